@@ -209,32 +209,25 @@ def explain_command(topic: tuple[str, ...]) -> None:
     """
     from nutdamp.views import explain, guide
 
-    requested = " ".join(topic).strip()
+    requested, shown = " ".join(topic).strip(), console()
     if not requested:
-        _read(explain.topics_screen())
+        screen: RenderableType = explain.topics_screen()
     elif requested.casefold() == guide.OVERVIEW:
-        _read(explain.equations_screen())
+        screen = explain.equations_screen()
     else:
-        _read(explain.topic_screen(explain.explained(requested)))
+        screen = explain.topic_screen(explain.explained(requested))
+    if shown.is_terminal and on_keyboard():
+        with shown.capture() as captured:
+            shown.print(screen)
+        if captured.get().count("\n") >= shown.height:
+            click.echo_via_pager(captured.get())
+            return
+    show(screen)
 
 
 def on_keyboard() -> bool:
     """True where someone can leave a pager."""
     return sys.stdin.isatty()
-
-
-def _read(screen: RenderableType) -> None:
-    """Show a screen; where it is longer than the terminal, in a pager."""
-    shown = console()
-    if not (shown.is_terminal and on_keyboard()):
-        show(screen)
-        return
-    with shown.capture() as captured:
-        shown.print(screen)
-    if captured.get().count("\n") < shown.height:
-        show(screen)
-    else:
-        click.echo_via_pager(captured.get())
 
 
 @click.command("export", cls=SessionCommand, context_settings={"allow_extra_args": True})
@@ -249,9 +242,7 @@ def _read(screen: RenderableType) -> None:
 @flown_options("Export")
 @goal_options
 @click.option(
-    "--until",
-    type=END,
-    help="Histories, spin-table: end; default last pulse + one inertial period, or last pulse.",
+    "--until", type=END, help="Histories, spin-table: end; default last pulse + one inertial period, or last pulse."
 )
 @click.option("-o", "--output", type=OUTPUT, default="-", help="Where to write it; default standard output.")
 @quiet_option

@@ -104,14 +104,8 @@ def _settings(ctx: click.Context, param: click.Parameter, texts: tuple[str, ...]
         raise click.BadParameter(str(wrong), ctx, param) from None
 
 
-set_option = click.option(
-    "--set",
-    "settings",
-    multiple=True,
-    metavar="KEY=VALUE",
-    callback=_settings,
-    help="Change a key, e.g. limits.gap=1s; repeatable.",
-)
+_CHANGE = "Change a key, e.g. limits.gap=1s; repeatable."
+set_option = click.option("--set", "settings", multiple=True, metavar="KEY=VALUE", callback=_settings, help=_CHANGE)
 
 
 def spacecraft_argument(command: Command) -> Command:
@@ -130,6 +124,11 @@ def placed(wrong: Unsuitable, given: FileInput) -> NutdampError:
     return FaultyFile([Fault(name, place.line, place.column, dotted(wrong.where), wrong.problem)])
 
 
+def defaulted(name: str, kind: click.ParamType[Any], default: object, text: str, **more: Any) -> Callable[..., Any]:
+    """An option whose default is on the help page, where ``text`` is its line."""
+    return click.option(name, type=kind, default=default, show_default=True, help=text, **more)
+
+
 def carry_options(when: str) -> Callable[[Command], Command]:
     """``-o FILE --at TIME``: the spacecraft file carried on, by default to ``when``."""
     which = click.option("--at", type=END, help=f"Its t = 0; default {when}.")
@@ -139,9 +138,7 @@ def carry_options(when: str) -> Callable[[Command], Command]:
 
 def plot_options(names: tuple[str, ...]) -> Callable[[Command], Command]:
     """``--plot FILE`` and the choice of the picture among ``names``, the default first."""
-    which = click.option(
-        "--figure", type=NameType(names), default=names[0], show_default=True, help="What --plot draws."
-    )
+    which = defaulted("--figure", NameType(names), names[0], "What --plot draws.")
     where = click.option("--plot", type=OutputName(), help="Draw it (.png, .svg, .pdf; needs extra plot).")
     return lambda command: where(which(command))
 
@@ -152,8 +149,7 @@ STANDARD = "-"  # file name that means standard input or standard output
 def expect_outputs(*read: str | None, **written: str | Sequence[str] | None) -> bool:
     """True where an output file is standard output, so that nothing else may go there.
 
-    A usage error where an output, given by its option, is one of the files ``read`` or another output, under whatever
-    name: relative, or through links.
+    A usage error where an output, by its option, is a file ``read`` or another output, under whatever name.
     """
     outputs = [
         (f"--{option}", path)
@@ -163,11 +159,8 @@ def expect_outputs(*read: str | None, **written: str | Sequence[str] | None) -> 
     standard = [option for option, path in outputs if path == STANDARD]
     if len(standard) > 1:
         raise click.UsageError(f"{' and '.join(standard)} cannot both go to standard output")
-    taken: dict[Hashable, str] = {}
-    if not standard:
-        taken[_identity(STANDARD, 1)] = "standard output goes to this file"
-    for path in filter(None, read):
-        taken[_identity(path, 0)] = "this command reads this file"
+    taken = {} if standard else {_identity(STANDARD, 1): "standard output goes to this file"}
+    taken |= {_identity(path, 0): "this command reads this file" for path in read if path}
     for option, path in outputs:
         identity = _identity(path, 1)
         if identity is not None and identity in taken:
@@ -177,10 +170,7 @@ def expect_outputs(*read: str | None, **written: str | Sequence[str] | None) -> 
 
 
 def _identity(path: str, standard: int) -> Hashable:
-    """Identity of a file among all others; None for a terminal, /dev/null and the like.
-
-    ``standard`` is the descriptor that ``-`` means.
-    """
+    """Identity of a file, None for a terminal, /dev/null and the like; ``standard``: the descriptor of ``-``."""
     try:
         status = os.fstat(standard) if path == STANDARD else Path(path).stat()
     except OSError:
@@ -202,9 +192,7 @@ KINDS = (("csv", "csv"), ("json", "data"), ("plot", "figure"))  # options of fil
 
 
 class FlownChoice(NamedTuple):
-    """Source of the pulses that a command flies: the plan of a ``scheme``, a ``schedule`` file, the command blocks of a
-    file, else the recommended plan.
-    """
+    """Source of the pulses that a command flies: a scheme, a schedule file, a file of blocks, else what is best."""
 
     scheme: str | None = None
     schedule: str | None = None
@@ -215,8 +203,7 @@ class FlownChoice(NamedTuple):
 class Job:
     """Request of a command line, and from `begin` on the ``spacecraft``, its ``source``, and ``silent``: no screens.
 
-    ``read``: files; ``written``: files by their options; ``figure``: the picture of ``plot``, None for the only one;
-    ``usual`` is its default.
+    ``read``, ``written``: files; ``figure``: the picture of ``plot``, None for the only one; ``usual``: its default.
     """
 
     given: FileInput
@@ -233,10 +220,9 @@ class Job:
     silent: bool = field(init=False)
 
     def begin(self, folder: Iterable[str] = ()) -> Spacecraft:
-        """Check the files of the command line and load its spacecraft, before any work.
+        """Check the files of the command line, those that go to a ``folder`` too, and load its spacecraft.
 
-        ``folder``: files that ``--schedules`` may write. Raises as `expect_outputs` and `Source.read` do, and where the
-        picture cannot be made.
+        Raises as `expect_outputs` and `Source.read` do, and where the picture cannot be made.
         """
         self.silent = expect_outputs(self.given.read, *self.read, **self.written, schedules=[*folder])
         if (plot := self.written.get("plot")) is not None:
@@ -285,10 +271,7 @@ class Job:
         return working(what, quiet=self.quiet)
 
     def carried(self, plan: Plan | None, at: float | None, usual: float | None = None) -> Files:
-        """The file of ``-o``: that of the spacecraft with the state of the flight of a ``plan`` ``at`` a time, s.
-
-        Default ``usual``, else that of the plan. Raises BadRequest where no file can hold the state.
-        """
+        """The file of ``-o``: the spacecraft ``at`` a time, s, of a plan (else ``usual``, else its own); BadRequest."""
         path = self.written["output"]
         if path is None:
             if at is not None:
@@ -315,8 +298,7 @@ class Job:
     ) -> None:
         """Write the files that are requested of a result, and show it, unless a file goes to standard output.
 
-        ``more``: content of files by their options, else the views of the result make it, as its screen where none is
-        given; ``shown`` are options of these views. ``files``: further ones. Raises as `deliver` does.
+        What ``more`` and ``screens`` lack the views of the result make, with the options ``shown``; see `deliver`.
         """
         from nutdamp.common import results
 
@@ -361,8 +343,7 @@ def deliver(
 ) -> None:
     """Write the files requested, and show results on standard output.
 
-    A file that cannot be saved keeps back neither the others nor the results: it is reported at the end, together
-    with those that are ``unsaved`` already. Raises CannotWrite.
+    A file that cannot be saved keeps nothing back: CannotWrite comes at the end, also for those ``unsaved`` already.
     """
     failures = list(unsaved)
     # All content is made before any file is written, so that a failure leaves no file behind.
@@ -399,10 +380,7 @@ def _file_of(content: Content, path: str) -> str | bytes | Callable[[IO[bytes]],
 
 
 class SessionCommand(click.Command):
-    """A command whose help page has headings, and whose errors say where the options of the schemes are.
-
-    The parameters that commands share are gathered into ``job``.
-    """
+    """A command whose help page has headings; the parameters that commands share are gathered into ``job``."""
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run the command; an unsuitable value of the spacecraft file is a fault with its place there."""

@@ -74,10 +74,7 @@ def run(group: click.Group) -> None:
 
 
 def leave(*, failed: bool = False, infeasible: bool = False, missed: bool = False) -> None:
-    """End with the exit status of the first that holds, if any.
-
-    ``failed``: something has a bug or disagrees; ``infeasible``: there is no result; ``missed``: the requirement is.
-    """
+    """End with the exit status of the first that holds: a bug or disagreement, no result, the requirement missed."""
     for holds, status in ((failed, INTERNAL), (infeasible, INFEASIBLE), (missed, REQUIREMENT_MISSED)):
         if holds:
             sys.exit(status)
@@ -95,10 +92,7 @@ class Interruption:
 
 @contextmanager
 def stoppable() -> Iterator[Interruption]:
-    """An `Interruption` set by Ctrl-C or SIGTERM, so that a run can end in order.
-
-    A second Ctrl-C interrupts at once. A KeyboardInterrupt after SIGTERM becomes `Terminated`.
-    """
+    """An `Interruption` set by Ctrl-C or SIGTERM, so that a run ends in order; a second Ctrl-C interrupts at once."""
     stop = Interruption()
 
     def ask(number: int, _: FrameType | None) -> None:
@@ -122,11 +116,7 @@ def _terminate(number: int, frame: FrameType | None) -> None:  # noqa: ARG001 - 
 
 
 def _open_streams() -> None:
-    """See that everything can be printed.
-
-    A process that was started without standard output or error (`>&-`) gets some that lead nowhere; where the screen's
-    encoding lacks a character, such as ω in Latin-1, it becomes a question mark.
-    """
+    """See that everything can be printed: to nowhere without streams (`>&-`), else ? for what an encoding lacks."""
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:
             setattr(sys, name, Path(os.devnull).open("w", encoding="utf-8"))  # noqa: SIM115 - until the end
@@ -148,20 +138,14 @@ def tell(wrong: Exception) -> None:
 
 def _explain(wrong: Exception) -> int:
     """Print an error that the user can cure, and return its exit status; a bug is raised again."""
-    from nutdamp import errors
+    from nutdamp.errors import BadRequest, FaultyFile, NutdampError
 
-    statuses: dict[type[errors.NutdampError], int] = {
-        errors.CannotRead: UNREADABLE,
-        errors.CannotWrite: UNREADABLE,
-        errors.MissingExtra: UNREADABLE,
-        errors.BadRequest: BAD_INPUT,
-        errors.FaultyFile: BAD_INPUT,
-        errors.Infeasible: INFEASIBLE,
-    }
-    if not isinstance(wrong, errors.NutdampError):
+    if not isinstance(wrong, NutdampError):
         raise wrong
     tell(wrong)
-    return next(status for kind, status in statuses.items() if isinstance(wrong, kind))
+    if isinstance(wrong, Infeasible):
+        return INFEASIBLE
+    return BAD_INPUT if isinstance(wrong, BadRequest | FaultyFile) else UNREADABLE
 
 
 COMMANDS = {  # the subcommands in the order of a first use, with their modules and their lines on the help page
@@ -184,15 +168,13 @@ COMMANDS = {  # the subcommands in the order of a first use, with their modules 
 }
 
 
-class CommandGroup(click.Group):
-    """Group whose subcommands are loaded from their modules when they are used."""
+class _CommandGroup(click.Group):
+    """Group whose subcommands are loaded from their modules when they are used, and listed in their order."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002 - signature of click
-        """Names in the order of a first use."""
         return list(COMMANDS)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
-        """The commands on the help page, without loading any of them."""
         with formatter.section("Commands"):
             formatter.write_dl([(name, line) for name, (_, line) in COMMANDS.items()])
 
@@ -217,7 +199,6 @@ class CommandGroup(click.Group):
             raise
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002
-        """The command of that name."""
         if cmd_name not in COMMANDS:
             return None
         module = import_module(f"nutdamp.cli.{COMMANDS[cmd_name][0]}")
@@ -226,7 +207,7 @@ class CommandGroup(click.Group):
 
 
 @click.command(
-    cls=CommandGroup,
+    cls=_CommandGroup,
     context_settings={"help_option_names": ["-h", "--help"]},
     epilog=(
         "Exit status: 0 done; 1 could not read or write; 2 bad command line or bad file; 3 none of the "

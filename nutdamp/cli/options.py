@@ -9,7 +9,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import click
@@ -81,12 +81,7 @@ class FileName(ParamType[str]):
     name = "file"
     completed_as = "file"
 
-    def shell_complete(
-        self,
-        ctx: click.Context,  # noqa: ARG002 - signature of click
-        param: click.Parameter,  # noqa: ARG002
-        incomplete: str,
-    ) -> list[CompletionItem]:
+    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:  # noqa: ARG002
         """Leave it to the shell to complete the name."""
         return [CompletionItem(incomplete, type=self.completed_as)]
 
@@ -98,13 +93,11 @@ class FolderName(FileName):
     completed_as = "dir"
 
 
-SAMPLES = 20_000  # default number of cases: as `nutdamp.montecarlo.study.SAMPLES`, without loading numpy
-
-
 class OutputName(FileName):
     """The name of a file to write."""
 
 
+SAMPLES = 20_000  # default number of cases: as `nutdamp.montecarlo.study.SAMPLES`, without loading numpy
 FILE = FileName()
 OUTPUT = OutputName()
 FOLDER = FolderName()
@@ -137,7 +130,7 @@ END = UnitType("time", units.end_of_flight, "expected a time after t = 0")
 
 
 def reading_of(value: float, kind: str, meant: str) -> str:
-    """The reading of a number without unit, and the text to write if another unit is ``meant``."""
+    """See `plausibility.reading`, of a number on the command line."""
     from nutdamp.files.plausibility import reading
 
     return reading(int(value) if value.is_integer() else float(value), kind, meant)
@@ -200,7 +193,6 @@ Command = TypeVar("Command", bound=Callable[..., Any])
 
 GOAL = "Goal and motion"  # heading of the options of the goal
 FASTEST = 100.0  # rad/s; no spacecraft spins faster: a larger number without unit is more likely one of rpm
-COUNT_FROM_ONE = click.IntRange(1)
 WIDEST = 26  # characters of an option that its help comes beside; below a longer one
 SHARED = names_of(SchemeOptions)  # options of every scheme
 NO_SUN = f"--sun is for {' and '.join(SUNLIT)}, which is not planned here"
@@ -215,10 +207,7 @@ class Grouped(click.Option):
 
 
 def goal_options(command: Command, *, several: bool = True) -> Command:
-    """The goal, and the options of every scheme; `Aim` and ``options`` of the job.
-
-    ``several``: the command plans any of the schemes, those that read the Sun too, and goes on where one has a bug.
-    """
+    """The goal, and the options of every scheme; ``several``: any may be planned, and one with a bug is passed over."""
     option = functools.partial(click.option, cls=Grouped, group=GOAL)
     angles = functools.partial(option, type=Direction(), metavar="ANGLE,ANGLE")
     command = debug_option(command) if several else command
@@ -234,13 +223,14 @@ def goal_options(command: Command, *, several: bool = True) -> Command:
 
 def scheme_options(command: Command) -> Command:
     """The options of all schemes."""
-    for name, field, schemes in reversed(list(_fields())):
+    for name, (field, schemes) in reversed(_fields().items()):
         kind: OptionKind = field.metadata["kind"]
-        settings: dict[str, Any] = {"is_flag": True} if kind.flag else {"type": _type(kind), "default": field.default}
-        if field.default is not None and not kind.flag:
-            settings["show_default"] = True
-        if settings.get("type") is COUNT_FROM_ONE:
-            settings["metavar"] = "N"
+        settings: dict[str, Any] = {"is_flag": True}
+        if not kind.flag:
+            settings = {"type": UnitType(kind.unit) if kind.unit else click.IntRange(1), "default": field.default}
+            settings["type"] = NameType(kind.names) if kind.names else settings["type"]
+            settings["show_default"] = field.default is not None
+            settings["metavar"] = None if kind.names or kind.unit else "N"
         group, text = f"Scheme {' and '.join(schemes)}", field.metadata["help"]
         option = click.option(f"--{name.replace('_', '-')}", cls=Grouped, group=group, help=text, **settings)
         command = option(command)
@@ -249,7 +239,7 @@ def scheme_options(command: Command) -> Command:
 
 def options_in(command: click.Command, parameters: dict[str, Any]) -> Options:
     """Options of the schemes among ``parameters``, from which they are taken; a usage error for a senseless one."""
-    known = {*SHARED, *(name for name, _, _ in _fields())}
+    known = {*SHARED, *_fields()}
     names = [each.name for each in command.params if isinstance(each, Grouped) and each.name in known]
     taken = {name: parameters.pop(name) for name in names if name is not None}
     try:
@@ -259,28 +249,20 @@ def options_in(command: click.Command, parameters: dict[str, Any]) -> Options:
         raise click.BadParameter(wrong.problem, click.get_current_context(), param_hint=hint) from None
 
 
-def _fields() -> Iterator[tuple[str, dataclasses.Field[Any], list[str]]]:
-    """Each option that not all schemes have: its name, its field, and the schemes that have it."""
+def _fields() -> dict[str, tuple[dataclasses.Field[Any], list[str]]]:
+    """Each option that not all schemes have, by its name: its field, and the schemes that have it."""
     varying: dict[str, tuple[dataclasses.Field[Any], list[str]]] = {}
     for scheme in SCHEMES.values():
         for field in dataclasses.fields(scheme.options):
             if field.name not in SHARED:
                 varying.setdefault(field.name, (field, []))[1].append(scheme.name)
-    for name, (field, schemes) in varying.items():
-        yield name, field, schemes
-
-
-def _type(kind: OptionKind) -> click.ParamType[Any]:
-    if kind.names:
-        return NameType(kind.names)
-    return COUNT_FROM_ONE if kind.unit is None else UnitType(kind.unit)
+    return varying
 
 
 class Aim(NamedTuple):
-    """A goal as the command line gives it, in place of the one in the file.
+    """A goal as the command line gives it, in place of the one in the file; ``spin``: rad/s, or ``keep``.
 
-    ``target`` and ``sun``: two angles in rad, right ascension and declination where the file has an attitude, else tilt
-    and azimuth in the frame N. ``spin``: rad/s, or ``keep``.
+    Angles are right ascension and declination where the file has an attitude, else tilt and azimuth in the frame N.
     """
 
     target: Angles | None = None
@@ -297,9 +279,8 @@ class Aim(NamedTuple):
         if self.spin is not None:
             spin = spacecraft.spin if isinstance(self.spin, str) else self.spin
             if spin * spacecraft.spin <= 0.0:
-                raise click.BadParameter(
-                    f"expected a rate with the sign of the spin ({spacecraft.spin:.4g} rad/s)", param_hint="--spin"
-                )
+                problem = f"expected a rate with the sign of the spin ({spacecraft.spin:.4g} rad/s)"
+                raise click.BadParameter(problem, param_hint="--spin")
             goal = dataclasses.replace(goal, spin=spin)
         if isinstance(self.spin, Bare) and (self.spin.is_integer() or abs(self.spin) > FASTEST):
             remark(f"--spin: warning: {reading_of(self.spin, 'rate', 'rpm')}")
@@ -313,14 +294,10 @@ def _direction(spacecraft: Spacecraft, angles: Angles, option: str) -> Vector:
     """The unit vector (3,) that two angles name, inertial; a usage error where they name none."""
     from nutdamp.physics.attitude import on_sphere
 
-    if spacecraft.attitude is not None:
-        problem = "expected a declination of -90 deg to 90 deg"
-        if abs(angles.second) <= 0.5 * math.pi:
-            return on_sphere(angles.first, angles.second)
-    else:
-        problem = "expected a tilt of at least 0 and below 180 deg"
-        if 0.0 <= angles.first < math.pi:
-            return spacecraft.direction_in_n(angles.first, angles.second)
+    in_sky = spacecraft.attitude is not None
+    if abs(angles.second) <= 0.5 * math.pi if in_sky else 0.0 <= angles.first < math.pi:
+        return on_sphere(*angles) if in_sky else spacecraft.direction_in_n(*angles)
+    problem = "expected a " + ("declination of -90 deg to 90 deg" if in_sky else "tilt of at least 0 and below 180 deg")
     raise click.BadParameter("; ".join((problem, *angles.readings)), param_hint=option)
 
 

@@ -14,6 +14,7 @@ from nutdamp.cli.job import (
     Job,
     SessionCommand,
     carry_options,
+    defaulted,
     deliver,
     plot_options,
     quiet_option,
@@ -41,11 +42,7 @@ JITTER_SEED = 1  # seed of the errors of the Sun pulses from which blocks are fi
 
 
 def flown_options(verb: str, scheme: str | None = None) -> Callable[[Command], Command]:
-    """``--scheme``, ``--schedule`` and ``--blocks``, the `FlownChoice` of the job for `plan_or_read`.
-
-    ``verb`` says how the command uses the pulses, ``scheme`` is the help of ``--scheme`` where that is longer.
-    A usage error for two of them.
-    """
+    """``--scheme`` (its help may be given), ``--schedule`` and ``--blocks``, one alone, of pulses to ``verb``."""
     default = f"{verb} this scheme with default options; without it the recommended one."
 
     def alone(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
@@ -95,8 +92,7 @@ def fronts_of(job: Job, points: int, shifts: Sequence[float], least: str) -> Tra
 def plan_or_read(job: Job, *, jitter: bool = False, judged: bool = False) -> Plan:
     """The pulses that a command flies, as a plan; raises Infeasible where there is none.
 
-    ``jitter``: the Sun pulses that fire the blocks of a file have errors, drawn with `JITTER_SEED`.
-    ``judged``: a verdict on the screen names the cones that are broken.
+    ``jitter``: that of the Sun pulses, with `JITTER_SEED`; ``judged``: a verdict names the cones that are broken.
     """
     from nutdamp import api
     from nutdamp.planning.decision import infeasibility
@@ -162,11 +158,7 @@ PRIMER = "primer"  # the picture of the certificate; the others are of one plan
 @click.command("plan", cls=SessionCommand)
 @spacecraft_argument
 @click.option(
-    "--scheme",
-    "names",
-    multiple=True,
-    type=SchemeName(PLANNED),
-    help=f"Repeatable: {listed(PLANNED, 'or')}.",
+    "--scheme", "names", multiple=True, type=SchemeName(PLANNED), help=f"Repeatable: {listed(PLANNED, 'or')}."
 )
 @scheme_options
 @goal_options
@@ -189,12 +181,12 @@ def plan_command(
     SPACECRAFT is a YAML file, or - for standard input; default spacecraft.yaml here, else the built-in example.
     A FILE of - is standard output.
     """
-    figure, plot = job.figure or FIGURES[0], job.written["plot"]
-    csv, blocks, certificate = (job.written[name] for name in ("csv", "blocks", "certificate"))
+    figure = job.figure or FIGURES[0]
+    csv, blocks, certificate, plot = (job.written[name] for name in ("csv", "blocks", "certificate", "plot"))
     for option, path in (("csv", csv), ("plot", plot if figure in FIGURES else None)):
         if path is not None and len(set(names)) > 1:
-            message = f"--{option} writes one schedule: name one --scheme, or none for the recommended one"
-            raise click.UsageError(message)
+            cure = "name one --scheme, or none for the recommended one"
+            raise click.UsageError(f"--{option} writes one schedule: {cure}")
     body = job.begin()
     if robust and nominal:
         raise click.UsageError("--robust goes by dispersed cases, which --nominal leaves out: name one of them")
@@ -232,10 +224,7 @@ def plan_command(
 
 
 def _blocks_file(job: Job, compared: Comparison, chosen: Plan | None) -> Files:
-    """The file of command blocks: of the plan to fly, or else of one that was compared; none without any plan.
-
-    Raises BadRequest where plans have pulses, but no blocks.
-    """
+    """The file of command blocks, of the plan to fly or another; raises BadRequest where plans have none."""
     plans: list[Plan] = [plan for plan in (chosen, *compared) if plan is not None and plan.feasible]
     source = next((plan for plan in plans if plan.pulses.blocks), None)
     if source is None:
@@ -250,10 +239,7 @@ def _blocks_file(job: Job, compared: Comparison, chosen: Plan | None) -> Files:
 
 
 def _expect_certified(names: Sequence[str], body: Spacecraft) -> None:
-    """Raise BadRequest, before any work, where the scheme that certificates belong to is not to be planned.
-
-    Also where it cannot plan, as without channels.
-    """
+    """Raise BadRequest where the scheme that certificates belong to is not to be planned, or cannot."""
     from nutdamp.planning.decision import usual
     from nutdamp.schemes.catalogue import OPTIMAL
 
@@ -306,10 +292,8 @@ def _screen(
 @click.option("-o", "--output", type=OUTPUT, required=True, help="The film: .gif, or .mp4 where ffmpeg is installed.")
 @click.option("--until", type=END, help="End of the motion; default soon after the last pulse.")
 @click.option("--seconds", type=click.FloatRange(0.2, 600.0), help="Length of the film; default 6 s to 30 s.")
-@click.option("--fps", type=click.IntRange(1, 50), default=20, show_default=True, help="Frames a second.")
-@click.option(
-    "--width", type=click.IntRange(320, 3840), default=800, show_default=True, help="Width in pixels; height 0.6 of it."
-)
+@defaulted("--fps", click.IntRange(1, 50), 20, "Frames a second.")
+@defaulted("--width", click.IntRange(320, 3840), 800, "Width in pixels; height 0.6 of it.")
 @quiet_option
 def animate_command(job: Job, until: float | None, seconds: float | None, fps: int, width: int) -> None:
     """Film the body cone rolling on the space cone through the pulses, flown with their real widths.
@@ -348,14 +332,8 @@ def animate_command(job: Job, until: float | None, seconds: float | None, fps: i
 )
 @goal_options
 @click.option("--flown", "real", is_flag=True, help="Propagate real pulse widths instead of the impulse sum (17).")
-@click.option(
-    "--until",
-    type=END,
-    help="End, of which the outcome is shown; default last pulse + one inertial period.",
-)
-@click.option(
-    "--samples", type=click.IntRange(2, 10_000_000), default=1000, show_default=True, help="Rows of the track."
-)
+@click.option("--until", type=END, help="End, of which the outcome is shown; default last pulse + one inertial period.")
+@defaulted("--samples", click.IntRange(2, 10_000_000), 1000, "Rows of the track.")
 @click.option("--csv", type=OUTPUT, help="Write the track.")
 @click.option("--json", type=OUTPUT, help="Write pulses, how both models end, and extremes.")
 @carry_options("the end")

@@ -53,19 +53,15 @@ def show(renderable: RenderableType) -> None:
 
 
 def console() -> Console:
-    """Standard output as rich sees it; NO_COLOR and COLUMNS count, names such as [red] or :rocket: stay as they are.
-
-    Fewer than `NARROWEST` characters, into which no number would fit, count as that many; COLUMNS = 0 as not set.
-    """
+    """Standard output as rich sees it, at least `NARROWEST` wide; names such as [red] or :rocket: stay as they are."""
     import os
     import shutil
 
     from rich.console import Console
 
-    requested = os.environ.get("COLUMNS", "")
-    width = shutil.get_terminal_size().columns if requested.isdigit() and int(requested) < NARROWEST else None
-    if width is not None:
-        width = max(width, NARROWEST)
+    requested, width = os.environ.get("COLUMNS", ""), None
+    if requested.isdigit() and int(requested) < NARROWEST:
+        width = max(shutil.get_terminal_size().columns, NARROWEST)
     return Console(highlight=False, markup=False, emoji=False, soft_wrap=False, width=width)
 
 
@@ -152,8 +148,7 @@ def working(what: str, *, quiet: bool = False) -> Iterator[None]:
 class _Progress:
     """Text of ``what`` has gone on since it ``began``, s: share of the steps done, time left, and the search that runs.
 
-    The share is shown where the steps are known, the time where `BELIEVED` of them are done. The time goes by the last
-    step, ``share`` at ``moment``, and counts down; none is shown where a step takes longer than all that was left.
+    The time left goes by the last step, ``share`` at ``moment``, from `BELIEVED` on; none where a step takes longer.
     """
 
     what: str
@@ -174,9 +169,5 @@ class _Progress:
         if not BELIEVED <= self.share < 1.0:
             return text
         left = (self.moment - self.began) / self.share - (now - self.began)
-        return f"{text}, about {_left(left)} left" if left > 0.0 else text
-
-
-def _left(seconds: float) -> str:
-    """A time left, s, in whole minutes where it is long."""
-    return f"{math.ceil(seconds)} s" if seconds < 120.0 else f"{math.ceil(seconds / 60.0)} min"
+        words = f"{math.ceil(left)} s" if left < 120.0 else f"{math.ceil(left / 60.0)} min"
+        return f"{text}, about {words} left" if left > 0.0 else text

@@ -16,6 +16,7 @@ from nutdamp.cli.job import (
     Output,
     SessionCommand,
     carry_options,
+    defaulted,
     plot_options,
     screen_options,
     spacecraft_argument,
@@ -60,13 +61,9 @@ if TYPE_CHECKING:
     metavar="ANGLE|any",
     help="How far from its target H may end; repeatable, a front for each. Default: 0 deg and any.",
 )
-@click.option("--points", type=click.IntRange(1, 1000), default=10, show_default=True, help="Horizons tried per front.")
-@click.option(
-    "--least",
-    type=NameType(LEAST[:2]),
-    default=LEAST[0],
-    show_default=True,
-    help="What is traded against time; impulse where propellant is unknown.",
+@defaulted("--points", click.IntRange(1, 1000), 10, "Horizons tried per front.")
+@defaulted(
+    "--least", NameType(LEAST[:2]), LEAST[0], "What is traded against time; impulse where propellant is unknown."
 )
 @partial(goal_options, several=False)
 @click.option("--csv", type=OUTPUT, help="Write the points.")
@@ -118,13 +115,9 @@ def _schedules(fronts: Sequence[Front], folder: str) -> tuple[list[Output], list
 @click.command("loop", cls=SessionCommand)
 @spacecraft_argument
 @click.option("--until", type=END, help="End; default: the horizon after the nutation is at start.")
-@click.option(
-    "--seed", type=click.IntRange(0, LARGEST_SEED), default=1, show_default=True, help="Of the noise of the sensor."
-)
+@defaulted("--seed", click.IntRange(0, LARGEST_SEED), 1, "Of the noise of the sensor.")
 @click.option("--case", type=Count(), help="Fly this dispersed case, as `disperse --loop` does with that seed.")
-@click.option(
-    "--samples", type=click.IntRange(2, 10_000_000), default=1000, show_default=True, help="Rows of the track."
-)
+@defaulted("--samples", click.IntRange(2, 10_000_000), 1000, "Rows of the track.")
 @click.option("--csv", type=OUTPUT, help="Write the pulses, as `plan --csv` does.")
 @click.option("--track", type=OUTPUT, help="Write the track, as `simulate --csv` does.")
 @click.option("--json", type=OUTPUT, help="Write firings, dead band, margins.")
@@ -173,7 +166,7 @@ def loop_command(
     type=UnitType("angle", tilt, "expected an angle between 0 and 90 deg"),
     help="By which damping must begin; default: requirement.nutation.",
 )
-@click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="Of the noise of the sensor.")
+@defaulted("--seed", click.IntRange(0), 1, "Of the noise of the sensor.")
 @click.option("--csv", type=OUTPUT, help="Write a row for each two thresholds.")
 @click.option("--json", type=OUTPUT, help="Write the same, and how the nutation grows.")
 @click.option("--plot", type=OUTPUT, help="Draw it (.png, .svg, .pdf; needs extra plot).")
@@ -254,16 +247,12 @@ FIGURES = ("overview", "cases", "momentum")  # figures that ``--plot`` draws
     show_default=f"{SAMPLES}; of --loop what shows the share required, 2000 or more",
     help="Dispersed cases to fly.",
 )
-@click.option(
-    "--seed", type=click.IntRange(0, LARGEST_SEED), default=1, show_default=True, help="Same seed, same draws, always."
-)
+@defaulted("--seed", click.IntRange(0, LARGEST_SEED), 1, "Same seed, same draws, always.")
 @click.option("--threads", type=click.IntRange(1, 1024), help="Default: the processors there are.")
 @click.option("--loop", "looped", is_flag=True, help="Disperse the closed loop of the file: body, valves and sensor.")
 @click.option("--until", type=END, help="End of --loop; default: the horizon after the nutation is at start.")
 @click.option("--case", type=Count(), help="Show this one case alone, with all its inputs.")
-@click.option(
-    "--worst", type=click.IntRange(0, 1000), default=5, show_default=True, metavar="N", help="Worst cases with -v."
-)
+@defaulted("--worst", click.IntRange(0, 1000), 5, "Worst cases with -v.", metavar="N")
 @click.option("--csv", type=OUTPUT, help="Write inputs and outcome of every case, with angles to cones.")
 @click.option("--json", type=OUTPUT, help="Write percentiles, requirement, tolerance budget, worst cases.")
 @plot_options(FIGURES)

@@ -26,13 +26,13 @@ from nutdamp.files.editing import (
     as_before,
     carry_text,
     epoch_after,
+    flow_list,
     motion_edits,
-    number,
     overlay,
 )
 from nutdamp.files.fields import KeyPath
 from nutdamp.files.reader import Source
-from nutdamp.files.yaml import Node, read_tree
+from nutdamp.files.yaml import Node, Place, read_tree
 from nutdamp.flight.propagation import Flight
 from nutdamp.physics.thruster import Trapezoid
 from nutdamp.planning.plan import Plan
@@ -42,35 +42,31 @@ from nutdamp.units import parse
 
 
 def later(flight: Flight, time: float) -> Later:
-    """The spacecraft of a ``flight`` at ``time`` s, which it must reach.
-
-    Raises BadRequest while a pulse is on, or where no propellant is left in the tank.
-    """
+    """The spacecraft of a ``flight`` at ``time`` s; BadRequest while a pulse is on, or where no propellant is left."""
     before = flight.spacecraft
     for count, (begins, ends) in enumerate(flight.spans, start=1):
         if begins + touching(time) < time < ends - touching(time):
             raise BadRequest(f"pulse {count} is on at {time:.6g} s: expected a time before {begins:.6g} s or after")
-    rates, quaternions = flight.motion(np.array([time]))
-    moments = np.broadcast_to(flight.moments_at(np.array([time])), (1, 3))[0]
+    moment = np.array([time])
+    rates, quaternions = flight.motion(moment)
+    moments = np.broadcast_to(flight.moments_at(moment), (1, 3))[0].tolist()
     first, second, third = rates[0].tolist()
     state, inertia = SpinState(complex(first, second), third, quaternions[0]), before.inertia
-    used = float(flight.schedule.used_by(np.array([time]))[0])
-    tank = before.tank
+    used, tank = float(flight.schedule.used_by(moment)[0]), before.tank
     if tank is not None:
         left = tank.propellant - tank.used - used
         if left <= 0.0:
             raise BadRequest(f"no propellant is left in the tank at {time:.6g} s: no file can hold that")
         tank = replace(tank, propellant=left, pressure=tank.pressure_after(tank.used + used), used=0.0)
-    changed = None
-    if before.attitude is not None:
-        epoch = before.attitude.epoch
-        changed = replace(before.attitude, epoch=None if epoch is None else epoch_after(epoch, time))
+    changed = before.attitude
+    if changed is not None and changed.epoch is not None:
+        changed = replace(changed, epoch=epoch_after(changed.epoch, time))
     center, per_kg = before.center_of_mass, before.center_of_mass_per_kg
     if per_kg is not None and used != 0.0:
         center = np.asarray((np.zeros(3) if center is None else center) + used * (inertia.axes @ per_kg))
     after = replace(
         before,
-        inertia=replace(inertia, moments=(float(moments[0]), float(moments[1]), float(moments[2]))),
+        inertia=replace(inertia, moments=tuple(moments)),
         omega0=rates[0],
         attitude=changed,
         center_of_mass=center,
@@ -121,9 +117,8 @@ def carried_notes(spacecraft: Spacecraft, time: float, source: Source) -> Iterat
 
 def _edits(tree: Node, moved_on: Later) -> Edits:
     before, after = moved_on.before, moved_on.after
-    moved = [*motion_edits(tree, moved_on)]
     same = after.inertia.moments == before.inertia.moments
-    yield from ((path, text) for path, text in moved if not (same and path[0] == "inertia"))
+    yield from (edit for edit in motion_edits(tree, moved_on) if not (same and edit[0][0] == "inertia"))
     if after.mass is not None and after.mass != before.mass:
         yield ("mass",), as_before(tree.get("mass"), after.mass, "mass", "kg")
     if after.center_of_mass is not None and before.center_of_mass is not None:
@@ -131,7 +126,7 @@ def _edits(tree: Node, moved_on: Later) -> Edits:
             value = float(after.center_of_mass[axis])
             yield ("center_of_mass", axis), as_before(tree.get("center_of_mass", axis), value, "length", "m")
     elif after.center_of_mass is not None:
-        yield ("center_of_mass",), "[" + ", ".join(number(part) for part in after.center_of_mass) + "]"
+        yield ("center_of_mass",), flow_list(after.center_of_mass)
     if after.tank is not None and before.tank is not None and after.tank.propellant != before.tank.propellant:
         for key, kind, unit in (("propellant", "mass", "kg"), ("pressure", "pressure", "Pa")):
             yield ("tank", key), as_before(tree.get("tank", key), float(getattr(after.tank, key)), kind, unit)
@@ -155,10 +150,7 @@ UNWRITTEN = {
 
 
 def fitted_text(text: str, name: str, settings: Sequence[Setting], fit: Fit, carried: Carried) -> str:
-    """The text of a spacecraft file, called ``name``, with the estimates; ``settings`` become part of it.
-
-    Raises BadRequest for values that an alias stands for.
-    """
+    """The text of a spacecraft file ``name`` with ``settings`` and the estimates; raises BadRequest for aliases."""
     return carry_text(text, name, settings, lambda tree: _fitted_edits(tree, fit, carried))
 
 
@@ -179,25 +171,25 @@ def notes(fit: Fit, carried: Carried) -> Iterator[str]:
     """Sentences on estimates that the file cannot hold, and on entries that still count from the old t = 0."""
     body = fit.model.spacecraft
     growth = fit.index("growth")
-    if growth is not None:
-        value, sigma = float(fit.values[growth]), float(fit.sigmas[growth])
-        if abs(value) > SEEN * sigma and not (carried.body.wheel or _grows_so(carried, value)):
-            way = "grows" if value > 0.0 else "decays"
-            yield f"the nutation {way} at {abs(value):.3g} 1/s, which dissipation within a rigid body would not let it"
-    fitted = list(zip((parameter.name for parameter in fit.model.parameters), fit.values, fit.sigmas, strict=True))
-    for name, value, sigma in fitted:
+    value = 0.0 if growth is None else float(fit.values[growth])
+    seen_to_grow = growth is not None and abs(value) > SEEN * fit.sigmas[growth]
+    if seen_to_grow and not (carried.body.wheel or _grows_so(carried, value)):
+        way = "grows" if value > 0.0 else "decays"
+        yield f"the nutation {way} at {abs(value):.3g} 1/s, which dissipation within a rigid body would not let it"
+    fitted = dict(zip((parameter.name for parameter in fit.model.parameters), fit.values, strict=True))
+    large = np.abs(fit.values) > SEEN * fit.sigmas
+    written, seen = dict(_delays(fit)), []
+    for name, value in (pair for pair, counts in zip(fitted.items(), large, strict=True) if counts):
         kind, _, channel = name.partition(" ")
-        if kind == "delay" and abs(value) > SEEN * sigma and channel not in dict(_delays(fit)):
+        if kind == "delay" and channel not in written:
             yield f"the delay of {channel}, {1e3 * value:.4g} ms, is not written: see the key valve"
-    seen = []
-    for name, value, sigma in fitted:
         kind, _, which = name.partition("_")
-        if kind in UNWRITTEN and which != ACCELERATION and abs(value) > SEEN * sigma:
+        if kind in UNWRITTEN and which != ACCELERATION:
             what, unit = UNWRITTEN[kind]
             seen.append(f"{what.format(which)} {math.degrees(value):.3g} {unit}")
     if seen:
         yield f"not written, as the file has no key for it: {', '.join(seen)}"
-    for name, factor, _ in fitted:
+    for name, factor in fitted.items():
         kind, _, channel = name.partition(" ")
         if kind == "thrust" and factor <= LEAST_THRUST:
             reversed_ = "it pushes the other way: another channel, or reversed?"
@@ -234,14 +226,12 @@ def _grows_so(carried: Carried, growth: float) -> bool:
 
 def _dissipation(tree: Node, fit: Fit, carried: Carried) -> Edits:
     index = fit.index("growth")
-    if index is None:
+    if index is None or abs(value := float(fit.values[index])) <= SEEN * fit.sigmas[index]:
         return
-    value, sigma = float(fit.values[index]), float(fit.sigmas[index])
     given = tree.get("dissipation", "time_constant")
-    if abs(value) > SEEN * sigma:
-        yield ("dissipation", "time_constant"), as_before(given, 1.0 / abs(value), "time", "s")
-        if tree.get("dissipation", "nutation") is not None or not _grows_so(carried, value):
-            yield ("dissipation", "nutation"), "grows" if value > 0.0 else "decays"
+    yield ("dissipation", "time_constant"), as_before(given, 1.0 / abs(value), "time", "s")
+    if tree.get("dissipation", "nutation") is not None or not _grows_so(carried, value):
+        yield ("dissipation", "nutation"), "grows" if value > 0.0 else "decays"
 
 
 def _thrusts(tree: Node, carried: Carried) -> Edits:
@@ -256,8 +246,8 @@ def _thrusts(tree: Node, carried: Carried) -> Edits:
 
 
 def _thrusters(tree: Node) -> dict[str, KeyPath]:
-    entries = tree.get("thrusters")
-    nodes = {} if entries is None else {index: entry.get("name") for index, entry in entries.children()}
+    entries = tree.get("thrusters") or Node(None, Place())
+    nodes = {index: entry.get("name") for index, entry in entries.children()}
     return {str(name.value): ("thrusters", index) for index, name in nodes.items() if name is not None}
 
 
@@ -302,10 +292,10 @@ def _valve(tree: Node, name: str, late: float) -> Edits:
     """The delays of the valve of a thruster, ``late`` s longer; one with the valve of the whole file gets its own."""
     path = (*_thrusters(tree)[name], "valve")
     own = tree.get(*path)
-    known = own or tree.get("valve")
-    values = {} if known is None else {str(key): str(node.value) for key, node in known.children()}
+    known = own or tree.get("valve") or Node(None, Place())
+    values = {str(key): str(node.value) for key, node in known.children()}
     for key in ("open_delay", "close_delay"):
-        before = None if known is None else known.get(key)
+        before = known.get(key)
         time = late if before is None else parse(before.value, "time") + late
         values[key] = as_before(before, time, "time", "s")
         if own is not None:

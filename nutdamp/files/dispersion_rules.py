@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import NamedTuple
 
 from nutdamp.errors import nearest
 from nutdamp.files.fields import RIGHT_ANGLE, KeyPath
@@ -32,23 +31,20 @@ def _correlations(facts: Facts) -> Iterator[Finding]:
     path = ("dispersions", "correlation")
     pairs: dict[frozenset[str], Pair] = {}
     drawn, sound = _drawn(facts), True
-    for index, node in facts.children(*path):
-        names = [facts.text(*path, index, place) for place in (0, 1)]
-        size = facts.number("ratio", *path, index, 2)
-        if len(node.value if isinstance(node.value, list) else ()) != 3 or None in names or size is None:
+    for row in facts.below(*path):
+        first, second, size = facts.text(*row, 0), facts.text(*row, 1), facts.number("ratio", *row, 2)
+        if len(facts.below(*row)) != 3 or first is None or second is None or size is None:
             sound = False
             continue  # reported already
-        first, second = (name or "" for name in names)
         for place, name in enumerate((first, second)):
-            problem = _unknown(name, drawn)
-            if problem:
-                yield Finding((*path, index, place), problem)
+            if problem := _unknown(name, drawn):
+                yield Finding((*row, place), problem)
         if first == second:
-            yield Finding((*path, index, 1), f"{shown(first)} again; expected two different inputs")
+            yield Finding((*row, 1), f"{shown(first)} again; expected two different inputs")
         elif frozenset((first, second)) in pairs:
-            yield Finding((*path, index), f"{first} and {second} are given before; keep one of the two")
+            yield Finding(row, f"{first} and {second} are given before; keep one of the two")
         elif abs(size) == 1.0:
-            yield Finding((*path, index, 2), f"{size:g}: one would follow from the other; expected less than 1 in size")
+            yield Finding((*row, 2), f"{size:g}: one would follow from the other; expected less than 1 in size")
         elif abs(size) < 1.0:
             pairs[frozenset((first, second))] = (first, second, size)
             continue
@@ -73,15 +69,15 @@ def _unknown(name: str, drawn: dict[str, bool]) -> str:
 def _drawn(facts: Facts) -> dict[str, bool]:
     """Names of all inputs that any schedule could draw once, as `montecarlo.inputs` has them, and whether they vary."""
     varying = {}
-    for entry in _entries(facts):
-        varies = facts.is_mapping(*entry.path) and not facts.has(*entry.path, "bias")
-        varying.update(dict.fromkeys(_names(facts, entry), varies))
+    for path in _entries(facts):
+        varies = facts.is_mapping(*path) and not facts.has(*path, "bias")
+        varying.update(dict.fromkeys(_names(facts, path), varies))
     return varying
 
 
-def _names(facts: Facts, entry: ToleranceEntry) -> list[str]:
+def _names(facts: Facts, path: KeyPath) -> list[str]:
     """Names of the inputs of a tolerance, which may be that of a thruster or an axis alone."""
-    key, chosen = str(entry.path[1]), entry.path[2:]
+    key, chosen = str(path[1]), path[2:]
     if key in EACH_PULSE:
         return []
     if key == "omega0":
@@ -108,15 +104,6 @@ draw in forty would turn its sign."""
 LARGEST_OFFSET = 1.0
 """Half widths and fixed offsets must stay below this, relative to the nominal value, which would otherwise turn its
 sign. Of an angle the nominal value is 90 deg."""
-
-
-class ToleranceEntry(NamedTuple):
-    """One tolerance: its path, its kind of quantity, the least nominal value and the name of that."""
-
-    path: KeyPath
-    kind: str
-    nominal: float | None = None
-    of: str = ""
 
 
 def dispersion_findings(root: Node) -> Iterator[Finding]:
@@ -160,15 +147,11 @@ def _each(facts: Facts, key: str) -> list[KeyPath]:
     path: KeyPath = ("dispersions", key)
     if not facts.is_mapping(*path):
         return []
-    named = dict(facts.children(*path))
-    return [(*path, name) for name in named] if by_name(named) else [path]
+    return facts.below(*path) if by_name(dict(facts.children(*path))) else [path]
 
 
 def _size_of(facts: Facts, path: KeyPath, kind: str, nominal: float | None = None) -> tuple[str, float] | None:
-    """The kind of a tolerance and the depth of draws below its nominal value, three sigma or all, in SI of ``kind``.
-
-    One in % is that of the ``nominal`` value, where that is known.
-    """
+    """Kind of a tolerance and depth of its draws, three sigma or all, in SI; of % by a ``nominal`` value."""
     for name in KINDS:
         size = facts.number(kind, *path, name)
         share = None if size is not None or nominal is None else facts.number("ratio", *path, name)
@@ -183,8 +166,7 @@ def _size_of(facts: Facts, path: KeyPath, kind: str, nominal: float | None = Non
 def _valve_times(facts: Facts, key: str, named: KeyPath) -> dict[str, float]:
     """The time of ``key`` of the valve of each thruster that a tolerance concerns, s."""
     times = {}
-    for index, _ in facts.children("thrusters"):
-        path: KeyPath = ("thrusters", index)
+    for path in facts.below("thrusters"):
         name = facts.text(*path, "name")
         valve: KeyPath = (*path, "valve") if facts.has(*path, "valve") else ("valve",)
         time = facts.number("time", *valve, key) if facts.has(*valve, key) else 0.0
@@ -194,21 +176,20 @@ def _valve_times(facts: Facts, key: str, named: KeyPath) -> dict[str, float]:
     return times
 
 
-def _entries(facts: Facts) -> Iterator[ToleranceEntry]:
-    for key, kind in QUANTITIES.items():
+def _entries(facts: Facts) -> Iterator[KeyPath]:
+    """Paths to all tolerances."""
+    for key in QUANTITIES:
         path: KeyPath = ("dispersions", key)
-        node = facts.root.get(*path)
-        paths = [] if node is None else [path]
         if key in BY_THRUSTER and facts.is_mapping(*path):
-            paths = _each(facts, key)
-        elif key == "omega0" and node is not None and isinstance(node.value, list):
-            paths = [(*path, index) for index, _ in node.children()]
-        for each in paths:
-            yield ToleranceEntry(each, kind, *_nominal(facts, each))
+            yield from _each(facts, key)
+        elif key == "omega0" and isinstance(facts.value(*path), list):
+            yield from facts.below(*path)
+        elif facts.has(*path):
+            yield path
 
 
 def _nominal(facts: Facts, path: KeyPath) -> tuple[float | None, str]:
-    """The value that a tolerance is compared with, and its name; None where it cannot be read, or nothing bounds it."""
+    """The least value that a tolerance is of, and its name; None where it cannot be read, or nothing bounds it."""
     key, named = str(path[1]), path[2:]
     if key == "thrust":
         forces = thrusts(facts).items()
@@ -250,20 +231,18 @@ def _thruster_names(facts: Facts) -> Iterator[Finding]:
 
 
 def _kinds(facts: Facts) -> Iterator[Finding]:
-    for entry in _entries(facts):
-        if not facts.is_mapping(*entry.path):
-            continue
-        nodes = dict(facts.children(*entry.path))
+    for path in filter(lambda path: facts.is_mapping(*path), _entries(facts)):
+        nodes = dict(facts.children(*path))
         given = [str(key) for key in nodes if key in KINDS]
-        reported = not nodes and entry.path[1:] in [(key,) for key in BY_THRUSTER]  # by `_thruster_names`
+        reported = not nodes and path[1:] in [(key,) for key in BY_THRUSTER]  # by `_thruster_names`
         if not given and not reported:
-            yield Finding(entry.path, f"names no distribution; give {_example(entry.kind)}")
+            yield Finding(path, f"names no distribution; give {_example(QUANTITIES[str(path[1])])}")
         for key in given[1:]:
-            yield Finding((*entry.path, key), f"given together with {given[0]}; keep one of the two", True)
+            yield Finding((*path, key), f"given together with {given[0]}; keep one of the two", True)
         for key in given:
-            problem = _size_fault(facts, entry, key, nodes[key].plain())
+            problem = _size_fault(facts, path, key, nodes[key].plain())
             if problem is not None:
-                yield Finding((*entry.path, key), problem)
+                yield Finding((*path, key), problem)
 
 
 def _example(kind: str) -> str:
@@ -272,28 +251,29 @@ def _example(kind: str) -> str:
     return f"{{normal: {sizes.get(kind, '5 ms')}}}, or uniform, triangular, bias"
 
 
-def _size_fault(facts: Facts, entry: ToleranceEntry, key: str, value: object) -> str | None:
+def _size_fault(facts: Facts, path: KeyPath, key: str, value: object) -> str | None:
     if value is None:
         return None  # reported already
+    kind = QUANTITIES[str(path[1])]
     try:
-        size, relative = size_of(value, entry.kind)
+        size, relative = size_of(value, kind)
     except ValueError as wrong:
         return str(wrong)
     if key != "bias" and size < 0.0:
         what = "one sigma" if key == "normal" else "half a width"
         return f"{shown(value)} is negative; expected {what} of at least 0, or bias for a fixed offset"
-    for name, thrust in thrusts(facts).items() if entry.kind == "force" and not relative else ():
-        if thrust is None and entry.path[2:] in ((), (name,)):
+    for name, thrust in thrusts(facts).items() if kind == "force" and not relative else ():
+        if thrust is None and path[2:] in ((), (name,)):
             unknown = f"the {STEERABLE} torquer" if name == STEERABLE else shown(name)
             return f"{shown(value)} needs the thrust of {unknown}, which is not known; give its lever_arm, or a %"
-    nominal = 1.0 if relative else entry.nominal
+    nominal, of = (1.0, "") if relative else _nominal(facts, path)
     if nominal is None:
         return None
     fraction, limit = abs(size) / nominal, LARGEST_SIGMA if key == "normal" else LARGEST_OFFSET
     if fraction < limit or (key == "normal" and fraction == limit):
         return None
     most = f"{'of at most' if key == 'normal' else 'below'} {100 * limit:g} %"
-    amounts = f"is {100 * fraction:.3g} % of {entry.of}" if entry.of and not relative else "is out of range"
+    amounts = f"is {100 * fraction:.3g} % of {of}" if of else "is out of range"
     what = {"normal": "one sigma", "bias": "an offset"}.get(key, "half a width")
     return f"{shown(value)} {amounts}; expected {what} {most}"
 
@@ -329,8 +309,7 @@ def _of_sensor(facts: Facts) -> Iterator[Finding]:
     path = ("dispersions", "sensor_delay", "bias")
     offset, delay = facts.number("time", *path), facts.number("time", "loop", "sensor", "delay") or 0.0
     if offset is not None and delay + offset < 0.0 and facts.has("loop"):
-        problem = f"with this offset the delay is {delay + offset:g} s; expected a delay of at least 0"
-        yield Finding(path, problem)
+        yield Finding(path, f"with this offset the delay is {delay + offset:g} s; expected a delay of at least 0")
 
 
 def _offset(facts: Facts, key: str, nominal: float) -> float | None:

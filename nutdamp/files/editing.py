@@ -34,10 +34,7 @@ _STEP = re.compile(rf"\.?(?P<word>[^.\[\]='\"]+|{_QUOTED})|\[(?P<entry>[0-9]{{1,
 
 
 class Setting(NamedTuple):
-    """A key and its new value; ``label`` is its name in messages.
-
-    Entries of a list are named by position or, where they have one, by ``name``. A text as ``value`` is YAML.
-    """
+    """A key, its new value (a text is YAML) and its name in messages; entries of lists go by position or ``name``."""
 
     path: KeyPath
     value: object
@@ -59,8 +56,7 @@ def parse_setting(text: str) -> Setting:
     path, end = _parse_path(text)
     if not path or text[end : end + 1] != "=":
         raise ValueError(f"{shown(text)} is not KEY=VALUE, such as limits.horizon=300s or thrusters.T1.force=12N")
-    value = text[end + 1 :]
-    return Setting(path, value, f"--set {dotted(path)}={_brief(value)}")
+    return _labelled("--set", path, text[end + 1 :])
 
 
 def settings_of(values: Mapping[str, object]) -> tuple[Setting, ...]:
@@ -75,10 +71,7 @@ def settings_of(values: Mapping[str, object]) -> tuple[Setting, ...]:
 
 
 def settings_within(values: Mapping[str, object], behind: KeyPath = ()) -> Iterator[Setting]:
-    """The settings in nested mappings, such as ``{"limits": {"horizon": "300 s"}}``, which are at ``behind``.
-
-    A mapping is replaced key by key, so that those beside them in the file keep their values. Raises BadRequest.
-    """
+    """The settings in nested mappings at ``behind``, key by key, so that others stay; raises BadRequest."""
     if len(behind) >= MAX_DEPTH:
         raise BadRequest(f"with_: nested more than {MAX_DEPTH} levels deep")
     for key, value in values.items():
@@ -92,17 +85,15 @@ def settings_within(values: Mapping[str, object], behind: KeyPath = ()) -> Itera
 
 
 def text_of(values: Mapping[str, object], name: str) -> str:
-    """The text of a spacecraft file with these keys and values, one a line; raises BadRequest.
-
-    It is JSON, which unlike other YAML needs no rule for texts that look like numbers.
-    """
+    """The text of a spacecraft file with these keys and values, as JSON; raises BadRequest."""
     plain = _of_python(values, Place(setting=name)).plain()
     return json.dumps(plain, indent=2, ensure_ascii=False) + "\n"
 
 
 def _labelled(call: str, path: KeyPath, value: object) -> Setting:
     text = value if isinstance(value, str) else shown(value)
-    return Setting(path, value, f"{call} {dotted(path)}={_brief(text)}")
+    brief = text if len(text) <= 40 and text.isprintable() else shown(text)
+    return Setting(path, value, f"{call} {dotted(path)}={brief}")
 
 
 def overlay(root: Node, settings: Iterable[Setting]) -> tuple[Node, list[Fault]]:
@@ -147,15 +138,8 @@ def _parse_path(text: str) -> tuple[KeyPath, int]:
     return tuple(path), end
 
 
-def _brief(text: str) -> str:
-    return text if len(text) <= 40 and text.isprintable() else shown(text)
-
-
 def _put(node: Node, path: KeyPath, behind: KeyPath, value: Node, place: Place) -> Node:
-    """``node``, which is at ``behind``, with ``value`` at ``path`` below it.
-
-    What changes is copied: through aliases a node may be in several places of the tree.
-    """
+    """``node``, at ``behind``, with ``value`` at ``path`` below it; copied, since aliases may share it."""
     if not path:
         return value
     step, rest = path[0], path[1:]
@@ -226,22 +210,19 @@ def edited(text: str, values: Mapping[KeyPath, str], renamed: Mapping[str, str] 
 
 
 def _with(text: str, path: KeyPath, value: str) -> str:
-    root = _root(text)
+    nodes: list[yaml.Node] = [_root(text)]  # as far as they are there
     for length in range(1, len(path) + 1):
-        key, node = _find(root, path[:length])
-        if key is not None and node is not None and node.start_mark.index < key.end_mark.index:
-            raise BadRequest(f"{dotted(path[:length])} is an alias: write its value out, for it to be changed")
-        anchor = None if node is None or not length else re.match(r"&(\S+)", text[node.start_mark.index :])
+        key, node = _find(nodes[0], path[:length])
+        if node is None:
+            return _added(text, nodes[-1], path[length - 1 :], value)
+        nodes.append(node)
+        where, begins = dotted(path[:length]), node.start_mark.index
+        if key is not None and begins < key.end_mark.index:
+            raise BadRequest(f"{where} is an alias: write its value out, for it to be changed")
+        anchor = re.match(r"&(\S+)", text[begins:])
         if anchor and f"*{anchor[1]}" in text:
-            problem = f"has the alias *{anchor[1]}: write that out, for it to be changed"
-            raise BadRequest(f"{dotted(path[:length])} {problem}")
-    for length in range(len(path), 0, -1):
-        _, node = _find(root, path[:length])
-        if node is not None and length == len(path):
-            return text[: node.start_mark.index] + value + text[_end(node) :]
-        if node is not None:
-            return _added(text, node, path[length:], value)
-    return _added(text, root, path, value)
+            raise BadRequest(f"{where} has the alias *{anchor[1]}: write that out, for it to be changed")
+    return text[: nodes[-1].start_mark.index] + value + text[_end(nodes[-1]) :]
 
 
 def _added(text: str, parent: yaml.Node, path: KeyPath, value: str) -> str:
@@ -338,7 +319,7 @@ def inertia_edits(tree: Node, later: Later) -> Edits:
             yield ("inertia", key), as_before(tree.get("inertia", key), value, "inertia", "kg m^2")
         return
     tensor = inertia.axes @ np.diag(inertia.moments) @ inertia.axes.T
-    rows = ", ".join("[" + ", ".join(number(part) for part in row) + "]" for row in 0.5 * (tensor + tensor.T))
+    rows = ", ".join(map(flow_list, 0.5 * (tensor + tensor.T)))
     if tree.get("inertia", "tensor") is None:
         yield ("inertia",), f"{{tensor: [{rows}]}}"
     else:
@@ -348,23 +329,19 @@ def inertia_edits(tree: Node, later: Later) -> Edits:
 def rate_edits(tree: Node, later: Later) -> Edits:
     """Rates at t = 0, as the file gives them."""
     inertia, state, rates = later.after.inertia, later.state, later.after.rates
-    if tree.get("state") is not None and inertia.symmetric and inertia.aligned:
+    if tree.get("state") is None:
+        for index, rate in enumerate(rates):
+            yield ("omega0", index), as_before(tree.get("omega0", index), float(rate), "rate", "rad/s")
+    elif inertia.symmetric and inertia.aligned:
         angle = rigid_body.nutation_angle(inertia.A, inertia.C, abs(state.omega), inertia.equivalent(state.spin))
         phase = math.atan2(state.omega.imag, state.omega.real)
         if angle < NOISE:
             angle = phase = 0.0
-        for key, value, kind, unit in (
-            ("spin", state.spin, "rate", "rad/s"),
-            ("nutation", angle, "angle", "deg"),
-            ("phase", phase, "angle", "deg"),
-        ):
-            yield ("state", key), as_before(tree.get("state", key), value, kind, unit)
-        return
-    if tree.get("state") is not None:
-        yield ("state",), "[" + ", ".join(number(rate) for rate in rates) + "]"
-        return
-    for index, rate in enumerate(rates):
-        yield ("omega0", index), as_before(tree.get("omega0", index), float(rate), "rate", "rad/s")
+        yield ("state", "spin"), as_before(tree.get("state", "spin"), state.spin, "rate", "rad/s")
+        for key, value in (("nutation", angle), ("phase", phase)):
+            yield ("state", key), as_before(tree.get("state", key), value, "angle", "deg")
+    else:
+        yield ("state",), flow_list(rates)
 
 
 def epoch_after(epoch: str, time: float) -> str:
@@ -378,15 +355,14 @@ def attitude_edits(tree: Node, later: Later) -> Edits:
     given, old = later.after.attitude, later.before.attitude
     if given is None:
         return
-    parts = "[" + ", ".join(number(part) for part in later.quaternion) + "]"
+    parts = flow_list(later.quaternion)
     keys = {"quaternion": parts, "epoch": given.epoch, "frame": given.frame}
     if tree.get("attitude", "quaternion") is None:  # none, or another form, which holds a direction alone
         yield ("attitude",), "{" + ", ".join(f"{key}: {value}" for key, value in keys.items() if value) + "}"
         return
     yield ("attitude", "quaternion"), parts
     for key in ("epoch", "frame"):
-        value = keys[key]
-        if value is not None and (old is None or value != getattr(old, key)):
+        if (value := keys[key]) is not None and (old is None or value != getattr(old, key)):
             yield ("attitude", key), value
 
 
@@ -404,14 +380,10 @@ def _goal(tree: Node, later: Later) -> Edits:
 
 
 def carry_text(text: str, name: str, settings: Sequence[Setting], edits: Callable[[Node], Edits]) -> str:
-    """The text of a file called ``name`` with the values of ``edits`` of its tree; ``settings`` become part of it.
-
-    Raises BadRequest for values that an alias stands for.
-    """
+    """The text of a file ``name`` with ``settings`` and the ``edits`` of its tree; raises BadRequest for aliases."""
     text = text.removeprefix("\ufeff")
     for setting in settings:
-        tree = read_tree(text, name)[0]
-        value = setting.value
+        tree, value = read_tree(text, name)[0], setting.value
         if not isinstance(value, str):
             value = json.dumps(setting.node()[0].plain(), ensure_ascii=False)
         positions: KeyPath = ()  # of entries of lists, which may be named instead
@@ -430,9 +402,8 @@ def as_before(node: Node | None, value: float, kind: str, unit: str) -> str:
     before = None if node is None else node.value
     if before is not None and not isinstance(before, str):
         return number(value)
-    if isinstance(before, str):
-        suffix = re.search(r"[^\d.eE+\s-].*$", before.strip())
-        unit = suffix.group() if suffix else unit
+    suffix = re.search(r"[^\d.eE+\s-].*$", (before or "").strip())
+    unit = suffix.group() if suffix else unit
     return f"{number(value / parse(f'1 {unit}', kind))} {unit}"
 
 
@@ -441,3 +412,8 @@ def number(value: float) -> str:
     text = f"{value + 0.0:.12g}"
     # Without a point YAML 1.1 readers take 1e-05 for a text.
     return text if "e" not in text or "." in text else text.replace("e", ".0e")
+
+
+def flow_list(values: Iterable[float]) -> str:
+    """Numbers as a list in one line."""
+    return f"[{', '.join(map(number, values))}]"

@@ -33,10 +33,7 @@ LONGEST_STEP = 0.1  # rad; the body turns by no more in one step of the script
 
 
 def basilisk_script(plan: Plan) -> str:
-    """The text of the script: data of the body and of each stretch of constant torque, and the code that flies them.
-
-    Raises BadRequest for a body with energy dissipation, a wheel, or moments that fall, which a rigid hub has not.
-    """
+    """The text of the script; raises BadRequest for dissipation, a wheel, or moments that fall."""
     body = plan.spacecraft
     if body.dissipation is not None:
         raise BadRequest("a Basilisk script flies a rigid body: leave dissipation out of the spacecraft file")
@@ -227,10 +224,9 @@ class Reference(NamedTuple):
 
 
 class AttitudeSegment(NamedTuple):
-    """Motion without jumps, in the axes of the file.
+    """Motion without jumps, in the axes of the file, ``completed`` pulses of which are over when it begins.
 
-    ``t`` (n,) s, whole nanoseconds; ``rates`` (n, 3) rad/s; ``quaternion`` (n, 4) body -> frame, scalar first, without
-    jumps of sign; ``completed`` pulses are over when it begins.
+    ``t`` (n,) s, whole nanoseconds; ``rates`` (n, 3) rad/s; ``quaternion`` (n, 4) body -> frame, scalar first.
     """
 
     t: Vector
@@ -246,10 +242,8 @@ def reference(spacecraft: Spacecraft) -> Reference:
         missing = [key for key in EXAMPLE if given is None or getattr(given, key) is None]
         names = " and ".join(f"attitude.{key}" for key in missing if key != "quaternion")
         lines = "\n".join(f"  {key}: {EXAMPLE[key]}" for key in missing)
-        verb = "add" if given is None else "add there"
-        raise BadRequest(
-            f"this format needs {names}, which the spacecraft file does not give; {verb}\nattitude:\n{lines}"
-        )
+        cure = f"add{'' if given is None else ' there'}\nattitude:\n{lines}"
+        raise BadRequest(f"this format needs {names}, which the spacecraft file does not give; {cure}")
     if given.frame not in FRAMES:
         problem = f"{given.frame!r} is no frame that the format knows; expected one of {', '.join(FRAMES)}"
         raise Unsuitable(("attitude", "frame"), problem)
@@ -262,8 +256,7 @@ def reference(spacecraft: Spacecraft) -> Reference:
 def interpolated(flown: Flight, until: float) -> Iterator[AttitudeSegment]:
     """The motion from 0 to ``until`` s between the edges of pulses, close enough to be interpolated.
 
-    Stretches too short to be distinguished in nanoseconds are left out. Raises BadRequest for a motion that would take
-    more than `MOST_RECORDS`.
+    Stretches too short for nanoseconds are left out. Raises BadRequest for more records than `MOST_RECORDS`.
     """
     legs = [leg for leg in flown.legs if leg.start < until]
     counts = []
@@ -272,11 +265,10 @@ def interpolated(flown: Flight, until: float) -> Iterator[AttitudeSegment]:
         rates, _ = leg.path.motion(np.linspace(leg.start, end, 9))
         turn = float(np.linalg.norm(rates, axis=1).max()) * (end - leg.start)
         counts.append(max(math.ceil(turn / TURN) + 1, LEAST_RECORDS))
-    if sum(counts) > MOST_RECORDS:
-        raise BadRequest(
-            f"the track would have {sum(counts)} records, more than {MOST_RECORDS}; choose an earlier end (until)"
-        )
-    previous: Vector | None = None
+    if (total := sum(counts)) > MOST_RECORDS:
+        cure = "choose an earlier end (until)"
+        raise BadRequest(f"the track would have {total} records, more than {MOST_RECORDS}; {cure}")
+    previous: Vector | None = None  # the quaternion of the record before
     for leg, count in zip(legs, counts, strict=True):
         begin, end = (round(time * NANOSECONDS) for time in (leg.start, min(leg.end, until)))
         t = np.unique(np.rint(np.linspace(begin, end, count))) / NANOSECONDS
@@ -292,10 +284,7 @@ def interpolated(flown: Flight, until: float) -> Iterator[AttitudeSegment]:
 
 
 def stk_attitude(flown: Flight, until: float, reference: Reference) -> str:
-    """The text of the file for a flight from 0 to ``until`` s.
-
-    Times are never repeated: where an ideal impulse makes the rates jump, the row after it comes a nanosecond later.
-    """
+    """The text of the file from 0 to ``until`` s; where rates jump, the second row comes a nanosecond later."""
     rows: list[str] = []
     last: tuple[float, list[float]] | None = None
     for stretch in interpolated(flown, until):
@@ -346,10 +335,7 @@ def column(entry: DispersedInput) -> str:
 
 
 class SamplesWriter:
-    """Writer of one row a case: its number (from 1), the true value of each input, the outputs; angles in degrees.
-
-    With cones the least and the largest angle from the spin axis to the direction of each cone follow.
-    """
+    """Writer of one row a case: number from 1, true inputs, outputs, then angles to cones; angles in degrees."""
 
     def __init__(self, stream: IO[bytes], study: Study) -> None:
         self._stream, self._source = stream, study.source()
@@ -383,7 +369,7 @@ def _texts(values: Array) -> list[str]:
 
 
 def check_room(path: str, study: Study, samples: int) -> None:
-    """Raise CannotWrite at once where a disk cannot hold so many rows, rather than when it is full."""
+    """Raise CannotWrite where a disk cannot hold so many rows."""
     if path == STDOUT or (Path(path).exists() and not Path(path).is_file()):
         return
     needed = samples * SHORTEST * (len(study.model.inputs.drawn) + len(OUTPUTS) + 2 * len(study.model.spacecraft.keep))
@@ -392,9 +378,8 @@ def check_room(path: str, study: Study, samples: int) -> None:
     except OSError:
         return  # the folder cannot be looked at: writing will say why
     if needed > free:
-        raise CannotWrite(
-            path, f"{samples} rows take more than {needed / 1e9:.3g} GB, and {free / 1e9:.3g} GB are free there"
-        )
+        room = f"{needed / 1e9:.3g} GB, and {free / 1e9:.3g} GB are free there"
+        raise CannotWrite(path, f"{samples} rows take more than {room}")
 
 
 def streamed(
@@ -425,9 +410,9 @@ def streamed(
                 try:
                     if not full:
                         rows.write(*part)
-                except BrokenPipeError:
-                    raise
                 except OSError as reason:
+                    if isinstance(reason, BrokenPipeError):
+                        raise
                     full.append(reason)
 
             fly_some(collect)

@@ -7,10 +7,8 @@ in a spacecraft file follow: quantities with units and bounds, directions, lists
 
 from __future__ import annotations
 
-import datetime
 import math
 import operator
-import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
@@ -129,10 +127,7 @@ class Section:
 
     @classmethod
     def read(cls, value: Any, problems: Problems, path: KeyPath = ()) -> Self | None:
-        """The section in ``value``, as YAML gives it; problems are added to ``problems``.
-
-        Unknown keys and empty values are not looked for here.
-        """
+        """The section in ``value``; ``problems`` get its own, but for unknown keys and empty values."""
         if not isinstance(value, dict):
             problems.append((path, _mismatch(value, cls.written)))
             return None
@@ -171,12 +166,20 @@ def _read(annotation: Any, value: Any, problems: Problems, path: KeyPath) -> Any
     if origin is Annotated:
         return _ruled(parts[0], parts[1:], value, problems, path)
     if origin in (Union, UnionType):
-        if (expected := _either(parts)) and not isinstance(value, list | dict):
+        kinds = [part for part in parts if part is not NoneType]
+        if (expected := _either(kinds)) and not isinstance(value, list | dict):
             problems.append((path, _mismatch(value, expected)))
             return None
-        return _read(_meant(parts, value), value, problems, path)
+        # A section is meant by a mapping, the other type by all else.
+        meant = next((kind for kind in kinds if isinstance(value, dict) == (section_of(kind) is kind)), kinds[0])
+        return _read(meant, value, problems, path)
     if origin is Literal:
-        return _chosen(parts, value, problems, path)
+        if value in parts:
+            return value
+        close = nearest(value, parts) if isinstance(value, str) else None
+        expected = _mismatch(value, listed([f"'{choice}'" for choice in parts], "or"))
+        problems.append((path, expected + (f"; did you mean {shown(close)}?" if close else "")))
+        return None
     section = section_of(annotation)
     if section is annotation:
         return section.read(value, problems, path)
@@ -208,27 +211,12 @@ def _ruled(annotation: Any, rules: tuple[Rule, ...], value: Any, problems: Probl
         return None
 
 
-def _meant(parts: tuple[Any, ...], value: Any) -> Any:
-    """The type of a union that a value is of: a section for a mapping, else the other; None is for a key left out."""
-    types = [part for part in parts if part is not NoneType]
-    return next((kind for kind in types if isinstance(value, dict) == (section_of(kind) is kind)), types[0])
-
-
-def _either(parts: tuple[Any, ...]) -> str:
+def _either(parts: list[Any]) -> str:
     """Words for what a union of a list and a mapping expects; empty for another union."""
-    kinds = [get_args(part)[0] if get_origin(part) is Annotated else part for part in parts if part is not NoneType]
+    kinds = [get_args(part)[0] if get_origin(part) is Annotated else part for part in parts]
     if {"dict" if section_of(kind) is kind else get_origin(kind) for kind in kinds} == {"dict", list}:
         return f"{_WORDS[list]} or {_WORDS[dict]}"
     return ""
-
-
-def _chosen(choices: tuple[str, ...], value: Any, problems: Problems, path: KeyPath) -> Any:
-    if value in choices:
-        return value
-    meant = nearest(value, choices) if isinstance(value, str) else None
-    expected = _mismatch(value, listed([f"'{choice}'" for choice in choices], "or"))
-    problems.append((path, expected + (f"; did you mean {shown(meant)}?" if meant else "")))
-    return None
 
 
 SMALLEST = 1e-15  # smaller values that must be above zero count as zero, in SI: a division by them could overflow
@@ -253,10 +241,10 @@ class Quantity(Rule):
         result = parse(value, self.kind)
         if not self._allows(result):
             # An angle without unit that would be in range in degrees, or a share that would be in %.
-            meant, hint = {"angle": "deg", "ratio": "%"}.get(self.kind), ""
-            if meant and not isinstance(value, str) and self._allows(parse(f"{value} {meant}", self.kind)):
-                radians, percent = f" (read as radians; write {value} deg)", f"; write {value} % if that is meant"
-                hint = radians if meant == "deg" else percent
+            hints = {"angle": f" (read as radians; write {value} deg)", "ratio": f"; write {value} % if that is meant"}
+            unit, hint = "deg" if self.kind == "angle" else "%", hints.get(self.kind, "")
+            if hint and (isinstance(value, str) or not self._allows(parse(f"{value} {unit}", self.kind))):
+                hint = ""
             raise ValueError(f"{shown(value)} is out of range; expected {self.range}{hint}")
         if result < self.bounds.get("exclusiveMinimum", -math.inf) + SMALLEST:
             least = f"in SI at least {SMALLEST:g}"
@@ -284,102 +272,11 @@ class Quantity(Rule):
         return {"anyOf": [number, {"type": "string", "pattern": pattern(self.kind)}]}
 
 
-class AxialShorthand(Rule):
-    """Annotation of a torque vector that may be written as a single torque, its part about axis 3."""
-
-    single = Quantity("torque")
-
-    def read(self, value: Any, inner: Callable[[Any], Any]) -> Any:
-        """Three components; raises ValueError with the form allowed."""
-        return inner(value) if isinstance(value, list) else [0.0, 0.0, self.single.read(value, inner)]
-
-    def schema(self, inner: Callable[[], dict[str, Any]]) -> dict[str, Any]:
-        """The vector or the torque."""
-        return {"anyOf": [inner(), *self.single.schema(inner)["anyOf"]]}
-
-
-class ListOf(Rule):
-    """Annotation of a list of lists, each ``written`` so; the error for a single list shows how to nest it."""
-
-    def __init__(self, written: str) -> None:
-        self.written = written
-
-    def read(self, value: Any, inner: Callable[[Any], Any]) -> Any:
-        """The list; raises ValueError where its first entry is none."""
-        if isinstance(value, list) and value and not isinstance(value[0], list):
-            text = ", ".join(str(entry) for entry in value)
-            raise ValueError(f"expected a list of {self.written}, such as [[{text}]], got [{text}]")
-        return inner(value)
-
-
-class OrWord(Rule):
-    """Annotation of a direction, two angles in a list, that may be written as one ``word`` instead."""
-
-    def __init__(self, word: str) -> None:
-        self.word = word
-
-    def read(self, value: Any, inner: Callable[[Any], Any]) -> Any:
-        """The angles or the word; raises ValueError with the forms allowed."""
-        if value == self.word:
-            return value
-        if not isinstance(value, list):
-            raise ValueError(f"expected {self.word} or [right ascension, declination], got {shown(value)}")
-        return inner(value)
-
-    def schema(self, inner: Callable[[], dict[str, Any]]) -> dict[str, Any]:
-        """The angles or the word."""
-        return {"anyOf": [inner(), {"const": self.word}]}
-
-
-class _DateAndTime(Rule):
-    def read(self, value: Any, inner: Callable[[Any], Any]) -> Any:
-        """The text as it is; raises ValueError unless it is a date and a time."""
-        text = inner(value)
-        try:
-            if text is not None:
-                if not re.fullmatch(_EPOCH, text):
-                    raise ValueError
-                datetime.datetime.fromisoformat(text)
-        except ValueError:
-            example = "2026-03-01T12:00:00Z"
-            raise ValueError(f"{shown(text)} is no epoch; expected ISO 8601 with date and time: {example}") from None
-        return text
-
-    def schema(self, inner: Callable[[], dict[str, Any]]) -> dict[str, Any]:
-        """A text of that form."""
-        return {**inner(), "pattern": f"^{_EPOCH}$"}
-
-
-_EPOCH = r"[0-9]{4}-[0-9]{2}-[0-9]{2}T[0-9]{2}:[0-9]{2}(:[0-9]{2}(\.[0-9]+)?)?(Z|[+-][0-9]{2}:[0-9]{2})?"
-
-Mass = Annotated[float, Quantity("mass", exclusiveMinimum=0)]
-Moment = Annotated[float, Quantity("inertia", exclusiveMinimum=0)]
-Rate = Annotated[float, Quantity("rate")]
-Angle = Annotated[float, Quantity("angle")]
 Nutation = Annotated[float, Quantity("angle", minimum=0, exclusiveMaximum=RIGHT_ANGLE)]
-Tilt = Annotated[float, Quantity("angle", minimum=0, exclusiveMaximum=2 * RIGHT_ANGLE)]
-Declination = Annotated[float, Quantity("angle", minimum=-RIGHT_ANGLE, maximum=RIGHT_ANGLE)]
 AcuteAngle = Annotated[float, Quantity("angle", exclusiveMinimum=0, exclusiveMaximum=RIGHT_ANGLE)]
 Time = Annotated[float, Quantity("time", minimum=0)]
 PositiveTime = Annotated[float, Quantity("time", exclusiveMinimum=0)]
-Force = Annotated[float, Quantity("force", exclusiveMinimum=0)]
-Lever = Annotated[float, Quantity("length", exclusiveMinimum=0)]
-Torque = Annotated[float, Quantity("torque", exclusiveMinimum=0)]
-Probability = Annotated[float, Quantity("ratio", exclusiveMinimum=0, exclusiveMaximum=1)]
-
-_THREE = Length(3, 3)
-Rates = Annotated[list[Rate], _THREE]
-Position = Annotated[list[Annotated[float, Quantity("length")]], _THREE]
-Travel = Annotated[list[Annotated[float, Quantity("travel")]], _THREE]
-Velocity = Annotated[list[Annotated[float, Quantity("speed")]], _THREE]
-Direction = Annotated[list[Annotated[float, Quantity("number")]], _THREE]
-Torques = Annotated[list[Annotated[float, Quantity("torque")]], _THREE]
-DisturbingTorques = Annotated[Torques, AxialShorthand()]
-Tensor = Annotated[list[Annotated[list[Annotated[float, Quantity("inertia")]], _THREE]], _THREE]
-Quaternion = Annotated[list[Annotated[float, Quantity("number")]], Length(4, 4)]
-InTheSky = Annotated[list[Angle], Length(2, 2)]
-Apart = Annotated[float, Quantity("angle", minimum=0, maximum=2 * RIGHT_ANGLE)]
-Window = Annotated[list[Time], Length(2, 2)]
+THREE = Length(3, 3)
+Position = Annotated[list[Annotated[float, Quantity("length")]], THREE]
+Direction = Annotated[list[Annotated[float, Quantity("number")]], THREE]
 Name = Annotated[str, Length(1)]
-Epoch = Annotated[str, _DateAndTime()]
-Count = Annotated[int, Within(1, 1_000_000)]

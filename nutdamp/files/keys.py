@@ -5,47 +5,115 @@ Constraints between several keys are in `rules`.
 
 from __future__ import annotations
 
+import datetime
+import re
+from collections.abc import Callable
 from typing import Annotated, Any, ClassVar, Literal
 
 from nutdamp.files.fields import (
     RIGHT_ANGLE,
+    THREE,
     AcuteAngle,
-    Angle,
-    Apart,
-    Count,
-    Declination,
     Direction,
-    DisturbingTorques,
-    Epoch,
     Field,
-    Force,
-    InTheSky,
     Length,
-    Lever,
-    ListOf,
-    Mass,
-    Moment,
     Name,
     Nutation,
-    OrWord,
     Position,
     PositiveTime,
-    Probability,
     Quantity,
-    Quaternion,
-    Rate,
-    Rates,
+    Rule,
     Section,
-    Tensor,
-    Tilt,
     Time,
-    Torque,
-    Torques,
-    Travel,
-    Velocity,
-    Window,
+    Within,
 )
 from nutdamp.files.study_keys import DispersionsSection, LoopSection
+from nutdamp.units import shown
+
+
+class _AxialShorthand(Rule):
+    """Annotation of a torque vector that may be written as a single torque, its part about axis 3."""
+
+    single = Quantity("torque")
+
+    def read(self, value: Any, inner: Callable[[Any], Any]) -> Any:
+        return inner(value) if isinstance(value, list) else [0.0, 0.0, self.single.read(value, inner)]
+
+    def schema(self, inner: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+        return {"anyOf": [inner(), *self.single.schema(inner)["anyOf"]]}
+
+
+class _ListOf(Rule):
+    """Annotation of a list of lists, each ``written`` so; the error for a single list shows how to nest it."""
+
+    def __init__(self, written: str) -> None:
+        self.written = written
+
+    def read(self, value: Any, inner: Callable[[Any], Any]) -> Any:
+        if isinstance(value, list) and value and not isinstance(value[0], list):
+            text = ", ".join(str(entry) for entry in value)
+            raise ValueError(f"expected a list of {self.written}, such as [[{text}]], got [{text}]")
+        return inner(value)
+
+
+class _OrWord(Rule):
+    """Annotation of a direction, two angles in a list, that may be written as one ``word`` instead."""
+
+    def __init__(self, word: str) -> None:
+        self.word = word
+
+    def read(self, value: Any, inner: Callable[[Any], Any]) -> Any:
+        if value == self.word:
+            return value
+        if not isinstance(value, list):
+            raise ValueError(f"expected {self.word} or [right ascension, declination], got {shown(value)}")
+        return inner(value)
+
+    def schema(self, inner: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+        return {"anyOf": [inner(), {"const": self.word}]}
+
+
+class _DateAndTime(Rule):
+    def read(self, value: Any, inner: Callable[[Any], Any]) -> Any:
+        text = inner(value)
+        try:
+            if text is not None:
+                if not re.fullmatch(_EPOCH, text):
+                    raise ValueError
+                datetime.datetime.fromisoformat(text)
+        except ValueError:
+            example = "2026-03-01T12:00:00Z"
+            raise ValueError(f"{shown(text)} is no epoch; expected ISO 8601 with date and time: {example}") from None
+        return text
+
+    def schema(self, inner: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+        return {**inner(), "pattern": f"^{_EPOCH}$"}
+
+
+_EPOCH = r"[0-9]{4}-[0-9]{2}-[0-9]{2}T[0-9]{2}:[0-9]{2}(:[0-9]{2}(\.[0-9]+)?)?(Z|[+-][0-9]{2}:[0-9]{2})?"
+
+Mass = Annotated[float, Quantity("mass", exclusiveMinimum=0)]
+Moment = Annotated[float, Quantity("inertia", exclusiveMinimum=0)]
+Rate = Annotated[float, Quantity("rate")]
+Angle = Annotated[float, Quantity("angle")]
+Tilt = Annotated[float, Quantity("angle", minimum=0, exclusiveMaximum=2 * RIGHT_ANGLE)]
+Declination = Annotated[float, Quantity("angle", minimum=-RIGHT_ANGLE, maximum=RIGHT_ANGLE)]
+Force = Annotated[float, Quantity("force", exclusiveMinimum=0)]
+Lever = Annotated[float, Quantity("length", exclusiveMinimum=0)]
+Torque = Annotated[float, Quantity("torque", exclusiveMinimum=0)]
+Probability = Annotated[float, Quantity("ratio", exclusiveMinimum=0, exclusiveMaximum=1)]
+Rates = Annotated[list[Rate], THREE]
+Travel = Annotated[list[Annotated[float, Quantity("travel")]], THREE]
+Velocity = Annotated[list[Annotated[float, Quantity("speed")]], THREE]
+Torques = Annotated[list[Annotated[float, Quantity("torque")]], THREE]
+DisturbingTorques = Annotated[Torques, _AxialShorthand()]
+Tensor = Annotated[list[Annotated[list[Annotated[float, Quantity("inertia")]], THREE]], THREE]
+Quaternion = Annotated[list[Annotated[float, Quantity("number")]], Length(4, 4)]
+InTheSky = Annotated[list[Angle], Length(2, 2)]
+Apart = Annotated[float, Quantity("angle", minimum=0, maximum=2 * RIGHT_ANGLE)]
+Window = Annotated[list[Time], Length(2, 2)]
+Epoch = Annotated[str, _DateAndTime()]
+Count = Annotated[int, Within(1, 1_000_000)]
 
 
 class OrbitSection(Section):
@@ -110,7 +178,7 @@ class KeepSection(Section):
     """A cone about a direction in space which the spin axis must not enter, or must not leave, nutation included."""
 
     name: Name = Field("Name of the cone, for reports.", "Earth")
-    direction: Annotated[InTheSky, OrWord("sun")] = Field(
+    direction: Annotated[InTheSky, _OrWord("sun")] = Field(
         "Right ascension and declination in the attitude's frame, rad; or sun.", "sun", ["120 deg", "10 deg"]
     )
     min: Apart | None = Field("Least angle to the spin axis, rad; default 0.", "4 deg")
@@ -327,7 +395,7 @@ class LimitsSection(Section):
     gap: Time = Field("Least time between two pulses, s; default 0.", "0.5 s", default=0.0)
     tick: PositiveTime | None = Field("Resolution of commanded starts and on-times, s; default: none.", "1 ms")
     max_pulses: Count | None = Field("Largest number of pulses; default: no limit.", 8)
-    blackout: Annotated[list[Window], ListOf("[begin, end]")] = Field(
+    blackout: Annotated[list[Window], _ListOf("[begin, end]")] = Field(
         "Windows [begin, end], s, in which no pulse may be on.", [["10 s", "20 s"]], default=[]
     )
 
@@ -442,7 +510,7 @@ class SpacecraftFile(Section):
     goal: GoalSection | None = Field(
         "Where the spin axis and the spin are to end.", {"tilt": "10 deg", "azimuth": "45 deg"}
     )
-    sun: Annotated[InTheSky, OrWord("epoch")] | None = Field(
+    sun: Annotated[InTheSky, _OrWord("epoch")] | None = Field(
         "Right ascension and declination of the Sun in the attitude's frame, rad; epoch computes them.",
         "epoch",
         ["120 deg", "10 deg"],

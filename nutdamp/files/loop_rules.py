@@ -9,15 +9,7 @@ import numpy as np
 
 from nutdamp.errors import span
 from nutdamp.files.fields import KeyPath
-from nutdamp.files.rules import (
-    Facts,
-    Finding,
-    Vector,
-    inertia_of,
-    norm,
-    spin_axis,
-    spin_of,
-)
+from nutdamp.files.rules import Facts, Finding, Vector, inertia_of, norm, spin_axis, spin_of
 from nutdamp.files.thruster_rules import instead, on_times_of, torque_of
 from nutdamp.files.yaml import Node
 from nutdamp.spacecraft.model import Inertia
@@ -42,8 +34,6 @@ UNITS_OF = {"gyro": "a gyro: rad/s, deg/s or rpm", "accelerometer": "an accelero
 def loop_findings(root: Node) -> Iterator[Finding]:
     """All faults of ``loop``."""
     facts = Facts(root)
-    if not facts.has("loop"):
-        return
     start, stop = (facts.number("angle", "loop", key) for key in ("start", "stop"))
     if start is not None and stop is not None and stop >= start > 0.0:
         problem = f"{math.degrees(stop):g} deg is not below start; expected less than {math.degrees(start):g} deg"
@@ -63,13 +53,8 @@ def loop_findings(root: Node) -> Iterator[Finding]:
 
 
 def _known_channels(facts: Facts) -> list[tuple[str, bool, bool, float, float]]:
-    """The channels of the file, or its thrusters where it names none, as far as they can be read.
-
-    Each with its name, True where its torque is known, and where that is more transverse than axial, and on-times, s.
-    """
-    thrusters = {
-        facts.text("thrusters", index, "name"): ("thrusters", index) for index, _ in facts.children("thrusters")
-    }
+    """Readable channels: name, whether the torque is known, and more transverse than axial, on-times, s."""
+    thrusters = {facts.text(*path, "name"): path for path in facts.below("thrusters")}
     named = {str(name): [entry.value for _, entry in node.children()] for name, node in facts.children("channels")}
     named = named or {name: [name] for name in thrusters if name is not None}
     axis, channels = spin_axis(facts), []
@@ -119,8 +104,9 @@ def _channels(facts: Facts) -> Iterator[Finding]:
     if not known:
         yield Finding(("loop",), "needs channels to fire: thrusters with a torque across axis 3", True)
     elif all(pushes and not damps for _, pushes, damps, *_ in known):
-        problem = "no channel has a torque more transverse than axial, so none can damp a nutation"
-        yield Finding(("loop",), problem, True)
+        yield Finding(
+            ("loop",), "no channel has a torque more transverse than axial, so none can damp a nutation", True
+        )
     if law == "bang" and not facts.has("loop", "on_time"):
         yield Finding(("loop", "on_time"), "missing; the law bang fires pulses of this length")
     if law == "one-pulse" and facts.has("loop", "on_time"):
@@ -131,13 +117,13 @@ def _channels(facts: Facts) -> Iterator[Finding]:
                 problem = f"{on_time:g} s is outside what {name} allows: {span(least, most, 's')}"
                 yield Finding(("loop", "on_time"), problem)
     names, before = [name for name, *_ in known], set()
-    for index, node in facts.children("loop", "faults", "reversed"):
-        path: KeyPath = ("loop", "faults", "reversed", index)
-        if node.value in before:
-            yield Finding(path, f"{shown(node.value)} is named twice; expected each channel once")
-        before.add(node.value)
-        if isinstance(node.value, str) and node.value not in names:
-            yield Finding(path, f"no channel is called {shown(node.value)}; {instead(node.value, names)}")
+    for path in facts.below("loop", "faults", "reversed"):
+        turned = facts.value(*path)
+        if turned in before:
+            yield Finding(path, f"{shown(turned)} is named twice; expected each channel once")
+        before.add(turned)
+        if isinstance(turned, str) and turned not in names:
+            yield Finding(path, f"no channel is called {shown(turned)}; {instead(turned, names)}")
 
 
 def _timing(facts: Facts, frequency: float) -> Iterator[Finding]:
@@ -169,8 +155,8 @@ def _accelerometer(facts: Facts, inertia: Inertia) -> Iterator[Finding]:
         yield Finding((*SENSOR, "kind"), "accelerometer: with a wheel only gyros are modelled; expected gyro")
         return
     if math.hypot(*position) > FARTHEST:
-        problem = f"{math.hypot(*position):.4g} m from the centre of mass; expected at most {FARTHEST:g} m"
-        yield Finding((*SENSOR, "position"), problem)
+        away = f"{math.hypot(*position):.4g} m from the centre of mass; expected at most {FARTHEST:g} m"
+        yield Finding((*SENSOR, "position"), away)
     if not is_blind(inertia.moments, position, axis):
         return
     if inertia.symmetric and inertia.C == 2.0 * inertia.A and abs(axis[2]) > 1.0 - 1e-9:

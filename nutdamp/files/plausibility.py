@@ -70,8 +70,8 @@ def doubts(root: Node) -> Iterator[Finding]:
         yield Finding(("loop", "start"), f"{degrees}: the loop lets more nutation stand than is required")
     first = _bare(facts, ("cold", "first"))
     if first is not None and first > STRONG:
-        problem = f"{first} is read as {first} times the thrust of a warm nozzle; write {first} % if that is meant"
-        yield Finding(("cold", "first"), problem)
+        cure = f"write {first} % if that is meant"
+        yield Finding(("cold", "first"), f"{first} is read as {first} times the thrust of a warm nozzle; {cure}")
 
 
 def reading(value: float, kind: str, meant: str) -> str:
@@ -83,41 +83,30 @@ def reading(value: float, kind: str, meant: str) -> str:
 
 def _bare(facts: Facts, path: KeyPath) -> float | None:
     """The finite number at ``path``; None where there is none, or a text with a unit."""
-    node = facts.root.get(*path)
-    value = None if node is None else node.value
+    value = facts.value(*path)
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
         return None
     return value
 
 
 def _bands(facts: Facts) -> Iterator[tuple[KeyPath, str, str, float, float, float]]:
-    """Paths of numbers, their kind, the unit that may be meant, and where they are doubtful.
-
-    That is below the first of three bounds, and between the other two.
-    """
+    """Paths, kinds and units that may be meant of numbers doubtful below the first and between the other two bounds."""
     # Other angles are refused where they are too large, with a hint: so are these from a right angle on.
     path: KeyPath
     for path in (("state", "phase"), ("goal", "azimuth"), ("goal", "right_ascension")):
         yield path, "angle", "deg", -2.0 * math.pi, 2.0 * math.pi, math.inf
-    for section, key, usual in (
-        ("requirement", "nutation", min(LOOSE, _nutation(facts))),
-        ("requirement", "momentum_shift", LOOSE),
-        ("state", "nutation", LOOSE),
-    ):
-        yield (section, key), "angle", "deg", -math.inf, usual, 0.5 * math.pi
-    for path, meant in (
-        (("state", "spin"), "rpm"),
-        (("goal", "spin"), "rpm"),
-        *((("omega0", axis), "deg/s") for axis, _ in facts.children("omega0")),
-    ):
+    for path in (("requirement", "nutation"), ("requirement", "momentum_shift"), ("state", "nutation")):
+        usual = min(LOOSE, _nutation(facts)) if path == ("requirement", "nutation") else LOOSE
+        yield path, "angle", "deg", -math.inf, usual, 0.5 * math.pi
+    for path in (("state", "spin"), ("goal", "spin"), *facts.below("omega0")):
         fastest = FAST if (_bare(facts, path) or 0.0) % 1 else FAST_AND_WHOLE
-        yield path, "rate", meant, -fastest, fastest, math.inf
+        yield path, "rate", "deg/s" if path[0] == "omega0" else "rpm", -fastest, fastest, math.inf
     for key, kind, least, meant in (("position", "length", NEAR, "km"), ("velocity", "speed", SLOW, "km/s")):
         given = facts.vector(kind, 3, "orbit", key)
         if given is not None and 0.0 < math.hypot(*given) < least:
             yield ("orbit", key, int(abs(given).argmax())), kind, meant, math.inf, math.inf, math.inf
-    thrusters: list[KeyPath] = [("thrusters", index) for index, _ in facts.children("thrusters")]
-    positions = [(*path, "position", axis) for path in thrusters for axis, _ in facts.children(*path, "position")]
+    thrusters = facts.below("thrusters")
+    positions = [position for path in thrusters for position in facts.below(*path, "position")]
     for path in (*positions, *((*path, "lever_arm") for path in (*thrusters, ("steerable",)))):
         yield path, "length", "mm", -FAR, FAR, math.inf
     spin = spin_of(facts)
@@ -127,11 +116,10 @@ def _bands(facts: Facts) -> Iterator[tuple[KeyPath, str, str, float, float, floa
         yield (*path, "max_on_time"), "time", "ms", -math.inf, LASTING * turn, math.inf
     times: list[KeyPath] = [(*path, "valve", key) for path in ((), *thrusters) for key in VALVE_TIMES]
     for path in thrusters:
-        rows = [(*path, "impulse_bit", row) for row, _ in facts.children(*path, "impulse_bit")]
-        times += [(*row, column) for row in rows for column in (0, 2)]
+        times += [(*row, column) for row in facts.below(*path, "impulse_bit") for column in (0, 2)]
     for path in times:
         yield path, "time", "ms", -math.inf, SLUGGISH, math.inf
-    pressures: list[KeyPath] = [("tank", "isp", row, 0) for row, _ in facts.children("tank", "isp")]
+    pressures = [(*row, 0) for row in facts.below("tank", "isp")]
     for path in (("tank", "pressure"), ("tank", "final_pressure"), *pressures):
         yield path, "pressure", "bar", -math.inf, 0.0, THIN
 

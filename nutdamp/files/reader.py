@@ -27,7 +27,7 @@ from nutdamp.files.editing import Setting, overlay, settings_of, settings_within
 from nutdamp.files.fields import REQUIRED, KeyPath, Problems, Rule, Section, section_of
 from nutdamp.files.plausibility import doubts, foreign
 from nutdamp.files.rules import CANCELLED, MOMENT, Finding, Vector, disturbance_kind, findings, force_vector, symmetric
-from nutdamp.files.study_keys import LoopSection, by_name, dispersions
+from nutdamp.files.study_keys import LoopSection, by_name, dispersions, thrust_behind
 from nutdamp.files.thruster_rules import thrust_findings
 from nutdamp.files.yaml import Node, dotted, read_text, read_tree
 from nutdamp.physics import attitude, sky
@@ -81,12 +81,8 @@ def _contents(text: str, name: str, settings: Sequence[Setting], warn: Warn) -> 
     root, faults = read_tree(text, name)
     root, unplaced = overlay(root, settings)
     faults += unplaced
-    faulty = [
-        *_spelling(root, keys.SpacecraftFile, ()),
-        *findings(root),
-        *dispersion_findings(root),
-        *thrust_findings(root),
-    ]
+    faulty = [*_spelling(root, keys.SpacecraftFile, ())]
+    faulty += [*findings(root), *dispersion_findings(root), *thrust_findings(root)]
     if root.get("loop") is not None:
         from nutdamp.files.loop_rules import loop_findings
 
@@ -106,21 +102,17 @@ def _contents(text: str, name: str, settings: Sequence[Setting], warn: Warn) -> 
 def _placed(finding: Finding, root: Node, name: str) -> Fault:
     """The finding with its place; a missing key is reported at the key of its parent."""
     path = finding.path
-    if finding.at_key:
-        place = root.key_place_of(path)
-    elif root.get(*path) is None:
-        place = root.key_place_of(path[:-1])
+    if finding.at_key or root.get(*path) is None:
+        place = root.key_place_of(path if finding.at_key else path[:-1])
     else:
         place = root.place_of(path)
     return place.fault(name, dotted(path), finding.problem)
 
 
 def _spelling(node: Node, model: type[Section] | None, path: KeyPath, named: bool = False) -> Iterator[Finding]:
-    """Unknown keys and empty values below ``node``, whose keys are the fields of ``model``.
+    """Unknown keys and empty values below ``node``, whose keys are fields of ``model``, or (``named``) names of such.
 
-    A misspelt key is put right in the tree, so that one slip makes one fault and its value is checked too; any
-    other unknown key is dropped, as is one that was set for a key that the file has. ``named``: the keys may also be
-    names, of entries of the ``model``.
+    A misspelt key is put right in the tree, so that its value is checked too; any other unknown key is dropped.
     """
     fields = model.fields() if model else {}
     named = named and isinstance(node.value, dict) and by_name(node.value)
@@ -161,10 +153,7 @@ def load_spacecraft(path: str | Path, settings: Sequence[Setting] = (), warn: Wa
 
 
 def read_spacecraft(text: str, name: str, settings: Sequence[Setting] = (), warn: Warn = lambda _: None) -> Spacecraft:
-    """The spacecraft in the text of a file; ``name`` is that of the file in messages.
-
-    ``settings`` replace values of the text. Raises `FaultyFile` with all faults.
-    """
+    """The spacecraft in the text of a file ``name``, with ``settings``; raises `FaultyFile` with all faults."""
     contents = _contents(text, name, settings, warn)
     given = contents.inertia
     tensor = np.diag(np.array([given.A, given.A, given.C], dtype=float))
@@ -186,10 +175,8 @@ def read_spacecraft(text: str, name: str, settings: Sequence[Setting] = (), warn
         mass=contents.mass,
         center_of_mass=None if contents.center_of_mass is None else center,
         center_of_mass_per_kg=axes.T @ np.array(per_kg) if per_kg and any(per_kg) else None,
-        attitude=_attitude(contents.attitude, inertia, omega0, sunward),
-        channels=tuple(
-            Channel(channel, tuple(thrusters[member] for member in members)) for channel, members in channels.items()
-        ),
+        attitude=_given(contents.attitude, _attitude, inertia, omega0, sunward),
+        channels=tuple(Channel(name, tuple(map(thrusters.__getitem__, members))) for name, members in channels.items()),
         steerable=steerable,
         requirement=None if asks_nothing else _part(Requirement, asked),
         limits=_part(Limits, limits, blackout=tuple(map(tuple, limits.blackout) if limits else ())) or Limits(),
@@ -198,14 +185,14 @@ def read_spacecraft(text: str, name: str, settings: Sequence[Setting] = (), warn
         nutation_grows=None if loss is None or loss.nutation is None else loss.nutation == "grows",
         dispersions=dispersions(contents.dispersions, thrusters.values(), torquer),
         object_id=contents.object_id,
-        orbit=_orbit(contents.orbit),
+        orbit=_given(contents.orbit, lambda at: Orbit(np.array(at.position), np.array(at.velocity), at.center.upper())),
         cold=_part(Cold, contents.cold),
-        tank=_tank(contents.tank),
+        tank=_given(contents.tank, _tank),
         sun=sunward,
         keep=tuple(_cones(contents, sunward)),
-        sun_sensor=_sun_sensor(contents.sun_sensor, axes),
-        commands=_commands(contents.commands),
-        loop=_loop(contents.loop, axes, center),
+        sun_sensor=_given(contents.sun_sensor, _sun_sensor, axes),
+        commands=_given(contents.commands, _commands),
+        loop=_given(contents.loop, _loop, axes, center),
     )
     return replace(spacecraft, goal=_goal(contents.goal, spacecraft))
 
@@ -232,10 +219,7 @@ class Source(NamedTuple):
 
 
 def source_of(path: str | PathLike[str] | Mapping[str, object], changes: Mapping[str, object] | None = None) -> Source:
-    """Source of a spacecraft in a file, or in a dict of its keys, with ``changes`` of keys.
-
-    Raises CannotRead or BadRequest.
-    """
+    """Source of a spacecraft in a file, or a dict of its keys, with ``changes``; raises CannotRead or BadRequest."""
     if isinstance(path, Mapping):
         return Source(text_of(path, "dict"), "dict", settings_of(units.changes(changes)))
     name = units.path("path", path, "the name of a file or a dict of its keys")
@@ -250,6 +234,11 @@ def _part(kind: type[Part], section: Section | None, **others: object) -> Part |
     named: tuple[Any, ...] = fields(kind)  # type: ignore[arg-type]
     given = {field.name: getattr(section, field.name) for field in named if hasattr(section, field.name)}
     return kind(**{**given, **others})
+
+
+def _given(section: Section | None, make: Callable[..., Part], *others: object) -> Part | None:
+    """The object that ``make`` makes of a section, where it is given."""
+    return None if section is None else make(section, *others)
 
 
 def _rates(contents: keys.SpacecraftFile, inertia: Inertia) -> Vector:
@@ -273,7 +262,7 @@ def _thruster(entry: keys.ThrusterSection, axes: Vector, every: keys.ValveSectio
     force = position = None
     if entry.torque is not None:
         torque = axes.T @ np.array(entry.torque)
-        thrust = None if entry.lever_arm is None else math.hypot(*entry.torque) / entry.lever_arm
+        thrust = thrust_behind(math.hypot(*entry.torque), entry.lever_arm)
     else:
         assert entry.position is not None
         assert entry.direction is not None
@@ -287,9 +276,7 @@ def _thruster(entry: keys.ThrusterSection, axes: Vector, every: keys.ValveSectio
     return Thruster(entry.name, torque, force, thrust, entry.isp, least, most, position, valve)
 
 
-def _tank(section: keys.TankSection | None) -> Tank | None:
-    if section is None:
-        return None
+def _tank(section: keys.TankSection) -> Tank | None:
     isp, shed = section.isp, section.inertia_per_kg
     rows = (shed.A, shed.A, shed.C) if isinstance(shed, keys.ShedSection) else tuple(shed or ())
     return _part(Tank, section, isp=isp and tuple(map(tuple, isp)), inertia_per_kg=rows if any(rows) else None)
@@ -303,9 +290,7 @@ def _valve(entry: keys.ThrusterSection, every: keys.ValveSection | None, thrust:
 
     if entry.impulse_bit is not None:
         assert thrust is not None
-        return thruster.Measured(
-            tuple((on_time, impulse / thrust, centroid) for on_time, impulse, centroid in entry.impulse_bit)
-        )
+        return thruster.Measured(tuple((time, impulse / thrust, mean) for time, impulse, mean in entry.impulse_bit))
     section = entry.valve or every
     assert section is not None
     times = (section.open_delay, section.close_delay, section.rise_time, section.fall_time)
@@ -313,11 +298,7 @@ def _valve(entry: keys.ThrusterSection, every: keys.ValveSection | None, thrust:
 
 
 def _disturbance(entry: keys.DisturbanceSection, inertia: Inertia, spin: float) -> Disturbance:
-    """A disturbance in principal axes; ``spin`` is ω3 at t = 0, rad/s.
-
-    What is fixed in space turns in the body at minus the spin, Magnus 1970 (27). Where the principal axes are
-    tilted, a transverse torque has a part about axis 3, which does not turn.
-    """
+    """A disturbance in principal axes; one fixed in space turns at minus the ``spin``, rad/s, Magnus 1970 (27)."""
     torque = np.array(entry.torque)
     if not inertia.aligned:
         torque = inertia.axes.T @ torque
@@ -328,14 +309,11 @@ def _disturbance(entry: keys.DisturbanceSection, inertia: Inertia, spin: float) 
     return Disturbance(complex(torque[0], torque[1]), float(torque[2]), rate, entry.name or "")
 
 
-def _attitude(
-    section: keys.AttitudeSection | None, inertia: Inertia, omega0: Vector, sunward: Vector | None
-) -> Attitude | None:
+def _attitude(section: keys.AttitudeSection, inertia: Inertia, omega0: Vector, sunward: Vector | None) -> Attitude:
     """Attitude of the axes of the file; ``omega0`` (3,) rad/s in principal axes tells spin axis and H in the body."""
-    if section is None:
-        return None
     if section.quaternion is not None:
-        return _part(Attitude, section, quaternion=np.array(section.quaternion) / math.hypot(*section.quaternion))
+        given = np.array(section.quaternion) / math.hypot(*section.quaternion)
+        return Attitude(given, section.epoch, section.frame)
     assert section.spin_axis is not None
     along = np.array([0.0, 0.0, math.copysign(1.0, inertia.axial(float(omega0[2])))])
     if section.of == "momentum":
@@ -383,15 +361,7 @@ def _cones(contents: keys.SpacecraftFile, sunward: Vector | None) -> Iterator[Ke
         yield Keep("H", None, 0.0, contents.requirement.nutation_during)
 
 
-def _orbit(section: keys.OrbitSection | None) -> Orbit | None:
-    if section is None:
-        return None
-    return Orbit(np.array(section.position), np.array(section.velocity), section.center.upper())
-
-
-def _sun_sensor(section: keys.SunSensorSection | None, axes: Vector) -> SunSensor | None:
-    if section is None:
-        return None
+def _sun_sensor(section: keys.SunSensorSection, axes: Vector) -> SunSensor | None:
     azimuth = section.azimuth
     if not np.array_equal(axes, np.eye(3)):
         first, second, _ = axes.T @ np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
@@ -399,9 +369,7 @@ def _sun_sensor(section: keys.SunSensorSection | None, axes: Vector) -> SunSenso
     return _part(SunSensor, section, azimuth=azimuth)
 
 
-def _commands(section: keys.CommandsSection | None) -> Commands | None:
-    if section is None:
-        return None
+def _commands(section: keys.CommandsSection) -> Commands:
     given, step = section.width, None
     if isinstance(given, list):
         widths = np.unique(given)
@@ -412,9 +380,7 @@ def _commands(section: keys.CommandsSection | None) -> Commands | None:
     return Commands(section.delay_step, section.delay_max, widths, section.max_count, every, step)
 
 
-def _loop(section: LoopSection | None, axes: Vector, center: Vector) -> Loop | None:
-    if section is None:
-        return None
+def _loop(section: LoopSection, axes: Vector, center: Vector) -> Loop | None:
     given = section.sensor
     along = np.array([0.0, 0.0, 1.0] if given.axis is None else given.axis)
     position = axes.T @ (np.array(given.position or center) - center)

@@ -46,15 +46,19 @@ class Facts:
         """True where something is at ``path``."""
         return self.root.get(*path) is not None
 
+    def value(self, *path: str | int) -> object:
+        """The text, number, dict or list of nodes at ``path``; None where there is none."""
+        node = self.root.get(*path)
+        return None if node is None else node.value
+
     def is_mapping(self, *path: str | int) -> bool:
         """True where keys may be at ``path``."""
-        node = self.root.get(*path)
-        return node is not None and isinstance(node.value, dict)
+        return isinstance(self.value(*path), dict)
 
     def text(self, *path: str | int) -> str | None:
         """The text at ``path``."""
-        node = self.root.get(*path)
-        return node.value if node is not None and isinstance(node.value, str) else None
+        value = self.value(*path)
+        return value if isinstance(value, str) else None
 
     def number(self, kind: str, *path: str | int) -> float | None:
         """The quantity at ``path``, SI."""
@@ -75,6 +79,10 @@ class Facts:
         """Keys or positions at ``path``, and their nodes."""
         node = self.root.get(*path)
         return [] if node is None else list(node.children())
+
+    def below(self, *path: str | int) -> list[KeyPath]:
+        """Paths of the entries at ``path``."""
+        return [(*path, step) for step, _ in self.children(*path)]
 
 
 ALONG = 1e-3  # rad from the spin axis, up to which the Sun counts as along it
@@ -131,12 +139,9 @@ def _sun_angle(facts: Facts, axis: Vector) -> float | None:
 
 
 def _orbit(facts: Facts) -> Iterator[Finding]:
-    if not facts.has("orbit"):
-        return
-    missing = [key for key in ("epoch", "frame") if not facts.has("attitude", key)]
-    if missing:
-        names = " and ".join(f"attitude.{key}" for key in missing)
-        yield Finding(("orbit",), f"needs {names}: the moment of the position and the axes that it is in", True)
+    missing = " and ".join(f"attitude.{key}" for key in ("epoch", "frame") if not facts.has("attitude", key))
+    if missing and facts.has("orbit"):
+        yield Finding(("orbit",), f"needs {missing}: the moment of the position and the axes that it is in", True)
     position = facts.vector("length", 3, "orbit", "position")
     if position is not None and not position.any():
         yield Finding(("orbit", "position"), "is zero; expected the position of the spacecraft relative to center")
@@ -160,8 +165,6 @@ def _to_sun(facts: Facts) -> Vector | None:
 
 
 def _sun(facts: Facts) -> Iterator[Finding]:
-    if not facts.has("sun"):
-        return
     yield from _direction(facts, ("sun",))
     if facts.text("sun") == "epoch" and facts.has("attitude") and _to_sun(facts) is None:
         epoch, cure = facts.text("attitude", "epoch"), "give [right ascension, declination]"
@@ -170,8 +173,7 @@ def _sun(facts: Facts) -> Iterator[Finding]:
 
 
 def _cones(facts: Facts) -> Iterator[Finding]:
-    for index, _ in facts.children("keep"):
-        path = ("keep", index)
+    for path in facts.below("keep"):
         yield from _direction(facts, (*path, "direction"))
         if facts.text(*path, "direction") == "sun" and not facts.has("sun"):
             yield Finding((*path, "direction"), "needs the key sun: [right ascension, declination], or sun: epoch")
@@ -224,9 +226,9 @@ def symmetric(tensor: Vector) -> Vector:
 
 def _names(facts: Facts) -> Iterator[Finding]:
     lists = ("thrusters", "disturbances", "keep")
-    entries: list[KeyPath] = [(key, index, "name") for key in lists for index, _ in facts.children(key)]
+    entries: list[KeyPath] = [(*path, "name") for key in lists for path in facts.below(key)]
     named = [(path, facts.text(*path), False) for path in (("name",), *entries)]
-    named += [(("channels", key), str(key), True) for key, _ in facts.children("channels")]
+    named += [(path, str(path[-1]), True) for path in facts.below("channels")]
     for path, name, at_key in named:
         if name is None:
             continue
@@ -262,8 +264,7 @@ def _inertia(facts: Facts) -> Iterator[Finding]:
     A, C = facts.number("inertia", "inertia", "A"), facts.number("inertia", "inertia", "C")
     if A is not None and C is not None and C > 2 * A > 0:
         most = "not physically possible (A and C swapped?); at most 2 A (a flat disc)"
-        problem = f"C = {C:g} exceeds 2 A = {2 * A:g} kg m^2: {most}"
-        yield Finding(("inertia", "C"), problem)
+        yield Finding(("inertia", "C"), f"C = {C:g} exceeds 2 A = {2 * A:g} kg m^2: {most}")
 
 
 def tensor_of(facts: Facts) -> Vector | None:
@@ -279,19 +280,17 @@ def tensor_fault(tensor: Vector) -> Finding | None:
     path: KeyPath = ("inertia", "tensor")
     skew = np.abs(tensor - tensor.T)
     if skew.max() > SYMMETRIC * np.abs(tensor).max():
-        column, row = (int(index) for index in np.unravel_index(np.argmax(skew), skew.shape))
-        mirrored = f"{tensor[column, row]:g} at [{column}][{row}]"
-        problem = f"not symmetric: {tensor[row, column]:g} here, but {mirrored}; both must be equal"
-        return Finding((*path, row, column), problem)
+        column, row = map(int, np.unravel_index(np.argmax(skew), skew.shape))
+        mirrored = f"{tensor[column, row]:g} at [{column}][{row}]; both must be equal"
+        return Finding((*path, row, column), f"not symmetric: {tensor[row, column]:g} here, but {mirrored}")
     moments = np.linalg.eigvalsh(symmetric(tensor))
-    values = ", ".join(f"{moment:g}" for moment in moments)
+    values = f"principal moments {', '.join(f'{moment:g}' for moment in moments)} kg m^2"
     least = max(SMALLEST, 1e-14 * moments[2])
     if moments[0] <= least:
         wrong = " or ".join(f"{moment:g}" for moment in moments if moment <= least)
-        return Finding(path, f"principal moments {values} kg m^2; all three must be above 0, not {wrong}")
+        return Finding(path, f"{values}; all three must be above 0, not {wrong}")
     if moments[2] > (moments[0] + moments[1]) * (1 + SYMMETRIC):
-        problem = f"principal moments {values} kg m^2: the largest must not exceed the sum of the other two"
-        return Finding(path, f"{problem} (triangle inequality)")
+        return Finding(path, f"{values}: the largest must not exceed the sum of the other two (triangle inequality)")
     return None
 
 
@@ -362,16 +361,16 @@ def _motion(facts: Facts) -> Iterator[Finding]:
             yield Finding(path, "the spin is zero; expected a rate about axis 3, or a wheel; nothing nutates without")
     spin, inertia = spin_of(facts), inertia_of(facts)
     if spin is not None and inertia is not None and inertia.wheel:
-        axial = inertia.axial(spin)
+        axial, path = inertia.axial(spin), ("wheel", "momentum")
         if abs(axial) <= CANCELLED * abs(inertia.wheel):
-            problem = f"cancels the C ω3 of the body, {inertia.C * spin:.4g} N m s: without momentum nothing nutates"
-            yield Finding(("wheel", "momentum"), problem)
+            momentum = f"{inertia.C * spin:.4g} N m s"
+            yield Finding(path, f"cancels the C ω3 of the body, {momentum}: without momentum nothing nutates")
         elif spin == 0.0 and facts.has("sun_sensor"):
-            problem = "the body does not turn about axis 3: there are no Sun pulses; leave it out"
-            yield Finding(("sun_sensor",), problem, True)
+            cure = "there are no Sun pulses; leave it out"
+            yield Finding(("sun_sensor",), f"the body does not turn about axis 3: {cure}", True)
         elif axial * spin < 0.0 and facts.has("sun_sensor"):
             problem = "turns the angular momentum against the spin: blocks fired from the Sun pulse are not planned"
-            yield Finding(("wheel", "momentum"), f"{problem} then; leave sun_sensor out")
+            yield Finding(path, f"{problem} then; leave sun_sensor out")
 
 
 def spin_axis(facts: Facts) -> Vector:
@@ -428,14 +427,12 @@ def disturbance_kind(kind: str | None, turns: bool) -> str:
 
 
 def _disturbances(facts: Facts) -> Iterator[Finding]:
-    for index, node in facts.children("disturbances"):
-        if isinstance(node.value, dict):
-            path = ("disturbances", index)
-            turning = [key for key in ("rate", "fixed_in") if facts.has(*path, key)]
-            unreadable = facts.has(*path, "kind") and facts.text(*path, "kind") is None
-            kind = "" if unreadable else disturbance_kind(facts.text(*path, "kind"), bool(turning))
-            yield from _turning(facts, path, kind, turning)
-            yield from _disturbing_torque(facts, path, kind)
+    for path in filter(lambda path: facts.is_mapping(*path), facts.below("disturbances")):
+        turning = [key for key in ("rate", "fixed_in") if facts.has(*path, key)]
+        unreadable = facts.has(*path, "kind") and facts.text(*path, "kind") is None
+        kind = "" if unreadable else disturbance_kind(facts.text(*path, "kind"), bool(turning))
+        yield from _turning(facts, path, kind, turning)
+        yield from _disturbing_torque(facts, path, kind)
 
 
 def _turning(facts: Facts, path: KeyPath, kind: str, turning: list[str]) -> Iterator[Finding]:
@@ -457,8 +454,8 @@ def _turning(facts: Facts, path: KeyPath, kind: str, turning: list[str]) -> Iter
 
 
 def _disturbing_torque(facts: Facts, path: KeyPath, kind: str) -> Iterator[Finding]:
-    single, torque = facts.number("torque", *path, "torque"), facts.vector("torque", 3, *path, "torque")
     path = (*path, "torque")
+    single, torque = facts.number("torque", *path), facts.vector("torque", 3, *path)
     if single is not None and kind in ("constant", "rotating"):
         cure = "; or, for a torque about axis 3 only, kind: axial" if kind == "constant" else ""
         yield Finding(path, f"expected three components, [M1, M2, M3], got a single torque{cure}")
@@ -470,8 +467,7 @@ def _disturbing_torque(facts: Facts, path: KeyPath, kind: str) -> Iterator[Findi
     if size < SMALLEST:
         yield Finding(path, "zero; expected at least one component other than 0")
     elif kind == "axial" and norm(torque[:2]) > CANCELLED * size:
-        problem = "an axial torque has no transverse components; expected [0, 0, M3], or kind: constant"
-        yield Finding(path, problem)
+        yield Finding(path, "an axial torque has no transverse components; expected [0, 0, M3], or kind: constant")
     elif kind == "rotating" and abs(torque[2]) > CANCELLED * size:
         problem = "a rotating torque has no part about axis 3; expected 0"
         yield Finding((*path, 2), f"{problem}, and this part as a disturbance of its own, kind: axial")
@@ -480,39 +476,35 @@ def _disturbing_torque(facts: Facts, path: KeyPath, kind: str) -> Iterator[Findi
 def _dissipation(facts: Facts) -> Iterator[Finding]:
     time_constant = facts.number("time", "dissipation", "time_constant")
     if time_constant == 0.0:
-        problem = "zero; expected a time above 0, or leave dissipation out for none"
-        yield Finding(("dissipation", "time_constant"), problem)
-    inertia, named = inertia_of(facts), facts.has("dissipation", "nutation")
-    if time_constant is not None and wheel_of(facts) and not named:
-        problem = "missing; with a wheel the place of the loss decides: give grows or decays"
-        yield Finding(("dissipation", "nutation"), problem)
-    elif inertia is not None and inertia.a == 0.0 and inertia.wheel == 0.0 and named:
-        problem = "the nutation of a sphere neither grows nor decays; leave it out"
-        yield Finding(("dissipation", "nutation"), problem, True)
+        path: KeyPath = ("dissipation", "time_constant")
+        yield Finding(path, "zero; expected a time above 0, or leave dissipation out for none")
+    path, inertia = ("dissipation", "nutation"), inertia_of(facts)
+    if time_constant is not None and wheel_of(facts) and not facts.has(*path):
+        yield Finding(path, "missing; with a wheel the place of the loss decides: give grows or decays")
+    elif inertia is not None and inertia.a == inertia.wheel == 0.0 and facts.has(*path):
+        yield Finding(path, "the nutation of a sphere neither grows nor decays; leave it out", True)
 
 
 def _limits(facts: Facts) -> Iterator[Finding]:
     earliest, horizon = facts.number("time", "limits", "earliest"), facts.number("time", "limits", "horizon")
     if earliest is not None and horizon is not None and earliest >= horizon > 0:
         yield Finding(("limits", "earliest"), f"not before the horizon; expected less than {horizon:g} s")
-    for index, _ in facts.children("limits", "blackout"):
-        window = facts.vector("time", 2, "limits", "blackout", index)
+    for path in facts.below("limits", "blackout"):
+        window = facts.vector("time", 2, *path)
         if window is not None and window[1] < window[0]:
-            yield Finding(("limits", "blackout", index), "ends before it begins; expected [begin, end]")
+            yield Finding(path, "ends before it begins; expected [begin, end]")
 
 
 def _goal(facts: Facts) -> Iterator[Finding]:
-    in_n, in_sky = (
-        [key for key in pair if facts.has("goal", key)]
-        for pair in (("tilt", "azimuth"), ("right_ascension", "declination"))
-    )
+    pairs = (("tilt", "azimuth"), ("right_ascension", "declination"))
+    in_n, in_sky = ([key for key in pair if facts.has("goal", key)] for pair in pairs)
     if in_n and in_sky:
         problem = f"given together with {' and '.join(in_sky)}; keep tilt and azimuth, or the other pair"
         yield Finding(("goal", in_n[0]), problem, True)
     elif in_n == ["azimuth"]:
         yield Finding(("goal", "tilt"), "missing; azimuth alone names no direction")
     elif len(in_sky) == 1:
-        other = "declination" if in_sky[0] == "right_ascension" else "right_ascension"
+        (other,) = {*pairs[1]} - {*in_sky}
         yield Finding(("goal", other), f"missing; {in_sky[0]} alone names no direction")
     elif in_sky and not facts.has("attitude"):
         problem = "needs attitude, which says where the body points at t = 0; without it give tilt and azimuth"

@@ -53,23 +53,21 @@ LATEST = 100_000  # number of the last Sun pulse that may fire a block
 def read_blocks(path: str | Path, spacecraft: Spacecraft) -> tuple[tuple[Block, ...], list[str]]:
     """The blocks in a CSV file, and warnings: commands that the file of the spacecraft does not have.
 
-    Needed are channel, first_sun_pulse, count, delay_s and width_s; delay_counts and width_counts do for the last two
-    where the spacecraft file has the steps. every is 1 where it is left out. A first_utc must be that of a first
-    pulse. Raises CannotRead, and FaultyFile with every fault of the file.
+    delay_counts and width_counts do for delay_s and width_s where the spacecraft file has the steps; every is 1 where
+    it is left out. Raises CannotRead, and FaultyFile with every fault of the file.
     """
     table = Table(path, BLOCKS_HEADER, "blocks")
     times = [f"{name}_counts" if _counted(table, spacecraft, name) else f"{name}_s" for name in TIMES]
     table.expect("channel", "first_sun_pulse", *times, "count")
     blocks: list[Block] = []
-    over = 0
     for row in table.rows:
         block = _block(row, spacecraft)
         if block is None:
             continue
+        over = blocks[-1].first + (blocks[-1].count - 1) * blocks[-1].every if blocks else 0
         if block.first <= over:
             problem = f"Sun pulse {block.first} comes before the block before is over; expected {over + 1} or later"
             row.fault("first_sun_pulse", problem)
-        over = block.first + (block.count - 1) * block.every
         _against_commands(row, block, spacecraft)
         blocks.append(block)
     total = sum(block.count for block in blocks)
@@ -81,18 +79,15 @@ def read_blocks(path: str | Path, spacecraft: Spacecraft) -> tuple[tuple[Block, 
 
 
 def _expect_utc(table: Table, spacecraft: Spacecraft, blocks: Sequence[Block]) -> None:
-    """Faults of a first_utc that is no time, or more than a spin turn from when the first pulse of its block begins.
-
-    So much may a delay be edited by. Without an epoch only its form is looked at.
-    """
+    """Faults of a first_utc that is no time, or over a spin turn off its first pulse: so much may a delay be edited."""
     parsed: dict[int, Epoch] = {}
     for row in table.rows:
         try:
             if row.get("first_utc"):
                 parsed[row.line] = Epoch.parse(row["first_utc"])
         except ValueError:
-            problem = f"{shown(row['first_utc'])} is no date and time; expected 2026-03-01T12:00:00Z"
-            row.fault("first_utc", problem)
+            example = "2026-03-01T12:00:00Z"
+            row.fault("first_utc", f"{shown(row['first_utc'])} is no date and time; expected {example}")
     table.check()
     place = spacecraft.attitude
     if not parsed or place is None or place.epoch is None:
@@ -172,24 +167,23 @@ def _against_commands(row: Row, block: Block, spacecraft: Spacecraft) -> None:
     nearest_delay = min(round(block.delay / commands.delay_step) * commands.delay_step, longest)
     nearest_width = float(commands.widths[np.abs(commands.widths - block.width).argmin()])
     allowed = ", ".join(map(str, commands.every))
-    off = {
-        "delay_s": (block.delay, nearest_delay, COUNTS * commands.delay_step),
-        "width_s": (block.width, nearest_width, COUNTS * block.width),
-    }
-    for column, (given, near, slack) in off.items():
-        if abs(given - near) > slack:
-            text = f"{column} = {given:.6g} s cannot be commanded, {near:.6g} s is the nearest: flown as given"
-            row.warn(column, text)
-    if block.count > commands.max_count:
-        text = f"count = {block.count} cannot be commanded, {commands.max_count} is the most: flown as given"
-        row.warn("count", text)
-    if block.every not in commands.every:
-        row.warn("every", f"every = {block.every} cannot be commanded, only {allowed}: flown as given")
+    off = [
+        (f"{column} = {given:.6g} s", f"{near:.6g} s is the nearest")
+        for column, given, near, slack in (
+            ("delay_s", block.delay, nearest_delay, COUNTS * commands.delay_step),
+            ("width_s", block.width, nearest_width, COUNTS * block.width),
+        )
+        if abs(given - near) > slack
+    ]
+    off += [(f"count = {block.count}", f"{commands.max_count} is the most")] * (block.count > commands.max_count)
+    off += [(f"every = {block.every}", f"only {allowed}")] * (block.every not in commands.every)
+    for given, possible in off:
+        row.warn(given.split()[0], f"{given} cannot be commanded, {possible}: flown as given")
     for name, time in zip(TIMES, (block.delay, block.width), strict=True):
         counts, right = row.get(f"{name}_counts", ""), commands.counts(name, time)
         if counts and f"{name}_s" in row and counts != str(right):
-            text = f"{name}_counts = {counts} contradicts {name}_s = {time:g}, which is {right}: ignored"
-            row.warn(f"{name}_counts", text)
+            meant = f"{name}_s = {time:g}, which is {right}"
+            row.warn(f"{name}_counts", f"{name}_counts = {counts} contradicts {meant}: ignored")
 
 
 AGREES = 1e-6  # relative difference up to which columns of a schedule agree
@@ -198,20 +192,14 @@ STARTS = ("start_s", "t_s")
 
 
 def read_pulses(path: str | Path, spacecraft: Spacecraft) -> tuple[Schedule, list[str]]:
-    """A schedule from a CSV file, and warnings of contradicting columns, which are ignored, and of unknown channels.
-
-    Raises CannotRead, and FaultyFile with every fault of the file.
-    """
+    """A schedule from a CSV file, and warnings; raises CannotRead, and FaultyFile with every fault of the file."""
     return _ScheduleReader(Table(path, (*PULSES_HEADER, *EFFECTIVE, UTC), "pulses"), spacecraft).read()
 
 
 def read_plan(
     path: str | Path, spacecraft: Spacecraft, options: SchemeOptions | None = None
 ) -> tuple[Plan, tuple[str, ...]]:
-    """A schedule file as a plan of that name, and the warnings of `read_pulses` and of limits that it breaks.
-
-    ``options``: with which disturbances it was planned. Raises as `read_pulses` does.
-    """
+    """A schedule file as a plan of that name, and warnings, of broken limits too; raises as `read_pulses` does."""
     pulses, warnings = read_pulses(path, spacecraft)
     plan = Plan(spacecraft, printable(str(path)), pulses, options=options or SchemeOptions(), from_file=True)
     return plan, (*warnings, *broken_limits(spacecraft, pulses))
@@ -226,8 +214,8 @@ class _ScheduleReader:
     def read(self) -> tuple[Schedule, list[str]]:
         header = self.table.header
         if not set(STARTS) & set(header):
-            problem = f"the column is missing (or {STARTS[1]}, the centre){self.table.misspelt(STARTS[0])}"
-            self.table.fault(1, STARTS[0], problem)
+            missing = f"the column is missing (or {STARTS[1]}, the centre)"
+            self.table.fault(1, STARTS[0], missing + self.table.misspelt(STARTS[0]))
         bare = not {*TORQUE, *IMPULSE} & set(header)  # else a pulse without channel is one of the torquer
         self.table.expect("on_time_s", *["channel"] * bare)
         pulses = [(row.line, pulse) for row in self.table.rows if (pulse := self._pulse(row)) is not None]
@@ -260,10 +248,7 @@ class _ScheduleReader:
         return self._as_given(row, name, t, on_time)
 
     def _timing(self, row: Row, channel: Channel | None) -> tuple[float, float, float | None] | None:
-        """Centre and on-time, s; the start rules where there is one.
-
-        Through a valve the centre is the centroid of the thrust, and the third is the start of the command, s.
-        """
+        """Centre (of the thrust) and on-time, s, and through a valve the start of the command, s."""
         column = next((column for column in STARTS if row.get(column)), None)
         if column is None:
             row.fault(STARTS[0], "the time is missing")
@@ -274,8 +259,7 @@ class _ScheduleReader:
         if on_time < 0.0:
             least, most = (0.0, math.inf) if channel is None else (channel.min_on_time, channel.max_on_time)
             allowed = f"{least:g} s or more" if most == math.inf else f"{least:g} s to {most:g} s"
-            problem = f"{on_time:g} s is negative; {allowed} is expected (0 for an ideal impulse)"
-            row.fault("on_time_s", problem)
+            row.fault("on_time_s", f"{on_time:g} s is negative; {allowed} is expected (0 for an ideal impulse)")
             return None
         lead = None if channel is None or on_time == 0.0 else self._lead(row, channel, on_time)
         centre = 0.5 * on_time if lead is None else lead
@@ -298,13 +282,13 @@ class _ScheduleReader:
         if channel.valve is None:
             return None
         least, most = channel.valve.known
+        named, thrust = shown(channel.name), channel.valve.thrust(on_time)
         if not least <= on_time <= most:
-            problem = f"{on_time:g} s is outside the impulse_bit of {shown(channel.name)}, {least:g} s to {most:g} s"
-            row.fault("on_time_s", problem)
-        thrust = channel.valve.thrust(on_time)
+            known = f"{least:g} s to {most:g} s"
+            row.fault("on_time_s", f"{on_time:g} s is outside the impulse_bit of {named}, {known}")
         if not thrust.ramps:
-            text = f"{on_time:g} s is too short for the valve of {shown(channel.name)}: it does not open"
-            row.warn(f"closed {channel.name}", text)
+            short = f"{on_time:g} s is too short for the valve of {named}: it does not open"
+            row.warn(f"closed {channel.name}", short)
         return thrust.centroid
 
     def _expect(self, row: Row, pulse: Pulse) -> None:
@@ -316,8 +300,7 @@ class _ScheduleReader:
         length = "effective_on_time_s" if pulse.through_valve else "on_time_s"
         _compare(row, IMPULSE, impulse, f"torque of {named} × {length}, {_vector(impulse)}")
         if pulse.propellant is not None:
-            used = f"{pulse.propellant:g} by the spacecraft file"
-            _compare(row, ("propellant_kg",), [pulse.propellant], used)
+            _compare(row, ("propellant_kg",), [pulse.propellant], f"{pulse.propellant:g} by the spacecraft file")
         if pulse.through_valve:
             meant = f"what the valve of {named} makes of the command"
             for column, value in zip(EFFECTIVE, (pulse.start, pulse.on_time), strict=True):
@@ -356,15 +339,16 @@ class _ScheduleReader:
 
     def _propellant(self, row: Row, name: str, impulse: Vector, torque: Vector | None) -> float | None:
         """Propellant of a pulse that flies as the schedule has it, kg; warns of differences from the file."""
+        named = shown(name)
         if name in self.channels:
-            ideal = "has an on-time of 0: flown as an ideal impulse, its propellant is unknown"
-            row.warn(f"ideal {name}", f"{shown(name)} {ideal}")
+            ideal = f"{named} has an on-time of 0: flown as an ideal impulse, its propellant is unknown"
+            row.warn(f"ideal {name}", ideal)
             return None
         torquer = self.spacecraft.torquer
         if name != STEERABLE or torquer is None:
             known = ", ".join(map(shown, self.channels)) or STEERABLE
-            text = f"channel {shown(name)} is not in the spacecraft file ({known}): flown as given, propellant unknown"
-            row.warn(f"unknown {name}", text)
+            missing = f"channel {named} is not in the spacecraft file ({known})"
+            row.warn(f"unknown {name}", f"{missing}: flown as given, propellant unknown")
             return None
         size = 0.0 if torque is None else float(np.linalg.norm(torque))
         if torque is not None and torquer.torque is not None and abs(size - torquer.torque) > AGREES * torquer.torque:

@@ -12,13 +12,13 @@ from functools import cache
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from nutdamp.files.fields import (
-    RIGHT_ANGLE,
     AcuteAngle,
     Direction,
     Field,
     Key,
     Length,
     Name,
+    Nutation,
     Position,
     PositiveTime,
     Quantity,
@@ -41,10 +41,7 @@ ALL = ""  # name of all thrusters together, where the file gives one tolerance f
 
 
 def size_of(value: object, kind: str) -> tuple[float, bool]:
-    """The size of a tolerance of ``kind`` (a key of `units.KINDS`), SI or a fraction, and True for a fraction.
-
-    Raises ValueError with the sizes allowed.
-    """
+    """The size of a tolerance of ``kind``, SI or a fraction, and True for a fraction; raises ValueError."""
     if kind in RELATIVE and isinstance(value, str) and value.rstrip().endswith("%"):
         return parse(value, "ratio"), True
     if kind == READING:
@@ -152,10 +149,7 @@ class DispersionsSection(Section):
 def dispersions(
     section: DispersionsSection | None, thrusters: Iterable[Thruster], torquer: Steerable | None
 ) -> Dispersions | None:
-    """The tolerances of a checked file; None where it has none. A thrust in N becomes a fraction of the thruster's.
-
-    ``torquer`` is the steerable one, also where an ideal one is assumed.
-    """
+    """The tolerances of a checked file, those of thrusts as fractions; ``torquer``: also an ideal one."""
     if section is None:
         return None
     from nutdamp.spacecraft.schedule import STEERABLE
@@ -163,12 +157,10 @@ def dispersions(
     thrusts = {thruster.name: thruster.thrust for thruster in thrusters}
     if torquer is not None:
         thrusts[STEERABLE] = thrust_behind(torquer.torque, torquer.lever_arm)
-    entries: dict[str, Any] = {}
-    for key in (field.name for field in fields(Dispersions)):
+    entries: dict[str, Any] = {"correlation": tuple(map(tuple, section.correlation))}
+    for key in QUANTITIES:
         entry = getattr(section, key)
-        if key == "correlation":
-            entries[key] = tuple((first, second, size) for first, second, size in entry)
-        elif isinstance(entry, ToleranceSection):
+        if isinstance(entry, ToleranceSection):
             entries[key] = entry.tolerance(key)
         elif isinstance(entry, list | tuple):  # by axis
             entries[key] = tuple(None if part is None else part.tolerance(key) for part in entry)
@@ -195,10 +187,7 @@ class Reading(Quantity):
 
     def read(self, value: Any, inner: Callable[[Any], Any]) -> float:  # noqa: ARG002
         """SI value; raises ValueError with the values allowed."""
-        try:
-            result = parse(value, "acceleration")
-        except ValueError:
-            result = parse(value, self.kind)
+        result, _ = size_of(value, READING)
         if not self._allows(result):
             raise ValueError(f"{shown(value)} is out of range; expected at least {self.bounds['minimum']:g}")
         return result
@@ -211,7 +200,6 @@ class Reading(Quantity):
 
 Frequency = Annotated[float, Quantity("frequency", exclusiveMinimum=0)]
 Least = Annotated[float, Reading(minimum=0)]
-Threshold = Annotated[float, Quantity("angle", minimum=0, exclusiveMaximum=RIGHT_ANGLE)]
 
 
 class LoopSensorSection(Section):
@@ -262,7 +250,7 @@ class LoopSection(Section):
         default="four-pulse",
     )
     start: AcuteAngle = Field("Nutation angle from which the loop fires, rad; above stop.", "0.5 deg")
-    stop: Threshold = Field("Nutation angle down to which it fires, rad; default 0.", "0.05 deg", default=0.0)
+    stop: Nutation = Field("Nutation angle down to which it fires, rad; default 0.", "0.05 deg", default=0.0)
     settle: Time = Field("Time after a firing in which samples are not used, s; default 0.", "0.2 s", default=0.0)
     min_interval: Time = Field("Least time from firing to firing, s; default 0.", "0.5 s", default=0.0)
     predict: bool = Field(

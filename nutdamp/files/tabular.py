@@ -43,8 +43,7 @@ ATTEMPTS = 10  # temporary files that are made before giving up, where others re
 def write_whole(path: str, content: str | bytes | Callable[[IO[bytes]], object]) -> None:
     """Write ``content`` to ``path``, or leave it as it was; ``-`` is standard output. Raises CannotWrite.
 
-    Long content is a function that writes to the stream. Text becomes UTF-8; a character without a place there, such as
-    a byte of a file name that is not UTF-8, becomes \\udcff.
+    Long content is a function that writes to the stream. Text becomes UTF-8, what has no place there \\udcff.
     """
     with whole_file(path) as stream:
         if callable(content):
@@ -55,10 +54,9 @@ def write_whole(path: str, content: str | bytes | Callable[[IO[bytes]], object])
 
 @contextmanager
 def whole_file(path: str) -> Iterator[IO[bytes]]:
-    """A file to write piece by piece, which takes its place at ``path`` when the block ends well, or never.
+    """A file to write piece by piece, temporary until the block ends well; raises CannotWrite.
 
-    Until then it is a temporary file in the same folder. What is no plain file (a pipe, /dev/null, standard output
-    as ``-``) is written to directly. Raises CannotWrite.
+    What is no plain file (a pipe, /dev/null, standard output as ``-``) is written to directly.
     """
     try:
         if path == STDOUT:
@@ -80,10 +78,7 @@ def whole_file(path: str) -> Iterator[IO[bytes]]:
 
 
 def check_place(path: str) -> Path:
-    """Place of a file, behind links; checked before long work to be one that can be written to.
-
-    Raises CannotWrite where it cannot: also where links go round in a circle, or the name cannot be one.
-    """
+    """Place of a file, behind links; checked before long work: raises CannotWrite where it cannot be written to."""
     if path == STDOUT:
         return Path(path)
     try:
@@ -109,10 +104,9 @@ def make_folder(path: str) -> None:
     """Make the folder ``path`` unless it is there. Raises CannotWrite."""
     try:
         Path(path).mkdir(parents=True, exist_ok=True)
-    except FileExistsError as reason:
-        raise CannotWrite(path, "it is there, and no directory") from reason
     except (OSError, ValueError) as reason:
-        raise CannotWrite(path, _reason(reason)) from reason
+        there = "it is there, and no directory" if isinstance(reason, FileExistsError) else ""
+        raise CannotWrite(path, there or _reason(reason)) from reason
 
 
 @contextmanager
@@ -250,13 +244,11 @@ class Row(dict[str, str]):
         """The number in a cell that must have one; None for a fault."""
         text = self.get(column, "")
         try:
-            value = float(text)
+            if abs(value := float(text)) <= LARGEST:
+                return value
+            self.fault(column, f"{shown(text)} is out of range, {-LARGEST:g} to {LARGEST:g}")
         except ValueError:
             self.fault(column, f"{shown(text)} is not a number")
-            return None
-        if abs(value) <= LARGEST:
-            return value
-        self.fault(column, f"{shown(text)} is out of range, {-LARGEST:g} to {LARGEST:g}")
         return None
 
     def fault(self, column: str, problem: str) -> None:
@@ -269,11 +261,7 @@ class Row(dict[str, str]):
 
 
 class Table:
-    """The rows of one file, below its first line, which names the columns.
-
-    ``header`` (the names) and, from `expect` on, ``rows``. Raises CannotRead, and FaultyFile for a file that is no
-    table.
-    """
+    """The ``header`` of a file (names of columns) and, from `expect` on, ``rows``; raises CannotRead, FaultyFile."""
 
     def __init__(self, path: str | Path, columns: Sequence[str], what: str) -> None:
         """Table with ``columns`` that are known; ``what`` is the word for a row, for messages."""
@@ -285,23 +273,20 @@ class Table:
         try:
             rows = [(reader.line_num, row) for row in reader if row]
         except csv.Error as reason:
-            raise FaultyFile([Fault(self.name, reader.line_num, 1, "", f"not CSV: {reason}")]) from reason
+            self.fault(reader.line_num, "", f"not CSV: {reason}")
+        self.check()
         if not rows:
-            problem = f"empty; the first line names the columns: {','.join(columns)}"
-            raise FaultyFile([Fault(self.name, 1, 1, "", problem)])
-        if len(rows) > MOST_ROWS + 1:
-            raise FaultyFile([Fault(self.name, rows[-1][0], 1, "", f"more than {MOST_ROWS} {what}")])
+            self.fault(1, "", f"empty; the first line names the columns: {','.join(columns)}")
+        elif len(rows) > MOST_ROWS + 1:
+            self.fault(rows[-1][0], "", f"more than {MOST_ROWS} {what}")
+        elif len(rows[0][1]) == 1 and re.search(r"[;\t]", rows[0][1][0].strip()):
+            self.fault(1, "", "columns are separated by commas, not by semicolons or tabs")
+        self.check()
         self.header, self._lines = [entry.strip() for entry in rows[0][1]], rows[1:]
         self.rows: list[Row] = []
-        if len(self.header) == 1 and re.search(r"[;\t]", self.header[0]):
-            problem = "columns are separated by commas, not by semicolons or tabs"
-            raise FaultyFile([Fault(self.name, 1, 1, "", problem)])
 
     def expect(self, *columns: str) -> None:
-        """Read the rows; faults for those of other lengths, and ``columns`` that are missing, or that are given twice.
-
-        Raises FaultyFile with those of the columns. Warns of columns that are not known.
-        """
+        """Read the rows; warns of unknown columns, FaultyFile for ``columns`` missing or given twice."""
         for column in columns:
             if column not in self.header:
                 self.fault(1, column, f"the column is missing{self.misspelt(column)}")
@@ -318,10 +303,7 @@ class Table:
                 self.fault(line, "", f"{len(cells)} values under {len(self.header)} columns")
 
     def check(self) -> None:
-        """Raise FaultyFile with the faults so far, if there are any.
-
-        Of more than `MOST_FAULTS` in one column it has the first, and how many more there are.
-        """
+        """Raise FaultyFile with the faults so far: of a column the first `MOST_FAULTS`, and how many more."""
         kept = []
         for where in dict.fromkeys(fault.where for fault in self.faults):
             every = [fault for fault in self.faults if fault.where == where]

@@ -1,11 +1,8 @@
 """Telemetry from CSV files and attitude ephemeris messages: times, and measurements of the motion.
 
-Columns of CSV, where an empty cell is a missing sample: t_s (from t = 0 of the spacecraft file) or utc; omega_1_rad_s
-to omega_3_rad_s (or _deg_s); axis_ra_deg and axis_dec_deg, or axis_x, axis_y, axis_z; q_w, q_x, q_y, q_z;
-acceleration_m_s2; crossing_azimuth_deg and crossing_elevation_deg of what is in the direction crossing_ra_deg,
-crossing_dec_deg, or else of the Sun; sun_aspect_deg; sun_pulse, 1 from the sample on that has seen one. A track of
-``simulate --csv`` is such a file. An attitude history (AEM, version 2, in KVN) gives the quaternions, and the rates
-where it has them; the other forms of an ephemeris leave the rates open or hold for symmetric bodies alone.
+An empty cell of CSV is a missing sample; a track of ``simulate --csv`` is such a file. An attitude history (AEM,
+version 2, in KVN) gives the quaternions, and the rates where it has them; the other forms of an ephemeris leave the
+rates open or hold for symmetric bodies alone.
 """
 
 from __future__ import annotations
@@ -13,8 +10,9 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,18 +34,14 @@ from nutdamp.estimation.parameters import (
 from nutdamp.files.ccsds.message import (
     AEM_METADATA,
     BEFORE,
-    BODY,
     QUATERNION_ANGVEL,
-    SAME_AXES,
-    UNIT,
-    VERSION,
     Checked,
     Frames,
     MessageBlock,
     expect_version,
     from_kvn,
     kvn_text,
-    unit_length,
+    unit_quaternion,
 )
 from nutdamp.files.tabular import HEADER as TRACK
 from nutdamp.files.tabular import Table
@@ -61,8 +55,7 @@ AEM_VERSION = "CCSDS_AEM_VERS"  # keyword of the first line
 COLUMNS = {"QUATERNION": 4, QUATERNION_ANGVEL: 7}  # numbers in a record of each ATTITUDE_TYPE read, besides its time
 
 
-@dataclass(frozen=True, slots=True)
-class History:
+class History(NamedTuple):
     """Attitude of an object at ``times`` (n,) s after ``epoch``: ``quaternions`` (n, 4) body -> frame, scalar first.
 
     ``rates`` (n, 3) rad/s in body axes, or None where the message has none.
@@ -103,7 +96,7 @@ def read_history(path: str) -> History:
             data.append((number + 1, word))
             lines[number] = ""
     blocks, faults = from_kvn("\n".join(lines), path)
-    expect_version(path, blocks[0], AEM_VERSION, VERSION, faults)
+    expect_version(path, blocks[0], AEM_VERSION, faults)
     reader = _HistoryReader(path, faults)
     segments = [block for block in blocks[1:] if block.name in ("META", "DATA")]
     ends = [block.line for block in segments[2::2]] + [len(lines) + 1]
@@ -119,16 +112,9 @@ def read_history(path: str) -> History:
     if faults:
         raise FaultyFile(faults)
     first = reader.times[0]
+    times, turns = np.array([time.since(first) for time in reader.times]), np.array(reader.quaternions)
     rates = None if reader.rates is None else np.array(reader.rates)
-    return History(
-        reader.name,
-        first,
-        reader.frame,
-        np.array([time.since(first) for time in reader.times]),
-        np.array(reader.quaternions),
-        rates,
-        tuple(reader.remarks),
-    )
+    return History(reader.name, first, reader.frame, times, turns, rates, tuple(reader.remarks))
 
 
 class _HistoryReader(Frames):
@@ -141,20 +127,16 @@ class _HistoryReader(Frames):
         self.rates: list[Vector] | None = []
 
     def take(self, metadata: MessageBlock, rows: list[tuple[int, str]]) -> None:
-        """Read a segment."""
         block = Checked(self.path, metadata, AEM_METADATA, self.faults)
         self.name = block.text("OBJECT_NAME") or self.name
         self.take_system(block)
         forward, kind = self.endpoints(block), block.text("ATTITUDE_TYPE")
         if kind is not None and kind not in COLUMNS:
             block.fault("ATTITUDE_TYPE", f"{kind!r} is not read; expected {' or '.join(COLUMNS)}")
-        axes = block.text("ANGVEL_FRAME")
-        turning = kind == QUATERNION_ANGVEL
+        axes, turning = block.text("ANGVEL_FRAME"), kind == QUATERNION_ANGVEL
         if turning and axes is None:
             block.fault("ANGVEL_FRAME", f"missing; {QUATERNION_ANGVEL} needs the frame of the rates")
-        in_body = axes is None or BODY.fullmatch(axes) is not None
-        if turning and not in_body and SAME_AXES.get(axes or "", axes) != self.frame:
-            block.fault("ANGVEL_FRAME", f"{axes!r} is neither REF_FRAME_A nor REF_FRAME_B")
+        in_body = not turning or axes is None or self.rates_in_body(block, axes)
         if self.faults or kind is None or forward is None:
             return
         if not turning:
@@ -167,8 +149,7 @@ class _HistoryReader(Frames):
             time, numbers = Epoch.parse(cells[0], self.system), [float(cell) for cell in cells[1:]]
             if len(numbers) != columns or not all(map(math.isfinite, numbers)):
                 raise ValueError(f"expected a time and {columns} numbers")
-            if not unit_length(numbers[:4], UNIT):
-                raise ValueError(f"the quaternion has length {math.hypot(*numbers[:4]):.6g}; expected 1")
+            parts = unit_quaternion([numbers[3], *numbers[:3]])
         except ValueError as wrong:
             self.faults.append(Fault(self.path, line, 1, "DATA", str(wrong)))
             return
@@ -177,7 +158,6 @@ class _HistoryReader(Frames):
         if self.times and time < self.times[-1]:
             self.faults.append(Fault(self.path, line, 1, "DATA", "comes before the record above; put them in order"))
             return
-        parts = np.array([numbers[3], *numbers[:3]]) / math.hypot(*numbers[:4])
         quaternion = parts if forward else attitude.conjugate(parts)
         self.times.append(time)
         self.quaternions.append(quaternion)
@@ -187,10 +167,7 @@ class _HistoryReader(Frames):
 
 
 def record_of(history: History, spacecraft: Spacecraft, schedule: Schedule) -> Record:
-    """Telemetry of a history for the fit of a spacecraft: the attitude, and the rates if given.
-
-    Times count from attitude.epoch of the file; raises BadRequest where it has none.
-    """
+    """Telemetry of a history, from attitude.epoch of the file on; raises BadRequest where it has none."""
     given = spacecraft.attitude
     if given is None or given.epoch is None:
         raise BadRequest("the spacecraft file has no attitude.epoch to count the times of a history from")
@@ -211,7 +188,7 @@ CROSSED = ("crossing_azimuth_deg", "crossing_elevation_deg")
 TOWARDS = ("crossing_ra_deg", "crossing_dec_deg")
 ACCELERATIONS, ASPECTS = "acceleration_m_s2", "sun_aspect_deg"
 MEASURED = (*RATES, *ANGLES, *AXIS, *QUATERNION, ACCELERATIONS, *CROSSED, *TOWARDS, ASPECTS, SUN_PULSE)
-"""Columns of samples."""
+"""Columns of samples: crossings are of what is TOWARDS, else of the Sun; SUN_PULSE is 1 from one seen on."""
 
 LIMITS = {ANGLES[0]: (-360.0, 360.0), ANGLES[1]: (-90.0, 90.0), CROSSED[0]: (-360.0, 360.0), CROSSED[1]: (-90.0, 90.0),
           TOWARDS[0]: (-360.0, 360.0), TOWARDS[1]: (-90.0, 90.0), ASPECTS: (0.0, 180.0)}  # fmt: skip
@@ -227,10 +204,7 @@ SAME = 0.03  # part by which a ratio of rates may differ from that of two units
 def read_telemetry(
     path: str | Path, spacecraft: Spacecraft, sun_pulses: str | Path | None = None, schedule: Schedule | None = None
 ) -> tuple[Record, list[str]]:
-    """The record in a CSV file, and warnings; ``sun_pulses``: a file of the times of Sun pulses besides.
-
-    Raises CannotRead, and FaultyFile with every fault of the first file that has one.
-    """
+    """The record in a file, with ``sun_pulses`` of another, and warnings; raises CannotRead and FaultyFile."""
     if is_history(str(path)):
         history = read_history(str(path))
         record = record_of(history, spacecraft, schedule or Schedule())
@@ -320,7 +294,7 @@ def _expect_whole(table: Table, columns: Mapping[str, Vector], spacecraft: Space
 
 
 def _expect_time(table: Table) -> None:
-    there = [name for name in TIMES if name in table.header]
+    there = {*TIMES} & {*table.header}
     if not there:
         table.fault(1, TIMES[0], f"the column is missing (or {TIMES[1]}){table.misspelt(TIMES[0])}")
     if len(there) == 2:
@@ -351,21 +325,15 @@ def _expect_columns(table: Table) -> None:
 
 
 def _instead(name: str) -> str:
-    lowered = name.lower()
-    rates = ["omega_1_rad_s … omega_3_rad_s or omega_1_deg_s … omega_3_deg_s"]
-    for word, columns in (
-        ("omega", rates),
-        ("rate", rates),
-        ("gyro", rates),
+    kinds: tuple[tuple[str | tuple[str, ...], Sequence[str]], ...] = (
+        (("omega", "rate", "gyro"), ["omega_1_rad_s … omega_3_rad_s or omega_1_deg_s … omega_3_deg_s"]),
         ("accel", [ACCELERATIONS]),
         ("sun", [SUN_PULSE, ASPECTS]),
         ("cross", [*CROSSED, *TOWARDS]),
-        ("q", list(QUATERNION)),
+        ("q", QUATERNION),
         ("", [*ANGLES, *AXIS]),
-    ):
-        if lowered.startswith(word):
-            return f"; expected {', '.join(columns)}"
-    return ""
+    )
+    return next(f"; expected {', '.join(columns)}" for words, columns in kinds if name.lower().startswith(words))
 
 
 def _times(table: Table, spacecraft: Spacecraft) -> Vector:
@@ -373,30 +341,24 @@ def _times(table: Table, spacecraft: Spacecraft) -> Vector:
     column = TIMES[0] if TIMES[0] in table.header else TIMES[1]
     if not table.rows:
         table.fault(1, "", "no rows of samples below the names of the columns")
-    epoch = None
-    if column == TIMES[1]:
-        given = None if spacecraft.attitude is None else spacecraft.attitude.epoch
-        if given is None:
-            table.fault(1, column, "the spacecraft file has no attitude.epoch to count from; expected the column t_s")
-        else:
-            epoch = Epoch.parse(given)
+    given = None if spacecraft.attitude is None else spacecraft.attitude.epoch
+    if column == TIMES[1] and given is None:
+        table.fault(1, column, "the spacecraft file has no attitude.epoch to count from; expected the column t_s")
     table.check()
-    times = np.full(len(table.rows), math.nan)
-    latest = -math.inf
-    for index, row in enumerate(table.rows):
+    epoch = Epoch.parse(given) if column == TIMES[1] and given is not None else None
+    times: list[float] = []
+    for row in table.rows:
         try:
             time = row.number(column) if epoch is None else Epoch.parse(row[column]).since(epoch)
         except ValueError as wrong:
             row.fault(column, str(wrong))
             continue
-        if time is None:
-            continue
-        if time <= latest:
-            text = f"{row[column]} does not rise: the sample before is at {latest:.9g} s"
+        if time is not None and times and time <= times[-1]:
+            text = f"{row[column]} does not rise: the sample before is at {times[-1]:.9g} s"
             row.fault(column, text + (JUMPS if TRACK[-1] in table.header else ""))
-        times[index] = latest = time
+        times += [] if time is None else [time]
     table.check()
-    return times
+    return np.array(times)
 
 
 def _column(table: Table, name: str) -> Vector:
@@ -451,18 +413,15 @@ def _expect_unit(table: Table, signals: Mapping[str, Vector], spin: float) -> No
     column = next(entry for entry in table.header if RATES.get(entry, ("",))[0] == name)
     ratio = abs(float(np.nanmedian(signals[name])) / spin)
     turned, per_minute = 180.0 / math.pi, 30.0 / math.pi
-    in_radians = RATES[column][1] == 1.0
-    of_values, of_file = "are the values of this column", "is the spin of the file"
-    for size, where, unit in (
-        (turned if in_radians else 1.0 / turned, of_values, "deg/s" if in_radians else "rad/s"),
-        (per_minute if in_radians else 1.0 / 6.0, of_values, "rpm"),
-        (1.0 / turned, of_file, "deg/s"),
-        (1.0 / per_minute, of_file, "rpm"),
-    ):
-        if abs(ratio / size - 1.0) < SAME:
-            seen = f"its median is {ratio:.3g} times the spin of the spacecraft file ({spin:.4g} rad/s)"
-            table.fault(1, column, f"{seen}: {where} in {unit}?")
-            return
+    of_values = ((turned, "deg/s"), (per_minute, "rpm"))
+    if RATES[column][1] != 1.0:
+        of_values = ((1.0 / turned, "rad/s"), (1.0 / 6.0, "rpm"))
+    meant = [(size, f"are the values of this column in {unit}") for size, unit in of_values]
+    meant += [(1.0 / turned, "is the spin of the file in deg/s"), (1.0 / per_minute, "is the spin of the file in rpm")]
+    words = next((words for size, words in meant if abs(ratio / size - 1.0) < SAME), None)
+    if words is not None:
+        seen = f"its median is {ratio:.3g} times the spin of the spacecraft file ({spin:.4g} rad/s)"
+        table.fault(1, column, f"{seen}: {words}?")
 
 
 def _sun_column(table: Table, times: Vector, values: Vector | None) -> tuple[Vector, float]:

@@ -18,17 +18,15 @@ from nutdamp.units import bar, shown
 
 
 def _thruster(facts: Facts, path: KeyPath) -> Iterator[Finding]:
-    needed = ("position", "direction", "force")
+    needed, torque_path = ("position", "direction", "force"), (*path, "torque")
     mounting = [key for key in needed if facts.has(*path, key)]
-    given = " and ".join(mounting)
-    if facts.has(*path, "torque"):
-        if mounting:
-            problem = f"given together with {given}; keep either torque, or position, direction and force"
-            yield Finding((*path, "torque"), problem, True)
-    elif not mounting:
-        yield Finding((*path, "torque"), "missing; give torque, or position, direction and force")
-    else:
-        for key in (key for key in needed if key not in mounting):
+    given, either = " and ".join(mounting), "torque, or position, direction and force"
+    if mounting and facts.has(*torque_path):
+        yield Finding(torque_path, f"given together with {given}; keep either {either}", True)
+    elif not mounting and not facts.has(*torque_path):
+        yield Finding(torque_path, f"missing; give {either}")
+    for key in needed if mounting and not facts.has(*torque_path) else ():
+        if key not in mounting:
             yield Finding((*path, key), f"missing; {given} alone cannot give a torque")
     if mounting and facts.has(*path, "lever_arm"):
         yield Finding((*path, "lever_arm"), "goes with torque only; leave it out, position gives the arm", True)
@@ -36,11 +34,11 @@ def _thruster(facts: Facts, path: KeyPath) -> Iterator[Finding]:
     if direction is not None and norm(direction) < SMALLEST:
         yield Finding((*path, "direction"), "zero; expected a direction, such as [1, 0, 0]")
     elif (torque := torque_of(facts, path)) is not None and norm(torque[0]) <= max(SMALLEST, CANCELLED * torque[1]):
-        if facts.has(*path, "torque"):
-            yield Finding((*path, "torque"), "zero; expected at least one component other than 0")
+        if facts.has(*torque_path):
+            yield Finding(torque_path, "zero; expected at least one component other than 0")
         else:
-            problem = "no torque: the force passes through the centre of mass; move or turn the thruster"
-            yield Finding((*path, "position"), problem)
+            cure = "the force passes through the centre of mass; move or turn the thruster"
+            yield Finding((*path, "position"), f"no torque: {cure}")
     least, most = on_times_of(facts, path)
     if least > most:
         yield Finding((*path, "min_on_time"), f"{least:g} s exceeds max_on_time; expected at most {most:g} s")
@@ -68,22 +66,20 @@ def on_times_of(facts: Facts, path: KeyPath) -> tuple[float, float]:
 
 
 def _channels(facts: Facts) -> Iterator[Finding]:
-    indices = {facts.text("thrusters", index, "name"): index for index, _ in facts.children("thrusters")}
-    names = [name for name in indices if name is not None]
-    for channel, node in facts.children("channels"):
-        path = ("channels", channel)
+    paths = {facts.text(*path, "name"): path for path in facts.below("thrusters")}
+    names = [name for name in paths if name is not None]
+    for path in facts.below("channels"):
         members: set[KeyPath] = set()
-        for index, entry in node.children():
-            name = entry.value
-            if not isinstance(name, str):
-                pass  # reported already
-            elif name not in indices:
-                yield Finding((*path, index), f"no thruster is called {shown(name)}; {instead(name, names)}")
-            elif (member := ("thrusters", indices[name])) in members:
-                yield Finding((*path, index), f"{shown(name)} is listed twice in this channel; expected once")
-            else:
-                members.add(member)
-        if members and len(members) == len(list(node.children())):
+        entries = facts.below(*path)
+        for entry in entries:
+            name = facts.text(*entry)
+            if name is not None and name not in paths:
+                yield Finding(entry, f"no thruster is called {shown(name)}; {instead(name, names)}")
+            elif name is not None and paths[name] in members:
+                yield Finding(entry, f"{shown(name)} is listed twice in this channel; expected once")
+            elif name is not None:
+                members.add(paths[name])
+        if members and len(members) == len(entries):
             times = [on_times_of(facts, member) for member in members]
             least, most = max(shortest for shortest, _ in times), min(longest for _, longest in times)
             if least > most and all(shortest <= longest for shortest, longest in times):
@@ -103,10 +99,8 @@ def instead(name: str, names: list[str]) -> str:
 def thrusts(facts: Facts) -> dict[str, float | None]:
     """The thrust in N of each thruster of the file and its torquer; None where it is not known."""
     forces: dict[str, float | None] = {}
-    for index, _ in facts.children("thrusters"):
-        path: KeyPath = ("thrusters", index)
-        name = facts.text(*path, "name")
-        if name is not None:
+    for path in facts.below("thrusters"):
+        if (name := facts.text(*path, "name")) is not None:
             torque = facts.vector("torque", 3, *path, "torque")
             size = None if torque is None else float(np.linalg.norm(torque))
             lever = facts.number("length", *path, "lever_arm") or None
@@ -120,7 +114,7 @@ def thrusts(facts: Facts) -> dict[str, float | None]:
 def thrust_findings(root: Node) -> Iterator[Finding]:
     """All faults of thrusters, channels, ``valve``, ``impulse_bit``, ``cold`` and ``tank``."""
     facts = Facts(root)
-    thrusters = [("thrusters", index) for index, _ in facts.children("thrusters")]
+    thrusters = facts.below("thrusters")
     for path in thrusters:
         if facts.is_mapping(*path):
             yield from _thruster(facts, path)
@@ -134,9 +128,8 @@ def thrust_findings(root: Node) -> Iterator[Finding]:
             yield Finding((*path, "impulse_bit"), "given together with valve; keep one of the two", True)
         valve = _valve_path(facts, path)
         if valve is not None:
-            for finding in _opens(facts, path, valve):
-                if finding.path not in reported:
-                    yield finding
+            for finding in (each for each in _opens(facts, path, valve) if each.path not in reported):
+                yield finding
                 reported.add(finding.path)
         elif facts.has(*path, "impulse_bit"):
             yield from _table(facts, path, named.get(facts.text(*path, "name") or ""))
@@ -154,19 +147,17 @@ def _valve_path(facts: Facts, path: KeyPath) -> KeyPath | None:
 
 def _opens(facts: Facts, path: KeyPath, valve: KeyPath) -> Iterator[Finding]:
     opened, closed = (facts.number("time", *valve, key) or 0.0 for key in VALVE_TIMES[:2])
-    longest = facts.number("time", *path, "max_on_time")
-    if facts.text(*valve, "on_time_is") != "effective" and longest is not None and longest + closed <= opened:
-        name, least = facts.text(*path, "name") or "a thruster", f"{longest + closed:g} s"
-        problem = f"{opened:g} s is not less than max_on_time + close_delay = {least} of {name}: its valve closes"
+    longest = on_times_of(facts, path)[1] + closed
+    if facts.text(*valve, "on_time_is") != "effective" and longest <= opened:
+        name = facts.text(*path, "name") or "a thruster"
+        problem = f"{opened:g} s is not less than max_on_time + close_delay = {longest:g} s of {name}: its valve closes"
         yield Finding((*valve, "open_delay"), f"{problem} before it opens, and no command gives thrust")
 
 
 def _table(facts: Facts, path: KeyPath, thrust: float | None) -> Iterator[Finding]:
     table: KeyPath = (*path, "impulse_bit")
-    rows = [
-        [facts.number(kind, *table, row, column) for column, kind in enumerate(("time", "impulse", "time"))]
-        for row, _ in facts.children(*table)
-    ]
+    kinds = ("time", "impulse", "time")
+    rows = [[facts.number(kind, *row, column) for column, kind in enumerate(kinds)] for row in facts.below(*table)]
     rising = "expected rows with rising on-times and impulses"
     columns = (
         ("on-time", "s", "not above", rising),
@@ -180,18 +171,19 @@ def _table(facts: Facts, path: KeyPath, thrust: float | None) -> Iterator[Findin
                 problem = f"{what} {value:g} {unit} is {wrong} that of the row before, {last:g} {unit}; {cure}"
                 yield Finding((*table, number, column), problem)
     if thrust is None:
-        if facts.has(*path, "force") or facts.has(*path, "lever_arm"):
-            return  # what cannot be read is reported already
-        yield Finding(table, "needs the thrust; give lever_arm", True)
+        if not facts.has(*path, "force") and not facts.has(*path, "lever_arm"):  # else it is reported already
+            yield Finding(table, "needs the thrust; give lever_arm", True)
         return
     for number, (on_time, impulse, centroid) in enumerate(rows):
         if on_time is None or impulse is None or centroid is None:
             continue
         lasts = impulse / thrust
         if centroid < 0.5 * lasts:
-            problem = f"{centroid:g} s is too early: {impulse:g} N s take {lasts:g} s at {thrust:g} N, so that the"
-            cure = f"expected at least {0.5 * lasts:g} s"
-            yield Finding((*table, number, 2), f"{problem} thrust would begin before the command; {cure}")
+            problem = (
+                f"{centroid:g} s is too early: {impulse:g} N s take {lasts:g} s at {thrust:g} N, so that the thrust"
+            )
+            cure = f"would begin before the command; expected at least {0.5 * lasts:g} s"
+            yield Finding((*table, number, 2), f"{problem} {cure}")
     first, last = (rows[0][0], rows[-1][0]) if rows else (None, None)
     least, most = (facts.number("time", *path, key) for key in ("min_on_time", "max_on_time"))
     if last is not None and least is not None and least >= last:
@@ -202,8 +194,8 @@ def _table(facts: Facts, path: KeyPath, thrust: float | None) -> Iterator[Findin
 
 def _alike(facts: Facts, named: dict[str, float | None]) -> Iterator[Finding]:
     """Thrusters of one channel that make different pulses of a command; ``named`` are their thrusts, N."""
-    entries = {facts.text("thrusters", index, "name"): index for index, _ in facts.children("thrusters")}
-    kinds = {name: _kind(facts, index, named.get(name or "")) for name, index in entries.items()}
+    entries = {facts.text(*path, "name"): path for path in facts.below("thrusters")}
+    kinds = {name: _kind(facts, path, named.get(name or "")) for name, path in entries.items()}
     for channel, node in facts.children("channels"):
         listed = [entry.value for _, entry in node.children() if isinstance(entry.value, str)]
         members = [name for name in listed if name in kinds]
@@ -232,13 +224,12 @@ def _tank(facts: Facts, named: dict[str, float | None]) -> Iterator[Finding]:
         yield Finding(("tank", "isp"), problem)
     if propellant is not None and facts.has("tank", "inertia_per_kg"):
         yield from _emptied(facts, propellant)
-    for index, _ in facts.children("thrusters"):
-        name = facts.text("thrusters", index, "name") or ""
-        problem = "missing; tank needs to know the propellant that is used"
-        if not facts.has("tank", "isp") and not facts.has("thrusters", index, "isp"):
-            yield Finding(("thrusters", index, "isp"), f"{problem}, by isp here or in tank")
-        if named.get(name, 0.0) is None and not facts.has("thrusters", index, "force"):
-            yield Finding(("thrusters", index, "lever_arm"), f"{problem}, and so the thrust")
+    problem = "missing; tank needs to know the propellant that is used"
+    for path in facts.below("thrusters"):
+        if not facts.has("tank", "isp") and not facts.has(*path, "isp"):
+            yield Finding((*path, "isp"), f"{problem}, by isp here or in tank")
+        if named.get(facts.text(*path, "name") or "", 0.0) is None and not facts.has(*path, "force"):
+            yield Finding((*path, "lever_arm"), f"{problem}, and so the thrust")
 
 
 def _emptied(facts: Facts, propellant: float) -> Iterator[Finding]:
@@ -255,8 +246,8 @@ def _emptied(facts: Facts, propellant: float) -> Iterator[Finding]:
     leaves = f"leaves {', '.join(f'{moment:.4g}' for moment in empty)} kg m^2 once {propellant:g} kg are used"
     least, middle, largest = np.sort(empty).tolist()
     if least <= 0.0:
-        worst = int(np.argmax(rows / moments))
-        most = f"expected less than {moments[worst] / propellant:.4g} kg m^2/kg of the moment {moments[worst]:g} kg m^2"
+        worst = moments[np.argmax(rows / moments)]
+        most = f"expected less than {worst / propellant:.4g} kg m^2/kg of the moment {worst:g} kg m^2"
         yield Finding(path, f"{leaves}, all must be above 0; {most}")
     elif empty[2] == middle and least < middle < largest:
         problem = "the moment about axis 3 is the middle one, about which a spin is unstable"
@@ -266,16 +257,15 @@ def _emptied(facts: Facts, propellant: float) -> Iterator[Finding]:
         yield Finding(path, f"{leaves}: {problem}; expected less off the smaller ones, or more off it")
 
 
-def _kind(facts: Facts, index: str | int, thrust: float | None) -> tuple[float | str | None, ...]:
+def _kind(facts: Facts, path: KeyPath, thrust: float | None) -> tuple[float | str | None, ...]:
     """Effect of a command on a thruster of ``thrust`` N, to be compared."""
-    path: KeyPath = ("thrusters", index)
     valve = _valve_path(facts, path)
     if valve is not None:
         times = tuple(facts.number("time", *valve, key) or 0.0 for key in VALVE_TIMES)
         return (*times, facts.text(*valve, "on_time_is") or "command")
     cells: list[float | str | None] = []
-    for row, _ in facts.children(*path, "impulse_bit"):
-        impulse = facts.number("impulse", *path, "impulse_bit", row, 1)
-        cells += [facts.number("time", *path, "impulse_bit", row, column) for column in (0, 2)]
+    for row in facts.below(*path, "impulse_bit"):
+        impulse = facts.number("impulse", *row, 1)
+        cells += [facts.number("time", *row, column) for column in (0, 2)]
         cells.append(None if impulse is None else round(impulse / (thrust or math.inf), 12))
     return tuple(cells) if cells else (*(0.0,) * len(VALVE_TIMES), "command")

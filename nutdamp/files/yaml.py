@@ -34,22 +34,16 @@ def read_bytes(path: str, most: int = -1) -> bytes:
             if sys.stdin is None:
                 raise CannotRead(path, "there is no standard input")
             return sys.stdin.buffer.read(most)
-        if _is_device(Path(path)):
-            raise CannotRead(path, "it is a device; expected a file, a pipe or -")
+        mode, problem = Path(path).stat().st_mode, "it is a device; expected a file, a pipe or -"
+        if stat.S_ISBLK(mode) or stat.S_ISSOCK(mode):
+            raise CannotRead(path, problem)
         with Path(path).open("rb") as stream:
+            if stat.S_ISCHR(mode) and not stream.isatty():  # reading may never end
+                raise CannotRead(path, problem)
             return stream.read(most)
     except (OSError, ValueError) as error:  # ValueError: a NUL in the name
         reason = getattr(error, "strerror", None) or str(error)
         raise CannotRead(path, reason.lower()) from error
-
-
-def _is_device(path: Path) -> bool:
-    """True where reading may never end, or have effects: a device that is no terminal, or a socket."""
-    mode = path.stat().st_mode
-    if stat.S_ISCHR(mode):
-        with path.open("rb") as stream:
-            return not stream.isatty()
-    return stat.S_ISBLK(mode) or stat.S_ISSOCK(mode)
 
 
 def read_limited(path: str, most: int) -> bytes:
@@ -74,10 +68,7 @@ MAX_DEPTH = 32
 
 
 class Place(NamedTuple):
-    """Line and column of a value, both from 1; 0 where there are none.
-
-    A value set beside the file has its name in messages in ``setting``.
-    """
+    """Line and column of a value, both from 1, 0 where there are none; or the name of a ``setting`` beside the file."""
 
     line: int = 0
     column: int = 0
@@ -185,10 +176,7 @@ def decode(data: bytes, name: str) -> str:
 
 
 def read_tree(text: str, name: str) -> tuple[Node, list[Fault]]:
-    """The mapping in a YAML text, and the faults that leave it readable (duplicate keys: the first one counts).
-
-    Raises `FaultyFile` where it is not one document with one mapping, of core values only, of sensible size.
-    """
+    """The mapping in a YAML text, and faults that leave it readable; raises `FaultyFile` for other texts."""
     builder = _Builder(text.removeprefix("\ufeff"), name)
     root = builder.document("a spacecraft file is a mapping with name, inertia, …", "one file holds one spacecraft")
     if not isinstance(root.value, dict):
@@ -198,10 +186,7 @@ def read_tree(text: str, name: str) -> tuple[Node, list[Fault]]:
 
 
 def read_value(text: str, name: str) -> tuple[Node, list[Fault]]:
-    """Any one value in a YAML text, such as ``8 deg`` or ``[[10 s, 20 s]]``, and its faults, as `read_tree` gives them.
-
-    Raises `FaultyFile` where it is not one value.
-    """
+    """Any one value in a YAML text, and its faults; raises as `read_tree` does."""
     builder = _Builder(text, name)
     return builder.document("expected a value", "expected one value"), builder.faults
 
@@ -239,7 +224,6 @@ class _Builder:
         return FaultyFile([*self.faults, place.fault(self.name, dotted(path), problem)])
 
     def next(self) -> yaml.Event:
-        """The next event; raises `FaultyFile` where the text is not YAML."""
         try:
             event: yaml.Event = self.events.get_event()  # type: ignore[no-untyped-call]
         except yaml.MarkedYAMLError as error:
@@ -260,12 +244,11 @@ class _Builder:
         self.next()
         event = self.next()
         if not isinstance(event, yaml.StreamEndEvent):
-            raise self.fatal(_start(event), f"a second document begins; {single}")
+            raise self.fatal(_at(event.start_mark), f"a second document begins; {single}")
         return root
 
     def node(self, event: yaml.Event, path: KeyPath) -> Node:
-        """The value that ``event`` begins."""
-        place = _start(event)
+        place = _at(event.start_mark)
         if isinstance(event, yaml.AliasEvent):
             node = self.alias(event, path)
             self.count(node.size, place, path)
@@ -293,30 +276,28 @@ class _Builder:
             raise self.fatal(place, f"more than {MAX_NODES} values (aliases unfolded)", path[:1])
 
     def alias(self, event: yaml.AliasEvent, path: KeyPath) -> Node:
-        """The value that an alias refers to."""
         name = str(event.anchor)
         node = self.anchors.get(name)
         if node is not None:
             return node
         problem = "lies inside the value it repeats" if name in self.anchors else f"has no anchor &{name} above it"
-        raise self.fatal(_start(event), f"alias {shown('*' + name)} {problem}", path)
+        raise self.fatal(_at(event.start_mark), f"alias {shown('*' + name)} {problem}", path)
 
     def sequence(self, event: yaml.SequenceStartEvent, path: KeyPath) -> Node:
-        """A list, up to its end event."""
-        self.check_tag(event.tag, ("seq",), _start(event), path)
+        self.check_tag(event.tag, ("seq",), _at(event.start_mark), path)
         entries: list[Node] = []
         while not isinstance(entry := self.next(), yaml.SequenceEndEvent):
             entries.append(self.node(entry, (*path, len(entries))))
-        return Node(entries, _start(event), size=1 + sum(entry.size for entry in entries))
+        return Node(entries, _at(event.start_mark), size=1 + sum(entry.size for entry in entries))
 
     def mapping(self, event: yaml.Event, path: KeyPath) -> Node:
         """A mapping, up to its end event; a key that comes again is reported and its value dropped."""
         assert isinstance(event, yaml.MappingStartEvent)
-        self.check_tag(event.tag, ("map",), _start(event), path)
+        self.check_tag(event.tag, ("map",), _at(event.start_mark), path)
         values: dict[str, Node] = {}
         keys: dict[str, Place] = {}
         while not isinstance(key := self.next(), yaml.MappingEndEvent):
-            place = _start(key)
+            place = _at(key.start_mark)
             if not isinstance(key, yaml.ScalarEvent):
                 raise self.fatal(place, "a key must be a plain text", path)
             text = self.characters(key.value, place, path)
@@ -329,11 +310,11 @@ class _Builder:
                 self.faults.append(place.fault(self.name, dotted((*path, text)), problem))
             else:
                 values[text], keys[text] = value, place
-        return Node(values, _start(event), keys, 1 + sum(node.size for node in values.values()))
+        return Node(values, _at(event.start_mark), keys, 1 + sum(node.size for node in values.values()))
 
     def scalar(self, event: yaml.ScalarEvent, path: KeyPath) -> Scalar:
         """Text, number, boolean or None: a plain scalar by the core schema, unless a core tag overrides it."""
-        place = _start(event)
+        place = _at(event.start_mark)
         text = self.characters(event.value, place, path)
         if event.tag is None:
             return text if event.style else resolve(text)
@@ -417,14 +398,10 @@ def _syntax_fault(error: yaml.MarkedYAMLError) -> tuple[Place, str]:
     """Place and wording of a syntax error: own words for the frequent slips, PyYAML's for the rest."""
     problem = " ".join(str(error.problem).split())
     _, cure, at_beginning = next((slip for slip in _SYNTAX if re.search(slip[0], problem)), ("", problem, False))
-    return _mark_place(error.context_mark if at_beginning else error.problem_mark), f"not YAML: {cure}"
+    return _at(error.context_mark if at_beginning else error.problem_mark), f"not YAML: {cure}"
 
 
-def _start(event: yaml.Event) -> Place:
-    return _mark_place(event.start_mark)
-
-
-def _mark_place(mark: Any) -> Place:
+def _at(mark: Any) -> Place:
     """Place of a mark, which PyYAML counts from 0; (0, 0) where it gave none."""
     return Place() if mark is None else Place(mark.line + 1, mark.column + 1)
 

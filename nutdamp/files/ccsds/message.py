@@ -10,17 +10,19 @@ from __future__ import annotations
 import math
 import re
 import unicodedata
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Sequence
 from decimal import Decimal
 from itertools import groupby
 from typing import NamedTuple
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
+import numpy as np
+
 from nutdamp.common.time import UNIFORM, Epoch
 from nutdamp.errors import Fault, FaultyFile, listed, nearest
 from nutdamp.files.export import FRAMES
 from nutdamp.files.yaml import read_limited, utf8_text
+from nutdamp.spacecraft.model import Vector
 
 VERSION = "2.0"  # of APM and AEM in issue 2 of their standard; version 1 has other keywords
 
@@ -103,8 +105,7 @@ APM_BLOCKS: dict[str, Layout] = {
         ),
     ),
     "INERTIA": Layout(
-        "inertia",
-        (*_text("INERTIA_REF_FRAME"), *_numbers("IXX", "IYY", "IZZ", "IXY", "IXZ", "IYZ", unit="kg*m**2")),
+        "inertia", (*_text("INERTIA_REF_FRAME"), *_numbers("IXX", "IYY", "IZZ", "IXY", "IXZ", "IYZ", unit="kg*m**2"))
     ),
     "MAN": Layout(
         "maneuverParameters",
@@ -178,8 +179,7 @@ class MessageEntry(NamedTuple):
     line: int = 0
 
 
-@dataclass(frozen=True, slots=True)
-class MessageBlock:
+class MessageBlock(NamedTuple):
     """Keywords that belong together; ``name`` is that of the layout, empty outside of blocks."""
 
     name: str
@@ -188,8 +188,7 @@ class MessageBlock:
     line: int = 0
 
 
-@dataclass(frozen=True, slots=True)
-class Segment:
+class Segment(NamedTuple):
     """Metadata and the data that they describe: blocks (APM), or records of the layout ``record`` (AEM)."""
 
     metadata: MessageBlock
@@ -198,8 +197,7 @@ class Segment:
     record: Layout | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class Message:
+class Message(NamedTuple):
     """A whole message; ``kind`` is APM, AEM or OPM."""
 
     kind: str
@@ -257,8 +255,8 @@ SCHEMA_INSTANCE = "http://www.w3.org/2001/XMLSchema-instance"
 def to_xml(message: Message) -> str:
     """The text of a message."""
     # Namespace and attributes are written as the standard prints them.
-    root = Element(message.kind.lower(), {"xmlns:xsi": SCHEMA_INSTANCE, "id": f"CCSDS_{message.kind}_VERS"})
-    root.set("version", VERSION_OF[message.kind])
+    versioned = {"id": f"CCSDS_{message.kind}_VERS", "version": VERSION_OF[message.kind]}
+    root = Element(message.kind.lower(), {"xmlns:xsi": SCHEMA_INSTANCE, **versioned})
     _fill(SubElement(root, "header"), message.header)
     body = SubElement(root, "body")
     for segment in message.segments:
@@ -272,8 +270,8 @@ def to_xml(message: Message) -> str:
             assert segment.record is not None
             tag, rows = segment.record
             entries = (MessageEntry(row.name, value, row.unit) for row, value in zip(rows, record, strict=True))
-            state = SubElement(SubElement(data, "attitudeState"), tag)
-            _fill(state, MessageBlock("", tuple(entries)), segment.record)
+            place = SubElement(SubElement(data, "attitudeState"), tag)
+            _fill(place, MessageBlock("", tuple(entries)), segment.record)
     indent(root)
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{tostring(root, encoding="unicode")}\n'
 
@@ -311,18 +309,12 @@ def _block(block: MessageBlock) -> list[str]:
     width = max((len(entry.keyword) for entry in block.entries), default=0)
     return [
         *(f"COMMENT {comment}" for comment in block.comments),
-        *(
-            f"{entry.keyword:<{width}} = {entry.value}" + (f" [{entry.unit}]" if entry.unit else "")
-            for entry in block.entries
-        ),
+        *(f"{word:<{width}} = {value}" + (f" [{unit}]" if unit else "") for word, value, unit, _ in block.entries),
     ]
 
 
 def from_kvn(text: str, name: str) -> tuple[list[MessageBlock], list[Fault]]:
-    """The blocks of an APM, the first for keywords outside of blocks, and the faults of notation.
-
-    Lines count from 1; ``name`` is that of the file in faults.
-    """
+    """The blocks of the file ``name``, the first for keywords outside of blocks, and the faults of notation."""
     begun: list[tuple[str, int, list[MessageEntry]]] = [("", 1, [])]
     faults: list[Fault] = []
     within: str | None = None
@@ -370,16 +362,16 @@ def kvn_text(path: str) -> str:
     return utf8_text(data, path)
 
 
-def expect_version(path: str, outside: MessageBlock, keyword: str, version: str, faults: list[Fault]) -> None:
+def expect_version(path: str, outside: MessageBlock, keyword: str, faults: list[Fault]) -> None:
     """Raise FaultyFile for another message, or another version of it, which makes no sense by these tables."""
     first = outside.entries[0] if outside.entries else None
     if first is None or not VERSIONS.fullmatch(first.keyword):
         kind = keyword.split("_")[1]
-        raise FaultyFile([*faults, Fault(path, 1, 1, "", f"not an {kind}: its first line is {keyword} = {version}")])
+        raise FaultyFile([*faults, Fault(path, 1, 1, "", f"not an {kind}: its first line is {keyword} = {VERSION}")])
     if first.keyword != keyword:
         raise FaultyFile([Fault(path, first.line, 1, first.keyword, f"another message; expected {keyword}")])
-    if first.value != version:
-        problem = f"version {first.value!r} is not read, its keywords are others; expected version {version}"
+    if first.value != VERSION:
+        problem = f"version {first.value!r} is not read, its keywords are others; expected version {VERSION}"
         raise FaultyFile([Fault(path, first.line, 1, keyword, problem)])
 
 
@@ -438,9 +430,7 @@ class Checked:
     def number(self, keyword: str) -> float | None:
         """The value as a number."""
         text = self.text(keyword)
-        if text is None or not _NUMBER.fullmatch(text) or not abs(float(text)) <= LARGEST:
-            return None
-        return float(text)
+        return float(text) if text and _NUMBER.fullmatch(text) and abs(float(text)) <= LARGEST else None
 
     def numbers(self, *keywords: str) -> list[float] | None:
         """Several numbers; None where one cannot be read."""
@@ -450,31 +440,32 @@ class Checked:
     def epoch(self, keyword: str, system: str) -> Epoch | None:
         """The value as a moment of a time system, see `Epoch.parse`."""
         text = self.text(keyword)
-        if text is None:
-            return None
         try:
-            return Epoch.parse(text, system)
+            return None if text is None else Epoch.parse(text, system)
         except ValueError as wrong:
             self.fault(keyword, str(wrong))
             return None
 
-    def has(self, keywords: Iterable[str]) -> bool:
+    def has(self, keywords: Sequence[str]) -> bool:
         """True where all of ``keywords`` are here; some without the others is a fault."""
-        expected = list(keywords)
-        there = [keyword for keyword in expected if keyword in self.entries]
-        if there and len(there) < len(expected):
-            absent = next(keyword for keyword in expected if keyword not in there)
-            self.fault(there[0], f"given without {absent}; {', '.join(expected)} go together")
-            return False
-        return bool(there)
-
-
-def unit_length(parts: list[float], tolerance: float) -> bool:
-    """True where the parts are those of a unit vector, but for rounding in the message."""
-    return math.isclose(math.hypot(*parts), 1.0, abs_tol=tolerance)
+        there = [keyword for keyword in keywords if keyword in self.entries]
+        absent = [keyword for keyword in keywords if keyword not in there]
+        if there and absent:
+            self.fault(there[0], f"given without {absent[0]}; {', '.join(keywords)} go together")
+        return not absent
 
 
 UNIT = 1e-4  # deviation from length one up to which a quaternion counts as rounded
+
+
+def unit_quaternion(parts: list[float]) -> Vector:
+    """The quaternion (4,) of a message, made length one; raises ValueError where it is off by more than rounding."""
+    length = math.hypot(*parts)
+    if not math.isclose(length, 1.0, abs_tol=UNIT):
+        raise ValueError(f"the quaternion has length {length:.6g}; expected 1")
+    return np.array(parts) / length
+
+
 SAME_AXES = {"ICRF": "GCRF"}  # frames whose axes are those of another that a spacecraft file knows
 BODY = re.compile(r"SC_BODY(_[A-Z0-9]+)?")  # frames fixed in the body
 
@@ -504,7 +495,7 @@ class Frames:
             return None
         forward = BODY.fullmatch(second) is not None
         inertial, body = (first, second) if forward else (second, first)
-        keyword = "REF_FRAME_A" if forward else "REF_FRAME_B"
+        keyword, other = ("REF_FRAME_A", "REF_FRAME_B")[:: 1 if forward else -1]
         if not BODY.fullmatch(body):
             block.fault("REF_FRAME_B", f"{second!r}: one of the two frames must be the body, SC_BODY_1")
             return None
@@ -514,7 +505,7 @@ class Frames:
         if not forward and not reversible:
             block.fault("REF_FRAME_A", "the body comes first; this block leads from the inertial frame to the body")
             return None
-        self.body_frame(block, "REF_FRAME_B" if forward else "REF_FRAME_A", body)
+        self.body_frame(block, other, body)
         known = SAME_AXES.get(inertial, inertial)
         if known != inertial:
             self.remark(f"{inertial} is taken as {known}, whose axes are the same")
@@ -533,6 +524,13 @@ class Frames:
             block.fault(keyword, f"{frame!r} here, {self.body!r} in another block; expected one body frame")
         else:
             self.body = frame
+
+    def rates_in_body(self, block: Checked, axes: str) -> bool:
+        """True for rates along the axes of the body, False for those of the inertial frame, a fault for others."""
+        in_body = BODY.fullmatch(axes) is not None
+        if not in_body and SAME_AXES.get(axes, axes) != self.frame:
+            block.fault("ANGVEL_FRAME", f"{axes!r} is neither REF_FRAME_A nor REF_FRAME_B")
+        return in_body
 
     def remark(self, text: str) -> None:
         """Take a remark for the reader, once."""

@@ -10,7 +10,8 @@ from __future__ import annotations
 import json
 import math
 import re
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,12 +20,8 @@ from nutdamp.errors import BadRequest, Fault, FaultyFile, printable
 from nutdamp.files.ccsds.message import (
     APM_BLOCKS,
     APM_METADATA,
-    BODY,
     HEADER,
     MOMENTUM,
-    SAME_AXES,
-    UNIT,
-    VERSION,
     Checked,
     Frames,
     Keyword,
@@ -32,7 +29,7 @@ from nutdamp.files.ccsds.message import (
     expect_version,
     from_kvn,
     kvn_text,
-    unit_length,
+    unit_quaternion,
 )
 from nutdamp.files.editing import Edits, Later, attitude_edits, carry_text, epoch_after, inertia_edits, rate_edits
 from nutdamp.files.reader import Source, read_spacecraft
@@ -50,8 +47,7 @@ _OUTSIDE = (Keyword(_VERSION, text=True), *HEADER, *APM_METADATA, Keyword("EPOCH
 _NUTATION = ("NUTATION", "NUTATION_PER", "NUTATION_PHASE")
 
 
-@dataclass(frozen=True, slots=True)
-class Manoeuvre:
+class Manoeuvre(NamedTuple):
     """A torque (3,) N m fixed in the body from ``start`` s after the epoch for ``duration`` s; ``mass`` kg or None."""
 
     start: float
@@ -61,13 +57,10 @@ class Manoeuvre:
     line: int
 
 
-@dataclass(frozen=True, slots=True)
-class ApmContents:
-    """Contents of a message, in body axes.
+class ApmContents(NamedTuple):
+    """Contents of a message, in body axes: ``quaternion`` body -> frame, scalar first; ``rates`` rad/s.
 
-    ``quaternion`` (4,) body -> frame, scalar first, or None; ``rates`` (3,) rad/s; ``tensor`` (3, 3) kg m², or None.
-    ``nutation`` rad as SPIN states it, or None. ``lines`` are those where blocks begin; ``remarks`` are for
-    the reader.
+    ``tensor`` kg m²; ``nutation`` rad as SPIN states it; ``lines`` where blocks begin; ``remarks`` for the reader.
     """
 
     name: str
@@ -86,7 +79,7 @@ class ApmContents:
 def read_apm(path: str) -> ApmContents:
     """The contents of a message; raises CannotRead, or FaultyFile with every fault of the file."""
     blocks, faults = from_kvn(kvn_text(path), path)
-    expect_version(path, blocks[0], _VERSION, VERSION, faults)
+    expect_version(path, blocks[0], _VERSION, faults)
     contents = _MessageReader(path, blocks, faults).read()
     if faults or contents is None:
         raise FaultyFile(faults)
@@ -102,16 +95,17 @@ class _MessageReader(Frames):
         self.nutation: float | None = None
         order, last = list(APM_BLOCKS), ""
         for block in blocks[1:]:
-            if block.name not in APM_BLOCKS:
-                known = ", ".join(f"{name}_START" for name in order)
-                self._fault(block.line, f"{block.name}_START", f"unknown block; known are {known}")
+            name, line = block.name, block.line
+            if name not in APM_BLOCKS:
+                known = ", ".join(f"{each}_START" for each in order)
+                self._fault(line, f"{name}_START", f"unknown block; known are {known}")
                 continue
-            if last and order.index(block.name) < order.index(last):
-                self._fault(block.line, block.name, f"comes after {last}; the order is {', '.join(order)}")
-            elif self.blocks[block.name] and block.name != "MAN":
-                self._fault(block.line, block.name, "a second block of this kind; which one counts is not said")
-            last = block.name
-            self.blocks[block.name].append(Checked(self.path, block, APM_BLOCKS[block.name].keywords, self.faults))
+            if last and order.index(name) < order.index(last):
+                self._fault(line, name, f"comes after {last}; the order is {', '.join(order)}")
+            elif self.blocks[name] and name != "MAN":
+                self._fault(line, name, "a second block of this kind; which one counts is not said")
+            last = name
+            self.blocks[name].append(Checked(path, block, APM_BLOCKS[name].keywords, faults))
 
     def _fault(self, line: int, where: str, problem: str) -> None:
         self.faults.append(Fault(self.path, line, 1, where, problem))
@@ -120,15 +114,11 @@ class _MessageReader(Frames):
         return next(iter(self.blocks[name]), None)
 
     def read(self) -> ApmContents | None:
-        """The contents; None where faults leave none."""
         outside = self.outside
         self.take_system(outside)
-        epoch = outside.epoch("EPOCH", self.system)
-        quaternion = self._attitude()
-        rates = self._rates(quaternion)
-        quaternion, rates = self._spin(quaternion, rates)
-        tensor = self._inertia()
-        manoeuvres = self._manoeuvres(epoch)
+        epoch, quaternion = outside.epoch("EPOCH", self.system), self._attitude()
+        quaternion, rates = self._spin(quaternion, self._rates(quaternion))
+        tensor, manoeuvres = self._inertia(), self._manoeuvres(epoch)
         if rates is None and not self.faults:
             self._fault(1, "ANGVEL", "missing; without an ANGVEL or a SPIN block the motion is not known")
         if self.faults or epoch is None or rates is None:
@@ -157,18 +147,20 @@ class _MessageReader(Frames):
         block = self._first("QUAT")
         if block is not None:
             forward, parts = self.endpoints(block), block.numbers("QC", "Q1", "Q2", "Q3")
-            if parts is not None and not unit_length(parts, UNIT):
-                block.fault("Q1", f"the quaternion has length {math.hypot(*parts):.6g}; expected 1")
-            elif parts is not None and forward is not None:
-                turn = np.array(parts) / math.hypot(*parts)
+            try:
+                turn = None if parts is None else unit_quaternion(parts)
+            except ValueError as wrong:
+                block.fault("Q1", str(wrong))
         elif (block := self._first("EULER")) is not None:
             forward, parts = self.endpoints(block), block.numbers("ANGLE_1", "ANGLE_2", "ANGLE_3")
             sequence = block.text("EULER_ROT_SEQ") or ""
             if not re.fullmatch("[XYZ]{3}", sequence) or sequence[1] in (sequence[0], sequence[2]):
                 block.fault("EULER_ROT_SEQ", f"{sequence!r} is no sequence of three turns, such as ZXZ")
-            elif parts is not None and forward is not None:
+            elif parts is not None:
                 turn = euler(sequence, *map(math.radians, parts))
-        return turn if turn is None or forward else attitude.conjugate(turn)
+        if turn is None or forward is None:
+            return None
+        return turn if forward else attitude.conjugate(turn)
 
     def _rates(self, quaternion: Vector | None) -> Vector | None:
         """Rates of the body against the frame, in body axes, rad/s."""
@@ -180,16 +172,14 @@ class _MessageReader(Frames):
         if parts is None or axes is None or forward is None:
             return None
         # The rate "from A to B" is that of B against A (annex F4).
-        rates = np.radians(parts) if forward else -np.radians(parts)
-        if BODY.fullmatch(axes):
+        rates, faults = np.radians(parts) if forward else -np.radians(parts), len(self.faults)
+        if self.rates_in_body(block, axes):
             self.body_frame(block, "ANGVEL_FRAME", axes)
             return rates
-        if SAME_AXES.get(axes, axes) != self.frame:
-            block.fault("ANGVEL_FRAME", f"{axes!r} is neither REF_FRAME_A nor REF_FRAME_B")
-        elif quaternion is None:
-            block.fault("ANGVEL_FRAME", f"rates in {axes} need an attitude, and the message gives none")
-        else:
+        if quaternion is not None:
             return np.asarray(attitude.matrix(quaternion).T @ rates)
+        if len(self.faults) == faults:
+            block.fault("ANGVEL_FRAME", f"rates in {axes} need an attitude, and the message gives none")
         return None
 
     def _spin(self, quaternion: Vector | None, rates: Vector | None) -> tuple[Vector | None, Vector | None]:
@@ -284,10 +274,7 @@ SAME_NUTATION, ROUNDED = 0.01, 1e-5
 
 
 def imported(contents: ApmContents, path: str) -> tuple[str, Spacecraft, Schedule]:
-    """Text of the spacecraft file, the spacecraft in it, and the manoeuvres as a schedule (empty without any).
-
-    Raises FaultyFile, with lines of the message, where its contents cannot be a spacecraft for nutdamp.
-    """
+    """Text of the spacecraft file, the spacecraft, and the manoeuvres; FaultyFile, by lines of the message."""
     if contents.tensor is None:
         problem = "missing; a spacecraft file needs moments of inertia: --into merges the message into one that has"
         raise FaultyFile([Fault(path, 1, 1, "INERTIA", f"{problem} them")])
@@ -339,12 +326,11 @@ def _file_text(contents: ApmContents, path: str, torquer: float | None) -> str:
     rates = ", ".join(f"{math.degrees(rate)!r} deg/s" for rate in contents.rates.tolist())
     lines += [*_inertia(contents.tensor), f"omega0: [{rates}]"]
     if contents.quaternion is not None:
-        parts = ", ".join(repr(part) for part in contents.quaternion.tolist())
         lines += [
             "attitude:",
             f"  epoch: {contents.epoch.text.rstrip('0').rstrip('.')}Z",
             f"  frame: {contents.frame}",
-            f"  quaternion: [{parts}]   # body -> frame, scalar first",
+            f"  quaternion: {contents.quaternion.tolist()}   # body -> frame, scalar first",
         ]
     lines += _actuators(contents.manoeuvres, torquer)
     return "\n".join(lines) + "\n"
@@ -362,12 +348,12 @@ def _actuators(manoeuvres: tuple[Manoeuvre, ...], torquer: float | None) -> list
     if not manoeuvres:
         return ["# The message fires nothing; without thrusters an ideal steerable impulse is assumed."]
     if torquer is not None:
-        lines = [
+        first = round(manoeuvres[0].start, DIGITS)
+        return [
             "# All manoeuvres of the message are transverse and of one torque, as a steerable torquer gives them.",
             f"steerable: {{torque: {torquer!r} N m}}",
+            *[f"limits: {{earliest: {first!r} s}}   # the first manoeuvre begins then"] * bool(first),
         ]
-        first = round(manoeuvres[0].start, DIGITS)
-        return [*lines, f"limits: {{earliest: {first!r} s}}   # the first manoeuvre begins then"] if first else lines
     distinct = {tuple(manoeuvre.torque.tolist()): None for manoeuvre in manoeuvres}
     return [
         "# The torques that the message fires, as thrusters to begin with; without any, an ideal steerable impulse is",
@@ -385,27 +371,19 @@ def _schedule(manoeuvres: tuple[Manoeuvre, ...], body: Spacecraft) -> Schedule:
     pulses: list[Pulse] = []
     free = 0.0
     for number, manoeuvre in enumerate(manoeuvres, start=1):
-        torque = body.inertia.axes.T @ manoeuvre.torque
+        torque, lasts = body.inertia.axes.T @ manoeuvre.torque, manoeuvre.duration
         alone = manoeuvre.start >= free - 1e-9
-        pulses.append(
-            Pulse(
-                t=manoeuvre.start + 0.5 * manoeuvre.duration,
-                on_time=manoeuvre.duration,
-                channel=STEERABLE if alone else f"MAN{number}",
-                impulse=torque * manoeuvre.duration,
-                torque=torque,
-                propellant=None if manoeuvre.mass is None else -manoeuvre.mass,
-            )
-        )
-        free = max(free, manoeuvre.start + manoeuvre.duration) if alone else free
+        channel = STEERABLE if alone else f"MAN{number}"
+        used = None if manoeuvre.mass is None else -manoeuvre.mass
+        pulses.append(Pulse(manoeuvre.start + 0.5 * lasts, lasts, channel, torque * lasts, torque, propellant=used))
+        free = max(free, manoeuvre.start + lasts) if alone else free
     return Schedule(tuple(pulses))
 
 
 def merged_text(source: Source, message: ApmContents | History, at: float = 0.0, *, inertia: bool) -> str:
-    """The text of a spacecraft file with the motion of a message; with its ``inertia`` where that is asked for.
+    """The text of a spacecraft file with the motion of a message, of a history the record from ``at`` s on.
 
-    Of a history it is that of the first record from ``at`` s after its first on. Raises BadRequest where the message
-    does not give what is asked for, or nothing, and where the file would be none for nutdamp.
+    Raises BadRequest where the message has no ``inertia`` to merge, and where the file would be none for nutdamp.
     """
     if isinstance(message, History):
         index, tensor = message.at(at), None

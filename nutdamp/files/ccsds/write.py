@@ -96,10 +96,7 @@ Values = dict[str, str | float]
 
 
 def apm(plan: Plan, reference: Reference, created: Epoch) -> Message:
-    """The message for a plan; ``created`` is the moment at which it is made.
-
-    Raises BadRequest for an ideal impulse, which has no duration and so no manoeuvre block.
-    """
+    """The message for a plan, made at ``created``; raises BadRequest for an ideal impulse, which has no duration."""
     body = plan.spacecraft
     frames: Values = {"REF_FRAME_A": reference.frame, "REF_FRAME_B": BODY_FRAME}
     motion = body.inertia.in_file_axes(body.initial.rates, body.initial.quaternion)
@@ -116,7 +113,10 @@ def apm(plan: Plan, reference: Reference, created: Epoch) -> Message:
         spin = spin_values(body.inertia, *(values[None] for values in motion))
         values = {name: float(value[0]) for name, value in spin.items() if name not in MOMENTUM}
         blocks.append(_block("SPIN", {**frames, **values}))
-    blocks.append(_block("INERTIA", _inertia(body)))
+    # The products are minus the entries off the diagonal (annex F6).
+    (xx, xy, xz), (_, yy, yz), (_, _, zz) = body.inertia.tensor.tolist()
+    parts: Values = {"IXX": xx, "IYY": yy, "IZZ": zz, "IXY": -xy, "IXZ": -xz, "IYZ": -yz}
+    blocks.append(_block("INERTIA", {"INERTIA_REF_FRAME": BODY_FRAME, **parts}))
     blocks += [
         _block("MAN", _apm_manoeuvre(pulse, number, body, reference), *_notes_on(pulse, number, reference))
         for number, pulse in enumerate(sorted(plan.pulses, key=lambda pulse: pulse.start), start=1)
@@ -131,11 +131,7 @@ def _block(name: str, values: Values, *comments: str) -> MessageBlock:
 
 def _header(plan: Plan, created: Epoch) -> MessageBlock:
     moment = created.text.partition(".")[0]
-    values: Values = {
-        "CREATION_DATE": moment,
-        "ORIGINATOR": ORIGINATOR,
-        "MESSAGE_ID": label(f"{plan.scheme}-{moment}"),
-    }
+    values: Values = {"CREATION_DATE": moment, "ORIGINATOR": ORIGINATOR, "MESSAGE_ID": label(f"{plan.scheme}-{moment}")}
     return block("", HEADER, values, f"nutdamp {__version__}: {plan.scheme} schedule for {plan.spacecraft.name}")
 
 
@@ -144,21 +140,17 @@ def _identity(body: Spacecraft) -> Values:
 
 
 def _unsaid(body: Spacecraft) -> list[str]:
-    remarks = []
-    if body.disturbances:
-        remarks.append("The disturbances of the spacecraft file are not in this message.")
-    if body.dissipation is not None:
-        remarks.append("The energy dissipation of the spacecraft file is not in this message.")
-    if body.inertia.wheel:
-        momentum = f"{body.inertia.wheel:.9g} N*m*s along principal axis 3"
-        remarks.append(f"The wheel of the spacecraft file, {momentum}, is in no keyword of this message.")
-    per_kg = shed(body)
-    if per_kg is not None:
-        values = ", ".join(f"{moment:.9g}" for moment in per_kg)
-        remarks.append(f"INERTIA is that at EPOCH: the principal moments fall by {values} kg*m**2 for each kg used.")
-    if not spinning(body.inertia):
-        remarks.append("No SPIN block: the body is not symmetric about its third axis, as the model of that block is.")
-    return remarks
+    wheel, per_kg, of_file, spins = body.inertia.wheel, shed(body), "of the spacecraft file", spinning(body.inertia)
+    momentum = f"{wheel:.9g} N*m*s along principal axis 3"
+    values = ", ".join(f"{moment:.9g}" for moment in (() if per_kg is None else per_kg))
+    remarks = {
+        f"The disturbances {of_file} are not in this message.": body.disturbances,
+        f"The energy dissipation {of_file} is not in this message.": body.dissipation is not None,
+        f"The wheel {of_file}, {momentum}, is in no keyword of this message.": wheel,
+        f"INERTIA is that at EPOCH: the principal moments fall by {values} kg*m**2 for each kg used.": values,
+        "No SPIN block: the body is not symmetric about its third axis, as the model of that block is.": not spins,
+    }
+    return [remark for remark, holds in remarks.items() if holds]
 
 
 def _notes_on(pulse: Pulse, number: int, reference: Reference) -> list[str]:
@@ -168,13 +160,6 @@ def _notes_on(pulse: Pulse, number: int, reference: Reference) -> list[str]:
         comments.append(f"Commanded: {on_time:.9g} s from {reference.epoch.plus(max(start, 0.0)).text} on.")
         comments.append(f"Start and duration below are those of the thrust: {pulse.on_time:.9g} s at the torque given.")
     return comments
-
-
-def _inertia(body: Spacecraft) -> Values:
-    """Moments and products; the products are minus the entries off the diagonal (annex F6)."""
-    (xx, xy, xz), (_, yy, yz), (_, _, zz) = body.inertia.tensor.tolist()
-    parts: Values = {"IXX": xx, "IYY": yy, "IZZ": zz, "IXY": -xy, "IXZ": -xz, "IYZ": -yz}
-    return {"INERTIA_REF_FRAME": BODY_FRAME, **parts}
 
 
 def _apm_manoeuvre(pulse: Pulse, number: int, body: Spacecraft, reference: Reference) -> Values:
@@ -194,10 +179,9 @@ def _apm_manoeuvre(pulse: Pulse, number: int, body: Spacecraft, reference: Refer
 def aem(
     plan: Plan, flown: Flight, until: float, reference: Reference, created: Epoch, kind: str = QUATERNION_ANGVEL
 ) -> Message:
-    """The message for the flight of a plan from 0 to ``until`` s; ``created`` is the moment at which it is made.
+    """The message for the flight of a plan from 0 to ``until`` s, in segments that end at the edges of pulses.
 
-    Nobody interpolates across the edges of pulses, where the torque jumps, because segments end there. ``kind`` is the
-    ATTITUDE_TYPE, SPIN where the body has not the nutation of SPIN/NUTATION_MOM.
+    ``kind`` is the ATTITUDE_TYPE, SPIN where the body has not the nutation of SPIN/NUTATION_MOM.
     """
     body = plan.spacecraft
     if kind == SPIN_NUTATION_MOM and not spinning(body.inertia):
@@ -250,10 +234,7 @@ KILO = 1e-3
 
 
 def opm(plan: Plan, reference: Reference, created: Epoch) -> Message:
-    """The message for a plan; ``created`` is the moment at which it is made.
-
-    Raises BadRequest where mass, forces or propellant are not known.
-    """
+    """The message for a plan, made at ``created``; raises BadRequest where mass, forces or propellant are unknown."""
     body, flown = plan.spacecraft, plan.flight
     if body.mass is None:
         raise BadRequest("an OPM needs the velocity change of each pulse; add the key mass to the spacecraft file")

@@ -156,5 +156,5 @@ def test_times_of_another_system_become_utc_and_a_nutation_that_contradicts_is_s
         assert [pulse.start for pulse in pulses] == [3600.0]
         (said,) = contradictions(apm, body)
         check_text("files.nutation-contradicts", said)
-        assert contradictions(replace(apm, nutation=body.widest.nutation), body) == []
+        assert contradictions(apm._replace(nutation=body.widest.nutation), body) == []
     assert [moments[0].since(moment) for moment in moments[1:]] == [37.0, 37.0 + 32.184]
