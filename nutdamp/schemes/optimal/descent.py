@@ -126,12 +126,10 @@ class Task:
         return bodies.momentum(rates), turn
 
     def _together(self, which: Indices, x: Vector, kicks: int) -> tuple[Vector, Vector]:
-        """`_in_turn` of a body without external torque, all stretches at once.
-
-        In the frame that turns with the nutation pulses add to H whatever it is, and between them the body turns about
-        H and its own axis (see `montecarlo.propagated`): so the motion at all edges is known first, and then all turns
-        are. A quaternion is a pair of complex numbers, w + iz and x + iy.
-        """
+        """`_in_turn` of a body without external torque, all stretches at once."""
+        # In the frame that turns with the nutation pulses add to H whatever it is, and between them the body turns
+        # about H and its own axis: so the motion at all edges is known first, and then all turns are. A quaternion is
+        # a pair of complex numbers, w + iz and x + iy.
         count, n = which.shape
         (A, _, C), rates, turn = self._start
         wheel = self._wheel
@@ -173,10 +171,7 @@ class Task:
     def _pulsed(
         self, which: Indices, across: Complex, before: Vector, widths: Vector
     ) -> tuple[Complex, tuple[Complex, Complex]]:
-        """H across axis 3 (b, n) in body axes after pulses, each alone, and the turn of each.
-
-        ``across`` and ``before``: H across and along axis 3 as they begin.
-        """
+        """H across axis 3 (b, n) after pulses, each alone, that begin with H ``across`` and along it; turn of each."""
         count = which.size
         moments = np.repeat(self._start[0][:, None], count, axis=1)
         spinning = before.ravel() - self._wheel
@@ -382,22 +377,16 @@ class Descent:
 
 
 class _LineSearch:
-    """The search along a step for less of cost, barrier and misses; ``slope`` (b,) is how fast they fall at first.
-
-    ``active`` are the sequences for which no step was good enough so far.
-    """
+    """The search along a step for less of cost, barrier and misses, which fall by ``slope`` (b,) at first."""
 
     def __init__(self, descent: Descent, penalty: Vector, slope: Vector) -> None:
         self.descent, self.old, self.penalty, self.slope = descent, descent.state, penalty, np.minimum(slope, 0.0)
         self.x, self.slack, self.misses = self.old.x.copy(), self.old.slack.copy(), self.old.misses.copy()
-        self.active = np.arange(len(penalty))
+        self.active = np.arange(len(penalty))  # sequences for which no step was good enough so far
         self.before = self._merit(self.x, self.slack, self.misses, self.active)
 
     def tried(self, step: Vector, shares: Vector = WHOLE) -> Vector:
-        """Take the first of the ``shares`` of the scaled ``step`` (k, v) of those still to do that falls enough.
-
-        The last where none does; the misses (…, equations) of those are given.
-        """
+        """Take the first share of the scaled ``step`` (k, v) that falls enough, or the last: the misses of these."""
         count, k = len(shares), np.tile(self.active, len(shares))
         share, old = np.repeat(shares, len(self.active)), self.old
         step = share[:, None] * np.tile(step, (count, 1))

@@ -257,10 +257,8 @@ class Program:
         return self._price[columns.channel] / self._dearest * self._dearness(columns.t)
 
     def _coefficients(self, columns: ProgramColumns) -> Vector:
-        """Coefficients of one unit of each column, (equations, n).
-
-        Once slots were looked at as often as there are any, all of them are, and kept.
-        """
+        """Coefficients of one unit of each column, (equations, n)."""
+        # Once slots were looked at as often as there are any, all of them are, and kept.
         slots = columns.width > 0.0
         self._looked += int(np.count_nonzero(slots))
         if self._grid is None and self._looked <= len(self.centres):
@@ -315,14 +313,11 @@ class Program:
         return alone(channel, self.centres[slot], np.where(self.strong[channel], 0.0, self.width))
 
     def _priced(self, duals: Vector, taken: ProgramColumns, unmet: float) -> ProgramColumns:
-        """Columns worth more than they cost: whole slots of a weak channel, the best moments of a strong one.
-
-        More of them at a time as long as something is ``unmet``: then most of what there is may be needed.
-        """
+        """Columns worth more than they cost: whole slots of a weak channel, the best moments of a strong one."""
         gains = self._gains(duals)
         weak = np.where(self.strong[:, None], -np.inf, gains)
-        slots = taken.width > 0.0
-        weak[taken.channel[slots], self._slot(taken.t[slots])] = -np.inf
+        weak[taken.channel, self._slot(taken.t)] = -np.inf
+        # More of them at a time as long as something is unmet: then most of what there is may be needed.
         most = max(BEST, np.count_nonzero(weak > PRICE) // MANY if unmet > SOME else 0)
         columns = self._slots(*above(weak, PRICE, most))
         return columns.joined(self._peaks(gains, duals)) if self.strong.any() else columns
@@ -510,22 +505,17 @@ def supplies(most: Vector, goal: Vector, off: float = 0.0) -> bool | None:
 
     ``off``: by how much its rows 2 and 3 may be missed, in norm. None where that is not known after `CORNERS`.
     """
-
-    def corner(direction: Vector) -> Vector:
-        """The point of what can be supplied, less the goal, that lies least far along ``direction``."""
-        point = most @ (direction @ most < 0.0) - goal
-        if off > 0.0 and (size := float(np.linalg.norm(direction[2:4]))) > 0.0:
-            point[2:4] -= off / size * direction[2:4]
-        return np.asarray(point)
-
-    corners = -goal[None, :]
-    weights = np.ones(1)
+    corners, weights = -goal[None, :], np.ones(1)
     for _ in range(CORNERS):
         nearest = weights @ corners
         distance = float(np.linalg.norm(nearest))
         if distance <= MET:
             return True
-        new = corner(nearest / distance)
+        direction = nearest / distance
+        # The point of what can be supplied, less the goal, that lies least far along it.
+        new = most @ (direction @ most < 0.0) - goal
+        if off > 0.0 and (size := float(np.linalg.norm(direction[2:4]))) > 0.0:
+            new[2:4] -= off / size * direction[2:4]
         ahead = float(nearest @ new) / distance
         if ahead > BEYOND * distance and ahead > MET:
             return False

@@ -88,10 +88,7 @@ def schedules(task: Task, known: Iterable[Schedule] = ()) -> list[Schedule]:
 
 
 def cheapened(task: Task, schedule: Schedule) -> Schedule | None:
-    """A schedule after a few steps down on the true motion, fewer where it has many pulses; None where there is none.
-
-    Its sequence of channels stays, and what it leaves too.
-    """
+    """A schedule of the same channels after a few steps down on the true motion; None where there is none."""
     sequences, x = laid_out(task, _together([_moments_of(task, schedule)]), bounded=True)
     if not len(x):
         return None
@@ -120,9 +117,9 @@ def random_starts(task: Task, pulses: int, count: int, rng: np.random.Generator)
 
 
 def laid_out(task: Task, moments: Moments, *, bounded: bool = False) -> tuple[Sequences, Vector]:
-    """Sequences and unknowns of `Task` to descend from: pulses in order, moved apart and into windows, within bounds.
+    """Sequences that fit, and their unknowns: pulses in order, moved apart and into windows, strictly within bounds.
 
-    Sequences that do not fit are left out. Unless on-times are ``bounded`` from below, pulses may still vanish.
+    Pulses may still vanish unless on-times are ``bounded`` from below.
     """
     order = np.argsort(moments.t, axis=1, kind="stable")
     which, t, on = (np.take_along_axis(part, order, axis=1) for part in moments)
@@ -188,10 +185,7 @@ def _added(task: Task, best: Descent, pulses: int, rng: np.random.Generator) -> 
 
 
 def _worth(task: Task, ideal: Moments, x: Vector, prices: Vector, t: Vector) -> Vector:
-    """Saving of the cost of ``ideal``, whose unknowns are ``x``, by a small impulse of each channel at ``t`` (k,) s.
-
-    (channels, k), over all.
-    """
+    """Saving by a small impulse of each channel at ``t`` (k,) s beside the pulses of unknowns x, (channels, k)."""
     count, n = len(ideal.which), len(task.channels) * len(t)
     channel, moment = np.repeat(np.arange(len(task.channels)), len(t)), np.tile(t, len(task.channels))
     place = np.searchsorted(ideal.t, moment)
