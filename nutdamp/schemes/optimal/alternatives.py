@@ -66,7 +66,7 @@ def _schedule(
     assert goal is not None
     rate = channel.axial / spacecraft.inertia.C
     whole = (goal - spacecraft.spin) / rate
-    count = math.ceil(whole / channel.max_on_time * (1.0 - 1e-9)) if math.isfinite(channel.max_on_time) else 1
+    count = max(math.ceil(whole / channel.max_on_time * (1.0 - 1e-9)), 1)
     if count > MOST_PULSES or (count == 1 and turn > 0.0):
         return None
     for _ in range(CORRECTED):

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from nutdamp.common import work
 from nutdamp.schemes.optimal import linear_program
-from nutdamp.schemes.optimal.linear_program import COLUMN, SOLVED, Burn, Program, ProgramColumns, alone, burns
+from nutdamp.schemes.optimal.linear_program import Burn, GrowingProgram, Program, ProgramColumns, above, alone, burns
 from nutdamp.spacecraft.model import Vector
 
 TIGHT = 1e-3  # share of a limit by which a solution may pass it
@@ -182,19 +182,19 @@ class ChanceProgram:
         tangents = [Tangent(limit, complex(u), *plain) for limit in self.limits for u in directions_of(limit, BEGUN)]
         columns = self._begin()
         rights = np.array([self.right(tangent, margin) for tangent in tangents])
-        master = linear_program.GrowingProgram(np.zeros(0), rights, np.zeros(0))
+        master = GrowingProgram(np.zeros(0), rights, np.zeros(0))
         excess = np.array([[-tangent.limit.most / self.scale] for tangent in tangents])
         # To pass all limits costs ten times all there is to do: that is done where hardly anything else helps.
         master.add(np.array([EXCESS]), excess, np.array([np.inf]))
         self._add(master, tangents, columns, margin)
         best, taken = None, columns
         for _ in range(ROUNDS):
-            work.spend(SOLVED + COLUMN * len(columns.t))
+            work.spend(linear_program.SOLVED + linear_program.COLUMN * len(columns.t))
             better = master.optimum()
             if better is None or work.exhausted():
                 break
             best, taken = better, columns
-            on_times = self._on_times(columns, best.x[1:])
+            on_times = np.where(best.x[1:] > SOME, best.x[1:], 0.0) * self.unit[columns.channel]
             new = self._broken(columns, on_times, margin, float(best.x[0]))
             for tangent in new:
                 row = np.concatenate([[-tangent.limit.most / self.scale], self.row(tangent, columns, margin)])
@@ -208,17 +208,9 @@ class ChanceProgram:
                 columns = columns.joined(priced)
         if best is None:
             return Sure((), np.inf, np.zeros(5))
-        on_times = self._on_times(taken, best.x[1:])
         used, left = on_times > 0.0, self.left(taken, on_times)
-        return Sure(
-            burns(self.program.channels, taken.of(used), on_times[used], 1.01 * self.program.width),
-            float(best.x[0]),
-            np.array([left[0].real, left[0].imag, left[1].real, left[1].imag, left[2].real]),
-        )
-
-    def _on_times(self, columns: ProgramColumns, amounts: Vector) -> Vector:
-        """On-times (n,) s of amounts in units, without rounding."""
-        return np.where(amounts > SOME, amounts, 0.0) * self.unit[columns.channel]
+        fired = burns(self.program.channels, taken.of(used), on_times[used], 1.01 * self.program.width)
+        return Sure(fired, float(best.x[0]), left.view(float)[:5])
 
     def _broken(self, columns: ProgramColumns, on_times: Vector, margin: float, excess: float) -> list[Tangent]:
         """Tangents where the cones are passed, the worst of each."""
@@ -255,9 +247,7 @@ class ChanceProgram:
     def _slots(self, channel: NDArray[np.int_], slot: NDArray[np.int_]) -> ProgramColumns:
         return alone(channel, self.program.centres[slot], self.width[channel])
 
-    def _add(
-        self, master: linear_program.GrowingProgram, tangents: list[Tangent], new: ProgramColumns, margin: float
-    ) -> None:
+    def _add(self, master: GrowingProgram, tangents: list[Tangent], new: ProgramColumns, margin: float) -> None:
         most = np.where(new.width > 0.0, new.width / self.unit[new.channel], np.inf)
         rows = np.array([self.row(tangent, new, margin) for tangent in tangents]).reshape(len(tangents), -1)
         master.add(self.cost[new.channel] / self.dearest, rows, most)
@@ -269,7 +259,7 @@ class ChanceProgram:
         worth = np.array([self._worth(channel, active, margin) - cost[channel] for channel in range(len(cost))])
         worth[self.program.forbidden] = -np.inf
         worth[taken.channel, np.searchsorted(self.program.centres, taken.t - 0.25 * self.program.width)] = -np.inf
-        return self._slots(*linear_program.above(worth, PRICE, BEST))
+        return self._slots(*above(worth, PRICE, BEST))
 
     def _worth(self, channel: int, active: list[tuple[Tangent, float]], margin: float) -> Vector:
         """Worth of one unit of a channel in each slot by tangents and their prices."""

@@ -204,25 +204,18 @@ class Problem:
             low, high = (low, middle) if (feasible or self.feasible)(middle) else (middle, high)
         return high
 
-    def overtaxed(self, solution: Solution) -> dict[str, float]:
-        """Channels that need more pulses of their longest on-time than there are moments for, and how many."""
-        needed: dict[str, float] = {}
-        for burn in solution.burns:
-            name = burn.channel.name
-            needed[name] = needed.get(name, 0.0) + burn.on_time / burn.channel.max_on_time
-        return {name: count for name, count in needed.items() if count > self.program().forbidden.shape[1]}
-
     def with_bounds(self, schedule: Schedule, first: Solution | None = None) -> Schedule:
         """The schedule with the lower bounds of its cost."""
+
+        def least(program: Program, solution: Solution) -> float | None:
+            return None if solution.unmet > UNMET else bounds.first_order(program, solution.prices).bound
+
         program = self.program()
-        first = first or program.solve()
-        least = None if first.unmet > UNMET else bounds.first_order(program, first.prices).bound
-        keeping = None
+        first_order, keeping = least(program, first or program.solve()), None
         if self.options.free_axis and not work.exhausted():
             still = self.program(equations=EndEquations(shift=True, spin=self.equations.spin))
-            kept = still.solve()
-            keeping = None if kept.unmet > UNMET else bounds.first_order(still, kept.prices).bound
-        lower = Bounds(least, self.rigorous(schedule), self.unit, program.end, keeping)
+            keeping = least(still, still.solve())
+        lower = Bounds(first_order, self.rigorous(schedule), self.unit, program.end, keeping)
         return Schedule(schedule.pulses, schedule.notes, lower)
 
     def rigorous(self, schedule: Schedule) -> float | None:

@@ -156,16 +156,13 @@ class _LeastCostSearch(Problem):
         if not self.feasible(horizon):
             return self
         span = self.least_horizon(begin, horizon) - begin
-        low, high = begin + span, horizon
-        for margin in MARGINS:  # small angles let channels fire at once, the schedule does not
-            end = begin + span * (1.0 + margin)
-            if end >= horizon:
+        low, later = begin + span, (begin + span * (1.0 + margin) for margin in MARGINS)
+        # Small angles let channels fire at once, the schedule does not.
+        for high in (*(end for end in later if end < horizon), horizon):
+            if self.has_schedule(high):
                 break
-            if self.has_schedule(end):
-                high = end
-                break
-            low = end
-        if high == horizon and not self.has_schedule(horizon):
+            low = high
+        else:
             return self  # shorter ones are looked at on the way to a schedule
         return _LeastCostSearch(self.within(self.least_horizon(low, high, SHARP, self.has_schedule)), self.options)
 
@@ -212,9 +209,11 @@ class _LeastCostSearch(Problem):
             later *= 2.0
             if self.feasible(later):
                 needed = self.least_horizon(0.5 * later, later, NAMED)
-                enough = self.long_enough(needed)
-                if enough is not None:
-                    return f"limits.horizon = {enough:.4g} s is long enough"
+                usual = replace(body, limits=replace(body.limits, horizon=None)).horizon
+                for margin in MARGINS[:TRIED] if needed <= LATER * usual else ():
+                    end = float(f"{needed * (1.0 + margin):.4g}")
+                    if not work.exhausted() and self.has_schedule(end):
+                        return f"limits.horizon = {end:.4g} s is long enough"
                 return (
                     f"set limits.horizon to at least {needed:.4g} s ({needed - horizon:.3g} s more; by small angles, "
                     f"without other limits)"
@@ -225,30 +224,17 @@ class _LeastCostSearch(Problem):
                 return "shorten the blackout windows (without any it can be done)"
         return f"not even {LATEST:g} times the horizon helps: channels of other directions or more torque are needed"
 
-    def long_enough(self, needed: float) -> float | None:
-        """A horizon in which a schedule is found, s, four digits: ``needed`` s by small angles, or a little more."""
-        usual = replace(self.spacecraft, limits=replace(self.spacecraft.limits, horizon=None)).horizon
-        if needed > LATER * usual:
-            return None
-        for margin in MARGINS[:TRIED]:
-            if work.exhausted():
-                break
-            end = float(f"{needed * (1.0 + margin):.4g}")
-            if self.has_schedule(end):
-                return end
-        return None
-
     def schedule(self) -> Schedule:
         """The cheapest schedule found: over the whole horizon, or over less where there the search does not settle."""
         first = self.program().solve()
-        if overtaxed := self.overtaxed(first):
-            schedule = self.without(overtaxed).schedule()
+        if other := self.without_overtaxed(first):
+            schedule = other.schedule()
             return self.with_bounds(Schedule(schedule.pulses, schedule.notes), first)
         # Where H may end elsewhere one that keeps it, or reaches the target, will do too: some work is left for it.
         looser = self.options.free_axis or self.options.shift is not None
         with work.budget("a schedule as asked", MOST_LOOSE if looser else math.inf):
             best = self.whole_or_shorter(first)
-        if best is None or self.dear(best, first.cost):
+        if self.dear(best, first.cost):
             best = self.cheaper(best, alternatives.within(self, self.spacecraft.horizon))
         if looser and not work.exhausted() and not self.proved(best, EQUAL):
             still = self.keeping(best)
@@ -271,8 +257,19 @@ class _LeastCostSearch(Problem):
                 return None
         return kept.whole_or_shorter(first)
 
-    def without(self, overtaxed: dict[str, float]) -> _LeastCostSearch:
-        """The search without channels whose pulses are too short for their share, Infeasible if there are no others."""
+    def without_overtaxed(self, solution: Solution) -> _LeastCostSearch | None:
+        """The search without channels that need more of their longest pulses than there are moments for, if any do.
+
+        Raises Infeasible where there are no others.
+        """
+        needed: dict[str, float] = {}
+        for burn in solution.burns:
+            name = burn.channel.name
+            needed[name] = needed.get(name, 0.0) + burn.on_time / burn.channel.max_on_time
+        moments = len(self.program().centres)
+        overtaxed = {name: count for name, count in needed.items() if count > moments}
+        if not overtaxed:
+            return None
         others = tuple(channel for channel in self.spacecraft.channels if channel.name not in overtaxed)
         try:
             return _LeastCostSearch(replace(self.spacecraft, channels=others), self.options)
