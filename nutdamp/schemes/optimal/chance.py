@@ -180,7 +180,13 @@ class ChanceProgram:
         inputs = len(self.uncertain.own)
         plain = np.zeros(inputs), np.zeros((0, 1 + inputs))  # tangents that know of no dispersion
         tangents = [Tangent(limit, complex(u), *plain) for limit in self.limits for u in directions_of(limit, BEGUN)]
-        columns = self._begin()
+        # Columns to begin with: those that pull along the goal, or back.
+        toward = np.conj(self.uncertain.goal[0] or self.uncertain.goal[1] or 1.0)
+        worth = np.abs((toward * self.turns(0, self._all(0))[None, :] * self.effects[0][:, None]).real)
+        worth = np.where(self.program.forbidden, 0.0, worth * (self.unit / self.scale)[:, None])
+        channel, slot = np.nonzero(worth > 0.8 * worth.max(initial=0.0))
+        some = np.unique(np.linspace(0, len(slot) - 1, min(2 * BEST, len(slot))).astype(int))
+        columns = self._slots(channel[some], slot[some])
         rights = np.array([self.right(tangent, margin) for tangent in tangents])
         master = GrowingProgram(np.zeros(0), rights, np.zeros(0))
         excess = np.array([[-tangent.limit.most / self.scale] for tangent in tangents])
@@ -229,15 +235,6 @@ class ChanceProgram:
                 own = np.column_stack([spread.pulses, (np.conj(u) * spread.own).real / length])
                 tangents.append(Tangent(limit, u, (np.conj(u) * spread.shared).real / length, own))
         return tangents
-
-    def _begin(self) -> ProgramColumns:
-        """Columns to begin with: those that pull along the goal, or back."""
-        toward = np.conj(self.uncertain.goal[0] or self.uncertain.goal[1] or 1.0)
-        worth = np.abs((toward * self.turns(0, self._all(0))[None, :] * self.effects[0][:, None]).real)
-        worth = np.where(self.program.forbidden, 0.0, worth * (self.unit / self.scale)[:, None])
-        channel, slot = np.nonzero(worth > 0.8 * worth.max(initial=0.0))
-        some = np.unique(np.linspace(0, len(slot) - 1, min(2 * BEST, len(slot))).astype(int))
-        return self._slots(channel[some], slot[some])
 
     def _all(self, channel: int) -> ProgramColumns:
         """All slots of a channel."""

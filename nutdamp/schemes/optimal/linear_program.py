@@ -249,12 +249,12 @@ class Program:
         ring[2:4] = np.cos(angles), np.sin(angles)
         return ring
 
-    def _dearness(self, times: Vector) -> Vector:
-        return 1.0 + self.haste * times / float(self.centres[-1])
-
     def _costs(self, columns: ProgramColumns) -> Vector:
         """Cost (n,) of one unit of each column, over the dearest channel's."""
         return self._price[columns.channel] / self._dearest * self._dearness(columns.t)
+
+    def _dearness(self, times: Vector) -> Vector:
+        return 1.0 + self.haste * times / float(self.centres[-1])
 
     def _coefficients(self, columns: ProgramColumns) -> Vector:
         """Coefficients of one unit of each column, (equations, n)."""

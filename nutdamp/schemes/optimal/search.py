@@ -107,10 +107,10 @@ def _fewest(search: _LeastCostSearch) -> Schedule:
     body = search.spacecraft
     if body.torquer is None and body.goal.spin is None:
         try:
-            if search.options.free_axis:
-                schedule = one_pulse.schedule(body, SchemeOptions())
-            else:
-                schedule = two_pulse.schedule(body, TwoPulseOptions())
+            free = search.options.free_axis
+            schedule = (
+                one_pulse.schedule(body, SchemeOptions()) if free else two_pulse.schedule(body, TwoPulseOptions())
+            )
         except Infeasible:
             schedule = Schedule()
         if schedule.pulses and keeps_limits(body, schedule) and search.left(search.flown(schedule)) <= LEFT:
