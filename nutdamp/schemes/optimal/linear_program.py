@@ -251,7 +251,7 @@ class Program:
 
     def _costs(self, columns: ProgramColumns) -> Vector:
         """Cost (n,) of one unit of each column, over the dearest channel's."""
-        return self._price[columns.channel] / self._dearest * self._dearness(columns.t)
+        return np.asarray(self._price[columns.channel] / self._dearest * self._dearness(columns.t))
 
     def _dearness(self, times: Vector) -> Vector:
         return 1.0 + self.haste * times / float(self.centres[-1])
@@ -318,7 +318,7 @@ class Program:
         weak = np.where(self.strong[:, None], -np.inf, gains)
         weak[taken.channel, self._slot(taken.t)] = -np.inf
         # More of them at a time as long as something is unmet: then most of what there is may be needed.
-        most = max(BEST, np.count_nonzero(weak > PRICE) // MANY if unmet > SOME else 0)
+        most = max(BEST, int(np.count_nonzero(weak > PRICE)) // MANY if unmet > SOME else 0)
         columns = self._slots(*above(weak, PRICE, most))
         return columns.joined(self._peaks(gains, duals)) if self.strong.any() else columns
 

@@ -122,7 +122,8 @@ def laid_out(task: Task, moments: Moments, *, bounded: bool = False) -> tuple[Se
     Pulses may still vanish unless on-times are ``bounded`` from below.
     """
     order = np.argsort(moments.t, axis=1, kind="stable")
-    which, t, on = (np.take_along_axis(part, order, axis=1) for part in moments)
+    which = np.take_along_axis(moments.which, order, axis=1)
+    t, on = (np.take_along_axis(part, order, axis=1) for part in moments[1:])
     least = task.shortest[which] if bounded else np.zeros(which.shape)
     limits = task.body.limits
     free = [(begin, end) for begin, end in free_windows(task.body) if begin < end]
