@@ -11,8 +11,7 @@ import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
-from functools import partial
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,7 +66,7 @@ def _schedule(
     assert goal is not None
     rate = channel.axial / spacecraft.inertia.C
     whole = (goal - spacecraft.spin) / rate
-    count = math.ceil(whole / channel.max_on_time * (1.0 - 1e-9)) if math.isfinite(channel.max_on_time) else 1
+    count = max(math.ceil(whole / channel.max_on_time * (1.0 - 1e-9)), 1)
     if count > MOST_PULSES or (count == 1 and turn > 0.0):
         return None
     for _ in range(CORRECTED):
@@ -168,21 +167,21 @@ def by_other_schemes(spacecraft: Spacecraft, *, shift: bool) -> Iterator[Schedul
 
     # The Sun keeps the phase of trains alone.
     body = replace(spacecraft, steerable=None, goal=replace(spacecraft.goal, sun=None))
-    plans: list[Callable[[], Schedule | Iterable[Schedule]]] = []
+    plans: list[tuple[Callable[[Spacecraft, Any], Schedule | Iterable[Schedule]], SchemeOptions]]
     if not shift:
-        plans.append(partial(one_pulse.schedule, body, SchemeOptions()))
+        plans = [(one_pulse.schedule, SchemeOptions())]
     elif body.goal.axis is None:
-        plans.append(partial(two_pulse.alternatives, body, TwoPulseOptions()))
+        plans = [(two_pulse.alternatives, TwoPulseOptions())]
     else:
-        plans.append(partial(two_pulse.schedule, body, TwoPulseOptions()))
+        plans = [(two_pulse.schedule, TwoPulseOptions())]
         if body.spin != 0.0:
-            plans.append(partial(rhumb_line.schedule, body, RhumbLineOptions()))
-        plans += [partial(half_cone.schedule, body, HalfConeOptions(cones=cones)) for cones in (None, 12, 6, 3)]
-    for plan in plans:
+            plans.append((rhumb_line.schedule, RhumbLineOptions()))
+        plans += [(half_cone.schedule, HalfConeOptions(cones=cones)) for cones in (None, 12, 6, 3)]
+    for plan, options in plans:
         if work.exhausted():
             return
         try:
-            planned = plan()
+            planned = plan(body, options)
             every = [planned] if isinstance(planned, Schedule) else list(planned)
         except Infeasible:
             continue
@@ -200,11 +199,8 @@ HALVINGS, LONGER = 10, (0.0, 0.01, 0.03, 0.08, 0.2, 0.4, 0.8)
 """Steps in which the earliest end by small angles is found, and shares added to it that are tried in turn."""
 
 
-class Piece(NamedTuple):
-    """A channel that fires, or none, for a ``time`` s."""
-
-    channel: Channel | None
-    time: float
+Pieces = tuple[NDArray[np.int_], Vector]
+"""Numbers (n,) of channels that fire one after the other, -1 where none does, and for how long, s."""
 
 
 def earliest(problem: Problem) -> Schedule | None:
@@ -234,7 +230,7 @@ def within(problem: Problem, horizon: float) -> Schedule | None:
         pieces = None if work.exhausted() else _pieces(problem, influence, horizon)
         if pieces is None:
             return None
-        schedule = _exact(problem, pieces)
+        schedule = _exact(problem, *pieces)
         try:
             flown = problem.flown(schedule)
         except Infeasible:
@@ -242,8 +238,7 @@ def within(problem: Problem, horizon: float) -> Schedule | None:
         in_time = problem.left(flown) <= LEFT and schedule.end <= horizon
         if in_time and keeps_limits(problem.spacecraft, schedule.pulses):
             return schedule
-        first = _burns(problem, pieces, np.array([piece.time for piece in pieces]))
-        influence = refinement.along(problem.flown(first), problem.equations, _slot(problem))
+        influence = refinement.along(problem.flown(_burns(problem, *pieces)), problem.equations, _slot(problem))
     return None
 
 
@@ -252,7 +247,7 @@ def _slot(problem: Problem) -> float:
     return 2.0 * math.pi / problem.spacecraft.fastest / SLOTS
 
 
-def _pieces(problem: Problem, influence: Influence, horizon: float) -> list[Piece] | None:
+def _pieces(problem: Problem, influence: Influence, horizon: float) -> Pieces | None:
     """The cheapest firing of one channel after another in time order; None where none is worth one, to first order."""
     body, channels, limits = problem.spacecraft, problem.channels, problem.spacecraft.limits
     if limits.gap > 0.0 or limits.tick is not None or limits.max_pulses is not None or not channels:
@@ -275,72 +270,64 @@ def _pieces(problem: Problem, influence: Influence, horizon: float) -> list[Piec
     equations, slots = len(influence.goal), len(free)
     program = linear_program.GrowingProgram(influence.goal / size, np.ones(slots), np.ones(equations))
     slack = np.vstack([np.hstack([np.eye(equations), -np.eye(equations)]), np.zeros((slots, 2 * equations))])
-    dearest = float(problem.costs.max())
     program.add(np.full(2 * equations, 1e4 * slots), slack, np.full(2 * equations, np.inf))
     shared = np.tile(np.eye(slots), len(channels))
-    cost = np.repeat(problem.costs / dearest, slots)
-    program.add(cost, np.vstack([columns, shared]), np.ones(columns.shape[1]))
+    cost = problem.costs / float(problem.costs.max())
+    program.add(np.repeat(cost, slots), np.vstack([columns, shared]), np.ones(columns.shape[1]))
     optimum = program.optimum()
     if optimum is None or float(optimum.x[: 2 * equations].sum()) > UNMET:
         return None
     shares = optimum.x[2 * equations :].reshape(len(channels), slots)
-    return _in_order(channels, edges, free, shares * width) or None
+    every = np.zeros((len(channels), count + 1))  # and one slot more, in which nothing fires
+    every[:, free] = shares * width
+    return _in_order(every, width)
 
 
-def _in_order(channels: tuple[Channel, ...], edges: Vector, free: NDArray[np.intp], times: Vector) -> list[Piece]:
+def _in_order(times: Vector, width: float) -> Pieces | None:
     """Burns from ``times`` (channels, slots) s: in each slot first what fired before, last what fires on after it."""
-    width = float(edges[1] - edges[0])
-    pieces, before = list[Piece](), None
-    every = np.zeros((len(channels), len(edges)))  # and one slot more, in which nothing fires
-    every[:, free] = times
-    for slot in range(len(edges) - 1):
-        mine, following = every[:, slot], every[:, slot + 1]
-        firing = [number for number in range(len(channels)) if mine[number] > SHORTEST * width]
-        firing.sort(key=lambda number: (channels[number] is not before, following[number] > 0.0))
-        for number in firing:
-            pieces.append(Piece(channels[number], float(mine[number])))
-            before = channels[number]
+    pieces = list[tuple[int, float]]()
+    for mine, following in itertools.pairwise(times.T):
+        before = pieces[-1][0] if pieces else -1
+        firing = np.flatnonzero(mine > SHORTEST * width).tolist()
+        firing.sort(key=lambda number: (number != before, following[number] > 0.0))
+        pieces += [(number, float(mine[number])) for number in firing]
         idle = width - float(sum(mine[number] for number in firing))
         if idle > SHORTEST * width:
-            pieces.append(Piece(None, idle))
-            before = None
-    joined = list[Piece]()
-    for channel, group in itertools.groupby(pieces, key=lambda piece: piece.channel):
-        joined.append(Piece(channel, sum(piece.time for piece in group)))
-    while joined and joined[-1].channel is None:
+            pieces.append((-1, idle))
+    groups = itertools.groupby(pieces, key=lambda piece: piece[0])
+    joined = [(number, sum(time for _, time in group)) for number, group in groups]
+    if joined[-1][0] < 0:
         joined.pop()
-    return joined
+    return (np.array([number for number, _ in joined]), np.array([time for _, time in joined])) if joined else None
 
 
-def _burns(problem: Problem, pieces: list[Piece], times: Vector) -> Schedule:
-    """The pieces with other ``times`` (n,) s, one after the other."""
+def _burns(problem: Problem, which: NDArray[np.int_], times: Vector) -> Schedule:
+    """The pieces, one after the other."""
     starts = problem.spacecraft.limits.earliest + np.concatenate([[0.0], np.cumsum(times)[:-1]])
     return Schedule(
         tuple(
-            channel_pulse(piece.channel, float(start + 0.5 * time), float(time))
-            for piece, start, time in zip(pieces, starts, times, strict=True)
-            if piece.channel is not None and time > 0.0
+            channel_pulse(problem.channels[number], float(start + 0.5 * time), float(time))
+            for number, start, time in zip(which.tolist(), starts, times, strict=True)
+            if number >= 0 and time > 0.0
         )
     )
 
 
-def _exact(problem: Problem, pieces: list[Piece]) -> Schedule:
+def _exact(problem: Problem, which: NDArray[np.int_], times: Vector) -> Schedule:
     """The schedule whose flown motion leaves nothing, by Newton's method for the lengths of its pieces."""
     body, size = problem.spacecraft, float(np.linalg.norm(problem.spacecraft.momentum))
-    times = np.array([piece.time for piece in pieces])
     scale = np.full(len(times), float(times.max(initial=1e-9)))
     most = body.horizon - body.limits.earliest
     task = Task(body, problem.equations, problem.channels, problem.costs) if problem.closed else None
-    firing = np.array([piece.channel is not None for piece in pieces])
-    which = np.array([problem.channels.index(piece.channel) for piece in pieces if piece.channel is not None])
+    firing = which >= 0
 
     def left(rows: Vector) -> Vector:
         """Misses of many times (k, n) s, (k, equations), over |H|."""
         if task is None:
-            flown = (problem.flown(_burns(problem, pieces, times)) for times in rows)
+            flown = (problem.flown(_burns(problem, which, times)) for times in rows)
             return np.array([refinement.misses(flight, problem.equations) for flight in flown]) / size
         starts = body.limits.earliest + np.cumsum(rows, axis=1) - rows
-        return task.misses(np.tile(which, (len(rows), 1)), np.hstack([starts[:, firing], rows[:, firing]]), 0)
+        return task.misses(np.tile(which[firing], (len(rows), 1)), np.hstack([starts[:, firing], rows[:, firing]]), 0)
 
     value = left(times[None])[0]
     for _ in range(NEWTON_STEPS):
@@ -356,4 +343,4 @@ def _exact(problem: Problem, pieces: list[Piece]) -> Schedule:
         else:
             break
         times, value = trial, following
-    return _burns(problem, pieces, times)
+    return _burns(problem, which, times)

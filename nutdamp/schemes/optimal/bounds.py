@@ -83,14 +83,13 @@ class SmallAngles:
 
 def _highest(curve: SmallAngles, which: NDArray[np.bool_]) -> float:
     """The highest q of ``which`` channels at any time; a little more where that is not exact."""
-    which_ones = np.flatnonzero(which)
-    if not len(which_ones):
+    if not which.any():
         return 0.0
     before, after = (curve.at(times)[:, which] for times in (curve.begins, curve.begins + curve.lengths))
-    tops = _top(before, after, curve.bends[which_ones], curve.lengths[:, None])
+    tops = _top(before, after, curve.bends[which], curve.lengths[:, None])
     best = float(max(before.max(), after.max()))
     slot, index = np.nonzero(tops > best + ENOUGH * abs(best))
-    begins, lengths, channel = curve.begins[slot], curve.lengths[slot], which_ones[index]
+    begins, lengths, channel = curve.begins[slot], curve.lengths[slot], np.flatnonzero(which)[index]
     highest = tops[slot, index]
     for _ in range(QUARTERINGS):
         if not len(begins):
@@ -108,13 +107,12 @@ def _highest(curve: SmallAngles, which: NDArray[np.bool_]) -> float:
 
 def _lasting(curve: SmallAngles, which: NDArray[np.bool_], factor: float) -> float:
     """Gain of ``which`` channels that are on whenever it pays, with prices lowered by a ``factor``."""
-    which_ones = np.flatnonzero(which)
-    if not len(which_ones):
+    if not which.any():
         return 0.0
-    costs, bends = curve.costs[which_ones], curve.bends[which_ones] / factor
+    costs, bends = curve.costs[which], curve.bends[which] / factor
 
     def gain(times: Vector) -> Vector:
-        return np.asarray(curve.at(times)[:, which_ones] / factor - 1.0)
+        return np.asarray(curve.at(times)[:, which] / factor - 1.0)
 
     before, after = gain(curve.begins), gain(curve.begins + curve.lengths)
     pays = np.flatnonzero((_top(before, after, bends, curve.lengths[:, None]) > 0.0).any(axis=1))
@@ -122,11 +120,12 @@ def _lasting(curve: SmallAngles, which: NDArray[np.bool_], factor: float) -> flo
     total, before = 0.0, before[pays]
     for part in range(PARTS):
         after = gain(begins + (part + 1) * lengths)
-        mean = curve.mean(begins + (part + 0.5) * lengths, lengths)[:, which_ones] / factor - 1.0
-        arch = bends * lengths[:, None] ** 2
+        mean = curve.mean(begins + (part + 0.5) * lengths, lengths)[:, which] / factor - 1.0
         gained = np.where(-_top(-before, -after, bends, lengths[:, None]) >= 0.0, mean, 0.0)
         crossing = _top(before, after, bends, lengths[:, None]) > 0.0
-        gained = np.where(crossing & (gained == 0.0), _positive_mean(before, after) + arch / 12.0, gained)
+        gained = np.where(
+            crossing & (gained == 0.0), _positive_mean(before, after) + bends * lengths[:, None] ** 2 / 12.0, gained
+        )
         total += float((gained * lengths[:, None] @ costs).sum())
         before = after
     return total
@@ -190,7 +189,7 @@ def rigorous(
 
 def _nutation(spacecraft: Spacecraft, channels: list[Channel], costs: Vector, cost: float, allowed: Allowed) -> float:
     """Least cost of taking the nutation out, at the phases at which the channels may be on."""
-    inertia, limits = spacecraft.inertia, spacecraft.limits
+    inertia = spacecraft.inertia
     dearest = float(max(abs(channel.axial) / price for channel, price in zip(channels, costs, strict=True)))
     faster = cost * dearest / inertia.C
     goal = -inertia.A * complex(spacecraft.omega0[0], spacecraft.omega0[1])
@@ -200,9 +199,14 @@ def _nutation(spacecraft: Spacecraft, channels: list[Channel], costs: Vector, co
     spans = []
     for begin, end in free_windows(spacecraft):
         phases = [spacecraft.nutation_rate * edge for edge in (begin - TOUCHING, end + TOUCHING)]
-        wider = abs(inertia.a) * faster * max(end + TOUCHING - limits.earliest, 0.0)
+        wider = abs(inertia.a) * faster * max(end + TOUCHING - spacecraft.limits.earliest, 0.0)
         spans.append((min(phases) - wider, max(phases) + wider))
-    low, wide = _arcs(spans)
+    # Arcs that these phases cover, joined: begins in [0, 2π) and lengths, rad.
+    lows, highs = np.array(sorted((begin % math.tau, begin % math.tau + end - begin) for begin, end in spans)).T
+    over = np.maximum.accumulate(highs)
+    first = np.append(True, lows[1:] > over[:-1])
+    low = lows[first]
+    wide = np.minimum(over[np.append(first[1:], True)] - low, math.tau)
     points = np.array([channel.transverse for channel in channels]) / costs
     strength, angle = np.abs(points), np.angle(points)
 
@@ -236,18 +240,6 @@ def _nutation_and_spin(spacecraft: Spacecraft, torques: Vector, costs: Vector, a
         return _ratio(gain, abs(goal), (points @ toward).max(axis=0), float(np.abs(points).max()))
 
     return _largest(value, float(np.angle(goal)), 0.5 * math.pi)
-
-
-def _arcs(spans: list[tuple[float, float]]) -> tuple[Vector, Vector]:
-    """Begins in [0, 2π) and lengths, rad, of the arcs that ``spans`` of phases (begin, end) cover, joined."""
-    merged: list[list[float]] = []
-    for low, high in sorted((begin % math.tau, begin % math.tau + end - begin) for begin, end in spans):
-        if merged and low <= merged[-1][1]:
-            merged[-1][1] = max(merged[-1][1], high)
-        else:
-            merged.append([low, high])
-    begins, ends = np.array(merged).T
-    return begins, np.minimum(ends - begins, math.tau)
 
 
 def _ratio(gain: Vector, most: float, reach: Vector, strongest: float) -> Vector:
@@ -293,9 +285,9 @@ def first_order(program: Program, prices: Vector) -> Proof:
     highest = max(_highest(curve, strong), 0.0 if strong.all() else 1.0)
     if highest <= 0.0:
         return nothing
-    proofs = []
-    for factor in map(float, highest * np.array([1.0] if strong.all() else LOWERINGS)):
+    best = nothing
+    for factor in [highest] if strong.all() else [highest * lowering for lowering in LOWERINGS]:
         gained = _lasting(curve, ~strong, factor)
-        proofs.append(Proof((goal / factor - gained) * (1.0 - ROUNDING), prices / factor, gained))
-    best = max(proofs, key=lambda proof: proof.bound)
-    return best if best.bound > 0.0 else nothing
+        proof = Proof((goal / factor - gained) * (1.0 - ROUNDING), prices / factor, gained)
+        best = max(best, proof, key=lambda proof: proof.bound)
+    return best

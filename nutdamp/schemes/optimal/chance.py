@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from nutdamp.common import work
 from nutdamp.schemes.optimal import linear_program
-from nutdamp.schemes.optimal.linear_program import COLUMN, SOLVED, Burn, Program, ProgramColumns, alone, burns
+from nutdamp.schemes.optimal.linear_program import Burn, GrowingProgram, Program, ProgramColumns, above, alone, burns
 from nutdamp.spacecraft.model import Vector
 
 TIGHT = 1e-3  # share of a limit by which a solution may pass it
@@ -111,7 +111,7 @@ class ChanceProgram:
         self.unit: Vector = self.scale / np.hypot(np.abs(uncertain.effects[0]), uncertain.effects[2].real)
         self.cost = program.costs * self.unit
         self.dearest = float(self.cost.max())
-        self.strong = self.unit < program.width
+        self.width = np.where(self.unit < program.width, 0.0, program.width)  # strong ones act at a moment
         self._kept: dict[tuple[int, int], tuple[Complex, NDArray[np.int_]]] = {}
 
     def turn_of(self, times: Vector) -> NDArray[np.int_]:
@@ -136,7 +136,7 @@ class ChanceProgram:
         return np.asarray(turned)
 
     def row(self, tangent: Tangent, columns: ProgramColumns, margin: float) -> Vector:
-        """Coefficients of a tangent per second of each column, N m, (n,)."""
+        """Coefficients of a tangent for one unit of each column, over the scale, (n,)."""
         kind = tangent.limit.kind
         effect, changes = self.effects[kind, columns.channel], self.changes[kind]
         total = effect + margin * (changes @ tangent.shared)[columns.channel]
@@ -149,13 +149,14 @@ class ChanceProgram:
             known = (at < len(tangent.own)) & (tangent.own[np.minimum(at, len(tangent.own) - 1), 0] == pulses)
             weights = tangent.own[at[known], 1:]
             total[known] += margin * (changes[columns.channel[known]] * weights).sum(axis=1)
-        return np.asarray((np.conj(tangent.u) * self.turns(kind, columns) * total).real)
+        per_second = (np.conj(tangent.u) * self.turns(kind, columns) * total).real
+        return np.asarray(per_second * self.unit[columns.channel] / self.scale)
 
     def right(self, tangent: Tangent, margin: float) -> float:
-        """Upper limit of the sum of a tangent over its columns, N m s."""
+        """Upper limit of the sum of a tangent over its columns, over the scale."""
         kind, inputs = tangent.limit.kind, self.uncertain
         taken = np.conj(tangent.u) * (margin * inputs.start[kind] @ tangent.shared - inputs.goal[kind])
-        return float(tangent.limit.most - taken.real)
+        return float(tangent.limit.most - taken.real) / self.scale
 
     def left(self, columns: ProgramColumns, on_times: Vector) -> Complex:
         """End errors of nutation, shift and spin, (3,) N m s."""
@@ -179,25 +180,31 @@ class ChanceProgram:
         inputs = len(self.uncertain.own)
         plain = np.zeros(inputs), np.zeros((0, 1 + inputs))  # tangents that know of no dispersion
         tangents = [Tangent(limit, complex(u), *plain) for limit in self.limits for u in directions_of(limit, BEGUN)]
-        columns = self._begin()
-        rights = np.array([self.right(tangent, margin) for tangent in tangents]) / self.scale
-        master = linear_program.GrowingProgram(np.zeros(0), rights, np.zeros(0))
+        # Columns to begin with: those that pull along the goal, or back.
+        toward = np.conj(self.uncertain.goal[0] or self.uncertain.goal[1] or 1.0)
+        worth = np.abs((toward * self.turns(0, self._all(0))[None, :] * self.effects[0][:, None]).real)
+        worth = np.where(self.program.forbidden, 0.0, worth * (self.unit / self.scale)[:, None])
+        channel, slot = np.nonzero(worth > 0.8 * worth.max(initial=0.0))
+        some = np.unique(np.linspace(0, len(slot) - 1, min(2 * BEST, len(slot))).astype(int))
+        columns = self._slots(channel[some], slot[some])
+        rights = np.array([self.right(tangent, margin) for tangent in tangents])
+        master = GrowingProgram(np.zeros(0), rights, np.zeros(0))
         excess = np.array([[-tangent.limit.most / self.scale] for tangent in tangents])
         # To pass all limits costs ten times all there is to do: that is done where hardly anything else helps.
         master.add(np.array([EXCESS]), excess, np.array([np.inf]))
         self._add(master, tangents, columns, margin)
         best, taken = None, columns
         for _ in range(ROUNDS):
-            work.spend(SOLVED + COLUMN * len(columns.t))
+            work.spend(linear_program.SOLVED + linear_program.COLUMN * len(columns.t))
             better = master.optimum()
             if better is None or work.exhausted():
                 break
             best, taken = better, columns
-            on_times = self._on_times(columns, best.x[1:])
+            on_times = np.where(best.x[1:] > SOME, best.x[1:], 0.0) * self.unit[columns.channel]
             new = self._broken(columns, on_times, margin, float(best.x[0]))
             for tangent in new:
-                row = np.concatenate([[-tangent.limit.most / self.scale], self._coefficients(tangent, columns, margin)])
-                master.limit(row, self.right(tangent, margin) / self.scale)
+                row = np.concatenate([[-tangent.limit.most / self.scale], self.row(tangent, columns, margin)])
+                master.limit(row, self.right(tangent, margin))
             priced = self._priced(tangents, best.shadows, columns, margin)
             tangents += new
             if not len(priced.t) and not new:
@@ -207,21 +214,9 @@ class ChanceProgram:
                 columns = columns.joined(priced)
         if best is None:
             return Sure((), np.inf, np.zeros(5))
-        on_times = self._on_times(taken, best.x[1:])
         used, left = on_times > 0.0, self.left(taken, on_times)
-        return Sure(
-            burns(self.program.channels, taken.of(used), on_times[used], 1.01 * self.program.width),
-            float(best.x[0]),
-            np.array([left[0].real, left[0].imag, left[1].real, left[1].imag, left[2].real]),
-        )
-
-    def _on_times(self, columns: ProgramColumns, amounts: Vector) -> Vector:
-        """On-times (n,) s of amounts in units, without rounding."""
-        return np.where(amounts > SOME, amounts, 0.0) * self.unit[columns.channel]
-
-    def _coefficients(self, tangent: Tangent, columns: ProgramColumns, margin: float) -> Vector:
-        """Coefficients of a tangent for one unit of each column, over the scale."""
-        return self.row(tangent, columns, margin) * self.unit[columns.channel] / self.scale
+        fired = burns(self.program.channels, taken.of(used), on_times[used], 1.01 * self.program.width)
+        return Sure(fired, float(best.x[0]), left.view(float)[:5])
 
     def _broken(self, columns: ProgramColumns, on_times: Vector, margin: float, excess: float) -> list[Tangent]:
         """Tangents where the cones are passed, the worst of each."""
@@ -241,27 +236,17 @@ class ChanceProgram:
                 tangents.append(Tangent(limit, u, (np.conj(u) * spread.shared).real / length, own))
         return tangents
 
-    def _begin(self) -> ProgramColumns:
-        """Columns to begin with: those that pull along the goal, or back."""
-        toward = np.conj(self.uncertain.goal[0] or self.uncertain.goal[1] or 1.0)
-        worth = np.abs((toward * self.turns(0, self._all())[None, :] * self.effects[0][:, None]).real)
-        worth = np.where(self.program.forbidden, 0.0, worth * (self.unit / self.scale)[:, None])
-        channel, slot = np.nonzero(worth > 0.8 * worth.max(initial=0.0))
-        some = np.unique(np.linspace(0, len(slot) - 1, min(2 * BEST, len(slot))).astype(int))
-        return self._slots(channel[some], slot[some])
-
-    def _all(self, channel: int = 0) -> ProgramColumns:
+    def _all(self, channel: int) -> ProgramColumns:
+        """All slots of a channel."""
         every = np.arange(len(self.program.centres))
         return self._slots(np.full(len(every), channel), every)
 
     def _slots(self, channel: NDArray[np.int_], slot: NDArray[np.int_]) -> ProgramColumns:
-        return alone(channel, self.program.centres[slot], np.where(self.strong[channel], 0.0, self.program.width))
+        return alone(channel, self.program.centres[slot], self.width[channel])
 
-    def _add(
-        self, master: linear_program.GrowingProgram, tangents: list[Tangent], new: ProgramColumns, margin: float
-    ) -> None:
+    def _add(self, master: GrowingProgram, tangents: list[Tangent], new: ProgramColumns, margin: float) -> None:
         most = np.where(new.width > 0.0, new.width / self.unit[new.channel], np.inf)
-        rows = np.array([self._coefficients(tangent, new, margin) for tangent in tangents]).reshape(len(tangents), -1)
+        rows = np.array([self.row(tangent, new, margin) for tangent in tangents]).reshape(len(tangents), -1)
         master.add(self.cost[new.channel] / self.dearest, rows, most)
 
     def _priced(self, tangents: list[Tangent], shadows: Vector, taken: ProgramColumns, margin: float) -> ProgramColumns:
@@ -271,11 +256,7 @@ class ChanceProgram:
         worth = np.array([self._worth(channel, active, margin) - cost[channel] for channel in range(len(cost))])
         worth[self.program.forbidden] = -np.inf
         worth[taken.channel, np.searchsorted(self.program.centres, taken.t - 0.25 * self.program.width)] = -np.inf
-        channel_, slot = np.nonzero(worth > PRICE)
-        if len(slot) > BEST:
-            best = np.argpartition(worth[channel_, slot], -BEST)[-BEST:]
-            channel_, slot = channel_[best], slot[best]
-        return self._slots(channel_, slot)
+        return self._slots(*above(worth, PRICE, BEST))
 
     def _worth(self, channel: int, active: list[tuple[Tangent, float]], margin: float) -> Vector:
         """Worth of one unit of a channel in each slot by tangents and their prices."""

@@ -8,6 +8,7 @@ differences of flights, which cost little where hundreds are flown at a time.
 
 from __future__ import annotations
 
+import copy
 import math
 from contextlib import suppress
 from typing import Any, NamedTuple
@@ -125,12 +126,10 @@ class Task:
         return bodies.momentum(rates), turn
 
     def _together(self, which: Indices, x: Vector, kicks: int) -> tuple[Vector, Vector]:
-        """`_in_turn` of a body without external torque, all stretches at once.
-
-        In the frame that turns with the nutation pulses add to H whatever it is, and between them the body turns about
-        H and its own axis (see `montecarlo.propagated`): so the motion at all edges is known first, and then all turns
-        are. A quaternion is a pair of complex numbers, w + iz and x + iy.
-        """
+        """`_in_turn` of a body without external torque, all stretches at once."""
+        # In the frame that turns with the nutation pulses add to H whatever it is, and between them the body turns
+        # about H and its own axis: so the motion at all edges is known first, and then all turns are. A quaternion is
+        # a pair of complex numbers, w + iz and x + iy.
         count, n = which.shape
         (A, _, C), rates, turn = self._start
         wheel = self._wheel
@@ -172,10 +171,7 @@ class Task:
     def _pulsed(
         self, which: Indices, across: Complex, before: Vector, widths: Vector
     ) -> tuple[Complex, tuple[Complex, Complex]]:
-        """H across axis 3 (b, n) in body axes after pulses, each alone, and the turn of each.
-
-        ``across`` and ``before``: H across and along axis 3 as they begin.
-        """
+        """H across axis 3 (b, n) after pulses, each alone, that begin with H ``across`` and along it; turn of each."""
         count = which.size
         moments = np.repeat(self._start[0][:, None], count, axis=1)
         spinning = before.ravel() - self._wheel
@@ -232,7 +228,8 @@ def _product(first: Complex, second: Complex) -> tuple[Complex, Complex]:
     return first[:, 0], second[:, 0]
 
 
-SHARES = np.array([0.5, 0.2, 0.05, 0.01])  # shares of a step that are tried where the whole does not help
+WHOLE, SHARES = np.array([1.0]), np.array([0.5, 0.2, 0.05, 0.01])
+"""All of a step, and the shares of it that are tried in turn where that does not help."""
 
 BARRIER, SETTLED = 1e-9, 1e-7
 """Share of the cost at which the barrier of the bounds ends, and the largest relative error of the conditions for an
@@ -307,10 +304,12 @@ class Descent:
         """Largest miss, (b,), over |H|."""
         return np.asarray(np.abs(self.state.misses).max(axis=1))
 
-    def keep(self, rows: Indices) -> None:
-        """Go on with some of the sequences only."""
-        self.sequences, self.state = self.sequences.of(rows), self.state.of(rows)
-        self.scale, self.rows, self.price = self.scale[rows], self.rows[rows], self.price[rows]
+    def of(self, rows: Indices) -> Descent:
+        """The descents of some of the sequences."""
+        some = copy.copy(self)
+        some.sequences, some.state = self.sequences.of(rows), self.state.of(rows)
+        some.scale, some.rows, some.price = self.scale[rows], self.rows[rows], self.price[rows]
+        return some
 
     def run(self, steps: int) -> None:
         """Take at most so many steps with each sequence."""
@@ -319,7 +318,7 @@ class Descent:
             if not len(going) or work.exhausted():
                 break
             with np.errstate(all="ignore"):  # a sequence that gets lost is left as it is
-                for state, stepped in zip(self.state, self._stepped(going), strict=True):
+                for state, stepped in zip(self.state, self.of(going)._stepped(), strict=True):
                     state[going] = stepped
 
     def close(self, steps: int = 5) -> None:
@@ -338,18 +337,18 @@ class Descent:
                 break
             state.x[better], state.slack[better], state.misses[better] = x[better], slack[better], misses[better]
 
-    def _stepped(self, at: Indices) -> DescentState:
-        old = self.state.of(at)
-        rows, price, scale, which = self.rows[at], self.price[at], self.scale[at], self.sequences.which[at]
+    def _stepped(self) -> DescentState:
+        """The state of all descents one step on."""
+        old, rows = self.state, self.rows
         weight = old.dual / old.slack
-        uphill = price - np.einsum("br,bri->bi", old.barrier[:, None] / old.slack, rows)
+        uphill = self.price - np.einsum("br,bri->bi", old.barrier[:, None] / old.slack, rows)
         curvature = old.curvature + _weighted(rows, weight)
         move, prices = _newton(old.slopes, curvature, uphill, old.misses, old.prices)
         lost = ~np.isfinite(move).all(axis=1) | ~np.isfinite(prices).all(axis=1)
         move[lost], prices[lost] = 0.0, 0.0
         penalty = np.maximum(old.penalty, 1.5 * np.abs(prices).max(axis=1))
         ahead = np.einsum("bi,bi->b", uphill, move)
-        line = _LineSearch(self, at, old, penalty, ahead - penalty * np.abs(old.misses).sum(axis=1))
+        line = _LineSearch(self, penalty, ahead - penalty * np.abs(old.misses).sum(axis=1))
         closer = np.einsum("bri,bi->br", rows, move)
         step = _to_bound(old.slack, closer, old.barrier)[:, None] * move
         there = line.tried(step)
@@ -357,16 +356,18 @@ class Descent:
             back, _ = _newton(old.slopes[k], curvature[k], 0.0 * step[k], there, 0.0 * prices[k])
             line.tried(step[k] + back)
         if len(line.active):
-            line.shortened(step[line.active])
+            line.tried(step[line.active], SHARES)
         x, slack, misses = line.x, line.slack, line.misses
-        slopes = self.task.slopes(which, x, scale, misses, self.kicks)
-        curvature = _curved(old.curvature, (x - old.x) / scale, np.einsum("bmi,bm->bi", slopes - old.slopes, prices))
-        curvature[line.stuck] = np.eye(x.shape[1])
+        slopes = self.task.slopes(self.sequences.which, x, self.scale, misses, self.kicks)
+        curvature = _curved(
+            old.curvature, (x - old.x) / self.scale, np.einsum("bmi,bm->bi", slopes - old.slopes, prices)
+        )
+        curvature[line.active] = np.eye(x.shape[1])
         dearer = old.barrier[:, None] / old.slack - old.dual - weight * closer
         dual = old.dual + _to_bound(old.dual, dearer, old.barrier)[:, None] * dearer
         central = old.barrier[:, None] / slack
         dual = np.clip(dual, 1e-2 * central, 1e2 * central)
-        gradient = price + np.einsum("bmi,bm->bi", slopes, prices) - np.einsum("br,bri->bi", dual, rows)
+        gradient = self.price + np.einsum("bmi,bm->bi", slopes, prices) - np.einsum("br,bri->bi", dual, rows)
         wrong = np.maximum(np.abs(gradient).max(axis=1), np.abs(misses).max(axis=1))
         near = np.maximum(wrong, np.abs(dual * slack - old.barrier[:, None]).max(axis=1)) < 10.0 * old.barrier
         barrier = np.where(near, np.maximum(np.minimum(0.2 * old.barrier, old.barrier**1.5), BARRIER), old.barrier)
@@ -376,53 +377,37 @@ class Descent:
 
 
 class _LineSearch:
-    """The search along a step for less of cost, barrier and misses; ``slope`` (b,) is how fast they fall at first."""
+    """The search along a step for less of cost, barrier and misses, which fall by ``slope`` (b,) at first."""
 
-    def __init__(self, descent: Descent, at: Indices, old: DescentState, penalty: Vector, slope: Vector) -> None:
-        self.task, self.kicks, self.which = descent.task, descent.kicks, descent.sequences.which[at]
-        self.price, self.scale, self.rows = descent.price[at], descent.scale[at], descent.rows[at]
-        self.old, self.penalty, self.slope = old, penalty, np.minimum(slope, 0.0)
-        self.x, self.slack, self.misses = old.x.copy(), old.slack.copy(), old.misses.copy()
-        self.active = np.arange(len(at))
-        self.before = self._merit(old.x, old.slack, old.misses, self.active)
-        self.stuck = np.zeros(len(at), dtype=bool)
+    def __init__(self, descent: Descent, penalty: Vector, slope: Vector) -> None:
+        self.descent, self.old, self.penalty, self.slope = descent, descent.state, penalty, np.minimum(slope, 0.0)
+        self.x, self.slack, self.misses = self.old.x.copy(), self.old.slack.copy(), self.old.misses.copy()
+        self.active = np.arange(len(penalty))  # sequences for which no step was good enough so far
+        self.before = self._merit(self.x, self.slack, self.misses, self.active)
 
-    def tried(self, step: Vector) -> Vector:
-        """Take the scaled ``step`` (k, v) of those still to do where it falls enough; the misses where it does not."""
-        k = self.active
-        x, slack, misses, enough = self._trial(k, step, 1.0)
-        there = k[enough]
-        self.x[there], self.slack[there], self.misses[there] = x[enough], slack[enough], misses[enough]
-        self.active = k[~enough]
-        return misses[~enough]
-
-    def shortened(self, step: Vector) -> None:
-        """Take the first of the `SHARES` of the ``step`` (k, v) of those still to do that falls enough, or the last."""
-        k, count = self.active, len(SHARES)
-        share = np.repeat(SHARES, len(k))
-        x, slack, misses, enough = self._trial(np.tile(k, count), share[:, None] * np.tile(step, (count, 1)), share)
-        x, slack, misses = (part.reshape(count, len(k), -1) for part in (x, slack, misses))
-        enough = enough.reshape(count, len(k))
-        self.stuck[k] = ~enough.any(axis=0)
-        first, every = np.where(self.stuck[k], count - 1, np.argmax(enough, axis=0)), np.arange(len(k))
-        self.x[k], self.slack[k], self.misses[k] = x[first, every], slack[first, every], misses[first, every]
-
-    def _trial(
-        self, k: Indices, step: Vector, share: Vector | float
-    ) -> tuple[Vector, Vector, Vector, NDArray[np.bool_]]:
-        """Unknowns, slacks and misses after a step, and whether it falls enough for its ``share`` of the whole."""
-        old = self.old
-        slack = old.slack[k] + np.einsum("bri,bi->br", self.rows[k], step)
+    def tried(self, step: Vector, shares: Vector = WHOLE) -> Vector:
+        """Take the first share of the scaled ``step`` (k, v) that falls enough, or the last: the misses of these."""
+        count, k = len(shares), np.tile(self.active, len(shares))
+        share, old = np.repeat(shares, len(self.active)), self.old
+        step = share[:, None] * np.tile(step, (count, 1))
+        slack = old.slack[k] + np.einsum("bri,bi->br", self.descent.rows[k], step)
         inside = np.all(slack > LEAST_ROOM * old.slack[k], axis=1)  # as much of the room must be left
-        x = np.where(inside[:, None], old.x[k] + step * self.scale[k], old.x[k])
+        x = np.where(inside[:, None], old.x[k] + step * self.descent.scale[k], old.x[k])
         slack = np.where(inside[:, None], slack, old.slack[k])
-        misses = self.task.misses(self.which[k], x, self.kicks)
-        merit = self._merit(x, slack, misses, k)
+        misses = self.descent.task.misses(self.descent.sequences.which[k], x, self.descent.kicks)
         least = self.before[k] + 1e-4 * share * self.slope[k] + 1e-11 * np.abs(self.before[k])
-        return x, slack, misses, inside & (merit <= least)
+        enough = (inside & (self._merit(x, slack, misses, k) <= least)).reshape(count, -1)
+        stuck = ~enough.any(axis=0)
+        # Rows of the first that falls enough.
+        first = np.where(stuck, count - 1, np.argmax(enough, axis=0)) * len(stuck) + np.arange(len(stuck))
+        for part, there in ((self.x, x), (self.slack, slack), (self.misses, misses)):
+            part[self.active] = there[first]
+        self.active = self.active[stuck]
+        return np.asarray(misses[first][stuck])
 
     def _merit(self, x: Vector, slack: Vector, misses: Vector, k: Indices) -> Vector:
-        dear = np.einsum("bi,bi->b", self.price[k], x / self.scale[k]) - self.old.barrier[k] * np.log(slack).sum(axis=1)
+        dear = np.einsum("bi,bi->b", self.descent.price[k], x / self.descent.scale[k])
+        dear -= self.old.barrier[k] * np.log(slack).sum(axis=1)
         return np.asarray(dear + self.penalty[k] * np.abs(misses).sum(axis=1))
 
 

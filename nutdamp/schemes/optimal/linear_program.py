@@ -23,7 +23,6 @@ from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Spacecraft, Vector
 
 SLACK_COST = 1e3  # cost of what no column supplies, over the dearest channel's: used only where there is no solution
-PROVED = 1e-6  # shortfall by which a program is proved to have no solution, over all there is to do
 LOOK = 0.05  # peaks of the price this far below zero are looked at more closely within their slots
 
 
@@ -66,16 +65,25 @@ class Burn:
         return self.on_time * float(np.linalg.norm(self.channel.torque))
 
 
+def above(worth: Vector, least: float, most: int) -> tuple[NDArray[np.int_], NDArray[np.int_]]:
+    """Channels and slots (n,) whose ``worth`` (channels, slots) is more than the ``least``; the ``most`` best ones."""
+    channel, slot = np.nonzero(worth > least)
+    if len(slot) > most:
+        best = np.argpartition(worth[channel, slot], -most)[-most:]
+        channel, slot = channel[best], slot[best]
+    return channel, slot
+
+
 def burns(channels: Sequence[Channel], columns: ProgramColumns, on_times: Vector, apart: float) -> tuple[Burn, ...]:
     """Columns of a channel that are less than ``apart`` s from one another as one burn about their common centre."""
     result: list[Burn] = []
-    for index in np.flatnonzero(np.bincount(columns.channel)).tolist():
-        mine = np.flatnonzero(columns.channel == index)
-        mine = mine[np.argsort(columns.t[mine], kind="stable")]
-        cut = (np.diff(columns.t[mine]) > apart) | (np.diff(columns.burn[mine]) != 0)
-        for group in np.split(mine, np.flatnonzero(cut) + 1):
-            total = float(on_times[group].sum())
-            result.append(Burn(channels[index], float(on_times[group] @ columns.t[group]) / total, total))
+    order = np.lexsort((columns.t, columns.channel))
+    channel, t, _, burn = columns.of(order)
+    cut = (np.diff(t) > apart) | (np.diff(burn) != 0) | (np.diff(channel) != 0)
+    for group in np.split(order, np.flatnonzero(cut) + 1) if len(order) else ():
+        total = float(on_times[group].sum())
+        centre = float(on_times[group] @ columns.t[group]) / total
+        result.append(Burn(channels[columns.channel[group[0]]], centre, total))
     return tuple(sorted(result, key=lambda burn: burn.t))
 
 
@@ -160,21 +168,17 @@ class Program:
         ``enough``: only to see whether there is a solution, at whatever cost; it ends once that is known.
         """
         work.spend(SOLVED + (SLOT * self.forbidden.size if columns is None else COLUMN * len(columns.t)))
-        nothing = np.zeros(len(self.influence.goal))
+        count, generate = len(self.influence.goal), columns is None
         if self._scale == 0.0:
-            return Solution((), 0.0, 0.0, np.zeros(2), nothing)
-        generate = columns is None
+            return Solution((), 0.0, 0.0, np.zeros(2), np.zeros(count))
         chosen = self._first() if columns is None else columns
-        reach = None
-        if columns is None:  # the most that one unit of any channel does in each of the equations, or a little more
-            reach = (np.abs(self._slot_rows()).max(axis=2) @ np.abs(self._direction).T).max(axis=1)
-        master = self._master(chosen, reach)
+        master = self._master(chosen, growing=generate)
         optimum = master.optimum()
         if optimum is None:
-            return Solution((), math.inf, math.inf, np.zeros(2), nothing)
+            return Solution((), math.inf, math.inf, np.zeros(2), np.zeros(count))
         for _ in range(ROUNDS if generate else 0):
-            unmet = float(optimum.x[: 2 * len(nothing)].sum())
-            if work.exhausted() or (enough and (unmet <= SOME or self._out_of_reach(optimum.prices))):
+            unmet = float(optimum.x[: 2 * count].sum())
+            if work.exhausted() or (enough and unmet <= SOME):
                 break
             new = self._priced(optimum.prices, chosen, unmet)
             if not len(new.t):
@@ -187,24 +191,23 @@ class Program:
         if generate:
             self._pool = chosen
         free, amounts = np.split(optimum.x, [len(optimum.x) - len(chosen.t)])
-        off = -(self._ring() @ free[2 * len(nothing) :])[2:4] * self._scale if self.off > 0.0 else np.zeros(2)
+        off = -(self._ring() @ free[2 * count :])[2:4] * self._scale if self.off > 0.0 else np.zeros(2)
         used = amounts > SOME
         on_times = amounts[used] * self._unit[chosen.channel[used]]
         return Solution(
             burns(self.channels, chosen.of(used), on_times, 1.01 * self.width),
             float(self.costs[chosen.channel[used]] @ on_times),
-            float(free[: 2 * len(nothing)].sum()),
+            float(free[: 2 * count].sum()),
             np.asarray(off),
             optimum.prices * self._dearest / self._scale,
         )
 
-    def _master(self, columns: ProgramColumns, reach: Vector | None) -> GrowingProgram:
-        """The program of these columns, in units of all there is to do, after slacks and the ring.
-
-        ``reach`` (equations,): the largest coefficients that there can be, where more columns are to come.
-        """
+    def _master(self, columns: ProgramColumns, *, growing: bool) -> GrowingProgram:
+        """The program of these columns, in units of all there is to do, after slacks and the ring."""
         count, ring = len(self.influence.goal), self._ring()
-        if reach is None:
+        if growing:  # the most that one unit of any channel does in each of the equations, or a little more
+            reach = (np.abs(self._slot_rows()).max(axis=2) @ np.abs(self._direction).T).max(axis=1)
+        else:
             reach = np.abs(self._coefficients(columns)).max(axis=1, initial=0.0)
         # Where H may end off its target, the shares of the directions add up to no more than `off`.
         shares, longest = min(ring.shape[1], 1), len(self._longest(columns))
@@ -223,12 +226,9 @@ class Program:
 
     def _add(self, master: GrowingProgram, columns: ProgramColumns) -> None:
         """Let the program have these columns."""
-        cost = self._price[columns.channel] / self._dearest * self._dearness(columns.t)
-        most = np.full(len(cost), np.inf)
-        wide = np.flatnonzero(columns.width)
-        most[wide] = columns.width[wide] / self._unit[columns.channel[wide]]
-        shares = np.zeros((int(self.off > 0.0), len(cost)))
-        master.add(cost, np.vstack([self._coefficients(columns), shares, self._longest(columns)]), most)
+        most = np.where(columns.width > 0.0, columns.width / self._unit[columns.channel], np.inf)
+        shares = np.zeros((int(self.off > 0.0), len(most)))
+        master.add(self._costs(columns), np.vstack([self._coefficients(columns), shares, self._longest(columns)]), most)
 
     def _longest(self, columns: ProgramColumns) -> Vector:
         """Rows (burns, n) that hold each burn's on-time, over the longest that its channel may be on."""
@@ -249,14 +249,16 @@ class Program:
         ring[2:4] = np.cos(angles), np.sin(angles)
         return ring
 
+    def _costs(self, columns: ProgramColumns) -> Vector:
+        """Cost (n,) of one unit of each column, over the dearest channel's."""
+        return np.asarray(self._price[columns.channel] / self._dearest * self._dearness(columns.t))
+
     def _dearness(self, times: Vector) -> Vector:
         return 1.0 + self.haste * times / float(self.centres[-1])
 
     def _coefficients(self, columns: ProgramColumns) -> Vector:
-        """Coefficients of one unit of each column, (equations, n).
-
-        Once slots were looked at as often as there are any, all of them are, and kept.
-        """
+        """Coefficients of one unit of each column, (equations, n)."""
+        # Once slots were looked at as often as there are any, all of them are, and kept.
         slots = columns.width > 0.0
         self._looked += int(np.count_nonzero(slots))
         if self._grid is None and self._looked <= len(self.centres):
@@ -298,15 +300,6 @@ class Program:
         most = np.einsum("ekn,ck->ecn", self._slot_rows(), self._direction) * (self.width / self._unit)[None, :, None]
         return supplies(most[:, ~self.forbidden], self.influence.goal / self._scale, self.off / self._scale)
 
-    def _out_of_reach(self, weights: Vector) -> bool:
-        """True where prices ``weights`` prove that all slots together do not supply the goal (Farkas' lemma)."""
-        if self.strong.any():  # these act at moments, of which the slots are only samples
-            return False
-        size = float(np.abs(weights).max())
-        most = float(np.maximum(self._worth(weights), 0.0).sum(axis=1) @ (self.width / self._unit))
-        loose = self.off / self._scale * float(np.linalg.norm(weights[2:4])) if self.off > 0.0 else 0.0
-        return float(weights @ self.influence.goal) / self._scale - most - loose > PROVED * size
-
     def _first(self) -> ProgramColumns:
         """Columns to begin with: those of the last time, or along the shortest way to the goal, spread over time."""
         if self._pool is not None:
@@ -320,20 +313,13 @@ class Program:
         return alone(channel, self.centres[slot], np.where(self.strong[channel], 0.0, self.width))
 
     def _priced(self, duals: Vector, taken: ProgramColumns, unmet: float) -> ProgramColumns:
-        """Columns worth more than they cost: whole slots of a weak channel, the best moments of a strong one.
-
-        More of them at a time as long as something is ``unmet``: then most of what there is may be needed.
-        """
+        """Columns worth more than they cost: whole slots of a weak channel, the best moments of a strong one."""
         gains = self._gains(duals)
         weak = np.where(self.strong[:, None], -np.inf, gains)
-        slots = taken.width > 0.0
-        weak[taken.channel[slots], self._slot(taken.t[slots])] = -np.inf
-        channel, slot = np.nonzero(weak > PRICE)
-        most = max(BEST, len(slot) // MANY if unmet > SOME else 0)
-        if len(slot) > most:
-            best = np.argpartition(weak[channel, slot], -most)[-most:]
-            channel, slot = channel[best], slot[best]
-        columns = self._slots(channel, slot)
+        weak[taken.channel, self._slot(taken.t)] = -np.inf
+        # More of them at a time as long as something is unmet: then most of what there is may be needed.
+        most = max(BEST, int(np.count_nonzero(weak > PRICE)) // MANY if unmet > SOME else 0)
+        columns = self._slots(*above(weak, PRICE, most))
         return columns.joined(self._peaks(gains, duals)) if self.strong.any() else columns
 
     def _peaks(self, gains: Vector, duals: Vector) -> ProgramColumns:
@@ -346,8 +332,7 @@ class Program:
         within = 0.25 * self.width * np.arange(-2, 3)  # both ends of the slot among them: there may be none beside it
         times = centre[:, None] + within
         fives = alone(np.repeat(channel, 5), times.ravel(), np.zeros(times.size))
-        cost = self._price[fives.channel] / self._dearest * self._dearness(fives.t)
-        worth = (duals @ self._coefficients(fives) - cost).reshape(-1, 5)
+        worth = (duals @ self._coefficients(fives) - self._costs(fives)).reshape(-1, 5)
         # By the parabola through the best of the five and those beside it; at an end of them, that end.
         best = np.argmax(worth, axis=1)
         every, inner = np.arange(len(best)), np.clip(best, 1, 3)
@@ -460,11 +445,10 @@ class GrowingProgram:
     def optimum(self) -> Optimum | None:
         """The cheapest solution, from the last one's basis if there is one; None where no way of solving succeeds."""
         optimum = self._solved(*WAYS[0])
-        for way in WAYS:
-            if optimum is not None:
-                break
+        for way in WAYS if optimum is None else ():
             self._highs.clearSolver()
-            optimum = self._solved(*way)
+            if optimum := self._solved(*way):
+                break
         return optimum
 
     def _solved(self, method: str, presolve: bool, factor: float) -> Optimum | None:
@@ -521,22 +505,17 @@ def supplies(most: Vector, goal: Vector, off: float = 0.0) -> bool | None:
 
     ``off``: by how much its rows 2 and 3 may be missed, in norm. None where that is not known after `CORNERS`.
     """
-
-    def corner(direction: Vector) -> Vector:
-        """The point of what can be supplied, less the goal, that lies least far along ``direction``."""
-        point = most @ (direction @ most < 0.0) - goal
-        if off > 0.0 and (size := float(np.linalg.norm(direction[2:4]))) > 0.0:
-            point[2:4] -= off / size * direction[2:4]
-        return np.asarray(point)
-
-    corners = -goal[None, :]
-    weights = np.ones(1)
+    corners, weights = -goal[None, :], np.ones(1)
     for _ in range(CORNERS):
         nearest = weights @ corners
         distance = float(np.linalg.norm(nearest))
         if distance <= MET:
             return True
-        new = corner(nearest / distance)
+        direction = nearest / distance
+        # The point of what can be supplied, less the goal, that lies least far along it.
+        new = most @ (direction @ most < 0.0) - goal
+        if off > 0.0 and (size := float(np.linalg.norm(direction[2:4]))) > 0.0:
+            new[2:4] -= off / size * direction[2:4]
         ahead = float(nearest @ new) / distance
         if ahead > BEYOND * distance and ahead > MET:
             return False
@@ -549,13 +528,9 @@ def supplies(most: Vector, goal: Vector, off: float = 0.0) -> bool | None:
 def _nearest(corners: Vector, weights: Vector) -> tuple[Vector, Vector]:
     """Corners (k, m) and weights (k,) of the point nearest to zero in their hull, those without weight left out."""
     while True:
-        count = len(corners)
-        system = np.ones((count + 1, count + 1))
+        system = np.pad(corners @ corners.T, ((1, 0), (1, 0)), constant_values=1.0)
         system[0, 0] = 0.0
-        system[1:, 1:] = corners @ corners.T
-        right = np.zeros(count + 1)
-        right[0] = 1.0
-        weights_of = np.linalg.lstsq(system, right, rcond=None)[0][1:]
+        weights_of = np.linalg.lstsq(system, np.eye(len(system))[0], rcond=None)[0][1:]
         if np.all(weights_of > FLAT):
             return corners, weights_of / weights_of.sum()
         falling = weights_of <= FLAT

@@ -47,19 +47,16 @@ CLOSE, MOVES, FEWEST_MOVES = 1e-5, 30, 3
 over the number of pulses, and the fewest."""
 
 
-class Starts(NamedTuple):
-    """Sequences and unknowns of `Task` from which they are descended."""
-
-    sequences: Sequences
-    x: Vector
-
-
 class Moments(NamedTuple):
     """Pulses still without order: channels ``which``, centres ``t`` and on-times ``on`` in s, (b, n) each."""
 
     which: NDArray[np.int_]
     t: Vector
     on: Vector
+
+    def of(self, pulses: NDArray[np.bool_]) -> Moments:
+        """Some of the pulses of one sequence (n,)."""
+        return Moments._make(part[pulses] for part in self)
 
 
 def schedules(task: Task, known: Iterable[Schedule] = ()) -> list[Schedule]:
@@ -68,37 +65,37 @@ def schedules(task: Task, known: Iterable[Schedule] = ()) -> list[Schedule]:
         return []
     rng = np.random.default_rng(0)  # the same plan every time
     for pulses in range(_pulses(task, 0), 0, -1):  # fewer where gap and windows leave no room for more
-        starts = random_starts(task, pulses, STARTS, rng)
-        if len(starts.x):
+        sequences, x = random_starts(task, pulses, STARTS, rng)
+        if len(x):
             break
-    best = _screened(task, starts)
+    descent = Descent(task, sequences, x, kicks=1)
+    for steps, share in ROUNDS:  # after each only the better part, misses and all, goes on
+        descent.run(steps)
+        score = np.nan_to_num(descent.cost / task.least + UNMET_COST * descent.left, nan=np.inf)
+        descent = descent.of(np.argsort(score, kind="stable")[: max(int(share * len(score)), 1)])
+    best = _best(descent)
     for _ in range(ADDITIONS):
         added = _added(task, best, _pulses(task, SPARE), rng)
-        if added is None:
+        if not added:
             break
-        descent = Descent(task, *added, kicks=1, barrier=1e-2)
+        descent = Descent(task, *laid_out(task, _together(added)), kicks=1, barrier=1e-2)
         descent.run(50)
         more = _best(descent)
-        if not len(more.left) or more.cost[0] > best.cost[0] * (1.0 - GAIN):
+        if not len(more.cost) or more.cost[0] > best.cost[0] * (1.0 - GAIN):
             break
         best = more
     return _flown(task, best, known)
 
 
 def cheapened(task: Task, schedule: Schedule) -> Schedule | None:
-    """A schedule after a few steps down on the true motion, fewer where it has many pulses; None where there is none.
-
-    Its sequence of channels stays, and what it leaves too.
-    """
-    every = Moments._make(part[None] for part in _moments_of(task, schedule))
-    starts = laid_out(task, every, task.shortest[every.which])
-    if not len(starts.x):
+    """A schedule of the same channels after a few steps down on the true motion; None where there is none."""
+    sequences, x = laid_out(task, _together([_moments_of(task, schedule)]), bounded=True)
+    if not len(x):
         return None
-    descent = Descent(task, *starts, kicks=0, barrier=CLOSE)
+    descent = Descent(task, sequences, x, kicks=0, barrier=CLOSE)
     descent.run(max(MOVES // len(schedule), FEWEST_MOVES))
     descent.close()
-    there = bool(descent.left[0] < EXACT)
-    return _schedule(task, _moments(descent.sequences.which[0], descent.state.x[0])) if there else None
+    return _schedule(task, _every(descent)[0]) if descent.left[0] < EXACT else None
 
 
 def _pulses(task: Task, spare: int) -> int:
@@ -108,7 +105,7 @@ def _pulses(task: Task, spare: int) -> int:
     return count if most is None else min(count, most)
 
 
-def random_starts(task: Task, pulses: int, count: int, rng: np.random.Generator) -> Starts:
+def random_starts(task: Task, pulses: int, count: int, rng: np.random.Generator) -> tuple[Sequences, Vector]:
     """Random channels and moments of ``count`` sequences; many begin or end with the time there is."""
     limits, horizon = task.body.limits, task.body.horizon
     which = rng.integers(len(task.channels), size=(count, pulses))
@@ -119,18 +116,22 @@ def random_starts(task: Task, pulses: int, count: int, rng: np.random.Generator)
     return laid_out(task, Moments(which, limits.earliest + (horizon - limits.earliest) * share, on))
 
 
-def laid_out(task: Task, moments: Moments, shortest: Vector | None = None) -> Starts:
-    """The pulses in order, moved apart and into windows, strictly within all bounds; those that do not fit left out.
+def laid_out(task: Task, moments: Moments, *, bounded: bool = False) -> tuple[Sequences, Vector]:
+    """Sequences that fit, and their unknowns: pulses in order, moved apart and into windows, strictly within bounds.
 
-    ``shortest`` (b, n) s, least on-times; none where pulses may still vanish.
+    Pulses may still vanish unless on-times are ``bounded`` from below.
     """
     order = np.argsort(moments.t, axis=1, kind="stable")
     which = np.take_along_axis(moments.which, order, axis=1)
     t, on = (np.take_along_axis(part, order, axis=1) for part in moments[1:])
-    least = np.zeros(which.shape) if shortest is None else np.take_along_axis(shortest, order, axis=1)
-    begins, ends = _windows(task, t)
-    longest = np.minimum(np.array([channel.max_on_time for channel in task.channels])[which], ends - begins)
+    least = task.shortest[which] if bounded else np.zeros(which.shape)
     limits = task.body.limits
+    free = [(begin, end) for begin, end in free_windows(task.body) if begin < end]
+    begins, ends = np.array(free or [(limits.earliest, limits.earliest)]).T
+    # The windows without blackout in which the moments lie, or the nearest.
+    nearest = np.argmin(np.maximum(begins - t[..., None], t[..., None] - ends), axis=-1)
+    begins, ends = begins[nearest], ends[nearest]
+    longest = np.minimum(np.array([channel.max_on_time for channel in task.channels])[which], ends - begins)
     inside = 1e-4 * (task.body.horizon - limits.earliest) / which.shape[1]
     edge = 1e-3 * np.minimum(task.unit[which], np.maximum(longest - least, 0.0))
     on = np.minimum(np.maximum(on, least + edge), longest - edge)
@@ -147,65 +148,30 @@ def laid_out(task: Task, moments: Moments, shortest: Vector | None = None) -> St
     x = np.hstack([start, on, np.zeros((len(t), task.loose))])
     rows, levels = task.bounds(sequences)
     fits = np.all(x @ rows.T > levels, axis=1)
-    return Starts(sequences.of(fits), x[fits])
+    return sequences.of(fits), x[fits]
 
 
-def _windows(task: Task, t: Vector) -> tuple[Vector, Vector]:
-    """Begin and end, s, of the windows without blackout in which moments ``t`` lie, or of the nearest."""
-    limits = task.body.limits
-    free = [(begin, end) for begin, end in free_windows(task.body) if begin < end]
-    if not free:
-        return np.full(t.shape, limits.earliest), np.full(t.shape, limits.earliest)
-    begins, ends = np.array(free).T
-    nearest = np.argmin(np.maximum(begins - t[..., None], t[..., None] - ends), axis=-1)
-    return begins[nearest], ends[nearest]
-
-
-class _Best(NamedTuple):
-    """The cheapest distinct sequences that leave nothing, cheapest first, and the ``prices`` of their equations."""
-
-    sequences: Sequences
-    x: Vector
-    cost: Vector
-    left: Vector
-    prices: Vector
-
-
-def _best(descent: Descent) -> _Best:
+def _best(descent: Descent) -> Descent:
+    """The cheapest distinct sequences that leave nothing, cheapest first."""
     cost, left = descent.cost, descent.left
     chosen: list[int] = []
     for row in np.argsort(cost, kind="stable").tolist():
         if left[row] < FOUND and all(abs(cost[row] - cost[other]) > GAIN * cost[other] for other in chosen):
             chosen.append(row)
-    rows = np.array(chosen[:BEST], dtype=int)
-    state = descent.state.of(rows)
-    return _Best(descent.sequences.of(rows), state.x, cost[rows], left[rows], state.prices)
+    return descent.of(np.array(chosen[:BEST], dtype=int))
 
 
-def _screened(task: Task, starts: Starts) -> _Best:
-    """The best of very many: in each round some steps, after which only the better part, misses and all, goes on."""
-    descent = Descent(task, *starts, kicks=1)
-    for steps, share in ROUNDS:
-        descent.run(steps)
-        score = np.nan_to_num(descent.cost / task.least + UNMET_COST * descent.left, nan=np.inf)
-        descent.keep(np.argsort(score, kind="stable")[: max(int(share * len(score)), 1)])
-    return _best(descent)
-
-
-def _added(task: Task, best: _Best, pulses: int, rng: np.random.Generator) -> Starts | None:
+def _added(task: Task, best: Descent, pulses: int, rng: np.random.Generator) -> list[Moments]:
     """The best sequences with more pulses, where they are worth most; three choices of each."""
     grid = np.linspace(task.body.limits.earliest, task.body.horizon, MOMENTS)
     every: list[Moments] = []
-    for row in range(len(best.left)):
-        which, x = best.sequences.which[row], best.x[row]
-        count = len(which)
-        worth = _worth(task, which, x, best.prices[row], grid)
+    for ideal, x, prices in zip(_every(best), best.state.x, best.state.prices, strict=True):
+        worth = _worth(task, ideal, x, prices, grid)
         padded = np.pad(worth, ((0, 0), (1, 1)), constant_values=-np.inf)
         peak = (worth >= padded[:, :-2]) & (worth >= padded[:, 2:]) & (worth > GAIN)
         channel, moment = np.nonzero(peak)
         order = np.argsort(-worth[channel, moment], kind="stable")
-        needed = x[count : 2 * count] > NEEDLESS * task.unit[which]
-        old = Moments(which[needed], (x[:count] + 0.5 * x[count : 2 * count])[needed], x[count : 2 * count][needed])
+        old = ideal.of(ideal.on > NEEDLESS * task.unit[ideal.which])
         room = pulses - len(old.which)
         for first, step in ((0, 1), (1, 3), (2, 3)):
             chosen = order[first::step][: max(room, 0)]
@@ -216,48 +182,46 @@ def _added(task: Task, best: _Best, pulses: int, rng: np.random.Generator) -> St
             t = np.concatenate([grid[moment[chosen]], rng.uniform(grid[0], grid[-1], len(spare))])
             on = task.unit[added] * np.repeat([0.02, 0.01], [len(chosen), len(spare)])
             every.append(Moments(*(np.concatenate(pair) for pair in zip(old, (added, t, on), strict=True))))
-    if not every:
-        return None
-    return laid_out(task, Moments(*(np.array(part) for part in zip(*every, strict=True))))
+    return every
 
 
-def _worth(task: Task, which: NDArray[np.int_], x: Vector, prices: Vector, t: Vector) -> Vector:
-    """Saving of a sequence's cost by a small impulse of each channel at moments ``t`` (k,), (channels, k), over all."""
-    count, n = len(which), len(task.channels) * len(t)
+def _worth(task: Task, ideal: Moments, x: Vector, prices: Vector, t: Vector) -> Vector:
+    """Saving by a small impulse of each channel at ``t`` (k,) s beside the pulses of unknowns x, (channels, k)."""
+    count, n = len(ideal.which), len(task.channels) * len(t)
     channel, moment = np.repeat(np.arange(len(task.channels)), len(t)), np.tile(t, len(task.channels))
-    centres = x[:count] + 0.5 * x[count : 2 * count]
-    place = np.searchsorted(centres, moment)
+    place = np.searchsorted(ideal.t, moment)
     order = np.argsort(np.hstack([np.tile(np.arange(count) + 0.5, (n, 1)), place[:, None]]), axis=1, kind="stable")
     small = SMALL * task.unit[channel]
 
     def among(old: Any, new: Any) -> Any:
         return np.take_along_axis(np.hstack([np.tile(old, (n, 1)), new[:, None]]), order, axis=1)
 
-    on = among(x[count : 2 * count], small)
-    start = among(centres, moment) - 0.5 * on
+    on = among(ideal.on, small)
+    start = among(ideal.t, moment) - 0.5 * on
     loose = np.tile(x[2 * count :], (n, 1))
-    there = task.misses(among(which, channel), np.hstack([start, on, loose]), 1)
-    here = task.misses(which[None], x[None], 1)
+    there = task.misses(among(ideal.which, channel), np.hstack([start, on, loose]), 1)
+    here = task.misses(ideal.which[None], x[None], 1)
     # By the prices of the equations: its change in them, less its cost.
     worth = -(there - here) / SMALL @ prices - (task.costs * task.unit / task.least)[channel]
     return np.asarray(worth.reshape(len(task.channels), len(t)))
 
 
-def _flown(task: Task, best: _Best, known: Iterable[Schedule]) -> list[Schedule]:
+def _flown(task: Task, best: Descent, known: Iterable[Schedule]) -> list[Schedule]:
     """Schedules on the true motion from the best of ideal impulses and from ``known`` ones, the cheapest first."""
     given = [_moments_of(task, schedule) for schedule in known if 0 < len(schedule) <= _pulses(task, 2 * SPARE)]
-    ideal = [_moments(which, x) for which, x in zip(best.sequences.which, best.x, strict=True)]
+    ideal = _every(best)
     near = int(np.count_nonzero(best.cost <= NEAR * best.cost[0])) if ideal else 0  # the cheapest come first
     flown = _on_the_true_motion(task, [*ideal[:near], *given]) or _on_the_true_motion(task, ideal[near:])
-    spare = [len(_needed(task, moments).which) < len(moments.which) for moments in flown]
-    lean = [moments for moments, more in zip(flown, spare, strict=True) if not more]
-    lean += _on_the_true_motion(task, [moments for moments, more in zip(flown, spare, strict=True) if more])
+    lean, spare = list[Moments](), list[Moments]()
+    for moments in flown:
+        (spare if len(_needed(task, moments).which) < len(moments.which) else lean).append(moments)
+    lean += _on_the_true_motion(task, spare)
 
     def price(moments: Moments) -> float:
         return float(task.price(moments.which, moments.on))
 
     most = min(map(price, lean), default=math.inf) * (1.0 - GAIN)
-    kept = lean + [moments for moments, more in zip(flown, spare, strict=True) if more and price(moments) < most]
+    kept = lean + [moments for moments in spare if price(moments) < most]
     return [_schedule(task, moments) for moments in sorted(kept, key=price)]
 
 
@@ -266,21 +230,25 @@ def _on_the_true_motion(task: Task, every: Sequence[Moments]) -> list[Moments]:
     lowered: list[Moments] = []
     fewer = [_needed(task, moments) for moments in every]
     for count in sorted({len(moments.which) for moments in fewer} - {0}):
-        alike = [moments for moments in fewer if len(moments.which) == count]
-        together = Moments(*(np.array(part) for part in zip(*alike, strict=True)))
-        starts = laid_out(task, together, task.shortest[together.which])
-        if len(starts.x):
+        together = _together([moments for moments in fewer if len(moments.which) == count])
+        sequences, x = laid_out(task, together, bounded=True)
+        if len(x):
             barrier, widest = 1e-4, float(np.max(together.on)) / task.pace
             if widest > WIDE:  # kicks fly faster than the true motion
-                descent = Descent(task, *starts, kicks=min(math.ceil(widest / WIDE), MOST_KICKS), barrier=barrier)
+                kicks = min(math.ceil(widest / WIDE), MOST_KICKS)
+                descent = Descent(task, sequences, x, kicks=kicks, barrier=barrier)
                 descent.run(30)
-                starts, barrier = Starts(descent.sequences, descent.state.x), 1e-6
-            descent = Descent(task, *starts, kicks=0, barrier=barrier)
+                x, barrier = descent.state.x, 1e-6
+            descent = Descent(task, sequences, x, kicks=0, barrier=barrier)
             descent.run(20)
             descent.close()
-            rows = np.flatnonzero(descent.left < EXACT)
-            lowered += [_moments(descent.sequences.which[row], descent.state.x[row]) for row in rows]
+            lowered += _every(descent.of(np.flatnonzero(descent.left < EXACT)))
     return lowered
+
+
+def _together(every: Sequence[Moments]) -> Moments:
+    """Sequences (n,) of as many pulses each as one array (b, n)."""
+    return Moments(*(np.array(part) for part in zip(*every, strict=True)))
 
 
 def _moments_of(task: Task, schedule: Schedule) -> Moments:
@@ -290,23 +258,24 @@ def _moments_of(task: Task, schedule: Schedule) -> Moments:
     return Moments(which, np.array([pulse.t for pulse in schedule]), np.array([pulse.on_time for pulse in schedule]))
 
 
-def _moments(which: NDArray[np.int_], x: Vector) -> Moments:
-    """One sequence (n,) from its unknowns."""
-    start, on = x[: len(which)], x[len(which) : 2 * len(which)]
-    return Moments(which, start + 0.5 * on, on)
+def _every(descent: Descent) -> list[Moments]:
+    """The sequences (n,) of a descent."""
+    which = descent.sequences.which
+    start, on = np.split(descent.state.x[:, : 2 * which.shape[1]], 2, axis=1)
+    return [Moments(*each) for each in zip(which, start + 0.5 * on, on, strict=True)]
 
 
 def _schedule(task: Task, moments: Moments) -> Schedule:
     """One sequence (n,) as a schedule."""
-    felt = moments.on > NOTHING * task.unit[moments.which]
-    every = zip(*(part[felt].tolist() for part in moments), strict=True)
-    return Schedule(tuple(channel_pulse(task.channels[number], t, on) for number, t, on in every))
+    felt = moments.of(moments.on > NOTHING * task.unit[moments.which])
+    pulses = zip(*(part.tolist() for part in felt), strict=True)
+    return Schedule(tuple(channel_pulse(task.channels[number], t, on) for number, t, on in pulses))
 
 
 def _needed(task: Task, moments: Moments) -> Moments:
     """One sequence (n,) without needless pulses, and with pulses of a channel that touch as one."""
     kept = moments.on > np.maximum(NEEDLESS * task.unit[moments.which], HALF * task.shortest[moments.which])
-    moments = Moments(*(part[kept] for part in moments))
+    moments = moments.of(kept)
     which, start, on = moments.which.tolist(), (moments.t - 0.5 * moments.on).tolist(), moments.on.tolist()
     for number in reversed(range(1, len(which))):
         before = number - 1

@@ -23,7 +23,7 @@ from nutdamp.schemes.optimal.bounds import Allowed
 from nutdamp.schemes.optimal.linear_program import Burn, Program, Solution
 from nutdamp.schemes.optimal.refinement import EndEquations
 from nutdamp.schemes.sequential import NO_AXIAL, at_hand
-from nutdamp.spacecraft.constraints import Windows, usable
+from nutdamp.spacecraft.constraints import usable
 from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.schedule import TOUCHING, Bounds, Schedule, channel_pulse
@@ -37,10 +37,7 @@ worth another search."""
 
 
 def thinned(program: Program, solution: Solution, cost: float, *, fewest: bool) -> Solution:
-    """Fewest burns that hardly cost more than ``cost``, or at any cost: the longest are kept and may grow.
-
-    The optimum itself has a burn at every alignment, for the shorter a burn the less it loses to its width.
-    """
+    """Fewest burns that hardly cost more than ``cost``, or at any cost: the longest are kept and may grow."""
     few = len(solution.burns) <= 2 * len(program.influence.goal)
     most = max(cost, solution.cost) * (1.0 + (GAIN if few else THRIFT))
     order = sorted(solution.burns, key=lambda burn: -burn.impulse)
@@ -59,10 +56,9 @@ def thinned(program: Program, solution: Solution, cost: float, *, fewest: bool) 
 
 
 def repaired(program: Program, solution: Solution) -> Solution | None:
-    """The solution, once none of its burns breaks a limit: where one does, its slots are forbidden.
+    """The solution with burns that keep on-times, gap and max_pulses: slots of one that does not are forbidden.
 
-    Where that leaves too little, burns longer than their channel may be on become several side by side. None where no
-    burns were found that keep on-times, gap and max_pulses all at once.
+    Where that leaves too little, too long burns become several side by side. None where that does not help either.
     """
     allowed = program.forbidden.copy()
     kept = _repaired(program, solution)
@@ -87,10 +83,7 @@ def _repaired(program: Program, solution: Solution) -> Solution | None:
 
 
 def _divide(program: Program, burns: tuple[Burn, ...]) -> bool:
-    """Forbid slots at regular distances about too long burns, so that no burn can be too long; true if there are any.
-
-    Between two pulses the thruster is off for the gap, and no shorter than its shortest pulse: valves take their time.
-    """
+    """Forbid slots at regular distances about too long burns, so that none can be too long; true if there are any."""
     every = np.arange(len(program.centres))
     divided = False
     for row, channel in enumerate(program.channels):
@@ -101,6 +94,7 @@ def _divide(program: Program, burns: tuple[Burn, ...]) -> bool:
         if window == 0:
             continue
         divided = True
+        # Between two the thruster is off no shorter than for its shortest pulse: valves take their time.
         pause = max(math.ceil(max(program.spacecraft.limits.gap, channel.min_on_time) / program.width - TOUCHING), 1)
         middles = np.searchsorted(program.centres, [burn.t for burn in long])
         nearest = np.searchsorted(0.5 * (middles[1:] + middles[:-1]), every)
@@ -139,13 +133,10 @@ def broken_by(program: Program, burns: tuple[Burn, ...]) -> Iterator[tuple[Chann
 
 def as_pulses(spacecraft: Spacecraft, burns: tuple[Burn, ...]) -> Schedule:
     """The burns as pulses, on-times within their bounds."""
-    limits = spacecraft.limits
-    windows = Windows(replace(spacecraft, limits=replace(limits, tick=None)))
     pulses = []
     for burn in burns:
-        on_time = windows.on_time(burn.on_time, burn.channel.min_on_time, burn.channel.max_on_time)
-        start = max(burn.t - 0.5 * on_time, limits.earliest)
-        start = min(start, spacecraft.horizon - on_time)
+        on_time = min(max(burn.on_time, burn.channel.min_on_time), burn.channel.max_on_time)
+        start = min(max(burn.t - 0.5 * on_time, spacecraft.limits.earliest), spacecraft.horizon - on_time)
         pulses.append(channel_pulse(burn.channel, start + 0.5 * on_time, on_time))
     return Schedule(tuple(pulses))
 
@@ -213,25 +204,18 @@ class Problem:
             low, high = (low, middle) if (feasible or self.feasible)(middle) else (middle, high)
         return high
 
-    def overtaxed(self, solution: Solution) -> dict[str, float]:
-        """Channels that need more pulses of their longest on-time than there are moments for, and how many."""
-        needed: dict[str, float] = {}
-        for burn in solution.burns:
-            name = burn.channel.name
-            needed[name] = needed.get(name, 0.0) + burn.on_time / burn.channel.max_on_time
-        return {name: count for name, count in needed.items() if count > self.program().forbidden.shape[1]}
-
     def with_bounds(self, schedule: Schedule, first: Solution | None = None) -> Schedule:
         """The schedule with the lower bounds of its cost."""
+
+        def least(program: Program, solution: Solution) -> float | None:
+            return None if solution.unmet > UNMET else bounds.first_order(program, solution.prices).bound
+
         program = self.program()
-        first = first or program.solve()
-        least = None if first.unmet > UNMET else bounds.first_order(program, first.prices).bound
-        keeping = None
+        first_order, keeping = least(program, first or program.solve()), None
         if self.options.free_axis and not work.exhausted():
             still = self.program(equations=EndEquations(shift=True, spin=self.equations.spin))
-            kept = still.solve()
-            keeping = None if kept.unmet > UNMET else bounds.first_order(still, kept.prices).bound
-        lower = Bounds(least, self.rigorous(schedule), self.unit, program.end, keeping)
+            keeping = least(still, still.solve())
+        lower = Bounds(first_order, self.rigorous(schedule), self.unit, program.end, keeping)
         return Schedule(schedule.pulses, schedule.notes, lower)
 
     def rigorous(self, schedule: Schedule) -> float | None:

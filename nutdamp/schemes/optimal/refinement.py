@@ -42,10 +42,6 @@ class EndEquations:
         """Rows of the five that count."""
         return [0, 1, *([2, 3] if self.shift else []), *([4] if self.spin else [])]
 
-    def beside(self, off: Vector) -> Vector:
-        """End errors, (equations,) N m s, with H ``off`` (2,) N m s beside its target and no other error."""
-        return np.array([0.0, 0.0, *off, 0.0])[self.chosen]
-
 
 @dataclass(frozen=True, eq=False)
 class Influence:
@@ -248,8 +244,8 @@ class Refinement:
         rows = along(flown, self.equations, self.step).rows
         columns = []
         begins, ends = (rows(np.array(times)) for times in zip(*((p.start, p.end) for p in schedule), strict=True))
-        for index, channel in enumerate(self.channels):
-            on, off = begins[index] @ channel.torque, ends[index] @ channel.torque
+        for begin, end, channel in zip(begins, ends, self.channels, strict=True):
+            on, off = begin @ channel.torque, end @ channel.torque
             columns += [off - on, 0.5 * (on + off)]
         return np.asarray(np.column_stack(columns) * self.scale / self.size)
 
@@ -275,59 +271,51 @@ class Refinement:
             if np.linalg.norm(following) >= norm:
                 break
             x, value = trial, following
-        return self.schedule(x) if self.spacecraft.limits.tick is None else self._on_ticks(x)
+        tick = self.spacecraft.limits.tick
+        return self.schedule(x) if tick is None else self._on_ticks(x, tick)
 
-    def _on_ticks(self, x: Vector) -> Schedule:
-        lattice = _Lattice(self.spacecraft, self, x)
-        ticks = lattice.rounded
-        best, least = self.schedule(lattice.settings(ticks)), np.inf
+    def _on_ticks(self, x: Vector, tick: float) -> Schedule:
+        """The schedule of least misses on ticks, by linear models one after the other; settings x are exact."""
+        windows, (centres, needed) = Windows(self.spacecraft), x.reshape(-1, 2).T
+        on_times = [
+            windows.on_time(on_time, channel.min_on_time, channel.max_on_time)
+            for on_time, channel in zip(needed, self.channels, strict=True)
+        ]
+        exact = np.column_stack([centres - 0.5 * needed, needed]) / tick
+        ticks = np.rint(np.column_stack([exact[:, 0], np.array(on_times) / tick]))
+        best, least = self.original, np.inf
         for _ in range(MODELS):
-            schedule = self.schedule(lattice.settings(ticks))
+            settings = tick * np.ravel(np.column_stack([ticks[:, 0] + 0.5 * ticks[:, 1], ticks[:, 1]]))
+            schedule = self.schedule(settings)
             missing, flown = self.left(schedule)
             size = float(np.linalg.norm(missing))
             if size >= least:
                 break
             best, least = schedule, size
-            ticks = lattice.stepped(ticks, missing, self.slopes(schedule, flown) / self.scale)
+            ticks = self._stepped(ticks, exact, tick, missing, self.slopes(schedule, flown) / self.scale)
         return best
 
+    def _stepped(self, ticks: Vector, exact: Vector, tick: float, missing: Vector, slopes: Vector) -> Vector:
+        """Ticks (k, 2) near the ``exact`` ones that leave less, where these leave ``missing``; ``slopes`` per s."""
+        bounds = np.array([[channel.min_on_time, channel.max_on_time] for channel in self.channels]).T
+        begun, latest = np.array(self.room).T
 
-class _Lattice:
-    """Starts and on-times in ticks, (k, 2) each, and which of them may be commanded."""
+        def allowed(ticks: Vector) -> NDArray[np.bool_]:
+            start, on_time = tick * ticks.T
+            near = np.abs(ticks - exact).max(axis=1) < REACH
+            inside = near & (start >= begun - TOUCHING) & (start + on_time <= latest + TOUCHING)
+            bounded = (on_time >= bounds[0] - TOUCHING) & (on_time <= bounds[1] + TOUCHING)
+            return np.asarray(inside & bounded & (on_time > 0.5 * tick))
 
-    def __init__(self, spacecraft: Spacecraft, parameters: Refinement, x: Vector) -> None:
-        windows, channels = Windows(spacecraft), parameters.channels
-        self.tick = spacecraft.limits.tick or 0.0
-        centres, needed = x.reshape(-1, 2).T
-        self.bounds = np.array([[channel.min_on_time, channel.max_on_time] for channel in channels]).T
-        self.room = np.array(parameters.room).T
-        self.exact = np.column_stack([centres - 0.5 * needed, needed]) / self.tick
-        on_times = [windows.on_time(on_time, *bounds) for on_time, bounds in zip(needed, self.bounds.T, strict=True)]
-        self.rounded = np.rint(np.column_stack([self.exact[:, 0], np.array(on_times) / self.tick]))
-
-    def settings(self, ticks: Vector) -> Vector:
-        """Centres and on-times, (2k,) s."""
-        return self.tick * np.ravel(np.column_stack([ticks[:, 0] + 0.5 * ticks[:, 1], ticks[:, 1]]))
-
-    def allowed(self, ticks: Vector) -> NDArray[np.bool_]:
-        """Pulses (k,) that keep their limits, and are near enough for a linear model."""
-        start, on_time = self.tick * ticks.T
-        near = np.abs(ticks - self.exact).max(axis=1) < REACH
-        inside = near & (start >= self.room[0] - TOUCHING) & (start + on_time <= self.room[1] + TOUCHING)
-        bounded = (on_time >= self.bounds[0] - TOUCHING) & (on_time <= self.bounds[1] + TOUCHING)
-        return np.asarray(inside & bounded & (on_time > 0.5 * self.tick))
-
-    def stepped(self, ticks: Vector, missing: Vector, slopes: Vector) -> Vector:
-        """Ticks that leave less, where ``ticks`` leave ``missing`` and ``slopes`` (…, 2k) are per s."""
         ticks = ticks.copy()
         for _ in range(TICK_STEPS):
-            possible = [(index, way) for way in WAYS for index in np.flatnonzero(self.allowed(ticks + way))]
+            possible = [(index, way) for way in WAYS for index in np.flatnonzero(allowed(ticks + way))]
             if not possible:
                 break
             pulse = np.array([index for index, _ in possible])
             start, on_time = np.array([way for _, way in possible]).T
             centre = start + 0.5 * on_time
-            changes = self.tick * (slopes[:, 2 * pulse] * centre + slopes[:, 2 * pulse + 1] * on_time)
+            changes = tick * (slopes[:, 2 * pulse] * centre + slopes[:, 2 * pulse + 1] * on_time)
             alone = missing[:, None] + changes
             pairs = np.linalg.norm(alone[:, :, None] + changes[:, None, :], axis=0)
             # Two steps of one pulse might leave its room; on the diagonal is the single step.

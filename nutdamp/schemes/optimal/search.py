@@ -27,7 +27,7 @@ from nutdamp.schemes.optimal.problem import GAIN, LEFT, UNMET, Problem, as_pulse
 from nutdamp.schemes.optimal.refinement import EndEquations, Refinement
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import keeps_limits, rounded_off, shortest_on_time
-from nutdamp.spacecraft.model import Spacecraft
+from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.requirements import DAMPED_ANGLE, SAME_COST, Part
 from nutdamp.spacecraft.schedule import TOUCHING, Schedule
 
@@ -84,20 +84,20 @@ def schedule(spacecraft: Spacecraft, options: OptimalOptions) -> Schedule:
         limits = replace(spacecraft.limits, horizon=min(spacecraft.horizon, faded))
         spacecraft = replace(spacecraft, limits=limits)
     search = _LeastCostSearch(spacecraft, options)
-    simple = list(spin_changes(search.spacecraft, search.flown))
-    if simple and options.least == "pulses":
-        return search.with_bounds(search.preferred(simple))
-    try:
-        if options.least == "time":
-            schedule = search.soonest()
-        else:
-            schedule = _fewest(search) if options.least == "pulses" else search.schedule()
-    except Infeasible:
-        if not simple:
-            raise
-        return search.with_bounds(search.preferred(simple))
-    best = search.preferred([schedule, *simple])
-    return schedule if best is schedule else search.with_bounds(best)
+    every = list(spin_changes(search.spacecraft, search.flown))
+    searched = None
+    if not every or options.least != "pulses":
+        try:
+            if options.least == "time":
+                searched = search.soonest()
+            else:
+                searched = _fewest(search) if options.least == "pulses" else search.schedule()
+            every = [searched, *every]
+        except Infeasible:
+            if not every:
+                raise
+    best = search.preferred(every)
+    return best if best is searched else search.with_bounds(best)
 
 
 def _fewest(search: _LeastCostSearch) -> Schedule:
@@ -107,10 +107,10 @@ def _fewest(search: _LeastCostSearch) -> Schedule:
     body = search.spacecraft
     if body.torquer is None and body.goal.spin is None:
         try:
-            if search.options.free_axis:
-                schedule = one_pulse.schedule(body, SchemeOptions())
-            else:
-                schedule = two_pulse.schedule(body, TwoPulseOptions())
+            free = search.options.free_axis
+            schedule = (
+                one_pulse.schedule(body, SchemeOptions()) if free else two_pulse.schedule(body, TwoPulseOptions())
+            )
         except Infeasible:
             schedule = Schedule()
         if schedule.pulses and keeps_limits(body, schedule) and search.left(search.flown(schedule)) <= LEFT:
@@ -156,24 +156,18 @@ class _LeastCostSearch(Problem):
         if not self.feasible(horizon):
             return self
         span = self.least_horizon(begin, horizon) - begin
-        low, high = begin + span, horizon
-        for margin in MARGINS:  # small angles let channels fire at once, the schedule does not
-            end = begin + span * (1.0 + margin)
-            if end >= horizon:
+        low, later = begin + span, (begin + span * (1.0 + margin) for margin in MARGINS)
+        # Small angles let channels fire at once, the schedule does not.
+        for high in (*(end for end in later if end < horizon), horizon):
+            if self.has_schedule(high):
                 break
-            if self.has_schedule(end):
-                high = end
-                break
-            low = end
-        if high == horizon and not self.has_schedule(horizon):
+            low = high
+        else:
             return self  # shorter ones are looked at on the way to a schedule
         return _LeastCostSearch(self.within(self.least_horizon(low, high, SHARP, self.has_schedule)), self.options)
 
     def preferred(self, schedules: Sequence[Schedule]) -> Schedule:
-        """The schedule with least of the quantity to be saved, of ``schedules`` that all meet the requirement.
-
-        Of those that take as much within `SAME_COST` the fewest pulses, then the earlier end.
-        """
+        """The schedule with least of what is to be saved; of those within `SAME_COST` fewest pulses, earliest end."""
         saved: dict[str, Callable[[Schedule], float]] = {"time": lambda schedule: schedule.end, "pulses": len}
         spent = saved.get(self.options.least, self.price)
         least = min(map(spent, schedules))
@@ -215,9 +209,11 @@ class _LeastCostSearch(Problem):
             later *= 2.0
             if self.feasible(later):
                 needed = self.least_horizon(0.5 * later, later, NAMED)
-                enough = self.long_enough(needed)
-                if enough is not None:
-                    return f"limits.horizon = {enough:.4g} s is long enough"
+                usual = replace(body, limits=replace(body.limits, horizon=None)).horizon
+                for margin in MARGINS[:TRIED] if needed <= LATER * usual else ():
+                    end = float(f"{needed * (1.0 + margin):.4g}")
+                    if not work.exhausted() and self.has_schedule(end):
+                        return f"limits.horizon = {end:.4g} s is long enough"
                 return (
                     f"set limits.horizon to at least {needed:.4g} s ({needed - horizon:.3g} s more; by small angles, "
                     f"without other limits)"
@@ -228,30 +224,17 @@ class _LeastCostSearch(Problem):
                 return "shorten the blackout windows (without any it can be done)"
         return f"not even {LATEST:g} times the horizon helps: channels of other directions or more torque are needed"
 
-    def long_enough(self, needed: float) -> float | None:
-        """A horizon in which a schedule is found, s, four digits: ``needed`` s by small angles, or a little more."""
-        usual = replace(self.spacecraft, limits=replace(self.spacecraft.limits, horizon=None)).horizon
-        if needed > LATER * usual:
-            return None
-        for margin in MARGINS[:TRIED]:
-            if work.exhausted():
-                return None
-            end = float(f"{needed * (1.0 + margin):.4g}")
-            if self.has_schedule(end):
-                return end
-        return None
-
     def schedule(self) -> Schedule:
         """The cheapest schedule found: over the whole horizon, or over less where there the search does not settle."""
         first = self.program().solve()
-        if overtaxed := self.overtaxed(first):
-            schedule = self.without(overtaxed).schedule()
+        if other := self.without_overtaxed(first):
+            schedule = other.schedule()
             return self.with_bounds(Schedule(schedule.pulses, schedule.notes), first)
         # Where H may end elsewhere one that keeps it, or reaches the target, will do too: some work is left for it.
         looser = self.options.free_axis or self.options.shift is not None
         with work.budget("a schedule as asked", MOST_LOOSE if looser else math.inf):
             best = self.whole_or_shorter(first)
-        if best is None or self.dear(best, first.cost):
+        if self.dear(best, first.cost):
             best = self.cheaper(best, alternatives.within(self, self.spacecraft.horizon))
         if looser and not work.exhausted() and not self.proved(best, EQUAL):
             still = self.keeping(best)
@@ -274,11 +257,19 @@ class _LeastCostSearch(Problem):
                 return None
         return kept.whole_or_shorter(first)
 
-    def without(self, overtaxed: dict[str, float]) -> _LeastCostSearch:
-        """The search without channels whose pulses are too short for their share.
+    def without_overtaxed(self, solution: Solution) -> _LeastCostSearch | None:
+        """The search without channels that need more of their longest pulses than there are moments for, if any do.
 
-        Raises Infeasible, naming the limit, where there are no others.
+        Raises Infeasible where there are no others.
         """
+        needed: dict[str, float] = {}
+        for burn in solution.burns:
+            name = burn.channel.name
+            needed[name] = needed.get(name, 0.0) + burn.on_time / burn.channel.max_on_time
+        moments = len(self.program().centres)
+        overtaxed = {name: count for name, count in needed.items() if count > moments}
+        if not overtaxed:
+            return None
         others = tuple(channel for channel in self.spacecraft.channels if channel.name not in overtaxed)
         try:
             return _LeastCostSearch(replace(self.spacecraft, channels=others), self.options)
@@ -321,10 +312,7 @@ class _LeastCostSearch(Problem):
         return best if best is None else self.fuller(best, first)
 
     def fuller(self, schedule: Schedule, first: Solution) -> Schedule:
-        """The ``schedule``, or one of up to `FEW` pulses for each equation where, flown, it saves `SAVED` of the cost.
-
-        Burns are left out by what the linear program thinks that it costs.
-        """
+        """The ``schedule``, or one of up to `FEW` pulses for each equation where that, flown, saves `SAVED` of it."""
         few = FEW * len(self.equations.chosen)
         if len(schedule) >= few or self.options.least == "pulses" or not self.dear(schedule, first.cost, SAVED):
             return schedule
@@ -333,9 +321,8 @@ class _LeastCostSearch(Problem):
         longest = sorted(program.solve().burns, key=lambda burn: -burn.impulse)[:few]
         if len(longest) <= len(schedule) or work.exhausted():
             return schedule
-        candidates = self.corrected(program, program.solve(program.about(longest)), first.cost)
-        more = self.cheapened(self.best(candidates))
-        return schedule if more is None or not self.dear(schedule, self.price(more), SAVED) else more
+        more = self.cheapened(self.best(self.corrected(program, program.solve(program.about(longest)), first.cost)))
+        return more if more is not None and self.dear(schedule, self.price(more), SAVED) else schedule
 
     def cheapened(self, schedule: Schedule | None) -> Schedule | None:
         """The schedule after some steps down on the true motion, where that is known in closed form between pulses."""
@@ -349,11 +336,10 @@ class _LeastCostSearch(Problem):
 
     def hurried(self, schedule: Schedule) -> bool:
         """True where a channel is on again before it was off for its shortest on-time: valves take their time."""
-        each = ((channel, [pulse for pulse in schedule if pulse.channel == channel.name]) for channel in self.channels)
         return any(
             after.start - before.end < channel.min_on_time - TOUCHING
-            for channel, pulses in each
-            for before, after in itertools.pairwise(pulses)
+            for channel in self.channels
+            for before, after in itertools.pairwise(pulse for pulse in schedule if pulse.channel == channel.name)
         )
 
     def programmed(self, first: Solution) -> Schedule | None:
@@ -375,11 +361,7 @@ class _LeastCostSearch(Problem):
         return best
 
     def doubtful(self, schedule: Schedule | None, first: Solution) -> bool:
-        """True where a schedule may not be the cheapest, so that very many starts are worth their time.
-
-        So where nothing was found; and where thrusters are strong, within a few nutation periods and where it is dear,
-        as long as the rigorous bound does not prove it cheap enough.
-        """
+        """True where a schedule may not be the cheapest, so that very many starts are worth their time."""
         body = self.spacecraft
         short = body.horizon - body.limits.earliest <= SHORT * body.inertial_period
         strong = float(np.min(self.task().unit)) <= STRONG * body.inertial_period
@@ -387,16 +369,12 @@ class _LeastCostSearch(Problem):
             return short
         if schedule is None:
             return True
-        if not strong or not (short or self.dear(schedule, first.cost)):
-            return False
-        return not self.proved(schedule, PROVED)
+        return strong and (short or self.dear(schedule, first.cost)) and not self.proved(schedule, PROVED)
 
     def proved(self, schedule: Schedule | None, share: float) -> bool:
         """True where a schedule costs at most that ``share`` more than the rigorous bound."""
-        if schedule is None:
-            return False
-        proof = self.rigorous(schedule)
-        return proof is not None and self.price(schedule) <= proof * (1.0 + share)
+        proof = None if schedule is None else self.rigorous(schedule)
+        return schedule is not None and proof is not None and self.price(schedule) <= proof * (1.0 + share)
 
     def task(self) -> Task:
         """Task of the descents."""
@@ -418,34 +396,30 @@ class _LeastCostSearch(Problem):
     def on_ticks(self, schedule: Schedule) -> Schedule:
         """An exact schedule on the ticks of the commands."""
         missed = refinement.misses(self.flown(schedule), self.equations)
-        off = missed[2:4] if self.options.shift is not None else np.zeros(2)
-        aside = self.equations.beside(off)
-        return Refinement(self.spacecraft, schedule, self.equations, aside, self.program().width, self.flown).refined()
+        return self.refined(schedule, missed[2:4] if self.options.shift is not None else np.zeros(2), self.program())
+
+    def refined(self, schedule: Schedule, off: Vector, program: Program) -> Schedule:
+        """The schedule moved as little as possible to leave H ``off`` (2,) N m s beside its target, and no more."""
+        aside = np.array([0.0, 0.0, *off, 0.0])[self.equations.chosen]
+        return Refinement(self.spacecraft, schedule, self.equations, aside, program.width, self.flown).refined()
 
     def settled(self, least: float) -> Schedule | None:
         """The cheapest of the schedules on which the search settles from one choice of burns or another."""
-        program = self.program()
+        program, fewest = self.program(), self.options.least == "pulses"
         program.haste = HASTE
         candidates: list[_FlownSchedule] = []
         for _ in range(CHOICES):
-            if work.exhausted():
+            if work.exhausted() or (solution := program.solve()).unmet > UNMET:
                 break
-            solution = program.solve()
-            if solution.unmet > UNMET:
-                break
-            fewest = self.options.least == "pulses"
             candidates += self.corrected(program, thinned(program, solution, least, fewest=fewest), least)
-            if not candidates or any(
-                candidate.left == 0.0 and candidate.price <= least * (1.0 + DEAR) for candidate in candidates
-            ):
+            if not candidates or any(each.left == 0.0 and each.price <= least * (1.0 + DEAR) for each in candidates):
                 break
         return self.best(candidates)
 
     def others(self, least: float) -> Schedule | None:
         """Best plan of other schemes, as it is or corrected to cost less: they know large angles and far targets."""
         names = {channel.name: channel for channel in self.channels}
-        candidates: list[_FlownSchedule] = []
-        flights: list[Flight] = []
+        candidates, flights = list[_FlownSchedule](), list[Flight]()
         for schedule in by_other_schemes(self.spacecraft, shift=self.equations.shift):
             flights.append(self.flown(Schedule(schedule.pulses)))
             if work.exhausted() or (self.left(flights[-1]) <= LEFT and self.price(schedule) <= least * (1.0 + DEAR)):
@@ -474,9 +448,7 @@ class _LeastCostSearch(Problem):
             flown = self.flown(schedule)
             program.aim(refinement.along(flown, self.equations, program.width))
             if self.left(flown) < NEAR:
-                aside = self.equations.beside(solution.off)
-                moving = Refinement(self.spacecraft, schedule, self.equations, aside, program.width, self.flown)
-                schedule = moving.refined()
+                schedule = self.refined(schedule, solution.off, program)
                 there = self.candidate(self.flown(schedule), self.price(schedule))
                 candidates.append(there)
                 if there.left == 0.0 and (there.price <= least * (1.0 + DEAR) or there.price > (1.0 - GAIN) * last):
@@ -486,13 +458,9 @@ class _LeastCostSearch(Problem):
         return candidates
 
     def best(self, candidates: list[_FlownSchedule]) -> Schedule | None:
-        """The cheapest that leaves nothing; on ticks the one that leaves least, where that is rounding.
-
-        All that leave up to `DAMPED_ANGLE` leave as little.
-        """
+        """The cheapest that leaves no more than `DAMPED_ANGLE`, else what leaves least, where that is rounding."""
         self.nearest += candidates
         # By starts and on-times on ticks, root sum square; zero without ticks.
-        rounded = (math.hypot(*rounded_off(self.spacecraft, candidate.schedule)) for candidate in candidates)
-        there = [candidate for candidate, most in zip(candidates, rounded, strict=True) if candidate.left <= most]
-        best = min(there, key=lambda candidate: (max(candidate.left, DAMPED_ANGLE), candidate.price), default=None)
+        there = [each for each in candidates if each.left <= math.hypot(*rounded_off(self.spacecraft, each.schedule))]
+        best = min(there, key=lambda each: (max(each.left, DAMPED_ANGLE), each.price), default=None)
         return None if best is None else best.schedule

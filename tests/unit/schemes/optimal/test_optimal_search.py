@@ -332,9 +332,9 @@ def test_a_descent_keeps_its_bounds_and_ends_where_no_step_saves(
     starts: int, runs: int, looked_at: int, tries: int
 ) -> None:
     task = task_of(strong(30.0, 3.0))
-    begun = multistart.random_starts(task, 4, starts, np.random.default_rng(5))
-    rows, levels = task.bounds(begun.sequences)
-    descent = Descent(task, *begun, kicks=1)
+    begun, unknowns = multistart.random_starts(task, 4, starts, np.random.default_rng(5))
+    rows, levels = task.bounds(begun)
+    descent = Descent(task, begun, unknowns, kicks=1)
     for _ in range(runs):
         descent.run(2 * 30 // runs)
         assert np.all(descent.state.x @ rows.T > levels)
@@ -342,7 +342,7 @@ def test_a_descent_keeps_its_bounds_and_ends_where_no_step_saves(
     assert len(met) >= looked_at
     rng = np.random.default_rng(6)
     for row in met[:looked_at]:
-        sequences, x = begun.sequences.of([row]), descent.state.x[[row]]
+        sequences, x = begun.of([row]), descent.state.x[[row]]
         scale = descent.scale[[row]]
         for _ in range(tries):  # other sequences near it that leave nothing either cost no less
             beside = x + 0.02 * scale * rng.normal(size=scale.shape)
