@@ -17,7 +17,18 @@ from nutdamp.files.carried import notes
 from nutdamp.units import screen_unit
 from nutdamp.views.decisions import exact_percent, heading, percent
 from nutdamp.views.parts import opening, summary
-from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable, Shared, to_figures
+from nutdamp.views.tables import (
+    TEXT,
+    WHOLE,
+    YES_NO,
+    Column,
+    DataTable,
+    Shared,
+    angle_of,
+    file_columns,
+    to_figures,
+    values_of,
+)
 from nutdamp.views.text import degrees, mass
 
 FAR = 4.0  # sigmas of the file from which on a change is remarked upon
@@ -80,11 +91,6 @@ ESTIMATES = (
 )
 
 
-def estimate_table(rows: Sequence[Estimate]) -> DataTable:
-    """The estimates."""
-    return DataTable("Estimates", ESTIMATES, rows)
-
-
 def signal_table(fit: Fit) -> DataTable:
     """The signals of the record, counted from 0, with the test of their residuals."""
     of_signal = [fit.model.signal == at for at in range(len(fit.model.signals))]
@@ -127,13 +133,12 @@ def prospect_table(ahead: Outlook) -> DataTable:
         Column("", "coast", "s", lambda row: f"{row.length:.4g}{' (now)' * (row is now)}", where="screen", kind=TEXT),
         Column("probe", "", "", lambda row: row.probe or None, where="json", kind=TEXT),
         Column("", "probe pulse", "", probe, where="screen"),
-        Column("on_time_s", "", "", lambda row: row.on_time, where="json"),
+        *file_columns("json", "on_time_s"),
         Column("sigma_C_over_A", "sigma of C/A", "", lambda row: row.ratio, to_figures(2), "screen json"),
-        Column("sigma_thrust", "", "", lambda row: row.thrust, where="json"),
+        *file_columns("json", "sigma_thrust=thrust"),
         Column("", "sigma of thrust", "%", lambda row: 100.0 * row.thrust if row.probe else None,
                to_figures(2), "screen"),
-        Column("nutation_deg", f"nutation {level}", "deg", lambda row: math.degrees(row.nutation),
-               to_figures(3), "screen json"),
+        Column("nutation_deg", f"nutation {level}", "deg", angle_of("nutation"), to_figures(3), "screen json"),
         Column("met_fraction", "comply", "%", lambda row: row.met, to_figures(4, 100.0), "screen json"),
         Column("propellant_kg", Shared.PROPELLANT, "g", lambda row: row.propellant, to_figures(3, 1e3), "screen json"),
         Column("gain_deg_kg", "gain", "deg/g", gain, to_figures(2, 1e-3), "screen json"),
@@ -150,7 +155,7 @@ def fit_screen(fit: Fit, time: float, ahead: Outlook | None = None, *, verbose: 
     test += f"; outliers left out: {outliers}" if outliers else ""
     headline = Text.assemble("FIT ", (", ".join(names), "bold"), f", {_record(fit)}")
     head = [*opening(fit.model.spacecraft, verbose), headline, Text(test, "bold red" if colored else "green")]
-    table = estimate_table(rows)
+    table = DataTable("Estimates", ESTIMATES, rows)
     return summary(
         [*head, Text(f"motion at t = {time:g} s")],
         lambda first=None: table.screen("screen", first=first and max(first, 3)),
@@ -228,33 +233,25 @@ def fit_json(fit: Fit, at_time: Carried, ahead: Outlook | None = None, warnings:
     return {
         **heading(model.spacecraft),
         "record": {
-            "start_s": model.record.start,
-            "end_s": model.record.end,
+            **values_of(model.record, "start_s", "end_s"),
             "pulses": len(model.record.fired),
             "signals": signal_table(fit).json(),
         },
         "time_s": at_time.time,
-        "estimates": estimate_table(estimates(fit, at_time.time)).json(),
+        "estimates": DataTable("Estimates", ESTIMATES, estimates(fit, at_time.time)).json(),
         "kept": list(fit.kept),
         "information": fit.information.tolist(),
         "parameters": [parameter.name for parameter in model.parameters],
-        "values_SI": fit.values.tolist(),
-        "covariance_SI": fit.region.tolist(),
+        **values_of(fit, "values_SI=values", "covariance_SI=region"),
         "dispersed": {
             "inputs": list(at_time.names),
-            "values_SI": at_time.values.tolist(),
-            "sigmas_SI": at_time.sigmas.tolist(),
-            "correlation": at_time.correlation.tolist(),
+            **values_of(at_time, "values_SI=values", "sigmas_SI=sigmas", "correlation"),
         },
         "notes": [*warnings, *doubts(fit), *untold(model.record), *notes(fit, at_time)],
         "next": ahead
         and {
-            "scheme": ahead.scheme,
-            "propellant_kg": ahead.propellant,
-            "probability": ahead.probability,
-            "longer_coast_s": ahead.longer and ahead.longer.length,
-            "probe": ahead.probe and ahead.probe.probe,
-            "probe_per_propellant": ahead.thrifty and ahead.thrifty.probe,
+            **values_of(ahead, "scheme", "propellant_kg", "probability", "longer_coast_s=longer.length"),
+            **values_of(ahead, "probe=probe.probe", "probe_per_propellant=thrifty.probe"),
             "prospects": prospect_table(ahead).json(),
         },
     }

@@ -24,7 +24,20 @@ from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.views import decisions
 from nutdamp.views.decisions import VERDICT, heading
 from nutdamp.views.parts import Remark, opening, pulse_table, seconds, summary, warnings_of
-from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable, Shared, angle_of, facts, to_figures
+from nutdamp.views.tables import (
+    TEXT,
+    WHOLE,
+    YES_NO,
+    Column,
+    DataTable,
+    Shared,
+    angle_of,
+    facts,
+    file_columns,
+    to_figures,
+    value_at,
+    values_of,
+)
 from nutdamp.views.text import degrees, duration, lasting, moment, most, quantity, small_angle
 
 SHOWN = 40  # largest number of firings in a table of a screen
@@ -59,7 +72,7 @@ FIRINGS = (
     Column("on_time_s", Shared.ON_TIME, "s", lambda row: row.firing.pulse.loaded[1], seconds, "verified verified_json"),
     Column("on_time_difference_s", "differs by", "s", lambda row: row.apart[1], _apart, "verified verified_json"),
     Column("", Shared.CHANNEL, "", lambda row: row.firing.pulse.channel, where="screen", kind=TEXT),
-    Column("decided_s", "", "", lambda row: row.firing.decided, where="json"),
+    *file_columns("json", "decided_s=firing.decided"),
     Column("seen_deg", "nutation seen", "deg", angle_of("firing.seen"), small_angle, "screen json"),
     Column("", "before", "deg", angle_of("before"), small_angle, "screen"),
     Column("", "after", "deg", angle_of("after"), small_angle, "screen"),
@@ -91,8 +104,7 @@ MARGINS = (
     Column("", "delay margin", "", lambda row: row.delay, lambda delay: "none" if delay < 0.0 else duration(delay),
            "screen"),
     Column("delay_margin_s", "", "", lambda row: _finite(row.delay), where="json"),
-    Column("damps", "", "", lambda row: row.damps, where="json", kind=YES_NO),
-    Column("reversed", "", "", lambda row: row.turned, where="json", kind=YES_NO),
+    *file_columns("json", "damps", "reversed=turned"),
 )  # fmt: skip
 
 
@@ -248,11 +260,8 @@ def loop_json(plan: LoopPlan) -> dict[str, Any]:
     run, body = plan.flown_run, plan.spacecraft
     pulses = zip(pulse_table(run.flight).json("flown"), firing_table(run).json(), strict=True)
     return {
-        **decisions.heading(body),
-        "law": run.loop.law,
-        "seed": run.seed,
-        "case": run.case,
-        "until_s": run.until,
+        **heading(body),
+        **values_of(run, "law=loop.law", "seed", "case", "until_s"),
         "stopped": run.stop.name.lower(),
         "channel": run.channel,
         "meets_requirement": False if run.stop.fault else plan.meets_requirement,
@@ -261,9 +270,7 @@ def loop_json(plan: LoopPlan) -> dict[str, Any]:
         "largest_since_quiet_deg": None if run.settled is None else math.degrees(plan.largest[0]),
         "dead_band_deg": math.degrees(plan.band.most),
         "pulses": [pulse | firing for pulse, firing in pulses],
-        "total_impulse_Nms": plan.total_impulse,
-        "propellant_kg": plan.propellant,
-        "end_s": plan.end,
+        **values_of(plan, "total_impulse_Nms", "propellant_kg", "end_s"),
         "flown": decisions.residual_json(plan.flight.residual),
         "final": decisions.final_json(plan.flight),
         "target": decisions.target_json(body),
@@ -273,14 +280,12 @@ def loop_json(plan: LoopPlan) -> dict[str, Any]:
 
 def verified_json(verification: LoopVerification) -> dict[str, Any]:
     """The object of ``verify --loop --json``: of each firing the difference by DOP853."""
-    run = verification.run
     return {
-        **decisions.heading(run.flight.spacecraft),
+        **heading(verification.run.flight.spacecraft),
         "scheme": "loop",
         "agree": None if verification.missing else verification.agree,
         "missing": verification.missing or None,
-        "evaluations": verification.evaluations,
-        "until_s": run.until,
+        **values_of(verification, "evaluations", "until_s=run.until"),
         "firings": _differences(verification).json("verified_json"),
     }
 
@@ -292,8 +297,8 @@ def _of_cycle(name: str, scale: float = 1.0) -> Callable[[HeldNutation], float |
     """A figure of the limit cycle times ``scale``; None without one."""
 
     def value(held: HeldNutation) -> float | None:
-        figure = None if held.cycle is None else getattr(held.cycle, name)
-        return None if figure is None else scale * figure
+        figure = value_at(held.cycle, name)
+        return None if figure is None else scale * float(figure)
 
     return value
 
@@ -304,7 +309,7 @@ FILES, EVERYWHERE = "csv json", "screen csv json"
 HELD = (
     Column("start_deg", Shared.START, "deg", angle_of("thresholds.start"), to_figures(4), EVERYWHERE),
     Column("stop_deg", "stop", "deg", angle_of("thresholds.stop"), to_figures(4), EVERYWHERE),
-    Column("first_firing_s", "", "", lambda held: held.begins, where=FILES),
+    *file_columns(FILES, "first_firing_s=begins"),
     Column("pulses_per_day", Shared.PULSES, "1/day", _of_cycle("pulses", DAY), to_figures(4), f"{EVERYWHERE} other"),
     Column("cycles_per_day", "", "", _of_cycle("cycles", DAY), where=f"{FILES} other"),
     Column("impulse_Nms_per_year", "", "", _of_cycle("impulse", YEAR), where=FILES),
@@ -319,8 +324,7 @@ HELD = (
     Column("nutation_largest_deg", Shared.MOST, "deg", angle_of("cycle.largest"), to_figures(3), EVERYWHERE),
     Column("", Shared.SPIN, "%/day", lambda held: None if held.slows is None else 100.0 * held.slows * DAY / YEAR,
            to_figures(2), "screen"),
-    Column("noise_deg", "", "", angle_of("band.noise"), where=FILES),
-    Column("smallest_pulse_deg", "", "", angle_of("band.step"), where=FILES),
+    *file_columns(FILES, "noise_deg=band.noise", "smallest_pulse_deg=band.step"),
     Column("tank_lasts_days", "tank", "days", lambda held: None if held.lasts is None else held.lasts / DAY,
            to_figures(4), "screen", lambda budget: budget.spacecraft.tank is not None),
     Column("tank_lasts_days", "", "", lambda held: None if held.lasts is None else held.lasts / DAY, where=FILES),
@@ -439,14 +443,13 @@ def budget_csv(budget: Budget) -> str:
 
 def budget_json(budget: Budget) -> dict[str, Any]:
     """Growth of the nutation, and every row."""
-    body, table = budget.spacecraft, budget_table(budget)
+    table = budget_table(budget)
     others = replace(table, rows=[replace(held, cycle=held.other) for held in budget.held])
     return {
-        **heading(body),
-        "growth_1_s": body.growth,
-        "largest_deg": None if budget.largest is None else math.degrees(budget.largest),
-        "until_largest_s": budget.until_largest,
-        "law": None if body.loop is None else body.loop.law,
+        **heading(budget.spacecraft),
+        **values_of(
+            budget, "growth_1_s=spacecraft.growth", "largest_deg", "until_largest_s", "law=spacecraft.loop.law"
+        ),
         "meets_requirement": budget.meets_requirement,
         "thresholds": [
             row | {"other": None if held.other is None else rates}

@@ -46,7 +46,19 @@ from nutdamp.views.parts import (
     summary,
     warnings_of,
 )
-from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, FittedColumns, Shared, angle_of, facts, to_figures
+from nutdamp.views.tables import (
+    TEXT,
+    WHOLE,
+    Column,
+    DataTable,
+    FittedColumns,
+    Shared,
+    angle_of,
+    facts,
+    file_columns,
+    to_figures,
+    values_of,
+)
 from nutdamp.views.text import MISSING, degrees, longitude, moment, pointing, small_angle
 
 MODELS = {IMPULSE_SUM: "impulse approximation (17)", REAL_WIDTHS: "full simulation"}  # names of the two models
@@ -319,10 +331,8 @@ def verification_json(flown: Flight, name: str, verification: Verification) -> d
         "final": decisions.final_json(flown),
         "target": decisions.target_json(spacecraft),
         "methods": DataTable("", METHODS, verification.methods).json(),
-        "momentum_drift": verification.momentum.drift,
-        "momentum_kept": verification.momentum.kept,
-        "energy_drift": verification.energy.drift,
-        "energy_kept": verification.energy.kept,
+        **values_of(verification, "momentum_drift=momentum.drift", "momentum_kept=momentum.kept"),
+        **values_of(verification, "energy_drift=energy.drift", "energy_kept=energy.kept"),
         "budget": DataTable("", IMPERFECTIONS, verification.budget, spacecraft).json(),
     }
 
@@ -345,10 +355,10 @@ METHODS = (
 IMPERFECTIONS = (
     Column("imperfection", "imperfection", "", attrgetter("name"), where="json screen", kind=TEXT),
     Column("nutation_deg", Part.NUTATION.label, "deg", angle_of("nutation"), small_angle, "json screen"),
-    Column("momentum_shift_deg", "", "", angle_of("momentum_shift"), where="json"),
+    *file_columns("json", "momentum_shift_deg"),
     Column("", Part.SHIFT.label, "deg", angle_of("momentum_shift"), small_angle, "screen",
            lambda body: body.goal.axis is None),
-    Column("axis_error_deg", "", "", angle_of("axis_error"), where="json"),
+    *file_columns("json", "axis_error_deg"),
     Column("", Part.DISTANCE.label, "deg", angle_of("axis_error"), small_angle, "screen",
            lambda body: body.goal.axis is not None),
 )  # fmt: skip

@@ -137,15 +137,40 @@ TEXT, REAL, WHOLE, YES_NO = "U", "f8", "i8", "bool"
 """Kinds of values: text, number, whole number, and yes or no."""
 
 
+UNIT = re.compile(r"_(deg|rad_s|s|kg|Nms?|kgm2|Pa)$")  # ends of names in files that are no part of an attribute
+
+
+def value_at(row: Any, path: str) -> Any:
+    """Value of a row at a dotted ``path`` of attributes; None where one is None."""
+    for name in path.split("."):
+        row = None if row is None else getattr(row, name)
+    return row
+
+
 def angle_of(path: str) -> Callable[[Any], float | None]:
-    """Value of a column: the angle of a row at a dotted ``path`` of attributes, in degrees; None where one is None."""
+    """Value of a column: the angle of a row at a ``path`` as `value_at` takes it, in degrees."""
 
     def value(row: Any) -> float | None:
-        for name in path.split("."):
-            row = None if row is None else getattr(row, name)
-        return None if row is None else math.degrees(row)
+        angle = value_at(row, path)
+        return None if angle is None else math.degrees(angle)
 
     return value
+
+
+def _named_value(name: str) -> tuple[str, Callable[[Any], Any]]:
+    key, _, path = name.partition("=")
+    path = path or UNIT.sub("", key)
+    return key, angle_of(path) if key.endswith("_deg") else lambda row: value_at(row, path)
+
+
+def values_of(source: Any, *names: str) -> dict[str, Any]:
+    """Values for JSON by their names: ``key`` of an attribute and its unit, or ``key=path``; angles are degrees."""
+    return {key: _plain(value(source)) for key, value in map(_named_value, names)}
+
+
+def file_columns(where: str, *names: str) -> list[Column]:
+    """Columns of numbers in files alone, with names as in `values_of`."""
+    return [Column(key, "", "", value, where=where) for key, value in map(_named_value, names)]
 
 
 def to_figures(count: int, scale: float = 1.0) -> Callable[[float], str]:

@@ -24,7 +24,7 @@ from nutdamp.spacecraft.schedule import STEERABLE
 from nutdamp.views import decisions
 from nutdamp.views.decisions import FARTHER, heading, plan_json
 from nutdamp.views.parts import derived_table, pulse_table, requested, summary
-from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable, Shared, angle_of
+from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable, Shared, angle_of, file_columns, values_of
 from nutdamp.views.text import cost, degrees, duration, fixed, small_angle
 
 ROWS = 18  # points on the default screen, at most: evenly some of more
@@ -84,19 +84,20 @@ def _columns(rows: Sequence[TradeRow]) -> Iterator[Column]:
     bounded = any(row.least is not None for row in rows)
     yield Column("point", "point", "", attrgetter("number"), where="csv full brief", kind=WHOLE)
     yield Column("", "H within", "deg", lambda row: _allowed(row.front), where="brief")
-    yield Column("shift_allowed_deg", "", "", angle_of("front.shift"), where="csv")
+    yield from file_columns("csv", "shift_allowed_deg=front.shift")
     yield Column("end_s", Shared.END, "s", attrgetter("plan.pulses.end"), lambda end: f"{end:.3f}", "csv full brief")
     yield Column("", "cost", "", lambda row: row.spent(row.point.cost), where="full brief")
     yield Column("", "small-angle bound", "", lambda row: row.spent(row.least), where="full" * bounded)
     yield Column("pulses", Shared.PULSES, "", lambda row: len(row.plan.pulses), where="csv full brief", kind=WHOLE)
-    yield Column("propellant_kg", "", "", attrgetter("plan.pulses.propellant"), where="csv")
-    yield Column("total_impulse_Nms", "", "", attrgetter("plan.pulses.total_impulse"), where="csv")
-    yield Column("first_order_least", "", "", attrgetter("least"), where="csv")
+    yield from file_columns(
+        "csv", "propellant_kg=plan.pulses.propellant", "total_impulse_Nms=plan.pulses.total_impulse"
+    )
+    yield from file_columns("csv", "first_order_least=least")
     yield Column("least_unit", "", "", attrgetter("point.unit"), where="csv", kind=TEXT)
-    yield Column("nutation_deg", "", "", angle_of("plan.flight.residual.nutation"), where="csv")
+    yield from file_columns("csv", "nutation_deg=plan.flight.residual.nutation")
     shift = angle_of("plan.flight.residual.momentum_shift")
     yield Column("momentum_shift_deg", Part.SHIFT.label, "deg", shift, small_angle, "csv full brief")
-    yield Column("axis_error_deg", "", "", angle_of("plan.flight.residual.axis_error"), where="csv")
+    yield from file_columns("csv", "axis_error_deg=plan.flight.residual.axis_error")
     yield Column("", f"vs point {first}", "%", _saved, where="full")
     yield Column("", "vs first", "%", _saved, where="" if others else "brief")
     scheme = "csv full brief" if others else "csv"
@@ -225,12 +226,9 @@ def trade_json(spacecraft: Spacecraft, fronts: Sequence[Front]) -> dict[str, Any
     """All fronts with their plans, in the form of ``plan --json``."""
     entries = []
     for front in fronts:
-        points = [
-            {"point": row.number, "horizon_s": row.point.horizon, **plan_json(row.plan)}
-            for row in rows_of(fronts)
-            if row.front is front
-        ]
-        entries.append({"shift_allowed_deg": math.degrees(front.shift), "why": front.why, "points": points})
+        rows = [row for row in rows_of(fronts) if row.front is front]
+        points = [values_of(row, "point=number", "horizon_s=point.horizon") | plan_json(row.plan) for row in rows]
+        entries.append({**values_of(front, "shift_allowed_deg=shift", "why"), "points": points})
     return {**heading(spacecraft), "fronts": entries}
 
 
