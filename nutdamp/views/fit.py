@@ -9,7 +9,7 @@ from typing import Any
 from rich.console import RenderableType
 from rich.text import Text
 
-from nutdamp.estimation.forecast import Outlook, Prospect
+from nutdamp.estimation.forecast import Outlook
 from nutdamp.estimation.parameters import KIND, in_moments, untold
 from nutdamp.estimation.results import UNTOLD, Carried, Estimate, carried, correlated, doubts, estimates
 from nutdamp.estimation.search import Fit
@@ -100,16 +100,13 @@ def signal_table(fit: Fit) -> DataTable:
             return "limited by resolution"
         return "white" if fit.white(at) else "NOT white, sigmas too small"
 
-    def noise(at: int) -> str:
-        return f"{float(fit.noise[at]) * in_shown(fit.model.signals[at])[1]:.3g}"
-
     columns = (
         Column("signal", "signal", "", lambda at: fit.model.signals[at], where="screen json", kind=TEXT),
         Column("samples", "samples", "", lambda at: int(of_signal[at].sum()), where="screen json", kind=WHOLE),
         Column("outliers", "outliers", "", lambda at: int((of_signal[at] & ~fit.used).sum()), where="screen json",
                kind=WHOLE),
         Column("noise_SI", "", "", lambda at: float(fit.noise[at]), where="json"),
-        Column("", "noise", "", noise, where="screen"),
+        Column("", "noise", "", lambda at: fit.noise[at] * in_shown(fit.model.signals[at])[1], to_figures(3), "screen"),
         Column("", "unit", "", lambda at: in_shown(fit.model.signals[at])[0], where="screen", kind=TEXT),
         Column("white", "", "", fit.white, where="json", kind=YES_NO),
         Column("", "residuals", "", verdict, where="screen", kind=TEXT),
@@ -121,18 +118,12 @@ def prospect_table(ahead: Outlook) -> DataTable:
     """A row for each coast and probe pulse of the forecast."""
     now, level = ahead.now, exact_percent(ahead.probability)
 
-    def gain(row: Prospect) -> float | None:
-        rate = ahead.gain(row)
-        return None if rate is None else math.degrees(rate)
-
-    def probe(row: Prospect) -> str | None:
-        return f"{row.probe}, {row.on_time:.3g} s" if row.probe else None
-
     columns = (
         Column("coast_s", "", "", lambda row: row.length, where="json"),
         Column("", "coast", "s", lambda row: f"{row.length:.4g}{' (now)' * (row is now)}", where="screen", kind=TEXT),
         Column("probe", "", "", lambda row: row.probe or None, where="json", kind=TEXT),
-        Column("", "probe pulse", "", probe, where="screen"),
+        Column("", "probe pulse", "", lambda row: f"{row.probe}, {row.on_time:.3g} s" if row.probe else None,
+               where="screen"),
         *file_columns("json", "on_time_s"),
         Column("sigma_C_over_A", "sigma of C/A", "", lambda row: row.ratio, to_figures(2), "screen json"),
         *file_columns("json", "sigma_thrust=thrust"),
@@ -141,7 +132,8 @@ def prospect_table(ahead: Outlook) -> DataTable:
         Column("nutation_deg", f"nutation {level}", "deg", angle_of("nutation"), to_figures(3), "screen json"),
         Column("met_fraction", "comply", "%", lambda row: row.met, to_figures(4, 100.0), "screen json"),
         Column("propellant_kg", Shared.PROPELLANT, "g", lambda row: row.propellant, to_figures(3, 1e3), "screen json"),
-        Column("gain_deg_kg", "gain", "deg/g", gain, to_figures(2, 1e-3), "screen json"),
+        Column("gain_deg_kg", "gain", "deg/g", lambda row: (rate := ahead.gain(row)) and math.degrees(rate),
+               to_figures(2, 1e-3), "screen json"),
     )  # fmt: skip
     return DataTable("Forecast with more telemetry", columns, (*ahead.coasts, *ahead.probes))
 
@@ -151,8 +143,8 @@ def fit_screen(fit: Fit, time: float, ahead: Outlook | None = None, *, verbose: 
     rows, names = estimates(fit, time), fit.model.signals
     colored = [name for at, name in enumerate(names) if fit.resolved[at] and not fit.white(at)]
     test = f"residuals NOT white: {', '.join(colored)}; the sigmas are too small" if colored else "residuals: noise"
-    outliers = int((~fit.used).sum())
-    test += f"; outliers left out: {outliers}" if outliers else ""
+    if outliers := int((~fit.used).sum()):
+        test += f"; outliers left out: {outliers}"
     headline = Text.assemble("FIT ", (", ".join(names), "bold"), f", {_record(fit)}")
     head = [*opening(fit.model.spacecraft, verbose), headline, Text(test, "bold red" if colored else "green")]
     table = DataTable("Estimates", ESTIMATES, rows)
@@ -185,11 +177,8 @@ def advice(ahead: Outlook) -> Iterator[str]:
         met = percent(now.met or 0.0, ahead.probability)
         yield f"{today}; {met} of cases comply ({level} required): neither a longer coast nor a probe pulse is needed"
         return
-    if longer is None:
-        last = ahead.coasts[-1]
-        yield f"{today}; a coast of {last.length:.4g} s would leave {degrees(last.nutation)}: it does not pay"
-    else:
-        yield f"{today}; a coast of {longer.length:.4g} s would leave {degrees(longer.nutation)}: it pays"
+    coast, pays = (ahead.coasts[-1], "it does not pay") if longer is None else (longer, "it pays")
+    yield f"{today}; a coast of {coast.length:.4g} s would leave {degrees(coast.nutation)}: {pays}"
     if probe is not None:
         pulse = f"one probe pulse of {probe.probe}, {probe.on_time:.3g} s, amid a coast of {probe.length:.4g} s"
         yield f"{pulse} would leave {degrees(probe.nutation)}: it pays; fit it with --schedule"

@@ -57,9 +57,7 @@ class FiringRow(NamedTuple):
     apart: tuple[float, float, float] = (math.nan, math.nan, math.nan)
 
 
-def _apart(value: float) -> str:
-    return f"{value:.1e}"
-
+APART = "{:.1e}".format  # text of a difference
 
 FIRINGS = (
     Column("", "firing", "", lambda row: row.at + 1, where="screen verified", kind=WHOLE),
@@ -67,17 +65,17 @@ FIRINGS = (
            kind=TEXT),
     Column("", Shared.START, "s", lambda row: row.firing.pulse.start, seconds, "screen"),
     Column("start_s", Shared.START, "s", lambda row: row.firing.pulse.loaded[0], seconds, "verified verified_json"),
-    Column("start_difference_s", "differs by", "s", lambda row: row.apart[0], _apart, "verified verified_json"),
+    Column("start_difference_s", "differs by", "s", lambda row: row.apart[0], APART, "verified verified_json"),
     Column("", Shared.ON_TIME, "s", lambda row: row.firing.pulse.on_time, seconds, "screen"),
     Column("on_time_s", Shared.ON_TIME, "s", lambda row: row.firing.pulse.loaded[1], seconds, "verified verified_json"),
-    Column("on_time_difference_s", "differs by", "s", lambda row: row.apart[1], _apart, "verified verified_json"),
+    Column("on_time_difference_s", "differs by", "s", lambda row: row.apart[1], APART, "verified verified_json"),
     Column("", Shared.CHANNEL, "", lambda row: row.firing.pulse.channel, where="screen", kind=TEXT),
     *file_columns("json", "decided_s=firing.decided"),
     Column("seen_deg", "nutation seen", "deg", angle_of("firing.seen"), small_angle, "screen json"),
     Column("", "before", "deg", angle_of("before"), small_angle, "screen"),
     Column("", "after", "deg", angle_of("after"), small_angle, "screen"),
     Column("", "nutation", "deg", angle_of("firing.true_nutation"), small_angle, "verified"),
-    Column("nutation_difference_deg", "differs by", "deg", lambda row: math.degrees(row.apart[2]), _apart,
+    Column("nutation_difference_deg", "differs by", "deg", lambda row: math.degrees(row.apart[2]), APART,
            "verified verified_json"),
 )  # fmt: skip
 
@@ -89,22 +87,17 @@ def firing_table(run: LoopRun) -> DataTable:
     return DataTable("Firings", FIRINGS, [FiringRow(index, *row) for index, row in enumerate(angles)])
 
 
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None
-
-
 MARGINS = (
     Column("channel", Shared.CHANNEL, "", lambda row: row.channel, where="screen json", kind=TEXT),
     Column("late_deg", "late", "deg", angle_of("late"), to_figures(4), "screen json"),
-    Column("latest_deg", "", "", lambda row: _finite(math.degrees(row.latest)), where="json"),
+    *file_columns("json", "latest_deg"),
     Column("gain", "remaining", "%", lambda row: row.gain,
            lambda gain: f"{100.0 * gain:.4g}" if gain >= ROUNDING else "0", "screen json"),
     Column("growth", "growth in a period", "%", lambda row: row.growth, lambda growth: f"{100.0 * (growth - 1.0):.3g}",
            "screen json"),
     Column("", "delay margin", "", lambda row: row.delay, lambda delay: "none" if delay < 0.0 else duration(delay),
            "screen"),
-    Column("delay_margin_s", "", "", lambda row: _finite(row.delay), where="json"),
-    *file_columns("json", "damps", "reversed=turned"),
+    *file_columns("json", "delay_margin_s=delay", "damps", "reversed=turned"),
 )  # fmt: skip
 
 

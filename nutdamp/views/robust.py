@@ -21,8 +21,8 @@ from nutdamp.spacecraft import requirements
 from nutdamp.views import decisions
 from nutdamp.views.decisions import KEPT, figures, final_json, plan_json, statement, target_json
 from nutdamp.views.parts import derived_table, pulse_table
-from nutdamp.views.tables import TEXT, Column, DataTable, Shared, file_columns, to_figures, values_of
-from nutdamp.views.text import in_degrees, joined, note_json, ordered, screen_line
+from nutdamp.views.tables import TEXT, Column, DataTable, Shared, angle_of, file_columns, to_figures, values_of
+from nutdamp.views.text import joined, note_json, ordered, screen_line, small_angle
 from nutdamp.views.tolerances import in_words, stated_text
 
 MOST_ROWS = 12  # largest number of candidates in the table
@@ -138,8 +138,8 @@ def _columns(robust: RobustComparison) -> Iterator[Column]:
     yield Column("", Shared.PROPELLANT, "g", attrgetter("plan.pulses.propellant"), to_figures(4, 1e3), "full" * fuelled)
     yield from file_columns("json", "nominal_nutation_deg=plan.flown.nutation", "nutation_deg")
     yield from file_columns("json", f"{requirements.aim(body).value}_deg=off")
-    yield Column("", Shared.NOMINAL, "deg", attrgetter("nominal"), in_degrees, "full")
-    yield Column("", level, "deg", attrgetter("left"), in_degrees, "full")
+    yield Column("", Shared.NOMINAL, "deg", angle_of("nominal"), small_angle, "full")
+    yield Column("", level, "deg", angle_of("left"), small_angle, "full")
     yield Column("", "nominal cones", "", lambda row: KEPT[row.plan.kept is not False], where="full" * bool(body.keep))
     yield from file_columns("json", "samples=cases.samples", "met_fraction=met")
     yield Column("", "cases that comply", "", attrgetter("share"), decisions.share_text,

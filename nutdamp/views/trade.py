@@ -118,20 +118,20 @@ def _saved(row: TradeRow) -> str:
 
 def trade_brief(spacecraft: Spacecraft, fronts: Sequence[Front]) -> RenderableType:
     """The default screen of ``trade``: the cheapest and the earliest schedule, the points of all fronts."""
-    points = rows_of(fronts)
-    steps, notes = "--csv points.csv · --plot trade.png · --schedules FOLDER", missing(spacecraft, fronts)
-    if not points:
-        return summary([*_head(spacecraft, fronts)], None, notes, steps)
-    if spacecraft.commands is not None:
+    points, notes = rows_of(fronts), missing(spacecraft, fronts)
+    if points and spacecraft.commands is not None:
         notes.append("the pulses are timed one by one: no command block fires these schedules")
-    if spacecraft.dispersions is not None:
+    if points and spacecraft.dispersions is not None:
         notes.append("tolerances not checked (nutdamp disperse --schedule FOLDER/point-1.csv)")
-    shown = np.unique(np.linspace(0, len(points) - 1, ROWS).round().astype(int)).tolist()
-    if len(shown) < len(points):
-        notes.append(f"Points on this screen: {len(shown)} of {len(points)}.")
-    rows = [points[index] for index in shown]
+    shown = {round(at) for at in np.linspace(0, len(points) - 1, ROWS).tolist()} if points else ()
+    rows = [points[index] for index in sorted(shown)]
+    if len(rows) < len(points):
+        notes.append(f"Points on this screen: {len(rows)} of {len(points)}.")
     return summary(
-        [*_head(spacecraft, fronts)], lambda **_: _table(rows).screen("brief"), [*notes, *_ends_off(fronts)], steps
+        [*_head(spacecraft, fronts)],
+        (lambda **_: _table(rows).screen("brief")) if points else None,
+        [*notes, *_ends_off(fronts)],
+        "--csv points.csv · --plot trade.png · --schedules FOLDER",
     )
 
 
