@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
@@ -21,7 +21,7 @@ from nutdamp.flight.end_state import at_start
 from nutdamp.montecarlo.inputs import reachable
 from nutdamp.physics.thruster import Tank
 from nutdamp.planning import capability
-from nutdamp.planning.capability import Acting, Consequence
+from nutdamp.planning.capability import Acting, ChannelSteps, Consequence
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.views.decisions import aspects_json, direction_json, spacecraft_json
 from nutdamp.views.loop import described, margin_table, warnings
@@ -34,7 +34,7 @@ from nutdamp.views.tolerances import correlation_json, in_words, size_text, with
 def channel_table(spacecraft: Spacecraft) -> DataTable:
     """Torque and on-times of each channel, and the nutation that its shortest and longest pulse take."""
 
-    def on_times(row: Any) -> str:
+    def on_times(row: ChannelSteps) -> str:
         most = row.channel.max_on_time
         return f"{duration(row.channel.min_on_time)} to {'any' if math.isinf(most) else duration(most)}"
 
@@ -242,24 +242,17 @@ def check_json(reports: list[dict[str, Any]]) -> dict[str, Any]:
     return {"nutdamp": __version__, "files": reports}
 
 
-def failed_json(name: str | None, wrong: FaultyFile | CannotRead, doubts: Iterable[Fault] = ()) -> dict[str, Any]:
+def failed_json(name: str | None, wrong: FaultyFile | CannotRead, doubts: Sequence[Fault] = ()) -> dict[str, Any]:
     """A file that could not be read or is faulty; ``doubts`` are warnings."""
     faults = [Fault(wrong.path, 0, 0, "", wrong.reason)] if isinstance(wrong, CannotRead) else wrong.faults
     report = {"file": name, "valid": False, "faults": _faults_json(faults), "warnings": _faults_json(doubts)}
-    return {**report, "spacecraft": None, "channels": [], "two_pulse": None}
+    return report | {"spacecraft": None, "channels": [], "two_pulse": None}
 
 
-def _faults_json(faults: Iterable[Fault]) -> list[dict[str, Any]]:
+def _faults_json(faults: Sequence[Fault]) -> list[dict[str, Any]]:
     """Faults, each with its ``place`` as messages have it; line and column are null where it is no place in a file."""
-    return [
-        {
-            "place": fault.place,
-            "line": fault.line or None,
-            "column": fault.column or None,
-            **values_of(fault, "where", "problem"),
-        }
-        for fault in faults
-    ]
+    places = [{"place": fault.place, "line": fault.line or None, "column": fault.column or None} for fault in faults]
+    return [place | values_of(fault, "where", "problem") for place, fault in zip(places, faults, strict=True)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -291,7 +284,7 @@ def checked(
         raise FaultyFile([Fault(name or source.name, 1, 1, "", str(wrong))]) from wrong
 
 
-def checked_json(name: str | None, spacecraft: Spacecraft, doubts: Iterable[Fault] = ()) -> dict[str, Any]:
+def checked_json(name: str | None, spacecraft: Spacecraft, doubts: Sequence[Fault] = ()) -> dict[str, Any]:
     """A valid file: derived quantities, channels with their steps, the mounting angle for two pulses."""
     pair, axis = capability.nearest_pair(spacecraft), capability.spin_axis(spacecraft)
     return {
@@ -300,7 +293,7 @@ def checked_json(name: str | None, spacecraft: Spacecraft, doubts: Iterable[Faul
         "faults": [],
         "warnings": _faults_json(doubts),
         "spacecraft": spacecraft_json(spacecraft),
-        "channels": _channels_json(spacecraft),
+        "channels": list(_channels_json(spacecraft)),
         **({} if spacecraft.tank is None else {"tank": tank_table(spacecraft.tank).json()}),
         "spin_axis": {
             **values_of(axis, "class=kind", "squared_exponent_1_s2=exponent", "growth_time_s", "tilt_deg"),
@@ -321,13 +314,11 @@ def checked_json(name: str | None, spacecraft: Spacecraft, doubts: Iterable[Faul
     }
 
 
-def _channels_json(spacecraft: Spacecraft) -> list[dict[str, Any]]:
-    rows, pulses = channel_table(spacecraft).json(), capability.acting(spacecraft)
-    for row, channel in zip(rows, spacecraft.channels, strict=True):
-        if channel.valve is not None:
-            own = [[pulse] for pulse in pulses if pulse.channel is channel]
-            row["commands"] = DataTable("", VALVES, own).json()
-    return rows
+def _channels_json(spacecraft: Spacecraft) -> Iterator[dict[str, Any]]:
+    pulses = capability.acting(spacecraft)
+    for row, channel in zip(channel_table(spacecraft).json(), spacecraft.channels, strict=True):
+        own = [[pulse] for pulse in pulses if pulse.channel is channel]
+        yield row if channel.valve is None else row | {"commands": DataTable("", VALVES, own).json()}
 
 
 def _sun_pulses_json(spacecraft: Spacecraft) -> dict[str, Any] | None:

@@ -6,7 +6,7 @@ The files of loops and the screens of other commands use the same parts.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -83,9 +83,7 @@ EMPTY = "the pulses take more propellant than there is, so that the last ones do
 def dispersion_brief(results: Results, *, scheme: str) -> RenderableType:
     """The default screen of ``disperse``: verdict, percentiles, what counts most, and the worst case."""
     head = [_title(results, scheme), *requirement_lines(results), *cone_lines(results), *_emptied(results)]
-    notes, case = list(tolerances.main_causes(results)), ""
-    if _varies(results):
-        case = f" · {_again(results)} (worst)"
+    notes, case = list(tolerances.main_causes(results)), f" · {_again(results)} (worst)" * _varies(results)
     if unused := results.study.model.inputs.unused:
         notes.append(f"Dispersions without effect: {', '.join(tolerances.in_words(entry.name) for entry in unused)}.")
     return summary(head, lambda **_: _percentiles(results).screen("screen"), notes, f"--plot cases.png{case}")
@@ -131,7 +129,7 @@ def dispersion_json(results: Results, *, scheme: str, worst: int) -> dict[str, A
         "shares": list(_shares(results)),
         **tolerances.correlation_json(body),
         "unused": [entry.name for entry in study.model.inputs.unused],
-        **unused_json(study),
+        "unused_because": dict(study.model.inputs.unused),
         "worst": [row_json(study, FLOWN_OUTPUTS, row) for row in _worst(results, worst)],
     }
 
@@ -140,11 +138,6 @@ def counts_json(results: Results | LoopResults) -> dict[str, Any]:
     """Number of cases, and their seed."""
     counts = values_of(results, "samples=done", "requested") | {"interrupted": results.done < results.requested}
     return counts | values_of(results, "seed=study.seed", "redrawn")
-
-
-def unused_json(study: Study | LoopStudy) -> dict[str, Any]:
-    """Inputs without effect, and the reasons."""
-    return {"unused_because": {entry.name: entry.reason for entry in study.model.inputs.unused}}
 
 
 def _worst(results: Results, count: int) -> list[CaseRow]:
@@ -377,36 +370,33 @@ def _output(at: int, output: StudyOutput, row: CaseRow) -> float | int | None:
 
 
 def case_table(
-    study: Study | LoopStudy, outputs: Sequence[StudyOutput], rows: Sequence[CaseRow], effects: Array
+    study: Study | LoopStudy, outputs: Sequence[StudyOutput], rows: Sequence[CaseRow], effects: Array | None = None
 ) -> DataTable:
-    """Cases, one row each; ``effects`` of the drawn inputs by which they are ranked."""
+    """Cases, one row each; ``effects`` of the drawn inputs by which their contributors are ranked."""
     return DataTable("Worst cases", tuple(_case_columns(study, outputs, rows, effects)), rows)
 
 
 def _case_columns(
-    study: Study | LoopStudy, outputs: Sequence[StudyOutput], rows: Sequence[CaseRow], effects: Array
+    study: Study | LoopStudy, outputs: Sequence[StudyOutput], rows: Sequence[CaseRow], effects: Array | None
 ) -> Iterator[Column]:
+    cones, inputs = study.model.spacecraft.keep, study.model.inputs.drawn
     yield Column("case", Shared.CASE, "", lambda row: row.case + 1, where="screen csv", kind=WHOLE)
     named = (Shared.THIS_CASE, Shared.NOMINAL)
     yield Column("", "", "", lambda row: named[row.case == ESTIMATE], where="case", kind=TEXT)
-    for entry in study.model.inputs.drawn:
+    for entry in inputs:
         yield Column(column(entry), "", "", partial(_true_value, entry), where="csv")
     for at, output in enumerate(outputs):
         value, where = partial(_output, at, output), "csv" + " screen" * output.ranks
         yield Column(output.key, output.heading, output.unit, value, to_figures(4, output.scale), where)
-        unit, factor = output.shown_unit
-        known = [abs(factor * size) for row in rows if (size := value(row)) is not None]
-        text = partial(_beside, factor, max(known, default=0.0)) if output.unit else "{:.0f}".format
-        yield Column("", output.heading, unit, value, text, "case")
+        text = _text_beside(output, map(value, rows))
+        yield Column("", output.heading, output.shown_unit[0], value, text, "case")
     yield Column("stopped", "", "", lambda row: row.stop.name.lower() if row.stop else None, where="csv", kind=TEXT)
-    cones = study.model.spacecraft.keep
     angles = [(which, cone) for cone in cones for which in ("least", "largest")]
     for at, (key, (which, cone)) in enumerate(zip(cone_columns(study.model.spacecraft), angles, strict=True)):
         where, name = "csv case" + " screen" * (which in bounded(cone)), f"{which} from {cone.name}"
         yield Column(key, name, "deg", partial(_angle, at), to_figures(4), where)
-    heading = f"largest {'contributors' if outputs is FLOWN_OUTPUTS else 'inputs'}, in sigmas"
-    largest = partial(_largest, study.model.inputs.drawn, effects)
-    yield Column("", heading, "", largest, where="screen", kind=TEXT)
+    heading = f"largest {'inputs' if effects is None else 'contributors'}, in sigmas"
+    yield Column("", heading, "", partial(_largest, inputs, effects), where="screen", kind=TEXT)
 
 
 def _true_value(entry: DispersedInput, row: CaseRow) -> float:
@@ -414,17 +404,22 @@ def _true_value(entry: DispersedInput, row: CaseRow) -> float:
     return math.degrees(value) if entry.unit == "rad" else value
 
 
-def _beside(factor: float, largest: float, value: float) -> str:
-    return beside(factor * value, largest)
+def _text_beside(output: StudyOutput, values: Iterable[float | None]) -> Callable[[float], str]:
+    """Text of an output of few cases beside each other, to the digits of the largest; counts are whole."""
+    if not output.unit:
+        return "{:.0f}".format
+    factor = output.shown_unit[1]
+    largest = max((abs(factor * value) for value in values if value is not None), default=0.0)
+    return lambda value: beside(factor * value, largest)
 
 
 def _angle(at: int, row: CaseRow) -> float:
     return math.nan if row.angles is None else math.degrees(row.angles.flat[at])
 
 
-def _largest(inputs: Sequence[DispersedInput], effects: Array, row: CaseRow) -> str:
-    sigmas = [row.draws[entry.name] / (entry.sigma or math.inf) for entry in inputs]
-    order = np.argsort(-np.abs(effects * sigmas), kind="stable")[:3].tolist()
+def _largest(inputs: Sequence[DispersedInput], effects: Array | None, row: CaseRow) -> str:
+    sigmas = np.array([row.draws[entry.name] / (entry.sigma or math.inf) for entry in inputs])
+    order = np.argsort(-np.abs(sigmas if effects is None else effects * sigmas), kind="stable")[:3].tolist()
     return ", ".join(f"{tolerances.in_words(inputs[at].name)} {sigmas[at]:+.1f}" for at in order if sigmas[at])
 
 

@@ -73,7 +73,7 @@ def explained(requested: str) -> Topic:
     if topic is None and texts:
         (_, summary), *texts = texts
     parts = [TopicPart("", (TopicRows(tuple(texts)),))] if texts else []
-    parts += [] if topic is None else topic.parts
+    parts += () if topic is None else topic.parts
     if keys:
         rows = tuple((f"{guide.FILE}.{key.path}", key.field.description) for key in keys)
         parts.append(TopicPart("In the spacecraft file", (TopicRows(rows),)))
@@ -244,19 +244,14 @@ def _what(field: fields.Key) -> str:
         factors = KINDS[quantity.kind].factors
         return f"unit {listed([*factors], 'or')}" if factors else "plain numbers, without unit"
     choices = next((get_args(part) for part in parts if get_origin(part) is Literal), ())
-    return listed(choices, "or") if choices else {int: "a whole number", str: "a text"}.get(_plain(field.type), "")
+    plain = next((part for part in parts if get_origin(part) in (list, dict) or isinstance(part, type)), None)
+    return listed(choices, "or") if choices else "a whole number" if plain is int else "a text" if plain is str else ""
 
 
 def _within(annotation: Any) -> Iterator[Any]:
     yield annotation
     for part in get_args(annotation):
         yield from _within(part)
-
-
-def _plain(annotation: Any) -> Any:
-    if get_origin(annotation) in (list, dict) or isinstance(annotation, type):
-        return annotation
-    return next((_plain(part) for part in get_args(annotation) if part is not type(None)), None)
 
 
 def flow(value: object) -> str:
@@ -297,9 +292,7 @@ def topic_screen(topic: Topic) -> RenderableType:
     """One topic."""
     parts: list[RenderableType] = [Text.assemble((topic.name, "bold"), f" – {topic.summary}")]
     for part in topic.parts:
-        parts.append(Text())
-        if part.title:
-            parts.append(Text(part.title, style="bold"))
+        parts += [Text(), *[Text(part.title, style="bold")] * bool(part.title)]
         for number, block in enumerate(part.blocks):
             parts += [Text()] * (number > 0) + [_block(block)]
     return Constrain(Group(*parts), WIDEST)
@@ -307,7 +300,10 @@ def topic_screen(topic: Topic) -> RenderableType:
 
 def equations_screen() -> RenderableType:
     """Every numbered equation: its subject, its place in the code, its differences from the print."""
-    rows = [(entry.number, "\n".join([f"{entry.subject}: {entry.place}", *entry.remarks])) for entry in guide.EQUATIONS]
+    rows = []
+    for entry in guide.EQUATIONS:
+        remarks = [block for block in entry.changed if isinstance(block, str)]
+        rows.append((entry.number, "\n".join([f"{entry.subject}: {entry.place}", *remarks])))
     hint = Text("Formula, symbols and units of one: nutdamp explain 17, explain K7, explain 24.4")
     return Constrain(Group(*(Text(source) for source in guide.SOURCES), hint, Text(), _Pairs(tuple(rows))), WIDEST)
 

@@ -26,20 +26,8 @@ from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import SLACK, Spacecraft
 from nutdamp.spacecraft.requirements import Bound, Part
-from nutdamp.views import decisions
+from nutdamp.views import decisions, parts
 from nutdamp.views.decisions import COUNT, coloured, lasting, limit, size, verdict
-from nutdamp.views.parts import (
-    angle_names,
-    angle_texts,
-    block_table,
-    blocks_screen,
-    cone_margins,
-    derived_table,
-    pulse_table,
-    title,
-    turn_floor,
-    turning,
-)
 from nutdamp.views.tables import (
     TEXT,
     WHOLE,
@@ -90,8 +78,8 @@ def scheme_table(compared: Comparison, chosen: Plan | None) -> DataTable:
     how = model_name(plan.pulses for plan in compared.plans)
     ideal = [plan.scheme for plan in compared.plans if plan.pulses.idealised]
     alone = f" (ideal impulses: {listed(ideal)})" if how == REAL_WIDTHS and ideal else ""
-    title = f"Cost and residuals of each scheme with nominal values, by {how}{alone}"
-    return DataTable(title, tuple(_columns(compared, chosen)), rows, compared, mark)
+    subject = f"Cost and residuals of each scheme with nominal values, by {how}{alone}"
+    return DataTable(subject, tuple(_columns(compared, chosen)), rows, compared, mark)
 
 
 def limits(body: Spacecraft) -> tuple[float, float]:
@@ -192,7 +180,7 @@ def ratios(body: Spacecraft) -> Iterator[tuple[str, float]]:
     """The floors of impulse, N m s, by name: A|ω0|, and with a target C|ω3|β."""
     yield "A|ω0|", body.least_impulse
     if body.goal.axis is not None:
-        yield turn_floor(body), turning(body)
+        yield parts.turn_floor(body), parts.turning(body)
 
 
 def _over(whole: float) -> Callable[[Plan], float | None]:
@@ -201,7 +189,7 @@ def _over(whole: float) -> Callable[[Plan], float | None]:
 
 def _directions(body: Spacecraft) -> Iterator[Column]:
     keys = ("tilt_deg", "azimuth_deg") if body.attitude is None else ("right_ascension_deg", "declination_deg")
-    names = angle_names(body) if body.attitude is None else SHORT_NAMES
+    names = parts.angle_names(body) if body.attitude is None else SHORT_NAMES
     for which in ("axis", "momentum"):
         for at, key in enumerate(keys):
             yield Column(f"{which}_{key}", "", "", _feasible(partial(_direction, which, at)), where="csv")
@@ -216,7 +204,7 @@ def _direction(which: str, at: int, plan: Plan) -> float | None:
 
 
 def _shown_direction(at: int, plan: Plan) -> str:
-    return angle_texts(plan.spacecraft, plan.flight.final.axis)[at].removesuffix(" deg")
+    return parts.angle_texts(plan.spacecraft, plan.flight.final.axis)[at].removesuffix(" deg")
 
 
 def _bounds(compared: Comparison) -> Iterator[Column]:
@@ -226,7 +214,7 @@ def _bounds(compared: Comparison) -> Iterator[Column]:
         name, cell = f"{bound.part.label} {limit(bound)}", partial(_part, bound)
         yield Column("", name, "", _feasible(cell), where="full", kind=TEXT)
     for at, cone in enumerate(at_start(compared.spacecraft)[: len(compared.spacecraft.keep)]):
-        for kept, _, _ in cone_margins(cone):
+        for kept, _, _ in parts.cone_margins(cone):
             name = f"axis from {cone.keep.name} {kept}"
             yield Column("", name, "", _feasible(partial(_cone, at, kept)), where="full", kind=TEXT)
 
@@ -238,7 +226,7 @@ def _part(bound: Bound, plan: Plan) -> str:
 
 
 def _cone(at: int, kept: str, plan: Plan) -> str:
-    angles = ((angle, left) for bound, angle, left in cone_margins(plan.aspects[at]) if bound == kept)
+    angles = ((angle, left) for bound, angle, left in parts.cone_margins(plan.aspects[at]) if bound == kept)
     return next(f"{NOT} " * (left < -SLACK) + degrees(angle).removesuffix(" deg") for angle, left in angles)
 
 
@@ -262,7 +250,7 @@ def glance(
     ``beside``: notes on that choice.
     """
     body = compared.spacecraft
-    head = [*title(body), headline(compared, decision, robust)]
+    head = [*parts.title(body), headline(compared, decision, robust)]
     remarks = ordered([*beside, *notes(compared, decision, robust)])
     more = [screen_line(note) for note in remarks if severity(note) != WARNING]
     name = robust or ("" if decision is None else decision.plan.scheme)
@@ -277,9 +265,9 @@ def glance(
     def screen(first: int) -> RenderableType:
         fired: list[RenderableType] = []
         if plan.pulses.blocks:
-            fired = [Text(), block_table(plan.flight).screen("screen", first=first)]
+            fired = [Text(), parts.block_table(plan.flight).screen("screen", first=first)]
         elif len(plan.pulses):
-            shown = pulse_table(plan.flight, least=limits(body)[0])
+            shown = parts.pulse_table(plan.flight, least=limits(body)[0])
             fired = [Text(), shown.screen("screen", between=", ", first=first if len(shown.rows) > ROWS else None)]
         required, middle = requirement_rows(decision), [ends(decision), *fired]
         blocks = bool(plan.pulses.blocks)
@@ -357,7 +345,7 @@ def requirement_rows(decision: Decision) -> list[RequirementRow]:
         rows.append(RequirementRow(bound.part.label, *words, met, left, (used[0], used[1])))
     for aspect in decision.aspects:
         name, keep = f"axis from {aspect.keep.name}", aspect.keep
-        for text, angle, margin in cone_margins(aspect):
+        for text, angle, margin in parts.cone_margins(aspect):
             kept, least = margin >= -SLACK, margin == aspect.least - keep.least
             used_up = keep.least / max(angle, SLACK) if least else angle / keep.most
             words, met = ("", f"nominal {degrees(angle)}", f"limit {text}"), coloured(decisions.VERDICT[kept], kept)
@@ -385,8 +373,8 @@ def ends(decision: Decision) -> Table:
     if formula is not None and (by_impulses := short_angle(formula.nutation, least)) not in angles[0].split():
         angles[0] += f" (17: {by_impulses})"
     rows = [("after pulses, deg", "  ".join(angles))]
-    first, second = angle_texts(body, decision.flight.final.axis)
-    names = angle_names(body) if body.attitude is None else SHORT_NAMES
+    first, second = parts.angle_texts(body, decision.flight.final.axis)
+    names = parts.angle_names(body) if body.attitude is None else SHORT_NAMES
     turned = f"turned by {short_angle(left.momentum_shift, turn)} deg"
     turned = turned if body.goal.axis is None else f"{short_angle(left.axis_error, turn)} deg off target"
     spun = abs(decision.flight.final.spin - body.spin) > requirements.SPIN_TOLERANCE * abs(body.spin)
@@ -432,21 +420,21 @@ def comparison_screen(compared: Comparison) -> RenderableType:
     """All tables of ``plan``, the decision on top."""
     decided, needless = decide(compared), decisions.needless(compared)
     schemes = scheme_table(compared, compared.recommended).transposed("full")
-    results: list[RenderableType] = [Text(), derived_table(compared.spacecraft), Text(), schemes]
-    parts: list[RenderableType] = [Text(compared.spacecraft.name, style="bold")]
+    results: list[RenderableType] = [Text(), parts.derived_table(compared.spacecraft), Text(), schemes]
+    lead: list[RenderableType] = [Text(compared.spacecraft.name, style="bold")]
     if needless is not None:
-        parts.append(Text.assemble(("No pulse needed: ", "bold"), f"{needless}."))
+        lead.append(Text.assemble(("No pulse needed: ", "bold"), f"{needless}."))
     remarks = [note for plan in compared.plans for note in plan_notes(plan)]
     results += [Text(), *map(screen_line, ordered(remarks))] if remarks else []
     if decided is None:
-        return Group(*parts, Text(f"No recommendation: {joined(reasons(compared))}.", style="bold"), *results)
+        return Group(*lead, Text(f"No recommendation: {joined(reasons(compared))}.", style="bold"), *results)
     if decided.plan.pulses.blocks:
-        results += [Text(), blocks_screen(decided.plan.flight, decided.plan.delta_v)]
+        results += [Text(), parts.blocks_screen(decided.plan.flight, decided.plan.delta_v)]
     elif len(decided.plan.pulses):
-        results += [Text(), pulse_table(decided.plan.flight).screen("full")]
+        results += [Text(), parts.pulse_table(decided.plan.flight).screen("full")]
     why, warnings = joined(reasons(compared)), comparison_warnings(compared, cones=False)
     return Group(
-        *parts,
+        *lead,
         Text.assemble("Recommended: ", (decided.plan.scheme, "bold"), f" – {why}."),
         decisions.statement(decided),
         *map(screen_line, ordered([*warnings, *decision_notes(decided), *alternatives(compared)])),

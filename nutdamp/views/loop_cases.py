@@ -42,7 +42,7 @@ SHARED = tuple(output for output in SHOWN_OUTPUTS if output.ranks and output.uni
 
 
 def _cases(study: LoopStudy, rows: Sequence[CaseRow]) -> DataTable:
-    return dispersion.case_table(study, SHOWN_OUTPUTS, rows, np.ones(len(study.model.inputs.drawn)))
+    return dispersion.case_table(study, SHOWN_OUTPUTS, rows)
 
 
 def _worst(results: LoopResults, count: int) -> list[CaseRow]:
@@ -182,7 +182,7 @@ def loop_cases_json(results: LoopResults, *, worst: int) -> dict[str, Any]:
         "shares": {output.key: results.shares(output.name) for output in SHARED},
         **correlation_json(study.spacecraft),
         "each_firing": {entry.name: entry._asdict() for entry in study.model.of_firings},
-        **dispersion.unused_json(study),
+        "unused_because": dict(study.model.inputs.unused),
         "worst": [row_json(study, SHOWN_OUTPUTS, row) for row in _worst(results, worst)],
     }
 
