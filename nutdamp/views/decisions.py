@@ -28,17 +28,7 @@ from nutdamp.spacecraft.model import SLACK, Spacecraft, Vector
 from nutdamp.spacecraft.requirements import Bound, Part
 from nutdamp.views.parts import FRAME_N, aspect_facts, commanded, cone_margins, direction_text, required, spin_text
 from nutdamp.views.tables import TEXT, Column, DataTable, Shared, facts, values_of
-from nutdamp.views.text import (
-    MISSING,
-    degrees,
-    duration,
-    joined,
-    mass,
-    moment,
-    most,
-    note_json,
-    quantity,
-)
+from nutdamp.views.text import MISSING, degrees, duration, joined, mass, moment, most, note_json, quantity
 
 if TYPE_CHECKING:
     from nutdamp.planning.tradeoff import Certificate
@@ -253,8 +243,8 @@ def lasting(flown: Flight) -> str:
     """Time of the end shown where the motion does not last, and the cause of its change; empty where it lasts."""
     body = flown.spacecraft
     causes = [*["dissipation"] * (body.growth != 0.0), *["disturbances"] * bool(body.disturbances)]
-    end = "as the last pulse ends, at " + moment(flown.schedule.end)
-    end = end if flown.until is None else f"at {moment(flown.until)}"
+    last = f"as the last pulse ends, at {moment(flown.schedule.end)}"
+    end = last if flown.until is None else f"at {moment(flown.until)}"
     return f"{end}; changed further by {' and '.join(causes)}" if causes else ""
 
 

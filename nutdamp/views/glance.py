@@ -26,7 +26,7 @@ from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import SLACK, Spacecraft
 from nutdamp.spacecraft.requirements import Bound, Part
-from nutdamp.views import decisions, parts
+from nutdamp.views import decisions, parts, tables
 from nutdamp.views.decisions import COUNT, coloured, lasting, limit, size, verdict
 from nutdamp.views.tables import (
     TEXT,
@@ -38,7 +38,6 @@ from nutdamp.views.tables import (
     Shared,
     angle_of,
     facts,
-    lines_of,
     to_figures,
 )
 from nutdamp.views.text import (
@@ -273,7 +272,7 @@ def glance(
         blocks = bool(plan.pulses.blocks)
         return _fitted(head, required, middle, more, table, blocks=blocks)
 
-    return next((shown for shown in map(screen, (FIRST, FIRST // 2)) if lines_of(shown) <= LINES), screen(1))
+    return next((shown for shown in map(screen, (FIRST, FIRST // 2)) if tables.lines_of(shown) <= LINES), screen(1))
 
 
 def notes(compared: Comparison, decision: Decision | None, robust: str = "") -> list[Note]:
@@ -395,7 +394,7 @@ def _fitted(
     blocks: bool = False,
 ) -> RenderableType:
     """All parts within the lines there are; notes go first, then requirements that are met with room."""
-    lines = lines_of(*head, *middle, schemes) + len(required) + 2
+    lines = tables.lines_of(*head, *middle, schemes) + len(required) + 2
     apart = [Text()] * (lines <= LINES)
     lines -= 1 - len(apart)
     shown = list(required)
@@ -405,7 +404,7 @@ def _fitted(
         lines -= len(required) - len(shown)
     shown_notes: list[Text] = []
     for note in more:
-        lines += lines_of(note)
+        lines += tables.lines_of(note)
         if lines > LINES or len(shown_notes) == NOTES:
             break
         shown_notes.append(note)

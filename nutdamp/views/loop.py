@@ -21,23 +21,10 @@ from nutdamp.planning.decision import Decision
 from nutdamp.planning.notes import decision_notes
 from nutdamp.spacecraft.equipment import GYRO, Loop
 from nutdamp.spacecraft.model import Spacecraft
-from nutdamp.views import decisions
+from nutdamp.views import decisions, tables
 from nutdamp.views.decisions import VERDICT, heading
 from nutdamp.views.parts import Remark, opening, pulse_table, seconds, summary, warnings_of
-from nutdamp.views.tables import (
-    TEXT,
-    WHOLE,
-    YES_NO,
-    Column,
-    DataTable,
-    Shared,
-    angle_of,
-    facts,
-    file_columns,
-    to_figures,
-    value_at,
-    values_of,
-)
+from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable, Shared, angle_of, facts, to_figures
 from nutdamp.views.text import degrees, duration, lasting, moment, most, quantity, small_angle
 
 SHOWN = 40  # largest number of firings in a table of a screen
@@ -70,7 +57,7 @@ FIRINGS = (
     Column("on_time_s", Shared.ON_TIME, "s", lambda row: row.firing.pulse.loaded[1], seconds, "verified verified_json"),
     Column("on_time_difference_s", "differs by", "s", lambda row: row.apart[1], APART, "verified verified_json"),
     Column("", Shared.CHANNEL, "", lambda row: row.firing.pulse.channel, where="screen", kind=TEXT),
-    *file_columns("json", "decided_s=firing.decided"),
+    *tables.file_columns("json", "decided_s=firing.decided"),
     Column("seen_deg", "nutation seen", "deg", angle_of("firing.seen"), small_angle, "screen json"),
     Column("", "before", "deg", angle_of("before"), small_angle, "screen"),
     Column("", "after", "deg", angle_of("after"), small_angle, "screen"),
@@ -90,14 +77,14 @@ def firing_table(run: LoopRun) -> DataTable:
 MARGINS = (
     Column("channel", Shared.CHANNEL, "", lambda row: row.channel, where="screen json", kind=TEXT),
     Column("late_deg", "late", "deg", angle_of("late"), to_figures(4), "screen json"),
-    *file_columns("json", "latest_deg"),
+    *tables.file_columns("json", "latest_deg"),
     Column("gain", "remaining", "%", lambda row: row.gain,
            lambda gain: f"{100.0 * gain:.4g}" if gain >= ROUNDING else "0", "screen json"),
     Column("growth", "growth in a period", "%", lambda row: row.growth, lambda growth: f"{100.0 * (growth - 1.0):.3g}",
            "screen json"),
     Column("", "delay margin", "", lambda row: row.delay, lambda delay: "none" if delay < 0.0 else duration(delay),
            "screen"),
-    *file_columns("json", "delay_margin_s=delay", "damps", "reversed=turned"),
+    *tables.file_columns("json", "delay_margin_s=delay", "damps", "reversed=turned"),
 )  # fmt: skip
 
 
@@ -254,7 +241,7 @@ def loop_json(plan: LoopPlan) -> dict[str, Any]:
     pulses = zip(pulse_table(run.flight).json("flown"), firing_table(run).json(), strict=True)
     return {
         **heading(body),
-        **values_of(run, "law=loop.law", "seed", "case", "until_s"),
+        **tables.values_of(run, "law=loop.law", "seed", "case", "until_s"),
         "stopped": run.stop.name.lower(),
         "channel": run.channel,
         "meets_requirement": False if run.stop.fault else plan.meets_requirement,
@@ -263,7 +250,7 @@ def loop_json(plan: LoopPlan) -> dict[str, Any]:
         "largest_since_quiet_deg": None if run.settled is None else math.degrees(plan.largest[0]),
         "dead_band_deg": math.degrees(plan.band.most),
         "pulses": [pulse | firing for pulse, firing in pulses],
-        **values_of(plan, "total_impulse_Nms", "propellant_kg", "end_s"),
+        **tables.values_of(plan, "total_impulse_Nms", "propellant_kg", "end_s"),
         "flown": decisions.residual_json(plan.flight.residual),
         "final": decisions.final_json(plan.flight),
         "target": decisions.target_json(body),
@@ -278,7 +265,7 @@ def verified_json(verification: LoopVerification) -> dict[str, Any]:
         "scheme": "loop",
         "agree": None if verification.missing else verification.agree,
         "missing": verification.missing or None,
-        **values_of(verification, "evaluations", "until_s=run.until"),
+        **tables.values_of(verification, "evaluations", "until_s=run.until"),
         "firings": _differences(verification).json("verified_json"),
     }
 
@@ -290,7 +277,7 @@ def _of_cycle(name: str, scale: float = 1.0) -> Callable[[HeldNutation], float |
     """A figure of the limit cycle times ``scale``; None without one."""
 
     def value(held: HeldNutation) -> float | None:
-        figure = value_at(held.cycle, name)
+        figure = tables.value_at(held.cycle, name)
         return None if figure is None else scale * float(figure)
 
     return value
@@ -302,7 +289,7 @@ FILES, EVERYWHERE = "csv json", "screen csv json"
 HELD = (
     Column("start_deg", Shared.START, "deg", angle_of("thresholds.start"), to_figures(4), EVERYWHERE),
     Column("stop_deg", "stop", "deg", angle_of("thresholds.stop"), to_figures(4), EVERYWHERE),
-    *file_columns(FILES, "first_firing_s=begins"),
+    *tables.file_columns(FILES, "first_firing_s=begins"),
     Column("pulses_per_day", Shared.PULSES, "1/day", _of_cycle("pulses", DAY), to_figures(4), f"{EVERYWHERE} other"),
     Column("cycles_per_day", "", "", _of_cycle("cycles", DAY), where=f"{FILES} other"),
     Column("impulse_Nms_per_year", "", "", _of_cycle("impulse", YEAR), where=FILES),
@@ -317,7 +304,7 @@ HELD = (
     Column("nutation_largest_deg", Shared.MOST, "deg", angle_of("cycle.largest"), to_figures(3), EVERYWHERE),
     Column("", Shared.SPIN, "%/day", lambda held: None if held.slows is None else 100.0 * held.slows * DAY / YEAR,
            to_figures(2), "screen"),
-    *file_columns(FILES, "noise_deg=band.noise", "smallest_pulse_deg=band.step"),
+    *tables.file_columns(FILES, "noise_deg=band.noise", "smallest_pulse_deg=band.step"),
     Column("tank_lasts_days", "tank", "days", lambda held: None if held.lasts is None else held.lasts / DAY,
            to_figures(4), "screen", lambda budget: budget.spacecraft.tank is not None),
     Column("tank_lasts_days", "", "", lambda held: None if held.lasts is None else held.lasts / DAY, where=FILES),
@@ -440,7 +427,7 @@ def budget_json(budget: Budget) -> dict[str, Any]:
     others = replace(table, rows=[replace(held, cycle=held.other) for held in budget.held])
     return {
         **heading(budget.spacecraft),
-        **values_of(
+        **tables.values_of(
             budget, "growth_1_s=spacecraft.growth", "largest_deg", "until_largest_s", "law=spacecraft.loop.law"
         ),
         "meets_requirement": budget.meets_requirement,

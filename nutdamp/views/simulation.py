@@ -30,20 +30,8 @@ from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.requirements import Part
 from nutdamp.spacecraft.schedule import Pulse, Schedule
-from nutdamp.views import decisions, parts
-from nutdamp.views.tables import (
-    TEXT,
-    WHOLE,
-    Column,
-    DataTable,
-    FittedColumns,
-    Shared,
-    angle_of,
-    facts,
-    file_columns,
-    to_figures,
-    values_of,
-)
+from nutdamp.views import decisions, parts, tables
+from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, FittedColumns, Shared, angle_of, facts, to_figures
 from nutdamp.views.text import MISSING, degrees, longitude, moment, pointing, small_angle
 
 MODELS = {IMPULSE_SUM: "impulse approximation (17)", REAL_WIDTHS: "full simulation"}  # names of the two models
@@ -322,8 +310,8 @@ def verification_json(flown: Flight, name: str, verification: Verification) -> d
         "final": decisions.final_json(flown),
         "target": decisions.target_json(spacecraft),
         "methods": DataTable("", METHODS, verification.methods).json(),
-        **values_of(verification, "momentum_drift=momentum.drift", "momentum_kept=momentum.kept"),
-        **values_of(verification, "energy_drift=energy.drift", "energy_kept=energy.kept"),
+        **tables.values_of(verification, "momentum_drift=momentum.drift", "momentum_kept=momentum.kept"),
+        **tables.values_of(verification, "energy_drift=energy.drift", "energy_kept=energy.kept"),
         "budget": DataTable("", IMPERFECTIONS, verification.budget, spacecraft).json(),
     }
 
@@ -347,10 +335,10 @@ METHODS = (
 IMPERFECTIONS = (
     Column("imperfection", "imperfection", "", attrgetter("name"), where="json screen", kind=TEXT),
     NUTATION,
-    *file_columns("json", "momentum_shift_deg"),
+    *tables.file_columns("json", "momentum_shift_deg"),
     Column("", Part.SHIFT.label, "deg", angle_of("momentum_shift"), small_angle, "screen",
            lambda body: body.goal.axis is None),
-    *file_columns("json", "axis_error_deg"),
+    *tables.file_columns("json", "axis_error_deg"),
     Column("", Part.DISTANCE.label, "deg", angle_of("axis_error"), small_angle, "screen",
            lambda body: body.goal.axis is not None),
 )  # fmt: skip

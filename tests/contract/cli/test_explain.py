@@ -286,7 +286,7 @@ def keys_of_columns() -> Iterator[tuple[str, str]]:
 
 def keys_named(node: ast.AST, function: str) -> Iterator[str]:
     """Names in files that a call of ``function`` has behind its first argument, with or without a path."""
-    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == function:
+    if isinstance(node, ast.Call) and ast.unparse(node.func).rpartition(".")[2] == function:
         for name in node.args[1:]:
             if isinstance(name, ast.Constant):
                 yield str(name.value).partition("=")[0]
