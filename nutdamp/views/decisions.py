@@ -51,14 +51,12 @@ def needless(compared: Comparison) -> str | None:
     body = compared.spacecraft
     if not compared.needless:
         return None
-    there = f"nutation {degrees(body.nutation)} at t = 0"
+    there, verdict = f"nutation {degrees(body.nutation)} at t = 0", "damped"
     if body.goal.axis is not None:
         there += f", H {degrees(body.to_turn)} from the target"
     if requirements.required(body):
         nominal = ", with nominal values" * (body.dispersions is not None and compared.flown is None)
         verdict = f"requirement met ({required(body)}){nominal}"
-    else:
-        verdict = "damped"
     lasting = f", up to the horizon of {duration(body.horizon)}" if body.growth > 0.0 else ""
     return f"{there}: {verdict}{lasting}"
 
@@ -219,10 +217,7 @@ def margin_lines(decision: Decision, values: str = Shared.NOMINAL) -> list[Rende
 
 
 def end_rows(flown: Flight, watched: Iterable[Aspect]) -> Iterator[tuple[str, str]]:
-    """Spin axis and angular momentum after the last pulse, beside the target, and the motion from then on.
-
-    ``watched``: least distances of the axis from directions in space.
-    """
+    """Spin axis and H after the last pulse, beside the target and directions ``watched``, and the motion from there."""
     body, final = flown.spacecraft, flown.final
     yield "spin axis ends at", direction_text(body, final.axis)
     yield "H ends at", direction_text(body, final.momentum)
@@ -373,9 +368,8 @@ def aspects_json(aspects: tuple[Aspect, ...]) -> dict[str, Any]:
 def direction_json(body: Spacecraft, direction: Vector) -> dict[str, float | None]:
     """The two angles that name an inertial direction (3,), as `Spacecraft.angles_of`."""
     around, other = (None if angle is None else math.degrees(angle) for angle in body.angles_of(direction))
-    if body.attitude is None:
-        return {"tilt_deg": other, "azimuth_deg": around}
-    return {"right_ascension_deg": around, "declination_deg": other}
+    named = {"tilt_deg": other, "azimuth_deg": around}
+    return named if body.attitude is None else {"right_ascension_deg": around, "declination_deg": other}
 
 
 def residual_json(residual: Residual | None) -> dict[str, float | None]:
@@ -386,10 +380,7 @@ def residual_json(residual: Residual | None) -> dict[str, float | None]:
 
 
 def decision_json(decision: Decision) -> dict[str, Any]:
-    """The plan, whether it ``met`` the requirement and the verdict in words, part by part with margins, its end.
-
-    ``cases`` is null where none were flown.
-    """
+    """The verdict on a plan, part by part with margins, its end and cost; ``cases`` is null where none were flown."""
     cases = decision.cases
     return {
         **values_of(decision, "scheme=plan.scheme", "met"),

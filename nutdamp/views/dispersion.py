@@ -42,10 +42,7 @@ BOTH = "screen full"  # the default screen, and that of all values
 
 
 class StudyOutput(NamedTuple):
-    """An output of a study: its ``key`` in files, its heading and unit for people, and the factor to that unit.
-
-    ``ranks``: worst cases are shown with it.
-    """
+    """An output: ``key`` in files, heading and unit for people, factor to it; ``ranks``: worst cases show it."""
 
     name: str
     key: str
@@ -108,11 +105,10 @@ def dispersion_screen(results: Results, *, scheme: str, worst: int, nominal: Fli
 
 
 def dispersion_json(results: Results, *, scheme: str, worst: int) -> dict[str, Any]:
-    """Percentiles, requirement, tolerance budget and the ``worst`` cases; angles in degrees, else SI.
+    """Percentiles, requirement, tolerance budget, ``worst`` cases and end of the nominal one; degrees, else SI.
 
-    ``shares`` are those of the nutation, with those of the other outputs below their names; ``effect_deg`` is that on
-    the nutation of one sigma of an input alone (or all of a bias). Of inputs in ``correlation`` each share is the
-    increment over those before it, and their sum that of all of them. ``final`` is the end of the nominal case.
+    ``shares`` are of the nutation, of other outputs below their names; with ``correlation`` each is the increment over
+    those before it. ``effect_deg``: on the nutation, of one sigma of an input alone (or all of a bias).
     """
     study, body = results.study, results.study.model.spacecraft
     return {
@@ -168,10 +164,7 @@ def _varies(results: Results) -> bool:
 def percentiles_json(
     column: str, nominal: float | None, distribution: Distribution | None, *, lower: bool = False
 ) -> dict[str, float | None]:
-    """The ``nominal`` value of an output and its distribution, in the unit of its ``column``; nulls where unknown.
-
-    ``lower``: the values that so many cases do not fall short of.
-    """
+    """The ``nominal`` value and the distribution in the unit of a ``column``; ``lower``: values that cases reach."""
     spread: list[float | None] = [None] * (len(PERCENTS) + 2)
     if distribution is not None:
         shares = np.array(PERCENTS) / 100.0
@@ -272,9 +265,8 @@ def requirement_lines(results: Results | LoopResults) -> list[RenderableType]:
     interval = " to ".join(decisions.percent(bound, probability) for bound in (low, high))
     text = Text.assemble(("Requirement ", "bold"), f"({required}) ", verdict, f"; 95 % interval {interval}.")
     if results.meets_requirement and low < probability:
-        few = cases_to_show(probability)
+        few, level = cases_to_show(probability), decisions.exact_percent(probability)
         hint = f" It takes at least {few:,}." if results.done < few else ""
-        level = decisions.exact_percent(probability)
         text.append(f" The interval reaches below {level}: more --samples would show it.{hint}")
     return [text]
 
@@ -313,8 +305,8 @@ def _cones(results: Results | LoopResults) -> Iterator[tuple[Keep, dict[str, Any
     nominal = np.degrees(results.study.nominal_aspects).tolist() if results.done and body.keep else ()
     for index, (keep, (least, largest)) in enumerate(zip(body.keep, nominal, strict=False)):
         least_of_all, largest_of_all = np.degrees(results.aspects[index]).tolist()
-        entry = {"name": keep.name, "min_deg": math.degrees(keep.least), "max_deg": math.degrees(keep.most)}
-        entry["broken_fraction"] = float(results.broken[index] / results.done)
+        entry = values_of(keep, "name", "min_deg=least", "max_deg=most")
+        entry |= {"broken_fraction": float(results.broken[index] / results.done)}
         entry |= {"least_deg": least_of_all, "largest_deg": largest_of_all}
         yield keep, entry | {"nominal_least_deg": least, "nominal_largest_deg": largest}
 
@@ -449,5 +441,5 @@ def _shares(results: Results) -> Iterator[dict[str, Any]]:
     for at, entry in enumerate(first.inputs):
         sampled = results.shares.get(entry.name, {})
         both = {name: {"analytic": linear[name][at], "sampled": sampled.get(name, 0.0)} for name in OUTPUTS}
-        about = {"tolerance": entry.tolerance, "sigma": entry.sigma, "effect_deg": effects[at]}
+        about = values_of(entry, "tolerance", "sigma") | {"effect_deg": effects[at]}
         yield {"input": entry.name, **both.pop("nutation"), **about, **both}

@@ -45,10 +45,7 @@ _UNIT = re.compile(  # end of a heading with hyphens for blanks: its unit
 
 
 def explained(requested: str) -> Topic:
-    """Everything that is known by that name, as one topic: words first, then the page, then the keys of the file.
-
-    Raises BadRequest, which names a near one, where there is nothing.
-    """
+    """Words, page and keys of the file of that name as one topic; raises BadRequest, which names a near one."""
     name, _, below = requested.partition(".")
     if name.casefold() == guide.FILE:
         return file_topic(below)
@@ -102,10 +99,7 @@ def _bare(name: str) -> str:
 
 
 def _texts(requested: str) -> Iterator[tuple[str, str]]:
-    """Kinds and paragraphs of the words of that name: as written, else folded, else without unit; no text twice.
-
-    Where the glossary has it, only names as written are looked for besides.
-    """
+    """Kinds and texts of the words of that name, as written, else folded or without unit unless the glossary has it."""
     seen: set[str] = set()
     for kind, source in WORDS:
         words = [(_spelt(entry), entry, text) for entry, text in source()]
@@ -187,10 +181,7 @@ def keys(model: type[Section] = SpacecraftFile, prefix: str = "") -> Iterator[Ke
 
 
 def file_topic(below: str = "") -> Topic:
-    """The keys of the file, or the one called ``below``, such as ``thrusters.force``, and those in it.
-
-    Raises BadRequest, which names a near one, where there is none.
-    """
+    """The keys of the file, or below one such as ``thrusters.force``; raises BadRequest, which names a near one."""
     every = list(keys())
     if not below:
         roots = [key for key in every if not key.parent]

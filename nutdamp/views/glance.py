@@ -67,11 +67,7 @@ class SchemeRow(NamedTuple):
 
 
 def scheme_table(compared: Comparison, chosen: Plan | None) -> DataTable:
-    """One row a scheme; the ``chosen`` one stands out.
-
-    Residuals are those of the flight through real widths; ``met_fraction`` is the share of cases that comply, where all
-    have flown.
-    """
+    """One row a scheme, with residuals of the flight through real widths; the ``chosen`` one stands out."""
     rows = [SchemeRow(plan, compared) for plan in compared.plans]
     mark = next((index for index, plan in enumerate(compared.plans) if plan is chosen), None)
     how = model_name(plan.pulses for plan in compared.plans)
@@ -230,11 +226,7 @@ def _cone(at: int, kept: str, plan: Plan) -> str:
 
 
 LINES = 24  # lines of the screen
-ROWS = 6  # pulses or blocks that are shown one by one; of more the first `FIRST` and the last
-
-FIRST = 4
-
-
+ROWS, FIRST = 6, 4  # pulses or blocks that are shown one by one; of more the first and the last
 TIGHTEST = 2  # requirements that are shown where there is no room for all that are met
 NOTES = 3  # notes that are shown, at most
 DIGITS = 8  # figures of a value beside its limit, at most
@@ -243,10 +235,9 @@ DIGITS = 8  # figures of a value beside its limit, at most
 def glance(
     compared: Comparison, decision: Decision | None, robust: str = "", beside: Sequence[Note] = ()
 ) -> RenderableType:
-    """The screen of a comparison and the plan to fly; or of the reason why there is none.
+    """The screen of a comparison and the plan to fly, or of the reason why there is none.
 
-    ``robust``: the name of the plan among those compared, where it was chosen by dispersed cases;
-    ``beside``: notes on that choice.
+    ``robust``: its name among those compared, where dispersed cases chose it; ``beside``: notes on that choice.
     """
     body = compared.spacecraft
     head = [*parts.title(body), headline(compared, decision, robust)]
@@ -269,8 +260,7 @@ def glance(
             shown = parts.pulse_table(plan.flight, least=limits(body)[0])
             fired = [Text(), shown.screen("screen", between=", ", first=first if len(shown.rows) > ROWS else None)]
         required, middle = requirement_rows(decision), [ends(decision), *fired]
-        blocks = bool(plan.pulses.blocks)
-        return _fitted(head, required, middle, more, table, blocks=blocks)
+        return _fitted(head, required, middle, more, table, blocks=bool(plan.pulses.blocks))
 
     return next((shown for shown in map(screen, (FIRST, FIRST // 2)) if tables.lines_of(shown) <= LINES), screen(1))
 

@@ -32,10 +32,7 @@ ROUNDING = 1e-12  # share of the nutation that a firing leaves by rounding alone
 
 
 class FiringRow(NamedTuple):
-    """A firing, counted from 0, with the nutation before and after it, rad, and its differences by DOP853.
-
-    ``apart``: start and on-time, s, and nutation before the firing, rad.
-    """
+    """A firing, from 0, with the nutation before and after it, rad; ``apart``: start, on-time, nutation by DOP853."""
 
     at: int
     firing: Fired
@@ -355,13 +352,12 @@ def _outlook(budget: Budget) -> Iterator[str]:
 
 def _warnings(budget: Budget) -> Iterator[str]:
     body = budget.spacecraft
-    warned: set[str] = set()
+    warned: dict[str, str] = {}
     for row in budget.held:
         named = f"{most(row.thresholds.start)} to {most(row.thresholds.stop)}: " if len(budget.held) > 1 else ""
         for text in _warnings_of_row(row, budget):
-            if text not in warned:
-                warned.add(text)
-                yield f"{named}{text}"
+            warned.setdefault(text, f"{named}{text}")
+    yield from warned.values()
     changes = [row.slows for row in budget.held if row.slows is not None]
     if changes and max(map(abs, changes)) > SLOW:
         worst = max(changes, key=abs) * DAY / YEAR

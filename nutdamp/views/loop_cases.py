@@ -62,8 +62,7 @@ def loop_cases_screen(results: LoopResults, *, worst: int) -> Group:
     """All tables of ``disperse --loop``."""
     study = results.study
     drawn = f"cases: {results.done:,}, seed {study.seed}"
-    if results.redrawn:
-        drawn += f", unphysical ones drawn again: {results.redrawn:,}"
+    drawn += f", unphysical ones drawn again: {results.redrawn:,}" if results.redrawn else ""
     title = Text.assemble((study.spacecraft.name, "bold"), f": loop, 0 to {duration(study.until)}, {drawn}")
     parts: list[RenderableType] = [title, Text(described(study.law.loop)), Text(), _percentiles(results).screen("full")]
     parts += [dispersion.angles_note(study.spacecraft), Text(), *_settled(results), _dead_band(results)]
@@ -201,10 +200,7 @@ def _fraction(count: int, of: int) -> dict[str, float | None]:
 
 
 class LoopCasesWriter:
-    """Writer of one row a case: its number (from 1), the true value of each input, the outputs; angles in degrees.
-
-    With cones the least and the largest angle from the spin axis to the direction of each cone follow.
-    """
+    """Writer of a row a case: number (from 1), true inputs, outputs, least and largest angle to each cone; degrees."""
 
     def __init__(self, stream: IO[bytes], study: LoopStudy) -> None:
         self._stream, self._study, self._table = stream, study, _cases(study, ())
@@ -214,14 +210,8 @@ class LoopCasesWriter:
     def write(self, first: int, values: Array, stops: list[Ending], angles: Array) -> None:
         """Write the cases from ``first`` (from 0) on, with their outputs (8, n) and ``angles`` (m, 2, n) rad."""
         drawn = self._study.draws_of_all(np.arange(first, first + len(stops)))
-        rows = [
-            CaseRow(
-                first + row,
-                {name: draw if isinstance(draw, float) else float(draw[row]) for name, draw in drawn.items()},
-                values[:, row].tolist(),
-                angles[..., row],
-                stop,
-            )
-            for row, stop in enumerate(stops)
-        ]
+        rows = []
+        for row, stop in enumerate(stops):
+            draws = {name: draw if isinstance(draw, float) else float(draw[row]) for name, draw in drawn.items()}
+            rows.append(CaseRow(first + row, draws, values[:, row].tolist(), angles[..., row], stop))
         self._stream.write(replace(self._table, rows=rows).csv().partition("\n")[2].encode())

@@ -134,8 +134,7 @@ def commanded(schedule: Schedule, body: Spacecraft) -> DataTable:
 def pulse_table(flown: Flight, *, scheme: str = "", least: float = math.inf) -> DataTable:
     """The pulses of a flight with the cone angles before and after each.
 
-    ``scheme``: its name, for pages, which have spin phases too; ``least``: limit of the nutation, rad, of the default
-    screen.
+    ``scheme``: its name, on pages, which have spin phases; ``least``: limit of the nutation, rad, on default screens.
     """
     before, after = flown.around_pulses()
     pulses, body = flown.schedule.pulses, flown.spacecraft

@@ -108,10 +108,7 @@ def _cell(cell: RenderableType) -> Text:
 
 
 def _widths(columns: list[list[str]], room: int, unbroken: list[bool]) -> list[int] | None:
-    """Characters for each column such that no word is cut; None where there is no ``room`` for that.
-
-    A number with its sign, as in "< 1e-9", or with its percent sign is one word; so are cells of ``unbroken`` columns.
-    """
+    """Characters for each column such that no word and no cell of ``unbroken`` ones is cut; None without ``room``."""
     least = [max((cell_len(word) for text in texts for word in WORD.findall(text)), default=0) for texts in columns]
     whole = [max(cell_len(line) for text in texts for line in text.split("\n")) for texts in columns]
     least = [most if kept else fewest for fewest, most, kept in zip(least, whole, unbroken, strict=True)]
@@ -213,10 +210,7 @@ class Heading(NamedTuple):
 
 @dataclass(frozen=True)
 class DataTable:
-    """Rows of one result under their columns.
-
-    ``source`` decides which columns there are; ``mark`` is a row to stand out.
-    """
+    """Rows of one result under their columns; ``source`` decides which there are, ``mark`` is a row to stand out."""
 
     title: str
     columns: Sequence[Column]
@@ -262,10 +256,7 @@ class DataTable:
         return Text(_text(column, row), "bold" if first and index == self.mark else style)
 
     def transposed(self, place: str, corner: str = "", names: str = "dim") -> FittedColumns:
-        """A table of a screen with quantities down and rows across, named by the first column; ``corner``: heading.
-
-        ``names``: style of the names of the quantities.
-        """
+        """Quantities down and rows across, named by the first column; ``corner``: heading, ``names``: their style."""
         name, *shown = self.at(place)
         table = columns(corner, *(_text(name, row) for row in self.rows))
         for column in shown:

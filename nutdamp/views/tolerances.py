@@ -36,11 +36,9 @@ ROUNDING = 1e-12  # rad; a smaller variation is rounding
 
 
 class BudgetRow(NamedTuple):
-    """A line of the tolerance budget: one input, or those that are left together.
+    """A line of the tolerance budget: one input, or several together; ``inputs``: their rows.
 
-    ``size``: one sigma or the bias as text; ``effects``: those of it alone on the two `budgeted_outputs`, rad, or the
-    root mean square of those of correlated inputs together; ``inputs``: rows of the drawn inputs; ``bias``: nothing of
-    it varies.
+    ``size``: one sigma or bias; ``effects``: alone on the two `budgeted_outputs`, rad; ``bias``: nothing of it varies.
     """
 
     name: str

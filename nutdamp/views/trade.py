@@ -247,11 +247,7 @@ def schedule_paths(folder: str, count: int) -> list[str]:
 
 
 def _better(fronts: Sequence[Front], chosen: Plan) -> tuple[float, float, TradeRow] | None:
-    """The point that meets the requirement, and costs less and ends no later, or ends sooner and is not worse.
-
-    Any that meets it, where the ``chosen`` plan does not. The cheapest, of those that cost as much the one that ends
-    first. Before it the share of the cost saved, and s by which it ends earlier.
-    """
+    """Share of the cost saved, s earlier, and the cheapest, then earliest, point that is better than ``chosen``."""
     until, misses, better = chosen.pulses.end, chosen.meets_requirement is False, []
     for row in rows_of(fronts):
         saved, end = 1.0 - row.point.cost / chosen.pulses.cost_in(row.point.unit), row.plan.pulses.end
