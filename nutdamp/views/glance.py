@@ -59,22 +59,14 @@ NOT = "✗"  # sign before a value above the requirement
 SHORT_NAMES = ("RA", "dec")  # right ascension and declination, where there is little room
 
 
-class SchemeRow(NamedTuple):
-    """A plan among those ``compared``; without a schedule most values are unknown."""
-
-    plan: Plan
-    compared: Comparison
-
-
 def scheme_table(compared: Comparison, chosen: Plan | None) -> DataTable:
     """One row a scheme, with residuals of the flight through real widths; the ``chosen`` one stands out."""
-    rows = [SchemeRow(plan, compared) for plan in compared.plans]
     mark = next((index for index, plan in enumerate(compared.plans) if plan is chosen), None)
     how = model_name(plan.pulses for plan in compared.plans)
     ideal = [plan.scheme for plan in compared.plans if plan.pulses.idealised]
     alone = f" (ideal impulses: {listed(ideal)})" if how == REAL_WIDTHS and ideal else ""
     subject = f"Cost and residuals of each scheme with nominal values, by {how}{alone}"
-    return DataTable(subject, tuple(_columns(compared, chosen)), rows, compared, mark)
+    return DataTable(subject, tuple(_columns(compared, chosen)), compared.plans, compared, mark)
 
 
 def limits(body: Spacecraft) -> tuple[float, float]:
@@ -84,25 +76,17 @@ def limits(body: Spacecraft) -> tuple[float, float]:
     return most.get(Part.NUTATION, math.inf), min(ends, default=math.inf)
 
 
-def _feasible(get: Callable[[Plan], Any] | str) -> Callable[[SchemeRow], Any]:
+def _feasible(get: Callable[[Plan], Any] | str) -> Callable[[Plan], Any]:
     """A value of plans that have a schedule, or an attribute of them."""
     value = attrgetter(get) if isinstance(get, str) else get
-    return lambda row: value(row.plan) if row.plan.feasible else None
+    return lambda plan: value(plan) if plan.feasible else None
 
 
-def _met(row: SchemeRow) -> bool | None:
-    return row.compared.meets(row.plan) if row.plan.feasible else None
-
-
-def scheme_verdict(row: SchemeRow) -> str:
+def scheme_verdict(compared: Comparison, plan: Plan) -> str:
     """Verdict on a plan, or the reason in a word why there is none."""
-    if not row.plan.feasible:
-        return decisions.no_plan(row.plan)
-    return decisions.VERDICT[_met(row)] + ", timed" * (not row.plan.commandable)
-
-
-def _share(row: SchemeRow) -> str:
-    return decisions.share_text(row.compared.shares.get(row.plan)).removesuffix(" %")
+    if not plan.feasible:
+        return decisions.no_plan(plan)
+    return decisions.VERDICT[compared.meets(plan)] + ", timed" * (not plan.commandable)
 
 
 def _four(value: float) -> str:
@@ -114,19 +98,23 @@ def _columns(compared: Comparison, chosen: Plan | None) -> Iterator[Column]:
     feasible = [plan for plan in compared.plans if plan.feasible]
     fuelled = any(plan.pulses.propellant is not None for plan in feasible)
     aimed, everywhere = body.goal.axis is not None, "screen full page"
-    exact = {plan: share.exact for plan, share in compared.shares.items()}
+    met = _feasible(compared.meets)
+
+    def share(plan: Plan) -> str:
+        return decisions.share_text(compared.shares.get(plan)).removesuffix(" %")
 
     def shortly(largest: float) -> Callable[[float], str]:
         return lambda angle: short_angle(math.radians(angle), largest)
 
-    yield Column("scheme", Shared.SCHEME, "", lambda row: row.plan.scheme, where=f"{everywhere} csv", kind=TEXT)
-    yield Column("feasible", "", "", lambda row: row.plan.feasible, where="csv", kind=YES_NO)
-    yield Column("recommended", "", "", lambda row: row.plan is chosen, where="csv", kind=YES_NO)
-    yield Column("meets_requirement", "", "", lambda row: row.compared.meets(row.plan), where="csv", kind=YES_NO)
-    yield Column("met_fraction", "", "", lambda row: exact.get(row.plan), where="csv")
+    yield Column("scheme", Shared.SCHEME, "", attrgetter("scheme"), where=f"{everywhere} csv", kind=TEXT)
+    yield Column("feasible", "", "", attrgetter("feasible"), where="csv", kind=YES_NO)
+    yield Column("recommended", "", "", lambda plan: plan is chosen, where="csv", kind=YES_NO)
+    yield Column("meets_requirement", "", "", compared.meets, where="csv", kind=YES_NO)
+    exact = {plan: known.exact for plan, known in compared.shares.items()}
+    yield Column("met_fraction", "", "", exact.get, where="csv")
     count = _feasible(lambda plan: len(plan.pulses))
     yield Column("", Shared.PULSES, "", count, where=everywhere, kind=WHOLE)
-    yield Column("pulses", "", "", lambda row: len(row.plan.pulses), where="csv", kind=WHOLE)
+    yield Column("pulses", "", "", lambda plan: len(plan.pulses), where="csv", kind=WHOLE)
     end, impulse = _feasible("pulses.end"), _feasible("pulses.total_impulse")
     yield Column("", "end", "s", end, to_figures(4), "screen")
     yield Column("end_s", "end", "s", end, lambda value: f"{value:.3f}", "full page csv")
@@ -135,19 +123,19 @@ def _columns(compared: Comparison, chosen: Plan | None) -> Iterator[Column]:
     yield Column("least_impulse_Nms", "", "", _feasible("spacecraft.least_impulse"), where="csv")
     for name, whole in ratios(body):
         yield Column("", f"impulse over {name}", "", _feasible(_over(whole)), lambda value: f"{value:.4f}", "full page")
-    yield Column("propellant_kg", Shared.PROPELLANT, "kg", _feasible("pulses.propellant"), where="csv")
+    spent = _feasible("pulses.propellant")
+    yield Column("propellant_kg", Shared.PROPELLANT, "kg", spent, where="csv")
     if fuelled:
-        spent = _feasible(lambda plan: None if plan.pulses.propellant is None else 1e3 * plan.pulses.propellant)
-        yield Column("", Shared.PROPELLANT, "g", spent, _four, "full page")
-        yield Column("", Shared.PROPELLANT, "g", spent, to_figures(4), "screen")
+        yield Column("", Shared.PROPELLANT, "g", spent, lambda mass: _four(1e3 * mass), "full page")
+        yield Column("", Shared.PROPELLANT, "g", spent, to_figures(4, 1e3), "screen")
     for name in ("nutation", "momentum_shift"):
         heading = f"{name.replace('_', ' ')}, impulses (17)"
-        yield Column("", heading, "deg", angle_of(f"plan.residual.{name}"), small_angle, "full")
+        yield Column("", heading, "deg", angle_of(f"residual.{name}"), small_angle, "full")
     ends = ("full page", everywhere) if aimed else (everywhere, "")
     shown = {"nutation": everywhere, "body_cone": "full", "space_cone": "full", "momentum_shift": ends[0],
              "axis_error": ends[1]}  # fmt: skip
     for name, where in shown.items():
-        heading, angle = name.replace("_", " "), angle_of(f"plan.flown.{name}")
+        heading, angle = name.replace("_", " "), angle_of(f"flown.{name}")
         if "screen" in where:
             yield Column("", heading, "", angle, shortly(least[name != "nutation"]), "screen")
         yield Column(f"{name}_deg", heading, "deg", angle, small_angle, where.removeprefix("screen ") + " csv")
@@ -156,19 +144,19 @@ def _columns(compared: Comparison, chosen: Plan | None) -> Iterator[Column]:
     if body.goal.spin is not None:
         yield Column("", "final spin", "rad/s", _feasible("flight.settled.spin"), to_figures(6), "full")
     where = "full csv" + " page" * any(plan.spin_change for plan in compared.plans)
-    yield Column("spin_change_rad_s", "spin change", "rad/s", lambda row: row.plan.spin_change, _four, where)
+    yield Column("spin_change_rad_s", "spin change", "rad/s", attrgetter("spin_change"), _four, where)
     where = "csv" + " full page" * any(plan.delta_v is not None for plan in compared.plans)
     yield Column("delta_v_m_s", "|ΔV|", "m/s", _speed, _four, where)
     if compared.shares:
-        yield Column("", Shared.CASES, "%", _share, where="screen", kind=TEXT)
-        yield Column("", COUNT, "%", _share, where="full page", kind=TEXT)
+        yield Column("", Shared.CASES, "%", share, where="screen", kind=TEXT)
+        yield Column("", COUNT, "%", share, where="full page", kind=TEXT)
     yield from _bounds(compared)
-    yield Column("", Shared.VERDICT, "", scheme_verdict, where=everywhere, kind=TEXT, met=_met)
-    yield Column("why", "", "", lambda row: infeasibility(row.plan), where="csv", kind=TEXT)
+    yield Column("", Shared.VERDICT, "", partial(scheme_verdict, compared), where=everywhere, kind=TEXT, met=met)
+    yield Column("why", "", "", infeasibility, where="csv", kind=TEXT)
 
 
-def _speed(row: SchemeRow) -> float | None:
-    return None if row.plan.delta_v is None else math.hypot(*row.plan.delta_v)
+def _speed(plan: Plan) -> float | None:
+    return None if plan.delta_v is None else math.hypot(*plan.delta_v)
 
 
 def ratios(body: Spacecraft) -> Iterator[tuple[str, float]]:
