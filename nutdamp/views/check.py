@@ -287,6 +287,7 @@ def checked(
 def checked_json(name: str | None, spacecraft: Spacecraft, doubts: Sequence[Fault] = ()) -> dict[str, Any]:
     """A valid file: derived quantities, channels with their steps, the mounting angle for two pulses."""
     pair, axis = capability.nearest_pair(spacecraft), capability.spin_axis(spacecraft)
+    inputs, unused = ((), ()) if spacecraft.dispersions is None else reachable(spacecraft)
     return {
         "file": name,
         "valid": True,
@@ -305,7 +306,12 @@ def checked_json(name: str | None, spacecraft: Spacecraft, doubts: Sequence[Faul
         "sun_pulses": _sun_pulses_json(spacecraft),
         "disturbances": disturbance_table(spacecraft).json(),
         **({} if spacecraft.loop is None else {"loop": _margins(spacecraft).json()}),
-        "dispersions": _dispersions_json(spacecraft),
+        "dispersions": spacecraft.dispersions
+        and {
+            "inputs": [entry._asdict() for entry in inputs],
+            "unused": dict(unused),
+            **correlation_json(spacecraft),
+        },
         "two_pulse": {
             "mounting_angle_deg": math.degrees(capability.mounting_angle(spacecraft)),
             "nearest": None if pair is None else [pair.first.name, pair.second.name],
@@ -329,18 +335,7 @@ def _sun_pulses_json(spacecraft: Spacecraft) -> dict[str, Any] | None:
     return {
         **values_of(clock, "period_s=turn", "first_s"),
         "why": clock.refusal or None,
-        "delay_step_deg": None if commands is None else spin * commands.delay_step,
-        "delay_max_deg": None if commands is None else spin * commands.delay_max,
+        "delay_step_deg": commands and spin * commands.delay_step,
+        "delay_max_deg": commands and spin * commands.delay_max,
         "channels": turn_table(spacecraft).json(),
-    }
-
-
-def _dispersions_json(spacecraft: Spacecraft) -> dict[str, Any] | None:
-    if spacecraft.dispersions is None:
-        return None
-    inputs, unused = reachable(spacecraft)
-    return {
-        "inputs": [entry._asdict() for entry in inputs],
-        "unused": {entry.name: entry.reason for entry in unused},
-        **correlation_json(spacecraft),
     }

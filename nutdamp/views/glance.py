@@ -173,17 +173,15 @@ def _over(whole: float) -> Callable[[Plan], float | None]:
 def _directions(body: Spacecraft) -> Iterator[Column]:
     keys = ("tilt_deg", "azimuth_deg") if body.attitude is None else ("right_ascension_deg", "declination_deg")
     names = parts.angle_names(body) if body.attitude is None else SHORT_NAMES
-    for which in ("axis", "momentum"):
-        for at, key in enumerate(keys):
-            yield Column(f"{which}_{key}", "", "", _feasible(partial(_direction, which, at)), where="csv")
-            if which == "axis":
-                shown = _feasible(partial(_shown_direction, at))
-                yield Column("", f"axis {names[at]}", "deg", shown, where="full page")
+    for at, key in enumerate(keys):
+        yield Column(f"axis_{key}", "", "", _feasible(partial(_direction, "axis", key)), where="csv")
+        yield Column("", f"axis {names[at]}", "deg", _feasible(partial(_shown_direction, at)), where="full page")
+    for key in keys:
+        yield Column(f"momentum_{key}", "", "", _feasible(partial(_direction, "momentum", key)), where="csv")
 
 
-def _direction(which: str, at: int, plan: Plan) -> float | None:
-    angles = decisions.direction_json(plan.spacecraft, getattr(plan.flight.final, which))
-    return list(angles.values())[at]
+def _direction(which: str, key: str, plan: Plan) -> float | None:
+    return decisions.direction_json(plan.spacecraft, getattr(plan.flight.final, which))[key]
 
 
 def _shown_direction(at: int, plan: Plan) -> str:

@@ -264,18 +264,16 @@ class DataTable:
             table.add_row(Text(column.headed(", "), style=names), *cells)
         return table
 
-    def array(self, place: str = "csv") -> NDArray[np.void]:
+    def array(self) -> NDArray[np.void]:
         """Fields as in CSV files; unknown values are NaN or empty."""
-        names, kinds, rows = self._fields(place)
-        types = []
-        for at, kind in enumerate(kinds):
-            longest = max((len(row[at]) for row in rows), default=1) or 1 if kind == TEXT else 0
-            types.append(f"U{longest}" if kind == TEXT else kind)
+        names, kinds, rows = self._fields()
+        longest = [max([1, *(len(row[at]) for row in rows)]) if kind == TEXT else "" for at, kind in enumerate(kinds)]
+        types = [f"{kind}{length}" for kind, length in zip(kinds, longest, strict=True)]
         return np.array(rows, dtype=list(zip(names, types, strict=True)))
 
-    def csv(self, place: str = "csv") -> str:
+    def csv(self) -> str:
         """A CSV file; unknown values are empty."""
-        names, _, rows = self._fields(place)
+        names, _, rows = self._fields()
         texts = ([number(cell) if isinstance(cell, float) else str(cell) for cell in row] for row in rows)
         return csv_text(names, texts)
 
@@ -284,9 +282,9 @@ class DataTable:
         shown = self.at(place)
         return [{column.key.replace("#", ""): _plain(column.value(row)) for column in shown} for row in self.rows]
 
-    def _fields(self, place: str) -> tuple[list[str], list[str], list[tuple[Any, ...]]]:
+    def _fields(self) -> tuple[list[str], list[str], list[tuple[Any, ...]]]:
         """Names, kinds and rows of the file, a vector in three columns."""
-        shown = self.at(place)
+        shown = self.at("csv")
         names = [name for column in shown for name in _names(column)]
         kinds = [TEXT if column.kind == YES_NO else column.kind for column in shown for _ in _names(column)]
         return names, kinds, [tuple(part for column in shown for part in _parts(column, row)) for row in self.rows]

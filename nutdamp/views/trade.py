@@ -153,8 +153,7 @@ def _head(spacecraft: Spacecraft, fronts: Sequence[Front]) -> Iterator[Text]:
 
 def trade_screen(spacecraft: Spacecraft, fronts: Sequence[Front]) -> RenderableType:
     """All tables of ``trade``."""
-    parts = front_parts(spacecraft, fronts)
-    return Group(*_head(spacecraft, fronts), Text(), derived_table(spacecraft), *parts)
+    return Group(*_head(spacecraft, fronts), Text(), derived_table(spacecraft), *front_parts(spacecraft, fronts))
 
 
 def front_parts(spacecraft: Spacecraft, fronts: Sequence[Front]) -> list[RenderableType]:
@@ -165,8 +164,7 @@ def front_parts(spacecraft: Spacecraft, fronts: Sequence[Front]) -> list[Rendera
         if front.why is not None:
             parts.append(Text(_without_optimal(front)))
         if front.points:
-            rows = [row for row in rows_of(fronts) if row.front is front]
-            parts.append(_table(rows).screen("full"))
+            parts.append(_table([row for row in rows_of(fronts) if row.front is front]).screen("full"))
     priced = [(row.spent(row.point.cost), row.spent(row.least)) for row in rows_of(fronts)
               if row.least is not None and row.point.cost < row.least]  # fmt: skip
     below = [BELOW] * any(spent != least for spent, least in priced)  # as the table writes both
