@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
@@ -21,12 +21,12 @@ from nutdamp.flight.end_state import at_start
 from nutdamp.montecarlo.inputs import reachable
 from nutdamp.physics.thruster import Tank
 from nutdamp.planning import capability
-from nutdamp.planning.capability import Acting, Consequence
+from nutdamp.planning.capability import Acting, ChannelSteps, Consequence
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.views.decisions import aspects_json, direction_json, spacecraft_json
 from nutdamp.views.loop import described, margin_table, warnings
 from nutdamp.views.parts import derived_table, summary, warnings_of
-from nutdamp.views.tables import TEXT, YES_NO, Column, DataTable, Shared, angle_of, to_figures
+from nutdamp.views.tables import TEXT, Column, DataTable, Shared, angle_of, file_columns, to_figures, values_of
 from nutdamp.views.text import degrees, duration, moment, quantity, small_angle, vector
 from nutdamp.views.tolerances import correlation_json, in_words, size_text, without_effect
 
@@ -34,7 +34,7 @@ from nutdamp.views.tolerances import correlation_json, in_words, size_text, with
 def channel_table(spacecraft: Spacecraft) -> DataTable:
     """Torque and on-times of each channel, and the nutation that its shortest and longest pulse take."""
 
-    def on_times(row: Any) -> str:
+    def on_times(row: ChannelSteps) -> str:
         most = row.channel.max_on_time
         return f"{duration(row.channel.min_on_time)} to {'any' if math.isinf(most) else duration(most)}"
 
@@ -43,12 +43,11 @@ def channel_table(spacecraft: Spacecraft) -> DataTable:
         Column("torque#_Nm", "torque, file axes", "N m", lambda row: spacecraft.inertia.in_file(row.channel.torque),
                vector, "screen json", kind=TEXT),
         Column("", Shared.ON_TIME, "", on_times, where="screen"),
-        Column("min_on_time_s", "", "", lambda row: row.channel.min_on_time, where="json"),
-        Column("max_on_time_s", "", "", lambda row: row.channel.max_on_time, where="json"),
+        *file_columns("json", "min_on_time_s=channel.min_on_time", "max_on_time_s=channel.max_on_time"),
         Column("smallest_step_deg", "smallest step", "deg", angle_of("smallest"),
                lambda step: small_angle(step) if step else "any", "screen json"),
         Column("largest_step_deg", "largest step", "deg", angle_of("largest"), small_angle, "screen json"),
-        Column("damps", "", "", lambda row: row.channel.damps, where="json", kind=YES_NO),
+        *file_columns("json", "damps=channel.damps"),
     )  # fmt: skip
     return DataTable("Channels", columns, capability.channel_steps(spacecraft))
 
@@ -101,25 +100,22 @@ def tank_table(tank: Tank) -> DataTable:
     return DataTable("Tank", TANK, [(tank, share * tank.propellant) for share in (0.0, 0.5, 1.0)])
 
 
-def _reached(row: Consequence) -> list[dict[str, float]]:
-    return [{"nutation_deg": math.degrees(mark), "t_s": time} for mark, time in row.resonant]
-
-
 def disturbance_table(spacecraft: Spacecraft) -> DataTable:
     """The forced tilt, the beat, or the times to reach a cone at resonance."""
     rows = list(capability.consequences(spacecraft))
     numbers = {id(row): number for number, row in enumerate(rows, start=1)}
+
+    def reached(row: Consequence) -> list[dict[str, float]]:
+        return [{"nutation_deg": math.degrees(mark), "t_s": time} for mark, time in row.resonant]
+
     columns = (
         Column("", "disturbance", "", lambda row: row.disturbance.name or f"number {numbers[id(row)]}", where="screen",
                kind=TEXT),
         Column("name", "", "", lambda row: row.disturbance.name or None, where="json", kind=TEXT),
         Column("", "effect", "", lambda row: "; ".join(_effects(row)), where="screen", kind=TEXT),
-        Column("precession_rad_s", "", "", lambda row: row.precession, where="json"),
-        Column("forced_tilt_deg", "", "", angle_of("tilt"), where="json"),
-        Column("beat_deg", "", "", angle_of("beat"), where="json"),
-        Column("beat_period_s", "", "", lambda row: row.beat_period, where="json"),
-        Column("reaches", "", "", _reached, where="json"),
-        Column("spin_rate_rad_s2", "", "", lambda row: row.spin_rate, where="json"),
+        *file_columns("json", "precession_rad_s", "forced_tilt_deg=tilt", "beat_deg", "beat_period_s"),
+        Column("reaches", "", "", reached, where="json"),
+        *file_columns("json", "spin_rate_rad_s2=spin_rate"),
     )  # fmt: skip
     return DataTable("Disturbances", columns, rows)
 
@@ -246,25 +242,17 @@ def check_json(reports: list[dict[str, Any]]) -> dict[str, Any]:
     return {"nutdamp": __version__, "files": reports}
 
 
-def failed_json(name: str | None, wrong: FaultyFile | CannotRead, doubts: Iterable[Fault] = ()) -> dict[str, Any]:
+def failed_json(name: str | None, wrong: FaultyFile | CannotRead, doubts: Sequence[Fault] = ()) -> dict[str, Any]:
     """A file that could not be read or is faulty; ``doubts`` are warnings."""
     faults = [Fault(wrong.path, 0, 0, "", wrong.reason)] if isinstance(wrong, CannotRead) else wrong.faults
     report = {"file": name, "valid": False, "faults": _faults_json(faults), "warnings": _faults_json(doubts)}
-    return {**report, "spacecraft": None, "channels": [], "two_pulse": None}
+    return report | {"spacecraft": None, "channels": [], "two_pulse": None}
 
 
-def _faults_json(faults: Iterable[Fault]) -> list[dict[str, Any]]:
+def _faults_json(faults: Sequence[Fault]) -> list[dict[str, Any]]:
     """Faults, each with its ``place`` as messages have it; line and column are null where it is no place in a file."""
-    return [
-        {
-            "place": fault.place,
-            "line": fault.line or None,
-            "column": fault.column or None,
-            "where": fault.where,
-            "problem": fault.problem,
-        }
-        for fault in faults
-    ]
+    places = [{"place": fault.place, "line": fault.line or None, "column": fault.column or None} for fault in faults]
+    return [place | values_of(fault, "where", "problem") for place, fault in zip(places, faults, strict=True)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -296,24 +284,34 @@ def checked(
         raise FaultyFile([Fault(name or source.name, 1, 1, "", str(wrong))]) from wrong
 
 
-def checked_json(name: str | None, spacecraft: Spacecraft, doubts: Iterable[Fault] = ()) -> dict[str, Any]:
+def checked_json(name: str | None, spacecraft: Spacecraft, doubts: Sequence[Fault] = ()) -> dict[str, Any]:
     """A valid file: derived quantities, channels with their steps, the mounting angle for two pulses."""
-    pair = capability.nearest_pair(spacecraft)
+    pair, axis = capability.nearest_pair(spacecraft), capability.spin_axis(spacecraft)
+    inputs, unused = ((), ()) if spacecraft.dispersions is None else reachable(spacecraft)
     return {
         "file": name,
         "valid": True,
         "faults": [],
         "warnings": _faults_json(doubts),
         "spacecraft": spacecraft_json(spacecraft),
-        "channels": _channels_json(spacecraft),
+        "channels": list(_channels_json(spacecraft)),
         **({} if spacecraft.tank is None else {"tank": tank_table(spacecraft.tank).json()}),
-        "spin_axis": _spin_axis_json(spacecraft),
+        "spin_axis": {
+            **values_of(axis, "class=kind", "squared_exponent_1_s2=exponent", "growth_time_s", "tilt_deg"),
+            **{f"nutation_rate_{frame}_rad_s": rate for frame, rate in axis.rates._asdict().items()},
+            "dissipation_growth_1_s": spacecraft.growth,
+        },
         **aspects_json(at_start(spacecraft)),
         "sun": None if spacecraft.sun is None else direction_json(spacecraft, spacecraft.sun),
         "sun_pulses": _sun_pulses_json(spacecraft),
         "disturbances": disturbance_table(spacecraft).json(),
         **({} if spacecraft.loop is None else {"loop": _margins(spacecraft).json()}),
-        "dispersions": _dispersions_json(spacecraft),
+        "dispersions": spacecraft.dispersions
+        and {
+            "inputs": [entry._asdict() for entry in inputs],
+            "unused": dict(unused),
+            **correlation_json(spacecraft),
+        },
         "two_pulse": {
             "mounting_angle_deg": math.degrees(capability.mounting_angle(spacecraft)),
             "nearest": None if pair is None else [pair.first.name, pair.second.name],
@@ -322,27 +320,11 @@ def checked_json(name: str | None, spacecraft: Spacecraft, doubts: Iterable[Faul
     }
 
 
-def _channels_json(spacecraft: Spacecraft) -> list[dict[str, Any]]:
-    rows, pulses = channel_table(spacecraft).json(), capability.acting(spacecraft)
-    for row, channel in zip(rows, spacecraft.channels, strict=True):
-        if channel.valve is not None:
-            own = [[pulse] for pulse in pulses if pulse.channel is channel]
-            row["commands"] = DataTable("", VALVES, own).json()
-    return rows
-
-
-def _spin_axis_json(spacecraft: Spacecraft) -> dict[str, Any]:
-    axis = capability.spin_axis(spacecraft)
-    return {
-        "class": axis.kind,
-        "squared_exponent_1_s2": axis.exponent,
-        "growth_time_s": axis.growth_time,
-        "tilt_deg": math.degrees(axis.tilt),
-        "nutation_rate_body_rad_s": axis.rates.body,
-        "nutation_rate_despun_rad_s": axis.rates.despun,
-        "nutation_rate_inertial_rad_s": axis.rates.inertial,
-        "dissipation_growth_1_s": spacecraft.growth,
-    }
+def _channels_json(spacecraft: Spacecraft) -> Iterator[dict[str, Any]]:
+    pulses = capability.acting(spacecraft)
+    for row, channel in zip(channel_table(spacecraft).json(), spacecraft.channels, strict=True):
+        own = [[pulse] for pulse in pulses if pulse.channel is channel]
+        yield row if channel.valve is None else row | {"commands": DataTable("", VALVES, own).json()}
 
 
 def _sun_pulses_json(spacecraft: Spacecraft) -> dict[str, Any] | None:
@@ -351,21 +333,9 @@ def _sun_pulses_json(spacecraft: Spacecraft) -> dict[str, Any] | None:
         return None
     spin = math.degrees(abs(spacecraft.spin))
     return {
-        "period_s": clock.turn,
-        "first_s": clock.first,
+        **values_of(clock, "period_s=turn", "first_s"),
         "why": clock.refusal or None,
-        "delay_step_deg": None if commands is None else spin * commands.delay_step,
-        "delay_max_deg": None if commands is None else spin * commands.delay_max,
+        "delay_step_deg": commands and spin * commands.delay_step,
+        "delay_max_deg": commands and spin * commands.delay_max,
         "channels": turn_table(spacecraft).json(),
-    }
-
-
-def _dispersions_json(spacecraft: Spacecraft) -> dict[str, Any] | None:
-    if spacecraft.dispersions is None:
-        return None
-    inputs, unused = reachable(spacecraft)
-    return {
-        "inputs": [entry._asdict() for entry in inputs],
-        "unused": {entry.name: entry.reason for entry in unused},
-        **correlation_json(spacecraft),
     }

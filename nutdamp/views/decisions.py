@@ -27,18 +27,8 @@ from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import SLACK, Spacecraft, Vector
 from nutdamp.spacecraft.requirements import Bound, Part
 from nutdamp.views.parts import FRAME_N, aspect_facts, commanded, cone_margins, direction_text, required, spin_text
-from nutdamp.views.tables import TEXT, Column, DataTable, Shared, facts
-from nutdamp.views.text import (
-    MISSING,
-    degrees,
-    duration,
-    joined,
-    mass,
-    moment,
-    most,
-    note_json,
-    quantity,
-)
+from nutdamp.views.tables import TEXT, Column, DataTable, Shared, facts, values_of
+from nutdamp.views.text import MISSING, degrees, duration, joined, mass, moment, most, note_json, quantity
 
 if TYPE_CHECKING:
     from nutdamp.planning.tradeoff import Certificate
@@ -61,14 +51,12 @@ def needless(compared: Comparison) -> str | None:
     body = compared.spacecraft
     if not compared.needless:
         return None
-    there = f"nutation {degrees(body.nutation)} at t = 0"
+    there, verdict = f"nutation {degrees(body.nutation)} at t = 0", "damped"
     if body.goal.axis is not None:
         there += f", H {degrees(body.to_turn)} from the target"
     if requirements.required(body):
         nominal = ", with nominal values" * (body.dispersions is not None and compared.flown is None)
         verdict = f"requirement met ({required(body)}){nominal}"
-    else:
-        verdict = "damped"
     lasting = f", up to the horizon of {duration(body.horizon)}" if body.growth > 0.0 else ""
     return f"{there}: {verdict}{lasting}"
 
@@ -206,11 +194,10 @@ def _met(line: Line) -> str:
 def cost(decision: Decision) -> Iterator[tuple[str, str]]:
     """Cost and end of the plan: names and values."""
     pulses = decision.flight.schedule
-    count = f"pulses: {len(pulses)}"
+    name, spent = "propellant", mass(pulses.propellant)
     if pulses.propellant is None:
-        yield "impulse", f"{quantity(pulses.total_impulse, 'N m s')}, {count}"
-    else:
-        yield "propellant", f"{mass(pulses.propellant)}, {count}"
+        name, spent = "impulse", quantity(pulses.total_impulse, "N m s")
+    yield name, f"{spent}, pulses: {len(pulses)}"
     yield "last pulse ends", moment(pulses.end) if len(pulses) else "no pulse is needed"
 
 
@@ -230,10 +217,7 @@ def margin_lines(decision: Decision, values: str = Shared.NOMINAL) -> list[Rende
 
 
 def end_rows(flown: Flight, watched: Iterable[Aspect]) -> Iterator[tuple[str, str]]:
-    """Spin axis and angular momentum after the last pulse, beside the target, and the motion from then on.
-
-    ``watched``: least distances of the axis from directions in space.
-    """
+    """Spin axis and H after the last pulse, beside the target and directions ``watched``, and the motion from there."""
     body, final = flown.spacecraft, flown.final
     yield "spin axis ends at", direction_text(body, final.axis)
     yield "H ends at", direction_text(body, final.momentum)
@@ -254,12 +238,9 @@ def lasting(flown: Flight) -> str:
     """Time of the end shown where the motion does not last, and the cause of its change; empty where it lasts."""
     body = flown.spacecraft
     causes = [*["dissipation"] * (body.growth != 0.0), *["disturbances"] * bool(body.disturbances)]
-    end = "as the last pulse ends, at " + moment(flown.schedule.end)
-    end = end if flown.until is None else f"at {moment(flown.until)}"
+    last = f"as the last pulse ends, at {moment(flown.schedule.end)}"
+    end = last if flown.until is None else f"at {moment(flown.until)}"
     return f"{end}; changed further by {' and '.join(causes)}" if causes else ""
-
-
-RESIDUAL = ("nutation", "body_cone", "space_cone", "momentum_shift", "axis_error")  # angles of a `Residual`
 
 
 def heading(spacecraft: Spacecraft) -> dict[str, Any]:
@@ -278,8 +259,7 @@ def decided_json(compared: Comparison, decided: Decision | None) -> dict[str, An
     return {
         **heading(compared.spacecraft),
         "plans": [compared_json(compared, plan) for plan in compared.plans],
-        "recommended": None if compared.recommended is None else compared.recommended.scheme,
-        "no_pulse_needed": compared.needless,
+        **values_of(compared, "recommended=recommended.scheme", "no_pulse_needed=needless"),
         "reason": joined(reasons(compared)),
         "notes": [note_json(note) for note in (*comparison_warnings(compared), *beside, *alternatives(compared))],
         "decision": None if decided is None else decision_json(decided),
@@ -295,11 +275,7 @@ def compared_json(compared: Comparison, plan: Plan) -> dict[str, Any]:
     if compared.shares:
         data["cases"] = share and {
             "samples": 0 if cases is None else cases.samples,
-            "met_fraction": share.exact,
-            "low": share.low,
-            "high": share.high,
-            "probability": share.probability,
-            "met": share.met,
+            **values_of(share, "met_fraction=exact", "low", "high", "probability", "met"),
         }
     return data
 
@@ -307,26 +283,17 @@ def compared_json(compared: Comparison, plan: Plan) -> dict[str, Any]:
 def spacecraft_json(spacecraft: Spacecraft) -> dict[str, Any]:
     """Derived quantities of a spacecraft at t = 0."""
     inertia = spacecraft.inertia
-    motion = spacecraft.widest
     return {
-        "name": spacecraft.name,
-        "A_kgm2": inertia.A,
-        "C_kgm2": inertia.C,
-        "a": inertia.a,
-        "shape": inertia.shape,
+        **values_of(spacecraft, "name", "A_kgm2=inertia.A", "C_kgm2=inertia.C", "a=inertia.a", "shape=inertia.shape"),
         "moments_kgm2": list(inertia.moments),
         "wheel_momentum_Nms": inertia.wheel,
         "principal_axes": cleaned(inertia.axes.T).tolist(),
         "omega0_rad_s": inertia.in_file(spacecraft.omega0).tolist(),
-        "nutation_deg": math.degrees(motion.nutation),
-        "body_cone_deg": math.degrees(motion.body),
-        "space_cone_deg": math.degrees(motion.space),
-        "nutation_at_start_deg": math.degrees(spacecraft.tilt),
-        "body_nutation_period_s": spacecraft.body_period,
+        **values_of(spacecraft.widest, "nutation_deg", "body_cone_deg=body", "space_cone_deg=space"),
+        **values_of(spacecraft, "nutation_at_start_deg=tilt", "body_nutation_period_s=body_period"),
         "inertial_nutation_period_s": spacecraft.inertial_period,
         "target_axis": cleaned(spacecraft.target_axis).tolist(),
-        "target_angle_deg": math.degrees(spacecraft.to_turn),
-        "target_spin_rad_s": spacecraft.goal.spin,
+        **values_of(spacecraft, "target_angle_deg=to_turn", "target_spin_rad_s=goal.spin"),
     }
 
 
@@ -334,16 +301,14 @@ def plan_json(plan: Plan) -> dict[str, Any]:
     """One plan; an infeasible one has no pulses, nulls, and the reason."""
     schedule, body = plan.schedule, plan.spacecraft
     return {
-        "scheme": plan.scheme,
-        "feasible": plan.feasible,
+        **values_of(plan, "scheme", "feasible"),
         "why": infeasibility(plan) or None,
         "meets_requirement": plan.meets_requirement,
         "requirement": requirement_json(plan),
         "pulses": commanded(plan.pulses, body).json(),
-        "total_impulse_Nms": None if schedule is None else schedule.total_impulse,
+        **values_of(schedule, "total_impulse_Nms"),
         "least_impulse_Nms": None if schedule is None else body.least_impulse,
-        "propellant_kg": None if schedule is None else schedule.propellant,
-        "end_s": None if schedule is None else schedule.end,
+        **values_of(schedule, "propellant_kg", "end_s"),
         "delta_v_m_s": None if plan.delta_v is None else cleaned(plan.delta_v).tolist(),
         "spin_change_rad_s": plan.spin_change,
         "residual": residual_json(plan.residual),
@@ -358,18 +323,17 @@ def plan_json(plan: Plan) -> dict[str, Any]:
 
 def requirement_json(plan: Plan) -> list[dict[str, Any]] | None:
     """The requirement and the residuals, part by part; None where nothing is required, or without a schedule."""
-    parts = []
-    for part in plan.held:
-        if part.bound.required:
-            unit, scale = _unit(part.bound)
-            left, most = scale * part.left, scale * part.bound.most
-            parts.append({"part": part.bound.part.value, f"left_{unit}": left, f"most_{unit}": most, "met": part.met})
-    return parts or None
+    return [
+        {"part": part.bound.part.value, **_in_unit(part.bound, left=part.left, most=part.bound.most), "met": part.met}
+        for part in plan.held
+        if part.bound.required
+    ] or None
 
 
-def _unit(bound: Bound) -> tuple[str, float]:
-    """Unit of a part in files, and its factor from SI."""
-    return ("rad_s", 1.0) if bound.part is Part.SPIN else ("deg", 180.0 / math.pi)
+def _in_unit(bound: Bound, **values: float | None) -> dict[str, float | None]:
+    """Values of a part by their names, in the unit that the names get in files."""
+    unit, scale = ("rad_s", 1.0) if bound.part is Part.SPIN else ("deg", 180.0 / math.pi)
+    return {f"{name}_{unit}": None if value is None else scale * value for name, value in values.items()}
 
 
 def final_json(flown: Flight) -> dict[str, Any]:
@@ -379,8 +343,7 @@ def final_json(flown: Flight) -> dict[str, Any]:
     return {
         "axis": direction_json(body, final.axis),
         "momentum": direction_json(body, final.momentum),
-        "spin_rad_s": final.spin,
-        "nutation_deg": math.degrees(final.nutation),
+        **values_of(final, "spin_rad_s", "nutation_deg"),
         "omega_rad_s": rates.tolist(),
         "quaternion": quaternion.tolist(),
     }
@@ -396,74 +359,45 @@ def target_json(body: Spacecraft) -> dict[str, Any] | None:
 
 def aspects_json(aspects: tuple[Aspect, ...]) -> dict[str, Any]:
     """Range of angles of the spin axis from each direction that is watched; nothing for a file that names none."""
-    entries = [
-        {
-            "name": aspect.keep.name,
-            "least_deg": math.degrees(aspect.least),
-            "least_s": aspect.least_at,
-            "largest_deg": math.degrees(aspect.largest),
-            "largest_s": aspect.largest_at,
-            "min_deg": math.degrees(aspect.keep.least),
-            "max_deg": math.degrees(aspect.keep.most),
-            "kept": aspect.kept,
-        }
-        for aspect in aspects
-    ]
+    names = ("least_deg", "least_s=least_at", "largest_deg", "largest_s=largest_at")
+    bounds = ("min_deg=keep.least", "max_deg=keep.most")
+    entries = [values_of(aspect, "name=keep.name", *names, *bounds, "kept") for aspect in aspects]
     return {"aspects": entries} if entries else {}
 
 
 def direction_json(body: Spacecraft, direction: Vector) -> dict[str, float | None]:
     """The two angles that name an inertial direction (3,), as `Spacecraft.angles_of`."""
     around, other = (None if angle is None else math.degrees(angle) for angle in body.angles_of(direction))
-    if body.attitude is None:
-        return {"tilt_deg": other, "azimuth_deg": around}
-    return {"right_ascension_deg": around, "declination_deg": other}
+    named = {"tilt_deg": other, "azimuth_deg": around}
+    return named if body.attitude is None else {"right_ascension_deg": around, "declination_deg": other}
 
 
 def residual_json(residual: Residual | None) -> dict[str, float | None]:
     """Cone angles and shifts in degrees; nulls where there is no schedule."""
-    return {f"{name}_deg": None if residual is None else math.degrees(getattr(residual, name)) for name in RESIDUAL}
+    return values_of(
+        residual, "nutation_deg", "body_cone_deg", "space_cone_deg", "momentum_shift_deg", "axis_error_deg"
+    )
 
 
 def decision_json(decision: Decision) -> dict[str, Any]:
-    """The plan, whether it ``met`` the requirement and the verdict in words, part by part with margins, its end.
-
-    ``cases`` is null where none were flown.
-    """
-    plan, cases, pulses = decision.plan, decision.cases, decision.flight.schedule
+    """The verdict on a plan, part by part with margins, its end and cost; ``cases`` is null where none were flown."""
+    cases = decision.cases
     return {
-        "scheme": plan.scheme,
-        "met": decision.met,
+        **values_of(decision, "scheme=plan.scheme", "met"),
         "verdict": verdict(decision),
         "requirement": [_line_json(line) for line in decision.lines],
-        "cases": cases
-        and {
-            "samples": cases.samples,
-            "seed": cases.seed,
-            "met_fraction": cases.complying,
-            "probability": cases.probability,
-            "met": cases.met,
-        },
+        "cases": cases and values_of(cases, "samples", "seed", "met_fraction=complying", "probability", "met"),
         "final": final_json(decision.flight),
         **aspects_json(decision.aspects),
-        "propellant_kg": pulses.propellant,
-        "total_impulse_Nms": pulses.total_impulse,
-        "end_s": pulses.end,
+        **values_of(decision.flight.schedule, "propellant_kg", "total_impulse_Nms", "end_s"),
     }
 
 
 def _line_json(line: Line) -> dict[str, Any]:
     """A part: its limit, its residual with nominal values and in the share of cases required, and the margin."""
-    unit, scale = _unit(line.bound)
-    return {
-        "part": line.bound.part.value,
-        "required": line.bound.required,
-        f"limit_{unit}": scale * line.bound.most,
-        f"nominal_{unit}": scale * line.nominal,
-        f"dispersed_{unit}": None if line.dispersed is None else scale * line.dispersed,
-        f"margin_{unit}": scale * line.margin,
-        "met": line.met,
-    }
+    values = {"limit": line.bound.most, "nominal": line.nominal, "dispersed": line.dispersed, "margin": line.margin}
+    part = values_of(line.bound, "part=part.value", "required")
+    return {**part, **_in_unit(line.bound, **values), "met": line.met}
 
 
 PROVES = (
@@ -493,8 +427,8 @@ def certificate_json(certificate: Certificate) -> dict[str, Any]:
     equations shift, and m3 to the equation spin. Of each equation the file has the goal and the price y, and q(t) of a
     channel is the sum of y times what it adds, over ``cost_per_s``.
     """
-    body, program, proof = certificate.spacecraft, certificate.program, certificate.proof
-    equations = zip(certificate.rows, program.influence.goal.tolist(), proof.prices.tolist(), strict=True)
+    body, program, prices = certificate.spacecraft, certificate.program, certificate.proof.prices.tolist()
+    equations = zip(certificate.rows, program.influence.goal.tolist(), prices, strict=True)
     names, pulses = [channel.name for channel in program.channels], certificate.plan.pulses
     return {
         "nutdamp": __version__,
@@ -503,31 +437,22 @@ def certificate_json(certificate: Certificate) -> dict[str, Any]:
         "proves": PROVES,
         "model": MODEL,
         "not_counted": NOT_COUNTED,
-        "a": body.inertia.a,
-        "spin_rad_s": body.spin,
-        "nutation_rad_s": body.nutation_rate,
-        "growth_per_s": body.growth,
+        **values_of(body, "a=inertia.a", "spin_rad_s", "nutation_rad_s=nutation_rate", "growth_per_s=growth"),
         "last_s": certificate.last,
         "windows_s": [list(span) for span in certificate.windows],
         "unit": certificate.problem.unit,
         "equations": [{"name": name, "goal_Nms": goal + 0.0, "price": price + 0.0} for name, goal, price in equations],
         "off_Nms": program.off,
         "channels": [
-            {
-                "name": channel.name,
-                "torque_Nm": channel.torque.tolist(),
-                "cost_per_s": float(cost),
-                "acts_at_once": bool(strong),
-            }
+            {**values_of(channel, "name", "torque_Nm"), "cost_per_s": float(cost), "acts_at_once": bool(strong)}
             for channel, cost, strong in zip(program.channels, program.costs, program.strong, strict=True)
         ],
-        "gained": proof.gained,
-        "bound": proof.bound,
+        **values_of(certificate.proof, "gained", "bound"),
         "burns": [_burn(certificate, burn) for burn in certificate.burns],
         "burns_cost": certificate.cost,
         "plan": {
             "cost": pulses.cost_in(certificate.problem.unit),
-            "pulses": [{"channel": pulse.channel, "t_s": pulse.t, "on_time_s": pulse.on_time} for pulse in pulses],
+            "pulses": [values_of(pulse, "channel", "t_s", "on_time_s") for pulse in pulses],
         },
         "primer": [
             {"t_s": times.tolist(), "q": dict(zip(names, certificate.primer(times).T.tolist(), strict=True))}
@@ -539,4 +464,4 @@ def certificate_json(certificate: Certificate) -> dict[str, Any]:
 def _burn(certificate: Certificate, burn: Burn) -> dict[str, Any]:
     at = certificate.program.channels.index(burn.channel)
     q = certificate.primer(np.array([burn.t]))[0, at]
-    return {"channel": burn.channel.name, "t_s": burn.t, "on_time_s": burn.on_time, "q": float(q)}
+    return {**values_of(burn, "channel=channel.name", "t_s", "on_time_s"), "q": float(q)}

@@ -6,7 +6,7 @@ The files of loops and the screens of other commands use the same parts.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -15,8 +15,10 @@ import numpy as np
 from rich.console import Group, RenderableType
 from rich.text import Text
 
+from nutdamp.files.export import column, cone_columns
 from nutdamp.flight.end_state import aspects
 from nutdamp.flight.propagation import IDEAL_IMPULSES, Flight, model_name
+from nutdamp.montecarlo.inputs import DispersedInput
 from nutdamp.montecarlo.statistics import OUTPUTS, Array, Distribution, cases_to_show
 from nutdamp.montecarlo.study import CONFIDENCE, Results, Study
 from nutdamp.spacecraft.model import Keep, Spacecraft
@@ -24,11 +26,12 @@ from nutdamp.spacecraft.requirements import Part
 from nutdamp.units import screen_unit
 from nutdamp.views import decisions, tolerances
 from nutdamp.views.parts import bounds_text, requested, summary
-from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, Shared, facts, to_figures
+from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, Shared, facts, to_figures, values_of
 from nutdamp.views.text import degrees, digits
 
 if TYPE_CHECKING:
-    from nutdamp.control_loop.dispersion import LoopResults
+    from nutdamp.control_loop.dispersion import LoopResults, LoopStudy
+    from nutdamp.control_loop.law import Ending
 
 
 PERCENTS = (50.0, 90.0, 95.0, 99.0, 99.7)
@@ -39,13 +42,14 @@ BOTH = "screen full"  # the default screen, and that of all values
 
 
 class StudyOutput(NamedTuple):
-    """An output of a study: its ``key`` in files, its heading and unit for people, and the factor to that unit."""
+    """An output: ``key`` in files, heading and unit for people, factor to it; ``ranks``: worst cases show it."""
 
     name: str
     key: str
     heading: str
     unit: str = "deg"
     scale: float = 1.0
+    ranks: bool = False
 
     @property
     def shown_unit(self) -> tuple[str, float]:
@@ -59,7 +63,10 @@ class StudyOutput(NamedTuple):
 
 
 FLOWN_OUTPUTS = (  # the outputs of a schedule, in the order of `OUTPUTS`
-    *(StudyOutput(part.value, f"{part.value}_deg", part.label) for part in (Part.NUTATION, Part.SHIFT, Part.DISTANCE)),
+    *(
+        StudyOutput(part.value, f"{part.value}_deg", part.label, ranks=True)
+        for part in (Part.NUTATION, Part.SHIFT, Part.DISTANCE)
+    ),
     StudyOutput("spin_change", "spin_change_rad_s", "spin change", "mrad/s", 1e3),
     StudyOutput("propellant", "propellant_kg", "propellant", "g", 1e3),
 )
@@ -73,9 +80,7 @@ EMPTY = "the pulses take more propellant than there is, so that the last ones do
 def dispersion_brief(results: Results, *, scheme: str) -> RenderableType:
     """The default screen of ``disperse``: verdict, percentiles, what counts most, and the worst case."""
     head = [_title(results, scheme), *requirement_lines(results), *cone_lines(results), *_emptied(results)]
-    notes, case = list(tolerances.main_causes(results)), ""
-    if _varies(results):
-        case = f" · {_again(results)} (worst)"
+    notes, case = list(tolerances.main_causes(results)), f" · {_again(results)} (worst)" * _varies(results)
     if unused := results.study.model.inputs.unused:
         notes.append(f"Dispersions without effect: {', '.join(tolerances.in_words(entry.name) for entry in unused)}.")
     return summary(head, lambda **_: _percentiles(results).screen("screen"), notes, f"--plot cases.png{case}")
@@ -83,7 +88,7 @@ def dispersion_brief(results: Results, *, scheme: str) -> RenderableType:
 
 def dispersion_screen(results: Results, *, scheme: str, worst: int, nominal: Flight | None = None) -> Group:
     """All tables of ``disperse``; ``nominal``: the nominal case, where its end is to be shown too."""
-    body = results.study.model.spacecraft
+    study, body = results.study, results.study.model.spacecraft
     parts: list[RenderableType] = [_title(results, scheme), Text(), _percentiles(results).screen("full")]
     parts.append(angles_note(body))
     if not results.exact:
@@ -93,50 +98,47 @@ def dispersion_screen(results: Results, *, scheme: str, worst: int, nominal: Fli
     parts += [Text(), *requirement_lines(results), *cone_lines(results), *_emptied(results)]
     parts += [Text(), *tolerances.tolerance_budget(results)]
     if worst and _varies(results):
-        cases = _cases(results.study, _worst(results, worst))
-        parts += [Text(), Text(cases.title, "bold"), cases.screen("full")]
+        cases = case_table(study, FLOWN_OUTPUTS, _worst(results, worst), _effects(study))
+        parts += [Text(), Text(cases.title, "bold"), cases.screen("screen")]
         parts.append(Text(f"Inspect one: nutdamp disperse, as here, with {_again(results)}", "dim"))
-    return Group(*parts, *tolerances.unused_table(results.study.model.inputs.unused))
+    return Group(*parts, *tolerances.unused_table(study.model.inputs.unused))
 
 
 def dispersion_json(results: Results, *, scheme: str, worst: int) -> dict[str, Any]:
-    """Percentiles, requirement, tolerance budget and the ``worst`` cases; angles in degrees, else SI.
+    """Percentiles, requirement, tolerance budget, ``worst`` cases and end of the nominal one; degrees, else SI.
 
-    ``shares`` are those of the nutation, with those of the other outputs below their names; ``effect_deg`` is that on
-    the nutation of one sigma of an input alone (or all of a bias). Of inputs in ``correlation`` each share is the
-    increment over those before it, and their sum that of all of them. ``final`` is the end of the nominal case.
+    ``shares`` are of the nutation, of other outputs below their names; with ``correlation`` each is the increment over
+    those before it. ``effect_deg``: on the nutation, of one sigma of an input alone (or all of a bias).
     """
     study, body = results.study, results.study.model.spacecraft
-    nominal = study.outputs_of({}).tolist()
     return {
         **decisions.heading(body),
         "scheme": scheme,
-        "samples": results.done,
-        "requested": results.requested,
-        "interrupted": results.done < results.requested,
-        "seed": study.seed,
-        "redrawn": results.redrawn,
+        **counts_json(results),
         "final": decisions.final_json(study.nominal),
         "target": decisions.target_json(body),
         "exact_percentiles": results.exact,
-        "percentiles": {
-            output.key: percentiles_json(output.key, value, results.distribution(output.name))
-            for output, value in zip(FLOWN_OUTPUTS, nominal, strict=True)
-        },
+        "percentiles": percentiles_of(results, FLOWN_OUTPUTS, study.outputs_of({})),
         "requirement": requirement_of(results),
         **cones_json(results),
         **({"tank_empty_fraction": results.emptied / results.done} if body.tank else {}),
         "shares": list(_shares(results)),
         **tolerances.correlation_json(body),
         "unused": [entry.name for entry in study.model.inputs.unused],
-        "unused_because": {entry.name: entry.reason for entry in study.model.inputs.unused},
-        "worst": _worst(results, worst),
+        "unused_because": dict(study.model.inputs.unused),
+        "worst": [row_json(study, FLOWN_OUTPUTS, row) for row in _worst(results, worst)],
     }
 
 
-def _worst(results: Results, count: int) -> list[dict[str, Any]]:
+def counts_json(results: Results | LoopResults) -> dict[str, Any]:
+    """Number of cases, and their seed."""
+    counts = values_of(results, "samples=done", "requested") | {"interrupted": results.done < results.requested}
+    return counts | values_of(results, "seed=study.seed", "redrawn")
+
+
+def _worst(results: Results, count: int) -> list[CaseRow]:
     study, cases = results.study, results.worst.cases[:count].tolist()
-    return [case_json(study, case, study.draws_of(case)) for case in cases]
+    return [_flown(study, case, study.draws_of(case)) for case in cases]
 
 
 def _title(results: Results, scheme: str) -> Text:
@@ -162,10 +164,7 @@ def _varies(results: Results) -> bool:
 def percentiles_json(
     column: str, nominal: float | None, distribution: Distribution | None, *, lower: bool = False
 ) -> dict[str, float | None]:
-    """The ``nominal`` value of an output and its distribution, in the unit of its ``column``; nulls where unknown.
-
-    ``lower``: the values that so many cases do not fall short of.
-    """
+    """The ``nominal`` value and the distribution in the unit of a ``column``; ``lower``: values that cases reach."""
     spread: list[float | None] = [None] * (len(PERCENTS) + 2)
     if distribution is not None:
         shares = np.array(PERCENTS) / 100.0
@@ -173,6 +172,16 @@ def percentiles_json(
         spread = [distribution.minimum, *levels, distribution.maximum]
     values = zip(("nominal", "min", *LEVELS, "max"), (nominal, *spread), strict=True)
     return {name: None if value is None else shown(column, value) for name, value in values}
+
+
+def percentiles_of(
+    results: Results | LoopResults, outputs: Sequence[StudyOutput], nominal: Array
+) -> dict[str, dict[str, float | None]]:
+    """`percentiles_json` of all outputs, by their keys."""
+    return {
+        output.key: percentiles_json(output.key, value, results.distribution(output.name))
+        for output, value in zip(outputs, nominal.tolist(), strict=True)
+    }
 
 
 def _percentiles(results: Results) -> DataTable:
@@ -256,9 +265,8 @@ def requirement_lines(results: Results | LoopResults) -> list[RenderableType]:
     interval = " to ".join(decisions.percent(bound, probability) for bound in (low, high))
     text = Text.assemble(("Requirement ", "bold"), f"({required}) ", verdict, f"; 95 % interval {interval}.")
     if results.meets_requirement and low < probability:
-        few = cases_to_show(probability)
+        few, level = cases_to_show(probability), decisions.exact_percent(probability)
         hint = f" It takes at least {few:,}." if results.done < few else ""
-        level = decisions.exact_percent(probability)
         text.append(f" The interval reaches below {level}: more --samples would show it.{hint}")
     return [text]
 
@@ -268,14 +276,8 @@ def requirement_of(results: Results | LoopResults) -> dict[str, Any] | None:
     if results.met_fraction is None:
         return None
     low, high = results.interval
-    return {
-        "met_fraction": results.met_fraction,
-        "low": low,
-        "high": high,
-        "confidence": CONFIDENCE,
-        "probability": results.probability,
-        "met": results.meets_requirement,
-    }
+    met = {"met_fraction": results.met_fraction, "low": low, "high": high, "confidence": CONFIDENCE}
+    return met | values_of(results, "probability", "met=meets_requirement")
 
 
 def cone_lines(results: Results | LoopResults) -> Iterator[Text]:
@@ -303,8 +305,8 @@ def _cones(results: Results | LoopResults) -> Iterator[tuple[Keep, dict[str, Any
     nominal = np.degrees(results.study.nominal_aspects).tolist() if results.done and body.keep else ()
     for index, (keep, (least, largest)) in enumerate(zip(body.keep, nominal, strict=False)):
         least_of_all, largest_of_all = np.degrees(results.aspects[index]).tolist()
-        entry = {"name": keep.name, "min_deg": math.degrees(keep.least), "max_deg": math.degrees(keep.most)}
-        entry["broken_fraction"] = float(results.broken[index] / results.done)
+        entry = values_of(keep, "name", "min_deg=least", "max_deg=most")
+        entry |= {"broken_fraction": float(results.broken[index] / results.done)}
         entry |= {"least_deg": least_of_all, "largest_deg": largest_of_all}
         yield keep, entry | {"nominal_least_deg": least, "nominal_largest_deg": largest}
 
@@ -318,67 +320,109 @@ def _emptied(results: Results) -> Iterator[Text]:
 # --- cases
 
 
+class CaseRow(NamedTuple):
+    """A case, from 0, or `ESTIMATE`: deviations of inputs, outputs, angles (m, 2) rad to cones, ending of a loop."""
+
+    case: int
+    draws: Mapping[str, float]
+    values: Sequence[float]
+    angles: Array | None
+    stop: Ending | None = None
+
+
+ESTIMATE = -1  # number of the nominal case
+
+
+def _flown(study: Study, case: int, draws: Mapping[str, float]) -> CaseRow:
+    aspects = study.ends_of(draws).aspects
+    return CaseRow(case, draws, study.outputs_of(draws).tolist(), None if aspects is None else aspects[:, :, 0])
+
+
 def case_json(study: Study, case: int, draws: Mapping[str, float]) -> dict[str, Any]:
     """One case (from 0): the true value of each input, in SI, and the outputs."""
-    outputs, aspects = study.outputs_of(draws).tolist(), study.ends_of(draws).aspects
-    return {
-        "case": case + 1,
-        "inputs": {entry.name: entry.nominal + draws.get(entry.name, 0.0) for entry in study.model.inputs.drawn},
-        **{output.key: shown(output.key, value) for output, value in zip(FLOWN_OUTPUTS, outputs, strict=True)},
-        **({} if aspects is None else angles_json(study.model.spacecraft, aspects[:, :, 0])),
-    }
+    return row_json(study, FLOWN_OUTPUTS, _flown(study, case, draws))
 
 
-def _cases(study: Study, rows: Sequence[Mapping[str, Any]]) -> DataTable:
-    """Cases as `case_json` has them, one row each; number 0 is the nominal one."""
-    return DataTable("Worst cases", tuple(_case_columns(study, rows)), rows)
+def row_json(study: Study | LoopStudy, outputs: Sequence[StudyOutput], row: CaseRow) -> dict[str, Any]:
+    """A case as `case_json` has it; unknown outputs are None."""
+    inputs = {entry.name: entry.nominal + row.draws.get(entry.name, 0.0) for entry in study.model.inputs.drawn}
+    data = {"case": row.case + 1, "inputs": inputs}
+    data |= {output.key: _output(at, output, row) for at, output in enumerate(outputs)}
+    if row.angles is not None and study.model.spacecraft.keep:
+        named = zip(study.model.spacecraft.keep, np.degrees(row.angles).tolist(), strict=True)
+        data["aspects"] = [{"name": keep.name, "least_deg": near, "largest_deg": far} for keep, (near, far) in named]
+    return data
 
 
-def _case_columns(study: Study, rows: Sequence[Mapping[str, Any]]) -> Iterator[Column]:
-    yield Column("", Shared.CASE, "", itemgetter("case"), where="full", kind=WHOLE)
-    yield Column("", "", "", lambda row: Shared.THIS_CASE if row["case"] else Shared.NOMINAL, where="case", kind=TEXT)
-    for output in FLOWN_OUTPUTS:
-        yield case_column(output, partial(_known, output.key), rows)
-        if output.unit == "deg":
-            yield Column("", output.heading, "deg", itemgetter(output.key), to_figures(4), "full")
-    for at, cone in enumerate(study.model.spacecraft.keep):
-        for which in ("least", "largest"):
-            where = "full case" if which in bounded(cone) else "case"
-            yield Column("", f"{which} from {cone.name}", "deg", partial(_angle, at, which), to_figures(4), where)
-    contributors = partial(_contributors, study)
-    yield Column("", "largest contributors, in sigmas", "", contributors, where="full", kind=TEXT)
+def _output(at: int, output: StudyOutput, row: CaseRow) -> float | int | None:
+    value = row.values[at]
+    if math.isnan(value):
+        return None
+    return shown(output.key, value) if output.unit else int(value)
 
 
-def case_column(output: StudyOutput, value: Callable[[Any], float | None], rows: Sequence[Any]) -> Column:
-    """An output of few cases beside each other, to the digits of the largest; numbers without a unit are whole."""
-    unit, factor = output.shown_unit
-    largest = max((abs(factor * known) for row in rows if (known := value(row)) is not None), default=0.0)
-
-    def text(known: float) -> str:
-        return beside(factor * known, largest) if output.unit else f"{known:.0f}"
-
-    return Column("", output.heading, unit, value, text, "case")
+def case_table(
+    study: Study | LoopStudy, outputs: Sequence[StudyOutput], rows: Sequence[CaseRow], effects: Array | None = None
+) -> DataTable:
+    """Cases, one row each; ``effects`` of the drawn inputs by which their contributors are ranked."""
+    return DataTable("Worst cases", tuple(_case_columns(study, outputs, rows, effects)), rows)
 
 
-def _known(key: str, row: Mapping[str, Any]) -> float | None:
-    return None if math.isnan(row[key]) else row[key]
+def _case_columns(
+    study: Study | LoopStudy, outputs: Sequence[StudyOutput], rows: Sequence[CaseRow], effects: Array | None
+) -> Iterator[Column]:
+    cones, inputs = study.model.spacecraft.keep, study.model.inputs.drawn
+    yield Column("case", Shared.CASE, "", lambda row: row.case + 1, where="screen csv", kind=WHOLE)
+    named = (Shared.THIS_CASE, Shared.NOMINAL)
+    yield Column("", "", "", lambda row: named[row.case == ESTIMATE], where="case", kind=TEXT)
+    for entry in inputs:
+        yield Column(column(entry), "", "", partial(_true_value, entry), where="csv")
+    for at, output in enumerate(outputs):
+        value, where = partial(_output, at, output), "csv" + " screen" * output.ranks
+        yield Column(output.key, output.heading, output.unit, value, to_figures(4, output.scale), where)
+        text = _text_beside(output, map(value, rows))
+        yield Column("", output.heading, output.shown_unit[0], value, text, "case")
+    yield Column("stopped", "", "", lambda row: row.stop.name.lower() if row.stop else None, where="csv", kind=TEXT)
+    angles = [(which, cone) for cone in cones for which in ("least", "largest")]
+    for at, (key, (which, cone)) in enumerate(zip(cone_columns(study.model.spacecraft), angles, strict=True)):
+        where, name = "csv case" + " screen" * (which in bounded(cone)), f"{which} from {cone.name}"
+        yield Column(key, name, "deg", partial(_angle, at), to_figures(4), where)
+    heading = f"largest {'inputs' if effects is None else 'contributors'}, in sigmas"
+    yield Column("", heading, "", partial(_largest, inputs, effects), where="screen", kind=TEXT)
 
 
-def _angle(cone: int, which: str, row: Mapping[str, Any]) -> float:
-    return float(row["aspects"][cone][f"{which}_deg"])
+def _true_value(entry: DispersedInput, row: CaseRow) -> float:
+    value = entry.nominal + row.draws[entry.name]
+    return math.degrees(value) if entry.unit == "rad" else value
 
 
-def _contributors(study: Study, row: Mapping[str, Any]) -> str:
-    inputs = study.model.inputs.drawn
-    effects = np.hypot(*(study.first_order.effects(output) for output, _ in tolerances.budgeted_outputs(study)))
-    sigmas = [(row["inputs"][entry.name] - entry.nominal) / (entry.sigma or math.inf) for entry in inputs]
-    order = np.argsort(-np.abs(effects * sigmas), kind="stable")[:3].tolist()
+def _text_beside(output: StudyOutput, values: Iterable[float | None]) -> Callable[[float], str]:
+    """Text of an output of few cases beside each other, to the digits of the largest; counts are whole."""
+    if not output.unit:
+        return "{:.0f}".format
+    factor = output.shown_unit[1]
+    largest = max((abs(factor * value) for value in values if value is not None), default=0.0)
+    return lambda value: beside(factor * value, largest)
+
+
+def _angle(at: int, row: CaseRow) -> float:
+    return math.nan if row.angles is None else math.degrees(row.angles.flat[at])
+
+
+def _largest(inputs: Sequence[DispersedInput], effects: Array | None, row: CaseRow) -> str:
+    sigmas = np.array([row.draws[entry.name] / (entry.sigma or math.inf) for entry in inputs])
+    order = np.argsort(-np.abs(sigmas if effects is None else effects * sigmas), kind="stable")[:3].tolist()
     return ", ".join(f"{tolerances.in_words(inputs[at].name)} {sigmas[at]:+.1f}" for at in order if sigmas[at])
+
+
+def _effects(study: Study) -> Array:
+    return np.hypot(*(study.first_order.effects(output) for output, _ in tolerances.budgeted_outputs(study)))
 
 
 def case_screen(study: Study, case: int, draws: dict[str, float], *, scheme: str) -> RenderableType:
     """One case (from 0): every input, and the ends of it and of the nominal case."""
-    outcome = _cases(study, [case_json(study, -1, {}), case_json(study, case, draws)])
+    rows = [_flown(study, ESTIMATE, {}), _flown(study, case, draws)]
+    outcome = case_table(study, FLOWN_OUTPUTS, rows, _effects(study))
     empty = [Text(f"Tank empty too soon: {EMPTY}.", "red")] * bool(study.ends_of(draws).drained > 1.0)
     title = Text.assemble((study.model.spacecraft.name, "bold"), f": {scheme}, seed {study.seed}, case {case + 1}")
     inputs = tolerances.inputs_table(study.model.inputs.drawn, draws)
@@ -390,14 +434,6 @@ def bounded(keep: Keep) -> list[str]:
     return ["least"] * (keep.least > 0.0) + ["largest"] * (keep.most < math.pi)
 
 
-def angles_json(spacecraft: Spacecraft, angles: Array) -> dict[str, Any]:
-    """Least and largest angle to the direction of each cone, of angles (m, 2) rad."""
-    if not spacecraft.keep:
-        return {}
-    named = zip(spacecraft.keep, np.degrees(angles).tolist(), strict=True)
-    return {"aspects": [{"name": keep.name, "least_deg": least, "largest_deg": far} for keep, (least, far) in named]}
-
-
 def _shares(results: Results) -> Iterator[dict[str, Any]]:
     first = results.study.first_order
     linear = {name: first.shares(name).tolist() for name in OUTPUTS}
@@ -405,5 +441,5 @@ def _shares(results: Results) -> Iterator[dict[str, Any]]:
     for at, entry in enumerate(first.inputs):
         sampled = results.shares.get(entry.name, {})
         both = {name: {"analytic": linear[name][at], "sampled": sampled.get(name, 0.0)} for name in OUTPUTS}
-        about = {"tolerance": entry.tolerance, "sigma": entry.sigma, "effect_deg": effects[at]}
+        about = values_of(entry, "tolerance", "sigma") | {"effect_deg": effects[at]}
         yield {"input": entry.name, **both.pop("nutation"), **about, **both}

@@ -9,26 +9,7 @@ from nutdamp.errors import BadRequest, Unsuitable
 
 if TYPE_CHECKING:
     from nutdamp.common.results import Note
-    from nutdamp.flight.propagation import Flight
     from nutdamp.planning.plan import Plan
-
-
-class Request(NamedTuple):
-    """A plan to be written: CCSDS messages as ``xml`` or as keyword = value, tracks ``until`` a time, s, or None."""
-
-    plan: Plan
-    xml: bool
-    until: float | None
-
-    def end(self) -> float:
-        """End of an attitude history, s: by default an inertial period after the last pulse."""
-        return self.plan.pulses.end + self.plan.spacecraft.inertial_period if self.until is None else self.until
-
-    def flight(self) -> Flight:
-        """The flight up to that end."""
-        from nutdamp.flight.propagation import flown
-
-        return flown(self.plan.spacecraft, self.plan.pulses, self.end())
 
 
 class Format(NamedTuple):
@@ -45,45 +26,6 @@ class Format(NamedTuple):
     dated: bool = False
     needs_orbit: bool = False
     nutates: bool = False
-
-
-def _text(form: str, request: Request) -> str:
-    plan, until = request.plan, request.until
-    if form == "json":
-        from nutdamp.files.tabular import json_text
-        from nutdamp.planning.decision import compare_plans
-        from nutdamp.views.decisions import comparison_json
-
-        return json_text(comparison_json(compare_plans((plan,))))
-    if form == "spin-table":
-        from nutdamp.views.simulation import spin_table
-
-        return spin_table(plan.spacecraft, plan.pulses, plan.pulses.end if until is None else until)
-    if FORMATS[form].message:
-        return _message(form, request)
-    from nutdamp.files.export import basilisk_script, reference, stk_attitude
-
-    if form == "basilisk":
-        return basilisk_script(plan)
-    return stk_attitude(request.flight(), request.end(), reference(plan.spacecraft))
-
-
-def _message(kind: str, request: Request) -> str:
-    """A CCSDS message, created now to the second."""
-    from nutdamp.common.time import Epoch
-    from nutdamp.files.ccsds import message, write
-    from nutdamp.files.export import reference
-
-    plan, place = request.plan, reference(request.plan.spacecraft)
-    now = Epoch.parse(datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%dT%H:%M:%SZ"))
-    if kind == "apm":
-        written = write.apm(plan, place, now)
-    elif kind == "opm":
-        written = write.opm(plan, place, now)
-    else:
-        form = message.SPIN_NUTATION_MOM if kind == "aem-spin" else message.QUATERNION_ANGVEL
-        written = write.aem(plan, request.flight(), request.end(), place, now, form)
-    return message.to_xml(written) if request.xml else message.to_kvn(written)
 
 
 FORMATS = {  # formats by name
@@ -120,16 +62,45 @@ def export_text(plan: Plan, form: str, *, xml: bool = False, until: float | None
     format needs data that the spacecraft file lacks, or cannot hold those of the plan.
     """
     expect_possible(form, xml=xml, until=until)
-    row, request = FORMATS[form], Request(plan, xml, until)
+    row, pulses = FORMATS[form], plan.pulses
     if row.dated:
-        from nutdamp.files.export import reference
+        return _dated(plan, row, pulses.end + plan.spacecraft.inertial_period if until is None else until, xml)
+    if form == "json":
+        from nutdamp.files.tabular import json_text
+        from nutdamp.planning.decision import compare_plans
+        from nutdamp.views.decisions import comparison_json
 
-        reference(plan.spacecraft)  # refuses a file without epoch or frame
-        last = request.end() if row.track else plan.pulses.end
-        if plan.spacecraft.utc(last) is None:
-            cure = "an earlier --until" if row.track else "a shorter horizon"
-            raise Unsuitable(("attitude", "epoch"), f"{last:.4g} s after it the year 9999 is over; {cure} helps")
-    return _text(form, request)
+        return json_text(comparison_json(compare_plans((plan,))))
+    if form == "spin-table":
+        from nutdamp.views.simulation import spin_table
+
+        return spin_table(plan.spacecraft, pulses, pulses.end if until is None else until)
+    from nutdamp.files.export import basilisk_script
+
+    return basilisk_script(plan)
+
+
+def _dated(plan: Plan, row: Format, until: float, xml: bool) -> str:
+    """A format that needs epoch and frame, with a track to ``until`` s; messages are created now to the second."""
+    from nutdamp.common.time import Epoch
+    from nutdamp.files.ccsds import message, write
+    from nutdamp.files.export import reference, stk_attitude
+    from nutdamp.flight.propagation import flown
+
+    body, place = plan.spacecraft, reference(plan.spacecraft)  # refuses a file without epoch or frame
+    last = until if row.track else plan.pulses.end
+    if body.utc(last) is None:
+        cure = "an earlier --until" if row.track else "a shorter horizon"
+        raise Unsuitable(("attitude", "epoch"), f"{last:.4g} s after it the year 9999 is over; {cure} helps")
+    if not row.message:
+        return stk_attitude(flown(body, plan.pulses, until), until, place)
+    now = Epoch.parse(datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%dT%H:%M:%SZ"))
+    if row.track:
+        form = message.SPIN_NUTATION_MOM if row.nutates else message.QUATERNION_ANGVEL
+        written = write.aem(plan, flown(body, plan.pulses, until), until, place, now, form)
+    else:
+        written = (write.opm if row.needs_orbit else write.apm)(plan, place, now)
+    return message.to_xml(written) if xml else message.to_kvn(written)
 
 
 def export_notes(plan: Plan, form: str) -> list[Note]:

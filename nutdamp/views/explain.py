@@ -45,10 +45,7 @@ _UNIT = re.compile(  # end of a heading with hyphens for blanks: its unit
 
 
 def explained(requested: str) -> Topic:
-    """Everything that is known by that name, as one topic: words first, then the page, then the keys of the file.
-
-    Raises BadRequest, which names a near one, where there is nothing.
-    """
+    """Words, page and keys of the file of that name as one topic; raises BadRequest, which names a near one."""
     name, _, below = requested.partition(".")
     if name.casefold() == guide.FILE:
         return file_topic(below)
@@ -73,7 +70,7 @@ def explained(requested: str) -> Topic:
     if topic is None and texts:
         (_, summary), *texts = texts
     parts = [TopicPart("", (TopicRows(tuple(texts)),))] if texts else []
-    parts += [] if topic is None else topic.parts
+    parts += () if topic is None else topic.parts
     if keys:
         rows = tuple((f"{guide.FILE}.{key.path}", key.field.description) for key in keys)
         parts.append(TopicPart("In the spacecraft file", (TopicRows(rows),)))
@@ -102,10 +99,7 @@ def _bare(name: str) -> str:
 
 
 def _texts(requested: str) -> Iterator[tuple[str, str]]:
-    """Kinds and paragraphs of the words of that name: as written, else folded, else without unit; no text twice.
-
-    Where the glossary has it, only names as written are looked for besides.
-    """
+    """Kinds and texts of the words of that name, as written, else folded or without unit unless the glossary has it."""
     seen: set[str] = set()
     for kind, source in WORDS:
         words = [(_spelt(entry), entry, text) for entry, text in source()]
@@ -187,10 +181,7 @@ def keys(model: type[Section] = SpacecraftFile, prefix: str = "") -> Iterator[Ke
 
 
 def file_topic(below: str = "") -> Topic:
-    """The keys of the file, or the one called ``below``, such as ``thrusters.force``, and those in it.
-
-    Raises BadRequest, which names a near one, where there is none.
-    """
+    """The keys of the file, or below one such as ``thrusters.force``; raises BadRequest, which names a near one."""
     every = list(keys())
     if not below:
         roots = [key for key in every if not key.parent]
@@ -244,19 +235,14 @@ def _what(field: fields.Key) -> str:
         factors = KINDS[quantity.kind].factors
         return f"unit {listed([*factors], 'or')}" if factors else "plain numbers, without unit"
     choices = next((get_args(part) for part in parts if get_origin(part) is Literal), ())
-    return listed(choices, "or") if choices else {int: "a whole number", str: "a text"}.get(_plain(field.type), "")
+    plain = next((part for part in parts if get_origin(part) in (list, dict) or isinstance(part, type)), None)
+    return listed(choices, "or") if choices else "a whole number" if plain is int else "a text" if plain is str else ""
 
 
 def _within(annotation: Any) -> Iterator[Any]:
     yield annotation
     for part in get_args(annotation):
         yield from _within(part)
-
-
-def _plain(annotation: Any) -> Any:
-    if get_origin(annotation) in (list, dict) or isinstance(annotation, type):
-        return annotation
-    return next((_plain(part) for part in get_args(annotation) if part is not type(None)), None)
 
 
 def flow(value: object) -> str:
@@ -297,9 +283,7 @@ def topic_screen(topic: Topic) -> RenderableType:
     """One topic."""
     parts: list[RenderableType] = [Text.assemble((topic.name, "bold"), f" – {topic.summary}")]
     for part in topic.parts:
-        parts.append(Text())
-        if part.title:
-            parts.append(Text(part.title, style="bold"))
+        parts += [Text(), *[Text(part.title, style="bold")] * bool(part.title)]
         for number, block in enumerate(part.blocks):
             parts += [Text()] * (number > 0) + [_block(block)]
     return Constrain(Group(*parts), WIDEST)
@@ -307,7 +291,10 @@ def topic_screen(topic: Topic) -> RenderableType:
 
 def equations_screen() -> RenderableType:
     """Every numbered equation: its subject, its place in the code, its differences from the print."""
-    rows = [(entry.number, "\n".join([f"{entry.subject}: {entry.place}", *entry.remarks])) for entry in guide.EQUATIONS]
+    rows = []
+    for entry in guide.EQUATIONS:
+        remarks = [block for block in entry.changed if isinstance(block, str)]
+        rows.append((entry.number, "\n".join([f"{entry.subject}: {entry.place}", *remarks])))
     hint = Text("Formula, symbols and units of one: nutdamp explain 17, explain K7, explain 24.4")
     return Constrain(Group(*(Text(source) for source in guide.SOURCES), hint, Text(), _Pairs(tuple(rows))), WIDEST)
 

@@ -9,7 +9,7 @@ from typing import Any
 from rich.console import RenderableType
 from rich.text import Text
 
-from nutdamp.estimation.forecast import Outlook, Prospect
+from nutdamp.estimation.forecast import Outlook
 from nutdamp.estimation.parameters import KIND, in_moments, untold
 from nutdamp.estimation.results import UNTOLD, Carried, Estimate, carried, correlated, doubts, estimates
 from nutdamp.estimation.search import Fit
@@ -17,7 +17,18 @@ from nutdamp.files.carried import notes
 from nutdamp.units import screen_unit
 from nutdamp.views.decisions import exact_percent, heading, percent
 from nutdamp.views.parts import opening, summary
-from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable, Shared, to_figures
+from nutdamp.views.tables import (
+    TEXT,
+    WHOLE,
+    YES_NO,
+    Column,
+    DataTable,
+    Shared,
+    angle_of,
+    file_columns,
+    to_figures,
+    values_of,
+)
 from nutdamp.views.text import degrees, mass
 
 FAR = 4.0  # sigmas of the file from which on a change is remarked upon
@@ -80,11 +91,6 @@ ESTIMATES = (
 )
 
 
-def estimate_table(rows: Sequence[Estimate]) -> DataTable:
-    """The estimates."""
-    return DataTable("Estimates", ESTIMATES, rows)
-
-
 def signal_table(fit: Fit) -> DataTable:
     """The signals of the record, counted from 0, with the test of their residuals."""
     of_signal = [fit.model.signal == at for at in range(len(fit.model.signals))]
@@ -94,16 +100,13 @@ def signal_table(fit: Fit) -> DataTable:
             return "limited by resolution"
         return "white" if fit.white(at) else "NOT white, sigmas too small"
 
-    def noise(at: int) -> str:
-        return f"{float(fit.noise[at]) * in_shown(fit.model.signals[at])[1]:.3g}"
-
     columns = (
         Column("signal", "signal", "", lambda at: fit.model.signals[at], where="screen json", kind=TEXT),
         Column("samples", "samples", "", lambda at: int(of_signal[at].sum()), where="screen json", kind=WHOLE),
         Column("outliers", "outliers", "", lambda at: int((of_signal[at] & ~fit.used).sum()), where="screen json",
                kind=WHOLE),
         Column("noise_SI", "", "", lambda at: float(fit.noise[at]), where="json"),
-        Column("", "noise", "", noise, where="screen"),
+        Column("", "noise", "", lambda at: fit.noise[at] * in_shown(fit.model.signals[at])[1], to_figures(3), "screen"),
         Column("", "unit", "", lambda at: in_shown(fit.model.signals[at])[0], where="screen", kind=TEXT),
         Column("white", "", "", fit.white, where="json", kind=YES_NO),
         Column("", "residuals", "", verdict, where="screen", kind=TEXT),
@@ -115,28 +118,22 @@ def prospect_table(ahead: Outlook) -> DataTable:
     """A row for each coast and probe pulse of the forecast."""
     now, level = ahead.now, exact_percent(ahead.probability)
 
-    def gain(row: Prospect) -> float | None:
-        rate = ahead.gain(row)
-        return None if rate is None else math.degrees(rate)
-
-    def probe(row: Prospect) -> str | None:
-        return f"{row.probe}, {row.on_time:.3g} s" if row.probe else None
-
     columns = (
         Column("coast_s", "", "", lambda row: row.length, where="json"),
         Column("", "coast", "s", lambda row: f"{row.length:.4g}{' (now)' * (row is now)}", where="screen", kind=TEXT),
         Column("probe", "", "", lambda row: row.probe or None, where="json", kind=TEXT),
-        Column("", "probe pulse", "", probe, where="screen"),
-        Column("on_time_s", "", "", lambda row: row.on_time, where="json"),
+        Column("", "probe pulse", "", lambda row: f"{row.probe}, {row.on_time:.3g} s" if row.probe else None,
+               where="screen"),
+        *file_columns("json", "on_time_s"),
         Column("sigma_C_over_A", "sigma of C/A", "", lambda row: row.ratio, to_figures(2), "screen json"),
-        Column("sigma_thrust", "", "", lambda row: row.thrust, where="json"),
+        *file_columns("json", "sigma_thrust=thrust"),
         Column("", "sigma of thrust", "%", lambda row: 100.0 * row.thrust if row.probe else None,
                to_figures(2), "screen"),
-        Column("nutation_deg", f"nutation {level}", "deg", lambda row: math.degrees(row.nutation),
-               to_figures(3), "screen json"),
+        Column("nutation_deg", f"nutation {level}", "deg", angle_of("nutation"), to_figures(3), "screen json"),
         Column("met_fraction", "comply", "%", lambda row: row.met, to_figures(4, 100.0), "screen json"),
         Column("propellant_kg", Shared.PROPELLANT, "g", lambda row: row.propellant, to_figures(3, 1e3), "screen json"),
-        Column("gain_deg_kg", "gain", "deg/g", gain, to_figures(2, 1e-3), "screen json"),
+        Column("gain_deg_kg", "gain", "deg/g", lambda row: (rate := ahead.gain(row)) and math.degrees(rate),
+               to_figures(2, 1e-3), "screen json"),
     )  # fmt: skip
     return DataTable("Forecast with more telemetry", columns, (*ahead.coasts, *ahead.probes))
 
@@ -146,11 +143,11 @@ def fit_screen(fit: Fit, time: float, ahead: Outlook | None = None, *, verbose: 
     rows, names = estimates(fit, time), fit.model.signals
     colored = [name for at, name in enumerate(names) if fit.resolved[at] and not fit.white(at)]
     test = f"residuals NOT white: {', '.join(colored)}; the sigmas are too small" if colored else "residuals: noise"
-    outliers = int((~fit.used).sum())
-    test += f"; outliers left out: {outliers}" if outliers else ""
+    if outliers := int((~fit.used).sum()):
+        test += f"; outliers left out: {outliers}"
     headline = Text.assemble("FIT ", (", ".join(names), "bold"), f", {_record(fit)}")
     head = [*opening(fit.model.spacecraft, verbose), headline, Text(test, "bold red" if colored else "green")]
-    table = estimate_table(rows)
+    table = DataTable("Estimates", ESTIMATES, rows)
     return summary(
         [*head, Text(f"motion at t = {time:g} s")],
         lambda first=None: table.screen("screen", first=first and max(first, 3)),
@@ -180,11 +177,8 @@ def advice(ahead: Outlook) -> Iterator[str]:
         met = percent(now.met or 0.0, ahead.probability)
         yield f"{today}; {met} of cases comply ({level} required): neither a longer coast nor a probe pulse is needed"
         return
-    if longer is None:
-        last = ahead.coasts[-1]
-        yield f"{today}; a coast of {last.length:.4g} s would leave {degrees(last.nutation)}: it does not pay"
-    else:
-        yield f"{today}; a coast of {longer.length:.4g} s would leave {degrees(longer.nutation)}: it pays"
+    coast, pays = (ahead.coasts[-1], "it does not pay") if longer is None else (longer, "it pays")
+    yield f"{today}; a coast of {coast.length:.4g} s would leave {degrees(coast.nutation)}: {pays}"
     if probe is not None:
         pulse = f"one probe pulse of {probe.probe}, {probe.on_time:.3g} s, amid a coast of {probe.length:.4g} s"
         yield f"{pulse} would leave {degrees(probe.nutation)}: it pays; fit it with --schedule"
@@ -228,33 +222,25 @@ def fit_json(fit: Fit, at_time: Carried, ahead: Outlook | None = None, warnings:
     return {
         **heading(model.spacecraft),
         "record": {
-            "start_s": model.record.start,
-            "end_s": model.record.end,
+            **values_of(model.record, "start_s", "end_s"),
             "pulses": len(model.record.fired),
             "signals": signal_table(fit).json(),
         },
         "time_s": at_time.time,
-        "estimates": estimate_table(estimates(fit, at_time.time)).json(),
+        "estimates": DataTable("Estimates", ESTIMATES, estimates(fit, at_time.time)).json(),
         "kept": list(fit.kept),
         "information": fit.information.tolist(),
         "parameters": [parameter.name for parameter in model.parameters],
-        "values_SI": fit.values.tolist(),
-        "covariance_SI": fit.region.tolist(),
+        **values_of(fit, "values_SI=values", "covariance_SI=region"),
         "dispersed": {
             "inputs": list(at_time.names),
-            "values_SI": at_time.values.tolist(),
-            "sigmas_SI": at_time.sigmas.tolist(),
-            "correlation": at_time.correlation.tolist(),
+            **values_of(at_time, "values_SI=values", "sigmas_SI=sigmas", "correlation"),
         },
         "notes": [*warnings, *doubts(fit), *untold(model.record), *notes(fit, at_time)],
         "next": ahead
         and {
-            "scheme": ahead.scheme,
-            "propellant_kg": ahead.propellant,
-            "probability": ahead.probability,
-            "longer_coast_s": ahead.longer and ahead.longer.length,
-            "probe": ahead.probe and ahead.probe.probe,
-            "probe_per_propellant": ahead.thrifty and ahead.thrifty.probe,
+            **values_of(ahead, "scheme", "propellant_kg", "probability", "longer_coast_s=longer.length"),
+            **values_of(ahead, "probe=probe.probe", "probe_per_propellant=thrifty.probe"),
             "prospects": prospect_table(ahead).json(),
         },
     }

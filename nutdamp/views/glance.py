@@ -26,20 +26,8 @@ from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import SLACK, Spacecraft
 from nutdamp.spacecraft.requirements import Bound, Part
-from nutdamp.views import decisions
+from nutdamp.views import decisions, parts, tables
 from nutdamp.views.decisions import COUNT, coloured, lasting, limit, size, verdict
-from nutdamp.views.parts import (
-    angle_names,
-    angle_texts,
-    block_table,
-    blocks_screen,
-    cone_margins,
-    derived_table,
-    pulse_table,
-    title,
-    turn_floor,
-    turning,
-)
 from nutdamp.views.tables import (
     TEXT,
     WHOLE,
@@ -50,7 +38,6 @@ from nutdamp.views.tables import (
     Shared,
     angle_of,
     facts,
-    lines_of,
     to_figures,
 )
 from nutdamp.views.text import (
@@ -72,26 +59,14 @@ NOT = "✗"  # sign before a value above the requirement
 SHORT_NAMES = ("RA", "dec")  # right ascension and declination, where there is little room
 
 
-class SchemeRow(NamedTuple):
-    """A plan among those ``compared``; without a schedule most values are unknown."""
-
-    plan: Plan
-    compared: Comparison
-
-
 def scheme_table(compared: Comparison, chosen: Plan | None) -> DataTable:
-    """One row a scheme; the ``chosen`` one stands out.
-
-    Residuals are those of the flight through real widths; ``met_fraction`` is the share of cases that comply, where all
-    have flown.
-    """
-    rows = [SchemeRow(plan, compared) for plan in compared.plans]
+    """One row a scheme, with residuals of the flight through real widths; the ``chosen`` one stands out."""
     mark = next((index for index, plan in enumerate(compared.plans) if plan is chosen), None)
     how = model_name(plan.pulses for plan in compared.plans)
     ideal = [plan.scheme for plan in compared.plans if plan.pulses.idealised]
     alone = f" (ideal impulses: {listed(ideal)})" if how == REAL_WIDTHS and ideal else ""
-    title = f"Cost and residuals of each scheme with nominal values, by {how}{alone}"
-    return DataTable(title, tuple(_columns(compared, chosen)), rows, compared, mark)
+    subject = f"Cost and residuals of each scheme with nominal values, by {how}{alone}"
+    return DataTable(subject, tuple(_columns(compared, chosen)), compared.plans, compared, mark)
 
 
 def limits(body: Spacecraft) -> tuple[float, float]:
@@ -101,25 +76,17 @@ def limits(body: Spacecraft) -> tuple[float, float]:
     return most.get(Part.NUTATION, math.inf), min(ends, default=math.inf)
 
 
-def _feasible(get: Callable[[Plan], Any] | str) -> Callable[[SchemeRow], Any]:
+def _feasible(get: Callable[[Plan], Any] | str) -> Callable[[Plan], Any]:
     """A value of plans that have a schedule, or an attribute of them."""
     value = attrgetter(get) if isinstance(get, str) else get
-    return lambda row: value(row.plan) if row.plan.feasible else None
+    return lambda plan: value(plan) if plan.feasible else None
 
 
-def _met(row: SchemeRow) -> bool | None:
-    return row.compared.meets(row.plan) if row.plan.feasible else None
-
-
-def scheme_verdict(row: SchemeRow) -> str:
+def scheme_verdict(compared: Comparison, plan: Plan) -> str:
     """Verdict on a plan, or the reason in a word why there is none."""
-    if not row.plan.feasible:
-        return decisions.no_plan(row.plan)
-    return decisions.VERDICT[_met(row)] + ", timed" * (not row.plan.commandable)
-
-
-def _share(row: SchemeRow) -> str:
-    return decisions.share_text(row.compared.shares.get(row.plan)).removesuffix(" %")
+    if not plan.feasible:
+        return decisions.no_plan(plan)
+    return decisions.VERDICT[compared.meets(plan)] + ", timed" * (not plan.commandable)
 
 
 def _four(value: float) -> str:
@@ -131,19 +98,23 @@ def _columns(compared: Comparison, chosen: Plan | None) -> Iterator[Column]:
     feasible = [plan for plan in compared.plans if plan.feasible]
     fuelled = any(plan.pulses.propellant is not None for plan in feasible)
     aimed, everywhere = body.goal.axis is not None, "screen full page"
-    exact = {plan: share.exact for plan, share in compared.shares.items()}
+    met = _feasible(compared.meets)
+
+    def share(plan: Plan) -> str:
+        return decisions.share_text(compared.shares.get(plan)).removesuffix(" %")
 
     def shortly(largest: float) -> Callable[[float], str]:
         return lambda angle: short_angle(math.radians(angle), largest)
 
-    yield Column("scheme", Shared.SCHEME, "", lambda row: row.plan.scheme, where=f"{everywhere} csv", kind=TEXT)
-    yield Column("feasible", "", "", lambda row: row.plan.feasible, where="csv", kind=YES_NO)
-    yield Column("recommended", "", "", lambda row: row.plan is chosen, where="csv", kind=YES_NO)
-    yield Column("meets_requirement", "", "", lambda row: row.compared.meets(row.plan), where="csv", kind=YES_NO)
-    yield Column("met_fraction", "", "", lambda row: exact.get(row.plan), where="csv")
+    yield Column("scheme", Shared.SCHEME, "", attrgetter("scheme"), where=f"{everywhere} csv", kind=TEXT)
+    yield Column("feasible", "", "", attrgetter("feasible"), where="csv", kind=YES_NO)
+    yield Column("recommended", "", "", lambda plan: plan is chosen, where="csv", kind=YES_NO)
+    yield Column("meets_requirement", "", "", compared.meets, where="csv", kind=YES_NO)
+    exact = {plan: known.exact for plan, known in compared.shares.items()}
+    yield Column("met_fraction", "", "", exact.get, where="csv")
     count = _feasible(lambda plan: len(plan.pulses))
     yield Column("", Shared.PULSES, "", count, where=everywhere, kind=WHOLE)
-    yield Column("pulses", "", "", lambda row: len(row.plan.pulses), where="csv", kind=WHOLE)
+    yield Column("pulses", "", "", lambda plan: len(plan.pulses), where="csv", kind=WHOLE)
     end, impulse = _feasible("pulses.end"), _feasible("pulses.total_impulse")
     yield Column("", "end", "s", end, to_figures(4), "screen")
     yield Column("end_s", "end", "s", end, lambda value: f"{value:.3f}", "full page csv")
@@ -152,19 +123,19 @@ def _columns(compared: Comparison, chosen: Plan | None) -> Iterator[Column]:
     yield Column("least_impulse_Nms", "", "", _feasible("spacecraft.least_impulse"), where="csv")
     for name, whole in ratios(body):
         yield Column("", f"impulse over {name}", "", _feasible(_over(whole)), lambda value: f"{value:.4f}", "full page")
-    yield Column("propellant_kg", Shared.PROPELLANT, "kg", _feasible("pulses.propellant"), where="csv")
+    spent = _feasible("pulses.propellant")
+    yield Column("propellant_kg", Shared.PROPELLANT, "kg", spent, where="csv")
     if fuelled:
-        spent = _feasible(lambda plan: None if plan.pulses.propellant is None else 1e3 * plan.pulses.propellant)
-        yield Column("", Shared.PROPELLANT, "g", spent, _four, "full page")
-        yield Column("", Shared.PROPELLANT, "g", spent, to_figures(4), "screen")
+        yield Column("", Shared.PROPELLANT, "g", spent, lambda mass: _four(1e3 * mass), "full page")
+        yield Column("", Shared.PROPELLANT, "g", spent, to_figures(4, 1e3), "screen")
     for name in ("nutation", "momentum_shift"):
         heading = f"{name.replace('_', ' ')}, impulses (17)"
-        yield Column("", heading, "deg", angle_of(f"plan.residual.{name}"), small_angle, "full")
+        yield Column("", heading, "deg", angle_of(f"residual.{name}"), small_angle, "full")
     ends = ("full page", everywhere) if aimed else (everywhere, "")
     shown = {"nutation": everywhere, "body_cone": "full", "space_cone": "full", "momentum_shift": ends[0],
              "axis_error": ends[1]}  # fmt: skip
     for name, where in shown.items():
-        heading, angle = name.replace("_", " "), angle_of(f"plan.flown.{name}")
+        heading, angle = name.replace("_", " "), angle_of(f"flown.{name}")
         if "screen" in where:
             yield Column("", heading, "", angle, shortly(least[name != "nutation"]), "screen")
         yield Column(f"{name}_deg", heading, "deg", angle, small_angle, where.removeprefix("screen ") + " csv")
@@ -173,26 +144,26 @@ def _columns(compared: Comparison, chosen: Plan | None) -> Iterator[Column]:
     if body.goal.spin is not None:
         yield Column("", "final spin", "rad/s", _feasible("flight.settled.spin"), to_figures(6), "full")
     where = "full csv" + " page" * any(plan.spin_change for plan in compared.plans)
-    yield Column("spin_change_rad_s", "spin change", "rad/s", lambda row: row.plan.spin_change, _four, where)
+    yield Column("spin_change_rad_s", "spin change", "rad/s", attrgetter("spin_change"), _four, where)
     where = "csv" + " full page" * any(plan.delta_v is not None for plan in compared.plans)
     yield Column("delta_v_m_s", "|ΔV|", "m/s", _speed, _four, where)
     if compared.shares:
-        yield Column("", Shared.CASES, "%", _share, where="screen", kind=TEXT)
-        yield Column("", COUNT, "%", _share, where="full page", kind=TEXT)
+        yield Column("", Shared.CASES, "%", share, where="screen", kind=TEXT)
+        yield Column("", COUNT, "%", share, where="full page", kind=TEXT)
     yield from _bounds(compared)
-    yield Column("", Shared.VERDICT, "", scheme_verdict, where=everywhere, kind=TEXT, met=_met)
-    yield Column("why", "", "", lambda row: infeasibility(row.plan), where="csv", kind=TEXT)
+    yield Column("", Shared.VERDICT, "", partial(scheme_verdict, compared), where=everywhere, kind=TEXT, met=met)
+    yield Column("why", "", "", infeasibility, where="csv", kind=TEXT)
 
 
-def _speed(row: SchemeRow) -> float | None:
-    return None if row.plan.delta_v is None else math.hypot(*row.plan.delta_v)
+def _speed(plan: Plan) -> float | None:
+    return None if plan.delta_v is None else math.hypot(*plan.delta_v)
 
 
 def ratios(body: Spacecraft) -> Iterator[tuple[str, float]]:
     """The floors of impulse, N m s, by name: A|ω0|, and with a target C|ω3|β."""
     yield "A|ω0|", body.least_impulse
     if body.goal.axis is not None:
-        yield turn_floor(body), turning(body)
+        yield parts.turn_floor(body), parts.turning(body)
 
 
 def _over(whole: float) -> Callable[[Plan], float | None]:
@@ -201,22 +172,20 @@ def _over(whole: float) -> Callable[[Plan], float | None]:
 
 def _directions(body: Spacecraft) -> Iterator[Column]:
     keys = ("tilt_deg", "azimuth_deg") if body.attitude is None else ("right_ascension_deg", "declination_deg")
-    names = angle_names(body) if body.attitude is None else SHORT_NAMES
-    for which in ("axis", "momentum"):
-        for at, key in enumerate(keys):
-            yield Column(f"{which}_{key}", "", "", _feasible(partial(_direction, which, at)), where="csv")
-            if which == "axis":
-                shown = _feasible(partial(_shown_direction, at))
-                yield Column("", f"axis {names[at]}", "deg", shown, where="full page")
+    names = parts.angle_names(body) if body.attitude is None else SHORT_NAMES
+    for at, key in enumerate(keys):
+        yield Column(f"axis_{key}", "", "", _feasible(partial(_direction, "axis", key)), where="csv")
+        yield Column("", f"axis {names[at]}", "deg", _feasible(partial(_shown_direction, at)), where="full page")
+    for key in keys:
+        yield Column(f"momentum_{key}", "", "", _feasible(partial(_direction, "momentum", key)), where="csv")
 
 
-def _direction(which: str, at: int, plan: Plan) -> float | None:
-    angles = decisions.direction_json(plan.spacecraft, getattr(plan.flight.final, which))
-    return list(angles.values())[at]
+def _direction(which: str, key: str, plan: Plan) -> float | None:
+    return decisions.direction_json(plan.spacecraft, getattr(plan.flight.final, which))[key]
 
 
 def _shown_direction(at: int, plan: Plan) -> str:
-    return angle_texts(plan.spacecraft, plan.flight.final.axis)[at].removesuffix(" deg")
+    return parts.angle_texts(plan.spacecraft, plan.flight.final.axis)[at].removesuffix(" deg")
 
 
 def _bounds(compared: Comparison) -> Iterator[Column]:
@@ -226,7 +195,7 @@ def _bounds(compared: Comparison) -> Iterator[Column]:
         name, cell = f"{bound.part.label} {limit(bound)}", partial(_part, bound)
         yield Column("", name, "", _feasible(cell), where="full", kind=TEXT)
     for at, cone in enumerate(at_start(compared.spacecraft)[: len(compared.spacecraft.keep)]):
-        for kept, _, _ in cone_margins(cone):
+        for kept, _, _ in parts.cone_margins(cone):
             name = f"axis from {cone.keep.name} {kept}"
             yield Column("", name, "", _feasible(partial(_cone, at, kept)), where="full", kind=TEXT)
 
@@ -238,16 +207,12 @@ def _part(bound: Bound, plan: Plan) -> str:
 
 
 def _cone(at: int, kept: str, plan: Plan) -> str:
-    angles = ((angle, left) for bound, angle, left in cone_margins(plan.aspects[at]) if bound == kept)
+    angles = ((angle, left) for bound, angle, left in parts.cone_margins(plan.aspects[at]) if bound == kept)
     return next(f"{NOT} " * (left < -SLACK) + degrees(angle).removesuffix(" deg") for angle, left in angles)
 
 
 LINES = 24  # lines of the screen
-ROWS = 6  # pulses or blocks that are shown one by one; of more the first `FIRST` and the last
-
-FIRST = 4
-
-
+ROWS, FIRST = 6, 4  # pulses or blocks that are shown one by one; of more the first and the last
 TIGHTEST = 2  # requirements that are shown where there is no room for all that are met
 NOTES = 3  # notes that are shown, at most
 DIGITS = 8  # figures of a value beside its limit, at most
@@ -256,13 +221,12 @@ DIGITS = 8  # figures of a value beside its limit, at most
 def glance(
     compared: Comparison, decision: Decision | None, robust: str = "", beside: Sequence[Note] = ()
 ) -> RenderableType:
-    """The screen of a comparison and the plan to fly; or of the reason why there is none.
+    """The screen of a comparison and the plan to fly, or of the reason why there is none.
 
-    ``robust``: the name of the plan among those compared, where it was chosen by dispersed cases;
-    ``beside``: notes on that choice.
+    ``robust``: its name among those compared, where dispersed cases chose it; ``beside``: notes on that choice.
     """
     body = compared.spacecraft
-    head = [*title(body), headline(compared, decision, robust)]
+    head = [*parts.title(body), headline(compared, decision, robust)]
     remarks = ordered([*beside, *notes(compared, decision, robust)])
     more = [screen_line(note) for note in remarks if severity(note) != WARNING]
     name = robust or ("" if decision is None else decision.plan.scheme)
@@ -277,15 +241,14 @@ def glance(
     def screen(first: int) -> RenderableType:
         fired: list[RenderableType] = []
         if plan.pulses.blocks:
-            fired = [Text(), block_table(plan.flight).screen("screen", first=first)]
+            fired = [Text(), parts.block_table(plan.flight).screen("screen", first=first)]
         elif len(plan.pulses):
-            shown = pulse_table(plan.flight, least=limits(body)[0])
+            shown = parts.pulse_table(plan.flight, least=limits(body)[0])
             fired = [Text(), shown.screen("screen", between=", ", first=first if len(shown.rows) > ROWS else None)]
         required, middle = requirement_rows(decision), [ends(decision), *fired]
-        blocks = bool(plan.pulses.blocks)
-        return _fitted(head, required, middle, more, table, blocks=blocks)
+        return _fitted(head, required, middle, more, table, blocks=bool(plan.pulses.blocks))
 
-    return next((shown for shown in map(screen, (FIRST, FIRST // 2)) if lines_of(shown) <= LINES), screen(1))
+    return next((shown for shown in map(screen, (FIRST, FIRST // 2)) if tables.lines_of(shown) <= LINES), screen(1))
 
 
 def notes(compared: Comparison, decision: Decision | None, robust: str = "") -> list[Note]:
@@ -357,7 +320,7 @@ def requirement_rows(decision: Decision) -> list[RequirementRow]:
         rows.append(RequirementRow(bound.part.label, *words, met, left, (used[0], used[1])))
     for aspect in decision.aspects:
         name, keep = f"axis from {aspect.keep.name}", aspect.keep
-        for text, angle, margin in cone_margins(aspect):
+        for text, angle, margin in parts.cone_margins(aspect):
             kept, least = margin >= -SLACK, margin == aspect.least - keep.least
             used_up = keep.least / max(angle, SLACK) if least else angle / keep.most
             words, met = ("", f"nominal {degrees(angle)}", f"limit {text}"), coloured(decisions.VERDICT[kept], kept)
@@ -385,8 +348,8 @@ def ends(decision: Decision) -> Table:
     if formula is not None and (by_impulses := short_angle(formula.nutation, least)) not in angles[0].split():
         angles[0] += f" (17: {by_impulses})"
     rows = [("after pulses, deg", "  ".join(angles))]
-    first, second = angle_texts(body, decision.flight.final.axis)
-    names = angle_names(body) if body.attitude is None else SHORT_NAMES
+    first, second = parts.angle_texts(body, decision.flight.final.axis)
+    names = parts.angle_names(body) if body.attitude is None else SHORT_NAMES
     turned = f"turned by {short_angle(left.momentum_shift, turn)} deg"
     turned = turned if body.goal.axis is None else f"{short_angle(left.axis_error, turn)} deg off target"
     spun = abs(decision.flight.final.spin - body.spin) > requirements.SPIN_TOLERANCE * abs(body.spin)
@@ -407,7 +370,7 @@ def _fitted(
     blocks: bool = False,
 ) -> RenderableType:
     """All parts within the lines there are; notes go first, then requirements that are met with room."""
-    lines = lines_of(*head, *middle, schemes) + len(required) + 2
+    lines = tables.lines_of(*head, *middle, schemes) + len(required) + 2
     apart = [Text()] * (lines <= LINES)
     lines -= 1 - len(apart)
     shown = list(required)
@@ -417,7 +380,7 @@ def _fitted(
         lines -= len(required) - len(shown)
     shown_notes: list[Text] = []
     for note in more:
-        lines += lines_of(note)
+        lines += tables.lines_of(note)
         if lines > LINES or len(shown_notes) == NOTES:
             break
         shown_notes.append(note)
@@ -432,21 +395,21 @@ def comparison_screen(compared: Comparison) -> RenderableType:
     """All tables of ``plan``, the decision on top."""
     decided, needless = decide(compared), decisions.needless(compared)
     schemes = scheme_table(compared, compared.recommended).transposed("full")
-    results: list[RenderableType] = [Text(), derived_table(compared.spacecraft), Text(), schemes]
-    parts: list[RenderableType] = [Text(compared.spacecraft.name, style="bold")]
+    results: list[RenderableType] = [Text(), parts.derived_table(compared.spacecraft), Text(), schemes]
+    lead: list[RenderableType] = [Text(compared.spacecraft.name, style="bold")]
     if needless is not None:
-        parts.append(Text.assemble(("No pulse needed: ", "bold"), f"{needless}."))
+        lead.append(Text.assemble(("No pulse needed: ", "bold"), f"{needless}."))
     remarks = [note for plan in compared.plans for note in plan_notes(plan)]
     results += [Text(), *map(screen_line, ordered(remarks))] if remarks else []
     if decided is None:
-        return Group(*parts, Text(f"No recommendation: {joined(reasons(compared))}.", style="bold"), *results)
+        return Group(*lead, Text(f"No recommendation: {joined(reasons(compared))}.", style="bold"), *results)
     if decided.plan.pulses.blocks:
-        results += [Text(), blocks_screen(decided.plan.flight, decided.plan.delta_v)]
+        results += [Text(), parts.blocks_screen(decided.plan.flight, decided.plan.delta_v)]
     elif len(decided.plan.pulses):
-        results += [Text(), pulse_table(decided.plan.flight).screen("full")]
+        results += [Text(), parts.pulse_table(decided.plan.flight).screen("full")]
     why, warnings = joined(reasons(compared)), comparison_warnings(compared, cones=False)
     return Group(
-        *parts,
+        *lead,
         Text.assemble("Recommended: ", (decided.plan.scheme, "bold"), f" – {why}."),
         decisions.statement(decided),
         *map(screen_line, ordered([*warnings, *decision_notes(decided), *alternatives(compared)])),

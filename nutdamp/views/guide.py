@@ -114,17 +114,13 @@ def _part(text: str) -> TopicPart:
 
 def _blocks(text: str) -> Iterator[Block]:
     for number, part in enumerate(re.split(r"^```(.*\n(?:.*\n)*?)```$", text, flags=re.MULTILINE)):
-        if number % 2:
-            yield _code(part.rstrip("\n").split("\n")[1:])
+        lines = part.rstrip("\n").split("\n")[1:]
+        if number % 2 and all(line.startswith("$ ") for line in lines):  # command lines alone
+            yield CommandHelp(tuple(tuple(re.split(r" (?=--?[a-z])", line[2:])) for line in lines))
+        elif number % 2:
+            yield Formula(tuple(lines))
         else:
             yield from map(_block, filter(str.strip, re.split(r"\n\n+", part.strip("\n"))))
-
-
-def _code(lines: list[str]) -> Block:
-    """Command lines alone, or lines to show as they are."""
-    if all(line.startswith("$ ") for line in lines):
-        return CommandHelp(tuple(tuple(re.split(r" (?=--?[a-z])", line[2:])) for line in lines))
-    return Formula(tuple(lines))
 
 
 def _block(text: str) -> Block:
@@ -141,16 +137,12 @@ def _block(text: str) -> Block:
 
 def _table(lines: list[str]) -> TopicRows:
     """The rows of a table: the first cell as name; further ones under their headings where there are several."""
-    heads, _, *cells = (
+    (_, *heads), _, *cells = (
         [_plain(cell.strip()).replace("\\|", "|") for cell in re.split(r"(?<!\\)\|", line)[1:-1]] for line in lines
     )
-    if len(heads) == 2:
-        return TopicRows(tuple((name, text) for name, text in cells))
-    rows = []
-    for name, *texts in cells:
-        named = (f"{head}: {text}" for head, text in zip(heads[1:], texts, strict=True) if text)
-        rows.append((name, "\n".join(named)))
-    return TopicRows(tuple(rows))
+    leads = [f"{head}: " if len(heads) > 1 else "" for head in heads]
+    texts = ([f"{lead}{text}" for lead, text in zip(leads, row, strict=True) if text] for _, *row in cells)
+    return TopicRows(tuple((row[0], "\n".join(text)) for row, text in zip(cells, texts, strict=True)))
 
 
 _LINK = re.compile(r"(?P<before>explain |, )?\[(?P<text>[^\]]+)\]\((?P<page>[^)#]*?)(\.md)?(#(?P<entry>[^)]*))?\)")
@@ -202,18 +194,14 @@ def found(requested: str) -> Topic:
     Raises BadRequest, which names a near one, where there is none.
     """
     name = re.sub(r"[\s_]+", "-", requested.strip().casefold())
-    if name in NAMES:
-        return page_or_topic(name)
-    if name in (other := {"energy-sink": "dissipation", "gyrostat": "wheel"}):
-        return page_or_topic(other[name])
-    if _FIGURE.fullmatch(name):
-        return page_or_topic("figures")
+    name = {"energy-sink": "dissipation", "gyrostat": "wheel"}.get(name, name)
+    if name in NAMES or _FIGURE.fullmatch(name):
+        return page_or_topic(name if name in NAMES else "figures")
     if match := _NUMBER.fullmatch(requested.strip().casefold()):
         number = match["number"]
         called = number if "." in number else f"{'K' if match['source'] == 'k' else 'M'}({number})"
-        for equation in EQUATIONS:
-            if equation.number == called:
-                return equation.topic
+        if equation := next((entry for entry in EQUATIONS if entry.number == called), None):
+            return equation.topic
         raise BadRequest(f"there is no equation {called}; there are M(1) to M(27), K(5) to K(15) and 24.4")
     raise BadRequest(f"there is no topic {requested!r}; {meant(name, NAMES)}")
 
@@ -253,13 +241,8 @@ class Equation(NamedTuple):
         """The equation of a topic of `equations.md`: its formula, symbols and place, and its changes."""
         ((_, (formula, rows, *changed)),) = topic.parts
         facts = dict(cast("TopicRows", rows).rows)
-        symbols = tuple(facts["symbols"].split())
-        return cls(topic.name, topic.summary, cast("Formula", formula), symbols, facts["place"], tuple(changed))
-
-    @property
-    def remarks(self) -> tuple[str, ...]:
-        """Differences from the print, in words."""
-        return tuple(block for block in self.changed if isinstance(block, str))
+        formula, symbols = cast("Formula", formula), tuple(facts["symbols"].split())
+        return cls(topic.name, topic.summary, formula, symbols, facts["place"], tuple(changed))
 
     @property
     def topic(self) -> Topic:
@@ -293,9 +276,8 @@ NOTE_ENTRY = re.compile(r"^## (\S+) \((\w+)\)\n\n((?:> [^\n]*\n)+)\n(.*?)(?=\n##
 @cache
 def note_entries() -> dict[str, NoteEntry]:
     """All codes."""
-    text = (FOLDER / "notes.md").read_text(encoding="utf-8")
-    entries = {}
-    for code, severity, quoted, paragraph in NOTE_ENTRY.findall(text):
-        words = " ".join(line.removeprefix("> ") for line in quoted.splitlines())
-        entries[code] = NoteEntry(severity, words, " ".join(paragraph.split()))
-    return entries
+    entries = NOTE_ENTRY.findall((FOLDER / "notes.md").read_text(encoding="utf-8"))
+    return {
+        code: NoteEntry(severity, " ".join(quoted[2:-1].split("\n> ")), " ".join(paragraph.split()))
+        for code, severity, quoted, paragraph in entries
+    }

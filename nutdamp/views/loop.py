@@ -21,7 +21,7 @@ from nutdamp.planning.decision import Decision
 from nutdamp.planning.notes import decision_notes
 from nutdamp.spacecraft.equipment import GYRO, Loop
 from nutdamp.spacecraft.model import Spacecraft
-from nutdamp.views import decisions
+from nutdamp.views import decisions, tables
 from nutdamp.views.decisions import VERDICT, heading
 from nutdamp.views.parts import Remark, opening, pulse_table, seconds, summary, warnings_of
 from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable, Shared, angle_of, facts, to_figures
@@ -32,10 +32,7 @@ ROUNDING = 1e-12  # share of the nutation that a firing leaves by rounding alone
 
 
 class FiringRow(NamedTuple):
-    """A firing, counted from 0, with the nutation before and after it, rad, and its differences by DOP853.
-
-    ``apart``: start and on-time, s, and nutation before the firing, rad.
-    """
+    """A firing, from 0, with the nutation before and after it, rad; ``apart``: start, on-time, nutation by DOP853."""
 
     at: int
     firing: Fired
@@ -44,9 +41,7 @@ class FiringRow(NamedTuple):
     apart: tuple[float, float, float] = (math.nan, math.nan, math.nan)
 
 
-def _apart(value: float) -> str:
-    return f"{value:.1e}"
-
+APART = "{:.1e}".format  # text of a difference
 
 FIRINGS = (
     Column("", "firing", "", lambda row: row.at + 1, where="screen verified", kind=WHOLE),
@@ -54,17 +49,17 @@ FIRINGS = (
            kind=TEXT),
     Column("", Shared.START, "s", lambda row: row.firing.pulse.start, seconds, "screen"),
     Column("start_s", Shared.START, "s", lambda row: row.firing.pulse.loaded[0], seconds, "verified verified_json"),
-    Column("start_difference_s", "differs by", "s", lambda row: row.apart[0], _apart, "verified verified_json"),
+    Column("start_difference_s", "differs by", "s", lambda row: row.apart[0], APART, "verified verified_json"),
     Column("", Shared.ON_TIME, "s", lambda row: row.firing.pulse.on_time, seconds, "screen"),
     Column("on_time_s", Shared.ON_TIME, "s", lambda row: row.firing.pulse.loaded[1], seconds, "verified verified_json"),
-    Column("on_time_difference_s", "differs by", "s", lambda row: row.apart[1], _apart, "verified verified_json"),
+    Column("on_time_difference_s", "differs by", "s", lambda row: row.apart[1], APART, "verified verified_json"),
     Column("", Shared.CHANNEL, "", lambda row: row.firing.pulse.channel, where="screen", kind=TEXT),
-    Column("decided_s", "", "", lambda row: row.firing.decided, where="json"),
+    *tables.file_columns("json", "decided_s=firing.decided"),
     Column("seen_deg", "nutation seen", "deg", angle_of("firing.seen"), small_angle, "screen json"),
     Column("", "before", "deg", angle_of("before"), small_angle, "screen"),
     Column("", "after", "deg", angle_of("after"), small_angle, "screen"),
     Column("", "nutation", "deg", angle_of("firing.true_nutation"), small_angle, "verified"),
-    Column("nutation_difference_deg", "differs by", "deg", lambda row: math.degrees(row.apart[2]), _apart,
+    Column("nutation_difference_deg", "differs by", "deg", lambda row: math.degrees(row.apart[2]), APART,
            "verified verified_json"),
 )  # fmt: skip
 
@@ -76,23 +71,17 @@ def firing_table(run: LoopRun) -> DataTable:
     return DataTable("Firings", FIRINGS, [FiringRow(index, *row) for index, row in enumerate(angles)])
 
 
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None
-
-
 MARGINS = (
     Column("channel", Shared.CHANNEL, "", lambda row: row.channel, where="screen json", kind=TEXT),
     Column("late_deg", "late", "deg", angle_of("late"), to_figures(4), "screen json"),
-    Column("latest_deg", "", "", lambda row: _finite(math.degrees(row.latest)), where="json"),
+    *tables.file_columns("json", "latest_deg"),
     Column("gain", "remaining", "%", lambda row: row.gain,
            lambda gain: f"{100.0 * gain:.4g}" if gain >= ROUNDING else "0", "screen json"),
     Column("growth", "growth in a period", "%", lambda row: row.growth, lambda growth: f"{100.0 * (growth - 1.0):.3g}",
            "screen json"),
     Column("", "delay margin", "", lambda row: row.delay, lambda delay: "none" if delay < 0.0 else duration(delay),
            "screen"),
-    Column("delay_margin_s", "", "", lambda row: _finite(row.delay), where="json"),
-    Column("damps", "", "", lambda row: row.damps, where="json", kind=YES_NO),
-    Column("reversed", "", "", lambda row: row.turned, where="json", kind=YES_NO),
+    *tables.file_columns("json", "delay_margin_s=delay", "damps", "reversed=turned"),
 )  # fmt: skip
 
 
@@ -248,11 +237,8 @@ def loop_json(plan: LoopPlan) -> dict[str, Any]:
     run, body = plan.flown_run, plan.spacecraft
     pulses = zip(pulse_table(run.flight).json("flown"), firing_table(run).json(), strict=True)
     return {
-        **decisions.heading(body),
-        "law": run.loop.law,
-        "seed": run.seed,
-        "case": run.case,
-        "until_s": run.until,
+        **heading(body),
+        **tables.values_of(run, "law=loop.law", "seed", "case", "until_s"),
         "stopped": run.stop.name.lower(),
         "channel": run.channel,
         "meets_requirement": False if run.stop.fault else plan.meets_requirement,
@@ -261,9 +247,7 @@ def loop_json(plan: LoopPlan) -> dict[str, Any]:
         "largest_since_quiet_deg": None if run.settled is None else math.degrees(plan.largest[0]),
         "dead_band_deg": math.degrees(plan.band.most),
         "pulses": [pulse | firing for pulse, firing in pulses],
-        "total_impulse_Nms": plan.total_impulse,
-        "propellant_kg": plan.propellant,
-        "end_s": plan.end,
+        **tables.values_of(plan, "total_impulse_Nms", "propellant_kg", "end_s"),
         "flown": decisions.residual_json(plan.flight.residual),
         "final": decisions.final_json(plan.flight),
         "target": decisions.target_json(body),
@@ -273,14 +257,12 @@ def loop_json(plan: LoopPlan) -> dict[str, Any]:
 
 def verified_json(verification: LoopVerification) -> dict[str, Any]:
     """The object of ``verify --loop --json``: of each firing the difference by DOP853."""
-    run = verification.run
     return {
-        **decisions.heading(run.flight.spacecraft),
+        **heading(verification.run.flight.spacecraft),
         "scheme": "loop",
         "agree": None if verification.missing else verification.agree,
         "missing": verification.missing or None,
-        "evaluations": verification.evaluations,
-        "until_s": run.until,
+        **tables.values_of(verification, "evaluations", "until_s=run.until"),
         "firings": _differences(verification).json("verified_json"),
     }
 
@@ -292,8 +274,8 @@ def _of_cycle(name: str, scale: float = 1.0) -> Callable[[HeldNutation], float |
     """A figure of the limit cycle times ``scale``; None without one."""
 
     def value(held: HeldNutation) -> float | None:
-        figure = None if held.cycle is None else getattr(held.cycle, name)
-        return None if figure is None else scale * figure
+        figure = tables.value_at(held.cycle, name)
+        return None if figure is None else scale * float(figure)
 
     return value
 
@@ -304,7 +286,7 @@ FILES, EVERYWHERE = "csv json", "screen csv json"
 HELD = (
     Column("start_deg", Shared.START, "deg", angle_of("thresholds.start"), to_figures(4), EVERYWHERE),
     Column("stop_deg", "stop", "deg", angle_of("thresholds.stop"), to_figures(4), EVERYWHERE),
-    Column("first_firing_s", "", "", lambda held: held.begins, where=FILES),
+    *tables.file_columns(FILES, "first_firing_s=begins"),
     Column("pulses_per_day", Shared.PULSES, "1/day", _of_cycle("pulses", DAY), to_figures(4), f"{EVERYWHERE} other"),
     Column("cycles_per_day", "", "", _of_cycle("cycles", DAY), where=f"{FILES} other"),
     Column("impulse_Nms_per_year", "", "", _of_cycle("impulse", YEAR), where=FILES),
@@ -319,8 +301,7 @@ HELD = (
     Column("nutation_largest_deg", Shared.MOST, "deg", angle_of("cycle.largest"), to_figures(3), EVERYWHERE),
     Column("", Shared.SPIN, "%/day", lambda held: None if held.slows is None else 100.0 * held.slows * DAY / YEAR,
            to_figures(2), "screen"),
-    Column("noise_deg", "", "", angle_of("band.noise"), where=FILES),
-    Column("smallest_pulse_deg", "", "", angle_of("band.step"), where=FILES),
+    *tables.file_columns(FILES, "noise_deg=band.noise", "smallest_pulse_deg=band.step"),
     Column("tank_lasts_days", "tank", "days", lambda held: None if held.lasts is None else held.lasts / DAY,
            to_figures(4), "screen", lambda budget: budget.spacecraft.tank is not None),
     Column("tank_lasts_days", "", "", lambda held: None if held.lasts is None else held.lasts / DAY, where=FILES),
@@ -371,13 +352,12 @@ def _outlook(budget: Budget) -> Iterator[str]:
 
 def _warnings(budget: Budget) -> Iterator[str]:
     body = budget.spacecraft
-    warned: set[str] = set()
+    warned: dict[str, str] = {}
     for row in budget.held:
         named = f"{most(row.thresholds.start)} to {most(row.thresholds.stop)}: " if len(budget.held) > 1 else ""
         for text in _warnings_of_row(row, budget):
-            if text not in warned:
-                warned.add(text)
-                yield f"{named}{text}"
+            warned.setdefault(text, f"{named}{text}")
+    yield from warned.values()
     changes = [row.slows for row in budget.held if row.slows is not None]
     if changes and max(map(abs, changes)) > SLOW:
         worst = max(changes, key=abs) * DAY / YEAR
@@ -439,14 +419,13 @@ def budget_csv(budget: Budget) -> str:
 
 def budget_json(budget: Budget) -> dict[str, Any]:
     """Growth of the nutation, and every row."""
-    body, table = budget.spacecraft, budget_table(budget)
+    table = budget_table(budget)
     others = replace(table, rows=[replace(held, cycle=held.other) for held in budget.held])
     return {
-        **heading(body),
-        "growth_1_s": body.growth,
-        "largest_deg": None if budget.largest is None else math.degrees(budget.largest),
-        "until_largest_s": budget.until_largest,
-        "law": None if body.loop is None else body.loop.law,
+        **heading(budget.spacecraft),
+        **tables.values_of(
+            budget, "growth_1_s=spacecraft.growth", "largest_deg", "until_largest_s", "law=spacecraft.loop.law"
+        ),
         "meets_requirement": budget.meets_requirement,
         "thresholds": [
             row | {"other": None if held.other is None else rates}

@@ -6,118 +6,63 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import IO, Any, NamedTuple
+from typing import IO, Any
 
 import numpy as np
 from rich.console import Group, RenderableType
 from rich.text import Text
 
 from nutdamp import __version__
-from nutdamp.control_loop.dispersion import OUTPUTS, LoopResults, LoopStudy
+from nutdamp.control_loop.dispersion import LoopResults, LoopStudy
 from nutdamp.control_loop.law import Ending
 from nutdamp.control_loop.simulation import FlownLoops
-from nutdamp.files.export import column, cone_columns
 from nutdamp.montecarlo.inputs import DispersedInput
 from nutdamp.montecarlo.statistics import Array, Exact, binomial_interval
 from nutdamp.montecarlo.study import CONFIDENCE
 from nutdamp.views import decisions, dispersion
-from nutdamp.views.dispersion import StudyOutput
+from nutdamp.views.dispersion import CaseRow, StudyOutput, row_json
 from nutdamp.views.loop import described
-from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, Shared, to_figures
+from nutdamp.views.tables import TEXT, Column, DataTable, Shared
 from nutdamp.views.text import degrees, duration
 from nutdamp.views.tolerances import MOST_ROWS, correlation_json, in_words, inputs_table, size_text, unused_table
 
 SHOWN_OUTPUTS = (  # the outputs, in the order of `OUTPUTS`
-    StudyOutput("settled", "settled_s", "first quiet", "s"),
+    StudyOutput("settled", "settled_s", "first quiet", "s", ranks=True),
     StudyOutput("quiet", "quiet_nutation_deg", "left then"),
-    StudyOutput("nutation", "largest_nutation_deg", "largest"),
+    StudyOutput("nutation", "largest_nutation_deg", "largest", ranks=True),
     StudyOutput("momentum_shift", "momentum_shift_deg", "momentum shift"),
     StudyOutput("axis_error", "axis_error_deg", "axis error"),
     StudyOutput("spin_change", "spin_change_rad_s", "spin off", "mrad/s", 1e3),
-    StudyOutput("propellant", "propellant_kg", "propellant", "g", 1e3),
-    StudyOutput("firings", "firings", "firings", ""),
+    StudyOutput("propellant", "propellant_kg", "propellant", "g", 1e3, ranks=True),
+    StudyOutput("firings", "firings", "firings", "", ranks=True),
 )
 
-SHARED = tuple(output for output in SHOWN_OUTPUTS if output.name in ("settled", "nutation", "propellant"))
+SHARED = tuple(output for output in SHOWN_OUTPUTS if output.ranks and output.unit)
 """Outputs whose dependence on the inputs is shown."""
 
-RANKED = (*SHARED, SHOWN_OUTPUTS[-1])  # outputs by which worst cases are shown
-NOMINAL = -1  # number of the nominal case
+
+def _cases(study: LoopStudy, rows: Sequence[CaseRow]) -> DataTable:
+    return dispersion.case_table(study, SHOWN_OUTPUTS, rows)
 
 
-class LoopCaseRow(NamedTuple):
-    """A case, from 0, or the nominal one: deviations of inputs, outputs (8,), ending, angles (m, 2) rad to cones."""
-
-    case: int
-    draws: dict[str, float]
-    values: list[float]
-    stop: Ending | None
-    angles: Array
-
-
-def _value(output: StudyOutput, row: LoopCaseRow) -> float | int | None:
-    value = row.values[OUTPUTS.index(output.name)]
-    if math.isnan(value):
-        return None
-    return int(value) if output.name == "firings" else dispersion.shown(output.key, value)
-
-
-def _true_value(entry: DispersedInput, row: LoopCaseRow) -> float:
-    value = entry.nominal + row.draws[entry.name]
-    return math.degrees(value) if entry.unit == "rad" else value
-
-
-def _angle(at: int, row: LoopCaseRow) -> float:
-    return math.degrees(row.angles.flat[at])
-
-
-def _columns(study: LoopStudy, rows: Sequence[LoopCaseRow]) -> Iterator[Column]:
-    yield Column("case", Shared.CASE, "", lambda row: row.case + 1, where="screen csv", kind=WHOLE)
-    named = (Shared.THIS_CASE, Shared.NOMINAL)
-    yield Column("", "", "", lambda row: named[row.case == NOMINAL], where="case", kind=TEXT)
-    for entry in study.model.inputs.drawn:
-        yield Column(column(entry), "", "", partial(_true_value, entry), where="csv")
-    for output in SHOWN_OUTPUTS:
-        where, text = "csv json" + " screen" * (output in RANKED), to_figures(4, output.scale)
-        yield Column(output.key, output.heading, output.unit, partial(_value, output), text, where, kind=WHOLE)
-        yield dispersion.case_column(output, partial(_value, output), rows)
-    yield Column("stopped", "", "", lambda row: row.stop.name.lower() if row.stop else None, where="csv", kind=TEXT)
-    angles = [(which, cone) for cone in study.spacecraft.keep for which in ("least", "largest")]
-    for at, (key, (which, cone)) in enumerate(zip(cone_columns(study.spacecraft), angles, strict=True)):
-        where, name = "csv case" + " screen" * (which in dispersion.bounded(cone)), f"{which} from {cone.name}"
-        yield Column(key, name, "deg", partial(_angle, at), to_figures(4), where)
-    yield Column("", "largest inputs, in sigmas", "", partial(_largest, study), where="screen", kind=TEXT)
-
-
-def _largest(study: LoopStudy, row: LoopCaseRow) -> str:
-    drawn = study.model.inputs.drawn
-    sigmas = [(in_words(entry.name), row.draws[entry.name] / entry.sigma) for entry in drawn if entry.sigma]
-    return ", ".join(f"{name} {sigma:+.1f}" for name, sigma in sorted(sigmas, key=lambda pair: -abs(pair[1]))[:3])
-
-
-def _cases(study: LoopStudy, rows: Sequence[LoopCaseRow]) -> DataTable:
-    return DataTable("Worst cases", tuple(_columns(study, rows)), rows)
-
-
-def _worst(results: LoopResults, count: int) -> list[LoopCaseRow]:
+def _worst(results: LoopResults, count: int) -> list[CaseRow]:
     study, cases = results.study, results.worst.cases[:count].tolist()
     return [
-        LoopCaseRow(case, study.draws_of(case), results.values[:, case].tolist(), None, results.angles[:, :, case])
+        CaseRow(case, study.draws_of(case), results.values[:, case].tolist(), results.angles[:, :, case])
         for case in cases
     ]
 
 
-def _flown_case(study: LoopStudy, case: int, flown: FlownLoops) -> LoopCaseRow:
+def _flown_case(study: LoopStudy, case: int, flown: FlownLoops) -> CaseRow:
     values = study.measured(flown)[0][:, 0].tolist()
-    return LoopCaseRow(case, study.draws_of(case), values, flown.pilots[0].ending[0], flown.aspects[:, :, 0])
+    return CaseRow(case, study.draws_of(case), values, flown.aspects[:, :, 0], flown.pilots[0].ending[0])
 
 
 def loop_cases_screen(results: LoopResults, *, worst: int) -> Group:
     """All tables of ``disperse --loop``."""
     study = results.study
     drawn = f"cases: {results.done:,}, seed {study.seed}"
-    if results.redrawn:
-        drawn += f", unphysical ones drawn again: {results.redrawn:,}"
+    drawn += f", unphysical ones drawn again: {results.redrawn:,}" if results.redrawn else ""
     title = Text.assemble((study.spacecraft.name, "bold"), f": loop, 0 to {duration(study.until)}, {drawn}")
     parts: list[RenderableType] = [title, Text(described(study.law.loop)), Text(), _percentiles(results).screen("full")]
     parts += [dispersion.angles_note(study.spacecraft), Text(), *_settled(results), _dead_band(results)]
@@ -204,7 +149,7 @@ def _shares(results: LoopResults) -> Iterator[RenderableType]:
 def loop_case_screen(study: LoopStudy, case: int, flown: FlownLoops) -> Group:
     """One case (from 0), ``flown`` alone: every input, and its end beside the nominal one."""
     row = _flown_case(study, case, flown)
-    nominal = LoopCaseRow(NOMINAL, {}, study.nominal.tolist(), None, study.nominal_aspects)
+    nominal = CaseRow(dispersion.ESTIMATE, {}, study.nominal.tolist(), study.nominal_aspects)
     table = _cases(study, [nominal, row]).transposed("case", names="")
     title = Text.assemble((study.spacecraft.name, "bold"), f": loop, seed {study.seed}, case {case + 1}")
     parts: list[RenderableType] = [title, Text(), inputs_table(study.model.inputs.drawn, row.draws), Text(), table]
@@ -221,16 +166,9 @@ def loop_cases_json(results: LoopResults, *, worst: int) -> dict[str, Any]:
         **decisions.heading(study.spacecraft),
         "law": study.law.loop.law,
         "until_s": study.until,
-        "samples": results.done,
-        "requested": results.requested,
-        "interrupted": results.done < results.requested,
-        "seed": study.seed,
-        "redrawn": results.redrawn,
+        **dispersion.counts_json(results),
         "alone_because": study.alone or None,
-        "percentiles": {
-            output.key: dispersion.percentiles_json(output.key, nominal, results.distribution(output.name))
-            for output, nominal in zip(SHOWN_OUTPUTS, study.nominal.tolist(), strict=True)
-        },
+        "percentiles": dispersion.percentiles_of(results, SHOWN_OUTPUTS, study.nominal),
         "settled": _fraction(results.settled, results.done),
         "never_started": results.idle,
         "dead_band": {
@@ -243,22 +181,17 @@ def loop_cases_json(results: LoopResults, *, worst: int) -> dict[str, Any]:
         "shares": {output.key: results.shares(output.name) for output in SHARED},
         **correlation_json(study.spacecraft),
         "each_firing": {entry.name: entry._asdict() for entry in study.model.of_firings},
-        "unused_because": {entry.name: entry.reason for entry in study.model.inputs.unused},
-        "worst": [_case_json(study, row) for row in _worst(results, worst)],
+        "unused_because": dict(study.model.inputs.unused),
+        "worst": [row_json(study, SHOWN_OUTPUTS, row) for row in _worst(results, worst)],
     }
 
 
 def loop_case_json(study: LoopStudy, case: int, flown: FlownLoops) -> dict[str, Any]:
     """One case (from 0), ``flown`` alone: the true value of each input, in SI, and the outputs."""
     row = _flown_case(study, case, flown)
-    given = {"nutdamp": __version__, "seed": study.seed, "until_s": study.until}
-    return {**given, **({} if row.stop is None else {"stopped": row.stop.name.lower()}), **_case_json(study, row)}
-
-
-def _case_json(study: LoopStudy, row: LoopCaseRow) -> dict[str, Any]:
-    inputs = {entry.name: entry.nominal + row.draws[entry.name] for entry in study.model.inputs.drawn}
-    (outputs,) = _cases(study, [row]).json()
-    return {"case": row.case + 1, "inputs": inputs, **outputs, **dispersion.angles_json(study.spacecraft, row.angles)}
+    data = {"nutdamp": __version__, "seed": study.seed, "until_s": study.until}
+    data |= {} if row.stop is None else {"stopped": row.stop.name.lower()}
+    return data | row_json(study, SHOWN_OUTPUTS, row)
 
 
 def _fraction(count: int, of: int) -> dict[str, float | None]:
@@ -267,10 +200,7 @@ def _fraction(count: int, of: int) -> dict[str, float | None]:
 
 
 class LoopCasesWriter:
-    """Writer of one row a case: its number (from 1), the true value of each input, the outputs; angles in degrees.
-
-    With cones the least and the largest angle from the spin axis to the direction of each cone follow.
-    """
+    """Writer of a row a case: number (from 1), true inputs, outputs, least and largest angle to each cone; degrees."""
 
     def __init__(self, stream: IO[bytes], study: LoopStudy) -> None:
         self._stream, self._study, self._table = stream, study, _cases(study, ())
@@ -280,14 +210,8 @@ class LoopCasesWriter:
     def write(self, first: int, values: Array, stops: list[Ending], angles: Array) -> None:
         """Write the cases from ``first`` (from 0) on, with their outputs (8, n) and ``angles`` (m, 2, n) rad."""
         drawn = self._study.draws_of_all(np.arange(first, first + len(stops)))
-        rows = [
-            LoopCaseRow(
-                first + row,
-                {name: draw if isinstance(draw, float) else float(draw[row]) for name, draw in drawn.items()},
-                values[:, row].tolist(),
-                stop,
-                angles[..., row],
-            )
-            for row, stop in enumerate(stops)
-        ]
+        rows = []
+        for row, stop in enumerate(stops):
+            draws = {name: draw if isinstance(draw, float) else float(draw[row]) for name, draw in drawn.items()}
+            rows.append(CaseRow(first + row, draws, values[:, row].tolist(), angles[..., row], stop))
         self._stream.write(replace(self._table, rows=rows).csv().partition("\n")[2].encode())

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import accumulate
 from typing import Any, NamedTuple
 
@@ -71,19 +72,11 @@ def seconds(value: float) -> str:
     return f"{value:.4f}"
 
 
-def _on_time(value: float) -> str:
-    return seconds(value) if value else "ideal"
-
-
-def _clock(date: str) -> str:
-    return date[5:].replace("T", " ").removesuffix("Z")
-
-
 def _cone(name: str, when: str, where: str) -> Column:
-    def angle(row: PulseRow) -> float:
+    def value(row: PulseRow) -> float:
         return math.degrees(getattr(getattr(row, when), name)[row.at])
 
-    return Column(f"{name}_{when}_deg", f"{name.replace('_', ' ')} {when}", "deg", angle, small_angle, where)
+    return Column(f"{name}_{when}_deg", f"{name.replace('_', ' ')} {when}", "deg", value, small_angle, where)
 
 
 def _vector(name: str, unit: str) -> Column:
@@ -107,10 +100,12 @@ PULSES = (
     Column("pulse", "pulse", "", lambda row: row.at + 1, where=f"{PEOPLE} csv", kind=WHOLE),
     Column("t_s", "centre", "s", lambda row: row.pulse.t, seconds, FILES),
     Column("start_s", Shared.START, "s", lambda row: row.pulse.loaded[0], seconds, f"{PEOPLE} {FILES}"),
-    Column("", Shared.START, "UTC", _date, _clock, "full", kind=TEXT),
+    Column("", Shared.START, "UTC", _date, lambda date: date[5:].replace("T", " ").removesuffix("Z"), "full",
+           kind=TEXT),
     Column("", Shared.START, "UTC", _date, where="page", kind=TEXT),
     Column("", "spin phase", "deg", lambda row: row.phase, lambda phase: longitude(phase).removesuffix(" deg"), "page"),
-    Column("on_time_s", Shared.ON_TIME, "s", lambda row: row.pulse.loaded[1], _on_time, f"{PEOPLE} {FILES}"),
+    Column("on_time_s", Shared.ON_TIME, "s", lambda row: row.pulse.loaded[1],
+           lambda value: seconds(value) if value else "ideal", f"{PEOPLE} {FILES}"),
     Column("", Shared.EFFECTIVE, "s", lambda row: row.pulse.on_time, seconds, "full page", _valves),
     Column("", Shared.CHANNEL, "", lambda row: channel_text(row.pulse, row.body), where=PEOPLE, kind=TEXT),
     Column("channel", Shared.CHANNEL, "", lambda row: row.pulse.channel, where=FILES, kind=TEXT),
@@ -127,7 +122,7 @@ PULSES = (
     Column("effective_start_s", "", "", lambda row: row.pulse.start, where=FILES, when=_valves),
     Column("effective_on_time_s", "", "", lambda row: row.pulse.on_time, where=FILES, when=_valves),
     Column("utc", "", "", lambda row: row.body.utc(row.pulse.loaded[0]), where=FILES, kind=TEXT),
-)
+)  # fmt: skip
 
 
 def commanded(schedule: Schedule, body: Spacecraft) -> DataTable:
@@ -139,16 +134,13 @@ def commanded(schedule: Schedule, body: Spacecraft) -> DataTable:
 def pulse_table(flown: Flight, *, scheme: str = "", least: float = math.inf) -> DataTable:
     """The pulses of a flight with the cone angles before and after each.
 
-    ``scheme``: its name, for pages, which have spin phases too; ``least``: limit of the nutation, rad, of the default
-    screen.
+    ``scheme``: its name, on pages, which have spin phases; ``least``: limit of the nutation, rad, on default screens.
     """
     before, after = flown.around_pulses()
     pulses, body = flown.schedule.pulses, flown.spacecraft
     phases = spin_phases(flown, np.array([pulse.loaded[0] for pulse in pulses])) if scheme else np.zeros(len(pulses))
-    rows = [
-        PulseRow(index, pulse, body, before, after, phase)
-        for index, (pulse, phase) in enumerate(zip(pulses, phases.tolist(), strict=True))
-    ]
+    phased = enumerate(zip(pulses, phases.tolist(), strict=True))
+    rows = [PulseRow(index, pulse, body, before, after, phase) for index, (pulse, phase) in phased]
     left = Column("", Shared.NUTATION_AFTER, "deg", lambda row: float(row.after.nutation[row.at]),
                   lambda angle: short_angle(angle, least), "screen")  # fmt: skip
     return DataTable(f"Pulses of {scheme}", (*_dated(body), left), rows, flown.schedule)
@@ -170,14 +162,9 @@ class BlockRow(NamedTuple):
     nutation: float
 
 
-def _counts(name: str) -> Callable[[BlockRow], int | None]:
-    def counted(row: BlockRow) -> int | None:
-        commands = row.body.commands
-        if commands is None:
-            return None
-        return commands.counts(name, getattr(row.block, name))
-
-    return counted
+def _counts(name: str, row: BlockRow) -> int | None:
+    commands = row.body.commands
+    return None if commands is None else commands.counts(name, getattr(row.block, name))
 
 
 def _nine(value: float) -> float:
@@ -193,11 +180,11 @@ BLOCKS = (
     Column("first_utc", "first pulse", "UTC", lambda row: row.body.utc(row.pulses[0].loaded[0]), where="csv page",
            kind=TEXT),
     Column("delay_s", Shared.DELAY, "s", lambda row: row.block.delay, to_figures(6), EVERYWHERE),
-    Column("delay_counts", Shared.DELAY, "counts", _counts("delay"), where=EVERYWHERE, kind=WHOLE),
+    Column("delay_counts", Shared.DELAY, "counts", partial(_counts, "delay"), where=EVERYWHERE, kind=WHOLE),
     Column("delay_deg", Shared.DELAY, "deg", lambda row: _nine(math.degrees(row.block.delay * abs(row.body.spin))),
            lambda angle: f"{angle:.2f}", EVERYWHERE),
     Column("width_s", "width", "s", lambda row: row.block.width, to_figures(6), EVERYWHERE),
-    Column("width_counts", "width", "counts", _counts("width"), where=EVERYWHERE, kind=WHOLE),
+    Column("width_counts", "width", "counts", partial(_counts, "width"), where=EVERYWHERE, kind=WHOLE),
     Column("count", Shared.PULSES, "", lambda row: row.block.count, where=EVERYWHERE, kind=WHOLE),
     Column("every", Shared.EVERY, "turn", lambda row: row.block.every, where=EVERYWHERE, kind=WHOLE),
     Column("impulse_Nms", Shared.IMPULSE, "N m s",

@@ -21,8 +21,8 @@ from nutdamp.spacecraft import requirements
 from nutdamp.views import decisions
 from nutdamp.views.decisions import KEPT, figures, final_json, plan_json, statement, target_json
 from nutdamp.views.parts import derived_table, pulse_table
-from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, Shared, angle_of, to_figures
-from nutdamp.views.text import in_degrees, joined, note_json, ordered, screen_line
+from nutdamp.views.tables import TEXT, Column, DataTable, Shared, angle_of, file_columns, to_figures, values_of
+from nutdamp.views.text import joined, note_json, ordered, screen_line, small_angle
 from nutdamp.views.tolerances import in_words, stated_text
 
 MOST_ROWS = 12  # largest number of candidates in the table
@@ -88,9 +88,7 @@ def robust_json(robust: RobustComparison) -> dict[str, Any]:
     given = [entry for entry in (*robust.candidates, chosen, robust.usual) if entry is not None]
     entries = dict(zip(map(id, given), _table(robust, given).json(), strict=True))
     return {
-        "probability": robust.probability,
-        "samples": robust.samples,
-        "seed": robust.seed,
+        **values_of(robust, "probability", "samples", "seed"),
         "target": target_json(robust.comparison.spacecraft),
         "candidates": [entries[id(candidate)] for candidate in robust.candidates],
         "recommended": None if chosen is None else {**entries[id(chosen)], "plan": plan_json(chosen.plan)},
@@ -99,9 +97,7 @@ def robust_json(robust: RobustComparison) -> dict[str, Any]:
         "meets_requirement": robust.meets_requirement,
         "fresh": fresh
         and {
-            "samples": fresh.cases.samples,
-            "seed": fresh.cases.seed,
-            "met_fraction": fresh.met,
+            **values_of(fresh, "samples=cases.samples", "seed=cases.seed", "met_fraction=met"),
             "interval": list(fresh.interval),
         },
         "tightening": needed
@@ -115,21 +111,10 @@ def robust_json(robust: RobustComparison) -> dict[str, Any]:
                 {"name": entry.name, entry.kind: entry.size, "needed": needed.factor * entry.size, "unit": entry.unit}
                 for entry, _ in needed.inputs
             ],
-            "checked": {
-                "samples": needed.cases,
-                "seed": needed.seed,
-                "met_fraction": needed.complied,
-                "at_least": needed.least,
-            },
+            "checked": values_of(needed, "samples=cases", "seed", "met_fraction=complied", "at_least=least"),
         },
         "against": entries.get(id(robust.usual)),
-        "cost": cost
-        and {
-            "propellant_kg": cost.propellant,
-            "total_impulse_Nms": cost.impulse,
-            "end_s": cost.end,
-            "nutation_deg": math.degrees(cost.nutation),
-        },
+        "cost": cost and values_of(cost, "propellant_kg", "total_impulse_Nms=impulse", "end_s", "nutation_deg"),
     }
 
 
@@ -143,24 +128,20 @@ def _columns(robust: RobustComparison) -> Iterator[Column]:
     body, level = robust.comparison.spacecraft, decisions.exact_percent(robust.probability)
     fuelled = all(candidate.plan.pulses.propellant is not None for candidate in robust.candidates)
     yield Column("scheme", "plan", "", attrgetter("plan.scheme"), where="full json", kind=TEXT)
-    yield Column("variant", "", "", attrgetter("variant"), where="json", kind=TEXT)
+    yield from file_columns("json", "variant")
     yield Column("", "variant", "", lambda row: row.variant + " *" * (row is robust.usual), where="full", kind=TEXT)
-    yield Column("pulses", "", "", lambda row: len(row.plan.pulses), where="json", kind=WHOLE)
+    yield Column("pulses", "", "", lambda row: len(row.plan.pulses), where="json")
     yield Column("end_s", Shared.END, "s", attrgetter("plan.pulses.end"), lambda end: f"{end:.3f}", "full json")
     impulse, where = attrgetter("plan.pulses.total_impulse"), "json" if fuelled else "full json"
     yield Column("total_impulse_Nms", Shared.IMPULSE, "N m s", impulse, to_figures(4), where)
-    yield Column("propellant_kg", "", "", attrgetter("plan.pulses.propellant"), where="json")
-    yield Column(
-        "", Shared.PROPELLANT, "g", lambda row: 1e3 * row.plan.pulses.propellant, to_figures(4), "full" * fuelled
-    )
-    yield Column("nominal_nutation_deg", "", "", angle_of("plan.flown.nutation"), where="json")
-    yield Column("nutation_deg", "", "", angle_of("nutation"), where="json")
-    yield Column(f"{requirements.aim(body).value}_deg", "", "", angle_of("off"), where="json")
-    yield Column("", Shared.NOMINAL, "deg", attrgetter("nominal"), in_degrees, "full")
-    yield Column("", level, "deg", attrgetter("left"), in_degrees, "full")
+    yield from file_columns("json", "propellant_kg=plan.pulses.propellant")
+    yield Column("", Shared.PROPELLANT, "g", attrgetter("plan.pulses.propellant"), to_figures(4, 1e3), "full" * fuelled)
+    yield from file_columns("json", "nominal_nutation_deg=plan.flown.nutation", "nutation_deg")
+    yield from file_columns("json", f"{requirements.aim(body).value}_deg=off")
+    yield Column("", Shared.NOMINAL, "deg", angle_of("nominal"), small_angle, "full")
+    yield Column("", level, "deg", angle_of("left"), small_angle, "full")
     yield Column("", "nominal cones", "", lambda row: KEPT[row.plan.kept is not False], where="full" * bool(body.keep))
-    yield Column("samples", "", "", attrgetter("cases.samples"), where="json", kind=WHOLE)
-    yield Column("met_fraction", "", "", attrgetter("met"), where="json")
+    yield from file_columns("json", "samples=cases.samples", "met_fraction=met")
     yield Column("", "cases that comply", "", attrgetter("share"), decisions.share_text,
                  "full" * requirements.judged(body))  # fmt: skip
     yield Column("final", "", "", lambda row: final_json(row.plan.flight), where="json")

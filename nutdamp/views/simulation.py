@@ -30,22 +30,7 @@ from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.requirements import Part
 from nutdamp.spacecraft.schedule import Pulse, Schedule
-from nutdamp.views import decisions
-from nutdamp.views.parts import (
-    FRAME_N,
-    Remark,
-    angle_names,
-    angle_texts,
-    aspect_facts,
-    blocks_screen,
-    derived_table,
-    opening,
-    pulse_table,
-    requested,
-    shown_rows,
-    summary,
-    warnings_of,
-)
+from nutdamp.views import decisions, parts, tables
 from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, FittedColumns, Shared, angle_of, facts, to_figures
 from nutdamp.views.text import MISSING, degrees, longitude, moment, pointing, small_angle
 
@@ -53,7 +38,7 @@ MODELS = {IMPULSE_SUM: "impulse approximation (17)", REAL_WIDTHS: "full simulati
 
 
 def _direction(name: str, at: int, flight: Flight) -> str:
-    return angle_texts(flight.spacecraft, getattr(flight.final, name))[at]
+    return parts.angle_texts(flight.spacecraft, getattr(flight.final, name))[at]
 
 
 def _columns(simulation: Simulation) -> Iterator[Column]:
@@ -63,7 +48,7 @@ def _columns(simulation: Simulation) -> Iterator[Column]:
     for name in names:
         yield Column("", name.replace("_", " "), "", attrgetter(f"residual.{name}"), degrees, "screen")
     for heading, name in (("spin axis", "axis"), ("H", "momentum")):
-        for at, angle in enumerate(angle_names(body)):
+        for at, angle in enumerate(parts.angle_names(body)):
             yield Column("", f"{heading}: {angle}", "", partial(_direction, name, at), where="screen")
     yield Column("", Shared.SPIN, "rad/s", attrgetter("final.spin"), to_figures(6), "screen")
 
@@ -75,18 +60,18 @@ def simulation_screen(simulation: Simulation, *, verbose: bool = True) -> Render
     fired = f"{spent}, last ends at {end}" if len(simulation.flown.schedule) else "no pulse"
     track = f"track by the {simulation.shown.model}, 0 to {moment(extremes.until)}"
     headline = Text.assemble("SIMULATED ", (simulation.plan.scheme, "bold"), f": {fired}; {track}")
-    head = [*opening(body, verbose), headline]
+    head = [*parts.opening(body, verbose), headline]
     begun, pulses, cut = len(simulation.shown.schedule), len(simulation.plan.pulses), []
     if begun < pulses:
         cut = [f"the track ends at {moment(extremes.until)}, with {begun or 'none'} of {pulses} pulses begun"]
-    head += warnings_of([*cut, *model_warnings(simulation.impulses, simulation.flown)])
+    head += parts.warnings_of([*cut, *model_warnings(simulation.impulses, simulation.flown)])
     ends = DataTable("", tuple(_columns(simulation)), (simulation.impulses, simulation.flown))
     near, far = (f"{degrees(angle)} at {moment(at)}" for angle, at in (extremes.nearest, extremes.farthest))
-    remarks: list[Remark] = [*decision_notes(decided), f"spin axis from H(0): min {near}, max {far}"]
-    return summary(
+    remarks: list[parts.Remark] = [*decision_notes(decided), f"spin axis from H(0): min {near}, max {far}"]
+    return parts.summary(
         [*head, decisions.statement(decided), *decisions.margin_lines(decided)],
         lambda **_: ends.transposed("screen", f"end of track, {moment(extremes.until)}"),
-        [*remarks, *[FRAME_N] * (body.attitude is None)],
+        [*remarks, *[parts.FRAME_N] * (body.attitude is None)],
         "--csv track.csv · --plot motion.png · nutdamp verify",
         more=[*_fired(simulation), facts(_extremes(simulation))] if verbose else (),
         verbose=verbose,
@@ -96,9 +81,9 @@ def simulation_screen(simulation: Simulation, *, verbose: bool = True) -> Render
 def _fired(simulation: Simulation) -> Iterator[RenderableType]:
     flight, schedule = simulation.shown, simulation.shown.schedule
     if schedule.blocks:
-        yield blocks_screen(flight, simulation.plan.delta_v)
+        yield parts.blocks_screen(flight, simulation.plan.delta_v)
     if len(schedule):
-        shown = shown_rows(pulse_table(flight), schedule.blocks)
+        shown = parts.shown_rows(parts.pulse_table(flight), schedule.blocks)
         yield shown.screen("simulate")
         if len(shown.rows) < len(schedule):
             yield Text(f"{len(shown.rows)} of {len(schedule)} pulses; --json writes all.", style="dim")
@@ -112,7 +97,7 @@ def _extremes(simulation: Simulation) -> Iterator[tuple[str, str]]:
         west, east = map(longitude, extremes.right_ascension)
         yield "right ascension", f"{west.removesuffix(' deg')} to {east} in {frame}, from its axis x towards y"
         yield "declination", _range(extremes.declination)
-    yield from aspect_facts(aspects(simulation.shown, extremes.until))
+    yield from parts.aspect_facts(aspects(simulation.shown, extremes.until))
     yield "track", f"{extremes.rows} rows, 0 to {moment(extremes.until)}"
 
 
@@ -125,12 +110,11 @@ def simulation_json(simulation: Simulation) -> dict[str, Any]:
     """Pulses with the cone angles around them, ends of both models, and extremes of the axis track in degrees."""
     flight, extremes, impulses, flown = simulation.shown, simulation.extremes, simulation.impulses, simulation.flown
     attitude = flight.spacecraft.attitude
-    east_west = None if attitude is None else [full_turn(angle) for angle in extremes.right_ascension]
     return {
         **decisions.heading(flight.spacecraft),
         "scheme": simulation.plan.scheme,
         "propagated": "flown" if simulation.real else "residual",
-        "pulses": pulse_table(flight).json("flown"),
+        "pulses": parts.pulse_table(flight).json("flown"),
         "residual": decisions.residual_json(impulses.residual),
         "flown": decisions.residual_json(flown.residual),
         "final": decisions.final_json(flown),
@@ -149,8 +133,8 @@ def simulation_json(simulation: Simulation) -> dict[str, Any]:
             "x_deg": [*map(math.degrees, extremes.x)],
             "y_deg": [*map(math.degrees, extremes.y)],
             # Western and eastern end, for any range between.
-            "right_ascension_deg": east_west and [*map(math.degrees, east_west)],
-            "declination_deg": None if attitude is None else [*map(math.degrees, extremes.declination)],
+            "right_ascension_deg": attitude and [math.degrees(full_turn(angle)) for angle in extremes.right_ascension],
+            "declination_deg": attitude and [*map(math.degrees, extremes.declination)],
         },
     }
 
@@ -245,9 +229,7 @@ def _turns(flown: Flight, until: float) -> Vector:
             edges.append(np.linspace(leg.start, leg.end, count + 1)[1:])
     times = np.concatenate(edges)
     gained = _turned(flown, times[:-1], times[1:])
-    reversed_ = np.flatnonzero(gained <= 0.0)
-    if len(reversed_):
-        gained = gained[: reversed_[0]]
+    gained = gained[np.logical_and.accumulate(gained > 0.0)]  # to where the spin is reversed
     total = np.append(0.0, np.cumsum(gained))
     whole = 2.0 * math.pi * np.arange(math.floor(total[-1] / (2.0 * math.pi)) + 1)
     piece = np.clip(np.searchsorted(total, whole, "right") - 1, 0, len(gained) - 1)
@@ -285,7 +267,9 @@ def verification_brief(plan: Plan, verification: Verification) -> RenderableType
     if most is not None and most.nutation - verification.budget[0].nutation > SHOWN:
         largest = f"Largest single imperfection: {most.name}, which alone leaves {degrees(most.nutation)} of nutation."
         notes.insert(1, largest)
-    return summary([*_head(plan, verification)], lambda **_: methods_table(verification), notes, "--json verified.json")
+    return parts.summary(
+        [*_head(plan, verification)], lambda **_: methods_table(verification), notes, "--json verified.json"
+    )
 
 
 def _head(plan: Plan, verification: Verification) -> Iterator[Text]:
@@ -293,7 +277,7 @@ def _head(plan: Plan, verification: Verification) -> Iterator[Text]:
     body = plan.spacecraft
     yield Text.assemble((body.name, "bold"), f": {plan.scheme}; Δ: maximum difference from the flown motion")
     yield decisions.coloured(verdict(verification), verification.agree)
-    if required := requested(body):
+    if required := parts.requested(body):
         left = "; ".join(f"{line.bound.part.label} {decisions.size(line.bound, line.left)}" for line in plan.held)
         met = decisions.coloured(decisions.VERDICT[plan.meets_requirement], plan.meets_requirement)
         yield Text.assemble(("Requirement ", "bold"), f"({required}) ", met, f" with nominal values: {left}.")
@@ -302,10 +286,17 @@ def _head(plan: Plan, verification: Verification) -> Iterator[Text]:
 def verification_screen(plan: Plan, verification: Verification) -> RenderableType:
     """All tables of ``verify``."""
     body = plan.spacecraft
-    parts: list[RenderableType] = [*_head(plan, verification), Text(), derived_table(body)]
-    parts += [Text(), methods_table(verification), *map(Text, _missing(verification))]
-    parts += [Text(), Text(conservation(verification)), Text(), Text(BUDGET, "bold"), Text()]
-    return Group(*parts, budget_table(body, verification), Text(BUDGET_NOTE, "dim"))
+    ways: list[RenderableType] = [
+        *_head(plan, verification),
+        Text(),
+        parts.derived_table(body),
+        Text(),
+        methods_table(verification),
+    ]
+    kept = [*map(Text, _missing(verification)), Text(), Text(conservation(verification))]
+    return Group(
+        *ways, *kept, Text(), Text(BUDGET, "bold"), Text(), budget_table(body, verification), Text(BUDGET_NOTE, "dim")
+    )
 
 
 def verification_json(flown: Flight, name: str, verification: Verification) -> dict[str, Any]:
@@ -319,10 +310,8 @@ def verification_json(flown: Flight, name: str, verification: Verification) -> d
         "final": decisions.final_json(flown),
         "target": decisions.target_json(spacecraft),
         "methods": DataTable("", METHODS, verification.methods).json(),
-        "momentum_drift": verification.momentum.drift,
-        "momentum_kept": verification.momentum.kept,
-        "energy_drift": verification.energy.drift,
-        "energy_kept": verification.energy.kept,
+        **tables.values_of(verification, "momentum_drift=momentum.drift", "momentum_kept=momentum.kept"),
+        **tables.values_of(verification, "energy_drift=energy.drift", "energy_kept=energy.kept"),
         "budget": DataTable("", IMPERFECTIONS, verification.budget, spacecraft).json(),
     }
 
@@ -333,9 +322,10 @@ def _difference(value: float | None) -> str:
     return "0" if value == 0.0 else "< 1e-12" if value < 1e-12 else f"{value:.1e}"
 
 
+NUTATION = Column("nutation_deg", Part.NUTATION.label, "deg", angle_of("nutation"), small_angle, "json screen")
 METHODS = (
     Column("name", "method", "", attrgetter("name"), where="json screen", kind=TEXT),
-    Column("nutation_deg", Part.NUTATION.label, "deg", angle_of("nutation"), small_angle, "json screen"),
+    NUTATION,
     Column("momentum_shift_deg", Part.SHIFT.label, "deg", angle_of("momentum_shift"), small_angle, "json screen"),
     Column("axis_difference_rad", "Δaxis", "rad", attrgetter("axis"), _difference, "json screen"),
     Column("momentum_difference_rad", "ΔH", "rad", attrgetter("momentum"), _difference, "json screen"),
@@ -344,11 +334,11 @@ METHODS = (
 )
 IMPERFECTIONS = (
     Column("imperfection", "imperfection", "", attrgetter("name"), where="json screen", kind=TEXT),
-    Column("nutation_deg", Part.NUTATION.label, "deg", angle_of("nutation"), small_angle, "json screen"),
-    Column("momentum_shift_deg", "", "", angle_of("momentum_shift"), where="json"),
+    NUTATION,
+    *tables.file_columns("json", "momentum_shift_deg"),
     Column("", Part.SHIFT.label, "deg", angle_of("momentum_shift"), small_angle, "screen",
            lambda body: body.goal.axis is None),
-    Column("axis_error_deg", "", "", angle_of("axis_error"), where="json"),
+    *tables.file_columns("json", "axis_error_deg"),
     Column("", Part.DISTANCE.label, "deg", angle_of("axis_error"), small_angle, "screen",
            lambda body: body.goal.axis is not None),
 )  # fmt: skip
@@ -373,9 +363,8 @@ def verdict(verification: Verification) -> str:
     """Sentence whether the integrations from outside confirm the flown motion."""
     if not verification.checks:
         return "NOT CONFIRMED: no independent integration was flown to the end."
-    names = verification.checks if verification.agree else verification.disagreeing
-    how = f"agree (within {AGREE:g} rad)" if verification.agree else f"DO NOT AGREE (within {AGREE:g} rad)"
-    return f"The flown motion and {' and '.join(names)} {how}."
+    names, how = (verification.checks, "agree") if verification.agree else (verification.disagreeing, "DO NOT AGREE")
+    return f"The flown motion and {' and '.join(names)} {how} (within {AGREE:g} rad)."
 
 
 def conservation(verification: Verification) -> str:

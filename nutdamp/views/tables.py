@@ -108,10 +108,7 @@ def _cell(cell: RenderableType) -> Text:
 
 
 def _widths(columns: list[list[str]], room: int, unbroken: list[bool]) -> list[int] | None:
-    """Characters for each column such that no word is cut; None where there is no ``room`` for that.
-
-    A number with its sign, as in "< 1e-9", or with its percent sign is one word; so are cells of ``unbroken`` columns.
-    """
+    """Characters for each column such that no word and no cell of ``unbroken`` ones is cut; None without ``room``."""
     least = [max((cell_len(word) for text in texts for word in WORD.findall(text)), default=0) for texts in columns]
     whole = [max(cell_len(line) for text in texts for line in text.split("\n")) for texts in columns]
     least = [most if kept else fewest for fewest, most, kept in zip(least, whole, unbroken, strict=True)]
@@ -137,15 +134,40 @@ TEXT, REAL, WHOLE, YES_NO = "U", "f8", "i8", "bool"
 """Kinds of values: text, number, whole number, and yes or no."""
 
 
+UNIT = re.compile(r"_(deg|rad_s|s|kg|Nms?|kgm2|Pa)$")  # ends of names in files that are no part of an attribute
+
+
+def value_at(row: Any, path: str) -> Any:
+    """Value of a row at a dotted ``path`` of attributes; None where one is None."""
+    for name in path.split("."):
+        row = None if row is None else getattr(row, name)
+    return row
+
+
 def angle_of(path: str) -> Callable[[Any], float | None]:
-    """Value of a column: the angle of a row at a dotted ``path`` of attributes, in degrees; None where one is None."""
+    """Value of a column: the angle of a row at a ``path`` as `value_at` takes it, in degrees."""
 
     def value(row: Any) -> float | None:
-        for name in path.split("."):
-            row = None if row is None else getattr(row, name)
-        return None if row is None else math.degrees(row)
+        angle = value_at(row, path)
+        return None if angle is None else math.degrees(angle)
 
     return value
+
+
+def _named_value(name: str) -> tuple[str, Callable[[Any], Any]]:
+    key, _, path = name.partition("=")
+    path = path or UNIT.sub("", key)
+    return key, angle_of(path) if key.endswith("_deg") else lambda row: value_at(row, path)
+
+
+def values_of(source: Any, *names: str) -> dict[str, Any]:
+    """Values for JSON by their names: ``key`` of an attribute and its unit, or ``key=path``; angles are degrees."""
+    return {key: _plain(value(source)) for key, value in map(_named_value, names)}
+
+
+def file_columns(where: str, *names: str) -> list[Column]:
+    """Columns of numbers in files alone, with names as in `values_of`."""
+    return [Column(key, "", "", value, where=where) for key, value in map(_named_value, names)]
 
 
 def to_figures(count: int, scale: float = 1.0) -> Callable[[float], str]:
@@ -188,10 +210,7 @@ class Heading(NamedTuple):
 
 @dataclass(frozen=True)
 class DataTable:
-    """Rows of one result under their columns.
-
-    ``source`` decides which columns there are; ``mark`` is a row to stand out.
-    """
+    """Rows of one result under their columns; ``source`` decides which there are, ``mark`` is a row to stand out."""
 
     title: str
     columns: Sequence[Column]
@@ -237,10 +256,7 @@ class DataTable:
         return Text(_text(column, row), "bold" if first and index == self.mark else style)
 
     def transposed(self, place: str, corner: str = "", names: str = "dim") -> FittedColumns:
-        """A table of a screen with quantities down and rows across, named by the first column; ``corner``: heading.
-
-        ``names``: style of the names of the quantities.
-        """
+        """Quantities down and rows across, named by the first column; ``corner``: heading, ``names``: their style."""
         name, *shown = self.at(place)
         table = columns(corner, *(_text(name, row) for row in self.rows))
         for column in shown:
@@ -248,18 +264,16 @@ class DataTable:
             table.add_row(Text(column.headed(", "), style=names), *cells)
         return table
 
-    def array(self, place: str = "csv") -> NDArray[np.void]:
+    def array(self) -> NDArray[np.void]:
         """Fields as in CSV files; unknown values are NaN or empty."""
-        names, kinds, rows = self._fields(place)
-        types = []
-        for at, kind in enumerate(kinds):
-            longest = max((len(row[at]) for row in rows), default=1) or 1 if kind == TEXT else 0
-            types.append(f"U{longest}" if kind == TEXT else kind)
+        names, kinds, rows = self._fields()
+        longest = [max([1, *(len(row[at]) for row in rows)]) if kind == TEXT else "" for at, kind in enumerate(kinds)]
+        types = [f"{kind}{length}" for kind, length in zip(kinds, longest, strict=True)]
         return np.array(rows, dtype=list(zip(names, types, strict=True)))
 
-    def csv(self, place: str = "csv") -> str:
+    def csv(self) -> str:
         """A CSV file; unknown values are empty."""
-        names, _, rows = self._fields(place)
+        names, _, rows = self._fields()
         texts = ([number(cell) if isinstance(cell, float) else str(cell) for cell in row] for row in rows)
         return csv_text(names, texts)
 
@@ -268,9 +282,9 @@ class DataTable:
         shown = self.at(place)
         return [{column.key.replace("#", ""): _plain(column.value(row)) for column in shown} for row in self.rows]
 
-    def _fields(self, place: str) -> tuple[list[str], list[str], list[tuple[Any, ...]]]:
+    def _fields(self) -> tuple[list[str], list[str], list[tuple[Any, ...]]]:
         """Names, kinds and rows of the file, a vector in three columns."""
-        shown = self.at(place)
+        shown = self.at("csv")
         names = [name for column in shown for name in _names(column)]
         kinds = [TEXT if column.kind == YES_NO else column.kind for column in shown for _ in _names(column)]
         return names, kinds, [tuple(part for column in shown for part in _parts(column, row)) for row in self.rows]

@@ -61,16 +61,9 @@ def degrees(angle: float | None) -> str:
     return f"{shown:.4g} deg"
 
 
-def in_degrees(angle: float | None) -> str:
-    """`degrees` without the unit, for columns that name it: with final zeros, as `digits` has them."""
-    if angle is None or not abs(math.degrees(angle)) >= 1e-9:  # not known, or rounding
-        return degrees(angle).removesuffix(" deg")
-    return digits(math.degrees(angle), 4)
-
-
 def small_angle(angle: float) -> str:
-    """An angle given in degrees, with final zeros; below 1e-9 deg it is rounding and shown as such."""
-    return in_degrees(math.radians(angle))
+    """An angle given in degrees, without the unit and with final zeros; below 1e-9 deg it is shown as rounding."""
+    return digits(angle, 4) if abs(angle) >= 1e-9 else degrees(math.radians(angle)).removesuffix(" deg")
 
 
 FINE = 0.01  # share of a limit below which what is left of it is shown as 0

@@ -36,11 +36,9 @@ ROUNDING = 1e-12  # rad; a smaller variation is rounding
 
 
 class BudgetRow(NamedTuple):
-    """A line of the tolerance budget: one input, or those that are left together.
+    """A line of the tolerance budget: one input, or several together; ``inputs``: their rows.
 
-    ``size``: one sigma or the bias as text; ``effects``: those of it alone on the two `budgeted_outputs`, rad, or the
-    root mean square of those of correlated inputs together; ``inputs``: rows of the drawn inputs; ``bias``: nothing of
-    it varies.
+    ``size``: one sigma or bias; ``effects``: alone on the two `budgeted_outputs`, rad; ``bias``: nothing of it varies.
     """
 
     name: str
@@ -55,15 +53,14 @@ def _budget_rows(study: Study) -> list[BudgetRow]:
     inputs, first = study.model.inputs.drawn, study.first_order
     if not any(entry.sigma for entry in inputs):
         return []
-    outputs = [output for output, _ in budgeted_outputs(study)]
+    outputs = dict(budgeted_outputs(study))
     units = together(inputs, study.model.groups)
     effects = np.array([[_effect(first, output, rows) for rows in units] for output in outputs])
     scales = np.array([[max(first.sigma(output), TINY)] for output in outputs])
     order = np.argsort(-(effects / scales).max(axis=0), kind="stable").tolist()
     named = order if len(order) <= MOST_ROWS + 1 else order[:MOST_ROWS]
     groups = [(*_named([inputs[row] for row in units[at]]), [at]) for at in named]
-    if named != order:
-        others = order[len(named) :]
+    if others := order[len(named) :]:
         groups.append((f"{sum(len(units[at]) for at in others)} others", "", others))
     rows = []
     for name, size, members in groups:
@@ -98,10 +95,8 @@ def tolerance_budget(results: Results) -> list[RenderableType]:
         return "bias" if row.bias else _percent(float(first.shares(output)[row.inputs].sum())) if row.inputs else ""
 
     def seen(at: int, output: str, row: BudgetRow) -> str:
-        if not row.inputs:
-            return _percent(shares[at])
         cases = math.fsum(sampled.get(inputs[index].name, {}).get(output, 0.0) for index in row.inputs)
-        return "" if row.bias else _percent(cases)
+        return "" if row.bias else _percent(cases if row.inputs else shares[at])
 
     def effect(at: int, row: BudgetRow) -> str:
         return f"{math.degrees(row.effects[at]):.3g}" if row.inputs else ""
@@ -162,16 +157,14 @@ def inputs_table(drawn: Sequence[DispersedInput], draws: Mapping[str, float]) ->
             return of_nominal(entry, draws[entry.name], "+.4g")
         return f"{scaled(entry, draws[entry.name], '+.4g')} {unit_of_people(entry)[0]}"
 
-    def sigmas(entry: DispersedInput) -> str:
-        return f"{draws[entry.name] / entry.sigma:+.2f}" if entry.sigma else "bias"
-
     columns = (
         Column("", Shared.INPUT, "", lambda row: in_words(row.name), where="screen", kind=TEXT),
         Column("", Shared.NOMINAL, "", lambda row: scaled(row, row.nominal), where="screen"),
         Column("", Shared.THIS_CASE, "", lambda row: scaled(row, row.nominal + draws[row.name]), where="screen"),
         Column("", "off by", "", off, where="screen"),
-        Column("", "in sigmas", "", sigmas, where="screen"),
-    )
+        Column("", "in sigmas", "", lambda row: f"{draws[row.name] / row.sigma:+.2f}" if row.sigma else "bias",
+               where="screen"),
+    )  # fmt: skip
     return DataTable("Inputs", columns, drawn).screen("screen")
 
 

@@ -24,7 +24,7 @@ from nutdamp.spacecraft.schedule import STEERABLE
 from nutdamp.views import decisions
 from nutdamp.views.decisions import FARTHER, heading, plan_json
 from nutdamp.views.parts import derived_table, pulse_table, requested, summary
-from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable, Shared, angle_of
+from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable, Shared, angle_of, file_columns, values_of
 from nutdamp.views.text import cost, degrees, duration, fixed, small_angle
 
 ROWS = 18  # points on the default screen, at most: evenly some of more
@@ -84,19 +84,20 @@ def _columns(rows: Sequence[TradeRow]) -> Iterator[Column]:
     bounded = any(row.least is not None for row in rows)
     yield Column("point", "point", "", attrgetter("number"), where="csv full brief", kind=WHOLE)
     yield Column("", "H within", "deg", lambda row: _allowed(row.front), where="brief")
-    yield Column("shift_allowed_deg", "", "", angle_of("front.shift"), where="csv")
+    yield from file_columns("csv", "shift_allowed_deg=front.shift")
     yield Column("end_s", Shared.END, "s", attrgetter("plan.pulses.end"), lambda end: f"{end:.3f}", "csv full brief")
     yield Column("", "cost", "", lambda row: row.spent(row.point.cost), where="full brief")
     yield Column("", "small-angle bound", "", lambda row: row.spent(row.least), where="full" * bounded)
     yield Column("pulses", Shared.PULSES, "", lambda row: len(row.plan.pulses), where="csv full brief", kind=WHOLE)
-    yield Column("propellant_kg", "", "", attrgetter("plan.pulses.propellant"), where="csv")
-    yield Column("total_impulse_Nms", "", "", attrgetter("plan.pulses.total_impulse"), where="csv")
-    yield Column("first_order_least", "", "", attrgetter("least"), where="csv")
+    yield from file_columns(
+        "csv", "propellant_kg=plan.pulses.propellant", "total_impulse_Nms=plan.pulses.total_impulse"
+    )
+    yield from file_columns("csv", "first_order_least=least")
     yield Column("least_unit", "", "", attrgetter("point.unit"), where="csv", kind=TEXT)
-    yield Column("nutation_deg", "", "", angle_of("plan.flight.residual.nutation"), where="csv")
+    yield from file_columns("csv", "nutation_deg=plan.flight.residual.nutation")
     shift = angle_of("plan.flight.residual.momentum_shift")
     yield Column("momentum_shift_deg", Part.SHIFT.label, "deg", shift, small_angle, "csv full brief")
-    yield Column("axis_error_deg", "", "", angle_of("plan.flight.residual.axis_error"), where="csv")
+    yield from file_columns("csv", "axis_error_deg=plan.flight.residual.axis_error")
     yield Column("", f"vs point {first}", "%", _saved, where="full")
     yield Column("", "vs first", "%", _saved, where="" if others else "brief")
     scheme = "csv full brief" if others else "csv"
@@ -117,20 +118,20 @@ def _saved(row: TradeRow) -> str:
 
 def trade_brief(spacecraft: Spacecraft, fronts: Sequence[Front]) -> RenderableType:
     """The default screen of ``trade``: the cheapest and the earliest schedule, the points of all fronts."""
-    points = rows_of(fronts)
-    steps, notes = "--csv points.csv · --plot trade.png · --schedules FOLDER", missing(spacecraft, fronts)
-    if not points:
-        return summary([*_head(spacecraft, fronts)], None, notes, steps)
-    if spacecraft.commands is not None:
+    points, notes = rows_of(fronts), missing(spacecraft, fronts)
+    if points and spacecraft.commands is not None:
         notes.append("the pulses are timed one by one: no command block fires these schedules")
-    if spacecraft.dispersions is not None:
+    if points and spacecraft.dispersions is not None:
         notes.append("tolerances not checked (nutdamp disperse --schedule FOLDER/point-1.csv)")
-    shown = np.unique(np.linspace(0, len(points) - 1, ROWS).round().astype(int)).tolist()
-    if len(shown) < len(points):
-        notes.append(f"Points on this screen: {len(shown)} of {len(points)}.")
-    rows = [points[index] for index in shown]
+    shown = {round(at) for at in np.linspace(0, len(points) - 1, ROWS).tolist()} if points else ()
+    rows = [points[index] for index in sorted(shown)]
+    if len(rows) < len(points):
+        notes.append(f"Points on this screen: {len(rows)} of {len(points)}.")
     return summary(
-        [*_head(spacecraft, fronts)], lambda **_: _table(rows).screen("brief"), [*notes, *_ends_off(fronts)], steps
+        [*_head(spacecraft, fronts)],
+        (lambda **_: _table(rows).screen("brief")) if points else None,
+        [*notes, *_ends_off(fronts)],
+        "--csv points.csv · --plot trade.png · --schedules FOLDER",
     )
 
 
@@ -152,8 +153,7 @@ def _head(spacecraft: Spacecraft, fronts: Sequence[Front]) -> Iterator[Text]:
 
 def trade_screen(spacecraft: Spacecraft, fronts: Sequence[Front]) -> RenderableType:
     """All tables of ``trade``."""
-    parts = front_parts(spacecraft, fronts)
-    return Group(*_head(spacecraft, fronts), Text(), derived_table(spacecraft), *parts)
+    return Group(*_head(spacecraft, fronts), Text(), derived_table(spacecraft), *front_parts(spacecraft, fronts))
 
 
 def front_parts(spacecraft: Spacecraft, fronts: Sequence[Front]) -> list[RenderableType]:
@@ -164,8 +164,7 @@ def front_parts(spacecraft: Spacecraft, fronts: Sequence[Front]) -> list[Rendera
         if front.why is not None:
             parts.append(Text(_without_optimal(front)))
         if front.points:
-            rows = [row for row in rows_of(fronts) if row.front is front]
-            parts.append(_table(rows).screen("full"))
+            parts.append(_table([row for row in rows_of(fronts) if row.front is front]).screen("full"))
     priced = [(row.spent(row.point.cost), row.spent(row.least)) for row in rows_of(fronts)
               if row.least is not None and row.point.cost < row.least]  # fmt: skip
     below = [BELOW] * any(spent != least for spent, least in priced)  # as the table writes both
@@ -225,12 +224,9 @@ def trade_json(spacecraft: Spacecraft, fronts: Sequence[Front]) -> dict[str, Any
     """All fronts with their plans, in the form of ``plan --json``."""
     entries = []
     for front in fronts:
-        points = [
-            {"point": row.number, "horizon_s": row.point.horizon, **plan_json(row.plan)}
-            for row in rows_of(fronts)
-            if row.front is front
-        ]
-        entries.append({"shift_allowed_deg": math.degrees(front.shift), "why": front.why, "points": points})
+        rows = [row for row in rows_of(fronts) if row.front is front]
+        points = [values_of(row, "point=number", "horizon_s=point.horizon") | plan_json(row.plan) for row in rows]
+        entries.append({**values_of(front, "shift_allowed_deg=shift", "why"), "points": points})
     return {**heading(spacecraft), "fronts": entries}
 
 
@@ -249,11 +245,7 @@ def schedule_paths(folder: str, count: int) -> list[str]:
 
 
 def _better(fronts: Sequence[Front], chosen: Plan) -> tuple[float, float, TradeRow] | None:
-    """The point that meets the requirement, and costs less and ends no later, or ends sooner and is not worse.
-
-    Any that meets it, where the ``chosen`` plan does not. The cheapest, of those that cost as much the one that ends
-    first. Before it the share of the cost saved, and s by which it ends earlier.
-    """
+    """Share of the cost saved, s earlier, and the cheapest, then earliest, point that is better than ``chosen``."""
     until, misses, better = chosen.pulses.end, chosen.meets_requirement is False, []
     for row in rows_of(fronts):
         saved, end = 1.0 - row.point.cost / chosen.pulses.cost_in(row.point.unit), row.plan.pulses.end

@@ -280,6 +280,16 @@ def keys_of_columns() -> Iterator[tuple[str, str]]:
             texts = [text for other in (*others, *(word.value for word in node.keywords)) for text in texts_in(other)]
             if isinstance(key, ast.Constant) and key.value:
                 yield str(key.value), " ".join(texts)
+        for key in keys_named(node, "file_columns"):
+            yield key, " ".join(texts_in(node.args[0]))
+
+
+def keys_named(node: ast.AST, function: str) -> Iterator[str]:
+    """Names in files that a call of ``function`` has behind its first argument, with or without a path."""
+    if isinstance(node, ast.Call) and ast.unparse(node.func).rpartition(".")[2] == function:
+        for name in node.args[1:]:
+            if isinstance(name, ast.Constant):
+                yield str(name.value).partition("=")[0]
 
 
 def keys_written() -> Iterator[str]:
@@ -300,6 +310,7 @@ def keys_written() -> Iterator[str]:
         for key in node.keys if isinstance(node, ast.Dict) else ():
             if isinstance(key, ast.Constant) and isinstance(key.value, str):
                 yield key.value
+        yield from keys_named(node, "values_of")
     yield from (key.replace("#", "") for key, where in keys_of_columns() if "json" in where)
 
 

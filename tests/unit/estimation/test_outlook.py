@@ -27,7 +27,8 @@ from nutdamp.montecarlo.study import Results, run, study_of
 from nutdamp.planning import decision
 from nutdamp.schemes import planner
 from nutdamp.spacecraft.model import Requirement
-from nutdamp.views.fit import advice, estimate_table, fit_screen, prospect_table
+from nutdamp.views.fit import ESTIMATES, advice, fit_screen, prospect_table
+from nutdamp.views.tables import DataTable
 
 SPIN, LENGTH = math.pi, 30.0
 
@@ -101,11 +102,12 @@ def test_values_are_shown_to_what_their_sigmas_leave() -> None:
     def row(value: float, sigma: float) -> Estimate:
         return Estimate("x", f"{value:g} ± {sigma:g}", "m", 1.0, value, sigma, 1.0, 0.5)
 
+    def screen(*rows: Estimate) -> str:
+        return shown(DataTable("Estimates", ESTIMATES, rows).screen("screen"))
+
     pairs = ((1.23456789, 1e-4), (1.23456789, 2.0), (1.23456789, 1.2), (0.0, 0.1), (1e-9, 1.0), (1.0, math.inf))
-    check_text("estimation.digits", shown(estimate_table([row(*pair) for pair in pairs]).screen("screen")))
-    (scaled,) = shown(
-        estimate_table([Estimate("x", "x", "mm", 1e3, 0.0123, 1e-4, 0.012, 1e-3)]).screen("screen")
-    ).splitlines()[-1:]
+    check_text("estimation.digits", screen(*(row(*pair) for pair in pairs)))
+    (scaled,) = screen(Estimate("x", "x", "mm", 1e3, 0.0123, 1e-4, 0.012, 1e-3)).splitlines()[-1:]
     assert scaled.split()[:6] == ["x", "12.3", "0.1", "mm", "12", "+0.3"]
 
 
