@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from nutdamp.common import results
 from nutdamp.control_loop.controller import SAMPLED, Watch
 from nutdamp.control_loop.law import Actuator, ComplexArray, Law
-from nutdamp.control_loop.stability import FARTHEST, Band, Odds, dead_band, expect_damping, transfer
+from nutdamp.control_loop.stability import FARTHEST, Band, Odds, dead_band, expect_in_time, margins, transfer
 from nutdamp.errors import Infeasible
 from nutdamp.flight.dynamics import Supply
 from nutdamp.physics.thruster import Ramp, shape_factor
@@ -32,21 +32,16 @@ Rows = NDArray[np.int64]
 
 
 class Cycle(NamedTuple):
-    """Limit cycle; rates are 1/s.
-
-    ``pulses``, ``cycles`` (from pause to pause; 0 where the loop never pauses), ``impulse`` N m s/s and ``propellant``
-    kg/s (None where it is not known), ``spin_rate`` rad/s², ``doubt``: one sigma of ``pulses`` over it. Nutation, rad:
-    ``high`` as firings begin (mean), ``low`` as they have ended (geometric mean), of each cycle, and the ``largest``.
-    """
+    """Limit cycle; rates are 1/s, nutations rad."""
 
     pulses: float
-    cycles: float
-    impulse: float
-    propellant: float | None
-    spin_rate: float
-    doubt: float
-    high: float
-    low: float
+    cycles: float  # from pause to pause; 0 where the loop never pauses
+    impulse: float  # N m s/s
+    propellant: float | None  # kg/s; None if unknown
+    spin_rate: float  # rad/s²
+    doubt: float  # one sigma of ``pulses`` over it
+    high: float  # nutation as firings begin, mean
+    low: float  # nutation as they have ended, geometric mean
     largest: float
 
 
@@ -68,21 +63,20 @@ ADDED = 6  # columns of `Sums` of which differences count
 
 @dataclass(eq=False)
 class Chains:
-    """State of each chain: z at the sample ``number``, previous waits of its channels, noise of its samples.
-
-    ``fresh``: at the first estimate after a firing. ``ready`` s: from when on it may fire again.
-    """
+    """State of each chain: z at the sample ``number``; ``fresh``: at the first estimate after a firing."""
 
     z: ComplexArray
     number: Rows
     active: NDArray[np.bool_]
     fresh: NDArray[np.bool_]
-    ready: Vector
-    carried: Vector
-    white: ComplexArray
+    ready: Vector  # s from which on it may fire again
+    carried: Vector  # previous waits of its channels
+    white: ComplexArray  # noise of its samples
     sums: list[Sums]
-    firings: list[list[Sums]]
-    cycles: list[list[Sums]]
+
+    def __post_init__(self) -> None:
+        self.firings: list[list[Sums]] = [[] for _ in self.sums]
+        self.cycles: list[list[Sums]] = [[] for _ in self.sums]
 
 
 CHAINS, CYCLES, SETTLING = 64, 16, 2  # cycles followed side by side, counted cycles of each, and cycles before those
@@ -95,8 +89,8 @@ LONGEST_LOOKED = 10_000  # largest number of samples examined one by one
 SIGMAS = 5.0  # reach of noise, sigmas, in which a channel may come to fire
 OUTGROWN = 4.0  # multiple of the expected dead band at which a loop does not hold the nutation
 
+# Mean by which a random walk first passes a level, 0.58 steps, in sigmas of noise of which all is new: √2 times.
 OVERSHOOT = 0.82
-"""Mean by which a random walk first passes a level, 0.58 steps, in sigmas of noise of which all is new: √2 times."""
 
 RISING = 1.1  # growth of the nutation from the first of many firings to the middle, and on, where it is not held
 
@@ -118,6 +112,7 @@ class Map:
         self.law, self.spin = Law(self.truth, loop), spacecraft.spin
         self.watch, self.rng = Watch(self.law, 0.0), np.random.default_rng(seed)
         self.seen = transfer(self.law, self.spin)
+        self.ahead = self.watch.ahead = self.seen.step if loop.predict or loop.sensor.rate is None else 0.0
         self.turn = complex(self.law.growth, -float(self.law.rate(self.spin)))
         self.start, self.stop = (self.law.size(angle, self.spin) for angle in (loop.start, loop.stop))
         self.channels = {channel.name: channel for channel in spacecraft.channels}
@@ -139,18 +134,14 @@ class Map:
         return self._summed(at.firings, at.cycles)
 
     def attractors(self, chains: int = CHAINS, *, z: complex | None = None) -> tuple[Cycle, ...]:
-        """Limit cycles that chains converge to, by their number: with pauses, and without.
-
-        They begin as for `cycle`, or fire already at ``z`` rad/s. Raises Infeasible as that does.
-        """
+        """Limit cycles that chains, or chains that fire already at ``z`` rad/s, converge to; raises as `cycle`."""
         at = self._begin(chains)
         if z is not None:
             self.bound = max(self.bound, 1.1 * abs(z))
             at.z[:], at.number[:], at.active[:], at.carried[:] = z, 0, True, math.nan
         # Until each has paused or fires on at the same size.
         self._follow(at, 0, FIRINGS + round(abs(z or 0.0) / max(self.smallest, 1e-9 * abs(z or 1.0))))
-        at.sums = [total._replace(pulses=0.0, cycles=0.0) for total in at.sums]
-        at.firings, at.cycles = [[] for _ in at.sums], [[] for _ in at.sums]
+        at = replace(at, sums=[total._replace(pulses=0.0, cycles=0.0) for total in at.sums])
         self._follow(at, SETTLING + CYCLES, FIRINGS)
         pausing: list[list[tuple[list[Sums], list[Sums]]]] = [[], []]
         for firings, cycles in zip(at.firings, at.cycles, strict=True):
@@ -171,11 +162,8 @@ class Map:
         raise Infeasible(f"the limit cycle is not reached within {MOST_STEPS} coasts")
 
     def _near(self) -> float | None:
-        """Size of z from which on every sample is examined until one shows the start threshold.
-
-        None where the chances of the samples add up: where the noise of each is new, or z grows little while it lasts.
-        """
-        seen = self.seen
+        """Size of z from which on every sample is examined; None where the chances of the samples add up."""
+        seen = self.seen  # chances add up where the noise of each sample is new, or z grows little while it lasts
         if not any(seen.grain) and (seen.fresh > 0.5 or seen.sigma == 0.0):
             return None
         # No more likely than if each sample had a chance of its own.
@@ -190,10 +178,8 @@ class Map:
         z = 0.5 * self.start / abs(self.seen.direct) * np.exp(1j * self.rng.uniform(0.0, 2.0 * math.pi, count))
         number = self.rng.integers(1, 2 + round(self.law.period / self.seen.step), count)
         quiet, waits = np.zeros(count, dtype=bool), np.full((len(self.law.actuators), count), math.nan)
-        firings: list[list[Sums]] = [[] for _ in range(count)]
-        cycles: list[list[Sums]] = [[] for _ in range(count)]
-        sums, white = [Sums() for _ in range(count)], self._drawn(count)
-        return Chains(z, number, quiet, quiet.copy(), np.zeros(count), waits, white, sums, firings, cycles)
+        white, sums = self._drawn(count), [Sums()] * count
+        return Chains(z, number, quiet, quiet.copy(), np.zeros(count), waits, white, sums)
 
     def _drawn(self, rows: int) -> ComplexArray:
         return self.seen.drawn(self.rng, rows, len(self.seen.weights))
@@ -241,8 +227,7 @@ class Map:
         waits = self._waits(mean)
         share = np.minimum(self.reach / np.maximum(np.abs(mean), self.reach + 1e-300), 1.0)
         slack = 3.0 * self.seen.step + 0.25 * share * self.law.period
-        ahead = self._ahead
-        due = np.where(waits < ahead - slack, waits + self.law.period, waits) - ahead - slack
+        due = np.where(waits < self.ahead - slack, waits + self.law.period, waits) - self.ahead - slack
         idle = np.isnan(due).all(axis=0)
         soonest = np.where(idle, 0.0, np.where(np.isnan(due), math.inf, due).min(axis=0))
         samples = np.maximum(np.floor(soonest / self.seen.step), 0.0).astype(np.int64)
@@ -259,11 +244,6 @@ class Map:
         moved = samples > 0
         self._goes(at, rows[moved], samples[moved])
 
-    @property
-    def _ahead(self) -> float:
-        """Lead of the decision on a firing before its start, s."""
-        return self.seen.step if self.law.loop.predict or self.law.loop.sensor.rate is None else 0.0
-
     def _look(self, at: Chains, rows: Rows) -> None:
         """Examine the next samples one by one, up to the first event of each."""
         step = self.seen.step
@@ -276,7 +256,7 @@ class Map:
         some = awake[:, -1]
         waits[:, some] = self._waits(seen[some])
         waits[:, ~some, -1] = self._waits(seen[~some, -1])
-        fires = self.watch.triggered(np.concatenate([at.carried[:, rows, None], waits], axis=2), self._ahead)
+        fires = self.watch.triggered(np.concatenate([at.carried[:, rows, None], waits], axis=2))
         downs = awake & (np.abs(seen) <= self.stop)
         firsts = np.where(downs.any(axis=1), downs.argmax(axis=1), count)
         at.active[rows] = awake[:, -1]
@@ -313,12 +293,9 @@ class Map:
     def _firing(self, actuator: Actuator, seen: complex, time: float) -> tuple[float, float, Pulse, Actuator] | None:
         """Start, length and pulse of a firing decided on z ``seen`` at ``time`` s."""
         now, law = time + self.law.loop.sensor.delay, self.law
-        firing = law.firing(actuator, seen, self.spin)
-        for _ in range(REFINED if law.loop.sensor.rate is None else 0):  # a continuous signal shows the moment itself
-            if firing is None:
-                return None
-            now, seen = now + firing.wait, seen * complex(np.exp(self.turn * firing.wait))
-            firing = law.firing(actuator, seen, self.spin)
+        more = REFINED if law.loop.sensor.rate is None else 0  # a continuous signal shows the moment itself
+        while (firing := law.firing(actuator, seen, self.spin)) is not None and more > 0:
+            now, seen, more = now + firing.wait, seen * complex(np.exp(self.turn * firing.wait)), more - 1
         if firing is None:
             return None
         begins = now + (max(firing.wait, 0.0) if law.loop.predict else 0.0)
@@ -407,16 +384,15 @@ class Map:
 DAY = 86400.0
 YEAR = 365.25 * DAY  # s
 
+# Noise of estimates (one sigma), over the start threshold, above which the map underestimates firings, and the share by
+# which their number is then known at best: flown loops fire up to a fifth more at 0.2 of start.
 NOISY, WIDENED = 0.1, 0.2
-"""Noise of estimates (one sigma), over the start threshold, above which the map underestimates firings, and the
-share by which their number is then known at best: flown loops fire up to a fifth more at 0.2 of start."""
 
 DIFFERENT = 0.3  # relative difference of pulses by which one limit cycle differs from another
 
+# Shares of the propellant used at which a rate of use is worked out, with the weights of Simpson's rule: so many, as
+# the rate is uneven; how well the last pulse of a cycle fits differs with the thrust.
 STAGES = tuple((part / 8.0, weight / 24.0) for part, weight in enumerate((1, 4, 2, 4, 2, 4, 2, 4, 1)))
-"""Shares of the propellant used at which a rate of use is worked out, with the weights of Simpson's rule.
-
-So many, as the rate is uneven: how well the last pulse of a cycle fits differs with the thrust."""
 
 
 class Thresholds(NamedTuple):
@@ -428,23 +404,16 @@ class Thresholds(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class HeldNutation:
-    """Nutation held between ``thresholds``: the limit ``cycle`` at the present spin; ``why`` there is none.
-
-    It is the one that the loop falls into from the nutation of the file; ``other`` is a second one, None without.
-    ``noisy``: its noise is above `NOISY` of start.
-
-    ``begins`` s is when the loop first fires, ``band`` what the sensor and the smallest pulse allow, ``lasts`` s how
-    long the propellant in the tank is enough for the limit cycle, None where that is not known.
-    """
+    """Nutation held between ``thresholds``: the limit ``cycle`` at the present spin; ``why`` there is none."""
 
     spacecraft: Spacecraft
     thresholds: Thresholds
-    begins: float
-    band: Band | None = None
-    cycle: Cycle | None = None
-    other: Cycle | None = None
-    lasts: float | None = None
-    noisy: bool = False
+    begins: float  # time at which the loop first fires, s
+    band: Band | None = None  # allowed by the sensor and the smallest pulse
+    cycle: Cycle | None = None  # the one that the loop falls into from the nutation of the file
+    other: Cycle | None = None  # a second one
+    lasts: float | None = None  # s that the propellant in the tank is enough for; None if unknown
+    noisy: bool = False  # noise above `NOISY` of start
     why: str = ""
 
     @property
@@ -464,13 +433,10 @@ class HeldNutation:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Budget(results.Data, results.Written):
-    """Growth of nutation in a ``spacecraft``, and the cost of holding it, for each pair of thresholds in ``held``.
-
-    ``largest``: θ_max, rad, of which `until_largest` tells when it is reached; None where none is named.
-    """
+    """Growth of nutation in a ``spacecraft``, and the cost of holding it, for each pair of thresholds in ``held``."""
 
     spacecraft: Spacecraft
-    largest: float | None
+    largest: float | None  # θ_max, rad; None where none is named
     held: tuple[HeldNutation, ...]
 
     def __repr__(self) -> str:
@@ -526,7 +492,10 @@ def _held(spacecraft: Spacecraft, loop: Loop, seed: int) -> HeldNutation:
     result = HeldNutation(body, pair, requirements.reached(body, loop.start))
     try:
         result = replace(result, band=dead_band(body, loop))
-        expect_damping(body, loop)
+        turned = [margin.channel for margin in margins(body, loop) if margin.turned]
+        if turned:
+            raise Infeasible(f"firings of {' and '.join(turned)} feed the nutation: wired backwards against the sensor")
+        expect_in_time(body, loop)
         cycles = Map(body, loop, seed=seed)
         cycle, *others = _attractors(body, loop, cycles)
         if cycles.seen.sigma > NOISY * cycles.start:
@@ -538,11 +507,9 @@ def _held(spacecraft: Spacecraft, loop: Loop, seed: int) -> HeldNutation:
 
 
 def _attractors(body: Spacecraft, loop: Loop, cycles: Map) -> list[Cycle]:
-    """Limit cycle of the loop from the nutation of the file, and others that differ from it.
-
-    There may be others where a firing can leave more than the stop threshold that no smaller pulse lowers.
-    """
+    """Limit cycle of the loop from the nutation of the file, and others that differ from it."""
     band, law = dead_band(body, loop), cycles.law
+    # There may be others where a firing can leave more than the stop threshold that no smaller pulse lowers.
     if not 0.5 * band.step > loop.stop > 0.0:
         return [cycles.cycle()]
     now = complex(law.seen(body.initial.omega))

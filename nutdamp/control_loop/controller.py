@@ -30,21 +30,16 @@ REFINED = 60  # steps, at most, in which the moment of a firing is found between
 
 
 class Seen(NamedTuple):
-    """Some moments of a coast: ``times`` (n,) s of the samples, and of the decisions on them, ``now`` (n,) s.
+    """Some moments (n,) of a coast."""
 
-    ``z`` is what the law takes for the transverse rate then, ``best`` what is known of it at ``times``; ``spin`` ω3.
-    ``shown`` (n,) rad is the nutation by ``z``; ``fires`` (channels, n): whether each comes to fire. ``size`` rad/s is
-    |z| in truth at the last of the samples.
-    """
-
-    times: Vector
-    now: Vector
-    z: ComplexArray
-    best: ComplexArray
-    spin: Vector
-    shown: Vector
-    fires: NDArray[np.bool_]
-    size: float
+    times: Vector  # of the samples, s
+    now: Vector  # of the decisions on them, s
+    z: ComplexArray  # transverse rate by the law then, rad/s
+    best: ComplexArray  # that known at ``times``
+    spin: Vector  # ω3, rad/s
+    shown: Vector  # nutation by ``z``, rad
+    fires: NDArray[np.bool_]  # (channels, n): True where each comes to fire
+    size: float  # true |z| at the last sample, rad/s
 
 
 class Decided(NamedTuple):
@@ -58,22 +53,16 @@ class Decided(NamedTuple):
 
 
 class Watch:
-    """Evaluation of the samples of coasts from ``since`` s on, which is (cases, 1) for many.
-
-    ``reach``: samples that are looked at together next.
-    """
+    """Evaluation of samples of coasts from ``since`` s on, (cases, 1) for many; ``reach``: how many come together."""
 
     def __init__(self, law: Law, since: Any) -> None:
         self.law, self.sensor = law, law.loop.sensor
         self.estimator = Estimator(law, self.sensor, since)
         step = self.estimator.step or law.period / GRID
         self.reach = min(max(round(0.5 * law.period / step), 2), LONGEST)
+        # s from decision to start of a firing: until the next sample, where the law predicts.
+        self.ahead = self.estimator.step if law.loop.predict else 0.0
         self._waits: Vector | None = None
-
-    @property
-    def ahead(self) -> float:
-        """Time from decision to start of a firing, s: until the next sample, where the law predicts."""
-        return self.estimator.step if self.law.loop.predict else 0.0
 
     def first(self, since: Any) -> Any:
         """Number of the first sample of a coast from ``since`` s on."""
@@ -83,10 +72,7 @@ class Watch:
     def judged(
         self, times: Vector, values: Vector, spin: Vector, active: NDArray[np.bool_]
     ) -> tuple[ComplexArray, ComplexArray, Vector, NDArray[np.bool_]]:
-        """Estimates: z on board, best z, nutation by it, and triggers of channels, (channels, ..., n).
-
-        The latter only where the loop is ``active``, or where it may become so: it matters nowhere else.
-        """
+        """Estimates: z on board, best z, nutation, and triggers (channels, ..., n) where the loop is or gets active."""
         raw = self.estimator.feed(times, values, spin)
         z, best = self.estimator.on_board(raw, spin), self.estimator.best(raw, spin)
         shown = self.law.nutation(np.abs(z), spin)
@@ -123,9 +109,9 @@ class Watch:
         """`Law.waits` of all channels, (channels, ..., n)."""
         return np.array([self.law.waits(actuator, z, spin) for actuator in self.law.actuators])
 
-    def triggered(self, waits: Vector, ahead: float | None = None) -> NDArray[np.bool_]:
-        """True where a channel comes to fire at a moment after the first: its wait falls below `ahead`."""
-        before, now, ahead = waits[..., :-1], waits[..., 1:], self.ahead if ahead is None else ahead
+    def triggered(self, waits: Vector) -> NDArray[np.bool_]:
+        """True where a channel comes to fire at a moment after the first: its wait falls below ``ahead``."""
+        before, now, ahead = waits[..., :-1], waits[..., 1:], self.ahead
         falls = (now < ahead) & (before >= ahead) & (before - now < 0.5 * self.law.period)
         slack = 1e-12 * self.law.period
         begins = np.isnan(before) & (now >= -slack) & (now < max(ahead, slack))
@@ -151,10 +137,7 @@ class Joined:
 
 
 class Coast(Watch):
-    """Motion of one body from ``state`` at ``since`` s on without firing, and its samples.
-
-    ``parts``: the motion since the last firing, as far as it had to be integrated.
-    """
+    """Motion of one body from ``state`` at ``since`` s on without firing, and its samples; ``parts``: as integrated."""
 
     def __init__(self, law: Law, signal: Signal, dynamics: Dynamics, state: SpinState, since: float) -> None:
         super().__init__(law, since)
@@ -254,10 +237,7 @@ TAG = 1  # ends the key of the random numbers of a firing: those of the noise ar
 
 
 class Fired(NamedTuple):
-    """Firing: the ``pulse`` as it acts, the time of the decision (s), and the observed nutation (rad) then.
-
-    ``true_nutation`` rad is what it was in truth as the pulse began.
-    """
+    """Firing: the ``pulse`` as it acts, time of the decision (s), nutation (rad) observed then, and true at start."""
 
     pulse: Pulse
     decided: float
@@ -293,16 +273,12 @@ def _drawn(random: np.random.Generator, tolerance: Tolerance | None) -> float:
 
 
 class Case(NamedTuple):
-    """Loop to be flown: the true spacecraft with its loop, the ``key`` of its noise, and the errors of firings.
-
-    ``key``: seed of the noise, and the number of the dispersed case from 1 where it is one. ``tilt`` rad is by how much
-    the attitude at t = 0 is off, about the body axes 1 and 2.
-    """
+    """Loop to be flown: the true spacecraft with its loop, and the errors of firings."""
 
     truth: Spacecraft
-    key: tuple[int, ...]
+    key: tuple[int, ...]  # seed of the noise, and number of a dispersed case, from 1
     scatter: Scatter | None = None
-    tilt: tuple[float, float] = (0.0, 0.0)
+    tilt: tuple[float, float] = (0.0, 0.0)  # rad, of the attitude at t = 0 about the body axes 1 and 2
 
 
 class Course(Enum):
@@ -313,9 +289,8 @@ class Course(Enum):
 
 
 class Pilot:
-    """Controller of one loop: from samples of its coasts, stretch by stretch, to firings.
+    """Controller of one loop, known on board to the ``law`` and true in the ``case``: from samples to firings.
 
-    The ``law`` has the loop as it is known on board; that of the ``case``, with sensor and faults, is as it is.
     ``free``: coasts are those of a symmetric body without torque from outside.
     """
 

@@ -165,16 +165,7 @@ def _sensor(sensor: Sensor, draw: dict[str, float]) -> Sensor:
 
 Array = NDArray[np.float64]
 
-OUTPUTS = (
-    "settled",
-    "quiet",
-    "nutation",
-    "momentum_shift",
-    "axis_error",
-    "spin_change",
-    "propellant",
-    "firings",
-)
+OUTPUTS = ("settled", "quiet", "nutation", "momentum_shift", "axis_error", "spin_change", "propellant", "firings")
 """Outputs of a case: first settling (s), nutation then and largest since (rad), by what H has turned and
 is off its target at the end (rad), by how much the spin has changed (rad/s), propellant (kg), firings.
 
@@ -192,10 +183,7 @@ FEW = 100  # least number of settled cases for sensitivities
 
 
 class LoopStudy(DrawnCases):
-    """Loop of a ``spacecraft`` flown to ``until`` s in dispersed cases; its ``law`` on board knows the file.
-
-    ``alone`` is why the cases fly one by one, which takes longer; empty where they fly together.
-    """
+    """Loop flown to ``until`` s in dispersed cases; ``alone`` is why they fly one by one, empty where together."""
 
     model: LoopModel
 
@@ -281,10 +269,7 @@ class LoopStudy(DrawnCases):
 
 
 def loop_study(spacecraft: Spacecraft, until: float | None = None, *, seed: int = 1) -> LoopStudy:
-    """Study of the loop of a spacecraft with dispersions; raises BadRequest for one without either of them.
-
-    Raises Infeasible as `plan.loop_of` does.
-    """
+    """Study of a loop; raises BadRequest without loop or dispersions, Infeasible as `evaluation.loop_of` does."""
     loop = requirements.expect_loop(spacecraft)
     expect_dispersions(spacecraft.dispersions)
     expect_in_time(spacecraft, loop)
@@ -293,23 +278,20 @@ def loop_study(spacecraft: Spacecraft, until: float | None = None, *, seed: int 
 
 @dataclass(eq=False)
 class LoopResults(Counted):
-    """Results of a study of a loop.
+    """Results of a study of a loop; cases that comply settle too.
 
-    Those that comply settle too. ``values`` are the outputs (8, requested), ``lost`` (done,) the cases that see no end,
-    or were stopped; ``stops`` is why loops were flown no further. ``angles`` (m, 2, requested) rad are the least and
-    the largest from the spin axis to the direction of each cone.
+    ``values`` are the outputs (8, requested), ``lost`` (done,) the cases that see no end, or were stopped; ``stops`` is
+    why loops were flown no further. ``angles`` (m, 2, requested) rad: least and largest to the direction of each cone.
     """
 
     study: LoopStudy
     stops: Counter[Ending] = field(default_factory=Counter)
-    values: Array = field(init=False)
-    angles: Array = field(init=False)
-    lost: NDArray[np.bool_] = field(init=False, default_factory=lambda: np.zeros(0, dtype=bool))
 
     def __post_init__(self) -> None:
         super().__post_init__()
         self.values = np.empty((len(OUTPUTS), self.requested))
         self.angles = np.empty((len(self.study.spacecraft.keep), 2, self.requested))
+        self.lost = np.zeros(0, dtype=bool)
 
     def of(self, output: str) -> Array:
         """Known values of an output, (m,)."""
@@ -384,9 +366,8 @@ def run(
 ) -> LoopResults:
     """Fly the cases that ``results`` is to have, a portion after the other; returns ``results``.
 
-    ``watch`` is called now and then with how many are done, ``collect`` with the portions in order: the number (from 0)
-    of the first case, outputs (8, n), why they were flown no further, and angles (m, 2, n) rad to the cones. When
-    ``stopped`` says so, the portions done so far are kept.
+    ``watch`` is called with how many are done, ``collect`` with the portions in order: number (from 0) of the first
+    case, outputs (8, n), why they end, and angles (m, 2, n) rad. Where ``stopped``, the portions done are kept.
     """
     study = results.study
     source, block = study.source(), -1

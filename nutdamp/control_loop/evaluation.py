@@ -130,9 +130,8 @@ LOOP = "loop"  # name in place of a scheme
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LoopPlan(Plan):
-    """Pulses fired by a loop in a ``flown_run``; its flight is that in which it fired them, to the end of the run.
+    """Pulses fired by a loop in a ``flown_run``, with its flight; ``known`` is the spacecraft as the law knows it.
 
-    ``known`` is the spacecraft as the law knows it.
     With growing nutation the same pulses fired again without looking would not do the same: errors of rounding grow.
     """
 

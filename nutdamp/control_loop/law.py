@@ -35,33 +35,25 @@ LEADS = 100  # on-times of a channel for which the valve response is tabulated
 
 
 class Firing(NamedTuple):
-    """Firing decided by the law: ``wait`` s until its command (negative: overdue).
+    """Firing decided by the law."""
 
-    ``on_time`` s is that of full thrust, about its centre ``lead`` s after the beginning of the command, which with its
-    thrust ``lasts`` so many s; without a valve half and all of the on-time. ``acts`` rad/s is what it adds to z there.
-    """
-
-    wait: float
-    on_time: float
-    lead: float
-    lasts: float
-    acts: complex
+    wait: float  # s until its command; negative: overdue
+    on_time: float  # s of full thrust
+    lead: float  # s from the beginning of the command to the centre of the thrust
+    lasts: float  # s of command and thrust together
+    acts: complex  # rad/s that it adds to z at its centre
 
 
 @dataclass(frozen=True, eq=False)
 class Actuator:
-    """Channel as the law sees it: ``kick`` rad/s² is the change of z per second, ``spin_rate`` rad/s² that of ω3.
-
-    Its pulses last from ``shortest`` to ``longest`` s. ``leads`` through a valve: effective on-times (n,) s between
-    these, and the lead of the commands to their centres.
-    """
+    """Channel as the law sees it."""
 
     channel: Channel
-    kick: complex
-    spin_rate: float
-    shortest: float
+    kick: complex  # rad/s²: change of z
+    spin_rate: float  # rad/s²: change of ω3
+    shortest: float  # s: least effective on-time
     longest: float
-    leads: tuple[Array, Array] | None = None
+    leads: tuple[Array, Array] | None = None  # with a valve, s: on-times (n,) between, and leads to their centres
 
 
 class Law:
@@ -135,8 +127,7 @@ class Law:
     def waits(self, actuator: Actuator, z: ComplexArray, spin: Array) -> Array:
         """`Firing.wait` of one channel for many moments (n,); not a number where a firing would not help.
 
-        To first order in the torque about axis 3, to the `LEADS` of its valve and between ticks: it tells between which
-        moments a channel comes to fire, `firing` then when and for how long.
+        To first order in the torque about axis 3, to the `LEADS` of its valve and between ticks; `firing` is exact.
         """
         rate, size, push = self.rate(spin), np.abs(z), abs(actuator.kick)
         half = np.abs(0.5 * rate)
@@ -194,21 +185,16 @@ class Ending(Enum):
 
 
 class Doubt(NamedTuple):
-    """Uncertainty of estimates of z: ``noise`` rad/s (one sigma) of a sample, ``white`` its part at the rate of z.
+    """Uncertainty of estimates of z; noise falls with the root of the number of samples."""
 
-    Both fall with the root of the number of samples, but to ``least``: of fits that share theirs. At rest the noise
-    counts ``lift`` times. ``bias`` is a constant of the coasts, ``steps`` of the quantisation are at most off by that.
-    ``turn`` is the share by which the rate at which z turns may be off, ``scale`` that of the sensor.
-    """
-
-    noise: float
-    white: float
-    least: float
-    lift: float
-    bias: float
-    steps: float
-    turn: float = 0.0
-    scale: float = 0.0
+    noise: float  # rad/s, one sigma of a sample
+    white: float  # its part at the rate of z
+    least: float  # noise at least: of fits that share their samples
+    lift: float  # factor on the noise at rest
+    bias: float  # rad/s: constant of the coasts
+    steps: float  # rad/s, at most, by the quantisation
+    turn: float = 0.0  # share by which the rate at which z turns may be off
+    scale: float = 0.0  # that of the sensor
 
     def of(self, seen: Glimpse) -> float:
         """One sigma of the estimate from the samples ``seen`` on a coast, for a known bias."""
@@ -218,18 +204,14 @@ class Doubt(NamedTuple):
 
 @dataclass(slots=True)
 class Glimpse:
-    """Rates z of one coast, carried to the centre of a firing by the nutation ``rate`` (1/s), with a bias b.
+    """Rates z of one coast, carried to the centre of a firing by the nutation, with a bias b: least squares."""
 
-    z = ``z`` - b ``leak``, the least squares fit; b by what is left of it: ``rest`` = b ``information``. ``apart``:
-    time from the samples to the firing, s.
-    """
-
-    z: complex
+    z: complex  # z = ``z`` - b ``leak``
     samples: int
     leak: complex
-    rest: complex
+    rest: complex  # left of the fit: b ``information``
     information: float
-    apart: float
+    apart: float  # s from the samples to the firing
 
     @classmethod
     def of(cls, times: Vector, best: ComplexArray, rate: complex, centre: float) -> Glimpse:
@@ -242,22 +224,16 @@ class Glimpse:
 
 
 class RateChange(NamedTuple):
-    """Values z rad/s ``before`` and ``after`` a firing, carried to its centre, and one ``sigma`` of their difference.
-
-    ``bound``: by how much it may be off beside that, in every firing alike.
-    """
+    """Values z rad/s ``before`` and ``after`` a firing, carried to its centre."""
 
     before: complex
     after: complex
-    sigma: float
-    bound: float
+    sigma: float  # one sigma of their difference
+    bound: float  # by which that may be off besides, in every firing alike
 
     @classmethod
     def of(cls, before: Glimpse, after: Glimpse, doubt: Doubt) -> RateChange:
-        """Change between two coasts of the same bias, which is estimated too where its limits are wider.
-
-        What of it stays open counts by how unlike the coasts are.
-        """
+        """Change between two coasts of the same bias, which is estimated too where its limits are wider."""
         sigma, unlike = math.hypot(doubt.of(before), doubt.of(after)), abs(after.leak - before.leak)
         information, bias, open_ = before.information + after.information, 0j, doubt.bias
         if doubt.bias > 0.0 and information > ALIKE * (before.samples + after.samples):
@@ -303,13 +279,9 @@ class Effect:
         """Uncertainty of the factor by noise, and by errors common to all firings."""
         return (sigmas * math.sqrt(self.noise) + self.bound) / self.wanted if self.wanted > 0.0 else math.inf
 
-    def works(self, sigmas: float = SIGMAS) -> bool:
-        """True if the firings surely have the expected effect."""
-        return self.factor.real >= WORKS and self.factor.real - self.open(sigmas) > -WORKS
-
-    def backwards(self, sigmas: float = SIGMAS) -> bool:
-        """True if they surely have the opposite effect."""
-        return self.factor.real <= -WORKS and self.factor.real + self.open(sigmas) < WORKS
+    def sure(self, sense: float, sigmas: float = SIGMAS) -> bool:
+        """True if the firings surely have the expected effect (``sense`` 1), or the opposite one (-1)."""
+        return sense * self.factor.real >= WORKS and sense * self.factor.real - self.open(sigmas) > -WORKS
 
 
 @dataclass(slots=True)
@@ -317,26 +289,20 @@ class Diagnosis:
     """Judges firing after firing. One that works backwards makes its channel ``suspect``, until ``deadline`` s.
 
     Another channel that works backwards too shows that it is the sensor, one that works that it is the channel.
-    z grows by ``growth`` 1/s, and with tan θ = ``slope`` |z| the spin falls; ``first``: |z| (rad/s) of the nutation
-    that is fired at, and the time (s), since the loop was last quiet.
     """
 
     period: float
-    growth: float = 0.0
-    slope: float = 0.0
+    growth: float = 0.0  # of z, 1/s
+    slope: float = 0.0  # tan θ over |z|: the spin falls with θ
     effects: dict[str, Effect] = field(default_factory=dict)
     suspect: str | None = None
     deadline: float = math.inf
-    first: tuple[float, float] | None = None
+    first: tuple[float, float] | None = None  # |z| (rad/s) as first fired at since the loop was quiet, and time (s)
 
     def judge(
         self, channel: str, now: float, before: Glimpse, after: Glimpse, expected: complex, doubt: Doubt
     ) -> tuple[Ending, str] | None:
-        """Reason to stop after a firing of ``channel`` expected to add ``expected``, and the channel to name; else
-        None.
-
-        Another may be fired from ``now`` s on.
-        """
+        """Reason to stop after a firing that was to add ``expected``, and the channel to name; another from ``now``."""
         change, effect = RateChange.of(before, after, doubt), self.effects.setdefault(channel, Effect())
         size, turns = max(abs(change.before), abs(change.after)), 2.0 * math.pi / self.period
         falls = abs(self.growth) * (before.apart + after.apart) * (self.slope * size) ** 2  # of the spin, as cos θ
@@ -353,13 +319,13 @@ class Diagnosis:
     ) -> tuple[Ending, str] | None:
         """Fault shown by the effects of firings, with the channel to name; None where there is none or not yet."""
         effect = self.effects[channel]
-        if self.suspect is None and effect.backwards():
+        if self.suspect is None and effect.sure(-1.0):
             self.suspect, self.deadline = channel, now + self.period
         if self.suspect is not None:
             others = [effect for name, effect in self.effects.items() if name != self.suspect]
-            if any(other.backwards(WHICH) for other in others):
+            if any(other.sure(-1.0, WHICH) for other in others):
                 return Ending.SENSOR, channel
-            return (Ending.CHANNEL, self.suspect) if any(other.works(WHICH) for other in others) else None
+            return (Ending.CHANNEL, self.suspect) if any(other.sure(1.0, WHICH) for other in others) else None
         if effect.open() >= WORKS:
             return None
         if abs(effect.factor) < WORKS:

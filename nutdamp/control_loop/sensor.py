@@ -31,8 +31,7 @@ from nutdamp.spacecraft.model import Spacecraft, Vector
 
 BLOCK = 4096  # samples whose noise is drawn at a time
 
-FILTERED = 600.0
-"""Time constants of the low-pass filter that are worked out at a time: the weights of more would overflow."""
+FILTERED = 600.0  # time constants of the low-pass filter worked out at a time: the weights of more would overflow
 
 HARMONIC = 7  # samples a nutation period from which on the sine of twice its rate can be distinguished from the others
 
@@ -41,8 +40,7 @@ FITTED, UNFITTED = 1.4, 2.0
 which leaves a tenth for those that are not; and where twice the rate is not fitted too, or a filter is reckoned with.
 """
 
-SETTLED = 5.0
-"""Time constants of the low-pass filter until its beginning is forgotten to 1 %: till then samples are not used."""
+SETTLED = 5.0  # time constants of the low-pass filter till samples are used: its beginning is forgotten to 1 %
 
 BLIND = 1e-6  # share of |ω3| times the distance from the centre of mass below which an accelerometer shows nothing of ω
 
@@ -126,10 +124,9 @@ def stepped(sensor: Sensor, values: Vector) -> Vector:
 
 
 class Estimator:
-    """From samples to z, the rate that the `Law` works on, along a coast that begins at ``since`` s.
+    """From samples to z, the rate that the `Law` works on, along a coast from ``since`` s on, (cases, 1) for many.
 
-    Samples are the last axis of times, spins and estimates, the last but one of values (n, columns). Before it there
-    may be cases, which began at ``since`` (cases, 1).
+    Samples are the last axis of times, spins and estimates, the last but one of values (..., n, columns).
     """
 
     def __init__(self, law: Law, sensor: Sensor, since: Any) -> None:
@@ -160,10 +157,7 @@ class Estimator:
         return self.since + (self.law.period if self.sensor.kind == ACCELEROMETER else 0.0)
 
     def feed(self, times: Vector, values: Vector, spin: Vector) -> ComplexArray:
-        """z at the ``times`` (s) of samples, filter reckoned with; NaN where there is none yet.
-
-        ``values`` are the samples, ``spin`` is ω3; call by call they go on.
-        """
+        """z at the ``times`` (s) of further samples ``values``, at a ``spin`` ω3, filtered; NaN where none yet."""
         smooth = self._low_pass(values)
         if self.sensor.kind == ACCELEROMETER:
             # The law knows how far out the sensor is and the spin, which dissipation changes: by more than ω shows.
@@ -207,10 +201,9 @@ class Estimator:
         return filtered
 
     def _fitted(self, times: Vector, values: Vector, spin: Vector) -> ComplexArray:
-        """z by an offset and a sine of the nutation rate, fitted to the samples of the last period.
+        """z by an offset and a sine of the nutation rate, fitted to the even samples of the last period.
 
-        Samples come evenly, so that the fit is a fixed combination of their sum and of the sums of their products with
-        sines of the rate and of twice it, over as many samples as the window has.
+        A fixed combination of their sum and of the sums of their products with sines of the rate and of twice it.
         """
         if not times.shape[-1]:
             return np.empty(times.shape, dtype=complex)
@@ -268,10 +261,7 @@ class Estimator:
 
 
 def _fit(rate: Vector, step: float, size: int) -> tuple[Vector, ComplexArray]:
-    """Least-squares fit of an offset and sines of a ``rate`` (rad/s) to ``size`` even samples.
-
-    Returns the rate and the weights of their sums: 1, cos φ, sin φ, cos 2φ, sin 2φ.
-    """
+    """Rate and weights, of sums by 1, cos φ, sin φ, cos 2φ, sin 2φ, of a sine fitted to ``size`` even samples."""
     angle = rate[..., None] * (step * np.arange(1.0 - size, 1.0))[:, None]
     powers = np.arange(1.0, 3.0 if size >= HARMONIC else 2.0)
     turns = np.stack([np.cos(angle * powers), np.sin(angle * powers)], axis=-1)

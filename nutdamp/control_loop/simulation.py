@@ -53,9 +53,8 @@ ROWS = 2000  # even moments at which the largest nutation of a run is looked for
 class LoopRun:
     """Loop of a ``case`` flown to ``until`` s: its firings, the reason of its end, and the ``channel`` to blame.
 
-    ``seed`` of the noise; ``case``: number of the dispersed case, from 1, or None. ``quiet``: the times
-    (s) from which it saw no more than the stop threshold, until the next start, ``settled`` the first of them, None
-    where it never was down to it; ``lost``: see `Pilot`.
+    ``case``: number of the dispersed case, from 1, or None. ``quiet``: times (s) from which it saw no more than the
+    stop threshold, ``settled`` the first of them, None without; ``lost``: see `Pilot`.
     """
 
     def __init__(self, law: Law, case: Case, until: float, dynamics: Dynamics | None = None) -> None:
@@ -171,20 +170,15 @@ Rows = NDArray[np.int_]
 
 @dataclass(frozen=True, eq=False)
 class FlownLoops:
-    """End of the loops of ``cases``: firings and judgements of the ``pilots``, and the motion at the end.
-
-    ``rates`` (3, n) rad/s, ``quaternion`` (4, n) from the body axes of t = 0. ``quiet`` (n,) rad is the nutation as a
-    loop first fell quiet, ``largest`` (n,) the largest of its coasts since; that of the end where it never did.
-    ``aspects`` (m, 2, n) rad: least and largest angle from the spin axis to the direction of each cone of the file.
-    """
+    """End of the loops of ``cases``: firings and judgements of the ``pilots``, and the motion at the end."""
 
     cases: Sequence[Case]
     pilots: list[Pilot]
-    rates: Vector
-    quaternion: Vector
-    quiet: Vector
-    largest: Vector
-    aspects: Vector
+    rates: Vector  # (3, n) rad/s
+    quaternion: Vector  # (4, n) from the body axes of t = 0
+    quiet: Vector  # (n,) rad: nutation as a loop first fell quiet
+    largest: Vector  # (n,) rad: nutation of its coasts since, at most; at the end where it never did
+    aspects: Vector  # (m, 2, n) rad: least and largest angle from the spin axis to the direction of each cone
 
     def momentum(self, rates: Vector) -> Vector:
         """Angular momentum (3, n) N m s of the true bodies at ``rates`` (3, n) rad/s, in body axes."""
@@ -205,7 +199,7 @@ class _Group:
         return _Group(self.rows[places], self.watch.some(places), self.numbers[places])
 
     def parts(self, size: int) -> Iterator[_Group]:
-        """Parts of at most ``most`` cases."""
+        """Parts of at most ``size`` cases."""
         if len(self.rows) <= size:
             yield self
             return
@@ -249,10 +243,7 @@ def fly_alone(
 
 
 class Fleet:
-    """Loops of ``cases`` flown together to ``until`` s.
-
-    Bodies are symmetric and nothing acts on them but their pulses and dissipation; see `expects_alone`.
-    """
+    """Loops of ``cases`` flown together to ``until`` s: symmetric bodies without disturbance, see `expects_alone`."""
 
     def __init__(self, law: Law, cases: Sequence[Case], until: float) -> None:
         self.law, self.cases, self.until = law, cases, until
@@ -342,8 +333,12 @@ class Fleet:
             yield from itertools.repeat(None, len(rows))
             return
         times: Vector = np.asarray((group.numbers[:, None] + np.arange(count)) * watch.estimator.step, dtype=np.float64)
-        omega, spin = self._motion(rows, times)
-        moments = self.bodies.moments[:, rows, None]
+        moments, forcing = self.bodies.moments[:, rows, None], self.bodies.forcing
+        x, y, axial = self.rates[:, rows, None]
+        wheel, now = forcing.wheel[rows, None], self.now[rows, None]
+        omega, spin = energy_sink.rates_on_arc(
+            moments[0], moments[2], forcing.growth, x + 1j * y, axial, times - now, wheel
+        )
         shown = np.stack(felt(sensor, moments, (omega.real, omega.imag, spin)), axis=-1)
         values = shown * self.scales[rows, None] + self.biases[rows, None]
         if (self.noise[rows] > 0.0).any():
@@ -360,14 +355,6 @@ class Fleet:
             at = (place, slice(0, end))
             seen = Seen(times[at], decided[at], z[at], best[at], spin[at], nutation[at], fires[:, *at], size)
             yield seen if end else None
-
-    def _motion(self, rows: Rows, times: Vector) -> tuple[NDArray[np.complex128], Vector]:
-        """ω and ω3 (cases, n) of coasts at ``times`` (cases, n) s."""
-        first, _, third = self.bodies.moments[:, rows, None]
-        x, y, z = self.rates[:, rows, None]
-        forcing, since = self.bodies.forcing, times - self.now[rows, None]
-        wheel = forcing.wheel[rows, None]
-        return energy_sink.rates_on_arc(first, third, forcing.growth, x + 1j * y, z, since, wheel)
 
     def _nutation(self, rows: Rows, growing: Vector | float = 0.0) -> Vector:
         """θ (n,) rad of cases now, and with tan θ grown by e to the power ``growing``."""

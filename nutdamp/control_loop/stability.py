@@ -31,21 +31,16 @@ NEVER = 1e3  # growth e^{κT} from which on further growth does not matter
 
 @dataclass(frozen=True, slots=True)
 class Margin:
-    """Channel at a ``nutation`` (rad): its largest delay ``late`` (rad), and the share (``gain``) that this leaves.
-
-    It damps while no later than ``latest`` rad. ``growth`` is the factor of a period. ``delay``: s by which it may come
-    later still; negative where it comes too late, minus infinity where no firing damps. ``turned``: the sensor or the
-    channel, not both, is reversed in the file: firings feed the nutation, which is not counted in these figures.
-    """
+    """Stability margin of a ``channel`` at a ``nutation`` (rad)."""
 
     channel: str
     nutation: float
-    late: float
-    latest: float
-    gain: float
-    growth: float
-    delay: float
-    turned: bool
+    late: float  # largest delay, rad
+    latest: float  # delay up to which it damps, rad
+    gain: float  # share of the nutation that the largest delay leaves
+    growth: float  # factor of a period
+    delay: float  # s by which it may come later still; negative: too late, minus infinity: no firing damps
+    turned: bool  # sensor or channel, not both, reversed in the file: not counted in these figures
 
     @property
     def damps(self) -> bool:
@@ -76,15 +71,16 @@ def expect_in_time(spacecraft: Spacecraft, loop: Loop) -> None:
 
 def too_late(margin: Margin) -> str:
     """Message on a channel of a loop that does not damp."""
-    degrees = np.degrees(margin.late)
-    theta = np.degrees(margin.nutation)
+    late, latest, theta = np.degrees([margin.late, margin.latest, margin.nutation])
     what = f"a firing of {margin.channel} leaves {100.0 * margin.gain:.4g} % of a nutation of {theta:.4g} deg"
     if margin.growth > 1.0:
         what += f", which grows by {100.0 * (margin.growth - 1.0):.3g} % in a period"
     if margin.delay == -np.inf:
         return f"the loop does not damp: {what}; raise start, or allow other on-times"
-    late = f"it comes up to {degrees:.4g} deg late, and damps up to {np.degrees(margin.latest):.4g} deg"
-    return f"the loop does not damp: {what}: {late}; shorten the delays by {-margin.delay:.4g} s, or set predict: true"
+    return (
+        f"the loop does not damp: {what}: it comes up to {late:.4g} deg late, and damps up to {latest:.4g} deg; "
+        f"shorten the delays by {-margin.delay:.4g} s, or set predict: true"
+    )
 
 
 def _margin(law: Law, actuator: Actuator, theta: float, spin: float) -> Margin:
@@ -116,14 +112,11 @@ def _most_late(pull: float, growth: float) -> float:
 
 
 class Band(NamedTuple):
-    """Nutation, rad, left by a loop as it settles: at most ``most`` in `SURELY` of the cases.
+    """Nutation, rad, left by a loop as it settles."""
 
-    ``noise`` is what the sensor adds to it, ``step`` what the smallest pulse takes away.
-    """
-
-    most: float
-    noise: float
-    step: float
+    most: float  # in `SURELY` of the cases
+    noise: float  # by the sensor
+    step: float  # that the smallest pulse takes away
 
 
 SURELY = 0.99  # share of the cases that keep the `Band`
@@ -132,9 +125,8 @@ SURELY = 0.99  # share of the cases that keep the `Band`
 def dead_band(spacecraft: Spacecraft, loop: Loop) -> Band:
     """Nutation that is left as the loop settles; raises Infeasible as `Law`.
 
-    The sensor shows no more than the stop threshold in one sample of a period: |z| is that and bias, steps, and noise
-    of which one of N samples exceeds σ sqrt(2 ln(N/p)) in a share p. Where half the smallest pulse
-    is more than the stop threshold, firings end there, the noise counted in the size and in both parts of the firing.
+    |z| is the stop threshold, bias, steps, and noise of which one of N samples exceeds σ sqrt(2 ln(N/p)) in a share p.
+    Where half the smallest pulse is more, firings end there: noise counts in the size and in both parts of the firing.
     """
     law, spin = Law(spacecraft, loop), spacecraft.spin
     doubts = Estimator(law, loop.sensor, 0.0).doubts
@@ -159,23 +151,18 @@ LONGEST_RESPONSE = 4096  # samples that count, at most
 
 
 class Transfer(NamedTuple):
-    """An estimate of z by samples ``step`` s apart: ``weights`` h (n,), the newest sample first.
+    """An estimate of z by samples: it shows ``direct`` z + ``mirrored`` conj(z) + ``offset``, and noise."""
 
-    It shows ``direct`` z + ``mirrored`` conj(z) + ``offset``, and noise of ``sigma`` rad/s in each direction, of which
-    in the frame that turns with z the share ``fresh`` is new in each sample. ``scatter``: sigma of a sample by parts
-    (real, imaginary), the imaginary zero for an accelerometer. ``first`` s after a pulse is the first estimate.
-    """
-
-    step: float
-    weights: ComplexArray
+    step: float  # s from sample to sample
+    weights: ComplexArray  # h (n,), the newest sample first
     direct: complex
     mirrored: complex
     offset: complex
-    sigma: float
-    fresh: float
-    scatter: tuple[float, float]
-    grain: tuple[float, float]
-    first: float
+    sigma: float  # of the noise in each direction, rad/s
+    fresh: float  # share of it that is new in each sample, in the frame that turns with z
+    scatter: tuple[float, float]  # sigma of a sample by parts (real, imaginary), imaginary zero for an accelerometer
+    grain: tuple[float, float]  # steps of a gyro by these
+    first: float  # s after a pulse: the first estimate
 
     def mean(self, z: Any) -> Any:
         """Observed z without noise, numbers or arrays."""
@@ -285,10 +272,9 @@ DEGREES = 240  # terms of the mixture of Rice's distribution: of numbers with a 
 
 
 class Odds:
-    """First passage: probability of an estimate of at least ``limit`` rad/s, or at most (``below``), while z grows.
+    """First passage: an estimate of at least ``limit`` rad/s, or at most (``below``), while z grows by ``growth`` 1/s.
 
-    ``growth`` (1/s) is that of z. The chances of the samples add up along a coast: an event is there where the sum has
-    come to an exponential number.
+    The chances of the samples add up along a coast: an event is where the sum has come to an exponential number.
     """
 
     def __init__(self, seen: Transfer, limit: float, growth: float, *, below: bool) -> None:
@@ -351,11 +337,3 @@ def exceeds(limit: float, shown: Vector) -> Vector:
             total += share * tail
         chances[near] = total
     return np.clip(chances, 0.0, 1.0)
-
-
-def expect_damping(body: Spacecraft, loop: Loop) -> None:
-    """Raise Infeasible where firings feed the nutation: by faults in the file, or by their delay."""
-    turned = [margin.channel for margin in margins(body, loop) if margin.turned]
-    if turned:
-        raise Infeasible(f"firings of {' and '.join(turned)} feed the nutation: wired backwards against the sensor")
-    expect_in_time(body, loop)

@@ -43,10 +43,7 @@ COARSE = 10  # a record that has so few different values is one of coarse steps
 
 
 def expect_alive(model: Model) -> None:
-    """Raise Infeasible for a sensor that does not change, all along while another one shows a nutation, or for long.
-
-    That gyro 3 does not change all along is as it should be.
-    """
+    """Raise Infeasible for a sensor that does not change, all along while another one shows a nutation, or for long."""
     shows = [index for index, name in enumerate(model.signals) if KIND[name].nutation]
     varying = [index for index in shows if _run(model, index)[3] > 1]
     for index, signal in enumerate(model.signals):
@@ -55,6 +52,7 @@ def expect_alive(model: Model) -> None:
         begins, ends, alike, different = _run(model, index)
         if alike < max(FEWEST, STUCK * len(model.samples[index])):
             continue
+        # That gyro 3 does not change all along is as it should be.
         dead = different == 1 and signal != GYROS[2] and bool(set(varying) - {index})
         if dead or different > COARSE:
             while_others = " while others show a nutation" if dead else ""
@@ -246,8 +244,7 @@ UNEQUAL_BY = ("unequal_1", "unequal_2")  # the parameters of unequal transverse 
 def fit(spacecraft: Spacecraft, record: Record) -> Fit:
     """Estimate what a record tells of a spacecraft.
 
-    Raises Infeasible where that is nothing, saying what would help; BadRequest where the file does not describe what
-    a signal of the record needs.
+    Raises Infeasible where that is nothing, BadRequest where the file does not describe what a signal needs.
     """
     with work.budget("fit", work.FIT * max(1.0, len(record.times) / work.FITTED)) as spent:
         best = _fitted(spacecraft, record)
@@ -273,35 +270,32 @@ def _fitted(spacecraft: Spacecraft, record: Record) -> Fit:
         [fitted, *(_settled(model, values) for values in initial_guess.neighbours(model, fitted.values))]
     )
     if model.unequal:
-        if _shows_growth(fitted):
-            return _widened(fitted, Model(spacecraft, record), ("growth",))
-        return _grown_a_little(fitted)
+        grown = Model(spacecraft, record)
+        return _widened(fitted, grown, ("growth",)) if _shows_growth(fitted, grown) else _grown_a_little(fitted, grown)
     three = Model(spacecraft, record, unequal=True, growing=fitted.grows)
     begin, of_moments = _begun(fitted, three), _places(three, UNEQUAL_BY)
     if not _shown(fitted, three, begin, of_moments):
         return fitted
     # What unequal moments do may look like growth of equal ones, which then is none.
     unequal = _widened(fitted, Model(spacecraft, record, unequal=True, growing=False), UNEQUAL_BY)
-    if not fitted.grows or not _shows_growth(unequal):
-        return _grown_a_little(unequal)
+    grown = Model(spacecraft, record, unequal=True)
+    if not fitted.grows or not _shows_growth(unequal, grown):
+        return _grown_a_little(unequal, grown)
     begin[of_moments] = _begun(unequal, three)[of_moments]
     return _settled(three, begin)
 
 
-def _shows_growth(narrow: Fit) -> bool:
-    """True where the residuals of a fit of three moments show dissipation."""
-    wider = Model(narrow.model.spacecraft, narrow.model.record, unequal=True)
+def _shows_growth(narrow: Fit, wider: Model) -> bool:
+    """True where the residuals of a fit of three moments show the dissipation of a ``wider`` model."""
     which = _places(wider, ("growth",))
     return bool(which) and _shown(narrow, wider, _begun(narrow, wider), which)
 
 
-def _grown_a_little(narrow: Fit) -> Fit:
-    """A fit of three moments with dissipation that does not show, by one step of least squares.
+def _grown_a_little(narrow: Fit, wider: Model) -> Fit:
+    """A fit of three moments with dissipation that does not show, by one step of least squares: it is linear then.
 
-    So small a growth is linear. Left out it would be taken as exactly known: what is known together with it would then
-    be off by more than its sigma.
+    Left out it would be taken as exactly known, and what is known together with it off by more than its sigma.
     """
-    wider = Model(narrow.model.spacecraft, narrow.model.record, unequal=True)
     which = _places(wider, ("growth",))
     if not which:
         return narrow
@@ -353,25 +347,19 @@ def _expect_seen(fitted: Fit) -> None:
 def _best(model: Model) -> Vector:
     """Values of the least robust cost, from the starts that the record gives."""
     best, cost = _try(model, list(starts(model)))
-    if share_left(model, best) > POOR:
-        for share in PARTS:
-            values, other = _try(model, list(starts(model, share)))
-            values, other = (values, other) if share == PARTS[0] else _grown(model, share, values)
-            if other < cost:
-                best, cost = values, other
-            if share_left(model, best) < POOR:
-                break
+    for share in PARTS if share_left(model, best) > POOR else ():
+        values, other = _try(model, list(starts(model, share)))
+        # The fit of that part of the record, then of twice as much, to the whole.
+        part = share
+        while share < PARTS[0] and part < 2.0:
+            rows = model.times <= model.start + min(part, 1.0) * model.record.length
+            values, other = search(model, values, scales_of(model), rows, robust=True, near=False)
+            part *= 2.0
+        if other < cost:
+            best, cost = values, other
+        if share_left(model, best) < POOR:
+            break
     return best
-
-
-def _grown(model: Model, share: float, values: Vector) -> tuple[Vector, float]:
-    """The fit of the first ``share`` of the record, then of twice as much, to the whole."""
-    while True:
-        rows = model.times <= model.start + share * model.record.length
-        values, cost = search(model, values, scales_of(model), rows, robust=True, near=False)
-        if share >= 1.0:
-            return values, cost
-        share = min(2.0 * share, 1.0)
 
 
 def _try(model: Model, begins: Sequence[dict[str, float]]) -> tuple[Vector, float]:

@@ -42,7 +42,6 @@ from nutdamp.montecarlo.statistics import ROWS, VECTORS, Exact, vectors
 from nutdamp.montecarlo.study import Results, Study, run
 from nutdamp.physics import attitude
 from nutdamp.planning import decision
-from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import Spacecraft, required_share
 from nutdamp.spacecraft.requirements import Left
@@ -58,36 +57,27 @@ MOST_SAMPLES = 20_000  # of a record that is looked at; longer ones are taken to
 
 @dataclass(frozen=True, eq=False)
 class Prospect:
-    """Prospect of knowing as much as after ``length`` s of coast: ``nutation`` rad, which most cases stay below.
-
-    How many is said by `Outlook.probability`. ``ratio``: sigma of C/A; ``met``: share that meets the requirement, None
-    without one; ``probe``: the channel that fires a pulse of ``on_time`` s meanwhile, and ``thrust``, sigma of its
-    thrust factor; empty for none. ``propellant``: kg of that pulse, None where it is not known.
-    """
+    """Prospect of knowing as much as after ``length`` s of coast."""
 
     length: float
-    ratio: float
-    nutation: float
-    met: float | None
-    probe: str = ""
+    ratio: float  # sigma of C/A
+    nutation: float  # rad, that `Outlook.probability` of the cases stay below
+    met: float | None  # share of cases that meets the requirement, None without one
+    probe: str = ""  # channel that fires a pulse of ``on_time`` s meanwhile, empty for none
     on_time: float = 0.0
-    thrust: float = math.nan
-    propellant: float | None = None
+    thrust: float = math.nan  # sigma of its thrust factor
+    propellant: float | None = None  # kg of that pulse, None if unknown
 
 
 @dataclass(frozen=True, eq=False)
 class Outlook:
-    """The prospects of coasts, from the shortest on, and of one probe pulse of each channel in the plan.
-
-    ``propellant``: kg of the plan, None where it is not known.
-    """
+    """The prospects of coasts, from the shortest on, and of one probe pulse of each channel in the plan."""
 
     scheme: str
     coasts: tuple[Prospect, ...]
     probes: tuple[Prospect, ...]
-    probability: float
-    """Share of cases that must meet the requirement, and that stay below the nutation shown."""
-    propellant: float | None
+    probability: float  # share of cases that must meet the requirement, and that stay below the nutation shown
+    propellant: float | None  # kg of the plan, None if unknown
 
     @property
     def now(self) -> Prospect:
@@ -108,8 +98,7 @@ class Outlook:
     @property
     def probe(self) -> Prospect | None:
         """The probe pulse that leaves least, where it pays."""
-        best = min(self.probes, key=lambda prospect: prospect.nutation, default=None)
-        return best if best is not None and self._pays(best) else None
+        return min(filter(self._pays, self.probes), key=lambda prospect: prospect.nutation, default=None)
 
     @property
     def thrifty(self) -> Prospect | None:
@@ -126,10 +115,7 @@ class Outlook:
 
 
 def outlook(fitted: Fit, time: float, progress: Callable[[int], None] = lambda _: None) -> Outlook:
-    """Prospects of a plan that begins at ``time`` s, by other records; raises Infeasible where there is no plan.
-
-    ``progress`` is called with the number of prospects that are done.
-    """
+    """Prospects of a plan from ``time`` s on, by other records; raises Infeasible where there is none."""
     spacecraft = fitted.model.spacecraft
     now = carried(fitted, time)
     body = replaced(spacecraft, now)
@@ -147,30 +133,21 @@ def outlook(fitted: Fit, time: float, progress: Callable[[int], None] = lambda _
             looked_at.append((length, name, math.fsum(on_times) / len(on_times)))
     prospects = []
     for done, (length, probe, on_time) in enumerate(looked_at, start=1):
-        prospects.append(_prospect(plan, fitted, time, probability, length, probe, on_time))
+        imagined = _imagined(fitted, length, probe, on_time)
+        then = carried(imagined, time - (fitted.model.record.end - length))
+        dispersed = replace(plan.spacecraft, dispersions=posterior(spacecraft.dispersions, then))
+        nutation, met = left_in_cases(dispersion.study_of(dispersed, plan.pulses), probability)
+        sigmas = named_of(imagined.model, imagined.sigmas)
+        thrust = sigmas.get(f"thrust {probe}", math.nan)
+        propellant = imagined.model.record.schedule.propellant if probe else None
+        prospects.append(Prospect(length, sigmas[RATIO], nutation, met, probe, on_time, thrust, propellant))
         progress(done)
     coasts, probes = tuple(prospects[: len(LENGTHS)]), tuple(prospects[len(LENGTHS) :])
     return Outlook(plan.scheme, coasts, probes, probability, plan.propellant)
 
 
-def _prospect(
-    plan: Plan, fitted: Fit, time: float, level: float, length: float, probe: str, on_time: float
-) -> Prospect:
-    imagined = _imagined(fitted, length, probe, on_time)
-    known = carried(imagined, time - (fitted.model.record.end - length))
-    dispersed = replace(plan.spacecraft, dispersions=posterior(fitted.model.spacecraft.dispersions, known))
-    nutation, met = left_in_cases(dispersion.study_of(dispersed, plan.pulses), level)
-    sigmas = named_of(imagined.model, imagined.sigmas)
-    thrust = sigmas.get(f"thrust {probe}", math.nan)
-    propellant = imagined.model.record.schedule.propellant if probe else None
-    return Prospect(length, sigmas[RATIO], nutation, met, probe, on_time, thrust, propellant)
-
-
 def left_in_cases(study: Study, level: float) -> tuple[float, float | None]:
-    """Nutation, rad, that the share ``level`` of the cases stays below, and the share that meets the requirement.
-
-    The closed form tells which cases are near one or the other, by as much as it errs for those: these are flown.
-    """
+    """Nutation, rad, that the share ``level`` of the cases stays below, and the share that meets the requirement."""
     model, body = study.model, study.model.spacecraft
     alone = not (body.keep or body.tank or body.disturbances or model.schedule.blocks) and body.goal.spin is None
     if not (alone and body.inertia.symmetric):
@@ -178,6 +155,7 @@ def left_in_cases(study: Study, level: float) -> tuple[float, float | None]:
         nutations = results.distribution("nutation")
         assert nutations is not None
         return float(nutations.quantiles(np.array([level]))[0]), results.met_fraction
+    # Only cases near one or the other by the closed form are flown.
     draws, closed = study.draws_of_all(np.arange(CASES)), ClosedForm(model)
 
     def ends(flies: Callable[[DispersedCases], Ends], drawn: Draws, count: int) -> Vector:

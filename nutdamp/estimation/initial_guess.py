@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from nutdamp.estimation.parameters import (
     ACCELERATION,
     AXIS,
     BODY,
+    CROSSING,
     DIRECTION,
     GYROS,
     KIND,
@@ -33,12 +34,8 @@ from nutdamp.estimation.parameters import (
     Vector,
     wrapped,
 )
-from nutdamp.estimation.search import named_of, scales_of
+from nutdamp.estimation.search import Fit, named_of, scales_of
 from nutdamp.physics import attitude
-
-if TYPE_CHECKING:
-    from nutdamp.estimation.search import Fit
-
 
 FINER = 8  # frequencies of a spectrum for each of its samples
 LONGEST_SPECTRUM = 1 << 16  # samples of a spectrum at most; of longer records the first
@@ -57,7 +54,7 @@ def starts(model: Model, share: float = 1.0) -> Iterator[dict[str, float]]:
     spin, record = _spin(model), model.record
     yield from _starts(model, share, spin)
     # The Sun does not go round a sensor once a turn where it is near the axis: then the file knows better.
-    by_pulses = len(record.sun_pulses) > 1 and not record.has(GYROS[2]) and _seen_around(model) is None
+    by_pulses = len(record.sun_pulses) > 1 and not record.has(GYROS[2]) and _around(model) is None
     if by_pulses and abs(spin / model.spacecraft.spin - 1.0) > OTHER:
         yield from _starts(model, share, model.spacecraft.spin)
 
@@ -81,8 +78,8 @@ def _starts(model: Model, share: float, spin: float) -> Iterator[dict[str, float
         count = math.ceil((high - low) * abs(spin) * model.record.length / SLIP) + 1
         ratios = np.linspace(low, high, min(count, TRIED))
     angles = [2.0 * math.pi * turn / TURNS for turn in range(TURNS)] if "attitude_3" in of_file else []
-    if _seen_around(model) is not None:
-        angles = [_around(model)[1]]
+    if (around := _around(model)) is not None:
+        angles = [around[1]]
     for turned in [{"attitude_3": angle} for angle in angles] or [{}]:
         if cone is not None:
             yield _on_cone(model, of_file | turned, spin, cone)
@@ -101,10 +98,10 @@ def _seldom(model: Model) -> bool:
     return not any(KIND[name].nutation for name in model.signals if name == "axis" or KIND[name].nutation == BODY)
 
 
-def _seen_around(model: Model) -> tuple[Vector, Vector] | None:
-    """Times (n,) s and angles (n,) rad by which the body is turned about its axis against the file, near enough.
+def _around(model: Model) -> tuple[float, float] | None:
+    """Rate (rad/s) at which known directions go round the body, and the turn of the body at the start, rad.
 
-    From the azimuths of known directions: those that crossed, or one across the axis that quaternions turn.
+    By the azimuths of those that crossed, or of one across the axis that quaternions turn; None without any.
     """
     record, reference = model.record, model.reference.quaternion
     of_file = attitude.from_matrix(model.spacecraft.inertia.axes)
@@ -119,15 +116,8 @@ def _seen_around(model: Model) -> tuple[Vector, Vector] | None:
         shown = attitude.rotate(attitude.conjugate(rows), there)
     shown = attitude.rotate(attitude.conjugate(of_file), shown)
     before = attitude.rotate(attitude.conjugate(reference), there)
-    return times, np.arctan2(before[:, 1], before[:, 0]) - np.arctan2(shown[:, 1], shown[:, 0])
-
-
-def _around(model: Model) -> tuple[float, float]:
-    """Rate (rad/s) at which known directions go round the body, and the turn of the body at the start, rad."""
-    seen = _seen_around(model)
-    assert seen is not None
-    times, angles = seen
-    gyro = model.record.samples(GYROS[2:])[1]
+    angles = np.arctan2(before[:, 1], before[:, 0]) - np.arctan2(shown[:, 1], shown[:, 0])
+    gyro = record.samples(GYROS[2:])[1]
     spin = float(np.median(gyro)) if len(gyro) else model.spacecraft.spin
     # Turns between two samples by the spin as it is known; then a line through all.
     steps = spin * np.diff(times)
@@ -144,8 +134,8 @@ def _spin(model: Model) -> float:
     record, spin = model.record, model.spacecraft.spin
     if record.has(GYROS[2]) and np.isfinite(record.signals[GYROS[2]]).any():
         return float(np.nanmedian(record.signals[GYROS[2]]))
-    if _seen_around(model) is not None:
-        return _around(model)[0]
+    if (around := _around(model)) is not None:
+        return around[0]
     if len(record.sun_pulses) > 1:
         return math.copysign(spin_of(record.sun_pulses)[0], spin)
     return spin
@@ -154,8 +144,7 @@ def _spin(model: Model) -> float:
 def spin_of(pulses: Vector, step: float = 0.0) -> tuple[float, float]:
     """Mean rate of the turns between two Sun pulses or more, at rising times (k,) s, and its sigma, rad/s.
 
-    The sigma is that of a straight line through the times, by what they are off it, a nutation included, or by the
-    ``step`` (s, full width) to within which they are known.
+    That of a straight line through the times, by what they are off it, or by their ``step`` (s, full width).
     """
     gaps = np.diff(pulses)
     turns = np.concatenate([[0.0], np.cumsum(np.rint(gaps / gaps.min()))])
@@ -296,8 +285,7 @@ def _moments(model: Model, rate: float, spin: float) -> dict[str, float]:
     else:  # of the A at which ω3 - H3/A is the rate
         wanted = inertia.C * (spin - rate) / float(inertia.axial(spin))
     wanted = min(max(wanted, 0.01), 1.999)
-    A, ratio = model.parameter("A"), model.parameter(RATIO)
-    assert ratio is not None
+    A, ratio = model.parameter("A"), model.parameters[_range(model)[0]]
     if A is None:
         return {RATIO: wanted}
     # Moments that are known together would be moved by many times what the ratio is: a start need not be.
@@ -318,7 +306,7 @@ def _towards(model: Model, axis: Vector) -> dict[str, float]:
 
 def _linear(model: Model, values: dict[str, float]) -> dict[str, float]:
     """The transverse rates, offsets and tilts by linear least squares, everything else as it is."""
-    offsets = ("bias", "attitude") if _seen_around(model) is not None else ("bias", "attitude_1", "attitude_2")
+    offsets = ("bias", "attitude") if {CROSSING, "turn"} & set(model.signals) else ("bias", "attitude_1", "attitude_2")
     names = ["omega_1", "omega_2", *(name for name in values if name.startswith(offsets))]
     base = values | {"omega_1": 0.0, "omega_2": 0.0}
     steps = {name: SMALL * abs(values.get("omega_3", model.spacecraft.spin)) for name in names[:2]}
@@ -342,18 +330,17 @@ POSSIBLE = (0.01, 1.999)  # range of C/A of a symmetric body
 
 
 def neighbours(model: Model, values: Vector) -> list[Vector]:
-    """Values of the parameters with the other C/A that equal sampling allows within the tolerances of the file.
-
-    Where the file gives no tolerance, all that are possible, if the nutation found is itself sampled too slowly.
-    """
+    """Values of the parameters with the other C/A that equal sampling allows within the tolerances of the file."""
     at, low, high = _range(model)
     of_file = model.parameters[at]
+    # Without a tolerance all that are possible, if the nutation found is itself sampled too slowly.
     if math.isinf(of_file.prior) and not too_slow(model, values):
         return []
     spin = named_of(model, values).get("omega_3", model.spacecraft.spin)
     step = 2.0 * math.pi / (abs(spin) * interval(model))
     # a -> a + k step; of one transverse signal also a -> -a + k step.
-    one_sided = len(_transverse(model)) == 1 and not any(KIND[name].nutation == SPACE for name in model.signals)
+    shown = [KIND[name].nutation for name in model.signals]
+    one_sided = shown.count(BODY) == 1 and SPACE not in shown
     mirrored = [(2.0 - values[at], False)] * one_sided + [(-values[at], False)] * _seldom(model)
     ratios = []
     for begin, itself in ((values[at], True), *mirrored):
@@ -366,10 +353,7 @@ def neighbours(model: Model, values: Vector) -> list[Vector]:
 
 
 def likeliest(fits: Sequence[Fit]) -> Fit:
-    """The one of some fits of one record that the data and the tolerances of the file leave.
-
-    Raises Infeasible where these leave several.
-    """
+    """The one of some fits of one record that data and tolerances leave; raises Infeasible where that is several."""
     model = fits[0].model
     at, low, high = _range(model)
     counts = np.bincount(model.signal)
@@ -409,7 +393,7 @@ def nutation_rate(model: Model, values: Vector) -> float:
     named = named_of(model, values)
     spin = named.get("omega_3", model.spacecraft.spin)
     axial = axial_rate(model, named[RATIO], spin)
-    return spin - axial if _transverse(model) else axial
+    return spin - axial if any(KIND[name].nutation == BODY for name in model.signals) else axial
 
 
 def axial_rate(model: Model, ratio: float, spin: float) -> float:
@@ -423,10 +407,6 @@ def interval(model: Model) -> float:
     shown = [index for index, name in enumerate(model.signals) if KIND[name].nutation]
     steps = [np.diff(model.times[model.signal == index][: len(model.samples[index])]) for index in shown]
     return min((float(np.median(gaps)) for gaps in steps if len(gaps)), default=model.record.interval)
-
-
-def _transverse(model: Model) -> list[str]:
-    return [name for name in model.signals if KIND[name].nutation == BODY]
 
 
 def _range(model: Model) -> tuple[int, float, float]:

@@ -7,8 +7,9 @@ regular at e = 0, where principal axes are any.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,7 +22,6 @@ from nutdamp.estimation.parameters import (
     DIRECTION,
     KIND,
     SUN_ASPECT,
-    Matrix,
     Parameter,
     Record,
     Sighting,
@@ -48,43 +48,25 @@ POLHODE = 0.8  # units of a coast of three moments between pulses
 OF_SENSORS = ("bias", "misalignment", "wobble")  # first words of parameters that leave the motion as it is
 
 
-@dataclass(frozen=True, eq=False)
-class Body:
-    """The body that parameters describe: its ``state`` at the start of the record in its own principal axes.
+class Body(NamedTuple):
+    """The body that parameters describe: its ``state`` at the start of the record in its own principal axes."""
 
-    ``moments`` (I1, I2, I3) kg m², ``axes`` (3, 3) its principal axes in those of the file, as columns; ``wheel`` is
-    the momentum of a wheel, N m s.
-    """
-
-    moments: tuple[float, float, float]
-    axes: Matrix
+    inertia: Inertia
     state: SpinState
     growth: float
-    wheel: float = 0.0
-
-    @property
-    def symmetric(self) -> bool:
-        """True where I1 = I2."""
-        return self.moments[0] == self.moments[1]
 
     @property
     def closed(self) -> bool:
         """True where a coast is a closed form."""
-        return self.symmetric or (self.growth == 0.0 and self.wheel == 0.0)
-
-    @property
-    def inertia(self) -> Inertia:
-        """Moments, axes and wheel."""
-        return Inertia(self.moments, self.axes, self.wheel)
+        return self.inertia.symmetric or (self.growth == 0.0 and self.inertia.wheel == 0.0)
 
 
 class Model:
     """Predictor of a record of a spacecraft.
 
-    ``parameters`` are estimated; ``measured`` (m,) are the samples that there are, signal by signal, or zero where what
-    is off is compared; ``signals`` their names and ``signal`` (m,) which of them each is; ``times`` (m,) s when;
-    ``samples`` (n, k) of each signal as they came. Raises BadRequest where the spacecraft file lacks what a signal
-    needs.
+    ``measured`` (m,) are the samples that there are, signal by signal, or zero where what is off is compared;
+    ``signals`` their names and ``signal`` (m,) which of them each is; ``times`` (m,) s when; ``samples`` (n, k) of each
+    signal as they came. Raises BadRequest where the spacecraft file lacks what a signal needs.
     """
 
     def __init__(
@@ -121,10 +103,9 @@ class Model:
     @cached_property
     def reference(self) -> SpinState:
         """The motion at the start of the record as the file has it."""
-        inertia = self.spacecraft.inertia
-        body = Body(inertia.moments, inertia.axes, self.spacecraft.initial, self.spacecraft.growth, inertia.wheel)
+        spacecraft = self.spacecraft
         # As if the record began at t = 0; a file's disturbances are too small to turn it much before.
-        return _state(_coast(body), self.start)
+        return _state(_coast(Body(spacecraft.inertia, spacecraft.initial, spacecraft.growth)), self.start)
 
     def parameter(self, name: str) -> Parameter | None:
         """The one of that name, if it is estimated."""
@@ -142,7 +123,6 @@ class Model:
         A, C = in_moments(spacecraft, values)
         rates = np.array([values["omega_1"], values["omega_2"], values.get("omega_3", spacecraft.omega0[2])])
         quaternion = self.turned(values)
-        growth = values.get("growth", spacecraft.growth)
         e1, e2 = values.get("unequal_1", 0.0), values.get("unequal_2", 0.0)
         size = math.hypot(e1, e2)
         if not (A > 0.0 and C > 0.0 and size < 1.0):
@@ -154,19 +134,17 @@ class Model:
             moments, axes, rates = (A * (1.0 + size), A * (1.0 - size), C), axes @ about, about.T @ rates
             quaternion = attitude.multiply(quaternion, np.array([math.cos(0.5 * half), 0, 0, math.sin(0.5 * half)]))
         state = SpinState(complex(rates[0], rates[1]), float(rates[2]), quaternion)
-        return Body(moments, axes, state, growth, values.get("wheel", of_file.wheel))
+        inertia = Inertia(moments, axes, values.get("wheel", of_file.wheel))
+        return Body(inertia, state, values.get("growth", spacecraft.growth))
 
     def motion(self, values: Values, times: Vector) -> tuple[Vector, Vector]:
         """Rates (n, 3) rad/s and quaternions (n, 4) of the file's axes at rising ``times`` (n,) s."""
         body = self.body(values)
         rates, quaternion = self._path(body, self._fired(values), float(times[-1])).motion(times - self.start)
-        return rates @ body.axes.T, attitude.multiply(quaternion, attitude.from_matrix(body.axes.T))
+        return rates @ body.inertia.axes.T, attitude.multiply(quaternion, attitude.from_matrix(body.inertia.axes.T))
 
     def at(self, values: Values, time: float) -> tuple[Body, SpinState]:
-        """The body, and its motion at ``time`` s in its own principal axes; before the record it coasts.
-
-        Once for each: what is estimated of it is derived again.
-        """
+        """The body, and its motion at ``time`` s in its own principal axes; before the record it coasts."""
         key = (time, *values.values())
         if key not in self._at:
             body = self.body(values)
@@ -200,11 +178,12 @@ class Model:
         body = self.body(values)
         if self.pulses.pulses or self.spacecraft.disturbances or not body.closed:
             return self.motion(values, times)[0]
-        state, (A, _, C), since = body.state, body.moments, times - self.start
-        if not body.symmetric:
-            return triaxial.free_rates(body.moments, state.rates, since) @ body.axes.T
-        omega, spin = energy_sink.rates_on_arc(A, C, body.growth, state.omega, state.spin, since, body.wheel)
-        return np.column_stack([omega.real, omega.imag, spin]) @ body.axes.T
+        inertia, state, growth = body
+        (A, _, C), since = inertia.moments, times - self.start
+        if not inertia.symmetric:
+            return triaxial.free_rates(inertia.moments, state.rates, since) @ inertia.axes.T
+        omega, spin = energy_sink.rates_on_arc(A, C, growth, state.omega, state.spin, since, inertia.wheel)
+        return np.column_stack([omega.real, omega.imag, spin]) @ inertia.axes.T
 
     def _pulses(self) -> Schedule:
         """The pulses fired since the record began; times count from there."""
@@ -224,7 +203,7 @@ class Model:
             pulses.append(replace(pulse.moved(late), torque=torque, impulse=factor * pulse.impulse))
         return Schedule(tuple(pulses))
 
-    def _path(self, body: Body, fired: Schedule, until: float) -> Path:
+    def _path(self, body: Body, fired: Schedule, until: float) -> Path | Flight:
         """The motion from the start of the record, from which its times count, to ``until`` s from t = 0."""
         if not fired.pulses and not self.spacecraft.disturbances and body.closed:
             return _coast(body)
@@ -233,40 +212,37 @@ class Model:
                 f"the motion at {until:g} s, before the record begins at {self.start:g} s, needs an integration "
                 "backwards: name a later --at"
             )
-        spacecraft = self._as_spacecraft(body)
+        inertia, state, growth = body
+        turn = inertia.axes.T @ self.spacecraft.inertia.axes  # from the principal axes of the file to those of the body
+        about = complex(turn[0, 0], turn[1, 0])  # both have axis 3
+        disturbances = (replace(each, transverse=about * each.transverse) for each in self.spacecraft.disturbances)
+        spacecraft = replace(
+            self.spacecraft,
+            inertia=inertia,
+            disturbances=tuple(disturbances),
+            omega0=state.rates,
+            attitude=Attitude(attitude.multiply(state.quaternion, attitude.from_matrix(inertia.axes.T))),
+        )
         acting = make_dynamics(spacecraft)
-        dynamics = _Closed(body.moments, acting.constant, Forcing(acting.forcing.turning, body.growth, body.wheel))
-        turn = body.axes.T @ self.spacecraft.inertia.axes  # from the principal axes of the file to those of the body
+        dynamics = _Closed(inertia.moments, acting.constant, Forcing(acting.forcing.turning, growth, inertia.wheel))
         pulses = tuple(
             replace(pulse, torque=None if pulse.torque is None else turn @ pulse.torque, impulse=turn @ pulse.impulse)
             for pulse in fired
         )
-        return _Flown(flown(spacecraft, Schedule(pulses), until - self.start, dynamics=dynamics))
-
-    def _as_spacecraft(self, body: Body) -> Spacecraft:
-        to_file = attitude.multiply(body.state.quaternion, attitude.from_matrix(body.axes.T))
-        turn = body.axes.T @ self.spacecraft.inertia.axes
-        about = complex(turn[0, 0], turn[1, 0])  # both have axis 3
-        disturbances = (replace(each, transverse=about * each.transverse) for each in self.spacecraft.disturbances)
-        return replace(
-            self.spacecraft,
-            inertia=body.inertia,
-            disturbances=tuple(disturbances),
-            omega0=body.state.rates,
-            attitude=Attitude(to_file),
-        )
+        return flown(spacecraft, Schedule(pulses), until - self.start, dynamics=dynamics)
 
 
-def _state(path: Path, time: float) -> SpinState:
+def _state(path: Path | Flight, time: float) -> SpinState:
     rates, quaternion = path.motion(np.array([time]))
     return SpinState(complex(rates[0, 0], rates[0, 1]), float(rates[0, 2]), quaternion[0])
 
 
 def _coast(body: Body) -> Path:
     """The motion without pulses; of three moments that without dissipation and wheel."""
-    if body.symmetric:
-        return Arc(body.moments[0], body.moments[2], 0.0, body.state, body.growth, body.wheel)
-    return FreeCoast(body.moments, 0.0, body.state)
+    inertia, state, growth = body
+    if inertia.symmetric:
+        return Arc(inertia.A, inertia.C, 0.0, state, growth, inertia.wheel)
+    return FreeCoast(inertia.moments, 0.0, state)
 
 
 class _Closed(Dynamics):
@@ -279,17 +255,6 @@ class _Closed(Dynamics):
         work.spend(POLHODE)
         coast = FreeCoast(self.moments, start, state)
         return coast, _state(coast, end)
-
-
-@dataclass(frozen=True)
-class _Flown:
-    """A flight as a path."""
-
-    flight: Flight
-    steps: int = 0
-
-    def motion(self, times: Vector) -> tuple[Vector, Vector]:
-        return self.flight.motion(np.maximum(times, 0.0))
 
 
 def _expect_described(spacecraft: Spacecraft, record: Record) -> None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -35,8 +36,7 @@ DIRECTION = ("crossing_x", "crossing_y", "crossing_z")
 ACCELERATION, SUN_ASPECT, CROSSING = "acceleration", "sun_aspect", "crossing"
 SUN_PULSE = "sun_pulse"
 
-BODY, SPACE = "body", "space"
-"""Where a signal shows the nutation: at its rate in the body, or at that of the axis about H."""
+BODY, SPACE = "body", "space"  # a signal shows the nutation at its rate in the body, or at that of the axis about H
 
 APART = math.sin(math.radians(1.0))  # sine of the angle from which on two directions are two
 STEPS = 4000  # values of a signal from which its steps are found, at most
@@ -45,14 +45,13 @@ MULTIPLES = 0.9  # share of their differences that are multiples of a step
 
 @dataclass(frozen=True, eq=False)
 class Record:
-    """Telemetry: ``signals`` by name, (n,) each, at ``times`` (n,) s that rise; NaN where there is no sample.
+    """Telemetry: ``signals`` by name, (n,) each, at rising ``times`` (n,) s from t = 0; NaN where there is no sample.
 
-    Body rates (rad/s) are in the axes of the file, ``axis_x``, ``axis_y``, ``axis_z`` the inertial unit vector along
-    the spin axis, ``q_w`` to ``q_z`` the attitude of the axes of the file, ``acceleration`` is m/s². ``crossing_1`` to
-    ``crossing_3`` are the unit vector in the body to what is in the inertial direction ``crossing_x`` to
-    ``crossing_z``; ``sun_aspect`` (rad) is the angle of the Sun from body axis 3. ``sun_pulses`` (k,) s are the times
-    of Sun pulses, known to within ``sun_step`` s (full width). ``schedule`` was fired meanwhile. All times count from
-    t = 0 of the file.
+    Body rates (rad/s) are in the axes of the file, ``axis_x`` to ``axis_z`` the inertial unit vector along the spin
+    axis, ``q_w`` to ``q_z`` the attitude of the axes of the file, ``acceleration`` is m/s². ``crossing_1`` to ``_3``
+    are the unit vector in the body to what is in the inertial direction ``crossing_x`` to ``_z``; ``sun_aspect`` (rad)
+    is the angle of the Sun from body axis 3. Times of ``sun_pulses`` (k,) s are known to within ``sun_step`` s (full
+    width). ``schedule`` was fired meanwhile.
     """
 
     times: Vector
@@ -116,10 +115,7 @@ class Record:
 
 
 def of_quaternions(quaternions: Vector, spacecraft: Spacecraft) -> dict[str, Vector]:
-    """Signals of measured attitudes (n, 4), NaN where there are none: the spin axis, and the turn about it.
-
-    They are compared apart, for star trackers tell them with different noise.
-    """
+    """Signals of measured attitudes (n, 4), NaN where there are none: spin axis and turn, which differ in noise."""
     up = spacecraft.sense * spacecraft.inertia.axes[:, 2]
     axis = attitude.rotate(quaternions, up)
     return dict(zip((*AXIS, *QUATERNION), np.column_stack([axis, quaternions]).T, strict=True))
@@ -137,53 +133,47 @@ def quantisation(values: Vector) -> float:
 
 
 class Sighting(NamedTuple):
-    """The motion at the samples (n, k) of one signal, in the axes of the file: rates (n, 3), quaternion (n, 4).
-
-    ``values`` are those of all parameters, ``moments`` about the principal axes of the file, kg m².
-    """
+    """The motion at the samples (n, k) of one signal, in the axes of the file: rates (n, 3), quaternion (n, 4)."""
 
     spacecraft: Spacecraft
     values: Values
-    moments: tuple[float, float, float]
+    moments: tuple[float, float, float]  # about the principal axes of the file, kg m²
     samples: Vector
     rates: Vector
     quaternion: Vector
 
     @property
-    def principal(self) -> Vector:
-        """Attitude (n, 4) of the principal axes of the file, tilted as attitude sensors see them."""
-        axes = attitude.from_matrix(self.spacecraft.inertia.axes)
-        return attitude.multiply(self.quaternion, attitude.multiply(axes, tilted(self.values, "wobble")))
+    def axes(self) -> Vector:
+        """Quaternion (4,) of the principal axes of the file."""
+        return attitude.from_matrix(self.spacecraft.inertia.axes)
 
     @property
-    def sensors(self) -> Vector:
-        """Attitude (n, 4) of the axes of the file, tilted so too."""
-        back = attitude.conjugate(attitude.from_matrix(self.spacecraft.inertia.axes))
-        return attitude.multiply(self.principal, back)
+    def principal(self) -> Vector:
+        """Attitude (n, 4) of the principal axes of the file, tilted as attitude sensors see them."""
+        return attitude.multiply(self.quaternion, attitude.multiply(self.axes, tilted(self.values, "wobble")))
+
+    def in_body(self, direction: Vector) -> Vector:
+        """Inertial directions in the axes of the file, tilted so too, (n, 3)."""
+        sensors = attitude.multiply(self.principal, attitude.conjugate(self.axes))
+        return attitude.rotate(attitude.conjugate(sensors), direction)
 
 
 @dataclass(frozen=True)
 class SignalKind:
-    """Measurement model: ``predicted`` samples of the signals ``columns`` of a record, in ``unit``.
-
-    ``parts`` (values compared per sample) are what is ``off``, zero if nothing is, or the samples themselves.
-    ``nutation``: where it shows one, if it does; ``turn``, ``spin``: True where it shows how the body is turned about
-    axis 3, and ω3; ``attitude``: True where it takes the attitude, and ``wobble`` where its sensor may be tilted.
-    ``spread``: what is usually off before a fit, over a spin period of Sun pulses.
-    """
+    """Measurement model: ``predicted`` samples of the signals ``columns`` of a record, in ``unit``."""
 
     name: str
     columns: tuple[str, ...]
     unit: str
     predicted: Callable[[Sighting], Vector]
-    nutation: str = ""
-    parts: int = 1
-    off: bool = False
-    turn: bool = False
-    spin: bool = False
-    attitude: bool = False
-    wobble: bool = False
-    spread: float = 1e-4
+    nutation: str = ""  # where it shows one, if it does
+    parts: int = 1  # values compared per sample
+    off: bool = False  # these are what is off, not the samples themselves
+    turn: bool = False  # shows how the body is turned about axis 3
+    spin: bool = False  # shows ω3
+    attitude: bool = False  # takes the attitude
+    wobble: bool = False  # its sensor may be tilted
+    spread: float = 1e-4  # usually off before a fit, over a spin period of Sun pulses
 
     def samples(self, record: Record) -> tuple[Vector, Vector]:
         """Times (n,) s and samples (n, k) of a record."""
@@ -192,14 +182,10 @@ class SignalKind:
         return record.sun_pulses, np.zeros((len(record.sun_pulses), 1))
 
 
-def _gyro(index: int) -> Callable[[Sighting], Vector]:
+def _gyro(index: int, seen: Sighting) -> Vector:
     """Rate about one axis of gyros that are turned by a rotation vector across axis 3: ω seen in their axes."""
-
-    def shown(seen: Sighting) -> Vector:
-        along = attitude.rotate(tilted(seen.values, "misalignment"), np.eye(3)[index])
-        return np.asarray(seen.rates @ along + seen.values.get(f"bias_{GYROS[index]}", 0.0))
-
-    return shown
+    along = attitude.rotate(tilted(seen.values, "misalignment"), np.eye(3)[index])
+    return np.asarray(seen.rates @ along + seen.values.get(f"bias_{GYROS[index]}", 0.0))
 
 
 def _felt(seen: Sighting) -> Vector:
@@ -227,23 +213,20 @@ def _axis_off(seen: Sighting) -> Vector:
 
 def _turn_off(seen: Sighting) -> Vector:
     """Angles by which the body is turned about axis 3 from a measured attitude, rad."""
-    of_file = attitude.from_matrix(seen.spacecraft.inertia.axes)
-    measured = attitude.multiply(seen.samples, of_file)
+    measured = attitude.multiply(seen.samples, seen.axes)
     apart = attitude.multiply(attitude.conjugate(measured), seen.principal)
     return wrapped(2.0 * np.arctan2(apart[:, 3], apart[:, 0]))
 
 
 def _crossing_off(seen: Sighting) -> Vector:
     """Components of a known direction, as the body has it, across where it was seen."""
-    there = attitude.rotate(attitude.conjugate(seen.sensors), seen.samples[:, 3:])
-    return _off(seen.samples[:, :3], there)
+    return _off(seen.samples[:, :3], seen.in_body(seen.samples[:, 3:]))
 
 
 def _sun_aspect(seen: Sighting) -> Vector:
     """Angle of the Sun from body axis 3, rad."""
-    sun = seen.spacecraft.sun
-    assert sun is not None
-    x, y, z = attitude.rotate(attitude.conjugate(seen.sensors), sun).T
+    assert seen.spacecraft.sun is not None
+    x, y, z = seen.in_body(seen.spacecraft.sun).T
     return np.asarray(np.arctan2(np.hypot(x, y), z))
 
 
@@ -252,10 +235,9 @@ def _sun_late(seen: Sighting) -> Vector:
     body, sensor = seen.spacecraft, seen.spacecraft.sun_sensor
     assert sensor is not None
     assert body.sun is not None
-    of_body = attitude.multiply(seen.quaternion, attitude.from_matrix(body.inertia.axes))
+    of_body = attitude.multiply(seen.quaternion, seen.axes)
     sun = np.broadcast_to(body.sun[:, None], (3, len(seen.rates)))
-    sense = body.sense
-    ahead, rate = sky.ahead((seen.rates @ body.inertia.axes).T, of_body.T, sun, sensor.azimuth, sense)
+    ahead, rate = sky.ahead((seen.rates @ body.inertia.axes).T, of_body.T, sun, sensor.azimuth, body.sense)
     return np.asarray(wrapped(ahead) / np.where(rate > 0.0, rate, abs(body.spin)))
 
 
@@ -284,9 +266,9 @@ def tilted(values: Values, kind: str) -> Vector:
 
 
 KINDS = (
-    SignalKind(GYROS[0], GYROS[:1], "rad/s", _gyro(0), BODY, turn=True),
-    SignalKind(GYROS[1], GYROS[1:2], "rad/s", _gyro(1), BODY, turn=True),
-    SignalKind(GYROS[2], GYROS[2:], "rad/s", _gyro(2), spin=True),
+    SignalKind(GYROS[0], GYROS[:1], "rad/s", partial(_gyro, 0), BODY, turn=True),
+    SignalKind(GYROS[1], GYROS[1:2], "rad/s", partial(_gyro, 1), BODY, turn=True),
+    SignalKind(GYROS[2], GYROS[2:], "rad/s", partial(_gyro, 2), spin=True),
     SignalKind(ACCELERATION, (ACCELERATION,), "m/s²", _felt, BODY, turn=True),
     SignalKind("axis", AXIS, "rad", _axis_off, SPACE, parts=2, off=True, attitude=True, wobble=True, spread=1e-3),
     SignalKind("turn", QUATERNION, "rad", _turn_off, off=True, turn=True, spin=True, attitude=True, wobble=True,
@@ -310,17 +292,19 @@ TINY = 1e-7  # step of derivatives, rad, or as a share of a value
 
 
 class Parameter(NamedTuple):
-    """One number to be estimated: its ``name`` and ``unit``, SI.
-
-    ``file``: what the file says, to within ``prior`` (one sigma; infinite where it says nothing that counts);
-    ``step``: by which it is changed for derivatives.
-    """
+    """One number to be estimated."""
 
     name: str
-    unit: str
-    file: float
-    prior: float
-    step: float
+    unit: str  # SI
+    file: float  # value by the file
+    prior: float  # one sigma of that; infinite where the file says nothing that counts
+    step: float  # change for derivatives
+
+
+def _pair(name: str, sigma: float) -> Iterator[Parameter]:
+    """Two angles, rad, about the axes across axis 3, zero by the file."""
+    for number in (1, 2):
+        yield Parameter(f"{name}_{number}", "rad", 0.0, sigma, TINY)
 
 
 def moments(spacecraft: Spacecraft) -> Iterator[Parameter]:
@@ -329,24 +313,23 @@ def moments(spacecraft: Spacecraft) -> Iterator[Parameter]:
     Its prior is that of A and C together; with A they are correlated, see `prior`. What has no tolerance is fixed: A
     where neither has one. The ratio and not C, because what telemetry fixes best is then linear in the parameters.
     """
-    of_A, of_C = _of_moments(spacecraft)
-    ratio = of_C[0] / of_A[0]
-    if of_A[1] > 0.0 and of_C[1] > 0.0:
-        yield Parameter("A", "kg m²", of_A[0], of_A[1], TINY * of_A[0])
-    both = 2.0 * _together(spacecraft) * of_A[1] / of_A[0] * of_C[1] / of_C[0]
-    sigma = ratio * math.sqrt((of_A[1] / of_A[0]) ** 2 + (of_C[1] / of_C[0]) ** 2 - both)
+    (A, of_A), (C, of_C), together = _of_moments(spacecraft)
+    ratio = C / A
+    if of_A > 0.0 and of_C > 0.0:
+        yield Parameter("A", "kg m²", A, of_A, TINY * A)
+    both = 2.0 * together * of_A / A * of_C / C
+    sigma = ratio * math.sqrt((of_A / A) ** 2 + (of_C / C) ** 2 - both)
     yield Parameter(RATIO, "", ratio, sigma or math.inf, TINY * ratio)
 
 
 def in_moments(spacecraft: Spacecraft, values: Mapping[str, float]) -> tuple[float, float]:
     """A and C (kg m²) of the ``values`` of parameters."""
-    of_A, of_C = _of_moments(spacecraft)
-    ratio = values[RATIO]
+    (A, of_A), (C, of_C), _ = _of_moments(spacecraft)
     # Of a body with a wheel it is A that C/A changes where neither has a tolerance: despun, C does not matter.
-    if of_C[1] == 0.0 and (of_A[1] > 0.0 or spacecraft.inertia.wheel != 0.0):
-        return of_C[0] / ratio, of_C[0]
-    A = values.get("A", of_A[0])
-    return A, ratio * A
+    if of_C == 0.0 and (of_A > 0.0 or spacecraft.inertia.wheel != 0.0):
+        return C / values[RATIO], C
+    A = values.get("A", A)
+    return A, values[RATIO] * A
 
 
 def prior(spacecraft: Spacecraft, chosen: Sequence[Parameter]) -> tuple[Matrix, Vector]:
@@ -356,11 +339,10 @@ def prior(spacecraft: Spacecraft, chosen: Sequence[Parameter]) -> tuple[Matrix, 
     for index, parameter in enumerate(chosen):
         row = np.zeros(len(chosen))
         row[index] = 1.0 / parameter.prior
-        value = parameter.file / parameter.prior if math.isfinite(parameter.prior) else 0.0
+        value = parameter.file / parameter.prior
         if parameter.name == RATIO and "A" in names:
             # What of C = A·(C/A), to first order, A does not tell.
-            (A, of_A), (C, of_C) = _of_moments(spacecraft)
-            both = _together(spacecraft)
+            (A, of_A), (C, of_C), both = _of_moments(spacecraft)
             left = of_C * math.sqrt(1.0 - both * both)
             row[index], row[names.index("A")] = A / left, (parameter.file - both * of_C / of_A) / left
             value = (2.0 * C - both * of_C / of_A * A) / left
@@ -373,23 +355,15 @@ def prior(spacecraft: Spacecraft, chosen: Sequence[Parameter]) -> tuple[Matrix, 
 EXACT = Dispersions()  # the dispersions of a file that has none
 
 
-def _together(spacecraft: Spacecraft) -> float:
-    """Correlation of A and C by the file."""
-    pairs = (spacecraft.dispersions or EXACT).correlation
-    return next((value for first, second, value in pairs if {first, second} == {"A", "C"}), 0.0)
-
-
-def _of_moments(spacecraft: Spacecraft) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Means and standard deviations of A and C by the file, kg m²."""
+def _of_moments(spacecraft: Spacecraft) -> tuple[tuple[float, float], tuple[float, float], float]:
+    """Means and standard deviations of A and C by the file, kg m², and their correlation."""
     given, inertia = spacecraft.dispersions or EXACT, spacecraft.inertia
-    return prior_of(given.A, inertia.A), prior_of(given.C, inertia.C)
+    together = (value for first, second, value in given.correlation if {first, second} == {"A", "C"})
+    return prior_of(given.A, inertia.A), prior_of(given.C, inertia.C), next(together, 0.0)
 
 
 def parameters(spacecraft: Spacecraft, record: Record, *, unequal: bool, growing: bool) -> Iterator[Parameter]:
-    """The parameters of a record, the motion first; ``unequal``: with I1 ≠ I2, ``growing``: with dissipation.
-
-    Rates are those at the start of the record.
-    """
+    """The parameters of a record, motion at its start first; ``unequal``: I1 ≠ I2, ``growing``: with dissipation."""
     given, spin, step = spacecraft.dispersions or EXACT, float(spacecraft.omega0[2]), TINY * spacecraft.fastest
     yield from moments(spacecraft)
     if given.wheel_momentum is not None and spacecraft.inertia.wheel != 0.0:
@@ -408,16 +382,17 @@ def parameters(spacecraft: Spacecraft, record: Record, *, unequal: bool, growing
         yield from _attitude(spacecraft, record)
     yield from _gyros(spacecraft, record)
     if any(kind.wobble for kind in record.kinds):
-        for number in (1, 2):
-            yield Parameter(f"wobble_{number}", "rad", 0.0, TILT, TINY)
+        yield from _pair("wobble", TILT)
     if record.has(ACCELERATION):
-        size = 1e-6 * spin * spin
-        yield Parameter("bias_acceleration", KIND[ACCELERATION].unit, 0.0, math.inf, size)
+        yield Parameter("bias_acceleration", KIND[ACCELERATION].unit, 0.0, math.inf, 1e-6 * spin * spin)
     if unequal:
         first, second, _ = spacecraft.inertia.moments
         yield Parameter("unequal_1", "", (first - second) / (first + second), math.inf, 1e-6)
         yield Parameter("unequal_2", "", 0.0, math.inf, 1e-6)
-    yield from _channels(spacecraft, record)
+    for name in dict.fromkeys(pulse.channel for pulse in record.fired):
+        mean, sigma = thrust_prior(spacecraft, name)
+        yield Parameter(f"thrust {name}", "", mean, max(sigma, THRUST), TINY)
+        yield Parameter(f"delay {name}", "s", 0.0, DELAY, 1e-6)
 
 
 def _attitude(spacecraft: Spacecraft, record: Record) -> Iterator[Parameter]:
@@ -433,8 +408,8 @@ def _attitude(spacecraft: Spacecraft, record: Record) -> Iterator[Parameter]:
         # The file has the attitude at t = 0: where on its cone the axis is as the record begins is less sure.
         turn = min(2.0 * math.pi / spacecraft.inertial_period * abs(record.start), math.pi)
         sigma = math.hypot(sigma, 2.0 * math.sin(0.5 * turn) * spacecraft.nutation) if sigma > 0.0 else 0.0
-    for number in (1, 2) if sigma > 0.0 else ():
-        yield Parameter(f"attitude_{number}", "rad", 0.0, sigma, TINY)
+    if sigma > 0.0:
+        yield from _pair("attitude", sigma)
     if record.shows_turn:
         yield Parameter("attitude_3", "rad", 0.0, math.inf, TINY)
 
@@ -452,16 +427,7 @@ def _gyros(spacecraft: Spacecraft, record: Record) -> Iterator[Parameter]:
             free = math.hypot(sigma, step / math.sqrt(12.0)) if aligned else math.inf
             yield Parameter(f"bias_{name}", "rad/s", mean, free, TINY)
     if aligned and (record.has(GYROS[0]) or record.has(GYROS[1])):
-        for number in (1, 2):
-            yield Parameter(f"misalignment_{number}", "rad", 0.0, TILT, TINY)
-
-
-def _channels(spacecraft: Spacecraft, record: Record) -> Iterator[Parameter]:
-    """Thrust factor and delay of each channel that fired."""
-    for name in dict.fromkeys(pulse.channel for pulse in record.fired):
-        mean, sigma = thrust_prior(spacecraft, name)
-        yield Parameter(f"thrust {name}", "", mean, max(sigma, THRUST), TINY)
-        yield Parameter(f"delay {name}", "s", 0.0, DELAY, 1e-6)
+        yield from _pair("misalignment", TILT)
 
 
 def thrust_prior(spacecraft: Spacecraft, name: str) -> tuple[float, float]:

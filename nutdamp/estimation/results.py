@@ -26,8 +26,7 @@ WHEEL = "wheel momentum"  # input of a wheel that is estimated
 
 DEG = math.pi / 180.0
 
-UNTOLD, SHARED, TOLD = "file", "both", "data"
-"""Sources of an estimate: the file's tolerances, both, or the data."""
+UNTOLD, SHARED, TOLD = "file", "both", "data"  # sources of an estimate: the file's tolerances, both, or the data
 
 FROM_DATA = 0.5  # share of its prior that a sigma is below where the data tell a value
 FROM_FILE = KEPT  # share above which they do not
@@ -38,9 +37,9 @@ WORTH_NAMING = 0.9  # correlation from which on it is named
 
 
 class Estimate(NamedTuple):
-    """A ``value`` with its ``sigma`` in ``unit`` (SI times ``factor``); what the ``file`` says, to within ``prior``.
+    """A ``value`` with its ``sigma`` (infinite where the data do not tell it), shown times ``factor`` in ``unit``.
 
-    ``file`` and ``prior`` are None where it says nothing; the sigma is infinite where the data do not tell the value.
+    ``file`` and its sigma ``prior`` are None where the file says nothing.
     """
 
     key: str
@@ -72,8 +71,6 @@ class Carried:
     """The spacecraft at ``time`` s: ``values`` (k,) and ``covariance`` (k, k) of the inputs ``names`` of dispersions.
 
     They are A, C (kg m²), omega0_1 … omega0_3 (rad/s, axes of the file) and ``thrust`` of thrusters (factors).
-    ``body`` with its ``state`` then, in its own principal axes; ``tilt`` (rad) one sigma of the axis about each of two
-    axes across it, None where the attitude is not estimated.
     """
 
     time: float
@@ -81,8 +78,8 @@ class Carried:
     values: Vector
     covariance: Matrix
     body: Body
-    state: SpinState
-    tilt: float | None
+    state: SpinState  # in its own principal axes
+    tilt: float | None  # one sigma of the axis about each of two axes across it, rad; None if not estimated
 
     @property
     def sigmas(self) -> Vector:
@@ -100,7 +97,7 @@ class Carried:
     @property
     def quaternion(self) -> Vector:
         """Attitude of the file's axes, (4,), scalar first."""
-        return attitude.multiply(self.state.quaternion, attitude.from_matrix(self.body.axes.T))
+        return attitude.multiply(self.state.quaternion, attitude.from_matrix(self.body.inertia.axes.T))
 
     @property
     def correlation(self) -> Matrix:
@@ -127,7 +124,7 @@ def carried(fitted: Fit, time: float) -> Carried:
 
     def inputs(values: Values) -> Vector:
         body, state = model.at(values, time)
-        rates = body.axes @ state.rates
+        rates = body.inertia.axes @ state.rates
         return np.array([*in_moments(model.spacecraft, values), *rates, *(values[name] for name in more.values())])
 
     def axis(values: Values) -> Vector:
@@ -135,9 +132,8 @@ def carried(fitted: Fit, time: float) -> Carried:
 
     tilt = None
     if fitted.index("attitude_1") is not None:
-        tilt = math.sqrt(0.5 * float(np.trace(_covariance(fitted, axis))))
-    covariance = _covariance(fitted, inputs)
-    return Carried(time, names, inputs(fitted.named), covariance, *moving(fitted, time), tilt)
+        tilt = math.sqrt(0.5 * float(np.trace(_told(fitted, axis)[1])))
+    return Carried(time, names, *_told(fitted, inputs), *moving(fitted, time), tilt)
 
 
 def moving(fitted: Fit, time: float) -> tuple[Body, SpinState]:
@@ -149,7 +145,7 @@ def moving(fitted: Fit, time: float) -> tuple[Body, SpinState]:
         first, at_first = model.at(fitted.named, 0.0)
         spacecraft = model.spacecraft
         of_file = attitude.multiply(spacecraft.initial.quaternion, attitude.from_matrix(spacecraft.inertia.axes.T))
-        back = attitude.conjugate(attitude.multiply(at_first.quaternion, attitude.from_matrix(first.axes.T)))
+        back = attitude.conjugate(attitude.multiply(at_first.quaternion, attitude.from_matrix(first.inertia.axes.T)))
         state = replace(state, quaternion=attitude.multiply(attitude.multiply(of_file, back), state.quaternion))
     return body, state
 
@@ -184,10 +180,7 @@ def posterior(given: Dispersions | None, known: Carried) -> Dispersions:
 
 
 def correlations(known: Carried, given: Dispersions | None) -> tuple[tuple[str, str, float], ...]:
-    """Pairs of inputs and their correlations, rounded as files hold them, and together positive definite.
-
-    Those ``given`` of other inputs stay.
-    """
+    """Correlations by pairs of inputs, rounded as in files, positive definite; those ``given`` of others stay."""
     matrix = known.correlation
     there = [index for index, sigma in enumerate(known.sigmas) if sigma > 0.0]
     rounded = np.round(np.where(np.abs(matrix) < CORRELATED, 0.0, matrix), DIGITS)[np.ix_(there, there)]
@@ -205,8 +198,8 @@ def correlations(known: Carried, given: Dispersions | None) -> tuple[tuple[str, 
     return (*(pair for pair in pairs if pair[2] != 0.0), *kept)
 
 
-def _covariance(fitted: Fit, function: Callable[[Values], Vector]) -> Matrix:
-    """Covariance (k, k) of what a function makes of body and motion, by central differences."""
+def _told(fitted: Fit, function: Callable[[Values], Vector]) -> tuple[Vector, Matrix]:
+    """Values (k,) that a function makes of body and motion, and their covariance (k, k), by central differences."""
     columns: list[Vector] = []
     for name, _, _, _, size in fitted.model.parameters:
         if name.startswith(OF_SENSORS):
@@ -215,7 +208,13 @@ def _covariance(fitted: Fit, function: Callable[[Values], Vector]) -> Matrix:
         above, below = (function(fitted.named | {name: fitted.named[name] + way}) for way in (size, -size))
         columns.append((above - below) / (2.0 * size))
     slopes = np.column_stack(columns)
-    return np.asarray(slopes @ fitted.covariance @ slopes.T)
+    return function(fitted.named), np.asarray(slopes @ fitted.covariance @ slopes.T)
+
+
+def _each(fitted: Fit, function: Callable[[Values], Vector]) -> list[tuple[float, float]]:
+    """Values that a function makes of body and motion, with their sigmas."""
+    values, covariance = _told(fitted, function)
+    return list(zip(values.tolist(), np.sqrt(np.diag(covariance)).tolist(), strict=True))
 
 
 def estimates(fitted: Fit, time: float) -> tuple[Estimate, ...]:
@@ -226,32 +225,36 @@ def estimates(fitted: Fit, time: float) -> tuple[Estimate, ...]:
 def _of_motion(fitted: Fit, time: float) -> Iterator[Estimate]:
     model, spacecraft = fitted.model, fitted.model.spacecraft
     first, begun = model.at(fitted.named, time)
-    x0, y0, _ = first.axes @ begun.rates  # in the axes of the file
+    x0, y0, _ = first.inertia.axes @ begun.rates  # in the axes of the file
     phase0 = math.atan2(y0, x0)
 
     def motion(values: Values) -> Vector:
         body, state = model.at(values, time)
-        x, y, _ = body.axes @ state.rates
+        inertia = body.inertia
+        x, y, _ = inertia.axes @ state.rates
         turned = math.remainder(math.atan2(y, x) - phase0, 2.0 * math.pi)
-        sense = math.copysign(1.0, body.inertia.axial(state.spin))
-        nutation = arc_cones(body.moments, state.rates, sense, body.wheel).nutation
+        sense = math.copysign(1.0, inertia.axial(state.spin))
+        nutation = arc_cones(inertia.moments, state.rates, sense, inertia.wheel).nutation
         return np.array([state.spin, nutation, math.hypot(x, y), phase0 + turned])
 
-    values, sigmas = motion(fitted.named), np.sqrt(np.diag(_covariance(fitted, motion)))
-    if not model.record.shows_turn:
-        sigmas[3] = math.inf
-    omega, symmetric = complex(*spacecraft.rates[:2]), model.body(fitted.named).symmetric
-    given = (spacecraft.dispersions or EXACT).omega0[2]
-    spin_prior = None if given is None else prior_of(given, spacecraft.spin)[1]
+    omega = complex(*spacecraft.rates[:2])
     # Carried to another time the phase is not comparable with that of the file.
+    phase = math.atan2(omega.imag, omega.real) if time == 0.0 else None
+    largest = "" if first.inertia.symmetric else "largest "
+    spin_prior = _sigma_of((spacecraft.dispersions or EXACT).omega0[2], spacecraft.spin)
     rows = (
         ("spin", "spin ω3", "deg/s", spacecraft.spin, spin_prior),
-        ("nutation", "nutation" if symmetric else "largest nutation", "deg", spacecraft.nutation, None),
+        ("nutation", f"{largest}nutation", "deg", spacecraft.nutation, None),
         ("omega", "transverse rate |ω|", "deg/s", abs(omega), None),
-        ("phase", "phase arg(ω1 + iω2)", "deg", math.atan2(omega.imag, omega.real) if time == 0.0 else None, None),
+        ("phase", "phase arg(ω1 + iω2)", "deg", phase, None),
     )
-    for (key, label, unit, known, prior), value, sigma in zip(rows, values, sigmas, strict=True):
-        yield Estimate(key, label, unit, 1.0 / DEG, float(value), float(sigma), known, prior)
+    for (key, label, unit, known, prior), (value, sigma) in zip(rows, _each(fitted, motion), strict=True):
+        shown = sigma if key != "phase" or model.record.shows_turn else math.inf
+        yield Estimate(key, label, unit, 1.0 / DEG, value, shown, known, prior)
+
+
+def _sigma_of(tolerance: Tolerance | None, nominal: float) -> float | None:
+    return None if tolerance is None else prior_of(tolerance, nominal)[1]
 
 
 def _of_body(fitted: Fit) -> Iterator[Estimate]:
@@ -261,10 +264,13 @@ def _of_body(fitted: Fit) -> Iterator[Estimate]:
         A, C = in_moments(spacecraft, values)
         return np.array([values[RATIO], 1.0 - values[RATIO], A, C])
 
-    values, sigmas = body(fitted.named), np.sqrt(np.diag(_covariance(fitted, body)))
+    def rate(values: Values) -> Vector:
+        """Rate of a small nutation in the body."""
+        body = fitted.model.body(values)
+        return np.array([body.inertia.nutation_rate(body.state.spin)])
+
     given = spacecraft.dispersions or EXACT
-    of_A = None if given.A is None else prior_of(given.A, inertia.A)[1]
-    of_C = None if given.C is None else prior_of(given.C, inertia.C)[1]
+    of_A, of_C = _sigma_of(given.A, inertia.A), _sigma_of(given.C, inertia.C)
     ratio = inertia.C / inertia.A
     both = ratio * math.hypot((of_A or 0.0) / inertia.A, (of_C or 0.0) / inertia.C) or None
     rows = (
@@ -273,11 +279,13 @@ def _of_body(fitted: Fit) -> Iterator[Estimate]:
         ("A", "A", "kg m²", inertia.A, of_A),
         ("C", "C", "kg m²", inertia.C, of_C),
     )
-    for (key, label, unit, file, prior), value, sigma in zip(rows, values, sigmas, strict=True):
+    for (key, label, unit, file, prior), (value, sigma) in zip(rows, _each(fitted, body), strict=True):
         if sigma > 0.0:
-            yield Estimate(key, label, unit, 1.0, float(value), float(sigma), file, prior)
+            yield Estimate(key, label, unit, 1.0, value, sigma, file, prior)
     if fitted.model.record.shows_turn and not fitted.model.record.shows_spin:
-        yield _rate(fitted)
+        # Told much better than C/A and ω3, where the file alone tells ω3.
+        file = inertia.nutation_rate(spacecraft.spin)
+        yield Estimate("rate", "nutation rate in the body", "deg/s", 1.0 / DEG, *_each(fitted, rate)[0], file, None)
     if fitted.index("wheel") is not None:
         known = prior_of(given.wheel_momentum, inertia.wheel)[1]
         yield Estimate("wheel", "wheel momentum h", "N m s", 1.0, *_at(fitted, "wheel"), inertia.wheel, known)
@@ -285,18 +293,6 @@ def _of_body(fitted: Fit) -> Iterator[Estimate]:
     for key, label, unit in others:
         if (parameter := fitted.model.parameter(key)) is not None:
             yield Estimate(key, label, unit, 1.0, *_at(fitted, key), parameter.file, None)
-
-
-def _rate(fitted: Fit) -> Estimate:
-    """The rate of a small nutation in the body: told much better than C/A and ω3, where the file alone tells ω3."""
-
-    def rate(values: Values) -> Vector:
-        body = fitted.model.body(values)
-        return np.array([body.inertia.nutation_rate(body.state.spin)])
-
-    value, sigma = float(rate(fitted.named)[0]), math.sqrt(float(_covariance(fitted, rate)[0, 0]))
-    file = fitted.model.spacecraft.inertia.nutation_rate(fitted.model.spacecraft.spin)
-    return Estimate("rate", "nutation rate in the body", "deg/s", 1.0 / DEG, value, sigma, file, None)
 
 
 LABELS = {
@@ -373,13 +369,11 @@ def _of_residuals(fitted: Fit) -> Iterator[str]:
     left = [index for index in range(len(fitted.model.signals)) if fitted.resolved[index] and not fitted.white(index)]
     if not left:
         return
-    says = f"the residuals of {', '.join(fitted.model.signals[index] for index in left)} are not white"
-    time = step(fitted, left, small=True)
-    if time is None:
-        yield f"{says}: the noise of neighbouring samples is correlated, or a small motion is not in the model"
-        return
-    what = "check --schedule" if fitted.model.record.fired else "give the pulses fired with --schedule"
-    yield f"{says}: the nutation steps at about {time:.3g} s, as by a small pulse; {what}, or end the record before it"
+    why = "the noise of neighbouring samples is correlated, or a small motion is not in the model"
+    if (time := step(fitted, left, small=True)) is not None:
+        what = "check --schedule" if fitted.model.record.fired else "give the pulses fired with --schedule"
+        why = f"the nutation steps at about {time:.3g} s, as by a small pulse; {what}, or end the record before it"
+    yield f"the residuals of {', '.join(fitted.model.signals[index] for index in left)} are not white: {why}"
 
 
 def _of_schedule(fitted: Fit) -> Iterator[str]:

@@ -53,8 +53,7 @@ def robust(model: Model, left: Vector) -> Vector:
 def plain(model: Model, left: Vector, used: NDArray[np.bool_], leverage: Vector | None = None) -> Vector:
     """One sigma of each signal by its samples that are no outliers; ``leverage`` is what the fit takes of each.
 
-    Of n samples with leverages that add up to p the mean of the variance is Σr²/(n - p - 2): that of its posterior,
-    so that regions made with it hold as often as they should.
+    Of n samples with leverages that add up to p the variance is Σr²/(n - p - 2), the mean of its posterior.
     """
     sigmas, signal = [], model.signal[used]
     for index in range(len(model.signals)):
@@ -128,10 +127,7 @@ def units_of(model: Model) -> Vector:
 def search(
     model: Model, values: Vector, noise: Vector, rows: NDArray[np.bool_], *, robust: bool, near: bool = True
 ) -> tuple[Vector, float]:
-    """Values of the least cost over some of the samples, and that cost; ``noise`` of each signal.
-
-    Those reached so far where the budget of work is spent.
-    """
+    """Values of the least cost over some of the samples, or reached with the budget of work, and that cost."""
     units, weights = units_of(model), 1.0 / noise[model.signal[rows]]
     bound, nominal = model.prior[0] * units, model.prior[1]
 
@@ -252,9 +248,9 @@ def covariance_of(model: Model, scaled: Matrix) -> Matrix:
     return np.asarray(covariance * np.outer(units, units))
 
 
+# By which the square of a shift across a curved region counts: (t², s t²) is then in the ellipsoid in 95 % of cases,
+# for 2 to 10 parameters, whether s is small or large.
 CURVED = 7.0
-"""By which the square of a shift across a curved region counts: (t², s t²) is then in the ellipsoid in 95 % of cases,
-for 2 to 10 parameters, whether s is small or large."""
 
 GROWS = 3.0  # standard deviations of κ from which on it shows
 KEPT = 0.9  # share of its prior above which a parameter's sigma is where the data do not tell it
@@ -262,21 +258,16 @@ KEPT = 0.9  # share of its prior above which a parameter's sigma is where the da
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """Estimate of a spacecraft from a record.
-
-    ``values`` (p,) of the model's parameters, SI, with their ``covariance`` (p, p); ``noise`` one sigma of each signal
-    (rad of directions, s of Sun pulses); ``used`` (m,) the samples that are no outliers, ``residuals`` (m,) measured
-    less predicted; ``finished`` unless the search ended with its budget of work.
-    """
+    """Estimate of a spacecraft from a record."""
 
     model: Model
-    values: Vector
-    covariance: Matrix
-    noise: Vector
-    used: NDArray[np.bool_]
-    residuals: Vector
-    jacobian: Matrix
-    finished: bool = True
+    values: Vector  # (p,) of the model's parameters, SI
+    covariance: Matrix  # (p, p) of these
+    noise: Vector  # one sigma of each signal: rad of directions, s of Sun pulses
+    used: NDArray[np.bool_]  # (m,) samples that are no outliers
+    residuals: Vector  # (m,) measured less predicted
+    jacobian: Matrix  # (m, p)
+    finished: bool = True  # unless the search ended with its budget of work
 
     @property
     def named(self) -> dict[str, float]:
@@ -303,9 +294,8 @@ class Fit:
         """The covariance (p, p) whose ellipsoids hold the true values as often as they say, though regions are curved.
 
         A direction of the covariance, followed for one sigma both ways, leaves residuals that do not cancel: least
-        squares by J turns them into the shift s across it that the curve takes there. ω3 of the file and C/A lie so on
-        the curve of one nutation rate, which is much better known than either. The curve is off by s t² at t sigmas,
-        and of P + `CURVED` Σ s sᵀ the 95 % ellipsoid holds 95 % of a normal t, for any length of s.
+        squares by J turns them into the shift s across it that the curve takes there. It is off by s t² at t sigmas:
+        of P + `CURVED` Σ s sᵀ the 95 % ellipsoid holds 95 % of a normal t, for any length of s.
         """
         scale = self.sigmas
         sizes, turned = np.linalg.eigh(self.covariance / np.outer(scale, scale))
@@ -332,10 +322,7 @@ class Fit:
 
     @cached_property
     def information(self) -> Vector:
-        """Singular values of the data against the priors, falling; below 1 the priors say more.
-
-        They are those of J/s in units of the priors, for the parameters that have one, the others being fitted.
-        """
+        """Singular values of J/s in units of the priors, the rest being fitted, falling; below 1 priors say more."""
         priors = np.array([parameter.prior for parameter in self.model.parameters])
         with_prior = np.isfinite(priors)
         scaled = self.jacobian[self.used] / self.noise[self.model.signal[self.used], None]

@@ -216,7 +216,7 @@ def fit_figure(fit: Fit) -> Figure:
     _autocorrelation(white, fit)
     _pulls(pulls, [row for row in estimates(fit, 0.0) if row.change is not None and row.prior])
     style.legend(figure, [*left, white])
-    shape = "symmetric" if fit.model.body(fit.named).symmetric else "triaxial"
+    shape = "symmetric" if fit.model.body(fit.named).inertia.symmetric else "triaxial"
     count = int(np.count_nonzero(fit.used))
     style.heading(figure, fit.model.spacecraft, f"fit of a free rigid body, {shape}, to {count:,} samples")
     return figure

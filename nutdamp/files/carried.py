@@ -173,7 +173,7 @@ def notes(fit: Fit, carried: Carried) -> Iterator[str]:
     growth = fit.index("growth")
     value = 0.0 if growth is None else float(fit.values[growth])
     seen_to_grow = growth is not None and abs(value) > SEEN * fit.sigmas[growth]
-    if seen_to_grow and not (carried.body.wheel or _grows_so(carried, value)):
+    if seen_to_grow and not (carried.body.inertia.wheel or _grows_so(carried, value)):
         way = "grows" if value > 0.0 else "decays"
         yield f"the nutation {way} at {abs(value):.3g} 1/s, which dissipation within a rigid body would not let it"
     fitted = dict(zip((parameter.name for parameter in fit.model.parameters), fit.values, strict=True))
@@ -220,8 +220,8 @@ def _fitted_edits(tree: Node, fit: Fit, carried: Carried) -> Edits:
 
 def _grows_so(carried: Carried, growth: float) -> bool:
     """True where dissipation lets the nutation of such a body grow (or decay) at this rate; with a wheel not known."""
-    first, second, third = carried.body.moments
-    return not carried.body.wheel and (0.5 * (first + second) - third) * growth > 0.0
+    first, second, third = carried.body.inertia.moments
+    return not carried.body.inertia.wheel and (0.5 * (first + second) - third) * growth > 0.0
 
 
 def _dissipation(tree: Node, fit: Fit, carried: Carried) -> Edits:

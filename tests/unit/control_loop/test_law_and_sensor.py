@@ -261,4 +261,6 @@ def test_a_channel_comes_to_fire_where_it_is_due_as_z_is_first_known() -> None:
     """Not where the moment is past; later only as its wait falls below what is looked ahead."""
     law = Law(body(), Loop(Sensor(rate=20.0), start=0.01))
     waits = np.array([[math.nan, 0.0], [math.nan, -0.1 * law.period], [0.2, 0.2], [0.03, 0.01]])
-    assert Watch(law, 0.0).triggered(waits, 0.02)[:, 0].tolist() == [True, False, False, True]
+    watch = Watch(law, 0.0)
+    watch.ahead = 0.02
+    assert watch.triggered(waits)[:, 0].tolist() == [True, False, False, True]
