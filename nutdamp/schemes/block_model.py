@@ -180,16 +180,11 @@ def first_sun_pulse(spacecraft: Spacecraft) -> float:
 
 
 def fired(spacecraft: Spacecraft, blocks: Sequence[Block], seed: int | None = None) -> Schedule:
-    """Pulses fired by ``blocks``, see `fire`."""
-    return fire(spacecraft, blocks, seed)[0]
-
-
-def fire(spacecraft: Spacecraft, blocks: Sequence[Block], seed: int | None = None) -> tuple[Schedule, list[bool]]:
-    """Pulses fired by ``blocks``, and `SunPulses.seen`; raises what `fire_all` gives as reasons."""
-    (schedule,), seen = fire_all(spacecraft, [blocks], seed)
+    """Pulses fired by ``blocks``; raises what `fire_all` gives as reasons."""
+    (schedule,), _ = fire_all(spacecraft, [blocks], seed)
     if isinstance(schedule, Infeasible):
         raise schedule
-    return schedule, [bool(sees[0]) for sees in seen]
+    return schedule
 
 
 def fire_all(
