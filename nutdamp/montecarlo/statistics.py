@@ -21,7 +21,6 @@ from nutdamp.montecarlo.propagated import ClosedForm, Ends
 
 STEPS = 200  # Newton steps and halvings in which a quantile is found, at most; half a dozen do mostly
 ACCURACY = 4e-16  # relative change of a quantile, or of a continued fraction, that is rounding
-TINY = 1e-300  # in place of a denominator of zero
 LARGE = 20.0  # argument from which Stirling's series of the logarithm of Γ is exact to rounding
 
 
@@ -86,22 +85,18 @@ def _rest(z: float) -> float:
 
 def _fraction(a: float, b: float, x: float) -> float:
     """Continued fraction of the incomplete beta function, by Lentz's method, in some √(a + b) terms."""
-    c, d = 1.0, 1.0 / _not_zero(1.0 - (a + b) * x / (a + 1.0))
+    c, d = 1.0, 1.0 / (1.0 - (a + b) * x / (a + 1.0))
     value = d
     for m in range(1, 100 + 20 * math.isqrt(int(a + b))):
         for term in (
             m * (b - m) * x / ((a + 2 * m - 1.0) * (a + 2 * m)),
             -(a + m) * (a + b + m) * x / ((a + 2 * m) * (a + 2 * m + 1.0)),
         ):
-            c, d = _not_zero(1.0 + term / c), 1.0 / _not_zero(1.0 + term * d)
+            c, d = 1.0 + term / c, 1.0 / (1.0 + term * d)
             value *= c * d
         if abs(c * d - 1.0) <= ACCURACY:
             break
     return value
-
-
-def _not_zero(value: float) -> float:
-    return value if abs(value) > TINY else TINY
 
 
 Array = NDArray[np.float64]
@@ -125,8 +120,8 @@ ROWS = 10  # rows of `vectors`
 def measure(model: DispersedModel, ends: Ends, out: Array) -> None:
     """Write the `OUTPUTS` of cases into ``out`` (5, n); propellant is NaN where unknown."""
     x, y, z = ends.momentum
-    sense = model.spacecraft.sense
-    out[0] = np.arctan2(np.sqrt(x * x + y * y), sense * z) if ends.nutation is None else ends.nutation
+    still = ends.nutation is None
+    out[0] = np.arctan2(np.sqrt(x * x + y * y), model.spacecraft.sense * z) if still else ends.nutation
     out[1] = angle(ends.before, ends.after)
     out[2] = angle(parts_of(model.target), ends.pointed)
     out[3] = ends.spin_change
@@ -141,8 +136,7 @@ def vectors(model: DispersedModel, ends: Ends, out: NDArray[Any]) -> None:
     nearly, for a good plan, so that they have no derivative themselves. All are in the body axes of t = 0.
     """
     x, y, z = ends.momentum
-    sense = model.spacecraft.sense
-    out[0], out[1] = x * sense / z, y * sense / z
+    out[0], out[1] = x * model.spacecraft.sense / z, y * model.spacecraft.sense / z
     before, after, pointed = (_unit(vector) for vector in (ends.before, ends.after, ends.pointed))
     for row in range(3):
         out[2 + row] = after[row] - before[row]
@@ -212,17 +206,14 @@ class Sketch:
         """Count more ``values`` (n,)."""
         for begin in range(0, len(values), PORTION):
             part = values[begin : begin + PORTION]
-            bins = (np.abs(part).view(np.int64) >> _SHIFT) - _LOWEST
-            np.clip(bins, 0, _SIZES - 1, out=bins)
-            least, most = float(part.min()), float(part.max())
-            if least < 0.0:
-                # Negative values lie below the middle, mirrored, so that bins ascend with the value.
-                np.copyto(bins, -1 - bins, where=part < 0.0)
-            bins += _SIZES
+            bins = np.clip((np.abs(part).view(np.int64) >> _SHIFT) - _LOWEST, 0, _SIZES - 1)
+            # Negative values lie below the middle, mirrored, so that bins ascend with the value.
+            np.copyto(bins, -1 - bins, where=part < 0.0)
             lowest = int(bins.min())
             counts = np.bincount(bins - lowest)  # values lie close together: few bins to count
-            self.counts[lowest : lowest + len(counts)] += counts
-            self.minimum, self.maximum = min(self.minimum, least), max(self.maximum, most)
+            self.counts[_SIZES + lowest : _SIZES + lowest + len(counts)] += counts
+            self.minimum = min(self.minimum, float(part.min()))
+            self.maximum = max(self.maximum, float(part.max()))
 
     def quantiles(self, probabilities: Array) -> Array:
         """Quantiles to 0.006 %."""
@@ -252,19 +243,16 @@ class Worst:
     """Cases of greatest severity, in a fixed order: the most severe first, then the lower number."""
 
     def __init__(self, keep: int) -> None:
-        self.keep = keep
-        self.cases = np.empty(0, dtype=np.int64)
-        self.severities = np.empty(0)
+        self.keep, self.cases, self.severities = keep, np.empty(0, dtype=np.int64), np.empty(0)
 
     def add(self, first: int, severities: Array) -> None:
         """Consider the cases from number ``first`` on."""
+        least, spare = -math.inf, len(severities) - self.keep
         if len(self.cases) == self.keep:
-            rows = np.flatnonzero(severities > self.severities[-1])
-        elif len(severities) > self.keep:
-            least = np.partition(severities, len(severities) - self.keep)[len(severities) - self.keep]
-            rows = np.flatnonzero(severities >= least)
-        else:
-            rows = np.arange(len(severities))
+            least = self.severities[-1]
+        elif spare > 0:
+            least = np.partition(severities, spare)[spare]
+        rows = np.flatnonzero(severities >= least)
         cases = np.concatenate([self.cases, first + rows])
         severities = np.concatenate([self.severities, severities[rows]])
         order = np.lexsort((cases, -severities))[: self.keep]
@@ -294,11 +282,6 @@ class FirstOrder:
         """Standard deviations of the inputs, (d,)."""
         return np.array([entry.sigma for entry in self.inputs])
 
-    def covariance(self, output: str) -> Array:
-        """Covariance of the vector behind ``output``."""
-        scaled = self.independent(output)
-        return np.asarray(scaled @ scaled.T)
-
     def independent(self, output: str) -> Array:
         """Effect of one sigma of each input on that vector, (m, d); of correlated ones beyond those before it."""
         scaled = (self.jacobian * self.sigmas)[VECTORS[output]]
@@ -306,7 +289,8 @@ class FirstOrder:
 
     def sigma(self, output: str) -> float:
         """Root mean square of that vector about its mean, rad (rad/s, kg)."""
-        return float(np.sqrt(np.trace(self.covariance(output))))
+        scaled = self.independent(output)
+        return float(np.sqrt(np.trace(scaled @ scaled.T)))
 
     def effects(self, output: str) -> Array:
         """Effect of each input alone on ``output``, (d,): one sigma of it, or all of a bias."""
@@ -334,12 +318,12 @@ def as_flown(model: DispersedModel, fly: Callable[[DispersedCases], Ends]) -> Fi
     flown = by_differences(model, fly)
     if model.schedule.blocks or not flown.inputs:
         return flown
-    closed, jacobian = first_order(model).jacobian, flown.jacobian.copy()
+    closed, jacobian = first_order(model).jacobian, flown.jacobian
     for rows in VECTORS.values():
         apart, size = (np.linalg.norm(vector[rows], axis=0) for vector in (closed - jacobian, jacobian))
         alike = apart <= ALIKE * size
         jacobian[rows, alike] = closed[rows, alike]
-    return FirstOrder(flown.inputs, jacobian, flown.groups)
+    return flown
 
 
 def by_differences(model: DispersedModel, fly: Callable[[DispersedCases], Ends]) -> FirstOrder:
@@ -360,9 +344,9 @@ def _varied(model: DispersedModel, fly: Callable[[DispersedCases], Ends], steps:
     """Outcome (10, d k) about nominal values (and biases), with each input off by its ``steps`` (d, k) in turn."""
     draws: dict[str, NDArray[Any]] = {}
     for index, entry in enumerate(model.inputs.drawn):
-        draw = np.full(steps.shape, entry.size if entry.kind == "bias" else 0.0, dtype=steps.dtype)
-        draw[index] += steps[index]
-        draws[entry.name] = draw.ravel()
+        draw = np.zeros_like(steps)
+        draw[index] = steps[index]
+        draws[entry.name] = draw.ravel() + (entry.size if entry.kind == "bias" else 0.0)
     out = np.empty((ROWS, steps.size), dtype=steps.dtype)
     if draws:
         vectors(model, fly(model.cases(draws)), out)
