@@ -8,6 +8,7 @@ outcome over equally likely intervals of each input (the correlation ratio, Pear
 from __future__ import annotations
 
 import math
+import operator
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -117,32 +118,37 @@ VECTORS = {
 ROWS = 10  # rows of `vectors`
 
 
-def measure(model: DispersedModel, ends: Ends, out: Array) -> None:
-    """Write the `OUTPUTS` of cases into ``out`` (5, n); propellant is NaN where unknown."""
+def measure(model: DispersedModel, ends: Ends, count: int) -> Array:
+    """The `OUTPUTS` (5, n) of ``count`` cases; propellant is NaN where unknown."""
     x, y, z = ends.momentum
-    still = ends.nutation is None
-    out[0] = np.arctan2(np.sqrt(x * x + y * y), model.spacecraft.sense * z) if still else ends.nutation
-    out[1] = angle(ends.before, ends.after)
-    out[2] = angle(parts_of(model.target), ends.pointed)
-    out[3] = ends.spin_change
-    out[4] = np.nan if ends.propellant is None else ends.propellant
+    symmetric = ends.nutation is None
+    rows = (
+        np.arctan2(np.sqrt(x * x + y * y), model.spacecraft.sense * z) if symmetric else ends.nutation,
+        angle(ends.before, ends.after),
+        angle(parts_of(model.target), ends.pointed),
+        ends.spin_change,
+        np.nan if ends.propellant is None else ends.propellant,
+    )
+    return np.array([np.broadcast_to(row, count) for row in rows])
 
 
-def vectors(model: DispersedModel, ends: Ends, out: NDArray[Any]) -> None:
-    """Write quantities that are linear for small dispersions into ``out`` (10, n); `VECTORS` names the rows.
+def vectors(model: DispersedModel, ends: Ends, count: int) -> NDArray[Any]:
+    """Quantities (10, n) of ``count`` cases that are linear for small dispersions; `VECTORS` names the rows.
 
     Nutation is the length of the transverse momentum over the axial one, the momentum shift that of the change of its
     direction, the axis error that of its direction's distance from the target: lengths of vectors that are zero, or
     nearly, for a good plan, so that they have no derivative themselves. All are in the body axes of t = 0.
     """
     x, y, z = ends.momentum
-    out[0], out[1] = x * model.spacecraft.sense / z, y * model.spacecraft.sense / z
     before, after, pointed = (_unit(vector) for vector in (ends.before, ends.after, ends.pointed))
-    for row in range(3):
-        out[2 + row] = after[row] - before[row]
-        out[5 + row] = pointed[row] - model.target[row]
-    out[8] = ends.spin_change
-    out[9] = 0.0 if ends.propellant is None else ends.propellant
+    rows = (
+        *(across * model.spacecraft.sense / z for across in (x, y)),
+        *map(operator.sub, after, before),
+        *map(operator.sub, pointed, model.target),
+        ends.spin_change,
+        0.0 if ends.propellant is None else ends.propellant,
+    )
+    return np.array([np.broadcast_to(row, count) for row in rows])
 
 
 def _unit(vector: Triple) -> Triple:
@@ -347,10 +353,7 @@ def _varied(model: DispersedModel, fly: Callable[[DispersedCases], Ends], steps:
         draw = np.zeros_like(steps)
         draw[index] = steps[index]
         draws[entry.name] = draw.ravel() + (entry.size if entry.kind == "bias" else 0.0)
-    out = np.empty((ROWS, steps.size), dtype=steps.dtype)
-    if draws:
-        vectors(model, fly(model.cases(draws)), out)
-    return out
+    return vectors(model, fly(model.cases(draws)), steps.size) if draws else np.empty((ROWS, 0))
 
 
 def sampled_shares(draws: Mapping[str, Array], outcome: Array) -> dict[str, dict[str, float]]:

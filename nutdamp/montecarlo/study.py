@@ -70,7 +70,7 @@ class Round:
         self.emptied = np.zeros(last - first, dtype=bool)
         self.portions = range(first // PORTION, math.ceil(last / PORTION))
         self.left = iter(self.portions)
-        self.finished = self.redrawn = 0
+        self.flown = self.redrawn = 0  # cases
         self.failures: list[BaseException] = []
         self.lock = threading.Lock()
 
@@ -86,18 +86,13 @@ class Round:
                 while worker.is_alive():
                     worker.join(0.1)
                     if worker.is_alive():
-                        watch(max(self._flown, self.first))
+                        watch(self.first + self.flown)
         except BaseException:
             self.left = iter(())  # nothing more is begun
             raise
         if self.failures:
             raise self.failures[0]
-        return max(self._flown - self.first, 0), self.redrawn
-
-    @property
-    def _flown(self) -> int:
-        """End states of the flown cases; below ``first`` where none is."""
-        return min(self.last, (self.portions[0] + self.finished) * PORTION)
+        return self.flown, self.redrawn
 
     def _work(self, stopped: Callable[[], bool]) -> None:
         try:
@@ -113,7 +108,7 @@ class Round:
                     drawn = source.block(block)
                 redrawn = self._fly(drawn, block * BLOCK, begin, end)
                 with self.lock:
-                    self.finished += 1
+                    self.flown += end - begin
                     self.redrawn += redrawn
         except BaseException as failure:  # handed to the thread that waits
             with self.lock:
@@ -129,8 +124,7 @@ class Round:
         rows = slice(low - start, high - start)
         ends = study.flies(study.model.cases(some_of(draws, rows)))
         inner = slice(begin - low, end - low)
-        outputs = np.empty((len(OUTPUTS), high - low))
-        measure(study.model, ends, outputs)
+        outputs = measure(study.model, ends, high - low)
         place = slice(begin - self.first, end - self.first)
         self.out[: len(OUTPUTS), place] = outputs[:, inner]
         self.severity[place] = study.severity(outputs, ends)[inner]
@@ -138,9 +132,7 @@ class Round:
         if ends.aspects is not None:
             self.aspects[:, :, place] = ends.aspects[:, :, inner]
         if low < early.shape[1]:
-            outcome = np.empty((ROWS, high - low))
-            vectors(study.model, ends, outcome)
-            early[:, begin:end] = outcome[:, inner]
+            early[:, begin:end] = vectors(study.model, ends, high - low)[:, inner]
         return int(np.count_nonzero((redrawn >= begin - start) & (redrawn < end - start)))
 
 
@@ -169,8 +161,7 @@ class DrawnCases:
 
     def draws_of(self, case: int) -> dict[str, float]:
         """Deviations of one case (from 0), by input."""
-        draws, _ = self.source().block(case // BLOCK)
-        return {name: float(draw) for name, draw in some_of(draws, case % BLOCK).items()}
+        return {name: float(np.ravel(draw)[0]) for name, draw in self.draws_of_all(np.array([case])).items()}
 
     def draws_of_all(self, cases: NDArray[np.intp]) -> dict[str, Array | float]:
         """Deviations of ``cases`` (from 0, ascending), by input."""
@@ -207,9 +198,7 @@ class Study(DrawnCases):
 
     def outputs_of(self, draws: Draws) -> Array:
         """Outputs (5,) of one case with these deviations; none: of the estimate itself."""
-        out = np.empty((len(OUTPUTS), 1))
-        measure(self.model, self.ends_of(draws), out)
-        return out[:, 0]
+        return measure(self.model, self.ends_of(draws), 1)[:, 0]
 
     @property
     def nominal(self) -> Flight:
@@ -520,8 +509,8 @@ class Checkpoints:
 
     def _flown(self, study: Study, draws: Draws) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Outputs (5, n) and severity (n,) of the cases."""
-        ends, outputs = study.flies(study.model.cases(draws)), np.empty((len(OUTPUTS), CASES))
-        measure(study.model, ends, outputs)
+        ends = study.flies(study.model.cases(draws))
+        outputs = measure(study.model, ends, CASES)
         return outputs, np.broadcast_to(study.severity(outputs, ends), CASES)
 
 

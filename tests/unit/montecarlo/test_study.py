@@ -246,9 +246,7 @@ def outcomes(
     model: DispersedModel, draws: dict[str, np.ndarray], fly: Callable[[DispersedCases], Ends] | None = None
 ) -> np.ndarray:
     """What the closed form leaves, or what ``fly`` flies."""
-    out = np.empty((ROWS, len(next(iter(draws.values())))))
-    vectors(model, (fly or ClosedForm(model))(model.cases(draws)), out)
-    return out
+    return vectors(model, (fly or ClosedForm(model))(model.cases(draws)), len(next(iter(draws.values()))))
 
 
 @pytest.mark.parametrize(
