@@ -121,9 +121,11 @@ ROWS = 10  # rows of `vectors`
 def measure(model: DispersedModel, ends: Ends, count: int) -> Array:
     """The `OUTPUTS` (5, n) of ``count`` cases; propellant is NaN where unknown."""
     x, y, z = ends.momentum
-    symmetric = ends.nutation is None
+    nutation = ends.nutation
+    if nutation is None:
+        nutation = np.arctan2(np.sqrt(x * x + y * y), model.spacecraft.sense * z)
     rows = (
-        np.arctan2(np.sqrt(x * x + y * y), model.spacecraft.sense * z) if symmetric else ends.nutation,
+        nutation,
         angle(ends.before, ends.after),
         angle(parts_of(model.target), ends.pointed),
         ends.spin_change,

@@ -68,7 +68,7 @@ def sun_pulses(flown: Flight, until: float) -> Vector:
     ahead = to_sun_pulse(flown, times)
     index = np.flatnonzero((ahead[:-1] < 0.5 * math.pi) & (ahead[1:] > 1.5 * math.pi))
     times_of = times[index] + ahead[index] * turn / (2.0 * math.pi)
-    for _ in range(ITERATIONS):  # three or four are usual
+    for _ in range(ITERATIONS):
         off = (to_sun_pulse(flown, np.minimum(times_of, until)) + math.pi) % (2.0 * math.pi) - math.pi
         times_of += off * turn / (2.0 * math.pi)
         if not len(times_of) or np.abs(off).max() < 2.0 * math.pi * EXACT:
@@ -244,19 +244,16 @@ def _firing(spacecraft: Spacecraft, blocks: Sequence[Block], supply: Supply) -> 
 
 def _together(given: Mapping[int, Pulse], count: int) -> list[TorqueRamp]:
     """Torques of ``count`` flights by the pulses of some: of the others, and once a pulse is over, there are none."""
-    ramps = {
-        flight: pushes(pulse, (np.zeros(3) if pulse.torque is None else pulse.torque)[:, None])
-        for flight, pulse in given.items()
-    }
-    together = []
-    for index in range(max(map(len, ramps.values()), default=0)):
-        begin, end, first, last = np.zeros(count), np.zeros(count), np.zeros((3, count)), np.zeros((3, count))
-        for flight, each in ramps.items():
-            ramp = each[min(index, len(each) - 1)] if each else TorqueRamp(0.0, 0.0, first[:, :1], last[:, :1])
-            begin[flight], end[flight] = ramp.begin if index < len(each) else ramp.end, ramp.end
-            if index < len(each):
-                first[:, [flight]], last[:, [flight]] = ramp.first, ramp.last
-        together.append(TorqueRamp(begin, end, first, last))
+    zero, together = np.zeros((3, 1)), list[TorqueRamp]()
+    ramps = [pushes(pulse, zero if pulse.torque is None else pulse.torque[:, None]) for pulse in given.values()]
+    for index in range(max(map(len, ramps), default=0)):
+        ramp = TorqueRamp(np.zeros(count), np.zeros(count), np.zeros((3, count)), np.zeros((3, count)))
+        for flight, each in zip(given, ramps, strict=True):
+            over = each[-1].end if each else 0.0
+            here = each[index] if index < len(each) else TorqueRamp(over, over, zero, zero)
+            ramp.begin[flight], ramp.end[flight] = here.begin, here.end
+            ramp.first[:, [flight]], ramp.last[:, [flight]] = here.first, here.last
+        together.append(ramp)
     return together
 
 
@@ -325,8 +322,8 @@ class BlockState:
 
     def shifted(self, off: BlockState) -> BlockState:
         """Copy with H, the nutation and the spin ``off`` by so much."""
-        here = replace(self, sun_angle=self.sun_angle + off.sun_angle, longitude=self.longitude + off.longitude)
-        return replace(here, phasor=self.phasor + off.phasor, spin=self.spin + off.spin)
+        names = "sun_angle", "longitude", "phasor", "spin"
+        return replace(self, **{name: getattr(self, name) + getattr(off, name) for name in names})
 
 
 class BlockModel:
@@ -366,8 +363,7 @@ class BlockModel:
 
     def turned_by(self, channel: Channel, width: Any, spin: Any) -> Any:
         """Turn of H by one pulse, rad."""
-        given = acts(channel, width)
-        momentum = abs(self.inertia.axial(spin))
+        given, momentum = acts(channel, width), abs(self.inertia.axial(spin))
         return precession.turned_by(momentum, abs(channel.transverse), given.on_time, spin, given.spread)
 
     def full_pulses(self, state: BlockState, channel: Channel, width: Any, count: Any) -> tuple[Any, Any]:
@@ -461,9 +457,8 @@ class BlockModel:
         following = first + (trial.count - 1) * interval + turn
         rate = self.rate(spin)
         kick = channel.transverse * np.sinc(0.5 * rate * given.spread / np.pi)
-        since_last = turn - trial.delay - given.centroid
-        kicks = self.kicks(state, channel, trial, rate * interval, back=True)
-        gathered = kick * np.exp(-1j * rate * since_last) * kicks
+        kick = kick * np.exp(-1j * rate * (turn - trial.delay - given.centroid))
+        gathered = kick * self.kicks(state, channel, trial, rate * interval, back=True)
         return BlockState(
             sun_angle=sun_angle,
             longitude=state.longitude + longitude,
