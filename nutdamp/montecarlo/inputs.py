@@ -266,8 +266,7 @@ def positive_definite(group: Group) -> bool:
 
 def grouped(pairs: Iterable[Pair]) -> tuple[Group, ...]:
     """Groups connected by ``pairs``, names in the order of their first pair."""
-    pairs = list(pairs)
-    members: list[list[str]] = []
+    pairs, members = list(pairs), list[list[str]]()
     for first, second, _ in pairs:
         touched = [member for member in members if first in member or second in member]
         members = [member for member in members if member not in touched]
@@ -285,8 +284,7 @@ def grouped(pairs: Iterable[Pair]) -> tuple[Group, ...]:
 
 def groups_of(pairs: Iterable[Pair]) -> tuple[Group, ...]:
     """`grouped`; raises BadRequest for groups that are not positive definite."""
-    groups = grouped(pairs)
-    for group in groups:
+    for group in (groups := grouped(pairs)):
         if not positive_definite(group):
             raise BadRequest(f"the correlation of {', '.join(group.names)} is not positive definite")
     return groups
@@ -346,11 +344,10 @@ def independent(
 def together(inputs: Sequence[DispersedInput], groups: Iterable[Group]) -> list[list[int]]:
     """Rows of ``inputs``, those of a group in one list, in order."""
     rows = {entry.name: row for row, entry in enumerate(inputs) if entry.sigma > 0.0}
-    rows_of = [[rows[name] for name in group.among(rows).names] for group in groups]
-    taken = {row for block in rows_of for row in block}
-    return sorted(
-        [block for block in rows_of if block] + [[row] for row in range(len(inputs)) if row not in taken], key=min
-    )
+    blocks = [[rows[name] for name in group.among(rows).names] for group in groups]
+    taken = {row for block in blocks for row in block}
+    blocks += [[row] for row in range(len(inputs)) if row not in taken]
+    return sorted(filter(None, blocks), key=min)
 
 
 def _of_values(first: DispersedInput, second: DispersedInput, rho: float) -> float:

@@ -7,6 +7,7 @@ after the other.
 from __future__ import annotations
 
 import math
+import operator
 import os
 import threading
 from collections.abc import Callable, Iterator, Sequence
@@ -57,17 +58,12 @@ PORTION = 2 * STRIDE  # cases that a thread takes at once; blocks are multiples 
 
 
 class Round:
-    """Some cases of a study, flown by several threads that take one portion after the other.
-
-    A portion is a part of a block of draws: flying takes much longer than drawing, and few cases too are shared by the
-    threads.
-    """
+    """Some cases of a study, flown by several threads that take one portion of a block of draws after the other."""
 
     def __init__(self, results: Results, first: int, last: int, out: Array) -> None:
         self.results, self.first, self.last, self.out = results, first, last, out
-        self.severity = np.empty(last - first)
+        self.severity, self.emptied = np.empty(last - first), np.zeros(last - first, dtype=bool)
         self.aspects = out[len(OUTPUTS) :].reshape(-1, 2, last - first)  # the same memory
-        self.emptied = np.zeros(last - first, dtype=bool)
         self.portions = range(first // PORTION, math.ceil(last / PORTION))
         self.left = iter(self.portions)
         self.flown = self.redrawn = 0  # cases
@@ -111,21 +107,17 @@ class Round:
                     self.flown += end - begin
                     self.redrawn += redrawn
         except BaseException as failure:  # handed to the thread that waits
-            with self.lock:
-                self.failures.append(failure)
-                self.left = iter(())
+            self.failures.append(failure)
+            self.left = iter(())
 
     def _fly(self, drawn: tuple[Draws, NDArray[np.intp]], start: int, begin: int, end: int) -> int:
         """Fly cases ``begin`` to ``end`` of the block that starts at ``start``; returns the number of redraws."""
-        study, early = self.results.study, self.results.early
-        draws, redrawn = drawn
+        study, early, (draws, redrawn) = self.results.study, self.results.early, drawn
         # Whole strides are flown, even for fewer cases: what flies them may let one depend on its stride.
         low, high = begin - begin % STRIDE, end + -end % STRIDE
-        rows = slice(low - start, high - start)
-        ends = study.flies(study.model.cases(some_of(draws, rows)))
-        inner = slice(begin - low, end - low)
+        ends = study.flies(study.model.cases(some_of(draws, slice(low - start, high - start))))
         outputs = measure(study.model, ends, high - low)
-        place = slice(begin - self.first, end - self.first)
+        inner, place = slice(begin - low, end - low), slice(begin - self.first, end - self.first)
         self.out[: len(OUTPUTS), place] = outputs[:, inner]
         self.severity[place] = study.severity(outputs, ends)[inner]
         self.emptied[place] = np.broadcast_to(np.real(ends.drained) > 1.0, high - low)[inner]
@@ -238,9 +230,8 @@ class Study(DrawnCases):
         if max(map(abs, errors.values())) < WORTH_SAYING:
             return ""
         message = " and ".join(f"{math.degrees(abs(error)):.2g} deg of {part.label}" for part, error in errors.items())
-        return (
-            f"cases let the moments of inertia fall at the edges of pulses: in the nominal one that errs by {message}"
-        )
+        text = "cases let the moments of inertia fall at the edges of pulses: in the nominal one that errs by"
+        return f"{text} {message}"
 
 
 @dataclass(eq=False)
@@ -309,13 +300,13 @@ class Results(Counted):
     emptied: int = 0
     early: Array = field(default_factory=lambda: np.zeros((ROWS, EARLY)))
     values: Array | None = field(init=False)
-    sketches: list[Sketch] | None = field(init=False)
+    sketches: list[Sketch] = field(init=False)
 
     def __post_init__(self) -> None:
         super().__post_init__()
         exact = self.requested <= EXACT_CASES
         self.values = np.empty((self.rows, self.requested)) if exact else None
-        self.sketches = None if exact else [Sketch() for _ in OUTPUTS]
+        self.sketches = [] if exact else [Sketch() for _ in OUTPUTS]
 
     @property
     def rows(self) -> int:
@@ -325,15 +316,13 @@ class Results(Counted):
     @property
     def exact(self) -> bool:
         """True if percentiles are exact."""
-        return self.sketches is None
+        return self.values is not None
 
     def distribution(self, output: str) -> Distribution | None:
         """Distribution of an output; None where it is unknown (propellant)."""
         row = OUTPUTS.index(output)
-        if self.sketches is not None:
-            sketch = self.sketches[row]
-            return None if math.isinf(sketch.minimum) or math.isnan(sketch.minimum) else sketch
-        assert self.values is not None
+        if self.values is None:
+            return self.sketches[row] if math.isfinite(self.sketches[row].minimum) else None
         values = self.values[row, : self.done]
         return None if not len(values) or math.isnan(values[0]) else Exact(values)
 
@@ -349,7 +338,7 @@ class Results(Counted):
         """Count further cases: outputs (5, n), see `count`; ``emptied`` (n,): whose tank runs empty."""
         missed = (severity > 1.0) & bool(requirements.required(self.study.model.spacecraft))
         self.emptied += int(np.count_nonzero(emptied))
-        for sketch, row in zip(self.sketches or (), values, strict=False):
+        for sketch, row in zip(self.sketches, values, strict=False):
             sketch.add(row)
         self.count(severity, angles, ~(missed | emptied))
 
@@ -465,8 +454,7 @@ class Checkpoints:
     @property
     def nutation(self) -> Range:
         """Angle from H to the spin axis at t = 0, rad."""
-        pairs = zip(self._initial.moments, self._initial.omega0, strict=True)
-        first, second, axial = (np.asarray(moment * rate, dtype=np.float64) for moment, rate in pairs)
+        first, second, axial = map(operator.mul, self._initial.moments, self._initial.omega0)
         return _range(np.arctan2(np.hypot(first, second), np.abs(axial + self._initial.wheel)))
 
     def nutation_after(self, counts: Sequence[int]) -> Iterator[Range]:
@@ -520,12 +508,11 @@ def _range(values: object) -> Range:
 
 def first_pulses(schedule: Schedule, count: int) -> Schedule:
     """First ``count`` pulses of a schedule, and the blocks cut to them."""
-    blocks: list[Block] = []
-    left = count
+    blocks, left = list[Block](), count
     for block in schedule.blocks:
         if left > 0:
             blocks.append(replace(block, count=min(block.count, left)))
-            left -= block.count
+        left -= block.count
     return replace(schedule, pulses=schedule.pulses[:count], blocks=tuple(blocks))
 
 
