@@ -1,8 +1,7 @@
 """Dispersed cases: body, initial motion and impulses of each case.
 
-The schedule is fixed: which channel, commanded start, on-time. A case differs from the estimate in its moments, its
-rates, and in the response of each pulse, cold nozzles and tank included. Everything here is elementwise over cases
-(structure of arrays); a quantity that nothing disperses stays one number for all of them.
+The schedule is fixed. A case differs from the estimate in its moments, its rates, and in the response of each pulse,
+cold nozzles and tank included. All is elementwise over cases; what nothing disperses stays one number for all of them.
 """
 
 from __future__ import annotations
@@ -134,12 +133,10 @@ def cold_of(body: Spacecraft, draws: Draws) -> Cold | None:
 def supplied(
     body: Spacecraft, schedule: Schedule, draws: Draws, flows: Sequence[Cases]
 ) -> tuple[list[Cases], tuple[Cases, ...] | None, Cases]:
-    """Strength of each pulse of cases over the planned one, and its propellant, kg, None where unknown.
+    """Strength of each pulse of cases over the planned one, zero once the tank is empty; its propellant, kg, or None.
 
-    It is zero once the tank is empty, and of those that do not fire as planned. ``flows``: what each takes of
-    propellant over what it does as planned, at the same pressure and as warm. The last is the share of the propellant
-    in the tank that all of them would take, 1 at most where it lasts; 0 without a tank, or where it is not known what
-    they take.
+    ``flows``: propellant of each over that planned, at the same pressure and as warm. The last is the share of the tank
+    that all of them would take, 1 at most where it lasts; 0 without a tank, or where it is not known what they take.
     """
     tank = tank_of(body, draws)
     known = all(pulse.propellant is not None for pulse in schedule)
@@ -267,10 +264,7 @@ class DispersedModel:
 
     @cached_property
     def on_times(self) -> tuple[float, ...]:
-        """On-time of each pulse, s: commanded, so the same in every case.
-
-        Through a valve that of the rectangle which has the impulse, the centroid and the spread of the thrust.
-        """
+        """On-time of each pulse, s, the same in every case: through a valve that of a rectangle of the same spread."""
         return tuple(
             spread(pulse.command.ramps, pulse.t) if pulse.command and pulse.command.ramps else pulse.on_time
             for pulse in self.schedule
@@ -278,10 +272,7 @@ class DispersedModel:
 
     @property
     def target(self) -> Vector:
-        """Target of H, as a unit vector (3,) in the estimated body axes at t = 0.
-
-        The goal of the spacecraft where it has one (an inertial axis), else H at t = 0 as the estimate has it.
-        """
+        """Goal of H, or H at t = 0 of the estimate, as a unit vector (3,) in the estimated body axes at t = 0."""
         body = self.spacecraft
         axis = body.inertia.momentum(body.omega0)
         if body.goal.axis is not None:

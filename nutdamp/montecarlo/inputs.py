@@ -108,10 +108,7 @@ def _listed(rows: Iterable[_Row]) -> Inputs:
 
 
 def reachable(spacecraft: Spacecraft) -> Inputs:
-    """Inputs of any schedule: those of one that fires each channel and the torquer once.
-
-    What each pulse draws is there once.
-    """
+    """Inputs of any schedule: those of one that fires each channel and the torquer; what pulses draw is there once."""
     pulses = [channel_pulse(channel, 0.0, 0.0) for channel in spacecraft.channels]
     if spacecraft.torquer is not None:
         pulses.append(steerable_pulse(spacecraft.torquer, 0.0, 0.0))
@@ -313,10 +310,7 @@ def normal_of(entry: DispersedInput, value: Array) -> Array:
 
 
 def mixing(inputs: Sequence[DispersedInput], groups: Iterable[Group]) -> Array:
-    """M (d, d): M Mᵀ is the correlation of the values of ``inputs``; the unit matrix where none is correlated.
-
-    In a group, column k is what input k adds to those before it.
-    """
+    """M (d, d): M Mᵀ is the correlation of the values of ``inputs``; in a group, column k is what input k adds."""
     mixed, rows = np.eye(len(inputs)), {entry.name: row for row, entry in enumerate(inputs) if entry.sigma > 0.0}
     for group in groups:
         present = group.among(rows)
@@ -406,7 +400,7 @@ class DrawSource:
     def block(self, number: int) -> tuple[dict[str, Array | float], NDArray[np.intp]]:
         """Deviations of the cases of block ``number`` (from 0), and the rows drawn again (once per redraw).
 
-        The arrays are used anew for the next block. Raises Unsuitable where no physical case is found.
+        The next block overwrites the arrays. Raises Unsuitable where no physical case is found.
         """
         rows, redrawn = np.arange(BLOCK), [np.empty(0, dtype=np.intp)]
         for attempt in range(MOST_ATTEMPTS + 1):

@@ -78,10 +78,7 @@ class Ends:
 
 @dataclass(frozen=True, eq=False)
 class ClosedForm:
-    """Flies cases of ``model`` by the impulse sum; disturbances and I1 ≠ I2 are left out.
-
-    Dissipation acts as the estimate has it, whatever the moments of a case are.
-    """
+    """Flies cases of ``model`` by the impulse sum, with the dissipation of the estimate, no disturbances, I1 = I2."""
 
     model: DispersedModel
 
@@ -243,15 +240,9 @@ def nodes_for(phase: float) -> int:
 
     By the error of the n-point rule, φ^{2n} 2^{2n+1} (n!)^4 / ((2n+1) ((2n)!)^3).
     """
-    phase = max(phase, 1e-3)
     for nodes in range(2, MOST_NODES, 2):
-        error = (
-            2 * nodes * math.log(2.0 * phase)
-            + 4.0 * math.lgamma(nodes + 1)
-            - math.log(2 * nodes + 1)
-            - 3.0 * math.lgamma(2 * nodes + 1)
-        )
-        if error < math.log(1e-17):
+        growing = 2 * nodes * math.log(2.0 * max(phase, 1e-3)) + 4.0 * math.lgamma(nodes + 1)
+        if growing - math.log(2 * nodes + 1) - 3.0 * math.lgamma(2 * nodes + 1) < math.log(1e-17):
             return nodes
     return MOST_NODES
 
@@ -345,10 +336,7 @@ CASE, STEPPED, LOOKED = 5e-3, 1e-2, 4e-3
 
 
 class RealWidths:
-    """Flies cases of ``model`` by Euler's equations, see `nutdamp.physics.batch`.
-
-    Disturbances and dissipation act as the estimate has them, whatever the moments of a case are.
-    """
+    """Flies cases of ``model`` by Euler's equations, with the disturbances and dissipation of the estimate."""
 
     def __init__(self, model: DispersedModel) -> None:
         self.model, self._dynamics = model, make_dynamics(model.spacecraft)

@@ -26,12 +26,8 @@ LARGE = 20.0  # argument from which Stirling's series of the logarithm of Γ is 
 
 
 def binomial_interval(successes: int, trials: int, confidence: float = 0.95) -> tuple[float, float]:
-    """Exact confidence interval of a probability from ``successes`` of ``trials``, Clopper & Pearson 1934.
-
-    It holds the true probability at least as often as ``confidence`` says, whatever that probability is.
-    """
-    tail = 0.5 * (1.0 - confidence)
-    failures = trials - successes
+    """Exact confidence interval of a probability from ``successes`` of ``trials``, Clopper & Pearson 1934."""
+    tail, failures = 0.5 * (1.0 - confidence), trials - successes
     low = 0.0 if successes == 0 else _quantile(successes, failures + 1, tail, upper=False)
     high = 1.0 if failures == 0 else _quantile(successes + 1, failures, tail, upper=True)
     return low, high
@@ -138,8 +134,7 @@ def vectors(model: DispersedModel, ends: Ends, count: int) -> NDArray[Any]:
     """Quantities (10, n) of ``count`` cases that are linear for small dispersions; `VECTORS` names the rows.
 
     Nutation is the length of the transverse momentum over the axial one, the momentum shift that of the change of its
-    direction, the axis error that of its direction's distance from the target: lengths of vectors that are zero, or
-    nearly, for a good plan, so that they have no derivative themselves. All are in the body axes of t = 0.
+    direction, the axis error that of its direction's distance from the target. All are in the body axes of t = 0.
     """
     x, y, z = ends.momentum
     before, after, pointed = (_unit(vector) for vector in (ends.before, ends.after, ends.pointed))
@@ -201,10 +196,7 @@ class Exact:
 
 
 class Sketch:
-    """Counts of values by sign, power of two and leading bits of the mantissa: 16 MiB for any number of cases.
-
-    Quantiles are right to 0.006 % of their value; minimum and maximum are exact.
-    """
+    """Counts of values by sign, power of two and leading bits of the mantissa: 16 MiB; the two extremes are exact."""
 
     def __init__(self) -> None:
         self.counts = np.zeros(2 * _SIZES, dtype=np.int64)
@@ -224,7 +216,7 @@ class Sketch:
             self.maximum = max(self.maximum, float(part.max()))
 
     def quantiles(self, probabilities: Array) -> Array:
-        """Quantiles to 0.006 %."""
+        """Quantiles to 0.006 % of their value."""
         below = np.cumsum(self.counts)
         ranks = np.floor(np.asarray(probabilities) * (below[-1] - 1)).astype(np.int64)
         values = _middles()[np.searchsorted(below, ranks, side="right")]
@@ -277,8 +269,8 @@ CLASS_SIZE = 32  # cases in each of them, at least
 class FirstOrder:
     """Outcome to first order about nominal values (and biases).
 
-    ``jacobian`` (10, d): derivative of each row of `nutdamp.montecarlo.statistics.vectors` by each drawn input, in its
-    unit; ``sigmas`` (d,) standard deviations of the inputs, some of which are correlated in ``groups``.
+    ``jacobian`` (10, d): derivative of each row of `vectors` by each drawn input, in its unit; some of these are
+    correlated in ``groups``.
     """
 
     inputs: tuple[DispersedInput, ...]
@@ -311,18 +303,14 @@ class FirstOrder:
         Of inputs that are correlated each has what it adds to those before it; the sum over them is the group's.
         """
         squares = (self.independent(output) ** 2).sum(axis=0)
-        total = squares.sum()
-        return np.asarray(squares / total if total > 0.0 else squares)
+        return np.asarray(squares / (squares.sum() or 1.0))
 
 
 ALIKE = 0.01  # relative difference up to which derivatives of the closed form may replace those of the flight
 
 
 def as_flown(model: DispersedModel, fly: Callable[[DispersedCases], Ends]) -> FirstOrder:
-    """Derivatives of the model that ``fly`` flies: those of the closed form, which have no rounding, where they agree.
-
-    By output and input; else central differences.
-    """
+    """Derivatives of the model that ``fly`` flies: of the closed form, without rounding, where it agrees with those."""
     flown = by_differences(model, fly)
     if model.schedule.blocks or not flown.inputs:
         return flown
@@ -359,15 +347,13 @@ def _varied(model: DispersedModel, fly: Callable[[DispersedCases], Ends], steps:
 
 
 def sampled_shares(draws: Mapping[str, Array], outcome: Array) -> dict[str, dict[str, float]]:
-    """First-order Sobol index of each input, by output, from n cases.
+    """First-order Sobol index of each input, by output, from ``draws`` (n,) and the outcome (10, n) of `vectors`.
 
-    ``draws`` (n,) by input; ``outcome`` (10, n) as `outputs.vectors` gives it. What the averaging over few cases adds
-    by chance, (classes - 1)/n of the variance, is taken off; nothing is below zero.
+    What the averaging over few cases adds by chance, (classes - 1)/n of the variance, is taken off; nothing is below 0.
     """
-    count = outcome.shape[1]
+    count, shares = outcome.shape[1], dict[str, dict[str, float]]()
     centred = outcome - outcome.mean(axis=1, keepdims=True)
     variances = {name: float((centred[rows] ** 2).sum()) for name, rows in VECTORS.items()}
-    shares: dict[str, dict[str, float]] = {}
     classes = min(CLASSES, max(count // CLASS_SIZE, 1))
     ranks = np.linspace(0, count, classes + 1).astype(int)[1:-1]
     for name, draw in draws.items():

@@ -206,8 +206,7 @@ class Study(DrawnCases):
     def severity(self, values: Array, ends: Ends) -> Array:
         """Severity of cases, (n,), by `requirements.severity`, of the outputs (5, n) and ``ends`` of cases.
 
-        Where the axis breaks a cone on the way, or the tank runs empty, no better than the share of its bound, or of
-        the propellant, that is used up.
+        Never less than the used share of the bound of a cone on the way, or of the propellant.
         """
         body, aim = self.model.spacecraft, OUTPUTS.index(requirements.aim(self.model.spacecraft).value)
         shares = [*([] if ends.aspects is None else cones_used(body.keep, ends.aspects)), ends.drained]
@@ -217,8 +216,7 @@ class Study(DrawnCases):
     def lightening_error(self) -> str:
         """Message on the error of falling moments in cases, by the nominal one; empty where negligible.
 
-        They fall half as each pulse begins and half as it ends, which errs in second order; `propagation.flown` lets
-        them fall as the thrust goes.
+        They fall half at either edge of a pulse; `propagation.flown` lets them fall as the thrust goes.
         """
         body = self.model.spacecraft
         if shed(body) is None:
@@ -289,11 +287,10 @@ class Counted:
 
 @dataclass(eq=False)
 class Results(Counted):
-    """Results of a study of a schedule.
+    """Results of a study of a schedule; ``emptied`` counts the cases whose tank runs empty.
 
     ``values`` (5 + 2m, capacity), outputs and the least and largest angle (rad) to the direction of each of m cones,
     are kept up to `EXACT_CASES`; beyond, ``sketches`` count. ``early`` (10, `EARLY`) is the outcome of the first cases.
-    ``emptied`` counts those whose tank runs empty.
     """
 
     study: Study
@@ -362,9 +359,8 @@ def run(
 ) -> Results:
     """Fly the cases that ``results`` is to have and does not have yet; returns ``results``.
 
-    ``watch`` is called now and then with how many are done. When ``stopped`` says so, the cases done so far, always
-    the first ones, are kept. ``collect`` is given the number (from 0) of the first of some cases, and their
-    `Results.values`, in order.
+    ``watch`` is called now and then with how many are done, always the first ones; they are kept when ``stopped`` says
+    so. ``collect`` is given the number (from 0) of the first of some cases, and their `Results.values`, in order.
     """
     # The C library keeps freed memory up to twice the largest block freed so far: else each stride asks for new pages.
     np.empty(FREED, dtype=np.uint8)
@@ -465,10 +461,9 @@ class Checkpoints:
             yield _range(self._flown(part, self._draws)[0][0])
 
     def window(self, probability: float) -> Range | None:
-        """Shifts (s) of all pulses with which the share ``probability`` of the cases complies, about none.
+        """Shifts (s) of all pulses with which the share ``probability`` of the cases complies; None without any.
 
-        As far as half a turn of spin or nutation, the faster, and no pulse before t = 0; None where too few comply
-        without a shift.
+        As far as half a turn of spin or nutation, the faster, and no pulse before t = 0.
         """
         schedule = self.study.model.schedule
         half, first = math.pi / self.study.model.spacecraft.fastest, min(pulse.loaded[0] for pulse in schedule)

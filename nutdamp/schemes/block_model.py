@@ -48,17 +48,13 @@ def spin_turn(spacecraft: Spacecraft) -> float:
 
     The body turns about H at |H|/A, and about its axis at ω3 - H3/A: together, and at small angles, at ω3.
     """
-    inertia = spacecraft.inertia
-    size = float(np.linalg.norm(spacecraft.momentum))
-    turning = spacecraft.spin - spacecraft.axial / inertia.A
-    return 2.0 * math.pi / abs(math.copysign(size / inertia.A, spacecraft.axial) + turning)
+    A, size = spacecraft.inertia.A, float(np.linalg.norm(spacecraft.momentum))
+    turning = spacecraft.spin - spacecraft.axial / A
+    return 2.0 * math.pi / abs(math.copysign(size / A, spacecraft.axial) + turning)
 
 
 def sun_pulses(flown: Flight, until: float) -> Vector:
-    """Times (n,) s from 0 to ``until`` s of the Sun pulses of the sensor; the flight must reach so far.
-
-    Raises Infeasible where the sensor never sees the Sun.
-    """
+    """Times (n,) s up to ``until`` s of the Sun pulses of a flight; raises Infeasible where the sensor sees none."""
     body = flown.spacecraft
     sensor, turn = body.sun_sensor, spin_turn(body) * min(1.0, abs(body.spin / flown.settled.spin))
     assert sensor is not None
@@ -106,8 +102,7 @@ class SunPulses:
     ``numbers``: those of each flight, 1 the first after t = 0; they must not decrease. Iterating gives the motion of
     all at a passage of the Sun, and the flights that one of their numbers comes to then. ``seen``: whether the sensor
     saw each passage so far, (n,); those that it saw count. ``failures``: why a flight ended before its last number, or
-    None: its axis is too near to the Sun, or the sensor sees it no more. Raises Infeasible where there is no Sun or no
-    sensor.
+    None. Raises Infeasible where there is no Sun or no sensor.
     """
 
     def __init__(self, spacecraft: Spacecraft, numbers: Sequence[Sequence[int]]) -> None:
@@ -192,9 +187,8 @@ def fire_all(
 ) -> tuple[list[Schedule | Infeasible], list[NDArray[np.bool_]]]:
     """Pulses fired by each of the sequences of blocks, with the Sun pulses of its own motion, and `SunPulses.seen`.
 
-    With a ``seed`` the Sun pulses have the jitter of the sensor, which the nominal motion is without. In the place of a
-    schedule is the reason where there is no Sun pulse, where a channel is not known, where a pulse would begin before
-    the one before is over, and where the propellant does not last.
+    With a ``seed`` the Sun pulses have the jitter of the sensor. In the place of a schedule is the reason where there
+    is no Sun pulse, a channel is not known, a pulse would begin before the one before is over, or the tank is empty.
     """
     sun_pulses = SunPulses(spacecraft, [[n for block in blocks for n in block.sun_pulses] for blocks in sequences])
     supplies, pulses = [Supply(spacecraft) for _ in sequences], [list[Pulse]() for _ in sequences]
@@ -307,8 +301,7 @@ class BlockState:
     """Motion between two blocks: one, or many at once.
 
     ``sun_angle`` and ``longitude`` of H about the Sun, rad; ``sun_pulse``: when the next one comes, s; ``phasor``:
-    A ω (N m s) at that moment; ``spin`` rad/s; ``used`` kg of propellant, 0 where every pulse is of full thrust;
-    ``cost`` as `Channel.cost_rate` counts it; ``fired``: pulses by channel.
+    A ω (N m s) then; ``spin`` rad/s; ``used`` kg, 0 where every pulse is of full thrust; ``fired``: pulses by channel.
     """
 
     sun_angle: Any
@@ -407,8 +400,7 @@ class BlockModel:
     def heading(self, channel: Channel, delay: Any, width: Any) -> Any:
         """Heading of H from the direction away from the Sun, right-handed about H, rad: the same for all pulses.
 
-        At the centroid of a pulse, width/2 without a valve, the Sun has turned in the body by -ω3 (delay + centroid)
-        from the sensor.
+        At the centroid of a pulse the Sun has turned in the body by -ω3 (delay + centroid) from the sensor.
         """
         turned = self.body.spin * (delay + acts(channel, width).centroid)
         from_sun = cmath.phase(channel.transverse) - self.sensor.azimuth + turned
@@ -433,7 +425,7 @@ class BlockModel:
 
     def course(self, state: BlockState) -> tuple[Any, Any]:
         """Heading to the target axis, and the way along the rhumb line, rad."""
-        goal_angle = math.atan2(math.hypot(self.goal[0], self.goal[1]), self.goal[2])
+        goal_angle = math.atan2(math.hypot(*self.goal[:2]), self.goal[2])
         return precession.rhumb_course(state.sun_angle, goal_angle, self.ahead(state))
 
     def ahead(self, state: BlockState) -> Any:

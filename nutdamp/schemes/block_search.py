@@ -74,10 +74,8 @@ DEARER = 1.01  # multiple of the cost of a sequence that complied in a flight fr
 
 
 class BlockSequence(NamedTuple):
-    """Blocks and their rank in closed form: the less, the better.
-
-    ``rank``: the share of a bound that is used up, zero where all are kept, then the cost, then the time of the end;
-    ``share``: the share.
+    """Blocks, and their rank in closed form, the less, the better: the share of a bound, 0 where all are kept, then
+    the cost, then the time of the end; and the ``share``.
     """
 
     blocks: Blocks
@@ -123,10 +121,7 @@ class BlockFlights:
         return {bound.part: np.asarray(left_of(bound.part, left, body) / bound.most) for bound in self.bounds}
 
     def fired(self, sequences: Sequence[BlockSequence]) -> Iterator[BlockSequence]:
-        """The sequences, one after the other, but for those that cost more than one that complied in a flight.
-
-        The pulses of a dozen of them are fired together.
-        """
+        """The sequences that cost no more than one that complied in a flight; a dozen of them are fired together."""
         for begin in range(0, len(sequences), FLOWN):
             some = [each for each in sequences[begin : begin + FLOWN] if each.rank[1] <= self.known * DEARER]
             new = [sequence.blocks for sequence in some if sequence.blocks not in self._fired]
@@ -174,10 +169,7 @@ def by_blocks(sequences: Iterable[BlockSequence]) -> dict[tuple[Block, ...], Blo
 
 
 def of_each_kind(ranked: Iterable[BlockSequence], *names: str) -> list[BlockSequence]:
-    """The first sequence of each kind, blocks with the same values of these fields: flights may differ.
-
-    By default the channel and the interval, where closed forms do not differ.
-    """
+    """The first sequence of each kind, by the fields of its blocks that are named; default channel and interval."""
     kinds: dict[tuple[object, ...], BlockSequence] = {}
     fields = operator.attrgetter(*(names or ("channel", "every")))
     for sequence in ranked:
@@ -310,7 +302,7 @@ class BlockSearch:
         """The best of the ``trials`` of each channel, after the blocks ``before``, from their `_motions`, ``state``.
 
         The axes of trials are the sequences before, and three more: the best ``few`` are chosen along the last two.
-        ``off``: by how much they end elsewhere than the closed form says, as far as that is known.
+        ``off``: by how much they end elsewhere than the closed form says.
         """
         following, sequences = np.array([_following(each.blocks) for each in before]), list[BlockSequence]()
         for channel, trial in trials:
@@ -356,10 +348,7 @@ class BlockSearch:
         return np.arange(1, max(min(most, self.allowed), 0) + 1)
 
     def _single(self) -> list[BlockSequence]:
-        """The best single blocks, of all widths, numbers and intervals at the delays that serve best.
-
-        What surely ends worse than the best ones found is left out: see `_short_by`.
-        """
+        """The best single blocks at the delays that serve best, without those that surely end worse by `_short_by`."""
         start = self.model.start
         waits = self._waits(start, self.earliest, self._waiting if abs(start.phasor) > 0.0 else 1)
         short = [(channel, every, self._short_by(start, channel, every)) for channel, every in self._kinds]
@@ -380,9 +369,8 @@ class BlockSearch:
     def _short_by(self, state: BlockState, channel: Channel, every: int) -> Array:
         """Least miss of blocks of each width and number, (k, w n) after each of k motions, in shares of its bound.
 
-        Where the spin is to change, the spin. With a target the length of the rhumb line: a block that is longer or
-        shorter than the way ends no nearer than a third of the difference. Else the nutation, which they can lower by
-        the sum of their kicks at most.
+        Of the spin where it is to change; with a target of the length of the rhumb line, of which a block ends no
+        nearer than a third of the difference; else of the nutation, lowered by the sum of their kicks at most.
         """
         if self._damps:
             return self._undamped(state, channel, every)
@@ -515,10 +503,7 @@ class BlockSearch:
         self._first_complying([each for each in self.doubtful if each.rank[1] < most and each.blocks not in flown])
 
     def nearer(self) -> list[BlockSequence]:
-        """Neighbours of the best of the flights that leave least where the closed form errs as it does for those.
-
-        Nutation on the way, which that form leaves out, is much the same then.
-        """
+        """Neighbours of the best of the flights that leave least where the closed form errs as it does for those."""
         sequences = list[BlockSequence]()
         best = of_each_kind(flight.sequence for flight in self.flights.all)
         for flight in (self.flights.of[each.blocks] for each in best[:CORRECTED]):

@@ -46,8 +46,7 @@ def plain(
 ) -> Spacecraft:
     """Body that schemes plan for: rectangles of full thrust within the capability of the channels.
 
-    Their pulses may be as weak and as strong as ``weakest`` and ``strongest`` times the thrust of the file, and
-    ``room`` s longer at either end. Its moments are those with so many kg ``used``.
+    Pulses may be ``weakest`` to ``strongest`` times as strong, and ``room`` s longer at either end; ``used`` is in kg.
     """
     limits, channels, leads, lags = spacecraft.limits, list[Channel](), list[float](), list[float]()
     for channel in spacecraft.channels:
@@ -194,8 +193,7 @@ def _translated(
     """Pulses as the commands of their impulse and centroid; ``unbounded``: as rectangles of any length.
 
     Where moments fall it changes ω, or the direction of H, as the pulse did with the ``inertia`` of the plan, and where
-    H does not count it comes as the nutation has turned in the body as far. Raises Infeasible for pulses so weak that
-    they would be longer than the horizon.
+    H does not count it comes as the nutation has turned in the body as far. Raises Infeasible where one is too weak.
     """
     supply, channels, pulses = Supply(spacecraft), {channel.name: channel for channel in spacecraft.channels}, []
     planned_, before, late = inertia or spacecraft.inertia, 0.0, 0.0
@@ -226,10 +224,7 @@ def _translated(
 def _outside(
     spacecraft: Spacecraft, schedule: Schedule, inertia: Inertia, correct: Correction
 ) -> tuple[list[float], list[float], float]:
-    """Levels, over the thrust of the file, of pulses so weak, and so strong, that no command of a channel gives them.
-
-    And by how much, s, a pulse becomes longer at either end. Raises as `_translated` does.
-    """
+    """Levels of pulses too weak, and too strong, for any command; s by which one becomes longer at each end."""
     channels = {channel.name: channel for channel in spacecraft.channels}
     weak, strong, longer = [], [], 0.0
     translated = _translated(spacecraft, schedule, inertia, correct, unbounded=True)
@@ -249,11 +244,7 @@ def _outside(
 
 
 def _on_ticks(spacecraft: Spacecraft, made: Schedule, correct: Correction) -> Schedule:
-    """Schedule on the ticks of its commands.
-
-    It is rounded all at once, and one of the last pulses after the other with those behind it corrected: what leaves
-    less is taken.
-    """
+    """Schedule on the ticks of its commands: the better of rounding all at once, and the last pulses in turn."""
     smooth = replace(spacecraft, limits=replace(spacecraft.limits, tick=None))
     made = correct(smooth, made, TAIL)
 
