@@ -119,7 +119,7 @@ class SunPulses:
 
     def __iter__(self) -> Iterator[tuple[MotionStretch, list[int]]]:
         clock, sensor, count = self.clock, self._sensor, np.zeros(len(self._due), dtype=np.int64)
-        unseen = [list[tuple[float, float]]() for _ in self._due]
+        blind, since, off = 0 * count, 0.0 * count, 0.0 * count  # passages unseen in a row; time and angle of the first
         while (following := int(self._due.min(initial=NEVER))) < NEVER:
             before, passage = clock.time, following if sensor.sees_all else len(self.seen) + 1
             motion = clock.sun_pulse(passage)
@@ -130,12 +130,10 @@ class SunPulses:
             sees = sensor.sees_all | np.asarray(sensor.sees(angles))
             count = np.full_like(count, passage) if sensor.sees_all else count + sees
             self.seen += [sees] * (passage - len(self.seen))
-            for flight in np.flatnonzero(~sees & (self._due < NEVER)).tolist():
-                unseen[flight].append((float(motion.since[flight]), float(angles[flight])))
-                if len(unseen[flight]) > BLIND:
-                    self.fail(flight, _blind(*unseen[flight][0]))
-            for flight in np.flatnonzero(sees).tolist():
-                unseen[flight].clear()
+            blind = np.where(sees, 0, blind + 1)
+            since, off = np.where(blind == 1, (motion.since, angles), (since, off))
+            for flight in np.flatnonzero((blind > BLIND) & (self._due < NEVER)).tolist():
+                self.fail(flight, _blind(float(since[flight]), float(off[flight])))
             flights = np.flatnonzero(sees & (count >= self._due)).tolist()
             for flight in flights:
                 self._due[flight] = next(self._numbers[flight], NEVER)
@@ -192,7 +190,8 @@ def fire_all(
     """
     sun_pulses = SunPulses(spacecraft, [[n for block in blocks for n in block.sun_pulses] for blocks in sequences])
     supplies, pulses = [Supply(spacecraft) for _ in sequences], [list[Pulse]() for _ in sequences]
-    firings = [_firing(spacecraft, *each) for each in zip(sequences, supplies, strict=True)]
+    firings = [iter([block for block in blocks for _ in block.sun_pulses]) for blocks in sequences]
+    channels = {channel.name: channel for channel in spacecraft.channels}
     clock, sensor, errors = sun_pulses.clock, spacecraft.sun_sensor, np.random.default_rng(seed)
     jitter, count = 0.0 if seed is None or sensor is None else sensor.jitter, len(sequences)
     arcs, per_kg = spacecraft.inertia.symmetric and not spacecraft.disturbances, shed(spacecraft)
@@ -201,11 +200,12 @@ def fire_all(
         work.spend((0.0 if arcs else INTEGRATED) + FIRED * len(flights))
         delays, widths, given = motion.since * 0.0, np.zeros(count), dict[int, Pulse]()
         for flight in flights:
-            try:
-                block, given[flight] = next(firings[flight])
-            except Infeasible as reason:
-                sun_pulses.fail(flight, reason)
+            block = next(firings[flight])
+            channel = channels.get(block.channel)
+            if channel is None:
+                sun_pulses.fail(flight, Infeasible(f"the spacecraft has no channel {block.channel}"))
                 continue
+            given[flight] = supplies[flight].fire(on_command(channel, 0.0, block.width), channel)
             delays[flight], widths[flight] = jitter * errors.standard_normal() + block.delay, block.width
             due = float(motion.since[flight] + delays[flight])
             if due < over[flight] - 1e-9:
@@ -223,17 +223,6 @@ def fire_all(
             sun_pulses.fail(flight, Infeasible(supply.shortage))
     schedules = [Schedule(tuple(row), blocks=tuple(blocks)) for row, blocks in zip(pulses, sequences, strict=True)]
     return [reason or each for reason, each in zip(sun_pulses.failures, schedules, strict=True)], sun_pulses.seen
-
-
-def _firing(spacecraft: Spacecraft, blocks: Sequence[Block], supply: Supply) -> Iterator[tuple[Block, Pulse]]:
-    """Each pulse of ``blocks``, as from t = 0, with its block; raises Infeasible for a channel that is not known."""
-    channels = {channel.name: channel for channel in spacecraft.channels}
-    for block in blocks:
-        for _ in block.sun_pulses:
-            if block.channel not in channels:
-                raise Infeasible(f"the spacecraft has no channel {block.channel}")
-            channel = channels[block.channel]
-            yield block, supply.fire(on_command(channel, 0.0, block.width), channel)
 
 
 def _together(given: Mapping[int, Pulse], count: int) -> list[TorqueRamp]:

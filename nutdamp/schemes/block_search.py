@@ -104,10 +104,10 @@ class BlockFlights:
         self.body, self.known = spacecraft, math.inf
         self.damps = spacecraft.goal.axis is None and spacecraft.goal.spin is None
         lower = 0.98 * spacecraft.nutation if self.damps else math.inf  # blocks without a goal are to lower it
-        mosts = [
-            (bound, lower if bound.part is Part.NUTATION else math.inf) for bound in requirements.bounds(spacecraft)
+        self.bounds = [
+            bound._replace(most=min(bound.most, lower)) if bound.part is Part.NUTATION else bound
+            for bound in requirements.bounds(spacecraft)
         ]
-        self.bounds = [bound._replace(most=min(bound.most, most)) for bound, most in mosts]
         self.of: dict[Blocks, FlownSequence] = {}
         self._fired: dict[Blocks, Schedule | Infeasible] = {}
 
