@@ -38,7 +38,7 @@ from nutdamp.montecarlo import study as dispersion
 from nutdamp.montecarlo.cases import DispersedCases
 from nutdamp.montecarlo.inputs import Draws
 from nutdamp.montecarlo.propagated import ClosedForm, Ends
-from nutdamp.montecarlo.statistics import ROWS, VECTORS, Exact, vectors
+from nutdamp.montecarlo.statistics import VECTORS, Exact, vectors
 from nutdamp.montecarlo.study import Results, Study, run
 from nutdamp.physics import attitude
 from nutdamp.planning import decision
@@ -159,9 +159,7 @@ def left_in_cases(study: Study, level: float) -> tuple[float, float | None]:
     draws, closed = study.draws_of_all(np.arange(CASES)), ClosedForm(model)
 
     def ends(flies: Callable[[DispersedCases], Ends], drawn: Draws, count: int) -> Vector:
-        there = np.empty((ROWS, count))
-        vectors(model, flies(model.cases(drawn)), there)
-        return there
+        return vectors(model, flies(model.cases(drawn)), count)
 
     def judged(there: Vector) -> Vector:
         """Nutation, rad, and severity, (2, n)."""

@@ -1,8 +1,7 @@
 """Dispersed cases: body, initial motion and impulses of each case.
 
-The schedule is fixed: which channel, commanded start, on-time. A case differs from the estimate in its moments, its
-rates, and in the response of each pulse, cold nozzles and tank included. Everything here is elementwise over cases
-(structure of arrays); a quantity that nothing disperses stays one number for all of them.
+The schedule is fixed. A case differs from the estimate in its moments, its rates, and in the response of each pulse,
+cold nozzles and tank included. All is elementwise over cases; what nothing disperses stays one number for all of them.
 """
 
 from __future__ import annotations
@@ -11,7 +10,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, reduce
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,14 +21,10 @@ from nutdamp.montecarlo.inputs import BY_VALVE, Draws, Group, groups_of, list_in
 from nutdamp.physics import attitude
 from nutdamp.physics.energy_sink import TINY
 from nutdamp.physics.sky import AxisWatch
-from nutdamp.physics.thruster import Cold, Tank, possible, spread
+from nutdamp.physics.thruster import Cold, Measured, Opened, Tank, Trapezoid, possible, spread
 from nutdamp.spacecraft.equipment import Thruster
 from nutdamp.spacecraft.model import Keep, Spacecraft, Vector
 from nutdamp.spacecraft.schedule import STEERABLE, Pulse, Schedule
-
-if TYPE_CHECKING:
-    from nutdamp.physics.thruster import Opened
-
 
 Cases = Any  # one number for all cases, or an array (n,): real, or complex for complex-step derivatives
 
@@ -138,33 +133,29 @@ def cold_of(body: Spacecraft, draws: Draws) -> Cold | None:
 def supplied(
     body: Spacecraft, schedule: Schedule, draws: Draws, flows: Sequence[Cases]
 ) -> tuple[list[Cases], tuple[Cases, ...] | None, Cases]:
-    """Strength of each pulse of cases over the planned one, and its propellant, kg, None where unknown.
+    """Strength of each pulse of cases over the planned one, zero once the tank is empty; its propellant, kg, or None.
 
-    It is zero once the tank is empty, and of those that do not fire as planned. ``flows``: what each takes of
-    propellant over what it does as planned, at the same pressure and as warm. The last is the share of the propellant
-    in the tank that all of them would take, 1 at most where it lasts; 0 without a tank, or where it is not known what
-    they take.
+    ``flows``: propellant of each over that planned, at the same pressure and as warm. The last is the share of the tank
+    that all of them would take, 1 at most where it lasts; 0 without a tank, or where it is not known what they take.
     """
     tank = tank_of(body, draws)
     known = all(pulse.propellant is not None for pulse in schedule)
-    planned = [pulse.propellant or 0.0 for pulse in schedule]
+    taken: list[Cases] = [(pulse.propellant or 0.0) * flow for pulse, flow in zip(schedule, flows, strict=True)]
     levels: list[Cases] = [1.0] * len(flows)
     if tank is None and not ("cold" in draws or "cold_pulses" in draws):
-        spent = tuple(used * flow for used, flow in zip(planned, flows, strict=True))
-        return levels, spent if known else None, 0.0
+        return levels, tuple(taken) if known else None, 0.0
     nominal, case = Supply(body), Supply(replace(body, cold=cold_of(body, draws), tank=tank))
     channels = {channel.name: channel for channel in body.channels}
     higher: Cases = 1.0  # the file gives the thrust at its own pressure
     if tank is not None and body.tank is not None:
         higher = (tank.pressure / body.tank.pressure) ** tank.exponent
-    taken: list[Cases] = list(planned)
     for number in sorted(range(len(flows)), key=lambda at: schedule.pulses[at].loaded[0]):
         pulse = schedule.pulses[number]
         channel = channels.get(pulse.channel)
         if channel is None or pulse.torque is None:
-            nominal.draw(planned[number])
-            levels[number] = case.draw(planned[number] * flows[number])
-            taken[number] = planned[number] * flows[number] * levels[number]
+            nominal.draw(pulse.propellant or 0.0)
+            levels[number] = case.draw(taken[number])
+            taken[number] = taken[number] * levels[number]
             continue
         before, _ = nominal.take(channel, pulse.on_time)
         level, used = case.take(channel, pulse.on_time * flows[number] * higher)
@@ -251,15 +242,8 @@ class _Actuation:
     remainder: Triple
 
 
-class _Fired(NamedTuple):
-    """Response of each case to one pulse at the thrust of the file, and its ``flow``; see `DispersedCases`."""
-
-    start: Cases
-    width: Cases
-    lead: Cases
-    impulse: Triple
-    thrust: tuple[Thrusting, ...]
-    flow: Cases
+# Response to one pulse at the thrust of the file: start, width, lead, impulse and thrust of `DispersedCases`, and flow.
+_Fired = tuple[Cases, Cases, Cases, Triple, tuple[Thrusting, ...], Cases]
 
 
 class DispersedModel:
@@ -280,10 +264,7 @@ class DispersedModel:
 
     @cached_property
     def on_times(self) -> tuple[float, ...]:
-        """On-time of each pulse, s: commanded, so the same in every case.
-
-        Through a valve that of the rectangle which has the impulse, the centroid and the spread of the thrust.
-        """
+        """On-time of each pulse, s, the same in every case: through a valve that of a rectangle of the same spread."""
         return tuple(
             spread(pulse.command.ramps, pulse.t) if pulse.command and pulse.command.ramps else pulse.on_time
             for pulse in self.schedule
@@ -291,16 +272,11 @@ class DispersedModel:
 
     @property
     def target(self) -> Vector:
-        """Target of H, as a unit vector (3,) in the estimated body axes at t = 0.
-
-        The goal of the spacecraft where it has one (an inertial axis), else H at t = 0 as the estimate has it.
-        """
+        """Goal of H, or H at t = 0 of the estimate, as a unit vector (3,) in the estimated body axes at t = 0."""
         body = self.spacecraft
-        axis = body.goal.axis
-        if axis is None:
-            axis = body.inertia.momentum(body.omega0)
-        else:
-            axis = attitude.rotate(attitude.conjugate(body.initial.quaternion), np.asarray(axis))
+        axis = body.inertia.momentum(body.omega0)
+        if body.goal.axis is not None:
+            axis = attitude.rotate(attitude.conjugate(body.initial.quaternion), np.asarray(body.goal.axis))
         return np.asarray(axis / np.linalg.norm(axis), dtype=np.float64)
 
     def physical(self, draws: Draws) -> NDArray[np.bool_] | bool:
@@ -308,17 +284,15 @@ class DispersedModel:
         moments = self._moments(draws)
         good: Any = _possible(*moments) if "A" in draws or "C" in draws else True
         for entry in self.inputs.drawn:
-            if entry.tolerance in NOT_NEGATIVE and entry.name in draws:
-                good = good & (entry.nominal + draws[entry.name] >= 0.0)
-            elif entry.tolerance in POSITIVE and entry.name in draws:
-                good = good & (entry.nominal + draws[entry.name] > 0.0)
+            if entry.tolerance in NOT_NEGATIVE + POSITIVE and entry.name in draws:
+                value = entry.nominal + draws[entry.name]
+                good = good & (value > 0.0 if entry.tolerance in POSITIVE else value >= 0.0)
         tank = tank_of(self.spacecraft, draws)
         if tank is not None and any(name.startswith("tank ") for name in draws):
             good = good & possible(tank)
         per_kg = self._per_kg(draws)
         if tank is not None and per_kg is not None:  # with all of it used there must be a body left
-            shed = scaled(per_kg, -1.0 * tank.propellant)
-            good = good & _possible(*added(moments, shed))
+            good = good & _possible(*added(moments, scaled(per_kg, -1.0 * tank.propellant)))
         return good  # type: ignore[no-any-return]
 
     def _per_kg(self, draws: Draws) -> Triple | None:
@@ -329,25 +303,21 @@ class DispersedModel:
     def cases(self, draws: Draws) -> DispersedCases:
         """Cases of the ``draws`` (deviations by input name)."""
         turn = self.spacecraft.inertia.axes
-        omega0 = parts_of(self.spacecraft.omega0)
         off = [draws.get(f"omega0_{axis}", 0.0) for axis in (1, 2, 3)]
-        torques = {
-            source: self._torque(source, draws) for source in {actuation.source for actuation in self._actuations}
-        }
-        fired = [
-            self._fired(n, actuation, torques[actuation.source], draws) for n, actuation in enumerate(self._actuations)
-        ]
-        levels, spent, drained = supplied(self.spacecraft, self.schedule, draws, [response.flow for response in fired])
+        torques = {source: self._torque(source, draws) for source in {each.source for each in self._actuations}}
+        fired = [self._fired(n, each, torques[each.source], draws) for n, each in enumerate(self._actuations)]
+        starts, widths, leads, impulses, thrusts, flows = zip(*fired, strict=True) if fired else ((),) * 6
+        levels, spent, drained = supplied(self.spacecraft, self.schedule, draws, flows)
         return DispersedCases(
             moments=self._moments(draws),
-            omega0=added(omega0, turned(turn.T, off)),
-            starts=tuple(response.start for response in fired),
-            widths=tuple(response.width for response in fired),
-            leads=tuple(response.lead for response in fired),
-            impulses=tuple(scaled(response.impulse, level) for response, level in zip(fired, levels, strict=True)),
+            omega0=added(parts_of(self.spacecraft.omega0), turned(turn.T, off)),
+            starts=starts,
+            widths=widths,
+            leads=leads,
+            impulses=tuple(map(scaled, impulses, levels)),
             thrust=tuple(
-                tuple(Thrusting(each.opened, scaled(each.torque, level)) for each in response.thrust)
-                for response, level in zip(fired, levels, strict=True)
+                tuple(Thrusting(each.opened, scaled(each.torque, level)) for each in thrust)
+                for thrust, level in zip(thrusts, levels, strict=True)
             ),
             tilt=(draws.get("attitude x", 0.0), draws.get("attitude y", 0.0)),
             spent=spent,
@@ -365,18 +335,14 @@ class DispersedModel:
         if actuation.pulse.command is not None:
             start = actuation.pulse.command.start
             lead = actuation.pulse.t - 0.5 * width - start
-        longer: dict[str, Cases] = {}
+        factor, (torque, mean, flow) = plus(1.0, draws.get(f"thrust pulse {number}", 0.0)), nominal
         if opened:
-            parts = [each.acts for _, each in opened]
-            longer = {
-                thruster.name: acts / actuation.pulse.on_time
-                for (thruster, _), (acts, _, _) in zip(opened, parts, strict=True)
-            }
-            centroid, width = (sum(part[at] for part in parts) / len(parts) for at in (1, 2))
+            acts = {thruster.name: each.acts for thruster, each in opened}
+            longer = {name: on_time / actuation.pulse.on_time for name, (on_time, _, _) in acts.items()}
+            torque, mean, flow = self._torque(actuation.source, draws, longer)
+            centroid, width = (sum(part[at] for part in acts.values()) / len(acts) for at in (1, 2))
             fall = 0.0 if actuation.pulse.command is None else actuation.pulse.command.fall
             lead = centroid - fall * width / 12.0 - 0.5 * width
-        factor = plus(1.0, draws.get(f"thrust pulse {number}", 0.0))
-        torque, mean, flow = nominal if not opened else self._torque(actuation.source, draws, longer)
         if actuation.source == STEERABLE and not self._members[STEERABLE]:
             impulse = self._steered(actuation.pulse.impulse, mean, draws)
         else:
@@ -386,14 +352,8 @@ class DispersedModel:
             strength = factor * (actuation.duration / actuation.pulse.on_time)
             strength = strength * plus(1.0, draws.get(f"thrust {thruster.name}", 0.0))
             thrust.append(Thrusting(each, scaled(self.thruster_torque(thruster, draws), strength)))
-        return _Fired(
-            start=plus(start if nothing(shift) else _not_before(start + shift), lead),
-            width=width,
-            lead=lead,
-            impulse=scaled(impulse, factor),
-            thrust=tuple(thrust),
-            flow=flow * factor,
-        )
+        begins = plus(start if nothing(shift) else _not_before(start + shift), lead)
+        return begins, width, lead, scaled(impulse, factor), tuple(thrust), flow * factor
 
     def _moments(self, draws: Draws) -> Triple:
         """Moments: the draw of A scales both transverse moments, C is the axial one."""
@@ -422,12 +382,10 @@ class DispersedModel:
         """Thrusters of a pulse with the response of their valves, where any of these is dispersed."""
         if actuation.pulse.command is None or actuation.source is None or not actuation.pulse.command.ramps:
             return []
-        from nutdamp.physics.thruster import Measured, Trapezoid  # few spacecraft have any
-
         members, on_time = self._members[actuation.source], actuation.pulse.command.on_time
         if not any(f"{key} {thruster.name}" in draws for thruster in members for key in BY_VALVE):
             return []
-        openings: list[tuple[Thruster, Opened]] = []
+        openings = list[tuple[Thruster, Opened]]()
         for thruster in members:
             off = [draws.get(f"{key} {thruster.name}", 0.0) for key in BY_VALVE]
             if isinstance(thruster.valve, Trapezoid):
@@ -446,10 +404,8 @@ class DispersedModel:
             return (0.0, 0.0, 0.0), factor, factor
         torque: Triple = (0.0, 0.0, 0.0)
         factors = [plus(1.0, draws.get(f"thrust {thruster.name}", 0.0)) for thruster in thrusters]
-        if longer is not None:
-            factors = [
-                factor * longer.get(thruster.name, 1.0) for factor, thruster in zip(factors, thrusters, strict=True)
-            ]
+        if longer:
+            factors = [factor * longer.get(each.name, 1.0) for factor, each in zip(factors, thrusters, strict=True)]
         for thruster, factor in zip(thrusters, factors, strict=True):
             torque = added(torque, scaled(self.thruster_torque(thruster, draws), factor))
         flows = [thruster.mass_flow or 1.0 for thruster in thrusters]
@@ -459,27 +415,20 @@ class DispersedModel:
     def thruster_torque(self, thruster: Thruster, draws: Draws) -> Triple:
         """Torque at nominal thrust, with the force tilted and its point of attack moved, N m."""
         tilts = [draws.get(f"direction {thruster.name} {axis}", 0.0) for axis in "ab"]
-        moves = [
-            plus(
-                draws.get(f"position {thruster.name} {axis}", 0.0),
-                times(-1.0, draws.get(f"center of mass {axis}", 0.0)),
-            )
-            for axis in "xyz"
-        ]
+        positions = [draws.get(f"position {thruster.name} {axis}", 0.0) for axis in "xyz"]
+        centers = [draws.get(f"center of mass {axis}", 0.0) for axis in "xyz"]
+        moves = added(positions, scaled(centers, -1.0))
         leans, moved = not all(map(nothing, tilts)), not all(map(nothing, moves))
         torque = parts_of(thruster.torque)
         if thruster.force is None or not (leans or moved):
             return torque
         force = parts_of(thruster.force)
         if leans and thruster.position is not None:
-            cosine, sine_ratio = tilted(*tilts)
-            leant = [times(tilt, sine_ratio) for tilt in tilts]
-            arm = parts_of(thruster.position)
-            torque, nominal = scaled(torque, cosine), thruster.force
-            force = scaled(force, cosine)
-            for axis, lean in zip(tilt_axes(nominal), leant, strict=True):
-                more = parts_of(np.cross(axis, nominal))
-                torque = added(torque, scaled(cross(arm, more), lean))
+            cosine, ratio = tilted(*tilts)
+            torque, force = scaled(torque, cosine), scaled(force, cosine)
+            for axis, tilt in zip(tilt_axes(thruster.force), tilts, strict=True):
+                more, lean = parts_of(np.cross(axis, thruster.force)), times(tilt, ratio)
+                torque = added(torque, scaled(cross(parts_of(thruster.position), more), lean))
                 force = added(force, scaled(more, lean))
         if moved:
             torque = added(torque, cross(turned(self.spacecraft.inertia.axes.T, moves), force))

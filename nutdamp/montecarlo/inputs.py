@@ -73,31 +73,42 @@ class Inputs(NamedTuple):
     unused: tuple[Unused, ...]
 
 
+class _Row(NamedTuple):
+    """Inputs of one tolerance of the file; ``idle`` says why they touch nothing, empty: they do."""
+
+    key: str
+    tolerance: Tolerance | None
+    names: Sequence[str]
+    nominal: float
+    unit: str
+    idle: str = ""
+
+
 def list_inputs(spacecraft: Spacecraft, schedule: Schedule) -> Inputs:
     """Inputs of a study of ``schedule``; none for a spacecraft without dispersions."""
-    return _listed(_entries(spacecraft, schedule))
+    return _listed(_rows(spacecraft, schedule))
 
 
-def _listed(entries: Iterable[DispersedInput | Unused]) -> Inputs:
-    """Inputs and unused tolerances, those too whose size is zero."""
-    drawn: list[DispersedInput] = []
-    unused: list[Unused] = []
-    for entry in entries:
-        if isinstance(entry, Unused):
-            unused.append(entry)
-        elif entry.size != 0.0:
-            drawn.append(entry)
-        else:
-            share = entry.tolerance in ("A", "C", "omega0", "wheel_momentum") and entry.nominal == 0.0
-            unused.append(Unused(entry.name, "given in % of a value that is zero" if share else "its size is zero"))
+def _listed(rows: Iterable[_Row]) -> Inputs:
+    """Inputs, whose relative sizes become absolute, and unused tolerances, those too whose size is zero."""
+    drawn, unused = list[DispersedInput](), list[Unused]()
+    for key, tolerance, names, nominal, unit, idle in rows:
+        if tolerance is None:
+            continue
+        size, reason = tolerance.size * (nominal if tolerance.relative else 1.0), idle
+        if size == 0.0 and not idle:
+            share = key in ("A", "C", "omega0", "wheel_momentum") and nominal == 0.0
+            reason = "given in % of a value that is zero" if share else "its size is zero"
+        if reason:
+            unused += [Unused(name, reason) for name in names]
+            continue
+        size = size if tolerance.kind == "bias" else abs(size)
+        drawn += [DispersedInput(name, key, tolerance.kind, size, nominal, unit) for name in names]
     return Inputs(tuple(drawn), tuple(unused))
 
 
 def reachable(spacecraft: Spacecraft) -> Inputs:
-    """Inputs of any schedule: those of one that fires each channel and the torquer once.
-
-    What each pulse draws is there once.
-    """
+    """Inputs of any schedule: those of one that fires each channel and the torquer; what pulses draw is there once."""
     pulses = [channel_pulse(channel, 0.0, 0.0) for channel in spacecraft.channels]
     if spacecraft.torquer is not None:
         pulses.append(steerable_pulse(spacecraft.torquer, 0.0, 0.0))
@@ -114,86 +125,57 @@ def with_sensor(spacecraft: Spacecraft, fired: Inputs, idle: str) -> Inputs:
     return Inputs((*fired.drawn, *sensor.drawn), (*unused, *sensor.unused))
 
 
-def _of_sensor(spacecraft: Spacecraft) -> Iterator[DispersedInput | Unused]:
+def _of_sensor(spacecraft: Spacecraft) -> Iterator[_Row]:
     """Bias and scale of each gyro, noise and delay; none for a spacecraft without sensor."""
     requested, loop = spacecraft.dispersions, spacecraft.loop
     if requested is None or loop is None:
         return
     sensor = loop.sensor
     axes, unit = ([""], "m/s²") if sensor.kind == ACCELEROMETER else ([" 1", " 2"], "rad/s")
-    known = {
-        **{f"sensor bias{axis}": ("sensor_bias", sensor.bias, unit) for axis in axes},
-        **{f"sensor scale{axis}": ("sensor_scale", 1.0, "") for axis in axes},
-        "sensor noise": ("sensor_noise", 1.0, ""),
-        "sensor delay": ("sensor_delay", sensor.delay, "s"),
-    }
-    for name, (key, nominal, of) in known.items():
-        tolerance: Tolerance | None = getattr(requested, key)
-        if tolerance is not None and key == "sensor_noise" and sensor.noise == 0.0:
-            yield Unused(name, "the sensor has no noise")
-        elif tolerance is not None:
-            yield _input(name, key, tolerance, nominal, of)
+    silent = "" if sensor.noise else "the sensor has no noise"
+    yield _Row("sensor_bias", requested.sensor_bias, [f"sensor bias{axis}" for axis in axes], sensor.bias, unit)
+    yield _Row("sensor_scale", requested.sensor_scale, [f"sensor scale{axis}" for axis in axes], 1.0, "")
+    yield _Row("sensor_noise", requested.sensor_noise, ["sensor noise"], 1.0, "", silent)
+    yield _Row("sensor_delay", requested.sensor_delay, ["sensor delay"], sensor.delay, "s")
 
 
-def _entries(spacecraft: Spacecraft, schedule: Schedule) -> Iterator[DispersedInput | Unused]:
+def _rows(spacecraft: Spacecraft, schedule: Schedule) -> Iterator[_Row]:
     requested, inertia = spacecraft.dispersions, spacecraft.inertia
     if requested is None:
         return
-    rates = (inertia.axes @ spacecraft.omega0).tolist()
-    for name, key, tolerance, nominal, unit in (
-        ("A", "A", requested.A, inertia.A, "kg m²"),
-        ("C", "C", requested.C, inertia.C, "kg m²"),
-        ("wheel momentum", "wheel_momentum", requested.wheel_momentum, inertia.wheel, "N m s"),
-        *((f"omega0_{at + 1}", "omega0", requested.omega0[at], rates[at], "rad/s") for at in range(3)),
-    ):
-        if tolerance is not None:
-            yield _input(name, key, tolerance, nominal, unit)
-    members = fired(spacecraft, schedule)
+    yield _Row("A", requested.A, ["A"], inertia.A, "kg m²")
+    yield _Row("C", requested.C, ["C"], inertia.C, "kg m²")
+    yield _Row("wheel_momentum", requested.wheel_momentum, ["wheel momentum"], inertia.wheel, "N m s")
+    for at, rate in enumerate((inertia.axes @ spacecraft.omega0).tolist()):
+        yield _Row("omega0", requested.omega0[at], [f"omega0_{at + 1}"], rate, "rad/s")
+    members = _fired(spacecraft, schedule)
     for key in ("thrust", "thrust_direction", "position", *BY_VALVE):
         for name, tolerance in getattr(requested, key).items():
-            if name in members:
-                yield from _of_thruster(key, name, tolerance, members[name])
-            else:
-                who = "the steerable torquer" if name == STEERABLE else name
-                yield Unused(f"{key.removeprefix('thrust_')} {name}", f"{SCHEDULE_IDLE} {who}")
-    if requested.center_of_mass is not None:
-        levered = any(thruster is not None and thruster.force is not None for thruster in members.values())
-        for name in ("center of mass x", "center of mass y", "center of mass z"):
-            if levered:
-                yield _input(name, "center_of_mass", requested.center_of_mass, 0.0, "m")
-            else:
-                yield Unused(name, KNOWN_BY_TORQUE if members else f"{SCHEDULE_IDLE} any thruster")
-    yield from _feed(spacecraft, requested, any(thruster is not None for thruster in members.values()))
-    numbers = range(1, len(schedule) + 1)
-    for key, names, nominal, unit in (
-        ("thrust_per_pulse", [f"thrust pulse {number}" for number in numbers], 1.0, ""),
-        ("timing", [f"timing pulse {number}" for number in numbers], 0.0, "s"),
-        ("timing_offset", ["timing offset"] * bool(numbers), 0.0, "s"),
-    ):
-        tolerance = getattr(requested, key)
-        if tolerance is not None and not names:
-            yield Unused(key.replace("_", " "), "the schedule has no pulses")
-        for name in names if tolerance is not None else ():
-            yield _input(name, key, tolerance, nominal, unit)
+            yield _of_thruster(key, name, tolerance, members)
+    thrusters = [thruster for thruster in members.values() if thruster is not None]
+    levered, components = (
+        any(each.force is not None for each in thrusters),
+        [f"center of mass {axis}" for axis in "xyz"],
+    )
+    idle = KNOWN_BY_TORQUE if members else f"{SCHEDULE_IDLE} any thruster"
+    yield _Row("center_of_mass", requested.center_of_mass, components, 0.0, "m", "" if levered else idle)
+    yield from _feed(spacecraft, requested, "" if thrusters else "the schedule fires no thruster")
+    numbers, idle = range(1, len(schedule) + 1), "" if len(schedule) else "the schedule has no pulses"
+    thrusts = [f"thrust pulse {number}" for number in numbers] or ["thrust per pulse"]
+    yield _Row("thrust_per_pulse", requested.thrust_per_pulse, thrusts, 1.0, "", idle)
+    yield _Row("timing", requested.timing, [f"timing pulse {n}" for n in numbers] or ["timing"], 0.0, "s", idle)
+    yield _Row("timing_offset", requested.timing_offset, ["timing offset"], 0.0, "s", idle)
     sensor = spacecraft.sun_sensor
     if schedule.blocks and sensor is not None and sensor.jitter > 0.0:
-        for number in numbers:
-            yield DispersedInput(f"Sun pulse {number}", "sun_sensor.jitter", "normal", sensor.jitter, 0.0, "s")
-    if requested.attitude is not None:
-        for axis in "xy":
-            yield _input(f"attitude {axis}", "attitude", requested.attitude, 0.0, "rad")
+        jitter, names = Tolerance("normal", sensor.jitter), [f"Sun pulse {number}" for number in numbers]
+        yield _Row("sun_sensor.jitter", jitter, names, 0.0, "s")
+    yield _Row("attitude", requested.attitude, ["attitude x", "attitude y"], 0.0, "rad")
     for key in ("sensor_bias", "sensor_scale", "sensor_noise", "sensor_delay"):
-        if getattr(requested, key) is not None:
-            yield Unused(key.replace("_", " "), "a schedule is fired whatever a sensor shows: --loop flies the loop")
+        idle = "a schedule is fired whatever a sensor shows: --loop flies the loop"
+        yield _Row(key, getattr(requested, key), [key.replace("_", " ")], 0.0, "", idle)
 
 
-def _input(name: str, key: str, tolerance: Tolerance, nominal: float, unit: str) -> DispersedInput:
-    """Input of a tolerance: relative sizes become absolute; a factor (nominal one) stays."""
-    size = tolerance.size * (nominal if tolerance.relative else 1.0)
-    return DispersedInput(name, key, tolerance.kind, size if tolerance.kind == "bias" else abs(size), nominal, unit)
-
-
-def fired(spacecraft: Spacecraft, schedule: Schedule) -> dict[str, Thruster | None]:
+def _fired(spacecraft: Spacecraft, schedule: Schedule) -> dict[str, Thruster | None]:
     """Thrusters fired by the schedule, by name; the steerable torquer has None."""
     channels = {channel.name: channel for channel in spacecraft.channels}
     members: dict[str, Thruster | None] = {}
@@ -205,53 +187,41 @@ def fired(spacecraft: Spacecraft, schedule: Schedule) -> dict[str, Thruster | No
     return members
 
 
-def _of_thruster(
-    key: str, name: str, tolerance: Tolerance, thruster: Thruster | None
-) -> Iterator[DispersedInput | Unused]:
-    """Inputs of a tolerance of a thruster, its valve or the table in its place; None: the steerable torquer."""
-    called = f"{key.removeprefix('thrust_')} {name}"
-    if key in BY_VALVE:
-        valve = None if thruster is None else thruster.valve
-        if key == "impulse_bit" and valve is not None and not hasattr(valve, "open_delay"):
-            yield _input(called, key, tolerance, 1.0, "")
-        elif key == "impulse_bit" or not hasattr(valve, key):
-            yield Unused(called, f"{name} has no {'impulse_bit' if key == 'impulse_bit' else 'valve'}")
-        else:
-            yield _input(called, key, tolerance, getattr(valve, key), "s")
-    elif key == "thrust":
-        yield _input(called, key, tolerance, 1.0, "")
-    elif thruster is None and key == "position":
-        yield Unused(called, "a steerable torquer gives a pure torque, wherever it is mounted")
+def _of_thruster(key: str, name: str, tolerance: Tolerance, members: Mapping[str, Thruster | None]) -> _Row:
+    """Inputs of a tolerance of a thruster, its valve or the table in its place."""
+    thruster, called = members.get(name), f"{key.removeprefix('thrust_')} {name}"
+    valve, names, nominal, unit, idle = None if thruster is None else thruster.valve, [called], 0.0, "rad", ""
+    if name not in members:
+        idle = f"{SCHEDULE_IDLE} {'the steerable torquer' if name == STEERABLE else name}"
+    elif key in ("thrust", "impulse_bit"):
+        nominal, unit = 1.0, ""
+        if key == "impulse_bit" and (valve is None or hasattr(valve, "open_delay")):
+            idle = f"{name} has no impulse_bit"
+    elif key in BY_VALVE:
+        nominal, unit, idle = getattr(valve, key, 0.0), "s", "" if hasattr(valve, key) else f"{name} has no valve"
     elif thruster is None:
-        yield _input(called, key, tolerance, 0.0, "rad")
+        idle = "a steerable torquer gives a pure torque, wherever it is mounted" if key == "position" else ""
     elif thruster.force is None or (key == "thrust_direction" and thruster.position is None):
-        yield Unused(called, KNOWN_BY_TORQUE)
+        idle = KNOWN_BY_TORQUE
     else:
         axes, unit = ("xyz", "m") if key == "position" else ("ab", "rad")
-        for axis in axes:
-            yield _input(f"{called} {axis}", key, tolerance, 0.0, unit)
+        names = [f"{called} {axis}" for axis in axes]
+    return _Row(key, tolerance, names, nominal, unit, idle)
 
 
-def _feed(spacecraft: Spacecraft, requested: Dispersions, fires: bool) -> Iterator[DispersedInput | Unused]:
-    """Tolerances of cold nozzles and of the tank; ``fires``: some thruster fires."""
+def _feed(spacecraft: Spacecraft, requested: Dispersions, idle: str) -> Iterator[_Row]:
+    """Tolerances of cold nozzles and of the tank; ``idle`` where no thruster fires."""
     cold, tank = spacecraft.cold, spacecraft.tank
-    first, count = (0.0, 0.0) if cold is None else (cold.first, cold.pulses)
-    of_cold = {"cold": (first, ""), "cold_pulses": (count, "")}
-    units = {"propellant": "kg", "pressure": "Pa", "final_pressure": "Pa", "exponent": ""}
-    of_tank = {f"tank_{name}": (0.0 if tank is None else getattr(tank, name), unit) for name, unit in units.items()}
-    for key, (nominal, unit) in (of_cold | of_tank | {"inertia_per_kg": (1.0, "")}).items():
-        tolerance: Tolerance | None = getattr(requested, key)
-        if tolerance is None:
-            continue
-        name = key.replace("tank_", "tank ")
-        if (cold if key in of_cold else tank) is None:
-            yield Unused(name, f"the file has no {'cold nozzles' if key in of_cold else 'tank'}")
-        elif key == "inertia_per_kg" and shed(spacecraft) is None:
-            yield Unused(name, "the tank has no inertia_per_kg")
-        elif not fires:
-            yield Unused(name, "the schedule fires no thruster")
-        else:
-            yield _input(name, key, tolerance, nominal, unit)
+    of_cold = "the file has no cold nozzles" if cold is None else idle
+    yield _Row("cold", requested.cold, ["cold"], getattr(cold, "first", 0.0), "", of_cold)
+    yield _Row("cold_pulses", requested.cold_pulses, ["cold_pulses"], getattr(cold, "pulses", 0.0), "", of_cold)
+    of_tank = "the file has no tank" if tank is None else idle
+    for name, unit in {"propellant": "kg", "pressure": "Pa", "final_pressure": "Pa", "exponent": ""}.items():
+        key = f"tank_{name}"
+        yield _Row(key, getattr(requested, key), [f"tank {name}"], getattr(tank, name, 0.0), unit, of_tank)
+    if tank is not None and shed(spacecraft) is None:
+        of_tank = "the tank has no inertia_per_kg"
+    yield _Row("inertia_per_kg", requested.inertia_per_kg, ["inertia_per_kg"], 1.0, "", of_tank)
 
 
 Array = NDArray[np.float64]
@@ -293,8 +263,7 @@ def positive_definite(group: Group) -> bool:
 
 def grouped(pairs: Iterable[Pair]) -> tuple[Group, ...]:
     """Groups connected by ``pairs``, names in the order of their first pair."""
-    pairs = list(pairs)
-    members: list[list[str]] = []
+    pairs, members = list(pairs), list[list[str]]()
     for first, second, _ in pairs:
         touched = [member for member in members if first in member or second in member]
         members = [member for member in members if member not in touched]
@@ -312,8 +281,7 @@ def grouped(pairs: Iterable[Pair]) -> tuple[Group, ...]:
 
 def groups_of(pairs: Iterable[Pair]) -> tuple[Group, ...]:
     """`grouped`; raises BadRequest for groups that are not positive definite."""
-    groups = grouped(pairs)
-    for group in groups:
+    for group in (groups := grouped(pairs)):
         if not positive_definite(group):
             raise BadRequest(f"the correlation of {', '.join(group.names)} is not positive definite")
     return groups
@@ -342,22 +310,14 @@ def normal_of(entry: DispersedInput, value: Array) -> Array:
 
 
 def mixing(inputs: Sequence[DispersedInput], groups: Iterable[Group]) -> Array:
-    """M (d, d): M Mᵀ is the correlation of the values of ``inputs``; the unit matrix where none is correlated.
-
-    In a group, column k is what input k adds to those before it.
-    """
+    """M (d, d): M Mᵀ is the correlation of the values of ``inputs``; in a group, column k is what input k adds."""
     mixed, rows = np.eye(len(inputs)), {entry.name: row for row, entry in enumerate(inputs) if entry.sigma > 0.0}
     for group in groups:
         present = group.among(rows)
-        members = [inputs[rows[name]] for name in present.names]
-        if len(members) < 2:
-            continue
-        matrix = [
-            [_of_values(member, other, rho) for other, rho in zip(members, line, strict=True)]
-            for member, line in zip(members, present.matrix.tolist(), strict=True)
-        ]
         at = [rows[name] for name in present.names]
-        mixed[np.ix_(at, at)] = np.linalg.cholesky(np.array(matrix))
+        for row, line in zip(at, present.matrix.tolist(), strict=True):
+            mixed[row, at] = [_of_values(inputs[row], inputs[other], rho) for other, rho in zip(at, line, strict=True)]
+        mixed[np.ix_(at, at)] = np.linalg.cholesky(mixed[np.ix_(at, at)])
     return mixed
 
 
@@ -378,11 +338,10 @@ def independent(
 def together(inputs: Sequence[DispersedInput], groups: Iterable[Group]) -> list[list[int]]:
     """Rows of ``inputs``, those of a group in one list, in order."""
     rows = {entry.name: row for row, entry in enumerate(inputs) if entry.sigma > 0.0}
-    rows_of = [[rows[name] for name in group.among(rows).names] for group in groups]
-    taken = {row for block in rows_of for row in block}
-    return sorted(
-        [block for block in rows_of if block] + [[row] for row in range(len(inputs)) if row not in taken], key=min
-    )
+    blocks = [[rows[name] for name in group.among(rows).names] for group in groups]
+    taken = {row for block in blocks for row in block}
+    blocks += [[row] for row in range(len(inputs)) if row not in taken]
+    return sorted(filter(None, blocks), key=min)
 
 
 def _of_values(first: DispersedInput, second: DispersedInput, rho: float) -> float:
@@ -433,18 +392,15 @@ class DrawSource:
     ):
         self._random = [entry for entry in inputs if entry.kind != "bias"]
         self._fixed = {entry.name: entry.size for entry in inputs if entry.kind == "bias"}
-        self._rows = {entry.name: row for row, entry in enumerate(self._random)}
-        self._groups = [group for group in groups if any(name in self._rows for name in group.names)]
-        grouped = {name for group in self._groups for name in group.names}
-        self._alone = [entry for entry in self._random if entry.name not in grouped]
-        self._seed = seed
+        names = {entry.name for entry in self._random}
+        self._groups = [group for group in groups if names & set(group.names)]
+        self._seed, self._physical = seed, physical
         self._table = np.empty((len(self._random), BLOCK))
-        self._physical = physical
 
     def block(self, number: int) -> tuple[dict[str, Array | float], NDArray[np.intp]]:
         """Deviations of the cases of block ``number`` (from 0), and the rows drawn again (once per redraw).
 
-        The arrays are used anew for the next block. Raises Unsuitable where no physical case is found.
+        The next block overwrites the arrays. Raises Unsuitable where no physical case is found.
         """
         rows, redrawn = np.arange(BLOCK), [np.empty(0, dtype=np.intp)]
         for attempt in range(MOST_ATTEMPTS + 1):
@@ -463,30 +419,26 @@ class DrawSource:
 
     def _fill(self, table: Array, block: int, attempt: int) -> None:
         """Fill ``table`` (inputs, cases) by the deviations of a block; each ``attempt`` has a stream of its own."""
-        at = self._seed, block, attempt, table.shape[1]
-        for entry in self._alone:
-            np.multiply(_drawn(entry.name, entry.kind, *at), entry.size, out=table[self._rows[entry.name]])
-        for group in self._groups:
-            normals = [_drawn(name, "normal", *at) for name in group.names]
-            for name, normal in zip(group.names, group.mixed(normals), strict=True):
-                if name in self._rows:
-                    table[self._rows[name]] = value_of(self._random[self._rows[name]], normal)
+        at, normals = (self._seed, block, attempt, table.shape[1]), dict[str, Array]()
+        with _DRAWING:
+            for group in self._groups:
+                alone = [_drawn(name, "normal", *at) for name in group.names]
+                normals.update(zip(group.names, group.mixed(alone), strict=True))
+            for entry, row in zip(self._random, table, strict=True):
+                if entry.name in normals:
+                    row[:] = value_of(entry, normals[entry.name])
+                else:
+                    np.multiply(_drawn(entry.name, entry.kind, *at), entry.size, out=row)
 
 
 KEPT = 128  # streams of blocks that are kept, 128 KiB each: all candidates and stages of a study fly the same draws
 
-_DRAWING = threading.Lock()
-
-
-def _drawn(name: str, kind: str, seed: int, block: int, attempt: int, count: int) -> Array:
-    """First ``count`` draws of an input, of size one; by the thread that comes first where several want the same."""
-    with _DRAWING:
-        return _stream(name, kind, seed, block, attempt, count)
+_DRAWING = threading.Lock()  # held while draws are made: of several threads that want the same one makes them
 
 
 @lru_cache(KEPT)
-def _stream(name: str, kind: str, seed: int, block: int, attempt: int, count: int) -> Array:
-    """Read-only draws of `_drawn`."""
+def _drawn(name: str, kind: str, seed: int, block: int, attempt: int, count: int) -> Array:
+    """First ``count`` draws of an input, of size one, read-only."""
     stream = int.from_bytes(hashlib.blake2b(name.encode(), digest_size=8).digest(), "little")  # the same everywhere
     key, counter = np.array([seed, stream], np.uint64), np.array([0, 0, attempt, block], np.uint64)
     generator = np.random.Generator(np.random.Philox(key=key, counter=counter))

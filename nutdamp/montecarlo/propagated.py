@@ -11,8 +11,9 @@ complex arrays, which gives derivatives to rounding (`nutdamp.montecarlo.statist
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+import operator
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from functools import cache, cached_property
 from itertools import pairwise
 
@@ -29,6 +30,7 @@ from nutdamp.montecarlo.cases import (
     Thrusting,
     Triple,
     in_body,
+    nothing,
     number_of,
     plus,
     rotated,
@@ -42,7 +44,7 @@ from nutdamp.physics.energy_sink import TINY
 from nutdamp.physics.sky import AxisWatch, SunPulseClock, TorqueRamp
 from nutdamp.physics.thruster import Opened
 from nutdamp.physics.triaxial import widest_cones
-from nutdamp.schemes.block_model import fire, pushes
+from nutdamp.schemes.block_model import fire_all, pushes
 
 Array = NDArray[np.float64]
 
@@ -76,16 +78,57 @@ class Ends:
 
 @dataclass(frozen=True, eq=False)
 class ClosedForm:
-    """Flies cases of ``model`` by the impulse sum; disturbances and I1 ≠ I2 are left out.
-
-    Dissipation acts as the estimate has it, whatever the moments of a case are.
-    """
+    """Flies cases of ``model`` by the impulse sum, with the dissipation of the estimate, no disturbances, I1 = I2."""
 
     model: DispersedModel
 
     def __call__(self, cases: DispersedCases) -> Ends:
-        """End states of the ``cases``, whose pulses all come in the order of the first of them."""
-        return _fly(*_in_order(cases, self._nodes), self.model.spacecraft.growth)
+        """End states of the ``cases``, whose pulses all come in the order of their centres in the first of them."""
+        # In one piece: any part of the loop would take and return nearly all of the seven numbers that run through it.
+        A, C, wheel, growth = cases.A, cases.C, cases.wheel, self.model.spacecraft.growth
+        a, per_A = 1.0 - C / A, 1.0 / A
+        sheds = cases.sheds
+        (first, second, _), (along, across, spin) = cases.moments, cases.omega0
+        before = x, y, z = first * along, second * across, plus(C * spin, wheel)  # H is the true one, I1 ≠ I2 or not
+        phase, now, turn = 0.0, 0.0, None
+        centres = [start + 0.5 * width for start, width in zip(cases.starts, cases.widths, strict=True)]
+        order = np.argsort([float(np.real(np.ravel(centre)[0])) for centre in centres], kind="stable")
+        for number in order.tolist():
+            coast, now = centres[number] - now, centres[number]
+            turn = _turned_on(turn, (x, y, z), coast * per_A)
+            if growth == 0.0:
+                phase = phase + plus(a * spin, times(-per_A, wheel)) * coast
+            else:
+                effect, turn = _slipped(turn, (x, y, z), growth, coast)
+                phase = phase + (a * z * effect.turned - wheel * coast) / C
+                x, y, z = x * effect.transverse, y * effect.transverse, z * effect.axial
+                spin = (z - wheel) / C
+            if sheds is not None:  # half before the pulse and half after it, the rates as they are
+                x, y, A, C = _lighter(x, y, A, C, sheds[number])
+                a, per_A, z = 1.0 - C / A, 1.0 / A, plus(C * spin, wheel)
+            rate = plus(a * spin, times(-per_A, wheel))
+            impulse, width, nodes = cases.impulses[number], cases.widths[number], self._nodes[number]
+            along, across, gained = _effective(impulse, rate, a / C, width, nodes, growth)
+            cosine, sine = cos_sin(phase)
+            x = x + along * cosine - across * sine
+            y = y + along * sine + across * cosine
+            if not nothing(gained):
+                spin = spin + gained / C
+                z = plus(C * spin, wheel)
+            if sheds is not None:
+                x, y, A, C = _lighter(x, y, A, C, sheds[number])
+                a, per_A, z = 1.0 - C / A, 1.0 / A, plus(C * spin, wheel)
+        after = (x, y, z) if turn is None else carried(turn, (x, y, z))
+        return Ends(
+            momentum=(x, y, z),
+            before=before,
+            after=after,
+            pointed=rotated(after, cases.tilt),
+            spin=spin,
+            spin_change=spin - cases.omega0[2],
+            propellant=cases.propellant,
+            drained=cases.drained,
+        )
 
     @cached_property
     def _nodes(self) -> tuple[int, ...]:
@@ -99,59 +142,6 @@ class ClosedForm:
         rate = ratio * (spin + max(off.get(f"omega0_{axis}", 0.0) for axis in (1, 2, 3)) + added)
         rate += (abs(body.inertia.wheel) + off.get("wheel momentum", 0.0)) / max(A - off_A, 0.25 * A)
         return tuple(nodes_for(0.5 * on_time * rate) for on_time in self.model.on_times)
-
-
-def _fly(cases: DispersedCases, nodes: tuple[int, ...], growth: float) -> Ends:
-    """End states of cases whose pulses are in order; ``nodes`` by pulse, ``growth`` κ in 1/s."""
-    # In one piece: any part of the loop would take and return nearly all of the seven numbers that run through it.
-    A, C, wheel = cases.A, cases.C, cases.wheel
-    a, per_A = 1.0 - C / A, 1.0 / A
-    sheds = cases.sheds
-    x, y = cases.moments[0] * cases.omega0[0], cases.moments[1] * cases.omega0[1]  # H is the true one, I1 ≠ I2 or not
-    spin = cases.omega0[2]
-    z = plus(C * spin, wheel)
-    before = (x, y, z)
-    phase: Cases = 0.0
-    now: Cases = 0.0
-    turn: tuple[Cases, ...] | None = None
-    for number, (start, impulse) in enumerate(zip(cases.starts, cases.impulses, strict=True)):
-        on_time = cases.widths[number]
-        centre = start + 0.5 * on_time
-        coast = centre - now
-        turn = _turned_on(turn, (x, y, z), coast * per_A)
-        if growth == 0.0:
-            phase = phase + plus(a * spin, times(-per_A, wheel)) * coast
-        else:
-            effect, turn = _slipped(turn, (x, y, z), growth, coast)
-            phase = phase + (a * z * effect.turned - wheel * coast) / C
-            x, y, z = x * effect.transverse, y * effect.transverse, z * effect.axial
-            spin = (z - wheel) / C
-        if sheds is not None:  # half before the pulse and half after it, the rates as they are
-            x, y, A, C = _lighter(x, y, A, C, sheds[number])
-            a, per_A, z = 1.0 - C / A, 1.0 / A, plus(C * spin, wheel)
-        rate = plus(a * spin, times(-per_A, wheel))
-        along, across, gained = _effective(impulse, rate, a / C, on_time, nodes[number], growth)
-        cosine, sine = cos_sin(phase)
-        x = x + along * cosine - across * sine
-        y = y + along * sine + across * cosine
-        if not (isinstance(gained, float) and gained == 0.0):
-            spin = spin + gained / C
-            z = plus(C * spin, wheel)
-        if sheds is not None:
-            x, y, A, C = _lighter(x, y, A, C, sheds[number])
-            a, per_A, z = 1.0 - C / A, 1.0 / A, plus(C * spin, wheel)
-        now = centre
-    after = (x, y, z) if turn is None else carried(turn, (x, y, z))
-    return Ends(
-        momentum=(x, y, z),
-        before=before,
-        after=after,
-        pointed=rotated(after, cases.tilt),
-        spin=spin,
-        spin_change=spin - cases.omega0[2],
-        propellant=cases.propellant,
-        drained=cases.drained,
-    )
 
 
 def _lighter(x: Cases, y: Cases, A: Cases, C: Cases, sheds: tuple[Cases, Cases]) -> tuple[Cases, Cases, Cases, Cases]:
@@ -207,10 +197,10 @@ def _effective(
     is ν as it begins, ``slope`` a/C.
     """
     along, across, axial = impulse
-    if isinstance(on_time, float) and on_time == 0.0:
+    if nothing(on_time):
         return impulse
     half = 0.5 * on_time
-    if isinstance(axial, float) and axial == 0.0:
+    if nothing(axial):
         angle = rate * half + TINY
         if growth == 0.0:
             tangent = np.tan(0.5 * angle)
@@ -224,8 +214,7 @@ def _effective(
         )
     gained = slope * axial
     swing, bend = (rate + 0.5 * gained) * half, 0.25 * gained * half
-    real: Cases = 0.0
-    imaginary: Cases = 0.0
+    real, imaginary = 0.0, 0.0
     for node, weight in _legendre(nodes):
         # The two nodes ±x together: cos φx cosh γx - i sin φx sinh γx, turned by the angle of the bend.
         level, slant = cos_sin(swing * node)
@@ -251,15 +240,9 @@ def nodes_for(phase: float) -> int:
 
     By the error of the n-point rule, φ^{2n} 2^{2n+1} (n!)^4 / ((2n+1) ((2n)!)^3).
     """
-    phase = max(phase, 1e-3)
     for nodes in range(2, MOST_NODES, 2):
-        error = (
-            2 * nodes * math.log(2.0 * phase)
-            + 4.0 * math.lgamma(nodes + 1)
-            - math.log(2 * nodes + 1)
-            - 3.0 * math.lgamma(2 * nodes + 1)
-        )
-        if error < math.log(1e-17):
+        growing = 2 * nodes * math.log(2.0 * max(phase, 1e-3)) + 4.0 * math.lgamma(nodes + 1)
+        if growing - math.log(2 * nodes + 1) - 3.0 * math.lgamma(2 * nodes + 1) < math.log(1e-17):
             return nodes
     return MOST_NODES
 
@@ -270,20 +253,6 @@ def _legendre(nodes: int) -> tuple[tuple[float, float], ...]:
     places, weights = gauss_legendre(nodes)
     half = nodes // 2
     return tuple(zip(places[half:].tolist(), weights[half:].tolist(), strict=True))
-
-
-def _in_order(cases: DispersedCases, nodes: tuple[int, ...]) -> tuple[DispersedCases, tuple[int, ...]]:
-    """Cases and ``nodes`` with the pulses in the order of their centres in the first case."""
-    centres = [start + 0.5 * width for start, width in zip(cases.starts, cases.widths, strict=True)]
-    order = np.argsort([float(np.real(np.ravel(centre)[0])) for centre in centres], kind="stable").tolist()
-    if order == sorted(order):
-        return cases, nodes
-    starts, widths, impulses = (
-        tuple(each[number] for number in order) for each in (cases.starts, cases.widths, cases.impulses)
-    )
-    spent = None if cases.spent is None else tuple(cases.spent[number] for number in order)
-    placed = replace(cases, starts=starts, widths=widths, impulses=impulses, spent=spent)
-    return placed, tuple(nodes[number] for number in order)
 
 
 def fly(
@@ -354,14 +323,12 @@ def _pushes(thrust: Sequence[Thrusting], seen: NDArray[np.bool_], part: Callable
         for each in thrust
     ]
     edges = np.sort(np.array([each.corners for each in opened]).reshape(-1, len(seen)), axis=0)
-    pushes = []
+    ramps = []
     for begin, end in pairwise(edges):
-        middle, first, last = 0.5 * (begin + end), np.zeros_like(torques[0]), np.zeros_like(torques[0])
-        for each, torque in zip(opened, torques, strict=True):
-            first = first + torque * each.within(middle, begin)
-            last = last + torque * each.within(middle, end)
-        pushes.append(TorqueRamp(begin, end, first, last))
-    return pushes
+        levels = [[each.within(0.5 * (begin + end), edge) for each in opened] for edge in (begin, end)]
+        first, last = (sum(map(operator.mul, torques, level), np.zeros(())) for level in levels)
+        ramps.append(TorqueRamp(begin, end, first, last))
+    return ramps
 
 
 CASE, STEPPED, LOOKED = 5e-3, 1e-2, 4e-3
@@ -369,10 +336,7 @@ CASE, STEPPED, LOOKED = 5e-3, 1e-2, 4e-3
 
 
 class RealWidths:
-    """Flies cases of ``model`` by Euler's equations, see `nutdamp.physics.batch`.
-
-    Disturbances and dissipation act as the estimate has them, whatever the moments of a case are.
-    """
+    """Flies cases of ``model`` by Euler's equations, with the disturbances and dissipation of the estimate."""
 
     def __init__(self, model: DispersedModel) -> None:
         self.model, self._dynamics = model, make_dynamics(model.spacecraft)
@@ -384,9 +348,10 @@ class RealWidths:
         if body.sun_sensor is not None and body.sun_sensor.sees_all:
             return [True] * max((number for block in blocks for number in block.sun_pulses), default=0)
         try:
-            return fire(body, blocks)[1]
+            (schedule,), seen = fire_all(body, [blocks])
         except Infeasible:
             return [False]
+        return [False] if isinstance(schedule, Infeasible) else [bool(sees[0]) for sees in seen]
 
     @cached_property
     def effort(self) -> float:
@@ -403,22 +368,24 @@ class RealWidths:
         count = number_of(cases)
         watch = watch_over(self.model.spacecraft, cases.tilt, count) if self.model.spacecraft.keep else None
         moments, rates = _whole(cases.moments, count), _whole(cases.omega0, count)
-        propellant, bodies = cases.propellant, self._bodies(moments, cases.wheel)
+        propellant, bodies, upright, sheds = cases.propellant, self._bodies(moments, cases.wheel), np.eye(4, 1), None
+        upright = upright.repeat(count, axis=1)  # the true body axes at t = 0 are where everything is seen from
+        if cases.per_kg is not None and cases.spent is not None:
+            sheds = np.array([_whole(cases.per_kg, count) * kg for kg in cases.spent]).reshape(-1, 3, count)
         if self.model.schedule.blocks:
-            seen_nominally, upright = self.seen_nominally, _upright(count)
-            settled, turned, _, seen, over = fly(self.model, bodies, rates, upright, cases, seen_nominally, watch)
+            nominal = self.seen_nominally
+            settled, turned, _, seen, over = fly(self.model, bodies, rates, upright, cases, nominal, watch)
             if cases.spent is not None:
                 propellant = sum((kg * sees for kg, sees in zip(cases.spent, seen, strict=True)), 0.0)
         else:
             starts = _whole(cases.starts, count)
             impulses = np.array([_whole(impulse, count) for impulse in cases.impulses]).reshape(-1, 3, count)
-            pulses = batch.Pulses(starts, np.array(self.model.on_times), impulses, sheds=_sheds(cases, count))
+            pulses = batch.Pulses(starts, np.array(self.model.on_times), impulses, sheds=sheds)
             if self.model.schedule.shaped:
-                pulses = self._ramps(cases, starts, impulses)
-            settled, turned = batch.fly(bodies, rates, _upright(count), pulses, watch)
+                pulses = self._ramps(cases, starts, impulses, sheds)
+            settled, turned = batch.fly(bodies, rates, upright, pulses, watch)
             over = np.max(pulses.edges, axis=0, initial=0.0)
-        shed = _sheds(cases, count)
-        last = bodies if shed is None else bodies.lighter(shed.sum(axis=0))
+        last = bodies if sheds is None else bodies.lighter(sheds.sum(axis=0))
         if watch is not None:
             watch.turn(batch.MotionStretch(last, over, settled, turned))
         momentum = triple(last.momentum(settled))
@@ -441,64 +408,39 @@ class RealWidths:
     def _bodies(self, moments: Array, wheel: Cases) -> batch.Bodies:
         return batch.Bodies(moments, self._dynamics.constant, self._dynamics.forcing._replace(wheel=wheel))
 
-    def _ramps(self, cases: DispersedCases, starts: Array, impulses: Array) -> batch.Pulses:
+    def _ramps(self, cases: DispersedCases, starts: Array, impulses: Array, sheds: Array | None) -> batch.Pulses:
         """Pulses by the ramps of their thrust, each as a pulse of its own; as in `batch.Pulses`."""
-        count, sheds = starts.shape[1], _sheds(cases, starts.shape[1])
-        begins, lengths, parts, leans, falls = [], [], [], [], []
+        pieces, count = list(self._pieces(cases, starts, impulses)), starts.shape[1]
+        begins, lengths, parts, leans, numbers, shares = zip(*pieces, strict=True) if pieces else ((),) * 6
+        falls = None
+        if sheds is not None:
+            falls = np.array([share * sheds[number] for number, share in zip(numbers, shares, strict=True)])
+            falls = falls.reshape(-1, 3, count)
+        impulses = np.array(parts).reshape(-1, 3, count)
+        return batch.Pulses(_whole(begins, count), _whole(lengths, count), impulses, _whole(leans, count), falls)
 
-        def add(begin: Array, length: Cases, impulse: Array, lean: Cases, number: int, share: Cases) -> None:
-            begins.append(begin)
-            lengths.append(np.broadcast_to(length, count))
-            parts.append(impulse)
-            leans.append(np.broadcast_to(lean, count))
-            falls.append(np.zeros((3, count)) if sheds is None else share * sheds[number])
-
-        for number, (pulse, on_time, start, impulse) in enumerate(
-            zip(self.model.schedule, self.model.on_times, starts, impulses, strict=True)
-        ):
+    def _pieces(
+        self, cases: DispersedCases, starts: Array, impulses: Array
+    ) -> Iterator[tuple[Array, Cases, Array, Cases, int, Cases]]:
+        """Begin, length, impulse and lean of each ramp, the number of its pulse, and its share of it."""
+        pulses = zip(self.model.schedule, self.model.on_times, starts, impulses, strict=True)
+        for number, (pulse, on_time, start, impulse) in enumerate(pulses):
             thrust = cases.thrust[number]
             if pulse.command is None:
-                add(start, on_time, impulse, 0.0, number, 1.0)
+                yield start, on_time, impulse, 0.0, number, 1.0
                 continue
-            if not thrust:
-                for ramp in pulse.command.ramps:
-                    share, lean = ramp.impulse / pulse.on_time, (ramp.last - ramp.first) / (ramp.last + ramp.first)
-                    begin = start + (ramp.begin - (pulse.t - 0.5 * on_time))
-                    add(begin, ramp.end - ramp.begin, impulse * share, lean, number, share)
-                continue
-            command, fall = start - cases.leads[number], pulse.command.fall  # of the nominal pulse, evenly
+            for ramp in () if thrust else pulse.command.ramps:
+                share, lean = ramp.impulse / pulse.on_time, (ramp.last - ramp.first) / (ramp.last + ramp.first)
+                begin = start + (ramp.begin - (pulse.t - 0.5 * on_time))
+                yield begin, ramp.end - ramp.begin, impulse * share, lean, number, share
             for thruster in thrust:
-                acts, passed = thruster.opened.acts[0], 0.0
+                acts, passed, fall = thruster.opened.acts[0], 0.0, pulse.command.fall  # of the nominal pulse, evenly
                 for begin, length, level, lean in thruster.opened.pieces:
-                    area = level * length
-                    part = area / np.where(acts == 0.0, 1.0, acts)
-                    area = area * (1.0 + fall * (0.5 - passed - 0.5 * part))
-                    lean = lean - 0.5 * fall * part
-                    add(
-                        command + begin, length, _whole(thruster.torque, count) * area, lean, number, part / len(thrust)
-                    )
+                    part = level * length / np.where(acts == 0.0, 1.0, acts)
+                    area = level * length * (1.0 + fall * (0.5 - passed - 0.5 * part))
+                    begin, impulse = start - cases.leads[number] + begin, _whole(thruster.torque, len(start)) * area
+                    yield begin, length, impulse, lean - 0.5 * fall * part, number, part / len(thrust)
                     passed = passed + part
-        return batch.Pulses(
-            np.array(begins).reshape(-1, count),
-            np.array(lengths).reshape(-1, count),
-            np.array(parts).reshape(-1, 3, count),
-            np.array(leans).reshape(-1, count),
-            None if sheds is None else np.array(falls).reshape(-1, 3, count),
-        )
-
-
-def _sheds(cases: DispersedCases, count: int) -> Array | None:
-    """Decrease of the moments by each pulse, (k, 3, n) kg m²; None where they stay."""
-    if cases.per_kg is None or cases.spent is None:
-        return None
-    return np.array([_whole(cases.per_kg, count) * kg for kg in cases.spent]).reshape(-1, 3, count)
-
-
-def _upright(count: int) -> Array:
-    """Quaternions (4, n) of the true body axes at t = 0, which are where everything is seen from."""
-    upright = np.zeros((4, count))
-    upright[0] = 1.0
-    return upright
 
 
 def _whole(parts: tuple[object, ...], count: int) -> Array:

@@ -8,6 +8,7 @@ outcome over equally likely intervals of each input (the correlation ratio, Pear
 from __future__ import annotations
 
 import math
+import operator
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -21,17 +22,12 @@ from nutdamp.montecarlo.propagated import ClosedForm, Ends
 
 STEPS = 200  # Newton steps and halvings in which a quantile is found, at most; half a dozen do mostly
 ACCURACY = 4e-16  # relative change of a quantile, or of a continued fraction, that is rounding
-TINY = 1e-300  # in place of a denominator of zero
 LARGE = 20.0  # argument from which Stirling's series of the logarithm of Γ is exact to rounding
 
 
 def binomial_interval(successes: int, trials: int, confidence: float = 0.95) -> tuple[float, float]:
-    """Exact confidence interval of a probability from ``successes`` of ``trials``, Clopper & Pearson 1934.
-
-    It holds the true probability at least as often as ``confidence`` says, whatever that probability is.
-    """
-    tail = 0.5 * (1.0 - confidence)
-    failures = trials - successes
+    """Exact confidence interval of a probability from ``successes`` of ``trials``, Clopper & Pearson 1934."""
+    tail, failures = 0.5 * (1.0 - confidence), trials - successes
     low = 0.0 if successes == 0 else _quantile(successes, failures + 1, tail, upper=False)
     high = 1.0 if failures == 0 else _quantile(successes + 1, failures, tail, upper=True)
     return low, high
@@ -86,22 +82,18 @@ def _rest(z: float) -> float:
 
 def _fraction(a: float, b: float, x: float) -> float:
     """Continued fraction of the incomplete beta function, by Lentz's method, in some √(a + b) terms."""
-    c, d = 1.0, 1.0 / _not_zero(1.0 - (a + b) * x / (a + 1.0))
+    c, d = 1.0, 1.0 / (1.0 - (a + b) * x / (a + 1.0))
     value = d
     for m in range(1, 100 + 20 * math.isqrt(int(a + b))):
         for term in (
             m * (b - m) * x / ((a + 2 * m - 1.0) * (a + 2 * m)),
             -(a + m) * (a + b + m) * x / ((a + 2 * m) * (a + 2 * m + 1.0)),
         ):
-            c, d = _not_zero(1.0 + term / c), 1.0 / _not_zero(1.0 + term * d)
+            c, d = 1.0 + term / c, 1.0 / (1.0 + term * d)
             value *= c * d
         if abs(c * d - 1.0) <= ACCURACY:
             break
     return value
-
-
-def _not_zero(value: float) -> float:
-    return value if abs(value) > TINY else TINY
 
 
 Array = NDArray[np.float64]
@@ -122,33 +114,38 @@ VECTORS = {
 ROWS = 10  # rows of `vectors`
 
 
-def measure(model: DispersedModel, ends: Ends, out: Array) -> None:
-    """Write the `OUTPUTS` of cases into ``out`` (5, n); propellant is NaN where unknown."""
+def measure(model: DispersedModel, ends: Ends, count: int) -> Array:
+    """The `OUTPUTS` (5, n) of ``count`` cases; propellant is NaN where unknown."""
     x, y, z = ends.momentum
-    sense = model.spacecraft.sense
-    out[0] = np.arctan2(np.sqrt(x * x + y * y), sense * z) if ends.nutation is None else ends.nutation
-    out[1] = angle(ends.before, ends.after)
-    out[2] = angle(parts_of(model.target), ends.pointed)
-    out[3] = ends.spin_change
-    out[4] = np.nan if ends.propellant is None else ends.propellant
+    nutation = ends.nutation
+    if nutation is None:
+        nutation = np.arctan2(np.sqrt(x * x + y * y), model.spacecraft.sense * z)
+    rows = (
+        nutation,
+        angle(ends.before, ends.after),
+        angle(parts_of(model.target), ends.pointed),
+        ends.spin_change,
+        np.nan if ends.propellant is None else ends.propellant,
+    )
+    return np.array([np.broadcast_to(row, count) for row in rows])
 
 
-def vectors(model: DispersedModel, ends: Ends, out: NDArray[Any]) -> None:
-    """Write quantities that are linear for small dispersions into ``out`` (10, n); `VECTORS` names the rows.
+def vectors(model: DispersedModel, ends: Ends, count: int) -> NDArray[Any]:
+    """Quantities (10, n) of ``count`` cases that are linear for small dispersions; `VECTORS` names the rows.
 
     Nutation is the length of the transverse momentum over the axial one, the momentum shift that of the change of its
-    direction, the axis error that of its direction's distance from the target: lengths of vectors that are zero, or
-    nearly, for a good plan, so that they have no derivative themselves. All are in the body axes of t = 0.
+    direction, the axis error that of its direction's distance from the target. All are in the body axes of t = 0.
     """
     x, y, z = ends.momentum
-    sense = model.spacecraft.sense
-    out[0], out[1] = x * sense / z, y * sense / z
     before, after, pointed = (_unit(vector) for vector in (ends.before, ends.after, ends.pointed))
-    for row in range(3):
-        out[2 + row] = after[row] - before[row]
-        out[5 + row] = pointed[row] - model.target[row]
-    out[8] = ends.spin_change
-    out[9] = 0.0 if ends.propellant is None else ends.propellant
+    rows = (
+        *(across * model.spacecraft.sense / z for across in (x, y)),
+        *map(operator.sub, after, before),
+        *map(operator.sub, pointed, model.target),
+        ends.spin_change,
+        0.0 if ends.propellant is None else ends.propellant,
+    )
+    return np.array([np.broadcast_to(row, count) for row in rows])
 
 
 def _unit(vector: Triple) -> Triple:
@@ -199,10 +196,7 @@ class Exact:
 
 
 class Sketch:
-    """Counts of values by sign, power of two and leading bits of the mantissa: 16 MiB for any number of cases.
-
-    Quantiles are right to 0.006 % of their value; minimum and maximum are exact.
-    """
+    """Counts of values by sign, power of two and leading bits of the mantissa: 16 MiB; the two extremes are exact."""
 
     def __init__(self) -> None:
         self.counts = np.zeros(2 * _SIZES, dtype=np.int64)
@@ -212,20 +206,17 @@ class Sketch:
         """Count more ``values`` (n,)."""
         for begin in range(0, len(values), PORTION):
             part = values[begin : begin + PORTION]
-            bins = (np.abs(part).view(np.int64) >> _SHIFT) - _LOWEST
-            np.clip(bins, 0, _SIZES - 1, out=bins)
-            least, most = float(part.min()), float(part.max())
-            if least < 0.0:
-                # Negative values lie below the middle, mirrored, so that bins ascend with the value.
-                np.copyto(bins, -1 - bins, where=part < 0.0)
-            bins += _SIZES
+            bins = np.clip((np.abs(part).view(np.int64) >> _SHIFT) - _LOWEST, 0, _SIZES - 1)
+            # Negative values lie below the middle, mirrored, so that bins ascend with the value.
+            np.copyto(bins, -1 - bins, where=part < 0.0)
             lowest = int(bins.min())
             counts = np.bincount(bins - lowest)  # values lie close together: few bins to count
-            self.counts[lowest : lowest + len(counts)] += counts
-            self.minimum, self.maximum = min(self.minimum, least), max(self.maximum, most)
+            self.counts[_SIZES + lowest : _SIZES + lowest + len(counts)] += counts
+            self.minimum = min(self.minimum, float(part.min()))
+            self.maximum = max(self.maximum, float(part.max()))
 
     def quantiles(self, probabilities: Array) -> Array:
-        """Quantiles to 0.006 %."""
+        """Quantiles to 0.006 % of their value."""
         below = np.cumsum(self.counts)
         ranks = np.floor(np.asarray(probabilities) * (below[-1] - 1)).astype(np.int64)
         values = _middles()[np.searchsorted(below, ranks, side="right")]
@@ -252,19 +243,16 @@ class Worst:
     """Cases of greatest severity, in a fixed order: the most severe first, then the lower number."""
 
     def __init__(self, keep: int) -> None:
-        self.keep = keep
-        self.cases = np.empty(0, dtype=np.int64)
-        self.severities = np.empty(0)
+        self.keep, self.cases, self.severities = keep, np.empty(0, dtype=np.int64), np.empty(0)
 
     def add(self, first: int, severities: Array) -> None:
         """Consider the cases from number ``first`` on."""
+        least, spare = -math.inf, len(severities) - self.keep
         if len(self.cases) == self.keep:
-            rows = np.flatnonzero(severities > self.severities[-1])
-        elif len(severities) > self.keep:
-            least = np.partition(severities, len(severities) - self.keep)[len(severities) - self.keep]
-            rows = np.flatnonzero(severities >= least)
-        else:
-            rows = np.arange(len(severities))
+            least = self.severities[-1]
+        elif spare > 0:
+            least = np.partition(severities, spare)[spare]
+        rows = np.flatnonzero(severities >= least)
         cases = np.concatenate([self.cases, first + rows])
         severities = np.concatenate([self.severities, severities[rows]])
         order = np.lexsort((cases, -severities))[: self.keep]
@@ -281,8 +269,8 @@ CLASS_SIZE = 32  # cases in each of them, at least
 class FirstOrder:
     """Outcome to first order about nominal values (and biases).
 
-    ``jacobian`` (10, d): derivative of each row of `nutdamp.montecarlo.statistics.vectors` by each drawn input, in its
-    unit; ``sigmas`` (d,) standard deviations of the inputs, some of which are correlated in ``groups``.
+    ``jacobian`` (10, d): derivative of each row of `vectors` by each drawn input, in its unit; some of these are
+    correlated in ``groups``.
     """
 
     inputs: tuple[DispersedInput, ...]
@@ -294,11 +282,6 @@ class FirstOrder:
         """Standard deviations of the inputs, (d,)."""
         return np.array([entry.sigma for entry in self.inputs])
 
-    def covariance(self, output: str) -> Array:
-        """Covariance of the vector behind ``output``."""
-        scaled = self.independent(output)
-        return np.asarray(scaled @ scaled.T)
-
     def independent(self, output: str) -> Array:
         """Effect of one sigma of each input on that vector, (m, d); of correlated ones beyond those before it."""
         scaled = (self.jacobian * self.sigmas)[VECTORS[output]]
@@ -306,7 +289,8 @@ class FirstOrder:
 
     def sigma(self, output: str) -> float:
         """Root mean square of that vector about its mean, rad (rad/s, kg)."""
-        return float(np.sqrt(np.trace(self.covariance(output))))
+        scaled = self.independent(output)
+        return float(np.sqrt(np.trace(scaled @ scaled.T)))
 
     def effects(self, output: str) -> Array:
         """Effect of each input alone on ``output``, (d,): one sigma of it, or all of a bias."""
@@ -319,27 +303,23 @@ class FirstOrder:
         Of inputs that are correlated each has what it adds to those before it; the sum over them is the group's.
         """
         squares = (self.independent(output) ** 2).sum(axis=0)
-        total = squares.sum()
-        return np.asarray(squares / total if total > 0.0 else squares)
+        return np.asarray(squares / (squares.sum() or 1.0))
 
 
 ALIKE = 0.01  # relative difference up to which derivatives of the closed form may replace those of the flight
 
 
 def as_flown(model: DispersedModel, fly: Callable[[DispersedCases], Ends]) -> FirstOrder:
-    """Derivatives of the model that ``fly`` flies: those of the closed form, which have no rounding, where they agree.
-
-    By output and input; else central differences.
-    """
+    """Derivatives of the model that ``fly`` flies: of the closed form, without rounding, where it agrees with those."""
     flown = by_differences(model, fly)
     if model.schedule.blocks or not flown.inputs:
         return flown
-    closed, jacobian = first_order(model).jacobian, flown.jacobian.copy()
+    closed, jacobian = first_order(model).jacobian, flown.jacobian
     for rows in VECTORS.values():
         apart, size = (np.linalg.norm(vector[rows], axis=0) for vector in (closed - jacobian, jacobian))
         alike = apart <= ALIKE * size
         jacobian[rows, alike] = closed[rows, alike]
-    return FirstOrder(flown.inputs, jacobian, flown.groups)
+    return flown
 
 
 def by_differences(model: DispersedModel, fly: Callable[[DispersedCases], Ends]) -> FirstOrder:
@@ -360,25 +340,20 @@ def _varied(model: DispersedModel, fly: Callable[[DispersedCases], Ends], steps:
     """Outcome (10, d k) about nominal values (and biases), with each input off by its ``steps`` (d, k) in turn."""
     draws: dict[str, NDArray[Any]] = {}
     for index, entry in enumerate(model.inputs.drawn):
-        draw = np.full(steps.shape, entry.size if entry.kind == "bias" else 0.0, dtype=steps.dtype)
-        draw[index] += steps[index]
-        draws[entry.name] = draw.ravel()
-    out = np.empty((ROWS, steps.size), dtype=steps.dtype)
-    if draws:
-        vectors(model, fly(model.cases(draws)), out)
-    return out
+        draw = np.zeros_like(steps)
+        draw[index] = steps[index]
+        draws[entry.name] = draw.ravel() + (entry.size if entry.kind == "bias" else 0.0)
+    return vectors(model, fly(model.cases(draws)), steps.size) if draws else np.empty((ROWS, 0))
 
 
 def sampled_shares(draws: Mapping[str, Array], outcome: Array) -> dict[str, dict[str, float]]:
-    """First-order Sobol index of each input, by output, from n cases.
+    """First-order Sobol index of each input, by output, from ``draws`` (n,) and the outcome (10, n) of `vectors`.
 
-    ``draws`` (n,) by input; ``outcome`` (10, n) as `outputs.vectors` gives it. What the averaging over few cases adds
-    by chance, (classes - 1)/n of the variance, is taken off; nothing is below zero.
+    What the averaging over few cases adds by chance, (classes - 1)/n of the variance, is taken off; nothing is below 0.
     """
-    count = outcome.shape[1]
+    count, shares = outcome.shape[1], dict[str, dict[str, float]]()
     centred = outcome - outcome.mean(axis=1, keepdims=True)
     variances = {name: float((centred[rows] ** 2).sum()) for name, rows in VECTORS.items()}
-    shares: dict[str, dict[str, float]] = {}
     classes = min(CLASSES, max(count // CLASS_SIZE, 1))
     ranks = np.linspace(0, count, classes + 1).astype(int)[1:-1]
     for name, draw in draws.items():

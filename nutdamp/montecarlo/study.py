@@ -7,6 +7,7 @@ after the other.
 from __future__ import annotations
 
 import math
+import operator
 import os
 import threading
 from collections.abc import Callable, Iterator, Sequence
@@ -57,20 +58,15 @@ PORTION = 2 * STRIDE  # cases that a thread takes at once; blocks are multiples 
 
 
 class Round:
-    """Some cases of a study, flown by several threads that take one portion after the other.
-
-    A portion is a part of a block of draws: flying takes much longer than drawing, and few cases too are shared by the
-    threads.
-    """
+    """Some cases of a study, flown by several threads that take one portion of a block of draws after the other."""
 
     def __init__(self, results: Results, first: int, last: int, out: Array) -> None:
         self.results, self.first, self.last, self.out = results, first, last, out
-        self.severity = np.empty(last - first)
+        self.severity, self.emptied = np.empty(last - first), np.zeros(last - first, dtype=bool)
         self.aspects = out[len(OUTPUTS) :].reshape(-1, 2, last - first)  # the same memory
-        self.emptied = np.zeros(last - first, dtype=bool)
         self.portions = range(first // PORTION, math.ceil(last / PORTION))
         self.left = iter(self.portions)
-        self.finished = self.redrawn = 0
+        self.flown = self.redrawn = 0  # cases
         self.failures: list[BaseException] = []
         self.lock = threading.Lock()
 
@@ -86,18 +82,13 @@ class Round:
                 while worker.is_alive():
                     worker.join(0.1)
                     if worker.is_alive():
-                        watch(max(self._flown, self.first))
+                        watch(self.first + self.flown)
         except BaseException:
             self.left = iter(())  # nothing more is begun
             raise
         if self.failures:
             raise self.failures[0]
-        return max(self._flown - self.first, 0), self.redrawn
-
-    @property
-    def _flown(self) -> int:
-        """End states of the flown cases; below ``first`` where none is."""
-        return min(self.last, (self.portions[0] + self.finished) * PORTION)
+        return self.flown, self.redrawn
 
     def _work(self, stopped: Callable[[], bool]) -> None:
         try:
@@ -113,34 +104,27 @@ class Round:
                     drawn = source.block(block)
                 redrawn = self._fly(drawn, block * BLOCK, begin, end)
                 with self.lock:
-                    self.finished += 1
+                    self.flown += end - begin
                     self.redrawn += redrawn
         except BaseException as failure:  # handed to the thread that waits
-            with self.lock:
-                self.failures.append(failure)
-                self.left = iter(())
+            self.failures.append(failure)
+            self.left = iter(())
 
     def _fly(self, drawn: tuple[Draws, NDArray[np.intp]], start: int, begin: int, end: int) -> int:
         """Fly cases ``begin`` to ``end`` of the block that starts at ``start``; returns the number of redraws."""
-        study, early = self.results.study, self.results.early
-        draws, redrawn = drawn
+        study, early, (draws, redrawn) = self.results.study, self.results.early, drawn
         # Whole strides are flown, even for fewer cases: what flies them may let one depend on its stride.
         low, high = begin - begin % STRIDE, end + -end % STRIDE
-        rows = slice(low - start, high - start)
-        ends = study.flies(study.model.cases(some_of(draws, rows)))
-        inner = slice(begin - low, end - low)
-        outputs = np.empty((len(OUTPUTS), high - low))
-        measure(study.model, ends, outputs)
-        place = slice(begin - self.first, end - self.first)
+        ends = study.flies(study.model.cases(some_of(draws, slice(low - start, high - start))))
+        outputs = measure(study.model, ends, high - low)
+        inner, place = slice(begin - low, end - low), slice(begin - self.first, end - self.first)
         self.out[: len(OUTPUTS), place] = outputs[:, inner]
         self.severity[place] = study.severity(outputs, ends)[inner]
         self.emptied[place] = np.broadcast_to(np.real(ends.drained) > 1.0, high - low)[inner]
         if ends.aspects is not None:
             self.aspects[:, :, place] = ends.aspects[:, :, inner]
         if low < early.shape[1]:
-            outcome = np.empty((ROWS, high - low))
-            vectors(study.model, ends, outcome)
-            early[:, begin:end] = outcome[:, inner]
+            early[:, begin:end] = vectors(study.model, ends, high - low)[:, inner]
         return int(np.count_nonzero((redrawn >= begin - start) & (redrawn < end - start)))
 
 
@@ -169,8 +153,7 @@ class DrawnCases:
 
     def draws_of(self, case: int) -> dict[str, float]:
         """Deviations of one case (from 0), by input."""
-        draws, _ = self.source().block(case // BLOCK)
-        return {name: float(draw) for name, draw in some_of(draws, case % BLOCK).items()}
+        return {name: float(np.ravel(draw)[0]) for name, draw in self.draws_of_all(np.array([case])).items()}
 
     def draws_of_all(self, cases: NDArray[np.intp]) -> dict[str, Array | float]:
         """Deviations of ``cases`` (from 0, ascending), by input."""
@@ -207,9 +190,7 @@ class Study(DrawnCases):
 
     def outputs_of(self, draws: Draws) -> Array:
         """Outputs (5,) of one case with these deviations; none: of the estimate itself."""
-        out = np.empty((len(OUTPUTS), 1))
-        measure(self.model, self.ends_of(draws), out)
-        return out[:, 0]
+        return measure(self.model, self.ends_of(draws), 1)[:, 0]
 
     @property
     def nominal(self) -> Flight:
@@ -225,8 +206,7 @@ class Study(DrawnCases):
     def severity(self, values: Array, ends: Ends) -> Array:
         """Severity of cases, (n,), by `requirements.severity`, of the outputs (5, n) and ``ends`` of cases.
 
-        Where the axis breaks a cone on the way, or the tank runs empty, no better than the share of its bound, or of
-        the propellant, that is used up.
+        Never less than the used share of the bound of a cone on the way, or of the propellant.
         """
         body, aim = self.model.spacecraft, OUTPUTS.index(requirements.aim(self.model.spacecraft).value)
         shares = [*([] if ends.aspects is None else cones_used(body.keep, ends.aspects)), ends.drained]
@@ -236,8 +216,7 @@ class Study(DrawnCases):
     def lightening_error(self) -> str:
         """Message on the error of falling moments in cases, by the nominal one; empty where negligible.
 
-        They fall half as each pulse begins and half as it ends, which errs in second order; `propagation.flown` lets
-        them fall as the thrust goes.
+        They fall half at either edge of a pulse; `propagation.flown` lets them fall as the thrust goes.
         """
         body = self.model.spacecraft
         if shed(body) is None:
@@ -249,9 +228,8 @@ class Study(DrawnCases):
         if max(map(abs, errors.values())) < WORTH_SAYING:
             return ""
         message = " and ".join(f"{math.degrees(abs(error)):.2g} deg of {part.label}" for part, error in errors.items())
-        return (
-            f"cases let the moments of inertia fall at the edges of pulses: in the nominal one that errs by {message}"
-        )
+        text = "cases let the moments of inertia fall at the edges of pulses: in the nominal one that errs by"
+        return f"{text} {message}"
 
 
 @dataclass(eq=False)
@@ -309,24 +287,23 @@ class Counted:
 
 @dataclass(eq=False)
 class Results(Counted):
-    """Results of a study of a schedule.
+    """Results of a study of a schedule; ``emptied`` counts the cases whose tank runs empty.
 
     ``values`` (5 + 2m, capacity), outputs and the least and largest angle (rad) to the direction of each of m cones,
     are kept up to `EXACT_CASES`; beyond, ``sketches`` count. ``early`` (10, `EARLY`) is the outcome of the first cases.
-    ``emptied`` counts those whose tank runs empty.
     """
 
     study: Study
     emptied: int = 0
     early: Array = field(default_factory=lambda: np.zeros((ROWS, EARLY)))
     values: Array | None = field(init=False)
-    sketches: list[Sketch] | None = field(init=False)
+    sketches: list[Sketch] = field(init=False)
 
     def __post_init__(self) -> None:
         super().__post_init__()
         exact = self.requested <= EXACT_CASES
         self.values = np.empty((self.rows, self.requested)) if exact else None
-        self.sketches = None if exact else [Sketch() for _ in OUTPUTS]
+        self.sketches = [] if exact else [Sketch() for _ in OUTPUTS]
 
     @property
     def rows(self) -> int:
@@ -336,15 +313,13 @@ class Results(Counted):
     @property
     def exact(self) -> bool:
         """True if percentiles are exact."""
-        return self.sketches is None
+        return self.values is not None
 
     def distribution(self, output: str) -> Distribution | None:
         """Distribution of an output; None where it is unknown (propellant)."""
         row = OUTPUTS.index(output)
-        if self.sketches is not None:
-            sketch = self.sketches[row]
-            return None if math.isinf(sketch.minimum) or math.isnan(sketch.minimum) else sketch
-        assert self.values is not None
+        if self.values is None:
+            return self.sketches[row] if math.isfinite(self.sketches[row].minimum) else None
         values = self.values[row, : self.done]
         return None if not len(values) or math.isnan(values[0]) else Exact(values)
 
@@ -360,7 +335,7 @@ class Results(Counted):
         """Count further cases: outputs (5, n), see `count`; ``emptied`` (n,): whose tank runs empty."""
         missed = (severity > 1.0) & bool(requirements.required(self.study.model.spacecraft))
         self.emptied += int(np.count_nonzero(emptied))
-        for sketch, row in zip(self.sketches or (), values, strict=False):
+        for sketch, row in zip(self.sketches, values, strict=False):
             sketch.add(row)
         self.count(severity, angles, ~(missed | emptied))
 
@@ -384,9 +359,8 @@ def run(
 ) -> Results:
     """Fly the cases that ``results`` is to have and does not have yet; returns ``results``.
 
-    ``watch`` is called now and then with how many are done. When ``stopped`` says so, the cases done so far, always
-    the first ones, are kept. ``collect`` is given the number (from 0) of the first of some cases, and their
-    `Results.values`, in order.
+    ``watch`` is called now and then with how many are done, always the first ones; they are kept when ``stopped`` says
+    so. ``collect`` is given the number (from 0) of the first of some cases, and their `Results.values`, in order.
     """
     # The C library keeps freed memory up to twice the largest block freed so far: else each stride asks for new pages.
     np.empty(FREED, dtype=np.uint8)
@@ -476,8 +450,7 @@ class Checkpoints:
     @property
     def nutation(self) -> Range:
         """Angle from H to the spin axis at t = 0, rad."""
-        pairs = zip(self._initial.moments, self._initial.omega0, strict=True)
-        first, second, axial = (np.asarray(moment * rate, dtype=np.float64) for moment, rate in pairs)
+        first, second, axial = map(operator.mul, self._initial.moments, self._initial.omega0)
         return _range(np.arctan2(np.hypot(first, second), np.abs(axial + self._initial.wheel)))
 
     def nutation_after(self, counts: Sequence[int]) -> Iterator[Range]:
@@ -488,10 +461,9 @@ class Checkpoints:
             yield _range(self._flown(part, self._draws)[0][0])
 
     def window(self, probability: float) -> Range | None:
-        """Shifts (s) of all pulses with which the share ``probability`` of the cases complies, about none.
+        """Shifts (s) of all pulses with which the share ``probability`` of the cases complies; None without any.
 
-        As far as half a turn of spin or nutation, the faster, and no pulse before t = 0; None where too few comply
-        without a shift.
+        As far as half a turn of spin or nutation, the faster, and no pulse before t = 0.
         """
         schedule = self.study.model.schedule
         half, first = math.pi / self.study.model.spacecraft.fastest, min(pulse.loaded[0] for pulse in schedule)
@@ -520,8 +492,8 @@ class Checkpoints:
 
     def _flown(self, study: Study, draws: Draws) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Outputs (5, n) and severity (n,) of the cases."""
-        ends, outputs = study.flies(study.model.cases(draws)), np.empty((len(OUTPUTS), CASES))
-        measure(study.model, ends, outputs)
+        ends = study.flies(study.model.cases(draws))
+        outputs = measure(study.model, ends, CASES)
         return outputs, np.broadcast_to(study.severity(outputs, ends), CASES)
 
 
@@ -531,12 +503,11 @@ def _range(values: object) -> Range:
 
 def first_pulses(schedule: Schedule, count: int) -> Schedule:
     """First ``count`` pulses of a schedule, and the blocks cut to them."""
-    blocks: list[Block] = []
-    left = count
+    blocks, left = list[Block](), count
     for block in schedule.blocks:
         if left > 0:
             blocks.append(replace(block, count=min(block.count, left)))
-            left -= block.count
+        left -= block.count
     return replace(schedule, pulses=schedule.pulses[:count], blocks=tuple(blocks))
 
 

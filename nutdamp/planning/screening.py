@@ -25,7 +25,7 @@ from nutdamp.flight import propagation
 from nutdamp.montecarlo.cases import DispersedModel, number_of
 from nutdamp.montecarlo.inputs import Draws
 from nutdamp.montecarlo.propagated import ClosedForm
-from nutdamp.montecarlo.statistics import EXACT_CASES, OUTPUTS, ROWS, binomial_interval, vectors
+from nutdamp.montecarlo.statistics import EXACT_CASES, OUTPUTS, binomial_interval, vectors
 from nutdamp.montecarlo.study import CONFIDENCE, EARLY, Results, Study, run, study_of, threads_here
 from nutdamp.physics import attitude
 from nutdamp.planning import plan as planning
@@ -499,9 +499,7 @@ def _ends(body: Spacecraft, schedule: Schedule, draws: Draws) -> Vector:
     """End vectors (10, n) of cases in the closed form."""
     model = DispersedModel(body, schedule)
     cases = model.cases(draws)
-    ends = np.empty((ROWS, number_of(cases)))
-    vectors(model, ClosedForm(model)(cases), ends)
-    return ends
+    return vectors(model, ClosedForm(model)(cases), number_of(cases))
 
 
 def shortest(chosen: PlanCandidate, fresh: Fresh) -> FlownPlan:

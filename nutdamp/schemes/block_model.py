@@ -48,17 +48,13 @@ def spin_turn(spacecraft: Spacecraft) -> float:
 
     The body turns about H at |H|/A, and about its axis at ω3 - H3/A: together, and at small angles, at ω3.
     """
-    inertia = spacecraft.inertia
-    size = float(np.linalg.norm(spacecraft.momentum))
-    turning = spacecraft.spin - spacecraft.axial / inertia.A
-    return 2.0 * math.pi / abs(math.copysign(size / inertia.A, spacecraft.axial) + turning)
+    A, size = spacecraft.inertia.A, float(np.linalg.norm(spacecraft.momentum))
+    turning = spacecraft.spin - spacecraft.axial / A
+    return 2.0 * math.pi / abs(math.copysign(size / A, spacecraft.axial) + turning)
 
 
 def sun_pulses(flown: Flight, until: float) -> Vector:
-    """Times (n,) s from 0 to ``until`` s of the Sun pulses of the sensor; the flight must reach so far.
-
-    Raises Infeasible where the sensor never sees the Sun.
-    """
+    """Times (n,) s up to ``until`` s of the Sun pulses of a flight; raises Infeasible where the sensor sees none."""
     body = flown.spacecraft
     sensor, turn = body.sun_sensor, spin_turn(body) * min(1.0, abs(body.spin / flown.settled.spin))
     assert sensor is not None
@@ -68,7 +64,7 @@ def sun_pulses(flown: Flight, until: float) -> Vector:
     ahead = to_sun_pulse(flown, times)
     index = np.flatnonzero((ahead[:-1] < 0.5 * math.pi) & (ahead[1:] > 1.5 * math.pi))
     times_of = times[index] + ahead[index] * turn / (2.0 * math.pi)
-    for _ in range(ITERATIONS):  # three or four are usual
+    for _ in range(ITERATIONS):
         off = (to_sun_pulse(flown, np.minimum(times_of, until)) + math.pi) % (2.0 * math.pi) - math.pi
         times_of += off * turn / (2.0 * math.pi)
         if not len(times_of) or np.abs(off).max() < 2.0 * math.pi * EXACT:
@@ -106,8 +102,7 @@ class SunPulses:
     ``numbers``: those of each flight, 1 the first after t = 0; they must not decrease. Iterating gives the motion of
     all at a passage of the Sun, and the flights that one of their numbers comes to then. ``seen``: whether the sensor
     saw each passage so far, (n,); those that it saw count. ``failures``: why a flight ended before its last number, or
-    None: its axis is too near to the Sun, or the sensor sees it no more. Raises Infeasible where there is no Sun or no
-    sensor.
+    None. Raises Infeasible where there is no Sun or no sensor.
     """
 
     def __init__(self, spacecraft: Spacecraft, numbers: Sequence[Sequence[int]]) -> None:
@@ -124,7 +119,7 @@ class SunPulses:
 
     def __iter__(self) -> Iterator[tuple[MotionStretch, list[int]]]:
         clock, sensor, count = self.clock, self._sensor, np.zeros(len(self._due), dtype=np.int64)
-        unseen = [list[tuple[float, float]]() for _ in self._due]
+        blind, since, off = 0 * count, 0.0 * count, 0.0 * count  # passages unseen in a row; time and angle of the first
         while (following := int(self._due.min(initial=NEVER))) < NEVER:
             before, passage = clock.time, following if sensor.sees_all else len(self.seen) + 1
             motion = clock.sun_pulse(passage)
@@ -135,12 +130,10 @@ class SunPulses:
             sees = sensor.sees_all | np.asarray(sensor.sees(angles))
             count = np.full_like(count, passage) if sensor.sees_all else count + sees
             self.seen += [sees] * (passage - len(self.seen))
-            for flight in np.flatnonzero(~sees & (self._due < NEVER)).tolist():
-                unseen[flight].append((float(motion.since[flight]), float(angles[flight])))
-                if len(unseen[flight]) > BLIND:
-                    self.fail(flight, _blind(*unseen[flight][0]))
-            for flight in np.flatnonzero(sees).tolist():
-                unseen[flight].clear()
+            blind = np.where(sees, 0, blind + 1)
+            since, off = np.where(blind == 1, (motion.since, angles), (since, off))
+            for flight in np.flatnonzero((blind > BLIND) & (self._due < NEVER)).tolist():
+                self.fail(flight, _blind(float(since[flight]), float(off[flight])))
             flights = np.flatnonzero(sees & (count >= self._due)).tolist()
             for flight in flights:
                 self._due[flight] = next(self._numbers[flight], NEVER)
@@ -180,16 +173,11 @@ def first_sun_pulse(spacecraft: Spacecraft) -> float:
 
 
 def fired(spacecraft: Spacecraft, blocks: Sequence[Block], seed: int | None = None) -> Schedule:
-    """Pulses fired by ``blocks``, see `fire`."""
-    return fire(spacecraft, blocks, seed)[0]
-
-
-def fire(spacecraft: Spacecraft, blocks: Sequence[Block], seed: int | None = None) -> tuple[Schedule, list[bool]]:
-    """Pulses fired by ``blocks``, and `SunPulses.seen`; raises what `fire_all` gives as reasons."""
-    (schedule,), seen = fire_all(spacecraft, [blocks], seed)
+    """Pulses fired by ``blocks``; raises what `fire_all` gives as reasons."""
+    (schedule,), _ = fire_all(spacecraft, [blocks], seed)
     if isinstance(schedule, Infeasible):
         raise schedule
-    return schedule, [bool(sees[0]) for sees in seen]
+    return schedule
 
 
 def fire_all(
@@ -197,13 +185,13 @@ def fire_all(
 ) -> tuple[list[Schedule | Infeasible], list[NDArray[np.bool_]]]:
     """Pulses fired by each of the sequences of blocks, with the Sun pulses of its own motion, and `SunPulses.seen`.
 
-    With a ``seed`` the Sun pulses have the jitter of the sensor, which the nominal motion is without. In the place of a
-    schedule is the reason where there is no Sun pulse, where a channel is not known, where a pulse would begin before
-    the one before is over, and where the propellant does not last.
+    With a ``seed`` the Sun pulses have the jitter of the sensor. In the place of a schedule is the reason where there
+    is no Sun pulse, a channel is not known, a pulse would begin before the one before is over, or the tank is empty.
     """
     sun_pulses = SunPulses(spacecraft, [[n for block in blocks for n in block.sun_pulses] for blocks in sequences])
     supplies, pulses = [Supply(spacecraft) for _ in sequences], [list[Pulse]() for _ in sequences]
-    firings = [_firing(spacecraft, *each) for each in zip(sequences, supplies, strict=True)]
+    firings = [iter([block for block in blocks for _ in block.sun_pulses]) for blocks in sequences]
+    channels = {channel.name: channel for channel in spacecraft.channels}
     clock, sensor, errors = sun_pulses.clock, spacecraft.sun_sensor, np.random.default_rng(seed)
     jitter, count = 0.0 if seed is None or sensor is None else sensor.jitter, len(sequences)
     arcs, per_kg = spacecraft.inertia.symmetric and not spacecraft.disturbances, shed(spacecraft)
@@ -212,11 +200,12 @@ def fire_all(
         work.spend((0.0 if arcs else INTEGRATED) + FIRED * len(flights))
         delays, widths, given = motion.since * 0.0, np.zeros(count), dict[int, Pulse]()
         for flight in flights:
-            try:
-                block, given[flight] = next(firings[flight])
-            except Infeasible as reason:
-                sun_pulses.fail(flight, reason)
+            block = next(firings[flight])
+            channel = channels.get(block.channel)
+            if channel is None:
+                sun_pulses.fail(flight, Infeasible(f"the spacecraft has no channel {block.channel}"))
                 continue
+            given[flight] = supplies[flight].fire(on_command(channel, 0.0, block.width), channel)
             delays[flight], widths[flight] = jitter * errors.standard_normal() + block.delay, block.width
             due = float(motion.since[flight] + delays[flight])
             if due < over[flight] - 1e-9:
@@ -236,32 +225,18 @@ def fire_all(
     return [reason or each for reason, each in zip(sun_pulses.failures, schedules, strict=True)], sun_pulses.seen
 
 
-def _firing(spacecraft: Spacecraft, blocks: Sequence[Block], supply: Supply) -> Iterator[tuple[Block, Pulse]]:
-    """Each pulse of ``blocks``, as from t = 0, with its block; raises Infeasible for a channel that is not known."""
-    channels = {channel.name: channel for channel in spacecraft.channels}
-    for block in blocks:
-        for _ in block.sun_pulses:
-            if block.channel not in channels:
-                raise Infeasible(f"the spacecraft has no channel {block.channel}")
-            channel = channels[block.channel]
-            yield block, supply.fire(on_command(channel, 0.0, block.width), channel)
-
-
 def _together(given: Mapping[int, Pulse], count: int) -> list[TorqueRamp]:
     """Torques of ``count`` flights by the pulses of some: of the others, and once a pulse is over, there are none."""
-    ramps = {
-        flight: pushes(pulse, (np.zeros(3) if pulse.torque is None else pulse.torque)[:, None])
-        for flight, pulse in given.items()
-    }
-    together = []
-    for index in range(max(map(len, ramps.values()), default=0)):
-        begin, end, first, last = np.zeros(count), np.zeros(count), np.zeros((3, count)), np.zeros((3, count))
-        for flight, each in ramps.items():
-            ramp = each[min(index, len(each) - 1)] if each else TorqueRamp(0.0, 0.0, first[:, :1], last[:, :1])
-            begin[flight], end[flight] = ramp.begin if index < len(each) else ramp.end, ramp.end
-            if index < len(each):
-                first[:, [flight]], last[:, [flight]] = ramp.first, ramp.last
-        together.append(TorqueRamp(begin, end, first, last))
+    zero, together = np.zeros((3, 1)), list[TorqueRamp]()
+    ramps = [pushes(pulse, zero if pulse.torque is None else pulse.torque[:, None]) for pulse in given.values()]
+    for index in range(max(map(len, ramps), default=0)):
+        ramp = TorqueRamp(np.zeros(count), np.zeros(count), np.zeros((3, count)), np.zeros((3, count)))
+        for flight, each in zip(given, ramps, strict=True):
+            over = each[-1].end if each else 0.0
+            here = each[index] if index < len(each) else TorqueRamp(over, over, zero, zero)
+            ramp.begin[flight], ramp.end[flight] = here.begin, here.end
+            ramp.first[:, [flight]], ramp.last[:, [flight]] = here.first, here.last
+        together.append(ramp)
     return together
 
 
@@ -315,8 +290,7 @@ class BlockState:
     """Motion between two blocks: one, or many at once.
 
     ``sun_angle`` and ``longitude`` of H about the Sun, rad; ``sun_pulse``: when the next one comes, s; ``phasor``:
-    A ω (N m s) at that moment; ``spin`` rad/s; ``used`` kg of propellant, 0 where every pulse is of full thrust;
-    ``cost`` as `Channel.cost_rate` counts it; ``fired``: pulses by channel.
+    A ω (N m s) then; ``spin`` rad/s; ``used`` kg, 0 where every pulse is of full thrust; ``fired``: pulses by channel.
     """
 
     sun_angle: Any
@@ -330,8 +304,8 @@ class BlockState:
 
     def shifted(self, off: BlockState) -> BlockState:
         """Copy with H, the nutation and the spin ``off`` by so much."""
-        here = replace(self, sun_angle=self.sun_angle + off.sun_angle, longitude=self.longitude + off.longitude)
-        return replace(here, phasor=self.phasor + off.phasor, spin=self.spin + off.spin)
+        names = "sun_angle", "longitude", "phasor", "spin"
+        return replace(self, **{name: getattr(self, name) + getattr(off, name) for name in names})
 
 
 class BlockModel:
@@ -371,8 +345,7 @@ class BlockModel:
 
     def turned_by(self, channel: Channel, width: Any, spin: Any) -> Any:
         """Turn of H by one pulse, rad."""
-        given = acts(channel, width)
-        momentum = abs(self.inertia.axial(spin))
+        given, momentum = acts(channel, width), abs(self.inertia.axial(spin))
         return precession.turned_by(momentum, abs(channel.transverse), given.on_time, spin, given.spread)
 
     def full_pulses(self, state: BlockState, channel: Channel, width: Any, count: Any) -> tuple[Any, Any]:
@@ -416,8 +389,7 @@ class BlockModel:
     def heading(self, channel: Channel, delay: Any, width: Any) -> Any:
         """Heading of H from the direction away from the Sun, right-handed about H, rad: the same for all pulses.
 
-        At the centroid of a pulse, width/2 without a valve, the Sun has turned in the body by -ω3 (delay + centroid)
-        from the sensor.
+        At the centroid of a pulse the Sun has turned in the body by -ω3 (delay + centroid) from the sensor.
         """
         turned = self.body.spin * (delay + acts(channel, width).centroid)
         from_sun = cmath.phase(channel.transverse) - self.sensor.azimuth + turned
@@ -442,7 +414,7 @@ class BlockModel:
 
     def course(self, state: BlockState) -> tuple[Any, Any]:
         """Heading to the target axis, and the way along the rhumb line, rad."""
-        goal_angle = math.atan2(math.hypot(self.goal[0], self.goal[1]), self.goal[2])
+        goal_angle = math.atan2(math.hypot(*self.goal[:2]), self.goal[2])
         return precession.rhumb_course(state.sun_angle, goal_angle, self.ahead(state))
 
     def ahead(self, state: BlockState) -> Any:
@@ -466,9 +438,8 @@ class BlockModel:
         following = first + (trial.count - 1) * interval + turn
         rate = self.rate(spin)
         kick = channel.transverse * np.sinc(0.5 * rate * given.spread / np.pi)
-        since_last = turn - trial.delay - given.centroid
-        kicks = self.kicks(state, channel, trial, rate * interval, back=True)
-        gathered = kick * np.exp(-1j * rate * since_last) * kicks
+        kick = kick * np.exp(-1j * rate * (turn - trial.delay - given.centroid))
+        gathered = kick * self.kicks(state, channel, trial, rate * interval, back=True)
         return BlockState(
             sun_angle=sun_angle,
             longitude=state.longitude + longitude,

@@ -74,10 +74,8 @@ DEARER = 1.01  # multiple of the cost of a sequence that complied in a flight fr
 
 
 class BlockSequence(NamedTuple):
-    """Blocks and their rank in closed form: the less, the better.
-
-    ``rank``: the share of a bound that is used up, zero where all are kept, then the cost, then the time of the end;
-    ``share``: the share.
+    """Blocks, and their rank in closed form, the less, the better: the share of a bound, 0 where all are kept, then
+    the cost, then the time of the end; and the ``share``.
     """
 
     blocks: Blocks
@@ -99,16 +97,17 @@ START = BlockSequence((), (math.inf, math.inf, math.inf))  # no blocks, before w
 class BlockFlights:
     """Flights of sequences of one spacecraft: ``of`` each, and the least cost that is ``known`` to comply.
 
-    ``bounds``: what they are judged by.
+    ``bounds``: what they are judged by; ``damps``: where the nutation alone is to be lowered.
     """
 
     def __init__(self, spacecraft: Spacecraft) -> None:
         self.body, self.known = spacecraft, math.inf
-        self.bounds, lower = list(requirements.bounds(spacecraft)), 0.98 * spacecraft.nutation
-        if spacecraft.goal.axis is None and spacecraft.goal.spin is None:  # then blocks are to lower the nutation
-            for index, bound in enumerate(self.bounds):
-                if bound.part is Part.NUTATION:
-                    self.bounds[index] = bound._replace(most=min(bound.most, lower))
+        self.damps = spacecraft.goal.axis is None and spacecraft.goal.spin is None
+        lower = 0.98 * spacecraft.nutation if self.damps else math.inf  # blocks without a goal are to lower it
+        self.bounds = [
+            bound._replace(most=min(bound.most, lower)) if bound.part is Part.NUTATION else bound
+            for bound in requirements.bounds(spacecraft)
+        ]
         self.of: dict[Blocks, FlownSequence] = {}
         self._fired: dict[Blocks, Schedule | Infeasible] = {}
 
@@ -118,14 +117,11 @@ class BlockFlights:
 
     def shares(self, left: Left) -> dict[Part, NDArray[np.float64]]:
         """Share of each bound that is ``left``."""
-        parts = [(bound.part, bound.most) for bound in self.bounds]
-        return {part: np.asarray(requirements.left_of(part, left, self.body) / most) for part, most in parts}
+        left_of, body = requirements.left_of, self.body
+        return {bound.part: np.asarray(left_of(bound.part, left, body) / bound.most) for bound in self.bounds}
 
     def fired(self, sequences: Sequence[BlockSequence]) -> Iterator[BlockSequence]:
-        """The sequences, one after the other, but for those that cost more than one that complied in a flight.
-
-        The pulses of a dozen of them are fired together.
-        """
+        """The sequences that cost no more than one that complied in a flight; a dozen of them are fired together."""
         for begin in range(0, len(sequences), FLOWN):
             some = [each for each in sequences[begin : begin + FLOWN] if each.rank[1] <= self.known * DEARER]
             new = [sequence.blocks for sequence in some if sequence.blocks not in self._fired]
@@ -173,10 +169,7 @@ def by_blocks(sequences: Iterable[BlockSequence]) -> dict[tuple[Block, ...], Blo
 
 
 def of_each_kind(ranked: Iterable[BlockSequence], *names: str) -> list[BlockSequence]:
-    """The first sequence of each kind, blocks with the same values of these fields: flights may differ.
-
-    By default the channel and the interval, where closed forms do not differ.
-    """
+    """The first sequence of each kind, by the fields of its blocks that are named; default channel and interval."""
     kinds: dict[tuple[object, ...], BlockSequence] = {}
     fields = operator.attrgetter(*(names or ("channel", "every")))
     for sequence in ranked:
@@ -203,7 +196,7 @@ class BlockSearch:
         self.dark = Windows(spacecraft).dark
         self.earliest = max(math.ceil((limits.earliest - self.model.start.sun_pulse) / turn), 0)
         # Where the nutation alone is to be lowered, and H may end anywhere, delays alone meet phases: fewer waits do.
-        self._damps = spacecraft.goal.axis is None and spacecraft.goal.spin is None
+        self._damps = self.flights.damps
         self._waiting = WAITS // 3 if self._damps and Part.SHIFT not in self._most else WAITS
         self._every = [every for every in commands.every if every * turn >= limits.gap + float(commands.widths[0])]
         self._kinds = list(itertools.product(channels, self._every))
@@ -219,15 +212,17 @@ class BlockSearch:
         sequences = self._single()
         firsts: list[BlockSequence] = []
         for number in range(2, most + 1):
-            self.most = self.least_cost(sequences)
+            complying = (sequence for sequence in sequences if sequence.rank[0] <= 0.0)
+            cheapest = by_blocks(nsmallest(ALIKE * DOUBTS, complying, key=_rank))
+            self.most = self._first_complying(list(cheapest.values()))
             if work.exhausted() or (self.most < math.inf and not (self.small or self._dear)):
                 break
             if number == 2:
                 small = self._further([START], few=2) if abs(self.model.start.phasor) > 0.0 else []
                 firsts = [*_promising(sequences, FIRST), *_promising(small, FIRST), *self._parts()[:FIRST]]
                 if self.small:  # the 300 cheapest of all
-                    start = self.model.start
-                    every = self.behind([START], start, self._grid(start, self.earliest), ALL_FIRSTS)
+                    grid = self._grid(self.model.start, self.earliest)
+                    every = self.behind([START], self.model.start, grid, ALL_FIRSTS)
                     firsts += sorted(every, key=lambda first: first.rank[1])[:ALL_FIRSTS]
             else:
                 firsts = _promising(firsts, FIRST // 2)
@@ -247,11 +242,6 @@ class BlockSearch:
         more = by_blocks((*_front(ranked)[:FLOWN], *of_each_kind(ranked)[:FLOWN], *gentle))
         others = (sequence for blocks, sequence in more.items() if blocks not in first)
         return [*first.values(), *islice(others, 4 * FLOWN)]
-
-    def least_cost(self, sequences: Iterable[BlockSequence]) -> float:
-        """Least cost, kg, of the sequences that comply in closed form and when flown; infinite where none is known."""
-        complying = (sequence for sequence in sequences if sequence.rank[0] <= 0.0)
-        return self._first_complying(list(by_blocks(nsmallest(ALIKE * DOUBTS, complying, key=_rank)).values()))
 
     def _first_complying(self, sequences: Sequence[BlockSequence]) -> float:
         """Fly sequences until one complies, and return its cost, kg; infinite where none does."""
@@ -281,10 +271,8 @@ class BlockSearch:
 
     def _largest_pulse(self, sequence: BlockSequence) -> float:
         """The most by which one of its pulses turns H, rad."""
-        spin = self.body.spin
-        return max(
-            float(self.model.turned_by(self._named[block.channel], block.width, spin)) for block in sequence.blocks
-        )
+        pulses = ((self._named[block.channel], block.width) for block in sequence.blocks)
+        return max(float(self.model.turned_by(*pulse, self.body.spin)) for pulse in pulses)
 
     def state(self, blocks: Blocks) -> BlockState:
         """Motion after blocks, in closed form."""
@@ -314,7 +302,7 @@ class BlockSearch:
         """The best of the ``trials`` of each channel, after the blocks ``before``, from their `_motions`, ``state``.
 
         The axes of trials are the sequences before, and three more: the best ``few`` are chosen along the last two.
-        ``off``: by how much they end elsewhere than the closed form says, as far as that is known.
+        ``off``: by how much they end elsewhere than the closed form says.
         """
         following, sequences = np.array([_following(each.blocks) for each in before]), list[BlockSequence]()
         for channel, trial in trials:
@@ -360,10 +348,7 @@ class BlockSearch:
         return np.arange(1, max(min(most, self.allowed), 0) + 1)
 
     def _single(self) -> list[BlockSequence]:
-        """The best single blocks, of all widths, numbers and intervals at the delays that serve best.
-
-        What surely ends worse than the best ones found is left out: see `_short_by`.
-        """
+        """The best single blocks at the delays that serve best, without those that surely end worse by `_short_by`."""
         start = self.model.start
         waits = self._waits(start, self.earliest, self._waiting if abs(start.phasor) > 0.0 else 1)
         short = [(channel, every, self._short_by(start, channel, every)) for channel, every in self._kinds]
@@ -384,13 +369,12 @@ class BlockSearch:
     def _short_by(self, state: BlockState, channel: Channel, every: int) -> Array:
         """Least miss of blocks of each width and number, (k, w n) after each of k motions, in shares of its bound.
 
-        Where the spin is to change, the spin. With a target the length of the rhumb line: a block that is longer or
-        shorter than the way ends no nearer than a third of the difference. Else the nutation, which they can lower by
-        the sum of their kicks at most.
+        Of the spin where it is to change; with a target of the length of the rhumb line, of which a block ends no
+        nearer than a third of the difference; else of the nutation, lowered by the sum of their kicks at most.
         """
-        widths, counts = commandable_widths(self.commands, channel)[:, None], self._counts(state, every)
         if self._damps:
             return self._undamped(state, channel, every)
+        widths, counts = commandable_widths(self.commands, channel)[:, None], self._counts(state, every)
         if self.body.goal.spin is not None:
             gained = channel.axial * acts(channel, widths).on_time * counts / self.model.inertia.C
             lacks = np.abs(self.body.goal.spin - state.spin - gained) / self._most[Part.SPIN]
@@ -515,15 +499,11 @@ class BlockSearch:
 
     def doubted(self) -> None:
         """Fly sequences cheaper than the best of the flights, the cheapest first, until one complies."""
-        most = self.flights.known * (1.0 - SAME_COST)
-        flown = self.flights.of
+        most, flown = self.flights.known * (1.0 - SAME_COST), self.flights.of
         self._first_complying([each for each in self.doubtful if each.rank[1] < most and each.blocks not in flown])
 
     def nearer(self) -> list[BlockSequence]:
-        """Neighbours of the best of the flights that leave least where the closed form errs as it does for those.
-
-        Nutation on the way, which that form leaves out, is much the same then.
-        """
+        """Neighbours of the best of the flights that leave least where the closed form errs as it does for those."""
         sequences = list[BlockSequence]()
         best = of_each_kind(flight.sequence for flight in self.flights.all)
         for flight in (self.flights.of[each.blocks] for each in best[:CORRECTED]):
@@ -534,8 +514,8 @@ class BlockSearch:
             sequences += self.behind([before], state, trials, off=off)
         other = (sequence for sequence in sequences if sequence.blocks not in self.flights.of)
         ranked = by_blocks(sorted(other, key=_rank))
-        clear = nsmallest(FLOWN // 2, ranked.values(), key=_share)
-        chosen = by_blocks((*islice(ranked.values(), FLOWN // 2), *clear, *of_each_kind(ranked.values())))
+        clear, first = nsmallest(FLOWN // 2, ranked.values(), key=_share), islice(ranked.values(), FLOWN // 2)
+        chosen = by_blocks((*first, *clear, *of_each_kind(ranked.values())))
         for blocks, sequence in chosen.items():  # ranked by the closed form alone
             share = float(self.flights.share(self.model.left(self.state(blocks))))
             chosen[blocks] = sequence._replace(rank=(share if share > 1.0 else 0.0, *sequence.rank[1:]), share=share)

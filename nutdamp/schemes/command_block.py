@@ -8,7 +8,7 @@ have a torque about axis 3: the spin leg behind them is planned on what they lea
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -102,7 +102,7 @@ def schedule(spacecraft: Spacecraft, options: CommandBlockOptions) -> Schedule:
     if alone:
         chosen = _searched(spacecraft, most)
     else:
-        chosen = spin_and_turn(spacecraft, lambda leg, few: _searched(leg, few).schedule, most)
+        chosen = spin_and_turn(spacecraft, most)
         missed = [*used_up(spacecraft, chosen.schedule)] or [note("finer-commands")]
         in_legs = (note("blocks-in-legs"), *missed * (chosen.rank[1] > 1.0))
         chosen = chosen._replace(schedule=replace(chosen.schedule, notes=in_legs))
@@ -155,10 +155,10 @@ def _searched(spacecraft: Spacecraft, most: int | None) -> FlownSequence:
     search.doubted()
     if not search.flights.of:
         raise Infeasible(why)
-    leading, *_ = flights = search.flights.all
     # Of those that cost as much as the best the fewest pulses, then the earlier end.
-    alike = [flight for flight in flights if flight.rank[:2] == leading.rank[:2]]
-    equal = [flight for flight in alike if flight.rank[2] <= leading.rank[2] * (1.0 + SAME_COST)]
+    broken, missed, cost, _ = search.flights.all[0].rank
+    alike = [flight for flight in search.flights.all if flight.rank[:2] == (broken, missed)]
+    equal = [flight for flight in alike if flight.rank[2] <= cost * (1.0 + SAME_COST)]
     chosen = min(equal, key=lambda flight: (len(flight.schedule), flight.schedule.end, flight.rank))
     first = chosen.sequence.rank[:2] <= best[0].rank[:2]
     notes = [scope_note(search, chosen, first=first)]
@@ -172,10 +172,8 @@ LEGS = 6  # legs of a row of blocks, at most: spin and turn, and both mended twi
 MARGIN = 0.97
 """Share of a bound that the turn may use up before the spin is changed, and the inverse for what that may add."""
 
-Searched = Callable[[Spacecraft, int | None], Schedule]  # blocks of one leg, of up to so many; raises Infeasible
 
-
-def spin_and_turn(spacecraft: Spacecraft, searched: Searched, most: int | None) -> FlownSequence:
+def spin_and_turn(spacecraft: Spacecraft, most: int | None) -> FlownSequence:
     """Blocks, ``most`` of them, that bring the spin to its goal, and turn or damp: the best of the orders tried.
 
     The other order is tried where the cheaper one does not comply. Raises Infeasible with the first reason.
@@ -186,9 +184,9 @@ def spin_and_turn(spacecraft: Spacecraft, searched: Searched, most: int | None) 
     flights, why = BlockFlights(spacecraft), list[Infeasible]()
     for first in (turns_first, not turns_first):
         try:
-            gained = _flown(spacecraft, flights, searched, most, goal, turns_first=first)
+            gained = _flown(spacecraft, flights, most, goal, turns_first=first)
             if not first and gained != 0.0 and not work.exhausted():
-                _flown(spacecraft, flights, searched, most, goal - gained, turns_first=first)
+                _flown(spacecraft, flights, most, goal - gained, turns_first=first)
         except Infeasible as reason:
             why.append(reason)
         if flights.complies or work.exhausted():
@@ -198,9 +196,7 @@ def spin_and_turn(spacecraft: Spacecraft, searched: Searched, most: int | None) 
     return flights.all[0]
 
 
-def _flown(
-    body: Spacecraft, flights: BlockFlights, searched: Searched, most: int | None, aim: float, *, turns_first: bool
-) -> float:
+def _flown(body: Spacecraft, flights: BlockFlights, most: int | None, aim: float, *, turns_first: bool) -> float:
     """Fly a row of legs, the first of the spin to ``aim`` rad/s; returns the change of the spin, rad/s, by a second
     leg that turned, where it takes the spin off its goal.
     """
@@ -230,7 +226,7 @@ def _flown(
             continue
         try:
             leg = replace(here, requirement=Requirement(*allowed), limits=replace(here.limits, horizon=horizon))
-            legs.fire(searched(leg, room))
+            legs.fire(_searched(leg, room).schedule)
         except Infeasible:
             if number < 2:
                 raise

@@ -47,8 +47,7 @@ def plain(
 ) -> Spacecraft:
     """Body that schemes plan for: rectangles of full thrust within the capability of the channels.
 
-    Their pulses may be as weak and as strong as ``weakest`` and ``strongest`` times the thrust of the file, and
-    ``room`` s longer at either end. Its moments are those with so many kg ``used``.
+    Pulses may be ``weakest`` to ``strongest`` times as strong, and ``room`` s longer at either end; ``used`` is in kg.
     """
     limits, channels, leads, lags = spacecraft.limits, list[Channel](), list[float](), list[float]()
     for channel in spacecraft.channels:
@@ -84,15 +83,11 @@ def options(spacecraft: Spacecraft, chosen: SchemeOptions) -> SchemeOptions:
     requested = getattr(chosen, "on_time", None)
     if requested is None:
         return chosen
-    on_times = {
-        requested if channel.valve is None else channel.valve.thrust(requested).on_time
-        for channel in spacecraft.channels
-    }
+    valves = [channel.valve for channel in spacecraft.channels]
+    on_times = {requested if valve is None else valve.thrust(requested).on_time for valve in valves}
     if len(on_times) > 1:
-        raise Infeasible(
-            f"an on-time of {requested:.4g} s is for channels with the same valve; these give pulses of different "
-            "length"
-        )
+        text = f"an on-time of {requested:.4g} s is for channels with the same valve; these give pulses of different"
+        raise Infeasible(f"{text} length")
     return replace(chosen, on_time=on_times.pop()) if on_times else chosen  # type: ignore[call-arg]
 
 
@@ -105,14 +100,12 @@ def planned(spacecraft: Spacecraft, plan: Callable[[Spacecraft], Schedule], corr
         body = plain(spacecraft, weakest, strongest, room, 0.5 * used)
         try:
             schedule = plan(body)
-        except TooShort as short:
-            if schedule is None:
-                raise TooShort(short.why + EFFECTIVE, short.cure) from None
-            break
         except Infeasible as reason:
-            if schedule is None:
-                raise Infeasible(f"{reason}{EFFECTIVE}") from None
-            break
+            if schedule is not None:
+                break
+            if isinstance(reason, TooShort):
+                raise TooShort(reason.why + EFFECTIVE, reason.cure) from None
+            raise Infeasible(f"{reason}{EFFECTIVE}") from None
         too_weak, too_strong, longer = _outside(spacecraft, schedule, body.inertia, correct)
         if too_weak or too_strong:
             weakest, strongest = min([weakest, *too_weak]), max([strongest, *too_strong])
@@ -128,10 +121,9 @@ def planned(spacecraft: Spacecraft, plan: Callable[[Spacecraft], Schedule], corr
             break
         kept, left = keeps_limits(spacecraft, commands.pulses), _left(spacecraft, commands, correct)
         tried.append((not kept, left, commands))
-        rounded = spacecraft.limits.tick is not None
         if work.exhausted() or not schedule.pulses:
             break
-        if kept and (rounded or left <= NEARLY * _left(body, schedule, correct) + EXACT):
+        if kept and (spacecraft.limits.tick is not None or left <= NEARLY * _left(body, schedule, correct) + EXACT):
             break
         # What is longer than planned, or has been moved, met its neighbour or a window: the next one leaves room.
         room = max(2.0 * room, longer, ROOM * max(pulse.on_time for pulse in schedule))
@@ -156,10 +148,8 @@ def as_commands(
     """
     commands = _translated(spacecraft, schedule, inertia, correct)
     first = _firing(replace(schedule.without_proof, pulses=commands))
-    if spacecraft.limits.tick is None or not first.pulses:
-        corrected = correct(spacecraft, first, TAIL)
-    else:
-        corrected = _on_ticks(spacecraft, first, correct)
+    ticks = spacecraft.limits.tick is not None and first.pulses
+    corrected = _on_ticks(spacecraft, first, correct) if ticks else correct(spacecraft, first, TAIL)
     firing = _firing(corrected)
     if firing.pulses:
         supply, channels = Supply(spacecraft), {channel.name: channel for channel in spacecraft.channels}
@@ -203,8 +193,7 @@ def _translated(
     """Pulses as the commands of their impulse and centroid; ``unbounded``: as rectangles of any length.
 
     Where moments fall it changes ω, or the direction of H, as the pulse did with the ``inertia`` of the plan, and where
-    H does not count it comes as the nutation has turned in the body as far. Raises Infeasible for pulses so weak that
-    they would be longer than the horizon.
+    H does not count it comes as the nutation has turned in the body as far. Raises Infeasible where one is too weak.
     """
     supply, channels, pulses = Supply(spacecraft), {channel.name: channel for channel in spacecraft.channels}, []
     planned_, before, late = inertia or spacecraft.inertia, 0.0, 0.0
@@ -235,23 +224,18 @@ def _translated(
 def _outside(
     spacecraft: Spacecraft, schedule: Schedule, inertia: Inertia, correct: Correction
 ) -> tuple[list[float], list[float], float]:
-    """Levels, over the thrust of the file, of pulses so weak, and so strong, that no command of a channel gives them.
-
-    And by how much, s, a pulse becomes longer at either end. Raises as `_translated` does.
-    """
+    """Levels of pulses too weak, and too strong, for any command; s by which one becomes longer at each end."""
     channels = {channel.name: channel for channel in spacecraft.channels}
     weak, strong, longer = [], [], 0.0
-    for planned_, pulse in zip(
-        schedule, _translated(spacecraft, schedule, inertia, correct, unbounded=True), strict=True
-    ):
+    translated = _translated(spacecraft, schedule, inertia, correct, unbounded=True)
+    for planned_, pulse in zip(schedule, translated, strict=True):
         longer = max(longer, 0.5 * (pulse.on_time - planned_.on_time))
         channel = channels.get(pulse.channel)
         if channel is None or pulse.torque is None:
             continue
         least, most = effective_on_times(channel)
         level = float(np.linalg.norm(pulse.torque) / np.linalg.norm(channel.torque))
-        if shed(spacecraft) is not None:
-            level = planned_.on_time / pulse.on_time
+        level = level if shed(spacecraft) is None else planned_.on_time / pulse.on_time
         if pulse.on_time > most * (1.0 + ROUNDING):
             weak.append(level)
         if pulse.on_time < least * (1.0 - ROUNDING):
@@ -260,11 +244,7 @@ def _outside(
 
 
 def _on_ticks(spacecraft: Spacecraft, made: Schedule, correct: Correction) -> Schedule:
-    """Schedule on the ticks of its commands.
-
-    It is rounded all at once, and one of the last pulses after the other with those behind it corrected: what leaves
-    less is taken.
-    """
+    """Schedule on the ticks of its commands: the better of rounding all at once, and the last pulses in turn."""
     smooth = replace(spacecraft, limits=replace(spacecraft.limits, tick=None))
     made = correct(smooth, made, TAIL)
 

@@ -56,9 +56,7 @@ LEAKING = DispersedModel(replace(PROLATE.spacecraft, disturbances=LEAKS, dissipa
 
 def outputs(fly: type[ClosedForm | RealWidths], model: DispersedModel, draws: Mapping[str, Any]) -> NDArray[np.float64]:
     """Of all cases, (5, n)."""
-    out = np.empty((len(OUTPUTS), max(map(np.size, draws.values()), default=1)))
-    measure(model, fly(model)(model.cases(draws)), out)
-    return out
+    return measure(model, fly(model)(model.cases(draws)), max(map(np.size, draws.values()), default=1))
 
 
 @spread("name", SYMMETRIC, quick=4, deep=3)

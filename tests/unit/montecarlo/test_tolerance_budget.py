@@ -10,7 +10,7 @@ from support.places import case
 
 import nutdamp
 from nutdamp.files.schedules import read_plan
-from nutdamp.montecarlo.statistics import ROWS, first_order, vectors
+from nutdamp.montecarlo.statistics import first_order, vectors
 from nutdamp.montecarlo.study import study_of
 
 
@@ -23,7 +23,6 @@ def test_the_budget_of_h_is_that_of_real_widths() -> None:
     assert math.degrees(flown.sigma("momentum_shift")) < 2e-6
     assert flown.sigma("nutation") == pytest.approx(closed.sigma("nutation"), rel=0.01)
     step = 1e-4 * flown.inputs[0].size
-    ends = np.empty((ROWS, 2))
     draw = np.array([step, -step])
-    vectors(study.model, study.flies(study.model.cases({flown.inputs[0].name: draw})), ends)
+    ends = vectors(study.model, study.flies(study.model.cases({flown.inputs[0].name: draw})), 2)
     assert flown.jacobian[:8, 0] == pytest.approx((ends[:8, 0] - ends[:8, 1]) / (2.0 * step), rel=0.02, abs=1e-9)
