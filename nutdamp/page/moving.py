@@ -53,20 +53,16 @@ def named_directions(body: Spacecraft) -> tuple[NamedDirection, ...]:
     directions = []
     if body.goal.axis is not None:
         shift = None if body.requirement is None else body.requirement.momentum_shift
-        circles = () if shift is None else (Circle(f"H at most {most(shift)} from target", shift, "target"),)
-        directions.append(NamedDirection("target", body.goal.axis, "target", circles))
+        circles = [] if shift is None else [Circle(f"H at most {most(shift)} from target", shift, "target")]
+        directions.append(NamedDirection("target", body.goal.axis, "target", tuple(circles)))
     for keep in body.watched:
         if keep.direction is not None:
-            bounds = (
-                ("least", keep.least, "keep-out", keep.least > 0.0),
-                ("most", keep.most, "keep-in", keep.most < math.pi),
-            )
-            circles = tuple(
-                Circle(f"axis at {word} {most(radius)} from {keep.name}", radius, kind)
-                for word, radius, kind, there in bounds
-                if there
-            )
-            directions.append(NamedDirection(keep.name, keep.direction, "watched", circles, watched=True))
+            bounds = [("least", keep.least, "keep-out")] * (keep.least > 0.0)
+            bounds += [("most", keep.most, "keep-in")] * (keep.most < math.pi)
+            circles = [
+                Circle(f"axis at {word} {most(size)} from {keep.name}", size, kind) for word, size, kind in bounds
+            ]
+            directions.append(NamedDirection(keep.name, keep.direction, "watched", tuple(circles), watched=True))
     return tuple(directions)
 
 
@@ -195,15 +191,11 @@ def _dates(body: Spacecraft, track: Track, digits: int) -> dict[str, Any] | None
 
 def _firing(flown: Flight, track: Track) -> tuple[list[int], list[str]]:
     """For each row the number of the text that names the firings; the first text is that of none."""
-    texts, column = ["none"], []
-    names = _pulse_names(flown)
+    texts, column, names = {"none": 0}, [], _pulse_names(flown)
     for time in track.t.tolist():
         on = (name for name, (begins, ends) in zip(names, flown.spans, strict=True) if begins <= time <= ends)
-        text = " and ".join(on) or texts[0]
-        if text not in texts:
-            texts.append(text)
-        column.append(texts.index(text))
-    return column, texts
+        column.append(texts.setdefault(" and ".join(on) or "none", len(texts)))
+    return column, [*texts]
 
 
 def _pulse_names(flown: Flight) -> tuple[str, ...]:

@@ -31,7 +31,7 @@ from nutdamp.files.reader import Source
 from nutdamp.files.yaml import dotted
 from nutdamp.flight.verification import verify
 from nutdamp.page import document
-from nutdamp.page.document import Block, Details, FactList, Page, PageSection, Picture, Points, Prose
+from nutdamp.page.document import Block, Control, Details, FactList, Page, PageSection, Picture, Points, Prose
 from nutdamp.page.manoeuvre import manoeuvre_blocks
 from nutdamp.page.moving import moving_of
 from nutdamp.planning.decision import Comparison, Decision, broken_limits, decide
@@ -154,7 +154,7 @@ class Report:
         return self.page.good
 
 
-def made_of(compared: Comparison, repeat: Repeat, control: document.Control, traded: Sequence[Front] = ()) -> Report:
+def made_of(compared: Comparison, repeat: Repeat, control: Control, traded: Sequence[Front] = ()) -> Report:
     """The report, not yet written. Raises MissingExtra without the extra plot."""
     chosen = compared.recommended
     page = report_page(compared, repeat, traded=traded, control=control)
@@ -196,11 +196,7 @@ def repeated(command: str, source: Source) -> Repeat:
 
 
 def report_page(
-    compared: Comparison,
-    repeat: Repeat,
-    *,
-    traded: Sequence[Front] = (),
-    control: document.Control = document.UNCONTROLLED,
+    compared: Comparison, repeat: Repeat, *, traded: Sequence[Front] = (), control: Control = document.UNCONTROLLED
 ) -> Page:
     """The page; raises MissingExtra without matplotlib. ``traded``: fronts of time against cost."""
     body, decided = compared.spacecraft, decide(compared)
@@ -429,7 +425,7 @@ def trade_picture(compared: Comparison, fronts: Sequence[Front]) -> Picture:
 def dispersion_pictures(dispersed: Results, scheme: str) -> tuple[Picture, ...]:
     """Distribution of the cases of a study, and where H ends; raises MissingExtra."""
     names = ("cases", "momentum")
-    return tuple(_picture(name, studies.dispersion_figure(name, dispersed, scheme=scheme)) for name in names)
+    return tuple(_picture(name, studies.dispersion_figure(dispersed, name, scheme=scheme)) for name in names)
 
 
 def _picture(name: str, figure: Figure, narrow: Figure | None = None) -> Picture:
@@ -456,21 +452,16 @@ def _method(compared: Comparison) -> Iterator[Block]:
     chosen = compared.recommended
     topics = [guide.found(number) for number in EQUATIONS]
     scheme = guide.found(chosen.scheme) if chosen is not None and chosen.scheme in guide.NAMES else None
-    lines = [line for topic in topics for line in _listed(topic, _formulas(topic)[-1])]
-    lines += [] if scheme is None else _listed(scheme, _formulas(scheme)[0])
+    formulas = [(topic, -1) for topic in topics]  # of an equation the last one, which is in use
+    formulas += [] if scheme is None else [(scheme, 0)]
+    lines: list[str] = []
+    for topic, which in formulas:
+        shown = [block for block in topic.blocks if isinstance(block, Formula)][which]
+        lines += [f"{topic.name}  {topic.summary}", *(f"    {line}" for line in shown.lines), ""]
     yield document.Listing("Equations", "\n".join(lines))
     symbols = _symbols(topics, scheme, " ".join([*lines, "θ"]))
     yield FactList("Symbols", (*symbols, *_floors(compared.spacecraft)))
     yield Points((("", guide.SOURCES[0]),))
-
-
-def _formulas(topic: Topic) -> list[Formula]:
-    """The formulas of a topic; the last one of a numbered equation is the one in use."""
-    return [block for block in topic.blocks if isinstance(block, Formula)]
-
-
-def _listed(topic: Topic, formula: Formula) -> list[str]:
-    return [f"{topic.name}  {topic.summary}", *(f"    {line}" for line in formula.lines), ""]
 
 
 def _symbols(topics: Sequence[Topic], scheme: Topic | None, listed: str) -> Iterator[tuple[str, str]]:
