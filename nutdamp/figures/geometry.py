@@ -41,10 +41,7 @@ def shown_until(spacecraft: Spacecraft, schedule: Schedule) -> float:
 
 
 def drawn(flight: Flight, track: Track) -> Track:
-    """``track``, or the same stretch of ``flight`` in as many rows as its curves need.
-
-    Where that would be more than `MOST_ROWS`, a shorter stretch from t = 0.
-    """
+    """``track`` in as many rows as its curves need; a shorter one from t = 0 where these are more than `MOST_ROWS`."""
     until, step = float(track.t[-1]), quickest(flight) / ROWS_A_TURN
     if until / step <= len(track.t):
         return track
@@ -60,9 +57,9 @@ def quickest(flight: Flight) -> float:
 
 def channels_fired(flight: Flight) -> list[str]:
     """Channels that fire, in the order of the file."""
-    used = dict.fromkeys(pulse.channel for pulse in flight.schedule)
     order = [channel.name for channel in flight.spacecraft.channels]
-    return [*(name for name in used if name not in order), *(name for name in order if name in used)]
+    used = dict.fromkeys(pulse.channel for pulse in flight.schedule)
+    return sorted(used, key=lambda name: order.index(name) if name in order else -1)
 
 
 class TrackPiece(NamedTuple):
@@ -108,10 +105,7 @@ class FiredBlock(NamedTuple):
 
 
 def blocks(flight: Flight, until: float, channel: str | None = None) -> list[FiredBlock]:
-    """The firings of a channel, or of all, up to ``until`` s; those that could not be distinguished are one.
-
-    These begin within `CLOSE` of the time shown one after the other, `MANY` at least.
-    """
+    """The firings of a channel, or of all, up to ``until`` s; `MANY` or more that begin `CLOSE` together are one."""
     firings = [
         (number, pulse)
         for number, pulse in enumerate(flight.schedule, start=1)

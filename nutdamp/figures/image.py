@@ -205,10 +205,7 @@ def timing(spacecraft: Spacecraft, until: float, fps: int, seconds: float | None
 
 @style.styled()
 def film(stream: IO[bytes], flight: Flight, timed: Timing, path: str, width: int = 800) -> None:
-    """Write the film of ``width`` pixels to ``stream``, frame by frame.
-
-    The ending of ``path`` says the format. Raises as `film_format`.
-    """
+    """Write the film of ``width`` pixels to ``stream``, in the `film_format` of ``path``; raises as that does."""
     kind = film_format(path)
     scene = Scene(flight, timed, width)
     with work.steps(timed.frames):

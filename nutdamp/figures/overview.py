@@ -109,10 +109,7 @@ def _pole_curve(axes: Axes, flight: Flight, track: Track) -> None:
 
 
 def _axis_track(axes: Axes, flight: Flight, track: Track) -> None:
-    """Path of the spin axis about the first direction of H, as angles, with the jumps of H (Magnus 1970 fig. 6-8).
-
-    Where it is too wide for the path of H, that is shown enlarged in an inset.
-    """
+    """Path of the spin axis about the first H, as angles, and of H, in an inset if small (Magnus 1970 fig. 6-8)."""
     path, momentum = geometry.sky_paths(flight, track)
     target, small = geometry.sky_target(flight, track), geometry.momentum_inset(flight, track)
     _path(axes, flight, track, path)

@@ -226,8 +226,7 @@ def trade_figure(
 ) -> Figure:
     """End of the last firing against propellant (impulse where that is unknown), numbered as in the table.
 
-    ``chosen``: a plan to be marked among them. Fronts that have no points are named, with the reason. ``narrow``: for a
-    phone.
+    ``chosen``: a plan to be marked among them. Fronts without points are named, with reasons. ``narrow``: for phones.
     """
     width = style.PHONE if narrow else 7.4
     figure = style.sheet(width, 4.8)

@@ -364,10 +364,7 @@ def settle(figure: Figure) -> None:
 
 
 def _all_fit(notes: list[Annotation], window: Bbox, points: float) -> bool:
-    """Put labels above their bars, no farther than the edges of the panel; True where none meets another of its row.
-
-    Those that do are hidden.
-    """
+    """Put labels above their bars, within the panel; hide those that meet another of their row; True if none does."""
     ends: dict[float, float] = {}
     for note in notes:
         note.set_position((0.0, BAR_GAP))

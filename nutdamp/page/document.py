@@ -53,15 +53,13 @@ class Sheet(NamedTuple):
     def cells(self) -> tuple[tuple[Cell, ...], ...]:
         """Rows of cells."""
         columns = []
-        for at, heading in enumerate(self.columns):
-            texts = [row[at] for row in self.rows]
+        for heading, texts in zip(self.columns, zip(*self.rows, strict=True), strict=False):
+            dotted, barred = heading.name in self.dots, heading.name in self.bars
             sizes = [*map(number_in, texts)]
             most = max((abs(size) for size in sizes if size is not None), default=0.0) or 1.0
-            dots = [
-                100.0 * abs(size) / most if size is not None and heading.name in self.dots else None for size in sizes
-            ]
-            bars = sizes if heading.name in self.bars else [None] * len(sizes)
-            columns.append([*map(Cell, texts, [heading.number] * len(texts), dots, bars)])
+            shown = [None if size is None or not dotted else 100.0 * abs(size) / most for size in sizes]
+            cells = zip(texts, shown, sizes, strict=True)
+            columns.append([Cell(text, heading.number, dot, bar if barred else None) for text, dot, bar in cells])
         return tuple(zip(*columns, strict=True))
 
 
@@ -125,10 +123,7 @@ class Circle(NamedTuple):
 
 
 class NamedDirection(NamedTuple):
-    """A direction on the globe, (3,) inertial unit vector, with circles around it; ``kind`` styles it.
-
-    ``watched``: the angle from it to the spin axis is shown.
-    """
+    """A direction on the globe, (3,) inertial; ``kind`` styles it, ``watched``: its angle to the spin axis is shown."""
 
     name: str
     axis: Vector
@@ -178,10 +173,7 @@ class Strip(NamedTuple):
 
 
 class Workbench(NamedTuple):
-    """Fixed parts of the workbench: quantities at the end, and the pulses by number and channel.
-
-    ``rows``: name of each quantity for the script and for people, and its bound in words.
-    """
+    """Names of each quantity for the script and for people, its bound in words; the pulses by number and channel."""
 
     rows: tuple[tuple[str, str, str], ...]
     pulses: tuple[str, ...]

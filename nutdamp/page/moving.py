@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -245,8 +245,7 @@ def panel(part: str, title: str, room: tuple[Vector, float], names: tuple[str, s
     for which, name in enumerate(names):
         values = np.array(geometry.ticks(float(middle[which]) - inner, float(middle[which]) + inner, 5))
         places = placed(np.column_stack([values, values]), middle[[which, which]], half)[which]
-        marks = zip(map(float, places), map(_number, (factor * values).tolist()), strict=True)
-        scales.append(Scale(name.replace(", deg", f", {prefix}deg"), tuple(marks)))
+        scales.append(_scale(name.replace(", deg", f", {prefix}deg"), map(float, places), (factor * values).tolist()))
     (across,), (along,) = placed(np.zeros((1, 2)), middle, half)
     described = f"{title}; {scales[0].name} to the right, {scales[1].name} upwards"
     return Panel(part, title, described, scales[0], scales[1], (across, along))
@@ -257,8 +256,8 @@ def _prefix(largest: float) -> tuple[str, float]:
     return next(((name, factor) for name, factor in PREFIXES if factor * largest >= SHORT), PREFIXES[-1])
 
 
-def _number(value: float) -> str:
-    return f"{value:.6g}".replace("-", "−")
+def _scale(name: str, places: Iterable[float], values: Iterable[float]) -> Scale:
+    return Scale(name, tuple((at, f"{value:.6g}".replace("-", "−")) for at, value in zip(places, values, strict=True)))
 
 
 def strip_of(flown: Flight, track: Track, until: float) -> tuple[Strip, list[float]]:
@@ -280,22 +279,24 @@ def strip_of(flown: Flight, track: Track, until: float) -> tuple[Strip, list[flo
         return round(width * across(begins), 1), round(width * (across(ends) - across(begins)), 1)
 
     required = None if body.requirement is None else body.requirement.nutation
+    level = math.inf if required is None else math.degrees(required)
     channels = tuple(geometry.channels_fired(flown))
-    fired = zip(flown.schedule, flown.spans, strict=True)
     prefix, factor = _prefix(high - low)
-    level = None if required is None else math.degrees(required)
     edge = EDGE * (high - low)
-    scale = tuple(
-        (rise(angle) * 100.0 / height, _number(factor * angle)) for angle in geometry.ticks(low + edge, high - edge, 5)
-    )
+    marked, times = geometry.ticks(low + edge, high - edge, 5), geometry.ticks(0.0, until, 6)
     strip = Strip(
-        times=Scale("time, s", tuple((100.0 * across(time), _number(time)) for time in geometry.ticks(0.0, until, 6))),
-        angles=Scale(f"{prefix}deg", scale),
+        times=_scale("time, s", (100.0 * across(time) for time in times), times),
+        angles=_scale(
+            f"{prefix}deg", (rise(angle) * 100.0 / height for angle in marked), (factor * angle for angle in marked)
+        ),
         zero=rise(0.0),
-        required=rise(level) if level is not None and low < level < high else None,
-        outside=most(math.radians(level)) if level is not None and not low < level < high else "",
+        required=rise(level) if low < level < high else None,
+        outside="" if required is None or low < level < high else most(math.radians(level)),
         channels=channels,
-        bars=tuple((channels.index(pulse.channel), *spread(*span)) for pulse, span in fired),
+        bars=tuple(
+            (channels.index(pulse.channel), *spread(*span))
+            for pulse, span in zip(flown.schedule, flown.spans, strict=True)
+        ),
         closed=tuple(spread(begins, ends) for begins, ends in geometry.closed(body, until)),
     )
     return strip, [low, high]
