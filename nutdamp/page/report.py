@@ -66,8 +66,13 @@ def expect_html(path: str) -> None:
     """
     if path != "-" and Path(path).suffix.lower() not in ENDINGS:
         raise BadRequest(f"--output {path}: a report is written as HTML (.html); a browser prints that as PDF")
-    _templates()
+    _require_jinja()
     require()
+
+
+def _require_jinja() -> None:
+    if find_spec("jinja2") is None:
+        raise MissingExtra("plot", "a page")
 
 
 def page_html(page: Page) -> str:
@@ -88,8 +93,7 @@ def block_html(block: Block) -> str:
 
 @cache
 def _templates() -> Environment:
-    if find_spec("jinja2") is None:
-        raise MissingExtra("plot", "a page")
+    _require_jinja()
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
