@@ -35,19 +35,14 @@ def shown_until(spacecraft: Spacecraft, schedule: Schedule) -> float:
     One inertial nutation period after the last pulse, but no more than a quarter of the time until then, or of a period
     as seen in the body where that is more. Without pulses, the inertial period.
     """
-    end = schedule.end
     if not len(schedule):
         return spacecraft.inertial_period
-    return end + min(spacecraft.inertial_period, 0.25 * max(end, spacecraft.body_period))
+    return schedule.end + min(spacecraft.inertial_period, 0.25 * max(schedule.end, spacecraft.body_period))
 
 
 def drawn(flight: Flight, track: Track) -> Track:
-    """``track``, or the same stretch of ``flight`` in as many rows as its curves need.
-
-    Where that would be more than `MOST_ROWS`, a shorter stretch from t = 0.
-    """
-    until = float(track.t[-1])
-    step = quickest(flight) / ROWS_A_TURN
+    """``track`` in as many rows as its curves need; a shorter one from t = 0 where these are more than `MOST_ROWS`."""
+    until, step = float(track.t[-1]), quickest(flight) / ROWS_A_TURN
     if until / step <= len(track.t):
         return track
     reach = min(until, max(MOST_ROWS * step, flight.schedule.end))
@@ -62,9 +57,9 @@ def quickest(flight: Flight) -> float:
 
 def channels_fired(flight: Flight) -> list[str]:
     """Channels that fire, in the order of the file."""
-    used = dict.fromkeys(pulse.channel for pulse in flight.schedule)
     order = [channel.name for channel in flight.spacecraft.channels]
-    return [*(name for name in used if name not in order), *(name for name in order if name in used)]
+    used = dict.fromkeys(pulse.channel for pulse in flight.schedule)
+    return sorted(used, key=lambda name: order.index(name) if name in order else -1)
 
 
 class TrackPiece(NamedTuple):
@@ -110,10 +105,7 @@ class FiredBlock(NamedTuple):
 
 
 def blocks(flight: Flight, until: float, channel: str | None = None) -> list[FiredBlock]:
-    """The firings of a channel, or of all, up to ``until`` s; those that could not be distinguished are one.
-
-    These begin within `CLOSE` of the time shown one after the other, `MANY` at least.
-    """
+    """The firings of a channel, or of all, up to ``until`` s; `MANY` or more that begin `CLOSE` together are one."""
     firings = [
         (number, pulse)
         for number, pulse in enumerate(flight.schedule, start=1)
@@ -139,10 +131,10 @@ def runs(items: Sequence[Item], near: Callable[[Item, Item], bool], least: int) 
 def sky_plane(flight: Flight, momentum: Vector) -> Vector:
     """Rows: two directions square to ``momentum``, and its own. In a celestial frame east and north, in N its x, y."""
     up = momentum / np.linalg.norm(momentum)
-    framed = flight.spacecraft.attitude is not None
-    first = np.cross([0.0, 0.0, 1.0], up) if framed else np.array([1.0, 0.0, 0.0])
+    x = np.array([1.0, 0.0, 0.0])
+    first = x if flight.spacecraft.attitude is None else np.cross([0.0, 0.0, 1.0], up)
     if np.linalg.norm(first) < 1e-9:  # H at the pole: there is no east
-        first = np.array([1.0, 0.0, 0.0])
+        first = x
     first = first - up * (first @ up)
     first /= np.linalg.norm(first)
     return np.array([first, np.cross(up, first), up])
@@ -159,8 +151,7 @@ def on_sky(plane: Vector, directions: Vector) -> Vector:
     """Directions (n, 3) as angles from H(0) in degrees, true to scale along every radius (azimuthal equidistant)."""
     local = directions @ plane.T
     across = np.hypot(local[:, 0], local[:, 1])
-    angle = np.degrees(np.arctan2(across, local[:, 2]))
-    scale = np.divide(angle, across, out=np.zeros_like(angle), where=across > 0)
+    scale = np.divide(np.degrees(np.arctan2(across, local[:, 2])), across, out=np.zeros_like(across), where=across > 0)
     return np.asarray(local[:, :2] * scale[:, None], dtype=np.float64)
 
 
@@ -251,9 +242,9 @@ def ticks(low: float, high: float, most: int) -> list[float]:
 class DrawnCones(NamedTuple):
     """Body cone and space cone at one moment, as unit vectors in the inertial frame.
 
-    ``axis`` spin axis, ``momentum`` direction of H, ``rotation`` of ω, (3,); ``body`` and ``space`` (n, 3) are the
-    rims of the cones, which touch along ``rotation``. A rim is empty where there is no cone. ``swept`` (m, 3) is the
-    circle that the space cone fills: its rim, and where I1 ≠ I2 the one about a rim that never closes.
+    (3,) each: spin axis, H and ω. ``body`` and ``space`` (n, 3) are the rims of the cones, which touch along
+    ``rotation``; empty where there is no cone. ``swept`` (m, 3) is the circle that the space cone fills: its rim, and
+    where I1 ≠ I2 the one about a rim that never closes.
     """
 
     axis: Vector
@@ -270,8 +261,7 @@ def cones(flight: Flight, rates: Vector, quaternion: Vector) -> DrawnCones:
     Polhode and herpolhode of the free motion: circles for a symmetric body (Magnus 1970 fig. 4). Without rims where
     they do not close, and for a body with a wheel and three moments.
     """
-    moments = np.asarray(flight.moments)
-    wheel = flight.spacecraft.inertia.wheel
+    moments, wheel = np.asarray(flight.moments), flight.spacecraft.inertia.wheel
     axis = attitude.rotate(quaternion, np.array([0.0, 0.0, flight.spacecraft.sense]))
     turning = attitude.rotate(quaternion, rates)
     momentum = attitude.rotate(quaternion, moments * rates + np.array([0.0, 0.0, wheel]))

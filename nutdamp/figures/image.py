@@ -10,9 +10,8 @@ import shutil
 import subprocess
 import tempfile
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,7 +58,7 @@ def ending(path: str, option: str = "--plot", formats: Sequence[str] = FORMATS) 
     return suffix
 
 
-@style.styled
+@style.styled()
 def rendered(figure: Figure, path: str) -> bytes:
     """The figure as the content of a file, vector or not by the ending of ``path``; raises BadRequest for others."""
     kind = ending(path)
@@ -94,7 +93,7 @@ def _joined(alike: re.Match[str]) -> str:
     return f'<path d="{paths}"{alike[1]}/>'
 
 
-@style.styled
+@style.styled()
 def svg(figure: Figure) -> str:
     """The figure as an inline ``<svg>`` element, as wide as its container, on no background.
 
@@ -172,8 +171,7 @@ def film_format(path: str) -> str:
     return kind
 
 
-@dataclass(frozen=True)
-class Timing:
+class Timing(NamedTuple):
     """Division of ``until`` s of motion into ``frames`` pictures at ``fps`` a second."""
 
     until: float
@@ -205,12 +203,9 @@ def timing(spacecraft: Spacecraft, until: float, fps: int, seconds: float | None
     return Timing(float(until), max(round(seconds * fps), 2), fps, turns)
 
 
-@style.styled
+@style.styled()
 def film(stream: IO[bytes], flight: Flight, timed: Timing, path: str, width: int = 800) -> None:
-    """Write the film of ``width`` pixels to ``stream``, frame by frame.
-
-    The ending of ``path`` says the format. Raises as `film_format`.
-    """
+    """Write the film of ``width`` pixels to ``stream``, in the `film_format` of ``path``; raises as that does."""
     kind = film_format(path)
     scene = Scene(flight, timed, width)
     with work.steps(timed.frames):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -23,11 +23,9 @@ from nutdamp.views.parts import angle_names, angle_texts
 from nutdamp.views.text import steering
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from matplotlib.gridspec import SubplotSpec
+    from matplotlib.gridspec import GridSpec, SubplotSpec
 
     from nutdamp.planning.plan import Plan
 
@@ -45,7 +43,7 @@ ROOM, INSET = 1.8, (0.675, 0.17, 0.315, 0.66)
 """Width of the axis track with an inset over that without, and the box of the inset as shares of the panel."""
 
 
-@style.styled
+@style.styled()
 def flight_figure(name: str, flight: Flight, track: Track, *, narrow: bool = False) -> Figure:
     """The figure ``overview``, ``motion``, ``sphere`` or ``history``; raises KeyError for others.
 
@@ -53,7 +51,7 @@ def flight_figure(name: str, flight: Flight, track: Track, *, narrow: bool = Fal
     ``history`` alone. Raises MissingExtra without matplotlib.
     """
     seen = geometry.drawn(flight, track)
-    figure = (NARROW if narrow else DRAWN)[name](flight, seen)
+    figure = (partial(history, narrow=True) if narrow else DRAWN[name])(flight, seen)
     until, end = float(seen.t[-1]), float(track.t[-1])
     part = f"; drawn: the first {until:.4g} s of {end:.4g} s" if until < 0.99 * end else ""
     style.heading(figure, flight.spacecraft, title(flight) + part)
@@ -73,18 +71,17 @@ def title(flight: Flight) -> str:
         target = ", ".join(f"{name} {text.removesuffix(' deg').rstrip('0').rstrip('.')}°" for name, text in angles)
         turn = f"H turned {style.angle(body.to_turn)} to the target, {target}\n"
     result = f"nutation {swings}{style.angle(body.nutation)} → {style.angle(left.nutation)}"
-    return f"{how}, {fired}\n{turn}{result}, {style.part_name(requirements.aim(body))} {style.angle(left.axis_error)}"
+    return f"{how}, {fired}\n{turn}{result}, {requirements.aim(body).label} {style.angle(left.axis_error)}"
 
 
 def overview(flight: Flight, track: Track) -> Figure:
     """Motion above history: one sheet of A4 across, or longer."""
-    sizes = heights(flight, track)
+    sizes = [*_courses(flight, track).values()]
     figure = style.sheet(9.6, TALL + 1.6 + sum(sizes))
     ratio = ROOM if geometry.momentum_inset(flight, track) is not None else 1.0
     grid = figure.add_gridspec(1 + len(sizes), 2, height_ratios=[TALL, *sizes], width_ratios=[1.0, ratio])
-    planes(figure, (grid[0, 0], grid[0, 1]), flight, track)
-    cells = [grid[row + 1, :] for row in range(len(sizes))]
-    style.legend(figure, courses(figure, cells, flight, track))
+    _planes(figure, grid, flight, track)
+    _draw_courses(figure, [grid[row + 1, :] for row in range(len(sizes))], flight, track)
     return figure
 
 
@@ -92,19 +89,16 @@ def motion(flight: Flight, track: Track) -> Figure:
     """Pole curve in the 1-2 plane of the body beside the axis track in space (Magnus 1970 fig. 5-8)."""
     wide = geometry.momentum_inset(flight, track) is not None
     figure = style.sheet(9.6 if wide else 7.4, 4.1)
-    grid = figure.add_gridspec(1, 2, width_ratios=[1.0, ROOM if wide else 1.0])
-    planes(figure, (grid[0], grid[1]), flight, track)
+    _planes(figure, figure.add_gridspec(1, 2, width_ratios=[1.0, ROOM if wide else 1.0]), flight, track)
     return figure
 
 
-def planes(figure: Figure, cells: Sequence[SubplotSpec], flight: Flight, track: Track) -> None:
-    """The two panels in ``cells`` of a figure."""
-    body, space = (figure.add_subplot(cell) for cell in cells)
-    pole_curve(body, flight, track)
-    axis_track(space, flight, track)
+def _planes(figure: Figure, grid: GridSpec, flight: Flight, track: Track) -> None:
+    for column, draw in enumerate((_pole_curve, _axis_track)):
+        draw(figure.add_subplot(grid[0, column]), flight, track)
 
 
-def pole_curve(axes: Axes, flight: Flight, track: Track) -> None:
+def _pole_curve(axes: Axes, flight: Flight, track: Track) -> None:
     """Path of the rotation vector in the 1-2 plane of the body (Magnus 1970 fig. 5), firings and channels marked."""
     rates = geometry.pole_path(track)
     _path(axes, flight, track, rates)
@@ -114,11 +108,8 @@ def pole_curve(axes: Axes, flight: Flight, track: Track) -> None:
     axes.set(xlabel=f"ω1, °/s{geometry.pole_note(flight)}", ylabel="ω2, °/s", title=title)
 
 
-def axis_track(axes: Axes, flight: Flight, track: Track) -> None:
-    """Path of the spin axis about the first direction of H, as angles, with the jumps of H (Magnus 1970 fig. 6-8).
-
-    Where it is too wide for the path of H, that is shown enlarged in an inset.
-    """
+def _axis_track(axes: Axes, flight: Flight, track: Track) -> None:
+    """Path of the spin axis about the first H, as angles, and of H, in an inset if small (Magnus 1970 fig. 6-8)."""
     path, momentum = geometry.sky_paths(flight, track)
     target, small = geometry.sky_target(flight, track), geometry.momentum_inset(flight, track)
     _path(axes, flight, track, path)
@@ -142,7 +133,7 @@ def _inset(axes: Axes, flight: Flight, track: Track, small: Vector) -> None:
     momentum = geometry.sky_paths(flight, track)[1]
     stations = _momentum(inset, flight, track, momentum, float(np.ptp(small, axis=0).max()))
     for number in style.thinned(len(stations) - 1, NUMBERED):
-        style.add(inset, str(number + 1), stations[number + 1], FIRED, meant=style.meant(stations, [number + 1]))
+        style.add(inset, str(number + 1), stations[number + 1], FIRED, meant=style.meant(stations, number + 1))
     style.add(inset, "t = 0", stations[0], INK, role="vital")
     style.target(inset, geometry.sky_target(flight, track))
     style.square(inset, small, margin=0.25)
@@ -163,7 +154,7 @@ def _momentum(axes: Axes, flight: Flight, track: Track, momentum: Vector, width:
             moved = _refined(momentum[stretch.first : stretch.last + 1])
             stations.append(moved[-1:])
             if stretch.pulse in numbered and np.hypot(*(moved[-1] - moved[0])) > 0.08 * width:
-                style.heads(axes, moved, _halfway(moved), MOMENTUM)
+                style.head(axes, moved, _halfway(moved), MOMENTUM)
     places = np.vstack(stations)
     marked = [row for row in range(len(places)) if len(places) <= SPARSE or row == 0 or row - 1 in numbered]
     look: dict[str, Any] = {"color": MOMENTUM, "markersize": 8, "markeredgewidth": 1.4, "zorder": 1.9}  # under firings
@@ -186,11 +177,11 @@ def _path(axes: Axes, flight: Flight, track: Track, points: Vector) -> None:
         if stretch.pulse is None:
             coasts.append(rows)
             if len(firings) in numbered or len(firings) == len(flight.schedule):
-                style.heads(axes, rows, _halfway(rows), MOTION, size)
+                style.head(axes, rows, _halfway(rows), MOTION, size)
             continue
         firings.append(rows)
         if stretch.pulse in numbered and np.hypot(*(rows[-1] - rows[0])) > 0.03 * width:
-            style.heads(axes, _refined(rows), [len(_refined(rows)) - 1], PULSE, size)
+            style.head(axes, _refined(rows), len(_refined(rows)) - 1, PULSE, size)
     _number(axes, [_refined(rows) for rows in firings], width)
     axes.plot(*style.joined(coasts).T, color=MOTION, linewidth=thin * style.LINE, label="path")
     if firings:
@@ -208,10 +199,9 @@ def _number(axes: Axes, firings: Sequence[Vector], width: float) -> None:
     """Numbers of firings beside their stretches of a path, (n, 2) each; first and last of those in one place."""
     some = [rows[:: max(len(rows) // 20, 1)] for rows in firings]
     for group in together([rows[len(rows) // 2] for rows in firings], width):
-        own, first, last = np.vstack([some[number] for number in group]), group[0] + 1, group[-1] + 1
+        first, last, middle = group[0] + 1, group[-1] + 1, firings[group[len(group) // 2]]
         others = [rows for other, rows in enumerate(some) if other not in group]
-        meant = style.Meant(own, np.vstack([np.empty((0, 2)), *others]))
-        middle = firings[group[len(group) // 2]]
+        meant = np.vstack([some[number] for number in group]), np.vstack([np.empty((0, 2)), *others])
         text = f"{'firing ' * (first == 1)}{first}" + (f"\N{EN DASH}{last}" if first != last else "")
         style.add(axes, text, middle[len(middle) // 2], FIRED, meant=meant)
 
@@ -229,13 +219,11 @@ def _refined(rows: Vector) -> Vector:
     return rows if len(rows) > 2 else np.linspace(rows[0], rows[-1], 21)
 
 
-def _halfway(rows: Vector) -> list[int]:
+def _halfway(rows: Vector) -> int:
     """Row of a stretch where an arrowhead goes: half a turn into it at most."""
     steps = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(rows, axis=0).T))])
     width = float(np.ptp(rows, axis=0).max())
-    if steps[-1] <= 0.0:
-        return []
-    return [int(np.searchsorted(steps, min(0.5 * float(steps[-1]), 1.3 * width)))]
+    return int(np.searchsorted(steps, min(0.5 * float(steps[-1]), 1.3 * width)))
 
 
 def _directions(axes: Axes, flight: Flight, size: float) -> bool:
@@ -246,16 +234,15 @@ def _directions(axes: Axes, flight: Flight, size: float) -> bool:
     groups: list[list[Channel]] = []
     for channel in channels:
         across = channel.transverse.conjugate()
-        group = next((group for group in groups if abs(np.angle(group[0].transverse * across)) < ALIKE), None)
-        if group is None:
-            groups.append([channel])
-        else:
-            group.append(channel)
+        group = next((group for group in groups if abs(np.angle(group[0].transverse * across)) < ALIKE), [])
+        if not group:
+            groups.append(group)
+        group.append(channel)
     for group in groups:
         torque = group[0].transverse / abs(group[0].transverse)
         way = np.array([torque.real, torque.imag]) * (size if size > geometry.LEAST else 0.7)
         axes.plot(*np.outer(way, [1.1, 1.28]), color=INK, linewidth=1.2)
-        style.heads(axes, np.outer([1.1, 1.3], way), [1], INK)
+        style.head(axes, np.outer([1.1, 1.3], way), 1, INK)
         names = ", ".join(entry.name for entry in group[:3]) + (" …" if len(group) > 3 else "")
         style.add(axes, names, 1.2 * way, INK, role="vital")
     return bool(groups)
@@ -285,11 +272,16 @@ BAR = 0.46  # height of a bar; the distance between two rows is 1
 CHANGES = 1e-3  # share of the largest ω3 from which on its change is drawn
 
 
-def heights(flight: Flight, track: Track) -> list[float]:
-    """Height of each panel, inches: nutation, firings, ω1 and ω2, and ω3 where it changes."""
+def _courses(flight: Flight, track: Track) -> dict[Callable[[Axes, Flight, Track], None], float]:
+    """The panels over time and the height of each, inches: nutation, firings, ω1 and ω2, and ω3 where it changes."""
     spin = track.rates[:, 2]
-    changes = float(np.ptp(spin)) > CHANGES * float(np.abs(spin).max())
-    return [1.9, *firings_height(flight), 1.5, *([0.9] * changes)]
+    courses: dict[Callable[[Axes, Flight, Track], None], float] = {nutation_history: 1.9}
+    for height in firings_height(flight):
+        courses[lambda axes, flight, track: firings(axes, flight, float(track.t[-1]))] = height
+    courses[_rate_history] = 1.5
+    if float(np.ptp(spin)) > CHANGES * float(np.abs(spin).max()):
+        courses[_spin_history] = 0.9
+    return courses
 
 
 def firings_height(flight: Flight) -> list[float]:
@@ -300,28 +292,22 @@ def firings_height(flight: Flight) -> list[float]:
 
 def history(flight: Flight, track: Track, *, narrow: bool = False) -> Figure:
     """Nutation, firings and rates over one time axis; ``narrow``: for a phone."""
-    sizes = heights(flight, track)
+    sizes = [*_courses(flight, track).values()]
     figure = style.sheet(style.PHONE if narrow else 7.4, 1.6 + sum(sizes))
     grid = figure.add_gridspec(len(sizes), 1, height_ratios=sizes)
-    style.legend(figure, courses(figure, [grid[row] for row in range(len(sizes))], flight, track))
+    _draw_courses(figure, [grid[row] for row in range(len(sizes))], flight, track)
     return figure
 
 
-def courses(figure: Figure, cells: Sequence[SubplotSpec], flight: Flight, track: Track) -> list[Axes]:
-    """The panels of `heights` in ``cells`` of a figure, from above."""
-    first = figure.add_subplot(cells[0])
-    panels = [first, *(figure.add_subplot(cell, sharex=first) for cell in cells[1:])]
-    others = iter(panels[1:])
-    nutation_history(first, flight, track)
-    if len(flight.schedule):
-        firings(next(others), flight, float(track.t[-1]))
-    rate_history(next(others), flight, track)
-    for axes in others:
-        _spin_history(axes, flight, track)
-    for axes in panels[:-1]:
-        axes.tick_params(labelbottom=False)
+def _draw_courses(figure: Figure, cells: Sequence[SubplotSpec], flight: Flight, track: Track) -> None:
+    """The panels over time in ``cells`` of a figure, from above, with their legend."""
+    panels: list[Axes] = []
+    for cell, draw in zip(cells, _courses(flight, track), strict=True):
+        panels.append(figure.add_subplot(cell, sharex=panels[0] if panels else None))
+        draw(panels[-1], flight, track)
+        panels[-1].tick_params(labelbottom=len(panels) == len(cells))
     panels[-1].set_xlabel(TIME)
-    return panels
+    style.legend(figure, panels)
 
 
 def nutation_history(axes: Axes, flight: Flight, track: Track) -> None:
@@ -344,16 +330,16 @@ def _verdict(flight: Flight) -> tuple[str, str]:
     """Words, and their colour, for the requirement after the last firing; empty without one."""
     body, left = flight.spacecraft, flight.residual
     limits = {part: style.limit_of(body, part) for part in (Part.NUTATION, requirements.aim(body))}
-    if all(limit is None for limit in limits.values()):
+    required = {part: limit for part, limit in limits.items() if limit is not None}
+    if not required:
         return "", INK
-    ends = {part: math.degrees(getattr(left, part.value)) for part in limits}
-    missed = [style.part_name(part) for part, limit in limits.items() if limit is not None and ends[part] > limit]
+    missed = [part.label for part, limit in required.items() if math.degrees(getattr(left, part.value)) > limit]
     if missed:
         return f"; NOT met: {', '.join(missed)}", MISSED
     return ("; tolerances not checked", UNCHECKED) if body.dispersions is None else ("", INK)
 
 
-def rate_history(axes: Axes, flight: Flight, track: Track) -> None:
+def _rate_history(axes: Axes, flight: Flight, track: Track) -> None:
     """Transverse rates ω1, ω2."""
     rates = np.degrees(track.rates)
     width = style.thickness(rates, float(track.t[-1]) / flight.spacecraft.body_period / 2.5)
@@ -422,8 +408,7 @@ def _bar(axes: Axes, flight: Flight, block: geometry.FiredBlock, row: int) -> No
         if pulse.channel == STEERABLE:
             how += f" at {steering(flight.spacecraft.inertia.in_file(pulse.impulse).tolist())}"
     place: Vector = np.array([block.begins + 0.5 * size, row + 0.5 * BAR])
-    style.add(axes, f"{block.name}: {how}", place, INK, role="bar", short=block.name)
+    style.add(axes, f"{block.name}: {how}", place, INK, role="bar")
 
 
 DRAWN = {"overview": overview, "motion": motion, "sphere": sphere.sphere, "history": history}
-NARROW = {"history": partial(history, narrow=True)}

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nutdamp.control_loop.budget import DAY, Budget, HeldNutation
+from nutdamp.control_loop.budget import DAY, Budget
 from nutdamp.control_loop.evaluation import LoopPlan
 from nutdamp.control_loop.sensor import Signal
 from nutdamp.figures import style
@@ -42,11 +41,11 @@ PERIODS = 4.0  # cycles drawn of the longest limit cycle
 ROWS = 600
 
 
-@style.styled
+@style.styled()
 def loop_figure(plan: LoopPlan) -> Figure:
     """Signal of the sensor, nutation with thresholds, and firings: the whole run, and beside it its first seconds."""
-    run = plan.flown_run
-    spans = [run.until, first_seconds(plan)] if first_seconds(plan) < SHORT * run.until else [run.until]
+    run, first = plan.flown_run, first_seconds(plan)
+    spans = [run.until, *[first] * (first < SHORT * run.until)]
     heights = [1.8, 1.8, *firings_height(run.flight)]
     figure = style.sheet(7.4 if len(spans) == 1 else 10.4, 1.8 + sum(heights))
     shape: dict[str, Any] = {"height_ratios": heights, "width_ratios": [1.5, 1.0][: len(spans)]}
@@ -59,7 +58,7 @@ def loop_figure(plan: LoopPlan) -> Figure:
         column[0].set_xlim(-EDGE * until, until)
         column[-1].set_xlabel(TIME)
     if len(spans) > 1:
-        panels[0, 1].set_title(f"The first {style.number(spans[1])} s")
+        panels[0, 1].set_title(f"The first {style.number(first)} s")
     style.legend(figure, list(panels.ravel()))
     loop = described(run.loop, thresholds=False).replace(" deg", "°")
     style.heading(figure, run.flight.spacecraft, f"{title(run.flight)}\n{loop}")
@@ -100,11 +99,11 @@ def _samples(plan: LoopPlan, rate: float, until: float) -> tuple[Vector, Vector]
         if len(numbers):
             times.append(np.asarray(numbers / rate, dtype=np.float64))
             values.append(signal.sampled(numbers, signal.shown(run.flight.motion(times[-1])[0])))
-    instants, shown = np.concatenate(times), np.concatenate(values)
+    instants = np.concatenate(times)
     quiet = np.ones(len(instants), dtype=bool)
     for firing in run.fired:
         quiet &= (instants < firing.pulse.start) | (instants > firing.pulse.end)
-    return instants[quiet], shown[quiet]
+    return instants[quiet], np.concatenate(values)[quiet]
 
 
 def _nutation(axes: Axes, plan: LoopPlan, until: float) -> None:
@@ -125,64 +124,45 @@ def _nutation(axes: Axes, plan: LoopPlan, until: float) -> None:
     style.log_angles(axes, low, 2.0 * most)
 
 
-@style.styled
+@style.styled()
 def budget_figure(budget: Budget) -> Figure:
     """Nutation over time: without firing, and the sawtooth of each limit cycle by its means."""
-    body, held = budget.spacecraft, [row for row in budget.held if row.cycle is not None]
+    body, growth, until = budget.spacecraft, budget.spacecraft.growth, budget.until_largest
+    # Cycles, or pulses of a loop that never pauses; with no nutation from the first that could grow at once.
+    held = [
+        (row.thresholds, cycle, 1.0 / (cycle.cycles or cycle.pulses), row.begins if math.isfinite(row.begins) else 0.0)
+        for row in budget.held
+        if (cycle := row.cycle) is not None
+    ]
+    size = max([PERIODS * period + begins for _, _, period, begins in held], default=0.0)
+    if until is not None and math.isfinite(until):
+        size = max(size, 1.2 * until)
+    size = size or 3.0 / max(abs(growth), 1e-300)
+    unit, seconds = ("days", DAY) if size > 2.0 * DAY else ("hours", 3600.0) if size > 7200.0 else ("s", 1.0)
     figure = style.sheet(7.4, 4.0)
     axes = figure.subplots()
-    size = _shown(budget, held)
-    unit, seconds = ("days", DAY) if size > 2.0 * DAY else ("hours", 3600.0) if size > 7200.0 else ("s", 1.0)
     times = np.linspace(0.0, size, ROWS)
-    free = np.degrees(np.arctan(np.exp(np.minimum(body.growth * times, 300.0)) * math.tan(body.nutation)))
+    free = np.degrees(np.arctan(np.exp(np.minimum(growth * times, 300.0)) * math.tan(body.nutation)))
     axes.plot(times / seconds, free, color=INK, label="no firing")
-    for row, (colour, line) in zip(held, LINES, strict=False):
-        drawn, angles = _sawtooth(body.growth, row, size)
-        name = f"{style.angle(row.thresholds.start)} to {style.angle(row.thresholds.stop)}"
+    for (thresholds, cycle, period, begins), (colour, line) in zip(held, LINES, strict=False):
+        low, high = math.degrees(cycle.low), math.degrees(cycle.high)
+        rises = min(math.log(high / low) / growth, period) if high > low > 0.0 else period
+        starts = begins + period * np.arange(max(math.ceil((size - begins) / period), 0))
+        drawn = np.stack([starts, starts + period - rises, starts + period], axis=1).ravel()
+        name = f"{style.angle(thresholds.start)} to {style.angle(thresholds.stop)}"
+        angles = np.tile([low, low, high], len(starts))
         axes.plot(drawn / seconds, angles, color=colour, linestyle=line, label=name)
     if budget.largest is not None:
         axes.axhline(math.degrees(budget.largest), **{**style.LIMIT, "label": "largest allowed"})
-    lows = [math.degrees(row.cycle.low) for row in held if row.cycle is not None]
-    highest = [math.degrees(row.cycle.largest) for row in held if row.cycle is not None]
+    highest = [math.degrees(cycle.largest) for _, cycle, _, _ in held]
     top = max([*highest, math.degrees(budget.largest or 0.0), float(free[0])])
+    lows = [math.degrees(cycle.low) for _, cycle, _, _ in held]
     style.log_angles(axes, 0.5 * min([*lows, max(float(free.min()), 1e-3 * top)]), 3.0 * top)
     axes.set(xlabel=f"time, {unit}", xlim=(0.0, size / seconds))
     style.legend(figure, [axes])
     how = "held by the limit cycle of the loop" if held else "without firing"
     style.heading(figure, body, f"nutation under dissipation, {how}")
     return figure
-
-
-def _shown(budget: Budget, held: Sequence[HeldNutation]) -> float:
-    """End of the time axis, s: some cycles, and the time until damping must begin."""
-    size = max([PERIODS / _pace(row) + _begins(row) for row in held], default=0.0)
-    until = budget.until_largest
-    if until is not None and math.isfinite(until):
-        size = max(size, 1.2 * until)
-    return size or 3.0 / max(abs(budget.spacecraft.growth), 1e-300)
-
-
-def _begins(row: HeldNutation) -> float:
-    """Time of the first firing, s; with no nutation that of the first that could grow at once."""
-    return row.begins if math.isfinite(row.begins) else 0.0
-
-
-def _pace(row: HeldNutation) -> float:
-    """Cycles, or pulses of a loop that never pauses, 1/s."""
-    assert row.cycle is not None
-    return row.cycle.cycles or row.cycle.pulses
-
-
-def _sawtooth(growth: float, row: HeldNutation, size: float) -> tuple[np.ndarray, np.ndarray]:
-    """Times (s) and nutation (deg) of a limit cycle, by its means, from when it first fires."""
-    assert row.cycle is not None
-    period, low, high = 1.0 / _pace(row), math.degrees(row.cycle.low), math.degrees(row.cycle.high)
-    count = max(math.ceil((size - _begins(row)) / period), 0)
-    rises = min(math.log(high / low) / growth, period) if high > low > 0.0 else period
-    starts = _begins(row) + period * np.arange(count)
-    times = np.stack([starts, starts + period - rises, starts + period], axis=1).ravel()
-    angles = np.tile([low, low, high], count)
-    return times, angles
 
 
 SPREAD = 6.0  # standard deviations to either side that residuals are drawn to; outliers beyond are marked at the edge
@@ -196,7 +176,7 @@ LOOKS = tuple((colour, line) for line in ("-", (0, (4, 1.5)), ":") for colour in
 FARTHEST = 6.0  # pulls beyond are drawn at the edge
 
 
-@style.styled
+@style.styled()
 def fit_figure(fit: Fit) -> Figure:
     """Residuals of the signals below each other; beside them autocorrelations, and pulls of the parameters."""
     from nutdamp.estimation.results import estimates

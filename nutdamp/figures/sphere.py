@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -36,8 +35,7 @@ HIDDEN = 0.04  # share of the space cone below which the body cone lies under th
 STEPS = (1.0, 2.0, 3.0, 5.0)
 
 
-@dataclass(frozen=True)
-class View:
+class View(NamedTuple):
     """Orthographic view of directions: ``plane`` rows are two directions square to H(0) and its own.
 
     ``magnified`` stretches directions square to H(0): straight lines, tangents and coplanar lines remain so.
@@ -55,11 +53,10 @@ class View:
     def seen(self, directions: Vector) -> tuple[Vector, Vector]:
         """Places on paper (n, 2), and heights towards the viewer (n,)."""
         local = np.atleast_2d(directions) @ self.plane.T * np.array([self.magnified, self.magnified, 1.0])
-        turn, rise = self.azimuth, ELEVATION
-        right = np.array([-math.sin(turn), math.cos(turn), 0.0])
-        near = np.array([math.cos(rise) * math.cos(turn), math.cos(rise) * math.sin(turn), math.sin(rise)])
-        up = np.cross(near, right)
-        return np.column_stack([local @ right, local @ up]), np.asarray(local @ near, dtype=np.float64)
+        sine, cosine, rise = math.sin(self.azimuth), math.cos(self.azimuth), math.cos(ELEVATION)
+        right, near = np.array([-sine, cosine, 0.0]), np.array([rise * cosine, rise * sine, math.sin(ELEVATION)])
+        places = np.column_stack([local @ right, local @ np.cross(near, right)])
+        return places, np.asarray(local @ near, dtype=np.float64)
 
 
 def view(flight: Flight, track: Track) -> View:
@@ -84,27 +81,22 @@ def magnification(widest: float) -> float:
 def sphere(flight: Flight, track: Track) -> Figure:
     """Body cone and space cone at t = 0 with the path of the spin axis, seen from outside."""
     figure = style.sheet(5.4, 5.2)
-    space = figure.subplots()
-    cones_in_space(space, flight, track)
-    style.legend(figure, [space], 4)
-    return figure
-
-
-def cones_in_space(axes: Axes, flight: Flight, track: Track) -> None:
-    """The cones at t = 0 and the path of the spin axis, seen from outside."""
+    axes = figure.subplots()
     looked, rolling = view(flight, track), geometry.cones(flight, track.rates[0], track.quaternion[0])
     draw_ground(axes, looked, track)
-    fired = draw_path(axes, looked, flight, track)
+    fired = _draw_path(axes, looked, flight, track)
     draw_cones(axes, looked, rolling)
     style.target(axes, looked.seen(geometry.aimed(flight))[0], "_target")
     tips = looked.seen(_directions(rolling))[0]
     for number, (_, colour, name) in enumerate(DIRECTIONS):
-        meant = style.meant(tips, [number])
+        meant = style.meant(tips, number)
         style.add(axes, name, tips[number], TURNED if colour == MOMENTUM else colour, role="vital", meant=meant)
-    name_lines(axes, rolling, fired=fired)
+    _name_lines(axes, rolling, fired=fired)
     frame(axes, looked, np.vstack([rolling.body, rolling.space, track.axis, track.momentum, geometry.aimed(flight)]))
     before = ", before firing 1" * any(pulse.thrust[0] <= 0.0 for pulse in flight.schedule.pulses[:1])
     axes.set_title(f"Cones at t = 0{before}{looked.scale}")
+    style.legend(figure, [axes], 4)
+    return figure
 
 
 def draw_ground(axes: Axes, looked: View, track: Track) -> None:
@@ -119,7 +111,7 @@ def draw_ground(axes: Axes, looked: View, track: Track) -> None:
     axes.plot(*geometry.once(momentum).T, **style.PATH_OF_H)
 
 
-def draw_path(axes: Axes, looked: View, flight: Flight, track: Track) -> bool:
+def _draw_path(axes: Axes, looked: View, flight: Flight, track: Track) -> bool:
     """The path of the spin axis, with the firings in it; True where any of them moves it (an impulse does not)."""
     fired = False
     thin = style.thickness(looked.seen(track.axis)[0]) / style.LINE
@@ -142,10 +134,10 @@ def draw_cones(axes: Axes, looked: View, rolling: DrawnCones) -> None:
         axes.plot(*looked.seen(rim)[0].T, color=colour, linewidth=RIM)
     for tip, (_, colour, _) in zip(looked.seen(_directions(rolling))[0], DIRECTIONS, strict=True):
         axes.plot(*np.outer(tip, [0.0, 0.97]), color=colour, linewidth=1.2)
-        style.heads(axes, np.outer([0.9, 1.0], tip), [1], colour)
+        style.head(axes, np.outer([0.9, 1.0], tip), 1, colour)
 
 
-def name_lines(axes: Axes, rolling: DrawnCones, *, fired: bool) -> None:
+def _name_lines(axes: Axes, rolling: DrawnCones, *, fired: bool) -> None:
     """The two cones, the path of the spin axis and that of H for the legend."""
     if len(rolling.body):
         about = (rolling.axis, rolling.momentum)

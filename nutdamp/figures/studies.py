@@ -54,18 +54,18 @@ PANELS = {"overview": 3, "cases": 2, "momentum": 1}
 """Panels of each figure: nutation and momentum, their cases, and the final directions of H."""
 
 
-def dispersion_figure(name: str, results: Results, *, scheme: str) -> Figure:
+def dispersion_figure(results: Results, name: str = "overview", *, scheme: str) -> Figure:
     """The figure ``overview``, ``cases`` or ``momentum``; raises KeyError for others."""
-    return _figure(name, results, f"{scheme} by {model_name([results.study.model.schedule])}")
+    return _figure(results, name, f"{scheme} by {model_name([results.study.model.schedule])}")
 
 
 def loop_cases_figure(results: LoopResults) -> Figure:
     """Largest nutation after the loop falls quiet, and how far H has moved, of dispersed cases of a loop."""
-    return _figure("cases", results, "closed loop by real pulse widths")
+    return _figure(results, "cases", "closed loop by real pulse widths")
 
 
-@style.styled
-def _figure(name: str, results: Results | LoopResults, how: str) -> Figure:
+@style.styled()
+def _figure(results: Results | LoopResults, name: str, how: str) -> Figure:
     panels, body, share = PANELS[name], results.study.model.spacecraft, results.met_fraction
     figure = style.sheet((4.1, 7.4, 10.8)[panels - 1], 4.4 if panels != 2 else 3.9)
     axes = list(figure.subplots(1, panels, squeeze=False)[0])
@@ -82,10 +82,9 @@ def _figure(name: str, results: Results | LoopResults, how: str) -> Figure:
 def _cases(panels: list[Axes], results: Results | LoopResults, body: Spacecraft) -> None:
     """Share of the cases within each value of nutation and momentum shift, over a histogram."""
     for axes, part in zip(panels, (Part.NUTATION, requirements.aim(body)), strict=True):
-        distribution = results.distribution(part.value)
+        distribution, limit = results.distribution(part.value), style.limit_of(body, part)
         nutation = "nutation left" if isinstance(results, Results) else "largest nutation"
-        name = nutation if part is Part.NUTATION else style.part_name(part)
-        limit = style.limit_of(body, part)
+        name = nutation if part is Part.NUTATION else part.label
         required = "" if limit is None else f", required {style.number(limit)}°"
         axes.set_title(name, **TITLE)
         alike = "no case ends" if distribution is None else _alike(distribution)
@@ -221,14 +220,13 @@ CHOSEN: dict[str, Any] = {"color": INK, "markersize": 11, "markerfacecolor": "no
 """Look of the mark of the recommended plan."""
 
 
-@style.styled
+@style.styled()
 def trade_figure(
     spacecraft: Spacecraft, fronts: Sequence[Front], chosen: Plan | None = None, *, narrow: bool = False
 ) -> Figure:
     """End of the last firing against propellant (impulse where that is unknown), numbered as in the table.
 
-    ``chosen``: a plan to be marked among them. Fronts that have no points are named, with the reason. ``narrow``: for a
-    phone.
+    ``chosen``: a plan to be marked among them. Fronts without points are named, with reasons. ``narrow``: for phones.
     """
     width = style.PHONE if narrow else 7.4
     figure = style.sheet(width, 4.8)
@@ -307,7 +305,7 @@ def _draw_fronts(axes: Axes, spacecraft: Spacecraft, fronts: Sequence[Front], sc
         axes.plot(*np.transpose(failing), "x", label=FAILS, **CROSS)
     places = np.array([place[:2] for place in shown])
     for row, (_, _, numbers) in enumerate(shown):
-        text, meant = ", ".join(map(str, numbers)), style.meant(places, [row])
+        text, meant = ", ".join(map(str, numbers)), style.meant(places, row)
         style.add(axes, text, places[row], INK, role="vital", meant=meant)
 
 
@@ -319,7 +317,7 @@ TURNS = 2.0  # periods of the nutation shown at least
 SHALLOW = 1e-3  # depth of the envelope below 0 that is the step of the linear program in time
 
 
-@style.styled
+@style.styled()
 def certificate_figure(proof: Certificate) -> Figure:
     """Envelope of 1 − q of all channels, as far as the plan fires, with the firings of program and plan.
 
@@ -328,16 +326,19 @@ def certificate_figure(proof: Certificate) -> Figure:
     """
     times = moments(proof)
     curves = [1.0 - proof.primer(span).max(axis=1) for span in times]
+    names = [channel.name for channel in proof.program.channels]
+    program = [(burn.t, burn.channel.name) for burn in proof.burns]
+    plan = [(pulse.t, pulse.channel) for pulse in proof.plan.pulses]
     figure = style.sheet(7.4, 3.9)
     axes = figure.subplots()
     for span, curve in zip(times, curves, strict=True):
         axes.plot(span, curve, color=MOTION, label="least 1 − q of all channels")
     last, later = float(times[-1][-1]), 0
-    for name, fired, mark in _firings(proof):
-        places = [(t, 1.0 - proof.primer(np.array([t]))[0, index]) for t, index in fired if t <= last]
-        later += len(fired) - len(places)
+    for name, fired, mark in (("program", program, "o"), ("plan", plan, "x")):
+        shown = [(t, 1.0 - proof.primer(np.array([t]))[0, names.index(channel)]) for t, channel in fired if t <= last]
+        later += len(fired) - len(shown)
         look = {"color": PULSE, "markersize": 5, "linestyle": "", "fillstyle": "none", "markeredgewidth": 1.3}
-        axes.plot(*np.array(places).reshape(-1, 2).T, marker=mark, label=name, **look)  # type: ignore[arg-type]
+        axes.plot(*np.array(shown).reshape(-1, 2).T, marker=mark, label=f"firings of the {name}", **look)  # type: ignore[arg-type]
     axes.axhline(0.0, color=GREY, linewidth=1.0)
     lowest = min(float(curve.min()) for curve in curves)
     axes.margins(x=0.02, y=0.08)
@@ -362,11 +363,3 @@ def moments(proof: Certificate) -> list[Vector]:
     spans = [(begins, min(ends, until)) for begins, ends in proof.windows if begins < until]
     pace = ROWS / max(sum(ends - begins for begins, ends in spans), 1e-9)
     return [np.linspace(begins, ends, int((ends - begins) * pace) + 2) for begins, ends in spans]
-
-
-def _firings(proof: Certificate) -> list[tuple[str, list[tuple[float, int]], str]]:
-    """Firings of the linear program and of the plan: moments, s, and channels, with name and mark."""
-    names = [channel.name for channel in proof.program.channels]
-    program = [(burn.t, names.index(burn.channel.name)) for burn in proof.burns]
-    plan = [(pulse.t, names.index(pulse.channel)) for pulse in proof.plan.pulses]
-    return [("firings of the program", program, "o"), ("firings of the plan", plan, "x")]

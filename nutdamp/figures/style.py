@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Sequence
-from functools import wraps
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from importlib.util import find_spec
 from textwrap import fill
-from typing import TYPE_CHECKING, Any, NamedTuple, ParamSpec, TypeVar
+from typing import TYPE_CHECKING, Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -103,24 +103,16 @@ def require() -> None:
         raise MissingExtra("plot", "a picture")
 
 
-Parameters = ParamSpec("Parameters")
-Result = TypeVar("Result")
-
-
-def styled(draw: Callable[Parameters, Result]) -> Callable[Parameters, Result]:
+@contextmanager
+def styled() -> Iterator[None]:
     """Draw in this style, whatever the settings of the user's matplotlib; raises MissingExtra without one."""
+    require()
+    from matplotlib import style
 
-    @wraps(draw)
-    def drawn(*args: Parameters.args, **kwargs: Parameters.kwargs) -> Result:
-        require()
-        from matplotlib import style
-
-        with style.context(["default", _SETTINGS]), warnings.catch_warnings():
-            # A name in another script is drawn as boxes, one that is too long leaves no room: no reader can mend that.
-            warnings.simplefilter("ignore", UserWarning)
-            return draw(*args, **kwargs)
-
-    return drawn
+    with style.context(["default", _SETTINGS]), warnings.catch_warnings():
+        # A name in another script is drawn as boxes, one that is too long leaves no room: no reader can mend that.
+        warnings.simplefilter("ignore", UserWarning)
+        yield
 
 
 PHONE = 3.7  # width of a figure for narrow screens, inches: its smallest text is 10 px high where 360 px show it
@@ -135,13 +127,12 @@ def sheet(width: float, height: float) -> Figure:
     return figure
 
 
-def heads(axes: Axes, path: Vector, places: Sequence[int], colour: str, size: float = 9.0) -> None:
-    """Arrowheads along a ``path`` (n, 2) that show its sense, at some of its rows."""
+def head(axes: Axes, path: Vector, row: int, colour: str, size: float = 9.0) -> None:
+    """An arrowhead at a row of a ``path`` (n, 2) that shows its sense; none at the first one."""
     look = {"arrowstyle": "-|>", "color": colour, "linewidth": 0, "mutation_scale": size, "shrinkA": 0, "shrinkB": 0}
-    for row in places:
-        if 0 < row < len(path) and np.any(path[row] != path[row - 1]):
-            (x0, y0), (x1, y1) = path[row - 1].tolist(), path[row].tolist()
-            axes.annotate("", (x1, y1), (x0, y0), annotation_clip=False, arrowprops=look)
+    if 0 < row < len(path) and np.any(path[row] != path[row - 1]):
+        (x0, y0), (x1, y1) = path[row - 1].tolist(), path[row].tolist()
+        axes.annotate("", (x1, y1), (x0, y0), annotation_clip=False, arrowprops=look)
 
 
 def words(axes: Axes, text: str) -> None:
@@ -212,11 +203,6 @@ def angle(radians: float) -> str:
     return f"{number(shown)}°" if abs(shown) >= 1e-6 else "< 1e-6°" if shown else "0°"
 
 
-def part_name(part: Part) -> str:
-    """Name of a quantity that a requirement bounds."""
-    return "momentum shift" if part is Part.SHIFT else part.label
-
-
 def limit_of(spacecraft: Spacecraft, part: Part) -> float | None:
     """The bound that the file requires of an angle, deg; None without one."""
     return next((math.degrees(bound.most) for bound in required(spacecraft) if bound.part is part), None)
@@ -269,43 +255,30 @@ def _across(names: Sequence[str], columns: int) -> float:
     return sum(HANDLE + LETTER * max(map(len, part)) for part in parts) + 11.0 * (columns - 1)
 
 
-class Meant(NamedTuple):
-    """Points of a label, (n, 2), and points that it must not be taken for, (m, 2), in the units of its panel."""
+Meant = tuple[Vector, Vector]
+"""Points of a label, (n, 2), and points that it must not be taken for, (m, 2), in the units of its panel."""
 
-    own: Vector
-    others: Vector
-
-
-_MEANT: WeakKeyDictionary[Artist, Meant] = WeakKeyDictionary()  # points meant by each label, until it is settled
+_MEANT: WeakKeyDictionary[Artist, Meant] = WeakKeyDictionary()
 
 
-def add(
-    axes: Axes,
-    text: str,
-    place: Vector,
-    colour: str,
-    *,
-    role: str = "label",
-    short: str = "",
-    meant: Meant | None = None,
-) -> None:
+def add(axes: Axes, text: str, place: Vector, colour: str, *, role: str = "label", meant: Meant | None = None) -> None:
     """A label near a point. `settle` moves it to where there is room, by its role, or takes it out.
 
     ``label`` goes anywhere around its point and may be left out; ``vital`` is never left out; ``bar`` is above the bar
-    of a firing, and reads ``short`` where not all of them have room. The point ``meant`` is nearest to the label, or
-    joined to it by a thin line.
+    of a firing, and ends before its colon where not all of them have room. The point ``meant`` is nearest to the label,
+    or joined to it by a thin line.
     """
     at, vertical = (float(place[0]), float(place[1])), "bottom" if role == "bar" else "center_baseline"
     look: dict[str, Any] = {"color": colour, "fontsize": SMALL, "ha": "center", "va": vertical}
     note = axes.annotate(text, at, xytext=(0, 0), textcoords="offset points", annotation_clip=False, **look)
-    note.set_label(f"_{role}{short}")  # begins so that no legend shows it
+    note.set_label(f"_{role}")  # begins so that no legend shows it
     if meant is not None:
         _MEANT[note] = meant
 
 
-def meant(places: Vector, rows: Sequence[int]) -> Meant:
-    """Some rows of ``places`` (n, 2), which are not to be taken for the others."""
-    return Meant(places[rows], np.delete(places, rows, axis=0))
+def meant(places: Vector, row: int) -> Meant:
+    """A row of ``places`` (n, 2), which is not to be taken for the others."""
+    return places[[row]], np.delete(places, row, axis=0)
 
 
 def target(axes: Axes, places: Vector, name: str = "target") -> None:
@@ -382,42 +355,33 @@ def settle(figure: Figure) -> None:
         leads = _stars(axes)
         window, points = axes.get_window_extent(), figure.dpi / 72.0
         for note in notes:
-            box = _settle(note, taken, (curves, leads), window, points)
-            if box is not None:
-                leads = np.vstack([leads, _lead(note, box, points)])
-            _MEANT.pop(note, None)
-        bars: list[Any] = [note for note in axes.texts if str(note.get_label()).startswith("_bar")]
-        if len(_in_rows(bars, window, points)) < len(bars):  # else all have room as they are
+            leads = np.vstack([leads, _settle(note, taken, (curves, leads), window, points)])
+        bars: list[Any] = [note for note in axes.texts if note.get_label() == "_bar"]
+        if not _all_fit(bars, window, points):
             for note in bars:
-                note.set_text(str(note.get_label()).removeprefix("_bar"))
-            fitting = _in_rows(bars, window, points)
-            for note in bars:
-                note.set_visible(note in fitting)
+                note.set(text=note.get_text().partition(":")[0], visible=True)
+            _all_fit(bars, window, points)
 
 
-def _in_rows(notes: list[Annotation], window: Bbox, points: float) -> set[Annotation]:
-    """Put labels above their bars, no farther than the edges of the panel; those that meet none before in their row."""
+def _all_fit(notes: list[Annotation], window: Bbox, points: float) -> bool:
+    """Put labels above their bars, within the panel; hide those that meet another of their row; True if none does."""
     ends: dict[float, float] = {}
-    fitting = set()
     for note in notes:
         note.set_position((0.0, BAR_GAP))
-        here = note.get_window_extent()
+        here, row = note.get_window_extent(), float(note.xy[1])
         shift = max(window.x0 + points - here.x0, 0.0) - max(here.x1 - window.x1 + points, 0.0)
         note.set_position((shift / points, BAR_GAP))
-        row = float(note.xy[1])
-        if here.x0 + shift >= ends.get(row, -np.inf) + 3.0 * points:
+        note.set_visible(here.x0 + shift >= ends.get(row, -np.inf) + 3.0 * points)
+        if note.get_visible():
             ends[row] = here.x1 + shift
-            fitting.add(note)
-    return fitting
+    return all(note.get_visible() for note in notes)
 
 
-def _settle(
-    note: Annotation, taken: list[Bbox], inked: tuple[Vector, Vector], window: Bbox, points: float
-) -> Bbox | None:
-    """Place of one label, which covers few of the curves and, if it can, none of the lines from other labels.
+def _settle(note: Annotation, taken: list[Bbox], inked: tuple[Vector, Vector], window: Bbox, points: float) -> Vector:
+    """Place one label, which covers few of the curves and, if it can, none of the lines from other labels.
 
     ``inked``: points of curves, and of stars and lines of other labels; ``window`` is that of the panel, ``points`` the
-    number of pixels in a point.
+    number of pixels in a point. Returns the points of a line to the label.
     """
     role = str(note.get_label())
     here = note.get_window_extent().padded(1.5 * points)
@@ -438,18 +402,23 @@ def _settle(
             if role != "_vital":
                 continue
             covered += 1e4 * (1.0 + out)
-        if led and not _nearest(note, box, points):
-            way = _way(note, box, points)
+        if led and len(way := _way(note, box, points)):
             covered += 3.0 if away[number] > FAR else 1e3
             covered += 1e3 * any(other.count_contains(way) for other in taken)
         if covered < least:
             best, least = number, covered
     if best is None:
         note.set_visible(False)
-        return None
+        return np.empty((0, 2))
     note.set_position(offsets[best].tolist())
     taken.append(boxes[best])
-    return taken[-1]
+    way = _way(note, boxes[best], points)
+    if len(way):
+        axes: Any = note.axes
+        ends, limits = axes.transData.inverted().transform(way[[0, -1]]), (axes.get_xlim(), axes.get_ylim())
+        axes.plot(*ends.T, color=note.get_color(), linewidth=LEADER, label="_leader", zorder=2.5)
+        axes.set(xlim=limits[0], ylim=limits[1])
+    return way
 
 
 def _contained(boxes: Sequence[Bbox], places: Vector) -> Vector:
@@ -464,41 +433,25 @@ NEARER, NEAR = 0.45, 8.0
 many points."""
 
 
-def _nearest(note: Annotation, box: Bbox, points: float) -> bool:
-    """True where a label in a ``box`` of pixels clearly belongs to the points it is meant for."""
+def _way(note: Annotation, box: Bbox, points: float) -> Vector:
+    """Points, 4 pixels apart, from the point of a label to its ``box``; none where it clearly belongs to its points."""
     axes: Any = note.axes
-    if note not in _MEANT:
-        return _away(box, axes.transData.transform([note.xy])) <= FAR * points
-    own, others = (_away(box, np.asarray(axes.transData.transform(part))) for part in _MEANT[note])
-    return own < min(NEARER * others, NEAR * points)
+    tip, inner = np.asarray(axes.transData.transform(note.xy)), box.padded(-1.5 * points)
+    if note in _MEANT:
+        own, others = (_away(box, np.asarray(axes.transData.transform(part))) for part in _MEANT[note])
+        near = own < min(NEARER * others, NEAR * points)
+    else:
+        near = _away(box, tip) <= FAR * points
+    if near:
+        return np.empty((0, 2))
+    edge = np.clip(tip, [inner.x0, inner.y0], [inner.x1, inner.y1])
+    return np.linspace(tip, edge, max(int(np.hypot(*(edge - tip)) / 4.0), 2))
 
 
 def _away(box: Bbox, places: Vector) -> float:
     """Distance of the nearest of some ``places`` (n, 2) from a box; infinite where there are none."""
     beyond = np.maximum(np.maximum([box.x0, box.y0] - places, places - [box.x1, box.y1]), 0.0)
     return float(np.hypot(*beyond.T).min(initial=np.inf))
-
-
-def _way(note: Annotation, box: Bbox, points: float) -> Vector:
-    """The points, 4 pixels apart, from the points of a label to its ``box``."""
-    axes: Any = note.axes
-    tip = np.asarray(axes.transData.transform(note.xy))
-    inner = box.padded(-1.5 * points)
-    edge = np.clip(tip, [inner.x0, inner.y0], [inner.x1, inner.y1])
-    return np.linspace(tip, edge, max(int(np.hypot(*(edge - tip)) / 4.0), 2))
-
-
-def _lead(note: Annotation, box: Bbox, points: float) -> Vector:
-    """The points, 4 pixels apart, of a thin line from a label to its point; none where that is nearest anyhow."""
-    axes: Any = note.axes
-    if _nearest(note, box, points):
-        return np.empty((0, 2))
-    way = _way(note, box, points)
-    ends = np.asarray(axes.transData.inverted().transform(way[[0, -1]]))
-    limits = axes.get_xlim(), axes.get_ylim()
-    axes.plot(*ends.T, color=note.get_color(), linewidth=LEADER, label="_leader", zorder=2.5)
-    axes.set(xlim=limits[0], ylim=limits[1])
-    return way
 
 
 def _inked(axes: Axes) -> Vector:

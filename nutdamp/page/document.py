@@ -1,6 +1,6 @@
 """Contents of a report, apart from their look: a page of sections, made of a few kinds of blocks.
 
-Each kind of block names the macro of the templates that shows it.
+The name of its class is that of the macro of the templates that shows a block.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rich.console import Group, RenderableType
 from rich.table import Table
@@ -33,14 +33,8 @@ class Cell(NamedTuple):
     dot: float | None = None
     bar: float | None = None
 
-    @property
-    def missed(self) -> bool:
-        """True for a requirement that is not met."""
-        return self.text.startswith("NOT ") or self.text == "FAIL"
 
-
-@dataclass(frozen=True, slots=True)
-class Sheet:
+class Sheet(NamedTuple):
     """A table with one row for each thing compared; the first column names it.
 
     ``mark`` is the row to stand out; ``dots``: names of columns in which a dot shows each number to scale, ``bars``:
@@ -54,53 +48,42 @@ class Sheet:
     dots: tuple[str, ...] = ()
     folds: bool = False
     bars: tuple[str, ...] = ()
-    kind: ClassVar[str] = "sheet"
 
     @property
     def cells(self) -> tuple[tuple[Cell, ...], ...]:
         """Rows of cells."""
-        columns = [self._column(at, heading) for at, heading in enumerate(self.columns)]
+        columns = []
+        for heading, texts in zip(self.columns, zip(*self.rows, strict=True), strict=False):
+            dotted, barred = heading.name in self.dots, heading.name in self.bars
+            sizes = [*map(number_in, texts)]
+            most = max((abs(size) for size in sizes if size is not None), default=0.0) or 1.0
+            shown = [None if size is None or not dotted else 100.0 * abs(size) / most for size in sizes]
+            cells = zip(texts, shown, sizes, strict=True)
+            columns.append([Cell(text, heading.number, dot, bar if barred else None) for text, dot, bar in cells])
         return tuple(zip(*columns, strict=True))
 
-    def _column(self, at: int, heading: Heading) -> list[Cell]:
-        cells = [Cell(row[at], heading.number) for row in self.rows]
-        if heading.name in self.bars:
-            return [cell._replace(bar=number_in(cell.text)) for cell in cells]
-        if heading.name not in self.dots:
-            return cells
-        sizes = [(cell, number_in(cell.text)) for cell in cells]
-        most = max((abs(number) for _, number in sizes if number is not None), default=0.0) or 1.0
-        return [cell._replace(dot=None if number is None else 100.0 * abs(number) / most) for cell, number in sizes]
 
-
-@dataclass(frozen=True, slots=True)
-class FactList:
+class FactList(NamedTuple):
     """Names and their values."""
 
     title: str
     rows: tuple[tuple[str, str], ...]
-    kind: ClassVar[str] = "facts"
 
 
-@dataclass(frozen=True, slots=True)
-class Prose:
+class Prose(NamedTuple):
     """A paragraph; ``alarm``: it stands in a red frame."""
 
     text: str
     alarm: bool = False
-    kind: ClassVar[str] = "prose"
 
 
-@dataclass(frozen=True, slots=True)
-class Points:
+class Points(NamedTuple):
     """A list of short paragraphs, each with the name of its subject, if any."""
 
     rows: tuple[tuple[str, str], ...]
-    kind: ClassVar[str] = "points"
 
 
-@dataclass(frozen=True, slots=True)
-class Picture:
+class Picture(NamedTuple):
     """An ``<svg>`` element, its title, a caption, a description, and the ``narrow`` drawing for a phone, if any."""
 
     svg: str
@@ -108,34 +91,27 @@ class Picture:
     caption: str
     described: str
     narrow: str = ""
-    kind: ClassVar[str] = "picture"
 
 
-@dataclass(frozen=True, slots=True)
-class Listing:
+class Listing(NamedTuple):
     """Text as it is in a file or on a command line."""
 
     title: str
     text: str
-    kind: ClassVar[str] = "listing"
 
 
-@dataclass(frozen=True, slots=True)
-class Beside:
+class Beside(NamedTuple):
     """Blocks side by side where there is room; ``still``: shown only where no script moves the view before them."""
 
     blocks: tuple[Block, ...]
     still: bool = False
-    kind: ClassVar[str] = "beside"
 
 
-@dataclass(frozen=True, slots=True)
-class Details:
+class Details(NamedTuple):
     """Blocks behind their title, which a click opens; they are not printed."""
 
     title: str
     blocks: tuple[Block, ...]
-    kind: ClassVar[str] = "details"
 
 
 class Circle(NamedTuple):
@@ -147,10 +123,7 @@ class Circle(NamedTuple):
 
 
 class NamedDirection(NamedTuple):
-    """A direction on the globe, (3,) inertial unit vector, with circles around it; ``kind`` styles it.
-
-    ``watched``: the angle from it to the spin axis is shown.
-    """
+    """A direction on the globe, (3,) inertial; ``kind`` styles it, ``watched``: its angle to the spin axis is shown."""
 
     name: str
     axis: Vector
@@ -200,20 +173,13 @@ class Strip(NamedTuple):
 
 
 class Workbench(NamedTuple):
-    """Fixed parts of the workbench: quantities at the end, and the pulses by number and channel.
-
-    ``rows``: name of each quantity for the script and for people, and its bound in words. ``ratio``, ``thrust``:
-    largest change of C/A and of the thrust by the sliders, per cent.
-    """
+    """Names of each quantity for the script and for people, its bound in words; the pulses by number and channel."""
 
     rows: tuple[tuple[str, str, str], ...]
     pulses: tuple[str, ...]
-    ratio: float = 1.0
-    thrust: float = 5.0
 
 
-@dataclass(frozen=True, slots=True)
-class Moving:
+class Moving(NamedTuple):
     """Fixed parts of the moving view, and its moving parts as the JSON ``data``.
 
     ``longitude``: name of the numbers of the globe; ``how``: the model that is flown; ``absent``: the reason for
@@ -234,7 +200,6 @@ class Moving:
     absent: str
     command: tuple[str, ...]
     data: str
-    kind: ClassVar[str] = "moving"
 
 
 Block = Sheet | FactList | Prose | Points | Picture | Listing | Moving | Beside | Details

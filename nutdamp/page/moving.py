@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -53,17 +53,16 @@ def named_directions(body: Spacecraft) -> tuple[NamedDirection, ...]:
     directions = []
     if body.goal.axis is not None:
         shift = None if body.requirement is None else body.requirement.momentum_shift
-        circles = () if shift is None else (Circle(f"H at most {most(shift)} from target", shift, "target"),)
-        directions.append(NamedDirection("target", body.goal.axis, "target", circles))
+        circles = [] if shift is None else [Circle(f"H at most {most(shift)} from target", shift, "target")]
+        directions.append(NamedDirection("target", body.goal.axis, "target", tuple(circles)))
     for keep in body.watched:
-        if keep.direction is None:
-            continue
-        bounds = []
-        if keep.least > 0.0:
-            bounds.append(Circle(f"axis at least {most(keep.least)} from {keep.name}", keep.least, "keep-out"))
-        if keep.most < math.pi:
-            bounds.append(Circle(f"axis at most {most(keep.most)} from {keep.name}", keep.most, "keep-in"))
-        directions.append(NamedDirection(keep.name, keep.direction, "watched", tuple(bounds), watched=True))
+        if keep.direction is not None:
+            bounds = [("least", keep.least, "keep-out")] * (keep.least > 0.0)
+            bounds += [("most", keep.most, "keep-in")] * (keep.most < math.pi)
+            circles = [
+                Circle(f"axis at {word} {most(size)} from {keep.name}", size, kind) for word, size, kind in bounds
+            ]
+            directions.append(NamedDirection(keep.name, keep.direction, "watched", tuple(circles), watched=True))
     return tuple(directions)
 
 
@@ -75,22 +74,24 @@ def moving(flown: Flight, until: float, scheme: str, named: Sequence[NamedDirect
     panels, columns, target, rooms = _panels(flown, track, named)
     strip, span = strip_of(flown, track, until)
     firing, texts = _firing(flown, track)
-    cone = _angle_digits(track)
+    largest = math.degrees(float(track.nutation.max()))
+    # Four figures of the largest nutation.
+    cone = ANGLE_DIGITS if largest < geometry.LEAST else max(ANGLE_DIGITS, 3 - math.floor(math.log10(largest)))
     clock = max(3, math.ceil(-math.log10(until / (samples - 1))) + 1)
     columns |= {
         "t": _whole(track.t, clock),
         "theta": _whole(np.degrees(track.nutation), cone),
         "mu": _whole(np.degrees(track.body_cone), cone),
         "lambda": _whole(np.degrees(track.space_cone), cone),
-        **_named_columns("angle", _pointing(body, track.axis)),
+        **_numbered("angle", _pointing(body, track.axis)),
         "firing": firing,
     }
     if named:
         for name, ways in (("axis", track.axis), ("H", track.momentum)):
             unit = ways / np.linalg.norm(ways, axis=1, keepdims=True)
-            columns |= _named_columns(name, np.rint(SPHERE * unit.T).astype(int).tolist())
-    for number, watched in enumerate((direction for direction in named if direction.watched), start=1):
-        columns[f"aspect{number}"] = _whole(np.degrees(attitude.angle_between(track.axis, watched.axis)), ANGLE_DIGITS)
+            columns |= _numbered(name, np.rint(SPHERE * unit.T).astype(int).tolist())
+    watched = (np.degrees(attitude.angle_between(track.axis, each.axis)) for each in named if each.watched)
+    columns |= _numbered("aspect", [_whole(angles, ANGLE_DIGITS) for angles in watched])
     utc = _dates(body, track, clock)
     absent = absence(body, flown.schedule)
     data: dict[str, Any] = {
@@ -117,9 +118,8 @@ def moving(flown: Flight, until: float, scheme: str, named: Sequence[NamedDirect
         "dots": turns * COARSE > samples,
         "bench": None if absent else workbench_data(flown, track, *rooms, until),
     }
-    speeds, speed = _speeds(until)
     return Moving(
-        panels, strip, speeds, speed, angle_names(body), tuple(named), utc is not None,
+        panels, strip, *_speeds(until), angle_names(body), tuple(named), utc is not None,
         "azimuths" if body.attitude is None else "right ascensions", turns > STEEP,
         propagation.model_name([flown.schedule]), None if absent else workbench_of(flown), absent,
         ("nutdamp simulate SPACECRAFT", f"--scheme {scheme}", "--flown", f"--until {until:.12g}",
@@ -128,42 +128,35 @@ def moving(flown: Flight, until: float, scheme: str, named: Sequence[NamedDirect
     )  # fmt: skip
 
 
+Room = tuple[Vector, float]  # middle (2,) and half the side of a square panel
+
+
 def _panels(
     flown: Flight, track: Track, named: Sequence[NamedDirection]
 ) -> tuple[tuple[Panel, ...], dict[str, list[int]], list[int] | None, tuple[Room, Room]]:
     """Pole curve and axis track, the columns of their paths, the place of the target in the latter, and both rooms."""
-    sky, momentum = geometry.sky_paths(flown, track)
-    target = geometry.sky_target(flown, track)
+    (sky, momentum), target = geometry.sky_paths(flown, track), geometry.sky_target(flown, track)
     # Only if the globe names it and it leaves room for the paths.
     reach = FAR * float(np.hypot(*np.vstack([sky, momentum]).T).max())
     if not (named and np.all(np.hypot(*target.T) <= reach)):
         target = np.empty((0, 2))
     pole = geometry.pole_path(track)
-    pole_room = geometry.room(pole, 0.1, centre=True)
-    sky_room = geometry.room(np.vstack([sky, momentum, target]), 0.1)
+    rooms = geometry.room(pole, 0.1, centre=True), geometry.room(np.vstack([sky, momentum, target]), 0.1)
     x, y, _ = geometry.sky_names(flown)
+    names = f"ω1, deg/s{geometry.pole_note(flown)}", "ω2, deg/s"
     panels = (
-        panel("pole", "Pole curve: ω in the body", pole_room, (f"ω1, deg/s{geometry.pole_note(flown)}", "ω2, deg/s")),
-        panel("sky", "Axis track, H towards you", sky_room, (x, y)),
+        panel("pole", "Pole curve: ω in the body", rooms[0], names),
+        panel("sky", "Axis track, H towards you", rooms[1], (x, y)),
     )
-    columns = {
-        **_named_columns("pole", placed(pole, *pole_room)),
-        **_named_columns("sky", placed(sky, *sky_room)),
-        **_named_columns("momentum", placed(momentum, *sky_room)),
-    }
-    place = [column[0] for column in placed(target, *sky_room)] if len(target) else None
-    return panels, columns, place, (pole_room, sky_room)
+    columns: dict[str, list[int]] = {}
+    for name, path, room in zip(("pole", "sky", "momentum"), (pole, sky, momentum), (*rooms, rooms[1]), strict=True):
+        columns |= _numbered(name, placed(path, *room))
+    return panels, columns, [column[0] for column in placed(target, *rooms[1]) if column] or None, rooms
 
 
-def _named_columns(name: str, columns: Sequence[list[int]]) -> dict[str, list[int]]:
+def _numbered(name: str, columns: Sequence[list[int]]) -> dict[str, list[int]]:
     """Columns by a common name and their number, from 1."""
     return {f"{name}{number}": column for number, column in enumerate(columns, start=1)}
-
-
-def _angle_digits(track: Track) -> int:
-    """Decimals of degrees that show four figures of the largest nutation."""
-    largest = math.degrees(float(track.nutation.max()))
-    return ANGLE_DIGITS if largest < geometry.LEAST else max(ANGLE_DIGITS, 3 - math.floor(math.log10(largest)))
 
 
 def _whole(values: Vector, digits: int) -> list[int]:
@@ -198,17 +191,16 @@ def _dates(body: Spacecraft, track: Track, digits: int) -> dict[str, Any] | None
 
 def _firing(flown: Flight, track: Track) -> tuple[list[int], list[str]]:
     """For each row the number of the text that names the firings; the first text is that of none."""
-    texts, column = ["none"], []
-    names = [
-        f"{number}: {channel_text(pulse, flown.spacecraft)}" for number, pulse in enumerate(flown.schedule, start=1)
-    ]
+    texts, column, names = {"none": 0}, [], _pulse_names(flown)
     for time in track.t.tolist():
         on = (name for name, (begins, ends) in zip(names, flown.spans, strict=True) if begins <= time <= ends)
-        text = " and ".join(on) or texts[0]
-        if text not in texts:
-            texts.append(text)
-        column.append(texts.index(text))
-    return column, texts
+        column.append(texts.setdefault(" and ".join(on) or "none", len(texts)))
+    return column, [*texts]
+
+
+def _pulse_names(flown: Flight) -> tuple[str, ...]:
+    """Number and channel of each pulse."""
+    return tuple(f"{number}: {channel_text(pulse, flown.spacecraft)}" for number, pulse in enumerate(flown.schedule, 1))
 
 
 def _look(track: Track, named: Sequence[NamedDirection]) -> list[float]:
@@ -249,18 +241,14 @@ def panel(part: str, title: str, room: tuple[Vector, float], names: tuple[str, s
     """A panel with ``room``: its middle (2,) and half its side; the ``names`` of its axes have deg as their unit."""
     middle, half = room
     prefix, factor = _prefix(half)
-    names = names[0].replace(", deg", f", {prefix}deg"), names[1].replace(", deg", f", {prefix}deg")
-    marks = []
-    for which in (0, 1):
-        inner = (1.0 - 2.0 * EDGE) * half
+    scales, inner = [], (1.0 - 2.0 * EDGE) * half
+    for which, name in enumerate(names):
         values = np.array(geometry.ticks(float(middle[which]) - inner, float(middle[which]) + inner, 5))
-        both = np.column_stack([values, values])
-        places = placed(both, middle[[which, which]], half)[which]
-        marks.append(tuple(zip(map(float, places), map(_number, (factor * values).tolist()), strict=True)))
-    zero = placed(np.zeros((1, 2)), middle, half)
-    described = f"{title}; {names[0]} to the right, {names[1]} upwards"
-    x, y = (Scale(name, mark) for name, mark in zip(names, marks, strict=True))
-    return Panel(part, title, described, x, y, (zero[0][0], zero[1][0]))
+        places = placed(np.column_stack([values, values]), middle[[which, which]], half)[which]
+        scales.append(_scale(name.replace(", deg", f", {prefix}deg"), map(float, places), (factor * values).tolist()))
+    (across,), (along,) = placed(np.zeros((1, 2)), middle, half)
+    described = f"{title}; {scales[0].name} to the right, {scales[1].name} upwards"
+    return Panel(part, title, described, scales[0], scales[1], (across, along))
 
 
 def _prefix(largest: float) -> tuple[str, float]:
@@ -268,8 +256,8 @@ def _prefix(largest: float) -> tuple[str, float]:
     return next(((name, factor) for name, factor in PREFIXES if factor * largest >= SHORT), PREFIXES[-1])
 
 
-def _number(value: float) -> str:
-    return f"{value:.6g}".replace("-", "−")
+def _scale(name: str, places: Iterable[float], values: Iterable[float]) -> Scale:
+    return Scale(name, tuple((at, f"{value:.6g}".replace("-", "−")) for at, value in zip(places, values, strict=True)))
 
 
 def strip_of(flown: Flight, track: Track, until: float) -> tuple[Strip, list[float]]:
@@ -291,28 +279,27 @@ def strip_of(flown: Flight, track: Track, until: float) -> tuple[Strip, list[flo
         return round(width * across(begins), 1), round(width * (across(ends) - across(begins)), 1)
 
     required = None if body.requirement is None else body.requirement.nutation
+    level = math.inf if required is None else math.degrees(required)
     channels = tuple(geometry.channels_fired(flown))
-    fired = zip(flown.schedule, flown.spans, strict=True)
     prefix, factor = _prefix(high - low)
-    level = None if required is None else math.degrees(required)
     edge = EDGE * (high - low)
-    scale = tuple(
-        (rise(angle) * 100.0 / height, _number(factor * angle)) for angle in geometry.ticks(low + edge, high - edge, 5)
-    )
+    marked, times = geometry.ticks(low + edge, high - edge, 5), geometry.ticks(0.0, until, 6)
     strip = Strip(
-        times=Scale("time, s", tuple((100.0 * across(time), _number(time)) for time in geometry.ticks(0.0, until, 6))),
-        angles=Scale(f"{prefix}deg", scale),
+        times=_scale("time, s", (100.0 * across(time) for time in times), times),
+        angles=_scale(
+            f"{prefix}deg", (rise(angle) * 100.0 / height for angle in marked), (factor * angle for angle in marked)
+        ),
         zero=rise(0.0),
-        required=rise(level) if level is not None and low < level < high else None,
-        outside=most(math.radians(level)) if level is not None and not low < level < high else "",
+        required=rise(level) if low < level < high else None,
+        outside="" if required is None or low < level < high else most(math.radians(level)),
         channels=channels,
-        bars=tuple((channels.index(pulse.channel), *spread(*span)) for pulse, span in fired),
+        bars=tuple(
+            (channels.index(pulse.channel), *spread(*span))
+            for pulse, span in zip(flown.schedule, flown.spans, strict=True)
+        ),
         closed=tuple(spread(begins, ends) for begins, ends in geometry.closed(body, until)),
     )
     return strip, [low, high]
-
-
-Room = tuple[Vector, float]  # middle (2,) and half the side of a square panel
 
 
 def absence(body: Spacecraft, schedule: Schedule) -> str:
@@ -331,18 +318,15 @@ def absence(body: Spacecraft, schedule: Schedule) -> str:
 def workbench_of(flown: Flight) -> Workbench:
     """The workbench of a flight; there must be one by `absence`."""
     body = flown.spacecraft
-    limits = {bound.part: bound for bound in requirements.required(body)}
-    names = [(Part.NUTATION, "nutation"), (Part.SHIFT, "momentum shift")]
-    if body.goal.axis is not None:
-        names.append((Part.DISTANCE, "axis error"))
+    limits = {bound.part: bound.most for bound in requirements.required(body)}
+    parts = [Part.NUTATION, Part.SHIFT, *[Part.DISTANCE] * (body.goal.axis is not None)]
     rows = [
-        (part.value, name, f"≤ {most(limits[part].most).removesuffix(' deg')}°" if part in limits else "")
-        for part, name in names
+        (part.value, part.label, f"≤ {most(limits[part]).removesuffix(' deg')}°" if part in limits else "")
+        for part in parts
     ]
     if Part.SPIN in limits:
-        rows.append(("spin", "spin error", f"≤ {quantity(limits[Part.SPIN].most, 'rad/s')}"))
-    pulses = (f"{number}: {channel_text(pulse, body)}" for number, pulse in enumerate(flown.schedule, start=1))
-    return Workbench(tuple(rows), tuple(pulses))
+        rows.append((Part.SPIN.value, Part.SPIN.label, f"≤ {quantity(limits[Part.SPIN], 'rad/s')}"))
+    return Workbench(tuple(rows), _pulse_names(flown))
 
 
 def workbench_data(flown: Flight, track: Track, pole: Room, sky: Room, until: float) -> dict[str, Any]:

@@ -17,7 +17,6 @@ from html import escape
 from importlib.metadata import PackageNotFoundError, version
 from importlib.resources import files
 from importlib.util import find_spec
-from itertools import cycle
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -31,26 +30,8 @@ from nutdamp.figures.style import require
 from nutdamp.files.reader import Source
 from nutdamp.files.yaml import dotted
 from nutdamp.flight.verification import verify
-from nutdamp.page.document import (
-    UNCONTROLLED,
-    Beside,
-    Block,
-    Contender,
-    Control,
-    Details,
-    FactList,
-    Listing,
-    Page,
-    PageSection,
-    Picture,
-    Points,
-    Prose,
-    blocks_of,
-    facts_of,
-    plain,
-    sheet,
-    sheet_of,
-)
+from nutdamp.page import document
+from nutdamp.page.document import Block, Control, Details, FactList, Page, PageSection, Picture, Points, Prose
 from nutdamp.page.manoeuvre import manoeuvre_blocks
 from nutdamp.page.moving import moving_of
 from nutdamp.planning.decision import Comparison, Decision, broken_limits, decide
@@ -96,7 +77,7 @@ def _require_jinja() -> None:
 
 def page_html(page: Page) -> str:
     """The whole file. All text of a spacecraft file is escaped; the policy in its head allows no other script."""
-    moves = any(block.kind == "moving" for block in page.motion)
+    moves = any(isinstance(block, document.Moving) for block in page.motion)
     style, script = (
         "\n".join(files("nutdamp.page").joinpath(name).read_text("utf-8").strip() for name in (first, *views * moves))
         for first, views in (("page.css", ["view.css"]), ("page.js", ["motion.js", "bench.js", "view.js"]))
@@ -135,9 +116,9 @@ def _whole(text: str) -> Markup:
     """Text in which options of commands and relations stay in one line."""
     from markupsafe import Markup
 
-    parts = (escape(part) for part in WHOLE.split(text))
-    spans = (f'<span class="whole-word">{part}</span>' if odd else part for odd, part in zip(cycle((0, 1)), parts))
-    return Markup("".join(spans))
+    parts = [escape(part) for part in WHOLE.split(text)]
+    parts[1::2] = [f'<span class="whole-word">{part}</span>' for part in parts[1::2]]
+    return Markup("".join(parts))
 
 
 def _css(text: str) -> str:
@@ -207,9 +188,9 @@ class Repeat(NamedTuple):
 
 def called(body: Spacecraft, how: str) -> Repeat:
     """The call in Python that makes a page again; where fields were replaced, no file stands for the spacecraft."""
-    if not isinstance(body.source, Source):
-        return Repeat(f"nutdamp.report(spacecraft, {how})", "", "")
-    return repeated(f"nutdamp.report({body.source.name!r}, {how})", body.source)
+    if isinstance(body.source, Source):
+        return repeated(f"nutdamp.report({body.source.name!r}, {how})", body.source)
+    return Repeat(f"nutdamp.report(spacecraft, {how})", "", "")
 
 
 def repeated(command: str, source: Source) -> Repeat:
@@ -219,7 +200,7 @@ def repeated(command: str, source: Source) -> Repeat:
 
 
 def report_page(
-    compared: Comparison, repeat: Repeat, *, traded: Sequence[Front] = (), control: Control = UNCONTROLLED
+    compared: Comparison, repeat: Repeat, *, traded: Sequence[Front] = (), control: Control = document.UNCONTROLLED
 ) -> Page:
     """The page; raises MissingExtra without matplotlib. ``traded``: fronts of time against cost."""
     body, decided = compared.spacecraft, decide(compared)
@@ -245,9 +226,9 @@ def report_page(
                 met=decided.met,
                 verdict=decisions.verdict(decided),
                 margins=tuple(glance.requirement_rows(decided)),
-                facts=facts_of("Final state, after the last pulse", glance.ends(decided)),
+                facts=document.facts_of("Final state, after the last pulse", glance.ends(decided)),
                 warnings=(*(text(note) for note in remarks if severity(note) == WARNING), *_broken(decided.plan)),
-                motion=(moving_of(decided.plan), Beside(flight_pictures(decided.plan), still=True)),
+                motion=(moving_of(decided.plan), document.Beside(flight_pictures(decided.plan), still=True)),
             )
         task.reach(1.0)
         sections = _sections(compared, decided, repeat, page, traded, notes[glance.NOTES :])
@@ -304,28 +285,28 @@ def _broken(plan: Plan) -> list[str]:
     return broken_limits(plan.spacecraft, plan.pulses) if plan.from_file else []
 
 
-def _contender(compared: Comparison, plan: Plan, decided: Decision | None) -> Contender:
+def _contender(compared: Comparison, plan: Plan, decided: Decision | None) -> document.Contender:
     """One scheme with its cost, and the share of cases that comply or the verdict."""
     if not plan.feasible:
-        return Contender(plan.scheme, (decisions.no_plan(plan),), False)
+        return document.Contender(plan.scheme, (decisions.no_plan(plan),), False)
     pulses = plan.pulses
     spent = quantity(pulses.total_impulse, "N m s") if pulses.propellant is None else mass(pulses.propellant)
     share = compared.shares.get(plan)
     word = decisions.share_text(share) if share is not None else decisions.VERDICT[compared.meets(plan)]
     word += ", timed" * (not plan.commandable)
-    return Contender(plan.scheme, (spent, word), decided is not None and plan is decided.plan)
+    return document.Contender(plan.scheme, (spent, word), decided is not None and plan is decided.plan)
 
 
 def _dispersion(chosen: Plan, dispersed: Results) -> Iterator[Block]:
     """Verdict, distributions and percentiles of the cases; budget and worst cases behind a title."""
     from nutdamp.views.dispersion import cone_lines, dispersion_screen, requirement_lines
 
-    lines = [Prose(plain(line)) for line in (*requirement_lines(dispersed), *cone_lines(dispersed))]
+    lines = [Prose(document.plain(line)) for line in (*requirement_lines(dispersed), *cone_lines(dispersed))]
     lines += [Prose(f"Note: {note}.")] if (note := dispersed.study.lightening_error) else []
     yield from lines
-    yield Beside(dispersion_pictures(dispersed, chosen.scheme))
+    yield document.Beside(dispersion_pictures(dispersed, chosen.scheme))
     screen = dispersion_screen(dispersed, scheme=chosen.scheme, worst=5)
-    title, percentiles, *rest = blocks_of("What is left, by share of the cases", screen)
+    title, percentiles, *rest = document.blocks_of("What is left, by share of the cases", screen)
     yield percentiles
     yield Details("Tolerance budget and worst cases", (title, *(block for block in rest if block not in lines)))
 
@@ -334,7 +315,7 @@ def _schemes(compared: Comparison, more_notes: Sequence[str]) -> Iterator[Block]
     """The comparison with the reason of the recommendation, and remarks that have no room on the first screen."""
     yield Prose(sentence(joined(reasons(compared))))
     chosen = compared.recommended
-    yield sheet(scheme_table(compared, chosen), dots=DOTS)
+    yield document.sheet(scheme_table(compared, chosen), dots=DOTS)
     rows = [("", note) for note in more_notes]
     for plan in compared.plans:
         if plan.feasible and plan is not chosen:
@@ -349,7 +330,7 @@ def _trade(compared: Comparison, traded: Sequence[Front]) -> Iterator[Block]:
         yield trade_picture(compared, traded)
     chosen = compared.recommended
     yield from (Prose(note) for say in (beats, apart) if chosen is not None and (note := say(traded, chosen)))
-    yield from blocks_of("Schedules by their ends", Group(*front_parts(compared.spacecraft, traded)))
+    yield from document.blocks_of("Schedules by their ends", Group(*front_parts(compared.spacecraft, traded)))
 
 
 def _verification(chosen: Plan) -> Iterator[Block]:
@@ -357,8 +338,8 @@ def _verification(chosen: Plan) -> Iterator[Block]:
     verified = verify(body, chosen.pulses, unrounded(chosen), expected=chosen.options.with_disturbances)
     yield Prose(f"{verdict(verified)} {conservation(verified)}")
     missing = tuple((method.name, f"not flown; {method.missing}") for method in verified.methods if method.missing)
-    flights = sheet_of("Maximum differences from the flown motion", methods_table(verified))
-    budget = sheet_of(BUDGET, budget_table(body, verified)), Prose(BUDGET_NOTE)
+    flights = document.sheet_of("Maximum differences from the flown motion", methods_table(verified))
+    budget = document.sheet_of(BUDGET, budget_table(body, verified)), Prose(BUDGET_NOTE)
     yield Details("Independent flights and error budget", (flights, *[Points(missing)] * bool(missing), *budget))
 
 
@@ -367,11 +348,11 @@ def _background(
 ) -> Iterator[Block]:
     """Reference data: spacecraft, pulses, method, assumptions, input."""
     body = compared.spacecraft
-    yield Details("Spacecraft", tuple(blocks_of("What actuators and tolerances do", check_screen(body))))
+    yield Details("Spacecraft", tuple(document.blocks_of("What actuators and tolerances do", check_screen(body))))
     if decided is not None:
-        ends = facts_of("Final state", decisions.end_facts(decided))
+        ends = document.facts_of("Final state", decisions.end_facts(decided))
         fired = pulse_table(decided.plan.flight, scheme=decided.plan.scheme)
-        yield Details("Pulses and final state, all values", (sheet(fired), ends))
+        yield Details("Pulses and final state, all values", (document.sheet(fired), ends))
     yield Details("Method and symbols", tuple(_method(compared)))
     yield Details("Assumptions", (Points(tuple(("", limit) for limit in assumptions(compared))),))
     yield Details("Input file, and how to repeat the page", tuple(_repeat(repeat, dispersed)))
@@ -383,14 +364,14 @@ def _file_line(repeat: Repeat) -> str:
 
 
 def _repeat(repeat: Repeat, dispersed: Results | None) -> Iterator[Block]:
-    yield Listing("Command", printable(repeat.command))
+    yield document.Listing("Command", printable(repeat.command))
     facts = [("seed of the dispersed cases", str(dispersed.study.seed))] if dispersed is not None else []
     facts += [("input file", _file_line(repeat))] if repeat.text else []
     yield FactList("Versions", (*_versions(), *facts))
     if repeat.settings:
         yield FactList("Set in place of what the file says", repeat.settings)
     if repeat.text:
-        yield Listing(f"Input file {printable(repeat.name)}", repeat.text.rstrip("\n"))
+        yield document.Listing(f"Input file {printable(repeat.name)}", repeat.text.rstrip("\n"))
 
 
 def _versions() -> Iterator[tuple[str, str]]:
@@ -448,7 +429,7 @@ def trade_picture(compared: Comparison, fronts: Sequence[Front]) -> Picture:
 def dispersion_pictures(dispersed: Results, scheme: str) -> tuple[Picture, ...]:
     """Distribution of the cases of a study, and where H ends; raises MissingExtra."""
     names = ("cases", "momentum")
-    return tuple(_picture(name, studies.dispersion_figure(name, dispersed, scheme=scheme)) for name in names)
+    return tuple(_picture(name, studies.dispersion_figure(dispersed, name, scheme=scheme)) for name in names)
 
 
 def _picture(name: str, figure: Figure, narrow: Figure | None = None) -> Picture:
@@ -475,21 +456,16 @@ def _method(compared: Comparison) -> Iterator[Block]:
     chosen = compared.recommended
     topics = [guide.found(number) for number in EQUATIONS]
     scheme = guide.found(chosen.scheme) if chosen is not None and chosen.scheme in guide.NAMES else None
-    lines = [line for topic in topics for line in _listed(topic, _formulas(topic)[-1])]
-    lines += [] if scheme is None else _listed(scheme, _formulas(scheme)[0])
-    yield Listing("Equations", "\n".join(lines))
+    formulas = [(topic, -1) for topic in topics]  # of an equation the last one, which is in use
+    formulas += [] if scheme is None else [(scheme, 0)]
+    lines: list[str] = []
+    for topic, which in formulas:
+        shown = [block for block in topic.blocks if isinstance(block, Formula)][which]
+        lines += [f"{topic.name}  {topic.summary}", *(f"    {line}" for line in shown.lines), ""]
+    yield document.Listing("Equations", "\n".join(lines))
     symbols = _symbols(topics, scheme, " ".join([*lines, "θ"]))
     yield FactList("Symbols", (*symbols, *_floors(compared.spacecraft)))
     yield Points((("", guide.SOURCES[0]),))
-
-
-def _formulas(topic: Topic) -> list[Formula]:
-    """The formulas of a topic; the last one of a numbered equation is the one in use."""
-    return [block for block in topic.blocks if isinstance(block, Formula)]
-
-
-def _listed(topic: Topic, formula: Formula) -> list[str]:
-    return [f"{topic.name}  {topic.summary}", *(f"    {line}" for line in formula.lines), ""]
 
 
 def _symbols(topics: Sequence[Topic], scheme: Topic | None, listed: str) -> Iterator[tuple[str, str]]:

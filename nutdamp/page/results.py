@@ -19,18 +19,15 @@ from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.views.decisions import decided_json
 from nutdamp.views.glance import scheme_table
 from nutdamp.views.parts import pulse_table
+from nutdamp.views.tables import DataTable
 from nutdamp.views.text import degrees, joined, sentences
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from nutdamp.flight.propagation import Track
-    from nutdamp.montecarlo.study import Dispersion
     from nutdamp.page.document import Block
     from nutdamp.planning.robust import RobustComparison
 
-
-_TABLED = ("csv", "table", "figure")  # subjects of results with rows
 
 VIEWS = {
     "object.save": "page.results:save",
@@ -41,17 +38,18 @@ VIEWS = {
         for kind in ("Spacecraft", "Plan", "Comparison", "Flight")
         for what in ("line", "html")
     },
+    **{
+        f"{kind}.{what}": f"page.results:{what}"
+        for kind in ("Plan", "Comparison", "Flight", "Simulation")
+        for what in ("csv", "table", "figure")
+    },
     "Plan.data": "views.decisions:plan_json",
-    "Plan.sentences": "page.results:plan_sentences",
+    "Plan.sentences": "page.results:remarks",
     "Plan.reason": "planning.decision:infeasibility",
-    **{f"Plan.{what}": f"page.results:plan_{what}" for what in _TABLED},
     "Comparison.data": "views.decisions:comparison_json",
-    "Comparison.sentences": "page.results:comparison_sentences",
+    "Comparison.sentences": "page.results:remarks",
     "Comparison.reason": "page.results:comparison_reason",
-    **{f"Comparison.{what}": f"page.results:comparison_{what}" for what in _TABLED},
     "RobustComparison.data": "page.results:robust_data",
-    **{f"Flight.{what}": f"page.results:flight_{what}" for what in _TABLED},
-    **{f"Simulation.{what}": f"page.results:simulation_{what}" for what in _TABLED},
     "Simulation.data": "views.simulation:simulation_json",
     **{f"Simulation.{what}": f"page.results:{what} shown" for what in ("line", "html")},
     "Trade.data": "views.trade:trade_json spacecraft fronts",
@@ -59,7 +57,7 @@ VIEWS = {
     "Trade.figure": "figures.studies:trade_figure spacecraft fronts",
     "Trade.screen": "views.trade:trade_screen spacecraft fronts",
     "Dispersion.data": "views.dispersion:dispersion_json core scheme=scheme",
-    "Dispersion.figure": "page.results:dispersion_figure",
+    "Dispersion.figure": "figures.studies:dispersion_figure core scheme=scheme",
     "Dispersion.screen": "views.dispersion:dispersion_screen core scheme=scheme nominal=core.study.nominal",
     "LoopDispersion.data": "views.loop_cases:loop_cases_json core",
     "LoopDispersion.figure": "figures.studies:loop_cases_figure core",
@@ -84,14 +82,11 @@ VIEWS = {
 """Functions of results, see `nutdamp.common.results.view`."""
 
 
-def plan_sentences(plan: Plan) -> tuple[str, ...]:
-    """Notes on a plan."""
-    return sentences(plan_notes(plan) if plan.feasible else ())
-
-
-def comparison_sentences(compared: Comparison) -> tuple[str, ...]:
-    """Warnings on the recommended plan."""
-    return sentences(comparison_warnings(compared))
+def remarks(result: Plan | Comparison) -> tuple[str, ...]:
+    """Notes on a plan, or warnings on the recommended one."""
+    if isinstance(result, Comparison):
+        return sentences(comparison_warnings(result))
+    return sentences(plan_notes(result) if result.feasible else ())
 
 
 def comparison_reason(compared: Comparison) -> str:
@@ -106,25 +101,47 @@ def robust_data(robust: RobustComparison) -> dict[str, Any]:
     return {**decided_json(robust.comparison, robust.decision), "robust": robust_json(robust)}
 
 
-def plan_table(plan: Plan) -> results.Table:
-    """Rows of the pulses."""
-    return pulse_table(plan.flight).array()
+def _rows(result: Plan | Comparison) -> DataTable:
+    if isinstance(result, Comparison):
+        return scheme_table(result, result.recommended)
+    return pulse_table(result.flight)
 
 
-def comparison_table(compared: Comparison) -> results.Table:
-    """Rows of the schemes."""
-    return scheme_table(compared, compared.recommended).array()
+def table(result: Plan | Comparison | Flight | Simulation) -> results.Table:
+    """Rows of the pulses, the schemes, or the track."""
+    if isinstance(result, Plan | Comparison):
+        return _rows(result).array()
+    flight, until = (result, result.shown_to) if isinstance(result, Flight) else (result.shown, result.until)
+    return track_array(flight.sampled(result.samples, until), flight.spacecraft.inertia)
 
 
-def flight_table(flight: Flight) -> results.Table:
-    """Rows of the track."""
-    return track_array(flight.sampled(flight.samples, flight.shown_to), flight.spacecraft.inertia)
+def csv(result: Plan | Comparison | Flight | Simulation) -> str | Callable[[IO[bytes]], None]:
+    """File of the rows of `table`; raises Infeasible."""
+    if isinstance(result, Plan | Comparison):
+        return _rows(feasible(result) if isinstance(result, Plan) else result).csv()
+    if isinstance(result, Flight):
+        return partial(write_track, result.pieces(result.samples, result.shown_to), result.spacecraft.inertia)
+    return partial(write_track, result.pieces(), result.plan.spacecraft.inertia)
 
 
-def simulation_table(simulation: Simulation) -> results.Table:
-    """Rows of the track."""
-    track = simulation.shown.sampled(simulation.samples, simulation.until)
-    return track_array(track, simulation.plan.spacecraft.inertia)
+def figure(result: Plan | Comparison | Flight | Simulation, name: str = "overview") -> Figure:
+    """Figure by its name of a flight, of that of a plan or of the recommended one; raises BadRequest, Infeasible."""
+    from nutdamp.figures import overview
+
+    if isinstance(result, Comparison):
+        if result.recommended is None:
+            raise Infeasible(result.reason)
+        result = result.recommended
+    if isinstance(result, Plan):
+        flight, track = overview.shown(feasible(result))
+    elif isinstance(result, Flight):
+        flight, track = result, result.sampled(result.samples, overview.until(result))
+    else:
+        flight, track = result.shown, result.pictured
+    try:
+        return overview.flight_figure(units.instance("name", name, str, "the name of a figure"), flight, track)
+    except KeyError:
+        raise BadRequest(f"there is no figure {name!r}; expected one of {', '.join(overview.DRAWN)}") from None
 
 
 def save(result: object, path: str | PathLike[str]) -> None:
@@ -135,69 +152,6 @@ def save(result: object, path: str | PathLike[str]) -> None:
 def write(_: object, path: str | PathLike[str], text: str) -> None:
     """Write a text of a result; raises CannotWrite."""
     write_whole(units.path("path", path), text)
-
-
-def dispersion_figure(dispersion: Dispersion, name: str = "overview") -> Figure:
-    """Figure of dispersed cases by its name."""
-    from nutdamp.figures import studies as figures
-
-    return figures.dispersion_figure(name, dispersion.core, scheme=dispersion.scheme)
-
-
-def plan_csv(plan: Plan) -> str:
-    """File of the pulses; raises Infeasible."""
-    return pulse_table(feasible(plan).flight).csv()
-
-
-def comparison_csv(compared: Comparison) -> str:
-    """File of the schemes."""
-    return scheme_table(compared, compared.recommended).csv()
-
-
-def flight_csv(flight: Flight) -> Callable[[IO[bytes]], None]:
-    """File of the track."""
-    return partial(write_track, flight.pieces(flight.samples, flight.shown_to), flight.spacecraft.inertia)
-
-
-def simulation_csv(simulation: Simulation) -> Callable[[IO[bytes]], None]:
-    """File of the track."""
-    return partial(write_track, simulation.pieces(), simulation.plan.spacecraft.inertia)
-
-
-def flight_figure(flight: Flight, name: str = "overview") -> Figure:
-    """Figure of a flight by its name."""
-    from nutdamp.figures import overview
-
-    return _drawn(name, flight, flight.sampled(flight.samples, overview.until(flight)))
-
-
-def simulation_figure(simulation: Simulation, name: str = "overview") -> Figure:
-    """Figure of the flight shown by its name."""
-    return _drawn(name, simulation.shown, simulation.pictured)
-
-
-def plan_figure(plan: Plan, name: str = "overview") -> Figure:
-    """Figure of the flight of a plan by its name."""
-    from nutdamp.figures import overview
-
-    return _drawn(name, *overview.shown(feasible(plan)))
-
-
-def comparison_figure(compared: Comparison, name: str = "overview") -> Figure:
-    """Figure of the recommended plan; raises Infeasible."""
-    if compared.recommended is None:
-        raise Infeasible(compared.reason)
-    return plan_figure(compared.recommended, name)
-
-
-def _drawn(name: str, flight: Flight, track: Track) -> Figure:
-    """A figure of a flight by its name; raises BadRequest."""
-    from nutdamp.figures import overview
-
-    try:
-        return overview.flight_figure(units.instance("name", name, str, "the name of a figure"), flight, track)
-    except KeyError:
-        raise BadRequest(f"there is no figure {name!r}; expected one of {', '.join(overview.DRAWN)}") from None
 
 
 def line(result: Spacecraft | Plan | Flight | Comparison) -> str:

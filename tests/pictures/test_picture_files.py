@@ -192,12 +192,12 @@ def test_a_gif_has_its_frames_its_size_and_its_pace(
     picture = Image.open(stream)
     assert (picture.format, picture.size, getattr(picture, "n_frames", 1)) == ("GIF", (400, 240), 8)
     assert (picture.info["duration"], picture.info["loop"]) == (50, 0)
-    scene, frames = style.styled(Scene)(made, timed, 401), []
+    scene, frames = style.styled()(Scene)(made, timed, 401), []
     for number in range(timed.frames):
         picture.seek(number)
         frames.append(np.asarray(picture.convert("RGB")).astype(int))
-        style.styled(scene.show)(number)
-        off = np.abs(frames[-1] - image.LEVELS[style.styled(scene.pixels)()].astype(int)).max(axis=2)
+        style.styled()(scene.show)(number)
+        off = np.abs(frames[-1] - image.LEVELS[style.styled()(scene.pixels)()].astype(int)).max(axis=2)
         assert np.count_nonzero(off > 40) < 0.002 * off.size  # colours that the palette has not
     assert frames[0][0, 0].tolist() == [255, 255, 255]
     assert np.ptp(frames[0]) > 150  # nothing blank

@@ -51,7 +51,7 @@ def study(which: str = "shift") -> Results:
 
 @cache
 def drawn(name: str, which: str = "shift") -> Figure:
-    return studies.dispersion_figure(name, study(which), scheme="two-pulse")
+    return studies.dispersion_figure(study(which), name, scheme="two-pulse")
 
 
 @pytest.mark.deep
@@ -101,7 +101,7 @@ def test_cases_that_are_all_alike_are_told_in_words(bias: float) -> None:
     """A histogram of rounding is an empty panel with ticks of 1e-13 degrees."""
     still = Dispersions(timing=Tolerance("uniform", 1e-15), timing_offset=OFFSET if bias else None)
     results = studied(replace(BODY, dispersions=still), 50)
-    figure = studies.dispersion_figure("cases", results, scheme="two-pulse")
+    figure = studies.dispersion_figure(results, "cases", scheme="two-pulse")
     check_layout(figure)
     for axes, output, required in zip(figure.axes, ("nutation", "momentum_shift"), (0.5, 0.2), strict=True):
         most = results.distribution(output)
@@ -119,7 +119,7 @@ def test_cases_that_are_all_alike_are_told_in_words(bias: float) -> None:
 def test_the_ticks_of_small_shifts_keep_apart(size: float) -> None:
     thrust = dict.fromkeys(TOLERANCES.thrust, Tolerance("normal", size, relative=True))
     body = replace(BODY, dispersions=Dispersions(thrust=thrust, timing=Tolerance("uniform", 0.05 * size)))
-    figure = studies.dispersion_figure("momentum", studied(body, 500), scheme="two-pulse")
+    figure = studies.dispersion_figure(studied(body, 500), "momentum", scheme="two-pulse")
     check_layout(figure)
     assert "the 500 cases" in legend_words(figure)
     ticks = figure.axes[0].get_xticklabels()
@@ -165,7 +165,7 @@ def test_the_ellipse_holds_its_share_and_is_that_of_the_covariance() -> None:
 @pytest.mark.parametrize("name", ["overview", *map(weekly, NAMES[1:])])
 def test_nothing_that_varies_is_drawn(name: str) -> None:
     results = studied(replace(BODY, dispersions=Dispersions(timing_offset=OFFSET)), 50)
-    check_layout(studies.dispersion_figure(name, results, scheme="two-pulse"))
+    check_layout(studies.dispersion_figure(results, name, scheme="two-pulse"))
 
 
 @pytest.mark.deep
