@@ -40,6 +40,7 @@ from nutdamp.physics import attitude
 FINER = 8  # frequencies of a spectrum for each of its samples
 LONGEST_SPECTRUM = 1 << 16  # samples of a spectrum at most; of longer records the first
 SMALL = 1e-3  # share of the spin that trial transverse rates have: the motion is linear there
+STILL = 1e-3  # share of |H|/A up to which a spin counts as none, and trial rates are a share of that
 OTHER = 0.05  # part by which a spin by Sun pulses may differ from that of the file before both are tried
 MOST_TURNED = 2.1  # C/A at most, and a little more: 2 for a thin disc
 NARROW = 0.966  # cosine of a nutation angle, 15 deg, from which on noise may decide in which plane a cone is
@@ -309,7 +310,9 @@ def _linear(model: Model, values: dict[str, float]) -> dict[str, float]:
     offsets = ("bias", "attitude") if {CROSSING, "turn"} & set(model.signals) else ("bias", "attitude_1", "attitude_2")
     names = ["omega_1", "omega_2", *(name for name in values if name.startswith(offsets))]
     base = values | {"omega_1": 0.0, "omega_2": 0.0}
-    steps = {name: SMALL * abs(values.get("omega_3", model.spacecraft.spin)) for name in names[:2]}
+    still = STILL * 2.0 * math.pi / model.spacecraft.inertial_period  # a wheel may hold a body that does not spin
+    pace = max(abs(values.get("omega_3", model.spacecraft.spin)), still)
+    steps = dict.fromkeys(names[:2], SMALL * pace)
     steps |= dict.fromkeys(names[2:], SMALL)
     at_rest = model.predicted(base)
     columns = [(model.predicted(base | {name: base[name] + steps[name]}) - at_rest) / steps[name] for name in names]
