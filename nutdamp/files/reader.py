@@ -22,12 +22,12 @@ from nutdamp import units
 from nutdamp.common.time import Epoch
 from nutdamp.errors import Fault, FaultyFile, in_order, nearest, warn
 from nutdamp.files import keys
-from nutdamp.files.dispersion_rules import dispersion_findings
 from nutdamp.files.editing import Setting, overlay, settings_of, settings_within, text_of
 from nutdamp.files.fields import REQUIRED, KeyPath, Problems, Rule, Section, section_of
 from nutdamp.files.plausibility import doubts, foreign
 from nutdamp.files.rules import CANCELLED, MOMENT, Finding, Vector, disturbance_kind, findings, force_vector, symmetric
 from nutdamp.files.study_keys import LoopSection, by_name, dispersions, thrust_behind
+from nutdamp.files.study_rules import dispersion_findings, loop_findings
 from nutdamp.files.thruster_rules import thrust_findings
 from nutdamp.files.yaml import Node, dotted, read_text, read_tree
 from nutdamp.physics import attitude, sky
@@ -84,8 +84,6 @@ def _contents(text: str, name: str, settings: Sequence[Setting], warn: Warn) -> 
     faulty = [*_spelling(root, keys.SpacecraftFile, ())]
     faulty += [*findings(root), *dispersion_findings(root), *thrust_findings(root)]
     if root.get("loop") is not None:
-        from nutdamp.files.loop_rules import loop_findings
-
         faulty += loop_findings(root)
     problems: Problems = []
     contents = keys.SpacecraftFile.read(root.plain(), problems)

@@ -1,6 +1,6 @@
 """Keys of a spacecraft file for studies: dispersions and the closed loop, with their units and ranges.
 
-Sizes of tolerances stay as they are written here: `dispersion_rules` finds the faults in them.
+Sizes of tolerances stay as they are written here: `study_rules` finds the faults in them.
 """
 
 from __future__ import annotations

@@ -16,7 +16,7 @@ from support.builders import one_of
 from support.contract import Write, check_faults, faults, known
 from support.golden import check_text
 
-from nutdamp.files import dispersion_rules, thruster_rules
+from nutdamp.files import study_rules, thruster_rules
 from nutdamp.files.reader import read_spacecraft
 from nutdamp.files.rules import Facts
 from nutdamp.files.schedules import EFFECTIVE, read_pulses
@@ -142,7 +142,7 @@ def test_the_thrusts_of_a_file_are_looked_up_once(monkeypatch: pytest.MonkeyPatc
         calls.append(facts)
         return thrusts(facts)
 
-    for rules in (dispersion_rules, thruster_rules):
+    for rules in (study_rules, thruster_rules):
         monkeypatch.setattr(rules, "thrusts", counted)
     read(body=with_table())
     assert len(calls) == 1

@@ -116,8 +116,8 @@ def test_bodies_of_any_kind_are_written_as_the_file_has_them(name: str) -> None:
     known = carried(fit, 4.0)
     written = fitted_text(text, "f.yaml", [], fit, known)
     now = read_spacecraft(written, "now.yaml")
-    tensors = [axes @ np.diag(moments) @ axes.T for moments, axes in
-               ((now.inertia.moments, now.inertia.axes), (known.body.inertia.moments, known.body.inertia.axes))]  # fmt: skip
+    bodies = now.inertia, known.body.inertia
+    tensors = [body.axes @ np.diag(body.moments) @ body.axes.T for body in bodies]
     assert tensors[0] == pytest.approx(tensors[1], rel=1e-9, abs=1e-8)
     assert now.inertia.axes @ now.omega0 == pytest.approx(known.values[2:5], rel=1e-9)
     if not unequal:
