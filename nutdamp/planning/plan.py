@@ -27,7 +27,7 @@ from nutdamp.flight.end_state import Aspect, left_by, seen_at
 from nutdamp.flight.propagation import Flight, Residual
 from nutdamp.physics import attitude, precession
 from nutdamp.schemes import catalogue, planner, valve_commands
-from nutdamp.schemes.block_legs import Legs
+from nutdamp.schemes.valve_commands import Legs
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import Breach, breaches, rounded_off
 from nutdamp.spacecraft.model import Keep, Spacecraft, Vector

@@ -18,11 +18,11 @@ from nutdamp.common.results import Note, note
 from nutdamp.errors import Infeasible
 from nutdamp.flight import propagation
 from nutdamp.flight.end_state import left_by
-from nutdamp.schemes.block_legs import Legs
 from nutdamp.schemes.block_model import BlockModel, acts, spin_turn
 from nutdamp.schemes.block_search import BLOCKS, FLOWN, BlockFlights, BlockSearch, BlockSequence, FlownSequence
 from nutdamp.schemes.catalogue import CommandBlockOptions
 from nutdamp.schemes.sequential import NO_AXIAL, at_hand
+from nutdamp.schemes.valve_commands import Legs
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import OFF_TICK, commandable_widths, usable
 from nutdamp.spacecraft.equipment import Channel

@@ -1,4 +1,4 @@
-"""Valve commands: translation of rectangular pulses into commands of valves.
+"""Valve commands: translation of rectangular pulses into commands of valves; schedules of several legs.
 
 A command is known by its effective on-time and the centroid of its thrust (`thruster`). Schemes plan
 for the *plain* body, which fires rectangles of full thrust within the effective bounds of its channels, and keeps
@@ -16,10 +16,12 @@ import numpy as np
 from nutdamp.common import work
 from nutdamp.common.results import Note, note
 from nutdamp.errors import Infeasible, TooShort
+from nutdamp.flight import propagation
 from nutdamp.flight.dynamics import Supply, lightened, shed, supplied
 from nutdamp.schemes import correction
+from nutdamp.schemes.block_model import fired, sun_pulses
 from nutdamp.schemes.catalogue import SchemeOptions
-from nutdamp.schemes.correction import TAIL, Correction
+from nutdamp.schemes.correction import TAIL, Correction, FlownBuilder
 from nutdamp.spacecraft.constraints import (
     commandable,
     effective_on_time,
@@ -27,7 +29,7 @@ from nutdamp.spacecraft.constraints import (
     keeps_limits,
     shortest_on_time,
 )
-from nutdamp.spacecraft.equipment import Channel
+from nutdamp.spacecraft.equipment import Block, Channel
 from nutdamp.spacecraft.model import Inertia, Limits, Spacecraft
 from nutdamp.spacecraft.schedule import Pulse, Schedule, channel_pulse
 
@@ -259,3 +261,32 @@ def _on_ticks(spacecraft: Spacecraft, made: Schedule, correct: Correction) -> Sc
     roundings = [rounded(schedule, len(made)) for schedule in (made, in_turn)]
     kept = [schedule for schedule in roundings if keeps_limits(spacecraft, schedule.pulses)] or roundings
     return min(kept, key=lambda schedule: _left(spacecraft, schedule, correct))
+
+
+class Legs:
+    """Schedules for a spacecraft, one after the other: pulses, or the ``blocks`` that fire them."""
+
+    def __init__(self, spacecraft: Spacecraft) -> None:
+        self.body, self.blocks = spacecraft, list[Block]()
+        self._builder, self._supply = FlownBuilder(spacecraft), Supply(spacecraft)
+
+    @property
+    def here(self) -> Spacecraft:
+        """Spacecraft after the legs so far, its time from there."""
+        return self._supply.behind(self._builder.here)
+
+    def fire(self, schedule: Schedule) -> None:
+        """Take the schedule of one more leg, with times and Sun pulses counted from `here`."""
+        now, builder = self._builder.now, self._builder
+        if schedule.blocks and now > 0.0:
+            passed = len(sun_pulses(propagation.flown(self.body, builder.schedule(), now), now))
+            later = tuple(replace(block, first=block.first + passed) for block in schedule.blocks)
+            schedule = replace(schedule, blocks=later)
+        self.blocks += schedule.blocks
+        builder.fire(schedule)
+        self._supply.count(schedule)
+
+    def schedule(self, *notes: Note) -> Schedule:
+        """All of them in one, with the Sun pulses of the whole flight."""
+        whole = fired(self.body, self.blocks) if self.blocks else self._builder.schedule()
+        return replace(whole, notes=notes)
