@@ -86,7 +86,12 @@ def tightening(plan: Plan, probability: float) -> Tightening | None:
     def complying(names: Iterable[str], factor: float) -> bool:
         return (tried(names, factor).met_fraction or 0.0) >= probability
 
-    ranked = _ranked(study, given)
+    shares: dict[str, float] = {}  # of the required bound, by tolerance
+    parts = [bound.part.value for bound in requirements.required(body) if bound.part is not Part.SPIN]
+    for output in parts or ["spin_change"]:
+        for entry, share in zip(study.first_order.inputs, study.first_order.shares(output).tolist(), strict=True):
+            shares[entry.tolerance] = max(shares.get(entry.tolerance, 0.0), share)
+    ranked = [name for name in sorted(shares, key=lambda name: -shares[name]) if hasattr(given, name)]
     fresh = min(max(SAMPLES, 2 * cases_to_show(probability, CONFIDENCE)), MOST_CASES) if probability < 1.0 else SAMPLES
     for count in range(1, min(len(ranked), MOST_TOLERANCES) + 1):
         names = tuple(ranked[:count])
@@ -104,17 +109,6 @@ def tightening(plan: Plan, probability: float) -> Tightening | None:
                 return Tightening(names, low, _stated(study, given, names), fresh, seed, share, trial.interval[0])
             low *= SMALLER
     return None
-
-
-def _ranked(study: Study, given: Dispersions) -> list[str]:
-    """Tolerances by their share of the required bound, the largest first."""
-    shares: dict[str, float] = {}
-    required = requirements.required(study.model.spacecraft)
-    parts = [bound.part.value for bound in required if bound.part is not Part.SPIN]
-    for output in parts or ["spin_change"]:
-        for entry, share in zip(study.first_order.inputs, study.first_order.shares(output).tolist(), strict=True):
-            shares[entry.tolerance] = max(shares.get(entry.tolerance, 0.0), share)
-    return [name for name in sorted(shares, key=lambda name: -shares[name]) if hasattr(given, name)]
 
 
 def _stated(study: Study, given: Dispersions, names: Iterable[str]) -> tuple[tuple[DispersedInput, bool], ...]:
@@ -339,14 +333,6 @@ class _MarginSearch:
         above = min((margin for margin in seen if margin > best), default=1.5 * best)
         return 0.5 * (best + (below if best - below > above - best else above))
 
-    def _few(self, solution: Sure) -> None:
-        """Forbid all slots that are not about the longest burns."""
-        program, near = self.program, np.zeros_like(self.program.forbidden)
-        for burn in sorted(solution.burns, key=lambda burn: -burn.impulse)[:MOST_BURNS]:
-            reach = 0.5 * burn.on_time + SLOTS // 8 * program.width
-            near[program.channels.index(burn.channel), np.abs(program.centres - burn.t) < reach] = True
-        program.forbidden |= ~near
-
     def _parted(self, solution: Sure) -> bool:
         """Separate burns that overlap or are too near, at the middle; True if there were any."""
         program, gap, parted = self.program, self.program.spacecraft.limits.gap, False
@@ -364,26 +350,31 @@ class _MarginSearch:
 
     def schedule(self, margin: float) -> Schedule | None:
         """Schedule of a margin, refined on the true motion; None where its burns cannot be fired."""
-        allowed, chance = self.program.forbidden.copy(), self.chance
+        program, chance = self.program, self.chance
+        allowed = program.forbidden.copy()
         try:
-            self._few(chance.solve(margin))
+            near = np.zeros_like(allowed)  # slots about the longest burns, the only ones from here on
+            for burn in sorted(chance.solve(margin).burns, key=lambda burn: -burn.impulse)[:MOST_BURNS]:
+                reach = 0.5 * burn.on_time + SLOTS // 8 * program.width
+                near[program.channels.index(burn.channel), np.abs(program.centres - burn.t) < reach] = True
+            program.forbidden |= ~near
             for _ in range(REPAIRS):
                 solution = chance.solve(margin)
                 if not solution.burns:
                     return None
                 if self._parted(solution):
                     continue
-                broken = next(broken_by(self.program, solution.burns), None)
+                broken = next(broken_by(program, solution.burns), None)
                 if broken is None:
                     break
-                self.program.forbid(*broken)
+                program.forbid(*broken)
             else:
                 return None
         finally:
-            self.program.forbidden = allowed
+            program.forbidden = allowed
         schedule = self.model.translate(as_pulses(self.model.body, solution.burns))
         aside, fly = solution.left[self.equations.chosen], partial(propagation.flown, self.plain)
-        schedule = Refinement(self.plain, schedule, self.equations, aside, self.program.width, fly).refined()
+        schedule = Refinement(self.plain, schedule, self.equations, aside, program.width, fly).refined()
         if not self.body.thrust_laws:
             return schedule
         try:

@@ -9,7 +9,7 @@ import math
 from collections.abc import Iterator
 
 from nutdamp.common.numerics import RPM, down
-from nutdamp.common.results import Note, note
+from nutdamp.common.results import Note, Value, note
 from nutdamp.flight import end_state
 from nutdamp.flight.end_state import Aspect, at_start
 from nutdamp.flight.propagation import Flight
@@ -120,8 +120,15 @@ def decision_notes(decision: Decision, *, looped: bool = False) -> Iterator[Note
         return
     if not plan.commandable:
         yield note("not-commandable", scheme=plan.scheme)
-    yield from _unaided(decision)
-    yield from _growing(decision)
+    now, limit = body.nutation, _limit_of(body, Part.NUTATION)
+    if requirements.only_nutation(body):
+        idle, damped = (requirements.to_required(body, now, growing=growing) for growing in (True, False))
+        if damped is not None and damped < body.horizon:
+            yield note("met-without-pulse-from", from_s=damped, nutation_deg=math.degrees(now), limit_deg=limit)
+        if idle:
+            yield note("met-without-pulse-until", until_s=idle, nutation_deg=math.degrees(now), limit_deg=limit)
+    if len(plan.pulses):
+        yield from _growing(decision)
     limited = body.goal.axis is not None or _limit_of(body, Part.SHIFT) is not None
     if not limited and final.momentum_shift > TURNED:
         yield note("momentum-shift", scheme=plan.scheme, momentum_shift_deg=math.degrees(final.momentum_shift))
@@ -172,11 +179,8 @@ def _limit_of(body: Spacecraft, part: Part) -> float | None:
 
 def _growing(decision: Decision) -> Iterator[Note]:
     """Time for which nutation that grows keeps the requirement after the last pulse."""
-    if not len(decision.plan.pulses):
-        return
-    body, flight = decision.plan.spacecraft, decision.flight
-    cases = decision.cases
-    left = decision.flight.final.nutation if cases is None else cases.levels[Part.NUTATION]
+    body, flight, cases = decision.plan.spacecraft, decision.flight, decision.cases
+    left = flight.final.nutation if cases is None else cases.levels[Part.NUTATION]
     again = requirements.to_required(body, left, growing=True)
     if again and left > TELLING:
         after = flight.schedule.end if flight.until is None else flight.until
@@ -186,19 +190,6 @@ def _growing(decision: Decision) -> Iterator[Note]:
             yield note("grows-again", **values)
         else:
             yield note("grows-again-in-cases", share=f"{100.0 * cases.probability:.10g}", **values)
-
-
-def _unaided(decision: Decision) -> Iterator[Note]:
-    """Time up to which, or from which on, the requirement is met without a pulse."""
-    body = decision.plan.spacecraft
-    if not requirements.only_nutation(body):
-        return
-    now, limit = math.degrees(body.nutation), _limit_of(body, Part.NUTATION)
-    idle, damped = (requirements.to_required(body, body.nutation, growing=growing) for growing in (True, False))
-    if damped is not None and damped < body.horizon:
-        yield note("met-without-pulse-from", from_s=damped, nutation_deg=now, limit_deg=limit)
-    if idle:
-        yield note("met-without-pulse-until", until_s=idle, nutation_deg=now, limit_deg=limit)
 
 
 def comparison_warnings(compared: Comparison, *, cones: bool = True) -> Iterator[Note]:
@@ -300,7 +291,6 @@ def alternatives(compared: Comparison) -> Iterator[Note]:
     chosen, others = recommendation.plan, dict[int, tuple[Gain, Plan]]()
     for gain, plan in recommendation.alternatives.items():
         others.setdefault(id(plan), (gain, plan))
-    unit, scale, shown = ("kg", 1e3, "g") if recommendation.by_propellant else ("N m s", 1.0, "N m s")
     for gain, other in others.values():
         assert chosen is not None
         assert chosen.flown is not None
@@ -310,14 +300,17 @@ def alternatives(compared: Comparison) -> Iterator[Note]:
             scheme=other.scheme,
             pulses=len(other.pulses),
             than_pulses=len(chosen.pulses),
-            cost=scale * other.pulses.cost_in(unit),
-            than_cost=scale * chosen.pulses.cost_in(unit),
-            unit=shown,
-            end_s=other.pulses.end,
-            than_end_s=chosen.pulses.end,
+            **beside(other, chosen, recommendation.by_propellant),
             axis_error_deg=math.degrees(other.flown.axis_error),
             than_axis_error_deg=math.degrees(chosen.flown.axis_error),
         )
+
+
+def beside(plan: Plan, than: Plan, by_propellant: bool) -> dict[str, Value]:
+    """Cost and end of a plan and of the one it is compared with, as values of a note."""
+    unit, scale, shown = ("kg", 1e3, "g") if by_propellant else ("N m s", 1.0, "N m s")
+    cost, than_cost = (scale * each.pulses.cost_in(unit) for each in (plan, than))
+    return {"cost": cost, "than_cost": than_cost, "unit": shown, "end_s": plan.end, "than_end_s": than.end}
 
 
 TIES = {

@@ -54,8 +54,7 @@ Route = tuple[Vector, ...]
 def schedules(spacecraft: Spacecraft, scheme: str, options: catalogue.SchemeOptions) -> Iterator[Schedule]:
     """Schedules of a ``scheme`` over routes that keep clear of the cones, the likeliest first.
 
-    Each is found when it is needed, as long as there is budget of `work`; routes that the scheme cannot fly are left
-    out.
+    Each is found when needed, as long as there is budget of `work`, of those routes that the scheme can fly.
     """
     as_it_is = not spacecraft.thrust_laws or catalogue.SCHEMES[scheme].on_true_body
     body = spacecraft if as_it_is else valve_commands.plain(spacecraft)
@@ -125,10 +124,7 @@ def _clear(corners: Route, keeps: Sequence[Keep], margin: float) -> bool:
 
 
 def _over(spacecraft: Spacecraft, scheme: str, options: catalogue.SchemeOptions, route: Route) -> Schedule:
-    """Schedule of a ``scheme`` by way of the points of a ``route``; raises Infeasible with the reason.
-
-    Each leg has the share of the horizon that it has of the way.
-    """
+    """Schedule over a ``route``, each leg with its share of the horizon; raises Infeasible with the reason."""
     legs, goal = Legs(spacecraft), spacecraft.goal
     for number, point in enumerate(route, start=1):
         here = legs.here
@@ -147,23 +143,16 @@ NO_NUTATION, ROUNDING = 1e-12, 1e-11
 
 
 class Standing(Enum):
-    """Standing of a plan, from the best down.
+    """Standing of a plan, from the best down."""
 
-    It meets the requirement, and damps the parts that it does not bound; it leaves other parts undamped; it does not
-    meet it, or, without one, does not damp.
-    """
-
-    COMPLIES = "complies"
-    MEETS = "meets"
-    MISSES = "misses"
+    COMPLIES = "complies"  # meets the requirement, and damps the parts that it does not bound
+    MEETS = "meets"  # leaves other parts undamped
+    MISSES = "misses"  # does not meet it, or, without one, does not damp
 
 
 @dataclass(frozen=True, slots=True)
 class Share:
-    """Share of all dispersed cases that comply with a plan: from ``low`` to ``high``, equal where all have flown.
-
-    ``probability``: the share that must.
-    """
+    """Share of dispersed cases that comply, ``low`` to ``high``, equal where all flew; ``probability`` of them must."""
 
     low: float
     high: float
@@ -255,7 +244,7 @@ class Hindrance:
 class Plan(results.Data, results.Tabled):
     """Schedule of a scheme for a spacecraft, and its judgement.
 
-    Without one: the ``refusal`` of the scheme in its words, or the first ``breach`` of the schedule found, or the cone
+    Without a schedule: the ``refusal`` of the scheme in its words, or the first ``breach`` of the schedule found, or the cone
     that the spin axis would break (``astray``) on its way to a target, or the nutation (rad) that would be left where
     that is ``worse`` than without pulses, at ``worse_at`` s. `nutdamp.planning.decision` has the words of all four.
     ``failure``: the exception of a scheme that has a bug; ``from_file``: the pulses were read, no scheme planned them.
@@ -378,9 +367,7 @@ class Plan(results.Data, results.Tabled):
         None where none of these is given, and without a schedule; kept cones alone meet nothing. With a target axis the
         momentum shift counts from there.
         """
-        if self.left is None:
-            return None
-        return False if self.kept is False else self.ends_well
+        return False if self.feasible and self.kept is False else self.ends_well
 
     @property
     def ends_well(self) -> bool | None:
@@ -463,10 +450,7 @@ class Plan(results.Data, results.Tabled):
 
 
 def plan(spacecraft: Spacecraft, scheme: str, options: planner.Choice = None) -> Plan:
-    """Plan one scheme and judge it; an infeasible plan gives the reason.
-
-    Raises KeyError for a name not in `schemes.NAMES`.
-    """
+    """Plan one scheme and judge it. Raises KeyError for a name not in `schemes.NAMES`."""
     if scheme not in catalogue.NAMES:
         raise KeyError(scheme)
     spun = reaches_spin(spacecraft)
@@ -506,10 +490,7 @@ def spinning(spacecraft: Spacecraft) -> tuple[str, ...]:
 
 
 def alternatives(spacecraft: Spacecraft, scheme: str, options: planner.Choice = None) -> tuple[Plan, ...]:
-    """Feasible plans by alternative schedules of the scheme, possibly including that of `plan`.
-
-    Raises KeyError for a name not in `schemes.NAMES`.
-    """
+    """Feasible plans by alternative schedules of the scheme, maybe that of `plan` too; raises KeyError as it does."""
     chosen = planner.settled(catalogue.SCHEMES[scheme], options, spacecraft)
     try:
         alternatives = planner.alternatives(scheme, known(spacecraft, chosen), chosen)
@@ -520,10 +501,7 @@ def alternatives(spacecraft: Spacecraft, scheme: str, options: planner.Choice = 
 
 
 def known(spacecraft: Spacecraft, options: catalogue.SchemeOptions) -> Spacecraft:
-    """Spacecraft as known to the schemes: with its disturbances only where they are requested.
-
-    A spin that nothing can change, and that is the one of the goal, is no goal for them.
-    """
+    """Spacecraft as known to schemes: with disturbances if requested, without a goal of a spin that nothing changes."""
     body = spacecraft if options.with_disturbances else replace(spacecraft, disturbances=())
     axial = any(channel.axial for channel in body.channels)
     if body.goal.spin is not None and reaches_spin(body) and not body.spin_drift and not axial:
@@ -581,10 +559,7 @@ def feasible(plan: Plan) -> Plan:
 
 
 def unrounded(plan_: Plan) -> Schedule | None:
-    """Schedule with commands of any resolution.
-
-    None where there is no tick, no such schedule, or no scheme that planned it.
-    """
+    """Schedule with commands of any resolution; None without a tick, such a schedule, or a scheme that planned it."""
     body = plan_.spacecraft
     if body.limits.tick is None or plan_.from_file:
         return None

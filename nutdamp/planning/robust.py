@@ -20,14 +20,14 @@ from typing import NamedTuple
 import numpy as np
 
 from nutdamp.common import results, work
-from nutdamp.common.results import Note, Value, note
+from nutdamp.common.results import Note, note
 from nutdamp.errors import Infeasible
 from nutdamp.montecarlo.study import SAMPLES, SEED, study_of
 from nutdamp.planning import chance_plan, screening
 from nutdamp.planning import plan as planning
 from nutdamp.planning.chance_plan import Tightening, tightening
 from nutdamp.planning.decision import Comparison, Decision, attempt
-from nutdamp.planning.notes import TIES
+from nutdamp.planning.notes import TIES, beside
 from nutdamp.planning.plan import Plan
 from nutdamp.planning.recommendation import Ground, by_propellant, cheapest
 from nutdamp.planning.screening import AS_GOOD, Fresh, PlanCandidate, entered, equal_from, fly_all, fresh_of
@@ -81,9 +81,8 @@ class RobustComparison(results.Data):
         if self.chosen is None or self.usual is None:
             return None
         more, less = self.chosen.plan.pulses, self.usual.plan.pulses
-        known = more.propellant is not None and less.propellant is not None
         return Cost(
-            (more.propellant or 0.0) - (less.propellant or 0.0) if known else None,
+            None if more.propellant is None or less.propellant is None else more.propellant - less.propellant,
             more.total_impulse - less.total_impulse,
             more.end - less.end,
             self.chosen.left - self.usual.left,
@@ -216,10 +215,8 @@ def _flown(
     """Comparison of the ``entries`` in all cases, where they may be chosen, and the choice."""
     candidates = list(entries.values())
     usual = None if comparison.recommended is None else entries.get(_kind(comparison.recommended))
-    always = [candidate for candidate in candidates if candidate is usual]
-    fly_all(candidates, samples, probability, always, watch)
-    ranks = ranked(comparison, candidates, samples, probability)
-    return ranks if ranks.chosen is None else _checked(ranks, candidates)
+    fly_all(candidates, samples, probability, [] if usual is None else [usual], watch)
+    return _checked(ranked(comparison, candidates, samples, probability), candidates)
 
 
 def _trimmed(ranks: RobustComparison) -> RobustComparison:
@@ -240,20 +237,19 @@ def _checked(ranks: RobustComparison, candidates: Sequence[PlanCandidate]) -> Ro
     A plan with which too few of them comply gives way to the next one with which enough seem to. Then, where too few
     comply all the same, with which tolerances enough would.
     """
-    comparison, samples, required = ranks.comparison, ranks.samples, ranks.probability
+    samples, required = ranks.samples, ranks.probability
     refused: list[PlanCandidate] = []
     while (chosen := ranks.chosen) is not None:
         if not chosen.cases.decided and chosen not in refused:  # it came after one that was refused
             flyable = [chosen]
             fly_all(flyable, samples, 0.0)
             refused += [] if flyable else [chosen]
-            ranks = ranked(comparison, candidates, samples, required, refused=refused)
-            continue
-        ranks = replace(ranks, fresh=fresh_of(chosen, samples))
-        if not ranks.lucky or chosen in refused or len(refused) == CHECKED:
-            break
-        refused.append(chosen)
-        ranks = ranked(comparison, candidates, samples, required, refused=refused)
+        else:
+            ranks = replace(ranks, fresh=fresh_of(chosen, samples))
+            if not ranks.lucky or chosen in refused or len(refused) == CHECKED:
+                break
+            refused.append(chosen)
+        ranks = ranked(ranks.comparison, candidates, samples, required, refused=refused)
     if chosen is None or ranks.met is None or ranks.met >= required:
         return ranks
     return replace(ranks, tightening=tightening(chosen.plan, required))
@@ -274,9 +270,15 @@ def ranked(
     """
     recommended = None if comparison.recommended is None else _kind(comparison.recommended)
     usual = next((candidate for candidate in candidates if _kind(candidate.plan) == recommended), None)
-    others = [candidate for candidate in candidates if candidate not in refused]
-    enough = any(other.met is not None and other.met >= probability for other in others)
-    equals = _equals(others if enough else candidates, samples, probability)
+    enough = [candidate for candidate in candidates if candidate.met is not None and candidate.met >= probability]
+    equals = [candidate for candidate in enough if candidate not in refused] or enough
+    if candidates and not equals:  # those as good as the best, but for what the sampling may make of them
+        top = min(candidates, key=attrgetter("rank"))
+        if top.met is None:
+            equals = [candidate for candidate in candidates if candidate.rank <= AS_GOOD * top.rank]
+        else:
+            low = equal_from(top.met, samples)
+            equals = [candidate for candidate in candidates if candidate.met is not None and candidate.met >= low]
     chosen, ground = None, None
     if equals:
         best, ground = cheapest([equal.plan for equal in equals], None if usual is None else usual.plan)
@@ -331,21 +333,6 @@ def _planned(variant: str, body: Spacecraft, scheme: str, options: Options) -> l
     return [(variant, attempt(body, scheme, options))]
 
 
-def _equals(candidates: Sequence[PlanCandidate], samples: int, probability: float) -> list[PlanCandidate]:
-    """Candidates that comply as often as required; without any those as good as the best.
-
-    But for what the sampling may make of them.
-    """
-    enough = [candidate for candidate in candidates if candidate.met is not None and candidate.met >= probability]
-    if enough or not candidates:
-        return enough
-    best = min(candidates, key=lambda candidate: candidate.rank)
-    if best.met is None:
-        return [candidate for candidate in candidates if candidate.rank <= AS_GOOD * best.rank]
-    low = equal_from(best.met, samples)
-    return [candidate for candidate in candidates if candidate.met is not None and candidate.met >= low]
-
-
 def robust_reasons(robust: RobustComparison) -> Iterator[Note]:
     """Reason for the robust plan, or for none."""
     chosen, count, required = robust.chosen, len(robust.candidates), 100.0 * robust.probability
@@ -368,21 +355,14 @@ def robust_reasons(robust: RobustComparison) -> Iterator[Note]:
 
 def robust_cost(robust: RobustComparison) -> Iterator[Note]:
     """The robust plan against the one that is recommended without ``--robust``."""
-    chosen, usual, cost = robust.chosen, robust.usual, robust.cost
-    if chosen is None or usual is None or cost is None:
+    chosen, usual = robust.chosen, robust.usual
+    if chosen is None or usual is None:
         return
     if chosen is usual:
         yield note("robust-is-usual")
         return
-    unit, scale, shown = ("N m s", 1.0, "N m s") if cost.propellant is None else ("kg", 1e3, "g")
-    figures: dict[str, Value] = {
-        "scheme": usual.plan.scheme,
-        "cost": scale * chosen.plan.pulses.cost_in(unit),
-        "than_cost": scale * usual.plan.pulses.cost_in(unit),
-        "unit": shown,
-        "end_s": chosen.plan.end,
-        "than_end_s": usual.plan.end,
-    }
+    known = by_propellant([chosen.plan, usual.plan])
+    figures = {"scheme": usual.plan.scheme, **beside(chosen.plan, usual.plan, known)}
     if chosen.met is not None and usual.met is not None:
         yield note("robust-cost", share=f"{100.0 * chosen.met:.4g}", than_share=f"{100.0 * usual.met:.4g}", **figures)
     else:

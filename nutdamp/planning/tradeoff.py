@@ -132,6 +132,15 @@ class Point(NamedTuple):
         return self.plan.pulses.cost_in(self.unit)
 
     @property
+    def off(self) -> float:
+        """Distance of H from its target at the end, rad."""
+        return self.plan.flight.residual.axis_error
+
+    def serves(self, other: Point) -> bool:
+        """True if the schedule costs as little as another one, ends as soon and leaves H as near."""
+        return self.off <= other.off and self.plan.end <= other.plan.end and self.cost <= other.cost
+
+    @property
     def bounds(self) -> Bounds:
         """Lower bounds on other schedules within the same horizon; unknown for schemes other than optimal."""
         return self.plan.pulses.bounds or Bounds(None, None, self.unit, self.horizon)
@@ -213,10 +222,9 @@ def _fronts(
     for shift in shifts:
         own = [point for asked, point in made_for if asked <= shift]
         looser = [point for asked, point in made_for if asked > shift]
-        points = own + [
-            point for point in looser if _keeps(point.plan, shift) or any(_serves(point, rival) for rival in own)
-        ]
-        kept = undominated(points or [point for point in others if _keeps(point.plan, shift)], kept)
+        # One that is nowhere worse than another stands for it: ticks prevent exact ends.
+        points = own + [point for point in looser if point.off <= shift + LEFT or any(map(point.serves, own))]
+        kept = undominated(points or [point for point in others if point.off <= shift + LEFT], kept)
         by_others = all(point.plan.scheme != OPTIMAL.name for point in kept)
         yield Front(shift, kept, why.get(shift) if by_others else None)
 
@@ -225,18 +233,6 @@ def _unit(plans: Sequence[Plan]) -> str:
     """Unit in which all costs and bounds are known."""
     bounds = [plan.pulses.bounds for plan in plans if plan.pulses.bounds is not None]
     return "kg" if by_propellant(plans) and all(bound.unit == "kg" for bound in bounds) else "N m s"
-
-
-def _keeps(plan: Plan, shift: float) -> bool:
-    """True if H ends no farther from its target than ``shift`` rad."""
-    return plan.flight.residual.axis_error <= shift + LEFT
-
-
-def _serves(point: Point, instead_of: Point) -> bool:
-    """True if a schedule costs as little, ends as soon and leaves H as near: ticks prevent exact ends."""
-    one, other = point.plan, instead_of.plan
-    as_near = one.flight.residual.axis_error <= other.flight.residual.axis_error
-    return as_near and one.pulses.end <= other.pulses.end and point.cost <= instead_of.cost
 
 
 def _others(spacecraft: Spacecraft, options: OptimalOptions) -> list[Plan]:
