@@ -55,9 +55,8 @@ CHECKS, SMALLER = 12, 0.96  # checks at most, and by what the tolerances shrink 
 class Tightening:
     """Inputs of the ``tolerances`` that are to be ``factor`` times as large; all others stay.
 
-    ``inputs``: one of each size that the file gives for them, and whether it gives it as a share of the nominal value.
-    In ``cases`` new ones of ``seed`` so many ``complied``; the share that complies is ``least`` at least, by the exact
-    interval of `CONFIDENCE`.
+    ``inputs``: one of each size in the file, True for a share of the nominal value. Of ``cases`` new ones of ``seed``
+    the share ``complied``; it is ``least`` at least, by the exact interval of `CONFIDENCE`.
     """
 
     tolerances: tuple[str, ...]
@@ -70,10 +69,7 @@ class Tightening:
 
 
 def tightening(plan: Plan, probability: float) -> Tightening | None:
-    """Fewest dominant tolerances, and their reduction, for the required share of complying cases.
-
-    None where enough do, or do not with the `MOST` of them exactly known.
-    """
+    """Fewest dominant tolerances, and their reduction, for the required share of complying cases; None if none do."""
     body, given = plan.spacecraft, plan.spacecraft.dispersions
     if given is None or not requirements.required(body):
         return None
@@ -171,10 +167,7 @@ MOST_BURNS, LARGEST = 8, 60_000
 
 
 def uncertain(body: Spacecraft, on_times: Vector, goal: Vector) -> Uncertain:
-    """First-order effect of the dispersions of a symmetric ``body`` on pulses of ``on_times`` (K,) s.
-
-    Derivatives are by complex steps through `dispersion.cases`, per second of on-time.
-    """
+    """First-order effect of dispersions on pulses of ``on_times`` (K,) s, per second of them, by complex steps."""
     pulses = [
         channel_pulse(channel, 100.0 + 1e3 * at, on)
         for at, (channel, on) in enumerate(zip(body.channels, on_times, strict=True))

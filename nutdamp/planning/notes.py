@@ -1,7 +1,4 @@
-"""Notes on plans and decisions, as data: codes of sentences with their values.
-
-The sentences stand in ``guide/notes.md``; `nutdamp.views.text` makes texts of them.
-"""
+"""Notes on plans and decisions, as data: codes of the sentences of ``guide/notes.md``, with their values."""
 
 from __future__ import annotations
 
@@ -27,10 +24,7 @@ TURNED = math.radians(0.1)  # turn of H, rad, from which it is mentioned
 
 
 def plan_notes(plan: Plan, *, cones: bool = True) -> tuple[Note, ...]:
-    """Notes on a plan, those of its scheme first, or the reason for the lack of a schedule.
-
-    Without ``cones`` broken ones are named elsewhere.
-    """
+    """Notes on a plan, its scheme's first, broken ``cones`` last; or the reason for the lack of a schedule."""
     if not plan.feasible:
         return (note("infeasible", scheme=plan.scheme, why=infeasibility(plan)),)
     notes = [*plan.pulses.notes, *[note("search-ended")] * plan.cut]
@@ -193,10 +187,7 @@ def _growing(decision: Decision) -> Iterator[Note]:
 
 
 def comparison_warnings(compared: Comparison, *, cones: bool = True) -> Iterator[Note]:
-    """Requirements that the recommended plan misses, the causes, and the cones that the spin axis breaks.
-
-    Without ``cones`` a verdict names those that are broken.
-    """
+    """Requirements that the recommended plan misses, the causes, and, with ``cones``, those that the axis breaks."""
     chosen = compared.recommended
     if chosen is None:
         return
@@ -340,19 +331,16 @@ def reasons(compared: Comparison) -> Iterator[Note]:
         yield note("as-requested" if len(compared.plans) == 1 else "only-plan")
         return
     if ground is Ground.CASES:
-        yield note("most-cases", count=count)
-        return
-    if recommendation.standing is Standing.COMPLIES:
-        if recommendation.plan.kept is False:
-            yield note("cheapest-at-end", count=count)
-        elif not requirements.required(body):
-            yield note("damps-at-least", count=count)
-        else:
-            yield note("least-propellant" if recommendation.by_propellant else "least-impulse", count=count)
-    elif ground is Ground.NEAREST:
-        yield note("nearest", count=count)
+        code = "most-cases"
+    elif recommendation.standing is not Standing.COMPLIES:
+        code = "nearest" if ground is Ground.NEAREST else "least-left"
+    elif recommendation.plan.kept is False:
+        code = "cheapest-at-end"
+    elif not requirements.required(body):
+        code = "damps-at-least"
     else:
-        yield note("least-left", count=count)
+        code = "least-propellant" if recommendation.by_propellant else "least-impulse"
+    yield note(code, count=count)
     if ground in TIES:
         yield note(TIES[ground])
 

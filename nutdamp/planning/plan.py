@@ -152,7 +152,7 @@ class Standing(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Share:
-    """Share of dispersed cases that comply, ``low`` to ``high``, equal where all flew; ``probability`` of them must."""
+    """Share of cases that comply, ``low`` to ``high``, equal where all flew; ``probability`` of them must."""
 
     low: float
     high: float
@@ -244,7 +244,7 @@ class Hindrance:
 class Plan(results.Data, results.Tabled):
     """Schedule of a scheme for a spacecraft, and its judgement.
 
-    Without a schedule: the ``refusal`` of the scheme in its words, or the first ``breach`` of the schedule found, or the cone
+    Without one: the ``refusal`` of the scheme in its words, or the first ``breach`` of the schedule found, or the cone
     that the spin axis would break (``astray``) on its way to a target, or the nutation (rad) that would be left where
     that is ``worse`` than without pulses, at ``worse_at`` s. `nutdamp.planning.decision` has the words of all four.
     ``failure``: the exception of a scheme that has a bug; ``from_file``: the pulses were read, no scheme planned them.
@@ -490,7 +490,7 @@ def spinning(spacecraft: Spacecraft) -> tuple[str, ...]:
 
 
 def alternatives(spacecraft: Spacecraft, scheme: str, options: planner.Choice = None) -> tuple[Plan, ...]:
-    """Feasible plans by alternative schedules of the scheme, maybe that of `plan` too; raises KeyError as it does."""
+    """Feasible plans by alternative schedules of the scheme, maybe that of `plan`; raises KeyError as it does."""
     chosen = planner.settled(catalogue.SCHEMES[scheme], options, spacecraft)
     try:
         alternatives = planner.alternatives(scheme, known(spacecraft, chosen), chosen)

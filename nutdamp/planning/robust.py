@@ -166,8 +166,8 @@ def compare(
 ) -> RobustComparison:
     """Make the plans of the ``variations``, let dispersed cases fly each, and recommend one; no schedule comes twice.
 
-    ``samples`` cases of those that may be chosen, see `screening`; ``watch`` is called with how many are done, and then
-    beyond that now and then. Raises BadRequest for a spacecraft without dispersions.
+    ``samples`` cases of those that may be chosen; ``watch`` is called with how many variations are done, then now and
+    then. Raises BadRequest for a spacecraft without dispersions.
     """
     body = comparison.spacecraft
     probability = required_share(body.requirement)
@@ -232,10 +232,9 @@ def _trimmed(ranks: RobustComparison) -> RobustComparison:
 
 
 def _checked(ranks: RobustComparison, candidates: Sequence[PlanCandidate]) -> RobustComparison:
-    """Comparison with the chosen plan in fresh cases, against selection by luck.
+    """Comparison with the chosen plan in fresh cases, against selection by luck; `Tightening` if too few comply.
 
-    A plan with which too few of them comply gives way to the next one with which enough seem to. Then, where too few
-    comply all the same, with which tolerances enough would.
+    A plan with which too few fresh ones comply gives way to the next one with which enough seem to.
     """
     samples, required = ranks.samples, ranks.probability
     refused: list[PlanCandidate] = []
@@ -341,10 +340,9 @@ def robust_reasons(robust: RobustComparison) -> Iterator[Note]:
     elif count == 1:
         yield note("as-requested" if len(robust.comparison.plans) == 1 else "only-plan")
     else:
-        if chosen.met is None:
-            yield note("robust-least-left", count=count, equals=robust.equals, required_share=required)
-        elif chosen.met >= robust.probability:
-            yield note("robust-complies", count=count, equals=robust.equals, required_share=required)
+        if chosen.met is None or chosen.met >= robust.probability:
+            code = "robust-least-left" if chosen.met is None else "robust-complies"
+            yield note(code, count=count, equals=robust.equals, required_share=required)
         else:
             yield note("robust-most-cases", count=count, equals=robust.equals)
         if robust.ground is not None and robust.ground is not Ground.ONLY:

@@ -7,6 +7,7 @@ second by the prices, over its cost. Where q exceeds one nowhere, no schedule co
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -117,10 +118,7 @@ def certificate(plan: Plan) -> Certificate:
 
 
 class Point(NamedTuple):
-    """Schedule of a front: a ``plan`` that ends in time, and the ``horizon`` (s) of its search.
-
-    Its cost is counted in ``unit`` (kg or N m s), for all points alike.
-    """
+    """Schedule of a front: a ``plan``, the ``horizon`` (s) of its search, the ``unit`` of costs (kg or N m s)."""
 
     plan: Plan
     horizon: float
@@ -160,9 +158,8 @@ class Front:
     def least(self, point: Point) -> float | None:
         """First-order lower bound for a ``point``; no more than those of points that have less time."""
         first, within = point.bounds.first_order, point.bounds.within
-        known = [point.bounds for point in self.points if point.bounds.within <= within]
-        known_orders = (bounds.first_order for bounds in known if bounds.first_order is not None)
-        return None if first is None else min(first, *known_orders, math.inf)
+        known = [each.bounds.first_order for each in self.points if each.bounds.within <= within]
+        return None if first is None else min(first, *(bound for bound in known if bound is not None), math.inf)
 
 
 def fronts(
@@ -176,9 +173,8 @@ def fronts(
     """Fronts for each of the ``shifts`` (rad, infinite for any), of at most ``count`` searches each.
 
     What is traded is propellant, with ``options.least`` of impulse that (then pulses do not tell their propellant).
-    Whichever search found it, a schedule counts for every front whose shift it keeps. Where the scheme optimal finds
-    none, those of the other schemes count that comply but for where H ends. ``progress`` is called with how many of the
-    count × len(shifts) searches are done.
+    A schedule counts for every front whose shift it keeps. Where optimal finds none, those of the other schemes count
+    that comply but for where H ends. ``progress``: called with how many of the count × len(shifts) searches are done.
     """
     if options.least == "impulse":
         # The search for the fastest saves time, and counts in kg whatever it can: one unit for all points.
@@ -246,10 +242,7 @@ def _others(spacecraft: Spacecraft, options: OptimalOptions) -> list[Plan]:
 def _searched(
     spacecraft: Spacecraft, options: OptimalOptions, count: int, search: Callable[[Spacecraft, OptimalOptions], Plan]
 ) -> list[tuple[Plan, float]] | str:
-    """Schedules of the whole horizon, the fastest, and of horizons between, evenly by their ratios.
-
-    Each with its horizon, s; or why there is none.
-    """
+    """Schedules of the whole horizon, the fastest, and between, each with its horizon, s; or why there is none."""
     whole = search(spacecraft, options)
     if whole.schedule is None or whole.schedule.bounds is None:
         return infeasibility(whole) or "there is nothing to do"
@@ -269,10 +262,7 @@ def _searched(
 
 
 def undominated(points: Sequence[Point], stricter: Sequence[Point] = ()) -> tuple[Point, ...]:
-    """In the order of their ends, those that cost less than all that end no later, by `SAME_COST` or more.
-
-    Those of a ``stricter`` front count where they cost less at all: what allows more is nowhere dearer.
-    """
+    """Points that cost less than all that end no later, by `SAME_COST`; those of a ``stricter`` front by anything."""
     given = {id(point.plan) for point in stricter}
     kept: list[Point] = []
     for point in sorted(points, key=lambda point: (point.plan.pulses.end, point.cost)):
@@ -284,8 +274,8 @@ def undominated(points: Sequence[Point], stricter: Sequence[Point] = ()) -> tupl
 
 def numbered(all_fronts: Sequence[Front]) -> Iterator[tuple[int, Front, Point]]:
     """All points of all fronts, numbered from 1."""
-    pairs = ((front, point) for front in all_fronts for point in front.points)
-    return ((index, front, point) for index, (front, point) in enumerate(pairs, start=1))
+    numbers = itertools.count(1)
+    return ((next(numbers), front, point) for front in all_fronts for point in front.points)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
