@@ -2,7 +2,6 @@
 
 `schemes.optimal.chance` gives burns that keep the requirement with a margin of so many sigmas, to first order. They are
 made pulses, refined on the true motion and flown in dispersed cases; the margin is adapted by what these show.
-Allocation: which tolerances have to shrink, and to what, so that a schedule meets its requirement in enough cases.
 """
 
 from __future__ import annotations

@@ -38,11 +38,10 @@ SEARCH = 100.0
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Comparison(results.Data, results.Tabled):
-    """Plans for one spacecraft, and the recommended one with the ground of the choice.
+    """Plans for one spacecraft, and the recommended one; ``comparison["two-pulse"]`` is one of them.
 
-    ``comparison["two-pulse"]`` is one of them, iterating gives all. ``flown``: the feasible ones in dispersed cases;
-    None where these were not to be flown. ``named``: their schemes were; ``timed``: pulses may be timed one by one
-    though the spacecraft takes commands.
+    ``flown``: the feasible ones in dispersed cases; None where these were not to be flown. ``named``: their schemes
+    were; ``timed``: pulses may be timed one by one though the spacecraft takes commands.
     """
 
     spacecraft: Spacecraft
@@ -173,10 +172,9 @@ def compare(
 ) -> Comparison:
     """Plan the schemes named, else the `usual` ones, and recommend one; one that has a bug takes no other down.
 
-    With dispersions each plan flies ``samples`` cases (default `dispersion.SAMPLES`, 0: none), as many of them as it
-    takes to know whether enough comply; where nothing is required, and no number is given, none. ``timed``: pulses may
-    be timed one by one though the file has commands. Raises NutdampError, such as BadRequest, and KeyError for a name
-    not in `schemes.NAMES`.
+    With dispersions each plan flies as many of ``samples`` cases (default `study.SAMPLES`, without a requirement 0) as
+    it takes to know whether enough comply. ``timed``: see `Comparison`. Raises NutdampError, such as BadRequest, and
+    KeyError for a name not in `schemes.NAMES`.
     """
     unknown = set(names) - set(catalogue.NAMES)
     if unknown:

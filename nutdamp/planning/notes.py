@@ -208,8 +208,7 @@ def comparison_warnings(compared: Comparison, *, cones: bool = True) -> Iterator
 
 def _missed(chosen: Plan, compared: Comparison) -> Iterator[Note]:
     """Requirements that the recommended plan misses, and the causes."""
-    recommendation = compared.recommendation
-    if recommendation.standing is Standing.COMPLIES:
+    if compared.recommendation.standing is Standing.COMPLIES:
         return
     share = compared.shares.get(chosen)
     if share is not None and not share.met and chosen.standing is not Standing.MISSES:
@@ -264,16 +263,11 @@ def _obstacles(plan: Plan, compared: Comparison) -> Iterator[Note]:
             yield remaining(plan).of(plan.scheme)
     if Part.DISTANCE in parts and plan.scheme not in (*catalogue.POINTING, *catalogue.COMMANDED):
         yield note("scheme-does-not-turn", scheme=plan.scheme, schemes=", ".join(catalogue.POINTING))
-    if optimal_untried(compared) and parts != {Part.SPIN}:
-        yield note("optimal-not-compared")
-    elif any(channel.damps for channel in body.channels) and requirements.required(body) and parts != {Part.SPIN}:
-        yield note("try-trade")
-
-
-def optimal_untried(compared: Comparison) -> bool:
-    """True where there are channels that optimal can fire, and it was not compared."""
-    able = any(channel.damps for channel in compared.spacecraft.channels)
-    return able and OPTIMAL.name not in {plan.scheme for plan in compared.plans}
+    if parts != {Part.SPIN} and any(channel.damps for channel in body.channels):
+        if OPTIMAL.name not in {plan.scheme for plan in compared.plans}:
+            yield note("optimal-not-compared")
+        elif requirements.required(body):
+            yield note("try-trade")
 
 
 def alternatives(compared: Comparison) -> Iterator[Note]:
@@ -324,7 +318,9 @@ def reasons(compared: Comparison) -> Iterator[Note]:
         waiting = requirements.only_nutation(body)
         damped = requirements.to_required(body, body.nutation, growing=False) if waiting else None
         yield note("none-feasible") if damped is None else note("none-needed-from", from_s=damped)
-        if optimal_untried(compared) and (body.goal.spin is None or any(entry.axial for entry in body.channels)):
+        able = any(channel.damps for channel in body.channels)
+        able = able and (body.goal.spin is None or any(channel.axial for channel in body.channels))
+        if able and OPTIMAL.name not in {plan.scheme for plan in compared.plans}:
             yield note("optimal-not-tried")
         return
     if ground is Ground.ONLY:

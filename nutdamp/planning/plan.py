@@ -1,8 +1,7 @@
 """Planning: plan by a scheme, fly the schedule, judge it, route it round exclusion cones.
 
-A scheme that points is planned leg by leg over way points. A route is a row of great circles: straight to the target in
-shorter legs, which swing the axis less, or by one or two dog-legs. Routes are sought on the sphere, with a margin for
-nutation; the flight judges the cones.
+A route is a row of great circles, a leg each: straight to the target in shorter legs, which swing the axis less, or by
+dog-legs. It is sought on the sphere, with a margin for nutation; the flight judges the cones.
 """
 
 from __future__ import annotations
@@ -322,10 +321,9 @@ class Plan(results.Data, results.Tabled):
         return self.end
 
     def carried(self, at: float | None = None) -> Spacecraft:
-        """Spacecraft of the file with the state that the flight has ``at`` a time, s, as ``plan -o`` writes it.
+        """Spacecraft of the file with the state that the flight has ``at`` a time, s (default `carried_at`).
 
-        Default the end of the last pulse, of a loop that of its run. Raises BadRequest for a spacecraft that was not
-        read from a file, while a pulse is on, and for a time that is none.
+        Raises BadRequest for a spacecraft not read from a file, while a pulse is on, and for a time that is none.
         """
         time = self.carried_at if at is None else units.end_of_flight(at)
         body: Spacecraft = results.view(feasible(self), "carried", time)
@@ -372,9 +370,8 @@ class Plan(results.Data, results.Tabled):
     @property
     def ends_well(self) -> bool | None:
         """Compliance of the flown residual at the end; None where nothing is required."""
-        if self.left is None or not requirements.required(self.spacecraft):
-            return None
-        return not any(bound.required for bound in self.shortfalls)
+        required = [line.met for line in self.held if line.bound.required]
+        return all(required) if required else None
 
     @property
     def held(self) -> tuple[Held, ...]:
@@ -512,8 +509,8 @@ def known(spacecraft: Spacecraft, options: catalogue.SchemeOptions) -> Spacecraf
 def judged(spacecraft: Spacecraft, scheme: str, schedule: Schedule, options: catalogue.SchemeOptions) -> Plan:
     """Plan of a schedule: infeasible where it breaks a limit or does not help. Raises Infeasible on flat spin.
 
-    It helps where nutation, distance from the target axis or from the requested spin is less than without pulses;
-    nutation that decays by itself must be less than what it has decayed to by the last pulse.
+    It helps where nutation, distance from the target axis or from the requested spin is less than without pulses by
+    the last one.
     """
     if spacecraft.disturbances:  # which the scheme need not have known
         schedule = schedule.without_proof

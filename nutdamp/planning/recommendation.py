@@ -50,9 +50,8 @@ class Gain(Enum):
 
 @dataclass(frozen=True, eq=False)
 class Recommendation:
-    """Recommended plan; None, as ``standing`` and ``ground``, where none is feasible.
+    """Recommended plan of the ``count`` of its ``standing``, by propellant or by impulse; None where none is feasible.
 
-    It was chosen among ``count`` plans of its ``standing``, by propellant or, not ``by_propellant``, by impulse.
     ``alternatives``: the cheapest plan that gains so much.
     """
 
@@ -65,12 +64,11 @@ class Recommendation:
 
 
 def recommend(plans: Sequence[Plan], shares: Mapping[Plan, Share] | None = None) -> Recommendation:
-    """Recommendation among plans.
+    """Recommendation: of the plans that meet the requirement, and damp where it bounds nothing, the `cheapest`.
 
-    Of the plans that meet the requirement, and damp where it bounds nothing, the cheapest, see `cheapest`. Where there
-    is none, that with least nutation left (least distance from a target axis where that is more). Where plans that
-    reach as much differ in whether the spin axis keeps its cones, those that do count alone. With ``shares`` a plan
-    meets the requirement in enough dispersed cases or not at all; where none does, it is that with which most comply.
+    Where there is none, that with least nutation left (least distance from a target axis where that is more). Of plans
+    that reach as much those that keep all cones count alone. With ``shares`` a plan meets the requirement in enough
+    dispersed cases or not at all; where none does, it is that with which most comply.
     """
     feasible = [plan for plan in plans if plan.flown is not None]
     if not feasible:

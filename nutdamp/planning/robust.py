@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
-from copy import copy
 from dataclasses import dataclass, replace
 from enum import IntEnum
 from functools import partial
@@ -56,10 +55,9 @@ class Cost(NamedTuple):
 class RobustComparison(results.Data):
     """Candidates from the best down; ``usual`` is recommended by the comparison, ``chosen`` the robust plan.
 
-    ``ground`` is what decided among the ``equals`` candidates that comply often enough, or are as good as the best, by
-    propellant or by impulse. Each candidate flew ``samples`` cases of ``seed``. ``chance_plan``: with which tolerances
-    enough cases would comply with the robust plan, where too few do.
-    ``fresh``: how the robust plan fares in as many cases by which it was not chosen; None where nothing is required.
+    ``ground`` decided among the ``equals`` candidates that comply often enough, or are as good as the best, by
+    propellant or by impulse. Each flew ``samples`` cases of ``seed``. ``tightening``: tolerances with which enough
+    cases would comply, where too few do. ``fresh``: the robust plan in cases by which it was not chosen, if required.
     """
 
     comparison: Comparison
@@ -118,9 +116,7 @@ class RobustComparison(results.Data):
     @property
     def lucky(self) -> bool:
         """True if enough cases comply, but too few of those by which the plan was not chosen."""
-        if self.fresh is None or self.chosen is None:
-            return False
-        return self.fresh.met < self.probability <= (self.chosen.met or 0.0)
+        return self.fresh is not None and self.fresh.met < self.probability <= (self.met or 0.0)
 
     @property
     def met(self) -> float | None:
@@ -145,9 +141,7 @@ def variations_of(comparison: Comparison, options: Options | None = None) -> lis
     """Variations of `compare`: the plans compared, and variants of each."""
     body, options = comparison.spacecraft, options or Options()
     tried = list[Variation]()
-    for base in comparison.plans:
-        if base.failure is not None:
-            continue
+    for base in (plan for plan in comparison.plans if plan.failure is None):
         tried.append(Variation(partial(list, [("as planned", base)]), VariationKind.PLANNED))
         tried.append(Variation(partial(_alignments, body, base.scheme, options)))
         tried += [Variation(partial(_planned, *other, base.scheme, options)) for other in _others(body, base)]
@@ -192,8 +186,7 @@ def compare(
                 known = None if comparison.flown is None else comparison.flown.get(plan)
                 with suppress(Infeasible):  # cases that cannot be flown, such as those that take too long
                     if known is not None and known.cases.requested == samples:
-                        entries[kind] = copy(known)
-                        entries[kind].variant = variant
+                        entries[kind] = replace(known, variant=variant)
                     else:
                         entries[kind] = entered(own, variant, study_of(body, own.pulses), samples)
             if planned and variation.kind in (VariationKind.MARGINS, VariationKind.EARLY):
@@ -212,11 +205,30 @@ def _flown(
     probability: float,
     watch: Callable[[], None] = lambda: None,
 ) -> RobustComparison:
-    """Comparison of the ``entries`` in all cases, where they may be chosen, and the choice."""
+    """Comparison of the ``entries`` in all cases, where they may be chosen, and the choice, checked in fresh cases.
+
+    Against selection by luck a plan with which too few of those comply gives way to the next one with which enough seem
+    to. `Tightening` where too few comply all the same.
+    """
     candidates = list(entries.values())
     usual = None if comparison.recommended is None else entries.get(_kind(comparison.recommended))
     fly_all(candidates, samples, probability, [] if usual is None else [usual], watch)
-    return _checked(ranked(comparison, candidates, samples, probability), candidates)
+    ranks = ranked(comparison, candidates, samples, probability)
+    refused: list[PlanCandidate] = []
+    while (chosen := ranks.chosen) is not None:
+        if not chosen.cases.decided and chosen not in refused:  # it came after one that was refused
+            flyable = [chosen]
+            fly_all(flyable, samples, 0.0)
+            refused += [] if flyable else [chosen]
+        else:
+            ranks = replace(ranks, fresh=fresh_of(chosen, samples))
+            if not ranks.lucky or chosen in refused or len(refused) == CHECKED:
+                break
+            refused.append(chosen)
+        ranks = ranked(comparison, candidates, samples, probability, refused=refused)
+    if chosen is None or ranks.met is None or ranks.met >= probability:
+        return ranks
+    return replace(ranks, tightening=tightening(chosen.plan, probability))
 
 
 def _trimmed(ranks: RobustComparison) -> RobustComparison:
@@ -229,29 +241,6 @@ def _trimmed(ranks: RobustComparison) -> RobustComparison:
         return ranks
     candidates = best.candidate, *ranks.candidates
     return replace(ranks, chosen=best.candidate, candidates=candidates, ground=Ground.COST, fresh=best.fresh)
-
-
-def _checked(ranks: RobustComparison, candidates: Sequence[PlanCandidate]) -> RobustComparison:
-    """Comparison with the chosen plan in fresh cases, against selection by luck; `Tightening` if too few comply.
-
-    A plan with which too few fresh ones comply gives way to the next one with which enough seem to.
-    """
-    samples, required = ranks.samples, ranks.probability
-    refused: list[PlanCandidate] = []
-    while (chosen := ranks.chosen) is not None:
-        if not chosen.cases.decided and chosen not in refused:  # it came after one that was refused
-            flyable = [chosen]
-            fly_all(flyable, samples, 0.0)
-            refused += [] if flyable else [chosen]
-        else:
-            ranks = replace(ranks, fresh=fresh_of(chosen, samples))
-            if not ranks.lucky or chosen in refused or len(refused) == CHECKED:
-                break
-            refused.append(chosen)
-        ranks = ranked(ranks.comparison, candidates, samples, required, refused=refused)
-    if chosen is None or ranks.met is None or ranks.met >= required:
-        return ranks
-    return replace(ranks, tightening=tightening(chosen.plan, required))
 
 
 def ranked(

@@ -1,10 +1,9 @@
 """Sequential screening of plans in dispersed cases, and on-times trimmed to what enough cases need.
 
-All plans fly the same draws, the first cases first. The complying share of all cases is bounded by an exact interval
-from the first ones (Clopper & Pearson 1934), so wide that it errs once in a million times; a plan that could not be
-chosen even at the favourable end of its interval is flown no further. Which cases comply with shorter on-times is
-predicted: their flown ends move by the slopes of the closed form. What comes out is flown, in fresh cases too; where
-too few cases comply then, fewer are predicted to the next time.
+All plans fly the same draws, the first cases first. From these the complying share is bounded by an exact interval
+(Clopper & Pearson 1934), which errs once in a million times; a plan that could not be chosen even at its favourable end
+is flown no further. Compliance with shorter on-times is predicted: flown ends move by the slopes of the closed form.
+What comes out is flown, in fresh cases too; where too few cases comply then, fewer are predicted to the next time.
 """
 
 from __future__ import annotations
@@ -12,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import NamedTuple
 
@@ -71,6 +70,15 @@ class Cases:
         """Compliance of enough of the flown cases; None where nothing is required."""
         return None if self.complying is None else self.complying >= self.probability
 
+    @property
+    def share(self) -> Share | None:
+        """Share of all requested cases; None where nothing is required."""
+        met, done = self.complying, self.samples
+        if met is None:
+            return None
+        bounds = (met, met) if self.decided else binomial_interval(round(met * done), done, CERTAIN)
+        return Share(*bounds, self.probability)
+
 
 def cases_of(results: Results, requested: int | None = None) -> Cases:
     """Result of a study; ``requested``: number of cases in all, default those of the ``results``."""
@@ -96,7 +104,7 @@ class PlanCandidate:
     variant: str
     cases: Cases
     results: Results | None = None
-    share: Share | None = field(init=False, default=None)
+    share: Share | None = None
 
     @property
     def nutation(self) -> float:
@@ -133,9 +141,8 @@ class PlanCandidate:
 def entered(plan: Plan, variant: str, study: Study, samples: int) -> PlanCandidate:
     """A candidate that has flown the first of ``samples`` cases of a study."""
     results = _run(Results(study, min(STAGES[0], samples)))
-    candidate = PlanCandidate(plan, variant, cases_of(results, samples), results)
-    _bound(candidate, samples)
-    return candidate
+    cases = cases_of(results, samples)
+    return PlanCandidate(plan, variant, cases, results, cases.share)
 
 
 def _run(results: Results) -> Results:
@@ -193,7 +200,7 @@ def _undecided(
     chosen = choose(shares)
     if chosen in ahead:
         return ahead[chosen]
-    if chosen not in flown or not shares or shares[chosen].met:
+    if chosen is None or chosen not in flown or not shares or shares[chosen].met:
         return None
     return next((ahead[plan] for plan in ahead if shares[plan].high >= shares[chosen].low + LIKELIER), None)
 
@@ -204,13 +211,6 @@ def shares_of(plans: Sequence[Plan], flown: Mapping[Plan, PlanCandidate]) -> dic
         return {}
     unknown = Share(0.0, 1.0, required_share(plans[0].spacecraft.requirement))
     return {plan: (flown[plan].share or unknown) if plan in flown else unknown for plan in plans}
-
-
-def _bound(candidate: PlanCandidate, samples: int) -> None:
-    met, done = candidate.met, candidate.cases.samples
-    if met is not None:
-        bounds = (met, met) if done >= samples else binomial_interval(round(met * done), done, CERTAIN)
-        candidate.share = Share(*bounds, candidate.cases.probability)
 
 
 def _stage(done: int, samples: int) -> int:
@@ -225,7 +225,7 @@ def _further(candidate: PlanCandidate, samples: int) -> None:
     exact = stage <= EXACT_CASES  # beyond, cases are counted and not kept: from the first one on
     candidate.results = _run(candidate.results.extended(stage) if exact else Results(candidate.results.study, stage))
     candidate.cases = cases_of(candidate.results, samples)
-    _bound(candidate, samples)
+    candidate.share = candidate.cases.share
 
 
 def fly_all(
@@ -352,7 +352,7 @@ def trimmed(plan: Plan, complies: Callable[[Plan], bool]) -> Plan:
     return best
 
 
-def _scaled(plan: Plan, ratios: Sequence[float], complies: Callable[[Plan], bool] = lambda _: True) -> Plan | None:
+def _scaled(plan: Plan, ratios: Sequence[float], complies: Callable[[Plan], bool]) -> Plan | None:
     """Plan with on-times times ``ratios``; None where it breaks a limit or its requirement, or ``complies`` fails."""
     body, schedule = plan.spacecraft, _longer(plan, ratios)
     if keeps_limits(body, schedule) and complies(replace(plan, schedule=schedule)):

@@ -205,7 +205,10 @@ def fronts(
                 entries += [(shift, *entry) for entry in searched]
             done = count * number
     others = _others(spacecraft, options) if why else []
-    unit = "N m s" if options.least == "impulse" else _unit([*(plan for _, plan, _ in entries), *others])
+    plans = [*(plan for _, plan, _ in entries), *others]
+    counted = [plan.pulses.bounds for plan in plans if plan.pulses.bounds is not None]
+    in_kg = options.least != "impulse" and by_propellant(plans) and all(known.unit == "kg" for known in counted)
+    unit = "kg" if in_kg else "N m s"
     made_for = [(kept, Point(plan, horizon, unit)) for kept, plan, horizon in entries]
     return tuple(_fronts(ordered, made_for, [Point(plan, spacecraft.horizon, unit) for plan in others], why))
 
@@ -223,12 +226,6 @@ def _fronts(
         kept = undominated(points or [point for point in others if point.off <= shift + LEFT], kept)
         by_others = all(point.plan.scheme != OPTIMAL.name for point in kept)
         yield Front(shift, kept, why.get(shift) if by_others else None)
-
-
-def _unit(plans: Sequence[Plan]) -> str:
-    """Unit in which all costs and bounds are known."""
-    bounds = [plan.pulses.bounds for plan in plans if plan.pulses.bounds is not None]
-    return "kg" if by_propellant(plans) and all(bound.unit == "kg" for bound in bounds) else "N m s"
 
 
 def _others(spacecraft: Spacecraft, options: OptimalOptions) -> list[Plan]:
