@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import cmath
 import math
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -186,29 +187,25 @@ MARKS = tuple(math.radians(mark) for mark in (10.0, 30.0, 60.0))
 """Nutation angles for which the time is given that a resonant disturbance takes to drive it there."""
 
 
-def consequences(spacecraft: Spacecraft) -> tuple[Consequence, ...]:
+def consequences(spacecraft: Spacecraft) -> Iterator[Consequence]:
     """Effect of each disturbance, in the order of the file."""
-    return tuple(_consequence(spacecraft, disturbance) for disturbance in spacecraft.disturbances)
-
-
-def _consequence(spacecraft: Spacecraft, disturbance: Disturbance) -> Consequence:
     A, C, turning = spacecraft.inertia.A, spacecraft.inertia.C, spacecraft.nutation_rate
-    spin_rate, spin = disturbance.axial / C, spacecraft.inertia.equivalent(spacecraft.spin)
-    if disturbance.transverse == 0.0:
-        return Consequence(disturbance, 0.0, 0.0, 0.0, math.inf, (), spin_rate)
-    largest, period = response.beat(A, turning, disturbance.transverse, disturbance.rate)
-    # A beat that takes longer than everything planned, several times over, is a resonance for the user.
-    if period > RESONANT * spacecraft.horizon:
-        omega0 = complex(spacecraft.omega0[0], spacecraft.omega0[1])
-        times = tuple(
-            (mark, response.resonant_time(A, spacecraft.axial, omega0, disturbance.transverse, mark))
-            for mark in MARKS
-            if mark > spacecraft.nutation
-        )
-        return Consequence(disturbance, None, None, None, period, times, spin_rate)
-    steady = abs(response.steady_response(A, turning, disturbance.transverse, disturbance.rate))
-    tilt, swell = (rigid_body.nutation_angle(A, C, rate, spin) for rate in (steady, largest))
-    return Consequence(disturbance, steady, float(tilt), float(swell), period, (), spin_rate)
+    spin, omega0 = spacecraft.inertia.equivalent(spacecraft.spin), complex(*spacecraft.omega0[:2])
+    for disturbance in spacecraft.disturbances:
+        torque, spin_rate = disturbance.transverse, disturbance.axial / C
+        if torque == 0.0:
+            yield Consequence(disturbance, 0.0, 0.0, 0.0, math.inf, (), spin_rate)
+            continue
+        largest, period = response.beat(A, turning, torque, disturbance.rate)
+        # A beat that takes longer than everything planned, several times over, is a resonance for the user.
+        if period > RESONANT * spacecraft.horizon:
+            marks = [mark for mark in MARKS if mark > spacecraft.nutation]
+            times = [(mark, response.resonant_time(A, spacecraft.axial, omega0, torque, mark)) for mark in marks]
+            yield Consequence(disturbance, None, None, None, period, tuple(times), spin_rate)
+            continue
+        steady = abs(response.steady_response(A, turning, torque, disturbance.rate))
+        tilt, swell = (float(rigid_body.nutation_angle(A, C, rate, spin)) for rate in (steady, largest))
+        yield Consequence(disturbance, steady, tilt, swell, period, (), spin_rate)
 
 
 class SpinAxis(NamedTuple):

@@ -332,7 +332,10 @@ def decide(compared: Comparison) -> Decision | None:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Simulation(results.Data, results.Tabled):
-    """Propagation of a ``plan`` to ``until`` s, through ``real`` widths or by (17); pictures show ``drawn_to`` s."""
+    """Propagation of a ``plan`` to ``until`` s, shown through ``real`` widths or by the impulse sum (17).
+
+    Its track has ``samples`` rows; pictures show it to ``drawn_to`` s.
+    """
 
     plan: Plan
     until: float

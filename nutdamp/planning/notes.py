@@ -299,11 +299,8 @@ def beside(plan: Plan, than: Plan, by_propellant: bool) -> dict[str, Value]:
 
 
 TIES = {
-    Ground.PULSES: "tie-pulses",
-    Ground.DELTA_V: "tie-delta-v",
-    Ground.SHIFT: "tie-shift",
-    Ground.END: "tie-end",
-    Ground.NOMINAL: "tie-nominal",
+    ground: f"tie-{ground.value}"
+    for ground in (Ground.PULSES, Ground.DELTA_V, Ground.SHIFT, Ground.END, Ground.NOMINAL)
 }
 
 

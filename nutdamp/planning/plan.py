@@ -304,16 +304,14 @@ class Plan(results.Data, results.Tabled):
     def fly(self, until: float | None = None, *, samples: int = 1000, by_impulses: bool = False) -> Flight:
         """Fly the schedule through its real pulse widths, or by the impulse sum (17), until ``until`` s.
 
-        Default end: one inertial nutation period after the last pulse. The track has ``samples`` even rows, and rows
-        just before and after each pulse. Raises Infeasible where there is no schedule, BadRequest where no track can
-        be made.
+        Default: one inertial nutation period after the last pulse. The track has ``samples`` even rows, and rows just
+        before and after each pulse. Raises Infeasible without a schedule, BadRequest where no track can be made.
         """
-        if self.schedule is None:
-            raise Infeasible(f"{self.scheme} is infeasible: {self.why}")
+        schedule = feasible(self).pulses
         end = units.end_of_flight(self.end + self.spacecraft.inertial_period if until is None else until)
         count = units.count("samples", samples, 2)
         fly = propagation.by_impulses if by_impulses else propagation.flown
-        return replace(seen_at(fly(self.spacecraft, self.schedule, end), end), samples=count, scheme=self.scheme)
+        return replace(seen_at(fly(self.spacecraft, schedule, end), end), samples=count, scheme=self.scheme)
 
     @property
     def carried_at(self) -> float:
@@ -362,8 +360,7 @@ class Plan(results.Data, results.Tabled):
     def meets_requirement(self) -> bool | None:
         """True if the flown residual keeps the requirement of the file, the spin of the goal, and all cones.
 
-        None where none of these is given, and without a schedule; kept cones alone meet nothing. With a target axis the
-        momentum shift counts from there.
+        None without these or a schedule; kept cones alone meet nothing. A momentum shift counts from a target axis.
         """
         return False if self.feasible and self.kept is False else self.ends_well
 
@@ -498,7 +495,7 @@ def alternatives(spacecraft: Spacecraft, scheme: str, options: planner.Choice = 
 
 
 def known(spacecraft: Spacecraft, options: catalogue.SchemeOptions) -> Spacecraft:
-    """Spacecraft as known to schemes: with disturbances if requested, without a goal of a spin that nothing changes."""
+    """Spacecraft as schemes know it: with disturbances if requested, no goal of a spin that is there and stays."""
     body = spacecraft if options.with_disturbances else replace(spacecraft, disturbances=())
     axial = any(channel.axial for channel in body.channels)
     if body.goal.spin is not None and reaches_spin(body) and not body.spin_drift and not axial:

@@ -1,8 +1,7 @@
 """Robust plans: selection by the share of complying cases, and on-times shortened to the required share.
 
-Candidates are the schedules of the schemes and variants of them: later starts, channels left unused, other alignments;
-and, where `optimal` is among the schemes, its earliest ends, for errors of the rates grow with time, and those that
-`chance_plan` makes for the dispersions. All fly the same draws through real widths.
+Candidates are the schedules of the schemes, and variants: later starts, channels left unused, other alignments; of
+`optimal` its earliest ends too, for errors of the rates grow with time, and those of `chance_plan`.
 """
 
 from __future__ import annotations
@@ -251,9 +250,8 @@ def ranked(
     *,
     refused: Sequence[PlanCandidate] = (),
 ) -> RobustComparison:
-    """Comparison of flown candidates, and the choice.
+    """Comparison of flown candidates, and the choice: the `cheapest` of the equals.
 
-    That is the cheapest of the equals; of those that cost the same the plan that the comparison recommends.
     With the ``refused`` ones too few of other cases comply: they are taken where there is no plan with which enough do.
     """
     recommended = None if comparison.recommended is None else _kind(comparison.recommended)

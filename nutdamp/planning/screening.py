@@ -267,8 +267,7 @@ def _hopeful(candidates: list[PlanCandidate], samples: int, probability: float) 
     if sure:
         comparable = len({candidate.plan.pulses.propellant is None for candidate in candidates}) == 1
         most = min(sure) * (1.0 + SAME_COST) if comparable else math.inf
-        may = [candidate for candidate, _, high in bounds if high >= probability]
-        return [candidate for candidate in may if candidate.plan.pulses.cost <= most]
+        return [each for each, _, high in bounds if high >= probability and each.plan.pulses.cost <= most]
     least = min(probability, equal_from(max((low for _, low, _ in bounds), default=0.0), samples))
     return [candidate for candidate, _, high in bounds if high >= least]
 
