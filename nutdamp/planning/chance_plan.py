@@ -68,7 +68,7 @@ class Tightening:
 
 
 def tightening(plan: Plan, probability: float) -> Tightening | None:
-    """Fewest dominant tolerances, and their reduction, for enough complying cases; None where none suffice, or need to."""
+    """Fewest dominant tolerances, and their reduction, for enough complying cases; None if none suffice."""
     body, given = plan.spacecraft, plan.spacecraft.dispersions
     if given is None or not requirements.required(body):
         return None

@@ -299,8 +299,11 @@ def beside(plan: Plan, than: Plan, by_propellant: bool) -> dict[str, Value]:
 
 
 TIES = {
-    ground: f"tie-{ground.value}"
-    for ground in (Ground.PULSES, Ground.DELTA_V, Ground.SHIFT, Ground.END, Ground.NOMINAL)
+    Ground.PULSES: "tie-pulses",
+    Ground.DELTA_V: "tie-delta-v",
+    Ground.SHIFT: "tie-shift",
+    Ground.END: "tie-end",
+    Ground.NOMINAL: "tie-nominal",
 }
 
 
@@ -324,16 +327,15 @@ def reasons(compared: Comparison) -> Iterator[Note]:
         yield note("as-requested" if len(compared.plans) == 1 else "only-plan")
         return
     if ground is Ground.CASES:
-        code = "most-cases"
+        yield note("most-cases", count=count)
     elif recommendation.standing is not Standing.COMPLIES:
-        code = "nearest" if ground is Ground.NEAREST else "least-left"
+        yield note("nearest" if ground is Ground.NEAREST else "least-left", count=count)
     elif recommendation.plan.kept is False:
-        code = "cheapest-at-end"
+        yield note("cheapest-at-end", count=count)
     elif not requirements.required(body):
-        code = "damps-at-least"
+        yield note("damps-at-least", count=count)
     else:
-        code = "least-propellant" if recommendation.by_propellant else "least-impulse"
-    yield note(code, count=count)
+        yield note("least-propellant" if recommendation.by_propellant else "least-impulse", count=count)
     if ground in TIES:
         yield note(TIES[ground])
 

@@ -327,9 +327,10 @@ def robust_reasons(robust: RobustComparison) -> Iterator[Note]:
     elif count == 1:
         yield note("as-requested" if len(robust.comparison.plans) == 1 else "only-plan")
     else:
-        if chosen.met is None or chosen.met >= robust.probability:
-            code = "robust-least-left" if chosen.met is None else "robust-complies"
-            yield note(code, count=count, equals=robust.equals, required_share=required)
+        if chosen.met is None:
+            yield note("robust-least-left", count=count, equals=robust.equals, required_share=required)
+        elif chosen.met >= robust.probability:
+            yield note("robust-complies", count=count, equals=robust.equals, required_share=required)
         else:
             yield note("robust-most-cases", count=count, equals=robust.equals)
         if robust.ground is not None and robust.ground is not Ground.ONLY:
