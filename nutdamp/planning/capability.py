@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import cmath
 import math
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -35,8 +36,8 @@ DIGITS = 9  # digits of misses in rad that are no rounding: among equals the pai
 class ChannelSteps(NamedTuple):
     """A channel and the nutation angles (rad) that its pulses take out or put in.
 
-    ``smallest`` is that of the shortest on-time to be commanded, `constraints.shortest_on_time`, and is 0 without any;
-    ``largest`` the most of on-times up to `constraints.longest_useful`, a right angle where nothing bounds it.
+    ``smallest``: of `constraints.shortest_on_time`, 0 without any. ``largest``: of on-times up to
+    `constraints.longest_useful`, a right angle where nothing bounds it.
     """
 
     channel: Channel
@@ -45,10 +46,7 @@ class ChannelSteps(NamedTuple):
 
 
 class SunPhases(NamedTuple):
-    """The Sun pulses of the free motion: ``turn`` s from one to the next on average, the ``first`` s after t = 0.
-
-    ``first`` is None where there is none, and ``refusal`` is then the reason.
-    """
+    """Sun pulses of the free motion: ``turn`` s apart on average, the ``first`` at s, or None and the ``refusal``."""
 
     turn: float
     first: float | None
@@ -79,8 +77,9 @@ class Turns(NamedTuple):
 def turns(spacecraft: Spacecraft) -> tuple[Turns, ...]:
     """Turns of each channel that blocks can fire, in the order of the file; nothing where the file has no commands."""
     steps, commands, spin = [], spacecraft.commands, spacecraft.spin
-    for channel in () if commands is None else usable(spacecraft):
-        assert commands is not None
+    if commands is None:
+        return ()
+    for channel in usable(spacecraft):
         widths = commandable_widths(commands, channel)
         if len(widths):
             given, momentum = acts(channel, widths), abs(spacecraft.axial)
@@ -115,10 +114,7 @@ def channel_steps(spacecraft: Spacecraft) -> tuple[ChannelSteps, ...]:
 
 
 class Acting(NamedTuple):
-    """Pulse of a command of ``on_time`` s: ``effective`` s of full thrust, its ``impulse`` N m s and ``centroid`` s.
-
-    The centroid counts from the start of the command.
-    """
+    """Pulse of a command of ``on_time`` s: ``effective`` s of full thrust, N m s, ``centroid`` s after its start."""
 
     channel: Channel
     on_time: float
@@ -131,10 +127,8 @@ def acting(spacecraft: Spacecraft) -> tuple[Acting, ...]:
     """Pulses of the shortest and the longest command of each channel, of those that have valves."""
     pulses = []
     for channel in spacecraft.channels:
-        if channel.valve is None:
-            continue
         for on_time in dict.fromkeys((shortest_on_time(spacecraft, channel), channel.max_on_time)):
-            if 0.0 < on_time < math.inf:
+            if channel.valve is not None and 0.0 < on_time < math.inf:
                 thrust = channel.valve.thrust(on_time)
                 impulse = channel.strength * thrust.on_time
                 pulses.append(Acting(channel, on_time, thrust.on_time, impulse, thrust.centroid))
@@ -193,37 +187,32 @@ MARKS = tuple(math.radians(mark) for mark in (10.0, 30.0, 60.0))
 """Nutation angles for which the time is given that a resonant disturbance takes to drive it there."""
 
 
-def consequences(spacecraft: Spacecraft) -> tuple[Consequence, ...]:
+def consequences(spacecraft: Spacecraft) -> Iterator[Consequence]:
     """Effect of each disturbance, in the order of the file."""
-    return tuple(_consequence(spacecraft, disturbance) for disturbance in spacecraft.disturbances)
-
-
-def _consequence(spacecraft: Spacecraft, disturbance: Disturbance) -> Consequence:
     A, C, turning = spacecraft.inertia.A, spacecraft.inertia.C, spacecraft.nutation_rate
-    spin_rate, spin = disturbance.axial / C, spacecraft.inertia.equivalent(spacecraft.spin)
-    if disturbance.transverse == 0.0:
-        return Consequence(disturbance, 0.0, 0.0, 0.0, math.inf, (), spin_rate)
-    largest, period = response.beat(A, turning, disturbance.transverse, disturbance.rate)
-    # A beat that takes longer than everything planned, several times over, is a resonance for the user.
-    if period > RESONANT * spacecraft.horizon:
-        omega0 = complex(spacecraft.omega0[0], spacecraft.omega0[1])
-        times = tuple(
-            (mark, response.resonant_time(A, spacecraft.axial, omega0, disturbance.transverse, mark))
-            for mark in MARKS
-            if mark > spacecraft.nutation
-        )
-        return Consequence(disturbance, None, None, None, period, times, spin_rate)
-    steady = abs(response.steady_response(A, turning, disturbance.transverse, disturbance.rate))
-    tilt, swell = (rigid_body.nutation_angle(A, C, rate, spin) for rate in (steady, largest))
-    return Consequence(disturbance, steady, float(tilt), float(swell), period, (), spin_rate)
+    spin, omega0 = spacecraft.inertia.equivalent(spacecraft.spin), complex(*spacecraft.omega0[:2])
+    for disturbance in spacecraft.disturbances:
+        torque, spin_rate = disturbance.transverse, disturbance.axial / C
+        if torque == 0.0:
+            yield Consequence(disturbance, 0.0, 0.0, 0.0, math.inf, (), spin_rate)
+            continue
+        largest, period = response.beat(A, turning, torque, disturbance.rate)
+        # A beat that takes longer than everything planned, several times over, is a resonance for the user.
+        if period > RESONANT * spacecraft.horizon:
+            marks = [mark for mark in MARKS if mark > spacecraft.nutation]
+            times = [(mark, response.resonant_time(A, spacecraft.axial, omega0, torque, mark)) for mark in marks]
+            yield Consequence(disturbance, None, None, None, period, tuple(times), spin_rate)
+            continue
+        steady = abs(response.steady_response(A, turning, torque, disturbance.rate))
+        tilt, swell = (float(rigid_body.nutation_angle(A, C, rate, spin)) for rate in (steady, largest))
+        yield Consequence(disturbance, steady, tilt, swell, period, (), spin_rate)
 
 
 class SpinAxis(NamedTuple):
     """Principal axis 3 of inertia.
 
-    ``kind`` of `body.axis_class`; ``exponent`` p² in 1/s² and ``growth_time`` s of `body.growth`; ``tilt``
-    (rad) of the principal axis against the third axis of the file (wobble); ``rates`` of the nutation in the body, the
-    despun frame and inertially, K(7), K(10), K(13), rad/s.
+    ``kind`` of `body.axis_class`; ``exponent`` p² in 1/s² and ``growth_time`` s of `body.growth`; ``tilt`` rad against
+    the third axis of the file; ``rates`` in the body, despun and inertially, K(7), K(10), K(13), rad/s.
     """
 
     kind: str

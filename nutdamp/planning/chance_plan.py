@@ -2,7 +2,6 @@
 
 `schemes.optimal.chance` gives burns that keep the requirement with a margin of so many sigmas, to first order. They are
 made pulses, refined on the true motion and flown in dispersed cases; the margin is adapted by what these show.
-Allocation: which tolerances have to shrink, and to what, so that a schedule meets its requirement in enough cases.
 """
 
 from __future__ import annotations
@@ -55,9 +54,8 @@ CHECKS, SMALLER = 12, 0.96  # checks at most, and by what the tolerances shrink 
 class Tightening:
     """Inputs of the ``tolerances`` that are to be ``factor`` times as large; all others stay.
 
-    ``inputs``: one of each size that the file gives for them, and whether it gives it as a share of the nominal value.
-    In ``cases`` new ones of ``seed`` so many ``complied``; the share that complies is ``least`` at least, by the exact
-    interval of `CONFIDENCE`.
+    ``inputs``: one of each size in the file, True for a share of the nominal value. Of ``cases`` new ones of ``seed``
+    the share ``complied``; it is ``least`` at least, by the exact interval of `CONFIDENCE`.
     """
 
     tolerances: tuple[str, ...]
@@ -70,10 +68,7 @@ class Tightening:
 
 
 def tightening(plan: Plan, probability: float) -> Tightening | None:
-    """Fewest dominant tolerances, and their reduction, for the required share of complying cases.
-
-    None where enough do, or do not with the `MOST` of them exactly known.
-    """
+    """Fewest dominant tolerances, and their reduction, for enough complying cases; None if none suffice."""
     body, given = plan.spacecraft, plan.spacecraft.dispersions
     if given is None or not requirements.required(body):
         return None
@@ -86,7 +81,12 @@ def tightening(plan: Plan, probability: float) -> Tightening | None:
     def complying(names: Iterable[str], factor: float) -> bool:
         return (tried(names, factor).met_fraction or 0.0) >= probability
 
-    ranked = _ranked(study, given)
+    shares: dict[str, float] = {}  # of the required bound, by tolerance
+    parts = [bound.part.value for bound in requirements.required(body) if bound.part is not Part.SPIN]
+    for output in parts or ["spin_change"]:
+        for entry, share in zip(study.first_order.inputs, study.first_order.shares(output).tolist(), strict=True):
+            shares[entry.tolerance] = max(shares.get(entry.tolerance, 0.0), share)
+    ranked = [name for name in sorted(shares, key=lambda name: -shares[name]) if hasattr(given, name)]
     fresh = min(max(SAMPLES, 2 * cases_to_show(probability, CONFIDENCE)), MOST_CASES) if probability < 1.0 else SAMPLES
     for count in range(1, min(len(ranked), MOST_TOLERANCES) + 1):
         names = tuple(ranked[:count])
@@ -104,17 +104,6 @@ def tightening(plan: Plan, probability: float) -> Tightening | None:
                 return Tightening(names, low, _stated(study, given, names), fresh, seed, share, trial.interval[0])
             low *= SMALLER
     return None
-
-
-def _ranked(study: Study, given: Dispersions) -> list[str]:
-    """Tolerances by their share of the required bound, the largest first."""
-    shares: dict[str, float] = {}
-    required = requirements.required(study.model.spacecraft)
-    parts = [bound.part.value for bound in required if bound.part is not Part.SPIN]
-    for output in parts or ["spin_change"]:
-        for entry, share in zip(study.first_order.inputs, study.first_order.shares(output).tolist(), strict=True):
-            shares[entry.tolerance] = max(shares.get(entry.tolerance, 0.0), share)
-    return [name for name in sorted(shares, key=lambda name: -shares[name]) if hasattr(given, name)]
 
 
 def _stated(study: Study, given: Dispersions, names: Iterable[str]) -> tuple[tuple[DispersedInput, bool], ...]:
@@ -177,10 +166,7 @@ MOST_BURNS, LARGEST = 8, 60_000
 
 
 def uncertain(body: Spacecraft, on_times: Vector, goal: Vector) -> Uncertain:
-    """First-order effect of the dispersions of a symmetric ``body`` on pulses of ``on_times`` (K,) s.
-
-    Derivatives are by complex steps through `dispersion.cases`, per second of on-time.
-    """
+    """First-order effect of dispersions on pulses of ``on_times`` (K,) s, per second of them, by complex steps."""
     pulses = [
         channel_pulse(channel, 100.0 + 1e3 * at, on)
         for at, (channel, on) in enumerate(zip(body.channels, on_times, strict=True))
@@ -339,14 +325,6 @@ class _MarginSearch:
         above = min((margin for margin in seen if margin > best), default=1.5 * best)
         return 0.5 * (best + (below if best - below > above - best else above))
 
-    def _few(self, solution: Sure) -> None:
-        """Forbid all slots that are not about the longest burns."""
-        program, near = self.program, np.zeros_like(self.program.forbidden)
-        for burn in sorted(solution.burns, key=lambda burn: -burn.impulse)[:MOST_BURNS]:
-            reach = 0.5 * burn.on_time + SLOTS // 8 * program.width
-            near[program.channels.index(burn.channel), np.abs(program.centres - burn.t) < reach] = True
-        program.forbidden |= ~near
-
     def _parted(self, solution: Sure) -> bool:
         """Separate burns that overlap or are too near, at the middle; True if there were any."""
         program, gap, parted = self.program, self.program.spacecraft.limits.gap, False
@@ -364,26 +342,31 @@ class _MarginSearch:
 
     def schedule(self, margin: float) -> Schedule | None:
         """Schedule of a margin, refined on the true motion; None where its burns cannot be fired."""
-        allowed, chance = self.program.forbidden.copy(), self.chance
+        program, chance = self.program, self.chance
+        allowed = program.forbidden.copy()
         try:
-            self._few(chance.solve(margin))
+            near = np.zeros_like(allowed)  # slots about the longest burns, the only ones from here on
+            for burn in sorted(chance.solve(margin).burns, key=lambda burn: -burn.impulse)[:MOST_BURNS]:
+                reach = 0.5 * burn.on_time + SLOTS // 8 * program.width
+                near[program.channels.index(burn.channel), np.abs(program.centres - burn.t) < reach] = True
+            program.forbidden |= ~near
             for _ in range(REPAIRS):
                 solution = chance.solve(margin)
                 if not solution.burns:
                     return None
                 if self._parted(solution):
                     continue
-                broken = next(broken_by(self.program, solution.burns), None)
+                broken = next(broken_by(program, solution.burns), None)
                 if broken is None:
                     break
-                self.program.forbid(*broken)
+                program.forbid(*broken)
             else:
                 return None
         finally:
-            self.program.forbidden = allowed
+            program.forbidden = allowed
         schedule = self.model.translate(as_pulses(self.model.body, solution.burns))
         aside, fly = solution.left[self.equations.chosen], partial(propagation.flown, self.plain)
-        schedule = Refinement(self.plain, schedule, self.equations, aside, self.program.width, fly).refined()
+        schedule = Refinement(self.plain, schedule, self.equations, aside, program.width, fly).refined()
         if not self.body.thrust_laws:
             return schedule
         try:

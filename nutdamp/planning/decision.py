@@ -1,8 +1,4 @@
-"""Comparison of plans, the decision on one of them line by line, and simulations to a given time.
-
-All is data but the reason for the lack of a schedule. `nutdamp.planning.notes` has the notes on it,
-`nutdamp.views.decisions` the words for it.
-"""
+"""Comparison of plans, the decision on one of them line by line, and simulations to a given time."""
 
 from __future__ import annotations
 
@@ -42,11 +38,10 @@ SEARCH = 100.0
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Comparison(results.Data, results.Tabled):
-    """Plans for one spacecraft, and the recommended one with the ground of the choice.
+    """Plans for one spacecraft, and the recommended one; ``comparison["two-pulse"]`` is one of them.
 
-    ``comparison["two-pulse"]`` is one of them, iterating gives all. ``flown``: the feasible ones in dispersed cases;
-    None where these were not to be flown. ``named``: their schemes were; ``timed``: pulses may be timed one by one
-    though the spacecraft takes commands.
+    ``flown``: the feasible ones in dispersed cases; None where these were not to be flown. ``named``: their schemes
+    were; ``timed``: pulses may be timed one by one though the spacecraft takes commands.
     """
 
     spacecraft: Spacecraft
@@ -81,10 +76,7 @@ class Comparison(results.Data, results.Tabled):
 
     @property
     def only_commanded(self) -> bool:
-        """True if only commandable plans may be recommended.
-
-        Others may, where pulses may be ``timed``, or schemes were ``named`` and none of their plans can be commanded.
-        """
+        """True if only commandable plans may be recommended: not ``timed``, nor ``named`` without any of them."""
         return not self.timed and (not self.named or any(plan.feasible and plan.commandable for plan in self.plans))
 
     @property
@@ -109,12 +101,12 @@ class Comparison(results.Data, results.Tabled):
 
     def cases(self, plan: Plan) -> Cases | None:
         """Dispersed cases of a plan; None where they were not flown."""
-        candidate = None if self.flown is None else self.flown.get(plan)
+        candidate = (self.flown or {}).get(plan)
         return None if candidate is None else candidate.cases
 
     def results(self, plan: Plan) -> Results | None:
         """All dispersed results of a plan; None where they have not flown."""
-        candidate = None if self.flown is None else self.flown.get(plan)
+        candidate = (self.flown or {}).get(plan)
         return None if candidate is None or not candidate.cases.decided else candidate.results
 
     def meets(self, plan: Plan) -> bool | None:
@@ -129,9 +121,9 @@ class Comparison(results.Data, results.Tabled):
 
     @cached_property
     def with_disturbances(self) -> Plan | None:
-        """Recommendation among the same schemes planned with the disturbances, where they were not.
+        """Recommendation among the schemes planned with the disturbances; None where they were, or there are none.
 
-        None where that is the case already. A scheme that is slow is planned only where no other one complies.
+        A scheme that is slow is planned only where no other one complies.
         """
         chosen, body = self.recommended, self.spacecraft
         if chosen is None or not body.disturbances or chosen.options.with_disturbances:
@@ -157,9 +149,9 @@ class Comparison(results.Data, results.Tabled):
 
 
 def usual(spacecraft: Spacecraft) -> tuple[str, ...]:
-    """Default schemes of a comparison: the classic ones and optimal, with a target those that can point.
+    """Default schemes of a comparison: the classic ones and optimal; those that can point or set the spin, if needed.
 
-    Those that can set the spin are among them where it has to change, and `none` where no pulse may be needed.
+    `none` is among them where no pulse may be needed.
     """
     names = catalogue.COMPARED if spacecraft.goal.axis is None else catalogue.POINTING
     if requirements.unaided(spacecraft):
@@ -180,10 +172,9 @@ def compare(
 ) -> Comparison:
     """Plan the schemes named, else the `usual` ones, and recommend one; one that has a bug takes no other down.
 
-    With dispersions each plan flies ``samples`` cases (default `dispersion.SAMPLES`, 0: none), as many of them as it
-    takes to know whether enough comply; where nothing is required, and no number is given, none. ``timed``: pulses may
-    be timed one by one though the file has commands. Raises NutdampError, such as BadRequest, and KeyError for a name
-    not in `schemes.NAMES`.
+    With dispersions each plan flies as many of ``samples`` cases (default `study.SAMPLES`, without a requirement 0) as
+    it takes to know whether enough comply. ``timed``: see `Comparison`. Raises NutdampError, such as BadRequest, and
+    KeyError for a name not in `schemes.NAMES`.
     """
     unknown = set(names) - set(catalogue.NAMES)
     if unknown:
@@ -240,8 +231,7 @@ def attempt(spacecraft: Spacecraft, scheme: str, options: planner.Choice) -> Pla
 class Line:
     """Part of the requirement: its bound, and its residual with ``nominal`` values (rad, rad/s).
 
-    ``dispersed``: what the share of cases required does not exceed, None where that is not known. ``met``: whether it
-    is kept, None where the cases do not say.
+    ``dispersed``: what the share of cases required does not exceed; None, as ``met``, where that is not known.
     """
 
     bound: Bound
@@ -259,9 +249,8 @@ class Line:
 class Decision:
     """Plan to decide on, the parts of its requirement, and its dispersed ``cases``, None if not flown.
 
-    ``unknown``: cases were to decide, but they could not be flown, or not all of them within the budget of work.
-    ``seen``: the flight of the plan through its real widths as it has come by a certain time, None for that to the end
-    of the last pulse.
+    ``unknown``: cases were to decide, but not all of them could be flown within the budget of work.
+    ``seen``: the flight through the real widths by a certain time; None for that to the end of the last pulse.
     """
 
     plan: Plan
@@ -277,7 +266,18 @@ class Decision:
     @property
     def lines(self) -> tuple[Line, ...]:
         """Required parts, and those with a definition of damped or reached."""
-        return tuple(self._line(line.bound, line.left) for line in self._held)
+        required, body = requirements.required(self.plan.spacecraft), self.plan.spacecraft
+        enough = None if self.cases is None else self.cases.met
+        # Of a sole part the count of cases and the percentile, which lies between two of them, say the same.
+        counted = enough or (enough is not None and len(required) == 1 and not body.keep)
+        lines = []
+        for bound, nominal, kept in ((held.bound, held.left, held.met) for held in self._held):
+            dispersed = None if self.cases is None else self.cases.levels.get(bound.part)
+            met: bool | None = kept and (dispersed is None or dispersed <= bound.most)
+            if bound.required and enough is not None and (counted or dispersed is None):
+                met = kept and enough if counted else None
+            lines.append(Line(bound, nominal, dispersed, met))
+        return tuple(lines)
 
     @property
     def _held(self) -> tuple[Held, ...]:
@@ -303,18 +303,6 @@ class Decision:
         """Compliance at the end with nominal values; None where nothing is required."""
         required = [line.met for line in self._held if line.bound.required]
         return all(required) if required else None
-
-    def _line(self, bound: Bound, nominal: float) -> Line:
-        kept, cases = nominal <= bound.most, self.cases
-        if cases is None:
-            return Line(bound, nominal, None, kept)
-        dispersed = cases.levels.get(bound.part)
-        if not bound.required or cases.met is None:
-            return Line(bound, nominal, dispersed, kept if dispersed is None else kept and dispersed <= bound.most)
-        alone = len(requirements.required(self.plan.spacecraft)) == 1 and not self.plan.spacecraft.keep
-        if cases.met or alone:  # the count of cases and the percentile, which lies between two of them, say the same
-            return Line(bound, nominal, dispersed, kept and cases.met)
-        return Line(bound, nominal, dispersed, None if dispersed is None else kept and dispersed <= bound.most)
 
     @property
     def met(self) -> bool | None:
@@ -429,10 +417,7 @@ def strays(aspect: Aspect) -> str:
 
 
 def broken_limits(spacecraft: Spacecraft, schedule: Schedule) -> list[str]:
-    """Broken limits and on-times of a schedule, a sentence each; empty where it keeps them all.
-
-    Each limit is named once, with the first pulse that breaks it and the number of others that do.
-    """
+    """Broken limits of a schedule, each in a sentence with the first pulse that breaks it and the number of others."""
     grouped: dict[tuple[Limit, tuple[float, float] | None], list[Breach]] = {}
     for breach in breaches(spacecraft, schedule):
         grouped.setdefault((breach.limit, breach.window), []).append(breach)

@@ -1,7 +1,4 @@
-"""Notes on plans and decisions, as data: codes of sentences with their values.
-
-The sentences stand in ``guide/notes.md``; `nutdamp.views.text` makes texts of them.
-"""
+"""Notes on plans and decisions, as data: codes of the sentences of ``guide/notes.md``, with their values."""
 
 from __future__ import annotations
 
@@ -9,7 +6,7 @@ import math
 from collections.abc import Iterator
 
 from nutdamp.common.numerics import RPM, down
-from nutdamp.common.results import Note, note
+from nutdamp.common.results import Note, Value, note
 from nutdamp.flight import end_state
 from nutdamp.flight.end_state import Aspect, at_start
 from nutdamp.flight.propagation import Flight
@@ -27,10 +24,7 @@ TURNED = math.radians(0.1)  # turn of H, rad, from which it is mentioned
 
 
 def plan_notes(plan: Plan, *, cones: bool = True) -> tuple[Note, ...]:
-    """Notes on a plan, those of its scheme first, or the reason for the lack of a schedule.
-
-    Without ``cones`` broken ones are named elsewhere.
-    """
+    """Notes on a plan, its scheme's first, broken ``cones`` last; or the reason for the lack of a schedule."""
     if not plan.feasible:
         return (note("infeasible", scheme=plan.scheme, why=infeasibility(plan)),)
     notes = [*plan.pulses.notes, *[note("search-ended")] * plan.cut]
@@ -120,8 +114,15 @@ def decision_notes(decision: Decision, *, looped: bool = False) -> Iterator[Note
         return
     if not plan.commandable:
         yield note("not-commandable", scheme=plan.scheme)
-    yield from _unaided(decision)
-    yield from _growing(decision)
+    now, limit = body.nutation, _limit_of(body, Part.NUTATION)
+    if requirements.only_nutation(body):
+        idle, damped = (requirements.to_required(body, now, growing=growing) for growing in (True, False))
+        if damped is not None and damped < body.horizon:
+            yield note("met-without-pulse-from", from_s=damped, nutation_deg=math.degrees(now), limit_deg=limit)
+        if idle:
+            yield note("met-without-pulse-until", until_s=idle, nutation_deg=math.degrees(now), limit_deg=limit)
+    if len(plan.pulses):
+        yield from _growing(decision)
     limited = body.goal.axis is not None or _limit_of(body, Part.SHIFT) is not None
     if not limited and final.momentum_shift > TURNED:
         yield note("momentum-shift", scheme=plan.scheme, momentum_shift_deg=math.degrees(final.momentum_shift))
@@ -172,11 +173,8 @@ def _limit_of(body: Spacecraft, part: Part) -> float | None:
 
 def _growing(decision: Decision) -> Iterator[Note]:
     """Time for which nutation that grows keeps the requirement after the last pulse."""
-    if not len(decision.plan.pulses):
-        return
-    body, flight = decision.plan.spacecraft, decision.flight
-    cases = decision.cases
-    left = decision.flight.final.nutation if cases is None else cases.levels[Part.NUTATION]
+    body, flight, cases = decision.plan.spacecraft, decision.flight, decision.cases
+    left = flight.final.nutation if cases is None else cases.levels[Part.NUTATION]
     again = requirements.to_required(body, left, growing=True)
     if again and left > TELLING:
         after = flight.schedule.end if flight.until is None else flight.until
@@ -188,24 +186,8 @@ def _growing(decision: Decision) -> Iterator[Note]:
             yield note("grows-again-in-cases", share=f"{100.0 * cases.probability:.10g}", **values)
 
 
-def _unaided(decision: Decision) -> Iterator[Note]:
-    """Time up to which, or from which on, the requirement is met without a pulse."""
-    body = decision.plan.spacecraft
-    if not requirements.only_nutation(body):
-        return
-    now, limit = math.degrees(body.nutation), _limit_of(body, Part.NUTATION)
-    idle, damped = (requirements.to_required(body, body.nutation, growing=growing) for growing in (True, False))
-    if damped is not None and damped < body.horizon:
-        yield note("met-without-pulse-from", from_s=damped, nutation_deg=now, limit_deg=limit)
-    if idle:
-        yield note("met-without-pulse-until", until_s=idle, nutation_deg=now, limit_deg=limit)
-
-
 def comparison_warnings(compared: Comparison, *, cones: bool = True) -> Iterator[Note]:
-    """Requirements that the recommended plan misses, the causes, and the cones that the spin axis breaks.
-
-    Without ``cones`` a verdict names those that are broken.
-    """
+    """Requirements that the recommended plan misses, the causes, and, with ``cones``, those that the axis breaks."""
     chosen = compared.recommended
     if chosen is None:
         return
@@ -226,8 +208,7 @@ def comparison_warnings(compared: Comparison, *, cones: bool = True) -> Iterator
 
 def _missed(chosen: Plan, compared: Comparison) -> Iterator[Note]:
     """Requirements that the recommended plan misses, and the causes."""
-    recommendation = compared.recommendation
-    if recommendation.standing is Standing.COMPLIES:
+    if compared.recommendation.standing is Standing.COMPLIES:
         return
     share = compared.shares.get(chosen)
     if share is not None and not share.met and chosen.standing is not Standing.MISSES:
@@ -282,16 +263,11 @@ def _obstacles(plan: Plan, compared: Comparison) -> Iterator[Note]:
             yield remaining(plan).of(plan.scheme)
     if Part.DISTANCE in parts and plan.scheme not in (*catalogue.POINTING, *catalogue.COMMANDED):
         yield note("scheme-does-not-turn", scheme=plan.scheme, schemes=", ".join(catalogue.POINTING))
-    if optimal_untried(compared) and parts != {Part.SPIN}:
-        yield note("optimal-not-compared")
-    elif any(channel.damps for channel in body.channels) and requirements.required(body) and parts != {Part.SPIN}:
-        yield note("try-trade")
-
-
-def optimal_untried(compared: Comparison) -> bool:
-    """True where there are channels that optimal can fire, and it was not compared."""
-    able = any(channel.damps for channel in compared.spacecraft.channels)
-    return able and OPTIMAL.name not in {plan.scheme for plan in compared.plans}
+    if parts != {Part.SPIN} and any(channel.damps for channel in body.channels):
+        if OPTIMAL.name not in {plan.scheme for plan in compared.plans}:
+            yield note("optimal-not-compared")
+        elif requirements.required(body):
+            yield note("try-trade")
 
 
 def alternatives(compared: Comparison) -> Iterator[Note]:
@@ -300,7 +276,6 @@ def alternatives(compared: Comparison) -> Iterator[Note]:
     chosen, others = recommendation.plan, dict[int, tuple[Gain, Plan]]()
     for gain, plan in recommendation.alternatives.items():
         others.setdefault(id(plan), (gain, plan))
-    unit, scale, shown = ("kg", 1e3, "g") if recommendation.by_propellant else ("N m s", 1.0, "N m s")
     for gain, other in others.values():
         assert chosen is not None
         assert chosen.flown is not None
@@ -310,14 +285,17 @@ def alternatives(compared: Comparison) -> Iterator[Note]:
             scheme=other.scheme,
             pulses=len(other.pulses),
             than_pulses=len(chosen.pulses),
-            cost=scale * other.pulses.cost_in(unit),
-            than_cost=scale * chosen.pulses.cost_in(unit),
-            unit=shown,
-            end_s=other.pulses.end,
-            than_end_s=chosen.pulses.end,
+            **beside(other, chosen, recommendation.by_propellant),
             axis_error_deg=math.degrees(other.flown.axis_error),
             than_axis_error_deg=math.degrees(chosen.flown.axis_error),
         )
+
+
+def beside(plan: Plan, than: Plan, by_propellant: bool) -> dict[str, Value]:
+    """Cost and end of a plan and of the one it is compared with, as values of a note."""
+    unit, scale, shown = ("kg", 1e3, "g") if by_propellant else ("N m s", 1.0, "N m s")
+    cost, than_cost = (scale * each.pulses.cost_in(unit) for each in (plan, than))
+    return {"cost": cost, "than_cost": than_cost, "unit": shown, "end_s": plan.end, "than_end_s": than.end}
 
 
 TIES = {
@@ -340,7 +318,9 @@ def reasons(compared: Comparison) -> Iterator[Note]:
         waiting = requirements.only_nutation(body)
         damped = requirements.to_required(body, body.nutation, growing=False) if waiting else None
         yield note("none-feasible") if damped is None else note("none-needed-from", from_s=damped)
-        if optimal_untried(compared) and (body.goal.spin is None or any(entry.axial for entry in body.channels)):
+        able = any(channel.damps for channel in body.channels)
+        able = able and (body.goal.spin is None or any(channel.axial for channel in body.channels))
+        if able and OPTIMAL.name not in {plan.scheme for plan in compared.plans}:
             yield note("optimal-not-tried")
         return
     if ground is Ground.ONLY:
@@ -348,18 +328,14 @@ def reasons(compared: Comparison) -> Iterator[Note]:
         return
     if ground is Ground.CASES:
         yield note("most-cases", count=count)
-        return
-    if recommendation.standing is Standing.COMPLIES:
-        if recommendation.plan.kept is False:
-            yield note("cheapest-at-end", count=count)
-        elif not requirements.required(body):
-            yield note("damps-at-least", count=count)
-        else:
-            yield note("least-propellant" if recommendation.by_propellant else "least-impulse", count=count)
-    elif ground is Ground.NEAREST:
-        yield note("nearest", count=count)
+    elif recommendation.standing is not Standing.COMPLIES:
+        yield note("nearest" if ground is Ground.NEAREST else "least-left", count=count)
+    elif recommendation.plan.kept is False:
+        yield note("cheapest-at-end", count=count)
+    elif not requirements.required(body):
+        yield note("damps-at-least", count=count)
     else:
-        yield note("least-left", count=count)
+        yield note("least-propellant" if recommendation.by_propellant else "least-impulse", count=count)
     if ground in TIES:
         yield note(TIES[ground])
 

@@ -1,8 +1,7 @@
 """Planning: plan by a scheme, fly the schedule, judge it, route it round exclusion cones.
 
-A scheme that points is planned leg by leg over way points. A route is a row of great circles: straight to the target in
-shorter legs, which swing the axis less, or by one or two dog-legs. Routes are sought on the sphere, with a margin for
-nutation; the flight judges the cones.
+A route is a row of great circles, a leg each: straight to the target in shorter legs, which swing the axis less, or by
+dog-legs. It is sought on the sphere, with a margin for nutation; the flight judges the cones.
 """
 
 from __future__ import annotations
@@ -54,8 +53,7 @@ Route = tuple[Vector, ...]
 def schedules(spacecraft: Spacecraft, scheme: str, options: catalogue.SchemeOptions) -> Iterator[Schedule]:
     """Schedules of a ``scheme`` over routes that keep clear of the cones, the likeliest first.
 
-    Each is found when it is needed, as long as there is budget of `work`; routes that the scheme cannot fly are left
-    out.
+    Each is found when needed, as long as there is budget of `work`, of those routes that the scheme can fly.
     """
     as_it_is = not spacecraft.thrust_laws or catalogue.SCHEMES[scheme].on_true_body
     body = spacecraft if as_it_is else valve_commands.plain(spacecraft)
@@ -125,10 +123,7 @@ def _clear(corners: Route, keeps: Sequence[Keep], margin: float) -> bool:
 
 
 def _over(spacecraft: Spacecraft, scheme: str, options: catalogue.SchemeOptions, route: Route) -> Schedule:
-    """Schedule of a ``scheme`` by way of the points of a ``route``; raises Infeasible with the reason.
-
-    Each leg has the share of the horizon that it has of the way.
-    """
+    """Schedule over a ``route``, each leg with its share of the horizon; raises Infeasible with the reason."""
     legs, goal = Legs(spacecraft), spacecraft.goal
     for number, point in enumerate(route, start=1):
         here = legs.here
@@ -147,23 +142,16 @@ NO_NUTATION, ROUNDING = 1e-12, 1e-11
 
 
 class Standing(Enum):
-    """Standing of a plan, from the best down.
+    """Standing of a plan, from the best down."""
 
-    It meets the requirement, and damps the parts that it does not bound; it leaves other parts undamped; it does not
-    meet it, or, without one, does not damp.
-    """
-
-    COMPLIES = "complies"
-    MEETS = "meets"
-    MISSES = "misses"
+    COMPLIES = "complies"  # meets the requirement, and damps the parts that it does not bound
+    MEETS = "meets"  # leaves other parts undamped
+    MISSES = "misses"  # does not meet it, or, without one, does not damp
 
 
 @dataclass(frozen=True, slots=True)
 class Share:
-    """Share of all dispersed cases that comply with a plan: from ``low`` to ``high``, equal where all have flown.
-
-    ``probability``: the share that must.
-    """
+    """Share of cases that comply, ``low`` to ``high``, equal where all flew; ``probability`` of them must."""
 
     low: float
     high: float
@@ -316,16 +304,14 @@ class Plan(results.Data, results.Tabled):
     def fly(self, until: float | None = None, *, samples: int = 1000, by_impulses: bool = False) -> Flight:
         """Fly the schedule through its real pulse widths, or by the impulse sum (17), until ``until`` s.
 
-        Default end: one inertial nutation period after the last pulse. The track has ``samples`` even rows, and rows
-        just before and after each pulse. Raises Infeasible where there is no schedule, BadRequest where no track can
-        be made.
+        Default: one inertial nutation period after the last pulse. The track has ``samples`` even rows, and rows just
+        before and after each pulse. Raises Infeasible without a schedule, BadRequest where no track can be made.
         """
-        if self.schedule is None:
-            raise Infeasible(f"{self.scheme} is infeasible: {self.why}")
+        schedule = feasible(self).pulses
         end = units.end_of_flight(self.end + self.spacecraft.inertial_period if until is None else until)
         count = units.count("samples", samples, 2)
         fly = propagation.by_impulses if by_impulses else propagation.flown
-        return replace(seen_at(fly(self.spacecraft, self.schedule, end), end), samples=count, scheme=self.scheme)
+        return replace(seen_at(fly(self.spacecraft, schedule, end), end), samples=count, scheme=self.scheme)
 
     @property
     def carried_at(self) -> float:
@@ -333,10 +319,9 @@ class Plan(results.Data, results.Tabled):
         return self.end
 
     def carried(self, at: float | None = None) -> Spacecraft:
-        """Spacecraft of the file with the state that the flight has ``at`` a time, s, as ``plan -o`` writes it.
+        """Spacecraft of the file with the state that the flight has ``at`` a time, s (default `carried_at`).
 
-        Default the end of the last pulse, of a loop that of its run. Raises BadRequest for a spacecraft that was not
-        read from a file, while a pulse is on, and for a time that is none.
+        Raises BadRequest for a spacecraft not read from a file, while a pulse is on, and for a time that is none.
         """
         time = self.carried_at if at is None else units.end_of_flight(at)
         body: Spacecraft = results.view(feasible(self), "carried", time)
@@ -375,19 +360,15 @@ class Plan(results.Data, results.Tabled):
     def meets_requirement(self) -> bool | None:
         """True if the flown residual keeps the requirement of the file, the spin of the goal, and all cones.
 
-        None where none of these is given, and without a schedule; kept cones alone meet nothing. With a target axis the
-        momentum shift counts from there.
+        None without these or a schedule; kept cones alone meet nothing. A momentum shift counts from a target axis.
         """
-        if self.left is None:
-            return None
-        return False if self.kept is False else self.ends_well
+        return False if self.feasible and self.kept is False else self.ends_well
 
     @property
     def ends_well(self) -> bool | None:
         """Compliance of the flown residual at the end; None where nothing is required."""
-        if self.left is None or not requirements.required(self.spacecraft):
-            return None
-        return not any(bound.required for bound in self.shortfalls)
+        required = [line.met for line in self.held if line.bound.required]
+        return all(required) if required else None
 
     @property
     def held(self) -> tuple[Held, ...]:
@@ -463,10 +444,7 @@ class Plan(results.Data, results.Tabled):
 
 
 def plan(spacecraft: Spacecraft, scheme: str, options: planner.Choice = None) -> Plan:
-    """Plan one scheme and judge it; an infeasible plan gives the reason.
-
-    Raises KeyError for a name not in `schemes.NAMES`.
-    """
+    """Plan one scheme and judge it. Raises KeyError for a name not in `schemes.NAMES`."""
     if scheme not in catalogue.NAMES:
         raise KeyError(scheme)
     spun = reaches_spin(spacecraft)
@@ -506,10 +484,7 @@ def spinning(spacecraft: Spacecraft) -> tuple[str, ...]:
 
 
 def alternatives(spacecraft: Spacecraft, scheme: str, options: planner.Choice = None) -> tuple[Plan, ...]:
-    """Feasible plans by alternative schedules of the scheme, possibly including that of `plan`.
-
-    Raises KeyError for a name not in `schemes.NAMES`.
-    """
+    """Feasible plans by alternative schedules of the scheme, maybe that of `plan`; raises KeyError as it does."""
     chosen = planner.settled(catalogue.SCHEMES[scheme], options, spacecraft)
     try:
         alternatives = planner.alternatives(scheme, known(spacecraft, chosen), chosen)
@@ -520,10 +495,7 @@ def alternatives(spacecraft: Spacecraft, scheme: str, options: planner.Choice = 
 
 
 def known(spacecraft: Spacecraft, options: catalogue.SchemeOptions) -> Spacecraft:
-    """Spacecraft as known to the schemes: with its disturbances only where they are requested.
-
-    A spin that nothing can change, and that is the one of the goal, is no goal for them.
-    """
+    """Spacecraft as schemes know it: with disturbances if requested, no goal of a spin that is there and stays."""
     body = spacecraft if options.with_disturbances else replace(spacecraft, disturbances=())
     axial = any(channel.axial for channel in body.channels)
     if body.goal.spin is not None and reaches_spin(body) and not body.spin_drift and not axial:
@@ -534,8 +506,8 @@ def known(spacecraft: Spacecraft, options: catalogue.SchemeOptions) -> Spacecraf
 def judged(spacecraft: Spacecraft, scheme: str, schedule: Schedule, options: catalogue.SchemeOptions) -> Plan:
     """Plan of a schedule: infeasible where it breaks a limit or does not help. Raises Infeasible on flat spin.
 
-    It helps where nutation, distance from the target axis or from the requested spin is less than without pulses;
-    nutation that decays by itself must be less than what it has decayed to by the last pulse.
+    It helps where nutation, distance from the target axis or from the requested spin is less than without pulses by
+    the last one.
     """
     if spacecraft.disturbances:  # which the scheme need not have known
         schedule = schedule.without_proof
@@ -581,10 +553,7 @@ def feasible(plan: Plan) -> Plan:
 
 
 def unrounded(plan_: Plan) -> Schedule | None:
-    """Schedule with commands of any resolution.
-
-    None where there is no tick, no such schedule, or no scheme that planned it.
-    """
+    """Schedule with commands of any resolution; None without a tick, such a schedule, or a scheme that planned it."""
     body = plan_.spacecraft
     if body.limits.tick is None or plan_.from_file:
         return None

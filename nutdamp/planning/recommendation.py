@@ -50,9 +50,8 @@ class Gain(Enum):
 
 @dataclass(frozen=True, eq=False)
 class Recommendation:
-    """Recommended plan; None, as ``standing`` and ``ground``, where none is feasible.
+    """Recommended plan of the ``count`` of its ``standing``, by propellant or by impulse; None where none is feasible.
 
-    It was chosen among ``count`` plans of its ``standing``, by propellant or, not ``by_propellant``, by impulse.
     ``alternatives``: the cheapest plan that gains so much.
     """
 
@@ -65,12 +64,11 @@ class Recommendation:
 
 
 def recommend(plans: Sequence[Plan], shares: Mapping[Plan, Share] | None = None) -> Recommendation:
-    """Recommendation among plans.
+    """Recommendation: of the plans that meet the requirement, and damp where it bounds nothing, the `cheapest`.
 
-    Of the plans that meet the requirement, and damp where it bounds nothing, the cheapest, see `cheapest`. Where there
-    is none, that with least nutation left (least distance from a target axis where that is more). Where plans that
-    reach as much differ in whether the spin axis keeps its cones, those that do count alone. With ``shares`` a plan
-    meets the requirement in enough dispersed cases or not at all; where none does, it is that with which most comply.
+    Where there is none, that with least nutation left (least distance from a target axis where that is more). Of plans
+    that reach as much those that keep all cones count alone. With ``shares`` a plan meets the requirement in enough
+    dispersed cases or not at all; where none does, it is that with which most comply.
     """
     feasible = [plan for plan in plans if plan.flown is not None]
     if not feasible:
@@ -93,9 +91,8 @@ def recommend(plans: Sequence[Plan], shares: Mapping[Plan, Share] | None = None)
 def cheapest(plans: Sequence[Plan], usual: Plan | None = None) -> tuple[Plan, Ground]:
     """Plan of least propellant (impulse where one is unknown), and the deciding ground.
 
-    Costs within `SAME_COST` are equal: then the ``usual`` one, if it is among them, else that with fewer pulses, less
-    ΔV, less momentum shift (distance from the target axis), the earlier end; the first of these that leaves one
-    decides.
+    Of costs within `SAME_COST` the ``usual`` one, else that with fewer pulses, less ΔV, less momentum shift (distance
+    from the target axis), the earlier end; the first of these that leaves one decides.
     """
     if len(plans) == 1:
         return plans[0], Ground.ONLY
@@ -122,10 +119,7 @@ def cheapest(plans: Sequence[Plan], usual: Plan | None = None) -> tuple[Plan, Gr
 
 
 def _nearest(plans: Sequence[Plan]) -> tuple[Plan, Ground]:
-    """Plan of least residual, and the deciding ground; of equal ones the nearest to the requirement.
-
-    Angles within `DAMPED_ANGLE` are as little; of those as near, but for 0.1 % or rounding, the one by `cheapest`.
-    """
+    """Plan of least residual but for `DAMPED_ANGLE`, nearest to the requirement, then `cheapest`; deciding ground."""
     if len(plans) == 1:
         return plans[0], Ground.ONLY
     least = min(map(_missed, plans))
@@ -140,16 +134,12 @@ def _nearest(plans: Sequence[Plan]) -> tuple[Plan, Ground]:
 
 
 def _alternatives(best: Plan, plans: Sequence[Plan]) -> dict[Gain, Plan]:
-    """Cheapest of the ``plans`` with each sufficient gain on the ``best``, by gain.
-
-    For little more; one of command blocks for whatever it costs, since the spacecraft may fire nothing else.
-    """
+    """Cheapest of the ``plans`` with each gain on the ``best`` for little more; of command blocks at any cost."""
     unit, body = _unit(plans), best.spacecraft
     turned = 0.0 if body.goal.axis is not None or _off(best) <= DAMPED_ANGLE else STEADIER_SHIFT * _off(best)
     few = FEWER_PULSES * len(best.pulses)
     soon = min(SOONER_END * best.pulses.end, best.pulses.end - body.inertial_period)
     gains_of: dict[Gain, Plan] = {}
-    # With the largest cost ratio at which each is worth a note.
     for gain, ratio, gains in (
         (Gain.STEADIER, STEADIER_COST, lambda plan: _off(plan) < turned),
         (Gain.SIMPLER, FEWER_COST, lambda plan: len(plan.pulses) <= few),

@@ -1,8 +1,7 @@
 """Robust plans: selection by the share of complying cases, and on-times shortened to the required share.
 
-Candidates are the schedules of the schemes and variants of them: later starts, channels left unused, other alignments;
-and, where `optimal` is among the schemes, its earliest ends, for errors of the rates grow with time, and those that
-`chance_plan` makes for the dispersions. All fly the same draws through real widths.
+Candidates are the schedules of the schemes, and variants: later starts, channels left unused, other alignments; of
+`optimal` its earliest ends too, for errors of the rates grow with time, and those of `chance_plan`.
 """
 
 from __future__ import annotations
@@ -10,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
-from copy import copy
 from dataclasses import dataclass, replace
 from enum import IntEnum
 from functools import partial
@@ -20,14 +18,14 @@ from typing import NamedTuple
 import numpy as np
 
 from nutdamp.common import results, work
-from nutdamp.common.results import Note, Value, note
+from nutdamp.common.results import Note, note
 from nutdamp.errors import Infeasible
 from nutdamp.montecarlo.study import SAMPLES, SEED, study_of
 from nutdamp.planning import chance_plan, screening
 from nutdamp.planning import plan as planning
 from nutdamp.planning.chance_plan import Tightening, tightening
 from nutdamp.planning.decision import Comparison, Decision, attempt
-from nutdamp.planning.notes import TIES
+from nutdamp.planning.notes import TIES, beside
 from nutdamp.planning.plan import Plan
 from nutdamp.planning.recommendation import Ground, by_propellant, cheapest
 from nutdamp.planning.screening import AS_GOOD, Fresh, PlanCandidate, entered, equal_from, fly_all, fresh_of
@@ -56,10 +54,9 @@ class Cost(NamedTuple):
 class RobustComparison(results.Data):
     """Candidates from the best down; ``usual`` is recommended by the comparison, ``chosen`` the robust plan.
 
-    ``ground`` is what decided among the ``equals`` candidates that comply often enough, or are as good as the best, by
-    propellant or by impulse. Each candidate flew ``samples`` cases of ``seed``. ``chance_plan``: with which tolerances
-    enough cases would comply with the robust plan, where too few do.
-    ``fresh``: how the robust plan fares in as many cases by which it was not chosen; None where nothing is required.
+    ``ground`` decided among the ``equals`` candidates that comply often enough, or are as good as the best, by
+    propellant or by impulse. Each flew ``samples`` cases of ``seed``. ``tightening``: tolerances with which enough
+    cases would comply, where too few do. ``fresh``: the robust plan in cases by which it was not chosen, if required.
     """
 
     comparison: Comparison
@@ -81,9 +78,8 @@ class RobustComparison(results.Data):
         if self.chosen is None or self.usual is None:
             return None
         more, less = self.chosen.plan.pulses, self.usual.plan.pulses
-        known = more.propellant is not None and less.propellant is not None
         return Cost(
-            (more.propellant or 0.0) - (less.propellant or 0.0) if known else None,
+            None if more.propellant is None or less.propellant is None else more.propellant - less.propellant,
             more.total_impulse - less.total_impulse,
             more.end - less.end,
             self.chosen.left - self.usual.left,
@@ -119,9 +115,7 @@ class RobustComparison(results.Data):
     @property
     def lucky(self) -> bool:
         """True if enough cases comply, but too few of those by which the plan was not chosen."""
-        if self.fresh is None or self.chosen is None:
-            return False
-        return self.fresh.met < self.probability <= (self.chosen.met or 0.0)
+        return self.fresh is not None and self.fresh.met < self.probability <= (self.met or 0.0)
 
     @property
     def met(self) -> float | None:
@@ -146,9 +140,7 @@ def variations_of(comparison: Comparison, options: Options | None = None) -> lis
     """Variations of `compare`: the plans compared, and variants of each."""
     body, options = comparison.spacecraft, options or Options()
     tried = list[Variation]()
-    for base in comparison.plans:
-        if base.failure is not None:
-            continue
+    for base in (plan for plan in comparison.plans if plan.failure is None):
         tried.append(Variation(partial(list, [("as planned", base)]), VariationKind.PLANNED))
         tried.append(Variation(partial(_alignments, body, base.scheme, options)))
         tried += [Variation(partial(_planned, *other, base.scheme, options)) for other in _others(body, base)]
@@ -167,8 +159,8 @@ def compare(
 ) -> RobustComparison:
     """Make the plans of the ``variations``, let dispersed cases fly each, and recommend one; no schedule comes twice.
 
-    ``samples`` cases of those that may be chosen, see `screening`; ``watch`` is called with how many are done, and then
-    beyond that now and then. Raises BadRequest for a spacecraft without dispersions.
+    ``samples`` cases of those that may be chosen; ``watch`` is called with how many variations are done, then now and
+    then. Raises BadRequest for a spacecraft without dispersions.
     """
     body = comparison.spacecraft
     probability = required_share(body.requirement)
@@ -193,8 +185,7 @@ def compare(
                 known = None if comparison.flown is None else comparison.flown.get(plan)
                 with suppress(Infeasible):  # cases that cannot be flown, such as those that take too long
                     if known is not None and known.cases.requested == samples:
-                        entries[kind] = copy(known)
-                        entries[kind].variant = variant
+                        entries[kind] = replace(known, variant=variant)
                     else:
                         entries[kind] = entered(own, variant, study_of(body, own.pulses), samples)
             if planned and variation.kind in (VariationKind.MARGINS, VariationKind.EARLY):
@@ -213,13 +204,30 @@ def _flown(
     probability: float,
     watch: Callable[[], None] = lambda: None,
 ) -> RobustComparison:
-    """Comparison of the ``entries`` in all cases, where they may be chosen, and the choice."""
+    """Comparison of the ``entries`` in all cases, where they may be chosen, and the choice, checked in fresh cases.
+
+    Against selection by luck a plan with which too few of those comply gives way to the next one with which enough seem
+    to. `Tightening` where too few comply all the same.
+    """
     candidates = list(entries.values())
     usual = None if comparison.recommended is None else entries.get(_kind(comparison.recommended))
-    always = [candidate for candidate in candidates if candidate is usual]
-    fly_all(candidates, samples, probability, always, watch)
+    fly_all(candidates, samples, probability, [] if usual is None else [usual], watch)
     ranks = ranked(comparison, candidates, samples, probability)
-    return ranks if ranks.chosen is None else _checked(ranks, candidates)
+    refused: list[PlanCandidate] = []
+    while (chosen := ranks.chosen) is not None:
+        if not chosen.cases.decided and chosen not in refused:  # it came after one that was refused
+            flyable = [chosen]
+            fly_all(flyable, samples, 0.0)
+            refused += [] if flyable else [chosen]
+        else:
+            ranks = replace(ranks, fresh=fresh_of(chosen, samples))
+            if not ranks.lucky or chosen in refused or len(refused) == CHECKED:
+                break
+            refused.append(chosen)
+        ranks = ranked(comparison, candidates, samples, probability, refused=refused)
+    if chosen is None or ranks.met is None or ranks.met >= probability:
+        return ranks
+    return replace(ranks, tightening=tightening(chosen.plan, probability))
 
 
 def _trimmed(ranks: RobustComparison) -> RobustComparison:
@@ -234,31 +242,6 @@ def _trimmed(ranks: RobustComparison) -> RobustComparison:
     return replace(ranks, chosen=best.candidate, candidates=candidates, ground=Ground.COST, fresh=best.fresh)
 
 
-def _checked(ranks: RobustComparison, candidates: Sequence[PlanCandidate]) -> RobustComparison:
-    """Comparison with the chosen plan in fresh cases, against selection by luck.
-
-    A plan with which too few of them comply gives way to the next one with which enough seem to. Then, where too few
-    comply all the same, with which tolerances enough would.
-    """
-    comparison, samples, required = ranks.comparison, ranks.samples, ranks.probability
-    refused: list[PlanCandidate] = []
-    while (chosen := ranks.chosen) is not None:
-        if not chosen.cases.decided and chosen not in refused:  # it came after one that was refused
-            flyable = [chosen]
-            fly_all(flyable, samples, 0.0)
-            refused += [] if flyable else [chosen]
-            ranks = ranked(comparison, candidates, samples, required, refused=refused)
-            continue
-        ranks = replace(ranks, fresh=fresh_of(chosen, samples))
-        if not ranks.lucky or chosen in refused or len(refused) == CHECKED:
-            break
-        refused.append(chosen)
-        ranks = ranked(comparison, candidates, samples, required, refused=refused)
-    if chosen is None or ranks.met is None or ranks.met >= required:
-        return ranks
-    return replace(ranks, tightening=tightening(chosen.plan, required))
-
-
 def ranked(
     comparison: Comparison,
     candidates: Sequence[PlanCandidate],
@@ -267,16 +250,21 @@ def ranked(
     *,
     refused: Sequence[PlanCandidate] = (),
 ) -> RobustComparison:
-    """Comparison of flown candidates, and the choice.
+    """Comparison of flown candidates, and the choice: the `cheapest` of the equals.
 
-    That is the cheapest of the equals; of those that cost the same the plan that the comparison recommends.
     With the ``refused`` ones too few of other cases comply: they are taken where there is no plan with which enough do.
     """
     recommended = None if comparison.recommended is None else _kind(comparison.recommended)
     usual = next((candidate for candidate in candidates if _kind(candidate.plan) == recommended), None)
-    others = [candidate for candidate in candidates if candidate not in refused]
-    enough = any(other.met is not None and other.met >= probability for other in others)
-    equals = _equals(others if enough else candidates, samples, probability)
+    enough = [candidate for candidate in candidates if candidate.met is not None and candidate.met >= probability]
+    equals = [candidate for candidate in enough if candidate not in refused] or enough
+    if candidates and not equals:  # those as good as the best, but for what the sampling may make of them
+        top = min(candidates, key=attrgetter("rank"))
+        if top.met is None:
+            equals = [candidate for candidate in candidates if candidate.rank <= AS_GOOD * top.rank]
+        else:
+            low = equal_from(top.met, samples)
+            equals = [candidate for candidate in candidates if candidate.met is not None and candidate.met >= low]
     chosen, ground = None, None
     if equals:
         best, ground = cheapest([equal.plan for equal in equals], None if usual is None else usual.plan)
@@ -331,21 +319,6 @@ def _planned(variant: str, body: Spacecraft, scheme: str, options: Options) -> l
     return [(variant, attempt(body, scheme, options))]
 
 
-def _equals(candidates: Sequence[PlanCandidate], samples: int, probability: float) -> list[PlanCandidate]:
-    """Candidates that comply as often as required; without any those as good as the best.
-
-    But for what the sampling may make of them.
-    """
-    enough = [candidate for candidate in candidates if candidate.met is not None and candidate.met >= probability]
-    if enough or not candidates:
-        return enough
-    best = min(candidates, key=lambda candidate: candidate.rank)
-    if best.met is None:
-        return [candidate for candidate in candidates if candidate.rank <= AS_GOOD * best.rank]
-    low = equal_from(best.met, samples)
-    return [candidate for candidate in candidates if candidate.met is not None and candidate.met >= low]
-
-
 def robust_reasons(robust: RobustComparison) -> Iterator[Note]:
     """Reason for the robust plan, or for none."""
     chosen, count, required = robust.chosen, len(robust.candidates), 100.0 * robust.probability
@@ -368,21 +341,14 @@ def robust_reasons(robust: RobustComparison) -> Iterator[Note]:
 
 def robust_cost(robust: RobustComparison) -> Iterator[Note]:
     """The robust plan against the one that is recommended without ``--robust``."""
-    chosen, usual, cost = robust.chosen, robust.usual, robust.cost
-    if chosen is None or usual is None or cost is None:
+    chosen, usual = robust.chosen, robust.usual
+    if chosen is None or usual is None:
         return
     if chosen is usual:
         yield note("robust-is-usual")
         return
-    unit, scale, shown = ("N m s", 1.0, "N m s") if cost.propellant is None else ("kg", 1e3, "g")
-    figures: dict[str, Value] = {
-        "scheme": usual.plan.scheme,
-        "cost": scale * chosen.plan.pulses.cost_in(unit),
-        "than_cost": scale * usual.plan.pulses.cost_in(unit),
-        "unit": shown,
-        "end_s": chosen.plan.end,
-        "than_end_s": usual.plan.end,
-    }
+    known = by_propellant([chosen.plan, usual.plan])
+    figures = {"scheme": usual.plan.scheme, **beside(chosen.plan, usual.plan, known)}
     if chosen.met is not None and usual.met is not None:
         yield note("robust-cost", share=f"{100.0 * chosen.met:.4g}", than_share=f"{100.0 * usual.met:.4g}", **figures)
     else:

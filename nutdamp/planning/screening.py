@@ -1,10 +1,9 @@
 """Sequential screening of plans in dispersed cases, and on-times trimmed to what enough cases need.
 
-All plans fly the same draws, the first cases first. The complying share of all cases is bounded by an exact interval
-from the first ones (Clopper & Pearson 1934), so wide that it errs once in a million times; a plan that could not be
-chosen even at the favourable end of its interval is flown no further. Which cases comply with shorter on-times is
-predicted: their flown ends move by the slopes of the closed form. What comes out is flown, in fresh cases too; where
-too few cases comply then, fewer are predicted to the next time.
+All plans fly the same draws, the first cases first. From these the complying share is bounded by an exact interval
+(Clopper & Pearson 1934), which errs once in a million times; a plan that could not be chosen even at its favourable end
+is flown no further. Compliance with shorter on-times is predicted: flown ends move by the slopes of the closed form.
+What comes out is flown, in fresh cases too; where too few cases comply then, fewer are predicted to the next time.
 """
 
 from __future__ import annotations
@@ -12,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import NamedTuple
 
@@ -50,9 +49,8 @@ AS_GOOD = 1.05
 class Cases:
     """Result of one schedule in ``samples`` of the ``requested`` dispersed cases of ``seed``.
 
-    ``complying``: the share that keeps every part of the requirement, None where nothing is required;
-    ``probability``: the share that must. ``levels``: what that share of the cases does not exceed, rad, by part; the
-    spin error has none.
+    ``complying``: the share that keeps the requirement, None without one; ``probability``: the share that must.
+    ``levels``: what that share of the cases does not exceed, rad, by part; the spin error has none.
     """
 
     samples: int
@@ -71,6 +69,15 @@ class Cases:
     def met(self) -> bool | None:
         """Compliance of enough of the flown cases; None where nothing is required."""
         return None if self.complying is None else self.complying >= self.probability
+
+    @property
+    def share(self) -> Share | None:
+        """Share of all requested cases; None where nothing is required."""
+        met, done = self.complying, self.samples
+        if met is None:
+            return None
+        bounds = (met, met) if self.decided else binomial_interval(round(met * done), done, CERTAIN)
+        return Share(*bounds, self.probability)
 
 
 def cases_of(results: Results, requested: int | None = None) -> Cases:
@@ -91,16 +98,13 @@ def equal_from(share: float, samples: int) -> float:
 
 @dataclass(eq=False)
 class PlanCandidate:
-    """Plan and its dispersed ``results``.
-
-    ``variant`` says how it differs from what its scheme plans. ``share``: of all cases; None where nothing is required.
-    """
+    """Plan, as ``variant`` of what its scheme plans, and its dispersed ``results``; ``share``: see `Share`."""
 
     plan: Plan
     variant: str
     cases: Cases
     results: Results | None = None
-    share: Share | None = field(init=False, default=None)
+    share: Share | None = None
 
     @property
     def nutation(self) -> float:
@@ -137,9 +141,8 @@ class PlanCandidate:
 def entered(plan: Plan, variant: str, study: Study, samples: int) -> PlanCandidate:
     """A candidate that has flown the first of ``samples`` cases of a study."""
     results = _run(Results(study, min(STAGES[0], samples)))
-    candidate = PlanCandidate(plan, variant, cases_of(results, samples), results)
-    _bound(candidate, samples)
-    return candidate
+    cases = cases_of(results, samples)
+    return PlanCandidate(plan, variant, cases, results, cases.share)
 
 
 def _run(results: Results) -> Results:
@@ -158,10 +161,9 @@ def fly_compared(
     samples: int,
     choose: Callable[[Mapping[Plan, Share]], Plan | None],
 ) -> dict[Plan, PlanCandidate]:
-    """Fly as many of the ``samples`` cases of each plan as decide on its compliance.
+    """Fly as many of the ``samples`` cases of each plan as decide on its compliance, within the budget of work.
 
     All of them with the plan that `choose` takes by the shares. Plans with a case that cannot be flown are left out.
-    Ends where the budget of work does.
     """
     flown: dict[Plan, PlanCandidate] = {}
     for plan in plans:
@@ -191,38 +193,24 @@ def _undecided(
 ) -> PlanCandidate | None:
     """Next candidate to fly further; None where all is decided."""
     shares = shares_of(plans, flown)
-    ahead = [candidate for candidate in flown.values() if candidate.cases.samples < samples]
-    for value in ahead:
-        if shares and shares[value.plan].met is None:
-            return value
+    ahead = {plan: candidate for plan, candidate in flown.items() if candidate.cases.samples < samples}
+    undecided = [plan for plan in ahead if shares and shares[plan].met is None]
+    if undecided:
+        return ahead[undecided[0]]
     chosen = choose(shares)
-    if chosen is None or chosen not in flown:
+    if chosen in ahead:
+        return ahead[chosen]
+    if chosen is None or chosen not in flown or not shares or shares[chosen].met:
         return None
-    if flown[chosen] in ahead:
-        return flown[chosen]
-    if not shares or shares[chosen].met:
-        return None
-    return next(
-        (candidate for candidate in ahead if shares[candidate.plan].high >= shares[chosen].low + LIKELIER), None
-    )
+    return next((ahead[plan] for plan in ahead if shares[plan].high >= shares[chosen].low + LIKELIER), None)
 
 
 def shares_of(plans: Sequence[Plan], flown: Mapping[Plan, PlanCandidate]) -> dict[Plan, Share]:
-    """Complying share of each plan, from none to all where cases have not flown.
-
-    Nothing where nothing is required.
-    """
+    """Complying share of each plan, from none to all where cases have not flown; nothing where none is required."""
     if not plans or not requirements.judged(plans[0].spacecraft):
         return {}
     unknown = Share(0.0, 1.0, required_share(plans[0].spacecraft.requirement))
     return {plan: (flown[plan].share or unknown) if plan in flown else unknown for plan in plans}
-
-
-def _bound(candidate: PlanCandidate, samples: int) -> None:
-    met, done = candidate.met, candidate.cases.samples
-    if met is not None:
-        bounds = (met, met) if done >= samples else binomial_interval(round(met * done), done, CERTAIN)
-        candidate.share = Share(*bounds, candidate.cases.probability)
 
 
 def _stage(done: int, samples: int) -> int:
@@ -237,7 +225,7 @@ def _further(candidate: PlanCandidate, samples: int) -> None:
     exact = stage <= EXACT_CASES  # beyond, cases are counted and not kept: from the first one on
     candidate.results = _run(candidate.results.extended(stage) if exact else Results(candidate.results.study, stage))
     candidate.cases = cases_of(candidate.results, samples)
-    _bound(candidate, samples)
+    candidate.share = candidate.cases.share
 
 
 def fly_all(
@@ -247,11 +235,9 @@ def fly_all(
     always: Sequence[PlanCandidate] = (),
     watch: Callable[[], None] = lambda: None,
 ) -> None:
-    """Fly all ``samples`` cases of those that may be chosen, and of ``always``; ``watch`` is called after each step.
+    """Fly all ``samples`` cases of those that `ranked` may choose, and of ``always``; ``watch`` follows each step.
 
-    To be chosen is the cheapest of which the share ``probability`` complies; where there is none, the cheapest of
-    those that comply as often as the best but for the sampling error. Those that have a case that cannot be flown
-    leave the ``candidates``.
+    Those that have a case that cannot be flown leave the ``candidates``.
     """
 
     def promise(candidate: PlanCandidate) -> tuple[bool, bool, float]:
@@ -281,8 +267,7 @@ def _hopeful(candidates: list[PlanCandidate], samples: int, probability: float) 
     if sure:
         comparable = len({candidate.plan.pulses.propellant is None for candidate in candidates}) == 1
         most = min(sure) * (1.0 + SAME_COST) if comparable else math.inf
-        may = [candidate for candidate, _, high in bounds if high >= probability]
-        return [candidate for candidate in may if candidate.plan.pulses.cost <= most]
+        return [each for each, _, high in bounds if high >= probability and each.plan.pulses.cost <= most]
     least = min(probability, equal_from(max((low for _, low, _ in bounds), default=0.0), samples))
     return [candidate for candidate, _, high in bounds if high >= least]
 
@@ -350,17 +335,13 @@ def fresh_of(chosen: PlanCandidate, samples: int) -> Fresh | None:
 
 
 def trimmed(plan: Plan, complies: Callable[[Plan], bool]) -> Plan:
-    """Plan with the shortest on-times for which `complies` holds; the same one where nothing is to be gained.
-
-    Plans on ticks, of command blocks, of nothing, or with pulses of no channel stay as they are.
-    """
+    """Plan with the shortest on-times for which `complies` holds; the same one on ticks, of blocks or of no channel."""
     channels = {channel.name: channel for channel in plan.spacecraft.channels}
     fixed = plan.spacecraft.limits.tick is not None or bool(plan.pulses.blocks) or not len(plan.pulses)
     if fixed or any(pulse.channel not in channels or pulse.on_time == 0.0 for pulse in plan.pulses):
         return plan
-    every = range(len(plan.pulses))
+    every, best = range(len(plan.pulses)), plan
     alone = [((index,), FINER) for index in every] if len(every) <= FEW else []
-    best = plan
     for which, halvings in ((every, HALVINGS), *alone):
         low, high, long = SHORTEST, 1.0, best
         for _ in range(halvings):
@@ -370,7 +351,7 @@ def trimmed(plan: Plan, complies: Callable[[Plan], bool]) -> Plan:
     return best
 
 
-def _scaled(plan: Plan, ratios: Sequence[float], complies: Callable[[Plan], bool] = lambda _: True) -> Plan | None:
+def _scaled(plan: Plan, ratios: Sequence[float], complies: Callable[[Plan], bool]) -> Plan | None:
     """Plan with on-times times ``ratios``; None where it breaks a limit or its requirement, or ``complies`` fails."""
     body, schedule = plan.spacecraft, _longer(plan, ratios)
     if keeps_limits(body, schedule) and complies(replace(plan, schedule=schedule)):
@@ -430,9 +411,8 @@ class FlownPlan:
     def _slopes(self) -> list[tuple[Vector, Vector, NDArray[np.int_]]]:
         """Ends (10, n) of cases of both draws, their slopes (k, 10, n), and for how many cases each stands, (n,).
 
-        All that are nearest to failing, and some of the others. By what share each pulse, or all of many, is on longer,
-        in the closed form, of which the nutation is exact too; it errs by what it takes wide pulses for, nearly alike
-        in all cases.
+        All that are nearest to failing, and some of the others. Slopes by the relative on-time of each pulse, or of all
+        of many, in the closed form; it errs by what it takes wide pulses for, nearly alike in all cases.
         """
         body = self.plan.spacecraft
         # Directions of H at the end of nominal flights, in body axes at t = 0.
@@ -471,10 +451,7 @@ class FlownPlan:
         return there[0], (there[0] - np.array(there[1:])) / SMALL
 
     def predicted(self, plan: Plan, fewer: float) -> bool:
-        """True if enough cases of each draw are predicted to comply with a plan of other on-times.
-
-        ``fewer`` cases than may are predicted to fail, unless as many do now.
-        """
+        """True if of each draw ``fewer`` cases than may, or no more than now, are predicted to fail with a plan."""
         nominal, slopes = self._nominal
         pairs = list(zip(plan.pulses, self.plan.pulses, strict=True))
         more = np.array([short.on_time / long.on_time - 1.0 for short, long in pairs[: len(slopes)]])

@@ -7,6 +7,7 @@ second by the prices, over its cost. Where q exceeds one nowhere, no schedule co
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -117,10 +118,7 @@ def certificate(plan: Plan) -> Certificate:
 
 
 class Point(NamedTuple):
-    """Schedule of a front: a ``plan`` that ends in time, and the ``horizon`` (s) of its search.
-
-    Its cost is counted in ``unit`` (kg or N m s), for all points alike.
-    """
+    """Schedule of a front: a ``plan``, the ``horizon`` (s) of its search, the ``unit`` of costs (kg or N m s)."""
 
     plan: Plan
     horizon: float
@@ -130,6 +128,15 @@ class Point(NamedTuple):
     def cost(self) -> float:
         """Cost of the schedule, in its unit."""
         return self.plan.pulses.cost_in(self.unit)
+
+    @property
+    def off(self) -> float:
+        """Distance of H from its target at the end, rad."""
+        return self.plan.flight.residual.axis_error
+
+    def serves(self, other: Point) -> bool:
+        """True if the schedule costs as little as another one, ends as soon and leaves H as near."""
+        return self.off <= other.off and self.plan.end <= other.plan.end and self.cost <= other.cost
 
     @property
     def bounds(self) -> Bounds:
@@ -151,9 +158,8 @@ class Front:
     def least(self, point: Point) -> float | None:
         """First-order lower bound for a ``point``; no more than those of points that have less time."""
         first, within = point.bounds.first_order, point.bounds.within
-        known = [point.bounds for point in self.points if point.bounds.within <= within]
-        known_orders = (bounds.first_order for bounds in known if bounds.first_order is not None)
-        return None if first is None else min(first, *known_orders, math.inf)
+        known = [each.bounds.first_order for each in self.points if each.bounds.within <= within]
+        return None if first is None else min(first, *(bound for bound in known if bound is not None), math.inf)
 
 
 def fronts(
@@ -167,9 +173,8 @@ def fronts(
     """Fronts for each of the ``shifts`` (rad, infinite for any), of at most ``count`` searches each.
 
     What is traded is propellant, with ``options.least`` of impulse that (then pulses do not tell their propellant).
-    Whichever search found it, a schedule counts for every front whose shift it keeps. Where the scheme optimal finds
-    none, those of the other schemes count that comply but for where H ends. ``progress`` is called with how many of the
-    count × len(shifts) searches are done.
+    A schedule counts for every front whose shift it keeps. Where optimal finds none, those of the other schemes count
+    that comply but for where H ends. ``progress``: called with how many of the count × len(shifts) searches are done.
     """
     if options.least == "impulse":
         # The search for the fastest saves time, and counts in kg whatever it can: one unit for all points.
@@ -200,7 +205,10 @@ def fronts(
                 entries += [(shift, *entry) for entry in searched]
             done = count * number
     others = _others(spacecraft, options) if why else []
-    unit = "N m s" if options.least == "impulse" else _unit([*(plan for _, plan, _ in entries), *others])
+    plans = [*(plan for _, plan, _ in entries), *others]
+    counted = [plan.pulses.bounds for plan in plans if plan.pulses.bounds is not None]
+    in_kg = options.least != "impulse" and by_propellant(plans) and all(known.unit == "kg" for known in counted)
+    unit = "kg" if in_kg else "N m s"
     made_for = [(kept, Point(plan, horizon, unit)) for kept, plan, horizon in entries]
     return tuple(_fronts(ordered, made_for, [Point(plan, spacecraft.horizon, unit) for plan in others], why))
 
@@ -213,30 +221,11 @@ def _fronts(
     for shift in shifts:
         own = [point for asked, point in made_for if asked <= shift]
         looser = [point for asked, point in made_for if asked > shift]
-        points = own + [
-            point for point in looser if _keeps(point.plan, shift) or any(_serves(point, rival) for rival in own)
-        ]
-        kept = undominated(points or [point for point in others if _keeps(point.plan, shift)], kept)
+        # One that is nowhere worse than another stands for it: ticks prevent exact ends.
+        points = own + [point for point in looser if point.off <= shift + LEFT or any(map(point.serves, own))]
+        kept = undominated(points or [point for point in others if point.off <= shift + LEFT], kept)
         by_others = all(point.plan.scheme != OPTIMAL.name for point in kept)
         yield Front(shift, kept, why.get(shift) if by_others else None)
-
-
-def _unit(plans: Sequence[Plan]) -> str:
-    """Unit in which all costs and bounds are known."""
-    bounds = [plan.pulses.bounds for plan in plans if plan.pulses.bounds is not None]
-    return "kg" if by_propellant(plans) and all(bound.unit == "kg" for bound in bounds) else "N m s"
-
-
-def _keeps(plan: Plan, shift: float) -> bool:
-    """True if H ends no farther from its target than ``shift`` rad."""
-    return plan.flight.residual.axis_error <= shift + LEFT
-
-
-def _serves(point: Point, instead_of: Point) -> bool:
-    """True if a schedule costs as little, ends as soon and leaves H as near: ticks prevent exact ends."""
-    one, other = point.plan, instead_of.plan
-    as_near = one.flight.residual.axis_error <= other.flight.residual.axis_error
-    return as_near and one.pulses.end <= other.pulses.end and point.cost <= instead_of.cost
 
 
 def _others(spacecraft: Spacecraft, options: OptimalOptions) -> list[Plan]:
@@ -250,10 +239,7 @@ def _others(spacecraft: Spacecraft, options: OptimalOptions) -> list[Plan]:
 def _searched(
     spacecraft: Spacecraft, options: OptimalOptions, count: int, search: Callable[[Spacecraft, OptimalOptions], Plan]
 ) -> list[tuple[Plan, float]] | str:
-    """Schedules of the whole horizon, the fastest, and of horizons between, evenly by their ratios.
-
-    Each with its horizon, s; or why there is none.
-    """
+    """Schedules of the whole horizon, the fastest, and between, each with its horizon, s; or why there is none."""
     whole = search(spacecraft, options)
     if whole.schedule is None or whole.schedule.bounds is None:
         return infeasibility(whole) or "there is nothing to do"
@@ -273,10 +259,7 @@ def _searched(
 
 
 def undominated(points: Sequence[Point], stricter: Sequence[Point] = ()) -> tuple[Point, ...]:
-    """In the order of their ends, those that cost less than all that end no later, by `SAME_COST` or more.
-
-    Those of a ``stricter`` front count where they cost less at all: what allows more is nowhere dearer.
-    """
+    """Points that cost less than all that end no later, by `SAME_COST`; those of a ``stricter`` front by anything."""
     given = {id(point.plan) for point in stricter}
     kept: list[Point] = []
     for point in sorted(points, key=lambda point: (point.plan.pulses.end, point.cost)):
@@ -288,8 +271,8 @@ def undominated(points: Sequence[Point], stricter: Sequence[Point] = ()) -> tupl
 
 def numbered(all_fronts: Sequence[Front]) -> Iterator[tuple[int, Front, Point]]:
     """All points of all fronts, numbered from 1."""
-    pairs = ((front, point) for front in all_fronts for point in front.points)
-    return ((index, front, point) for index, (front, point) in enumerate(pairs, start=1))
+    numbers = itertools.count(1)
+    return ((next(numbers), front, point) for front in all_fronts for point in front.points)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
