@@ -46,7 +46,7 @@ from nutdamp.views.guide import Formula, Topic
 from nutdamp.views.parts import beyond_floors, pulse_table, turn_floor
 from nutdamp.views.simulation import BUDGET, BUDGET_NOTE, budget_table, conservation, methods_table, verdict
 from nutdamp.views.text import WARNING, joined, mass, quantity, sentence, severity, text
-from nutdamp.views.trade import apart, beats, front_parts
+from nutdamp.views.trade import front_parts, trade_notes
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -329,7 +329,7 @@ def _trade(compared: Comparison, traded: Sequence[Front]) -> Iterator[Block]:
     if any(len(front.points) > 1 for front in traded):  # one point for each shows no trade
         yield trade_picture(compared, traded)
     chosen = compared.recommended
-    yield from (Prose(note) for say in (beats, apart) if chosen is not None and (note := say(traded, chosen)))
+    yield from (Prose(sentence(text(note))) for note in (trade_notes(traded, chosen) if chosen is not None else ()))
     yield from document.blocks_of("Schedules by their ends", Group(*front_parts(compared.spacecraft, traded)))
 
 

@@ -278,17 +278,16 @@ def alternatives(compared: Comparison) -> Iterator[Note]:
         others.setdefault(id(plan), (gain, plan))
     for gain, other in others.values():
         assert chosen is not None
-        assert chosen.flown is not None
-        assert other.flown is not None
-        yield note(
-            gain.value,
-            scheme=other.scheme,
-            pulses=len(other.pulses),
-            than_pulses=len(chosen.pulses),
-            **beside(other, chosen, recommendation.by_propellant),
-            axis_error_deg=math.degrees(other.flown.axis_error),
-            than_axis_error_deg=math.degrees(chosen.flown.axis_error),
-        )
+        yield note(gain.value, scheme=other.scheme, **figures(other, chosen, recommendation.by_propellant))
+
+
+def figures(plan: Plan, than: Plan, by_propellant: bool) -> dict[str, Value]:
+    """Figures of a plan and of the one it is compared with, as values of a note."""
+    assert plan.flown is not None
+    assert than.flown is not None
+    off, than_off = (math.degrees(left.axis_error) for left in (plan.flown, than.flown))
+    counts: dict[str, Value] = {"pulses": len(plan.pulses), "than_pulses": len(than.pulses)}
+    return {**counts, **beside(plan, than, by_propellant), "axis_error_deg": off, "than_axis_error_deg": than_off}
 
 
 def beside(plan: Plan, than: Plan, by_propellant: bool) -> dict[str, Value]:

@@ -12,23 +12,21 @@ import numpy as np
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from nutdamp.errors import listed
+from nutdamp.common.results import Note, note
+from nutdamp.planning import notes
 from nutdamp.planning.plan import Plan
 from nutdamp.planning.recommendation import SAME_ANGLE
 from nutdamp.planning.tradeoff import Front, Point, numbered
 from nutdamp.schemes.catalogue import OPTIMAL
-from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.requirements import DAMPED_ANGLE, SAME_COST, Part
-from nutdamp.spacecraft.schedule import STEERABLE
 from nutdamp.views import decisions
 from nutdamp.views.decisions import FARTHER, heading, plan_json
 from nutdamp.views.parts import derived_table, pulse_table, requested, summary
 from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable, Shared, angle_of, file_columns, values_of
-from nutdamp.views.text import cost, degrees, duration, fixed, small_angle
+from nutdamp.views.text import cost, degrees, fixed, small_angle
 
 ROWS = 18  # points on the default screen, at most: evenly some of more
-TOGETHER = 1e-3  # s between ends that count as one
 SOONER = 0.05  # share of its time by which a plan that costs as much has to end sooner to be worth a remark
 FAILS = "does not meet the requirement with nominal values"  # or breaks a cone
 BELOW = (  # note on points that cost less than their small-angle bound
@@ -38,10 +36,6 @@ BELOW = (  # note on points that cost less than their small-angle bound
 
 OFF = (  # note on points whose H ends a little beside its target
     "With real widths, ticks and on-time limits H ends slightly off the direction that the schedules were planned for."
-)
-
-ALIKE = (  # note on a plan that is cheaper than the points by less than counts
-    "the cheapest point that ends no later costs as much as the recommended plan within 0.1 %, which counts as equal."
 )
 
 
@@ -168,8 +162,8 @@ def front_parts(spacecraft: Spacecraft, fronts: Sequence[Front]) -> list[Rendera
     priced = [(row.spent(row.point.cost), row.spent(row.least)) for row in rows_of(fronts)
               if row.least is not None and row.point.cost < row.least]  # fmt: skip
     below = [BELOW] * any(spent != least for spent, least in priced)  # as the table writes both
-    for note in (*below, *_ends_off(fronts)):
-        parts += [Text(), Text(note, style="dim")]
+    for sentence in (*below, *_ends_off(fronts)):
+        parts += [Text(), Text(sentence, style="dim")]
     return parts
 
 
@@ -262,54 +256,29 @@ def _sooner(plan: Plan, chosen: Plan, saved: float) -> bool:
     return abs(saved) <= SAME_COST and ends_sooner and shifts[0] <= FARTHER * shifts[1] + SAME_ANGLE
 
 
-def beats(fronts: Sequence[Front], chosen: Plan) -> str:
-    """The schedule of a front that is better than the ``chosen`` one, with its command, in a sentence; or nothing."""
+def trade_notes(fronts: Sequence[Front], chosen: Plan) -> Iterator[Note]:
+    """The schedule of a front that is better than the ``chosen`` plan, with its command; or that costs more than it."""
     better = _better(fronts, chosen)
-    if better is None:
-        return ""
-    saved, earlier, row = better
-    front, point = row.front, row.point
-    too, how = "", "meets the requirement with nominal values, which the recommended plan does not"
-    if chosen.meets_requirement is not False:
-        costs = f"costs {100.0 * saved:.2g} % less than" if saved else "costs as much as"
-        ends = f"{duration(earlier)} earlier" if earlier > TOGETHER else "at the same time"
-        too = "meets the requirement with nominal values too, "
-        how = f"{costs} the recommended plan and ends {ends}"
-    pointing, plans = chosen.spacecraft.goal.axis is not None, (point.plan, chosen)
-    off, counts = [plan.flight.residual.axis_error for plan in plans], [len(plan.pulses) for plan in plans]
-    asides = [front_name(front, pointing=pointing)]
-    if abs(off[0] - off[1]) > SAME_ANGLE:
-        name = requirements.aim(chosen.spacecraft).label
-        asides.append(f"{name} {degrees(off[0])} instead of {degrees(off[1])}")
-    if counts[0] != counts[1]:
-        asides.append(f"pulses: {counts[0]} instead of {counts[1]}")
-    options = "--free-axis " if math.isinf(front.shift) else f'--shift "{degrees(front.shift)}" ' * (front.shift > 0.0)
-    return (
-        f"point {row.number} {too}{how} ({'; '.join(asides)}): "
-        f'nutdamp plan SPACECRAFT --scheme {point.plan.scheme} {options}--set "limits.horizon={point.horizon:.6g} s".'
-    )
-
-
-def apart(fronts: Sequence[Front], chosen: Plan) -> str:
-    """The reason why the ``chosen`` plan may cost less than the schedules traded, by another scheme; or nothing."""
+    if better is not None:
+        (_, _, row), front = better, better[2].front
+        bound = (
+            "--free-axis " if math.isinf(front.shift) else f'--shift "{degrees(front.shift)}" ' * (front.shift > 0.0)
+        )
+        horizon = f'--set "limits.horizon={row.point.horizon:.6g} s"'
+        command = f"nutdamp plan SPACECRAFT --scheme {row.plan.scheme} {bound}{horizon}"
+        shown = notes.figures(row.plan, chosen, row.point.unit == "kg")
+        if chosen.meets_requirement is False:
+            yield note("trade-meets", point=row.number, command=command, **shown)
+        else:
+            yield note("trade-better", point=row.number, command=command, **shown)
     rows = [row for row in rows_of(fronts) if row.plan.pulses.end <= chosen.pulses.end and not fails(row.point)]
-    if not rows:
-        return ""
-    nearest = min(rows, key=lambda row: row.point.cost)
+    nearest = min(rows, key=lambda row: row.point.cost, default=None)
+    if nearest is None:
+        return
     spent, cheapest = chosen.pulses.cost_in(nearest.point.unit), nearest.point.cost
-    if spent >= cheapest * (1.0 - SAME_COST):
-        return ALIKE * (spent < cheapest and nearest.spent(spent) != nearest.spent(cheapest))
-    if chosen.scheme in schemes_of(fronts):
-        return ""
-    reasons = []
-    if any(pulse.channel == STEERABLE for pulse in chosen.pulses):
-        impulses = " with ideal impulses" * chosen.pulses.idealised
-        reasons.append(f"it fires the steerable torquer{impulses}, which the schedules of the trade do not")
-    own, left = chosen.flight.residual.nutation, max(row.plan.flight.residual.nutation for row in rows)
-    if own > left + SAME_ANGLE:
-        reasons.append(f"it leaves {degrees(own)} of nutation, they at most {degrees(left)}")
-    because = f": {listed(reasons)}" if reasons else ""
-    return (
-        f"the recommended plan, by {chosen.scheme}, costs {100.0 * (1.0 - spent / cheapest):.2g} % less than "
-        f"point {nearest.number}, the cheapest of the trade that meets the requirement and ends no later{because}."
-    )
+    if spent < cheapest * (1.0 - SAME_COST):
+        if chosen.scheme not in schemes_of(fronts):
+            saved = 100.0 * (1.0 - spent / cheapest)
+            yield note("trade-dearer", scheme=chosen.scheme, saved_percent=saved, point=nearest.number)
+    elif spent < cheapest and nearest.spent(spent) != nearest.spent(cheapest):
+        yield note("trade-alike", point=nearest.number)

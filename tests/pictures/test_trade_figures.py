@@ -22,13 +22,14 @@ from nutdamp.figures import studies
 from nutdamp.planning import plan as planning
 from nutdamp.planning import tradeoff
 from nutdamp.planning.decision import compare
+from nutdamp.planning.plan import Plan
 from nutdamp.planning.tradeoff import Front, Point, certificate
 from nutdamp.schemes.catalogue import OptimalOptions
 from nutdamp.spacecraft.equipment import Steerable
 from nutdamp.spacecraft.model import Limits, Requirement, Spacecraft
 from nutdamp.spacecraft.schedule import Bounds, Schedule
-from nutdamp.views.text import cost
-from nutdamp.views.trade import ALIKE, BELOW, OFF, apart, beats, fails, front_parts
+from nutdamp.views.text import cost, text
+from nutdamp.views.trade import BELOW, OFF, fails, front_parts, trade_notes
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 
@@ -175,13 +176,17 @@ def half_of(front: Front) -> Front:
     return replace(front, points=(point._replace(plan=half),))
 
 
+def codes(fronts: tuple[Front, ...], chosen: Plan) -> list[str]:
+    """Codes of the notes on a trade beside a plan."""
+    return [note.code for note in trade_notes(fronts, chosen)]
+
+
 def test_a_schedule_that_is_better_is_named_beside_the_recommended_one() -> None:
     """One that costs less, one as cheap a nutation period earlier, one that meets what the plan does not."""
     chosen = compare(EASY, ["two-pulse"])["two-pulse"]
-    cheaper = beats((front_of(EASY, 0.999999, 0.95, 0.9),), chosen)
-    assert "pulses instead of" not in cheaper, "both take two"
-    assert [beats((front_of(EASY, *shares),), chosen) for shares in ((1.0, 1.1), (1.0,))] == ["", ""]
-    assert beats((), chosen) == ""
+    cheaper = (front_of(EASY, 0.999999, 0.95, 0.9),)
+    assert [codes((front_of(EASY, *shares),), chosen) for shares in ((1.0, 1.1), (1.0,))] == [[], []]
+    assert codes((), chosen) == []
     late = replace(EASY, limits=replace(EASY.limits, earliest=EASY.nutation_period))
     later = compare(late, ["two-pulse"])["two-pulse"]
     alike = (front_of(EASY, 1.0),)
@@ -189,9 +194,11 @@ def test_a_schedule_that_is_better_is_named_beside_the_recommended_one() -> None
     failing = half_of(whole)
     plan = failing.points[0].plan
     assert plan.meets_requirement is False
-    assert beats((failing,), plan) == ""
-    said = [cheaper, beats(alike, later), beats((whole,), plan)]
-    check_text("pictures.trade-better", "\n".join(said))
+    assert codes((failing,), plan) == []
+    pairs = ((cheaper, chosen), (alike, later), ((whole,), plan))
+    assert [codes(*pair) for pair in pairs] == [["trade-better"], ["trade-better"], ["trade-meets"]]
+    assert next(trade_notes(*pairs[0])).values["point"] == 3
+    check_text("pictures.trade-better", "\n".join(text(note) for pair in pairs for note in trade_notes(*pair)))
 
 
 def test_a_recommended_plan_that_is_not_traded_and_costs_less_is_explained() -> None:
@@ -200,17 +207,19 @@ def test_a_recommended_plan_that_is_not_traded_and_costs_less_is_explained() -> 
     share = 0.9 * dearer.points[0].plan.pulses.cost_in("N m s") / chosen.pulses.total_impulse
     pulses = tuple(replace(one, impulse=one.impulse * share, t=one.t + 60.0) for one in chosen.pulses)
     cheap = replace(chosen, schedule=replace(chosen.pulses, pulses=pulses))
-    check_text("pictures.trade-apart", apart((dearer,), cheap))
-    assert apart((dearer,), dearer.points[0].plan) == ""
+    (dear,) = trade_notes((dearer,), cheap)
+    assert (dear.code, dear.values["point"]) == ("trade-dearer", 1)
+    assert dear.values["saved_percent"] == pytest.approx(10.0)
+    assert codes((dearer,), dearer.points[0].plan) == []
     little = replace(pulses[0], impulse=1e-3 * pulses[0].impulse)
     cheaper = replace(cheap, schedule=replace(cheap.pulses, pulses=(little,)))
-    assert apart((half_of(dearer),), cheaper)
+    assert codes((half_of(dearer),), cheaper) == ["trade-dearer"]
     (point,) = half_of(dearer).points
     failing = point._replace(plan=replace(point.plan, spacecraft=replace(WIDE, requirement=Requirement(nutation=1e-6))))
     assert fails(failing)
-    assert apart((replace(dearer, points=(failing,)),), cheaper) == "", "it is not compared with what fails"
+    assert codes((replace(dearer, points=(failing,)),), cheaper) == [], "it is not compared with what fails"
     # Costs that count as equal are told where they read differently.
-    assert apart((front_of(WIDE, 1.0009),), dearer.points[0].plan) == ALIKE
+    assert codes((front_of(WIDE, 1.0009),), dearer.points[0].plan) == ["trade-alike"]
 
 
 def test_a_table_says_why_h_ends_beside_where_it_was_and_how_costs_lie_below_their_first_order_least() -> None:
