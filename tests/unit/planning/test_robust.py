@@ -214,7 +214,7 @@ def test_on_times_of_the_robust_plan_are_as_short_as_the_cases_allow_by_which_it
     assert found.fresh is not None
     assert found.fresh.met == share(body, chosen.plan, screening.FRESH) >= 0.99
     # A little shorter and too few comply.
-    shorter = screening._scaled(chosen.plan, [0.997, 0.997])
+    shorter = screening._scaled(chosen.plan, [0.997, 0.997], lambda _: True)
     assert shorter is None or min(share(body, shorter), share(body, shorter, screening.FRESH)) < 0.99
 
 
