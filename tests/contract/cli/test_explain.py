@@ -280,8 +280,9 @@ def keys_of_columns() -> Iterator[tuple[str, str]]:
             texts = [text for other in (*others, *(word.value for word in node.keywords)) for text in texts_in(other)]
             if isinstance(key, ast.Constant) and key.value:
                 yield str(key.value), " ".join(texts)
-        for key in keys_named(node, "file_columns"):
-            yield key, " ".join(texts_in(node.args[0]))
+        for name in keys_named(node, "file_columns"):
+            assert isinstance(node, ast.Call)
+            yield name, " ".join(texts_in(node.args[0]))
 
 
 def keys_named(node: ast.AST, function: str) -> Iterator[str]:

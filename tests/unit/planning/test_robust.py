@@ -316,7 +316,8 @@ def test_a_plan_with_which_enough_cases_comply_by_luck_alone_gives_way_to_the_ne
     for one in seemed:
         assert share(body, one.plan, screening.FRESH, found.samples) < found.probability
     # Where there is no other plan, the cases of any schedule decide; the new ones are a note, and nothing is trimmed.
-    alone = robust._trimmed(robust._checked(replace(found, chosen=seemed[0], candidates=(seemed[0],)), [seemed[0]]))
+    entries: dict[object, screening.PlanCandidate] = {"": seemed[0]}
+    alone = robust._trimmed(robust._flown(found.comparison, entries, found.samples, found.probability))
     assert (alone.chosen, alone.lucky, alone.meets_requirement) == (seemed[0], True, True)
     assert alone.decision is not None
     assert alone.fresh is not None
