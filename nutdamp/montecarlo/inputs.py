@@ -420,25 +420,30 @@ class DrawSource:
     def _fill(self, table: Array, block: int, attempt: int) -> None:
         """Fill ``table`` (inputs, cases) by the deviations of a block; each ``attempt`` has a stream of its own."""
         at, normals = (self._seed, block, attempt, table.shape[1]), dict[str, Array]()
-        with _DRAWING:
-            for group in self._groups:
-                alone = [_drawn(name, "normal", *at) for name in group.names]
-                normals.update(zip(group.names, group.mixed(alone), strict=True))
-            for entry, row in zip(self._random, table, strict=True):
-                if entry.name in normals:
-                    row[:] = value_of(entry, normals[entry.name])
-                else:
-                    np.multiply(_drawn(entry.name, entry.kind, *at), entry.size, out=row)
+        for group in self._groups:
+            alone = [_drawn(name, "normal", *at) for name in group.names]
+            normals.update(zip(group.names, group.mixed(alone), strict=True))
+        for entry, row in zip(self._random, table, strict=True):
+            if entry.name in normals:
+                row[:] = value_of(entry, normals[entry.name])
+            else:
+                np.multiply(_drawn(entry.name, entry.kind, *at), entry.size, out=row)
 
 
 KEPT = 128  # streams of blocks that are kept, 128 KiB each: all candidates and stages of a study fly the same draws
 
-_DRAWING = threading.Lock()  # held while draws are made: of several threads that want the same one makes them
+_DRAWING = threading.Lock()
+
+
+def _drawn(name: str, kind: str, seed: int, block: int, attempt: int, count: int) -> Array:
+    """First ``count`` draws of an input, of size one; by the thread that comes first where several want the same."""
+    with _DRAWING:
+        return _stream(name, kind, seed, block, attempt, count)
 
 
 @lru_cache(KEPT)
-def _drawn(name: str, kind: str, seed: int, block: int, attempt: int, count: int) -> Array:
-    """First ``count`` draws of an input, of size one, read-only."""
+def _stream(name: str, kind: str, seed: int, block: int, attempt: int, count: int) -> Array:
+    """Read-only draws of `_drawn`."""
     stream = int.from_bytes(hashlib.blake2b(name.encode(), digest_size=8).digest(), "little")  # the same everywhere
     key, counter = np.array([seed, stream], np.uint64), np.array([0, 0, attempt, block], np.uint64)
     generator = np.random.Generator(np.random.Philox(key=key, counter=counter))

@@ -252,7 +252,7 @@ class Worst:
             least = self.severities[-1]
         elif spare > 0:
             least = np.partition(severities, spare)[spare]
-        rows = np.flatnonzero(severities >= least)
+        rows = np.flatnonzero(~(severities < least))
         cases = np.concatenate([self.cases, first + rows])
         severities = np.concatenate([self.severities, severities[rows]])
         order = np.lexsort((cases, -severities))[: self.keep]

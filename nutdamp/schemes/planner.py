@@ -63,10 +63,11 @@ def schedule(name: str, spacecraft: Spacecraft, options: Choice = None) -> Sched
         return valve_commands.planned(spacecraft, lambda body: schedule(name, body, on_plain), correct)
     model = model_of(spacecraft, turning=chosen.equal)
     try:
-        return _corrected(scheme, model, planned(model.body, chosen), chosen)
+        whole = planned(model.body, chosen)
     except TooShort as short:
         cure = short.cure or _longer_horizon(model.body, lambda body: planned(body, chosen))
         raise TooShort(short.why, cure) from None
+    return _corrected(scheme, model, whole, chosen)
 
 
 def _longer_horizon(spacecraft: Spacecraft, planned: Callable[[Spacecraft], Schedule]) -> str:

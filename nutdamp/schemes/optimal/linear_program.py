@@ -23,6 +23,7 @@ from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Spacecraft, Vector
 
 SLACK_COST = 1e3  # cost of what no column supplies, over the dearest channel's: used only where there is no solution
+PROVED = 1e-6  # shortfall by which a program is proved to have no solution, over all there is to do
 LOOK = 0.05  # peaks of the price this far below zero are looked at more closely within their slots
 
 
@@ -178,7 +179,7 @@ class Program:
             return Solution((), math.inf, math.inf, np.zeros(2), np.zeros(count))
         for _ in range(ROUNDS if generate else 0):
             unmet = float(optimum.x[: 2 * count].sum())
-            if work.exhausted() or (enough and unmet <= SOME):
+            if work.exhausted() or (enough and (unmet <= SOME or self._out_of_reach(optimum.prices))):
                 break
             new = self._priced(optimum.prices, chosen, unmet)
             if not len(new.t):
@@ -299,6 +300,15 @@ class Program:
         work.spend(SOLVED + SLOT * self.forbidden.size)
         most = np.einsum("ekn,ck->ecn", self._slot_rows(), self._direction) * (self.width / self._unit)[None, :, None]
         return supplies(most[:, ~self.forbidden], self.influence.goal / self._scale, self.off / self._scale)
+
+    def _out_of_reach(self, weights: Vector) -> bool:
+        """True where prices ``weights`` prove that all slots together do not supply the goal (Farkas' lemma)."""
+        if self.strong.any():  # these act at moments, of which the slots are only samples
+            return False
+        size = float(np.abs(weights).max())
+        most = float(np.maximum(self._worth(weights), 0.0).sum(axis=1) @ (self.width / self._unit))
+        loose = self.off / self._scale * float(np.linalg.norm(weights[2:4])) if self.off > 0.0 else 0.0
+        return float(weights @ self.influence.goal) / self._scale - most - loose > PROVED * size
 
     def _first(self) -> ProgramColumns:
         """Columns to begin with: those of the last time, or along the shortest way to the goal, spread over time."""
