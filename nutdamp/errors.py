@@ -111,26 +111,29 @@ class SenselessOption(BadRequest):
         return f"{self.name} = {self.shown}: {self.problem}"
 
 
-class CannotRead(NutdampError):
+class FileFailure(NutdampError):
+    """A file at ``path`` that could not be used, and the ``reason``; ``use`` is the verb of the message."""
+
+    use = ""
+
+    def __init__(self, path: str, reason: str) -> None:
+        self.path, self.reason = path, reason
+        super().__init__(path, reason)
+
+    def __str__(self) -> str:
+        return f"cannot {self.use} {printable(self.path)}: {self.reason}"
+
+
+class CannotRead(FileFailure):
     """A file that could not be read."""
 
-    def __init__(self, path: str, reason: str) -> None:
-        self.path, self.reason = path, reason
-        super().__init__(path, reason)
-
-    def __str__(self) -> str:
-        return f"cannot read {printable(self.path)}: {self.reason}"
+    use = "read"
 
 
-class CannotWrite(NutdampError):
+class CannotWrite(FileFailure):
     """A file that could not be written; its earlier contents are kept."""
 
-    def __init__(self, path: str, reason: str) -> None:
-        self.path, self.reason = path, reason
-        super().__init__(path, reason)
-
-    def __str__(self) -> str:
-        return f"cannot write {printable(self.path)}: {self.reason}"
+    use = "write"
 
 
 class MissingExtra(NutdampError):

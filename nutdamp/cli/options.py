@@ -227,10 +227,10 @@ def scheme_options(command: Command) -> Command:
         kind: OptionKind = field.metadata["kind"]
         settings: dict[str, Any] = {"is_flag": True}
         if not kind.flag:
-            settings = {"type": UnitType(kind.unit) if kind.unit else click.IntRange(1), "default": field.default}
-            settings["type"] = NameType(kind.names) if kind.names else settings["type"]
+            value = NameType(kind.names) if kind.names else UnitType(kind.unit) if kind.unit else click.IntRange(1)
+            metavar = None if kind.names or kind.unit else "N"
+            settings = {"type": value, "default": field.default, "metavar": metavar}
             settings["show_default"] = field.default is not None
-            settings["metavar"] = None if kind.names or kind.unit else "N"
         group, text = f"Scheme {' and '.join(schemes)}", field.metadata["help"]
         option = click.option(f"--{name.replace('_', '-')}", cls=Grouped, group=group, help=text, **settings)
         command = option(command)
