@@ -532,6 +532,7 @@ def fit(
     from nutdamp.files.schedules import read_pulses
     from nutdamp.files.telemetry import read_telemetry
     from nutdamp.planning.plan import Plan
+    from nutdamp.views.text import text
 
     body, name, odd = _expected(spacecraft), units.path("telemetry", telemetry), list[str]()
     if schedule is None or isinstance(schedule, Plan):
@@ -540,11 +541,11 @@ def fit(
         fired, odd = read_pulses(units.path("schedule", schedule, "a Plan or the name of a file"), body)
     times = None if sun_pulses is None else units.path("sun_pulses", sun_pulses)
     record, remarks = read_telemetry(name, body, times, fired)
-    for text in (*odd, *remarks):
-        (ignored or warn)(text)
+    for remark in (*odd, *remarks):
+        (ignored or warn)(remark)
     estimate = fitted(body, record)
-    for text in doubts(estimate) if ignored is None else ():
-        warn(text)
+    for entry in doubts(estimate) if ignored is None else ():
+        warn(text(entry))
     return Fitted(estimate, tuple(remarks))
 
 

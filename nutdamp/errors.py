@@ -111,29 +111,26 @@ class SenselessOption(BadRequest):
         return f"{self.name} = {self.shown}: {self.problem}"
 
 
-class FileFailure(NutdampError):
-    """A file at ``path`` that could not be used, and the ``reason``; ``use`` is the verb of the message."""
-
-    use = ""
+class CannotRead(NutdampError):
+    """A file that could not be read."""
 
     def __init__(self, path: str, reason: str) -> None:
         self.path, self.reason = path, reason
         super().__init__(path, reason)
 
     def __str__(self) -> str:
-        return f"cannot {self.use} {printable(self.path)}: {self.reason}"
+        return f"cannot read {printable(self.path)}: {self.reason}"
 
 
-class CannotRead(FileFailure):
-    """A file that could not be read."""
-
-    use = "read"
-
-
-class CannotWrite(FileFailure):
+class CannotWrite(NutdampError):
     """A file that could not be written; its earlier contents are kept."""
 
-    use = "write"
+    def __init__(self, path: str, reason: str) -> None:
+        self.path, self.reason = path, reason
+        super().__init__(path, reason)
+
+    def __str__(self) -> str:
+        return f"cannot write {printable(self.path)}: {self.reason}"
 
 
 class MissingExtra(NutdampError):

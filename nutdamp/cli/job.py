@@ -248,11 +248,6 @@ class Job:
         if not self.quiet:
             say(text)
 
-    def warn(self, warnings: Iterable[str]) -> None:
-        """Print warnings about results on standard error, unless quiet."""
-        for warning in warnings:
-            self.remark(f"warning: {warning}")
-
     def note(self, notes: Iterable[Note]) -> None:
         """Print notes on results on standard error, unless quiet."""
         from nutdamp.views.text import screen_line

@@ -137,17 +137,18 @@ def loop_command(
     from nutdamp.api import loop
     from nutdamp.files.tabular import write_track
     from nutdamp.views.loop import loop_screen, stopped, warnings
+    from nutdamp.views.text import text
 
     with job.working("flying"):
         plan = loop(body, until, seed=seed, case=case)
     run = plan.flown_run
     if job.silent:
-        job.warn(warnings(body))
+        job.note(warnings(body))
     pieces = partial(run.flight.pieces, samples, run.until)
     track: Files = {"track": lambda: partial(write_track, pieces(), run.flight.spacecraft.inertia)}
     job.deliver(plan, partial(loop_screen, plan, verbose=verbose), more=track | job.carried(plan, at))
     if run.stop.fault:
-        say(f"nutdamp: the loop was stopped {stopped(run)}")
+        say(f"nutdamp: {text(stopped(run))}")
     leave(infeasible=run.stop.fault, missed=plan.meets_requirement is False)
 
 
@@ -227,7 +228,7 @@ def fit_command(job: Job, telemetry: str, sun_pulses: str | None, at: float, ahe
 
     with job.working("fitting"):
         fitted = fit(telemetry, body, schedule=job.flown.schedule, sun_pulses=sun_pulses, ignored=job.doubt)
-    job.warn(notes(fitted.core, carried(fitted.core, at)))
+    job.note(notes(fitted.core, carried(fitted.core, at)))
     with job.working("looking ahead"):
         prospects = fitted.outlook(at) if ahead else None
     files: Files = {"output": partial(fitted.text, at), "json": partial(fitted.to_dict, at, prospects)}

@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from nutdamp.common.results import Note, note
 from nutdamp.control_loop.sensor import felt
 from nutdamp.montecarlo.inputs import SPREAD
 from nutdamp.physics import attitude, sky
@@ -451,12 +452,12 @@ def prior_of(tolerance: Tolerance | None, nominal: float) -> tuple[float, float]
     return nominal, abs(size) * SPREAD[tolerance.kind]
 
 
-def untold(record: Record) -> Iterator[str]:
-    """Words on what signals of the kinds in a record cannot tell, whatever the file."""
+def untold(record: Record) -> Iterator[Note]:
+    """Quantities that signals of the kinds in a record cannot tell, whatever the file."""
     if not record.fired:
-        yield "a coast fixes C/A only, never A and C apart: what it does not fix stays at the tolerances of the file"
+        yield note("fit-coast")
     if not record.has(GYROS[2]) and (record.has(GYROS[0]) or record.has(GYROS[1])):
-        yield "without omega_3 a misalignment of the gyros times the spin counts as their bias"
+        yield note("fit-without-omega-3")
     if not record.shows_spin:
         shown = ", ".join(kind.name for kind in KINDS if kind.spin)
-        yield f"no signal shows the spin ({shown}): it is that of the file"
+        yield note("fit-spin-of-file", signals=shown)

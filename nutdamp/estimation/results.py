@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from nutdamp.common.results import Note, note
 from nutdamp.estimation import initial_guess
 from nutdamp.estimation.fit import step
 from nutdamp.estimation.model import OF_SENSORS, Body
@@ -336,62 +337,46 @@ LATE = 0.1  # delay of a channel from which on the times of the schedule are dou
 SURE = 3.0  # standard deviations from which on a doubt is said
 
 
-def doubts(fitted: Fit) -> Iterator[str]:
-    """Remarks on a fit: what it rests on besides the data, and where record, schedule and file disagree."""
+def doubts(fitted: Fit) -> Iterator[Note]:
+    """Notes on a fit: what it rests on besides the data, and where record, schedule and file disagree."""
+    model = fitted.model
     if not fitted.finished:
-        yield "the search ended with its budget of work, perhaps before the best fit: the sigmas may be too small"
-    if initial_guess.too_slow(fitted.model, fitted.values):
-        yield (
-            f"sampled below the nutation rate, every {initial_guess.interval(fitted.model):.4g} s: which C/A it is "
-            "rests on the tolerance of the file (are the times in seconds?)"
-        )
-    spin = fitted.model.spacecraft.spin
-    if fitted.named.get("omega_3", spin) * spin < 0.0:
-        yield "the body spins the other way than the file has it: is omega_3 reversed, or state.spin?"
-    if fitted.model.unequal and fitted.model.spacecraft.inertia.symmetric:
+        yield note("fit-cut")
+    if initial_guess.too_slow(model, fitted.values):
+        yield note("fit-sampled-below", every_s=initial_guess.interval(model))
+    if fitted.named.get("omega_3", model.spacecraft.spin) * model.spacecraft.spin < 0.0:
+        yield note("fit-other-sense")
+    if model.unequal and model.spacecraft.inertia.symmetric:
         apart = 200.0 * math.hypot(fitted.named["unequal_1"], fitted.named["unequal_2"])
-        yield (
-            f"the transverse moments of inertia differ by {apart:.2g} %, and in the file they are equal: all else is "
-            "estimated with what they are; give the tensor"
-        )
-    if not fitted.model.record.shows_turn:
-        yield (
-            f"{' and '.join(fitted.model.signals)} alone does not show how the body is turned about its axis: the "
-            "phase, and so the firing times of a plan, rest on the attitude of the file; omega_1 or omega_2, an "
-            "acceleration, Sun pulses, crossings or quaternions would show it"
-        )
+        yield note("fit-unequal-moments", apart_percent=apart)
+    if not model.record.shows_turn:
+        yield note("fit-phase-of-file", signals=", ".join(model.signals))
     yield from _of_residuals(fitted)
     yield from _of_schedule(fitted)
 
 
-def _of_residuals(fitted: Fit) -> Iterator[str]:
-    """Words on where residuals that are not white may come from, and what helps."""
+def _of_residuals(fitted: Fit) -> Iterator[Note]:
+    """Possible cause of residuals that are not white, and the cure."""
     left = [index for index in range(len(fitted.model.signals)) if fitted.resolved[index] and not fitted.white(index)]
     if not left:
         return
-    why = "the noise of neighbouring samples is correlated, or a small motion is not in the model"
+    signals = ", ".join(fitted.model.signals[index] for index in left)
     if (time := step(fitted, left, small=True)) is not None:
-        what = "check --schedule" if fitted.model.record.fired else "give the pulses fired with --schedule"
-        why = f"the nutation steps at about {time:.3g} s, as by a small pulse; {what}, or end the record before it"
-    yield f"the residuals of {', '.join(fitted.model.signals[index] for index in left)} are not white: {why}"
+        yield note("fit-steps", signals=signals, at_s=time)
+    else:
+        yield note("fit-not-white", signals=signals)
 
 
-def _of_schedule(fitted: Fit) -> Iterator[str]:
-    """Words on where the schedule is not what was fired in the record."""
+def _of_schedule(fitted: Fit) -> Iterator[Note]:
+    """Differences between the schedule and the firings in the record."""
     record = fitted.model.record
     outside = len(record.schedule) - len(record.fired)
     if outside:
-        span = f"the record, {record.start:g} s to {record.end:g} s"
-        count = f"{outside} of {len(record.schedule)} pulses of the schedule" if record.fired else "the whole schedule"
-        yield f"{count} is outside {span}: of its channels the record tells nothing"
+        span = {"start_s": record.start, "end_s": record.end}
+        yield note("fit-pulses-outside", outside=outside, pulses=len(record.schedule), **span)
     for parameter, value, sigma in zip(fitted.model.parameters, fitted.values, fitted.sigmas, strict=True):
         kind, _, channel = parameter.name.partition(" ")
         if kind == "delay" and abs(value) > max(LATE, SURE * sigma):
-            way = "late" if value < 0.0 else "early"
-            yield (
-                f"the times of {channel} in the schedule are {abs(value):.3f} s {way} against the record: do both "
-                "count from the same t = 0?"
-            )
+            yield note("fit-late" if value < 0.0 else "fit-early", channel=channel, by_s=float(abs(value)))
         if kind == "thrust" and value < -SURE * sigma:
-            way = "it pushes the other way: another channel, or reversed?"
-            yield f"the thrust factor of {channel} is {value:.3g}: {way}"
+            yield note("fit-reversed", channel=channel, thrust_percent=100.0 * float(value))

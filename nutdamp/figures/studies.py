@@ -23,6 +23,7 @@ from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.requirements import Part
 from nutdamp.views.decisions import cases_verdict, exact_percent
 from nutdamp.views.text import cost as written
+from nutdamp.views.text import text
 from nutdamp.views.trade import FAILS, fails, front_name, missing, schemes_of
 
 if TYPE_CHECKING:
@@ -233,7 +234,7 @@ def trade_figure(
     points = [point for _, _, point in numbered(fronts)]
     how = model_name(point.plan.pulses for point in points)
     style.heading(figure, spacecraft, f"finish time against cost, {', '.join(schemes_of(fronts))} by {how}")
-    reasons = "\n".join(fill(reason, int(WIDTH * width)) for reason in missing(spacecraft, fronts))
+    reasons = "\n".join(fill(text(entry), int(WIDTH * width)) for entry in missing(spacecraft, fronts))
     if not points:
         figure.text(0.5, 0.5, reasons, ha="center", va="center", linespacing=1.6)
         return figure

@@ -167,39 +167,37 @@ def fitted_spacecraft(_: object, text: str) -> Spacecraft:
     return Source(text, "fitted").read()
 
 
-def notes(fit: Fit, carried: Carried) -> Iterator[str]:
-    """Sentences on estimates that the file cannot hold, and on entries that still count from the old t = 0."""
+def notes(fit: Fit, carried: Carried) -> Iterator[Note]:
+    """Estimates that the file cannot hold, and entries that still count from the old t = 0."""
     body = fit.model.spacecraft
     growth = fit.index("growth")
     value = 0.0 if growth is None else float(fit.values[growth])
     seen_to_grow = growth is not None and abs(value) > SEEN * fit.sigmas[growth]
     if seen_to_grow and not (carried.body.inertia.wheel or _grows_so(carried, value)):
-        way = "grows" if value > 0.0 else "decays"
-        yield f"the nutation {way} at {abs(value):.3g} 1/s, which dissipation within a rigid body would not let it"
-    fitted = dict(zip((parameter.name for parameter in fit.model.parameters), fit.values, strict=True))
+        yield note("fit-growth", growth=f"{value:+.3g} 1/s")
+    fitted = dict(zip((parameter.name for parameter in fit.model.parameters), fit.values.tolist(), strict=True))
     large = np.abs(fit.values) > SEEN * fit.sigmas
     written, seen = dict(_delays(fit)), []
     for name, value in (pair for pair, counts in zip(fitted.items(), large, strict=True) if counts):
         kind, _, channel = name.partition(" ")
         if kind == "delay" and channel not in written:
-            yield f"the delay of {channel}, {1e3 * value:.4g} ms, is not written: see the key valve"
+            yield note("fit-delay-not-written", channel=channel, delay_s=value)
         kind, _, which = name.partition("_")
         if kind in UNWRITTEN and which != ACCELERATION:
             what, unit = UNWRITTEN[kind]
             seen.append(f"{what.format(which)} {math.degrees(value):.3g} {unit}")
     if seen:
-        yield f"not written, as the file has no key for it: {', '.join(seen)}"
+        yield note("fit-not-written", estimates=", ".join(seen))
     for name, factor in fitted.items():
         kind, _, channel = name.partition(" ")
         if kind == "thrust" and factor <= LEAST_THRUST:
-            reversed_ = "it pushes the other way: another channel, or reversed?"
-            doubt = "did it fire?" if factor > -LEAST_THRUST else reversed_
-            yield f"{channel} gave {100.0 * factor:.3g} % of its thrust: {doubt} Its force stays as it was"
+            silent, given = factor > -LEAST_THRUST, 100.0 * factor
+            yield note("fit-no-thrust" if silent else "fit-thrust-reversed", channel=channel, thrust_percent=given)
     limits = body.limits
     if carried.time != 0.0 and (limits.blackout or limits.earliest > 0.0 or limits.horizon is not None):
-        yield f"limits (horizon, earliest, blackout) count from the new t = 0, {carried.time:g} s after the old one"
+        yield note("limits-count-anew", at_s=carried.time)
     if body.tank is not None and len(fit.model.record.schedule):
-        yield "tank.propellant is that before the pulses of the schedule"
+        yield note("fit-tank")
 
 
 def _fitted_edits(tree: Node, fit: Fit, carried: Carried) -> Edits:

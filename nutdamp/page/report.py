@@ -336,7 +336,7 @@ def _trade(compared: Comparison, traded: Sequence[Front]) -> Iterator[Block]:
 def _verification(chosen: Plan) -> Iterator[Block]:
     body = chosen.spacecraft
     verified = verify(body, chosen.pulses, unrounded(chosen), expected=chosen.options.with_disturbances)
-    yield Prose(f"{verdict(verified)} {conservation(verified)}")
+    yield Prose(f"{verdict(verified)} {sentence(text(conservation(verified)))}")
     missing = tuple((method.name, f"not flown; {method.missing}") for method in verified.methods if method.missing)
     flights = document.sheet_of("Maximum differences from the flown motion", methods_table(verified))
     budget = document.sheet_of(BUDGET, budget_table(body, verified)), Prose(BUDGET_NOTE)

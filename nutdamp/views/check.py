@@ -13,7 +13,7 @@ from rich.text import Text
 
 from nutdamp import __version__
 from nutdamp.common.numerics import finite
-from nutdamp.common.results import Data
+from nutdamp.common.results import Data, Note, note
 from nutdamp.control_loop.stability import margins
 from nutdamp.errors import CannotRead, Fault, FaultyFile, NutdampError, listed
 from nutdamp.files.reader import Source
@@ -25,7 +25,7 @@ from nutdamp.planning.capability import Acting, ChannelSteps, Consequence
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.views.decisions import aspects_json, direction_json, spacecraft_json
 from nutdamp.views.loop import described, margin_table, warnings
-from nutdamp.views.parts import derived_table, summary, warnings_of
+from nutdamp.views.parts import derived_table, summary
 from nutdamp.views.tables import TEXT, Column, DataTable, Shared, angle_of, file_columns, to_figures, values_of
 from nutdamp.views.text import degrees, duration, moment, quantity, small_angle, vector
 from nutdamp.views.tolerances import correlation_json, in_words, size_text, without_effect
@@ -156,46 +156,47 @@ def check_screen(spacecraft: Spacecraft, *, verbose: bool = True) -> RenderableT
     table, tolerances = channel_table(spacecraft), tolerance_table(spacecraft)
     counted = f" (channels: {len(table.rows)}, tolerances: {len(tolerances.rows)})"
     head = [Text.assemble((f"{spacecraft.name}   ", "bold"), ("VALID", "bold green"), counted)]
-    head += warnings_of(warnings(spacecraft))
     known = (*_spin_axis(spacecraft), *sun_pulse_facts(spacecraft)) if verbose else ()
     tables = [turn_table(spacecraft), valve_table(spacecraft), *map(tank_table, filter(None, [spacecraft.tank]))]
     tables += [disturbance_table(spacecraft), _margins(spacecraft), tolerances]
     return summary(
         [*head, derived_table(spacecraft, known)],
         partial(table.screen, "screen") if table.rows else None,
-        _remarks(spacecraft, verbose),
+        (*warnings(spacecraft), *_notes(spacecraft, verbose)),
         "nutdamp plan · nutdamp report",
         more=[each.screen("screen") for each in tables if each.rows],
         verbose=verbose,
     )
 
 
-def _remarks(spacecraft: Spacecraft, verbose: bool) -> Iterator[str]:
+def _notes(spacecraft: Spacecraft, verbose: bool) -> Iterator[Note]:
     """Notes on a valid file; ``verbose``: disturbances stand in a table."""
     clock, dispersions = capability.sun_clock(spacecraft), spacecraft.dispersions
     if clock is not None and clock.refusal:
-        yield clock.refusal
+        yield note("no-sun-pulse", why=clock.refusal)
     for names, reason in without_effect(() if dispersions is None else reachable(spacecraft)[1]):
-        yield f"dispersions without effect: {names}: {reason}"
+        yield note("dispersions-unused", dispersions=names, why=reason)
     idle = [channel.name for channel in spacecraft.channels if not channel.damps]
     if idle:
-        yield f"never fired for damping, more axial than transverse: {', '.join(idle)}"
+        yield note("never-damping", channels=", ".join(idle))
     if not verbose:
-        yield from (f"disturbance {name} {effect}" for name, effect in disturbance_table(spacecraft).cells("screen"))
+        for name, effect in disturbance_table(spacecraft).cells("screen"):
+            yield note("disturbance", disturbance=name, effect=effect)
     angle, pair = math.degrees(capability.mounting_angle(spacecraft)), capability.nearest_pair(spacecraft)
-    spacing = f"two pulses of fixed actuators: ideal spacing {angle:.2f} deg about axis 3, first to second"
     if pair is None:
-        yield spacing
+        yield note("two-pulse-spacing", spacing_deg=angle)
     else:
-        miss = f"{abs(math.degrees(pair.miss)):.2f} deg off half a nutation turn"
-        yield f"{spacing}; nearest channels: {pair.first.name} then {pair.second.name}, {miss}"
+        off = abs(math.degrees(pair.miss))
+        yield note("two-pulse-pair", spacing_deg=angle, first=pair.first.name, second=pair.second.name, off_deg=off)
     if spacecraft.cold is not None:
         levels = ", ".join(f"{100.0 * spacecraft.cold.factor(before):.4g}" for before in range(3))
-        yield f"cold nozzles: the first pulses of a channel have {levels} % … of the thrust"
+        yield note("cold-nozzles", levels=levels)
     if spacecraft.loop is not None:
-        yield described(spacecraft.loop)
+        yield note("loop-in-file", loop=described(spacecraft.loop))
     pairs = () if dispersions is None else dispersions.correlation
-    yield "; ".join(f"correlated: {in_words(first)} and {in_words(second)} {size:g}" for first, second, size in pairs)
+    if pairs:
+        correlated = (f"{in_words(first)} and {in_words(second)} {size:g}" for first, second, size in pairs)
+        yield note("correlated-inputs", inputs="; ".join(correlated))
 
 
 def _spin_axis(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:

@@ -17,6 +17,7 @@ from rich.text import Text
 
 from nutdamp import __version__
 from nutdamp.common.numerics import cleaned
+from nutdamp.common.results import note
 from nutdamp.flight.end_state import Aspect
 from nutdamp.flight.propagation import Flight, Residual
 from nutdamp.planning.decision import Comparison, Decision, Line, decide, infeasibility, strays
@@ -26,9 +27,9 @@ from nutdamp.schemes import catalogue
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import SLACK, Spacecraft, Vector
 from nutdamp.spacecraft.requirements import Bound, Part
-from nutdamp.views.parts import FRAME_N, aspect_facts, commanded, cone_margins, direction_text, required, spin_text
+from nutdamp.views.parts import aspect_facts, commanded, cone_margins, direction_text, required, spin_text
 from nutdamp.views.tables import TEXT, Column, DataTable, Shared, facts, values_of
-from nutdamp.views.text import MISSING, degrees, duration, joined, mass, moment, most, note_json, quantity
+from nutdamp.views.text import MISSING, degrees, duration, joined, mass, moment, most, note_json, quantity, text
 
 if TYPE_CHECKING:
     from nutdamp.planning.tradeoff import Certificate
@@ -229,7 +230,7 @@ def end_rows(flown: Flight, watched: Iterable[Aspect]) -> Iterator[tuple[str, st
         yield "", lasting(flown)
     yield from aspect_facts(watched)
     if body.attitude is None:
-        yield "", FRAME_N
+        yield "", text(note("frame-n"))
     elif body.attitude.frame is not None:
         yield "frame", body.attitude.frame
 

@@ -15,6 +15,7 @@ import numpy as np
 from rich.console import Group, RenderableType
 from rich.text import Text
 
+from nutdamp.common.results import note
 from nutdamp.files.export import column, cone_columns
 from nutdamp.flight.end_state import aspects
 from nutdamp.flight.propagation import IDEAL_IMPULSES, Flight, model_name
@@ -82,7 +83,8 @@ def dispersion_brief(results: Results, *, scheme: str) -> RenderableType:
     head = [_title(results, scheme), *requirement_lines(results), *cone_lines(results), *_emptied(results)]
     notes, case = list(tolerances.main_causes(results)), f" · {_again(results)} (worst)" * _varies(results)
     if unused := results.study.model.inputs.unused:
-        notes.append(f"Dispersions without effect: {', '.join(tolerances.in_words(entry.name) for entry in unused)}.")
+        named = ", ".join(tolerances.in_words(entry.name) for entry in unused)
+        notes.append(note("dispersions-without-effect", dispersions=named))
     return summary(head, lambda **_: _percentiles(results).screen("screen"), notes, f"--plot cases.png{case}")
 
 

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from functools import partial
 from typing import Any
 
 from rich.console import RenderableType
 from rich.text import Text
 
+from nutdamp.common.results import Note, note
 from nutdamp.estimation.forecast import Outlook
 from nutdamp.estimation.parameters import KIND, in_moments, untold
 from nutdamp.estimation.results import UNTOLD, Carried, Estimate, carried, correlated, doubts, estimates
@@ -29,7 +31,7 @@ from nutdamp.views.tables import (
     to_figures,
     values_of,
 )
-from nutdamp.views.text import degrees, mass
+from nutdamp.views.text import mass, note_json
 
 FAR = 4.0  # sigmas of the file from which on a change is remarked upon
 NOTHING = 1e-3  # sigmas below which a value, or a change, is zero
@@ -168,49 +170,48 @@ def _record(fit: Fit) -> str:
     return f"{record.start:g} s to {record.end:g} s{turns}{fired}"
 
 
-def advice(ahead: Outlook) -> Iterator[str]:
-    """Clauses on the value of more telemetry."""
+def advice(ahead: Outlook) -> Iterator[Note]:
+    """Value of more telemetry."""
     now, longer, probe = ahead.now, ahead.longer, ahead.probe
-    level = exact_percent(ahead.probability)
-    today = f"the {ahead.scheme} plan from this estimate leaves at most {degrees(now.nutation)} in {level} of cases"
+    level = 100.0 * ahead.probability
+    today = partial(note, scheme=ahead.scheme, now_deg=math.degrees(now.nutation), level_share=level)
     if ahead.enough:
-        met = percent(now.met or 0.0, ahead.probability)
-        yield f"{today}; {met} of cases comply ({level} required): neither a longer coast nor a probe pulse is needed"
+        yield today("telemetry-enough", complying=percent(now.met or 0.0, ahead.probability))
         return
-    coast, pays = (ahead.coasts[-1], "it does not pay") if longer is None else (longer, "it pays")
-    yield f"{today}; a coast of {coast.length:.4g} s would leave {degrees(coast.nutation)}: {pays}"
+    coast = ahead.coasts[-1] if longer is None else longer
+    code, left = "coast-does-not-pay" if longer is None else "coast-pays", math.degrees(coast.nutation)
+    yield today(code, coast_s=coast.length, left_deg=left)
     if probe is not None:
-        pulse = f"one probe pulse of {probe.probe}, {probe.on_time:.3g} s, amid a coast of {probe.length:.4g} s"
-        yield f"{pulse} would leave {degrees(probe.nutation)}: it pays; fit it with --schedule"
+        left = math.degrees(probe.nutation)
+        yield note("probe-pays", channel=probe.probe, on_s=probe.on_time, coast_s=probe.length, left_deg=left)
         if probe.propellant is not None and ahead.propellant is not None:
-            spent = f"{mass(probe.propellant)} of propellant, besides the {mass(ahead.propellant)} of the plan"
-            yield f"the probe pulse takes {spent}"
+            yield note("probe-propellant", probe=mass(probe.propellant), plan=mass(ahead.propellant))
         thrifty = ahead.thrifty
         if thrifty is not None and thrifty is not probe:
-            takes = f"{mass(thrifty.propellant or 0.0)}, {degrees(thrifty.nutation)} left"
-            yield f"most is gained per propellant by the probe pulse of {thrifty.probe} ({takes})"
+            left, taken = math.degrees(thrifty.nutation), mass(thrifty.propellant)
+            yield note("probe-thrifty", channel=thrifty.probe, propellant=taken, left_deg=left)
     elif ahead.probes:
-        yield "no single probe pulse of a channel of the plan pays"
+        yield note("no-probe-pays")
 
 
-def told(fit: Fit, rows: Sequence[Estimate]) -> Iterator[str]:
-    """Clauses on parameters that the data do not determine, or only together, and on unexpected estimates."""
+def told(fit: Fit, rows: Sequence[Estimate]) -> Iterator[Note]:
+    """Parameters that the data do not determine, or only together, and unexpected estimates."""
     yield from doubts(fit)
     yield from untold(fit.model.record)
     kept = [estimate.label for estimate in rows if estimate.source == UNTOLD]
     if kept:
-        yield f"the data do not tell {', '.join(kept)}: kept as the file has it"
+        yield note("fit-kept", estimates=", ".join(kept))
     known = carried(fit, fit.model.start)  # A and C are correlated where both are estimated
     tied = [f"A and C {float(known.correlation[0, 1]):+.4f}"] if known.sigmas[0] > 0.0 else []
     tied += [f"{first} and {second} {value:+.3f}" for first, second, value in correlated(fit)[:MOST_PAIRS]]
     if tied:
-        yield f"correlated: {', '.join(tied)}"
+        yield note("correlated-inputs", inputs=", ".join(tied))
     changes = [(row.label, row.change) for row in rows if row.change is not None]
     far = [f"{label} ({_changed(change)})" for label, change in changes if abs(change) > FAR]
     if far:
-        yield f"farther from the file than its tolerances allow, in their sigmas: {', '.join(far)}"
+        yield note("fit-far", estimates=", ".join(far))
     if fit.model.unequal and fit.model.spacecraft.inertia.symmetric:
-        yield "I1 and I2 differ: the file has one A for both"
+        yield note("fit-one-moment")
 
 
 def fit_json(fit: Fit, at_time: Carried, ahead: Outlook | None = None, warnings: Sequence[str] = ()) -> dict[str, Any]:
@@ -236,7 +237,13 @@ def fit_json(fit: Fit, at_time: Carried, ahead: Outlook | None = None, warnings:
             "inputs": list(at_time.names),
             **values_of(at_time, "values_SI=values", "sigmas_SI=sigmas", "correlation"),
         },
-        "notes": [*warnings, *doubts(fit), *untold(model.record), *notes(fit, at_time)],
+        "notes": [
+            note_json(entry)
+            for entry in (
+                *(note("record-read", warning=warning) for warning in warnings),
+                *(*doubts(fit), *untold(model.record), *notes(fit, at_time)),
+            )
+        ],
         "next": ahead
         and {
             **values_of(ahead, "scheme", "propellant_kg", "probability", "longer_coast_s=longer.length"),

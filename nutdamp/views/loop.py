@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 from rich.console import Group, RenderableType
 from rich.text import Text
 
+from nutdamp.common.results import Note, note
 from nutdamp.control_loop.budget import DAY, NOISY, WIDENED, YEAR, Budget, HeldNutation
 from nutdamp.control_loop.controller import Fired
 from nutdamp.control_loop.evaluation import AGREE, LoopPlan, LoopVerification
@@ -23,9 +24,20 @@ from nutdamp.spacecraft.equipment import GYRO, Loop
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.views import decisions, tables
 from nutdamp.views.decisions import VERDICT, heading
-from nutdamp.views.parts import Remark, opening, pulse_table, seconds, summary, warnings_of
+from nutdamp.views.parts import opening, pulse_table, seconds, summary
 from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable, Shared, angle_of, facts, to_figures
-from nutdamp.views.text import degrees, duration, lasting, moment, most, quantity, small_angle
+from nutdamp.views.text import (
+    duration,
+    lasting,
+    moment,
+    most,
+    note_json,
+    ordered,
+    quantity,
+    screen_line,
+    sentences,
+    small_angle,
+)
 
 SHOWN = 40  # largest number of firings in a table of a screen
 ROUNDING = 1e-12  # share of the nutation that a firing leaves by rounding alone
@@ -97,37 +109,40 @@ def loop_screen(plan: LoopPlan, *, verbose: bool = True) -> RenderableType:
     fired = f"{spent}, last ends at {end}" if run.fired else "no firing"
     headline = Text.assemble("LOOP ", (run.loop.law, "bold"), f": {fired}; first quiet {_settled(run)}")
     head = [*opening(plan.spacecraft, verbose), headline, *_verdict(plan, decision)]
-    head += warnings_of(warnings(plan.spacecraft))
     head += decisions.margin_lines(decision, Shared.THIS_CASE if run.case else Shared.NOMINAL)
     return summary(
         head,
         partial(firing_table(run).screen, "screen", first=SHOWN - 1) if run.fired else None,
-        _remarks(plan, decision),
+        _notes(plan, decision),
         "--plot loop.png · nutdamp disperse --loop",
         more=[margin_table(plan.margins).screen("screen"), facts(decisions.end_rows(plan.flight, plan.aspects))],
         verbose=verbose,
     )
 
 
-def _remarks(plan: LoopPlan, decision: Decision) -> Iterator[Remark]:
-    run = plan.flown_run
+def _notes(plan: LoopPlan, decision: Decision) -> Iterator[Note]:
+    run, band, share = plan.flown_run, math.degrees(plan.band.most), 100.0 * SURELY
+    yield from warnings(plan.spacecraft)
     yield from decision_notes(decision, looped=True)
-    band = f"dead band at most {degrees(plan.band.most)} in {100.0 * SURELY:g} % of cases as it falls quiet"
-    largest, when = plan.largest
-    since = f"; largest nutation since first quiet {degrees(largest)} at {moment(when)}"
-    yield band if run.settled is None else band + since
+    if run.settled is None:
+        yield note("dead-band", band_deg=band, cases_share=share)
+    else:
+        largest, when = math.degrees(plan.largest[0]), plan.largest[1]
+        yield note("dead-band-held", band_deg=band, cases_share=share, largest_deg=largest, at_s=when)
     least = min(plan.margins, key=lambda margin: margin.delay, default=None)
     if least is not None and least.delay >= 0.0:
-        yield f"least delay margin before a firing feeds the nutation: {duration(least.delay)}, of {least.channel}"
-    yield described(run.loop)
-    case = "" if run.case is None else f", dispersed case {run.case}"
-    yield f"flown 0 to {moment(run.until)}, noise of seed {run.seed}{case}"
+        yield note("delay-margin", margin_s=least.delay, channel=least.channel)
+    yield note("loop-in-file", loop=described(run.loop))
+    if run.case is None:
+        yield note("loop-flown", until_s=run.until, seed=run.seed)
+    else:
+        yield note("loop-case-flown", until_s=run.until, seed=run.seed, case=run.case)
 
 
 def _verdict(plan: LoopPlan, decision: Decision) -> Iterator[Text]:
     run = plan.flown_run
     if run.stop.fault:
-        yield Text.assemble(("Stopped: ", "bold red"), f"{stopped(run)}.")
+        yield screen_line(stopped(run))
     elif run.case is not None:
         met = {None: "", True: " meets the requirement", False: " does NOT meet the requirement"}
         yield Text(f"Dispersed case {run.case} of seed {run.seed}{met[plan.meets_requirement]}.")
@@ -149,27 +164,25 @@ def described(loop: Loop, *, thresholds: bool = True) -> str:
     return f"Loop: {loop.law}, from {kind} ({rate}){band}; {timing}"
 
 
-def stopped(run: LoopRun) -> str:
-    """The reason why the loop was stopped; empty where it was flown to its end."""
-    if not run.stop.fault:
-        return ""
-    after = f"at {moment(run.fired[-1].pulse.end)}, firings: {len(run.fired)}: " if run.fired else ""
-    name, fired = run.channel, " and ".join(dict.fromkeys(firing.pulse.channel for firing in run.fired))
-    reasons = {
-        Ending.EMPTY: "the tank is empty, and nothing fires any more",
-        Ending.SENSOR: f"the sensor is reversed, or else {fired} are all wired backwards: each firing changed what the "
-        "sensor shows against what it should",
-        Ending.CHANNEL: f"channel {name} is wired backwards: it fed the nutation, and another channel damps it",
-        Ending.UNCLEAR: f"channel {name} is wired backwards, or the sensor is reversed: no other channel fired to tell",
-        Ending.IDLE: f"channel {name} does nothing, or much less than its torque should",
-        Ending.FED: "the firings feed the nutation: sensor or channels are reversed, or they come at the wrong time; "
-        "bias, noise or delay hide which",
-        Ending.FEEDS: f"a firing of {name} fed the nutation: it came at the wrong time",
-    }
-    return after + reasons[run.stop]
+STOPS = {  # codes of notes on a loop that was stopped
+    Ending.EMPTY: "loop-tank-empty",
+    Ending.SENSOR: "loop-all-reversed",
+    Ending.CHANNEL: "loop-channel-reversed",
+    Ending.UNCLEAR: "loop-channel-or-sensor",
+    Ending.IDLE: "loop-channel-idle",
+    Ending.FED: "loop-feeds",
+    Ending.FEEDS: "loop-firing-late",
+}
 
 
-def warnings(spacecraft: Spacecraft) -> Iterator[str]:
+def stopped(run: LoopRun) -> Note:
+    """The reason why the loop was stopped by a fault."""
+    channels = ", ".join(dict.fromkeys(firing.pulse.channel for firing in run.fired))
+    at = run.fired[-1].pulse.end if run.fired else 0.0
+    return note(STOPS[run.stop], at_s=at, firings=len(run.fired), channel=run.channel, channels=channels)
+
+
+def warnings(spacecraft: Spacecraft) -> Iterator[Note]:
     """Parts of the loop in the file that will feed the nutation, or waste propellant: before it is flown."""
     loop = spacecraft.loop
     if loop is None:
@@ -177,29 +190,22 @@ def warnings(spacecraft: Spacecraft) -> Iterator[str]:
     per_channel = margins(spacecraft, loop)
     turned = [margin.channel for margin in per_channel if margin.turned]
     if turned and len(turned) == len(per_channel) and loop.sensor.scale < 0.0:
-        scale = f"loop.sensor.scale = {100.0 * loop.sensor.scale:g} %"
-        yield f"{scale} is a reversed sensor: every firing feeds the nutation"
+        yield note("sensor-reversed", scale_percent=100.0 * loop.sensor.scale)
     elif turned:
-        yield f"loop: firings feed the nutation, wired backwards against the sensor: {' and '.join(turned)}"
+        yield note("channels-reversed", channels=", ".join(turned))
     late = feeding(spacecraft, loop)
     if late is not None:
-        yield too_late(late)
-    band = dead_band(spacecraft, loop)
+        yield note("loop-does-not-damp", why=too_late(late))
+    band, start, stop = dead_band(spacecraft, loop), math.degrees(loop.start), math.degrees(loop.stop)
+    step, noise = math.degrees(band.step), math.degrees(band.noise)
     if band.step > loop.start * (1.0 + 1e-9):
-        yield (
-            f"loop.start is below {degrees(band.step)}, which the smallest pulse takes away: such a firing leaves "
-            "up to as much as before; a start above it needs less propellant"
-        )
+        yield note("start-below-pulse", start_deg=start, step_deg=step)
     if 0.5 * band.step > loop.stop > 0.0:
-        yield (
-            f"half of {degrees(band.step)}, which the smallest pulse takes away, is above loop.stop: a firing may "
-            "leave more than stop that no pulse lowers, and the loop then never pauses"
-        )
-    noise = f"noise, bias and steps of the sensor, {degrees(band.noise)}, are above"
+        yield note("stop-below-pulse", stop_deg=stop, step_deg=step)
     if band.noise > loop.start:
-        yield f"{noise} loop.start: they set off firings"
+        yield note("start-below-noise", start_deg=start, noise_deg=noise)
     elif band.noise > loop.stop > 0.0:
-        yield f"{noise} loop.stop"
+        yield note("stop-below-noise", stop_deg=stop, noise_deg=noise)
 
 
 def _settled(run: LoopRun) -> str:
@@ -233,9 +239,10 @@ def _differences(verification: LoopVerification) -> DataTable:
 
 
 def loop_json(plan: LoopPlan) -> dict[str, Any]:
-    """Firings with the nutation seen, final motion, dead band, and margin of each channel before it feeds."""
+    """Firings with the nutation seen, final motion, dead band, margin of each channel before it feeds, and notes."""
     run, body = plan.flown_run, plan.spacecraft
     pulses = zip(pulse_table(run.flight).json("flown"), firing_table(run).json(), strict=True)
+    faults = [stopped(run)] if run.stop.fault else []
     return {
         **heading(body),
         **tables.values_of(run, "law=loop.law", "seed", "case", "until_s"),
@@ -252,6 +259,7 @@ def loop_json(plan: LoopPlan) -> dict[str, Any]:
         "final": decisions.final_json(plan.flight),
         "target": decisions.target_json(body),
         "margins": margin_table(plan.margins).json(),
+        "notes": [note_json(entry) for entry in (*faults, *ordered(_notes(plan, Decision(plan))))],
     }
 
 
@@ -319,97 +327,95 @@ def budget_table(budget: Budget) -> DataTable:
 
 def budget_screen(budget: Budget, *, verbose: bool = True) -> RenderableType:
     """The screen of ``budget``."""
-    first, *others = _outlook(budget)
-    head = [*opening(budget.spacecraft, verbose), Text(first, style="bold"), *map(Text, others)]
-    head += warnings_of(_warnings(budget))
+    head = [*opening(budget.spacecraft, verbose), *(Text(line, "bold") for line in sentences(_outlook(budget)))]
     rows = partial(budget_table(budget).screen, "screen") if budget.held else None
-    remarks = _notes(budget) if budget.held else ()
-    return summary(head, rows, remarks, "--csv budget.csv · --plot budget.png · nutdamp loop", verbose=verbose)
+    steps = "--csv budget.csv · --plot budget.png · nutdamp loop"
+    return summary(head, rows, _budget_notes(budget), steps, verbose=verbose)
 
 
-def _outlook(budget: Budget) -> Iterator[str]:
-    body, limit = budget.spacecraft, budget.largest
-    now = degrees(body.nutation)
+def _outlook(budget: Budget) -> Iterator[Note]:
+    body, limit = budget.spacecraft, None if budget.largest is None else math.degrees(budget.largest)
+    now, until = math.degrees(body.nutation), budget.until_largest
     if body.growth == 0.0:
-        yield f"The nutation stays at {now}: a sphere has no energy to lose. No damping is needed to hold it."
+        yield note("nutation-stays", nutation_deg=now)
     elif body.growth < 0.0:
-        already, then = budget.until_largest == 0.0, ""
-        if limit is not None:
-            then = f"; it is below {most(limit)} " + ("already" if already else f"in {lasting(budget.until_largest)}")
-        yield f"No damping is needed: the nutation decays, e-fold in {lasting(-1.0 / body.growth)}{then}."
+        decay = -1.0 / body.growth
+        if limit is None:
+            yield note("nutation-decays", e_fold_lasting_s=decay)
+        elif until == 0.0:
+            yield note("nutation-decayed", e_fold_lasting_s=decay, limit_deg=limit)
+        else:
+            yield note("nutation-decays-below", e_fold_lasting_s=decay, limit_deg=limit, until_lasting_s=until)
     elif body.nutation == 0.0:
-        yield "There is no nutation yet that could grow."
+        yield note("no-nutation-yet")
     elif limit is None:
-        yield "No largest nutation is named: give requirement.nutation or --largest, to see when damping must begin."
-    elif budget.until_largest == 0.0:
-        yield f"Damping must begin now: the nutation of {now} is not below {most(limit)}."
+        yield note("no-largest-nutation")
+    elif until == 0.0:
+        yield note("damping-due", nutation_deg=now, limit_deg=limit)
     else:
-        within = lasting(budget.until_largest)
-        yield f"Damping must begin within {within}: from {now} now the nutation grows to {most(limit)}."
+        yield note("damping-within", until_lasting_s=until, nutation_deg=now, limit_deg=limit)
     if body.growth > 0.0 and body.loop is None:
-        yield "Pulses a day and propellant a year need a closed loop: the key loop of the file (nutdamp explain loop)."
+        yield note("budget-needs-loop")
 
 
-def _warnings(budget: Budget) -> Iterator[str]:
+def _budget_notes(budget: Budget) -> Iterator[Note]:
+    """Warnings of each pair of thresholds, then what the figures rest on; none without any pair."""
     body = budget.spacecraft
-    warned: dict[str, str] = {}
+    if not budget.held:
+        return
     for row in budget.held:
-        named = f"{most(row.thresholds.start)} to {most(row.thresholds.stop)}: " if len(budget.held) > 1 else ""
-        for text in _warnings_of_row(row, budget):
-            warned.setdefault(text, f"{named}{text}")
-    yield from warned.values()
+        yield from _row_warnings(row, budget)
     changes = [row.slows for row in budget.held if row.slows is not None]
     if changes and max(map(abs, changes)) > SLOW:
-        worst = max(changes, key=abs) * DAY / YEAR
-        yield f"the spin changes by up to {100.0 * worst:.3g} % a day: the figures are those of the present spin"
-    if body.disturbances and budget.held:
-        yield "disturbances of the file are left out"
+        yield note("spin-changes", change_percent=100.0 * max(changes, key=abs) * DAY / YEAR)
+    if body.disturbances:
+        yield note("disturbances-left-out")
+    known = [row.cycle.doubt for row in budget.held if row.cycle is not None]
+    if known:
+        yield note("budget-accuracy", sigma=f"{100.0 * max(known):.2g} %")
+    yield note("cycle-angles")
+    band = next((row.band for row in budget.held if row.band is not None), None)
+    if band is not None:
+        step = math.degrees(band.step)
+        yield note("smallest-pulse", step_deg=step, least_deg=0.5 * step)
+    for begins in dict.fromkeys(row.begins for row in budget.held):
+        starts = ", ".join(most(row.thresholds.start) for row in budget.held if row.begins == begins)
+        if math.isinf(begins):
+            yield note("first-firing-by-noise")
+        elif begins == 0.0:
+            yield note("first-firing-now", thresholds=starts)
+        else:
+            yield note("first-firing", thresholds=starts, after_lasting_s=begins)
+    if band is not None:
+        yield note("sensor-noise", noise_deg=math.degrees(band.noise))
+    if body.tank is not None:
+        yield note("tank-days")
+    if body.cold is not None:
+        yield note("nozzles-warm")
+    if body.loop is not None:
+        yield note("loop-in-file", loop=described(body.loop, thresholds=False))
 
 
-def _warnings_of_row(row: HeldNutation, budget: Budget) -> Iterator[str]:
+def _row_warnings(row: HeldNutation, budget: Budget) -> Iterator[Note]:
     body, loop = budget.spacecraft, budget.spacecraft.loop
     assert loop is not None
+    start, stop = math.degrees(row.thresholds.start), math.degrees(row.thresholds.stop)
     if row.why:
-        yield row.why
+        yield note("no-limit-cycle", why=row.why, start_deg=start, stop_deg=stop)
     else:
         yield from warnings(replace(body, loop=replace(loop, start=row.thresholds.start, stop=row.thresholds.stop)))
     if row.cycle is not None and row.cycle.cycles == 0.0:
-        yield "the loop never falls quiet: it fires whenever a channel comes into line"
+        yield note("never-quiet", start_deg=start, stop_deg=stop)
         if loop.sensor.noise == 0.0 and loop.stop > 0.0:
-            yield "without noise the number of its pulses is known to a factor of two only"
+            yield note("pulses-to-a-factor-of-two", start_deg=start, stop_deg=stop)
     if row.noisy:
-        yield (
-            f"the noise of the sensor is above {100.0 * NOISY:g} % of loop.start: the loop fires more often than "
-            f"the figures say, which are known to {100.0 * WIDENED:g} % only"
-        )
+        yield note("start-noisy", start_deg=start, noise_share=100.0 * NOISY, known_share=100.0 * WIDENED)
     if row.other is not None and row.cycle is not None:
         words = ("never falls quiet", "falls quiet between firings")
-        kept, takes = (words[cycle.cycles > 0.0] for cycle in (row.cycle, row.other))
-        takes += f", with {row.other.pulses * DAY:.4g} pulses a day"
-        takes += "" if row.other.propellant is None else f" and {quantity(row.other.propellant * YEAR, 'kg')} a year"
-        yield f"the loop has two limit cycles: the figures are those in which it {kept}; in the other one it {takes}"
-
-
-def _notes(budget: Budget) -> Iterator[str]:
-    known = [row.cycle.doubt for row in budget.held if row.cycle is not None]
-    if known:
-        yield f"accuracy: {100.0 * max(known):.1g} % (one sigma), at the present spin"
-    yield "after, before firing: mean nutation of a cycle; max: the largest of all"
-    band = next((row.band for row in budget.held if row.band is not None), None)
-    if band is not None:
-        yield f"smallest pulse: takes away {degrees(band.step)}; below {degrees(0.5 * band.step)} no firing helps"
-    for begins in dict.fromkeys(row.begins for row in budget.held):
-        starts = ", ".join(most(row.thresholds.start) for row in budget.held if row.begins == begins)
-        never = "when noise shows it, with no nutation that could grow" if math.isinf(begins) else ""
-        yield f"first firing: {never or ('now' if begins == 0.0 else f'in {lasting(begins)}, at {starts}')}"
-    if band is not None:
-        yield f"sensor: noise, bias and steps of up to {degrees(band.noise)} in a nutation period"
-    if budget.spacecraft.tank is not None:
-        yield "tank: days until it is empty; pulses and propellant are those of the full tank"
-    if budget.spacecraft.cold is not None:
-        yield "nozzles: taken as warm"
-    if budget.spacecraft.loop is not None:
-        yield described(budget.spacecraft.loop, thresholds=False)
+        held, other = (words[cycle.cycles > 0.0] for cycle in (row.cycle, row.other))
+        used = None if row.other.propellant is None else row.other.propellant * YEAR
+        yield note("two-limit-cycles", held=held, other=other, pulses=f"{row.other.pulses * DAY:.4g}",
+                   propellant=quantity(used, "kg"), start_deg=start, stop_deg=stop)  # fmt: skip
 
 
 def budget_csv(budget: Budget) -> str:
@@ -418,11 +424,12 @@ def budget_csv(budget: Budget) -> str:
 
 
 def budget_json(budget: Budget) -> dict[str, Any]:
-    """Growth of the nutation, and every row."""
+    """Growth of the nutation, every row, and notes."""
     table = budget_table(budget)
     others = replace(table, rows=[replace(held, cycle=held.other) for held in budget.held])
     return {
         **heading(budget.spacecraft),
+        "notes": [note_json(entry) for entry in (*_outlook(budget), *ordered(_budget_notes(budget)))],
         **tables.values_of(
             budget, "growth_1_s=spacecraft.growth", "largest_deg", "until_largest_s", "law=spacecraft.loop.law"
         ),

@@ -28,7 +28,6 @@ from nutdamp.spacecraft.schedule import STEERABLE, Pulse, Schedule
 from nutdamp.units import screen_unit
 from nutdamp.views.tables import TEXT, WHOLE, WIDTH, Column, DataTable, Shared, angle_of, facts, lines_of, to_figures
 from nutdamp.views.text import (
-    NOTE,
     RPM,
     WARNING,
     degrees,
@@ -38,9 +37,11 @@ from nutdamp.views.text import (
     mass,
     moment,
     most,
+    ordered,
     pointing,
     quantity,
     screen_line,
+    severity,
     short_angle,
     small_angle,
     steering,
@@ -231,44 +232,33 @@ def opening(body: Spacecraft, verbose: bool) -> Iterator[RenderableType]:
     yield from (Text(body.name, style="bold"), derived_table(body), Text()) if verbose else title(body)
 
 
-Remark = str | Note
-"""A note of the catalogue, or a sentence of one screen."""
-
-
-def line_of(remark: Remark, level: str = NOTE) -> Text:
-    """A remark as a line of a screen; ``level``: severity of a sentence."""
-    if isinstance(remark, Note):
-        return screen_line(remark)
-    return Text.assemble((f"{level}: ", "bold red" if level == WARNING else "bold"), remark.removesuffix("."))
-
-
-def warnings_of(remarks: Iterable[Remark]) -> list[Text]:
-    """Warnings, each once."""
-    return [line_of(remark, WARNING) for remark in dict.fromkeys(remarks)]
-
-
 def summary(
     head: Sequence[RenderableType],
     table: Rows | None,
-    remarks: Iterable[Remark],
+    notes: Iterable[Note],
     steps: str,
     *,
     more: Iterable[RenderableType] = (),
     verbose: bool = False,
 ) -> RenderableType:
-    """A default screen, with ``steps`` to take next; ``verbose``: with all rows and remarks, and ``more`` parts."""
-    notes = [line_of(remark) for remark in dict.fromkeys(remarks) if remark]
+    """A default screen, warnings below its ``head``, and ``steps`` to take next.
+
+    ``verbose``: with all rows and notes, and ``more`` parts.
+    """
+    every = ordered(notes)
+    warnings = [screen_line(entry) for entry in every if severity(entry) == WARNING]
+    others = [screen_line(entry) for entry in every[len(warnings) :]]
     if verbose:
         body = [Text(), table()] if table is not None else []
         for part in more:
             body += [Text(), part]
-        return Group(*head, *body, *[Text()] * bool(notes), *notes)
+        return Group(*head, *warnings, *body, *[Text()] * bool(others), *others)
 
     def screen(rows: int, count: int) -> Group:
         body = [Text(), table(first=rows)] if table is not None else []
-        hidden = f" ({len(notes) - count} more)" if len(notes) > count else ""
+        hidden = f" ({len(others) - count} more)" if len(others) > count else ""
         last = Text(f"-v all values{hidden} · {steps}", style="dim")
-        return Group(*head, *body, *[Text()] * bool(body), *notes[:count], last)
+        return Group(*head, *warnings, *body, *[Text()] * bool(body), *others[:count], last)
 
     sizes = (screen(*size) for size in SIZES)
     return next((shown for shown in sizes if lines_of(shown) <= LINES), screen(*SIZES[-1]))
@@ -305,10 +295,6 @@ def _effects(flown: Flight, velocity: Vector | None) -> Iterator[tuple[str, str]
     yield "propellant", spent
     if velocity is not None:
         yield "|ΔV|", quantity(float(np.linalg.norm(velocity)), "m/s")
-
-
-FRAME_N = "tilt from H(0); azimuth about it, from the initial tilt direction"
-"""Frame of the two angles of a direction without an attitude in the file."""
 
 
 def title(body: Spacecraft) -> list[Text]:

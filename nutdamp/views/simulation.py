@@ -17,6 +17,7 @@ import numpy as np
 from rich.console import Group, RenderableType
 from rich.text import Text
 
+from nutdamp.common.results import Note, note
 from nutdamp.errors import BadRequest
 from nutdamp.files.tabular import number
 from nutdamp.flight import end_state, propagation
@@ -32,7 +33,7 @@ from nutdamp.spacecraft.requirements import Part
 from nutdamp.spacecraft.schedule import Pulse, Schedule
 from nutdamp.views import decisions, parts, tables
 from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, FittedColumns, Shared, angle_of, facts, to_figures
-from nutdamp.views.text import MISSING, degrees, longitude, moment, pointing, small_angle
+from nutdamp.views.text import MISSING, degrees, longitude, moment, pointing, screen_line, small_angle
 
 MODELS = {IMPULSE_SUM: "impulse approximation (17)", REAL_WIDTHS: "full simulation"}  # names of the two models
 
@@ -60,22 +61,29 @@ def simulation_screen(simulation: Simulation, *, verbose: bool = True) -> Render
     fired = f"{spent}, last ends at {end}" if len(simulation.flown.schedule) else "no pulse"
     track = f"track by the {simulation.shown.model}, 0 to {moment(extremes.until)}"
     headline = Text.assemble("SIMULATED ", (simulation.plan.scheme, "bold"), f": {fired}; {track}")
-    head = [*parts.opening(body, verbose), headline]
-    begun, pulses, cut = len(simulation.shown.schedule), len(simulation.plan.pulses), []
-    if begun < pulses:
-        cut = [f"the track ends at {moment(extremes.until)}, with {begun or 'none'} of {pulses} pulses begun"]
-    head += parts.warnings_of([*cut, *model_warnings(simulation.impulses, simulation.flown)])
+    head = [*parts.opening(body, verbose), headline, decisions.statement(decided), *decisions.margin_lines(decided)]
     ends = DataTable("", tuple(_columns(simulation)), (simulation.impulses, simulation.flown))
-    near, far = (f"{degrees(angle)} at {moment(at)}" for angle, at in (extremes.nearest, extremes.farthest))
-    remarks: list[parts.Remark] = [*decision_notes(decided), f"spin axis from H(0): min {near}, max {far}"]
     return parts.summary(
-        [*head, decisions.statement(decided), *decisions.margin_lines(decided)],
+        head,
         lambda **_: ends.transposed("screen", f"end of track, {moment(extremes.until)}"),
-        [*remarks, *[parts.FRAME_N] * (body.attitude is None)],
+        _notes(simulation),
         "--csv track.csv · --plot motion.png · nutdamp verify",
         more=[*_fired(simulation), facts(_extremes(simulation))] if verbose else (),
         verbose=verbose,
     )
+
+
+def _notes(simulation: Simulation) -> Iterator[Note]:
+    extremes, begun, pulses = simulation.extremes, len(simulation.shown.schedule), len(simulation.plan.pulses)
+    if begun < pulses:
+        yield note("track-cut", until_s=extremes.until, begun=begun, pulses=pulses)
+    yield from model_warnings(simulation.impulses, simulation.flown)
+    yield from decision_notes(simulation.decision)
+    (near, near_at), (far, far_at) = extremes.nearest, extremes.farthest
+    near, far = math.degrees(near), math.degrees(far)
+    yield note("axis-track", nearest_deg=near, nearest_s=near_at, farthest_deg=far, farthest_s=far_at)
+    if simulation.flown.spacecraft.attitude is None:
+        yield note("frame-n")
 
 
 def _fired(simulation: Simulation) -> Iterator[RenderableType]:
@@ -260,13 +268,13 @@ BUDGET_NOTE = (  # note on `budget_table`
 
 def verification_brief(plan: Plan, verification: Verification) -> RenderableType:
     """The default screen of ``verify``: verdict, requirement, methods."""
-    notes = [conservation(verification), *_missing(verification)]
+    notes = [conservation(verification)]
     # The imperfection that leaves the most nutation alone, where one leaves more than ideal impulses.
     single = [row for row in verification.budget if row.name not in (IDEAL, AS_FLOWN) and WITHOUT not in row.name]
     most = max(single, key=lambda row: row.nutation, default=None)
     if most is not None and most.nutation - verification.budget[0].nutation > SHOWN:
-        largest = f"Largest single imperfection: {most.name}, which alone leaves {degrees(most.nutation)} of nutation."
-        notes.insert(1, largest)
+        notes.append(note("largest-imperfection", imperfection=most.name, nutation_deg=math.degrees(most.nutation)))
+    notes += _missing(verification)
     return parts.summary(
         [*_head(plan, verification)], lambda **_: methods_table(verification), notes, "--json verified.json"
     )
@@ -293,7 +301,7 @@ def verification_screen(plan: Plan, verification: Verification) -> RenderableTyp
         Text(),
         methods_table(verification),
     ]
-    kept = [*map(Text, _missing(verification)), Text(), Text(conservation(verification))]
+    kept = [*map(screen_line, (*_missing(verification), conservation(verification)))]
     return Group(
         *ways, *kept, Text(), Text(BUDGET, "bold"), Text(), budget_table(body, verification), Text(BUDGET_NOTE, "dim")
     )
@@ -355,8 +363,9 @@ def budget_table(spacecraft: Spacecraft, verification: Verification) -> FittedCo
     return DataTable(BUDGET, IMPERFECTIONS, verification.budget, spacecraft).screen("screen")
 
 
-def _missing(verification: Verification) -> list[str]:
-    return [f"{method.name}: {method.missing}" for method in verification.methods if method.missing]
+def _missing(verification: Verification) -> list[Note]:
+    absent = ((method.name, method.missing) for method in verification.methods if method.missing)
+    return [note("method-missing", method=name, why=why) for name, why in absent]
 
 
 def verdict(verification: Verification) -> str:
@@ -367,10 +376,9 @@ def verdict(verification: Verification) -> str:
     return f"The flown motion and {' and '.join(names)} {how} (within {AGREE:g} rad)."
 
 
-def conservation(verification: Verification) -> str:
-    """Sentence on the change of |H| and of the energy on coasts, and its cause."""
-    momentum, energy = map(_course, (verification.momentum, verification.energy))
-    return f"On coasts |H| is {momentum}, the energy {energy}."
+def conservation(verification: Verification) -> Note:
+    """The change of |H| and of the energy on coasts, and its cause."""
+    return note("on-coasts", momentum=_course(verification.momentum), energy=_course(verification.energy))
 
 
 def _course(course: Conservation) -> str:

@@ -11,6 +11,7 @@ import numpy as np
 from rich.console import RenderableType
 from rich.text import Text
 
+from nutdamp.common.results import Note, note
 from nutdamp.montecarlo.inputs import DispersedInput, Unused, together
 from nutdamp.montecarlo.statistics import FirstOrder
 from nutdamp.montecarlo.study import EARLY, Results, Study
@@ -19,7 +20,7 @@ from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.requirements import Part
 from nutdamp.units import screen_unit
 from nutdamp.views.tables import TEXT, Column, DataTable, FittedColumns, Shared, facts
-from nutdamp.views.text import quantity
+from nutdamp.views.text import quantity, sentences
 
 SHOWN = {  # units for people of those of inputs, and the factor
     "rad": ("deg", 180.0 / math.pi),
@@ -110,21 +111,22 @@ def tolerance_budget(results: Results) -> list[RenderableType]:
         columns.append(Column("", Shared.LINEAR, "%", partial(linear, output), where="screen"))
         columns.append(Column("", Shared.CASES, "%", partial(seen, at, output), where="screen"))
     table = DataTable("Tolerance budget", columns, [*rows, BudgetRow("interactions", "", (0.0, 0.0), [], False)])
-    note = (
+    caption = (
         "Effect: of the input alone. Shares of the variance of the residual vector: linear by derivatives of the "
         f"flight; cases by the first {min(results.done, EARLY):,} cases (first-order Sobol index), an estimate that "
         "may not total 100 %."
     )
     if study.model.groups:
-        note += " Correlated inputs vary together: their effect is the root mean square of the group."
-    return [Text(table.title, "bold"), table.screen("screen"), Text(note, "dim"), *map(Text, main_causes(results))]
+        caption += " Correlated inputs vary together: their effect is the root mean square of the group."
+    causes = map(Text, sentences(main_causes(results)))
+    return [Text(table.title, "bold"), table.screen("screen"), Text(caption, "dim"), *causes]
 
 
 def _percent(share: float) -> str:
     return f"{100 * share:.1f}" if share >= 5e-4 else "0"
 
 
-def main_causes(results: Results) -> Iterator[str]:
+def main_causes(results: Results) -> Iterator[Note]:
     """The tolerances of the file with the largest shares of each residual."""
     first = results.study.first_order
     for output, name in budgeted_outputs(results.study):
@@ -137,7 +139,7 @@ def main_causes(results: Results) -> Iterator[str]:
         ranked = sorted(sums.items(), key=lambda item: -item[1])
         leading = [f"{key} ({100 * share:.1f} %)" for key, share in ranked if share >= 0.1]
         if any(sums.values()):
-            yield f"Main causes of {name}: {', '.join(leading or [ranked[0][0]])}."
+            yield note("main-causes", part=name, causes=", ".join(leading or [ranked[0][0]]))
 
 
 def budgeted_outputs(study: Study) -> tuple[tuple[str, str], tuple[str, str]]:

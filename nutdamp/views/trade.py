@@ -24,19 +24,11 @@ from nutdamp.views import decisions
 from nutdamp.views.decisions import FARTHER, heading, plan_json
 from nutdamp.views.parts import derived_table, pulse_table, requested, summary
 from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable, Shared, angle_of, file_columns, values_of
-from nutdamp.views.text import cost, degrees, fixed, small_angle
+from nutdamp.views.text import cost, degrees, fixed, sentences, small_angle
 
 ROWS = 18  # points on the default screen, at most: evenly some of more
 SOONER = 0.05  # share of its time by which a plan that costs as much has to end sooner to be worth a remark
 FAILS = "does not meet the requirement with nominal values"  # or breaks a cone
-BELOW = (  # note on points that cost less than their small-angle bound
-    "The small-angle bound is for plans that leave no nutation: where a cost is below it, the plan leaves a little, or "
-    "its flight at larger angles needs less."
-)
-
-OFF = (  # note on points whose H ends a little beside its target
-    "With real widths, ticks and on-time limits H ends slightly off the direction that the schedules were planned for."
-)
 
 
 class TradeRow(NamedTuple):
@@ -114,13 +106,13 @@ def trade_brief(spacecraft: Spacecraft, fronts: Sequence[Front]) -> RenderableTy
     """The default screen of ``trade``: the cheapest and the earliest schedule, the points of all fronts."""
     points, notes = rows_of(fronts), missing(spacecraft, fronts)
     if points and spacecraft.commands is not None:
-        notes.append("the pulses are timed one by one: no command block fires these schedules")
+        notes.append(note("trade-not-commandable"))
     if points and spacecraft.dispersions is not None:
-        notes.append("tolerances not checked (nutdamp disperse --schedule FOLDER/point-1.csv)")
+        notes.append(note("trade-not-dispersed"))
     shown = {round(at) for at in np.linspace(0, len(points) - 1, ROWS).tolist()} if points else ()
     rows = [points[index] for index in sorted(shown)]
     if len(rows) < len(points):
-        notes.append(f"Points on this screen: {len(rows)} of {len(points)}.")
+        notes.append(note("trade-points", shown=len(rows), count=len(points)))
     return summary(
         [*_head(spacecraft, fronts)],
         (lambda **_: _table(rows).screen("brief")) if points else None,
@@ -161,16 +153,16 @@ def front_parts(spacecraft: Spacecraft, fronts: Sequence[Front]) -> list[Rendera
             parts.append(_table([row for row in rows_of(fronts) if row.front is front]).screen("full"))
     priced = [(row.spent(row.point.cost), row.spent(row.least)) for row in rows_of(fronts)
               if row.least is not None and row.point.cost < row.least]  # fmt: skip
-    below = [BELOW] * any(spent != least for spent, least in priced)  # as the table writes both
-    for sentence in (*below, *_ends_off(fronts)):
+    below = [note("trade-below-bound")] * any(spent != least for spent, least in priced)  # as the table writes both
+    for sentence in sentences((*below, *_ends_off(fronts))):
         parts += [Text(), Text(sentence, style="dim")]
     return parts
 
 
-def _ends_off(fronts: Sequence[Front]) -> Iterator[str]:
+def _ends_off(fronts: Sequence[Front]) -> Iterator[Note]:
     off = [row.plan.flight.residual.axis_error for row in rows_of(fronts) if row.front.shift == 0.0]
     if max(off, default=0.0) > DAMPED_ANGLE:
-        yield OFF
+        yield note("trade-ends-off")
 
 
 def fails(point: Point) -> bool:
@@ -182,14 +174,14 @@ def _without_optimal(front: Front) -> str:
     return f"{'no schedule of optimal' if front.points else 'none'}: {front.why}"
 
 
-def missing(spacecraft: Spacecraft, traded: Sequence[Front]) -> list[str]:
-    """Sentences on fronts and points that a picture lacks, with the reasons."""
+def missing(spacecraft: Spacecraft, traded: Sequence[Front]) -> list[Note]:
+    """Fronts and points that a picture lacks, with the reasons."""
     pointing = spacecraft.goal.axis is not None
     fronts: dict[str, list[str]] = {}
     for entry in traded:
         if entry.why is not None:
             fronts.setdefault(_without_optimal(entry), []).append(front_name(entry, pointing=pointing))
-    return [f"{', '.join(names)} \N{EN DASH} {reason}" for reason, names in fronts.items()]
+    return [note("trade-missing", fronts=", ".join(names), why=reason) for reason, names in fronts.items()]
 
 
 def schemes_of(fronts: Sequence[Front]) -> list[str]:
@@ -260,10 +252,8 @@ def trade_notes(fronts: Sequence[Front], chosen: Plan) -> Iterator[Note]:
     """The schedule of a front that is better than the ``chosen`` plan, with its command; or that costs more than it."""
     better = _better(fronts, chosen)
     if better is not None:
-        (_, _, row), front = better, better[2].front
-        bound = (
-            "--free-axis " if math.isinf(front.shift) else f'--shift "{degrees(front.shift)}" ' * (front.shift > 0.0)
-        )
+        row, shift = better[2], better[2].front.shift
+        bound = "--free-axis " if math.isinf(shift) else f'--shift "{degrees(shift)}" ' * (shift > 0.0)
         horizon = f'--set "limits.horizon={row.point.horizon:.6g} s"'
         command = f"nutdamp plan SPACECRAFT --scheme {row.plan.scheme} {bound}{horizon}"
         shown = notes.figures(row.plan, chosen, row.point.unit == "kg")

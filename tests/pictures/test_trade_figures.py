@@ -18,6 +18,7 @@ from support.layout import check_layout, texts
 from support.shown import WIDE, check_star, legend_words
 
 from nutdamp.common.numerics import down
+from nutdamp.common.results import note
 from nutdamp.figures import studies
 from nutdamp.planning import plan as planning
 from nutdamp.planning import tradeoff
@@ -28,8 +29,8 @@ from nutdamp.schemes.catalogue import OptimalOptions
 from nutdamp.spacecraft.equipment import Steerable
 from nutdamp.spacecraft.model import Limits, Requirement, Spacecraft
 from nutdamp.spacecraft.schedule import Bounds, Schedule
-from nutdamp.views.text import cost, text
-from nutdamp.views.trade import BELOW, OFF, fails, front_parts, trade_notes
+from nutdamp.views.text import cost, sentences, text
+from nutdamp.views.trade import fails, front_parts, trade_notes
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 
@@ -124,13 +125,13 @@ def test_points_close_together_keep_numbers_that_can_be_read(count: int, later: 
     assert {str(number) for number in range(1, count + 1)} <= {text.get_text() for text, _ in texts(figure)}
     (axes,) = figure.axes
     joined = [np.asarray(line.get_xydata())[0] for line in axes.lines if line.get_label() == "_leader"]
-    named = {note.get_text(): note for note in axes.texts if isinstance(note, Annotation)}
-    spots = {name: np.asarray(axes.transData.transform(note.xy)) for name, note in named.items()}
-    for name, note in named.items() if count == 5 else ():
-        box = note.get_window_extent()
+    named = {label.get_text(): label for label in axes.texts if isinstance(label, Annotation)}
+    spots = {name: np.asarray(axes.transData.transform(label.xy)) for name, label in named.items()}
+    for name, label in named.items() if count == 5 else ():
+        box = label.get_window_extent()
         away = {other: np.hypot(*(np.clip(spot, box.min, box.max) - spot)) for other, spot in spots.items()}
         own = away.pop(name)
-        assert own < 0.5 * min(away.values()) or any(np.allclose(note.xy, end) for end in joined), name
+        assert own < 0.5 * min(away.values()) or any(np.allclose(label.xy, end) for end in joined), name
 
 
 @pytest.mark.deep
@@ -226,11 +227,12 @@ def test_a_table_says_why_h_ends_beside_where_it_was_and_how_costs_lie_below_the
     """The first of two pulses alone shifts H: on a front where H is not to move that is explained."""
     whole = front_of(WIDE, 1.0)
     shifted, still = (replace(front, shift=0.0) for front in (half_of(whole), whole))
-    for front, note, told in (
-        (shifted, OFF, True),
-        (replace(shifted, shift=math.inf), OFF, False),
-        (still, OFF, False),
-        (front_of(WIDE, 0.9), BELOW, True),
-        (front_of(WIDE, 1.1), BELOW, False),
+    for front, code, told in (
+        (shifted, "trade-ends-off", True),
+        (replace(shifted, shift=math.inf), "trade-ends-off", False),
+        (still, "trade-ends-off", False),
+        (front_of(WIDE, 0.9), "trade-below-bound", True),
+        (front_of(WIDE, 1.1), "trade-below-bound", False),
     ):
-        assert (note in [str(part) for part in front_parts(WIDE, [front])]) is told
+        (sentence,) = sentences([note(code)])
+        assert (sentence in [str(part) for part in front_parts(WIDE, [front])]) is told

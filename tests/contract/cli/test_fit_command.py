@@ -161,10 +161,10 @@ def test_remarks_are_in_the_json_and_a_schedule_outside_the_record_is_doubted(ru
     flight(tmp_path, 11, bias=0.05)
     assert run("fit", "flight.csv", "--schedule", "late.csv").returncode == 1
     (tmp_path / "late.csv").write_text(f"{PROBE}99,0.3,+M1\n", encoding="utf-8")
-    shown = fit(run, "flight.csv", "--schedule", "late.csv", "--json", "f.json").lower()
+    shown = fit(run, "flight.csv", "--schedule", "late.csv", "--json", "f.json")
     notes = results(tmp_path)["notes"]
-    check_text("fit.notes", "\n".join(notes))
-    assert all(" ".join(note.split()).lower() in shown for note in notes)
+    check_text("fit.notes", "\n".join(note["text"] for note in notes))
+    assert all(" ".join(f"{note['severity']}[{note['code']}]: {note['text']}".split()) in shown for note in notes)
 
 
 @pytest.mark.deep

@@ -96,13 +96,15 @@ def test_seeds_are_other_noise(run: Run, file: str, monkeypatch: pytest.MonkeyPa
 def test_what_is_wired_backwards_is_named(run: Run, file: str, tmp_path: Path, setting: str) -> None:
     screen = run("loop", file, "--set", setting, "--json", "loop.json")
     assert screen.returncode == 3
-    stopped = next(line for line in screen.stdout.splitlines() if line.startswith("Stopped"))
+    written = json.loads((tmp_path / "loop.json").read_text())
     checked = run("check", file, "--set", setting)
     assert checked.returncode == 0
-    warning = "".join(flat(checked.stdout).partition("warning: loop")[1:]).partition(" the nutation")[0]
-    wired = "channel" if "faults" in setting else "sensor"
-    check_text(f"loop.wired-{wired}", "\n".join([screen.stderr, stopped, warning]))
-    assert json.loads((tmp_path / "loop.json").read_text())["meets_requirement"] is False
+    wired, code = ("channel", "channels-reversed") if "faults" in setting else ("sensor", "sensor-reversed")
+    check_text(f"loop.wired-{wired}", "\n".join([screen.stderr, *(note["code"] for note in written["notes"])]))
+    assert written["notes"][0]["severity"] == "warning"
+    assert f"warning[{written['notes'][0]['code']}]: the loop was stopped" in flat(screen.stdout)
+    assert f"warning[{code}]: " in checked.stdout
+    assert written["meets_requirement"] is False
 
 
 def test_too_late_is_refused_with_what_is_allowed(run: Run, file: str) -> None:
@@ -110,7 +112,7 @@ def test_too_late_is_refused_with_what_is_allowed(run: Run, file: str) -> None:
     screen = run("loop", file, *late)
     assert (screen.returncode, screen.stdout) == (3, "")
     check_text("loop.refused-too-late", screen.stderr)
-    assert "warning: the loop does not damp" in flat(run("check", file, *late).stdout)
+    assert "warning[loop-does-not-damp]: " in flat(run("check", file, *late).stdout)
     margins = json.loads(run("check", file, *late, "--json", "-").stdout)["files"][0]["loop"]
     assert {each["damps"] for each in margins} == {False}
     assert margins[0]["delay_margin_s"] < 0.0
@@ -152,7 +154,7 @@ def test_where_nutation_grows_the_default_end_comes_after_a_cycle(run: Run, file
 
 def test_start_below_the_smallest_pulse_is_warned_of(run: Run, file: str) -> None:
     shown = flat(run("loop", file, *settings("loop.start=0.02deg", "loop.stop=0.001deg"), "--until", "5s").stdout)
-    assert "loop.start is below 0.02728 deg, which the smallest pulse takes away" in shown
+    assert "warning[start-below-pulse]: loop.start, 0.02 deg, is below 0.02728 deg" in shown
     assert "noise, bias and steps of the sensor" in shown
 
 

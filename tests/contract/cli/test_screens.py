@@ -73,7 +73,7 @@ def test_default_screens_are_short_and_cut_nothing(run: Run, name: str) -> None:
         assert len(lines) <= 40
         assert max(map(len, lines)) <= 80
         assert lines[-1].startswith("-v all values")
-        assert sum(line.startswith("note: ") for line in lines) <= 3
+        assert sum(line.startswith("note[") for line in lines) <= 3
         (table, *_), (whole, *_) = (tables(ended.stdout) for ended in (usual, wide))
         assert [row.split() for row in table] == [row.split() for row in whole]
 

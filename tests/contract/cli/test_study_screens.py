@@ -36,7 +36,7 @@ def check_screen(shown: str) -> None:
     assert len(lines) <= LINES
     assert max(map(len, lines)) <= WIDTH
     assert "…" not in shown
-    assert sum(line.startswith("note: ") for line in lines) <= 3
+    assert sum(line.startswith("note[") for line in lines) <= 3
     _, *tables, _ = shown.split("\n\n")
     assert len(tables) <= 1
     for table in tables:
@@ -75,7 +75,7 @@ def test_of_many_points_some_are_shown_the_first_and_the_last_among_them() -> No
     check_screen(shown)
     rows = re.findall(r"^(\d+) .*met$", shown, re.MULTILINE)
     assert (len(rows), rows[0], rows[-1]) == (ROWS, "1", "100")
-    assert f"Points on this screen: {ROWS} of 100" in shown
+    assert f"note[trade-points]: points on this screen: {ROWS} of 100" in shown
     assert len(re.findall(r"^\d+ .*met$", rendered(trade_screen(body, fronts)), re.MULTILINE)) == 100
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.special import chndtr
-from support.builders import spinner
+from support.builders import codes, noted, spinner
 from support.cases import deep, spread
 from support.golden import check_text, refused
 from support.loops import fired_by, fires, follow_few_cycles, four, rad
@@ -27,7 +27,7 @@ from nutdamp.physics.thruster import Cold, Tank, Trapezoid
 from nutdamp.spacecraft.equipment import BANG, ONE_PULSE, Channel, Loop, Sensor
 from nutdamp.spacecraft.model import Limits, Requirement, Spacecraft
 from nutdamp.spacecraft.requirements import reached
-from nutdamp.views.loop import _notes, _warnings
+from nutdamp.views.loop import _budget_notes
 
 
 def thrusters(torque: float = 6.0, least: float = 0.002, isp: float | None = 220.0) -> tuple[Channel, ...]:
@@ -274,9 +274,9 @@ def test_noise_above_a_tenth_of_start_widens_what_is_known(monkeypatch: pytest.M
     for share, noisy in ((0.05, False), (0.2, True)):
         held, cycle = held_by(craft(loop=loop(gyro(noise=share * start))))
         assert (held.noisy, cycle.doubt >= 0.2) == (noisy, noisy)
-        warnings = list(_warnings(Budget(held.spacecraft, None, (held,))))
-        assert any("above 10 % of loop.start" in warning for warning in warnings) is noisy
-    check_text("budget.noisy", "\n".join(warnings))
+        notes = list(_budget_notes(Budget(held.spacecraft, None, (held,))))
+        assert ("start-noisy" in codes(notes)) is noisy
+    check_text("budget.noisy", noted(notes))
 
 
 def test_pairs_of_thresholds_are_rows(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -339,11 +339,15 @@ def test_the_library_gives_what_the_command_writes(monkeypatch: pytest.MonkeyPat
         nutdamp.budget(replace(STAGE, loop=None), [(0.1, 0.05)])
 
 
-def test_the_table_says_what_its_columns_are() -> None:
+def test_the_table_says_what_its_columns_are(monkeypatch: pytest.MonkeyPatch) -> None:
+    follow_few_cycles(monkeypatch)
     body = craft(loop=loop(gyro()))
-    named = [note.partition(":")[0] for note in _notes(Budget(body, None, ()))]
-    assert "after, before firing" in named
-    assert ("tank" in named) is (body.tank is not None)
+    held = budget(body).held
+    named = codes(_budget_notes(Budget(body, None, held)))
+    assert "cycle-angles" in named
+    assert "tank-days" not in named
+    assert "tank-days" in codes(_budget_notes(Budget(replace(body, tank=Tank(0.15, 22e5, 8e5, 1.0)), None, held)))
+    assert not codes(_budget_notes(Budget(body, None, ())))
 
 
 def test_the_picture_shows_what_is_held() -> None:

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from rich.console import Console
+from support.builders import noted
 from support.golden import check_text, refused
 from support.synthetic import motion
 
@@ -157,7 +158,7 @@ def test_cases_near_a_bound_are_flown_and_the_others_cannot_pass_it(
 
 def test_what_pays_is_said_once_it_does() -> None:
     """Nutations left in deg: by coasts of 15, 30, 60 and 120 s, of which 30 s is the record, and by a probe pulse."""
-    clauses = []
+    lines = []
     for nutations, probe, met in (
         ((0.5, 0.4, 0.39, 0.38), None, 0.5),
         ((0.5, 0.4, 0.3, 0.1), 0.35, 0.5),
@@ -168,8 +169,8 @@ def test_what_pays_is_said_once_it_does() -> None:
         coasts = [Prospect(one, 1e-4, math.radians(left), met) for one, left in zip(lengths, nutations, strict=True)]
         coasts.insert(0, Prospect(7.5, 2e-4, 0.02, met))
         probes = () if probe is None else (Prospect(30.0, 1e-4, math.radians(probe), met, "T1", 0.5, 0.01, 0.004),)
-        clauses += [*advice(Outlook("optimal", tuple(coasts), probes, 0.997, 0.1)), "-"]
-    check_text("estimation.advice", "\n".join(clauses))
+        lines += [noted(advice(Outlook("optimal", tuple(coasts), probes, 0.997, 0.1))), "-"]
+    check_text("estimation.advice", "\n".join(lines))
 
 
 def test_a_probe_pulse_that_gains_more_per_propellant_is_named_beside_the_one_that_leaves_least() -> None:
@@ -182,7 +183,7 @@ def test_a_probe_pulse_that_gains_more_per_propellant_is_named_beside_the_one_th
     assert ahead.thrifty is probes[1]
     gains = [ahead.gain(probe) for probe in probes]
     assert [gain and math.degrees(gain) for gain in gains] == [*map(pytest.approx, (75.0, 100.0, 100.0)), None]
-    check_text("estimation.advice-propellant", "\n".join(advice(ahead)))
+    check_text("estimation.advice-propellant", noted(advice(ahead)))
     table = shown(prospect_table(ahead).screen("screen"))
     assert "0.075" in table
     assert "gain" in table

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support import reference
+from support.builders import noted
 from support.cases import spread
 from support.golden import check_text
 from support.places import case
@@ -108,7 +109,7 @@ def test_a_file_with_equal_moments_for_such_a_body_is_named(tmp_path: Path) -> N
     fitted = of_ace(path)
     thrust, _, of_thrust, _ = calibrated(fitted, "P1")
     assert abs(thrust - 1.0) < of_thrust < 0.02
-    check_text("estimation.equal-in-the-file", "\n".join(doubts(fitted)))
+    check_text("estimation.equal-in-the-file", noted(doubts(fitted)))
 
 
 @spread("seed", range(12), quick=0, deep=1)

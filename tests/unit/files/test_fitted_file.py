@@ -7,6 +7,7 @@ from collections.abc import Mapping
 
 import numpy as np
 import pytest
+from support.builders import noted
 from support.golden import check_text
 from support.hand_made_fit import silent, told
 
@@ -92,7 +93,7 @@ def test_the_file_holds_all_that_is_known_now() -> None:
     assert re.findall("#.*", text) == re.findall("#.*", FILE)
     units = "kg m^2", "rpm", "deg", "N", "N m", "ms"
     assert [bool(re.search(rf"[\d.] {re.escape(unit)}\b", text)) for unit in units] == [True] * 6
-    check_text("files.fitted-notes", "\n".join(notes(fit, known)))
+    check_text("files.fitted-notes", noted(notes(fit, known)))
 
 
 CASES: dict[str, tuple[str, Mapping[str, float], bool]] = {
@@ -123,7 +124,7 @@ def test_bodies_of_any_kind_are_written_as_the_file_has_them(name: str) -> None:
     if not unequal:
         assert now.growth == pytest.approx(values["growth"] if name != "not seen" else 0.0)
     shape = re.sub(r"\b\d[\d.e-]*", "#", written.partition("dispersions")[0])
-    check_text(f"files.fitted-{name.split()[0]}", shape + "\n".join(notes(fit, known)))
+    check_text(f"files.fitted-{name.split()[0]}", shape + noted(notes(fit, known)))
 
 
 def test_thrusters_that_did_not_fire_and_delays_that_no_valve_has_are_said() -> None:
@@ -132,7 +133,7 @@ def test_thrusters_that_did_not_fire_and_delays_that_no_valve_has_are_said() -> 
     values = {"thrust T1": 0.01, "thrust T 2": -0.9, "delay T1": -0.5, "delay T3": -0.02}
     fit = told(body, silent(*GYROS, schedule=fired), values, {})
     known = carried(fit, 0.0)
-    check_text("files.fitted-doubts", "\n".join(notes(fit, known)))
+    check_text("files.fitted-doubts", noted(notes(fit, known)))
     text = fitted_text(FILE, "f.yaml", [], fit, known)
     now = read_spacecraft(text, "now.yaml")
     assert "epoch: 2026-03-01T12:00:00Z" in text  # as it was

@@ -16,6 +16,7 @@ from nutdamp.planning.decision import compare, decide
 from nutdamp.planning.notes import TIES, alternatives, comparison_warnings, decision_notes, plan_notes, reasons
 from nutdamp.planning.recommendation import Gain
 from nutdamp.views.guide import note_entries
+from nutdamp.views.loop import STOPS
 from nutdamp.views.text import NAME, NOTE, REASON, WARNING, note_json, ordered, screen_line, text
 
 SOURCE = Path(nutdamp.__file__).parent
@@ -47,6 +48,7 @@ def test_every_code_has_a_sentence_and_every_sentence_its_values() -> None:
 def test_every_entry_is_used_and_says_what_it_means() -> None:
     used = {code for _, code, _ in CALLS} | {*(gain.value for gain in Gain), *TIES.values()}
     used |= {"cone-broken-at-start", "ideal-impulses", "ideal-torquer-assumed", "ideal-torque-missing"}
+    used |= {*STOPS.values(), "telemetry-enough", "coast-pays", "coast-does-not-pay"}
     assert set(note_entries()) == used
     for entry in note_entries().values():
         assert entry.severity in (WARNING, NOTE, REASON)
