@@ -380,7 +380,7 @@ class RealWidths:
         else:
             starts = _whole(cases.starts, count)
             impulses = np.array([_whole(impulse, count) for impulse in cases.impulses]).reshape(-1, 3, count)
-            pulses = batch.Pulses(starts, np.array(self.model.on_times), impulses, sheds=sheds)
+            pulses = batch.Pulses(starts, np.array(self.model.on_times).reshape(-1, 1), impulses, sheds=sheds)
             if self.model.schedule.shaped:
                 pulses = self._ramps(cases, starts, impulses, sheds)
             settled, turned = batch.fly(bodies, rates, upright, pulses, watch)

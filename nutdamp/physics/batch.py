@@ -1,9 +1,8 @@
 """Vectorised flight of many bodies: Euler's equations and the attitude through pulses of real width.
 
-Arrays carry the case last (structure of arrays). Each case has its own moments, motion, torques and edges. A stretch
-between two edges is an arc in closed form where the body is symmetric and no external torque acts, with energy
-dissipation too; else a Taylor series as in `taylor`, with an order and a number of steps common to a block of cases
-that stays in the cache.
+Arrays carry the case last. Each case has its own moments, motion, torques and edges. A stretch between two edges is an
+arc in closed form where the body is symmetric and no external torque acts, with energy dissipation too; else a Taylor
+series as in `taylor`, with an order and a number of steps common to a block of cases that stays in the cache.
 """
 
 from __future__ import annotations
@@ -199,11 +198,11 @@ class Bodies:
 
 @dataclass(frozen=True, slots=True)
 class Pulses:
-    """Rectangular pulses: ``starts`` (k, n) s, ``on_times`` (k,) s and ``impulses`` (k, 3, n) N m s, torque × on-time.
+    """Rectangular pulses: ``starts`` (k, n) s, ``on_times`` (k, n) s and ``impulses`` (k, 3, n) N m s, torque × on-time.
 
-    An on-time of 0 is an ideal impulse. With ``leans`` (k,) torques run evenly from 1 - lean times their mean to 1 +
-    lean times it. On-times and leans that differ are (k, n). The moments fall by ``sheds`` (k, 3, n) kg m², half as a
-    pulse begins and half as it ends, which errs in second order; None: they stay.
+    On-times are (k, 1) where all cases have the same; 0 is an ideal impulse. With ``leans`` (k, n) torques run evenly
+    from 1 - lean times their mean to 1 + lean times it. The moments fall by ``sheds`` (k, 3, n) kg m², half as a pulse
+    begins and half as it ends, which errs in second order; None: they stay.
     """
 
     starts: Array
@@ -214,8 +213,8 @@ class Pulses:
 
     def some(self, cases: Any) -> Pulses:
         """Subset of ``cases`` (an index of arrays)."""
-        on_times = self.on_times if self.on_times.ndim == 1 else self.on_times[:, cases]
-        leans = self.leans if self.leans is None or self.leans.ndim == 1 else self.leans[:, cases]
+        on_times = self.on_times if self.on_times.shape[1] == 1 else self.on_times[:, cases]
+        leans = None if self.leans is None else self.leans[:, cases]
         sheds = None if self.sheds is None else self.sheds[:, :, cases]
         return Pulses(self.starts[:, cases], on_times, self.impulses[:, :, cases], leans, sheds)
 
@@ -225,29 +224,25 @@ class Pulses:
         if self.leans is None or not self.leans.any():
             return None
         lasts = np.where(self.on_times == 0.0, 1.0, self.on_times)
-        return np.asarray(self.impulses * _of_each(2.0 * self.leans / lasts**2))
+        return self.impulses * (2.0 * self.leans / lasts**2)[:, None]
 
     @property
     def edges(self) -> Array:
         """Starts and ends in turn, (2k, n) s."""
-        ends = self.starts + (self.on_times[:, None] if self.on_times.ndim == 1 else self.on_times)
+        ends = self.starts + self.on_times
         return np.stack([self.starts, ends], axis=1).reshape(-1, self.starts.shape[1])
 
     @property
     def jumps(self) -> tuple[Array, Array]:
         """Jump at each edge, (2k, 3, n) each: of the torque in N m, and of the momentum in N m s."""
-        ideal = _of_each(self.on_times == 0.0)
-        torque = np.where(ideal, 0.0, self.impulses / _of_each(np.where(self.on_times == 0.0, 1.0, self.on_times)))
+        on_times = self.on_times[:, None]
+        ideal = on_times == 0.0
+        first = last = np.where(ideal, 0.0, self.impulses / np.where(ideal, 1.0, on_times))
         kick = np.where(ideal, self.impulses, 0.0)
         if self.leans is not None:  # what begins at its first value, less than its mean, ends at its last
-            first, last = _of_each(1.0 - self.leans) * torque, _of_each(1.0 + self.leans) * torque
-            return _edgewise(first, -last), _edgewise(kick, 0.0 * kick)
-        return _edgewise(torque, -torque), _edgewise(kick, 0.0 * kick)
-
-
-def _of_each(values: Any) -> Any:
-    """Values by pulse, (k,) or (k, n), broadcast against vectors (k, 3, n)."""
-    return values[:, None, None] if values.ndim == 1 else values[:, None, :]
+            leans = self.leans[:, None]
+            first, last = (1.0 - leans) * first, (1.0 + leans) * last
+        return _edgewise(first, -last), _edgewise(kick, 0.0 * kick)
 
 
 def _edgewise(begins: Array, ends: Array) -> Array:
@@ -520,13 +515,7 @@ def _integrate_symmetric(here: MotionStretch, duration: Array, acceleration: Arr
     """`_series` for I1 = I2 without dissipation or jerk, at its end: many steps at once, see `taylor.steps`."""
     bodies, rates, quaternion = here.bodies, here.rates, here.quaternion
     A, _, C = bodies.moments
-    drive = taylor.Drive(
-        1.0 - C / A,
-        acceleration[0] + 1j * acceleration[1],
-        acceleration[2],
-        tuple((size / A, rate) for size, rate in bodies.forcing.turning),
-        bodies.forcing.wheel / A,
-    )
+    drive = taylor.Drive.of(1.0 - C / A, acceleration, bodies.forcing, A)
     omega, spin = rates[0] + 1j * rates[1], rates[2]
     _expect_short(float(np.max(drive.pace(omega, spin, duration) * duration)))
     turned = np.stack([quaternion[0] + 1j * quaternion[3], quaternion[1] + 1j * quaternion[2]])

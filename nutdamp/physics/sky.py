@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -70,14 +70,14 @@ class AxisWatch:
     least: Array
     largest: Array
     sense: float
-    momentum: int | None = None
-    rows: Any = ...
+    momentum: int | None
+    rows: NDArray[np.intp]
 
     @classmethod
     def of(cls, directions: Array, sense: float, momentum: int | None = None) -> AxisWatch:
         """Observer without observations."""
         shape = len(directions), directions.shape[2]
-        return cls(directions, np.full(shape, math.pi), np.zeros(shape), sense, momentum)
+        return cls(directions, np.full(shape, math.pi), np.zeros(shape), sense, momentum, np.arange(shape[1]))
 
     @property
     def angles(self) -> Array:
@@ -86,15 +86,13 @@ class AxisWatch:
 
     def some(self, cases: Any) -> AxisWatch:
         """Observer of a subset of ``cases`` (an index of arrays), which adds to this one."""
-        rows = np.arange(self.least.shape[1])[self.rows][cases]
-        return AxisWatch(self.directions, self.least, self.largest, self.sense, self.momentum, rows)
+        return replace(self, rows=self.rows[cases])
 
     def motion(self, here: MotionStretch, duration: Array) -> None:
         """Record the motion that `batch.advance` makes with these arguments, which stay as they are."""
-        bodies = here.bodies
-        if here.torque is not None or not bodies.free:
+        if here.torque is not None or not here.bodies.free:
             self._steps(here, duration)
-        elif bodies.forcing.growth == 0.0:
+        elif here.bodies.forcing.growth == 0.0:
             self._arc(here, duration)
         else:
             self._slow(here, duration)
@@ -105,9 +103,8 @@ class AxisWatch:
         self.motion(here, CIRCLE * 0.5 * (first + second) / _momentum(here))
 
     def _take(self, number: int, least: Array, largest: Array, cases: Any = ...) -> None:
-        rows = np.arange(self.least.shape[1])[self.rows][cases]
-        np.minimum.at(self.least[number], rows, least)  # a case may come twice
-        np.maximum.at(self.largest[number], rows, largest)
+        np.minimum.at(self.least[number], self.rows[cases], least)  # a case may come twice
+        np.maximum.at(self.largest[number], self.rows[cases], largest)
 
     def _arc(self, here: MotionStretch, duration: Array) -> None:
         """Record start and inner extremes of arcs; their ends are starts of others."""
@@ -315,8 +312,7 @@ class SunPulseClock:
         begun = sun_pulse.moved(starts + pushes[0].begin)
         late = np.flatnonzero(sun_pulse.since < before.since)  # it came while the pulse before was on
         if len(late):
-            again = before.some(late).moved(begun.since[late])
-            begun.rates[:, late], begun.quaternion[:, late] = again.rates, again.quaternion
+            begun.rates[:, late], begun.quaternion[:, late] = before.some(late).moved(begun.since[late])[2:4]
         begun = begun._replace(bodies=before.bodies.lighter(half))
         self._stretches = [before]
         for push in pushes:

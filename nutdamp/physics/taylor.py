@@ -1,15 +1,13 @@
 """Taylor integration of Euler's equations and the attitude of one body under piecewise constant torques.
 
 The equations are polynomials in rates and quaternion, so the Taylor coefficients of a solution follow from one
-another by products of series. One step spans about two radians at rounding accuracy, for any principal moments, and
-the series is its own dense output; closed forms and plans are checked against it.
+another by products of series. One step spans about two radians at rounding accuracy, for any principal moments.
 
-Without dissipation the rates of a symmetric body do not depend on its attitude and are linear in their drive:
-ω' = -iaω3 ω + M/A with ω3 linear in time, Magnus 1970 (1). The rates at the ends of all steps follow from sums, and
-the steps of the attitude are independent of each other: arrays carry the steps and the cases, and the turns of the
-steps are multiplied at the end. A quaternion (w, x, y, z) is a pair of complex numbers there, p = w + iz and
-r = x + iy: dq/dt = q (0, ω)/2 becomes p' = (iω3 p - ω̄ r)/2 and r' = (ω p - iω3 r)/2, and the product of two is
-(p p* - r r̄*, p r* + r p̄*).
+Without dissipation the rates of a symmetric body are linear in their drive whatever its attitude: ω' = -iaω3 ω + M/A
+with ω3 linear in time, Magnus 1970 (1). The rates at the ends of all steps follow from sums, and the steps of the
+attitude are independent of each other: arrays carry the steps and the cases, and the turns of the steps are multiplied
+at the end. A quaternion (w, x, y, z) is a pair of complex numbers there, p = w + iz and r = x + iy: dq/dt = q (0, ω)/2
+becomes p' = (iω3 p - ω̄ r)/2 and r' = (ω p - iω3 r)/2, and the product of two is (p p* - r r̄*, p r* + r p̄*).
 """
 
 from __future__ import annotations
@@ -51,8 +49,14 @@ class Drive:
     a: Array
     transverse: ComplexArray
     axial: Array
-    turning: tuple[tuple[ComplexArray, float], ...] = ()
+    turning: tuple[tuple[ComplexArray | complex, float], ...] = ()
     wheel: Array | float = 0.0
+
+    @classmethod
+    def of(cls, a: Array, acceleration: Array, forcing: Forcing, A: Any) -> Drive:
+        """Drive by an angular ``acceleration`` (3, n) rad/s² besides the ``forcing``."""
+        turning = tuple((size / A, rate) for size, rate in forcing.turning)
+        return cls(a, acceleration[0] + 1j * acceleration[1], acceleration[2], turning, forcing.wheel / A)
 
     def pace(self, omega: ComplexArray, spin: Array, duration: Array) -> Array:
         """Upper bound (n,) in rad/s on all rates during the ``duration`` (n,) s."""
@@ -84,11 +88,9 @@ def steps(drive: Drive, omega: ComplexArray, spin: Array, start: Array, duration
 
     ``omega`` and ``spin`` (n,) rad/s at the start. Raises NotConverged.
     """
-    step, done = duration / count, 0
-    together = max(TOGETHER // len(spin), 1)
-    halvings = 0
+    step, done, halvings = duration / count, 0, 0
     while done < count:
-        some = min(together, count - done)
+        some = min(max(TOGETHER // len(spin), 1), count - done)
         series = _driven_series(drive, omega, spin, start + done * step, step, some)
         if series is None:
             if halvings == HALVINGS:
@@ -134,8 +136,7 @@ def _driven_series(drive: Drive, omega: ComplexArray, spin: Array, now: Array, s
         driven = _rates(np.zeros_like(forces[0]), turning, spins, wheel, forces, DRIVEN_ORDER).sum(axis=0)
         turned = np.cumsum(drive.a * step * (spins[0] + 0.5 * gained) - drive.wheel * step, axis=0)
         sums = omega + np.cumsum(np.exp(1j * turned) * driven, axis=0)
-        later = sums[:-1] * np.exp(-1j * turned[:-1])
-        omega_starts = np.concatenate([omega[None], later])
+        omega_starts = np.concatenate([omega[None], sums[:-1] * np.exp(-1j * turned[:-1])])
     else:
         omega_starts = np.broadcast_to(omega, starts.shape)
     while True:
@@ -163,8 +164,7 @@ def _powers(constant: ComplexArray, turning: list[tuple[Any, Any]]) -> list[Any]
     """Terms of the drive of ω in a step, times the step: the ``constant`` in the first only."""
     if not turning:
         return [constant]
-    terms: list[Any] = []
-    sizes = [size for size, _ in turning]
+    terms, sizes = list[Any](), [size for size, _ in turning]
     for order in range(DRIVEN_ORDER):
         terms.append(sum(sizes))
         sizes = [size * turn / (order + 1) for size, (_, turn) in zip(sizes, turning, strict=True)]
@@ -190,8 +190,7 @@ def _rates(omega: ComplexArray, turning: Any, spins: Array, wheel: Any, forces: 
 
 def _turns(rates: ComplexArray, spins: Array, step: Array, order: int) -> ComplexArray:
     """Series of the turn (order+1, 2, s, n) since the start of each step."""
-    shape = rates.shape[1:]
-    series = np.empty((order + 1, 2, *shape), dtype=complex)
+    series = np.empty((order + 1, 2, *rates.shape[1:]), dtype=complex)
     series[0, 0], series[0, 1] = 1.0, 0.0
     half = 0.5 * step
     across = np.stack([-rates.conj(), rates], axis=1) * half
@@ -325,7 +324,7 @@ def integrate(
     turned = (float(np.linalg.norm(rates)) + math.sqrt(strength) + fastest) * (end - start)
     even = jerk is None and falling is None
     if moments[0] == moments[1] and forcing.growth == 0.0 and even and not turned <= SHORT:
-        return _symmetric(moments, torque, rates, quaternion, start, end, forcing, most)
+        return _symmetric(moments, acceleration, rates, quaternion, start, end, forcing, most)
     size = float(np.linalg.norm(inertia * rates)) + abs(forcing.wheel) + strength * max(moments) * (end - start)
     floor = (AT_REST * size) ** 2
     gone, duration = 0.0, end - start  # counted from the start: a late clock cannot tell so short a step
@@ -349,9 +348,8 @@ def integrate(
         if left - step < 1e-3 * step:  # no sliver of a step at the end
             step = left
         scaled = series * ((step / unit) ** np.arange(ORDER + 1))[:, None]
-        piece = TaylorPiece(now, step, scaled[:, :3], scaled[:, 3:])
-        pieces.append(piece)
-        rates, quaternion = piece.final
+        pieces.append(TaylorPiece(now, step, scaled[:, :3], scaled[:, 3:]))
+        rates, quaternion = pieces[-1].final
         gone = duration if step == left else gone + step
     raise _refused(start, end)
 
@@ -367,7 +365,7 @@ def _refused(start: float, end: float, angle: float | None = None) -> Infeasible
 
 def _symmetric(
     moments: tuple[float, float, float],
-    torque: Array,
+    acceleration: Array,
     rates: Array,
     quaternion: Array,
     start: float,
@@ -377,22 +375,14 @@ def _symmetric(
 ) -> list[TaylorPiece]:
     """`integrate` for I1 = I2 without dissipation: many steps at once, see `steps`."""
     A, _, C = moments
-    drive = Drive(
-        np.array([(A - C) / A]),
-        np.array([complex(torque[0], torque[1]) / A]),
-        np.array([float(torque[2]) / C]),
-        tuple((np.array([size / A]), rate) for size, rate in forcing.turning),
-        forcing.wheel / A,
-    )
-    omega, spin = np.array([complex(rates[0], rates[1])]), np.array([float(rates[2])])
-    duration = np.array([end - start])
+    drive = Drive.of(np.array([(A - C) / A]), acceleration[:, None], forcing, A)
+    omega, spin, duration = np.array([complex(rates[0], rates[1])]), rates[2:], np.array([end - start])
     angle = float(drive.pace(omega, spin, duration)[0]) * (end - start)
     if angle > most * STRIDE and most < MOST_STEPS:
         raise _refused(start, end)
     if not angle <= LONGEST:
         raise _refused(start, end, angle)
-    count = count_for(drive, omega, spin, duration)
-    pieces: list[TaylorPiece] = []
+    count, pieces = count_for(drive, omega, spin, duration), list[TaylorPiece]()
     try:
         for series in steps(drive, omega, spin, np.array([start]), duration, count):
             pieces += _pieces(series, quaternion)
@@ -429,8 +419,8 @@ def _series(
     now: float,
     state: Array,
     unit: float,
-    jerk: Array | None = None,
-    falling: Falling | None = None,
+    jerk: Array | None,
+    falling: Falling | None,
 ) -> Array:
     """Taylor coefficients (ORDER+1, 7) of rates and quaternion in units of time ``unit``.
 
@@ -540,10 +530,6 @@ class _Sink:
 
 def _reach(series: Array, unit: float) -> float:
     """Reach of the series at accuracy `REMAINDER`, in its unit of time, from its last two orders."""
-    size = np.max(np.abs(series[-2:]) * np.array([unit] * 3 + [1.0] * 4), axis=1)
-    reaches = [
-        (REMAINDER / float(last)) ** (1.0 / order)
-        for last, order in zip(size, (ORDER - 1, ORDER), strict=True)
-        if last > 0.0
-    ]
+    sizes = np.max(np.abs(series[-2:]) * np.array([unit] * 3 + [1.0] * 4), axis=1).tolist()
+    reaches = [(REMAINDER / last) ** (1.0 / order) for order, last in enumerate(sizes, ORDER - 1) if last > 0.0]
     return min(reaches, default=math.inf)
