@@ -1,8 +1,4 @@
-"""Motion between two pulses, and the propellant supply by which moments fall and pulses weaken.
-
-Coasts of symmetric bodies are in closed form, else Taylor pieces. The strength of each pulse follows from cold nozzles
-and the falling pressure of the tank.
-"""
+"""Motion between two pulses, and the propellant supply by which moments fall and pulses weaken."""
 
 from __future__ import annotations
 
@@ -67,27 +63,23 @@ class Arc:
 
     def motion(self, times: Vector) -> tuple[Vector, Vector]:
         """Rates (n, 3) in rad/s and quaternions (n, 4) at ``times`` (n,) s."""
-        since = np.asarray(times) - self.start
-        state = self.state
+        A, C, state, since = self.A, self.C, self.state, np.asarray(times) - self.start
+        motion = state.quaternion, state.omega, state.spin, since, self.wheel
         if self.growth != 0.0:
-            omega, spin, quaternion = energy_sink.arc(
-                self.A, self.C, self.growth, state.quaternion, state.omega, state.spin, since, self.wheel
-            )
-            return np.column_stack([omega.real, omega.imag, spin]), quaternion
-        turning = (self.A - self.C) / self.A * state.spin - self.wheel / self.A
-        omega = state.omega * np.exp(-1j * turning * since)
-        quaternion = attitude.arc(self.A, self.C, state.quaternion, state.omega, state.spin, since, self.wheel)
-        return np.column_stack([omega.real, omega.imag, np.full(len(since), state.spin)]), quaternion
+            omega, spin, quaternion = energy_sink.arc(A, C, self.growth, *motion)
+        else:
+            omega = state.omega * np.exp(-1j * ((A - C) / A * state.spin - self.wheel / A) * since)
+            spin, quaternion = np.full(len(since), state.spin), attitude.arc(A, C, *motion)
+        return np.column_stack([omega.real, omega.imag, spin]), quaternion
 
     def end(self, time: float) -> SpinState:
         """State at ``time`` s."""
-        A, C, state, since, wheel = self.A, self.C, self.state, time - self.start, self.wheel
-        motion = state.quaternion, state.omega, state.spin, since, wheel
+        A, C, state, since = self.A, self.C, self.state, time - self.start
+        motion = state.quaternion, state.omega, state.spin, since, self.wheel
         if self.growth != 0.0:
             return SpinState(*energy_sink.arc(A, C, self.growth, *motion))
-        turned = cmath.exp(-1j * ((A - C) / A * state.spin - wheel / A) * since)
-        quaternion = attitude.arc_end(A, C, *motion)
-        return SpinState(state.omega * turned, state.spin, quaternion)
+        turned = cmath.exp(-1j * ((A - C) / A * state.spin - self.wheel / A) * since)
+        return SpinState(state.omega * turned, state.spin, attitude.arc_end(A, C, *motion))
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,10 +142,7 @@ class Push(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Dynamics:
-    """Body as flown by one of the two models, with all torques besides the pulses.
-
-    ``known``: the legs flown before, where they are remembered: see `remembering`.
-    """
+    """Body as flown, with all torques besides the pulses; ``known``: the legs flown before, see `remembering`."""
 
     moments: tuple[float, float, float]
     constant: Vector
@@ -209,14 +198,13 @@ class Dynamics:
             coast = FreeCoast(self.moments, start, state)
             (rates,), (quaternion,) = coast.motion(np.array([end]))
             work.spend(PULSE)
-            return coast, SpinState(complex(rates[0], rates[1]), float(rates[2]), quaternion)
+            return coast, SpinState.of(rates, quaternion)
         pieces = taylor.integrate(
             self.moments, torque, state.rates, state.quaternion, start, end, self.forcing, most, slope, falling
         )
         step = SPUN_STEP if self.moments[0] == self.moments[1] else STEP
         work.spend(PULSE + (SUNK_STEP if self.forcing.growth != 0.0 else step) * len(pieces))
-        rates_, quaternion_ = pieces[-1].final
-        return Integrated(tuple(pieces)), SpinState(complex(rates_[0], rates_[1]), float(rates_[2]), quaternion_)
+        return Integrated(tuple(pieces)), SpinState.of(*pieces[-1].final)
 
     def with_moments(self, moments: Vector) -> Dynamics:
         """Copy with these principal moments (3,) kg m²."""
@@ -225,8 +213,7 @@ class Dynamics:
 
     def kicked(self, state: SpinState, impulse: Vector) -> SpinState:
         """State after an ``impulse`` (3,) N m s."""
-        body = state.rates + impulse / np.asarray(self.moments)
-        return SpinState(complex(body[0], body[1]), float(body[2]), state.quaternion)
+        return SpinState.of(state.rates + impulse / np.asarray(self.moments), state.quaternion)
 
 
 def make_dynamics(spacecraft: Spacecraft) -> Dynamics:
@@ -330,13 +317,8 @@ class Supply:
         if self.spacecraft.tank is not None and flow is not None and propellant:
             cold = 1.0 if self.spacecraft.cold is None else self.spacecraft.cold.factor(self.fired[channel.name] - 1)
             commanded = falling(commanded, self.spacecraft.tank, before, flow * cold)
-        return replace(
-            commanded,
-            torque=torque,
-            impulse=torque * commanded.on_time,
-            force=None if force is None else force * level,
-            propellant=propellant,
-        )
+        impulse, force = torque * commanded.on_time, None if force is None else force * level
+        return replace(commanded, torque=torque, impulse=impulse, force=force, propellant=propellant)
 
     def torque(self, channel: Channel, used: float) -> Vector:
         """Torque of ``channel`` at the thrust of the file with ``used`` kg gone, (3,) N m: the center of mass moves."""
@@ -466,11 +448,8 @@ def lacking(spacecraft: Spacecraft, schedule: Schedule, law: str) -> tuple[Space
         body = replace(spacecraft, tank=replace(spacecraft.tank, final_pressure=spacecraft.tank.pressure))
     else:
         body = replace(spacecraft, cold=None)
-    known = {channel.name: channel for channel in body.channels}
-    fired = [
-        on_command(known[pulse.channel], *pulse.loaded)
-        if pulse.channel in known and pulse.torque is not None
-        else pulse
-        for pulse in schedule
-    ]
+    known, fired = {channel.name: channel for channel in body.channels}, []
+    for pulse in schedule:
+        commanded = pulse.channel in known and pulse.torque is not None
+        fired.append(on_command(known[pulse.channel], *pulse.loaded) if commanded else pulse)
     return body, Schedule(supplied(body, fired))

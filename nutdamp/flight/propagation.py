@@ -328,27 +328,22 @@ class Flight(Tabled):
 
         The flight must have been made to reach ``until``.
         """
-        return self._joined(self._motions(samples, until))
+        return self._track(self._motions(samples, until))
 
     def pieces(self, samples: int, until: float) -> Iterator[Track]:
-        """Rows of `sampled` in order, about `track.PIECE` at a time, to bound memory."""
-        motions: list[Motion] = []
-        count = 0
+        """Rows of `sampled` in order, about `PIECE` at a time, to bound memory."""
+        motions = list[Motion]()
         for motion in self._motions(samples, until):
             motions.append(motion)
-            count += len(motion[0])
-            if count >= PIECE:
-                yield self._joined(motions)
-                motions, count = [], 0
+            if sum(len(times) for times, *_ in motions) >= PIECE:
+                yield self._track(motions)
+                motions = []
         if motions:
-            yield self._joined(motions)
+            yield self._track(motions)
 
-    def _joined(self, motions: Iterable[Motion]) -> Track:
-        t, rates, quaternion, pulse = (np.concatenate(column) for column in zip(*motions, strict=True))
-        return self._track(t, rates, quaternion, pulse)
-
-    def _track(self, t: Vector, rates: Vector, quaternion: Vector, pulse: NDArray[np.int64]) -> Track:
+    def _track(self, motions: Iterable[Motion]) -> Track:
         """All that follows from the motion. Cone angles are of each moment; with I1 ≠ I2 they swing: see `widest`."""
+        t, rates, quaternion, pulse = (np.concatenate(column) for column in zip(*motions, strict=True))
         sense = self.spacecraft.sense
         momentum = rates * self.moments_at(t) + np.array([0.0, 0.0, self.spacecraft.inertia.wheel])
         nutation = np.arctan2(np.hypot(momentum[:, 0], momentum[:, 1]), sense * momentum[:, 2])
@@ -358,7 +353,7 @@ class Flight(Tabled):
         return Track(t, rates, quaternion, axis, in_space, nutation, body_cone, nutation - body_cone, pulse)
 
     def _motions(self, samples: int, until: float) -> Iterator[Motion]:
-        """Rows of a track by leg, and each leg in stretches of `track.PIECE` even times."""
+        """Rows of a track by leg, and each leg in stretches of `PIECE` even times."""
         for leg in self.legs:
             if leg.start > until:
                 break
@@ -373,21 +368,19 @@ class Flight(Tabled):
 
     def around_pulses(self) -> tuple[Track, Track]:
         """Motion just before and after each pulse, a row per pulse; cone angles as in `Residual`."""
-        before, after = [], []
+        nothing = np.empty(0), np.empty((0, 3)), np.empty((0, 4)), np.empty(0, dtype=np.int64)
+        before, after = [nothing], [nothing]
         starts, overs = [leg.start for leg in self.legs], [leg.end for leg in self.legs]
-        for begins, ends in self.spans:
-            first, last = self.legs[bisect_left(overs, begins)], self.legs[bisect_right(starts, ends) - 1]
-            before.append((begins, *first.path.motion(np.array([begins]))))
-            after.append((ends, *last.path.motion(np.array([ends]))))
-        return self._rows(before, 0), self._rows(after, 1)
+        for completed, span in enumerate(self.spans):
+            first, last = self.legs[bisect_left(overs, span[0])], self.legs[bisect_right(starts, span[1]) - 1]
+            begins, ends = np.array([span[0]]), np.array([span[1]])
+            before.append((begins, *first.path.motion(begins), np.array([completed])))
+            after.append((ends, *last.path.motion(ends), np.array([completed + 1])))
+        return self._widest(before), self._widest(after)
 
-    def _rows(self, states: list[tuple[float, Vector, Vector]], completed: int) -> Track:
-        t = np.array([time for time, _, _ in states])
-        body = np.concatenate([np.empty((0, 3)), *(rates for _, rates, _ in states)])
-        quaternion = np.concatenate([np.empty((0, 4)), *(turn for _, _, turn in states)])
-        numbers = completed + np.arange(len(t), dtype=np.int64)
-        moments, sense, wheel = self.moments_at(t), self.spacecraft.sense, self.spacecraft.inertia.wheel
-        return widest(self._track(t, body, quaternion, numbers), moments, sense, wheel)
+    def _widest(self, motions: Iterable[Motion]) -> Track:
+        track, body = self._track(motions), self.spacecraft
+        return widest(track, self.moments_at(track.t), body.sense, body.inertia.wheel)
 
 
 def by_impulses(spacecraft: Spacecraft, schedule: Schedule, until: float = 0.0) -> Flight:

@@ -1,11 +1,11 @@
 """Cases flown, many at once: through real pulse widths, and in closed form for derivatives.
 
-The closed form is the impulse sum Magnus 1970 (17) with exact attitude arcs. Seen in the frame that turns with the
-nutation, by the phase aα with α = ∫ω3 dt, the angular momentum of a free symmetric body does not move: its transverse
-part is AΩ = Aω0 + Σ J e^{iaα}. And that frame, in space, turns about H at |H|/A (the exact arc R(t) = Rot(H t/A) R(0)
-Rot3(aω3 t)). So a pulse adds to a vector, and a coast turns a quaternion; energy dissipation draws H away from axis 3
-in that frame, along an arc that `energy_sink` knows. Nothing takes an absolute value or compares: the same code runs on
-complex arrays, which gives derivatives to rounding (`nutdamp.montecarlo.statistics`).
+The closed form is the impulse sum Magnus 1970 (17) with exact attitude arcs. In the frame that turns with the nutation,
+by the phase aα with α = ∫ω3 dt, the angular momentum of a free symmetric body does not move: its transverse part is
+AΩ = Aω0 + Σ J e^{iaα}. That frame, in space, turns about H at |H|/A (R(t) = Rot(H t/A) R(0) Rot3(aω3 t)). So a pulse
+adds to a vector, and a coast turns a quaternion; energy dissipation draws H away from axis 3 along an arc that
+`energy_sink` knows. Nothing takes an absolute value or compares: the same code runs on complex arrays, which gives
+derivatives to rounding (`nutdamp.montecarlo.statistics`).
 """
 
 from __future__ import annotations
@@ -365,24 +365,24 @@ class RealWidths:
 
     def __call__(self, cases: DispersedCases) -> Ends:
         """End states of the ``cases``. Raises Infeasible for motions too long to be integrated."""
-        count = number_of(cases)
-        watch = watch_over(self.model.spacecraft, cases.tilt, count) if self.model.spacecraft.keep else None
-        moments, rates = _whole(cases.moments, count), _whole(cases.omega0, count)
-        propellant, bodies, upright, sheds = cases.propellant, self._bodies(moments, cases.wheel), np.eye(4, 1), None
-        upright = upright.repeat(count, axis=1)  # the true body axes at t = 0 are where everything is seen from
+        count, body, sheds = number_of(cases), self.model.spacecraft, None
+        watch = watch_over(body, cases.tilt, count) if body.keep else None
+        rates, propellant = _whole(cases.omega0, count), cases.propellant
+        bodies = self._bodies(_whole(cases.moments, count), cases.wheel)
+        upright = np.eye(4, 1).repeat(count, axis=1)  # the true body axes at t = 0 are where everything is seen from
         if cases.per_kg is not None and cases.spent is not None:
             sheds = np.array([_whole(cases.per_kg, count) * kg for kg in cases.spent]).reshape(-1, 3, count)
         if self.model.schedule.blocks:
-            nominal = self.seen_nominally
-            settled, turned, _, seen, over = fly(self.model, bodies, rates, upright, cases, nominal, watch)
+            settled, turned, _, seen, over = fly(self.model, bodies, rates, upright, cases, self.seen_nominally, watch)
             if cases.spent is not None:
                 propellant = sum((kg * sees for kg, sees in zip(cases.spent, seen, strict=True)), 0.0)
         else:
             starts = _whole(cases.starts, count)
             impulses = np.array([_whole(impulse, count) for impulse in cases.impulses]).reshape(-1, 3, count)
-            pulses = batch.Pulses(starts, np.array(self.model.on_times).reshape(-1, 1), impulses, sheds=sheds)
             if self.model.schedule.shaped:
                 pulses = self._ramps(cases, starts, impulses, sheds)
+            else:
+                pulses = batch.Pulses(starts, np.array(self.model.on_times).reshape(-1, 1), impulses, sheds=sheds)
             settled, turned = batch.fly(bodies, rates, upright, pulses, watch)
             over = np.max(pulses.edges, axis=0, initial=0.0)
         last = bodies if sheds is None else bodies.lighter(sheds.sum(axis=0))
@@ -391,7 +391,7 @@ class RealWidths:
         momentum = triple(last.momentum(settled))
         after, nutation = carried(tuple(turned), momentum), None
         if not np.array_equal(last.moments[0], last.moments[1]):
-            nutation = widest_cones(last.moments, settled, self.model.spacecraft.sense, last.forcing.wheel)[0]
+            nutation = widest_cones(last.moments, settled, body.sense, last.forcing.wheel)[0]
         return Ends(
             momentum=momentum,
             before=triple(bodies.momentum(rates)),

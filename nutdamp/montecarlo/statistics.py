@@ -98,10 +98,6 @@ def _fraction(a: float, b: float, x: float) -> float:
 
 Array = NDArray[np.float64]
 
-OUTPUTS = ("nutation", "momentum_shift", "axis_error", "spin_change", "propellant")
-"""In rad, rad, rad, rad/s and kg; the angles are called as the values of `nutdamp.spacecraft.requirements.Part`."""
-
-
 VECTORS = {
     "nutation": slice(0, 2),
     "momentum_shift": slice(2, 5),
@@ -111,17 +107,17 @@ VECTORS = {
 }
 """Rows of `vectors` by output."""
 
+OUTPUTS = tuple(VECTORS)
+"""In rad, rad, rad, rad/s and kg; the angles are called as the values of `nutdamp.spacecraft.requirements.Part`."""
+
 ROWS = 10  # rows of `vectors`
 
 
 def measure(model: DispersedModel, ends: Ends, count: int) -> Array:
     """The `OUTPUTS` (5, n) of ``count`` cases; propellant is NaN where unknown."""
     x, y, z = ends.momentum
-    nutation = ends.nutation
-    if nutation is None:
-        nutation = np.arctan2(np.sqrt(x * x + y * y), model.spacecraft.sense * z)
     rows = (
-        nutation,
+        np.arctan2(np.sqrt(x * x + y * y), model.spacecraft.sense * z) if ends.nutation is None else ends.nutation,
         angle(ends.before, ends.after),
         angle(parts_of(model.target), ends.pointed),
         ends.spin_change,
@@ -133,8 +129,8 @@ def measure(model: DispersedModel, ends: Ends, count: int) -> Array:
 def vectors(model: DispersedModel, ends: Ends, count: int) -> NDArray[Any]:
     """Quantities (10, n) of ``count`` cases that are linear for small dispersions; `VECTORS` names the rows.
 
-    Nutation is the length of the transverse momentum over the axial one, the momentum shift that of the change of its
-    direction, the axis error that of its direction's distance from the target. All are in the body axes of t = 0.
+    Nutation is the transverse momentum over the axial one, the momentum shift the change of its direction, the axis
+    error that direction less the target, in the body axes of t = 0.
     """
     x, y, z = ends.momentum
     before, after, pointed = (_unit(vector) for vector in (ends.before, ends.after, ends.pointed))
@@ -187,8 +183,7 @@ class Exact:
         share, above = places - ranks, np.ceil(places).astype(int)
         ordered = np.partition(self.values, sorted({*ranks.tolist(), *above.tolist()}))  # np.unique loads numpy.ma
         low, high = ordered[ranks], ordered[above]
-        quantiles: Array = np.where(share < 0.5, low + (high - low) * share, high - (high - low) * (1.0 - share))
-        return quantiles
+        return np.where(share < 0.5, low + (high - low) * share, high - (high - low) * (1.0 - share))
 
     def histogram(self, edges: Array) -> Array:
         """Cases between each two of ``edges``."""
@@ -269,8 +264,7 @@ CLASS_SIZE = 32  # cases in each of them, at least
 class FirstOrder:
     """Outcome to first order about nominal values (and biases).
 
-    ``jacobian`` (10, d): derivative of each row of `vectors` by each drawn input, in its unit; some of these are
-    correlated in ``groups``.
+    ``jacobian`` (10, d): derivative of each row of `vectors` by each of the ``inputs``, correlated in ``groups``.
     """
 
     inputs: tuple[DispersedInput, ...]
@@ -364,10 +358,9 @@ def sampled_shares(draws: Mapping[str, Array], outcome: Array) -> dict[str, dict
         sums = np.add.reduceat(centred.take(order, axis=1), starts, axis=1)
         between = (sums**2 / np.diff(starts, append=count)).sum(axis=1)
         chance = (len(starts) - 1) / count
-        shares[name] = {
-            output: max(0.0, (float(between[VECTORS[output]].sum()) / variances[output] - chance) / (1.0 - chance))
-            if variances[output] > 0.0 and chance < 1.0
-            else 0.0
-            for output in OUTPUTS
-        }
+        shares[name] = dict.fromkeys(OUTPUTS, 0.0)
+        for output, rows in VECTORS.items():
+            if variances[output] > 0.0 and chance < 1.0:
+                share = float(between[rows].sum()) / variances[output]
+                shares[name][output] = max(0.0, (share - chance) / (1.0 - chance))
     return shares

@@ -198,7 +198,7 @@ class Bodies:
 
 @dataclass(frozen=True, slots=True)
 class Pulses:
-    """Rectangular pulses: ``starts`` (k, n) s, ``on_times`` (k, n) s and ``impulses`` (k, 3, n) N m s, torque × on-time.
+    """Rectangular pulses: ``starts`` (k, n) s, ``on_times`` (k, n) s, ``impulses`` (k, 3, n) N m s, torque × on-time.
 
     On-times are (k, 1) where all cases have the same; 0 is an ideal impulse. With ``leans`` (k, n) torques run evenly
     from 1 - lean times their mean to 1 + lean times it. The moments fall by ``sheds`` (k, 3, n) kg m², half as a pulse
