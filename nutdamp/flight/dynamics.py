@@ -171,8 +171,7 @@ class Dynamics:
     ) -> tuple[Path, SpinState]:
         """Motion from ``state`` at ``start`` to ``end`` s under the sum of ``torques``, and its final state.
 
-        With a ``slope`` (3,) N m/s the torque runs evenly from that sum; the moments may be ``falling``. Raises
-        Infeasible where it takes more than ``most`` steps of integration.
+        With a ``slope`` (3,) N m/s the torque runs evenly from there. Raises Infeasible for more than ``most`` steps.
         """
         push = Push(torques, slope, falling)
         if self.known is None:
@@ -257,10 +256,7 @@ class Lightening:
         return dynamics.with_moments(self.first - 0.5 * (before + self.used[time]) * self.per_kg)
 
     def between(self, dynamics: Dynamics, start: float, end: float) -> tuple[Dynamics, Falling | None]:
-        """Body at ``start`` s, and the fall of its moments until ``end`` s, with no edge of a pulse in between.
-
-        As no more than a quadratic of time: what is used by start, middle and end says all.
-        """
+        """Body at ``start`` s, and the fall of its moments, quadratic in time, to ``end`` s before the next edge."""
         if self.per_kg is None:
             return dynamics, None
         before, length = self.used[start], end - start
@@ -275,8 +271,7 @@ class Lightening:
 class Supply:
     """Supply state: pulses fired by channel, and propellant used, kg: numbers, or arrays of cases.
 
-    By default what was fired before t = 0. ``used`` is what the pulses would take of a tank that lasts: with an empty
-    one nothing fires, and the last pulse before that only as far as the propellant goes.
+    By default what was fired before t = 0. ``used`` is what the pulses would take of a tank that lasts.
     """
 
     def __init__(self, spacecraft: Spacecraft, fired: Counter[str] | None = None, used: Any = None) -> None:
@@ -328,16 +323,13 @@ class Supply:
         return channel.torque - np.cross((used - self._begun) * per_kg, channel.force)
 
     def on_time_for(self, channel: Channel, effective: float) -> float:
-        """On-time (s) of the next pulse of ``channel`` with the impulse of ``effective`` s of the thrust of the file.
-
-        Found by repeating: each step errs by the share by which the thrust falls, of the error before it.
-        """
+        """On-time (s) of the next pulse of ``channel`` with the impulse of ``effective`` s at the file's thrust."""
         cold, tank, flow = self.spacecraft.cold, self.spacecraft.tank, self.full_flow(channel)
         warm = effective / (1.0 if cold is None else cold.factor(self.fired[channel.name]))
         if tank is None:
             return warm
         on_time = warm / float(tank.thrust_factor(self.used))
-        for _ in range(REPEATED if flow is not None else 0):
+        for _ in range(REPEATED if flow is not None else 0):  # each step errs by a small share of the error before
             before, on_time = on_time, warm / float(tank.burn(self.used, flow * effective / warm, on_time)[1])
             if abs(on_time - before) <= CLOSE * on_time:
                 break
@@ -359,10 +351,7 @@ class Supply:
         return 1.0 if tank is None else tank.share(before, propellant)
 
     def take(self, channel: Channel, on_time: Any) -> tuple[Any, Any]:
-        """Mean level of a pulse of effective ``on_time`` s and its propellant, kg or None, which counts for later ones.
-
-        No level once the tank is empty.
-        """
+        """Fire a pulse of effective ``on_time`` s; returns its mean level, and its propellant, kg or None."""
         flow, tank, cold = self.full_flow(channel), self.spacecraft.tank, self.spacecraft.cold
         warmth = 1.0 if cold is None else cold.factor(self.fired[channel.name])
         if flow is None or tank is None:
@@ -400,8 +389,7 @@ def weakened(pulse: Pulse, factor: float) -> Pulse:
 def falling(pulse: Pulse, tank: Tank, used: float, flow: float) -> Pulse:
     """Pulse whose thrust falls with the pressure of the ``tank``, of which ``used`` kg were gone at its start.
 
-    ``flow`` as `Tank.burn` takes it. Its ramps are straight pieces, each with the impulse and the centroid of the
-    thrust there; its mean level is left to the torque.
+    ``flow`` as in `Tank.burn`. Its ramps are straight pieces, each with impulse and centroid of the thrust there.
     """
     start, on_time = pulse.loaded
     command = pulse.command or Command(start, on_time, (Ramp(pulse.start, pulse.end, 1.0, 1.0),), valve=False)

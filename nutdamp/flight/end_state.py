@@ -76,10 +76,7 @@ class Deviation(NamedTuple):
 
 
 def seen_at(flight: Flight, time: float) -> Flight:
-    """Flight truncated at ``time`` s, which it must reach: residual, final state and rows end there.
-
-    Of the pulses those that have begun; what is after one that is still on is the motion at ``time``.
-    """
+    """Flight truncated at ``time`` s, which it must reach, with the pulses that have begun."""
     rates, quaternion = flight.motion(np.array([time]))
     begun = [begins < time or begins == ends == time for begins, ends in flight.spans]
     return replace(
@@ -175,8 +172,7 @@ class Aspect(NamedTuple):
 def aspects(flown: Flight, until: float | None = None) -> tuple[Aspect, ...]:
     """For each direction that the spacecraft watches, from t = 0 to ``until`` s.
 
-    Default: one inertial nutation period after the last pulse. A flight that ends earlier is flown on by its model.
-    Raises Infeasible as `propagation.flown` does.
+    Default: one inertial nutation period after the last pulse. Raises Infeasible as `propagation.flown` does.
     """
     body = flown.spacecraft
     if not body.watched:

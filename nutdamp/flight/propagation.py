@@ -1,8 +1,7 @@
 """Propagation of schedules, by impulse sum or real pulse widths, and the track: motion over time as arrays.
 
 `by_impulses` is the plan's own model, the impulse sum (17) with effective impulses. `flown` is the judge: real
-widths, true moments. Both give legs that evaluate the motion at any time: coasts of a symmetric body in closed form,
-else Taylor pieces. The principal moments fall along a schedule with the propellant that is used.
+widths, true moments. Both give legs that evaluate the motion at any time.
 """
 
 from __future__ import annotations
@@ -31,22 +30,17 @@ BINS = 7200  # parts of a turn by which a range of right ascension is distinguis
 
 @dataclass(frozen=True, slots=True)
 class Track:
-    """Motion over n rows, in principal axes.
+    """Motion over n rows, in principal axes."""
 
-    ``t`` (n,) s; ``rates`` (n, 3) rad/s; ``quaternion`` (n, 4) body -> inertial; ``axis`` (n, 3) spin axis and
-    ``momentum`` (n, 3) N m s in the inertial frame; ``nutation``, ``body_cone``, ``space_cone`` (n,) rad;
-    ``pulse`` (n,) pulses completed.
-    """
-
-    t: Array
-    rates: Array
-    quaternion: Array
-    axis: Array
-    momentum: Array
-    nutation: Array
+    t: Array  # (n,) s
+    rates: Array  # (n, 3) rad/s
+    quaternion: Array  # (n, 4) body -> inertial
+    axis: Array  # (n, 3) spin axis, inertial
+    momentum: Array  # (n, 3) N m s, inertial
+    nutation: Array  # (n,) rad, as are both cones
     body_cone: Array
     space_cone: Array
-    pulse: NDArray[np.int64]
+    pulse: NDArray[np.int64]  # (n,) pulses completed
 
 
 def widest(track: Track, moments: Array, sense: float, wheel: float) -> Track:
@@ -67,10 +61,9 @@ def in_file_axes(track: Track, inertia: Inertia) -> Track:
 
 
 def even_times(samples: int, until: float, start: float, end: float) -> Iterator[tuple[Array, bool, bool]]:
-    """Members of ``samples`` even times from 0 to ``until`` s between ``start`` and ``end``, `PIECE` at a time.
+    """Those of ``samples`` even times from 0 to ``until`` s that lie between ``start`` and ``end``, `PIECE` at a time.
 
-    Each part with marks of the first and of the last one. There is one at least, which may be empty. The times are
-    those of np.linspace.
+    Each part, one at least, with marks of the first and of the last one; the times are those of np.linspace.
     """
     step = until / max(samples - 1, 1)
     low, high = (min(max(int(time / step) + more, 0), samples) for time, more in ((start, -1), (end, 2)))
@@ -86,9 +79,9 @@ def even_times(samples: int, until: float, start: float, end: float) -> Iterator
 class Extremes:
     """Excursion of the spin axis over ``rows`` rows from 0 to ``until`` s, rad and s.
 
-    ``farthest`` and ``nearest`` are angles from H at t = 0 with their times; ``x`` and ``y`` the range of the axis
-    direction in the inertial frame, as angles from its y-z and x-z planes; ``right_ascension`` (the
-    shortest range, which may pass 2π) and ``declination`` the same on the sphere.
+    ``farthest`` and ``nearest`` are angles from H at t = 0 with their times; ``x`` and ``y`` the range of the axis as
+    angles from the inertial y-z and x-z planes; ``right_ascension`` (the shortest range, which may pass 2π) and
+    ``declination`` the same on the sphere.
     """
 
     rows: int
@@ -124,10 +117,7 @@ def extremes(pieces: Iterable[Track]) -> Extremes:
 
 
 class _Record:
-    """Running maximum, and the first time it was reached, but for rounding.
-
-    After the last pulse of a good plan nothing moves any more: values that differ by rounding are one.
-    """
+    """Running maximum, and the first time it was reached, but for rounding."""
 
     def __init__(self) -> None:
         self.values, self.times = np.empty(0), np.empty(0)
@@ -187,10 +177,8 @@ def model_name(schedules: Iterable[Schedule], model: str = REAL_WIDTHS) -> str:
 class Residual:
     """Residual after the last pulse, rad.
 
-    ``nutation`` is the largest on the following arc (constant for a symmetric body), ``body_cone`` and ``space_cone``
-    (signed) are those of that instant, so that they add up to it.
-    ``momentum_shift`` is the angle of H from where it was at t = 0, ``axis_error`` from the target axis; ``model`` by
-    which it was found, which does not count where two are compared.
+    ``nutation`` is the largest on the following arc, ``body_cone`` and ``space_cone`` (signed) are those of that
+    instant. ``momentum_shift`` is the angle of H from where it was at t = 0, ``axis_error`` from the target axis.
     """
 
     nutation: float
@@ -198,14 +186,13 @@ class Residual:
     space_cone: float
     momentum_shift: float
     axis_error: float
-    model: str = field(default=REAL_WIDTHS, compare=False)
+    model: str = field(default=REAL_WIDTHS, compare=False)  # by which it was found
 
 
 @dataclass(frozen=True, slots=True)
 class Final:
-    """Final pointing and subsequent motion of the body.
+    """Final pointing: spin ``axis`` and direction of H, inertial unit vectors (3,), just after the last pulse.
 
-    ``axis`` spin axis and ``momentum`` direction of H, inertial unit vectors (3,), just after the last pulse;
     ``spin`` ω3 rad/s; ``nutation`` rad, as in `Residual`: the half-angle at which the axis goes round H from then on.
     """
 
@@ -219,7 +206,7 @@ class Final:
 class Leg:
     """Leg of the flight from ``start`` to ``end`` s; ``jump``: the rates jumped at its start.
 
-    ``completed`` pulses are over along it, ``completed_at_end`` at its very end (one more where a width ends).
+    ``completed`` pulses are over along it, ``completed_at_end`` at its very end.
     """
 
     start: float
@@ -236,12 +223,11 @@ Motion = tuple[Vector, Vector, Vector, NDArray[np.int64]]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Flight(Tabled):
-    """Flight of a schedule by one ``model``: its legs in order, and the state at the end of the last pulse.
+    """Flight of a schedule by one ``model``: its legs in order.
 
     ``moments`` are those at t = 0; ``settled`` is the motion just after the end of the last pulse; ``spans`` are
-    the times (s) between which each pulse acts, its centre twice in the impulse sum. The rows that it is shown by are
-    ``samples`` even times to ``until`` s, default its last leg, and rows just before and after each pulse. ``scheme``
-    is what planned it, empty where that is not known.
+    the times (s) between which each pulse acts, its centre twice in the impulse sum. It is shown by ``samples`` even
+    times to ``until`` s, default its last leg, and rows just before and after each pulse. ``scheme``: what planned it.
     """
 
     spacecraft: Spacecraft
@@ -324,10 +310,7 @@ class Flight(Tabled):
         return in_file_axes(self.sampled(self.samples, self.shown_to), self.spacecraft.inertia)
 
     def sampled(self, samples: int, until: float) -> Track:
-        """Motion at ``samples`` even times from 0 to ``until`` s, and just before and after each pulse.
-
-        The flight must have been made to reach ``until``.
-        """
+        """Motion at ``samples`` even times from 0 to ``until`` s, which it reaches, and before and after each pulse."""
         return self._track(self._motions(samples, until))
 
     def pieces(self, samples: int, until: float) -> Iterator[Track]:
@@ -386,9 +369,8 @@ class Flight(Tabled):
 def by_impulses(spacecraft: Spacecraft, schedule: Schedule, until: float = 0.0) -> Flight:
     """Impulse-sum solution, Magnus 1970 (17), pulse by pulse.
 
-    Each pulse acts at its centre with its effective impulse (`effective_impulses`). Between them the motion is that of
-    the true moments: exact arcs for I1 = I2, as (17) has them, else Taylor series. Disturbances and dissipation act
-    between the pulses as in `flown`. The last leg reaches at least to ``until`` s. Raises Infeasible as `flown` does.
+    Each pulse acts at its centre with its effective impulse (`effective_impulses`); between them the motion is that of
+    `flown`. The last leg reaches at least to ``until`` s. Raises Infeasible as `flown` does.
     """
     dynamics, state, allowed = make_dynamics(spacecraft), spacecraft.initial, _allowed(schedule, until)
     legs: list[Leg] = []
@@ -447,9 +429,8 @@ def flown(
     """Euler's equations through the real pulse widths, with the true principal moments.
 
     Coasts of symmetric bodies without disturbances are exact arcs, with dissipation too; everything else is Taylor
-    series at rounding accuracy. The last leg reaches at least to ``until`` s. ``dynamics`` are those of the
-    spacecraft, where they are known. Raises Infeasible where that takes more than `PLANNED_STEPS`, or
-    `rigid.MOST_STEPS` where a later end is requested.
+    series at rounding accuracy. The last leg reaches at least to ``until`` s. ``dynamics``: those of the spacecraft,
+    where known. Raises Infeasible beyond `PLANNED_STEPS`, or `taylor.MOST_STEPS` where a later end is requested.
     """
     dynamics, state = dynamics or make_dynamics(spacecraft), spacecraft.initial
     allowed = _allowed(schedule, until)
@@ -485,10 +466,7 @@ def flown(
 
 
 def _torques(pulses: Iterable[Pulse], start: float, end: float) -> tuple[list[Vector], Vector | None]:
-    """Torques (3,) N m at ``start`` of the ``pulses`` that fire until ``end`` s, and their slope together, N m/s.
-
-    No slope, None, where all keep even.
-    """
+    """Torques (3,) N m at ``start`` of the ``pulses`` that fire until ``end`` s, and their slope, N m/s, or None."""
     pushes = [push for push in (pulse.push(start, end) for pulse in pulses) if push is not None]
     slopes = [slope for _, slope in pushes if slope is not None]
     return [torque for torque, _ in pushes], np.sum(slopes, axis=0) if slopes else None

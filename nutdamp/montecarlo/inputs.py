@@ -39,10 +39,9 @@ SCHEDULE_IDLE = "the schedule does not fire"
 
 
 class DispersedInput(NamedTuple):
-    """Drawn quantity: its value in a case = ``nominal`` + draw, in ``unit``.
+    """Drawn quantity: its value in a case = ``nominal`` + draw, in ``unit``, empty for factors.
 
-    ``tolerance`` is the key of the file's ``dispersions`` it comes from; ``size`` is what its ``kind`` means in
-    `nutdamp.spacecraft.equipment.KINDS`, in ``unit`` (a bare number for factors).
+    ``tolerance`` is the key of ``dispersions`` it comes from, ``size`` what `equipment.KINDS` says for its ``kind``.
     """
 
     name: str
@@ -374,8 +373,7 @@ MOST_ATTEMPTS = 1_000  # largest number of redraws of a case; beyond it the disp
 class DrawSource:
     """Draws of the blocks of a study. Not to be shared by threads: each makes its own.
 
-    ``physical`` tells which of the cases drawn can be (a mask (n,), or True for all); ``groups`` are the inputs that
-    are correlated, those too that are not drawn: which others are makes no difference to a draw.
+    ``physical`` tells which of the cases drawn can be, (n,) or True for all; ``groups`` has inputs not drawn, too.
     """
 
     def __init__(

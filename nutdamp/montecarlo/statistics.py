@@ -1,8 +1,8 @@
 """Statistics of a study: output vectors, percentiles, exact binomial intervals, sensitivities.
 
-First-order sensitivities are those of the closed form on numbers with an infinitesimal imaginary part (complex-step
-differentiation, Squire & Trapp 1998). The shares from the cases are first-order Sobol indices, from the means of the
-outcome over equally likely intervals of each input (the correlation ratio, Pearson 1905): they see curvature too.
+First-order sensitivities are those of the closed form by complex-step differentiation (Squire & Trapp 1998). The shares
+from the cases are first-order Sobol indices, from the means of the outcome over equally likely intervals of each input
+(the correlation ratio, Pearson 1905).
 """
 
 from __future__ import annotations
@@ -292,10 +292,7 @@ class FirstOrder:
         return np.asarray(np.linalg.norm((self.jacobian * sizes)[VECTORS[output]], axis=0))
 
     def shares(self, output: str) -> Array:
-        """Share of each input in the variance of ``output``, (d,); all zero where nothing varies.
-
-        Of inputs that are correlated each has what it adds to those before it; the sum over them is the group's.
-        """
+        """Share of each input in the variance of ``output``, (d,), as of `independent`; all zero where nothing varies."""
         squares = (self.independent(output) ** 2).sum(axis=0)
         return np.asarray(squares / (squares.sum() or 1.0))
 

@@ -1,8 +1,4 @@
-"""Dispersion studies: many dispersed cases fly one schedule.
-
-Blocks of cases run over threads in rounds, so that a study can be watched and stopped; the threads take one portion
-after the other.
-"""
+"""Dispersion studies: many dispersed cases fly one schedule, in rounds, so that a study can be watched and stopped."""
 
 from __future__ import annotations
 
@@ -204,25 +200,17 @@ class Study(DrawnCases):
         return np.array([(aspect.least, aspect.largest) for aspect in seen])
 
     def severity(self, values: Array, ends: Ends) -> Array:
-        """Severity of cases, (n,), by `requirements.severity`, of the outputs (5, n) and ``ends`` of cases.
-
-        Never less than the used share of the bound of a cone on the way, or of the propellant.
-        """
+        """Severity of cases, (n,), by their outputs (5, n), cones and propellant; see `requirements.severity`."""
         body, aim = self.model.spacecraft, OUTPUTS.index(requirements.aim(self.model.spacecraft).value)
         shares = [*([] if ends.aspects is None else cones_used(body.keep, ends.aspects)), ends.drained]
         return np.asarray(requirements.severity(body, Left(values[0], values[aim], ends.spin), shares))
 
     @property
     def lightening_error(self) -> str:
-        """Message on the error of falling moments in cases, by the nominal one; empty where negligible.
-
-        They fall half at either edge of a pulse; `propagation.flown` lets them fall as the thrust goes.
-        """
-        body = self.model.spacecraft
-        if shed(body) is None:
+        """Message on the error of falling moments in cases, by the nominal one; empty where negligible."""
+        if shed(self.model.spacecraft) is None:
             return ""
-        outputs, exact = self.outputs_of({}), self.nominal.residual
-        part = requirements.aim(body)
+        outputs, exact, part = self.outputs_of({}), self.nominal.residual, requirements.aim(self.model.spacecraft)
         aim = exact.momentum_shift if part is Part.SHIFT else exact.axis_error
         errors = {Part.NUTATION: outputs[0] - exact.nutation, part: outputs[OUTPUTS.index(part.value)] - aim}
         if max(map(abs, errors.values())) < WORTH_SAYING:
@@ -236,8 +224,7 @@ class Study(DrawnCases):
 class Counted:
     """Results of a study so far: the cases from 0 to ``done`` of the ``requested``, of which ``met`` comply.
 
-    By cone, (m,): ``broken`` counts the cases that break it, ``aspects`` (m, 2) rad are the least and the largest angle
-    from the spin axis to its direction in all cases.
+    ``broken`` (m,): cases that break each cone; ``aspects`` (m, 2) rad: least and largest angle to it in all cases.
     """
 
     study: Any
@@ -289,8 +276,8 @@ class Counted:
 class Results(Counted):
     """Results of a study of a schedule; ``emptied`` counts the cases whose tank runs empty.
 
-    ``values`` (5 + 2m, capacity), outputs and the least and largest angle (rad) to the direction of each of m cones,
-    are kept up to `EXACT_CASES`; beyond, ``sketches`` count. ``early`` (10, `EARLY`) is the outcome of the first cases.
+    ``values`` (5 + 2m, capacity): outputs, and least and largest angle (rad) to each of m cones, up to `EXACT_CASES`;
+    beyond, ``sketches`` count. ``early`` (10, `EARLY`): `vectors` of the first cases.
     """
 
     study: Study
@@ -359,8 +346,8 @@ def run(
 ) -> Results:
     """Fly the cases that ``results`` is to have and does not have yet; returns ``results``.
 
-    ``watch`` is called now and then with how many are done, always the first ones; they are kept when ``stopped`` says
-    so. ``collect`` is given the number (from 0) of the first of some cases, and their `Results.values`, in order.
+    ``watch`` is called now and then with how many are done; they are kept when ``stopped`` says so. ``collect`` is
+    given the number (from 0) of the first of some cases, and their `Results.values`, in order.
     """
     # The C library keeps freed memory up to twice the largest block freed so far: else each stride asks for new pages.
     np.empty(FREED, dtype=np.uint8)
@@ -465,10 +452,10 @@ class Checkpoints:
 
         As far as half a turn of spin or nutation, the faster, and no pulse before t = 0.
         """
-        schedule = self.study.model.schedule
-        half, first = math.pi / self.study.model.spacecraft.fastest, min(pulse.loaded[0] for pulse in schedule)
         if not self._complies(0.0, probability):
             return None
+        first = min(pulse.loaded[0] for pulse in self.study.model.schedule)
+        half = math.pi / self.study.model.spacecraft.fastest
         return Range(-self._reach(-1.0, min(half, first), probability), self._reach(1.0, half, probability))
 
     def _reach(self, sense: float, most: float, probability: float) -> float:

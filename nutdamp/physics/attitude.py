@@ -59,13 +59,10 @@ def matrix(quaternion: Array) -> Array:
 
 
 def from_matrix(rotation: Array) -> Array:
-    """Unit quaternion of a rotation matrix, (3, 3) -> (4,), scalar part not negative.
-
-    The largest of the four components is taken first, so that none is lost to cancellation.
-    """
+    """Unit quaternion of a rotation matrix, (3, 3) -> (4,), scalar part not negative."""
     diagonal = np.diagonal(rotation)
     squares = 0.25 * np.array([1 + diagonal.sum(), *(1 - diagonal.sum() + 2 * diagonal)])
-    largest = int(np.argmax(squares))
+    largest = int(np.argmax(squares))  # the largest component is taken first, so that none is lost to cancellation
     off = 0.25 * (rotation - rotation.T)
     mixed = 0.25 * (rotation + rotation.T)
     w_times = np.array([off[2, 1], off[0, 2], off[1, 0]])

@@ -27,10 +27,10 @@ REMAINDER = 1e-15  # size of the last terms kept, relative to the scale of rates
 
 
 class Series:
-    """Taylor coefficients of rates and quaternion in x = (t - now)/step, for the cases of a block.
+    """Taylor coefficients of rates and quaternion in x = (t - now)/step, for the cases of a block; see `taylor`.
 
     ``rates`` (order+1, 5, n) holds ω1, ω2, ω3, ω1, ω2, so that the products in Euler's equations are one product of two
-    slices; ``turns`` (order+1, 4, n) is the quaternion. The equations are those of `taylor`.
+    slices; ``turns`` (order+1, 4, n) is the quaternion.
     """
 
     def __init__(self, here: MotionStretch, step: Array, acceleration: Array, jerk: Array | None) -> None:
@@ -67,8 +67,7 @@ class Series:
 
     def end(self) -> tuple[Array, Array]:
         """Rates (3, n) and unit quaternions (4, n) at the end of the step."""
-        rates = self.rates[: self.order + 1, :3].sum(axis=0)
-        quaternion = self.turns[: self.order + 1].sum(axis=0)
+        rates, quaternion = (part[: self.order + 1].sum(axis=0) for part in (self.rates[:, :3], self.turns))
         return rates, quaternion / np.sqrt(np.sum(quaternion * quaternion, axis=0))
 
     def at(self, way: Array, cases: Any) -> tuple[Array, Array]:
@@ -130,11 +129,8 @@ class _DampingSeries:
 
     def __init__(self, moments: Array, forcing: Forcing, acceleration: Array, rates: Array, step: Array) -> None:
         self.moments, self.growth, self.wheel = moments, forcing.growth, forcing.wheel
-        count = len(step)
-        self.momentum = np.zeros((LARGEST_ORDER, 3, count))
-        self.squares = np.zeros((LARGEST_ORDER, count))  # |H|²
-        self.quotient = np.zeros((LARGEST_ORDER, count))  # H3/|H|²
-        self.slip = np.zeros((LARGEST_ORDER, 3, count))
+        self.momentum, self.slip = np.zeros((2, LARGEST_ORDER, 3, len(step)))
+        self.squares, self.quotient = np.zeros((2, LARGEST_ORDER, len(step)))  # |H|² and H3/|H|²
         largest = self.moments * (np.abs(rates) + np.abs(acceleration) * step)
         largest[2] += np.abs(self.wheel)
         self.floor = AT_REST**2 * np.sum(largest * largest, axis=0)
@@ -224,7 +220,7 @@ class Pulses:
         if self.leans is None or not self.leans.any():
             return None
         lasts = np.where(self.on_times == 0.0, 1.0, self.on_times)
-        return self.impulses * (2.0 * self.leans / lasts**2)[:, None]
+        return np.asarray(self.impulses * (2.0 * self.leans / lasts**2)[:, None])
 
     @property
     def edges(self) -> Array:
@@ -251,17 +247,14 @@ def _edgewise(begins: Array, ends: Array) -> Array:
 
 
 class MotionStretch(NamedTuple):
-    """Motion of ``bodies`` under one ``torque`` (3, n) N m, None for a coast, from ``since`` (n,) s on.
-
-    ``rates`` (3, n) rad/s and ``quaternion`` (4, n) at ``since``; the torque changes by ``slope`` (3, n) N m/s or None.
-    """
+    """Motion of ``bodies`` under one torque, None for a coast, from ``since`` on."""
 
     bodies: Bodies
-    since: Array
-    rates: Array
-    quaternion: Array
-    torque: Array | None = None
-    slope: Array | None = None
+    since: Array  # (n,) s
+    rates: Array  # (3, n) rad/s, at ``since``, as all below
+    quaternion: Array  # (4, n)
+    torque: Array | None = None  # (3, n) N m
+    slope: Array | None = None  # of the torque, (3, n) N m/s
 
     def some(self, cases: Any) -> MotionStretch:
         """Subset of ``cases`` (an index of arrays)."""
@@ -332,9 +325,8 @@ def fly(
 ) -> tuple[Array, Array]:
     """Rates (3, n) rad/s and unit quaternions (4, n), body -> inertial, as the last pulse of each case ends.
 
-    ``rates`` (3, n) and ``quaternion`` (4, n) at t = 0; ``watch`` sees the motion until then. Exact to some 1e-13 rad
-    for each hundred radians flown. Pulses may overlap and come in any order, in each case its own. Raises Infeasible
-    for motions over more than `taylor.LONGEST` rad.
+    ``rates`` and ``quaternion`` at t = 0; ``watch`` sees the motion until then. Exact to some 1e-13 rad for each
+    hundred radians flown. Pulses may overlap and come in any order. Raises Infeasible beyond `taylor.LONGEST` rad.
     """
     rates, quaternion = np.array(rates, dtype=float), np.array(quaternion, dtype=float)
     for begin in range(0, rates.shape[1], BLOCK):
@@ -366,21 +358,14 @@ def _fly_block(bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses, 
 
 
 def _fly_alike(
-    bodies: Bodies,
-    rates: Array,
-    quaternion: Array,
-    pulses: Pulses,
-    watch: Observer | None,
-    order: NDArray[np.intp],
+    bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses, watch: Observer | None, order: NDArray[np.intp]
 ) -> None:
     """Fly cases whose edges have the same ``order``, in place: between pulses all of them coast."""
     edges, (turns, kicks), slopes = pulses.edges, pulses.jumps, pulses.slopes
     half = None if pulses.sheds is None else 0.5 * pulses.sheds
-    now = np.zeros(rates.shape[1])
-    on: set[int] = set()
+    now, on = np.zeros(rates.shape[1]), set[int]()
     for edge in order.tolist():
-        torque = np.sum(turns[sorted(on)], axis=0) if on else None
-        slope = None
+        torque, slope = np.sum(turns[sorted(on)], axis=0) if on else None, None
         if torque is not None and slopes is not None:
             rising = [first // 2 for first in sorted(on)]
             slope = np.sum(slopes[rising], axis=0)
@@ -403,12 +388,11 @@ def _fly_each(bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses, w
     order = np.argsort(edges, axis=0, kind="stable")
     edges, of_each = np.take_along_axis(edges, order, axis=0), order[:, None, :]
     turns, kicks = (np.take_along_axis(jump, of_each, axis=0) for jump in pulses.jumps)
-    slopes, slope = pulses.slopes, None
-    half = None if pulses.sheds is None else np.repeat(0.5 * pulses.sheds, 2, axis=0)
-    half = None if half is None else np.take_along_axis(half, of_each, axis=0)
+    slopes, slope, half = pulses.slopes, None, None
+    if pulses.sheds is not None:
+        half = np.take_along_axis(np.repeat(0.5 * pulses.sheds, 2, axis=0), of_each, axis=0)
     bends = None if slopes is None else np.take_along_axis(_edgewise(slopes, -slopes), of_each, axis=0)
-    now = np.zeros(rates.shape[1])
-    torque = np.zeros_like(rates)
+    now, torque = np.zeros(rates.shape[1]), np.zeros_like(rates)
     for number, (edge, turn, kick) in enumerate(zip(edges, turns, kicks, strict=True)):
         advance(MotionStretch(bodies, now, rates, quaternion, torque, slope), edge - now, watch)
         torque = torque + turn if slope is None else torque + slope * (edge - now) + turn
@@ -447,8 +431,7 @@ def _pushed(here: MotionStretch) -> tuple[Array, Array | None]:
 def _arc(moments: Array, forcing: Forcing, rates: Array, quaternion: Array, duration: Array) -> None:
     """Exact arc of symmetric bodies, in place; see `attitude.arc`, and `energy_sink.arc` with dissipation.
 
-    R(t) = R(0) Rot(H(0)/A t) Rot3(νt), with H in body axes: the body turns about H at |H|/A and about its own axis
-    at ν = ω3 - H3/A.
+    R(t) = R(0) Rot(H(0)/A t) Rot3(νt), with H in body axes and ν = ω3 - H3/A.
     """
     A, _, C = moments
     x, y, growth, wheel = rates[0], rates[1], forcing.growth, forcing.wheel / A

@@ -168,8 +168,7 @@ def stepwise_torque(
 ) -> tuple[ComplexArray, Array]:
     """General solution, Magnus 1970 (8)-(10), for a torque that is constant between edges; exact at any angle.
 
-    The form of these equations; schedules fly their pulses by `rates` and `taylor`. ``times`` (n,) s in [edges[0],
-    edges[-1]]; ``edges`` (k+1,) s ascending, the motion (``omega0``, ``spin0`` in rad/s) begins at edges[0];
+    ``times`` (n,) s within ``edges`` (k+1,) s ascending; ``omega0``, ``spin0`` in rad/s are those at edges[0];
     ``torques`` (k, 3) N m. Returns ω (n,) and ω3 (n,) in rad/s.
     """
     edges, torques = np.asarray(edges, dtype=float), np.asarray(torques, dtype=float)

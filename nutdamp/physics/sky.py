@@ -4,8 +4,7 @@ On a free arc of a symmetric body the axis goes round H on a cone: with H at the
 axis at θ from H it comes as near as |β - θ| and as far as β + θ, if it goes so far round. Where dissipation changes θ
 only the turns that count are followed in steps; any other motion all the way.
 
-A Sun pulse comes when the Sun passes the azimuth of the sensor in the nutating body, so each thruster pulse moves the
-Sun pulses after it. Arrays carry the case last, as in `batch`, which propagates everything.
+A Sun pulse comes when the Sun passes the azimuth of the sensor in the nutating body. Arrays carry the case last.
 """
 
 from __future__ import annotations
@@ -30,9 +29,8 @@ TILTING, NODE = math.radians(0.013056), math.radians(174.876)
 def direction(days: float) -> NDArray[np.float64]:
     """Geocentric unit vector (3,) to the apparent Sun in the mean equator and equinox of J2000.0.
 
-    ``days`` since J2000.0 (2000-01-01T12:00 TT). To 0.01 deg from 1972 to 2100. Longitude by J. Meeus, Astronomical
-    Algorithms, 2nd ed., chapter 25, "low accuracy", with aberration, taken from ecliptic and equinox of date to J2000.0
-    (21).
+    ``days`` since J2000.0 (2000-01-01T12:00 TT). To 0.01 deg from 1972 to 2100. By J. Meeus, Astronomical Algorithms,
+    2nd ed., chapter 25, "low accuracy", with aberration, taken to ecliptic and equinox of J2000.0 (21).
     """
     centuries = days / 36525.0
     mean_longitude = 280.46646 + centuries * (36000.76983 + centuries * 0.0003032)
@@ -122,10 +120,9 @@ class AxisWatch:
             self._take(number, np.where(way >= nearest, least, begins), np.where(way >= farthest, largest, begins))
 
     def _slow(self, here: MotionStretch, duration: Array) -> None:
-        """Record arcs with dissipation, of which the first turn and the last are followed in steps.
+        """Record arcs with dissipation: the first turn and the last in steps, all turns where θ passes β or π - β.
 
-        H stays and θ changes monotonically: between those turns so do |β - θ| and β + θ, unless θ passes β or π - β,
-        where all turns are followed.
+        Else |β - θ| and β + θ change monotonically between those two, as θ does.
         """
         turn = CIRCLE * here.bodies.moments[0] / _momentum(here)
         last = here.moved(here.since + np.maximum(duration - turn, 0.0))
@@ -266,9 +263,8 @@ class SunPulseClock:
     """Motion of bodies from Sun pulse to Sun pulse, which count from 1, the first after t = 0.
 
     ``sun`` (3, n) are inertial unit vectors, ``azimuth`` rad is that of the sensor about axis 3 from axis 1, ``sense``
-    the sign of the spin. ``time`` (n,) s is that of the last computed Sun pulse, ``lost`` (n,) True where there was
-    none: the Sun is too near to the axis to go round in the body. ``over`` (n,) s: end of the last pulse, command and
-    thrust.
+    the sign of the spin. ``time`` (n,) s is that of the last computed Sun pulse; there was none where ``lost`` (n,):
+    the Sun is too near to the axis to go round. ``over`` (n,) s: end of the last pulse, command and thrust.
     """
 
     def __init__(self, start: MotionStretch, sun: Array, sense: float, azimuth: float) -> None:
@@ -346,10 +342,7 @@ class SunPulseClock:
 
     @property
     def _pace(self) -> Array:
-        """Mean rate (n,) rad/s at which the Sun goes round in the free body.
-
-        The body turns about H at |H|/A, and about its axis at ω3 - H3/A: together, and at small angles, at ω3.
-        """
+        """Mean rate (n,) rad/s of the Sun in the free body: |H|/A about H, and ω3 - H3/A about the axis."""
         first, second, _ = self.here.bodies.moments
         A, momentum = 0.5 * (first + second), self.here.bodies.momentum(self.here.rates)
         return np.asarray(np.abs(self.sense * _momentum(self.here) / A + self.here.rates[2] - momentum[2] / A))
@@ -389,8 +382,7 @@ class SunPulseClock:
 def ahead(rates: Array, quaternion: Array, sun: Array, azimuth: float, sense: float) -> tuple[Array, Array]:
     """Angle (n,) in [0, 2π) by which bodies have to turn until the Sun passes the sensor, and its rate, rad/s.
 
-    ``rates`` (3, n) rad/s, ``quaternion`` (4, n) body -> inertial, ``sun`` (3, n) inertial unit vectors; ``azimuth``
-    rad and ``sense`` are those of a `SunPulseClock`.
+    ``rates`` (3, n) rad/s, ``quaternion`` (4, n) body -> inertial; the others are those of a `SunPulseClock`.
     """
     w, x, y, z = quaternion
     s1, s2, s3 = sun

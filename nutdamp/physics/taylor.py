@@ -42,8 +42,8 @@ class NotConverged(ArithmeticError):
 class Drive:
     """Drive of n symmetric bodies, (n,) each: ``a`` = (A - C)/A, M/A = ``transverse`` in rad/s² and M3/C.
 
-    ``turning``: (M/A, r) of torques M e^{irt} about axis 3, with M/A (n,) at t = 0 and r in rad/s. ``wheel``: h/A
-    in rad/s of a part of constant momentum h along axis 3, which turns ω at aω3 - h/A in the body.
+    ``turning``: (M/A, r) of torques M e^{irt} about axis 3, r in rad/s. ``wheel``: h/A in rad/s of a constant momentum
+    h along axis 3, which turns ω at aω3 - h/A in the body.
     """
 
     a: Array
@@ -70,17 +70,13 @@ class Drive:
 
 
 class Steps(NamedTuple):
-    """Series of s steps of n bodies in x from 0 to 1 within each: ``starts`` (s, n) s and ``duration`` (n,) s.
+    """Series of s steps of n bodies in x from 0 to 1 within each."""
 
-    ``omega`` (k, s, n) and ``spin`` (2, s, n) in rad/s; ``turn`` (k, 2, s, n): p and r of the turn since the start of
-    the step.
-    """
-
-    starts: Array
-    duration: Array
-    omega: ComplexArray
-    spin: Array
-    turn: ComplexArray
+    starts: Array  # (s, n) s
+    duration: Array  # (n,) s
+    omega: ComplexArray  # (k, s, n) rad/s
+    spin: Array  # (2, s, n) rad/s
+    turn: ComplexArray  # (k, 2, s, n), p and r of the turn since the start of the step
 
 
 def steps(drive: Drive, omega: ComplexArray, spin: Array, start: Array, duration: Array, count: int) -> Iterator[Steps]:
@@ -105,10 +101,7 @@ def steps(drive: Drive, omega: ComplexArray, spin: Array, start: Array, duration
 def end(
     drive: Drive, omega: ComplexArray, spin: Array, turned: ComplexArray, start: Array, duration: Array
 ) -> tuple[ComplexArray, Array, ComplexArray]:
-    """ω (n,), ω3 (n,) and the turn (2, n) after ``duration`` (n,) s, from those at ``start`` (n,) s.
-
-    Raises NotConverged.
-    """
+    """ω (n,), ω3 (n,), turn (2, n) after ``duration`` (n,) s, from those at ``start`` (n,) s; raises NotConverged."""
     for series in steps(drive, omega, spin, start, duration, count_for(drive, omega, spin, duration)):
         turned = product(turned, whole(series.turn.sum(axis=0)))
         omega, spin = series.omega[:, -1].sum(axis=0), series.spin[:, -1].sum(axis=0)
@@ -254,16 +247,11 @@ class Falling(NamedTuple):
 
 
 class Forcing(NamedTuple):
-    """Forcing of a body besides a constant torque.
+    """Forcing of a body besides a constant torque."""
 
-    ``turning``: torques M e^{irt} about axis 3 of the body, as (M = M1 + iM2 in N m at t = 0, r in rad/s).
-    ``growth``: rate κ in 1/s at which energy dissipation lets a small nutation grow (negative: decay), `energy_sink`.
-    ``wheel``: constant momentum h along axis 3 besides I3 ω3, N m s; (n,) by case in `batch`.
-    """
-
-    turning: tuple[tuple[complex, float], ...] = ()
-    growth: float = 0.0
-    wheel: Any = 0.0
+    turning: tuple[tuple[complex, float], ...] = ()  # torques M e^{irt} about axis 3: M1 + iM2 in N m at t = 0, r rad/s
+    growth: float = 0.0  # κ of `energy_sink`, 1/s, at which a small nutation grows; negative: decay
+    wheel: Any = 0.0  # constant momentum h along axis 3 besides I3 ω3, N m s; (n,) by case in `batch`
 
 
 NOTHING = Forcing()
@@ -271,15 +259,12 @@ NOTHING = Forcing()
 
 @dataclass(frozen=True, slots=True)
 class TaylorPiece:
-    """Solution from ``start`` over ``duration`` s as polynomials in x = (t - start)/duration.
-
-    ``rates`` (orders, 3) in rad/s, ``attitude`` (orders, 4).
-    """
+    """Solution from ``start`` over ``duration`` s as polynomials in x = (t - start)/duration."""
 
     start: float
     duration: float
-    rates: Array
-    attitude: Array
+    rates: Array  # (orders, 3) rad/s
+    attitude: Array  # (orders, 4)
 
     def at(self, times: Array) -> tuple[Array, Array]:
         """Rates (n, 3) and unit quaternions (n, 4) at ``times`` (n,) s within the piece."""
@@ -308,9 +293,8 @@ def integrate(
 ) -> list[TaylorPiece]:
     """Motion of a rigid body under a constant body torque and ``forcing``, from ``start`` to ``end`` s (> start).
 
-    ``moments`` (I1, I2, I3) kg m², ``torque`` (3,) N m, ``rates`` (3,) rad/s, ``quaternion`` (4,) body -> inertial.
-    With a ``slope`` (3,) N m/s the torque is that at ``start`` and changes linearly; ``falling`` moments are those at
-    ``start``. Raises Infeasible for motions over more than `LONGEST` rad or ``most`` steps.
+    ``moments`` (I1, I2, I3) kg m², ``torque`` (3,) N m with its ``slope`` (3,) N m/s, ``rates`` (3,) rad/s,
+    ``quaternion`` (4,) body -> inertial at ``start``. Raises Infeasible beyond `LONGEST` rad or ``most`` steps.
     """
     # In one piece: a part of the loop would take torque, slope, moments and forcing, each as it is at a step.
     pieces: list[TaylorPiece] = []
@@ -495,22 +479,17 @@ class _Light:
 class _Sink:
     """`energy_sink` as series: torque of dissipation on H in body axes, and slip of the body.
 
-    With q = H3/|H|² the slip is s = κq (H2, -H1, 0), and H × s is added to dH/dt in the body: products of series but
-    for q. ``floor`` keeps q regular where external torques bring H to rest: there is nothing to dissipate there.
+    With q = H3/|H|² the slip is s = κq (H2, -H1, 0), and H × s is added to dH/dt in the body. ``floor`` keeps q regular
+    where external torques bring H to rest: there is nothing to dissipate there.
     """
 
     def __init__(self, moments: Array, growth: float, floor: float, wheel: float) -> None:
         self.moments, self.growth, self.floor, self.wheel = moments, growth, floor, wheel
-        self.momentum = np.zeros((ORDER, 3))
-        self.squares = np.zeros(ORDER)  # |H|²
-        self.quotient = np.zeros(ORDER)  # q
-        self.slip = np.zeros((ORDER, 3))  # s
+        self.momentum, self.slip = np.zeros((2, ORDER, 3))  # H and s
+        self.squares, self.quotient = np.zeros((2, ORDER))  # |H|² and q
 
-    def acceleration(self, rates: Array, k: int, more: Array | None = None) -> Array:
-        """Coefficient k of (H × s)/I, (3,); stores that of ``slip``. ``rates`` (3,): coefficient k of ω.
-
-        ``more`` (3,) is added to that of H, I ω with the moments of the beginning.
-        """
+    def acceleration(self, rates: Array, k: int, more: Array | None) -> Array:
+        """Coefficient k of (H × s)/I, (3,), from that of ω and ``more`` of H (3,); stores that of ``slip``."""
         momentum, slip = self.momentum, self.slip
         momentum[k] = self.moments * rates if more is None else self.moments * rates + more
         momentum[k, 2] += self.wheel if k == 0 else 0.0
