@@ -43,17 +43,14 @@ class Path(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Arc:
-    """Coast of a symmetric body in closed form, from ``state`` at ``start`` s.
-
-    ``growth`` 1/s is `energy_sink`'s κ, ``wheel`` h in N m s.
-    """
+    """Coast of a symmetric body in closed form, from ``state`` at ``start`` s."""
 
     A: float
     C: float
     start: float
     state: SpinState
-    growth: float = 0.0
-    wheel: float = 0.0
+    growth: float = 0.0  # κ of `energy_sink`, 1/s
+    wheel: float = 0.0  # h, N m s
     steps: int = 0
 
     @classmethod

@@ -77,20 +77,15 @@ def even_times(samples: int, until: float, start: float, end: float) -> Iterator
 
 @dataclass(frozen=True, slots=True)
 class Extremes:
-    """Excursion of the spin axis over ``rows`` rows from 0 to ``until`` s, rad and s.
-
-    ``farthest`` and ``nearest`` are angles from H at t = 0 with their times; ``x`` and ``y`` the range of the axis as
-    angles from the inertial y-z and x-z planes; ``right_ascension`` (the shortest range, which may pass 2π) and
-    ``declination`` the same on the sphere.
-    """
+    """Excursion of the spin axis over ``rows`` rows from 0 to ``until`` s, in rad."""
 
     rows: int
     until: float
-    farthest: tuple[float, float]
+    farthest: tuple[float, float]  # angle from H at t = 0, and its time, s
     nearest: tuple[float, float]
-    x: tuple[float, float]
-    y: tuple[float, float]
-    right_ascension: tuple[float, float]
+    x: tuple[float, float]  # range of the angle from the inertial y-z plane
+    y: tuple[float, float]  # from the x-z plane
+    right_ascension: tuple[float, float]  # shortest range, which may pass 2π
     declination: tuple[float, float]
 
 
@@ -175,46 +170,36 @@ def model_name(schedules: Iterable[Schedule], model: str = REAL_WIDTHS) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Residual:
-    """Residual after the last pulse, rad.
+    """Residual after the last pulse, rad."""
 
-    ``nutation`` is the largest on the following arc, ``body_cone`` and ``space_cone`` (signed) are those of that
-    instant. ``momentum_shift`` is the angle of H from where it was at t = 0, ``axis_error`` from the target axis.
-    """
-
-    nutation: float
-    body_cone: float
-    space_cone: float
-    momentum_shift: float
-    axis_error: float
+    nutation: float  # largest on the following arc
+    body_cone: float  # at that instant
+    space_cone: float  # signed
+    momentum_shift: float  # of H from where it was at t = 0
+    axis_error: float  # of H from the target axis
     model: str = field(default=REAL_WIDTHS, compare=False)  # by which it was found
 
 
 @dataclass(frozen=True, slots=True)
 class Final:
-    """Final pointing: spin ``axis`` and direction of H, inertial unit vectors (3,), just after the last pulse.
+    """Final pointing, just after the last pulse."""
 
-    ``spin`` ω3 rad/s; ``nutation`` rad, as in `Residual`: the half-angle at which the axis goes round H from then on.
-    """
-
-    axis: Vector
-    momentum: Vector
-    spin: float
-    nutation: float
+    axis: Vector  # spin axis, inertial unit vector (3,)
+    momentum: Vector  # direction of H, the same
+    spin: float  # ω3, rad/s
+    nutation: float  # as in `Residual`, rad: the half-angle at which the axis goes round H from then on
 
 
 @dataclass(frozen=True, slots=True)
 class Leg:
-    """Leg of the flight from ``start`` to ``end`` s; ``jump``: the rates jumped at its start.
-
-    ``completed`` pulses are over along it, ``completed_at_end`` at its very end.
-    """
+    """Leg of the flight from ``start`` to ``end`` s."""
 
     start: float
     end: float
     path: Path
-    completed: int
-    jump: bool
-    completed_at_end: int
+    completed: int  # pulses that are over along it
+    jump: bool  # of the rates at its start
+    completed_at_end: int  # pulses that are over at its very end
 
 
 Motion = tuple[Vector, Vector, Vector, NDArray[np.int64]]

@@ -88,8 +88,7 @@ class EulerEquations:
     ) -> Any:
         """Result of solve_ivp from ``state`` at ``start`` to ``end`` s, with interpolant where ``dense``.
 
-        ``burn``: flow of propellant at ``start``, kg/s, and its slope, kg/s². Raises Infeasible where all of them
-        together take more than ``most``.
+        ``burn``: flow of propellant at ``start``, kg/s, and its slope, kg/s². Raises Infeasible beyond ``most``.
         """
         from scipy.integrate import solve_ivp
 
@@ -212,21 +211,16 @@ WITHOUT = "without "  # prefix of the rows of the budget that omit an effect inc
 
 @dataclass(frozen=True, slots=True)
 class Method:
-    """Method of flying the schedule: its residual (rad), or the reason why it could not be flown.
-
-    ``axis``, ``momentum`` (rad) and ``rate`` are its largest differences from the flown motion; that of the rates is
-    relative to |ω|, or to |H| over the largest moment where a wheel holds the body still. ``outside``: an integration
-    that shares nothing with it, and so is to confirm it.
-    """
+    """Method of flying the schedule: its residual and its largest differences from the flown motion."""
 
     name: str
-    nutation: float | None = None
-    momentum_shift: float | None = None
-    axis: float | None = None
-    momentum: float | None = None
-    rate: float | None = None
-    missing: str = ""
-    outside: bool = False
+    nutation: float | None = None  # left, rad
+    momentum_shift: float | None = None  # left, rad
+    axis: float | None = None  # difference, rad
+    momentum: float | None = None  # difference, rad
+    rate: float | None = None  # over |ω|, or over |H| by the largest moment where a wheel holds the body still
+    missing: str = ""  # reason why it could not be flown
+    outside: bool = False  # it shares nothing with the flown motion, and so is to confirm it
 
     @property
     def short(self) -> str:
@@ -303,8 +297,7 @@ def verify(
 ) -> Verification:
     """Fly ``schedule`` by the impulse sum, Taylor series, DOP853 and, where it is installed, Basilisk.
 
-    ``unrounded`` is the schedule before its commands were rounded to ticks, where there is one; ``expected``: it was
-    planned on the motion with the disturbances.
+    ``unrounded``: the schedule before its commands were rounded to ticks; ``expected``: planned with the disturbances.
     """
     end = schedule.end + spacecraft.inertial_period
     judge = propagation.flown(spacecraft, schedule, end)

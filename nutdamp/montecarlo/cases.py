@@ -182,27 +182,20 @@ class Thrusting(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class DispersedCases:
-    """Dispersed cases, in principal axes and SI.
+    """Dispersed cases, in principal axes and SI; each pulse counts as a rectangle."""
 
-    ``moments`` (I1, I2, I3) kg m² and ``omega0`` rad/s at t = 0. Of each pulse ``starts`` and ``widths``, s, of the
-    rectangle that it counts as, which begins ``leads`` s after the command, its ``impulses`` N m s, and its ``thrust``
-    where a valve is not as in the file. ``tilt``: rotation vector (rad, about body axes 1 and 2) by which the attitude
-    at t = 0 is off; ``spent``: propellant of each pulse, kg, None where not known; ``drained`` as of `supplied`;
-    ``per_kg``: what each kg takes off the moments, m², None where they stay; ``wheel``: h, N m s.
-    """
-
-    moments: Triple
-    omega0: Triple
-    starts: tuple[Cases, ...]
-    widths: tuple[Cases, ...]
-    leads: tuple[Cases, ...]
-    impulses: tuple[Triple, ...]
-    thrust: tuple[tuple[Thrusting, ...], ...]
-    tilt: tuple[Cases, Cases]
-    spent: tuple[Cases, ...] | None
-    drained: Cases = 0.0
-    per_kg: Triple | None = None
-    wheel: Cases = 0.0
+    moments: Triple  # at t = 0, kg m²
+    omega0: Triple  # rad/s
+    starts: tuple[Cases, ...]  # of each rectangle, s
+    widths: tuple[Cases, ...]  # s
+    leads: tuple[Cases, ...]  # from the command to its start, s
+    impulses: tuple[Triple, ...]  # N m s
+    thrust: tuple[tuple[Thrusting, ...], ...]  # of each pulse where a valve is not as in the file
+    tilt: tuple[Cases, Cases]  # rotation vector about body axes 1 and 2 by which the attitude at t = 0 is off, rad
+    spent: tuple[Cases, ...] | None  # propellant of each pulse, kg; None where that of one is not known
+    drained: Cases = 0.0  # as of `supplied`
+    per_kg: Triple | None = None  # decrease of the moments by each kg, m²; None where they stay
+    wheel: Cases = 0.0  # h, N m s
 
     @property
     def propellant(self) -> Cases | None:

@@ -292,7 +292,7 @@ class FirstOrder:
         return np.asarray(np.linalg.norm((self.jacobian * sizes)[VECTORS[output]], axis=0))
 
     def shares(self, output: str) -> Array:
-        """Share of each input in the variance of ``output``, (d,), as of `independent`; all zero where nothing varies."""
+        """Share of each input in the variance of ``output``, (d,), as of `independent`; zero where nothing varies."""
         squares = (self.independent(output) ** 2).sum(axis=0)
         return np.asarray(squares / (squares.sum() or 1.0))
 

@@ -58,18 +58,14 @@ CIRCLE = 2.0 * math.pi
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AxisWatch:
-    """Extreme angles ``least`` and ``largest`` (m, n) rad so far between the spin axis and ``directions`` (m, 3, n).
+    """Extreme angles so far between the spin axis and directions."""
 
-    The directions are inertial unit vectors, but for the one with the number ``momentum``: that of H, wherever it
-    points. ``sense`` is the sign of the spin; ``rows``: indices of the observed cases among the n.
-    """
-
-    directions: Array
-    least: Array
-    largest: Array
-    sense: float
-    momentum: int | None
-    rows: NDArray[np.intp]
+    directions: Array  # inertial unit vectors (m, 3, n)
+    least: Array  # (m, n) rad
+    largest: Array  # (m, n) rad
+    sense: float  # sign of the spin
+    momentum: int | None  # number of the direction in place of which H is taken, wherever it points
+    rows: NDArray[np.intp]  # indices of the observed cases among the n
 
     @classmethod
     def of(cls, directions: Array, sense: float, momentum: int | None = None) -> AxisWatch:

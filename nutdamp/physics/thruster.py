@@ -28,14 +28,11 @@ def possible(tank: Tank) -> Any:
 
 @dataclass(frozen=True, slots=True)
 class Cold:
-    """Cold nozzle: the first pulse of each channel has ``first`` times the thrust; it decays to 1 over ``pulses``.
+    """Cold nozzle; the first two may be arrays, of cases."""
 
-    ``fired``: pulses by channel before t = 0. The first two may be arrays, of cases.
-    """
-
-    first: Any
-    pulses: Any
-    fired: Mapping[str, int] = field(default_factory=dict)
+    first: Any  # thrust of the first pulse of each channel over that of a warm one
+    pulses: Any  # over which that decays to 1
+    fired: Mapping[str, int] = field(default_factory=dict)  # pulses by channel before t = 0
 
     def factor(self, before: int) -> Any:
         """Thrust factor of the pulse after ``before`` others: 1 - (1 - first) exp(-k/pulses)."""
