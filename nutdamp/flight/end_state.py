@@ -261,10 +261,7 @@ def _closer(flown: Flight, keep: Keep, way: float, times: Vector, width: float, 
 
 
 def _peaks(times: Vector, values: Vector) -> Vector:
-    """Times of the largest of ``values`` (n,), and of the `TRIED` highest parabolas with the top between their rows.
-
-    Rows at the same time, before and after a jump, are no neighbours.
-    """
+    """Times of the largest of ``values`` (n,), and of the `TRIED` highest parabolas with the top between their rows."""
     before, after = np.diff(times)[:-1], np.diff(times)[1:]
     with np.errstate(divide="ignore", invalid="ignore"):
         rise, fall = np.diff(values)[:-1] / before, np.diff(values)[1:] / after

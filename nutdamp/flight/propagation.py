@@ -208,23 +208,18 @@ Motion = tuple[Vector, Vector, Vector, NDArray[np.int64]]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Flight(Tabled):
-    """Flight of a schedule by one ``model``: its legs in order.
-
-    ``moments`` are those at t = 0; ``settled`` is the motion just after the end of the last pulse; ``spans`` are
-    the times (s) between which each pulse acts, its centre twice in the impulse sum. It is shown by ``samples`` even
-    times to ``until`` s, default its last leg, and rows just before and after each pulse. ``scheme``: what planned it.
-    """
+    """Flight of a schedule by one ``model``."""
 
     spacecraft: Spacecraft
     schedule: Schedule
-    legs: tuple[Leg, ...]
-    settled: SpinState
-    moments: tuple[float, float, float]
-    spans: tuple[tuple[float, float], ...]
+    legs: tuple[Leg, ...]  # in order
+    settled: SpinState  # just after the end of the last pulse
+    moments: tuple[float, float, float]  # at t = 0
+    spans: tuple[tuple[float, float], ...]  # times (s) between which each pulse acts, its centre twice for impulses
     model: str = REAL_WIDTHS
-    until: float | None = None
-    samples: int = 1000
-    scheme: str = ""
+    until: float | None = None  # end of the rows it is shown by, s; None: that of its last leg
+    samples: int = 1000  # even times among these, besides rows just before and after each pulse
+    scheme: str = ""  # by which it was planned
 
     @property
     def steps(self) -> int:

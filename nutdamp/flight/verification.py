@@ -191,10 +191,7 @@ def integrate(spacecraft: Spacecraft, schedule: Schedule, times: Vector) -> tupl
 
 
 def _flow(pulse: Pulse, start: float, end: float) -> tuple[float, float]:
-    """Flow of propellant, kg/s, at the start of a stretch of a pulse without an edge, and its slope, kg/s².
-
-    It goes by the share of the impulse, a parabola there.
-    """
+    """Flow of propellant, kg/s, as a stretch without an edge starts, and its slope, kg/s², by the share of impulse."""
     times = np.array([start, 0.5 * (start + end), end])
     before, middle, after = ((pulse.propellant or 0.0) * pulse.share(times)).tolist()
     length = end - start

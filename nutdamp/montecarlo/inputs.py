@@ -39,17 +39,14 @@ SCHEDULE_IDLE = "the schedule does not fire"
 
 
 class DispersedInput(NamedTuple):
-    """Drawn quantity: its value in a case = ``nominal`` + draw, in ``unit``, empty for factors.
-
-    ``tolerance`` is the key of ``dispersions`` it comes from, ``size`` what `equipment.KINDS` says for its ``kind``.
-    """
+    """Drawn quantity: its value in a case = ``nominal`` + draw, in ``unit``."""
 
     name: str
-    tolerance: str
-    kind: str
+    tolerance: str  # key of the file's ``dispersions``
+    kind: str  # of `nutdamp.spacecraft.equipment.KINDS`, which says what ``size`` means
     size: float
     nominal: float
-    unit: str
+    unit: str  # empty for factors
 
     @property
     def sigma(self) -> float:

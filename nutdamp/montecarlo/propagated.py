@@ -252,10 +252,9 @@ def fly(
 ) -> tuple[Array, Array, Array, NDArray[np.bool_], Array]:
     """Fire the blocks of ``model`` in each case from its own Sun pulses; ``watch`` sees the motion.
 
-    ``nominal``: `RealWidths.seen_nominally`. A pulse that is due while the one before is on begins as that ends.
-    Returns rates (3, n) rad/s and quaternions (4, n) at the end of the last pulse; starts (k, n) s of the pulses;
-    whether they fire (k, n): not once the sensor has seen the Sun in other turns than in the nominal flight; when the
-    last pulse ends (n,), s.
+    ``nominal``: `RealWidths.seen_nominally`. Returns rates (3, n) rad/s and quaternions (4, n) at the end of the last
+    pulse; starts (k, n) s of the pulses; whether they fire (k, n): not once the sensor has seen the Sun in other turns
+    than in the nominal flight; when the last pulse ends (n,), s.
     """
     count, body = rates.shape[1], model.spacecraft
     assert body.sun_sensor is not None

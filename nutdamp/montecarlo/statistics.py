@@ -16,9 +16,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.montecarlo.cases import Cases, DispersedCases, DispersedModel, Triple, parts_of
+from nutdamp.montecarlo.cases import DispersedCases, DispersedModel, Triple, parts_of
 from nutdamp.montecarlo.inputs import DispersedInput, Group, mixing
 from nutdamp.montecarlo.propagated import ClosedForm, Ends
+from nutdamp.physics.attitude import angle_of_parts
 
 STEPS = 200  # Newton steps and halvings in which a quantile is found, at most; half a dozen do mostly
 ACCURACY = 4e-16  # relative change of a quantile, or of a continued fraction, that is rounding
@@ -118,8 +119,8 @@ def measure(model: DispersedModel, ends: Ends, count: int) -> Array:
     x, y, z = ends.momentum
     rows = (
         np.arctan2(np.sqrt(x * x + y * y), model.spacecraft.sense * z) if ends.nutation is None else ends.nutation,
-        angle(ends.before, ends.after),
-        angle(parts_of(model.target), ends.pointed),
+        angle_of_parts(ends.before, ends.after),
+        angle_of_parts(parts_of(model.target), ends.pointed),
         ends.spin_change,
         np.nan if ends.propellant is None else ends.propellant,
     )
@@ -150,13 +151,6 @@ def _unit(vector: Triple) -> Triple:
     return x * size, y * size, z * size
 
 
-def angle(first: Triple, second: Triple) -> Cases:
-    """Angle between vectors, exact to rounding from 0 to π."""
-    (a, b, c), (x, y, z) = first, second
-    i, j, k = b * z - c * y, c * x - a * z, a * y - b * x
-    return np.arctan2(np.sqrt(i * i + j * j + k * k), a * x + b * y + c * z)
-
-
 EXACT_CASES = 1_000_000  # number of cases up to which every value is kept, and percentiles are exact
 
 SHARPNESS = 13
@@ -183,7 +177,7 @@ class Exact:
         share, above = places - ranks, np.ceil(places).astype(int)
         ordered = np.partition(self.values, sorted({*ranks.tolist(), *above.tolist()}))  # np.unique loads numpy.ma
         low, high = ordered[ranks], ordered[above]
-        return np.where(share < 0.5, low + (high - low) * share, high - (high - low) * (1.0 - share))
+        return np.asarray(np.where(share < 0.5, low + (high - low) * share, high - (high - low) * (1.0 - share)))
 
     def histogram(self, edges: Array) -> Array:
         """Cases between each two of ``edges``."""

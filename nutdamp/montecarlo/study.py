@@ -222,10 +222,7 @@ class Study(DrawnCases):
 
 @dataclass(eq=False)
 class Counted:
-    """Results of a study so far: the cases from 0 to ``done`` of the ``requested``, of which ``met`` comply.
-
-    ``broken`` (m,): cases that break each cone; ``aspects`` (m, 2) rad: least and largest angle to it in all cases.
-    """
+    """Results of a study so far: the cases from 0 to ``done`` of the ``requested``, of which ``met`` comply."""
 
     study: Any
     requested: int
@@ -233,8 +230,8 @@ class Counted:
     redrawn: int = 0
     met: int = 0
     worst: Worst = field(default_factory=lambda: Worst(KEPT_WORST))
-    broken: NDArray[np.int64] = field(init=False)
-    aspects: Array = field(init=False)
+    broken: NDArray[np.int64] = field(init=False)  # cases that break each cone, (m,)
+    aspects: Array = field(init=False)  # least and largest angle to it in all cases, (m, 2) rad
 
     def __post_init__(self) -> None:
         cones = len(self.study.model.spacecraft.keep)
@@ -274,17 +271,13 @@ class Counted:
 
 @dataclass(eq=False)
 class Results(Counted):
-    """Results of a study of a schedule; ``emptied`` counts the cases whose tank runs empty.
-
-    ``values`` (5 + 2m, capacity): outputs, and least and largest angle (rad) to each of m cones, up to `EXACT_CASES`;
-    beyond, ``sketches`` count. ``early`` (10, `EARLY`): `vectors` of the first cases.
-    """
+    """Results of a study of a schedule."""
 
     study: Study
-    emptied: int = 0
-    early: Array = field(default_factory=lambda: np.zeros((ROWS, EARLY)))
-    values: Array | None = field(init=False)
-    sketches: list[Sketch] = field(init=False)
+    emptied: int = 0  # cases whose tank runs empty
+    early: Array = field(default_factory=lambda: np.zeros((ROWS, EARLY)))  # `vectors` of the first cases
+    values: Array | None = field(init=False)  # outputs, least and largest angle (rad) to each of m cones: (5 + 2m, n)
+    sketches: list[Sketch] = field(init=False)  # of the outputs, beyond `EXACT_CASES`, in place of ``values``
 
     def __post_init__(self) -> None:
         super().__post_init__()

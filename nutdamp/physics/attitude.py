@@ -83,6 +83,13 @@ def angle_between(first: Array, second: Array) -> Array:
     return np.asarray(np.arctan2(cross, np.sum(first * second, axis=-1)), dtype=np.float64)
 
 
+def angle_of_parts(first: Iterable[Any], second: Iterable[Any]) -> Any:
+    """`angle_between` by components, each a number or an array."""
+    (a, b, c), (x, y, z) = first, second
+    i, j, k = b * z - c * y, c * x - a * z, a * y - b * x
+    return np.arctan2(np.sqrt(i * i + j * j + k * k), a * x + b * y + c * z)
+
+
 def angular_momentum(A: float, C: float, omega: complex, spin: float, wheel: float = 0.0) -> Array:
     """H = (A ω1, A ω2, C ω3 + h) in body axes, (3,) N m s; ``wheel`` is h."""
     return np.array([A * omega.real, A * omega.imag, C * spin + wheel])

@@ -194,18 +194,13 @@ class Bodies:
 
 @dataclass(frozen=True, slots=True)
 class Pulses:
-    """Rectangular pulses: ``starts`` (k, n) s, ``on_times`` (k, n) s, ``impulses`` (k, 3, n) N m s, torque × on-time.
+    """Rectangular pulses; the moments fall half as one begins and half as it ends, which errs in second order."""
 
-    On-times are (k, 1) where all cases have the same; 0 is an ideal impulse. With ``leans`` (k, n) torques run evenly
-    from 1 - lean times their mean to 1 + lean times it. The moments fall by ``sheds`` (k, 3, n) kg m², half as a pulse
-    begins and half as it ends, which errs in second order; None: they stay.
-    """
-
-    starts: Array
-    on_times: Array
-    impulses: Array
-    leans: Array | None = None
-    sheds: Array | None = None
+    starts: Array  # (k, n) s
+    on_times: Array  # (k, n) s, or (k, 1) for all cases; 0: an ideal impulse
+    impulses: Array  # torque × on-time, (k, 3, n) N m s
+    leans: Array | None = None  # (k, n): torques run evenly from 1 - lean to 1 + lean times their mean
+    sheds: Array | None = None  # decrease of the moments, (k, 3, n) kg m²
 
     def some(self, cases: Any) -> Pulses:
         """Subset of ``cases`` (an index of arrays)."""

@@ -12,11 +12,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import reduce
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from nutdamp.physics.attitude import angle_of_parts
 from nutdamp.physics.batch import MotionStretch, pieces
 
 OBLIQUITY = math.radians(23.43928)  # obliquity of the ecliptic at J2000.0
@@ -105,9 +107,9 @@ class AxisWatch:
         momentum = _rotated(here.quaternion, here.bodies.momentum(here.rates))
         axis, size = self.sense * _third_axis(here.quaternion), np.sqrt(np.sum(momentum * momentum, axis=0))
         momentum, way = momentum / size, size / here.bodies.moments[0] * duration
-        theta = _angles(momentum, axis)
+        theta = angle_of_parts(momentum, axis)
         for number, direction in enumerate(self._towards(momentum)):
-            begins, beta = _angles(axis, direction), _angles(momentum, direction)
+            begins, beta = angle_of_parts(axis, direction), angle_of_parts(momentum, direction)
             along = np.sum(axis * direction, axis=0) - np.cos(theta) * np.cos(beta)
             ahead = np.sum(_cross(momentum, axis) * direction, axis=0)
             nearest = np.arctan2(ahead, along) % CIRCLE  # how far round from where it is the axis comes nearest
@@ -124,8 +126,10 @@ class AxisWatch:
         last = here.moved(here.since + np.maximum(duration - turn, 0.0))
         momentum = _rotated(here.quaternion, here.bodies.momentum(here.rates))
         momentum /= np.sqrt(np.sum(momentum * momentum, axis=0))
-        before, after = (_angles(momentum, self.sense * _third_axis(stretch.quaternion)) for stretch in (here, last))
-        betas = np.array([_angles(momentum, direction) for direction in self._towards(momentum)])
+        before, after = (
+            angle_of_parts(momentum, self.sense * _third_axis(stretch.quaternion)) for stretch in (here, last)
+        )
+        betas = np.array([angle_of_parts(momentum, direction) for direction in self._towards(momentum)])
         passed = [(before - other) * (after - other) <= 0.0 for other in (*betas, *(math.pi - betas))]
         whole = (duration <= 2.0 * turn) | np.any(passed, axis=0)
         for cases, begins, lasts in ((whole, here, duration), (~whole, here, turn), (~whole, last, turn)):
@@ -235,12 +239,6 @@ def _third_axis(quaternion: Array) -> Array:
     return np.array([2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)])
 
 
-def _angles(first: Array, second: Array) -> Array:
-    """Angles (n,) between vectors (3, n), exact to rounding from 0 to π."""
-    across = _cross(first, second)
-    return np.asarray(np.arctan2(np.sqrt(np.sum(across * across, axis=0)), np.sum(first * second, axis=0)))
-
-
 ITERATIONS = 40  # largest number of Newton steps to a Sun pulse; three or four are usual
 EXACT = 1e-13  # tolerance of the time of a Sun pulse, in spin turns
 AHEAD = 8  # largest number of Sun pulses skipped between two computed ones; the mean rate predicts the next
@@ -286,7 +284,7 @@ class SunPulseClock:
         delay: Array,
         width: float,
         pushes: Sequence[TorqueRamp],
-        sheds: Array | None = None,
+        sheds: Array | None,
     ) -> Array:
         """Fire a command of ``width`` s, ``delay`` (n,) s after the last Sun pulse, ``sun_pulse``.
 
@@ -295,10 +293,7 @@ class SunPulseClock:
         """
         before, half = self.here, None if sheds is None else 0.5 * sheds
         starts = np.maximum(sun_pulse.since + delay, self.over)
-        lasts: Any = width
-        for push in pushes:
-            lasts = np.maximum(lasts, push.end)
-        self.over = starts + lasts
+        self.over = starts + reduce(np.maximum, (push.end for push in pushes), width)
         if not pushes:
             return starts
         begun = sun_pulse.moved(starts + pushes[0].begin)
@@ -334,7 +329,7 @@ class SunPulseClock:
 
     def angle(self, here: MotionStretch) -> Array:
         """Angle between spin axis and Sun, (n,) rad."""
-        return _angles(self.sense * _third_axis(here.quaternion), self.sun)
+        return np.asarray(angle_of_parts(self.sense * _third_axis(here.quaternion), self.sun))
 
     @property
     def _pace(self) -> Array:

@@ -40,17 +40,13 @@ class NotConverged(ArithmeticError):
 
 @dataclass(frozen=True, slots=True)
 class Drive:
-    """Drive of n symmetric bodies, (n,) each: ``a`` = (A - C)/A, M/A = ``transverse`` in rad/s² and M3/C.
+    """Drive of n symmetric bodies, (n,) each."""
 
-    ``turning``: (M/A, r) of torques M e^{irt} about axis 3, r in rad/s. ``wheel``: h/A in rad/s of a constant momentum
-    h along axis 3, which turns ω at aω3 - h/A in the body.
-    """
-
-    a: Array
-    transverse: ComplexArray
-    axial: Array
-    turning: tuple[tuple[ComplexArray | complex, float], ...] = ()
-    wheel: Array | float = 0.0
+    a: Array  # (A - C)/A
+    transverse: ComplexArray  # M/A, rad/s²
+    axial: Array  # M3/C, rad/s²
+    turning: tuple[tuple[ComplexArray | complex, float], ...] = ()  # (M/A, r) of torques M e^{irt}, r in rad/s
+    wheel: Array | float = 0.0  # h/A, rad/s, of a constant momentum h along axis 3: ω turns at aω3 - h/A
 
     @classmethod
     def of(cls, a: Array, acceleration: Array, forcing: Forcing, A: Any) -> Drive:

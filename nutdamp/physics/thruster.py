@@ -200,18 +200,13 @@ class Opened(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Trapezoid:
-    """Valve with delays of opening and closing, s, and linear rise and fall of the thrust.
+    """Valve with linear rise and fall of the thrust: a triangle where it closes before full thrust is reached."""
 
-    A command from 0 to τ lets the thrust rise from ``open_delay`` on, to full thrust within ``rise_time``, and fall
-    from τ + ``close_delay`` on, as fast as from full thrust to nothing within ``fall_time``: a triangle where it closes
-    before full thrust is reached. ``effective``: on-times are loaded as effective ones.
-    """
-
-    open_delay: float = 0.0
-    close_delay: float = 0.0
-    rise_time: float = 0.0
-    fall_time: float = 0.0
-    effective: bool = False
+    open_delay: float = 0.0  # s from the start of the command until the thrust rises
+    close_delay: float = 0.0  # s from its end until the thrust falls
+    rise_time: float = 0.0  # s to full thrust
+    fall_time: float = 0.0  # s from full thrust to nothing
+    effective: bool = False  # on-times are loaded as effective ones
 
     @property
     def known(self) -> tuple[float, float]:
