@@ -5,7 +5,7 @@ from __future__ import annotations
 import cmath
 import math
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any, NamedTuple, Protocol
@@ -39,6 +39,20 @@ class Path(Protocol):
     def motion(self, times: Vector) -> tuple[Vector, Vector]:
         """Rates (n, 3) in rad/s and quaternions (n, 4) at ``times`` (n,) s."""
         ...
+
+
+def joined(
+    pieces: Sequence[tuple[float, Callable[[Vector], tuple[Vector, Vector]]]], times: Vector
+) -> tuple[Vector, Vector]:
+    """Rates (n, 3) and quaternions (n, 4) at ``times`` (n,) s by ``pieces``: the start (s) of each, and its motion."""
+    times = np.asarray(times, dtype=float)
+    owner = np.searchsorted([start for start, _ in pieces], times, side="right") - 1
+    owner = np.clip(owner, 0, len(pieces) - 1)
+    rates, quaternion = np.empty((len(times), 3)), np.empty((len(times), 4))
+    for index in np.flatnonzero(np.bincount(owner)):  # np.unique would load numpy.ma
+        rows = owner == index
+        rates[rows], quaternion[rows] = pieces[index][1](times[rows])
+    return rates, quaternion
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,14 +122,7 @@ class Integrated:
 
     def motion(self, times: Vector) -> tuple[Vector, Vector]:
         """Rates (n, 3) in rad/s and quaternions (n, 4) at ``times`` (n,) s."""
-        times = np.asarray(times, dtype=float)
-        starts = np.array([piece.start for piece in self.pieces])
-        owner = np.clip(np.searchsorted(starts, times, side="right") - 1, 0, len(starts) - 1)
-        body, quaternion = np.empty((len(times), 3)), np.empty((len(times), 4))
-        for index in np.flatnonzero(np.bincount(owner)):  # np.unique would load numpy.ma
-            rows = owner == index
-            body[rows], quaternion[rows] = self.pieces[index].at(times[rows])
-        return body, quaternion
+        return joined([(piece.start, piece.at) for piece in self.pieces], times)
 
 
 LONG = 20.0
@@ -266,10 +273,7 @@ class Lightening:
 
 
 class Supply:
-    """Supply state: pulses fired by channel, and propellant used, kg: numbers, or arrays of cases.
-
-    By default what was fired before t = 0. ``used`` is what the pulses would take of a tank that lasts.
-    """
+    """Pulses ``fired`` by channel, and propellant ``used`` if the tank lasts, kg: by default, those before t = 0."""
 
     def __init__(self, spacecraft: Spacecraft, fired: Counter[str] | None = None, used: Any = None) -> None:
         cold, tank = spacecraft.cold, spacecraft.tank

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from nutdamp.common.numerics import SAME_ANGLE
 from nutdamp.common.results import Tabled
-from nutdamp.flight.dynamics import Dynamics, Lightening, Path, lightened, make_dynamics, shed
+from nutdamp.flight.dynamics import Dynamics, Lightening, Path, joined, lightened, make_dynamics, shed
 from nutdamp.physics import attitude, response, taylor
 from nutdamp.physics.triaxial import arc_cones, widest_cones
 from nutdamp.spacecraft.model import Inertia, Spacecraft, SpinState, Vector
@@ -132,10 +132,7 @@ class _Record:
 
 
 class _Circle:
-    """Shortest arc that holds many angles: its complement is the widest gap between neighbours.
-
-    Of the angles in each `BINS`-th of a turn the least and the largest are kept; gaps within one are not looked at.
-    """
+    """Shortest arc that holds many angles: all but the widest gap between neighbours in different `BINS`."""
 
     def __init__(self) -> None:
         self.low, self.high = np.full(BINS, math.inf), np.full(BINS, -math.inf)
@@ -267,13 +264,7 @@ class Flight(Tabled):
 
     def motion(self, times: Vector) -> tuple[Vector, Vector]:
         """Rates (n, 3) in rad/s and quaternions (n, 4) at ``times`` (n,) s; just after a jump."""
-        times = np.asarray(times, dtype=float)
-        owner = np.searchsorted([leg.start for leg in self.legs], times, side="right") - 1
-        body, quaternion = np.empty((len(times), 3)), np.empty((len(times), 4))
-        for index in np.flatnonzero(np.bincount(owner + 1)) - 1:  # np.unique would load numpy.ma
-            rows = owner == index
-            body[rows], quaternion[rows] = self.legs[index].path.motion(times[rows])
-        return body, quaternion
+        return joined([(leg.start, leg.path.motion) for leg in self.legs], times)
 
     def axis(self, times: Vector) -> Vector:
         """Spin axis, inertial unit vectors (n, 3), at ``times`` (n,) s."""

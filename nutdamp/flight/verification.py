@@ -35,11 +35,7 @@ Matrix = Sequence[Numbers]
 
 
 class EulerEquations:
-    """Euler's equations of a spacecraft and its attitude; ``evaluations`` of them so far, ``most`` at most.
-
-    A state (7,) holds rates, rad/s, and quaternion of the axes of the file; (8,) the propellant used too, kg, where
-    the moments fall.
-    """
+    """Euler's equations of a spacecraft and its attitude; ``evaluations`` of them so far, ``most`` at most."""
 
     def __init__(self, spacecraft: Spacecraft, most: int | None = None) -> None:
         self.most = EVALUATIONS if most is None else most
@@ -54,7 +50,7 @@ class EulerEquations:
         self.evaluations = 0
 
     def state(self, motion: SpinState) -> Vector:
-        """State vector of a motion."""
+        """Rates, rad/s, and quaternion in the axes of the file, (7,); (8,) with propellant used, kg: moments fall."""
         turned = attitude.multiply(motion.quaternion, attitude.from_matrix(self.axes.T))
         return np.concatenate([self.axes @ motion.rates, turned, [] if self.shed is None else [0.0]])
 

@@ -256,14 +256,11 @@ CLASS_SIZE = 32  # cases in each of them, at least
 
 @dataclass(frozen=True, eq=False)
 class FirstOrder:
-    """Outcome to first order about nominal values (and biases).
-
-    ``jacobian`` (10, d): derivative of each row of `vectors` by each of the ``inputs``, correlated in ``groups``.
-    """
+    """Outcome to first order about nominal values (and biases)."""
 
     inputs: tuple[DispersedInput, ...]
-    jacobian: Array
-    groups: tuple[Group, ...]
+    jacobian: Array  # derivative of each row of `vectors` by each input, in its unit, (10, d)
+    groups: tuple[Group, ...]  # of correlated inputs
 
     @property
     def sigmas(self) -> Array:

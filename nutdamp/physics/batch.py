@@ -460,10 +460,7 @@ def _arc(moments: Array, forcing: Forcing, rates: Array, quaternion: Array, dura
 
 
 def _series(here: MotionStretch, duration: Array, acceleration: Array, jerk: Array | None) -> Iterator[Series]:
-    """Taylor series over ``duration`` under an angular ``acceleration`` (3, n) in rad/s², in place, one by one.
-
-    With a ``jerk`` (3, n) rad/s³ the acceleration is that at the start; None: constant.
-    """
+    """Taylor series over ``duration`` in place, each in turn; ``acceleration`` (3, n) rad/s² at its start, ``jerk``."""
     forcing, moments = here.bodies.forcing, here.bodies.moments
     strength = np.sqrt(np.sum(acceleration * acceleration, axis=0))
     if jerk is not None:

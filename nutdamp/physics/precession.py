@@ -165,10 +165,7 @@ def reach(torque: float, spin: float, longest: float) -> float:
 
 
 def on_times_to_turn(impulses: Array, torque: float, spin: float) -> Array:
-    """On-times (n,) s of pulses that turn H like ``impulses`` (n,) N m s: (2/ω3) asin(ω3J/2M).
-
-    Not a number beyond 2M/ω3, the largest turn of H by a torque fixed in the body.
-    """
+    """On-times (n,) s of pulses that turn H like ``impulses`` (n,) N m s: (2/ω3) asin(ω3J/2M), NaN beyond 2M/ω3."""
     rate = 0.5 * abs(spin)
     if rate == 0.0:
         return impulses / torque

@@ -232,8 +232,7 @@ def permanent_rotation(A: float, C: float, spin: float, torque: complex) -> tupl
     Returns ω (rad/s), its rate ψ̇0 = |ω_i| and the Euler angles ϑ0, φ0 (rad), (14).
 
     tan ϑ0 = |M|/(|A - C| ω3²), tan φ0 = ω1/ω2 by arctan2; ψ̇0 is |ω|, where the source prints |ω̇|. With
-    ω1 = ψ̇0 sin ϑ0 sin φ0, ω2 = ψ̇0 sin ϑ0 cos φ0, ω3 = ψ̇0 cos ϑ0. Infinite for a sphere. The form of (14); plans
-    need no more than `steady_response`.
+    ω1 = ψ̇0 sin ϑ0 sin φ0, ω2 = ψ̇0 sin ϑ0 cos φ0, ω3 = ψ̇0 cos ϑ0. Infinite for a sphere.
     """
     omega = steady_response(A, (A - C) / A * spin, torque)
     rate = math.hypot(abs(omega), spin)

@@ -76,10 +76,7 @@ class Steps(NamedTuple):
 
 
 def steps(drive: Drive, omega: ComplexArray, spin: Array, start: Array, duration: Array, count: int) -> Iterator[Steps]:
-    """Motion over ``duration`` (n,) s from ``start`` (n,) s in ``count`` equal steps or a multiple, in groups.
-
-    ``omega`` and ``spin`` (n,) rad/s at the start. Raises NotConverged.
-    """
+    """Motion from ``start`` (n,) s in ``count`` equal steps or a multiple, in groups; raises NotConverged."""
     step, done, halvings = duration / count, 0, 0
     while done < count:
         some = min(max(TOGETHER // len(spin), 1), count - done)
