@@ -83,13 +83,12 @@ def default_step(spacecraft: Spacecraft, schedule: Schedule, until: float) -> fl
     √(2T) = √(Σ Ij ωj²) is constant without torque, grows by |J|/√Imin at most under an impulse J, and bounds |ω| √Imin.
     """
     moments, rates = np.asarray(spacecraft.inertia.moments), spacecraft.initial.rates
-    pushes = schedule.total_impulse + until * math.fsum(
-        math.hypot(abs(disturbance.transverse), disturbance.axial) for disturbance in spacecraft.disturbances
-    )
+    lasting = math.fsum(math.hypot(abs(each.transverse), each.axial) for each in spacecraft.disturbances)
+    pushes = schedule.total_impulse + until * lasting
     least = math.sqrt(float(moments.min()))
     pace = (math.sqrt(float(moments @ rates**2)) + pushes / least) / least
     pace += abs(spacecraft.inertia.wheel) / float(moments.min())
-    turning = [abs(disturbance.rate) for disturbance in spacecraft.disturbances if disturbance.rate != 0.0]
+    turning = [abs(each.rate) for each in spacecraft.disturbances if each.rate != 0.0]
     angle, pace = (TURN_TURNING, pace + max(turning)) if turning else (TURN, pace)
     return angle / pace if pace > 0.0 else 1.0
 

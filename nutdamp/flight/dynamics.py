@@ -46,10 +46,9 @@ def joined(
 ) -> tuple[Vector, Vector]:
     """Rates (n, 3) and quaternions (n, 4) at ``times`` (n,) s by ``pieces``: the start (s) of each, and its motion."""
     times = np.asarray(times, dtype=float)
-    owner = np.searchsorted([start for start, _ in pieces], times, side="right") - 1
-    owner = np.clip(owner, 0, len(pieces) - 1)
+    owner = np.clip(np.searchsorted([start for start, _ in pieces], times, side="right") - 1, 0, len(pieces) - 1)
     rates, quaternion = np.empty((len(times), 3)), np.empty((len(times), 4))
-    for index in np.flatnonzero(np.bincount(owner)):  # np.unique would load numpy.ma
+    for index in np.flatnonzero(np.bincount(owner)).tolist():  # np.unique would load numpy.ma
         rows = owner == index
         rates[rows], quaternion[rows] = pieces[index][1](times[rows])
     return rates, quaternion

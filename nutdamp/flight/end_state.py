@@ -115,10 +115,7 @@ def left_by(flight: Flight) -> Left:
 
 
 def tolerated(spacecraft: Spacecraft) -> dict[Part, float]:
-    """Tolerated difference between models in nutation, direction of H, and spin where the goal names one.
-
-    A tenth of what is required; `ANGLE` for a part that nothing bounds.
-    """
+    """Tolerated difference between models, by part: `SHARE` of what is required, `ANGLE` where nothing bounds it."""
     required = {bound.part: SHARE * bound.most for bound in requirements.required(spacecraft)}
     return {Part.NUTATION: ANGLE, requirements.aim(spacecraft): ANGLE, **required}
 

@@ -61,10 +61,7 @@ def in_file_axes(track: Track, inertia: Inertia) -> Track:
 
 
 def even_times(samples: int, until: float, start: float, end: float) -> Iterator[tuple[Array, bool, bool]]:
-    """Those of ``samples`` even times from 0 to ``until`` s that lie between ``start`` and ``end``, `PIECE` at a time.
-
-    Each part, one at least, with marks of the first and of the last one; the times are those of np.linspace.
-    """
+    """Parts of np.linspace(0, ``until``, ``samples``) within ``start`` to ``end``, with marks of the first and last."""
     step = until / max(samples - 1, 1)
     low, high = (min(max(int(time / step) + more, 0), samples) for time, more in ((start, -1), (end, 2)))
     for begin in range(low, max(high, low + 1), PIECE):

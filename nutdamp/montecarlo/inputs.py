@@ -368,10 +368,7 @@ MOST_ATTEMPTS = 1_000  # largest number of redraws of a case; beyond it the disp
 
 
 class DrawSource:
-    """Draws of the blocks of a study. Not to be shared by threads: each makes its own.
-
-    ``physical`` tells which of the cases drawn can be, (n,) or True for all; ``groups`` has inputs not drawn, too.
-    """
+    """Draws of the blocks of a study by one thread; ``physical`` tells which cases can be, (n,) or True for all."""
 
     def __init__(
         self,

@@ -303,11 +303,10 @@ def fly(
 def _pushes(thrust: Sequence[Thrusting], seen: NDArray[np.bool_], part: Callable[[object], Array]) -> list[TorqueRamp]:
     """Torques of thrusters through valves of their own, together, between successive corners of their thrust."""
     torques = [np.array([part(component) for component in each.torque]) * seen for each in thrust]
-    opened = [
-        Opened(tuple(map(part, each.opened.corners)), part(each.opened.level))  # type: ignore[arg-type]  # four
-        for each in thrust
-    ]
-    edges = np.sort(np.array([each.corners for each in opened]).reshape(-1, len(seen)), axis=0)
+    corners = [tuple(map(part, each.opened.corners)) for each in thrust]
+    pairs = zip(corners, thrust, strict=True)
+    opened = [Opened(four, part(each.opened.level)) for four, each in pairs]  # type: ignore[arg-type]
+    edges = np.sort(np.array(corners).reshape(-1, len(seen)), axis=0)
     ramps = []
     for begin, end in pairwise(edges):
         levels = [[each.within(0.5 * (begin + end), edge) for each in opened] for edge in (begin, end)]

@@ -441,10 +441,7 @@ class Checkpoints:
             yield _range(self._flown(part, self._draws)[0][0])
 
     def window(self, probability: float) -> Range | None:
-        """Shifts (s) of all pulses with which the share ``probability`` of the cases complies; None without any.
-
-        As far as half a turn of spin or nutation, the faster, and no pulse before t = 0.
-        """
+        """Shifts (s) of all pulses, to half a turn, with which the share ``probability`` complies; None without any."""
         if not self._complies(0.0, probability):
             return None
         first = min(pulse.loaded[0] for pulse in self.study.model.schedule)

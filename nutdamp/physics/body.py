@@ -117,10 +117,7 @@ def half_pulses_as_printed(A: float, C: float, omega: float, spin: float) -> Hal
 
 
 def turn_between_halves(A: float, C: float, omega: float, spin: float, wheel: float = 0.0) -> float:
-    """Angle in rad by which ω turns in the body between the two `half_pulses`: π(H3 - Aω3)/|H3| cos(θ/2).
-
-    Without a wheel σπ(1 - A/C)cos(θ/2). ``spin`` is ω3 itself.
-    """
+    """Angle in rad by which ω turns in the body between the `half_pulses`: π(H3 - Aω3)/|H3| cos(θ/2), ``spin`` = ω3."""
     axial = C * spin + wheel
     theta = nutation_angle(A, C, omega, axial / C)
     return math.copysign(math.pi, axial) * (1.0 - A * spin / axial) * math.cos(0.5 * theta)
@@ -149,10 +146,7 @@ Moments = tuple[float, float, float]
 
 
 def settled(moments: ArrayLike) -> Moments:
-    """Principal moments (I1, I2, I3), those within `DEGENERATE` of each other made exactly equal.
-
-    I1 and I2 become their mean; of a sphere all are I3. So nothing divides by a difference that is rounding.
-    """
+    """Principal moments, those within `DEGENERATE` made exactly equal: I1 and I2 their mean, of a sphere all I3."""
     first, second, third = (float(moment) for moment in np.asarray(moments, dtype=float))
     rounding = DEGENERATE * max(first, second, third)
     if first != second and abs(first - second) <= rounding:

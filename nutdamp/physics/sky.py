@@ -118,10 +118,7 @@ class AxisWatch:
             self._take(number, np.where(way >= nearest, least, begins), np.where(way >= farthest, largest, begins))
 
     def _slow(self, here: MotionStretch, duration: Array) -> None:
-        """Record arcs with dissipation: the first turn and the last in steps, all turns where θ passes β or π - β.
-
-        Else |β - θ| and β + θ change monotonically between those two, as θ does.
-        """
+        """Record arcs with dissipation: in steps the first turn and the last, or all where θ passes β or π - β."""
         turn = CIRCLE * here.bodies.moments[0] / _momentum(here)
         last = here.moved(here.since + np.maximum(duration - turn, 0.0))
         momentum = _rotated(here.quaternion, here.bodies.momentum(here.rates))
@@ -130,6 +127,7 @@ class AxisWatch:
             angle_of_parts(momentum, self.sense * _third_axis(stretch.quaternion)) for stretch in (here, last)
         )
         betas = np.array([angle_of_parts(momentum, direction) for direction in self._towards(momentum)])
+        # Else |β - θ| and β + θ change monotonically between the first turn and the last, as θ does.
         passed = [(before - other) * (after - other) <= 0.0 for other in (*betas, *(math.pi - betas))]
         whole = (duration <= 2.0 * turn) | np.any(passed, axis=0)
         for cases, begins, lasts in ((whole, here, duration), (~whole, here, turn), (~whole, last, turn)):
