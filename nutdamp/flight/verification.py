@@ -163,7 +163,7 @@ def _cross(one: Numbers, other: Numbers) -> Numbers:
 
 
 def integrate(spacecraft: Spacecraft, schedule: Schedule, times: Vector) -> tuple[Vector, Vector]:
-    """Rates (n, 3), quaternions (n, 4), principal axes, at ascending ``times`` (n,) s. Raises Infeasible if too long."""
+    """Rates (n, 3), quaternions (n, 4), principal axes, at rising ``times`` (n,) s. Raises Infeasible if too long."""
     equations = EulerEquations(spacecraft)
     state = equations.state(spacecraft.initial)
     edges = {0.0, float(times[-1]), *times.tolist()}
