@@ -366,7 +366,7 @@ class _MarginSearch:
             program.forbidden = allowed
         schedule = self.model.translate(as_pulses(self.model.body, solution.burns))
         aside, fly = solution.left[self.equations.chosen], partial(propagation.flown, self.plain)
-        schedule = Refinement(self.plain, schedule, self.equations, aside, program.width, fly).refined()
+        schedule = Refinement(fly(schedule), self.equations, aside, fly).refined()
         if not self.body.thrust_laws:
             return schedule
         try:

@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 from nutdamp.common import work
 from nutdamp.errors import Infeasible
 from nutdamp.flight.end_state import left_by
-from nutdamp.flight.propagation import Flight
 from nutdamp.schemes.catalogue import HalfConeOptions, RhumbLineOptions, SchemeOptions, TwoPulseOptions
 from nutdamp.schemes.correction import bounded_step
 from nutdamp.schemes.optimal import linear_program, refinement
@@ -42,48 +41,42 @@ STARTS, CORRECTED, MOST_PULSES = 8, 4, 200
 length is corrected; pulses at most."""
 
 
-def spin_changes(spacecraft: Spacecraft, fly: Callable[[Schedule], Flight]) -> Iterator[Schedule]:
-    """Simple spin changes that keep limits and requirement, flown by ``fly``; none where H has a target."""
-    if spacecraft.goal.spin is None or spacecraft.goal.axis is not None:
+def spin_changes(problem: Problem) -> Iterator[Schedule]:
+    """Simple spin changes that keep limits and requirement; none where H has a target."""
+    spacecraft, goal = problem.spacecraft, problem.spacecraft.goal.spin
+    if goal is None or spacecraft.goal.axis is not None:
         return
     for channel in spacecraft.channels:
-        if (spacecraft.goal.spin - spacecraft.spin) * channel.axial <= 0.0:
+        if (goal - spacecraft.spin) * channel.axial <= 0.0:
             continue
         starts = STARTS if abs(channel.transverse) > 1e-12 * abs(channel.axial) else 1
         for number in range(starts):
             start = spacecraft.limits.earliest + number / starts * spacecraft.nutation_period
             for turns in (0.0, 2.0 * math.pi / spacecraft.fastest):
-                schedule = _schedule(spacecraft, channel, start, turns, fly)
-                if schedule is not None:
+                if schedule := _spin_change(problem, goal, channel, start, turns):
                     yield schedule
 
 
-def _schedule(
-    spacecraft: Spacecraft, channel: Channel, start: float, turn: float, fly: Callable[[Schedule], Flight]
-) -> Schedule | None:
+def _spin_change(problem: Problem, goal: float, channel: Channel, start: float, turn: float) -> Schedule | None:
     """The pulses of a ``channel`` from ``start`` s on, one each ``turn`` s or one after the other; else None."""
-    goal, tick = spacecraft.goal.spin, spacecraft.limits.tick
-    assert goal is not None
+    spacecraft, tick = problem.spacecraft, problem.spacecraft.limits.tick
     rate = channel.axial / spacecraft.inertia.C
     whole = (goal - spacecraft.spin) / rate
     count = max(math.ceil(whole / channel.max_on_time * (1.0 - 1e-9)), 1)
     if count > MOST_PULSES or (count == 1 and turn > 0.0):
         return None
     for _ in range(CORRECTED):
-        on_time = whole / count
-        if tick is not None:
-            on_time = round(on_time / tick) * tick
+        on_time = Windows(spacecraft).nearest_tick(whole / count)
         if not channel.min_on_time <= on_time <= channel.max_on_time * (1.0 + 1e-12):
             return None
         apart = max(turn, on_time + spacecraft.limits.gap)
         if tick is not None:
-            start, apart = math.ceil(start / tick - 1e-9) * tick, math.ceil(apart / tick - 1e-9) * tick
-        schedule = Schedule(
-            tuple(channel_pulse(channel, start + k * apart + 0.5 * on_time, on_time) for k in range(count))
-        )
+            start, apart = (math.ceil(time / tick - 1e-9) * tick for time in (start, apart))
+        centres = (start + number * apart + 0.5 * on_time for number in range(count))
+        schedule = Schedule(tuple(channel_pulse(channel, centre, on_time) for centre in centres))
         if schedule.end > spacecraft.horizon:
             return None
-        flight = fly(schedule)
+        flight = problem.flown(schedule)
         missed = goal - flight.settled.spin
         if tick is not None or abs(missed) < 1e-12 * abs(goal):
             break
@@ -114,7 +107,7 @@ def hastened(
     """
     if problem.options.least not in ("propellant", "impulse") or first.unmet > UNMET:
         return best
-    begin, dearest = problem.spacecraft.limits.earliest, problem.price(best) * (1.0 + SAME_COST)
+    dearest = problem.price(best) * (1.0 + SAME_COST)
     small_angles = max(problem.price(best), first.cost) * (1.0 + ABOUT)
     left = problem.left(problem.flown(best)) + DAMPED_ANGLE
 
@@ -128,10 +121,8 @@ def hastened(
             return not len(best) or work.exhausted() or spent.done > EARLIER
 
         for _ in range(ROUNDS):
-            span = best.end - begin
-            share = None if over() else _least_share(problem, span, small_angles)
-            later = () if share is None else (share + part * (1.0 - share) for part in PARTS)
-            schedules = (cheapest(begin + part * span) for part in later if not over())
+            ends = [] if over() else _earlier_ends(problem, best.end, small_angles)
+            schedules = (cheapest(end) for end in ends if not over())
             earlier = next((schedule for schedule in schedules if schedule is not None and better(schedule)), None)
             if earlier is None:
                 break
@@ -139,23 +130,24 @@ def hastened(
     return best
 
 
-def _least_share(problem: Problem, span: float, most: float) -> float | None:
-    """The least share of the ``span`` s that small angles allow at a cost of ``most``; None for one above `CLEARLY`."""
+def _earlier_ends(problem: Problem, end: float, most: float) -> list[float]:
+    """Horizons to try for an earlier ``end`` s, after what small angles allow at a cost of ``most``; none near it."""
+    begin = problem.spacecraft.limits.earliest
+    span = end - begin
 
     def cost(share: float) -> float:
-        horizon = problem.spacecraft.limits.earliest + share * span
-        solution = problem.program(problem.within(horizon)).solve()
+        solution = problem.program(problem.within(begin + share * span)).solve()
         return solution.cost if solution.unmet <= UNMET else math.inf
 
     clearly = cost(CLEARLY)
     # Nor may it cost them more than `ABOUT` over what they cost in all of the span.
     if clearly > most or clearly > (most := min(most, cost(1.0) * (1.0 + ABOUT))):
-        return None
+        return []
     low, high = 0.0, CLEARLY
     for _ in range(BISECTIONS):
         middle = 0.5 * (low + high)
         low, high = (low, middle) if cost(middle) <= most else (middle, high)
-    return high
+    return [begin + (high + part * (1.0 - high)) * span for part in PARTS]
 
 
 def by_other_schemes(spacecraft: Spacecraft, *, shift: bool) -> Iterator[Schedule]:

@@ -29,7 +29,6 @@ from numpy.typing import NDArray
 
 from nutdamp.schemes.optimal.linear_program import Program
 from nutdamp.spacecraft.constraints import free_windows, usable
-from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.schedule import TOUCHING
 
@@ -92,14 +91,12 @@ def _highest(curve: SmallAngles, which: NDArray[np.bool_]) -> float:
     begins, lengths, channel = curve.begins[slot], curve.lengths[slot], np.flatnonzero(which)[index]
     highest = tops[slot, index]
     for _ in range(QUARTERINGS):
-        if not len(begins):
-            return best + ENOUGH * abs(best)
         lengths, channel = np.repeat(0.25 * lengths, 4), np.repeat(channel, 4)
         begins = np.repeat(begins, 4) + lengths * np.tile(np.arange(4), len(begins))
         every = np.arange(len(begins))
         before, after = (curve.at(times)[every, channel] for times in (begins, begins + lengths))
         highest = _top(before, after, curve.bends[channel], lengths)
-        best = max(best, float(before.max()), float(after.max()))
+        best = max(float(edge.max(initial=best)) for edge in (before, after))
         there = highest > best + ENOUGH * abs(best)
         begins, lengths, channel, highest = begins[there], lengths[there], channel[there], highest[there]
     return max(best + ENOUGH * abs(best), float(highest.max(initial=-math.inf)))
@@ -173,11 +170,10 @@ def rigorous(
         return None
     costs = np.array([prices[channel.name] for channel in channels])
     torques = np.array([channel.torque for channel in channels])
-    axial = bool(torques[:, 2].any())
-    lower_bounds = [_nutation(spacecraft, channels, costs, cost, allowed)]
+    lower_bounds = [_nutation(spacecraft, torques, costs, cost, allowed)]
     if spacecraft.goal.spin is not None:
         lower_bounds.append(_nutation_and_spin(spacecraft, torques, costs, allowed))
-    if shift and not axial:
+    if shift and not torques[:, 2].any():
         # The way of H to the direction of the target, round the sphere of radius |H3|.
         nutation, beta = spacecraft.nutation, max(spacecraft.to_turn - allowed.off, 0.0)
         way = math.tan(nutation) + beta - nutation if beta > nutation else math.sin(beta) / math.cos(nutation)
@@ -187,11 +183,10 @@ def rigorous(
     return best if math.isfinite(best) else None
 
 
-def _nutation(spacecraft: Spacecraft, channels: list[Channel], costs: Vector, cost: float, allowed: Allowed) -> float:
+def _nutation(spacecraft: Spacecraft, torques: Vector, costs: Vector, cost: float, allowed: Allowed) -> float:
     """Least cost of taking the nutation out, at the phases at which the channels may be on."""
     inertia = spacecraft.inertia
-    dearest = float(max(abs(channel.axial) / price for channel, price in zip(channels, costs, strict=True)))
-    faster = cost * dearest / inertia.C
+    faster = cost * float((np.abs(torques[:, 2]) / costs).max()) / inertia.C
     goal = -inertia.A * complex(spacecraft.omega0[0], spacecraft.omega0[1])
     stays = (abs(spacecraft.axial) + inertia.C * faster) * math.tan(allowed.nutation)
     if abs(goal) <= stays:
@@ -207,7 +202,7 @@ def _nutation(spacecraft: Spacecraft, channels: list[Channel], costs: Vector, co
     first = np.append(True, lows[1:] > over[:-1])
     low = lows[first]
     wide = np.minimum(over[np.append(first[1:], True)] - low, math.tau)
-    points = np.array([channel.transverse for channel in channels]) / costs
+    points = (torques[:, 0] + 1j * torques[:, 1]) / costs
     strength, angle = np.abs(points), np.angle(points)
 
     def value(directions: Vector) -> Vector:
@@ -277,16 +272,14 @@ def first_order(program: Program, prices: Vector) -> Proof:
 
     Any prices give a bound; the best are those of a solution. The proof's are no higher than what it costs.
     """
-    nothing, strong = Proof(0.0, np.zeros_like(prices)), program.strong
+    best, strong = Proof(0.0, np.zeros_like(prices)), program.strong
     if not prices.any():
-        return nothing
+        return best
     goal = float(prices @ program.influence.goal) - program.off * float(np.linalg.norm(prices[2:4]))
     curve = SmallAngles(program, prices)
     highest = max(_highest(curve, strong), 0.0 if strong.all() else 1.0)
-    if highest <= 0.0:
-        return nothing
-    best = nothing
-    for factor in [highest] if strong.all() else [highest * lowering for lowering in LOWERINGS]:
+    for lowering in LOWERINGS[: 1 if strong.all() else None] if highest > 0.0 else ():
+        factor = highest * lowering
         gained = _lasting(curve, ~strong, factor)
         proof = Proof((goal / factor - gained) * (1.0 - ROUNDING), prices / factor, gained)
         best = max(best, proof, key=lambda proof: proof.bound)

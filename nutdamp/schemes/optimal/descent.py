@@ -21,7 +21,7 @@ from nutdamp.common.numerics import cos_sin
 from nutdamp.flight.dynamics import make_dynamics
 from nutdamp.physics import attitude, batch
 from nutdamp.schemes.optimal import refinement
-from nutdamp.schemes.optimal.refinement import EndEquations
+from nutdamp.schemes.optimal.refinement import AROUND, EndEquations
 from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Spacecraft, Vector
 
@@ -30,7 +30,6 @@ LEAST_ROOM = 1e-10  # share of the room to a bound that a step must leave
 Indices = NDArray[np.int_]
 Complex = NDArray[np.complex128]
 
-SIDES = 32  # sides of the polygon within which H may end off its target, where it may
 DIFFERENCE = 1e-6  # step of the difference quotients, in scaled unknowns
 FLIGHT, CASE = 0.05, 0.0003  # units of `work` of a stretch of a flight of many sequences, and of each of them
 
@@ -209,10 +208,10 @@ class Task:
         levels = [np.full((count, n - 1), self.body.limits.gap), sequences.begins, -sequences.ends]
         levels += [sequences.shortest, -sequences.longest]
         if self.loose:
-            angles = 2 * math.pi / SIDES * np.arange(SIDES)
-            sides = np.hstack([np.zeros((SIDES, 2 * n)), -np.column_stack([np.cos(angles), np.sin(angles)])])
-            matrix = np.vstack([np.hstack([matrix, np.zeros((len(matrix), 2))]), sides])
-            levels.append(np.full((count, SIDES), -math.cos(math.pi / SIDES)))
+            # Within the polygon that touches the circle in all directions where H may end.
+            sides = np.pad(-AROUND.T, ((0, 0), (2 * n, 0)))
+            matrix = np.vstack([np.pad(matrix, ((0, 0), (0, 2))), sides])
+            levels.append(np.full((count, len(sides)), -math.cos(math.pi / len(sides))))
         return matrix, np.hstack(levels)
 
 

@@ -10,12 +10,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.schemes.optimal.descent import Descent, Sequences, Task
+from nutdamp.schemes.optimal.linear_program import peaks
 from nutdamp.spacecraft.constraints import free_windows
 from nutdamp.spacecraft.model import Vector
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
@@ -56,7 +57,12 @@ class Moments(NamedTuple):
 
     def of(self, pulses: NDArray[np.bool_]) -> Moments:
         """Some of the pulses of one sequence (n,)."""
-        return Moments._make(part[pulses] for part in self)
+        return self._make(part[pulses] for part in self)
+
+    def in_order(self) -> Moments:
+        """The pulses of each sequence (b, n) by their centres."""
+        order = np.argsort(self.t, axis=1, kind="stable")
+        return self._make(np.take_along_axis(part, order, axis=1) for part in self)
 
 
 def schedules(task: Task, known: Iterable[Schedule] = ()) -> list[Schedule]:
@@ -90,12 +96,9 @@ def schedules(task: Task, known: Iterable[Schedule] = ()) -> list[Schedule]:
 def cheapened(task: Task, schedule: Schedule) -> Schedule | None:
     """A schedule of the same channels after a few steps down on the true motion; None where there is none."""
     sequences, x = laid_out(task, _together([_moments_of(task, schedule)]), bounded=True)
-    if not len(x):
-        return None
-    descent = Descent(task, sequences, x, kicks=0, barrier=CLOSE)
-    descent.run(max(MOVES // len(schedule), FEWEST_MOVES))
-    descent.close()
-    return _schedule(task, _every(descent)[0]) if descent.left[0] < EXACT else None
+    steps = max(MOVES // len(schedule), FEWEST_MOVES)
+    lowered = _lowered(Descent(task, sequences, x, kicks=0, barrier=CLOSE), steps) if len(x) else []
+    return _schedule(task, lowered[0]) if lowered else None
 
 
 def _pulses(task: Task, spare: int) -> int:
@@ -121,9 +124,7 @@ def laid_out(task: Task, moments: Moments, *, bounded: bool = False) -> tuple[Se
 
     Pulses may still vanish unless on-times are ``bounded`` from below.
     """
-    order = np.argsort(moments.t, axis=1, kind="stable")
-    which = np.take_along_axis(moments.which, order, axis=1)
-    t, on = (np.take_along_axis(part, order, axis=1) for part in moments[1:])
+    which, t, on = moments.in_order()
     least = task.shortest[which] if bounded else np.zeros(which.shape)
     limits = task.body.limits
     free = [(begin, end) for begin, end in free_windows(task.body) if begin < end]
@@ -167,9 +168,7 @@ def _added(task: Task, best: Descent, pulses: int, rng: np.random.Generator) -> 
     every: list[Moments] = []
     for ideal, x, prices in zip(_every(best), best.state.x, best.state.prices, strict=True):
         worth = _worth(task, ideal, x, prices, grid)
-        padded = np.pad(worth, ((0, 0), (1, 1)), constant_values=-np.inf)
-        peak = (worth >= padded[:, :-2]) & (worth >= padded[:, 2:]) & (worth > GAIN)
-        channel, moment = np.nonzero(peak)
+        channel, moment = peaks(worth, GAIN)
         order = np.argsort(-worth[channel, moment], kind="stable")
         old = ideal.of(ideal.on > NEEDLESS * task.unit[ideal.which])
         room = pulses - len(old.which)
@@ -187,23 +186,17 @@ def _added(task: Task, best: Descent, pulses: int, rng: np.random.Generator) -> 
 
 def _worth(task: Task, ideal: Moments, x: Vector, prices: Vector, t: Vector) -> Vector:
     """Saving by a small impulse of each channel at ``t`` (k,) s beside the pulses of unknowns x, (channels, k)."""
-    count, n = len(ideal.which), len(task.channels) * len(t)
-    channel, moment = np.repeat(np.arange(len(task.channels)), len(t)), np.tile(t, len(task.channels))
-    place = np.searchsorted(ideal.t, moment)
-    order = np.argsort(np.hstack([np.tile(np.arange(count) + 0.5, (n, 1)), place[:, None]]), axis=1, kind="stable")
-    small = SMALL * task.unit[channel]
-
-    def among(old: Any, new: Any) -> Any:
-        return np.take_along_axis(np.hstack([np.tile(old, (n, 1)), new[:, None]]), order, axis=1)
-
-    on = among(ideal.on, small)
-    start = among(ideal.t, moment) - 0.5 * on
-    loose = np.tile(x[2 * count :], (n, 1))
-    there = task.misses(among(ideal.which, channel), np.hstack([start, on, loose]), 1)
+    count = len(task.channels)
+    channel = np.repeat(np.arange(count), len(t))
+    added = channel, np.tile(t, count), SMALL * task.unit[channel]
+    joined = (np.column_stack([new, np.tile(old, (len(new), 1))]) for new, old in zip(added, ideal, strict=True))
+    which, centres, on = Moments(*joined).in_order()
+    loose = np.tile(x[2 * len(ideal.which) :], (len(channel), 1))
+    there = task.misses(which, np.hstack([centres - 0.5 * on, on, loose]), 1)
     here = task.misses(ideal.which[None], x[None], 1)
     # By the prices of the equations: its change in them, less its cost.
     worth = -(there - here) / SMALL @ prices - (task.costs * task.unit / task.least)[channel]
-    return np.asarray(worth.reshape(len(task.channels), len(t)))
+    return np.asarray(worth.reshape(count, len(t)))
 
 
 def _flown(task: Task, best: Descent, known: Iterable[Schedule]) -> list[Schedule]:
@@ -239,11 +232,15 @@ def _on_the_true_motion(task: Task, every: Sequence[Moments]) -> list[Moments]:
                 descent = Descent(task, sequences, x, kicks=kicks, barrier=barrier)
                 descent.run(30)
                 x, barrier = descent.state.x, 1e-6
-            descent = Descent(task, sequences, x, kicks=0, barrier=barrier)
-            descent.run(20)
-            descent.close()
-            lowered += _every(descent.of(np.flatnonzero(descent.left < EXACT)))
+            lowered += _lowered(Descent(task, sequences, x, kicks=0, barrier=barrier), 20)
     return lowered
+
+
+def _lowered(descent: Descent, steps: int) -> list[Moments]:
+    """The sequences (n,) that leave nothing after some steps of a descent on the true motion."""
+    descent.run(steps)
+    descent.close()
+    return _every(descent.of(np.flatnonzero(descent.left < EXACT)))
 
 
 def _together(every: Sequence[Moments]) -> Moments:
@@ -254,8 +251,8 @@ def _together(every: Sequence[Moments]) -> Moments:
 def _moments_of(task: Task, schedule: Schedule) -> Moments:
     """The pulses of a schedule."""
     numbers = {channel.name: number for number, channel in enumerate(task.channels)}
-    which = np.array([numbers[pulse.channel] for pulse in schedule], dtype=int)
-    return Moments(which, np.array([pulse.t for pulse in schedule]), np.array([pulse.on_time for pulse in schedule]))
+    pulses = [(numbers[pulse.channel], pulse.t, pulse.on_time) for pulse in schedule]
+    return Moments(*map(np.array, zip(*pulses, strict=True)))
 
 
 def _every(descent: Descent) -> list[Moments]:

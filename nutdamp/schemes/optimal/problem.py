@@ -84,12 +84,10 @@ def _repaired(program: Program, solution: Solution) -> Solution | None:
 
 def _divide(program: Program, burns: tuple[Burn, ...]) -> bool:
     """Forbid slots at regular distances about too long burns, so that none can be too long; true if there are any."""
-    every = np.arange(len(program.centres))
-    divided = False
+    every, divided = np.arange(len(program.centres)), False
     for row, channel in enumerate(program.channels):
         most = channel.max_on_time
         long = [burn for burn in burns if burn.channel is channel and burn.on_time > most + TOUCHING]
-        long.sort(key=lambda burn: burn.t)
         window = math.floor(most / program.width + TOUCHING) if long else 0
         if window == 0:
             continue

@@ -10,6 +10,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -84,38 +85,17 @@ def schedule(spacecraft: Spacecraft, options: OptimalOptions) -> Schedule:
         limits = replace(spacecraft.limits, horizon=min(spacecraft.horizon, faded))
         spacecraft = replace(spacecraft, limits=limits)
     search = _LeastCostSearch(spacecraft, options)
-    every = list(spin_changes(search.spacecraft, search.flown))
-    searched = None
+    every, searched = list(spin_changes(search)), None
     if not every or options.least != "pulses":
         try:
-            if options.least == "time":
-                searched = search.soonest()
-            else:
-                searched = _fewest(search) if options.least == "pulses" else search.schedule()
+            ways = {"time": search.soonest, "pulses": search.fewest}
+            searched = ways.get(options.least, search.schedule)()
             every = [searched, *every]
         except Infeasible:
             if not every:
                 raise
     best = search.preferred(every)
     return best if best is searched else search.with_bounds(best)
-
-
-def _fewest(search: _LeastCostSearch) -> Schedule:
-    """The schedule of fewest pulses: one or two by the schemes that look for them, else as the program thins."""
-    from nutdamp.schemes import one_pulse, two_pulse
-
-    body = search.spacecraft
-    if body.torquer is None and body.goal.spin is None:
-        try:
-            free = search.options.free_axis
-            schedule = (
-                one_pulse.schedule(body, SchemeOptions()) if free else two_pulse.schedule(body, TwoPulseOptions())
-            )
-        except Infeasible:
-            schedule = Schedule()
-        if schedule.pulses and keeps_limits(body, schedule) and search.left(search.flown(schedule)) <= LEFT:
-            return search.with_bounds(schedule)
-    return search.schedule()
 
 
 class _FlownSchedule(NamedTuple):
@@ -149,6 +129,20 @@ class _LeastCostSearch(Problem):
             return self.preferred([early, search.schedule()])
         except Infeasible:
             return self.with_bounds(early)
+
+    def fewest(self) -> Schedule:
+        """The schedule of fewest pulses: one or two by the schemes that look for them, else as the program thins."""
+        from nutdamp.schemes import one_pulse, two_pulse
+
+        body, schedule = self.spacecraft, Schedule()
+        if body.torquer is None and body.goal.spin is None:
+            with suppress(Infeasible):
+                if self.options.free_axis:
+                    schedule = one_pulse.schedule(body, SchemeOptions())
+                else:
+                    schedule = two_pulse.schedule(body, TwoPulseOptions())
+        good = schedule.pulses and keeps_limits(body, schedule) and self.left(self.flown(schedule)) <= LEFT
+        return self.with_bounds(schedule) if good else self.schedule()
 
     def sooner(self) -> _LeastCostSearch:
         """The same search with the shortest horizon in which a schedule is found."""
@@ -395,13 +389,14 @@ class _LeastCostSearch(Problem):
 
     def on_ticks(self, schedule: Schedule) -> Schedule:
         """An exact schedule on the ticks of the commands."""
-        missed = refinement.misses(self.flown(schedule), self.equations)
-        return self.refined(schedule, missed[2:4] if self.options.shift is not None else np.zeros(2), self.program())
+        flight = self.flown(schedule)
+        missed = refinement.misses(flight, self.equations)
+        return self.refined(flight, missed[2:4] if self.options.shift is not None else np.zeros(2))
 
-    def refined(self, schedule: Schedule, off: Vector, program: Program) -> Schedule:
+    def refined(self, flight: Flight, off: Vector) -> Schedule:
         """The schedule moved as little as possible to leave H ``off`` (2,) N m s beside its target, and no more."""
         aside = np.array([0.0, 0.0, *off, 0.0])[self.equations.chosen]
-        return Refinement(self.spacecraft, schedule, self.equations, aside, program.width, self.flown).refined()
+        return Refinement(flight, self.equations, aside, self.flown).refined()
 
     def settled(self, least: float) -> Schedule | None:
         """The cheapest of the schedules on which the search settles from one choice of burns or another."""
@@ -444,11 +439,10 @@ class _LeastCostSearch(Problem):
             kept = repaired(program, solution)
             if kept is None:
                 break
-            solution, schedule = kept, as_pulses(self.spacecraft, kept.burns)
-            flown = self.flown(schedule)
+            solution, flown = kept, self.flown(as_pulses(self.spacecraft, kept.burns))
             program.aim(refinement.along(flown, self.equations, program.width))
             if self.left(flown) < NEAR:
-                schedule = self.refined(schedule, solution.off, program)
+                schedule = self.refined(flown, solution.off)
                 there = self.candidate(self.flown(schedule), self.price(schedule))
                 candidates.append(there)
                 if there.left == 0.0 and (there.price <= least * (1.0 + DEAR) or there.price > (1.0 - GAIN) * last):
