@@ -356,7 +356,7 @@ class _MarginSearch:
                     return None
                 if self._parted(solution):
                     continue
-                broken = next(broken_by(program, solution.burns), None)
+                broken = broken_by(program, solution.burns)
                 if broken is None:
                     break
                 program.forbid(*broken)

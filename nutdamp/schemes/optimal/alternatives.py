@@ -21,11 +21,10 @@ from nutdamp.errors import Infeasible
 from nutdamp.flight.end_state import left_by
 from nutdamp.schemes.catalogue import HalfConeOptions, RhumbLineOptions, SchemeOptions, TwoPulseOptions
 from nutdamp.schemes.correction import bounded_step
-from nutdamp.schemes.optimal import linear_program, refinement
 from nutdamp.schemes.optimal.descent import Task
-from nutdamp.schemes.optimal.linear_program import Solution
+from nutdamp.schemes.optimal.linear_program import GrowingProgram, Solution
 from nutdamp.schemes.optimal.problem import LEFT, UNMET, Problem
-from nutdamp.schemes.optimal.refinement import Influence
+from nutdamp.schemes.optimal.refinement import Influence, along, misses, small_angles
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import Windows, keeps_limits
 from nutdamp.spacecraft.equipment import Channel
@@ -35,10 +34,8 @@ from nutdamp.spacecraft.schedule import Schedule, channel_pulse
 
 LINES = 4  # programs one after the other, each about the flight of the one before: at large angles small ones mislead
 PROGRAM = 4.0  # units of work of a program
-
-STARTS, CORRECTED, MOST_PULSES = 8, 4, 200
-"""Starts in a nutation period that are tried of a channel that has a transverse torque, too; flights by which the
-length is corrected; pulses at most."""
+STARTS, MOST_PULSES = 8, 200  # starts in a nutation period of a channel with a transverse torque; pulses at most
+CORRECTED = 4  # flights by which the length of a spin change is corrected
 
 
 def spin_changes(problem: Problem) -> Iterator[Schedule]:
@@ -93,8 +90,7 @@ BISECTIONS, ROUNDS, PARTS = 3, 3, (0.2, 0.4, 0.6)
 """Steps in which the earliest end is found that they allow; earlier ends looked for one after the other; horizons that
 are tried in turn, as parts of the way from the earliest end that they allow to the end there is."""
 
-EARLIER, MOST_ENDS = 300.0, 900.0
-"""Units of `work` after which no other one is looked for, and that may be spent on all of them."""
+EARLIER, MOST_ENDS = 300.0, 900.0  # units of `work` after which no other end is looked for, and for all of them
 
 
 def hastened(
@@ -108,7 +104,7 @@ def hastened(
     if problem.options.least not in ("propellant", "impulse") or first.unmet > UNMET:
         return best
     dearest = problem.price(best) * (1.0 + SAME_COST)
-    small_angles = max(problem.price(best), first.cost) * (1.0 + ABOUT)
+    allowed = max(problem.price(best), first.cost) * (1.0 + ABOUT)
     left = problem.left(problem.flown(best)) + DAMPED_ANGLE
 
     def better(schedule: Schedule) -> bool:
@@ -121,7 +117,7 @@ def hastened(
             return not len(best) or work.exhausted() or spent.done > EARLIER
 
         for _ in range(ROUNDS):
-            ends = [] if over() else _earlier_ends(problem, best.end, small_angles)
+            ends = [] if over() else _earlier_ends(problem, best.end, allowed)
             schedules = (cheapest(end) for end in ends if not over())
             earlier = next((schedule for schedule in schedules if schedule is not None and better(schedule)), None)
             if earlier is None:
@@ -181,10 +177,7 @@ def by_other_schemes(spacecraft: Spacecraft, *, shift: bool) -> Iterator[Schedul
 
 
 SLOTS, MOST_SLOTS = 40, 320  # slots in the faster of the two turns, at ω3 and at aω3, and in all
-
-NEWTON_STEPS, CONVERGED = 25, 1e-12
-"""Newton steps for the lengths of the burns, and the end error, over |H|, at which they end."""
-
+NEWTON_STEPS, CONVERGED = 25, 1e-12  # for the lengths of burns, and the end error, over |H|, at which they end
 SHORTEST = 0.02  # share of a slot below which a burn is left out before the lengths are found
 
 HALVINGS, LONGER = 10, (0.0, 0.01, 0.03, 0.08, 0.2, 0.4, 0.8)
@@ -198,7 +191,7 @@ Pieces = tuple[NDArray[np.int_], Vector]
 def earliest(problem: Problem) -> Schedule | None:
     """The schedule of one channel after another that ends first, as far as it is found; None where there is none."""
     begin, horizon = problem.spacecraft.limits.earliest, problem.spacecraft.horizon
-    influence = refinement.small_angles(problem.spacecraft, problem.equations)
+    influence = small_angles(problem.spacecraft, problem.equations)
     if _pieces(problem, influence, horizon) is None:
         return None
     low, high = begin, horizon
@@ -217,7 +210,7 @@ def earliest(problem: Problem) -> Schedule | None:
 
 def within(problem: Problem, horizon: float) -> Schedule | None:
     """A schedule of one channel after another within ``horizon`` s that leaves nothing; None where none is found."""
-    influence = refinement.small_angles(problem.spacecraft, problem.equations)
+    influence = small_angles(problem.spacecraft, problem.equations)
     for _ in range(LINES):  # programs, each about the flight of the one before: at large angles small ones mislead
         pieces = None if work.exhausted() else _pieces(problem, influence, horizon)
         if pieces is None:
@@ -230,7 +223,7 @@ def within(problem: Problem, horizon: float) -> Schedule | None:
         in_time = problem.left(flown) <= LEFT and schedule.end <= horizon
         if in_time and keeps_limits(problem.spacecraft, schedule.pulses):
             return schedule
-        influence = refinement.along(problem.flown(_burns(problem, *pieces)), problem.equations, _slot(problem))
+        influence = along(problem.flown(_burns(problem, *pieces)), problem.equations, _slot(problem))
     return None
 
 
@@ -258,20 +251,17 @@ def _pieces(problem: Problem, influence: Influence, horizon: float) -> Pieces | 
     # What a whole slot of each channel adds to each equation, over all there is to do; columns channel by channel.
     size = float(np.linalg.norm(influence.goal)) or 1.0
     whole = np.einsum("nek,ck->ecn", influence.rows(centres) * lost[:, None], torques) * (width / size)
-    columns = whole.reshape(len(influence.goal), -1)
     equations, slots = len(influence.goal), len(free)
-    program = linear_program.GrowingProgram(influence.goal / size, np.ones(slots), np.ones(equations))
+    program = GrowingProgram(influence.goal / size, np.ones(slots), np.ones(equations))
     slack = np.vstack([np.hstack([np.eye(equations), -np.eye(equations)]), np.zeros((slots, 2 * equations))])
     program.add(np.full(2 * equations, 1e4 * slots), slack, np.full(2 * equations, np.inf))
-    shared = np.tile(np.eye(slots), len(channels))
-    cost = problem.costs / float(problem.costs.max())
-    program.add(np.repeat(cost, slots), np.vstack([columns, shared]), np.ones(columns.shape[1]))
+    rows = np.vstack([whole.reshape(equations, -1), np.tile(np.eye(slots), len(channels))])
+    program.add(np.repeat(problem.costs / float(problem.costs.max()), slots), rows, np.ones(rows.shape[1]))
     optimum = program.optimum()
     if optimum is None or float(optimum.x[: 2 * equations].sum()) > UNMET:
         return None
-    shares = optimum.x[2 * equations :].reshape(len(channels), slots)
     every = np.zeros((len(channels), count + 1))  # and one slot more, in which nothing fires
-    every[:, free] = shares * width
+    every[:, free] = optimum.x[2 * equations :].reshape(len(channels), slots) * width
     return _in_order(every, width)
 
 
@@ -317,7 +307,7 @@ def _exact(problem: Problem, which: NDArray[np.int_], times: Vector) -> Schedule
         """Misses of many times (k, n) s, (k, equations), over |H|."""
         if task is None:
             flown = (problem.flown(_burns(problem, which, times)) for times in rows)
-            return np.array([refinement.misses(flight, problem.equations) for flight in flown]) / size
+            return np.array([misses(flight, problem.equations) for flight in flown]) / size
         starts = body.limits.earliest + np.cumsum(rows, axis=1) - rows
         return task.misses(np.tile(which[firing], (len(rows), 1)), np.hstack([starts[:, firing], rows[:, firing]]), 0)
 

@@ -191,13 +191,11 @@ def _nutation(spacecraft: Spacecraft, torques: Vector, costs: Vector, cost: floa
     stays = (abs(spacecraft.axial) + inertia.C * faster) * math.tan(allowed.nutation)
     if abs(goal) <= stays:
         return 0.0
-    spans = []
-    for begin, end in free_windows(spacecraft):
-        phases = [spacecraft.nutation_rate * edge for edge in (begin - TOUCHING, end + TOUCHING)]
-        wider = abs(inertia.a) * faster * max(end + TOUCHING - spacecraft.limits.earliest, 0.0)
-        spans.append((min(phases) - wider, max(phases) + wider))
+    edges = np.array(free_windows(spacecraft)).T + np.array([[-TOUCHING], [TOUCHING]])
+    wider = abs(inertia.a) * faster * np.maximum(edges[1] - spacecraft.limits.earliest, 0.0)
+    phases = np.sort(spacecraft.nutation_rate * edges, axis=0) + np.array([-wider, wider])
     # Arcs that these phases cover, joined: begins in [0, 2π) and lengths, rad.
-    lows, highs = np.array(sorted((begin % math.tau, begin % math.tau + end - begin) for begin, end in spans)).T
+    lows, highs = np.array(sorted((begin % math.tau, begin % math.tau + end - begin) for begin, end in phases.T)).T
     over = np.maximum.accumulate(highs)
     first = np.append(True, lows[1:] > over[:-1])
     low = lows[first]

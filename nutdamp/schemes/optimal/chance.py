@@ -81,12 +81,8 @@ class Spread(NamedTuple):
         return np.sqrt(np.maximum(0.5 * (size + (np.conj(directions) ** 2 * double).real), 0.0))
 
 
-DIRECTIONS, BEGUN = 72, 16
-"""Directions in which the cones of two equations are looked at, and of the first tangents of one, without margin."""
-
-WORST, ROUNDS = 3, 40
-"""Tangents added to a cone at a time, and rounds of the linear program, each with more tangents or columns."""
-
+DIRECTIONS, BEGUN = 72, 16  # in which the cone of two equations is looked at, and of its first tangents
+WORST, ROUNDS = 3, 40  # tangents added to a cone at a time, and rounds with more tangents or columns
 BEST, PRICE = 200, 1e-6  # columns taken in at a time, and the relative reduced cost below which none enters
 
 

@@ -20,8 +20,7 @@ from nutdamp.common import work
 from nutdamp.common.numerics import cos_sin
 from nutdamp.flight.dynamics import make_dynamics
 from nutdamp.physics import attitude, batch
-from nutdamp.schemes.optimal import refinement
-from nutdamp.schemes.optimal.refinement import AROUND, EndEquations
+from nutdamp.schemes.optimal.refinement import AROUND, EndEquations, square_to_target
 from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Spacecraft, Vector
 
@@ -79,10 +78,9 @@ class Task:
         self._forced = dynamics.constant, dynamics.forcing
         self._coasting = np.zeros(3), dynamics.forcing._replace(turning=())
         self._start = np.asarray(dynamics.moments, dtype=float), start.rates, start.quaternion
-        forcing = dynamics.forcing
-        self._decays, self._wheel = forcing.growth != 0.0, forcing.wheel
-        self._free = not dynamics.constant.any() and not forcing.turning and not self._decays
-        self._target, self._across = body.target_axis, refinement.square_to_target(body)
+        self._decays = body.growth != 0.0
+        self._free = not dynamics.constant.any() and not dynamics.forcing.turning and not self._decays
+        self._across = square_to_target(body)
 
     def misses(self, which: Indices, x: Vector, kicks: int) -> Vector:
         """Misses of the flights of ``x`` (b, …), (b, equations), over |H|.
@@ -99,7 +97,7 @@ class Task:
         momentum, turn = flown(which, x, kicks)
         inertial = attitude.rotate(turn.T, momentum.T)
         shift = inertial @ self._across.T
-        shift[inertial @ self._target < 0.0] += self.momentum  # the other way round is no solution
+        shift[inertial @ self.body.target_axis < 0.0] += self.momentum  # the other way round is no solution
         if self.loose:
             shift = shift - self.off * x[:, -2:]
         spin = momentum[2] - self.body.inertia.axial(self.spin)
@@ -131,7 +129,7 @@ class Task:
         # a pair of complex numbers, w + iz and x + iy.
         count, n = which.shape
         (A, _, C), rates, turn = self._start
-        wheel = self._wheel
+        wheel = self.body.inertia.wheel
         parts, starts, widths = max(kicks, 1), x[:, :n], x[:, n : 2 * n]
         impulses = np.repeat(self.torques[which] * (widths / parts)[:, :, None], parts, axis=1)
         if kicks:
@@ -173,8 +171,8 @@ class Task:
         """H across axis 3 (b, n) after pulses, each alone, that begin with H ``across`` and along it; turn of each."""
         count = which.size
         moments = np.repeat(self._start[0][:, None], count, axis=1)
-        spinning = before.ravel() - self._wheel
-        rates = np.array([across.real.ravel(), across.imag.ravel(), spinning]) / moments
+        spinning = before - self.body.inertia.wheel
+        rates = np.array([across.real, across.imag, spinning]).reshape(3, -1) / moments
         turns = np.repeat(np.array([[1.0], [0.0], [0.0], [0.0]]), count, axis=1)
         bodies = batch.Bodies(moments, *self._coasting)
         stretch = batch.MotionStretch(bodies, np.zeros(count), rates, turns, self.torques[which].reshape(-1, 3).T)
@@ -227,8 +225,7 @@ def _product(first: Complex, second: Complex) -> tuple[Complex, Complex]:
     return first[:, 0], second[:, 0]
 
 
-WHOLE, SHARES = np.array([1.0]), np.array([0.5, 0.2, 0.05, 0.01])
-"""All of a step, and the shares of it that are tried in turn where that does not help."""
+WHOLE, SHARES = np.array([1.0]), np.array([0.5, 0.2, 0.05, 0.01])  # of a step, where all of it does not help
 
 BARRIER, SETTLED = 1e-9, 1e-7
 """Share of the cost at which the barrier of the bounds ends, and the largest relative error of the conditions for an

@@ -40,11 +40,11 @@ class ProgramColumns(NamedTuple):
 
     def of(self, which: NDArray[np.bool_] | NDArray[np.int_]) -> ProgramColumns:
         """Some of the columns."""
-        return self._make(part[which] for part in self)
+        return ProgramColumns._make(part[which] for part in self)
 
     def joined(self, other: ProgramColumns) -> ProgramColumns:
         """These columns and others."""
-        return self._make(np.concatenate(parts) for parts in zip(self, other, strict=True))
+        return ProgramColumns._make(np.concatenate(parts) for parts in zip(self, other, strict=True))
 
 
 def alone(channel: NDArray[np.int_], t: Vector, width: Vector) -> ProgramColumns:
@@ -99,8 +99,7 @@ SLOTS, MOST_SLOTS = 64, 600_000
 """Slots in the faster of the two turns, at ω3 and at aω3; and of all channels together: a horizon of more is looked at
 as far as they reach."""
 
-SOLVED, SLOT, COLUMN, LIMITED = 3.0, 3e-4, 1.5e-3, 0.06
-"""Units of `work` of a program's solution, of each slot or column given, and of each burn of limited on-time."""
+SOLVED, SLOT, COLUMN, LIMITED = 3.0, 3e-4, 1.5e-3, 0.06  # units of `work`: solution, slot, column, limited burn
 
 PRICE, PEAK = 1e-7, 1e-6
 """Relative reduced cost below which a column cannot lower the cost any more, and that for the best moment of a strong
@@ -401,9 +400,7 @@ WAYS: tuple[tuple[Literal["simplex", "ipm"], bool, float], ...] = (
 costs, against which its tolerances count, it mostly does not at another; interior points do not know the trouble."""
 
 MOST_STEPS = 100_000  # steps of the simplex or of the interior points, in one way of solving
-
-SMALL, NONZERO = 10_000, 1e-2
-"""Coefficients other than zero up to which a solution counts for nothing here, and units of `work` of each above it."""
+SMALL, NONZERO = 10_000, 1e-2  # coefficients that count for nothing here, and units of `work` of each above them
 
 
 class Optimum(NamedTuple):
@@ -497,8 +494,7 @@ class _SilentSolver(highspy.Highs):
         highspy.Highs.enableCallbacks(self)
 
 
-CORNERS, FLAT = 3000, 1e-12
-"""Corners that are looked at, at most, and share of the weight of one below which it is none."""
+CORNERS, FLAT = 3000, 1e-12  # looked at, at most, and share of the weight of one below which it is none
 
 MET, BEYOND = 3e-8, 1e-6
 """Distance from the goal that counts as none, over all there is to do, and the share of it by which the goal must lie

@@ -24,24 +24,14 @@ from nutdamp.spacecraft.schedule import Schedule, channel_pulse
 UNMET_COST = 100.0  # cost of a miss beside the propellant when the better part is chosen, per |H|, over the least cost
 NEAR = 1.03  # schedules of ideal impulses so much dearer than the best go on to the true motion
 HALF = 0.5  # share of the least on-time from which a pulse is lengthened to it; shorter ones are left out
-
 STARTS, BEST = 512, 8  # random sequences to begin with, and schedules that go on to the next stage
 ROUNDS = ((12, 1 / 2), (12, 1 / 3), (40, 1.0))  # steps of descent, and share of the sequences that goes on after them
-
-SPARE, ADDITIONS = 2, 2
-"""Pulses more than equations when some are added: what they make needless goes back to nothing; rounds of that."""
-
+SPARE, ADDITIONS = 2, 2  # more pulses than equations, which may go back to nothing; rounds of adding them
 MOMENTS, SMALL = 97, 1e-6  # moments at which each channel is priced, by an impulse of that share of all there is to do
 GAIN = 1e-4  # share of the cost that is worth another round, and by which two schedules differ
-
-FOUND, EXACT = 1e-6, 1e-10
-"""Largest miss, over |H|, of a schedule of ideal impulses, and of one flown through real widths."""
-
-NEEDLESS, NOTHING = 1e-3, 1e-10
-"""Shares of all there is to do below which a pulse may be left out, and is even where nothing makes good for it."""
-
-WIDE, MOST_KICKS = 0.25, 24
-"""Angle of the faster turn, rad, from which pulses are first taken as several kicks, and the most of them."""
+FOUND, EXACT = 1e-6, 1e-10  # largest miss, over |H|, of ideal impulses, and of a flight through real widths
+NEEDLESS, NOTHING = 1e-3, 1e-10  # of all there is to do: below it a pulse may be left out; is, though nothing helps
+WIDE, MOST_KICKS = 0.25, 24  # rad of the faster turn from which a pulse is first so many kicks, and the most of them
 
 CLOSE, MOVES, FEWEST_MOVES = 1e-5, 30, 3
 """Barrier of the bounds from which a schedule that is nearly the cheapest nearby is descended, steps of such a descent,
@@ -57,12 +47,12 @@ class Moments(NamedTuple):
 
     def of(self, pulses: NDArray[np.bool_]) -> Moments:
         """Some of the pulses of one sequence (n,)."""
-        return self._make(part[pulses] for part in self)
+        return Moments._make(part[pulses] for part in self)
 
     def in_order(self) -> Moments:
         """The pulses of each sequence (b, n) by their centres."""
         order = np.argsort(self.t, axis=1, kind="stable")
-        return self._make(np.take_along_axis(part, order, axis=1) for part in self)
+        return Moments._make(np.take_along_axis(part, order, axis=1) for part in self)
 
 
 def schedules(task: Task, known: Iterable[Schedule] = ()) -> list[Schedule]:

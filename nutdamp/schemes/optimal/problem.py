@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -18,10 +18,10 @@ from nutdamp.flight import propagation
 from nutdamp.flight.dynamics import make_dynamics
 from nutdamp.flight.propagation import Flight
 from nutdamp.schemes.catalogue import OptimalOptions
-from nutdamp.schemes.optimal import bounds, refinement
+from nutdamp.schemes.optimal import bounds
 from nutdamp.schemes.optimal.bounds import Allowed
 from nutdamp.schemes.optimal.linear_program import Burn, Program, Solution
-from nutdamp.schemes.optimal.refinement import EndEquations
+from nutdamp.schemes.optimal.refinement import EndEquations, small_angles
 from nutdamp.schemes.sequential import NO_AXIAL, at_hand
 from nutdamp.spacecraft.constraints import usable
 from nutdamp.spacecraft.equipment import Channel
@@ -73,7 +73,7 @@ def _repaired(program: Program, solution: Solution) -> Solution | None:
     for _ in range(REPAIRS):
         if solution.unmet > UNMET or work.exhausted():
             return None
-        broken = next(broken_by(program, solution.burns), None)
+        broken = broken_by(program, solution.burns)
         if broken is None:
             return solution
         program.forbid(*broken)
@@ -107,26 +107,25 @@ def _divide(program: Program, burns: tuple[Burn, ...]) -> bool:
     return divided
 
 
-def broken_by(program: Program, burns: tuple[Burn, ...]) -> Iterator[tuple[Channel | None, float, float]]:
-    """Spans to forbid, s: ends of too long burns, too short ones, the less of two too near, the least if too many."""
+def broken_by(program: Program, burns: tuple[Burn, ...]) -> tuple[Channel, float, float] | None:
+    """Span to forbid, s, of a burn too long (its begin), too short, too near another or one too many; else None."""
     limits, width = program.spacecraft.limits, program.width
     for burn in burns:
         longest, shortest = burn.channel.max_on_time, burn.channel.min_on_time
         if burn.on_time > longest + TOUCHING:
-            reach = burn.on_time + width
-            yield burn.channel, burn.t - reach, burn.t - 0.5 * longest + 0.5 * width
-            yield burn.channel, burn.t + 0.5 * longest - 0.5 * width, burn.t + reach
+            return burn.channel, burn.t - (burn.on_time + width), burn.t - 0.5 * longest + 0.5 * width
         if burn.on_time < 0.5 * shortest:
-            yield burn.channel, burn.t - 2.0 * width, burn.t + 2.0 * width
+            return burn.channel, burn.t - 2.0 * width, burn.t + 2.0 * width
     for earlier, later in itertools.pairwise(burns):
         if later.t - 0.5 * later.on_time < earlier.t + 0.5 * earlier.on_time + limits.gap - TOUCHING:
             less = min(earlier, later, key=lambda burn: burn.on_time)
             reach = 0.5 * less.on_time + width
-            yield less.channel, less.t - reach, less.t + reach
+            return less.channel, less.t - reach, less.t + reach
     if limits.max_pulses is not None and len(burns) > limits.max_pulses:
         least = min(burns, key=lambda burn: burn.impulse)
         reach = 0.5 * least.on_time + 2.0 * width
-        yield least.channel, least.t - reach, least.t + reach
+        return least.channel, least.t - reach, least.t + reach
+    return None
 
 
 def as_pulses(spacecraft: Spacecraft, burns: tuple[Burn, ...]) -> Schedule:
@@ -176,7 +175,7 @@ class Problem:
     def program(self, spacecraft: Spacecraft | None = None, equations: EndEquations | None = None) -> Program:
         """The linear program of small angles, with another horizon or other equations if given."""
         body, equations = spacecraft or self.spacecraft, equations or self.equations
-        aim = refinement.small_angles(body, equations)
+        aim = small_angles(body, equations)
         off = 0.0
         if self.options.shift is not None and equations.shift:
             final = body.spin if body.goal.spin is None else body.goal.spin

@@ -87,9 +87,7 @@ def small_angles(spacecraft: Spacecraft, equations: EndEquations) -> Influence:
     def rows(times: Vector) -> Vector:
         turned = np.exp(1j * np.outer(times, [spacecraft.nutation_rate, spin]))
         turned[:, 0] *= np.exp(np.minimum(-growth * (times - last), 0.0))
-        shifts = np.zeros((len(times), 2, 3))
-        shifts[:, :, :2] = _complex_product(turned[:, 1])
-        return _all_rows(turned[:, 0], shifts)[:, equations.chosen]
+        return _all_rows(turned[:, 0], _complex_product(turned[:, 1]))[:, equations.chosen]
 
     return Influence(rows, every[equations.chosen], _turning(spacecraft)[equations.chosen])
 
@@ -124,9 +122,8 @@ def misses(flight: Flight, equations: EndEquations) -> Vector:
     body, end = flight.spacecraft, flight.settled
     back = _turned_back(flight, np.array([flight.schedule.end]))[0]
     nutation = body.inertia.A * end.omega * back
-    momentum = flight.last_momentum
     final = end.spin if body.goal.spin is None else body.goal.spin
-    shift = square_to_target(body) @ momentum
+    shift = square_to_target(body) @ flight.last_momentum
     return np.array([nutation.real, nutation.imag, *shift, body.inertia.C * (end.spin - final)])[equations.chosen]
 
 
@@ -178,10 +175,10 @@ def _complex_product(factors: Vector) -> Vector:
 
 
 def _all_rows(nutation: Vector, shifts: Vector) -> Vector:
-    """All five equations, (n, 5, 3), from the turn of ω (n,) and the effect on H (n, 2, 3)."""
+    """All five equations, (n, 5, 3), from the turn of ω (n,) and the effect of axes on H (n, 2, …)."""
     rows = np.zeros((len(nutation), 5, 3))
     rows[:, :2, :2] = _complex_product(nutation)
-    rows[:, 2:4] = shifts
+    rows[:, 2:4, : shifts.shape[2]] = shifts
     rows[:, 4, 2] = 1.0
     return rows
 
@@ -193,8 +190,7 @@ model; and linear models, each about the best ticks so far."""
 WAYS = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])  # a step: of the start, of the on-time
 
 
-CONVERGED, NEWTON_STEPS = 1e-13, 25
-"""Share of |H| that is left: a few roundings of the flight; steps in which that is reached, at most."""
+CONVERGED, NEWTON_STEPS = 1e-13, 25  # share of |H| left: a few roundings of the flight; steps to it, at most
 
 
 class Refinement:

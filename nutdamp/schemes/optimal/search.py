@@ -20,12 +20,11 @@ from nutdamp.common import work
 from nutdamp.errors import Infeasible
 from nutdamp.flight.propagation import Flight
 from nutdamp.schemes.catalogue import OptimalOptions, SchemeOptions, TwoPulseOptions
-from nutdamp.schemes.optimal import alternatives, multistart, refinement
-from nutdamp.schemes.optimal.alternatives import by_other_schemes, hastened, spin_changes
+from nutdamp.schemes.optimal import alternatives, multistart
 from nutdamp.schemes.optimal.descent import Task
 from nutdamp.schemes.optimal.linear_program import Burn, Program, Solution
 from nutdamp.schemes.optimal.problem import GAIN, LEFT, UNMET, Problem, as_pulses, repaired, thinned
-from nutdamp.schemes.optimal.refinement import EndEquations, Refinement
+from nutdamp.schemes.optimal.refinement import MOST_GROWN, EndEquations, Refinement, along, misses
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import keeps_limits, rounded_off, shortest_on_time
 from nutdamp.spacecraft.model import Spacecraft, Vector
@@ -42,21 +41,15 @@ LOST, DEAR = 0.5, 0.01
 """Share of what there is to do that corrected burns may fail to supply, and share above the program's least cost, from
 which others are chosen."""
 
-FEW, SAVED = 2, 0.001
-"""Pulses for each equation that are few, and share of the cost that so many must save over still fewer."""
-
+FEW, SAVED = 2, 0.001  # pulses for each equation, and share of the cost that so many must save over still fewer
 WAYS = 3  # schedules of other schemes that are corrected to cost less, and exact ones that are put on ticks
 
 SHORT, STRONG = 4.0, 0.3
 """Inertial nutation periods up to which very many starts are tried, and within which a strong channel does all."""
 
-PROVED, EQUAL = 0.002, 1e-6
-"""Shares above the rigorous bound below which very many starts, and schedules that keep H, are not tried."""
-
+PROVED, EQUAL = 0.002, 1e-6  # above the rigorous bound: very many starts, and keeping H, are not tried below
 HALVINGS = 3  # shorter horizons that are looked at where there is a schedule already
-
-HASTE = 0.0008
-"""Share by which the end of the horizon is dearer than its beginning, so that of equals early burns are taken."""
+HASTE = 0.0008  # share by which the end of the horizon is dearer than its beginning: of equals early burns are taken
 
 NEAR, NEARLY = 0.05, 0.05
 """End error, rad, below which a flight is refined; share of the tightest bound that a schedule may leave where none
@@ -64,12 +57,8 @@ leaves nothing."""
 
 SHARP = 0.02  # relative accuracy of a least time by schedules found
 MARGINS = (0.002, 0.03, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0)  # shares added to the program's least time, tried in turn
-
-TRIED, LATER = 6, 4.0
-"""Margins tried to name a horizon that is long enough, and the longest one, over the default: looking takes long."""
-
-LATEST, NAMED = 64.0, 5e-3
-"""Multiple of the horizon up to which a feasible one is looked for, to name it, and its relative accuracy."""
+TRIED, LATER = 6, 4.0  # margins tried to name a long enough horizon, and the longest, over the default: that is slow
+LATEST, NAMED = 64.0, 5e-3  # multiple of the horizon up to which a feasible one is sought; relative accuracy
 
 ELSEWHERE, MOST_ELSEWHERE = (0.85, 0.7, 0.55, 0.4), 1500.0
 """Shares of the horizon that are tried in turn where a schedule is dear or was not found, and units for them."""
@@ -81,11 +70,11 @@ def schedule(spacecraft: Spacecraft, options: OptimalOptions) -> Schedule:
     Raises Infeasible where the program has no solution, naming the limit to relax, or where no schedule was found.
     """
     if spacecraft.growth < 0.0:  # once a millionth of the nutation is left, waiting costs ever less
-        faded = spacecraft.limits.earliest - refinement.MOST_GROWN / spacecraft.growth
+        faded = spacecraft.limits.earliest - MOST_GROWN / spacecraft.growth
         limits = replace(spacecraft.limits, horizon=min(spacecraft.horizon, faded))
         spacecraft = replace(spacecraft, limits=limits)
     search = _LeastCostSearch(spacecraft, options)
-    every, searched = list(spin_changes(search)), None
+    every, searched = list(alternatives.spin_changes(search)), None
     if not every or options.least != "pulses":
         try:
             ways = {"time": search.soonest, "pulses": search.fewest}
@@ -239,7 +228,7 @@ class _LeastCostSearch(Problem):
             best = min(there, key=lambda each: each.price).schedule if there else None
         if best is None:
             raise Infeasible(self.cured() if UNMET < first.unmet < math.inf else self.not_found())
-        return self.with_bounds(hastened(self, best, first, self.within_shorter), first)
+        return self.with_bounds(alternatives.hastened(self, best, first, self.within_shorter), first)
 
     def keeping(self, best: Schedule | None) -> Schedule | None:
         """The cheapest schedule found that keeps H, or reaches the target; None where it would not replace the best."""
@@ -390,7 +379,7 @@ class _LeastCostSearch(Problem):
     def on_ticks(self, schedule: Schedule) -> Schedule:
         """An exact schedule on the ticks of the commands."""
         flight = self.flown(schedule)
-        missed = refinement.misses(flight, self.equations)
+        missed = misses(flight, self.equations)
         return self.refined(flight, missed[2:4] if self.options.shift is not None else np.zeros(2))
 
     def refined(self, flight: Flight, off: Vector) -> Schedule:
@@ -415,7 +404,7 @@ class _LeastCostSearch(Problem):
         """Best plan of other schemes, as it is or corrected to cost less: they know large angles and far targets."""
         names = {channel.name: channel for channel in self.channels}
         candidates, flights = list[_FlownSchedule](), list[Flight]()
-        for schedule in by_other_schemes(self.spacecraft, shift=self.equations.shift):
+        for schedule in alternatives.by_other_schemes(self.spacecraft, shift=self.equations.shift):
             flights.append(self.flown(Schedule(schedule.pulses)))
             if work.exhausted() or (self.left(flights[-1]) <= LEFT and self.price(schedule) <= least * (1.0 + DEAR)):
                 break
@@ -424,7 +413,7 @@ class _LeastCostSearch(Problem):
             if work.exhausted():
                 continue
             program = self.program()
-            program.aim(refinement.along(way, self.equations, program.width))
+            program.aim(along(way, self.equations, program.width))
             burns = [Burn(names[pulse.channel], pulse.t, pulse.on_time) for pulse in way.schedule]
             candidates += self.corrected(program, program.solve(program.about(burns)), least)
         return self.best(candidates)
@@ -440,7 +429,7 @@ class _LeastCostSearch(Problem):
             if kept is None:
                 break
             solution, flown = kept, self.flown(as_pulses(self.spacecraft, kept.burns))
-            program.aim(refinement.along(flown, self.equations, program.width))
+            program.aim(along(flown, self.equations, program.width))
             if self.left(flown) < NEAR:
                 schedule = self.refined(flown, solution.off)
                 there = self.candidate(self.flown(schedule), self.price(schedule))
