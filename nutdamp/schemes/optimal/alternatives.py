@@ -286,13 +286,9 @@ def _in_order(times: Vector, width: float) -> Pieces | None:
 def _burns(problem: Problem, which: NDArray[np.int_], times: Vector) -> Schedule:
     """The pieces, one after the other."""
     starts = problem.spacecraft.limits.earliest + np.concatenate([[0.0], np.cumsum(times)[:-1]])
-    return Schedule(
-        tuple(
-            channel_pulse(problem.channels[number], float(start + 0.5 * time), float(time))
-            for number, start, time in zip(which.tolist(), starts, times, strict=True)
-            if number >= 0 and time > 0.0
-        )
-    )
+    pieces = zip(which.tolist(), starts.tolist(), times.tolist(), strict=True)
+    on = [(problem.channels[number], start, time) for number, start, time in pieces if number >= 0 and time > 0.0]
+    return Schedule(tuple(channel_pulse(channel, start + 0.5 * time, time) for channel, start, time in on))
 
 
 def _exact(problem: Problem, which: NDArray[np.int_], times: Vector) -> Schedule:

@@ -61,11 +61,9 @@ class SmallAngles:
         self.begins = np.concatenate([part[:-1] for part in edges])
         self.lengths = np.concatenate([np.diff(part) for part in edges])
         # Second derivative, at most: each pair of equations turns at its rate, and grows or decays slowly.
-        rates = program.influence.turning
-        bend = sum(
-            float(np.linalg.norm(prices[rates == rate])) * (rate**2 + program.spacecraft.growth**2)
-            for rate in sorted(set(rates.tolist()))
-        )
+        rates, growth = program.influence.turning, program.spacecraft.growth
+        pairs = ((rate, float(np.linalg.norm(prices[rates == rate]))) for rate in sorted(set(rates.tolist())))
+        bend = sum(size * (rate**2 + growth**2) for rate, size in pairs)
         self.bends = bend * np.linalg.norm(self.torques, axis=1) / program.costs
 
     def at(self, times: Vector) -> Vector:
@@ -120,9 +118,8 @@ def _lasting(curve: SmallAngles, which: NDArray[np.bool_], factor: float) -> flo
         mean = curve.mean(begins + (part + 0.5) * lengths, lengths)[:, which] / factor - 1.0
         gained = np.where(-_top(-before, -after, bends, lengths[:, None]) >= 0.0, mean, 0.0)
         crossing = _top(before, after, bends, lengths[:, None]) > 0.0
-        gained = np.where(
-            crossing & (gained == 0.0), _positive_mean(before, after) + bends * lengths[:, None] ** 2 / 12.0, gained
-        )
+        most = _positive_mean(before, after) + bends * lengths[:, None] ** 2 / 12.0
+        gained = np.where(crossing & (gained == 0.0), most, gained)
         total += float((gained * lengths[:, None] @ costs).sum())
         before = after
     return total

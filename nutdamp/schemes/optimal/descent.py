@@ -146,8 +146,7 @@ class Task:
         begun = np.exp(1j * (phase - within))  # as each pulse begins
         added = impulses[:, :, 0] + 1j * impulses[:, :, 1]
         if not kicks and self.torques[:, 2].any():
-            added, _ = self._pulsed(which, np.zeros_like(added), before, widths)
-            added = added * np.exp(1j * within)
+            added = self._pulsed(which, np.zeros_like(added), before, widths)[0] * np.exp(1j * within)
         elif not kicks:
             added = added * np.exp(0.5j * within) * np.sinc(within / (2.0 * np.pi))
         after = A * complex(rates[0], rates[1]) + np.cumsum(added * begun, axis=1)
@@ -158,16 +157,14 @@ class Task:
         half = np.exp(0.5j * turned)
         first, second = (cosine + 1j * (sine * before)) * half, sine * across * half
         if not kicks:
-            turns = zip((first, second), self._pulsed(which, across, before, widths)[1], strict=True)
+            turns = zip((first, second), self._pulsed(which, across, before, widths)[1:], strict=True)
             first, second = (np.stack(pair, axis=2).reshape(count, 2 * n) for pair in turns)
         first, second = _product(first, second)
         momentum = after[:, -1] * np.exp(-1j * phase[:, -1])
         spun = attitude.product(turn, (first.real, second.real, second.imag, first.imag))
         return np.array([momentum.real, momentum.imag, axial[:, -1]]), np.array(spun)
 
-    def _pulsed(
-        self, which: Indices, across: Complex, before: Vector, widths: Vector
-    ) -> tuple[Complex, tuple[Complex, Complex]]:
+    def _pulsed(self, which: Indices, across: Complex, before: Vector, widths: Vector) -> tuple[Complex, ...]:
         """H across axis 3 (b, n) after pulses, each alone, that begin with H ``across`` and along it; turn of each."""
         count = which.size
         moments = np.repeat(self._start[0][:, None], count, axis=1)
@@ -177,11 +174,9 @@ class Task:
         bodies = batch.Bodies(moments, *self._coasting)
         stretch = batch.MotionStretch(bodies, np.zeros(count), rates, turns, self.torques[which].reshape(-1, 3).T)
         batch.advance(stretch, widths.ravel())
-        after, first, second = (
-            (real + 1j * imaginary).reshape(which.shape)
-            for real, imaginary in ((rates[0], rates[1]), (turns[0], turns[3]), (turns[1], turns[2]))
-        )
-        return after * self._start[0][0], (first, second)
+        pairs = (rates[0], rates[1]), (turns[0], turns[3]), (turns[1], turns[2])
+        after, *turned = ((real + 1j * imaginary).reshape(which.shape) for real, imaginary in pairs)
+        return after * self._start[0][0], *turned
 
     def slopes(self, which: Indices, x: Vector, scale: Vector, here: Vector, kicks: int) -> Vector:
         """Slopes of the misses, ``here`` now, by the unknowns in units of ``scale`` (b, …): (b, equations, …)."""
@@ -218,10 +213,8 @@ def _product(first: Complex, second: Complex) -> tuple[Complex, Complex]:
     while (count := first.shape[1]) > 1:
         last = count & ~1
         u, v, w, z = first[:, :last:2], second[:, :last:2], first[:, 1::2], second[:, 1::2]
-        first, second = (
-            np.concatenate([product, rest[:, last:]], axis=1)
-            for product, rest in ((u * w - v * z.conj(), first), (u * z + v * w.conj(), second))
-        )
+        products = (u * w - v * z.conj(), first), (u * z + v * w.conj(), second)
+        first, second = (np.concatenate([product, rest[:, last:]], axis=1) for product, rest in products)
     return first[:, 0], second[:, 0]
 
 
@@ -253,10 +246,6 @@ class DescentState(NamedTuple):
     barrier: Vector
     penalty: Vector
     error: Vector
-
-    def of(self, rows: Any) -> DescentState:
-        """The states of some sequences."""
-        return DescentState._make(part[rows] for part in self)
 
 
 class Descent:
@@ -303,7 +292,7 @@ class Descent:
     def of(self, rows: Indices) -> Descent:
         """The descents of some of the sequences."""
         some = copy.copy(self)
-        some.sequences, some.state = self.sequences.of(rows), self.state.of(rows)
+        some.sequences, some.state = self.sequences.of(rows), DescentState._make(part[rows] for part in self.state)
         some.scale, some.rows, some.price = self.scale[rows], self.rows[rows], self.price[rows]
         return some
 
@@ -355,9 +344,8 @@ class Descent:
             line.tried(step[line.active], SHARES)
         x, slack, misses = line.x, line.slack, line.misses
         slopes = self.task.slopes(self.sequences.which, x, self.scale, misses, self.kicks)
-        curvature = _curved(
-            old.curvature, (x - old.x) / self.scale, np.einsum("bmi,bm->bi", slopes - old.slopes, prices)
-        )
+        change = np.einsum("bmi,bm->bi", slopes - old.slopes, prices)
+        curvature = _curved(old.curvature, (x - old.x) / self.scale, change)
         curvature[line.active] = np.eye(x.shape[1])
         dearer = old.barrier[:, None] / old.slack - old.dual - weight * closer
         dual = old.dual + _to_bound(old.dual, dearer, old.barrier)[:, None] * dearer

@@ -371,8 +371,7 @@ class Program:
                 times = burn.t + np.linspace(-1.0, 1.0, 17) * reach / zoom
                 times = np.clip(times, self.centres[0] - half, self.centres[-1] + half)
                 times = times[(np.diff(times, prepend=-np.inf) > 0.0) & ~self.forbidden[index, self._slot(times)]]
-                there = alone(np.full(len(times), index), times, np.zeros(len(times)))
-                impulses = impulses.joined(there._replace(burn=np.full(len(times), number)))
+                impulses = impulses.joined(ProgramColumns(*np.broadcast_arrays(index, times, 0.0, number)))
             else:
                 first, last = self._slot(np.array([burn.t - reach, burn.t + reach]))
                 near = np.arange(first, last + 1)

@@ -188,8 +188,6 @@ REACH, TICK_STEPS, MODELS = 2.0, 300, 4
 model; and linear models, each about the best ticks so far."""
 
 WAYS = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])  # a step: of the start, of the on-time
-
-
 CONVERGED, NEWTON_STEPS = 1e-13, 25  # share of |H| left: a few roundings of the flight; steps to it, at most
 
 
@@ -291,11 +289,10 @@ class Refinement:
 
         ticks = ticks.copy()
         for _ in range(TICK_STEPS):
-            possible = [(index, way) for way in WAYS for index in np.flatnonzero(allowed(ticks + way))]
-            if not possible:
+            way, pulse = np.nonzero([allowed(ticks + way) for way in WAYS])
+            if not len(pulse):
                 break
-            pulse = np.array([index for index, _ in possible])
-            start, on_time = np.array([way for _, way in possible]).T
+            start, on_time = WAYS[way].T
             centre = start + 0.5 * on_time
             changes = tick * (slopes[:, 2 * pulse] * centre + slopes[:, 2 * pulse + 1] * on_time)
             alone = missing[:, None] + changes
@@ -307,6 +304,6 @@ class Refinement:
             if pairs[row, column] >= float(np.linalg.norm(missing)) * (1.0 - 1e-9):
                 break
             for index in {row, column}:
-                ticks[pulse[index]] += start[index], on_time[index]
+                ticks[pulse[index]] += WAYS[way[index]]
                 missing = missing + changes[:, index]
         return ticks
