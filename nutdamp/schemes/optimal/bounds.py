@@ -33,8 +33,7 @@ from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.schedule import TOUCHING
 
 QUARTERINGS, PARTS = 9, 4
-"""Subdivisions into quarters of the span between two times: to a 1e-5 of a slot; parts of a slot in which the gain of a
-channel that is on for long is summed."""
+"""Subdivisions of a span into quarters, to 1e-5 of a slot; parts of a slot in which a long gain is summed."""
 
 LOWERINGS = (1.0, 1.0003, 1.0005, 1.001, 1.0016)
 """Factors by which prices are lowered for channels that are on for long. Solved with slots, they are up to w²/8 + w²/24
@@ -55,8 +54,7 @@ class SmallAngles:
     def __init__(self, program: Program, prices: Vector) -> None:
         self.program, self.prices, self.costs = program, prices, program.costs
         self.torques = np.array([channel.torque for channel in program.channels])
-        windows = free_windows(program.spacecraft, program.end)
-        spans = [(begin - TOUCHING, end + TOUCHING) for begin, end in windows]
+        spans = [(begin - TOUCHING, end + TOUCHING) for begin, end in free_windows(program.spacecraft, program.end)]
         edges = [np.linspace(*span, max(math.ceil((span[1] - span[0]) / program.width), 1) + 1) for span in spans]
         self.begins = np.concatenate([part[:-1] for part in edges])
         self.lengths = np.concatenate([np.diff(part) for part in edges])
@@ -91,8 +89,7 @@ def _highest(curve: SmallAngles, which: NDArray[np.bool_]) -> float:
     for _ in range(QUARTERINGS):
         lengths, channel = np.repeat(0.25 * lengths, 4), np.repeat(channel, 4)
         begins = np.repeat(begins, 4) + lengths * np.tile(np.arange(4), len(begins))
-        every = np.arange(len(begins))
-        before, after = (curve.at(times)[every, channel] for times in (begins, begins + lengths))
+        before, after = (curve.at(times)[np.arange(len(times)), channel] for times in (begins, begins + lengths))
         highest = _top(before, after, curve.bends[channel], lengths)
         best = max(float(edge.max(initial=best)) for edge in (before, after))
         there = highest > best + ENOUGH * abs(best)

@@ -168,8 +168,7 @@ class Task:
         """H across axis 3 (b, n) after pulses, each alone, that begin with H ``across`` and along it; turn of each."""
         count = which.size
         moments = np.repeat(self._start[0][:, None], count, axis=1)
-        spinning = before - self.body.inertia.wheel
-        rates = np.array([across.real, across.imag, spinning]).reshape(3, -1) / moments
+        rates = np.array([across.real, across.imag, before - self.body.inertia.wheel]).reshape(3, -1) / moments
         turns = np.repeat(np.array([[1.0], [0.0], [0.0], [0.0]]), count, axis=1)
         bodies = batch.Bodies(moments, *self._coasting)
         stretch = batch.MotionStretch(bodies, np.zeros(count), rates, turns, self.torques[which].reshape(-1, 3).T)
@@ -221,8 +220,7 @@ def _product(first: Complex, second: Complex) -> tuple[Complex, Complex]:
 WHOLE, SHARES = np.array([1.0]), np.array([0.5, 0.2, 0.05, 0.01])  # of a step, where all of it does not help
 
 BARRIER, SETTLED = 1e-9, 1e-7
-"""Share of the cost at which the barrier of the bounds ends, and the largest relative error of the conditions for an
-optimum at which a sequence is done."""
+"""Share of the cost at which the barrier ends; relative error of the conditions for an optimum that is none."""
 
 FLAT, PROXIMAL = 1e-5, 1e-9
 """Share of the cost below which the next step's promise, the barrier and the misses are not worth taking it; weight

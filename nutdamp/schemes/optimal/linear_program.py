@@ -96,8 +96,7 @@ def burns(channels: Sequence[Channel], columns: ProgramColumns, on_times: Vector
 
 
 SLOTS, MOST_SLOTS = 64, 600_000
-"""Slots in the faster of the two turns, at ω3 and at aω3; and of all channels together: a horizon of more is looked at
-as far as they reach."""
+"""Slots in the faster of the turns at ω3 and at aω3, and of all channels: of a longer horizon no more is seen."""
 
 SOLVED, SLOT, COLUMN, LIMITED = 3.0, 3e-4, 1.5e-3, 0.06  # units of `work`: solution, slot, column, limited burn
 
@@ -112,8 +111,7 @@ while they do not supply what is needed."""
 FIRST, ROUNDS = 400, 60  # columns to begin with, and rounds in which more are taken in
 
 TINIEST, SOME = 1e-6, 1e-12
-"""Coefficient below which an equation is not scaled up any more; share of what is needed below which an on-time is
-rounding."""
+"""Coefficient below which an equation is not scaled up; share of what is needed below which an on-time is none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -223,8 +221,7 @@ class Program:
         shares, longest = min(ring.shape[1], 1), len(self._longest(columns))
         work.spend(LIMITED * longest)
         limits = np.concatenate([np.full(shares, self.off / self._scale), np.ones(longest)])
-        goal = self.influence.goal / self._scale
-        master = GrowingProgram(goal, limits, np.maximum(reach, TINIEST))
+        master = GrowingProgram(self.influence.goal / self._scale, limits, np.maximum(reach, TINIEST))
         rows = np.zeros((count + len(limits), 2 * count + ring.shape[1]))
         rows[:count] = np.hstack([np.eye(count), -np.eye(count), ring])
         rows[count : count + shares, 2 * count :] = 1.0
@@ -278,8 +275,7 @@ class Program:
 
     def _worth(self, weights: Vector) -> Vector:
         """Worth of one unit of each channel in each slot by prices ``weights``, (channels, slots)."""
-        grid = self._slot_rows()
-        worth = self._direction @ (weights @ grid.reshape(len(weights), -1)).reshape(3, -1)
+        worth = self._direction @ (weights @ self._slot_rows().reshape(len(weights), -1)).reshape(3, -1)
         if self.forbidden.any():
             worth[self.forbidden] = -np.inf
         return np.asarray(worth)
@@ -403,10 +399,7 @@ SMALL, NONZERO = 10_000, 1e-2  # coefficients that count for nothing here, and u
 
 
 class Optimum(NamedTuple):
-    """Unknowns ``x`` (n,), and ``prices`` (m,) of one more of each right-hand side of the equations.
-
-    ``shadows`` are the same of the limits, at most zero.
-    """
+    """Unknowns ``x`` (n,), ``prices`` (m,) of one more of each right-hand side, ``shadows`` of the limits, ≤ 0."""
 
     x: Vector
     prices: Vector
@@ -496,8 +489,7 @@ class _SilentSolver(highspy.Highs):
 CORNERS, FLAT = 3000, 1e-12  # looked at, at most, and share of the weight of one below which it is none
 
 MET, BEYOND = 3e-8, 1e-6
-"""Distance from the goal that counts as none, over all there is to do, and the share of it by which the goal must lie
-beyond the set, for that to be proved in spite of rounding."""
+"""Distance from the goal, over all there is to do, that is none; share of it that proves it, despite rounding."""
 
 
 def supplies(most: Vector, goal: Vector, off: float = 0.0) -> bool | None:

@@ -34,8 +34,7 @@ NEEDLESS, NOTHING = 1e-3, 1e-10  # of all there is to do: below it a pulse may b
 WIDE, MOST_KICKS = 0.25, 24  # rad of the faster turn from which a pulse is first so many kicks, and the most of them
 
 CLOSE, MOVES, FEWEST_MOVES = 1e-5, 30, 3
-"""Barrier of the bounds from which a schedule that is nearly the cheapest nearby is descended, steps of such a descent,
-over the number of pulses, and the fewest."""
+"""Barrier for a schedule that is nearly the cheapest nearby; steps of its descent, over its pulses; the fewest."""
 
 
 class Moments(NamedTuple):

@@ -32,8 +32,7 @@ UNMET = 1e-7  # share of what there is to do that columns may fail to supply: th
 REPAIRS = 60  # rounds in which burns that break a limit are moved elsewhere
 
 THRIFT, GAIN = 0.004, 0.0005
-"""Shares of the least cost that are given away for fewer pulses, where there are many and where few: so little is not
-worth another search."""
+"""Shares of the least cost given away for fewer pulses, of many and of few: so little is not worth a search."""
 
 
 def thinned(program: Program, solution: Solution, cost: float, *, fewest: bool) -> Solution:
@@ -99,8 +98,7 @@ def _divide(program: Program, burns: tuple[Burn, ...]) -> bool:
         pieces = np.array([math.ceil(burn.on_time / (window * program.width)) for burn in long])
         # The first of the pieces begins so that all of them are centred on the burn.
         first = middles - (pieces * (window + pause) - pause) // 2
-        within = (every - first[nearest]) % (window + pause)
-        program.forbidden[row, within >= window] = True
+        program.forbidden[row, (every - first[nearest]) % (window + pause) >= window] = True
         ends = np.flatnonzero(np.diff(nearest))
         for back in range(pause):  # windows of neighbouring patterns do not join
             program.forbidden[row, ends - back] = True
@@ -141,8 +139,7 @@ def as_pulses(spacecraft: Spacecraft, burns: tuple[Burn, ...]) -> Schedule:
 LEFT = math.radians(1e-6)  # largest nutation and distance from the target, rad, and spin error, as a share, of a plan
 
 SHARPEST, DEARER = 1e-3, 0.03
-"""Relative accuracy of a least time by the program of small angles, and the share above its least cost from which
-shorter horizons are looked at too."""
+"""Relative accuracy of a least time by small angles; share above its least cost from which others are looked for."""
 
 
 class Problem:
@@ -175,12 +172,11 @@ class Problem:
     def program(self, spacecraft: Spacecraft | None = None, equations: EndEquations | None = None) -> Program:
         """The linear program of small angles, with another horizon or other equations if given."""
         body, equations = spacecraft or self.spacecraft, equations or self.equations
-        aim = small_angles(body, equations)
         off = 0.0
         if self.options.shift is not None and equations.shift:
             final = body.spin if body.goal.spin is None else body.goal.spin
             off = abs(body.inertia.axial(final)) * math.sin(min(self.options.shift, 0.5 * math.pi))
-        return Program(body, self.channels, self.costs, aim, off=off)
+        return Program(body, self.channels, self.costs, small_angles(body, equations), off=off)
 
     def within(self, horizon: float) -> Spacecraft:
         """The spacecraft with another horizon."""

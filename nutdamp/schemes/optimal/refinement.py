@@ -120,8 +120,7 @@ def _rows(flight: Flight, equations: EndEquations, times: Vector) -> Vector:
 def misses(flight: Flight, equations: EndEquations) -> Vector:
     """End errors of a flight, (equations,) N m s; zero where it ends as requested."""
     body, end = flight.spacecraft, flight.settled
-    back = _turned_back(flight, np.array([flight.schedule.end]))[0]
-    nutation = body.inertia.A * end.omega * back
+    nutation = body.inertia.A * end.omega * _turned_back(flight, np.array([flight.schedule.end]))[0]
     final = end.spin if body.goal.spin is None else body.goal.spin
     shift = square_to_target(body) @ flight.last_momentum
     return np.array([nutation.real, nutation.imag, *shift, body.inertia.C * (end.spin - final)])[equations.chosen]
@@ -184,8 +183,7 @@ def _all_rows(nutation: Vector, shifts: Vector) -> Vector:
 
 
 REACH, TICK_STEPS, MODELS = 2.0, 300, 4
-"""Ticks that a start or on-time may lie from what it was before; steps of one tick, two pulses at a time, by one linear
-model; and linear models, each about the best ticks so far."""
+"""Ticks that a setting may lie from its exact value; steps of a tick, two pulses at a time, by one model; models."""
 
 WAYS = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])  # a step: of the start, of the on-time
 CONVERGED, NEWTON_STEPS = 1e-13, 25  # share of |H| left: a few roundings of the flight; steps to it, at most

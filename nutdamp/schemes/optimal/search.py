@@ -34,12 +34,10 @@ from nutdamp.spacecraft.schedule import TOUCHING, Schedule
 MOST_LOOSE = 5000.0  # units that may be spent where H may move, so that some are left for schedules that keep it
 
 CHOICES, AIMS = 3, 8
-"""Choices of burns among all channels and moments: at small angles, then along the flight before; and flights along
-which those chosen are corrected, at most."""
+"""Choices of burns: at small angles, then along the flight before; and flights along which each is corrected."""
 
 LOST, DEAR = 0.5, 0.01
-"""Share of what there is to do that corrected burns may fail to supply, and share above the program's least cost, from
-which others are chosen."""
+"""Share of what is to do that corrected burns may lack; share above the least cost from which others are chosen."""
 
 FEW, SAVED = 2, 0.001  # pulses for each equation, and share of the cost that so many must save over still fewer
 WAYS = 3  # schedules of other schemes that are corrected to cost less, and exact ones that are put on ticks
@@ -52,8 +50,7 @@ HALVINGS = 3  # shorter horizons that are looked at where there is a schedule al
 HASTE = 0.0008  # share by which the end of the horizon is dearer than its beginning: of equals early burns are taken
 
 NEAR, NEARLY = 0.05, 0.05
-"""End error, rad, below which a flight is refined; share of the tightest bound that a schedule may leave where none
-leaves nothing."""
+"""End error, rad, below which a flight is refined; share of the tightest bound that is left where none is exact."""
 
 SHARP = 0.02  # relative accuracy of a least time by schedules found
 MARGINS = (0.002, 0.03, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0)  # shares added to the program's least time, tried in turn
@@ -71,8 +68,7 @@ def schedule(spacecraft: Spacecraft, options: OptimalOptions) -> Schedule:
     """
     if spacecraft.growth < 0.0:  # once a millionth of the nutation is left, waiting costs ever less
         faded = spacecraft.limits.earliest - MOST_GROWN / spacecraft.growth
-        limits = replace(spacecraft.limits, horizon=min(spacecraft.horizon, faded))
-        spacecraft = replace(spacecraft, limits=limits)
+        spacecraft = replace(spacecraft, limits=replace(spacecraft.limits, horizon=min(spacecraft.horizon, faded)))
     search = _LeastCostSearch(spacecraft, options)
     every, searched = list(alternatives.spin_changes(search)), None
     if not every or options.least != "pulses":
