@@ -83,8 +83,7 @@ def _spin_change(problem: Problem, goal: float, channel: Channel, start: float, 
 
 
 CLEARLY, ABOUT = 0.8, 0.002
-"""Share of the end at which small angles must allow the same cost, for an earlier end to be looked for, and the share
-by which it may be more: it is not that of the true motion."""
+"""Share of the end at which small angles must allow the cost, for an earlier one to be looked for, and the excess."""
 
 BISECTIONS, ROUNDS, PARTS = 3, 3, (0.2, 0.4, 0.6)
 """Steps in which the earliest end is found that they allow; earlier ends looked for one after the other; horizons that

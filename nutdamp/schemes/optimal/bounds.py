@@ -166,7 +166,7 @@ def rigorous(
     torques = np.array([channel.torque for channel in channels])
     lower_bounds = [_nutation(spacecraft, torques, costs, cost, allowed)]
     if spacecraft.goal.spin is not None:
-        lower_bounds.append(_nutation_and_spin(spacecraft, torques, costs, allowed))
+        lower_bounds.append(_nutation_and_spin(spacecraft, spacecraft.goal.spin, torques, costs, allowed))
     if shift and not torques[:, 2].any():
         # The way of H to the direction of the target, round the sphere of radius |H3|.
         nutation, beta = spacecraft.nutation, max(spacecraft.to_turn - allowed.off, 0.0)
@@ -207,10 +207,8 @@ def _nutation(spacecraft: Spacecraft, torques: Vector, costs: Vector, cost: floa
     return _largest(value, float(np.angle(goal)), math.acos(stays / abs(goal)))
 
 
-def _nutation_and_spin(spacecraft: Spacecraft, torques: Vector, costs: Vector, allowed: Allowed) -> float:
-    """Least cost of taking the nutation out and changing the spin, whatever the phases."""
-    final = spacecraft.goal.spin
-    assert final is not None
+def _nutation_and_spin(spacecraft: Spacecraft, final: float, torques: Vector, costs: Vector, allowed: Allowed) -> float:
+    """Least cost of taking the nutation out and changing the spin to ``final``, whatever the phases."""
     C, off = spacecraft.inertia.C, abs(final) * allowed.spin
     stays = (abs(spacecraft.inertia.axial(final)) + C * off) * math.tan(allowed.nutation)
     change = final - spacecraft.spin

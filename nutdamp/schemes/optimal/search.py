@@ -207,8 +207,7 @@ class _LeastCostSearch(Problem):
         """The cheapest schedule found: over the whole horizon, or over less where there the search does not settle."""
         first = self.program().solve()
         if other := self.without_overtaxed(first):
-            schedule = other.schedule()
-            return self.with_bounds(Schedule(schedule.pulses, schedule.notes), first)
+            return self.with_bounds(other.schedule(), first)
         # Where H may end elsewhere one that keeps it, or reaches the target, will do too: some work is left for it.
         looser = self.options.free_axis or self.options.shift is not None
         with work.budget("a schedule as asked", MOST_LOOSE if looser else math.inf):
