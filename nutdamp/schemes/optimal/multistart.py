@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -232,16 +232,15 @@ def _lowered(descent: Descent, steps: int) -> list[Moments]:
     return _every(descent.of(np.flatnonzero(descent.left < EXACT)))
 
 
-def _together(every: Sequence[Moments]) -> Moments:
-    """Sequences (n,) of as many pulses each as one array (b, n)."""
+def _together(every: Iterable[tuple[Any, Any, Any]]) -> Moments:
+    """Pulses as arrays (n,), or sequences (n,) of as many pulses each as arrays (b, n)."""
     return Moments(*(np.array(part) for part in zip(*every, strict=True)))
 
 
 def _moments_of(task: Task, schedule: Schedule) -> Moments:
     """The pulses of a schedule."""
     numbers = {channel.name: number for number, channel in enumerate(task.channels)}
-    pulses = [(numbers[pulse.channel], pulse.t, pulse.on_time) for pulse in schedule]
-    return Moments(*map(np.array, zip(*pulses, strict=True)))
+    return _together((numbers[pulse.channel], pulse.t, pulse.on_time) for pulse in schedule)
 
 
 def _every(descent: Descent) -> list[Moments]:
