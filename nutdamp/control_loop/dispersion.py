@@ -25,7 +25,7 @@ from nutdamp.errors import BadRequest
 from nutdamp.montecarlo.cases import DispersedModel, cold_of, cones_used, rotated, tank_of, triple
 from nutdamp.montecarlo.inputs import BLOCK, BY_VALVE, Draws, Inputs, independent, some_of, with_sensor
 from nutdamp.montecarlo.propagated import carried
-from nutdamp.montecarlo.statistics import Exact, angle, cases_to_show
+from nutdamp.montecarlo.statistics import Exact, cases_to_show
 from nutdamp.montecarlo.study import Counted, Dispersed, DrawnCases
 from nutdamp.physics import attitude
 from nutdamp.spacecraft import requirements
@@ -255,8 +255,8 @@ class LoopStudy(DrawnCases):
         out = np.empty((len(OUTPUTS), len(cases)))
         out[0] = [pilot.quiet[0] if pilot.quiet else math.nan for pilot in pilots]
         out[1], out[2] = flown.quiet, flown.largest
-        out[3] = angle(start, triple(np.array(momentum)))
-        out[4] = angle(triple(self.model.target.tolist()), rotated(momentum, (tilts[0], tilts[1])))
+        out[3] = attitude.angle_of_parts(start, triple(np.array(momentum)))
+        out[4] = attitude.angle_of_parts(triple(self.model.target.tolist()), rotated(momentum, (tilts[0], tilts[1])))
         out[5] = flown.rates[2] - before[2]
         used = [[firing.pulse.propellant for firing in pilot.fired] for pilot in pilots]
         out[6] = [math.fsum(math.nan if kg is None else kg for kg in pulses) for pulses in used]

@@ -33,16 +33,12 @@ GAUSS = math.sqrt(3.0) / 6.0  # distance of the two Gauss nodes from the middle 
 
 @dataclass(frozen=True, eq=False)
 class BasiliskFlight:
-    """Motion flown by Basilisk, in principal axes; where the rates jump, the row is just after the jump.
+    """Motion flown by Basilisk, in principal axes; where the rates jump, the row is just after the jump."""
 
-    ``t`` (n,) s, ``rates`` (n, 3) rad/s, ``quaternion`` (n, 4) body -> inertial with scalar part not negative;
-    ``step`` is the longest step of integration taken, s.
-    """
-
-    t: Vector
-    rates: Vector
-    quaternion: Vector
-    step: float
+    t: Vector  # (n,) s
+    rates: Vector  # (n, 3) rad/s
+    quaternion: Vector  # (n, 4) body -> inertial, scalar part not negative
+    step: float  # longest step of integration taken, s
 
 
 def fly(
@@ -51,10 +47,9 @@ def fly(
     """Fly ``schedule`` from 0 to ``until`` s with Basilisk, real widths and true principal moments.
 
     There is a row for each of ``samples`` even times from 0 to ``until`` and each edge of a pulse in between. ``step``
-    is the longest step in s; by default the body turns by `TURN` at most. Constant and axial disturbances act all the
-    time; a turning one is held constant for a step at a time such that the error falls with the fourth power of
-    the step. Raises MissingExtra without Basilisk, Infeasible where there is energy dissipation (a rigid hub has
-    none) or the flight takes more than `MOST_STEPS`, BadRequest for times that cannot be.
+    is the longest step in s, see `default_step`; torques that change are those of `stretches`. Raises MissingExtra
+    without Basilisk, Infeasible where there is energy dissipation (a rigid hub has none) or the flight takes more than
+    `MOST_STEPS`, BadRequest for times that cannot be.
     """
     if not 0.0 <= until < math.inf:
         raise BadRequest(f"until = {until} s: expected a time of 0 s or later")
@@ -88,13 +83,12 @@ def default_step(spacecraft: Spacecraft, schedule: Schedule, until: float) -> fl
     √(2T) = √(Σ Ij ωj²) is constant without torque, grows by |J|/√Imin at most under an impulse J, and bounds |ω| √Imin.
     """
     moments, rates = np.asarray(spacecraft.inertia.moments), spacecraft.initial.rates
-    pushes = schedule.total_impulse + until * math.fsum(
-        math.hypot(abs(disturbance.transverse), disturbance.axial) for disturbance in spacecraft.disturbances
-    )
+    lasting = math.fsum(math.hypot(abs(each.transverse), each.axial) for each in spacecraft.disturbances)
+    pushes = schedule.total_impulse + until * lasting
     least = math.sqrt(float(moments.min()))
     pace = (math.sqrt(float(moments @ rates**2)) + pushes / least) / least
     pace += abs(spacecraft.inertia.wheel) / float(moments.min())
-    turning = [abs(disturbance.rate) for disturbance in spacecraft.disturbances if disturbance.rate != 0.0]
+    turning = [abs(each.rate) for each in spacecraft.disturbances if each.rate != 0.0]
     angle, pace = (TURN_TURNING, pace + max(turning)) if turning else (TURN, pace)
     return angle / pace if pace > 0.0 else 1.0
 
@@ -109,17 +103,14 @@ def stretches(
     Marthinsen, Owren 2003), in which each half step is a motion under constant torque.
     """
     constant, slope = np.zeros(3), np.zeros(3)
-    for push in (pulse.push(start, end) for pulse in schedule):
-        if push is not None:
-            constant += push[0]
-            slope += 0.0 if push[1] is None else push[1]
+    for torque, rise in filter(None, (pulse.push(start, end) for pulse in schedule)):
+        constant += torque
+        slope += 0.0 if rise is None else rise
     for disturbance in spacecraft.disturbances:
         constant[2] += disturbance.axial
         if disturbance.rate == 0.0:
             constant[:2] += (disturbance.transverse.real, disturbance.transverse.imag)
-    turning = [
-        (disturbance.transverse, disturbance.rate) for disturbance in spacecraft.disturbances if disturbance.rate != 0.0
-    ]
+    turning = [(each.transverse, each.rate) for each in spacecraft.disturbances if each.rate != 0.0]
     if not turning and not slope.any():
         yield end - start, constant
         return
@@ -142,11 +133,8 @@ class _Hub:
 
     def __init__(self, spacecraft: Spacecraft, longest: float) -> None:
         basilisk = _modules()
-        self._longest = longest
-        self._moments = np.asarray(spacecraft.inertia.moments)
-        self._period = max(round(longest * 1e9), 1)
-        self._clock = 0
-        initial = spacecraft.initial
+        self._longest, self._period, self._clock = longest, max(round(longest * 1e9), 1), 0
+        self._moments, initial = np.asarray(spacecraft.inertia.moments), spacecraft.initial
         self._body = basilisk.spacecraft.Spacecraft()
         self._body.ModelTag = "body"
         rotor = ROTOR * self._moments[2] if spacecraft.inertia.wheel else 0.0  # any share will do
@@ -234,11 +222,7 @@ def _column(vector: Vector) -> list[list[float]]:
 
 
 def _from_mrp(sigma: Vector) -> Vector:
-    """Unit quaternion (4,) of MRPs (3,).
-
-    The MRPs of the frame B relative to N turn N into B, as the quaternion body -> inertial turns vectors. Basilisk
-    switches to the shadow set -σ/σ² as |σ| passes 1; that is the same attitude, and here only the sign of q.
-    """
+    """Unit quaternion (4,) of MRPs (3,), or of their shadow set -σ/σ², which Basilisk takes beyond |σ| = 1."""
     square = float(sigma @ sigma)
     quaternion = np.array([1.0 - square, *(2.0 * sigma)]) / (1.0 + square)
     return np.asarray(-quaternion if quaternion[0] < 0.0 else quaternion)

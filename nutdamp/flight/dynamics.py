@@ -1,15 +1,11 @@
-"""Motion between two pulses, and the propellant supply by which moments fall and pulses weaken.
-
-Coasts of symmetric bodies are in closed form, else Taylor pieces. The strength of each pulse follows from cold nozzles
-and the falling pressure of the tank.
-"""
+"""Motion between two pulses, and the propellant supply by which moments fall and pulses weaken."""
 
 from __future__ import annotations
 
 import cmath
 import math
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any, NamedTuple, Protocol
@@ -45,19 +41,29 @@ class Path(Protocol):
         ...
 
 
+def joined(
+    pieces: Sequence[tuple[float, Callable[[Vector], tuple[Vector, Vector]]]], times: Vector
+) -> tuple[Vector, Vector]:
+    """Rates (n, 3) and quaternions (n, 4) at ``times`` (n,) s by ``pieces``: the start (s) of each, and its motion."""
+    times = np.asarray(times, dtype=float)
+    owner = np.clip(np.searchsorted([start for start, _ in pieces], times, side="right") - 1, 0, len(pieces) - 1)
+    rates, quaternion = np.empty((len(times), 3)), np.empty((len(times), 4))
+    for index in np.flatnonzero(np.bincount(owner)).tolist():  # np.unique would load numpy.ma
+        rows = owner == index
+        rates[rows], quaternion[rows] = pieces[index][1](times[rows])
+    return rates, quaternion
+
+
 @dataclass(frozen=True, slots=True)
 class Arc:
-    """Coast of a symmetric body in closed form, from ``state`` at ``start`` s.
-
-    ``growth`` 1/s is `energy_sink`'s κ, ``wheel`` h in N m s.
-    """
+    """Coast of a symmetric body in closed form, from ``state`` at ``start`` s."""
 
     A: float
     C: float
     start: float
     state: SpinState
-    growth: float = 0.0
-    wheel: float = 0.0
+    growth: float = 0.0  # κ of `energy_sink`, 1/s
+    wheel: float = 0.0  # h, N m s
     steps: int = 0
 
     @classmethod
@@ -67,27 +73,23 @@ class Arc:
 
     def motion(self, times: Vector) -> tuple[Vector, Vector]:
         """Rates (n, 3) in rad/s and quaternions (n, 4) at ``times`` (n,) s."""
-        since = np.asarray(times) - self.start
-        state = self.state
+        A, C, state, since = self.A, self.C, self.state, np.asarray(times) - self.start
+        motion = state.quaternion, state.omega, state.spin, since, self.wheel
         if self.growth != 0.0:
-            omega, spin, quaternion = energy_sink.arc(
-                self.A, self.C, self.growth, state.quaternion, state.omega, state.spin, since, self.wheel
-            )
-            return np.column_stack([omega.real, omega.imag, spin]), quaternion
-        turning = (self.A - self.C) / self.A * state.spin - self.wheel / self.A
-        omega = state.omega * np.exp(-1j * turning * since)
-        quaternion = attitude.arc(self.A, self.C, state.quaternion, state.omega, state.spin, since, self.wheel)
-        return np.column_stack([omega.real, omega.imag, np.full(len(since), state.spin)]), quaternion
+            omega, spin, quaternion = energy_sink.arc(A, C, self.growth, *motion)
+        else:
+            omega = state.omega * np.exp(-1j * ((A - C) / A * state.spin - self.wheel / A) * since)
+            spin, quaternion = np.full(len(since), state.spin), attitude.arc(A, C, *motion)
+        return np.column_stack([omega.real, omega.imag, spin]), quaternion
 
     def end(self, time: float) -> SpinState:
         """State at ``time`` s."""
-        A, C, state, since, wheel = self.A, self.C, self.state, time - self.start, self.wheel
-        motion = state.quaternion, state.omega, state.spin, since, wheel
+        A, C, state, since = self.A, self.C, self.state, time - self.start
+        motion = state.quaternion, state.omega, state.spin, since, self.wheel
         if self.growth != 0.0:
             return SpinState(*energy_sink.arc(A, C, self.growth, *motion))
-        turned = cmath.exp(-1j * ((A - C) / A * state.spin - wheel / A) * since)
-        quaternion = attitude.arc_end(A, C, *motion)
-        return SpinState(state.omega * turned, state.spin, quaternion)
+        turned = cmath.exp(-1j * ((A - C) / A * state.spin - self.wheel / A) * since)
+        return SpinState(state.omega * turned, state.spin, attitude.arc_end(A, C, *motion))
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,14 +121,7 @@ class Integrated:
 
     def motion(self, times: Vector) -> tuple[Vector, Vector]:
         """Rates (n, 3) in rad/s and quaternions (n, 4) at ``times`` (n,) s."""
-        times = np.asarray(times, dtype=float)
-        starts = np.array([piece.start for piece in self.pieces])
-        owner = np.clip(np.searchsorted(starts, times, side="right") - 1, 0, len(starts) - 1)
-        body, quaternion = np.empty((len(times), 3)), np.empty((len(times), 4))
-        for index in np.flatnonzero(np.bincount(owner)):  # np.unique would load numpy.ma
-            rows = owner == index
-            body[rows], quaternion[rows] = self.pieces[index].at(times[rows])
-        return body, quaternion
+        return joined([(piece.start, piece.at) for piece in self.pieces], times)
 
 
 LONG = 20.0
@@ -150,10 +145,7 @@ class Push(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Dynamics:
-    """Body as flown by one of the two models, with all torques besides the pulses.
-
-    ``known``: the legs flown before, where they are remembered: see `remembering`.
-    """
+    """Body as flown, with all torques besides the pulses; ``known``: the legs flown before, see `remembering`."""
 
     moments: tuple[float, float, float]
     constant: Vector
@@ -182,8 +174,7 @@ class Dynamics:
     ) -> tuple[Path, SpinState]:
         """Motion from ``state`` at ``start`` to ``end`` s under the sum of ``torques``, and its final state.
 
-        With a ``slope`` (3,) N m/s the torque runs evenly from that sum; the moments may be ``falling``. Raises
-        Infeasible where it takes more than ``most`` steps of integration.
+        With a ``slope`` (3,) N m/s the torque runs evenly from there. Raises Infeasible for more than ``most`` steps.
         """
         push = Push(torques, slope, falling)
         if self.known is None:
@@ -209,14 +200,13 @@ class Dynamics:
             coast = FreeCoast(self.moments, start, state)
             (rates,), (quaternion,) = coast.motion(np.array([end]))
             work.spend(PULSE)
-            return coast, SpinState(complex(rates[0], rates[1]), float(rates[2]), quaternion)
+            return coast, SpinState.of(rates, quaternion)
         pieces = taylor.integrate(
             self.moments, torque, state.rates, state.quaternion, start, end, self.forcing, most, slope, falling
         )
         step = SPUN_STEP if self.moments[0] == self.moments[1] else STEP
         work.spend(PULSE + (SUNK_STEP if self.forcing.growth != 0.0 else step) * len(pieces))
-        rates_, quaternion_ = pieces[-1].final
-        return Integrated(tuple(pieces)), SpinState(complex(rates_[0], rates_[1]), float(rates_[2]), quaternion_)
+        return Integrated(tuple(pieces)), SpinState.of(*pieces[-1].final)
 
     def with_moments(self, moments: Vector) -> Dynamics:
         """Copy with these principal moments (3,) kg m²."""
@@ -225,8 +215,7 @@ class Dynamics:
 
     def kicked(self, state: SpinState, impulse: Vector) -> SpinState:
         """State after an ``impulse`` (3,) N m s."""
-        body = state.rates + impulse / np.asarray(self.moments)
-        return SpinState(complex(body[0], body[1]), float(body[2]), state.quaternion)
+        return SpinState.of(state.rates + impulse / np.asarray(self.moments), state.quaternion)
 
 
 def make_dynamics(spacecraft: Spacecraft) -> Dynamics:
@@ -270,10 +259,7 @@ class Lightening:
         return dynamics.with_moments(self.first - 0.5 * (before + self.used[time]) * self.per_kg)
 
     def between(self, dynamics: Dynamics, start: float, end: float) -> tuple[Dynamics, Falling | None]:
-        """Body at ``start`` s, and the fall of its moments until ``end`` s, with no edge of a pulse in between.
-
-        As no more than a quadratic of time: what is used by start, middle and end says all.
-        """
+        """Body at ``start`` s, and the fall of its moments, quadratic in time, to ``end`` s before the next edge."""
         if self.per_kg is None:
             return dynamics, None
         before, length = self.used[start], end - start
@@ -286,11 +272,7 @@ class Lightening:
 
 
 class Supply:
-    """Supply state: pulses fired by channel, and propellant used, kg: numbers, or arrays of cases.
-
-    By default what was fired before t = 0. ``used`` is what the pulses would take of a tank that lasts: with an empty
-    one nothing fires, and the last pulse before that only as far as the propellant goes.
-    """
+    """Pulses ``fired`` by channel, and propellant ``used`` if the tank lasts, kg: by default, those before t = 0."""
 
     def __init__(self, spacecraft: Spacecraft, fired: Counter[str] | None = None, used: Any = None) -> None:
         cold, tank = spacecraft.cold, spacecraft.tank
@@ -330,13 +312,8 @@ class Supply:
         if self.spacecraft.tank is not None and flow is not None and propellant:
             cold = 1.0 if self.spacecraft.cold is None else self.spacecraft.cold.factor(self.fired[channel.name] - 1)
             commanded = falling(commanded, self.spacecraft.tank, before, flow * cold)
-        return replace(
-            commanded,
-            torque=torque,
-            impulse=torque * commanded.on_time,
-            force=None if force is None else force * level,
-            propellant=propellant,
-        )
+        impulse, force = torque * commanded.on_time, None if force is None else force * level
+        return replace(commanded, torque=torque, impulse=impulse, force=force, propellant=propellant)
 
     def torque(self, channel: Channel, used: float) -> Vector:
         """Torque of ``channel`` at the thrust of the file with ``used`` kg gone, (3,) N m: the center of mass moves."""
@@ -346,16 +323,13 @@ class Supply:
         return channel.torque - np.cross((used - self._begun) * per_kg, channel.force)
 
     def on_time_for(self, channel: Channel, effective: float) -> float:
-        """On-time (s) of the next pulse of ``channel`` with the impulse of ``effective`` s of the thrust of the file.
-
-        Found by repeating: each step errs by the share by which the thrust falls, of the error before it.
-        """
+        """On-time (s) of the next pulse of ``channel`` with the impulse of ``effective`` s at the file's thrust."""
         cold, tank, flow = self.spacecraft.cold, self.spacecraft.tank, self.full_flow(channel)
         warm = effective / (1.0 if cold is None else cold.factor(self.fired[channel.name]))
         if tank is None:
             return warm
         on_time = warm / float(tank.thrust_factor(self.used))
-        for _ in range(REPEATED if flow is not None else 0):
+        for _ in range(REPEATED if flow is not None else 0):  # each step errs by a small share of the error before
             before, on_time = on_time, warm / float(tank.burn(self.used, flow * effective / warm, on_time)[1])
             if abs(on_time - before) <= CLOSE * on_time:
                 break
@@ -377,10 +351,7 @@ class Supply:
         return 1.0 if tank is None else tank.share(before, propellant)
 
     def take(self, channel: Channel, on_time: Any) -> tuple[Any, Any]:
-        """Mean level of a pulse of effective ``on_time`` s and its propellant, kg or None, which counts for later ones.
-
-        No level once the tank is empty.
-        """
+        """Fire a pulse of effective ``on_time`` s; returns its mean level, and its propellant, kg or None."""
         flow, tank, cold = self.full_flow(channel), self.spacecraft.tank, self.spacecraft.cold
         warmth = 1.0 if cold is None else cold.factor(self.fired[channel.name])
         if flow is None or tank is None:
@@ -418,8 +389,7 @@ def weakened(pulse: Pulse, factor: float) -> Pulse:
 def falling(pulse: Pulse, tank: Tank, used: float, flow: float) -> Pulse:
     """Pulse whose thrust falls with the pressure of the ``tank``, of which ``used`` kg were gone at its start.
 
-    ``flow`` as `Tank.burn` takes it. Its ramps are straight pieces, each with the impulse and the centroid of the
-    thrust there; its mean level is left to the torque.
+    ``flow`` as in `Tank.burn`. Its ramps are straight pieces, each with impulse and centroid of the thrust there.
     """
     start, on_time = pulse.loaded
     command = pulse.command or Command(start, on_time, (Ramp(pulse.start, pulse.end, 1.0, 1.0),), valve=False)
@@ -466,11 +436,8 @@ def lacking(spacecraft: Spacecraft, schedule: Schedule, law: str) -> tuple[Space
         body = replace(spacecraft, tank=replace(spacecraft.tank, final_pressure=spacecraft.tank.pressure))
     else:
         body = replace(spacecraft, cold=None)
-    known = {channel.name: channel for channel in body.channels}
-    fired = [
-        on_command(known[pulse.channel], *pulse.loaded)
-        if pulse.channel in known and pulse.torque is not None
-        else pulse
-        for pulse in schedule
-    ]
+    known, fired = {channel.name: channel for channel in body.channels}, []
+    for pulse in schedule:
+        commanded = pulse.channel in known and pulse.torque is not None
+        fired.append(on_command(known[pulse.channel], *pulse.loaded) if commanded else pulse)
     return body, Schedule(supplied(body, fired))

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Iterable
 from dataclasses import replace
+from itertools import compress, pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -76,20 +76,14 @@ class Deviation(NamedTuple):
 
 
 def seen_at(flight: Flight, time: float) -> Flight:
-    """Flight truncated at ``time`` s, which it must reach: residual, final state and rows end there.
-
-    Of the pulses those that have begun; what is after one that is still on is the motion at ``time``.
-    """
+    """Flight truncated at ``time`` s, which it must reach, with the pulses that have begun."""
     rates, quaternion = flight.motion(np.array([time]))
-    first, second, third = rates[0].tolist()
     begun = [begins < time or begins == ends == time for begins, ends in flight.spans]
-    kept = [index for index, flag in enumerate(begun) if flag]
-    some = Schedule(tuple(flight.schedule.pulses[index] for index in kept))
     return replace(
         flight,
-        schedule=flight.schedule if all(begun) else some,
-        settled=SpinState(complex(first, second), third, quaternion[0]),
-        spans=tuple((flight.spans[index][0], min(flight.spans[index][1], time)) for index in kept),
+        schedule=flight.schedule if all(begun) else Schedule(tuple(compress(flight.schedule, begun))),
+        settled=SpinState.of(rates[0], quaternion[0]),
+        spans=tuple((begins, min(ends, time)) for begins, ends in compress(flight.spans, begun)),
         until=time,
     )
 
@@ -102,7 +96,7 @@ def spin_phases(flight: Flight, times: Vector) -> Vector:
     last = float(times[-1]) if len(times) else 0.0
     edges = sorted({0.0, *times.tolist(), *(leg.end for leg in flight.legs if leg.end <= last)})
     phases, phase = {0.0: 0.0}, 0.0
-    for begin, end in itertools.pairwise(edges):
+    for begin, end in pairwise(edges):
         spins = abs(flight.motion(np.array([begin, end]))[0][:, 2])
         count = 2 * math.ceil(float(spins.max()) * (end - begin) / 0.5) + 2
         spin = flight.motion(np.linspace(begin, end, count + 1)[:-1])[0][:, 2]
@@ -121,10 +115,7 @@ def left_by(flight: Flight) -> Left:
 
 
 def tolerated(spacecraft: Spacecraft) -> dict[Part, float]:
-    """Tolerated difference between models in nutation, direction of H, and spin where the goal names one.
-
-    A tenth of what is required; `ANGLE` for a part that nothing bounds.
-    """
+    """Tolerated difference between models, by part: `SHARE` of what is required, `ANGLE` where nothing bounds it."""
     required = {bound.part: SHARE * bound.most for bound in requirements.required(spacecraft)}
     return {Part.NUTATION: ANGLE, requirements.aim(spacecraft): ANGLE, **required}
 
@@ -178,8 +169,7 @@ class Aspect(NamedTuple):
 def aspects(flown: Flight, until: float | None = None) -> tuple[Aspect, ...]:
     """For each direction that the spacecraft watches, from t = 0 to ``until`` s.
 
-    Default: one inertial nutation period after the last pulse. A flight that ends earlier is flown on by its model.
-    Raises Infeasible as `propagation.flown` does.
+    Default: one inertial nutation period after the last pulse. Raises Infeasible as `propagation.flown` does.
     """
     body = flown.spacecraft
     if not body.watched:
@@ -246,20 +236,15 @@ def _axis_and_direction(flown: Flight, keep: Keep, times: Vector) -> tuple[Vecto
 
 
 def _closer(flown: Flight, keep: Keep, way: float, times: Vector, width: float, end: float) -> Vector:
-    """Moments up to ``end`` within ``width`` s of the ``times`` (n,) at which the axis is nearest to the direction.
-
-    With ``way`` -1 to the opposite of that of ``keep``. Each look is among places a quarter as far apart as before,
-    with a parabola in the square of the distance.
-    """
+    """Moments up to ``end`` within ``width`` s of ``times`` (n,) at which the axis is nearest to ``way``·direction."""
 
     def apart_at(moments: Vector) -> Vector:
         """Square of the distance between axis and direction, as points of a sphere."""
         axis, direction = _axis_and_direction(flown, keep, moments)
         return np.asarray(np.sum((axis - way * direction) ** 2, axis=-1))
 
-    rough = apart_at(times)
-    times = times[np.argsort(rough, kind="stable")[:CLOSE]]
-    for _ in range(LOOKS):
+    times = times[np.argsort(apart_at(times), kind="stable")[:CLOSE]]
+    for _ in range(LOOKS):  # each among places a quarter as far apart, with a parabola in the square of the distance
         places = np.clip(times[:, None] + width * np.linspace(-1.0, 1.0, FINER), 0.0, end)
         apart = apart_at(places.ravel()).reshape(places.shape)
         best = np.argmin(apart, axis=1, keepdims=True)
@@ -273,11 +258,7 @@ def _closer(flown: Flight, keep: Keep, way: float, times: Vector, width: float, 
 
 
 def _peaks(times: Vector, values: Vector) -> Vector:
-    """Times of possible maxima of ``values`` (n,): the largest row, and vertices of parabolas through three rows.
-
-    Of the parabolas with their top between the three the eight highest count. Rows at the same time, before and after
-    a jump, are no neighbours.
-    """
+    """Times of the largest of ``values`` (n,), and of the `TRIED` highest parabolas with the top between their rows."""
     before, after = np.diff(times)[:-1], np.diff(times)[1:]
     with np.errstate(divide="ignore", invalid="ignore"):
         rise, fall = np.diff(values)[:-1] / before, np.diff(values)[1:] / after

@@ -1,8 +1,7 @@
 """Propagation of schedules, by impulse sum or real pulse widths, and the track: motion over time as arrays.
 
 `by_impulses` is the plan's own model, the impulse sum (17) with effective impulses. `flown` is the judge: real
-widths, true moments. Both give legs that evaluate the motion at any time: coasts of a symmetric body in closed form,
-else Taylor pieces. The principal moments fall along a schedule with the propellant that is used.
+widths, true moments. Both give legs that evaluate the motion at any time.
 """
 
 from __future__ import annotations
@@ -17,7 +16,7 @@ from numpy.typing import NDArray
 
 from nutdamp.common.numerics import SAME_ANGLE
 from nutdamp.common.results import Tabled
-from nutdamp.flight.dynamics import Dynamics, Lightening, Path, lightened, make_dynamics, shed
+from nutdamp.flight.dynamics import Dynamics, Lightening, Path, joined, lightened, make_dynamics, shed
 from nutdamp.physics import attitude, response, taylor
 from nutdamp.physics.triaxial import arc_cones, widest_cones
 from nutdamp.spacecraft.model import Inertia, Spacecraft, SpinState, Vector
@@ -31,22 +30,17 @@ BINS = 7200  # parts of a turn by which a range of right ascension is distinguis
 
 @dataclass(frozen=True, slots=True)
 class Track:
-    """Motion over n rows, in principal axes.
+    """Motion over n rows, in principal axes."""
 
-    ``t`` (n,) s; ``rates`` (n, 3) rad/s; ``quaternion`` (n, 4) body -> inertial; ``axis`` (n, 3) spin axis and
-    ``momentum`` (n, 3) N m s in the inertial frame; ``nutation``, ``body_cone``, ``space_cone`` (n,) rad;
-    ``pulse`` (n,) pulses completed.
-    """
-
-    t: Array
-    rates: Array
-    quaternion: Array
-    axis: Array
-    momentum: Array
-    nutation: Array
+    t: Array  # (n,) s
+    rates: Array  # (n, 3) rad/s
+    quaternion: Array  # (n, 4) body -> inertial
+    axis: Array  # (n, 3) spin axis, inertial
+    momentum: Array  # (n, 3) N m s, inertial
+    nutation: Array  # (n,) rad, as are both cones
     body_cone: Array
     space_cone: Array
-    pulse: NDArray[np.int64]
+    pulse: NDArray[np.int64]  # (n,) pulses completed
 
 
 def widest(track: Track, moments: Array, sense: float, wheel: float) -> Track:
@@ -67,11 +61,7 @@ def in_file_axes(track: Track, inertia: Inertia) -> Track:
 
 
 def even_times(samples: int, until: float, start: float, end: float) -> Iterator[tuple[Array, bool, bool]]:
-    """Members of ``samples`` even times from 0 to ``until`` s between ``start`` and ``end``, `PIECE` at a time.
-
-    Each part with marks of the first and of the last one. There is one at least, which may be empty. The times are
-    those of np.linspace.
-    """
+    """Parts of np.linspace(0, ``until``, ``samples``) within ``start`` to ``end``, with marks of the first and last."""
     step = until / max(samples - 1, 1)
     low, high = (min(max(int(time / step) + more, 0), samples) for time, more in ((start, -1), (end, 2)))
     for begin in range(low, max(high, low + 1), PIECE):
@@ -84,20 +74,15 @@ def even_times(samples: int, until: float, start: float, end: float) -> Iterator
 
 @dataclass(frozen=True, slots=True)
 class Extremes:
-    """Excursion of the spin axis over ``rows`` rows from 0 to ``until`` s, rad and s.
-
-    ``farthest`` and ``nearest`` are angles from H at t = 0 with their times; ``x`` and ``y`` the range of the axis
-    direction in the inertial frame, as angles from its y-z and x-z planes; ``right_ascension`` (the
-    shortest range, which may pass 2π) and ``declination`` the same on the sphere.
-    """
+    """Excursion of the spin axis over ``rows`` rows from 0 to ``until`` s, in rad."""
 
     rows: int
     until: float
-    farthest: tuple[float, float]
+    farthest: tuple[float, float]  # angle from H at t = 0, and its time, s
     nearest: tuple[float, float]
-    x: tuple[float, float]
-    y: tuple[float, float]
-    right_ascension: tuple[float, float]
+    x: tuple[float, float]  # range of the angle from the inertial y-z plane
+    y: tuple[float, float]  # from the x-z plane
+    right_ascension: tuple[float, float]  # shortest range, which may pass 2π
     declination: tuple[float, float]
 
 
@@ -124,10 +109,7 @@ def extremes(pieces: Iterable[Track]) -> Extremes:
 
 
 class _Record:
-    """Running maximum, and the first time it was reached, but for rounding.
-
-    After the last pulse of a good plan nothing moves any more: values that differ by rounding are one.
-    """
+    """Running maximum, and the first time it was reached, but for rounding."""
 
     def __init__(self) -> None:
         self.values, self.times = np.empty(0), np.empty(0)
@@ -147,10 +129,7 @@ class _Record:
 
 
 class _Circle:
-    """Shortest arc that holds many angles: its complement is the widest gap between neighbours.
-
-    Of the angles in each `BINS`-th of a turn the least and the largest are kept; gaps within one are not looked at.
-    """
+    """Shortest arc that holds many angles: all but the widest gap between neighbours in different `BINS`."""
 
     def __init__(self) -> None:
         self.low, self.high = np.full(BINS, math.inf), np.full(BINS, -math.inf)
@@ -185,49 +164,36 @@ def model_name(schedules: Iterable[Schedule], model: str = REAL_WIDTHS) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Residual:
-    """Residual after the last pulse, rad.
+    """Residual after the last pulse, rad."""
 
-    ``nutation`` is the largest on the following arc (constant for a symmetric body), ``body_cone`` and ``space_cone``
-    (signed) are those of that instant, so that they add up to it.
-    ``momentum_shift`` is the angle of H from where it was at t = 0, ``axis_error`` from the target axis; ``model`` by
-    which it was found, which does not count where two are compared.
-    """
-
-    nutation: float
-    body_cone: float
-    space_cone: float
-    momentum_shift: float
-    axis_error: float
-    model: str = field(default=REAL_WIDTHS, compare=False)
+    nutation: float  # largest on the following arc
+    body_cone: float  # at that instant
+    space_cone: float  # signed
+    momentum_shift: float  # of H from where it was at t = 0
+    axis_error: float  # of H from the target axis
+    model: str = field(default=REAL_WIDTHS, compare=False)  # by which it was found
 
 
 @dataclass(frozen=True, slots=True)
 class Final:
-    """Final pointing and subsequent motion of the body.
+    """Final pointing, just after the last pulse."""
 
-    ``axis`` spin axis and ``momentum`` direction of H, inertial unit vectors (3,), just after the last pulse;
-    ``spin`` ω3 rad/s; ``nutation`` rad, as in `Residual`: the half-angle at which the axis goes round H from then on.
-    """
-
-    axis: Vector
-    momentum: Vector
-    spin: float
-    nutation: float
+    axis: Vector  # spin axis, inertial unit vector (3,)
+    momentum: Vector  # direction of H, the same
+    spin: float  # ω3, rad/s
+    nutation: float  # as in `Residual`, rad: the half-angle at which the axis goes round H from then on
 
 
 @dataclass(frozen=True, slots=True)
 class Leg:
-    """Leg of the flight from ``start`` to ``end`` s; ``jump``: the rates jumped at its start.
-
-    ``completed`` pulses are over along it, ``completed_at_end`` at its very end (one more where a width ends).
-    """
+    """Leg of the flight from ``start`` to ``end`` s."""
 
     start: float
     end: float
     path: Path
-    completed: int
-    jump: bool
-    completed_at_end: int
+    completed: int  # pulses that are over along it
+    jump: bool  # of the rates at its start
+    completed_at_end: int  # pulses that are over at its very end
 
 
 Motion = tuple[Vector, Vector, Vector, NDArray[np.int64]]
@@ -236,24 +202,18 @@ Motion = tuple[Vector, Vector, Vector, NDArray[np.int64]]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Flight(Tabled):
-    """Flight of a schedule by one ``model``: its legs in order, and the state at the end of the last pulse.
-
-    ``moments`` are those at t = 0; ``settled`` is the motion just after the end of the last pulse; ``spans`` are
-    the times (s) between which each pulse acts, its centre twice in the impulse sum. The rows that it is shown by are
-    ``samples`` even times to ``until`` s, default its last leg, and rows just before and after each pulse. ``scheme``
-    is what planned it, empty where that is not known.
-    """
+    """Flight of a schedule by one ``model``."""
 
     spacecraft: Spacecraft
     schedule: Schedule
-    legs: tuple[Leg, ...]
-    settled: SpinState
-    moments: tuple[float, float, float]
-    spans: tuple[tuple[float, float], ...]
+    legs: tuple[Leg, ...]  # in order
+    settled: SpinState  # just after the end of the last pulse
+    moments: tuple[float, float, float]  # at t = 0
+    spans: tuple[tuple[float, float], ...]  # times (s) between which each pulse acts, its centre twice for impulses
     model: str = REAL_WIDTHS
-    until: float | None = None
-    samples: int = 1000
-    scheme: str = ""
+    until: float | None = None  # end of the rows it is shown by, s; None: that of its last leg
+    samples: int = 1000  # even times among these, besides rows just before and after each pulse
+    scheme: str = ""  # by which it was planned
 
     @property
     def steps(self) -> int:
@@ -301,13 +261,7 @@ class Flight(Tabled):
 
     def motion(self, times: Vector) -> tuple[Vector, Vector]:
         """Rates (n, 3) in rad/s and quaternions (n, 4) at ``times`` (n,) s; just after a jump."""
-        times = np.asarray(times, dtype=float)
-        owner = np.searchsorted([leg.start for leg in self.legs], times, side="right") - 1
-        body, quaternion = np.empty((len(times), 3)), np.empty((len(times), 4))
-        for index in np.flatnonzero(np.bincount(owner + 1)) - 1:  # np.unique would load numpy.ma
-            rows = owner == index
-            body[rows], quaternion[rows] = self.legs[index].path.motion(times[rows])
-        return body, quaternion
+        return joined([(leg.start, leg.path.motion) for leg in self.legs], times)
 
     def axis(self, times: Vector) -> Vector:
         """Spin axis, inertial unit vectors (n, 3), at ``times`` (n,) s."""
@@ -324,31 +278,23 @@ class Flight(Tabled):
         return in_file_axes(self.sampled(self.samples, self.shown_to), self.spacecraft.inertia)
 
     def sampled(self, samples: int, until: float) -> Track:
-        """Motion at ``samples`` even times from 0 to ``until`` s, and just before and after each pulse.
-
-        The flight must have been made to reach ``until``.
-        """
-        return self._joined(self._motions(samples, until))
+        """Motion at ``samples`` even times from 0 to ``until`` s, which it reaches, and before and after each pulse."""
+        return self._track(self._motions(samples, until))
 
     def pieces(self, samples: int, until: float) -> Iterator[Track]:
-        """Rows of `sampled` in order, about `track.PIECE` at a time, to bound memory."""
-        motions: list[Motion] = []
-        count = 0
+        """Rows of `sampled` in order, about `PIECE` at a time, to bound memory."""
+        motions = list[Motion]()
         for motion in self._motions(samples, until):
             motions.append(motion)
-            count += len(motion[0])
-            if count >= PIECE:
-                yield self._joined(motions)
-                motions, count = [], 0
+            if sum(len(times) for times, *_ in motions) >= PIECE:
+                yield self._track(motions)
+                motions = []
         if motions:
-            yield self._joined(motions)
+            yield self._track(motions)
 
-    def _joined(self, motions: Iterable[Motion]) -> Track:
-        t, rates, quaternion, pulse = (np.concatenate(column) for column in zip(*motions, strict=True))
-        return self._track(t, rates, quaternion, pulse)
-
-    def _track(self, t: Vector, rates: Vector, quaternion: Vector, pulse: NDArray[np.int64]) -> Track:
+    def _track(self, motions: Iterable[Motion]) -> Track:
         """All that follows from the motion. Cone angles are of each moment; with I1 ≠ I2 they swing: see `widest`."""
+        t, rates, quaternion, pulse = (np.concatenate(column) for column in zip(*motions, strict=True))
         sense = self.spacecraft.sense
         momentum = rates * self.moments_at(t) + np.array([0.0, 0.0, self.spacecraft.inertia.wheel])
         nutation = np.arctan2(np.hypot(momentum[:, 0], momentum[:, 1]), sense * momentum[:, 2])
@@ -358,7 +304,7 @@ class Flight(Tabled):
         return Track(t, rates, quaternion, axis, in_space, nutation, body_cone, nutation - body_cone, pulse)
 
     def _motions(self, samples: int, until: float) -> Iterator[Motion]:
-        """Rows of a track by leg, and each leg in stretches of `track.PIECE` even times."""
+        """Rows of a track by leg, and each leg in stretches of `PIECE` even times."""
         for leg in self.legs:
             if leg.start > until:
                 break
@@ -373,29 +319,26 @@ class Flight(Tabled):
 
     def around_pulses(self) -> tuple[Track, Track]:
         """Motion just before and after each pulse, a row per pulse; cone angles as in `Residual`."""
-        before, after = [], []
+        nothing = np.empty(0), np.empty((0, 3)), np.empty((0, 4)), np.empty(0, dtype=np.int64)
+        before, after = [nothing], [nothing]
         starts, overs = [leg.start for leg in self.legs], [leg.end for leg in self.legs]
-        for begins, ends in self.spans:
-            first, last = self.legs[bisect_left(overs, begins)], self.legs[bisect_right(starts, ends) - 1]
-            before.append((begins, *first.path.motion(np.array([begins]))))
-            after.append((ends, *last.path.motion(np.array([ends]))))
-        return self._rows(before, 0), self._rows(after, 1)
+        for completed, span in enumerate(self.spans):
+            first, last = self.legs[bisect_left(overs, span[0])], self.legs[bisect_right(starts, span[1]) - 1]
+            begins, ends = np.array([span[0]]), np.array([span[1]])
+            before.append((begins, *first.path.motion(begins), np.array([completed])))
+            after.append((ends, *last.path.motion(ends), np.array([completed + 1])))
+        return self._widest(before), self._widest(after)
 
-    def _rows(self, states: list[tuple[float, Vector, Vector]], completed: int) -> Track:
-        t = np.array([time for time, _, _ in states])
-        body = np.concatenate([np.empty((0, 3)), *(rates for _, rates, _ in states)])
-        quaternion = np.concatenate([np.empty((0, 4)), *(turn for _, _, turn in states)])
-        numbers = completed + np.arange(len(t), dtype=np.int64)
-        moments, sense, wheel = self.moments_at(t), self.spacecraft.sense, self.spacecraft.inertia.wheel
-        return widest(self._track(t, body, quaternion, numbers), moments, sense, wheel)
+    def _widest(self, motions: Iterable[Motion]) -> Track:
+        track, body = self._track(motions), self.spacecraft
+        return widest(track, self.moments_at(track.t), body.sense, body.inertia.wheel)
 
 
 def by_impulses(spacecraft: Spacecraft, schedule: Schedule, until: float = 0.0) -> Flight:
     """Impulse-sum solution, Magnus 1970 (17), pulse by pulse.
 
-    Each pulse acts at its centre with its effective impulse (`effective_impulses`). Between them the motion is that of
-    the true moments: exact arcs for I1 = I2, as (17) has them, else Taylor series. Disturbances and dissipation act
-    between the pulses as in `flown`. The last leg reaches at least to ``until`` s. Raises Infeasible as `flown` does.
+    Each pulse acts at its centre with its effective impulse (`effective_impulses`); between them the motion is that of
+    `flown`. The last leg reaches at least to ``until`` s. Raises Infeasible as `flown` does.
     """
     dynamics, state, allowed = make_dynamics(spacecraft), spacecraft.initial, _allowed(schedule, until)
     legs: list[Leg] = []
@@ -454,9 +397,8 @@ def flown(
     """Euler's equations through the real pulse widths, with the true principal moments.
 
     Coasts of symmetric bodies without disturbances are exact arcs, with dissipation too; everything else is Taylor
-    series at rounding accuracy. The last leg reaches at least to ``until`` s. ``dynamics`` are those of the
-    spacecraft, where they are known. Raises Infeasible where that takes more than `PLANNED_STEPS`, or
-    `rigid.MOST_STEPS` where a later end is requested.
+    series at rounding accuracy. The last leg reaches at least to ``until`` s. ``dynamics``: those of the spacecraft,
+    where known. Raises Infeasible beyond `PLANNED_STEPS`, or `taylor.MOST_STEPS` where a later end is requested.
     """
     dynamics, state = dynamics or make_dynamics(spacecraft), spacecraft.initial
     allowed = _allowed(schedule, until)
@@ -492,10 +434,7 @@ def flown(
 
 
 def _torques(pulses: Iterable[Pulse], start: float, end: float) -> tuple[list[Vector], Vector | None]:
-    """Torques (3,) N m at ``start`` of the ``pulses`` that fire until ``end`` s, and their slope together, N m/s.
-
-    No slope, None, where all keep even.
-    """
+    """Torques (3,) N m at ``start`` of the ``pulses`` that fire until ``end`` s, and their slope, N m/s, or None."""
     pushes = [push for push in (pulse.push(start, end) for pulse in pulses) if push is not None]
     slopes = [slope for _, slope in pushes if slope is not None]
     return [torque for torque, _ in pushes], np.sum(slopes, axis=0) if slopes else None

@@ -1,8 +1,7 @@
 """Verification: cross-check by DOP853, conservation laws, error budget.
 
 Euler's equations by scipy's DOP853 are written independently of everything else that flies: cross products, a matrix
-for the tensor, in the axes of the file, and restarts at every edge of a pulse. Where the moments fall with the
-propellant, its use is one more integrated number.
+for the tensor, in the axes of the file, and restarts at every edge of a pulse.
 """
 
 from __future__ import annotations
@@ -36,11 +35,7 @@ Matrix = Sequence[Numbers]
 
 
 class EulerEquations:
-    """Euler's equations of a spacecraft and its attitude; ``evaluations`` of them so far, ``most`` at most.
-
-    A state (7,) holds the rates, rad/s, and the quaternion, both of the axes of the file; where the moments fall, (8,),
-    the propellant used too, kg.
-    """
+    """Euler's equations of a spacecraft and its attitude; ``evaluations`` of them so far, ``most`` at most."""
 
     def __init__(self, spacecraft: Spacecraft, most: int | None = None) -> None:
         self.most = EVALUATIONS if most is None else most
@@ -55,7 +50,7 @@ class EulerEquations:
         self.evaluations = 0
 
     def state(self, motion: SpinState) -> Vector:
-        """State vector of a motion."""
+        """Rates, rad/s, and quaternion in the axes of the file, (7,); (8,) with propellant used, kg: moments fall."""
         turned = attitude.multiply(motion.quaternion, attitude.from_matrix(self.axes.T))
         return np.concatenate([self.axes @ motion.rates, turned, [] if self.shed is None else [0.0]])
 
@@ -89,8 +84,7 @@ class EulerEquations:
     ) -> Any:
         """Result of solve_ivp from ``state`` at ``start`` to ``end`` s, with interpolant where ``dense``.
 
-        ``burn``: flow of propellant at ``start``, kg/s, and its slope, kg/s². Raises Infeasible where all of them
-        together take more than ``most``.
+        ``burn``: flow of propellant at ``start``, kg/s, and its slope, kg/s². Raises Infeasible beyond ``most``.
         """
         from scipy.integrate import solve_ivp
 
@@ -142,9 +136,8 @@ class EulerEquations:
     def _sink(self, momentum: Numbers) -> tuple[Numbers, Numbers]:
         """Contribution of energy dissipation to dH/dt in the body, N m, and to its turning, rad/s, axes of the file.
 
-        It turns axis 3 away from H (towards it for an oblate body) at κ sin θ cos θ and leaves H where it is in space.
-        So in the body H is turned at that rate towards the plane square to axis 3: along the part of -axis 3 square to
-        H. Nothing inside a body can turn H in space, so the body slips against it at the rate that undoes this.
+        It turns axis 3 away from H (towards it for an oblate body) at κ sin θ cos θ: in the body H moves along the part
+        of -axis 3 square to H. Nothing inside a body can turn H in space, so the body slips against it to undo this.
         """
         squared = sum(part * part for part in momentum)
         if self.growth == 0.0 or squared == 0.0:
@@ -170,10 +163,7 @@ def _cross(one: Numbers, other: Numbers) -> Numbers:
 
 
 def integrate(spacecraft: Spacecraft, schedule: Schedule, times: Vector) -> tuple[Vector, Vector]:
-    """Rates (n, 3) and quaternions (n, 4) under a schedule in principal axes at ``times`` (n,) s ascending.
-
-    Raises Infeasible where that takes more than `EVALUATIONS`.
-    """
+    """Rates (n, 3), quaternions (n, 4), principal axes, at rising ``times`` (n,) s. Raises Infeasible if too long."""
     equations = EulerEquations(spacecraft)
     state = equations.state(spacecraft.initial)
     edges = {0.0, float(times[-1]), *times.tolist()}
@@ -194,10 +184,7 @@ def integrate(spacecraft: Spacecraft, schedule: Schedule, times: Vector) -> tupl
 
 
 def _flow(pulse: Pulse, start: float, end: float) -> tuple[float, float]:
-    """Flow of propellant, kg/s, at the start of a stretch of a pulse without an edge, and its slope, kg/s².
-
-    It goes by the share of the impulse, a parabola there, as thrusters whose torques cancel use propellant too.
-    """
+    """Flow of propellant, kg/s, as a stretch without an edge starts, and its slope, kg/s², by the share of impulse."""
     times = np.array([start, 0.5 * (start + end), end])
     before, middle, after = ((pulse.propellant or 0.0) * pulse.share(times)).tolist()
     length = end - start
@@ -214,21 +201,16 @@ WITHOUT = "without "  # prefix of the rows of the budget that omit an effect inc
 
 @dataclass(frozen=True, slots=True)
 class Method:
-    """Method of flying the schedule: its residual (rad), or the reason why it could not be flown.
-
-    ``axis``, ``momentum`` (rad) and ``rate`` are its largest differences from the flown motion; that of the rates is
-    relative to |ω|, or to |H| over the largest moment where a wheel holds the body still.
-    ``outside``: an integration that shares nothing with it, and so is to confirm it.
-    """
+    """Method of flying the schedule: its residual and its largest differences from the flown motion."""
 
     name: str
-    nutation: float | None = None
-    momentum_shift: float | None = None
-    axis: float | None = None
-    momentum: float | None = None
-    rate: float | None = None
-    missing: str = ""
-    outside: bool = False
+    nutation: float | None = None  # left, rad
+    momentum_shift: float | None = None  # left, rad
+    axis: float | None = None  # difference, rad
+    momentum: float | None = None  # difference, rad
+    rate: float | None = None  # over |ω|, or over |H| by the largest moment where a wheel holds the body still
+    missing: str = ""  # reason why it could not be flown
+    outside: bool = False  # it shares nothing with the flown motion, and so is to confirm it
 
     @property
     def short(self) -> str:
@@ -305,8 +287,7 @@ def verify(
 ) -> Verification:
     """Fly ``schedule`` by the impulse sum, Taylor series, DOP853 and, where it is installed, Basilisk.
 
-    ``unrounded`` is the schedule before its commands were rounded to ticks, where there is one; ``expected``: it was
-    planned on the motion with the disturbances.
+    ``unrounded``: the schedule before its commands were rounded to ticks; ``expected``: planned with the disturbances.
     """
     end = schedule.end + spacecraft.inertial_period
     judge = propagation.flown(spacecraft, schedule, end)
@@ -325,9 +306,8 @@ def verify(
 def _closed_form(judge: Flight, end: float, times: Vector) -> Method:
     """Exact arcs between effective impulses; where ω3 keeps between them, the rates by the sum (17) written out."""
     spacecraft, schedule = judge.spacecraft, judge.schedule
-    arcs = propagation.by_impulses(spacecraft, schedule, end)
+    arcs, inertia = propagation.by_impulses(spacecraft, schedule, end), spacecraft.inertia
     body, quaternion = arcs.motion(times)
-    inertia = spacecraft.inertia
     if inertia.symmetric and not spacecraft.disturbances and spacecraft.growth == 0.0 and shed(spacecraft) is None:
         omega, spin = response.impulse_sum(
             times,
@@ -343,9 +323,8 @@ def _closed_form(judge: Flight, end: float, times: Vector) -> Method:
         body = np.column_stack([omega.real, omega.imag, spin])
     outside = np.all([(times <= pulse.thrust[0]) | (times >= pulse.thrust[1]) for pulse in schedule], axis=0)
     between = np.broadcast_to(outside, times.shape)  # within a pulse the impulse has been given or not
-    residual = arcs.residual
-    name, left = "impulse sum (17), arcs", (residual.nutation, residual.momentum_shift)
-    return Method(name, *left, *_differences(judge, times, (body, quaternion), between))
+    left, apart = arcs.residual, _differences(judge, times, (body, quaternion), between)
+    return Method("impulse sum (17), arcs", left.nutation, left.momentum_shift, *apart)
 
 
 def _by_dop853(judge: Flight, times: Vector) -> Method:
@@ -415,13 +394,11 @@ def _conserved(flown: Flight) -> tuple[Conservation, Conservation]:
 def _budget(
     spacecraft: Spacecraft, schedule: Schedule, unrounded: Schedule | None, *, expected: bool
 ) -> tuple[Imperfection, ...]:
-    """Residual of the ideal flight, with each imperfection alone, with all, and without the included ones.
+    """Residual of the ideal flight, with each imperfection alone, with all, and without those that plans include.
 
-    Plans include the moments of the body, with the axial parts of its torques, with dissipation and, ``expected``,
-    with disturbances: these are part of the ideal flight, so that it leaves little.
+    These are three moments, axial torques, dissipation and, ``expected``, disturbances.
     """
-    exact = schedule if unrounded is None else unrounded
-    inertia = spacecraft.inertia
+    exact, inertia = schedule if unrounded is None else unrounded, spacecraft.inertia
     ideal = spacecraft if expected else replace(spacecraft, disturbances=())
     sharp = _sharp(ideal, exact)
     rows = [(IDEAL, ideal, sharp)]

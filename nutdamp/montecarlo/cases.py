@@ -1,7 +1,6 @@
 """Dispersed cases: body, initial motion and impulses of each case.
 
-The schedule is fixed. A case differs from the estimate in its moments, its rates, and in the response of each pulse,
-cold nozzles and tank included. All is elementwise over cases; what nothing disperses stays one number for all of them.
+All is elementwise over cases; what nothing disperses stays one number for all of them.
 """
 
 from __future__ import annotations
@@ -119,9 +118,8 @@ def tank_of(body: Spacecraft, draws: Draws) -> Tank | None:
     if body.tank is None:
         return None
     names = ("propellant", "pressure", "final_pressure", "exponent")
-    return replace(
-        body.tank, **{name: plus(getattr(body.tank, name), draws.get(f"tank {name}", 0.0)) for name in names}
-    )
+    changed = {name: plus(getattr(body.tank, name), draws.get(f"tank {name}", 0.0)) for name in names}
+    return replace(body.tank, **changed)
 
 
 def cold_of(body: Spacecraft, draws: Draws) -> Cold | None:
@@ -136,7 +134,7 @@ def supplied(
     """Strength of each pulse of cases over the planned one, zero once the tank is empty; its propellant, kg, or None.
 
     ``flows``: propellant of each over that planned, at the same pressure and as warm. The last is the share of the tank
-    that all of them would take, 1 at most where it lasts; 0 without a tank, or where it is not known what they take.
+    that all would take, above 1 where it does not last; 0 without a tank, or where it is not known what they take.
     """
     tank = tank_of(body, draws)
     known = all(pulse.propellant is not None for pulse in schedule)
@@ -184,28 +182,20 @@ class Thrusting(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class DispersedCases:
-    """Dispersed cases, in principal axes and SI.
+    """Dispersed cases, in principal axes and SI; each pulse counts as a rectangle."""
 
-    ``moments`` (I1, I2, I3) kg m² and ``omega0`` rad/s at t = 0. Of each pulse: its ``starts`` s and ``widths`` s, of
-    the rectangle that it counts as, which begins ``leads`` s after the command, its ``impulses`` N m s, and its
-    ``thrust`` where a valve is not as the file has it. ``tilt`` is the rotation vector (rad, about body axes 1 and 2)
-    by which the attitude at t = 0 is off; ``spent`` the propellant of each pulse, kg, None where that of one is not
-    known; ``drained`` as of `supplied`; ``per_kg`` what each kg takes off the moments, m², None where they stay;
-    ``wheel`` the momentum h of a wheel, N m s.
-    """
-
-    moments: Triple
-    omega0: Triple
-    starts: tuple[Cases, ...]
-    widths: tuple[Cases, ...]
-    leads: tuple[Cases, ...]
-    impulses: tuple[Triple, ...]
-    thrust: tuple[tuple[Thrusting, ...], ...]
-    tilt: tuple[Cases, Cases]
-    spent: tuple[Cases, ...] | None
-    drained: Cases = 0.0
-    per_kg: Triple | None = None
-    wheel: Cases = 0.0
+    moments: Triple  # at t = 0, kg m²
+    omega0: Triple  # rad/s
+    starts: tuple[Cases, ...]  # of each rectangle, s
+    widths: tuple[Cases, ...]  # s
+    leads: tuple[Cases, ...]  # from the command to its start, s
+    impulses: tuple[Triple, ...]  # N m s
+    thrust: tuple[tuple[Thrusting, ...], ...]  # of each pulse where a valve is not as in the file
+    tilt: tuple[Cases, Cases]  # rotation vector about body axes 1 and 2 by which the attitude at t = 0 is off, rad
+    spent: tuple[Cases, ...] | None  # propellant of each pulse, kg; None where that of one is not known
+    drained: Cases = 0.0  # as of `supplied`
+    per_kg: Triple | None = None  # decrease of the moments by each kg, m²; None where they stay
+    wheel: Cases = 0.0  # h, N m s
 
     @property
     def propellant(self) -> Cases | None:
@@ -234,7 +224,7 @@ class DispersedCases:
 
 @dataclass(frozen=True, slots=True)
 class _Actuation:
-    """Dependence of a pulse on its actuator: nominal ``impulse``, and the part of it of no thruster."""
+    """Dependence of a pulse on its actuator: on-time at its torque, and the part of the impulse of no thruster."""
 
     pulse: Pulse
     source: str | None
@@ -331,25 +321,24 @@ class DispersedModel:
         opened, width, number = self._opened(actuation, draws), self.on_times[index], index + 1
         late = plus(draws.get("timing offset", 0.0), draws.get(f"Sun pulse {number}", 0.0))
         shift = plus(late, draws.get(f"timing pulse {number}", 0.0))
-        start, lead = actuation.pulse.start, 0.0
-        if actuation.pulse.command is not None:
-            start = actuation.pulse.command.start
-            lead = actuation.pulse.t - 0.5 * width - start
+        pulse, start, lead, fall = actuation.pulse, actuation.pulse.start, 0.0, 0.0
+        if pulse.command is not None:
+            start, fall = pulse.command.start, pulse.command.fall
+            lead = pulse.t - 0.5 * width - start
         factor, (torque, mean, flow) = plus(1.0, draws.get(f"thrust pulse {number}", 0.0)), nominal
         if opened:
             acts = {thruster.name: each.acts for thruster, each in opened}
-            longer = {name: on_time / actuation.pulse.on_time for name, (on_time, _, _) in acts.items()}
+            longer = {name: on_time / pulse.on_time for name, (on_time, _, _) in acts.items()}
             torque, mean, flow = self._torque(actuation.source, draws, longer)
             centroid, width = (sum(part[at] for part in acts.values()) / len(acts) for at in (1, 2))
-            fall = 0.0 if actuation.pulse.command is None else actuation.pulse.command.fall
             lead = centroid - fall * width / 12.0 - 0.5 * width
         if actuation.source == STEERABLE and not self._members[STEERABLE]:
-            impulse = self._steered(actuation.pulse.impulse, mean, draws)
+            impulse = self._steered(pulse.impulse, mean, draws)
         else:
             impulse = added(scaled(torque, actuation.duration), scaled(actuation.remainder, mean))
         thrust = []
         for thruster, each in opened:
-            strength = factor * (actuation.duration / actuation.pulse.on_time)
+            strength = factor * (actuation.duration / pulse.on_time)
             strength = strength * plus(1.0, draws.get(f"thrust {thruster.name}", 0.0))
             thrust.append(Thrusting(each, scaled(self.thruster_torque(thruster, draws), strength)))
         begins = plus(start if nothing(shift) else _not_before(start + shift), lead)
@@ -473,9 +462,8 @@ def in_body(body: Spacecraft, tilt: tuple[Any, Any], count: int, direction: Vect
 
 def cones_used(keep: Sequence[Keep], aspects: NDArray[np.float64]) -> NDArray[np.float64]:
     """Used fraction of cones by cone and case (m, n), see `Keep.used`, from angles (m, 2, n) on the way."""
-    return np.array([cone.used(*angles) for cone, angles in zip(keep, aspects, strict=True)]).reshape(
-        aspects[:, 0].shape
-    )
+    used = [cone.used(*angles) for cone, angles in zip(keep, aspects, strict=True)]
+    return np.array(used).reshape(aspects[:, 0].shape)
 
 
 def number_of(cases: DispersedCases) -> int:

@@ -1,12 +1,11 @@
 """Dispersed inputs of a study: selection, correlation, random draws.
 
 Correlated inputs are a Gaussian copula: each input is a monotonic function of a standard normal number, and the
-correlation given is that of these numbers (Nelsen 2006, 5.2): of two normal inputs it is their own, of two uniform
-ones theirs is (6/π) asin(ρ/2).
+correlation given is that of these numbers (Nelsen 2006, 5.2): of two uniform inputs theirs is (6/π) asin(ρ/2).
 
 Every input has a stream of its own in every block of `BLOCK` cases: the counter-based Philox generator with the seed
-and the input's name in the key, the block in the counter. So case 1234 is the same in a study of any size and with any
-number of threads, and a tolerance that is tightened or dropped leaves the draws of all others as they were.
+and the input's name in the key, the block in the counter. So a case is the same in a study of any size and with any
+number of threads, and a tolerance that is tightened or dropped leaves all other draws as they were.
 """
 
 from __future__ import annotations
@@ -40,18 +39,14 @@ SCHEDULE_IDLE = "the schedule does not fire"
 
 
 class DispersedInput(NamedTuple):
-    """Drawn quantity: its value in a case = ``nominal`` + draw, in ``unit``.
-
-    ``tolerance`` is the key of the file's ``dispersions`` it comes from; ``size`` is what its ``kind`` means in
-    `nutdamp.spacecraft.equipment.KINDS`, in ``unit`` (a bare number for factors).
-    """
+    """Drawn quantity: its value in a case = ``nominal`` + draw, in ``unit``."""
 
     name: str
-    tolerance: str
-    kind: str
+    tolerance: str  # key of the file's ``dispersions``
+    kind: str  # of `nutdamp.spacecraft.equipment.KINDS`, which says what ``size`` means
     size: float
     nominal: float
-    unit: str
+    unit: str  # empty for factors
 
     @property
     def sigma(self) -> float:
@@ -95,12 +90,12 @@ def _listed(rows: Iterable[_Row]) -> Inputs:
     for key, tolerance, names, nominal, unit, idle in rows:
         if tolerance is None:
             continue
-        size, reason = tolerance.size * (nominal if tolerance.relative else 1.0), idle
+        size = tolerance.size * (nominal if tolerance.relative else 1.0)
         if size == 0.0 and not idle:
             share = key in ("A", "C", "omega0", "wheel_momentum") and nominal == 0.0
-            reason = "given in % of a value that is zero" if share else "its size is zero"
-        if reason:
-            unused += [Unused(name, reason) for name in names]
+            idle = "given in % of a value that is zero" if share else "its size is zero"
+        if idle:
+            unused += [Unused(name, idle) for name in names]
             continue
         size = size if tolerance.kind == "bias" else abs(size)
         drawn += [DispersedInput(name, key, tolerance.kind, size, nominal, unit) for name in names]
@@ -153,12 +148,9 @@ def _rows(spacecraft: Spacecraft, schedule: Schedule) -> Iterator[_Row]:
         for name, tolerance in getattr(requested, key).items():
             yield _of_thruster(key, name, tolerance, members)
     thrusters = [thruster for thruster in members.values() if thruster is not None]
-    levered, components = (
-        any(each.force is not None for each in thrusters),
-        [f"center of mass {axis}" for axis in "xyz"],
-    )
     idle = KNOWN_BY_TORQUE if members else f"{SCHEDULE_IDLE} any thruster"
-    yield _Row("center_of_mass", requested.center_of_mass, components, 0.0, "m", "" if levered else idle)
+    idle = "" if any(each.force is not None for each in thrusters) else idle
+    yield _Row("center_of_mass", requested.center_of_mass, [f"center of mass {a}" for a in "xyz"], 0.0, "m", idle)
     yield from _feed(spacecraft, requested, "" if thrusters else "the schedule fires no thruster")
     numbers, idle = range(1, len(schedule) + 1), "" if len(schedule) else "the schedule has no pulses"
     thrusts = [f"thrust pulse {number}" for number in numbers] or ["thrust per pulse"]
@@ -170,8 +162,8 @@ def _rows(spacecraft: Spacecraft, schedule: Schedule) -> Iterator[_Row]:
         jitter, names = Tolerance("normal", sensor.jitter), [f"Sun pulse {number}" for number in numbers]
         yield _Row("sun_sensor.jitter", jitter, names, 0.0, "s")
     yield _Row("attitude", requested.attitude, ["attitude x", "attitude y"], 0.0, "rad")
+    idle = "a schedule is fired whatever a sensor shows: --loop flies the loop"
     for key in ("sensor_bias", "sensor_scale", "sensor_noise", "sensor_delay"):
-        idle = "a schedule is fired whatever a sensor shows: --loop flies the loop"
         yield _Row(key, getattr(requested, key), [key.replace("_", " ")], 0.0, "", idle)
 
 
@@ -305,7 +297,7 @@ def normal_of(entry: DispersedInput, value: Array) -> Array:
     from scipy.special import ndtri  # as above
 
     share = value / entry.size
-    below = 0.5 * (1.0 - np.abs(share)) if entry.kind == "uniform" else 0.5 * (1.0 - np.abs(share)) ** 2
+    below = 0.5 * (1.0 - np.abs(share)) ** (1 if entry.kind == "uniform" else 2)
     return np.asarray(-np.sign(share) * ndtri(np.maximum(below, np.finfo(float).tiny)))
 
 
@@ -339,8 +331,7 @@ def together(inputs: Sequence[DispersedInput], groups: Iterable[Group]) -> list[
     """Rows of ``inputs``, those of a group in one list, in order."""
     rows = {entry.name: row for row, entry in enumerate(inputs) if entry.sigma > 0.0}
     blocks = [[rows[name] for name in group.among(rows).names] for group in groups]
-    taken = {row for block in blocks for row in block}
-    blocks += [[row] for row in range(len(inputs)) if row not in taken]
+    blocks += [[row] for row in range(len(inputs)) if not any(row in block for block in blocks)]
     return sorted(filter(None, blocks), key=min)
 
 
@@ -377,11 +368,7 @@ MOST_ATTEMPTS = 1_000  # largest number of redraws of a case; beyond it the disp
 
 
 class DrawSource:
-    """Draws of the blocks of a study. Not to be shared by threads: each makes its own.
-
-    ``physical`` tells which of the cases drawn can be (a mask (n,), or True for all); ``groups`` are the inputs that
-    are correlated, those too that are not drawn: which others are makes no difference to a draw.
-    """
+    """Draws of the blocks of a study by one thread; ``physical`` tells which cases can be, (n,) or True for all."""
 
     def __init__(
         self,

@@ -1,11 +1,11 @@
 """Cases flown, many at once: through real pulse widths, and in closed form for derivatives.
 
-The closed form is the impulse sum Magnus 1970 (17) with exact attitude arcs. Seen in the frame that turns with the
-nutation, by the phase aα with α = ∫ω3 dt, the angular momentum of a free symmetric body does not move: its transverse
-part is AΩ = Aω0 + Σ J e^{iaα}. And that frame, in space, turns about H at |H|/A (the exact arc R(t) = Rot(H t/A) R(0)
-Rot3(aω3 t)). So a pulse adds to a vector, and a coast turns a quaternion; energy dissipation draws H away from axis 3
-in that frame, along an arc that `energy_sink` knows. Nothing takes an absolute value or compares: the same code runs on
-complex arrays, which gives derivatives to rounding (`nutdamp.montecarlo.statistics`).
+The closed form is the impulse sum Magnus 1970 (17) with exact attitude arcs. In the frame that turns with the nutation,
+by the phase aα with α = ∫ω3 dt, the angular momentum of a free symmetric body does not move: its transverse part is
+AΩ = Aω0 + Σ J e^{iaα}. That frame, in space, turns about H at |H|/A (R(t) = Rot(H t/A) R(0) Rot3(aω3 t)). So a pulse
+adds to a vector, and a coast turns a quaternion; energy dissipation draws H away from axis 3 along an arc that
+`energy_sink` knows. Nothing takes an absolute value or compares: the same code runs on complex arrays, which gives
+derivatives to rounding (`nutdamp.montecarlo.statistics`).
 """
 
 from __future__ import annotations
@@ -54,26 +54,18 @@ MOST_NODES = 128  # largest number of nodes of that quadrature: enough for pulse
 
 @dataclass(frozen=True, slots=True)
 class Ends:
-    """End states of cases.
+    """End states of cases; H in N m s, in the axes named, of which those of t = 0 are fixed in space."""
 
-    ``momentum``: H at the end in the frame that turns with the nutation, (AΩ1, AΩ2, Cω3). ``before`` and ``after``:
-    H at t = 0 and at the end in the true body axes of t = 0, which are fixed in space; ``pointed``: the end in the
-    estimated body axes of t = 0. ``spin`` is ω3 at the end, ``spin_change`` what it gained, rad/s; ``propellant`` kg or
-    None. ``nutation`` rad where it is not simply the angle of ``momentum`` (bodies with I1 ≠ I2). ``aspects`` (m, 2, n)
-    rad: least and largest angle on the way from the spin axis to each cone's direction; None without cones.
-    ``drained`` as of `cases.supplied`.
-    """
-
-    momentum: Triple
-    before: Triple
-    after: Triple
-    pointed: Triple
-    spin: Cases
-    spin_change: Cases
-    propellant: Cases | None
-    nutation: Cases | None = None
-    aspects: NDArray[np.float64] | None = None
-    drained: Cases = 0.0
+    momentum: Triple  # H in the frame that turns with the nutation: (AΩ1, AΩ2, Cω3)
+    before: Triple  # H at t = 0 in the true body axes of t = 0
+    after: Triple  # H in the true body axes of t = 0
+    pointed: Triple  # H in the estimated body axes of t = 0
+    spin: Cases  # ω3, rad/s
+    spin_change: Cases  # gain of ω3, rad/s
+    propellant: Cases | None  # kg
+    nutation: Cases | None = None  # rad; None: the angle of ``momentum``, as for I1 = I2
+    aspects: Array | None = None  # least and largest angle from spin axis to each cone on the way, (m, 2, n) rad
+    drained: Cases = 0.0  # as of `cases.supplied`
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,11 +182,10 @@ def carried(turn: tuple[Cases, ...], vector: Triple) -> Triple:
 def _effective(
     impulse: Triple, rate: Cases, slope: Cases, on_time: Cases, nodes: int, growth: float
 ) -> tuple[Cases, Cases, Cases]:
-    """Impulse (J1, J2) with which a pulse acts on ω at its centre, and its axial part J3; see `rates.width_factor`.
+    """Impulse (J1, J2) with which a pulse acts on ω at its centre, and its axial part J3; see `response.width_factor`.
 
-    The spin runs through the pulse, and the factor is the mean of exp(i(φx + β(1 + x²)) - γx) over |x| <= 1 with φ =
-    (ν + aJ3/2C)τ/2, β = aJ3τ/8C and γ = κτ/2, by ``nodes`` Gauss-Legendre nodes; sinc(ντ/2) without J3 and κ. ``rate``
-    is ν as it begins, ``slope`` a/C.
+    The factor is the mean of exp(i(φx + β(1 + x²)) - γx) over |x| <= 1 with φ = (ν + aJ3/2C)τ/2, β = aJ3τ/8C and
+    γ = κτ/2, by ``nodes`` Gauss-Legendre nodes; sinc(ντ/2) without J3 and κ. ``rate`` is ν as it begins, ``slope`` a/C.
     """
     along, across, axial = impulse
     if nothing(on_time):
@@ -209,9 +200,8 @@ def _effective(
         (cosine, sine), grown = cos_sin(angle), growth * half
         level, slant = sine * np.cosh(grown), cosine * np.sinh(grown)
         scale = 1.0 / (angle * angle + grown * grown)
-        return _turned(
-            along, across, (level * angle + slant * grown) * scale, (slant * angle - level * grown) * scale, 0.0
-        )
+        real, imaginary = (level * angle + slant * grown) * scale, (slant * angle - level * grown) * scale
+        return _turned(along, across, real, imaginary, 0.0)
     gained = slope * axial
     swing, bend = (rate + 0.5 * gained) * half, 0.25 * gained * half
     real, imaginary = 0.0, 0.0
@@ -228,11 +218,8 @@ def _effective(
 
 def _turned(along: Cases, across: Cases, real: Cases, imaginary: Cases, axial: Cases) -> tuple[Cases, Cases, Cases]:
     """Complex number ``along``, ``across`` times another, and ``axial``."""
-    return (
-        plus(times(along, real), times(-1.0, times(across, imaginary))),
-        plus(times(along, imaginary), times(across, real)),
-        axial,
-    )
+    first = plus(times(along, real), times(-1.0, times(across, imaginary)))
+    return first, plus(times(along, imaginary), times(across, real)), axial
 
 
 def nodes_for(phase: float) -> int:
@@ -251,8 +238,7 @@ def nodes_for(phase: float) -> int:
 def _legendre(nodes: int) -> tuple[tuple[float, float], ...]:
     """Positive nodes of an even Gauss-Legendre rule, with weights for the mean of an even function."""
     places, weights = gauss_legendre(nodes)
-    half = nodes // 2
-    return tuple(zip(places[half:].tolist(), weights[half:].tolist(), strict=True))
+    return tuple(zip(places[nodes // 2 :].tolist(), weights[nodes // 2 :].tolist(), strict=True))
 
 
 def fly(
@@ -266,10 +252,9 @@ def fly(
 ) -> tuple[Array, Array, Array, NDArray[np.bool_], Array]:
     """Fire the blocks of ``model`` in each case from its own Sun pulses; ``watch`` sees the motion.
 
-    ``nominal``: `RealWidths.seen_nominally`. A pulse that is due while the one before is on begins as that ends.
-    Returns rates (3, n) rad/s and quaternions (4, n) at the end of the last pulse; starts (k, n) s of the pulses;
-    whether they fire (k, n), which needs the sensor to have seen the Sun up to then in the same turns as in the nominal
-    flight: another count of Sun pulses is another plan; when the last pulse ends (n,), s.
+    ``nominal``: `RealWidths.seen_nominally`. Returns rates (3, n) rad/s and quaternions (4, n) at the end of the last
+    pulse; starts (k, n) s of the pulses; whether they fire (k, n): not once the sensor has seen the Sun in other turns
+    than in the nominal flight; when the last pulse ends (n,), s.
     """
     count, body = rates.shape[1], model.spacecraft
     assert body.sun_sensor is not None
@@ -318,11 +303,10 @@ def fly(
 def _pushes(thrust: Sequence[Thrusting], seen: NDArray[np.bool_], part: Callable[[object], Array]) -> list[TorqueRamp]:
     """Torques of thrusters through valves of their own, together, between successive corners of their thrust."""
     torques = [np.array([part(component) for component in each.torque]) * seen for each in thrust]
-    opened = [
-        Opened(tuple(map(part, each.opened.corners)), part(each.opened.level))  # type: ignore[arg-type]  # four
-        for each in thrust
-    ]
-    edges = np.sort(np.array([each.corners for each in opened]).reshape(-1, len(seen)), axis=0)
+    corners = [tuple(map(part, each.opened.corners)) for each in thrust]
+    pairs = zip(corners, thrust, strict=True)
+    opened = [Opened(four, part(each.opened.level)) for four, each in pairs]  # type: ignore[arg-type]
+    edges = np.sort(np.array(corners).reshape(-1, len(seen)), axis=0)
     ramps = []
     for begin, end in pairwise(edges):
         levels = [[each.within(0.5 * (begin + end), edge) for each in opened] for edge in (begin, end)]
@@ -365,24 +349,24 @@ class RealWidths:
 
     def __call__(self, cases: DispersedCases) -> Ends:
         """End states of the ``cases``. Raises Infeasible for motions too long to be integrated."""
-        count = number_of(cases)
-        watch = watch_over(self.model.spacecraft, cases.tilt, count) if self.model.spacecraft.keep else None
-        moments, rates = _whole(cases.moments, count), _whole(cases.omega0, count)
-        propellant, bodies, upright, sheds = cases.propellant, self._bodies(moments, cases.wheel), np.eye(4, 1), None
-        upright = upright.repeat(count, axis=1)  # the true body axes at t = 0 are where everything is seen from
+        count, body, sheds = number_of(cases), self.model.spacecraft, None
+        watch = watch_over(body, cases.tilt, count) if body.keep else None
+        rates, propellant = _whole(cases.omega0, count), cases.propellant
+        bodies = self._bodies(_whole(cases.moments, count), cases.wheel)
+        upright = np.eye(4, 1).repeat(count, axis=1)  # the true body axes at t = 0 are where everything is seen from
         if cases.per_kg is not None and cases.spent is not None:
             sheds = np.array([_whole(cases.per_kg, count) * kg for kg in cases.spent]).reshape(-1, 3, count)
         if self.model.schedule.blocks:
-            nominal = self.seen_nominally
-            settled, turned, _, seen, over = fly(self.model, bodies, rates, upright, cases, nominal, watch)
+            settled, turned, _, seen, over = fly(self.model, bodies, rates, upright, cases, self.seen_nominally, watch)
             if cases.spent is not None:
                 propellant = sum((kg * sees for kg, sees in zip(cases.spent, seen, strict=True)), 0.0)
         else:
             starts = _whole(cases.starts, count)
             impulses = np.array([_whole(impulse, count) for impulse in cases.impulses]).reshape(-1, 3, count)
-            pulses = batch.Pulses(starts, np.array(self.model.on_times), impulses, sheds=sheds)
             if self.model.schedule.shaped:
                 pulses = self._ramps(cases, starts, impulses, sheds)
+            else:
+                pulses = batch.Pulses(starts, np.array(self.model.on_times).reshape(-1, 1), impulses, sheds=sheds)
             settled, turned = batch.fly(bodies, rates, upright, pulses, watch)
             over = np.max(pulses.edges, axis=0, initial=0.0)
         last = bodies if sheds is None else bodies.lighter(sheds.sum(axis=0))
@@ -391,7 +375,7 @@ class RealWidths:
         momentum = triple(last.momentum(settled))
         after, nutation = carried(tuple(turned), momentum), None
         if not np.array_equal(last.moments[0], last.moments[1]):
-            nutation = widest_cones(last.moments, settled, self.model.spacecraft.sense, last.forcing.wheel)[0]
+            nutation = widest_cones(last.moments, settled, body.sense, last.forcing.wheel)[0]
         return Ends(
             momentum=momentum,
             before=triple(bodies.momentum(rates)),

@@ -1,8 +1,8 @@
 """Statistics of a study: output vectors, percentiles, exact binomial intervals, sensitivities.
 
-First-order sensitivities are those of the closed form on numbers with an infinitesimal imaginary part (complex-step
-differentiation, Squire & Trapp 1998). The shares from the cases are first-order Sobol indices, from the means of the
-outcome over equally likely intervals of each input (the correlation ratio, Pearson 1905): they see curvature too.
+First-order sensitivities are those of the closed form by complex-step differentiation (Squire & Trapp 1998). The shares
+from the cases are first-order Sobol indices, from the means of the outcome over equally likely intervals of each input
+(the correlation ratio, Pearson 1905).
 """
 
 from __future__ import annotations
@@ -16,9 +16,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.montecarlo.cases import Cases, DispersedCases, DispersedModel, Triple, parts_of
+from nutdamp.montecarlo.cases import DispersedCases, DispersedModel, Triple, parts_of
 from nutdamp.montecarlo.inputs import DispersedInput, Group, mixing
 from nutdamp.montecarlo.propagated import ClosedForm, Ends
+from nutdamp.physics.attitude import angle_of_parts
 
 STEPS = 200  # Newton steps and halvings in which a quantile is found, at most; half a dozen do mostly
 ACCURACY = 4e-16  # relative change of a quantile, or of a continued fraction, that is rounding
@@ -98,10 +99,6 @@ def _fraction(a: float, b: float, x: float) -> float:
 
 Array = NDArray[np.float64]
 
-OUTPUTS = ("nutation", "momentum_shift", "axis_error", "spin_change", "propellant")
-"""In rad, rad, rad, rad/s and kg; the angles are called as the values of `nutdamp.spacecraft.requirements.Part`."""
-
-
 VECTORS = {
     "nutation": slice(0, 2),
     "momentum_shift": slice(2, 5),
@@ -111,19 +108,19 @@ VECTORS = {
 }
 """Rows of `vectors` by output."""
 
+OUTPUTS = tuple(VECTORS)
+"""In rad, rad, rad, rad/s and kg; the angles are called as the values of `nutdamp.spacecraft.requirements.Part`."""
+
 ROWS = 10  # rows of `vectors`
 
 
 def measure(model: DispersedModel, ends: Ends, count: int) -> Array:
     """The `OUTPUTS` (5, n) of ``count`` cases; propellant is NaN where unknown."""
     x, y, z = ends.momentum
-    nutation = ends.nutation
-    if nutation is None:
-        nutation = np.arctan2(np.sqrt(x * x + y * y), model.spacecraft.sense * z)
     rows = (
-        nutation,
-        angle(ends.before, ends.after),
-        angle(parts_of(model.target), ends.pointed),
+        np.arctan2(np.sqrt(x * x + y * y), model.spacecraft.sense * z) if ends.nutation is None else ends.nutation,
+        angle_of_parts(ends.before, ends.after),
+        angle_of_parts(parts_of(model.target), ends.pointed),
         ends.spin_change,
         np.nan if ends.propellant is None else ends.propellant,
     )
@@ -133,8 +130,8 @@ def measure(model: DispersedModel, ends: Ends, count: int) -> Array:
 def vectors(model: DispersedModel, ends: Ends, count: int) -> NDArray[Any]:
     """Quantities (10, n) of ``count`` cases that are linear for small dispersions; `VECTORS` names the rows.
 
-    Nutation is the length of the transverse momentum over the axial one, the momentum shift that of the change of its
-    direction, the axis error that of its direction's distance from the target. All are in the body axes of t = 0.
+    Nutation is the transverse momentum over the axial one, the momentum shift the change of its direction, the axis
+    error that direction less the target, in the body axes of t = 0.
     """
     x, y, z = ends.momentum
     before, after, pointed = (_unit(vector) for vector in (ends.before, ends.after, ends.pointed))
@@ -152,13 +149,6 @@ def _unit(vector: Triple) -> Triple:
     x, y, z = vector
     size = 1.0 / np.sqrt(x * x + y * y + z * z)
     return x * size, y * size, z * size
-
-
-def angle(first: Triple, second: Triple) -> Cases:
-    """Angle between vectors, exact to rounding from 0 to π."""
-    (a, b, c), (x, y, z) = first, second
-    i, j, k = b * z - c * y, c * x - a * z, a * y - b * x
-    return np.arctan2(np.sqrt(i * i + j * j + k * k), a * x + b * y + c * z)
 
 
 EXACT_CASES = 1_000_000  # number of cases up to which every value is kept, and percentiles are exact
@@ -187,8 +177,7 @@ class Exact:
         share, above = places - ranks, np.ceil(places).astype(int)
         ordered = np.partition(self.values, sorted({*ranks.tolist(), *above.tolist()}))  # np.unique loads numpy.ma
         low, high = ordered[ranks], ordered[above]
-        quantiles: Array = np.where(share < 0.5, low + (high - low) * share, high - (high - low) * (1.0 - share))
-        return quantiles
+        return np.asarray(np.where(share < 0.5, low + (high - low) * share, high - (high - low) * (1.0 - share)))
 
     def histogram(self, edges: Array) -> Array:
         """Cases between each two of ``edges``."""
@@ -267,15 +256,11 @@ CLASS_SIZE = 32  # cases in each of them, at least
 
 @dataclass(frozen=True, eq=False)
 class FirstOrder:
-    """Outcome to first order about nominal values (and biases).
-
-    ``jacobian`` (10, d): derivative of each row of `vectors` by each drawn input, in its unit; some of these are
-    correlated in ``groups``.
-    """
+    """Outcome to first order about nominal values (and biases)."""
 
     inputs: tuple[DispersedInput, ...]
-    jacobian: Array
-    groups: tuple[Group, ...]
+    jacobian: Array  # derivative of each row of `vectors` by each input, in its unit, (10, d)
+    groups: tuple[Group, ...]  # of correlated inputs
 
     @property
     def sigmas(self) -> Array:
@@ -298,10 +283,7 @@ class FirstOrder:
         return np.asarray(np.linalg.norm((self.jacobian * sizes)[VECTORS[output]], axis=0))
 
     def shares(self, output: str) -> Array:
-        """Share of each input in the variance of ``output``, (d,); all zero where nothing varies.
-
-        Of inputs that are correlated each has what it adds to those before it; the sum over them is the group's.
-        """
+        """Share of each input in the variance of ``output``, (d,), as of `independent`; zero where nothing varies."""
         squares = (self.independent(output) ** 2).sum(axis=0)
         return np.asarray(squares / (squares.sum() or 1.0))
 
@@ -364,10 +346,9 @@ def sampled_shares(draws: Mapping[str, Array], outcome: Array) -> dict[str, dict
         sums = np.add.reduceat(centred.take(order, axis=1), starts, axis=1)
         between = (sums**2 / np.diff(starts, append=count)).sum(axis=1)
         chance = (len(starts) - 1) / count
-        shares[name] = {
-            output: max(0.0, (float(between[VECTORS[output]].sum()) / variances[output] - chance) / (1.0 - chance))
-            if variances[output] > 0.0 and chance < 1.0
-            else 0.0
-            for output in OUTPUTS
-        }
+        shares[name] = dict.fromkeys(OUTPUTS, 0.0)
+        for output, rows in VECTORS.items():
+            if variances[output] > 0.0 and chance < 1.0:
+                share = float(between[rows].sum()) / variances[output]
+                shares[name][output] = max(0.0, (share - chance) / (1.0 - chance))
     return shares

@@ -1,8 +1,4 @@
-"""Dispersion studies: many dispersed cases fly one schedule.
-
-Blocks of cases run over threads in rounds, so that a study can be watched and stopped; the threads take one portion
-after the other.
-"""
+"""Dispersion studies: many dispersed cases fly one schedule, in rounds, so that a study can be watched and stopped."""
 
 from __future__ import annotations
 
@@ -204,25 +200,17 @@ class Study(DrawnCases):
         return np.array([(aspect.least, aspect.largest) for aspect in seen])
 
     def severity(self, values: Array, ends: Ends) -> Array:
-        """Severity of cases, (n,), by `requirements.severity`, of the outputs (5, n) and ``ends`` of cases.
-
-        Never less than the used share of the bound of a cone on the way, or of the propellant.
-        """
+        """Severity of cases, (n,), by their outputs (5, n), cones and propellant; see `requirements.severity`."""
         body, aim = self.model.spacecraft, OUTPUTS.index(requirements.aim(self.model.spacecraft).value)
         shares = [*([] if ends.aspects is None else cones_used(body.keep, ends.aspects)), ends.drained]
         return np.asarray(requirements.severity(body, Left(values[0], values[aim], ends.spin), shares))
 
     @property
     def lightening_error(self) -> str:
-        """Message on the error of falling moments in cases, by the nominal one; empty where negligible.
-
-        They fall half at either edge of a pulse; `propagation.flown` lets them fall as the thrust goes.
-        """
-        body = self.model.spacecraft
-        if shed(body) is None:
+        """Message on the error of falling moments in cases, by the nominal one; empty where negligible."""
+        if shed(self.model.spacecraft) is None:
             return ""
-        outputs, exact = self.outputs_of({}), self.nominal.residual
-        part = requirements.aim(body)
+        outputs, exact, part = self.outputs_of({}), self.nominal.residual, requirements.aim(self.model.spacecraft)
         aim = exact.momentum_shift if part is Part.SHIFT else exact.axis_error
         errors = {Part.NUTATION: outputs[0] - exact.nutation, part: outputs[OUTPUTS.index(part.value)] - aim}
         if max(map(abs, errors.values())) < WORTH_SAYING:
@@ -234,11 +222,7 @@ class Study(DrawnCases):
 
 @dataclass(eq=False)
 class Counted:
-    """Results of a study so far: the cases from 0 to ``done`` of the ``requested``, of which ``met`` comply.
-
-    By cone, (m,): ``broken`` counts the cases that break it, ``aspects`` (m, 2) rad are the least and the largest angle
-    from the spin axis to its direction in all cases.
-    """
+    """Results of a study so far: the cases from 0 to ``done`` of the ``requested``, of which ``met`` comply."""
 
     study: Any
     requested: int
@@ -246,8 +230,8 @@ class Counted:
     redrawn: int = 0
     met: int = 0
     worst: Worst = field(default_factory=lambda: Worst(KEPT_WORST))
-    broken: NDArray[np.int64] = field(init=False)
-    aspects: Array = field(init=False)
+    broken: NDArray[np.int64] = field(init=False)  # cases that break each cone, (m,)
+    aspects: Array = field(init=False)  # least and largest angle to it in all cases, (m, 2) rad
 
     def __post_init__(self) -> None:
         cones = len(self.study.model.spacecraft.keep)
@@ -287,17 +271,13 @@ class Counted:
 
 @dataclass(eq=False)
 class Results(Counted):
-    """Results of a study of a schedule; ``emptied`` counts the cases whose tank runs empty.
-
-    ``values`` (5 + 2m, capacity), outputs and the least and largest angle (rad) to the direction of each of m cones,
-    are kept up to `EXACT_CASES`; beyond, ``sketches`` count. ``early`` (10, `EARLY`) is the outcome of the first cases.
-    """
+    """Results of a study of a schedule."""
 
     study: Study
-    emptied: int = 0
-    early: Array = field(default_factory=lambda: np.zeros((ROWS, EARLY)))
-    values: Array | None = field(init=False)
-    sketches: list[Sketch] = field(init=False)
+    emptied: int = 0  # cases whose tank runs empty
+    early: Array = field(default_factory=lambda: np.zeros((ROWS, EARLY)))  # `vectors` of the first cases
+    values: Array | None = field(init=False)  # outputs, least and largest angle (rad) to each of m cones: (5 + 2m, n)
+    sketches: list[Sketch] = field(init=False)  # of the outputs, beyond `EXACT_CASES`, in place of ``values``
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -359,8 +339,8 @@ def run(
 ) -> Results:
     """Fly the cases that ``results`` is to have and does not have yet; returns ``results``.
 
-    ``watch`` is called now and then with how many are done, always the first ones; they are kept when ``stopped`` says
-    so. ``collect`` is given the number (from 0) of the first of some cases, and their `Results.values`, in order.
+    ``watch`` is called now and then with how many are done; they are kept when ``stopped`` says so. ``collect`` is
+    given the number (from 0) of the first of some cases, and their `Results.values`, in order.
     """
     # The C library keeps freed memory up to twice the largest block freed so far: else each stride asks for new pages.
     np.empty(FREED, dtype=np.uint8)
@@ -461,14 +441,11 @@ class Checkpoints:
             yield _range(self._flown(part, self._draws)[0][0])
 
     def window(self, probability: float) -> Range | None:
-        """Shifts (s) of all pulses with which the share ``probability`` of the cases complies; None without any.
-
-        As far as half a turn of spin or nutation, the faster, and no pulse before t = 0.
-        """
-        schedule = self.study.model.schedule
-        half, first = math.pi / self.study.model.spacecraft.fastest, min(pulse.loaded[0] for pulse in schedule)
+        """Shifts (s) of all pulses, to half a turn, with which the share ``probability`` complies; None without any."""
         if not self._complies(0.0, probability):
             return None
+        first = min(pulse.loaded[0] for pulse in self.study.model.schedule)
+        half = math.pi / self.study.model.spacecraft.fastest
         return Range(-self._reach(-1.0, min(half, first), probability), self._reach(1.0, half, probability))
 
     def _reach(self, sense: float, most: float, probability: float) -> float:

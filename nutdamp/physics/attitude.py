@@ -59,13 +59,10 @@ def matrix(quaternion: Array) -> Array:
 
 
 def from_matrix(rotation: Array) -> Array:
-    """Unit quaternion of a rotation matrix, (3, 3) -> (4,), scalar part not negative.
-
-    The largest of the four components is taken first, so that none is lost to cancellation.
-    """
+    """Unit quaternion of a rotation matrix, (3, 3) -> (4,), scalar part not negative."""
     diagonal = np.diagonal(rotation)
     squares = 0.25 * np.array([1 + diagonal.sum(), *(1 - diagonal.sum() + 2 * diagonal)])
-    largest = int(np.argmax(squares))
+    largest = int(np.argmax(squares))  # the largest component is taken first, so that none is lost to cancellation
     off = 0.25 * (rotation - rotation.T)
     mixed = 0.25 * (rotation + rotation.T)
     w_times = np.array([off[2, 1], off[0, 2], off[1, 0]])
@@ -84,6 +81,13 @@ def angle_between(first: Array, second: Array) -> Array:
     """Angle in rad between vectors (..., 3), exact to rounding from 0 to π."""
     cross = np.linalg.norm(np.cross(first, second), axis=-1)
     return np.asarray(np.arctan2(cross, np.sum(first * second, axis=-1)), dtype=np.float64)
+
+
+def angle_of_parts(first: Iterable[Any], second: Iterable[Any]) -> Any:
+    """`angle_between` by components, each a number or an array."""
+    (a, b, c), (x, y, z) = first, second
+    i, j, k = b * z - c * y, c * x - a * z, a * y - b * x
+    return np.arctan2(np.sqrt(i * i + j * j + k * k), a * x + b * y + c * z)
 
 
 def angular_momentum(A: float, C: float, omega: complex, spin: float, wheel: float = 0.0) -> Array:

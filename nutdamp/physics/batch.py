@@ -1,9 +1,8 @@
 """Vectorised flight of many bodies: Euler's equations and the attitude through pulses of real width.
 
-Arrays carry the case last (structure of arrays). Each case has its own moments, motion, torques and edges. A stretch
-between two edges is an arc in closed form where the body is symmetric and no external torque acts, with energy
-dissipation too; else a Taylor series as in `taylor`, with an order and a number of steps common to a block of cases
-that stays in the cache.
+Arrays carry the case last. Each case has its own moments, motion, torques and edges. A stretch between two edges is an
+arc in closed form where the body is symmetric and no external torque acts, with energy dissipation too; else a Taylor
+series as in `taylor`, with an order and a number of steps common to a block of cases that stays in the cache.
 """
 
 from __future__ import annotations
@@ -28,10 +27,10 @@ REMAINDER = 1e-15  # size of the last terms kept, relative to the scale of rates
 
 
 class Series:
-    """Taylor coefficients of rates and quaternion in x = (t - now)/step, for the cases of a block.
+    """Taylor coefficients of rates and quaternion in x = (t - now)/step, for the cases of a block; see `taylor`.
 
     ``rates`` (order+1, 5, n) holds ω1, ω2, ω3, ω1, ω2, so that the products in Euler's equations are one product of two
-    slices; ``turns`` (order+1, 4, n) is the quaternion. The equations are those of `taylor`.
+    slices; ``turns`` (order+1, 4, n) is the quaternion.
     """
 
     def __init__(self, here: MotionStretch, step: Array, acceleration: Array, jerk: Array | None) -> None:
@@ -68,8 +67,7 @@ class Series:
 
     def end(self) -> tuple[Array, Array]:
         """Rates (3, n) and unit quaternions (4, n) at the end of the step."""
-        rates = self.rates[: self.order + 1, :3].sum(axis=0)
-        quaternion = self.turns[: self.order + 1].sum(axis=0)
+        rates, quaternion = (part[: self.order + 1].sum(axis=0) for part in (self.rates[:, :3], self.turns))
         return rates, quaternion / np.sqrt(np.sum(quaternion * quaternion, axis=0))
 
     def at(self, way: Array, cases: Any) -> tuple[Array, Array]:
@@ -131,11 +129,8 @@ class _DampingSeries:
 
     def __init__(self, moments: Array, forcing: Forcing, acceleration: Array, rates: Array, step: Array) -> None:
         self.moments, self.growth, self.wheel = moments, forcing.growth, forcing.wheel
-        count = len(step)
-        self.momentum = np.zeros((LARGEST_ORDER, 3, count))
-        self.squares = np.zeros((LARGEST_ORDER, count))  # |H|²
-        self.quotient = np.zeros((LARGEST_ORDER, count))  # H3/|H|²
-        self.slip = np.zeros((LARGEST_ORDER, 3, count))
+        self.momentum, self.slip = np.zeros((2, LARGEST_ORDER, 3, len(step)))
+        self.squares, self.quotient = np.zeros((2, LARGEST_ORDER, len(step)))  # |H|² and H3/|H|²
         largest = self.moments * (np.abs(rates) + np.abs(acceleration) * step)
         largest[2] += np.abs(self.wheel)
         self.floor = AT_REST**2 * np.sum(largest * largest, axis=0)
@@ -199,23 +194,18 @@ class Bodies:
 
 @dataclass(frozen=True, slots=True)
 class Pulses:
-    """Rectangular pulses: ``starts`` (k, n) s, ``on_times`` (k,) s and ``impulses`` (k, 3, n) N m s, torque × on-time.
+    """Rectangular pulses; the moments fall half as one begins and half as it ends, which errs in second order."""
 
-    An on-time of 0 is an ideal impulse. With ``leans`` (k,) torques run evenly from 1 - lean times their mean to 1 +
-    lean times it. On-times and leans that differ are (k, n). The moments fall by ``sheds`` (k, 3, n) kg m², half as a
-    pulse begins and half as it ends, which errs in second order; None: they stay.
-    """
-
-    starts: Array
-    on_times: Array
-    impulses: Array
-    leans: Array | None = None
-    sheds: Array | None = None
+    starts: Array  # (k, n) s
+    on_times: Array  # (k, n) s, or (k, 1) for all cases; 0: an ideal impulse
+    impulses: Array  # torque × on-time, (k, 3, n) N m s
+    leans: Array | None = None  # (k, n): torques run evenly from 1 - lean to 1 + lean times their mean
+    sheds: Array | None = None  # decrease of the moments, (k, 3, n) kg m²
 
     def some(self, cases: Any) -> Pulses:
         """Subset of ``cases`` (an index of arrays)."""
-        on_times = self.on_times if self.on_times.ndim == 1 else self.on_times[:, cases]
-        leans = self.leans if self.leans is None or self.leans.ndim == 1 else self.leans[:, cases]
+        on_times = self.on_times if self.on_times.shape[1] == 1 else self.on_times[:, cases]
+        leans = None if self.leans is None else self.leans[:, cases]
         sheds = None if self.sheds is None else self.sheds[:, :, cases]
         return Pulses(self.starts[:, cases], on_times, self.impulses[:, :, cases], leans, sheds)
 
@@ -225,29 +215,25 @@ class Pulses:
         if self.leans is None or not self.leans.any():
             return None
         lasts = np.where(self.on_times == 0.0, 1.0, self.on_times)
-        return np.asarray(self.impulses * _of_each(2.0 * self.leans / lasts**2))
+        return np.asarray(self.impulses * (2.0 * self.leans / lasts**2)[:, None])
 
     @property
     def edges(self) -> Array:
         """Starts and ends in turn, (2k, n) s."""
-        ends = self.starts + (self.on_times[:, None] if self.on_times.ndim == 1 else self.on_times)
+        ends = self.starts + self.on_times
         return np.stack([self.starts, ends], axis=1).reshape(-1, self.starts.shape[1])
 
     @property
     def jumps(self) -> tuple[Array, Array]:
         """Jump at each edge, (2k, 3, n) each: of the torque in N m, and of the momentum in N m s."""
-        ideal = _of_each(self.on_times == 0.0)
-        torque = np.where(ideal, 0.0, self.impulses / _of_each(np.where(self.on_times == 0.0, 1.0, self.on_times)))
+        on_times = self.on_times[:, None]
+        ideal = on_times == 0.0
+        first = last = np.where(ideal, 0.0, self.impulses / np.where(ideal, 1.0, on_times))
         kick = np.where(ideal, self.impulses, 0.0)
         if self.leans is not None:  # what begins at its first value, less than its mean, ends at its last
-            first, last = _of_each(1.0 - self.leans) * torque, _of_each(1.0 + self.leans) * torque
-            return _edgewise(first, -last), _edgewise(kick, 0.0 * kick)
-        return _edgewise(torque, -torque), _edgewise(kick, 0.0 * kick)
-
-
-def _of_each(values: Any) -> Any:
-    """Values by pulse, (k,) or (k, n), broadcast against vectors (k, 3, n)."""
-    return values[:, None, None] if values.ndim == 1 else values[:, None, :]
+            leans = self.leans[:, None]
+            first, last = (1.0 - leans) * first, (1.0 + leans) * last
+        return _edgewise(first, -last), _edgewise(kick, 0.0 * kick)
 
 
 def _edgewise(begins: Array, ends: Array) -> Array:
@@ -256,17 +242,14 @@ def _edgewise(begins: Array, ends: Array) -> Array:
 
 
 class MotionStretch(NamedTuple):
-    """Motion of ``bodies`` under one ``torque`` (3, n) N m, None for a coast, from ``since`` (n,) s on.
-
-    ``rates`` (3, n) rad/s and ``quaternion`` (4, n) at ``since``; the torque changes by ``slope`` (3, n) N m/s or None.
-    """
+    """Motion of ``bodies`` under one torque, None for a coast, from ``since`` on."""
 
     bodies: Bodies
-    since: Array
-    rates: Array
-    quaternion: Array
-    torque: Array | None = None
-    slope: Array | None = None
+    since: Array  # (n,) s
+    rates: Array  # (3, n) rad/s, at ``since``, as all below
+    quaternion: Array  # (4, n)
+    torque: Array | None = None  # (3, n) N m
+    slope: Array | None = None  # of the torque, (3, n) N m/s
 
     def some(self, cases: Any) -> MotionStretch:
         """Subset of ``cases`` (an index of arrays)."""
@@ -337,9 +320,8 @@ def fly(
 ) -> tuple[Array, Array]:
     """Rates (3, n) rad/s and unit quaternions (4, n), body -> inertial, as the last pulse of each case ends.
 
-    ``rates`` (3, n) and ``quaternion`` (4, n) at t = 0; ``watch`` sees the motion until then. Exact to some 1e-13 rad
-    for each hundred radians flown. Pulses may overlap and come in any order, in each case its own. Raises Infeasible
-    for motions over more than `taylor.LONGEST` rad.
+    ``rates`` and ``quaternion`` at t = 0; ``watch`` sees the motion until then. Exact to some 1e-13 rad for each
+    hundred radians flown. Pulses may overlap and come in any order. Raises Infeasible beyond `taylor.LONGEST` rad.
     """
     rates, quaternion = np.array(rates, dtype=float), np.array(quaternion, dtype=float)
     for begin in range(0, rates.shape[1], BLOCK):
@@ -371,21 +353,14 @@ def _fly_block(bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses, 
 
 
 def _fly_alike(
-    bodies: Bodies,
-    rates: Array,
-    quaternion: Array,
-    pulses: Pulses,
-    watch: Observer | None,
-    order: NDArray[np.intp],
+    bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses, watch: Observer | None, order: NDArray[np.intp]
 ) -> None:
     """Fly cases whose edges have the same ``order``, in place: between pulses all of them coast."""
     edges, (turns, kicks), slopes = pulses.edges, pulses.jumps, pulses.slopes
     half = None if pulses.sheds is None else 0.5 * pulses.sheds
-    now = np.zeros(rates.shape[1])
-    on: set[int] = set()
+    now, on = np.zeros(rates.shape[1]), set[int]()
     for edge in order.tolist():
-        torque = np.sum(turns[sorted(on)], axis=0) if on else None
-        slope = None
+        torque, slope = np.sum(turns[sorted(on)], axis=0) if on else None, None
         if torque is not None and slopes is not None:
             rising = [first // 2 for first in sorted(on)]
             slope = np.sum(slopes[rising], axis=0)
@@ -408,12 +383,11 @@ def _fly_each(bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses, w
     order = np.argsort(edges, axis=0, kind="stable")
     edges, of_each = np.take_along_axis(edges, order, axis=0), order[:, None, :]
     turns, kicks = (np.take_along_axis(jump, of_each, axis=0) for jump in pulses.jumps)
-    slopes, slope = pulses.slopes, None
-    half = None if pulses.sheds is None else np.repeat(0.5 * pulses.sheds, 2, axis=0)
-    half = None if half is None else np.take_along_axis(half, of_each, axis=0)
+    slopes, slope, half = pulses.slopes, None, None
+    if pulses.sheds is not None:
+        half = np.take_along_axis(np.repeat(0.5 * pulses.sheds, 2, axis=0), of_each, axis=0)
     bends = None if slopes is None else np.take_along_axis(_edgewise(slopes, -slopes), of_each, axis=0)
-    now = np.zeros(rates.shape[1])
-    torque = np.zeros_like(rates)
+    now, torque = np.zeros(rates.shape[1]), np.zeros_like(rates)
     for number, (edge, turn, kick) in enumerate(zip(edges, turns, kicks, strict=True)):
         advance(MotionStretch(bodies, now, rates, quaternion, torque, slope), edge - now, watch)
         torque = torque + turn if slope is None else torque + slope * (edge - now) + turn
@@ -452,8 +426,7 @@ def _pushed(here: MotionStretch) -> tuple[Array, Array | None]:
 def _arc(moments: Array, forcing: Forcing, rates: Array, quaternion: Array, duration: Array) -> None:
     """Exact arc of symmetric bodies, in place; see `attitude.arc`, and `energy_sink.arc` with dissipation.
 
-    R(t) = R(0) Rot(H(0)/A t) Rot3(νt), with H in body axes: the body turns about H at |H|/A and about its own axis
-    at ν = ω3 - H3/A.
+    R(t) = R(0) Rot(H(0)/A t) Rot3(νt), with H in body axes and ν = ω3 - H3/A.
     """
     A, _, C = moments
     x, y, growth, wheel = rates[0], rates[1], forcing.growth, forcing.wheel / A
@@ -487,10 +460,7 @@ def _arc(moments: Array, forcing: Forcing, rates: Array, quaternion: Array, dura
 
 
 def _series(here: MotionStretch, duration: Array, acceleration: Array, jerk: Array | None) -> Iterator[Series]:
-    """Taylor series over ``duration`` under an angular ``acceleration`` (3, n) in rad/s², in place, one by one.
-
-    With a ``jerk`` (3, n) rad/s³ the acceleration is that at the start; None: constant.
-    """
+    """Taylor series over ``duration`` in place, each in turn; ``acceleration`` (3, n) rad/s² at its start, ``jerk``."""
     forcing, moments = here.bodies.forcing, here.bodies.moments
     strength = np.sqrt(np.sum(acceleration * acceleration, axis=0))
     if jerk is not None:
@@ -520,13 +490,7 @@ def _integrate_symmetric(here: MotionStretch, duration: Array, acceleration: Arr
     """`_series` for I1 = I2 without dissipation or jerk, at its end: many steps at once, see `taylor.steps`."""
     bodies, rates, quaternion = here.bodies, here.rates, here.quaternion
     A, _, C = bodies.moments
-    drive = taylor.Drive(
-        1.0 - C / A,
-        acceleration[0] + 1j * acceleration[1],
-        acceleration[2],
-        tuple((size / A, rate) for size, rate in bodies.forcing.turning),
-        bodies.forcing.wheel / A,
-    )
+    drive = taylor.Drive.of(1.0 - C / A, acceleration, bodies.forcing, A)
     omega, spin = rates[0] + 1j * rates[1], rates[2]
     _expect_short(float(np.max(drive.pace(omega, spin, duration) * duration)))
     turned = np.stack([quaternion[0] + 1j * quaternion[3], quaternion[1] + 1j * quaternion[2]])

@@ -36,10 +36,7 @@ class ConeAngles(NamedTuple):
 
 
 def momentary(moments: ArrayLike, rates: ArrayLike, sense: float, wheel: float = 0.0) -> ConeAngles:
-    """Instantaneous cones of any body: angles of H and of ω from the spin axis ``sense``·e3, up to π.
-
-    ``moments`` (I1, I2, I3) in kg m², ``rates`` (3,) in rad/s.
-    """
+    """Instantaneous cones of any body with ``rates`` (3,) rad/s: angles of H and ω from the axis ``sense``·e3, to π."""
     w = np.asarray(rates, dtype=float)
     first, second, third = (np.asarray(moments, dtype=float) * w + (0.0, 0.0, wheel)).tolist()
     across, along = math.hypot(w[0], w[1]), sense * float(w[2])
@@ -47,19 +44,13 @@ def momentary(moments: ArrayLike, rates: ArrayLike, sense: float, wheel: float =
 
 
 def nutation_angle(A: float, C: float, omega: Rate, spin: Rate) -> Rate:
-    """Nutation angle θ = λ + μ in rad between spin axis and angular momentum, Magnus 1970 (19).
-
-    tan θ = A|ω| / (C|ω3|), from 0 (pure spin) to π/2 (no spin).
-    """
+    """Nutation angle θ = λ + μ in rad of the spin axis from H, 0 to π/2, Magnus 1970 (19): tan θ = A|ω| / (C|ω3|)."""
     angle: Rate = np.arctan2(A * omega, C * np.abs(spin))
     return angle
 
 
 def body_cone(omega: Rate, spin: Rate) -> Rate:
-    """Half-angle μ of the body cone ("Polkegel") in rad, Magnus 1970 (18): tan μ = |ω| / |ω3|.
-
-    For symmetric bodies; flights take their cones from `momentary`.
-    """
+    """Half-angle μ of the body cone ("Polkegel") in rad, Magnus 1970 (18): tan μ = |ω| / |ω3|."""
     angle: Rate = np.arctan2(omega, np.abs(spin))
     return angle
 
@@ -106,11 +97,9 @@ class HalfPulses(NamedTuple):
 def half_pulses(A: float, C: float, omega: float, spin: float) -> HalfPulses:
     """Two pulses that leave no nutation and H where it was, exact at every angle.
 
-    J1 = C|ω3|(tan θ - tan(θ/2)) halves the nutation angle, so that H jumps onto the cone's half-angle; after half an
-    inertial turn at that angle, Δt = π A cos(θ/2)/(C|ω3|), the spin axis is where H was, and
-    J2 = C|ω3| tan(θ/2) brings H back there. J1 + J2 = A|ω|: no more than one pulse, Magnus 1970 (21).
-
-    ``omega`` is |ω|, ``spin`` ω3 (rad/s).
+    J1 = C|ω3|(tan θ - tan(θ/2)) halves the nutation angle; after half an inertial turn at that angle,
+    Δt = π A cos(θ/2)/(C|ω3|), the spin axis is where H was, and J2 = C|ω3| tan(θ/2) brings H back there.
+    J1 + J2 = A|ω|: no more than one pulse, Magnus 1970 (21).
     """
     theta = nutation_angle(A, C, omega, spin)
     axial = C * abs(spin)
@@ -128,10 +117,7 @@ def half_pulses_as_printed(A: float, C: float, omega: float, spin: float) -> Hal
 
 
 def turn_between_halves(A: float, C: float, omega: float, spin: float, wheel: float = 0.0) -> float:
-    """Angle in rad by which ω turns in the body between the two `half_pulses`: π(H3 - Aω3)/|H3| cos(θ/2).
-
-    Without a wheel σπ(1 - A/C)cos(θ/2). ``spin`` is ω3 itself.
-    """
+    """Angle in rad by which ω turns in the body between the `half_pulses`: π(H3 - Aω3)/|H3| cos(θ/2), ``spin`` = ω3."""
     axial = C * spin + wheel
     theta = nutation_angle(A, C, omega, axial / C)
     return math.copysign(math.pi, axial) * (1.0 - A * spin / axial) * math.cos(0.5 * theta)
@@ -148,9 +134,8 @@ def mounting_angle(A: float, C: float, omega: float, spin: float, wheel: float =
 def phase_to_oppose(omega: complex, torque: complex) -> float:
     """Remaining turn of ω, rad in (-π, π], at a ω3 > 0, until it points against ``torque``.
 
-    The best time for a body-fixed torque direction d is arg ω = arg d + π. For ±1, ±2 this is the table of
-    Magnus 1970 before fig. 5 when a ω3 > 0, and its mirror image when a ω3 < 0, where the printed table would
-    pump the nutation up.
+    For ±1, ±2 this is the table of Magnus 1970 before fig. 5 when a ω3 > 0, and its mirror image when a ω3 < 0, where
+    the printed table would pump the nutation up.
     """
     return cmath.phase(-omega * torque.conjugate())
 
@@ -161,11 +146,7 @@ Moments = tuple[float, float, float]
 
 
 def settled(moments: ArrayLike) -> Moments:
-    """Principal moments (I1, I2, I3), those within `DEGENERATE` of each other made exactly equal.
-
-    I1 and I2 become their mean; of a sphere all are I3. Comparisons of moments (sphere, symmetry, class of an axis)
-    thus agree everywhere, and nothing divides by a difference that is rounding.
-    """
+    """Principal moments, those within `DEGENERATE` made exactly equal: I1 and I2 their mean, of a sphere all I3."""
     first, second, third = (float(moment) for moment in np.asarray(moments, dtype=float))
     rounding = DEGENERATE * max(first, second, third)
     if first != second and abs(first - second) <= rounding:
@@ -191,8 +172,8 @@ def principal_axes(tensor: Array) -> tuple[Moments, Array]:
     """Principal moments and axes of a symmetric 3×3 tensor (kg m²).
 
     Returns ((I1, I2, I3), axes): the columns of ``axes`` are the principal axes in the axes of the tensor, right
-    handed. Axis 3 is the one nearest the third axis of the tensor, axis 1 the one nearest its first; where
-    moments coincide, so that the axes are free, they are laid along those of the tensor.
+    handed. Axis 3 is the one nearest the third axis of the tensor, axis 1 the one nearest its first, also where moments
+    coincide.
     """
     tensor = np.asarray(tensor, dtype=float)
     if np.count_nonzero(tensor - np.diag(np.diagonal(tensor))) == 0:
@@ -245,9 +226,8 @@ class NutationRates(NamedTuple):
 
 
 def axis_class(moments: ArrayLike) -> AxisClass:
-    """Kind of axis 3 among the principal moments (I1, I2, I3).
+    """Kind of axis 3 among the principal moments (I1, I2, I3), equal ones as of `settled`.
 
-    Equal moments are those of `settled`. I1 = I2 leaves axis 3 the minimum or the maximum;
     ``degenerate`` means I3 equal to one of the others alone, so that any axis of their plane would do.
     """
     first, second, third = settled(moments)
@@ -282,10 +262,7 @@ def growth(moments: ArrayLike, spin: float, wheel: float = 0.0) -> Stability:
 
 
 def principal_tilt(axes: ArrayLike) -> float:
-    """Angle in rad, 0 to π/2, between principal axis 3 and the third axis of the file: the wobble of a pure spin.
-
-    ``axes`` (3, 3) has the principal axes as columns, as `principal_axes` returns them.
-    """
+    """Angle in rad, 0 to π/2, of principal axis 3 from the third axis of the file, by the `principal_axes` (3, 3)."""
     x, y, z = (float(component) for component in np.asarray(axes, dtype=float)[:, 2])
     return math.atan2(math.hypot(x, y), abs(z))
 

@@ -45,18 +45,13 @@ SMALLEST = 1e-150  # least cosine of a nutation angle that is distinguished from
 
 
 class SinkEffect(NamedTuple):
-    """Effect of the sink on an arc: factors and terms on the free arc of the same body.
+    """Effect of the sink on an arc, beside the free arc of the same body."""
 
-    ``transverse`` and ``axial``: factors on |ω| and on ω3. ``turned``: s, the time in which the spin at the start turns
-    the body as far as it has turned, ∫ω3 dt / ω3(0). ``cosine`` of half the angle by which θ has grown, and ``sine`` of
-    it as a multiple of sin θ0.
-    """
-
-    transverse: Any
-    axial: Any
-    turned: Any
-    cosine: Any
-    sine: Any
+    transverse: Any  # factor on |ω|
+    axial: Any  # factor on ω3
+    turned: Any  # s, in which the spin at the start turns the body as far as it has turned, ∫ω3 dt / ω3(0)
+    cosine: Any  # of half the angle by which θ has grown
+    sine: Any  # of that, as a multiple of sin θ0
 
 
 def course(growth: float, cosine: float, sine_squared: float, time: float) -> SinkEffect:
@@ -116,7 +111,7 @@ def slip(effect: SinkEffect, first: Any, second: Any, behind: Any, cos_sin: Call
     """Quaternion (w, x, y, z) by which the body has slipped from its free arc; it multiplies that from the right.
 
     ``first`` and ``second``: components of h in the body at the end of the free arc; ``behind`` = aH3/C(turned - t),
-    rad, the excess turn about axis 3; ``cos_sin`` gives cosine and sine of an angle, of numbers or arrays.
+    rad, the excess turn about axis 3.
     """
     x, y = effect.sine * second, -effect.sine * first
     cosine, sine = cos_sin(0.5 * behind)
@@ -128,8 +123,7 @@ def arc(
 ) -> tuple[Any, Any, Array]:
     """Coast of a symmetric body, exact: ω (n,), ω3 (n,) rad/s and attitude (n, 4) at ``times`` (n,) s from its start.
 
-    ``quaternion`` (4,) body -> inertial, ``omega`` = ω1 + iω2 and ``spin`` hold at its start; ``growth`` is κ in 1/s.
-    At one time that is a number, by plain numbers: a tenth of the cost of arrays.
+    ``growth`` is κ in 1/s. At one time that is a number, by plain numbers: a tenth of the cost of arrays.
     """
     many = isinstance(times, np.ndarray)
     module, exp, effect_of = (np, np.exp, courses) if many else (math, cmath.exp, course)
@@ -154,7 +148,7 @@ def rates_on_arc(
 ) -> tuple[ComplexArray, Array]:
     """ω and ω3 of `arc` alone, for many bodies: ``times`` (cases, n) s from the starts of their arcs, else (cases, 1).
 
-    ``omega`` and ``spin`` at the starts, rad/s, and moments, kg m², are by case; ``growth`` may be zero.
+    All but ``growth`` are by case.
     """
     offset = wheel / C
     rate = (A - C) / A * (spin + offset)

@@ -77,17 +77,13 @@ Array = NDArray[np.float64]
 
 
 class TwoJumps(NamedTuple):
-    """Two jumps of H that bring it and the spin axis to the target, one row per start: n rows.
+    """Two jumps of H that bring it and the spin axis to the target, one row per start: n rows."""
 
-    ``middle`` (n, 3) is H between them, N m s; ``first`` and ``second`` (n,) their sizes, N m s; ``wait`` (n,) s from
-    one to the other, or ``turn`` (n,) s more for each further turn of the spin axis.
-    """
-
-    middle: Array
-    first: Array
+    middle: Array  # H between them, (n, 3) N m s
+    first: Array  # size, (n,) N m s
     second: Array
-    wait: Array
-    turn: Array
+    wait: Array  # (n,) s from one to the other
+    turn: Array  # (n,) s more for each further turn of the spin axis
 
     @property
     def cost(self) -> Array:
@@ -96,13 +92,7 @@ class TwoJumps(NamedTuple):
 
 
 def two_jumps(
-    A: float,
-    h: float,
-    momentum: Array,
-    axes: Array,
-    target: Array,
-    aside: Array | float = 0.0,
-    straight: bool = False,
+    A: float, h: float, momentum: Array, axes: Array, target: Array, aside: Array | float = 0.0, straight: bool = False
 ) -> TwoJumps:
     """Two jumps from H = ``momentum`` (3,), spin axes ``axes`` (n, 3), to the unit vector ``target`` (3,).
 
@@ -132,10 +122,7 @@ def two_jumps(
 
 
 def coast(A: float, momentum: Array, axes: Array, target: Array) -> tuple[Array, Array]:
-    """Time in s until the spin axes ``axes`` (n, 3) pass ``target`` (3,) about ``momentum`` (n, 3); and one period.
-
-    Both must lie on the same cone about H.
-    """
+    """Time in s until ``axes`` (n, 3) pass ``target`` (3,), on the same cone about ``momentum`` (n, 3); one period."""
     size = np.linalg.norm(momentum, axis=-1)
     unit = momentum / size[:, None]
     sine = np.sum(unit * np.cross(axes, target), axis=-1)
@@ -145,11 +132,9 @@ def coast(A: float, momentum: Array, axes: Array, target: Array) -> tuple[Array,
 
 
 def half_cone(h: float, axes: Array, target: Array, cones: int) -> tuple[Array, Array]:
-    """H (n, 3) in the first of ``cones`` half cones from spin axes ``axes`` (n, 3) to ``target`` (3,), and further
-    cost.
+    """H (n, 3) in the first of ``cones`` half cones from ``axes`` (n, 3) to ``target`` (3,), and the further cost.
 
-    Half cones of half-angle δ = β/2n lie in a row on the great circle from S to T. The further cost (n,) N m s is that
-    of the jumps after the first: (2n - 1) h tan δ.
+    Half cones of half-angle δ = β/2n lie in a row on the great circle from S to T; further jumps cost (2n - 1) h tan δ.
     """
     angle = np.arctan2(np.linalg.norm(np.cross(axes, target), axis=-1), axes @ target)
     half = angle / (2 * cones)
@@ -161,10 +146,7 @@ def half_cone(h: float, axes: Array, target: Array, cones: int) -> tuple[Array, 
 
 
 def half_cones_impulse(h: float, angle: float, cones: int) -> float:
-    """Cost of ``cones`` half cones, N m s: 2n h tan(β/2n), with β = ``angle`` in rad below nπ.
-
-    As n grows it falls to the lower bound hβ.
-    """
+    """Cost of n = ``cones`` half cones, N m s: 2n h tan(β/2n), with β = ``angle`` in rad below nπ; hβ as n grows."""
     return 2 * cones * h * math.tan(angle / (2 * cones))
 
 
@@ -183,10 +165,7 @@ def reach(torque: float, spin: float, longest: float) -> float:
 
 
 def on_times_to_turn(impulses: Array, torque: float, spin: float) -> Array:
-    """On-times (n,) s of pulses that turn H like ``impulses`` (n,) N m s: (2/ω3) asin(ω3J/2M).
-
-    Not a number beyond 2M/ω3, the largest turn of H by a torque fixed in the body.
-    """
+    """On-times (n,) s of pulses that turn H like ``impulses`` (n,) N m s: (2/ω3) asin(ω3J/2M), NaN beyond 2M/ω3."""
     rate = 0.5 * abs(spin)
     if rate == 0.0:
         return impulses / torque

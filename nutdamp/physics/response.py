@@ -168,8 +168,7 @@ def stepwise_torque(
 ) -> tuple[ComplexArray, Array]:
     """General solution, Magnus 1970 (8)-(10), for a torque that is constant between edges; exact at any angle.
 
-    The form of these equations; schedules fly their pulses by `rates` and `taylor`. ``times`` (n,) s in [edges[0],
-    edges[-1]]; ``edges`` (k+1,) s ascending, the motion (``omega0``, ``spin0`` in rad/s) begins at edges[0];
+    ``times`` (n,) s within ``edges`` (k+1,) s ascending; ``omega0``, ``spin0`` in rad/s are those at edges[0];
     ``torques`` (k, 3) N m. Returns ω (n,) and ω3 (n,) in rad/s.
     """
     edges, torques = np.asarray(edges, dtype=float), np.asarray(torques, dtype=float)
@@ -233,8 +232,7 @@ def permanent_rotation(A: float, C: float, spin: float, torque: complex) -> tupl
     Returns ω (rad/s), its rate ψ̇0 = |ω_i| and the Euler angles ϑ0, φ0 (rad), (14).
 
     tan ϑ0 = |M|/(|A - C| ω3²), tan φ0 = ω1/ω2 by arctan2; ψ̇0 is |ω|, where the source prints |ω̇|. With
-    ω1 = ψ̇0 sin ϑ0 sin φ0, ω2 = ψ̇0 sin ϑ0 cos φ0, ω3 = ψ̇0 cos ϑ0. Infinite for a sphere. The form of (14); plans
-    need no more than `steady_response`.
+    ω1 = ψ̇0 sin ϑ0 sin φ0, ω2 = ψ̇0 sin ϑ0 cos φ0, ω3 = ψ̇0 cos ϑ0. Infinite for a sphere.
     """
     omega = steady_response(A, (A - C) / A * spin, torque)
     rate = math.hypot(abs(omega), spin)

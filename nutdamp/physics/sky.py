@@ -4,20 +4,21 @@ On a free arc of a symmetric body the axis goes round H on a cone: with H at the
 axis at θ from H it comes as near as |β - θ| and as far as β + θ, if it goes so far round. Where dissipation changes θ
 only the turns that count are followed in steps; any other motion all the way.
 
-A Sun pulse comes when the Sun passes the azimuth of the sensor in the nutating body, so each thruster pulse moves the
-Sun pulses after it. Arrays carry the case last, as in `batch`, which propagates everything.
+A Sun pulse comes when the Sun passes the azimuth of the sensor in the nutating body. Arrays carry the case last.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import reduce
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from nutdamp.physics.attitude import angle_of_parts
 from nutdamp.physics.batch import MotionStretch, pieces
 
 OBLIQUITY = math.radians(23.43928)  # obliquity of the ecliptic at J2000.0
@@ -30,9 +31,8 @@ TILTING, NODE = math.radians(0.013056), math.radians(174.876)
 def direction(days: float) -> NDArray[np.float64]:
     """Geocentric unit vector (3,) to the apparent Sun in the mean equator and equinox of J2000.0.
 
-    ``days`` since J2000.0 (2000-01-01T12:00 TT). To 0.01 deg from 1972 to 2100. Longitude by J. Meeus, Astronomical
-    Algorithms, 2nd ed., chapter 25, "low accuracy", with aberration, taken from ecliptic and equinox of date to J2000.0
-    (21).
+    ``days`` since J2000.0 (2000-01-01T12:00 TT). To 0.01 deg from 1972 to 2100. By J. Meeus, Astronomical Algorithms,
+    2nd ed., chapter 25, "low accuracy", with aberration, taken to ecliptic and equinox of J2000.0 (21).
     """
     centuries = days / 36525.0
     mean_longitude = 280.46646 + centuries * (36000.76983 + centuries * 0.0003032)
@@ -60,24 +60,20 @@ CIRCLE = 2.0 * math.pi
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AxisWatch:
-    """Extreme angles ``least`` and ``largest`` (m, n) rad so far between the spin axis and ``directions`` (m, 3, n).
+    """Extreme angles so far between the spin axis and directions."""
 
-    The directions are inertial unit vectors, but for the one with the number ``momentum``: that of H, wherever it
-    points. ``sense`` is the sign of the spin; ``rows``: indices of the observed cases among the n.
-    """
-
-    directions: Array
-    least: Array
-    largest: Array
-    sense: float
-    momentum: int | None = None
-    rows: Any = ...
+    directions: Array  # inertial unit vectors (m, 3, n)
+    least: Array  # (m, n) rad
+    largest: Array  # (m, n) rad
+    sense: float  # sign of the spin
+    momentum: int | None  # number of the direction in place of which H is taken, wherever it points
+    rows: NDArray[np.intp]  # indices of the observed cases among the n
 
     @classmethod
     def of(cls, directions: Array, sense: float, momentum: int | None = None) -> AxisWatch:
         """Observer without observations."""
         shape = len(directions), directions.shape[2]
-        return cls(directions, np.full(shape, math.pi), np.zeros(shape), sense, momentum)
+        return cls(directions, np.full(shape, math.pi), np.zeros(shape), sense, momentum, np.arange(shape[1]))
 
     @property
     def angles(self) -> Array:
@@ -86,15 +82,13 @@ class AxisWatch:
 
     def some(self, cases: Any) -> AxisWatch:
         """Observer of a subset of ``cases`` (an index of arrays), which adds to this one."""
-        rows = np.arange(self.least.shape[1])[self.rows][cases]
-        return AxisWatch(self.directions, self.least, self.largest, self.sense, self.momentum, rows)
+        return replace(self, rows=self.rows[cases])
 
     def motion(self, here: MotionStretch, duration: Array) -> None:
         """Record the motion that `batch.advance` makes with these arguments, which stay as they are."""
-        bodies = here.bodies
-        if here.torque is not None or not bodies.free:
+        if here.torque is not None or not here.bodies.free:
             self._steps(here, duration)
-        elif bodies.forcing.growth == 0.0:
+        elif here.bodies.forcing.growth == 0.0:
             self._arc(here, duration)
         else:
             self._slow(here, duration)
@@ -105,18 +99,17 @@ class AxisWatch:
         self.motion(here, CIRCLE * 0.5 * (first + second) / _momentum(here))
 
     def _take(self, number: int, least: Array, largest: Array, cases: Any = ...) -> None:
-        rows = np.arange(self.least.shape[1])[self.rows][cases]
-        np.minimum.at(self.least[number], rows, least)  # a case may come twice
-        np.maximum.at(self.largest[number], rows, largest)
+        np.minimum.at(self.least[number], self.rows[cases], least)  # a case may come twice
+        np.maximum.at(self.largest[number], self.rows[cases], largest)
 
     def _arc(self, here: MotionStretch, duration: Array) -> None:
         """Record start and inner extremes of arcs; their ends are starts of others."""
         momentum = _rotated(here.quaternion, here.bodies.momentum(here.rates))
         axis, size = self.sense * _third_axis(here.quaternion), np.sqrt(np.sum(momentum * momentum, axis=0))
         momentum, way = momentum / size, size / here.bodies.moments[0] * duration
-        theta = _angles(momentum, axis)
+        theta = angle_of_parts(momentum, axis)
         for number, direction in enumerate(self._towards(momentum)):
-            begins, beta = _angles(axis, direction), _angles(momentum, direction)
+            begins, beta = angle_of_parts(axis, direction), angle_of_parts(momentum, direction)
             along = np.sum(axis * direction, axis=0) - np.cos(theta) * np.cos(beta)
             ahead = np.sum(_cross(momentum, axis) * direction, axis=0)
             nearest = np.arctan2(ahead, along) % CIRCLE  # how far round from where it is the axis comes nearest
@@ -125,17 +118,16 @@ class AxisWatch:
             self._take(number, np.where(way >= nearest, least, begins), np.where(way >= farthest, largest, begins))
 
     def _slow(self, here: MotionStretch, duration: Array) -> None:
-        """Record arcs with dissipation, of which the first turn and the last are followed in steps.
-
-        H stays and θ changes monotonically: between those turns so do |β - θ| and β + θ, unless θ passes β or π - β,
-        where all turns are followed.
-        """
+        """Record arcs with dissipation: in steps the first turn and the last, or all where θ passes β or π - β."""
         turn = CIRCLE * here.bodies.moments[0] / _momentum(here)
         last = here.moved(here.since + np.maximum(duration - turn, 0.0))
         momentum = _rotated(here.quaternion, here.bodies.momentum(here.rates))
         momentum /= np.sqrt(np.sum(momentum * momentum, axis=0))
-        before, after = (_angles(momentum, self.sense * _third_axis(stretch.quaternion)) for stretch in (here, last))
-        betas = np.array([_angles(momentum, direction) for direction in self._towards(momentum)])
+        before, after = (
+            angle_of_parts(momentum, self.sense * _third_axis(stretch.quaternion)) for stretch in (here, last)
+        )
+        betas = np.array([angle_of_parts(momentum, direction) for direction in self._towards(momentum)])
+        # Else |β - θ| and β + θ change monotonically between the first turn and the last, as θ does.
         passed = [(before - other) * (after - other) <= 0.0 for other in (*betas, *(math.pi - betas))]
         whole = (duration <= 2.0 * turn) | np.any(passed, axis=0)
         for cases, begins, lasts in ((whole, here, duration), (~whole, here, turn), (~whole, last, turn)):
@@ -245,12 +237,6 @@ def _third_axis(quaternion: Array) -> Array:
     return np.array([2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)])
 
 
-def _angles(first: Array, second: Array) -> Array:
-    """Angles (n,) between vectors (3, n), exact to rounding from 0 to π."""
-    across = _cross(first, second)
-    return np.asarray(np.arctan2(np.sqrt(np.sum(across * across, axis=0)), np.sum(first * second, axis=0)))
-
-
 ITERATIONS = 40  # largest number of Newton steps to a Sun pulse; three or four are usual
 EXACT = 1e-13  # tolerance of the time of a Sun pulse, in spin turns
 AHEAD = 8  # largest number of Sun pulses skipped between two computed ones; the mean rate predicts the next
@@ -269,9 +255,8 @@ class SunPulseClock:
     """Motion of bodies from Sun pulse to Sun pulse, which count from 1, the first after t = 0.
 
     ``sun`` (3, n) are inertial unit vectors, ``azimuth`` rad is that of the sensor about axis 3 from axis 1, ``sense``
-    the sign of the spin. ``time`` (n,) s is that of the last computed Sun pulse, ``lost`` (n,) True where there was
-    none: the Sun is too near to the axis to go round in the body. ``over`` (n,) s: end of the last pulse, command and
-    thrust.
+    the sign of the spin. ``time`` (n,) s is that of the last computed Sun pulse; there was none where ``lost`` (n,):
+    the Sun is too near to the axis to go round. ``over`` (n,) s: end of the last pulse, command and thrust.
     """
 
     def __init__(self, start: MotionStretch, sun: Array, sense: float, azimuth: float) -> None:
@@ -297,7 +282,7 @@ class SunPulseClock:
         delay: Array,
         width: float,
         pushes: Sequence[TorqueRamp],
-        sheds: Array | None = None,
+        sheds: Array | None,
     ) -> Array:
         """Fire a command of ``width`` s, ``delay`` (n,) s after the last Sun pulse, ``sun_pulse``.
 
@@ -306,17 +291,13 @@ class SunPulseClock:
         """
         before, half = self.here, None if sheds is None else 0.5 * sheds
         starts = np.maximum(sun_pulse.since + delay, self.over)
-        lasts: Any = width
-        for push in pushes:
-            lasts = np.maximum(lasts, push.end)
-        self.over = starts + lasts
+        self.over = starts + reduce(np.maximum, (push.end for push in pushes), width)
         if not pushes:
             return starts
         begun = sun_pulse.moved(starts + pushes[0].begin)
         late = np.flatnonzero(sun_pulse.since < before.since)  # it came while the pulse before was on
         if len(late):
-            again = before.some(late).moved(begun.since[late])
-            begun.rates[:, late], begun.quaternion[:, late] = again.rates, again.quaternion
+            begun.rates[:, late], begun.quaternion[:, late] = before.some(late).moved(begun.since[late])[2:4]
         begun = begun._replace(bodies=before.bodies.lighter(half))
         self._stretches = [before]
         for push in pushes:
@@ -346,14 +327,11 @@ class SunPulseClock:
 
     def angle(self, here: MotionStretch) -> Array:
         """Angle between spin axis and Sun, (n,) rad."""
-        return _angles(self.sense * _third_axis(here.quaternion), self.sun)
+        return np.asarray(angle_of_parts(self.sense * _third_axis(here.quaternion), self.sun))
 
     @property
     def _pace(self) -> Array:
-        """Mean rate (n,) rad/s at which the Sun goes round in the free body.
-
-        The body turns about H at |H|/A, and about its axis at ω3 - H3/A: together, and at small angles, at ω3.
-        """
+        """Mean rate (n,) rad/s of the Sun in the free body: |H|/A about H, and ω3 - H3/A about the axis."""
         first, second, _ = self.here.bodies.moments
         A, momentum = 0.5 * (first + second), self.here.bodies.momentum(self.here.rates)
         return np.asarray(np.abs(self.sense * _momentum(self.here) / A + self.here.rates[2] - momentum[2] / A))
@@ -393,8 +371,7 @@ class SunPulseClock:
 def ahead(rates: Array, quaternion: Array, sun: Array, azimuth: float, sense: float) -> tuple[Array, Array]:
     """Angle (n,) in [0, 2π) by which bodies have to turn until the Sun passes the sensor, and its rate, rad/s.
 
-    ``rates`` (3, n) rad/s, ``quaternion`` (4, n) body -> inertial, ``sun`` (3, n) inertial unit vectors; ``azimuth``
-    rad and ``sense`` are those of a `SunPulseClock`.
+    ``rates`` (3, n) rad/s, ``quaternion`` (4, n) body -> inertial; the others are those of a `SunPulseClock`.
     """
     w, x, y, z = quaternion
     s1, s2, s3 = sun

@@ -1,15 +1,13 @@
 """Taylor integration of Euler's equations and the attitude of one body under piecewise constant torques.
 
 The equations are polynomials in rates and quaternion, so the Taylor coefficients of a solution follow from one
-another by products of series. One step spans about two radians at rounding accuracy, for any principal moments, and
-the series is its own dense output; closed forms and plans are checked against it.
+another by products of series. One step spans about two radians at rounding accuracy, for any principal moments.
 
-Without dissipation the rates of a symmetric body do not depend on its attitude and are linear in their drive:
-ω' = -iaω3 ω + M/A with ω3 linear in time, Magnus 1970 (1). The rates at the ends of all steps follow from sums, and
-the steps of the attitude are independent of each other: arrays carry the steps and the cases, and the turns of the
-steps are multiplied at the end. A quaternion (w, x, y, z) is a pair of complex numbers there, p = w + iz and
-r = x + iy: dq/dt = q (0, ω)/2 becomes p' = (iω3 p - ω̄ r)/2 and r' = (ω p - iω3 r)/2, and the product of two is
-(p p* - r r̄*, p r* + r p̄*).
+Without dissipation the rates of a symmetric body are linear in their drive whatever its attitude: ω' = -iaω3 ω + M/A
+with ω3 linear in time, Magnus 1970 (1). The rates at the ends of all steps follow from sums, and the steps of the
+attitude are independent of each other: arrays carry the steps and the cases, and the turns of the steps are multiplied
+at the end. A quaternion (w, x, y, z) is a pair of complex numbers there, p = w + iz and r = x + iy: dq/dt = q (0, ω)/2
+becomes p' = (iω3 p - ω̄ r)/2 and r' = (ω p - iω3 r)/2, and the product of two is (p p* - r r̄*, p r* + r p̄*).
 """
 
 from __future__ import annotations
@@ -42,17 +40,19 @@ class NotConverged(ArithmeticError):
 
 @dataclass(frozen=True, slots=True)
 class Drive:
-    """Drive of n symmetric bodies, (n,) each: ``a`` = (A - C)/A, M/A = ``transverse`` in rad/s² and M3/C.
+    """Drive of n symmetric bodies, (n,) each."""
 
-    ``turning``: (M/A, r) of torques M e^{irt} about axis 3, with M/A (n,) at t = 0 and r in rad/s. ``wheel``: h/A
-    in rad/s of a part of constant momentum h along axis 3, which turns ω at aω3 - h/A in the body.
-    """
+    a: Array  # (A - C)/A
+    transverse: ComplexArray  # M/A, rad/s²
+    axial: Array  # M3/C, rad/s²
+    turning: tuple[tuple[ComplexArray | complex, float], ...] = ()  # (M/A, r) of torques M e^{irt}, r in rad/s
+    wheel: Array | float = 0.0  # h/A, rad/s, of a constant momentum h along axis 3: ω turns at aω3 - h/A
 
-    a: Array
-    transverse: ComplexArray
-    axial: Array
-    turning: tuple[tuple[ComplexArray, float], ...] = ()
-    wheel: Array | float = 0.0
+    @classmethod
+    def of(cls, a: Array, acceleration: Array, forcing: Forcing, A: Any) -> Drive:
+        """Drive by an angular ``acceleration`` (3, n) rad/s² besides the ``forcing``."""
+        turning = tuple((size / A, rate) for size, rate in forcing.turning)
+        return cls(a, acceleration[0] + 1j * acceleration[1], acceleration[2], turning, forcing.wheel / A)
 
     def pace(self, omega: ComplexArray, spin: Array, duration: Array) -> Array:
         """Upper bound (n,) in rad/s on all rates during the ``duration`` (n,) s."""
@@ -66,29 +66,20 @@ class Drive:
 
 
 class Steps(NamedTuple):
-    """Series of s steps of n bodies in x from 0 to 1 within each: ``starts`` (s, n) s and ``duration`` (n,) s.
+    """Series of s steps of n bodies in x from 0 to 1 within each."""
 
-    ``omega`` (k, s, n) and ``spin`` (2, s, n) in rad/s; ``turn`` (k, 2, s, n): p and r of the turn since the start of
-    the step.
-    """
-
-    starts: Array
-    duration: Array
-    omega: ComplexArray
-    spin: Array
-    turn: ComplexArray
+    starts: Array  # (s, n) s
+    duration: Array  # (n,) s
+    omega: ComplexArray  # (k, s, n) rad/s
+    spin: Array  # (2, s, n) rad/s
+    turn: ComplexArray  # (k, 2, s, n), p and r of the turn since the start of the step
 
 
 def steps(drive: Drive, omega: ComplexArray, spin: Array, start: Array, duration: Array, count: int) -> Iterator[Steps]:
-    """Motion over ``duration`` (n,) s from ``start`` (n,) s in ``count`` equal steps or a multiple, in groups.
-
-    ``omega`` and ``spin`` (n,) rad/s at the start. Raises NotConverged.
-    """
-    step, done = duration / count, 0
-    together = max(TOGETHER // len(spin), 1)
-    halvings = 0
+    """Motion from ``start`` (n,) s in ``count`` equal steps or a multiple, in groups; raises NotConverged."""
+    step, done, halvings = duration / count, 0, 0
     while done < count:
-        some = min(together, count - done)
+        some = min(max(TOGETHER // len(spin), 1), count - done)
         series = _driven_series(drive, omega, spin, start + done * step, step, some)
         if series is None:
             if halvings == HALVINGS:
@@ -103,10 +94,7 @@ def steps(drive: Drive, omega: ComplexArray, spin: Array, start: Array, duration
 def end(
     drive: Drive, omega: ComplexArray, spin: Array, turned: ComplexArray, start: Array, duration: Array
 ) -> tuple[ComplexArray, Array, ComplexArray]:
-    """ω (n,), ω3 (n,) and the turn (2, n) after ``duration`` (n,) s, from those at ``start`` (n,) s.
-
-    Raises NotConverged.
-    """
+    """ω (n,), ω3 (n,), turn (2, n) after ``duration`` (n,) s, from those at ``start`` (n,) s; raises NotConverged."""
     for series in steps(drive, omega, spin, start, duration, count_for(drive, omega, spin, duration)):
         turned = product(turned, whole(series.turn.sum(axis=0)))
         omega, spin = series.omega[:, -1].sum(axis=0), series.spin[:, -1].sum(axis=0)
@@ -134,8 +122,7 @@ def _driven_series(drive: Drive, omega: ComplexArray, spin: Array, now: Array, s
         driven = _rates(np.zeros_like(forces[0]), turning, spins, wheel, forces, DRIVEN_ORDER).sum(axis=0)
         turned = np.cumsum(drive.a * step * (spins[0] + 0.5 * gained) - drive.wheel * step, axis=0)
         sums = omega + np.cumsum(np.exp(1j * turned) * driven, axis=0)
-        later = sums[:-1] * np.exp(-1j * turned[:-1])
-        omega_starts = np.concatenate([omega[None], later])
+        omega_starts = np.concatenate([omega[None], sums[:-1] * np.exp(-1j * turned[:-1])])
     else:
         omega_starts = np.broadcast_to(omega, starts.shape)
     while True:
@@ -163,8 +150,7 @@ def _powers(constant: ComplexArray, turning: list[tuple[Any, Any]]) -> list[Any]
     """Terms of the drive of ω in a step, times the step: the ``constant`` in the first only."""
     if not turning:
         return [constant]
-    terms: list[Any] = []
-    sizes = [size for size, _ in turning]
+    terms, sizes = list[Any](), [size for size, _ in turning]
     for order in range(DRIVEN_ORDER):
         terms.append(sum(sizes))
         sizes = [size * turn / (order + 1) for size, (_, turn) in zip(sizes, turning, strict=True)]
@@ -190,8 +176,7 @@ def _rates(omega: ComplexArray, turning: Any, spins: Array, wheel: Any, forces: 
 
 def _turns(rates: ComplexArray, spins: Array, step: Array, order: int) -> ComplexArray:
     """Series of the turn (order+1, 2, s, n) since the start of each step."""
-    shape = rates.shape[1:]
-    series = np.empty((order + 1, 2, *shape), dtype=complex)
+    series = np.empty((order + 1, 2, *rates.shape[1:]), dtype=complex)
     series[0, 0], series[0, 1] = 1.0, 0.0
     half = 0.5 * step
     across = np.stack([-rates.conj(), rates], axis=1) * half
@@ -255,16 +240,11 @@ class Falling(NamedTuple):
 
 
 class Forcing(NamedTuple):
-    """Forcing of a body besides a constant torque.
+    """Forcing of a body besides a constant torque."""
 
-    ``turning``: torques M e^{irt} about axis 3 of the body, as (M = M1 + iM2 in N m at t = 0, r in rad/s).
-    ``growth``: rate κ in 1/s at which energy dissipation lets a small nutation grow (negative: decay), `energy_sink`.
-    ``wheel``: constant momentum h along axis 3 besides I3 ω3, N m s; (n,) by case in `batch`.
-    """
-
-    turning: tuple[tuple[complex, float], ...] = ()
-    growth: float = 0.0
-    wheel: Any = 0.0
+    turning: tuple[tuple[complex, float], ...] = ()  # torques M e^{irt} about axis 3: M1 + iM2 in N m at t = 0, r rad/s
+    growth: float = 0.0  # κ of `energy_sink`, 1/s, at which a small nutation grows; negative: decay
+    wheel: Any = 0.0  # constant momentum h along axis 3 besides I3 ω3, N m s; (n,) by case in `batch`
 
 
 NOTHING = Forcing()
@@ -272,15 +252,12 @@ NOTHING = Forcing()
 
 @dataclass(frozen=True, slots=True)
 class TaylorPiece:
-    """Solution from ``start`` over ``duration`` s as polynomials in x = (t - start)/duration.
-
-    ``rates`` (orders, 3) in rad/s, ``attitude`` (orders, 4).
-    """
+    """Solution from ``start`` over ``duration`` s as polynomials in x = (t - start)/duration."""
 
     start: float
     duration: float
-    rates: Array
-    attitude: Array
+    rates: Array  # (orders, 3) rad/s
+    attitude: Array  # (orders, 4)
 
     def at(self, times: Array) -> tuple[Array, Array]:
         """Rates (n, 3) and unit quaternions (n, 4) at ``times`` (n,) s within the piece."""
@@ -309,9 +286,8 @@ def integrate(
 ) -> list[TaylorPiece]:
     """Motion of a rigid body under a constant body torque and ``forcing``, from ``start`` to ``end`` s (> start).
 
-    ``moments`` (I1, I2, I3) kg m², ``torque`` (3,) N m, ``rates`` (3,) rad/s, ``quaternion`` (4,) body -> inertial.
-    With a ``slope`` (3,) N m/s the torque is that at ``start`` and changes linearly; ``falling`` moments are those at
-    ``start``. Raises Infeasible for motions over more than `LONGEST` rad or ``most`` steps.
+    ``moments`` (I1, I2, I3) kg m², ``torque`` (3,) N m with its ``slope`` (3,) N m/s, ``rates`` (3,) rad/s,
+    ``quaternion`` (4,) body -> inertial at ``start``. Raises Infeasible beyond `LONGEST` rad or ``most`` steps.
     """
     # In one piece: a part of the loop would take torque, slope, moments and forcing, each as it is at a step.
     pieces: list[TaylorPiece] = []
@@ -325,7 +301,7 @@ def integrate(
     turned = (float(np.linalg.norm(rates)) + math.sqrt(strength) + fastest) * (end - start)
     even = jerk is None and falling is None
     if moments[0] == moments[1] and forcing.growth == 0.0 and even and not turned <= SHORT:
-        return _symmetric(moments, torque, rates, quaternion, start, end, forcing, most)
+        return _symmetric(moments, acceleration, rates, quaternion, start, end, forcing, most)
     size = float(np.linalg.norm(inertia * rates)) + abs(forcing.wheel) + strength * max(moments) * (end - start)
     floor = (AT_REST * size) ** 2
     gone, duration = 0.0, end - start  # counted from the start: a late clock cannot tell so short a step
@@ -349,9 +325,8 @@ def integrate(
         if left - step < 1e-3 * step:  # no sliver of a step at the end
             step = left
         scaled = series * ((step / unit) ** np.arange(ORDER + 1))[:, None]
-        piece = TaylorPiece(now, step, scaled[:, :3], scaled[:, 3:])
-        pieces.append(piece)
-        rates, quaternion = piece.final
+        pieces.append(TaylorPiece(now, step, scaled[:, :3], scaled[:, 3:]))
+        rates, quaternion = pieces[-1].final
         gone = duration if step == left else gone + step
     raise _refused(start, end)
 
@@ -367,7 +342,7 @@ def _refused(start: float, end: float, angle: float | None = None) -> Infeasible
 
 def _symmetric(
     moments: tuple[float, float, float],
-    torque: Array,
+    acceleration: Array,
     rates: Array,
     quaternion: Array,
     start: float,
@@ -377,22 +352,14 @@ def _symmetric(
 ) -> list[TaylorPiece]:
     """`integrate` for I1 = I2 without dissipation: many steps at once, see `steps`."""
     A, _, C = moments
-    drive = Drive(
-        np.array([(A - C) / A]),
-        np.array([complex(torque[0], torque[1]) / A]),
-        np.array([float(torque[2]) / C]),
-        tuple((np.array([size / A]), rate) for size, rate in forcing.turning),
-        forcing.wheel / A,
-    )
-    omega, spin = np.array([complex(rates[0], rates[1])]), np.array([float(rates[2])])
-    duration = np.array([end - start])
+    drive = Drive.of(np.array([(A - C) / A]), acceleration[:, None], forcing, A)
+    omega, spin, duration = np.array([complex(rates[0], rates[1])]), rates[2:], np.array([end - start])
     angle = float(drive.pace(omega, spin, duration)[0]) * (end - start)
     if angle > most * STRIDE and most < MOST_STEPS:
         raise _refused(start, end)
     if not angle <= LONGEST:
         raise _refused(start, end, angle)
-    count = count_for(drive, omega, spin, duration)
-    pieces: list[TaylorPiece] = []
+    count, pieces = count_for(drive, omega, spin, duration), list[TaylorPiece]()
     try:
         for series in steps(drive, omega, spin, np.array([start]), duration, count):
             pieces += _pieces(series, quaternion)
@@ -429,8 +396,8 @@ def _series(
     now: float,
     state: Array,
     unit: float,
-    jerk: Array | None = None,
-    falling: Falling | None = None,
+    jerk: Array | None,
+    falling: Falling | None,
 ) -> Array:
     """Taylor coefficients (ORDER+1, 7) of rates and quaternion in units of time ``unit``.
 
@@ -505,22 +472,17 @@ class _Light:
 class _Sink:
     """`energy_sink` as series: torque of dissipation on H in body axes, and slip of the body.
 
-    With q = H3/|H|² the slip is s = κq (H2, -H1, 0), and H × s is added to dH/dt in the body: products of series but
-    for q. ``floor`` keeps q regular where external torques bring H to rest: there is nothing to dissipate there.
+    With q = H3/|H|² the slip is s = κq (H2, -H1, 0), and H × s is added to dH/dt in the body. ``floor`` keeps q regular
+    where external torques bring H to rest: there is nothing to dissipate there.
     """
 
     def __init__(self, moments: Array, growth: float, floor: float, wheel: float) -> None:
         self.moments, self.growth, self.floor, self.wheel = moments, growth, floor, wheel
-        self.momentum = np.zeros((ORDER, 3))
-        self.squares = np.zeros(ORDER)  # |H|²
-        self.quotient = np.zeros(ORDER)  # q
-        self.slip = np.zeros((ORDER, 3))  # s
+        self.momentum, self.slip = np.zeros((2, ORDER, 3))  # H and s
+        self.squares, self.quotient = np.zeros((2, ORDER))  # |H|² and q
 
-    def acceleration(self, rates: Array, k: int, more: Array | None = None) -> Array:
-        """Coefficient k of (H × s)/I, (3,); stores that of ``slip``. ``rates`` (3,): coefficient k of ω.
-
-        ``more`` (3,) is added to that of H, I ω with the moments of the beginning.
-        """
+    def acceleration(self, rates: Array, k: int, more: Array | None) -> Array:
+        """Coefficient k of (H × s)/I, (3,), from that of ω and ``more`` of H (3,); stores that of ``slip``."""
         momentum, slip = self.momentum, self.slip
         momentum[k] = self.moments * rates if more is None else self.moments * rates + more
         momentum[k, 2] += self.wheel if k == 0 else 0.0
@@ -540,10 +502,6 @@ class _Sink:
 
 def _reach(series: Array, unit: float) -> float:
     """Reach of the series at accuracy `REMAINDER`, in its unit of time, from its last two orders."""
-    size = np.max(np.abs(series[-2:]) * np.array([unit] * 3 + [1.0] * 4), axis=1)
-    reaches = [
-        (REMAINDER / float(last)) ** (1.0 / order)
-        for last, order in zip(size, (ORDER - 1, ORDER), strict=True)
-        if last > 0.0
-    ]
+    sizes = np.max(np.abs(series[-2:]) * np.array([unit] * 3 + [1.0] * 4), axis=1).tolist()
+    reaches = [(REMAINDER / last) ** (1.0 / order) for order, last in enumerate(sizes, ORDER - 1) if last > 0.0]
     return min(reaches, default=math.inf)

@@ -1,8 +1,7 @@
 """Thruster: valve response (thrust, impulse, centroid), nozzle temperature, tank in blowdown.
 
 Times are in s after the start of the command; thrust is counted in full thrust, so that an impulse is a time, the
-*effective on-time*: impulse over full thrust. A rectangular pulse of that length about the centroid has the same
-impulse and the same first moment.
+*effective on-time*: that of a rectangular pulse about the centroid with the same impulse and first moment.
 """
 
 from __future__ import annotations
@@ -29,14 +28,11 @@ def possible(tank: Tank) -> Any:
 
 @dataclass(frozen=True, slots=True)
 class Cold:
-    """Cold nozzle: the first pulse of each channel has ``first`` times the thrust; it decays to 1 over ``pulses``.
+    """Cold nozzle; the first two may be arrays, of cases."""
 
-    ``fired``: pulses by channel before t = 0. The first two may be arrays, of cases.
-    """
-
-    first: Any
-    pulses: Any
-    fired: Mapping[str, int] = field(default_factory=dict)
+    first: Any  # thrust of the first pulse of each channel over that of a warm one
+    pulses: Any  # over which that decays to 1
+    fired: Mapping[str, int] = field(default_factory=dict)  # pulses by channel before t = 0
 
     def factor(self, before: int) -> Any:
         """Thrust factor of the pulse after ``before`` others: 1 - (1 - first) exp(-k/pulses)."""
@@ -52,21 +48,15 @@ PIECES = 16  # parts of a pulse, each with the specific impulse of its middle
 
 @dataclass(frozen=True, slots=True)
 class Tank:
-    """Tank in blowdown: ``propellant`` kg, ``pressure`` when full and ``final_pressure`` Pa with nothing left.
+    """Tank in blowdown; the first four may be arrays, of cases."""
 
-    Thrust goes with the pressure to the power ``exponent``. ``isp`` are rows of pressure, Pa, rising, and specific
-    impulse, s, interpolated linearly; None leaves it to the thrusters. ``used`` kg were used before t = 0. The
-    principal moments (I1, I2, I3) of the spacecraft fall by ``inertia_per_kg`` kg m² for each kg that is used; None:
-    constant. The first four may be arrays, of cases.
-    """
-
-    propellant: Any
-    pressure: Any
-    final_pressure: Any
-    exponent: Any
-    isp: tuple[tuple[float, float], ...] | None = None
-    used: float = 0.0
-    inertia_per_kg: tuple[float, float, float] | None = None
+    propellant: Any  # kg
+    pressure: Any  # Pa, when full
+    final_pressure: Any  # Pa, with nothing left
+    exponent: Any  # power of the pressure that the thrust goes with
+    isp: tuple[tuple[float, float], ...] | None = None  # rows of pressure, Pa, rising, and s; None: of the thrusters
+    used: float = 0.0  # kg, before t = 0
+    inertia_per_kg: tuple[float, float, float] | None = None  # kg m² by which I1, I2, I3 fall for each kg used
 
     @property
     def doubled(self) -> Tank:
@@ -91,9 +81,8 @@ class Tank:
     def burn(self, used: Any, flow: Any, time: Any) -> tuple[Any, Any]:
         """Propellant (kg) of ``time`` s of full thrust after ``used`` kg, and its mean thrust over that of a full tank.
 
-        ``flow`` is that of a full tank, kg/s, times the specific impulse where the tank has it. The pressure falls as
-        the gas expands, p = p0/(1 + κu/U) with κ = p0/p1 - 1, and the thrust with its power x, so that (1 + κu/U)^(x+1)
-        grows linearly in time. Past the last of the propellant it goes on falling.
+        ``flow`` is that of a full tank, kg/s, times the specific impulse where the tank has it. With p = p0/(1 + κu/U),
+        κ = p0/p1 - 1, and the thrust as its power x, (1 + κu/U)^(x+1) grows linearly in time, past the last kg too.
         """
         if self.isp is None:
             return self._burn(used, flow, time)
@@ -116,10 +105,7 @@ class Tank:
         return flow * level * time * share, level * share
 
     def share(self, used: Any, more: Any) -> Any:
-        """Fraction fired of a pulse that takes ``more`` kg after ``used``: 1, or as far as the propellant lasts.
-
-        A pulse during which the tank runs empty is as long as commanded, and that much weaker.
-        """
+        """Fraction fired of a pulse that takes ``more`` kg after ``used``: 1, or as far as the propellant lasts."""
         left, many = self.propellant - used, np.ndim(used) or np.ndim(more) or np.ndim(self.propellant)
         if not many:
             return 1.0 if more <= left or more == 0.0 else max(left, 0.0) / more
@@ -214,19 +200,13 @@ class Opened(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Trapezoid:
-    """Valve with delays of opening and closing, s, and linear rise and fall of the thrust.
+    """Valve with linear rise and fall of the thrust: a triangle where it closes before full thrust is reached."""
 
-    A command from 0 to τ lets the thrust rise from ``open_delay`` on, to full thrust within ``rise_time``, and fall
-    from τ + ``close_delay`` on, as fast as from full thrust to nothing within ``fall_time``. A valve that closes before
-    full thrust is reached gives a triangle. ``effective``: the on-times loaded are effective ones, which the
-    electronics of the valve turns into commands.
-    """
-
-    open_delay: float = 0.0
-    close_delay: float = 0.0
-    rise_time: float = 0.0
-    fall_time: float = 0.0
-    effective: bool = False
+    open_delay: float = 0.0  # s from the start of the command until the thrust rises
+    close_delay: float = 0.0  # s from its end until the thrust falls
+    rise_time: float = 0.0  # s to full thrust
+    fall_time: float = 0.0  # s from full thrust to nothing
+    effective: bool = False  # on-times are loaded as effective ones
 
     @property
     def known(self) -> tuple[float, float]:
@@ -285,10 +265,9 @@ class Trapezoid:
         """Bounds (s) of lead and lag of commands that act from ``shortest`` to ``longest`` s of full thrust.
 
         The lead is the time from the start of the command to that of the effective pulse, the lag that from the end of
-        the effective pulse until command and thrust are over.
-
-        With full thrust the lead is open + rise/2 + (fall² - rise²)/(24 × effective), the lag mirrors it; a triangle of
-        level h has open + h(2 rise + fall)/3 - h²(rise + fall)/4. Both are monotone but for one maximum.
+        the effective pulse until command and thrust are over. With full thrust the lead is
+        open + rise/2 + (fall² - rise²)/(24 × effective), the lag mirrors it; a triangle of level h has
+        open + h(2 rise + fall)/3 - h²(rise + fall)/4. Both are monotone but for one maximum.
         """
         rise, fall = self.rise_time, self.fall_time
         corner = 0.5 * (rise + fall)
@@ -314,8 +293,7 @@ class Trapezoid:
 class Measured:
     """Valve by a table of tests: ``rows`` of on-time, effective on-time and centroid, s, each rising.
 
-    Linear between the rows, unknown outside. The thrust is taken as full from half the effective on-time before the
-    centroid to half of it after.
+    Linear between the rows, unknown outside. The thrust is taken as full for the effective on-time about the centroid.
     """
 
     rows: tuple[tuple[float, float, float], ...]
@@ -336,10 +314,7 @@ class Measured:
         return self._between(1, effective, 0)
 
     def opened(self, on_time: float, factor: Any) -> Opened:
-        """Response to a command with all impulses of the table ``factor`` times as large, elementwise.
-
-        It does not begin before the command does.
-        """
+        """Response, not before the command, with all impulses of the table ``factor`` times as large, elementwise."""
         effective, centroid = (self._between(0, on_time, column) for column in (1, 2))
         begin = centroid - 0.5 * effective * factor
         begin = np.where(np.real(begin) > 0.0, begin, 0.0)
@@ -358,25 +333,16 @@ class Measured:
     def reaches(self, shortest: float, longest: float) -> tuple[float, float]:
         """Bounds (s) of lead and lag, see `Trapezoid.reaches`: both linear between the rows."""
         places = [shortest, longest, *(row[1] for row in self.rows if shortest < row[1] < longest)]
-        leads, lags = [], []
-        for place in places:
-            on_time = self.on_time_for(place)
-            thrust = self.thrust(on_time)
-            leads.append(thrust.ramps[0].begin)
-            lags.append(max(on_time - thrust.ramps[0].end, 0.0))
-        return max(leads), max(lags)
+        ramps = [(on_time, self.thrust(on_time).ramps[0]) for on_time in map(self.on_time_for, places)]
+        lags = (max(on_time - ramp.end, 0.0) for on_time, ramp in ramps)
+        return max(ramp.begin for _, ramp in ramps), max(lags)
 
 
 Valve = Trapezoid | Measured  # map from commands to thrust. Times of commands are on-times as they are loaded.
 
 
 def shape_factor(
-    rate: float,
-    change: float,
-    ramps: Sequence[Ramp],
-    centroid: float,
-    growth: float = 0.0,
-    drift: float = 0.0,
+    rate: float, change: float, ramps: Sequence[Ramp], centroid: float, growth: float = 0.0, drift: float = 0.0
 ) -> complex:
     """Factor on the impulse at the ``centroid`` for the effect of a shaped pulse on ω: see `response.width_factor`.
 

@@ -10,8 +10,8 @@ extreme: ω_a ~ cn, ω_b ~ sn, ω_c ~ dn of p t + const. With d_xy = |I_x - I_y|
     P  = I_a d_ca ω_a² + I_b d_cb ω_b²           |H² - 2T I_c|, zero without nutation
     1 - m = Q/(I_c d_cb D²)                      complementary parameter
 
-The addition theorems give the motion from the rates at t = 0 by sn, cn, dn of p t alone, so that neither the phase at
-the start nor the amplitudes of ω_a and ω_b are needed, and no limit divides by a vanishing quantity.
+The addition theorems give the motion from the rates at t = 0 by sn, cn, dn of p t alone: no limit divides by a
+vanishing quantity.
 """
 
 from __future__ import annotations
@@ -95,8 +95,7 @@ def body_nutation_rate(moments: ArrayLike, spin: float, wheel: float = 0.0) -> f
 def nutation_period(moments: ArrayLike, rates0: ArrayLike) -> float:
     """Period 4K/p of the body rates, s, at any amplitude; about 2π/|`body_nutation_rate`| for small ones.
 
-    Infinite on the separatrix and where the rates are constant for want of a restoring couple: a sphere, no spin at
-    all, spin about the middle axis or about any axis in the plane of two equal moments.
+    Infinite on the separatrix and where the rates are constant for want of a restoring couple.
     """
     polhode = _polhode(moments, rates0)
     if polhode.pace == 0.0 or polhode.complement == 0.0:
@@ -281,8 +280,7 @@ def _means(complement: float) -> tuple[list[tuple[float, float]], float]:
 def _jacobi(u: Array, complement: float) -> tuple[Array, Array, Array]:
     """sn, cn, dn of u (n,) by descending Landen transformations (Bulirsch 1965), from 1 - m in [0, 1].
 
-    Taking 1 - m keeps the relative accuracy of cn and dn near m = 1, where scipy.special.ellipj, besides taking
-    longer to load than a plan to make, leaves its period.
+    Taking 1 - m keeps the relative accuracy of cn and dn near m = 1, where scipy.special.ellipj leaves its period.
     """
     if complement == 0.0:
         decay = np.exp(-np.abs(u))

@@ -356,7 +356,7 @@ class _MarginSearch:
                     return None
                 if self._parted(solution):
                     continue
-                broken = next(broken_by(program, solution.burns), None)
+                broken = broken_by(program, solution.burns)
                 if broken is None:
                     break
                 program.forbid(*broken)
@@ -366,7 +366,7 @@ class _MarginSearch:
             program.forbidden = allowed
         schedule = self.model.translate(as_pulses(self.model.body, solution.burns))
         aside, fly = solution.left[self.equations.chosen], partial(propagation.flown, self.plain)
-        schedule = Refinement(self.plain, schedule, self.equations, aside, program.width, fly).refined()
+        schedule = Refinement(fly(schedule), self.equations, aside, fly).refined()
         if not self.body.thrust_laws:
             return schedule
         try:

@@ -277,6 +277,12 @@ class SpinState:
     spin: float
     quaternion: Vector
 
+    @classmethod
+    def of(cls, rates: Vector, quaternion: Vector) -> SpinState:
+        """State with ``rates`` (3,) in rad/s."""
+        first, second, third = rates.tolist()
+        return cls(complex(first, second), third, quaternion)
+
     @property
     def rates(self) -> Vector:
         """(ω1, ω2, ω3) in rad/s."""

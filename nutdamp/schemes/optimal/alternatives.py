@@ -19,14 +19,12 @@ from numpy.typing import NDArray
 from nutdamp.common import work
 from nutdamp.errors import Infeasible
 from nutdamp.flight.end_state import left_by
-from nutdamp.flight.propagation import Flight
 from nutdamp.schemes.catalogue import HalfConeOptions, RhumbLineOptions, SchemeOptions, TwoPulseOptions
 from nutdamp.schemes.correction import bounded_step
-from nutdamp.schemes.optimal import linear_program, refinement
 from nutdamp.schemes.optimal.descent import Task
-from nutdamp.schemes.optimal.linear_program import Solution
+from nutdamp.schemes.optimal.linear_program import GrowingProgram, Solution
 from nutdamp.schemes.optimal.problem import LEFT, UNMET, Problem
-from nutdamp.schemes.optimal.refinement import Influence
+from nutdamp.schemes.optimal.refinement import Influence, along, misses, small_angles
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import Windows, keeps_limits
 from nutdamp.spacecraft.equipment import Channel
@@ -36,54 +34,46 @@ from nutdamp.spacecraft.schedule import Schedule, channel_pulse
 
 LINES = 4  # programs one after the other, each about the flight of the one before: at large angles small ones mislead
 PROGRAM = 4.0  # units of work of a program
-
-STARTS, CORRECTED, MOST_PULSES = 8, 4, 200
-"""Starts in a nutation period that are tried of a channel that has a transverse torque, too; flights by which the
-length is corrected; pulses at most."""
+STARTS, MOST_PULSES = 8, 200  # starts in a nutation period of a channel with a transverse torque; pulses at most
+CORRECTED = 4  # flights by which the length of a spin change is corrected
 
 
-def spin_changes(spacecraft: Spacecraft, fly: Callable[[Schedule], Flight]) -> Iterator[Schedule]:
-    """Simple spin changes that keep limits and requirement, flown by ``fly``; none where H has a target."""
-    if spacecraft.goal.spin is None or spacecraft.goal.axis is not None:
+def spin_changes(problem: Problem) -> Iterator[Schedule]:
+    """Simple spin changes that keep limits and requirement; none where H has a target."""
+    spacecraft, goal = problem.spacecraft, problem.spacecraft.goal.spin
+    if goal is None or spacecraft.goal.axis is not None:
         return
     for channel in spacecraft.channels:
-        if (spacecraft.goal.spin - spacecraft.spin) * channel.axial <= 0.0:
+        if (goal - spacecraft.spin) * channel.axial <= 0.0:
             continue
         starts = STARTS if abs(channel.transverse) > 1e-12 * abs(channel.axial) else 1
         for number in range(starts):
             start = spacecraft.limits.earliest + number / starts * spacecraft.nutation_period
             for turns in (0.0, 2.0 * math.pi / spacecraft.fastest):
-                schedule = _schedule(spacecraft, channel, start, turns, fly)
-                if schedule is not None:
+                if schedule := _spin_change(problem, goal, channel, start, turns):
                     yield schedule
 
 
-def _schedule(
-    spacecraft: Spacecraft, channel: Channel, start: float, turn: float, fly: Callable[[Schedule], Flight]
-) -> Schedule | None:
+def _spin_change(problem: Problem, goal: float, channel: Channel, start: float, turn: float) -> Schedule | None:
     """The pulses of a ``channel`` from ``start`` s on, one each ``turn`` s or one after the other; else None."""
-    goal, tick = spacecraft.goal.spin, spacecraft.limits.tick
-    assert goal is not None
+    spacecraft, tick = problem.spacecraft, problem.spacecraft.limits.tick
     rate = channel.axial / spacecraft.inertia.C
     whole = (goal - spacecraft.spin) / rate
     count = max(math.ceil(whole / channel.max_on_time * (1.0 - 1e-9)), 1)
     if count > MOST_PULSES or (count == 1 and turn > 0.0):
         return None
     for _ in range(CORRECTED):
-        on_time = whole / count
-        if tick is not None:
-            on_time = round(on_time / tick) * tick
+        on_time = Windows(spacecraft).nearest_tick(whole / count)
         if not channel.min_on_time <= on_time <= channel.max_on_time * (1.0 + 1e-12):
             return None
         apart = max(turn, on_time + spacecraft.limits.gap)
         if tick is not None:
-            start, apart = math.ceil(start / tick - 1e-9) * tick, math.ceil(apart / tick - 1e-9) * tick
-        schedule = Schedule(
-            tuple(channel_pulse(channel, start + k * apart + 0.5 * on_time, on_time) for k in range(count))
-        )
+            start, apart = (math.ceil(time / tick - 1e-9) * tick for time in (start, apart))
+        centres = (start + number * apart + 0.5 * on_time for number in range(count))
+        schedule = Schedule(tuple(channel_pulse(channel, centre, on_time) for centre in centres))
         if schedule.end > spacecraft.horizon:
             return None
-        flight = fly(schedule)
+        flight = problem.flown(schedule)
         missed = goal - flight.settled.spin
         if tick is not None or abs(missed) < 1e-12 * abs(goal):
             break
@@ -93,15 +83,13 @@ def _schedule(
 
 
 CLEARLY, ABOUT = 0.8, 0.002
-"""Share of the end at which small angles must allow the same cost, for an earlier end to be looked for, and the share
-by which it may be more: it is not that of the true motion."""
+"""Share of the end at which small angles must allow the cost, for an earlier one to be looked for, and the excess."""
 
 BISECTIONS, ROUNDS, PARTS = 3, 3, (0.2, 0.4, 0.6)
 """Steps in which the earliest end is found that they allow; earlier ends looked for one after the other; horizons that
 are tried in turn, as parts of the way from the earliest end that they allow to the end there is."""
 
-EARLIER, MOST_ENDS = 300.0, 900.0
-"""Units of `work` after which no other one is looked for, and that may be spent on all of them."""
+EARLIER, MOST_ENDS = 300.0, 900.0  # units of `work` after which no other end is looked for, and for all of them
 
 
 def hastened(
@@ -114,8 +102,8 @@ def hastened(
     """
     if problem.options.least not in ("propellant", "impulse") or first.unmet > UNMET:
         return best
-    begin, dearest = problem.spacecraft.limits.earliest, problem.price(best) * (1.0 + SAME_COST)
-    small_angles = max(problem.price(best), first.cost) * (1.0 + ABOUT)
+    dearest = problem.price(best) * (1.0 + SAME_COST)
+    allowed = max(problem.price(best), first.cost) * (1.0 + ABOUT)
     left = problem.left(problem.flown(best)) + DAMPED_ANGLE
 
     def better(schedule: Schedule) -> bool:
@@ -128,10 +116,8 @@ def hastened(
             return not len(best) or work.exhausted() or spent.done > EARLIER
 
         for _ in range(ROUNDS):
-            span = best.end - begin
-            share = None if over() else _least_share(problem, span, small_angles)
-            later = () if share is None else (share + part * (1.0 - share) for part in PARTS)
-            schedules = (cheapest(begin + part * span) for part in later if not over())
+            ends = [] if over() else _earlier_ends(problem, best.end, allowed)
+            schedules = (cheapest(end) for end in ends if not over())
             earlier = next((schedule for schedule in schedules if schedule is not None and better(schedule)), None)
             if earlier is None:
                 break
@@ -139,23 +125,24 @@ def hastened(
     return best
 
 
-def _least_share(problem: Problem, span: float, most: float) -> float | None:
-    """The least share of the ``span`` s that small angles allow at a cost of ``most``; None for one above `CLEARLY`."""
+def _earlier_ends(problem: Problem, end: float, most: float) -> list[float]:
+    """Horizons to try for an earlier ``end`` s, after what small angles allow at a cost of ``most``; none near it."""
+    begin = problem.spacecraft.limits.earliest
+    span = end - begin
 
     def cost(share: float) -> float:
-        horizon = problem.spacecraft.limits.earliest + share * span
-        solution = problem.program(problem.within(horizon)).solve()
+        solution = problem.program(problem.within(begin + share * span)).solve()
         return solution.cost if solution.unmet <= UNMET else math.inf
 
     clearly = cost(CLEARLY)
     # Nor may it cost them more than `ABOUT` over what they cost in all of the span.
     if clearly > most or clearly > (most := min(most, cost(1.0) * (1.0 + ABOUT))):
-        return None
+        return []
     low, high = 0.0, CLEARLY
     for _ in range(BISECTIONS):
         middle = 0.5 * (low + high)
         low, high = (low, middle) if cost(middle) <= most else (middle, high)
-    return high
+    return [begin + (high + part * (1.0 - high)) * span for part in PARTS]
 
 
 def by_other_schemes(spacecraft: Spacecraft, *, shift: bool) -> Iterator[Schedule]:
@@ -189,10 +176,7 @@ def by_other_schemes(spacecraft: Spacecraft, *, shift: bool) -> Iterator[Schedul
 
 
 SLOTS, MOST_SLOTS = 40, 320  # slots in the faster of the two turns, at ω3 and at aω3, and in all
-
-NEWTON_STEPS, CONVERGED = 25, 1e-12
-"""Newton steps for the lengths of the burns, and the end error, over |H|, at which they end."""
-
+NEWTON_STEPS, CONVERGED = 25, 1e-12  # for the lengths of burns, and the end error, over |H|, at which they end
 SHORTEST = 0.02  # share of a slot below which a burn is left out before the lengths are found
 
 HALVINGS, LONGER = 10, (0.0, 0.01, 0.03, 0.08, 0.2, 0.4, 0.8)
@@ -206,7 +190,7 @@ Pieces = tuple[NDArray[np.int_], Vector]
 def earliest(problem: Problem) -> Schedule | None:
     """The schedule of one channel after another that ends first, as far as it is found; None where there is none."""
     begin, horizon = problem.spacecraft.limits.earliest, problem.spacecraft.horizon
-    influence = refinement.small_angles(problem.spacecraft, problem.equations)
+    influence = small_angles(problem.spacecraft, problem.equations)
     if _pieces(problem, influence, horizon) is None:
         return None
     low, high = begin, horizon
@@ -225,7 +209,7 @@ def earliest(problem: Problem) -> Schedule | None:
 
 def within(problem: Problem, horizon: float) -> Schedule | None:
     """A schedule of one channel after another within ``horizon`` s that leaves nothing; None where none is found."""
-    influence = refinement.small_angles(problem.spacecraft, problem.equations)
+    influence = small_angles(problem.spacecraft, problem.equations)
     for _ in range(LINES):  # programs, each about the flight of the one before: at large angles small ones mislead
         pieces = None if work.exhausted() else _pieces(problem, influence, horizon)
         if pieces is None:
@@ -238,7 +222,7 @@ def within(problem: Problem, horizon: float) -> Schedule | None:
         in_time = problem.left(flown) <= LEFT and schedule.end <= horizon
         if in_time and keeps_limits(problem.spacecraft, schedule.pulses):
             return schedule
-        influence = refinement.along(problem.flown(_burns(problem, *pieces)), problem.equations, _slot(problem))
+        influence = along(problem.flown(_burns(problem, *pieces)), problem.equations, _slot(problem))
     return None
 
 
@@ -266,20 +250,17 @@ def _pieces(problem: Problem, influence: Influence, horizon: float) -> Pieces | 
     # What a whole slot of each channel adds to each equation, over all there is to do; columns channel by channel.
     size = float(np.linalg.norm(influence.goal)) or 1.0
     whole = np.einsum("nek,ck->ecn", influence.rows(centres) * lost[:, None], torques) * (width / size)
-    columns = whole.reshape(len(influence.goal), -1)
     equations, slots = len(influence.goal), len(free)
-    program = linear_program.GrowingProgram(influence.goal / size, np.ones(slots), np.ones(equations))
+    program = GrowingProgram(influence.goal / size, np.ones(slots), np.ones(equations))
     slack = np.vstack([np.hstack([np.eye(equations), -np.eye(equations)]), np.zeros((slots, 2 * equations))])
     program.add(np.full(2 * equations, 1e4 * slots), slack, np.full(2 * equations, np.inf))
-    shared = np.tile(np.eye(slots), len(channels))
-    cost = problem.costs / float(problem.costs.max())
-    program.add(np.repeat(cost, slots), np.vstack([columns, shared]), np.ones(columns.shape[1]))
+    rows = np.vstack([whole.reshape(equations, -1), np.tile(np.eye(slots), len(channels))])
+    program.add(np.repeat(problem.costs / float(problem.costs.max()), slots), rows, np.ones(rows.shape[1]))
     optimum = program.optimum()
     if optimum is None or float(optimum.x[: 2 * equations].sum()) > UNMET:
         return None
-    shares = optimum.x[2 * equations :].reshape(len(channels), slots)
     every = np.zeros((len(channels), count + 1))  # and one slot more, in which nothing fires
-    every[:, free] = shares * width
+    every[:, free] = optimum.x[2 * equations :].reshape(len(channels), slots) * width
     return _in_order(every, width)
 
 
@@ -304,13 +285,9 @@ def _in_order(times: Vector, width: float) -> Pieces | None:
 def _burns(problem: Problem, which: NDArray[np.int_], times: Vector) -> Schedule:
     """The pieces, one after the other."""
     starts = problem.spacecraft.limits.earliest + np.concatenate([[0.0], np.cumsum(times)[:-1]])
-    return Schedule(
-        tuple(
-            channel_pulse(problem.channels[number], float(start + 0.5 * time), float(time))
-            for number, start, time in zip(which.tolist(), starts, times, strict=True)
-            if number >= 0 and time > 0.0
-        )
-    )
+    pieces = zip(which.tolist(), starts.tolist(), times.tolist(), strict=True)
+    on = [(problem.channels[number], start, time) for number, start, time in pieces if number >= 0 and time > 0.0]
+    return Schedule(tuple(channel_pulse(channel, start + 0.5 * time, time) for channel, start, time in on))
 
 
 def _exact(problem: Problem, which: NDArray[np.int_], times: Vector) -> Schedule:
@@ -325,7 +302,7 @@ def _exact(problem: Problem, which: NDArray[np.int_], times: Vector) -> Schedule
         """Misses of many times (k, n) s, (k, equations), over |H|."""
         if task is None:
             flown = (problem.flown(_burns(problem, which, times)) for times in rows)
-            return np.array([refinement.misses(flight, problem.equations) for flight in flown]) / size
+            return np.array([misses(flight, problem.equations) for flight in flown]) / size
         starts = body.limits.earliest + np.cumsum(rows, axis=1) - rows
         return task.misses(np.tile(which[firing], (len(rows), 1)), np.hstack([starts[:, firing], rows[:, firing]]), 0)
 

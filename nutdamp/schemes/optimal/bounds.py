@@ -29,13 +29,11 @@ from numpy.typing import NDArray
 
 from nutdamp.schemes.optimal.linear_program import Program
 from nutdamp.spacecraft.constraints import free_windows, usable
-from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.schedule import TOUCHING
 
 QUARTERINGS, PARTS = 9, 4
-"""Subdivisions into quarters of the span between two times: to a 1e-5 of a slot; parts of a slot in which the gain of a
-channel that is on for long is summed."""
+"""Subdivisions of a span into quarters, to 1e-5 of a slot; parts of a slot in which a long gain is summed."""
 
 LOWERINGS = (1.0, 1.0003, 1.0005, 1.001, 1.0016)
 """Factors by which prices are lowered for channels that are on for long. Solved with slots, they are up to w²/8 + w²/24
@@ -56,17 +54,14 @@ class SmallAngles:
     def __init__(self, program: Program, prices: Vector) -> None:
         self.program, self.prices, self.costs = program, prices, program.costs
         self.torques = np.array([channel.torque for channel in program.channels])
-        windows = free_windows(program.spacecraft, program.end)
-        spans = [(begin - TOUCHING, end + TOUCHING) for begin, end in windows]
+        spans = [(begin - TOUCHING, end + TOUCHING) for begin, end in free_windows(program.spacecraft, program.end)]
         edges = [np.linspace(*span, max(math.ceil((span[1] - span[0]) / program.width), 1) + 1) for span in spans]
         self.begins = np.concatenate([part[:-1] for part in edges])
         self.lengths = np.concatenate([np.diff(part) for part in edges])
         # Second derivative, at most: each pair of equations turns at its rate, and grows or decays slowly.
-        rates = program.influence.turning
-        bend = sum(
-            float(np.linalg.norm(prices[rates == rate])) * (rate**2 + program.spacecraft.growth**2)
-            for rate in sorted(set(rates.tolist()))
-        )
+        rates, growth = program.influence.turning, program.spacecraft.growth
+        pairs = ((rate, float(np.linalg.norm(prices[rates == rate]))) for rate in sorted(set(rates.tolist())))
+        bend = sum(size * (rate**2 + growth**2) for rate, size in pairs)
         self.bends = bend * np.linalg.norm(self.torques, axis=1) / program.costs
 
     def at(self, times: Vector) -> Vector:
@@ -92,14 +87,11 @@ def _highest(curve: SmallAngles, which: NDArray[np.bool_]) -> float:
     begins, lengths, channel = curve.begins[slot], curve.lengths[slot], np.flatnonzero(which)[index]
     highest = tops[slot, index]
     for _ in range(QUARTERINGS):
-        if not len(begins):
-            return best + ENOUGH * abs(best)
         lengths, channel = np.repeat(0.25 * lengths, 4), np.repeat(channel, 4)
         begins = np.repeat(begins, 4) + lengths * np.tile(np.arange(4), len(begins))
-        every = np.arange(len(begins))
-        before, after = (curve.at(times)[every, channel] for times in (begins, begins + lengths))
+        before, after = (curve.at(times)[np.arange(len(times)), channel] for times in (begins, begins + lengths))
         highest = _top(before, after, curve.bends[channel], lengths)
-        best = max(best, float(before.max()), float(after.max()))
+        best = max(float(edge.max(initial=best)) for edge in (before, after))
         there = highest > best + ENOUGH * abs(best)
         begins, lengths, channel, highest = begins[there], lengths[there], channel[there], highest[there]
     return max(best + ENOUGH * abs(best), float(highest.max(initial=-math.inf)))
@@ -123,9 +115,8 @@ def _lasting(curve: SmallAngles, which: NDArray[np.bool_], factor: float) -> flo
         mean = curve.mean(begins + (part + 0.5) * lengths, lengths)[:, which] / factor - 1.0
         gained = np.where(-_top(-before, -after, bends, lengths[:, None]) >= 0.0, mean, 0.0)
         crossing = _top(before, after, bends, lengths[:, None]) > 0.0
-        gained = np.where(
-            crossing & (gained == 0.0), _positive_mean(before, after) + bends * lengths[:, None] ** 2 / 12.0, gained
-        )
+        most = _positive_mean(before, after) + bends * lengths[:, None] ** 2 / 12.0
+        gained = np.where(crossing & (gained == 0.0), most, gained)
         total += float((gained * lengths[:, None] @ costs).sum())
         before = after
     return total
@@ -173,11 +164,10 @@ def rigorous(
         return None
     costs = np.array([prices[channel.name] for channel in channels])
     torques = np.array([channel.torque for channel in channels])
-    axial = bool(torques[:, 2].any())
-    lower_bounds = [_nutation(spacecraft, channels, costs, cost, allowed)]
+    lower_bounds = [_nutation(spacecraft, torques, costs, cost, allowed)]
     if spacecraft.goal.spin is not None:
-        lower_bounds.append(_nutation_and_spin(spacecraft, torques, costs, allowed))
-    if shift and not axial:
+        lower_bounds.append(_nutation_and_spin(spacecraft, spacecraft.goal.spin, torques, costs, allowed))
+    if shift and not torques[:, 2].any():
         # The way of H to the direction of the target, round the sphere of radius |H3|.
         nutation, beta = spacecraft.nutation, max(spacecraft.to_turn - allowed.off, 0.0)
         way = math.tan(nutation) + beta - nutation if beta > nutation else math.sin(beta) / math.cos(nutation)
@@ -187,27 +177,24 @@ def rigorous(
     return best if math.isfinite(best) else None
 
 
-def _nutation(spacecraft: Spacecraft, channels: list[Channel], costs: Vector, cost: float, allowed: Allowed) -> float:
+def _nutation(spacecraft: Spacecraft, torques: Vector, costs: Vector, cost: float, allowed: Allowed) -> float:
     """Least cost of taking the nutation out, at the phases at which the channels may be on."""
     inertia = spacecraft.inertia
-    dearest = float(max(abs(channel.axial) / price for channel, price in zip(channels, costs, strict=True)))
-    faster = cost * dearest / inertia.C
+    faster = cost * float((np.abs(torques[:, 2]) / costs).max()) / inertia.C
     goal = -inertia.A * complex(spacecraft.omega0[0], spacecraft.omega0[1])
     stays = (abs(spacecraft.axial) + inertia.C * faster) * math.tan(allowed.nutation)
     if abs(goal) <= stays:
         return 0.0
-    spans = []
-    for begin, end in free_windows(spacecraft):
-        phases = [spacecraft.nutation_rate * edge for edge in (begin - TOUCHING, end + TOUCHING)]
-        wider = abs(inertia.a) * faster * max(end + TOUCHING - spacecraft.limits.earliest, 0.0)
-        spans.append((min(phases) - wider, max(phases) + wider))
+    edges = np.array(free_windows(spacecraft)).T + np.array([[-TOUCHING], [TOUCHING]])
+    wider = abs(inertia.a) * faster * np.maximum(edges[1] - spacecraft.limits.earliest, 0.0)
+    phases = np.sort(spacecraft.nutation_rate * edges, axis=0) + np.array([-wider, wider])
     # Arcs that these phases cover, joined: begins in [0, 2π) and lengths, rad.
-    lows, highs = np.array(sorted((begin % math.tau, begin % math.tau + end - begin) for begin, end in spans)).T
+    lows, highs = np.array(sorted((begin % math.tau, begin % math.tau + end - begin) for begin, end in phases.T)).T
     over = np.maximum.accumulate(highs)
     first = np.append(True, lows[1:] > over[:-1])
     low = lows[first]
     wide = np.minimum(over[np.append(first[1:], True)] - low, math.tau)
-    points = np.array([channel.transverse for channel in channels]) / costs
+    points = (torques[:, 0] + 1j * torques[:, 1]) / costs
     strength, angle = np.abs(points), np.angle(points)
 
     def value(directions: Vector) -> Vector:
@@ -220,10 +207,8 @@ def _nutation(spacecraft: Spacecraft, channels: list[Channel], costs: Vector, co
     return _largest(value, float(np.angle(goal)), math.acos(stays / abs(goal)))
 
 
-def _nutation_and_spin(spacecraft: Spacecraft, torques: Vector, costs: Vector, allowed: Allowed) -> float:
-    """Least cost of taking the nutation out and changing the spin, whatever the phases."""
-    final = spacecraft.goal.spin
-    assert final is not None
+def _nutation_and_spin(spacecraft: Spacecraft, final: float, torques: Vector, costs: Vector, allowed: Allowed) -> float:
+    """Least cost of taking the nutation out and changing the spin to ``final``, whatever the phases."""
     C, off = spacecraft.inertia.C, abs(final) * allowed.spin
     stays = (abs(spacecraft.inertia.axial(final)) + C * off) * math.tan(allowed.nutation)
     change = final - spacecraft.spin
@@ -277,16 +262,14 @@ def first_order(program: Program, prices: Vector) -> Proof:
 
     Any prices give a bound; the best are those of a solution. The proof's are no higher than what it costs.
     """
-    nothing, strong = Proof(0.0, np.zeros_like(prices)), program.strong
+    best, strong = Proof(0.0, np.zeros_like(prices)), program.strong
     if not prices.any():
-        return nothing
+        return best
     goal = float(prices @ program.influence.goal) - program.off * float(np.linalg.norm(prices[2:4]))
     curve = SmallAngles(program, prices)
     highest = max(_highest(curve, strong), 0.0 if strong.all() else 1.0)
-    if highest <= 0.0:
-        return nothing
-    best = nothing
-    for factor in [highest] if strong.all() else [highest * lowering for lowering in LOWERINGS]:
+    for lowering in LOWERINGS[: 1 if strong.all() else None] if highest > 0.0 else ():
+        factor = highest * lowering
         gained = _lasting(curve, ~strong, factor)
         proof = Proof((goal / factor - gained) * (1.0 - ROUNDING), prices / factor, gained)
         best = max(best, proof, key=lambda proof: proof.bound)

@@ -81,12 +81,8 @@ class Spread(NamedTuple):
         return np.sqrt(np.maximum(0.5 * (size + (np.conj(directions) ** 2 * double).real), 0.0))
 
 
-DIRECTIONS, BEGUN = 72, 16
-"""Directions in which the cones of two equations are looked at, and of the first tangents of one, without margin."""
-
-WORST, ROUNDS = 3, 40
-"""Tangents added to a cone at a time, and rounds of the linear program, each with more tangents or columns."""
-
+DIRECTIONS, BEGUN = 72, 16  # in which the cone of two equations is looked at, and of its first tangents
+WORST, ROUNDS = 3, 40  # tangents added to a cone at a time, and rounds with more tangents or columns
 BEST, PRICE = 200, 1e-6  # columns taken in at a time, and the relative reduced cost below which none enters
 
 
@@ -103,16 +99,16 @@ class ChanceProgram:
 
     def __init__(self, program: Program, uncertain: Uncertain, limits: tuple[ChanceLimit, ...], size: float) -> None:
         self.program, self.limits, self.uncertain, body = program, limits, uncertain, program.spacecraft
-        self.pace = np.array([body.nutation_rate, body.spin])
-        self.turn = 2.0 * np.pi / max(abs(self.pace[0]), abs(self.pace[1]))
-        self.count = int(self.turn_of(np.array([program.end]))[0]) + 1
+        self.turn = 2.0 * np.pi / body.fastest
+        self.slot_turns = self.turn_of(program.centres)
         self.effects, self.changes, self.rates = uncertain.effects, uncertain.changes, uncertain.rates
         self.scale = max(size, max(limit.most for limit in limits))
         self.unit: Vector = self.scale / np.hypot(np.abs(uncertain.effects[0]), uncertain.effects[2].real)
-        self.cost = program.costs * self.unit
-        self.dearest = float(self.cost.max())
+        cost = program.costs * self.unit
+        self.cost = cost / float(cost.max())
         self.width = np.where(self.unit < program.width, 0.0, program.width)  # strong ones act at a moment
-        self._kept: dict[tuple[int, int], tuple[Complex, NDArray[np.int_]]] = {}
+        kinds, channels = {limit.kind for limit in limits}, range(len(cost))
+        self.turned = {kind: [self.turns(kind, self._all(channel)) for channel in channels] for kind in kinds}
 
     def turn_of(self, times: Vector) -> NDArray[np.int_]:
         """Number from 0 of the turn, of the faster of both rates, in which ``times`` (n,) s lie."""
@@ -128,7 +124,7 @@ class ChanceProgram:
         if kind == 2:
             return np.ones(len(columns.t), dtype=complex)
         body, late = self.program.spacecraft, self.uncertain.delay[columns.channel]
-        rate = self.pace[kind]
+        rate = (body.nutation_rate, body.spin)[kind]
         turned = np.exp(1j * rate * (columns.t + late)) * np.sinc(rate * columns.width / (2.0 * np.pi))
         if kind == 0 and body.growth:
             rows = self.program.influence.rows(columns.t)[:, :2, 0]
@@ -140,13 +136,11 @@ class ChanceProgram:
         kind = tangent.limit.kind
         effect, changes = self.effects[kind, columns.channel], self.changes[kind]
         total = effect + margin * (changes @ tangent.shared)[columns.channel]
-        rate = float(self.rates[kind] @ tangent.shared)
-        if rate:
-            total = total + margin * 1j * rate * columns.t * effect
+        total += margin * 1j * float(self.rates[kind] @ tangent.shared) * columns.t * effect
         if len(tangent.own):
-            pulses = self.pulse(columns)
-            at = np.searchsorted(tangent.own[:, 0], pulses)
-            known = (at < len(tangent.own)) & (tangent.own[np.minimum(at, len(tangent.own) - 1), 0] == pulses)
+            pulses, mine = self.pulse(columns), tangent.own[:, 0]
+            at = np.minimum(np.searchsorted(mine, pulses), len(mine) - 1)
+            known = mine[at] == pulses
             weights = tangent.own[at[known], 1:]
             total[known] += margin * (changes[columns.channel[known]] * weights).sum(axis=1)
         per_second = (np.conj(tangent.u) * self.turns(kind, columns) * total).real
@@ -185,7 +179,7 @@ class ChanceProgram:
         worth = np.abs((toward * self.turns(0, self._all(0))[None, :] * self.effects[0][:, None]).real)
         worth = np.where(self.program.forbidden, 0.0, worth * (self.unit / self.scale)[:, None])
         channel, slot = np.nonzero(worth > 0.8 * worth.max(initial=0.0))
-        some = np.unique(np.linspace(0, len(slot) - 1, min(2 * BEST, len(slot))).astype(int))
+        some = np.linspace(0, len(slot) - 1, min(2 * BEST, len(slot))).astype(int)
         columns = self._slots(channel[some], slot[some])
         rights = np.array([self.right(tangent, margin) for tangent in tangents])
         master = GrowingProgram(np.zeros(0), rights, np.zeros(0))
@@ -247,13 +241,12 @@ class ChanceProgram:
     def _add(self, master: GrowingProgram, tangents: list[Tangent], new: ProgramColumns, margin: float) -> None:
         most = np.where(new.width > 0.0, new.width / self.unit[new.channel], np.inf)
         rows = np.array([self.row(tangent, new, margin) for tangent in tangents]).reshape(len(tangents), -1)
-        master.add(self.cost[new.channel] / self.dearest, rows, most)
+        master.add(self.cost[new.channel], rows, most)
 
     def _priced(self, tangents: list[Tangent], shadows: Vector, taken: ProgramColumns, margin: float) -> ProgramColumns:
         """Slots that would lower the cost, the best; of channels that act at once the best moments too."""
-        cost = self.cost / self.dearest
         active = [(tangent, price) for tangent, price in zip(tangents, shadows.tolist(), strict=True) if price < -1e-12]
-        worth = np.array([self._worth(channel, active, margin) - cost[channel] for channel in range(len(cost))])
+        worth = np.array([self._worth(channel, active, margin) - cost for channel, cost in enumerate(self.cost)])
         worth[self.program.forbidden] = -np.inf
         worth[taken.channel, np.searchsorted(self.program.centres, taken.t - 0.25 * self.program.width)] = -np.inf
         return self._slots(*above(worth, PRICE, BEST))
@@ -261,13 +254,9 @@ class ChanceProgram:
     def _worth(self, channel: int, active: list[tuple[Tangent, float]], margin: float) -> Vector:
         """Worth of one unit of a channel in each slot by tangents and their prices."""
         worth = np.zeros(len(self.program.centres))
-        for kind in {limit.kind for limit in self.limits}:
-            if (kind, channel) not in self._kept:
-                every = self._all(channel)
-                self._kept[kind, channel] = self.turns(kind, every), self.turn_of(every.t)
-            turned, turn = self._kept[kind, channel]
+        for kind, turned in self.turned.items():
             effect, changes = self.effects[kind, channel], self.changes[kind, channel]
-            fixed, rate, own = 0j, 0j, np.zeros(self.count, dtype=complex)
+            fixed, rate, own = 0j, 0j, np.zeros(self.slot_turns[-1] + 1, dtype=complex)
             for tangent, price in active:
                 if tangent.limit.kind == kind:
                     weight = price * np.conj(tangent.u)
@@ -276,7 +265,7 @@ class ChanceProgram:
                     pulses = tangent.own[:, 0].astype(int)
                     mine = pulses // TURNS == channel
                     own[pulses[mine] % TURNS] += weight * margin * (tangent.own[mine, 1:] @ changes)
-            worth += (turned * (fixed + rate * self.program.centres + own[turn])).real
+            worth += (turned[channel] * (fixed + rate * self.program.centres + own[self.slot_turns])).real
         return np.asarray(worth * (self.unit[channel] / self.scale))
 
 

@@ -20,8 +20,7 @@ from nutdamp.common import work
 from nutdamp.common.numerics import cos_sin
 from nutdamp.flight.dynamics import make_dynamics
 from nutdamp.physics import attitude, batch
-from nutdamp.schemes.optimal import refinement
-from nutdamp.schemes.optimal.refinement import EndEquations
+from nutdamp.schemes.optimal.refinement import AROUND, EndEquations, square_to_target
 from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Spacecraft, Vector
 
@@ -30,7 +29,6 @@ LEAST_ROOM = 1e-10  # share of the room to a bound that a step must leave
 Indices = NDArray[np.int_]
 Complex = NDArray[np.complex128]
 
-SIDES = 32  # sides of the polygon within which H may end off its target, where it may
 DIFFERENCE = 1e-6  # step of the difference quotients, in scaled unknowns
 FLIGHT, CASE = 0.05, 0.0003  # units of `work` of a stretch of a flight of many sequences, and of each of them
 
@@ -80,10 +78,9 @@ class Task:
         self._forced = dynamics.constant, dynamics.forcing
         self._coasting = np.zeros(3), dynamics.forcing._replace(turning=())
         self._start = np.asarray(dynamics.moments, dtype=float), start.rates, start.quaternion
-        forcing = dynamics.forcing
-        self._decays, self._wheel = forcing.growth != 0.0, forcing.wheel
-        self._free = not dynamics.constant.any() and not forcing.turning and not self._decays
-        self._target, self._across = body.target_axis, refinement.square_to_target(body)
+        self._decays = body.growth != 0.0
+        self._free = not dynamics.constant.any() and not dynamics.forcing.turning and not self._decays
+        self._across = square_to_target(body)
 
     def misses(self, which: Indices, x: Vector, kicks: int) -> Vector:
         """Misses of the flights of ``x`` (b, …), (b, equations), over |H|.
@@ -100,7 +97,7 @@ class Task:
         momentum, turn = flown(which, x, kicks)
         inertial = attitude.rotate(turn.T, momentum.T)
         shift = inertial @ self._across.T
-        shift[inertial @ self._target < 0.0] += self.momentum  # the other way round is no solution
+        shift[inertial @ self.body.target_axis < 0.0] += self.momentum  # the other way round is no solution
         if self.loose:
             shift = shift - self.off * x[:, -2:]
         spin = momentum[2] - self.body.inertia.axial(self.spin)
@@ -132,7 +129,7 @@ class Task:
         # a pair of complex numbers, w + iz and x + iy.
         count, n = which.shape
         (A, _, C), rates, turn = self._start
-        wheel = self._wheel
+        wheel = self.body.inertia.wheel
         parts, starts, widths = max(kicks, 1), x[:, :n], x[:, n : 2 * n]
         impulses = np.repeat(self.torques[which] * (widths / parts)[:, :, None], parts, axis=1)
         if kicks:
@@ -149,8 +146,7 @@ class Task:
         begun = np.exp(1j * (phase - within))  # as each pulse begins
         added = impulses[:, :, 0] + 1j * impulses[:, :, 1]
         if not kicks and self.torques[:, 2].any():
-            added, _ = self._pulsed(which, np.zeros_like(added), before, widths)
-            added = added * np.exp(1j * within)
+            added = self._pulsed(which, np.zeros_like(added), before, widths)[0] * np.exp(1j * within)
         elif not kicks:
             added = added * np.exp(0.5j * within) * np.sinc(within / (2.0 * np.pi))
         after = A * complex(rates[0], rates[1]) + np.cumsum(added * begun, axis=1)
@@ -161,30 +157,25 @@ class Task:
         half = np.exp(0.5j * turned)
         first, second = (cosine + 1j * (sine * before)) * half, sine * across * half
         if not kicks:
-            turns = zip((first, second), self._pulsed(which, across, before, widths)[1], strict=True)
+            turns = zip((first, second), self._pulsed(which, across, before, widths)[1:], strict=True)
             first, second = (np.stack(pair, axis=2).reshape(count, 2 * n) for pair in turns)
         first, second = _product(first, second)
         momentum = after[:, -1] * np.exp(-1j * phase[:, -1])
         spun = attitude.product(turn, (first.real, second.real, second.imag, first.imag))
         return np.array([momentum.real, momentum.imag, axial[:, -1]]), np.array(spun)
 
-    def _pulsed(
-        self, which: Indices, across: Complex, before: Vector, widths: Vector
-    ) -> tuple[Complex, tuple[Complex, Complex]]:
+    def _pulsed(self, which: Indices, across: Complex, before: Vector, widths: Vector) -> tuple[Complex, ...]:
         """H across axis 3 (b, n) after pulses, each alone, that begin with H ``across`` and along it; turn of each."""
         count = which.size
         moments = np.repeat(self._start[0][:, None], count, axis=1)
-        spinning = before.ravel() - self._wheel
-        rates = np.array([across.real.ravel(), across.imag.ravel(), spinning]) / moments
+        rates = np.array([across.real, across.imag, before - self.body.inertia.wheel]).reshape(3, -1) / moments
         turns = np.repeat(np.array([[1.0], [0.0], [0.0], [0.0]]), count, axis=1)
         bodies = batch.Bodies(moments, *self._coasting)
         stretch = batch.MotionStretch(bodies, np.zeros(count), rates, turns, self.torques[which].reshape(-1, 3).T)
         batch.advance(stretch, widths.ravel())
-        after, first, second = (
-            (real + 1j * imaginary).reshape(which.shape)
-            for real, imaginary in ((rates[0], rates[1]), (turns[0], turns[3]), (turns[1], turns[2]))
-        )
-        return after * self._start[0][0], (first, second)
+        pairs = (rates[0], rates[1]), (turns[0], turns[3]), (turns[1], turns[2])
+        after, *turned = ((real + 1j * imaginary).reshape(which.shape) for real, imaginary in pairs)
+        return after * self._start[0][0], *turned
 
     def slopes(self, which: Indices, x: Vector, scale: Vector, here: Vector, kicks: int) -> Vector:
         """Slopes of the misses, ``here`` now, by the unknowns in units of ``scale`` (b, …): (b, equations, …)."""
@@ -209,10 +200,10 @@ class Task:
         levels = [np.full((count, n - 1), self.body.limits.gap), sequences.begins, -sequences.ends]
         levels += [sequences.shortest, -sequences.longest]
         if self.loose:
-            angles = 2 * math.pi / SIDES * np.arange(SIDES)
-            sides = np.hstack([np.zeros((SIDES, 2 * n)), -np.column_stack([np.cos(angles), np.sin(angles)])])
-            matrix = np.vstack([np.hstack([matrix, np.zeros((len(matrix), 2))]), sides])
-            levels.append(np.full((count, SIDES), -math.cos(math.pi / SIDES)))
+            # Within the polygon that touches the circle in all directions where H may end.
+            sides = np.pad(-AROUND.T, ((0, 0), (2 * n, 0)))
+            matrix = np.vstack([np.pad(matrix, ((0, 0), (0, 2))), sides])
+            levels.append(np.full((count, len(sides)), -math.cos(math.pi / len(sides))))
         return matrix, np.hstack(levels)
 
 
@@ -221,19 +212,15 @@ def _product(first: Complex, second: Complex) -> tuple[Complex, Complex]:
     while (count := first.shape[1]) > 1:
         last = count & ~1
         u, v, w, z = first[:, :last:2], second[:, :last:2], first[:, 1::2], second[:, 1::2]
-        first, second = (
-            np.concatenate([product, rest[:, last:]], axis=1)
-            for product, rest in ((u * w - v * z.conj(), first), (u * z + v * w.conj(), second))
-        )
+        products = (u * w - v * z.conj(), first), (u * z + v * w.conj(), second)
+        first, second = (np.concatenate([product, rest[:, last:]], axis=1) for product, rest in products)
     return first[:, 0], second[:, 0]
 
 
-WHOLE, SHARES = np.array([1.0]), np.array([0.5, 0.2, 0.05, 0.01])
-"""All of a step, and the shares of it that are tried in turn where that does not help."""
+WHOLE, SHARES = np.array([1.0]), np.array([0.5, 0.2, 0.05, 0.01])  # of a step, where all of it does not help
 
 BARRIER, SETTLED = 1e-9, 1e-7
-"""Share of the cost at which the barrier of the bounds ends, and the largest relative error of the conditions for an
-optimum at which a sequence is done."""
+"""Share of the cost at which the barrier ends; relative error of the conditions for an optimum that is none."""
 
 FLAT, PROXIMAL = 1e-5, 1e-9
 """Share of the cost below which the next step's promise, the barrier and the misses are not worth taking it; weight
@@ -257,10 +244,6 @@ class DescentState(NamedTuple):
     barrier: Vector
     penalty: Vector
     error: Vector
-
-    def of(self, rows: Any) -> DescentState:
-        """The states of some sequences."""
-        return DescentState._make(part[rows] for part in self)
 
 
 class Descent:
@@ -307,7 +290,7 @@ class Descent:
     def of(self, rows: Indices) -> Descent:
         """The descents of some of the sequences."""
         some = copy.copy(self)
-        some.sequences, some.state = self.sequences.of(rows), self.state.of(rows)
+        some.sequences, some.state = self.sequences.of(rows), DescentState._make(part[rows] for part in self.state)
         some.scale, some.rows, some.price = self.scale[rows], self.rows[rows], self.price[rows]
         return some
 
@@ -359,9 +342,8 @@ class Descent:
             line.tried(step[line.active], SHARES)
         x, slack, misses = line.x, line.slack, line.misses
         slopes = self.task.slopes(self.sequences.which, x, self.scale, misses, self.kicks)
-        curvature = _curved(
-            old.curvature, (x - old.x) / self.scale, np.einsum("bmi,bm->bi", slopes - old.slopes, prices)
-        )
+        change = np.einsum("bmi,bm->bi", slopes - old.slopes, prices)
+        curvature = _curved(old.curvature, (x - old.x) / self.scale, change)
         curvature[line.active] = np.eye(x.shape[1])
         dearer = old.barrier[:, None] / old.slack - old.dual - weight * closer
         dual = old.dual + _to_bound(old.dual, dearer, old.barrier)[:, None] * dearer

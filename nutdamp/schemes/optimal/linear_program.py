@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.common import work
-from nutdamp.schemes.optimal.refinement import Influence
+from nutdamp.schemes.optimal.refinement import AROUND, Influence
 from nutdamp.spacecraft.constraints import Windows
 from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Spacecraft, Vector
@@ -75,6 +75,13 @@ def above(worth: Vector, least: float, most: int) -> tuple[NDArray[np.int_], NDA
     return channel, slot
 
 
+def peaks(worth: Vector, least: float) -> tuple[NDArray[np.int_], NDArray[np.int_]]:
+    """Channels and moments (n,) whose ``worth`` (channels, moments) is more than the ``least``, and highest nearby."""
+    padded = np.pad(worth, ((0, 0), (1, 1)), constant_values=-np.inf)
+    channel, moment = np.nonzero((worth >= padded[:, :-2]) & (worth >= padded[:, 2:]) & (worth > least))
+    return channel, moment
+
+
 def burns(channels: Sequence[Channel], columns: ProgramColumns, on_times: Vector, apart: float) -> tuple[Burn, ...]:
     """Columns of a channel that are less than ``apart`` s from one another as one burn about their common centre."""
     result: list[Burn] = []
@@ -89,11 +96,9 @@ def burns(channels: Sequence[Channel], columns: ProgramColumns, on_times: Vector
 
 
 SLOTS, MOST_SLOTS = 64, 600_000
-"""Slots in the faster of the two turns, at ω3 and at aω3; and of all channels together: a horizon of more is looked at
-as far as they reach."""
+"""Slots in the faster of the turns at ω3 and at aω3, and of all channels: of a longer horizon no more is seen."""
 
-SOLVED, SLOT, COLUMN, LIMITED = 3.0, 3e-4, 1.5e-3, 0.06
-"""Units of `work` of a program's solution, of each slot or column given, and of each burn of limited on-time."""
+SOLVED, SLOT, COLUMN, LIMITED = 3.0, 3e-4, 1.5e-3, 0.06  # units of `work`: solution, slot, column, limited burn
 
 PRICE, PEAK = 1e-7, 1e-6
 """Relative reduced cost below which a column cannot lower the cost any more, and that for the best moment of a strong
@@ -104,11 +109,9 @@ BEST, MANY = 250, 4
 while they do not supply what is needed."""
 
 FIRST, ROUNDS = 400, 60  # columns to begin with, and rounds in which more are taken in
-SIDES = 32  # directions in which H may end off the target, where it may
 
 TINIEST, SOME = 1e-6, 1e-12
-"""Coefficient below which an equation is not scaled up any more; share of what is needed below which an on-time is
-rounding."""
+"""Coefficient below which an equation is not scaled up; share of what is needed below which an on-time is none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,6 +163,10 @@ class Program:
         self.strong: NDArray[np.bool_] = self._unit < self.width
         self._price = self.costs * self._unit
         self._dearest = float(self._price.max())
+        # Columns (equations, n) for free in all directions of the shift, where H may end off its target.
+        self._ring = np.zeros((len(influence.goal), AROUND.shape[1] if self.off > 0.0 else 0))
+        if self.off > 0.0:
+            self._ring[2:4] = AROUND
         self._grid: Vector | None = None
         self._looked = 0
 
@@ -192,7 +199,7 @@ class Program:
         if generate:
             self._pool = chosen
         free, amounts = np.split(optimum.x, [len(optimum.x) - len(chosen.t)])
-        off = -(self._ring() @ free[2 * count :])[2:4] * self._scale if self.off > 0.0 else np.zeros(2)
+        off = -(self._ring @ free[2 * count :])[2:4] * self._scale if self.off > 0.0 else np.zeros(2)
         used = amounts > SOME
         on_times = amounts[used] * self._unit[chosen.channel[used]]
         return Solution(
@@ -205,7 +212,7 @@ class Program:
 
     def _master(self, columns: ProgramColumns, *, growing: bool) -> GrowingProgram:
         """The program of these columns, in units of all there is to do, after slacks and the ring."""
-        count, ring = len(self.influence.goal), self._ring()
+        count, ring = len(self.influence.goal), self._ring
         if growing:  # the most that one unit of any channel does in each of the equations, or a little more
             reach = (np.abs(self._slot_rows()).max(axis=2) @ np.abs(self._direction).T).max(axis=1)
         else:
@@ -214,12 +221,10 @@ class Program:
         shares, longest = min(ring.shape[1], 1), len(self._longest(columns))
         work.spend(LIMITED * longest)
         limits = np.concatenate([np.full(shares, self.off / self._scale), np.ones(longest)])
-        goal = self.influence.goal / self._scale
-        master = GrowingProgram(goal, limits, np.maximum(reach, TINIEST))
+        master = GrowingProgram(self.influence.goal / self._scale, limits, np.maximum(reach, TINIEST))
         rows = np.zeros((count + len(limits), 2 * count + ring.shape[1]))
         rows[:count] = np.hstack([np.eye(count), -np.eye(count), ring])
         rows[count : count + shares, 2 * count :] = 1.0
-        # What no column supplies costs far more than the dearest channel: used only where there is no solution.
         cost = np.repeat([SLACK_COST, 0.0], [2 * count, ring.shape[1]])
         master.add(cost, rows, np.full(len(cost), np.inf))
         self._add(master, columns)
@@ -229,7 +234,8 @@ class Program:
         """Let the program have these columns."""
         most = np.where(columns.width > 0.0, columns.width / self._unit[columns.channel], np.inf)
         shares = np.zeros((int(self.off > 0.0), len(most)))
-        master.add(self._costs(columns), np.vstack([self._coefficients(columns), shares, self._longest(columns)]), most)
+        rows = np.vstack([self._coefficients(columns), shares, self._longest(columns)])
+        master.add(self._costs(columns.channel, columns.t), rows, most)
 
     def _longest(self, columns: ProgramColumns) -> Vector:
         """Rows (burns, n) that hold each burn's on-time, over the longest that its channel may be on."""
@@ -241,21 +247,10 @@ class Program:
         rows[row, bounded] = self._unit[columns.channel[bounded]] / longest[bounded]
         return rows
 
-    def _ring(self) -> Vector:
-        """Columns for free in all directions of the shift, (equations, SIDES), where H may end off its target."""
-        if self.off == 0.0:
-            return np.zeros((len(self.influence.goal), 0))
-        angles = 2 * math.pi / SIDES * np.arange(SIDES)
-        ring = np.zeros((len(self.influence.goal), SIDES))
-        ring[2:4] = np.cos(angles), np.sin(angles)
-        return ring
-
-    def _costs(self, columns: ProgramColumns) -> Vector:
-        """Cost (n,) of one unit of each column, over the dearest channel's."""
-        return np.asarray(self._price[columns.channel] / self._dearest * self._dearness(columns.t))
-
-    def _dearness(self, times: Vector) -> Vector:
-        return 1.0 + self.haste * times / float(self.centres[-1])
+    def _costs(self, channel: NDArray[np.int_], times: Vector) -> Vector:
+        """Cost of one unit of each ``channel`` at these ``times``, over the dearest channel's."""
+        dearness = 1.0 + self.haste * times / float(self.centres[-1])
+        return np.asarray(self._price[channel] / self._dearest * dearness)
 
     def _coefficients(self, columns: ProgramColumns) -> Vector:
         """Coefficients of one unit of each column, (equations, n)."""
@@ -280,17 +275,16 @@ class Program:
 
     def _worth(self, weights: Vector) -> Vector:
         """Worth of one unit of each channel in each slot by prices ``weights``, (channels, slots)."""
-        grid = self._slot_rows()
-        worth = self._direction @ (weights @ grid.reshape(len(weights), -1)).reshape(3, -1)
+        worth = self._direction @ (weights @ self._slot_rows().reshape(len(weights), -1)).reshape(3, -1)
         if self.forbidden.any():
             worth[self.forbidden] = -np.inf
         return np.asarray(worth)
 
     def _gains(self, weights: Vector) -> Vector:
         """Worth of one unit of each channel in each slot, less its cost, (channels, slots)."""
-        gains = self._worth(weights)
-        cost = (self._price / self._dearest)[:, None]
-        gains -= cost * self._dearness(self.centres) if self.haste else cost  # large: in place
+        gains, every = self._worth(weights), np.arange(len(self.channels))[:, None]
+        # Large: in place, and with one time where none is dearer.
+        gains -= self._costs(every, self.centres if self.haste else self.centres[:1])
         return gains
 
     def reachable(self) -> bool | None:
@@ -305,10 +299,9 @@ class Program:
         """True where prices ``weights`` prove that all slots together do not supply the goal (Farkas' lemma)."""
         if self.strong.any():  # these act at moments, of which the slots are only samples
             return False
-        size = float(np.abs(weights).max())
         most = float(np.maximum(self._worth(weights), 0.0).sum(axis=1) @ (self.width / self._unit))
-        loose = self.off / self._scale * float(np.linalg.norm(weights[2:4])) if self.off > 0.0 else 0.0
-        return float(weights @ self.influence.goal) / self._scale - most - loose > PROVED * size
+        loose = self.off / self._scale * float(np.linalg.norm(weights[2:4]))
+        return float(weights @ self.influence.goal) / self._scale - most - loose > PROVED * float(np.abs(weights).max())
 
     def _first(self) -> ProgramColumns:
         """Columns to begin with: those of the last time, or along the shortest way to the goal, spread over time."""
@@ -334,15 +327,13 @@ class Program:
 
     def _peaks(self, gains: Vector, duals: Vector) -> ProgramColumns:
         """Moments within slots at which a strong channel is worth most, in slots in which it costs little more."""
-        padded = np.pad(np.where(self.strong[:, None], gains, -np.inf), ((0, 0), (1, 1)), constant_values=-np.inf)
-        middle = padded[:, 1:-1]
-        channel, slot = np.nonzero((middle >= padded[:, :-2]) & (middle >= padded[:, 2:]) & (middle > -LOOK))
-        order = np.argsort(middle[channel, slot])[::-1][: 2 * BEST]
+        channel, slot = peaks(np.where(self.strong[:, None], gains, -np.inf), -LOOK)
+        order = np.argsort(gains[channel, slot])[::-1][: 2 * BEST]
         channel, centre = channel[order], self.centres[slot[order]]
         within = 0.25 * self.width * np.arange(-2, 3)  # both ends of the slot among them: there may be none beside it
         times = centre[:, None] + within
         fives = alone(np.repeat(channel, 5), times.ravel(), np.zeros(times.size))
-        worth = (duals @ self._coefficients(fives) - self._costs(fives)).reshape(-1, 5)
+        worth = (duals @ self._coefficients(fives) - self._costs(fives.channel, fives.t)).reshape(-1, 5)
         # By the parabola through the best of the five and those beside it; at an end of them, that end.
         best = np.argmax(worth, axis=1)
         every, inner = np.arange(len(best)), np.clip(best, 1, 3)
@@ -375,10 +366,8 @@ class Program:
             if self.strong[index]:
                 times = burn.t + np.linspace(-1.0, 1.0, 17) * reach / zoom
                 times = np.clip(times, self.centres[0] - half, self.centres[-1] + half)
-                times = times[np.diff(times, prepend=-np.inf) > 0.0]
-                times = times[~self.forbidden[index, self._slot(times)]]
-                same, mine = (np.full(len(times), value) for value in (index, number))
-                impulses = impulses.joined(ProgramColumns(same, times, np.zeros(len(times)), mine))
+                times = times[(np.diff(times, prepend=-np.inf) > 0.0) & ~self.forbidden[index, self._slot(times)]]
+                impulses = impulses.joined(ProgramColumns(*np.broadcast_arrays(index, times, 0.0, number)))
             else:
                 first, last = self._slot(np.array([burn.t - reach, burn.t + reach]))
                 near = np.arange(first, last + 1)
@@ -406,16 +395,11 @@ WAYS: tuple[tuple[Literal["simplex", "ipm"], bool, float], ...] = (
 costs, against which its tolerances count, it mostly does not at another; interior points do not know the trouble."""
 
 MOST_STEPS = 100_000  # steps of the simplex or of the interior points, in one way of solving
-
-SMALL, NONZERO = 10_000, 1e-2
-"""Coefficients other than zero up to which a solution counts for nothing here, and units of `work` of each above it."""
+SMALL, NONZERO = 10_000, 1e-2  # coefficients that count for nothing here, and units of `work` of each above them
 
 
 class Optimum(NamedTuple):
-    """Unknowns ``x`` (n,), and ``prices`` (m,) of one more of each right-hand side of the equations.
-
-    ``shadows`` are the same of the limits, at most zero.
-    """
+    """Unknowns ``x`` (n,), ``prices`` (m,) of one more of each right-hand side, ``shadows`` of the limits, ≤ 0."""
 
     x: Vector
     prices: Vector
@@ -455,10 +439,10 @@ class GrowingProgram:
     def optimum(self) -> Optimum | None:
         """The cheapest solution, from the last one's basis if there is one; None where no way of solving succeeds."""
         optimum = self._solved(*WAYS[0])
-        for way in WAYS if optimum is None else ():
-            self._highs.clearSolver()
-            if optimum := self._solved(*way):
-                break
+        for way in WAYS:
+            if optimum is None:
+                self._highs.clearSolver()
+                optimum = self._solved(*way)
         return optimum
 
     def _solved(self, method: str, presolve: bool, factor: float) -> Optimum | None:
@@ -491,10 +475,10 @@ class _SilentSolver(highspy.Highs):
         self.setOptionValue("output_flag", False)
         self.setOptionValue("threads", 1)
         self.setOptionValue("parallel", "off")
-        self.setOptionValue("simplex_iteration_limit", MOST_STEPS)
-        self.setOptionValue("ipm_iteration_limit", MOST_STEPS)
-        self.setOptionValue("dual_feasibility_tolerance", 1e-9)
-        self.setOptionValue("primal_feasibility_tolerance", 1e-9)
+        for way in ("simplex", "ipm"):
+            self.setOptionValue(f"{way}_iteration_limit", MOST_STEPS)
+        for side in ("primal", "dual"):
+            self.setOptionValue(f"{side}_feasibility_tolerance", 1e-9)
 
     def enableCallbacks(self) -> None:
         """No banner: in highspy 1.16 the constructor calls this, which prints one to stdout, where CSV and JSON go."""
@@ -502,12 +486,10 @@ class _SilentSolver(highspy.Highs):
         highspy.Highs.enableCallbacks(self)
 
 
-CORNERS, FLAT = 3000, 1e-12
-"""Corners that are looked at, at most, and share of the weight of one below which it is none."""
+CORNERS, FLAT = 3000, 1e-12  # looked at, at most, and share of the weight of one below which it is none
 
 MET, BEYOND = 3e-8, 1e-6
-"""Distance from the goal that counts as none, over all there is to do, and the share of it by which the goal must lie
-beyond the set, for that to be proved in spite of rounding."""
+"""Distance from the goal, over all there is to do, that is none; share of it that proves it, despite rounding."""
 
 
 def supplies(most: Vector, goal: Vector, off: float = 0.0) -> bool | None:
@@ -524,7 +506,7 @@ def supplies(most: Vector, goal: Vector, off: float = 0.0) -> bool | None:
         direction = nearest / distance
         # The point of what can be supplied, less the goal, that lies least far along it.
         new = most @ (direction @ most < 0.0) - goal
-        if off > 0.0 and (size := float(np.linalg.norm(direction[2:4]))) > 0.0:
+        if size := float(np.linalg.norm(direction[2:4])):
             new[2:4] -= off / size * direction[2:4]
         ahead = float(nearest @ new) / distance
         if ahead > BEYOND * distance and ahead > MET:

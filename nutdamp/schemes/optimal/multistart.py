@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.schemes.optimal.descent import Descent, Sequences, Task
+from nutdamp.schemes.optimal.linear_program import peaks
 from nutdamp.spacecraft.constraints import free_windows
 from nutdamp.spacecraft.model import Vector
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
@@ -23,28 +24,17 @@ from nutdamp.spacecraft.schedule import Schedule, channel_pulse
 UNMET_COST = 100.0  # cost of a miss beside the propellant when the better part is chosen, per |H|, over the least cost
 NEAR = 1.03  # schedules of ideal impulses so much dearer than the best go on to the true motion
 HALF = 0.5  # share of the least on-time from which a pulse is lengthened to it; shorter ones are left out
-
 STARTS, BEST = 512, 8  # random sequences to begin with, and schedules that go on to the next stage
 ROUNDS = ((12, 1 / 2), (12, 1 / 3), (40, 1.0))  # steps of descent, and share of the sequences that goes on after them
-
-SPARE, ADDITIONS = 2, 2
-"""Pulses more than equations when some are added: what they make needless goes back to nothing; rounds of that."""
-
+SPARE, ADDITIONS = 2, 2  # more pulses than equations, which may go back to nothing; rounds of adding them
 MOMENTS, SMALL = 97, 1e-6  # moments at which each channel is priced, by an impulse of that share of all there is to do
 GAIN = 1e-4  # share of the cost that is worth another round, and by which two schedules differ
-
-FOUND, EXACT = 1e-6, 1e-10
-"""Largest miss, over |H|, of a schedule of ideal impulses, and of one flown through real widths."""
-
-NEEDLESS, NOTHING = 1e-3, 1e-10
-"""Shares of all there is to do below which a pulse may be left out, and is even where nothing makes good for it."""
-
-WIDE, MOST_KICKS = 0.25, 24
-"""Angle of the faster turn, rad, from which pulses are first taken as several kicks, and the most of them."""
+FOUND, EXACT = 1e-6, 1e-10  # largest miss, over |H|, of ideal impulses, and of a flight through real widths
+NEEDLESS, NOTHING = 1e-3, 1e-10  # of all there is to do: below it a pulse may be left out; is, though nothing helps
+WIDE, MOST_KICKS = 0.25, 24  # rad of the faster turn from which a pulse is first so many kicks, and the most of them
 
 CLOSE, MOVES, FEWEST_MOVES = 1e-5, 30, 3
-"""Barrier of the bounds from which a schedule that is nearly the cheapest nearby is descended, steps of such a descent,
-over the number of pulses, and the fewest."""
+"""Barrier for a schedule that is nearly the cheapest nearby; steps of its descent, over its pulses; the fewest."""
 
 
 class Moments(NamedTuple):
@@ -57,6 +47,11 @@ class Moments(NamedTuple):
     def of(self, pulses: NDArray[np.bool_]) -> Moments:
         """Some of the pulses of one sequence (n,)."""
         return Moments._make(part[pulses] for part in self)
+
+    def in_order(self) -> Moments:
+        """The pulses of each sequence (b, n) by their centres."""
+        order = np.argsort(self.t, axis=1, kind="stable")
+        return Moments._make(np.take_along_axis(part, order, axis=1) for part in self)
 
 
 def schedules(task: Task, known: Iterable[Schedule] = ()) -> list[Schedule]:
@@ -90,12 +85,9 @@ def schedules(task: Task, known: Iterable[Schedule] = ()) -> list[Schedule]:
 def cheapened(task: Task, schedule: Schedule) -> Schedule | None:
     """A schedule of the same channels after a few steps down on the true motion; None where there is none."""
     sequences, x = laid_out(task, _together([_moments_of(task, schedule)]), bounded=True)
-    if not len(x):
-        return None
-    descent = Descent(task, sequences, x, kicks=0, barrier=CLOSE)
-    descent.run(max(MOVES // len(schedule), FEWEST_MOVES))
-    descent.close()
-    return _schedule(task, _every(descent)[0]) if descent.left[0] < EXACT else None
+    steps = max(MOVES // len(schedule), FEWEST_MOVES)
+    lowered = _lowered(Descent(task, sequences, x, kicks=0, barrier=CLOSE), steps) if len(x) else []
+    return _schedule(task, lowered[0]) if lowered else None
 
 
 def _pulses(task: Task, spare: int) -> int:
@@ -121,9 +113,7 @@ def laid_out(task: Task, moments: Moments, *, bounded: bool = False) -> tuple[Se
 
     Pulses may still vanish unless on-times are ``bounded`` from below.
     """
-    order = np.argsort(moments.t, axis=1, kind="stable")
-    which = np.take_along_axis(moments.which, order, axis=1)
-    t, on = (np.take_along_axis(part, order, axis=1) for part in moments[1:])
+    which, t, on = moments.in_order()
     least = task.shortest[which] if bounded else np.zeros(which.shape)
     limits = task.body.limits
     free = [(begin, end) for begin, end in free_windows(task.body) if begin < end]
@@ -167,9 +157,7 @@ def _added(task: Task, best: Descent, pulses: int, rng: np.random.Generator) -> 
     every: list[Moments] = []
     for ideal, x, prices in zip(_every(best), best.state.x, best.state.prices, strict=True):
         worth = _worth(task, ideal, x, prices, grid)
-        padded = np.pad(worth, ((0, 0), (1, 1)), constant_values=-np.inf)
-        peak = (worth >= padded[:, :-2]) & (worth >= padded[:, 2:]) & (worth > GAIN)
-        channel, moment = np.nonzero(peak)
+        channel, moment = peaks(worth, GAIN)
         order = np.argsort(-worth[channel, moment], kind="stable")
         old = ideal.of(ideal.on > NEEDLESS * task.unit[ideal.which])
         room = pulses - len(old.which)
@@ -187,23 +175,17 @@ def _added(task: Task, best: Descent, pulses: int, rng: np.random.Generator) -> 
 
 def _worth(task: Task, ideal: Moments, x: Vector, prices: Vector, t: Vector) -> Vector:
     """Saving by a small impulse of each channel at ``t`` (k,) s beside the pulses of unknowns x, (channels, k)."""
-    count, n = len(ideal.which), len(task.channels) * len(t)
-    channel, moment = np.repeat(np.arange(len(task.channels)), len(t)), np.tile(t, len(task.channels))
-    place = np.searchsorted(ideal.t, moment)
-    order = np.argsort(np.hstack([np.tile(np.arange(count) + 0.5, (n, 1)), place[:, None]]), axis=1, kind="stable")
-    small = SMALL * task.unit[channel]
-
-    def among(old: Any, new: Any) -> Any:
-        return np.take_along_axis(np.hstack([np.tile(old, (n, 1)), new[:, None]]), order, axis=1)
-
-    on = among(ideal.on, small)
-    start = among(ideal.t, moment) - 0.5 * on
-    loose = np.tile(x[2 * count :], (n, 1))
-    there = task.misses(among(ideal.which, channel), np.hstack([start, on, loose]), 1)
+    count = len(task.channels)
+    channel = np.repeat(np.arange(count), len(t))
+    added = channel, np.tile(t, count), SMALL * task.unit[channel]
+    joined = (np.column_stack([new, np.tile(old, (len(new), 1))]) for new, old in zip(added, ideal, strict=True))
+    which, centres, on = Moments(*joined).in_order()
+    loose = np.tile(x[2 * len(ideal.which) :], (len(channel), 1))
+    there = task.misses(which, np.hstack([centres - 0.5 * on, on, loose]), 1)
     here = task.misses(ideal.which[None], x[None], 1)
     # By the prices of the equations: its change in them, less its cost.
     worth = -(there - here) / SMALL @ prices - (task.costs * task.unit / task.least)[channel]
-    return np.asarray(worth.reshape(len(task.channels), len(t)))
+    return np.asarray(worth.reshape(count, len(t)))
 
 
 def _flown(task: Task, best: Descent, known: Iterable[Schedule]) -> list[Schedule]:
@@ -239,23 +221,26 @@ def _on_the_true_motion(task: Task, every: Sequence[Moments]) -> list[Moments]:
                 descent = Descent(task, sequences, x, kicks=kicks, barrier=barrier)
                 descent.run(30)
                 x, barrier = descent.state.x, 1e-6
-            descent = Descent(task, sequences, x, kicks=0, barrier=barrier)
-            descent.run(20)
-            descent.close()
-            lowered += _every(descent.of(np.flatnonzero(descent.left < EXACT)))
+            lowered += _lowered(Descent(task, sequences, x, kicks=0, barrier=barrier), 20)
     return lowered
 
 
-def _together(every: Sequence[Moments]) -> Moments:
-    """Sequences (n,) of as many pulses each as one array (b, n)."""
+def _lowered(descent: Descent, steps: int) -> list[Moments]:
+    """The sequences (n,) that leave nothing after some steps of a descent on the true motion."""
+    descent.run(steps)
+    descent.close()
+    return _every(descent.of(np.flatnonzero(descent.left < EXACT)))
+
+
+def _together(every: Iterable[tuple[Any, Any, Any]]) -> Moments:
+    """Pulses as arrays (n,), or sequences (n,) of as many pulses each as arrays (b, n)."""
     return Moments(*(np.array(part) for part in zip(*every, strict=True)))
 
 
 def _moments_of(task: Task, schedule: Schedule) -> Moments:
     """The pulses of a schedule."""
     numbers = {channel.name: number for number, channel in enumerate(task.channels)}
-    which = np.array([numbers[pulse.channel] for pulse in schedule], dtype=int)
-    return Moments(which, np.array([pulse.t for pulse in schedule]), np.array([pulse.on_time for pulse in schedule]))
+    return _together((numbers[pulse.channel], pulse.t, pulse.on_time) for pulse in schedule)
 
 
 def _every(descent: Descent) -> list[Moments]:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -18,10 +18,10 @@ from nutdamp.flight import propagation
 from nutdamp.flight.dynamics import make_dynamics
 from nutdamp.flight.propagation import Flight
 from nutdamp.schemes.catalogue import OptimalOptions
-from nutdamp.schemes.optimal import bounds, refinement
+from nutdamp.schemes.optimal import bounds
 from nutdamp.schemes.optimal.bounds import Allowed
 from nutdamp.schemes.optimal.linear_program import Burn, Program, Solution
-from nutdamp.schemes.optimal.refinement import EndEquations
+from nutdamp.schemes.optimal.refinement import EndEquations, small_angles
 from nutdamp.schemes.sequential import NO_AXIAL, at_hand
 from nutdamp.spacecraft.constraints import usable
 from nutdamp.spacecraft.equipment import Channel
@@ -32,8 +32,7 @@ UNMET = 1e-7  # share of what there is to do that columns may fail to supply: th
 REPAIRS = 60  # rounds in which burns that break a limit are moved elsewhere
 
 THRIFT, GAIN = 0.004, 0.0005
-"""Shares of the least cost that are given away for fewer pulses, where there are many and where few: so little is not
-worth another search."""
+"""Shares of the least cost given away for fewer pulses, of many and of few: so little is not worth a search."""
 
 
 def thinned(program: Program, solution: Solution, cost: float, *, fewest: bool) -> Solution:
@@ -73,7 +72,7 @@ def _repaired(program: Program, solution: Solution) -> Solution | None:
     for _ in range(REPAIRS):
         if solution.unmet > UNMET or work.exhausted():
             return None
-        broken = next(broken_by(program, solution.burns), None)
+        broken = broken_by(program, solution.burns)
         if broken is None:
             return solution
         program.forbid(*broken)
@@ -84,12 +83,10 @@ def _repaired(program: Program, solution: Solution) -> Solution | None:
 
 def _divide(program: Program, burns: tuple[Burn, ...]) -> bool:
     """Forbid slots at regular distances about too long burns, so that none can be too long; true if there are any."""
-    every = np.arange(len(program.centres))
-    divided = False
+    every, divided = np.arange(len(program.centres)), False
     for row, channel in enumerate(program.channels):
         most = channel.max_on_time
         long = [burn for burn in burns if burn.channel is channel and burn.on_time > most + TOUCHING]
-        long.sort(key=lambda burn: burn.t)
         window = math.floor(most / program.width + TOUCHING) if long else 0
         if window == 0:
             continue
@@ -101,34 +98,32 @@ def _divide(program: Program, burns: tuple[Burn, ...]) -> bool:
         pieces = np.array([math.ceil(burn.on_time / (window * program.width)) for burn in long])
         # The first of the pieces begins so that all of them are centred on the burn.
         first = middles - (pieces * (window + pause) - pause) // 2
-        within = (every - first[nearest]) % (window + pause)
-        program.forbidden[row, within >= window] = True
+        program.forbidden[row, (every - first[nearest]) % (window + pause) >= window] = True
         ends = np.flatnonzero(np.diff(nearest))
         for back in range(pause):  # windows of neighbouring patterns do not join
             program.forbidden[row, ends - back] = True
     return divided
 
 
-def broken_by(program: Program, burns: tuple[Burn, ...]) -> Iterator[tuple[Channel | None, float, float]]:
-    """Spans to forbid, s: ends of too long burns, too short ones, the less of two too near, the least if too many."""
+def broken_by(program: Program, burns: tuple[Burn, ...]) -> tuple[Channel, float, float] | None:
+    """Span to forbid, s, of a burn too long (its begin), too short, too near another or one too many; else None."""
     limits, width = program.spacecraft.limits, program.width
     for burn in burns:
         longest, shortest = burn.channel.max_on_time, burn.channel.min_on_time
         if burn.on_time > longest + TOUCHING:
-            reach = burn.on_time + width
-            yield burn.channel, burn.t - reach, burn.t - 0.5 * longest + 0.5 * width
-            yield burn.channel, burn.t + 0.5 * longest - 0.5 * width, burn.t + reach
+            return burn.channel, burn.t - (burn.on_time + width), burn.t - 0.5 * longest + 0.5 * width
         if burn.on_time < 0.5 * shortest:
-            yield burn.channel, burn.t - 2.0 * width, burn.t + 2.0 * width
+            return burn.channel, burn.t - 2.0 * width, burn.t + 2.0 * width
     for earlier, later in itertools.pairwise(burns):
         if later.t - 0.5 * later.on_time < earlier.t + 0.5 * earlier.on_time + limits.gap - TOUCHING:
             less = min(earlier, later, key=lambda burn: burn.on_time)
             reach = 0.5 * less.on_time + width
-            yield less.channel, less.t - reach, less.t + reach
+            return less.channel, less.t - reach, less.t + reach
     if limits.max_pulses is not None and len(burns) > limits.max_pulses:
         least = min(burns, key=lambda burn: burn.impulse)
         reach = 0.5 * least.on_time + 2.0 * width
-        yield least.channel, least.t - reach, least.t + reach
+        return least.channel, least.t - reach, least.t + reach
+    return None
 
 
 def as_pulses(spacecraft: Spacecraft, burns: tuple[Burn, ...]) -> Schedule:
@@ -144,8 +139,7 @@ def as_pulses(spacecraft: Spacecraft, burns: tuple[Burn, ...]) -> Schedule:
 LEFT = math.radians(1e-6)  # largest nutation and distance from the target, rad, and spin error, as a share, of a plan
 
 SHARPEST, DEARER = 1e-3, 0.03
-"""Relative accuracy of a least time by the program of small angles, and the share above its least cost from which
-shorter horizons are looked at too."""
+"""Relative accuracy of a least time by small angles; share above its least cost from which others are looked for."""
 
 
 class Problem:
@@ -178,12 +172,11 @@ class Problem:
     def program(self, spacecraft: Spacecraft | None = None, equations: EndEquations | None = None) -> Program:
         """The linear program of small angles, with another horizon or other equations if given."""
         body, equations = spacecraft or self.spacecraft, equations or self.equations
-        aim = refinement.small_angles(body, equations)
         off = 0.0
         if self.options.shift is not None and equations.shift:
             final = body.spin if body.goal.spin is None else body.goal.spin
             off = abs(body.inertia.axial(final)) * math.sin(min(self.options.shift, 0.5 * math.pi))
-        return Program(body, self.channels, self.costs, aim, off=off)
+        return Program(body, self.channels, self.costs, small_angles(body, equations), off=off)
 
     def within(self, horizon: float) -> Spacecraft:
         """The spacecraft with another horizon."""

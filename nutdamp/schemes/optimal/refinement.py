@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,10 @@ from nutdamp.spacecraft.schedule import TOUCHING, Schedule, channel_pulse
 MOST_GROWN, KNOTS = 14.0, 400
 """Exponent of growth or decay beyond which nothing (a millionth, of pulses that a clock still resolves) is left of the
 nutation, or all is lost; even moments, besides the edges of pulses, at which ω3 is read from a flight with it."""
+
+
+AROUND: Vector = np.array([part(2 * math.pi / 32 * np.arange(32)) for part in (np.cos, np.sin)])
+"""Directions (2, n) in which H may end off the target, where it may."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,17 +63,6 @@ class Influence:
         """Share of the effect that is left of impulses spread over ``width`` (n,) s, (n, equations)."""
         return np.sinc(np.outer(width, self.turning) / (2 * np.pi))
 
-    def of(self, schedule: Schedule, step: float) -> Vector:
-        """Sum of all pulses, (equations,) N m s, each taken in parts of at most ``step`` s."""
-        if not len(schedule):
-            return np.zeros(len(self.turning))
-        counts = [int(np.ceil(pulse.on_time / step)) or 1 for pulse in schedule]
-        widths = np.repeat([pulse.on_time for pulse in schedule], counts) / np.repeat(counts, counts)
-        parts = np.concatenate([np.arange(count) + 0.5 for count in counts])
-        times = np.repeat([pulse.start for pulse in schedule], counts) + widths * parts
-        impulses = np.repeat([pulse.impulse / count for pulse, count in zip(schedule, counts, strict=True)], counts, 0)
-        return np.asarray(np.einsum("nek,nk,ne->e", self.rows(times), impulses, self.widths(widths)))
-
 
 def growth_from(spacecraft: Spacecraft) -> float:
     """Time, s, from which nutation counts: the end of the horizon where it is damped (or all is lost), else 0."""
@@ -94,9 +87,7 @@ def small_angles(spacecraft: Spacecraft, equations: EndEquations) -> Influence:
     def rows(times: Vector) -> Vector:
         turned = np.exp(1j * np.outer(times, [spacecraft.nutation_rate, spin]))
         turned[:, 0] *= np.exp(np.minimum(-growth * (times - last), 0.0))
-        shifts = np.zeros((len(times), 2, 3))
-        shifts[:, :, :2] = _complex_product(turned[:, 1])
-        return _all_rows(turned[:, 0], shifts)[:, equations.chosen]
+        return _all_rows(turned[:, 0], _complex_product(turned[:, 1]))[:, equations.chosen]
 
     return Influence(rows, every[equations.chosen], _turning(spacecraft)[equations.chosen])
 
@@ -104,28 +95,34 @@ def small_angles(spacecraft: Spacecraft, equations: EndEquations) -> Influence:
 def along(flight: Flight, equations: EndEquations, step: float) -> Influence:
     """The equations about a flight, at its true angles: what its pulses add, less what it leaves, is the goal.
 
-    That a firing also turns the body under the pulses that follow is neglected; ``step`` s is for `Influence.of`.
+    That a firing also turns the body under the pulses that follow is neglected. Pulses count in parts of at most
+    ``step`` s.
     """
-    across = square_to_target(flight.spacecraft)
+    schedule, goal = flight.schedule, 0.0 - misses(flight, equations)
+    here = Influence(partial(_rows, flight, equations), goal, _turning(flight.spacecraft)[equations.chosen])
+    if not len(schedule):
+        return here
+    counts = [int(np.ceil(pulse.on_time / step)) or 1 for pulse in schedule]
+    parts = np.concatenate([np.arange(count) + 0.5 for count in counts])
+    widths = np.repeat([pulse.on_time for pulse in schedule], counts) / np.repeat(counts, counts)
+    times = np.repeat([pulse.start for pulse in schedule], counts) + widths * parts
+    impulses = np.repeat([pulse.impulse / count for pulse, count in zip(schedule, counts, strict=True)], counts, 0)
+    return replace(here, goal=goal + np.einsum("nek,nk,ne->e", here.rows(times), impulses, here.widths(widths)))
 
-    def rows(times: Vector) -> Vector:
-        _, quaternions = flight.motion(times)
-        columns = [attitude.rotate(quaternions, axis) @ across.T for axis in np.eye(3)]
-        back = _turned_back(flight, times)
-        return _all_rows(back, np.stack(columns, axis=-1))[:, equations.chosen]
 
-    here = Influence(rows, np.zeros(0), _turning(flight.spacecraft)[equations.chosen])
-    return replace(here, goal=here.of(flight.schedule, step) - misses(flight, equations))
+def _rows(flight: Flight, equations: EndEquations, times: Vector) -> Vector:
+    """Coefficients of `Influence` at the true angles of a flight."""
+    across, (_, quaternions) = square_to_target(flight.spacecraft), flight.motion(times)
+    columns = [attitude.rotate(quaternions, axis) @ across.T for axis in np.eye(3)]
+    return _all_rows(_turned_back(flight, times), np.stack(columns, axis=-1))[:, equations.chosen]
 
 
 def misses(flight: Flight, equations: EndEquations) -> Vector:
     """End errors of a flight, (equations,) N m s; zero where it ends as requested."""
     body, end = flight.spacecraft, flight.settled
-    back = _turned_back(flight, np.array([flight.schedule.end]))[0]
-    nutation = body.inertia.A * end.omega * back
-    momentum = flight.last_momentum
+    nutation = body.inertia.A * end.omega * _turned_back(flight, np.array([flight.schedule.end]))[0]
     final = end.spin if body.goal.spin is None else body.goal.spin
-    shift = square_to_target(body) @ momentum
+    shift = square_to_target(body) @ flight.last_momentum
     return np.array([nutation.real, nutation.imag, *shift, body.inertia.C * (end.spin - final)])[equations.chosen]
 
 
@@ -177,83 +174,68 @@ def _complex_product(factors: Vector) -> Vector:
 
 
 def _all_rows(nutation: Vector, shifts: Vector) -> Vector:
-    """All five equations, (n, 5, 3), from the turn of ω (n,) and the effect on H (n, 2, 3)."""
+    """All five equations, (n, 5, 3), from the turn of ω (n,) and the effect of axes on H (n, 2, …)."""
     rows = np.zeros((len(nutation), 5, 3))
     rows[:, :2, :2] = _complex_product(nutation)
-    rows[:, 2:4] = shifts
+    rows[:, 2:4, : shifts.shape[2]] = shifts
     rows[:, 4, 2] = 1.0
     return rows
 
 
 REACH, TICK_STEPS, MODELS = 2.0, 300, 4
-"""Ticks that a start or on-time may lie from what it was before; steps of one tick, two pulses at a time, by one linear
-model; and linear models, each about the best ticks so far."""
+"""Ticks that a setting may lie from its exact value; steps of a tick, two pulses at a time, by one model; models."""
 
 WAYS = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])  # a step: of the start, of the on-time
-
-
-CONVERGED, NEWTON_STEPS = 1e-13, 25
-"""Share of |H| that is left: a few roundings of the flight; steps in which that is reached, at most."""
+CONVERGED, NEWTON_STEPS = 1e-13, 25  # share of |H| left: a few roundings of the flight; steps to it, at most
 
 
 class Refinement:
-    """The ``schedule`` with centres and on-times of its pulses moved, as little as it takes, to meet ``equations``.
+    """The schedule of a ``flight`` with its pulses moved and lengthened, as little as it takes, to meet ``equations``.
 
-    ``fly`` flies schedules of the ``spacecraft``; ``aside`` (equations,) N m s is to be left of them; ``step`` s
-    is for `Influence.of`. Settings x are (c1, τ1, c2, τ2 …) s, with their scale and how far each may go.
+    ``fly`` flies schedules of its spacecraft; ``aside`` (equations,) N m s is to be left of them. Settings x are
+    (c1, τ1, c2, τ2 …) s, with their scale and how far each may go.
     """
 
     def __init__(
-        self,
-        spacecraft: Spacecraft,
-        schedule: Schedule,
-        equations: EndEquations,
-        aside: Vector,
-        step: float,
-        fly: Callable[[Schedule], Flight],
+        self, flight: Flight, equations: EndEquations, aside: Vector, fly: Callable[[Schedule], Flight]
     ) -> None:
-        self.spacecraft, self.original, self.equations = spacecraft, schedule, equations
-        self.aside, self.step, self.fly = aside, step, fly
-        self.size = float(np.linalg.norm(spacecraft.momentum))
-        names = {channel.name: channel for channel in spacecraft.channels}
+        self.flight, self.equations, self.aside, self.fly = flight, equations, aside, fly
+        spacecraft, schedule = flight.spacecraft, flight.schedule
+        self.size, self.windows = float(np.linalg.norm(spacecraft.momentum)), Windows(spacecraft)
+        names, pace = {channel.name: channel for channel in spacecraft.channels}, 1.0 / spacecraft.fastest
         self.channels = [names[pulse.channel] for pulse in schedule]
-        pace = 1.0 / spacecraft.fastest
         self.room = rooms(spacecraft, schedule.pulses)
-        start, scale, lower, upper = list[float](), list[float](), list[float](), list[float]()
+        self.bounds = [(channel.min_on_time, channel.max_on_time) for channel in self.channels]
+        settings = []
         for pulse, channel, (begun, latest) in zip(schedule, self.channels, self.room, strict=True):
-            before, after = max(pulse.start - begun, 0.0), max(latest - pulse.end, 0.0)
-            start += [pulse.t, pulse.on_time]
-            scale += [pace, min(pulse.on_time, pace)]
-            lower += [pulse.t - 0.5 * before, min(channel.min_on_time, pulse.on_time)]
-            most = min(longest_on_time(spacecraft, channel), pulse.on_time + min(before, after))
-            upper += [pulse.t + 0.5 * after, max(most, pulse.on_time)]
-        self.start, self.scale, self.lower, self.upper = map(np.array, (start, scale, lower, upper))
+            t, on, before, after = pulse.t, pulse.on_time, max(pulse.start - begun, 0.0), max(latest - pulse.end, 0.0)
+            settings.append((t, pace, t - 0.5 * before, t + 0.5 * after))
+            most = min(longest_on_time(spacecraft, channel), on + min(before, after))
+            settings.append((on, min(on, pace), min(channel.min_on_time, on), max(most, on)))
+        self.start, self.scale, self.lower, self.upper = np.array(settings).reshape(-1, 4).T.copy()
 
     def schedule(self, x: Vector) -> Schedule:
         """The schedule with these settings."""
         pairs = zip(self.channels, x.reshape(-1, 2).tolist(), strict=True)
-        return replace(self.original, pulses=tuple(channel_pulse(channel, t, on) for channel, (t, on) in pairs))
+        pulses = tuple(channel_pulse(channel, t, on) for channel, (t, on) in pairs)
+        return replace(self.flight.schedule, pulses=pulses)
 
-    def left(self, schedule: Schedule) -> tuple[Vector, Flight]:
-        """Misses of a schedule beyond what is to be left, (equations,), over |H|, and its flight."""
-        flown = self.fly(schedule)
-        return (misses(flown, self.equations) - self.aside) / self.size, flown
+    def left(self, flight: Flight) -> Vector:
+        """Misses of a flight beyond what is to be left, (equations,), over |H|."""
+        return (misses(flight, self.equations) - self.aside) / self.size
 
-    def slopes(self, schedule: Schedule, flown: Flight) -> Vector:
+    def slopes(self, flight: Flight) -> Vector:
         """Slopes of what is left by the scaled parameters, (equations, 2k)."""
-        rows = along(flown, self.equations, self.step).rows
-        columns = []
-        begins, ends = (rows(np.array(times)) for times in zip(*((p.start, p.end) for p in schedule), strict=True))
-        for begin, end, channel in zip(begins, ends, self.channels, strict=True):
+        columns, times = [], np.array([(pulse.start, pulse.end) for pulse in flight.schedule]).T
+        edges = (_rows(flight, self.equations, each) for each in times)
+        for begin, end, channel in zip(*edges, self.channels, strict=True):
             on, off = begin @ channel.torque, end @ channel.torque
             columns += [off - on, 0.5 * (on + off)]
         return np.asarray(np.column_stack(columns) * self.scale / self.size)
 
     def refined(self) -> Schedule:
         """The schedule that leaves least; how little is for the caller to judge."""
-        x = self.start
-        value, flown = self.left(self.original)
-        slopes = self.slopes(self.original, flown)
+        x, value, slopes = self.start, self.left(self.flight), self.slopes(self.flight)
         for _ in range(NEWTON_STEPS):
             norm = float(np.linalg.norm(value))
             if norm <= CONVERGED:
@@ -261,7 +243,7 @@ class Refinement:
             move = bounded_step(slopes, value, x, self.scale, self.lower, self.upper)
             for shrink in range(5):
                 trial = np.clip(x + move * 0.5**shrink, self.lower, self.upper)
-                following, _ = self.left(self.schedule(trial))
+                following = self.left(self.fly(self.schedule(trial)))
                 if np.linalg.norm(following) < norm:
                     break
             moved = (trial - x) / self.scale
@@ -271,49 +253,44 @@ class Refinement:
             if np.linalg.norm(following) >= norm:
                 break
             x, value = trial, following
-        tick = self.spacecraft.limits.tick
+        tick = self.windows.limits.tick
         return self.schedule(x) if tick is None else self._on_ticks(x, tick)
 
     def _on_ticks(self, x: Vector, tick: float) -> Schedule:
         """The schedule of least misses on ticks, by linear models one after the other; settings x are exact."""
-        windows, (centres, needed) = Windows(self.spacecraft), x.reshape(-1, 2).T
-        on_times = [
-            windows.on_time(on_time, channel.min_on_time, channel.max_on_time)
-            for on_time, channel in zip(needed, self.channels, strict=True)
-        ]
+        centres, needed = x.reshape(-1, 2).T
+        on_times = [self.windows.on_time(on, *bounds) for on, bounds in zip(needed, self.bounds, strict=True)]
         exact = np.column_stack([centres - 0.5 * needed, needed]) / tick
         ticks = np.rint(np.column_stack([exact[:, 0], np.array(on_times) / tick]))
-        best, least = self.original, np.inf
+        best, least = self.flight, np.inf
         for _ in range(MODELS):
             settings = tick * np.ravel(np.column_stack([ticks[:, 0] + 0.5 * ticks[:, 1], ticks[:, 1]]))
-            schedule = self.schedule(settings)
-            missing, flown = self.left(schedule)
+            flight = self.fly(self.schedule(settings))
+            missing = self.left(flight)
             size = float(np.linalg.norm(missing))
             if size >= least:
                 break
-            best, least = schedule, size
-            ticks = self._stepped(ticks, exact, tick, missing, self.slopes(schedule, flown) / self.scale)
-        return best
+            best, least = flight, size
+            ticks = self._stepped(ticks, exact, tick, missing, self.slopes(flight) / self.scale)
+        return best.schedule
 
     def _stepped(self, ticks: Vector, exact: Vector, tick: float, missing: Vector, slopes: Vector) -> Vector:
         """Ticks (k, 2) near the ``exact`` ones that leave less, where these leave ``missing``; ``slopes`` per s."""
-        bounds = np.array([[channel.min_on_time, channel.max_on_time] for channel in self.channels]).T
-        begun, latest = np.array(self.room).T
+        (begun, latest), (shortest, longest) = np.array(self.room).T, np.array(self.bounds).T
 
         def allowed(ticks: Vector) -> NDArray[np.bool_]:
             start, on_time = tick * ticks.T
             near = np.abs(ticks - exact).max(axis=1) < REACH
             inside = near & (start >= begun - TOUCHING) & (start + on_time <= latest + TOUCHING)
-            bounded = (on_time >= bounds[0] - TOUCHING) & (on_time <= bounds[1] + TOUCHING)
+            bounded = (on_time >= shortest - TOUCHING) & (on_time <= longest + TOUCHING)
             return np.asarray(inside & bounded & (on_time > 0.5 * tick))
 
         ticks = ticks.copy()
         for _ in range(TICK_STEPS):
-            possible = [(index, way) for way in WAYS for index in np.flatnonzero(allowed(ticks + way))]
-            if not possible:
+            way, pulse = np.nonzero([allowed(ticks + way) for way in WAYS])
+            if not len(pulse):
                 break
-            pulse = np.array([index for index, _ in possible])
-            start, on_time = np.array([way for _, way in possible]).T
+            start, on_time = WAYS[way].T
             centre = start + 0.5 * on_time
             changes = tick * (slopes[:, 2 * pulse] * centre + slopes[:, 2 * pulse + 1] * on_time)
             alone = missing[:, None] + changes
@@ -325,6 +302,6 @@ class Refinement:
             if pairs[row, column] >= float(np.linalg.norm(missing)) * (1.0 - 1e-9):
                 break
             for index in {row, column}:
-                ticks[pulse[index]] += start[index], on_time[index]
+                ticks[pulse[index]] += WAYS[way[index]]
                 missing = missing + changes[:, index]
         return ticks

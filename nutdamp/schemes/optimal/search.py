@@ -10,6 +10,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -19,12 +20,11 @@ from nutdamp.common import work
 from nutdamp.errors import Infeasible
 from nutdamp.flight.propagation import Flight
 from nutdamp.schemes.catalogue import OptimalOptions, SchemeOptions, TwoPulseOptions
-from nutdamp.schemes.optimal import alternatives, multistart, refinement
-from nutdamp.schemes.optimal.alternatives import by_other_schemes, hastened, spin_changes
+from nutdamp.schemes.optimal import alternatives, multistart
 from nutdamp.schemes.optimal.descent import Task
 from nutdamp.schemes.optimal.linear_program import Burn, Program, Solution
 from nutdamp.schemes.optimal.problem import GAIN, LEFT, UNMET, Problem, as_pulses, repaired, thinned
-from nutdamp.schemes.optimal.refinement import EndEquations, Refinement
+from nutdamp.schemes.optimal.refinement import MOST_GROWN, EndEquations, Refinement, along, misses
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import keeps_limits, rounded_off, shortest_on_time
 from nutdamp.spacecraft.model import Spacecraft, Vector
@@ -34,41 +34,28 @@ from nutdamp.spacecraft.schedule import TOUCHING, Schedule
 MOST_LOOSE = 5000.0  # units that may be spent where H may move, so that some are left for schedules that keep it
 
 CHOICES, AIMS = 3, 8
-"""Choices of burns among all channels and moments: at small angles, then along the flight before; and flights along
-which those chosen are corrected, at most."""
+"""Choices of burns: at small angles, then along the flight before; and flights along which each is corrected."""
 
 LOST, DEAR = 0.5, 0.01
-"""Share of what there is to do that corrected burns may fail to supply, and share above the program's least cost, from
-which others are chosen."""
+"""Share of what is to do that corrected burns may lack; share above the least cost from which others are chosen."""
 
-FEW, SAVED = 2, 0.001
-"""Pulses for each equation that are few, and share of the cost that so many must save over still fewer."""
-
+FEW, SAVED = 2, 0.001  # pulses for each equation, and share of the cost that so many must save over still fewer
 WAYS = 3  # schedules of other schemes that are corrected to cost less, and exact ones that are put on ticks
 
 SHORT, STRONG = 4.0, 0.3
 """Inertial nutation periods up to which very many starts are tried, and within which a strong channel does all."""
 
-PROVED, EQUAL = 0.002, 1e-6
-"""Shares above the rigorous bound below which very many starts, and schedules that keep H, are not tried."""
-
+PROVED, EQUAL = 0.002, 1e-6  # above the rigorous bound: very many starts, and keeping H, are not tried below
 HALVINGS = 3  # shorter horizons that are looked at where there is a schedule already
-
-HASTE = 0.0008
-"""Share by which the end of the horizon is dearer than its beginning, so that of equals early burns are taken."""
+HASTE = 0.0008  # share by which the end of the horizon is dearer than its beginning: of equals early burns are taken
 
 NEAR, NEARLY = 0.05, 0.05
-"""End error, rad, below which a flight is refined; share of the tightest bound that a schedule may leave where none
-leaves nothing."""
+"""End error, rad, below which a flight is refined; share of the tightest bound that is left where none is exact."""
 
 SHARP = 0.02  # relative accuracy of a least time by schedules found
 MARGINS = (0.002, 0.03, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0)  # shares added to the program's least time, tried in turn
-
-TRIED, LATER = 6, 4.0
-"""Margins tried to name a horizon that is long enough, and the longest one, over the default: looking takes long."""
-
-LATEST, NAMED = 64.0, 5e-3
-"""Multiple of the horizon up to which a feasible one is looked for, to name it, and its relative accuracy."""
+TRIED, LATER = 6, 4.0  # margins tried to name a long enough horizon, and the longest, over the default: that is slow
+LATEST, NAMED = 64.0, 5e-3  # multiple of the horizon up to which a feasible one is sought; relative accuracy
 
 ELSEWHERE, MOST_ELSEWHERE = (0.85, 0.7, 0.55, 0.4), 1500.0
 """Shares of the horizon that are tried in turn where a schedule is dear or was not found, and units for them."""
@@ -80,42 +67,20 @@ def schedule(spacecraft: Spacecraft, options: OptimalOptions) -> Schedule:
     Raises Infeasible where the program has no solution, naming the limit to relax, or where no schedule was found.
     """
     if spacecraft.growth < 0.0:  # once a millionth of the nutation is left, waiting costs ever less
-        faded = spacecraft.limits.earliest - refinement.MOST_GROWN / spacecraft.growth
-        limits = replace(spacecraft.limits, horizon=min(spacecraft.horizon, faded))
-        spacecraft = replace(spacecraft, limits=limits)
+        faded = spacecraft.limits.earliest - MOST_GROWN / spacecraft.growth
+        spacecraft = replace(spacecraft, limits=replace(spacecraft.limits, horizon=min(spacecraft.horizon, faded)))
     search = _LeastCostSearch(spacecraft, options)
-    every = list(spin_changes(search.spacecraft, search.flown))
-    searched = None
+    every, searched = list(alternatives.spin_changes(search)), None
     if not every or options.least != "pulses":
         try:
-            if options.least == "time":
-                searched = search.soonest()
-            else:
-                searched = _fewest(search) if options.least == "pulses" else search.schedule()
+            ways = {"time": search.soonest, "pulses": search.fewest}
+            searched = ways.get(options.least, search.schedule)()
             every = [searched, *every]
         except Infeasible:
             if not every:
                 raise
     best = search.preferred(every)
     return best if best is searched else search.with_bounds(best)
-
-
-def _fewest(search: _LeastCostSearch) -> Schedule:
-    """The schedule of fewest pulses: one or two by the schemes that look for them, else as the program thins."""
-    from nutdamp.schemes import one_pulse, two_pulse
-
-    body = search.spacecraft
-    if body.torquer is None and body.goal.spin is None:
-        try:
-            free = search.options.free_axis
-            schedule = (
-                one_pulse.schedule(body, SchemeOptions()) if free else two_pulse.schedule(body, TwoPulseOptions())
-            )
-        except Infeasible:
-            schedule = Schedule()
-        if schedule.pulses and keeps_limits(body, schedule) and search.left(search.flown(schedule)) <= LEFT:
-            return search.with_bounds(schedule)
-    return search.schedule()
 
 
 class _FlownSchedule(NamedTuple):
@@ -149,6 +114,20 @@ class _LeastCostSearch(Problem):
             return self.preferred([early, search.schedule()])
         except Infeasible:
             return self.with_bounds(early)
+
+    def fewest(self) -> Schedule:
+        """The schedule of fewest pulses: one or two by the schemes that look for them, else as the program thins."""
+        from nutdamp.schemes import one_pulse, two_pulse
+
+        body, schedule = self.spacecraft, Schedule()
+        if body.torquer is None and body.goal.spin is None:
+            with suppress(Infeasible):
+                if self.options.free_axis:
+                    schedule = one_pulse.schedule(body, SchemeOptions())
+                else:
+                    schedule = two_pulse.schedule(body, TwoPulseOptions())
+        good = schedule.pulses and keeps_limits(body, schedule) and self.left(self.flown(schedule)) <= LEFT
+        return self.with_bounds(schedule) if good else self.schedule()
 
     def sooner(self) -> _LeastCostSearch:
         """The same search with the shortest horizon in which a schedule is found."""
@@ -228,8 +207,7 @@ class _LeastCostSearch(Problem):
         """The cheapest schedule found: over the whole horizon, or over less where there the search does not settle."""
         first = self.program().solve()
         if other := self.without_overtaxed(first):
-            schedule = other.schedule()
-            return self.with_bounds(Schedule(schedule.pulses, schedule.notes), first)
+            return self.with_bounds(other.schedule(), first)
         # Where H may end elsewhere one that keeps it, or reaches the target, will do too: some work is left for it.
         looser = self.options.free_axis or self.options.shift is not None
         with work.budget("a schedule as asked", MOST_LOOSE if looser else math.inf):
@@ -245,7 +223,7 @@ class _LeastCostSearch(Problem):
             best = min(there, key=lambda each: each.price).schedule if there else None
         if best is None:
             raise Infeasible(self.cured() if UNMET < first.unmet < math.inf else self.not_found())
-        return self.with_bounds(hastened(self, best, first, self.within_shorter), first)
+        return self.with_bounds(alternatives.hastened(self, best, first, self.within_shorter), first)
 
     def keeping(self, best: Schedule | None) -> Schedule | None:
         """The cheapest schedule found that keeps H, or reaches the target; None where it would not replace the best."""
@@ -395,13 +373,14 @@ class _LeastCostSearch(Problem):
 
     def on_ticks(self, schedule: Schedule) -> Schedule:
         """An exact schedule on the ticks of the commands."""
-        missed = refinement.misses(self.flown(schedule), self.equations)
-        return self.refined(schedule, missed[2:4] if self.options.shift is not None else np.zeros(2), self.program())
+        flight = self.flown(schedule)
+        missed = misses(flight, self.equations)
+        return self.refined(flight, missed[2:4] if self.options.shift is not None else np.zeros(2))
 
-    def refined(self, schedule: Schedule, off: Vector, program: Program) -> Schedule:
+    def refined(self, flight: Flight, off: Vector) -> Schedule:
         """The schedule moved as little as possible to leave H ``off`` (2,) N m s beside its target, and no more."""
         aside = np.array([0.0, 0.0, *off, 0.0])[self.equations.chosen]
-        return Refinement(self.spacecraft, schedule, self.equations, aside, program.width, self.flown).refined()
+        return Refinement(flight, self.equations, aside, self.flown).refined()
 
     def settled(self, least: float) -> Schedule | None:
         """The cheapest of the schedules on which the search settles from one choice of burns or another."""
@@ -420,7 +399,7 @@ class _LeastCostSearch(Problem):
         """Best plan of other schemes, as it is or corrected to cost less: they know large angles and far targets."""
         names = {channel.name: channel for channel in self.channels}
         candidates, flights = list[_FlownSchedule](), list[Flight]()
-        for schedule in by_other_schemes(self.spacecraft, shift=self.equations.shift):
+        for schedule in alternatives.by_other_schemes(self.spacecraft, shift=self.equations.shift):
             flights.append(self.flown(Schedule(schedule.pulses)))
             if work.exhausted() or (self.left(flights[-1]) <= LEFT and self.price(schedule) <= least * (1.0 + DEAR)):
                 break
@@ -429,7 +408,7 @@ class _LeastCostSearch(Problem):
             if work.exhausted():
                 continue
             program = self.program()
-            program.aim(refinement.along(way, self.equations, program.width))
+            program.aim(along(way, self.equations, program.width))
             burns = [Burn(names[pulse.channel], pulse.t, pulse.on_time) for pulse in way.schedule]
             candidates += self.corrected(program, program.solve(program.about(burns)), least)
         return self.best(candidates)
@@ -444,11 +423,10 @@ class _LeastCostSearch(Problem):
             kept = repaired(program, solution)
             if kept is None:
                 break
-            solution, schedule = kept, as_pulses(self.spacecraft, kept.burns)
-            flown = self.flown(schedule)
-            program.aim(refinement.along(flown, self.equations, program.width))
+            solution, flown = kept, self.flown(as_pulses(self.spacecraft, kept.burns))
+            program.aim(along(flown, self.equations, program.width))
             if self.left(flown) < NEAR:
-                schedule = self.refined(schedule, solution.off, program)
+                schedule = self.refined(flown, solution.off)
                 there = self.candidate(self.flown(schedule), self.price(schedule))
                 candidates.append(there)
                 if there.left == 0.0 and (there.price <= least * (1.0 + DEAR) or there.price > (1.0 - GAIN) * last):

@@ -51,7 +51,7 @@ class Case(NamedTuple):
         starts, impulses = self.pulses.starts[:, number], self.pulses.impulses[:, :, number]
         return [
             Push(start, start + width, impulse / width) if width else Kick(start, impulse)
-            for start, width, impulse in zip(starts, self.pulses.on_times, impulses, strict=True)
+            for start, width, impulse in zip(starts, self.pulses.on_times[:, 0], impulses, strict=True)
         ]
 
 
@@ -77,7 +77,7 @@ def cases(
     torque = np.array([12.0, -9.0, 1.5])[None, :, None] * (1 + 0.1 * draw.standard_normal((len(starts), 3, count)))
     widths = np.array(on_times, dtype=float)
     impulses = torque * np.where(widths == 0.0, 0.5, widths)[:, None, None]
-    return Case(Bodies(bodies, constant, forcing), rates, quaternion, Pulses(times, widths, impulses))
+    return Case(Bodies(bodies, constant, forcing), rates, quaternion, Pulses(times, widths[:, None], impulses))
 
 
 def assert_is(flown: tuple[Array, Array], number: int, motion: Motion, tolerance: float) -> None:
@@ -89,7 +89,7 @@ def assert_flown_alike(case: Case, numbers: Iterable[int], tolerance: float = 2e
     flown = case.fly()
     assert_allclose(np.linalg.norm(flown[1], axis=0), 1.0, atol=1e-15)
     for number in numbers:
-        until = float((case.pulses.starts[:, number] + case.pulses.on_times).max())
+        until = float((case.pulses.starts[:, number] + case.pulses.on_times[:, 0]).max())
         moments, start = case.bodies.moments[:, number].tolist(), case.start(number)
         growth = case.bodies.forcing.growth
         motion = reference.fly(moments, start.rates, case.events(number), until, start.rotation, growth)
