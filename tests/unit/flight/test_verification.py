@@ -39,8 +39,8 @@ from nutdamp.schemes.catalogue import Options
 from nutdamp.spacecraft.equipment import Steerable
 from nutdamp.spacecraft.model import Disturbance, Inertia, Limits, Spacecraft
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
+from nutdamp.views import text as words
 from nutdamp.views.simulation import conservation, verdict
-from nutdamp.views.text import text
 
 EXAMPLE = read_spacecraft(example_text(), "example.yaml")
 HEAVIER = replace(EXAMPLE, inertia=Inertia((120.00012, 120.00012, 80.0)))  # by 1 ppm
@@ -319,5 +319,5 @@ def test_what_is_conserved_is_no_number_of_noughts() -> None:
     ):
         verified = Verification((), Conservation("|H|", momentum), Conservation("energy", energy, changed), ())
         assert verified.drifting == (("|H|",) if momentum > AGREE else ())
-        said.append(text(conservation(verified)))
+        said.append(words.text(conservation(verified)))
     check_text("flight.conserved", "\n".join(said))
