@@ -362,7 +362,8 @@ def _of_residuals(fitted: Fit) -> Iterator[Note]:
         return
     signals = ", ".join(fitted.model.signals[index] for index in left)
     if (time := step(fitted, left, small=True)) is not None:
-        yield note("fit-steps", signals=signals, at_s=time)
+        fired = fitted.model.record.fired
+        yield note("fit-steps-beside-schedule" if fired else "fit-steps", signals=signals, at_s=time)
     else:
         yield note("fit-not-white", signals=signals)
 

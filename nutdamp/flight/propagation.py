@@ -283,12 +283,13 @@ class Flight(Tabled):
 
     def pieces(self, samples: int, until: float) -> Iterator[Track]:
         """Rows of `sampled` in order, about `PIECE` at a time, to bound memory."""
-        motions = list[Motion]()
+        motions, count = list[Motion](), 0
         for motion in self._motions(samples, until):
             motions.append(motion)
-            if sum(len(times) for times, *_ in motions) >= PIECE:
+            count += len(motion[0])
+            if count >= PIECE:
                 yield self._track(motions)
-                motions = []
+                motions, count = [], 0
         if motions:
             yield self._track(motions)
 

@@ -43,7 +43,7 @@ class DispersedInput(NamedTuple):
 
     name: str
     tolerance: str  # key of the file's ``dispersions``
-    kind: str  # of `nutdamp.spacecraft.equipment.KINDS`, which says what ``size`` means
+    kind: str  # of `nutdamp.spacecraft.tolerances.KINDS`, which says what ``size`` means
     size: float
     nominal: float
     unit: str  # empty for factors

@@ -36,7 +36,10 @@ class ConeAngles(NamedTuple):
 
 
 def momentary(moments: ArrayLike, rates: ArrayLike, sense: float, wheel: float = 0.0) -> ConeAngles:
-    """Instantaneous cones of any body with ``rates`` (3,) rad/s: angles of H and ω from the axis ``sense``·e3, to π."""
+    """Instantaneous cones of any body: angles of H and of ω from the spin axis ``sense``·e3, up to π.
+
+    ``moments`` (I1, I2, I3) in kg m², ``rates`` (3,) in rad/s.
+    """
     w = np.asarray(rates, dtype=float)
     first, second, third = (np.asarray(moments, dtype=float) * w + (0.0, 0.0, wheel)).tolist()
     across, along = math.hypot(w[0], w[1]), sense * float(w[2])
@@ -99,7 +102,7 @@ def half_pulses(A: float, C: float, omega: float, spin: float) -> HalfPulses:
 
     J1 = C|ω3|(tan θ - tan(θ/2)) halves the nutation angle; after half an inertial turn at that angle,
     Δt = π A cos(θ/2)/(C|ω3|), the spin axis is where H was, and J2 = C|ω3| tan(θ/2) brings H back there.
-    J1 + J2 = A|ω|: no more than one pulse, Magnus 1970 (21).
+    J1 + J2 = A|ω|: no more than one pulse, Magnus 1970 (21). ``omega`` is |ω|, ``spin`` ω3, rad/s.
     """
     theta = nutation_angle(A, C, omega, spin)
     axial = C * abs(spin)

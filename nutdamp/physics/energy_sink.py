@@ -123,7 +123,8 @@ def arc(
 ) -> tuple[Any, Any, Array]:
     """Coast of a symmetric body, exact: ω (n,), ω3 (n,) rad/s and attitude (n, 4) at ``times`` (n,) s from its start.
 
-    ``growth`` is κ in 1/s. At one time that is a number, by plain numbers: a tenth of the cost of arrays.
+    ``quaternion`` (4,) body -> inertial, ``omega`` = ω1 + iω2 and ``spin`` hold at its start; ``growth`` is κ in 1/s.
+    At one time that is a number, by plain numbers: a tenth of the cost of arrays.
     """
     many = isinstance(times, np.ndarray)
     module, exp, effect_of = (np, np.exp, courses) if many else (math, cmath.exp, course)
@@ -148,7 +149,7 @@ def rates_on_arc(
 ) -> tuple[ComplexArray, Array]:
     """ω and ω3 of `arc` alone, for many bodies: ``times`` (cases, n) s from the starts of their arcs, else (cases, 1).
 
-    All but ``growth`` are by case.
+    ``omega`` and ``spin`` at the starts, rad/s, and moments, kg m², are by case; ``growth`` may be zero.
     """
     offset = wheel / C
     rate = (A - C) / A * (spin + offset)

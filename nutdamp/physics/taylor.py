@@ -76,7 +76,10 @@ class Steps(NamedTuple):
 
 
 def steps(drive: Drive, omega: ComplexArray, spin: Array, start: Array, duration: Array, count: int) -> Iterator[Steps]:
-    """Motion from ``start`` (n,) s in ``count`` equal steps or a multiple, in groups; raises NotConverged."""
+    """Motion over ``duration`` (n,) s from ``start`` (n,) s in ``count`` equal steps or a multiple, in groups.
+
+    ``omega`` and ``spin`` (n,) rad/s at the start. Raises NotConverged.
+    """
     step, done, halvings = duration / count, 0, 0
     while done < count:
         some = min(max(TOGETHER // len(spin), 1), count - done)
@@ -287,7 +290,8 @@ def integrate(
     """Motion of a rigid body under a constant body torque and ``forcing``, from ``start`` to ``end`` s (> start).
 
     ``moments`` (I1, I2, I3) kg m², ``torque`` (3,) N m with its ``slope`` (3,) N m/s, ``rates`` (3,) rad/s,
-    ``quaternion`` (4,) body -> inertial at ``start``. Raises Infeasible beyond `LONGEST` rad or ``most`` steps.
+    ``quaternion`` (4,) body -> inertial; all, ``falling`` moments too, as at ``start``. Raises Infeasible beyond
+    `LONGEST` rad or ``most`` steps.
     """
     # In one piece: a part of the loop would take torque, slope, moments and forcing, each as it is at a step.
     pieces: list[TaylorPiece] = []

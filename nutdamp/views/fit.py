@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from functools import partial
 from typing import Any
 
 from rich.console import RenderableType
@@ -174,13 +173,20 @@ def advice(ahead: Outlook) -> Iterator[Note]:
     """Value of more telemetry."""
     now, longer, probe = ahead.now, ahead.longer, ahead.probe
     level = 100.0 * ahead.probability
-    today = partial(note, scheme=ahead.scheme, now_deg=math.degrees(now.nutation), level_share=level)
+    scheme, today = ahead.scheme, math.degrees(now.nutation)
     if ahead.enough:
-        yield today("telemetry-enough", complying=percent(now.met or 0.0, ahead.probability))
+        met = percent(now.met or 0.0, ahead.probability)
+        yield note("telemetry-enough", scheme=scheme, now_deg=today, level_share=level, complying=met)
         return
     coast = ahead.coasts[-1] if longer is None else longer
-    code, left = "coast-does-not-pay" if longer is None else "coast-pays", math.degrees(coast.nutation)
-    yield today(code, coast_s=coast.length, left_deg=left)
+    yield note(
+        "coast-does-not-pay" if longer is None else "coast-pays",
+        scheme=scheme,
+        now_deg=today,
+        level_share=level,
+        coast_s=coast.length,
+        left_deg=math.degrees(coast.nutation),
+    )
     if probe is not None:
         left = math.degrees(probe.nutation)
         yield note("probe-pays", channel=probe.probe, on_s=probe.on_time, coast_s=probe.length, left_deg=left)

@@ -294,16 +294,13 @@ def _head(plan: Plan, verification: Verification) -> Iterator[Text]:
 def verification_screen(plan: Plan, verification: Verification) -> RenderableType:
     """All tables of ``verify``."""
     body = plan.spacecraft
-    ways: list[RenderableType] = [
-        *_head(plan, verification),
-        Text(),
-        parts.derived_table(body),
-        Text(),
-        methods_table(verification),
-    ]
-    kept = [*map(screen_line, (*_missing(verification), conservation(verification)))]
     return Group(
-        *ways, *kept, Text(), Text(BUDGET, "bold"), Text(), budget_table(body, verification), Text(BUDGET_NOTE, "dim")
+        *_head(plan, verification),
+        *(Text(), parts.derived_table(body)),
+        *(Text(), methods_table(verification)),
+        *(Text(), *map(screen_line, (*_missing(verification), conservation(verification)))),
+        *(Text(), Text(BUDGET, "bold")),
+        *(Text(), budget_table(body, verification), Text(BUDGET_NOTE, "dim")),
     )
 
 

@@ -30,7 +30,9 @@ SPARE, ADDITIONS = 2, 2  # more pulses than equations, which may go back to noth
 MOMENTS, SMALL = 97, 1e-6  # moments at which each channel is priced, by an impulse of that share of all there is to do
 GAIN = 1e-4  # share of the cost that is worth another round, and by which two schedules differ
 FOUND, EXACT = 1e-6, 1e-10  # largest miss, over |H|, of ideal impulses, and of a flight through real widths
-NEEDLESS, NOTHING = 1e-3, 1e-10  # of all there is to do: below it a pulse may be left out; is, though nothing helps
+NEEDLESS, NOTHING = 1e-3, 1e-10
+"""Shares of all there is to do below which a pulse may be left out, and is even where nothing makes good for it."""
+
 WIDE, MOST_KICKS = 0.25, 24  # rad of the faster turn from which a pulse is first so many kicks, and the most of them
 
 CLOSE, MOVES, FEWEST_MOVES = 1e-5, 30, 3

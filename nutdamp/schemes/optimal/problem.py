@@ -139,7 +139,7 @@ def as_pulses(spacecraft: Spacecraft, burns: tuple[Burn, ...]) -> Schedule:
 LEFT = math.radians(1e-6)  # largest nutation and distance from the target, rad, and spin error, as a share, of a plan
 
 SHARPEST, DEARER = 1e-3, 0.03
-"""Relative accuracy of a least time by small angles; share above its least cost from which others are looked for."""
+"""Relative accuracy of a least time by small angles; share above its cost from which shorter ones are looked at."""
 
 
 class Problem:

@@ -45,7 +45,9 @@ WAYS = 3  # schedules of other schemes that are corrected to cost less, and exac
 SHORT, STRONG = 4.0, 0.3
 """Inertial nutation periods up to which very many starts are tried, and within which a strong channel does all."""
 
-PROVED, EQUAL = 0.002, 1e-6  # above the rigorous bound: very many starts, and keeping H, are not tried below
+PROVED, EQUAL = 0.002, 1e-6
+"""Shares above the rigorous bound below which very many starts, and schedules that keep H, are not tried."""
+
 HALVINGS = 3  # shorter horizons that are looked at where there is a schedule already
 HASTE = 0.0008  # share by which the end of the horizon is dearer than its beginning: of equals early burns are taken
 
