@@ -280,7 +280,7 @@ def _format(form: str | None, spacecraft: FileInput, more: list[str]) -> str:
     words = [word for word in (spacecraft.path, *more) if word is not None]
     meant = next((word.lower() for word in words if word.lower() in FORMATS), None)
     if more and (meant is None or form is not None):
-        raise click.UsageError(f"got unexpected extra argument{'s' * (len(more) > 1)} ({' '.join(more)})")
+        raise click.UsageError(f"not expected here: {' '.join(more)}")
     if form is not None:
         return form
     if meant is None:

@@ -314,6 +314,4 @@ def expect_read(names: Sequence[str], options: Options, body: Spacecraft, remark
         if without:
             remark(f"--sun is read by {' and '.join(SUNLIT)} alone: {', '.join(without)} plan without it")
     if planned and body.goal.axis is None and all(scheme.only_points for scheme in planned):
-        turns, needs = ("turns", "needs") if len(names) == 1 else ("turn", "need")
-        problem = f"{turns} the spin axis to a target and {needs} one: --target, or goal in the file"
-        raise click.UsageError(f"{' and '.join(names)} {problem}")
+        raise click.UsageError(f"no target of the spin axis for {' and '.join(names)}: --target, or goal in the file")
