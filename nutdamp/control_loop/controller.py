@@ -196,8 +196,7 @@ class Coast(Watch):
         if self.path is None or (time > self._until and not self.dynamics.free):
             self._go_to(time)
         rates, quaternion = self._motion(np.array([time]))
-        first, second, third = rates[0].tolist()
-        return SpinState(complex(first, second), third, quaternion[0])
+        return SpinState.of(rates[0], quaternion[0])
 
     def later(self, time: float) -> Coast:
         """The coast from ``time`` s on, of which nothing was looked at before."""

@@ -69,10 +69,7 @@ class _Independent(Dynamics):
         solution = self.equations.solved(first, start, end, [torque], dense=True)
         work.reach(end)
         rates, quaternion = self.equations.motion(solution.y[:, -1:].T)
-        first_rate, second_rate, spin = rates[0].tolist()
-        return _Solved(self.equations, solution.sol, len(solution.t)), SpinState(
-            complex(first_rate, second_rate), spin, quaternion[0]
-        )
+        return _Solved(self.equations, solution.sol, len(solution.t)), SpinState.of(rates[0], quaternion[0])
 
 
 @dataclass(frozen=True, eq=False)

@@ -133,7 +133,7 @@ class Model:
             about = np.array([[math.cos(half), -math.sin(half), 0.0], [math.sin(half), math.cos(half), 0.0], [0, 0, 1]])
             moments, axes, rates = (A * (1.0 + size), A * (1.0 - size), C), axes @ about, about.T @ rates
             quaternion = attitude.multiply(quaternion, np.array([math.cos(0.5 * half), 0, 0, math.sin(0.5 * half)]))
-        state = SpinState(complex(rates[0], rates[1]), float(rates[2]), quaternion)
+        state = SpinState.of(rates, quaternion)
         inertia = Inertia(moments, axes, values.get("wheel", of_file.wheel))
         return Body(inertia, state, values.get("growth", spacecraft.growth))
 
@@ -234,7 +234,7 @@ class Model:
 
 def _state(path: Path | Flight, time: float) -> SpinState:
     rates, quaternion = path.motion(np.array([time]))
-    return SpinState(complex(rates[0, 0], rates[0, 1]), float(rates[0, 2]), quaternion[0])
+    return SpinState.of(rates[0], quaternion[0])
 
 
 def _coast(body: Body) -> Path:

@@ -50,8 +50,7 @@ def later(flight: Flight, time: float) -> Later:
     moment = np.array([time])
     rates, quaternions = flight.motion(moment)
     moments = np.broadcast_to(flight.moments_at(moment), (1, 3))[0].tolist()
-    first, second, third = rates[0].tolist()
-    state, inertia = SpinState(complex(first, second), third, quaternions[0]), before.inertia
+    state, inertia = SpinState.of(rates[0], quaternions[0]), before.inertia
     used, tank = float(flight.schedule.used_by(moment)[0]), before.tank
     if tank is not None:
         left = tank.propellant - tank.used - used

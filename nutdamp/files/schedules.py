@@ -64,7 +64,7 @@ def read_blocks(path: str | Path, spacecraft: Spacecraft) -> tuple[tuple[Block, 
         block = _block(row, spacecraft)
         if block is None:
             continue
-        over = blocks[-1].first + (blocks[-1].count - 1) * blocks[-1].every if blocks else 0
+        over = blocks[-1].sun_pulses[-1] if blocks else 0
         if block.first <= over:
             problem = f"Sun pulse {block.first} comes before the block before is over; expected {over + 1} or later"
             row.fault("first_sun_pulse", problem)
@@ -168,17 +168,17 @@ def _against_commands(row: Row, block: Block, spacecraft: Spacecraft) -> None:
     nearest_width = float(commands.widths[np.abs(commands.widths - block.width).argmin()])
     allowed = ", ".join(map(str, commands.every))
     off = [
-        (f"{column} = {given:.6g} s", f"{near:.6g} s is the nearest")
+        (column, f"{given:.6g} s", f"{near:.6g} s is the nearest")
         for column, given, near, slack in (
             ("delay_s", block.delay, nearest_delay, COUNTS * commands.delay_step),
             ("width_s", block.width, nearest_width, COUNTS * block.width),
         )
         if abs(given - near) > slack
     ]
-    off += [(f"count = {block.count}", f"{commands.max_count} is the most")] * (block.count > commands.max_count)
-    off += [(f"every = {block.every}", f"only {allowed}")] * (block.every not in commands.every)
-    for given, possible in off:
-        row.warn(given.split()[0], f"{given} cannot be commanded, {possible}: flown as given")
+    off += [("count", str(block.count), f"{commands.max_count} is the most")] * (block.count > commands.max_count)
+    off += [("every", str(block.every), f"only {allowed}")] * (block.every not in commands.every)
+    for column, value, possible in off:
+        row.warn(column, f"{column} = {value} cannot be commanded, {possible}: flown as given")
     for name, time in zip(TIMES, (block.delay, block.width), strict=True):
         counts, right = row.get(f"{name}_counts", ""), commands.counts(name, time)
         if counts and f"{name}_s" in row and counts != str(right):

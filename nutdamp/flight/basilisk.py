@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from nutdamp.errors import BadRequest, Infeasible, MissingExtra
+from nutdamp.flight.dynamics import shed
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.schedule import Schedule
 
@@ -40,6 +41,11 @@ class BasiliskFlight:
     quaternion: Vector  # (n, 4) body -> inertial, scalar part not negative
     step: float  # longest step of integration taken, s
 
+    @property
+    def motion(self) -> tuple[Vector, tuple[Vector, Vector]]:
+        """Times, and rates with quaternions."""
+        return self.t, (self.rates, self.quaternion)
+
 
 def fly(
     spacecraft: Spacecraft, schedule: Schedule, until: float, *, step: float | None = None, samples: int = 50
@@ -48,8 +54,8 @@ def fly(
 
     There is a row for each of ``samples`` even times from 0 to ``until`` and each edge of a pulse in between. ``step``
     is the longest step in s, see `default_step`; torques that change are those of `stretches`. Raises MissingExtra
-    without Basilisk, Infeasible where there is energy dissipation (a rigid hub has none) or the flight takes more than
-    `MOST_STEPS`, BadRequest for times that cannot be.
+    without Basilisk, Infeasible where there is energy dissipation (a rigid hub has none), moments fall, or the flight
+    takes more than `MOST_STEPS`, BadRequest for times that cannot be.
     """
     if not 0.0 <= until < math.inf:
         raise BadRequest(f"until = {until} s: expected a time of 0 s or later")
@@ -57,6 +63,8 @@ def fly(
         raise BadRequest(f"step = {step} s: expected more than 0 s")
     if spacecraft.growth != 0.0:
         raise Infeasible("Basilisk is flown without energy dissipation, because its hub is rigid, and this body has it")
+    if shed(spacecraft) is not None:
+        raise Infeasible("it flies with constant moments, and those of the file fall")
     longest = default_step(spacecraft, schedule, until) if step is None else step
     if until > MOST_STEPS * longest:
         raise Infeasible(f"the motion takes more than {MOST_STEPS} steps of Basilisk")

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from importlib.util import find_spec
 from typing import Any
 
@@ -298,8 +299,9 @@ def verify(
     ]
     with work.steps(2.0 if find_spec("Basilisk") else 1.0):  # all else takes no time beside these two
         with work.steps(end):
-            methods.append(_by_dop853(judge, times))
-        methods.append(_by_basilisk(judge, end))
+            dop853 = partial(integrate, spacecraft, schedule, times)
+            methods.append(_from_outside("DOP853, full tensor", judge, lambda: (times, dop853())))
+        methods.append(_from_outside("Basilisk", judge, lambda: basilisk.fly(spacecraft, schedule, end).motion))
     return Verification(tuple(methods), *_conserved(judge), _budget(spacecraft, schedule, unrounded, expected=expected))
 
 
@@ -327,26 +329,12 @@ def _closed_form(judge: Flight, end: float, times: Vector) -> Method:
     return Method("impulse sum (17), arcs", left.nutation, left.momentum_shift, *apart)
 
 
-def _by_dop853(judge: Flight, times: Vector) -> Method:
-    name = "DOP853, full tensor"
+def _from_outside(name: str, judge: Flight, fly: Callable[[], tuple[Vector, tuple[Vector, Vector]]]) -> Method:
+    """A method that gives times and motion only: its residual is read at the first time after the last pulse."""
     try:
-        return _from_outside(name, judge, times, integrate(judge.spacecraft, judge.schedule, times))
-    except Infeasible as reason:
-        return Method(name, missing=str(reason), outside=True)
-
-
-def _by_basilisk(judge: Flight, end: float) -> Method:
-    if shed(judge.spacecraft) is not None:
-        return Method("Basilisk", missing="it flies with constant moments, and those of the file fall", outside=True)
-    try:
-        flown = basilisk.fly(judge.spacecraft, judge.schedule, end)
+        times, motion = fly()
     except (MissingExtra, Infeasible) as reason:
-        return Method("Basilisk", missing=str(reason), outside=True)
-    return _from_outside("Basilisk", judge, flown.t, (flown.rates, flown.quaternion))
-
-
-def _from_outside(name: str, judge: Flight, times: Vector, motion: tuple[Vector, Vector]) -> Method:
-    """A method that gives motion only: its residual is read at the first time after the last pulse."""
+        return Method(name, missing=str(reason), outside=True)
     last, craft = int(np.searchsorted(times, judge.schedule.end - 1e-9)), judge.spacecraft
     rates, quaternion = (part[last] for part in motion)
     inertia = replace(craft.inertia, moments=judge.last_moments)

@@ -117,16 +117,11 @@ def free_windows(spacecraft: Spacecraft, horizon: float | None = None) -> list[t
     ``horizon`` s, where given, replaces that of the spacecraft. Windows that only touch leave a moment free between
     them.
     """
-    limits, until = spacecraft.limits, spacecraft.horizon if horizon is None else horizon
-    now = limits.earliest
-    free: list[tuple[float, float]] = []
-    for dark, light in sorted(limits.blackout):
-        if now >= until:
-            return free
-        if dark >= now:
-            free.append((now, min(dark, until)))
-        now = max(now, light)
-    return [*free, (now, max(now, until))] if now < until or not limits.blackout else free
+    earliest, until = spacecraft.limits.earliest, spacecraft.horizon if horizon is None else horizon
+    begins, over = Windows(spacecraft).dark
+    edges = zip([earliest, *np.maximum(over, earliest).tolist()], [*begins.tolist(), math.inf], strict=True)
+    free = [(begin, min(end, until)) for begin, end in edges if begin <= end and begin < until]
+    return free if len(begins) or free else [(earliest, earliest)]
 
 
 def rooms(spacecraft: Spacecraft, pulses: Sequence[Pulse]) -> list[tuple[float, float]]:

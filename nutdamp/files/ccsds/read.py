@@ -399,12 +399,11 @@ def merged_text(source: Source, message: ApmContents | History, at: float = 0.0,
         after = replace(after, inertia=Inertia(*principal_axes(tensor), before.inertia.wheel))
     axes = after.inertia.axes
     after = replace(after, omega0=axes.T @ (before.rates if given is None else given))
-    first, second, third = after.omega0.tolist()
     quaternion = before.initial.quaternion
     if turn is not None:
         quaternion = attitude.multiply(turn, attitude.from_matrix(axes))
         after = replace(after, attitude=Attitude(turn, epoch_after(epoch.text, 0.0), message.frame))
-    later = Later(before, after, SpinState(complex(first, second), third, quaternion))
+    later = Later(before, after, SpinState.of(after.omega0, quaternion))
 
     def edits(tree: Node) -> Edits:
         if inertia:
