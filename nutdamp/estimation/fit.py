@@ -81,8 +81,8 @@ def expect_enough(model: Model) -> None:
     rows, free = len(np.unique(model.times)), sum(math.isinf(parameter.prior) for parameter in model.parameters)
     if len(model.measured) <= free + 2:
         raise Infeasible(
-            f"{rows} row{'s' * (rows != 1)} of samples, with {len(model.measured)} values in all, cannot tell {free} "
-            "unknowns; a longer record, or more samples, helps"
+            f"the samples (rows: {rows}, values: {len(model.measured)}) cannot tell {free} unknowns; a longer record, "
+            "or more samples, helps"
         )
     body, length = model.spacecraft, model.record.length
     period = rigid_body.body_period(body.inertia.A, body.inertia.C, body.spin, body.inertia.wheel)

@@ -327,6 +327,6 @@ class Table:
         """The warnings in words, with file and line."""
         words = []
         for (line, text), *others in self.warnings.values():
-            more = f" (and so in {len(others)} more row{'s' if len(others) > 1 else ''})" if others else ""
+            more = f" (further rows alike: {len(others)})" if others else ""
             words.append(f"{self.name}:{line}: {text}{more}")
         return words

@@ -422,7 +422,7 @@ def broken_limits(spacecraft: Spacecraft, schedule: Schedule) -> list[str]:
     for breach in breaches(spacecraft, schedule):
         grouped.setdefault((breach.limit, breach.window), []).append(breach)
     counts = [(_broken(broken[0]), len(broken) - 1) for broken in grouped.values()]
-    return [text + f"; likewise {more} more pulse{'s' * (more > 1)}" * (more > 0) for text, more in counts]
+    return [text + f"; further pulses alike: {more}" * (more > 0) for text, more in counts]
 
 
 def _broken(breach: Breach) -> str:

@@ -199,8 +199,8 @@ class SteerablePair:
                     "cones or rhumb-line take less"
                 )
         return (
-            f"the pulses of {cones} half cone{'s' if cones > 1 else ''} find no room within the {horizon:.4g} s up to "
-            "limits.horizon, the gap and the blackout windows"
+            f"the pulses (half cones: {cones}) find no room within the {horizon:.4g} s up to limits.horizon, the gap "
+            "and the blackout windows"
         )
 
 
