@@ -158,7 +158,10 @@ def _margins(decision: Decision) -> Iterator[tuple[str, str, str, str, str, str,
     cases = decision.cases
     for line in decision.lines:
         nominal, dispersed, margin = (size(line.bound, each) for each in (line.nominal, line.dispersed, line.margin))
-        yield line.bound.part.label, limit(line.bound), nominal, dispersed, margin, _met(line), line.met
+        words = VERDICT[line.met]
+        if not line.bound.required and line.met is not None:
+            words = "NOT " * (not line.met) + ("reached" if line.bound.part is Part.DISTANCE else "damped")
+        yield line.bound.part.label, limit(line.bound), nominal, dispersed, margin, words, line.met
     for aspect in decision.aspects:
         for bound, angle, left in cone_margins(aspect):
             words = KEPT[left >= -SLACK] + " (nominal)" * (cases is not None)
@@ -183,14 +186,6 @@ def limit(bound: Bound) -> str:
 def size(bound: Bound, value: float | None) -> str:
     """The residual of a part, in rad/s or degrees."""
     return quantity(value, "rad/s") if bound.part is Part.SPIN else degrees(value)
-
-
-def _met(line: Line) -> str:
-    """Verdict on a part: met or not; on one that is not required, damped or reached."""
-    if line.bound.required:
-        return VERDICT[line.met]
-    done = "reached" if line.bound.part is Part.DISTANCE else "damped"
-    return MISSING if line.met is None else f"{'NOT ' * (not line.met)}{done}"
 
 
 def spent(pulses: Schedule) -> str:

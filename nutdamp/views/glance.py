@@ -123,17 +123,14 @@ def _columns(compared: Comparison, chosen: Plan | None) -> Iterator[Column]:
     where = "full csv" + " page" * any(plan.spin_change for plan in compared.plans)
     yield Column("spin_change_rad_s", "spin change", "rad/s", attrgetter("spin_change"), _four, where)
     where = "csv" + " full page" * any(plan.delta_v is not None for plan in compared.plans)
-    yield Column("delta_v_m_s", "|ΔV|", "m/s", _speed, _four, where)
+    yield Column("delta_v_m_s", "|ΔV|", "m/s", lambda plan: None if plan.delta_v is None else math.hypot(*plan.delta_v),
+                 _four, where)  # fmt: skip
     if compared.shares:
         yield Column("", Shared.CASES, "%", share, where="screen", kind=TEXT)
         yield Column("", COUNT, "%", share, where="full page", kind=TEXT)
     yield from _bounds(compared)
     yield Column("", Shared.VERDICT, "", partial(scheme_verdict, compared), where=everywhere, kind=TEXT, met=met)
     yield Column("why", "", "", infeasibility, where="csv", kind=TEXT)
-
-
-def _speed(plan: Plan) -> float | None:
-    return None if plan.delta_v is None else math.hypot(*plan.delta_v)
 
 
 def ratios(body: Spacecraft) -> Iterator[tuple[str, float]]:
