@@ -27,6 +27,7 @@ from nutdamp.schemes import catalogue
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import SLACK, Spacecraft, Vector
 from nutdamp.spacecraft.requirements import Bound, Part
+from nutdamp.spacecraft.schedule import Schedule
 from nutdamp.views.parts import aspect_facts, commanded, cone_margins, direction_text, required, spin_text
 from nutdamp.views.tables import TEXT, Column, DataTable, Shared, facts, values_of
 from nutdamp.views.text import MISSING, degrees, duration, joined, mass, moment, most, note_json, quantity, text
@@ -157,7 +158,10 @@ def _margins(decision: Decision) -> Iterator[tuple[str, str, str, str, str, str,
     cases = decision.cases
     for line in decision.lines:
         nominal, dispersed, margin = (size(line.bound, each) for each in (line.nominal, line.dispersed, line.margin))
-        yield line.bound.part.label, limit(line.bound), nominal, dispersed, margin, _met(line), line.met
+        words = VERDICT[line.met]
+        if not line.bound.required and line.met is not None:
+            words = "NOT " * (not line.met) + ("reached" if line.bound.part is Part.DISTANCE else "damped")
+        yield line.bound.part.label, limit(line.bound), nominal, dispersed, margin, words, line.met
     for aspect in decision.aspects:
         for bound, angle, left in cone_margins(aspect):
             words = KEPT[left >= -SLACK] + " (nominal)" * (cases is not None)
@@ -184,21 +188,15 @@ def size(bound: Bound, value: float | None) -> str:
     return quantity(value, "rad/s") if bound.part is Part.SPIN else degrees(value)
 
 
-def _met(line: Line) -> str:
-    """Verdict on a part: met or not; on one that is not required, damped or reached."""
-    if line.bound.required:
-        return VERDICT[line.met]
-    done = "reached" if line.bound.part is Part.DISTANCE else "damped"
-    return MISSING if line.met is None else f"{'NOT ' * (not line.met)}{done}"
+def spent(pulses: Schedule) -> str:
+    """The propellant, or the impulse where it is not known."""
+    return quantity(pulses.total_impulse, "N m s") if pulses.propellant is None else mass(pulses.propellant)
 
 
 def cost(decision: Decision) -> Iterator[tuple[str, str]]:
     """Cost and end of the plan: names and values."""
     pulses = decision.flight.schedule
-    name, spent = "propellant", mass(pulses.propellant)
-    if pulses.propellant is None:
-        name, spent = "impulse", quantity(pulses.total_impulse, "N m s")
-    yield name, f"{spent}, pulses: {len(pulses)}"
+    yield "impulse" if pulses.propellant is None else "propellant", f"{spent(pulses)}, pulses: {len(pulses)}"
     yield "last pulse ends", moment(pulses.end) if len(pulses) else "no pulse is needed"
 
 

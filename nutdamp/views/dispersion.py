@@ -374,7 +374,7 @@ def _case_columns(
     study: Study | LoopStudy, outputs: Sequence[StudyOutput], rows: Sequence[CaseRow], effects: Array | None
 ) -> Iterator[Column]:
     cones, inputs = study.model.spacecraft.keep, study.model.inputs.drawn
-    yield Column("case", Shared.CASE, "", lambda row: row.case + 1, where="screen csv", kind=WHOLE)
+    yield Column("case", "case", "", lambda row: row.case + 1, where="screen csv", kind=WHOLE)
     named = (Shared.THIS_CASE, Shared.NOMINAL)
     yield Column("", "", "", lambda row: named[row.case == ESTIMATE], where="case", kind=TEXT)
     for entry in inputs:

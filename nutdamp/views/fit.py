@@ -18,18 +18,7 @@ from nutdamp.files.carried import notes
 from nutdamp.units import screen_unit
 from nutdamp.views.decisions import exact_percent, heading, percent
 from nutdamp.views.parts import opening, summary
-from nutdamp.views.tables import (
-    TEXT,
-    WHOLE,
-    YES_NO,
-    Column,
-    DataTable,
-    Shared,
-    angle_of,
-    file_columns,
-    to_figures,
-    values_of,
-)
+from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, Shared, angle_of, file_columns, to_figures, values_of
 from nutdamp.views.text import mass, note_json
 
 FAR = 4.0  # sigmas of the file from which on a change is remarked upon
@@ -109,7 +98,7 @@ def signal_table(fit: Fit) -> DataTable:
         Column("noise_SI", "", "", lambda at: float(fit.noise[at]), where="json"),
         Column("", "noise", "", lambda at: fit.noise[at] * in_shown(fit.model.signals[at])[1], to_figures(3), "screen"),
         Column("", "unit", "", lambda at: in_shown(fit.model.signals[at])[0], where="screen", kind=TEXT),
-        Column("white", "", "", fit.white, where="json", kind=YES_NO),
+        Column("white", "", "", fit.white, where="json"),
         Column("", "residuals", "", verdict, where="screen", kind=TEXT),
     )  # fmt: skip
     return DataTable("Signals", columns, range(len(of_signal)))

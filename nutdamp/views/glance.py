@@ -16,6 +16,7 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from nutdamp.common.numerics import RPM
 from nutdamp.common.results import Note
 from nutdamp.errors import listed
 from nutdamp.flight.end_state import at_start
@@ -28,32 +29,8 @@ from nutdamp.spacecraft.model import SLACK, Spacecraft
 from nutdamp.spacecraft.requirements import Bound, Part
 from nutdamp.views import decisions, parts, tables
 from nutdamp.views.decisions import COUNT, coloured, lasting, limit, size, verdict
-from nutdamp.views.tables import (
-    TEXT,
-    WHOLE,
-    YES_NO,
-    Column,
-    DataTable,
-    FittedColumns,
-    Shared,
-    angle_of,
-    facts,
-    to_figures,
-)
-from nutdamp.views.text import (
-    RPM,
-    WARNING,
-    degrees,
-    digits,
-    joined,
-    mass,
-    ordered,
-    quantity,
-    screen_line,
-    severity,
-    short_angle,
-    small_angle,
-)
+from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable, Shared, angle_of, facts, to_figures
+from nutdamp.views.text import degrees, digits, joined, ordered, screen_line, screen_lines, short_angle, small_angle
 
 NOT = "✗"  # sign before a value above the requirement
 SHORT_NAMES = ("RA", "dec")  # right ascension and declination, where there is little room
@@ -146,17 +123,14 @@ def _columns(compared: Comparison, chosen: Plan | None) -> Iterator[Column]:
     where = "full csv" + " page" * any(plan.spin_change for plan in compared.plans)
     yield Column("spin_change_rad_s", "spin change", "rad/s", attrgetter("spin_change"), _four, where)
     where = "csv" + " full page" * any(plan.delta_v is not None for plan in compared.plans)
-    yield Column("delta_v_m_s", "|ΔV|", "m/s", _speed, _four, where)
+    yield Column("delta_v_m_s", "|ΔV|", "m/s", lambda plan: None if plan.delta_v is None else math.hypot(*plan.delta_v),
+                 _four, where)  # fmt: skip
     if compared.shares:
         yield Column("", Shared.CASES, "%", share, where="screen", kind=TEXT)
         yield Column("", COUNT, "%", share, where="full page", kind=TEXT)
     yield from _bounds(compared)
     yield Column("", Shared.VERDICT, "", partial(scheme_verdict, compared), where=everywhere, kind=TEXT, met=met)
     yield Column("why", "", "", infeasibility, where="csv", kind=TEXT)
-
-
-def _speed(plan: Plan) -> float | None:
-    return None if plan.delta_v is None else math.hypot(*plan.delta_v)
 
 
 def ratios(body: Spacecraft) -> Iterator[tuple[str, float]]:
@@ -227,16 +201,14 @@ def glance(
     """
     body = compared.spacecraft
     head = [*parts.title(body), headline(compared, decision, robust)]
-    remarks = ordered([*beside, *notes(compared, decision, robust)])
-    more = [screen_line(note) for note in remarks if severity(note) != WARNING]
+    warnings, more = screen_lines([*beside, *notes(compared, decision, robust)])
     name = robust or ("" if decision is None else decision.plan.scheme)
     chosen = next((plan for plan in compared.plans if plan.scheme == name), None)
     table = scheme_table(compared, chosen).screen("screen", between=" ")
     if decision is None:
         return _fitted(head, [], [], more, table)
     plan = decision.plan
-    head.append(coloured(verdict(decision), decision.met))
-    head += [screen_line(note) for note in remarks if severity(note) == WARNING]
+    head += [coloured(verdict(decision), decision.met), *warnings]
 
     def screen(first: int) -> RenderableType:
         fired: list[RenderableType] = []
@@ -269,9 +241,8 @@ def headline(compared: Comparison, decision: Decision | None, robust: str = "") 
     pulses = plan.pulses
     if not len(pulses):
         return Text.assemble(("NO PULSE needed", "bold"), f": {decisions.needless(compared) or 'nothing is fired'}")
-    spent = quantity(pulses.total_impulse, "N m s") if pulses.propellant is None else mass(pulses.propellant)
     blocks = f"blocks {len(pulses.blocks)}, " if pulses.blocks else ""
-    count = f"{blocks}pulses {len(pulses)}, {spent}, ends at {pulses.end:.4g} s"
+    count = f"{blocks}pulses {len(pulses)}, {decisions.spent(pulses)}, ends at {pulses.end:.4g} s"
     lead = ("NOT ENOUGH: ", "bold red") if decision.met is False else ("FLY ", "bold")
     ideal = " (ideal impulses)" * pulses.idealised
     return Text.assemble(lead, (robust or plan.scheme, "bold"), f"{ideal}: {count}")
@@ -365,7 +336,7 @@ def _fitted(
     required: Sequence[RequirementRow],
     middle: Sequence[RenderableType],
     more: Sequence[Text],
-    schemes: FittedColumns,
+    schemes: RenderableType,
     *,
     blocks: bool = False,
 ) -> RenderableType:

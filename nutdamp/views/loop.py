@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
+from operator import attrgetter
 from typing import Any, NamedTuple
 
 from rich.console import Group, RenderableType
@@ -280,12 +281,8 @@ SLOW = 0.1  # share of its spin by which a year may change it before figures of 
 
 def _of_cycle(name: str, scale: float = 1.0) -> Callable[[HeldNutation], float | None]:
     """A figure of the limit cycle times ``scale``; None without one."""
-
-    def value(held: HeldNutation) -> float | None:
-        figure = tables.value_at(held.cycle, name)
-        return None if figure is None else scale * float(figure)
-
-    return value
+    figure = attrgetter(f"cycle.{name}")
+    return lambda held: None if held.cycle is None or figure(held) is None else scale * float(figure(held))
 
 
 FILES, EVERYWHERE = "csv json", "screen csv json"

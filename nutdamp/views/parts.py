@@ -29,7 +29,6 @@ from nutdamp.units import screen_unit
 from nutdamp.views.tables import TEXT, WHOLE, WIDTH, Column, DataTable, Shared, angle_of, facts, lines_of, to_figures
 from nutdamp.views.text import (
     RPM,
-    WARNING,
     degrees,
     digits,
     duration,
@@ -37,11 +36,9 @@ from nutdamp.views.text import (
     mass,
     moment,
     most,
-    ordered,
     pointing,
     quantity,
-    screen_line,
-    severity,
+    screen_lines,
     short_angle,
     small_angle,
     steering,
@@ -223,10 +220,6 @@ LINES = 40  # lines of a default screen
 SIZES = ((14, 3), (8, 3), (4, 3), (4, 2), (4, 1), (1, 0))  # rows before the last one, and notes: the first that fits
 
 
-Rows = Callable[..., RenderableType]
-"""A table; with ``first`` only of so many rows, and the last one."""
-
-
 def opening(body: Spacecraft, verbose: bool) -> Iterator[RenderableType]:
     """Name and motion of a spacecraft at t = 0; ``verbose``: all its derived quantities."""
     yield from (Text(body.name, style="bold"), derived_table(body), Text()) if verbose else title(body)
@@ -234,20 +227,18 @@ def opening(body: Spacecraft, verbose: bool) -> Iterator[RenderableType]:
 
 def summary(
     head: Sequence[RenderableType],
-    table: Rows | None,
+    table: Callable[..., RenderableType] | None,
     notes: Iterable[Note],
     steps: str,
     *,
     more: Iterable[RenderableType] = (),
     verbose: bool = False,
 ) -> RenderableType:
-    """A default screen, warnings below its ``head``, and ``steps`` to take next.
+    """A default screen, warnings below its ``head``, and ``steps`` to take next; ``table`` by its ``first`` rows.
 
     ``verbose``: with all rows and notes, and ``more`` parts.
     """
-    every = ordered(notes)
-    warnings = [screen_line(entry) for entry in every if severity(entry) == WARNING]
-    others = [screen_line(entry) for entry in every[len(warnings) :]]
+    warnings, others = screen_lines(notes)
     if verbose:
         body = [Text(), table()] if table is not None else []
         for part in more:
@@ -277,13 +268,12 @@ def _effects(flown: Flight, velocity: Vector | None) -> Iterator[tuple[str, str]
         start = pulse.loaded[0]
         dated = body.utc(start, 3)
         yield name, f"starts at {moment(start)}" + (f", {dated}" if dated else "")
-    for name, before_, after_ in zip(
-        angle_names(body), angle_texts(body, body.momentum), angle_texts(body, final.momentum), strict=True
-    ):
-        yield f"H: {name}", f"{before_} to {after_}"
+    turned = (angle_texts(body, momentum) for momentum in (body.momentum, final.momentum))
+    for name, *ends in zip(angle_names(body), *turned, strict=True):
+        yield f"H: {name}", " to ".join(ends)
     assert body.sun is not None
-    ends = (attitude.angle_between(momentum, body.sun) for momentum in (body.momentum, final.momentum))
-    yield "Sun angle of H", " to ".join(degrees(float(angle)) for angle in ends)
+    aspects = (attitude.angle_between(momentum, body.sun) for momentum in (body.momentum, final.momentum))
+    yield "Sun angle of H", " to ".join(degrees(float(angle)) for angle in aspects)
     yield "spin", f"{spin_text(body.spin)} to {spin_text(final.spin)}"
     largest = float(max(before.nutation.max(), after.nutation.max()))
     yield "nutation", f"{degrees(body.nutation)} to {degrees(final.nutation)}; largest {degrees(largest)}"

@@ -49,7 +49,6 @@ def facts(rows: Iterable[Sequence[RenderableType]]) -> Table:
 class Shared:
     """Headings that several tables have; every other heading stands in one module."""
 
-    CASE = "case"
     CASES = "cases"
     CHANNEL = "channel"
     DELAY = "delay"
@@ -236,18 +235,19 @@ class DataTable:
     def screen(self, place: str, *, between: str = "\n", first: int | None = None) -> FittedColumns:
         """A table of a screen; ``between`` heading and unit, and of many rows the ``first`` ones and the last."""
         shown = self.at(place)
-        names = [column.headed(between) for column in shown]
-        text = [name for name, column in zip(names, shown, strict=True) if column.kind == TEXT]
-        table = columns(*names, text=tuple(text))
-        table.whole = tuple(name for name, column in zip(names, shown, strict=True) if column.met)
-        cut = first is not None and len(self.rows) > first + 2
+        headed = [(column.headed(between), column) for column in shown]
+        text = tuple(name for name, column in headed if column.kind == TEXT)
+        table = columns(*(name for name, _ in headed), text=text)
+        table.whole = tuple(name for name, column in headed if column.met)
+        last = len(self.rows) - 1
+        cut = last if first is None or last < first + 2 else first
         for index, row in enumerate(self.rows):
-            if not cut or first is None or index < first or index == len(self.rows) - 1:
+            if index < cut or index == last:
                 table.add_row(*(self._cell(column, row, index, at == 0) for at, column in enumerate(shown)))
-            elif index == first:
+            elif index == cut:
                 more = next((at for at, column in enumerate(shown) if at and column.kind == TEXT), 1)
-                between_ = {0: "…", more: f"{len(self.rows) - first - 1} more"}
-                table.add_row(*(between_.get(at, "") for at in range(len(names))))
+                left_out = {0: "…", more: f"{last - cut} more"}
+                table.add_row(*(left_out.get(at, "") for at in range(len(shown))))
         return table
 
     def _cell(self, column: Column, row: Any, index: int, first: bool) -> Text:

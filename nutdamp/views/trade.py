@@ -75,10 +75,8 @@ def _columns(rows: Sequence[TradeRow]) -> Iterator[Column]:
     yield Column("", "cost", "", lambda row: row.spent(row.point.cost), where="full brief")
     yield Column("", "small-angle bound", "", lambda row: row.spent(row.least), where="full" * bounded)
     yield Column("pulses", Shared.PULSES, "", lambda row: len(row.plan.pulses), where="csv full brief", kind=WHOLE)
-    yield from file_columns(
-        "csv", "propellant_kg=plan.pulses.propellant", "total_impulse_Nms=plan.pulses.total_impulse"
-    )
-    yield from file_columns("csv", "first_order_least=least")
+    spent = ("propellant_kg=plan.pulses.propellant", "total_impulse_Nms=plan.pulses.total_impulse")
+    yield from file_columns("csv", *spent, "first_order_least=least")
     yield Column("least_unit", "", "", attrgetter("point.unit"), where="csv", kind=TEXT)
     yield from file_columns("csv", "nutation_deg=plan.flight.residual.nutation")
     shift = angle_of("plan.flight.residual.momentum_shift")
