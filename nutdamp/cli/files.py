@@ -32,11 +32,10 @@ from nutdamp.cli.options import (
     Count,
     Grouped,
     NameType,
-    SchemeName,
     goal_options,
     is_number,
 )
-from nutdamp.cli.plan import compared_with, flown_options, fronts_of, plan_or_read, robust_of
+from nutdamp.cli.plan import compared_with, flown_options, fronts_of, plan_or_read, robust_of, scheme_option
 from nutdamp.cli.screen import console, say, show, show_failures, units_of_screen
 from nutdamp.errors import BadRequest, nearest, printable
 from nutdamp.schemes.catalogue import LEAST, PLANNED
@@ -378,7 +377,7 @@ def control_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 @click.command("report", cls=ReportCommand)
 @spacecraft_argument
-@click.option("--scheme", "names", multiple=True, type=SchemeName(PLANNED), help="Compare this one only; repeatable.")
+@scheme_option("names", multiple=True, type=NameType(PLANNED), help="Compare this one only; repeatable.")
 @click.option("--schedule", type=FILE, help="Report the pulses of a CSV file, as `plan --csv` writes it.")
 @click.option("--blocks", type=FILE, help="Report what the command blocks of a CSV file fire.")
 @click.option("--robust", is_flag=True, help="Compare the plan of `plan --robust` as well.")

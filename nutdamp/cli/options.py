@@ -54,14 +54,6 @@ class NameType(Choice[str]):
             self.fail(f"{wrong.message.rstrip('.')}; did you mean {close!r}?", param, ctx)
 
 
-class SchemeName(NameType):
-    """The name of a scheme; there are more of them than a line of the help page holds."""
-
-    def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:  # noqa: ARG002 - click's
-        """Form of the value on the help page."""
-        return "SCHEME"
-
-
 class Bare(float):
     """A number that was written without a unit."""
 

@@ -22,7 +22,7 @@ from nutdamp.cli.job import (
     spacecraft_argument,
 )
 from nutdamp.cli.main import leave
-from nutdamp.cli.options import END, FILE, OUTPUT, Command, SchemeName, expect_read, goal_options, scheme_options
+from nutdamp.cli.options import END, FILE, OUTPUT, Command, NameType, expect_read, goal_options, scheme_options
 from nutdamp.cli.screen import say, show_failures
 from nutdamp.errors import BadRequest, Infeasible, listed, printable
 from nutdamp.schemes.catalogue import NAMES, PLANNED, SchemeOptions
@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from nutdamp.spacecraft.model import Spacecraft
 
 
+scheme_option = partial(click.option, "--scheme", metavar="SCHEME")  # a line does not hold all the names
 JITTER_SEED = 1  # seed of the errors of the Sun pulses from which blocks are fired: the same in every run
 
 
@@ -56,8 +57,7 @@ def flown_options(verb: str, scheme: str | None = None) -> Callable[[Command], C
         fired = f"{verb} what the command blocks of a CSV file fire, as `plan --blocks` writes it."
         command = click.option("--blocks", type=FILE, callback=alone, help=fired)(command)
         command = click.option("--schedule", type=FILE, callback=alone, help=read)(command)
-        named = click.option("--scheme", type=SchemeName(NAMES), callback=alone, help=scheme or default)
-        return named(command)
+        return scheme_option(type=NameType(NAMES), callback=alone, help=scheme or default)(command)
 
     return decorate
 
@@ -157,9 +157,7 @@ PRIMER = "primer"  # the picture of the certificate; the others are of one plan
 
 @click.command("plan", cls=SessionCommand)
 @spacecraft_argument
-@click.option(
-    "--scheme", "names", multiple=True, type=SchemeName(PLANNED), help=f"Repeatable: {listed(PLANNED, 'or')}."
-)
+@scheme_option("names", multiple=True, type=NameType(PLANNED), help=f"Repeatable: {listed(PLANNED, 'or')}.")
 @scheme_options
 @goal_options
 @click.option("--robust", is_flag=True, help="Cheapest plan with which enough cases comply.")

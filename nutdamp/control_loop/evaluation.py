@@ -54,14 +54,8 @@ class _Independent(Dynamics):
         """Always False: no coast is known in closed form."""
         return False
 
-    def _path(
-        self,
-        state: SpinState,
-        start: float,
-        end: float,
-        push: Push,
-        most: int,  # noqa: ARG002 - of steps
-    ) -> tuple[Path, SpinState]:
+    def _path(self, state: SpinState, start: float, end: float, push: Push, most: int) -> tuple[Path, SpinState]:
+        del most  # of steps of a Taylor series
         first = self.equations.state(state)  # no loop is flown with moments that fall
         if end <= start:
             return _Solved(self.equations, lambda times: np.outer(first, np.ones(np.size(times))), 0), state

@@ -289,12 +289,12 @@ def _contender(compared: Comparison, plan: Plan, decided: Decision | None) -> do
     """One scheme with its cost, and the share of cases that comply or the verdict."""
     if not plan.feasible:
         return document.Contender(plan.scheme, (decisions.no_plan(plan),), False)
-    pulses = plan.pulses
-    spent = quantity(pulses.total_impulse, "N m s") if pulses.propellant is None else mass(pulses.propellant)
     share = compared.shares.get(plan)
     word = decisions.share_text(share) if share is not None else decisions.VERDICT[compared.meets(plan)]
     word += ", timed" * (not plan.commandable)
-    return document.Contender(plan.scheme, (spent, word), decided is not None and plan is decided.plan)
+    return document.Contender(
+        plan.scheme, (decisions.spent(plan.pulses), word), decided is not None and plan is decided.plan
+    )
 
 
 def _dispersion(chosen: Plan, dispersed: Results) -> Iterator[Block]:
