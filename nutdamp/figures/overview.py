@@ -25,7 +25,7 @@ from nutdamp.views.text import steering
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from matplotlib.gridspec import GridSpec, SubplotSpec
+    from matplotlib.gridspec import SubplotSpec
 
     from nutdamp.planning.plan import Plan
 
@@ -80,7 +80,8 @@ def overview(flight: Flight, track: Track) -> Figure:
     figure = style.sheet(9.6, TALL + 1.6 + sum(sizes))
     ratio = ROOM if geometry.momentum_inset(flight, track) is not None else 1.0
     grid = figure.add_gridspec(1 + len(sizes), 2, height_ratios=[TALL, *sizes], width_ratios=[1.0, ratio])
-    _planes(figure, grid, flight, track)
+    _pole_curve(figure.add_subplot(grid[0, 0]), flight, track)
+    _axis_track(figure.add_subplot(grid[0, 1]), flight, track)
     _draw_courses(figure, [grid[row + 1, :] for row in range(len(sizes))], flight, track)
     return figure
 
@@ -89,13 +90,10 @@ def motion(flight: Flight, track: Track) -> Figure:
     """Pole curve in the 1-2 plane of the body beside the axis track in space (Magnus 1970 fig. 5-8)."""
     wide = geometry.momentum_inset(flight, track) is not None
     figure = style.sheet(9.6 if wide else 7.4, 4.1)
-    _planes(figure, figure.add_gridspec(1, 2, width_ratios=[1.0, ROOM if wide else 1.0]), flight, track)
+    pole, sky = figure.subplots(1, 2, width_ratios=[1.0, ROOM if wide else 1.0])
+    _pole_curve(pole, flight, track)
+    _axis_track(sky, flight, track)
     return figure
-
-
-def _planes(figure: Figure, grid: GridSpec, flight: Flight, track: Track) -> None:
-    for column, draw in enumerate((_pole_curve, _axis_track)):
-        draw(figure.add_subplot(grid[0, column]), flight, track)
 
 
 def _pole_curve(axes: Axes, flight: Flight, track: Track) -> None:
@@ -340,7 +338,6 @@ def _verdict(flight: Flight) -> tuple[str, str]:
 
 
 def _rate_history(axes: Axes, flight: Flight, track: Track) -> None:
-    """Transverse rates ω1, ω2."""
     rates = np.degrees(track.rates)
     width = style.thickness(rates, float(track.t[-1]) / flight.spacecraft.body_period / 2.5)
     axes.plot(track.t, rates[:, 0], color=MOTION, linewidth=width, label="ω1")

@@ -184,15 +184,12 @@ def fit_figure(fit: Fit) -> Figure:
     signals = fit.model.signals
     figure = style.sheet(8.6, max(4.8, 1.2 + 1.15 * len(signals)))
     sides = figure.add_gridspec(1, 2, width_ratios=[1.2, 1.0])
-    rows, others = sides[0].subgridspec(len(signals), 1), sides[1].subgridspec(2, 1)
-    left: list[Axes] = []
-    for index in range(len(signals)):
-        left.append(figure.add_subplot(rows[index], sharex=left[0] if left else None))
-        _residuals(left[-1], fit, index)
-        left[-1].tick_params(labelbottom=index + 1 == len(signals))
+    left = sides[0].subgridspec(len(signals), 1).subplots(sharex=True, squeeze=False)[:, 0].tolist()
+    white, pulls = sides[1].subgridspec(2, 1).subplots(squeeze=False)[:, 0]
+    for index, axes in enumerate(left):
+        _residuals(axes, fit, index)
     left[0].set_title("Residuals: data less fit")
-    left[-1].set_xlabel("time, s")
-    white, pulls = figure.add_subplot(others[0]), figure.add_subplot(others[1])
+    left[-1].set_xlabel(TIME)
     _autocorrelation(white, fit)
     _pulls(pulls, [row for row in estimates(fit, 0.0) if row.change is not None and row.prior])
     style.legend(figure, [*left, white])

@@ -211,7 +211,6 @@ def _phase_note(body: Spacecraft) -> str:
 
 
 def _totals(plan: Plan) -> str:
-    """Number of pulses, on-time, cost and end."""
     pulses, body, digits = plan.pulses, plan.spacecraft, _decimals(plan.spacecraft)
     on = math.fsum(pulse.loaded[1] for pulse in pulses)
     spent = quantity(pulses.total_impulse, "N m s") if pulses.propellant is None else mass(pulses.propellant)

@@ -199,7 +199,6 @@ def _firing(flown: Flight, track: Track) -> tuple[list[int], list[str]]:
 
 
 def _pulse_names(flown: Flight) -> tuple[str, ...]:
-    """Number and channel of each pulse."""
     return tuple(f"{number}: {channel_text(pulse, flown.spacecraft)}" for number, pulse in enumerate(flown.schedule, 1))
 
 

@@ -325,7 +325,6 @@ def _schemes(compared: Comparison, more_notes: Sequence[str]) -> Iterator[Block]
 
 
 def _trade(compared: Comparison, traded: Sequence[Front]) -> Iterator[Block]:
-    """The cost of an earlier end, as ``trade`` has it."""
     if any(len(front.points) > 1 for front in traded):  # one point for each shows no trade
         yield trade_picture(compared, traded)
     chosen = compared.recommended
@@ -346,7 +345,6 @@ def _verification(chosen: Plan) -> Iterator[Block]:
 def _background(
     compared: Comparison, decided: Decision | None, dispersed: Results | None, repeat: Repeat
 ) -> Iterator[Block]:
-    """Reference data: spacecraft, pulses, method, assumptions, input."""
     body = compared.spacecraft
     yield Details("Spacecraft", tuple(document.blocks_of("What actuators and tolerances do", check_screen(body))))
     if decided is not None:

@@ -198,7 +198,6 @@ def html(result: Spacecraft | Plan | Flight | Comparison) -> str | None:
 
 
 def _block(result: Spacecraft | Plan | Flight | Comparison) -> Block:
-    """The table of a result."""
     from nutdamp.page.document import FactList, Prose, facts_of, sheet
     from nutdamp.views.parts import derived_table
 
