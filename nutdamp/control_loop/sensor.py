@@ -112,10 +112,11 @@ class Signal:
         return np.asarray(self.sensor.scales * values + self.sensor.biases)
 
     def sampled(self, numbers: NDArray[np.int64], shown: Vector) -> Vector:
-        """Samples by their ``numbers`` (n,), one after the other from 0 at t = 0: ``shown`` with noise and steps."""
-        sensor = self.sensor
-        values = shown + sensor.noise * self.noise.of(int(numbers[0]), len(numbers)) if sensor.noise > 0.0 else shown
-        return stepped(sensor, values)
+        """Samples by their rising ``numbers`` (n,), that at t = 0 is 0: ``shown`` with noise and steps."""
+        sensor, first = self.sensor, int(numbers[0])
+        if sensor.noise > 0.0:
+            shown = shown + sensor.noise * self.noise.of(first, int(numbers[-1]) - first + 1)[numbers - first]
+        return stepped(sensor, shown)
 
 
 def stepped(sensor: Sensor, values: Vector) -> Vector:

@@ -26,7 +26,7 @@ from nutdamp.views import decisions
 from nutdamp.views.glance import limits
 from nutdamp.views.parts import MILLISECONDS, channel_text
 from nutdamp.views.tables import TEXT, Column, DataTable, Heading, Shared
-from nutdamp.views.text import MISSING, RPM, fixed, mass, quantity, sentence, short_angle, text
+from nutdamp.views.text import MISSING, RPM, fixed, sentence, short_angle, text
 
 if TYPE_CHECKING:
     from nutdamp.montecarlo.study import Checkpoints, Results
@@ -213,10 +213,9 @@ def _phase_note(body: Spacecraft) -> str:
 def _totals(plan: Plan) -> str:
     pulses, body, digits = plan.pulses, plan.spacecraft, _decimals(plan.spacecraft)
     on = math.fsum(pulse.loaded[1] for pulse in pulses)
-    spent = quantity(pulses.total_impulse, "N m s") if pulses.propellant is None else mass(pulses.propellant)
     date = body.utc(pulses.end, min(digits, MILLISECONDS))
     ends = f"{pulses.end:.{digits}f} s" + (f" ({date})" if date else "")
-    return f"pulses: {len(pulses)}; on-time {on:.{digits}f} s; {spent}; the last ends at {ends}"
+    return f"pulses: {len(pulses)}; on-time {on:.{digits}f} s; {decisions.spent(pulses)}; the last ends at {ends}"
 
 
 def _decimals(body: Spacecraft) -> int:

@@ -45,7 +45,7 @@ from nutdamp.views.glance import scheme_table
 from nutdamp.views.guide import Formula, Topic
 from nutdamp.views.parts import beyond_floors, pulse_table, turn_floor
 from nutdamp.views.simulation import BUDGET, BUDGET_NOTE, budget_table, conservation, methods_table, verdict
-from nutdamp.views.text import WARNING, joined, mass, quantity, sentence, severity, text
+from nutdamp.views.text import WARNING, joined, quantity, sentence, severity, text
 from nutdamp.views.trade import front_parts, trade_notes
 
 if TYPE_CHECKING:
@@ -292,9 +292,8 @@ def _contender(compared: Comparison, plan: Plan, decided: Decision | None) -> do
     share = compared.shares.get(plan)
     word = decisions.share_text(share) if share is not None else decisions.VERDICT[compared.meets(plan)]
     word += ", timed" * (not plan.commandable)
-    return document.Contender(
-        plan.scheme, (decisions.spent(plan.pulses), word), decided is not None and plan is decided.plan
-    )
+    chosen = decided is not None and plan is decided.plan
+    return document.Contender(plan.scheme, (decisions.spent(plan.pulses), word), chosen)
 
 
 def _dispersion(chosen: Plan, dispersed: Results) -> Iterator[Block]:

@@ -173,6 +173,7 @@ def test_noise_of_a_sample_is_the_same_however_it_is_come_by() -> None:
     whole, numbers = noise(np.arange(9000)), np.arange(4000, 8500)
     assert whole.std() == pytest.approx(0.1, rel=0.02)
     assert np.array_equal(noise(numbers), whole[numbers])
+    assert np.array_equal(noise(numbers[::7]), whole[numbers[::7]])
     assert not np.array_equal(noise(numbers, 8), whole[numbers])
 
 
