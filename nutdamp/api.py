@@ -294,7 +294,7 @@ def trade(
 
 def disperse(
     plan: Plan,
-    samples: int = 20_000,
+    samples: int = work.SAMPLES,
     *,
     seed: int = 1,
     threads: int | None = None,

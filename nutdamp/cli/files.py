@@ -28,7 +28,6 @@ from nutdamp.cli.options import (
     END,
     FILE,
     OUTPUT,
-    SAMPLES,
     Count,
     Grouped,
     NameType,
@@ -37,6 +36,7 @@ from nutdamp.cli.options import (
 )
 from nutdamp.cli.plan import compared_with, flown_options, fronts_of, plan_or_read, robust_of, scheme_option
 from nutdamp.cli.screen import console, say, show, show_failures, units_of_screen
+from nutdamp.common.work import SAMPLES
 from nutdamp.errors import BadRequest, nearest, printable
 from nutdamp.schemes.catalogue import LEAST, PLANNED
 from nutdamp.views.exchange import FORMATS, expect_possible, export_notes, lacking

@@ -89,7 +89,6 @@ class OutputName(FileName):
     """The name of a file to write."""
 
 
-SAMPLES = 20_000  # default number of cases: as `nutdamp.montecarlo.study.SAMPLES`, without loading numpy
 FILE = FileName()
 OUTPUT = OutputName()
 FOLDER = FolderName()

@@ -27,7 +27,6 @@ from nutdamp.cli.options import (
     FILE,
     FOLDER,
     OUTPUT,
-    SAMPLES,
     Angles,
     Bare,
     Count,
@@ -40,6 +39,7 @@ from nutdamp.cli.options import (
 )
 from nutdamp.cli.plan import flown_options, fronts_of, plan_or_read
 from nutdamp.cli.screen import say
+from nutdamp.common.work import SAMPLES
 from nutdamp.schemes.catalogue import LEAST, OPTIMAL
 from nutdamp.units import LARGEST_SEED, shifts, thresholds, tilt
 

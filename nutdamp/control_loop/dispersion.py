@@ -351,11 +351,6 @@ class LoopDispersion(Dispersed):
 
     core: LoopResults
 
-    @property
-    def settled_fraction(self) -> float:
-        """Share of the cases that fall quiet, and are not stopped."""
-        return self.core.settled / self.core.done
-
 
 def run(
     results: LoopResults,

@@ -339,7 +339,7 @@ class Diagnosis:
         return None
 
     def _fed(self, channel: str, now: float, change: RateChange, doubt: Doubt) -> tuple[Ending, str] | None:
-        """True if the nutation has grown under fire by more than observation errors explain."""
+        """Ending and channel where the nutation has grown under fire by more than observation errors explain."""
         if self.first is None:
             self.first = abs(change.before), now
             return None

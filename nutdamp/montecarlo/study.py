@@ -393,7 +393,6 @@ class Dispersion(Dispersed):
     scheme: str = ""
 
 
-SAMPLES = 20_000  # cases that are flown where nothing else is said
 SEED = 1  # default seed of the draws
 
 

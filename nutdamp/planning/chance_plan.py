@@ -15,12 +15,13 @@ from typing import Any
 
 import numpy as np
 
+from nutdamp.common.work import SAMPLES
 from nutdamp.errors import Infeasible
 from nutdamp.flight import propagation
 from nutdamp.montecarlo.cases import DispersedModel
 from nutdamp.montecarlo.inputs import DispersedInput, mixing
 from nutdamp.montecarlo.statistics import cases_to_show
-from nutdamp.montecarlo.study import CONFIDENCE, SAMPLES, SEED, Results, Study, run, study_of, threads_here
+from nutdamp.montecarlo.study import CONFIDENCE, SEED, Results, Study, run, study_of, threads_here
 from nutdamp.planning import plan as planning
 from nutdamp.planning.plan import Plan
 from nutdamp.schemes import catalogue, planner, valve_commands

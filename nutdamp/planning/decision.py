@@ -172,7 +172,7 @@ def compare(
 ) -> Comparison:
     """Plan the schemes named, else the `usual` ones, and recommend one; one that has a bug takes no other down.
 
-    With dispersions each plan flies as many of ``samples`` cases (default `study.SAMPLES`, without a requirement 0) as
+    With dispersions each plan flies as many of ``samples`` cases (default `work.SAMPLES`, without a requirement 0) as
     it takes to know whether enough comply. ``timed``: see `Comparison`. Raises NutdampError, such as BadRequest, and
     KeyError for a name not in `schemes.NAMES`.
     """
@@ -197,12 +197,11 @@ def compare_plans(
     nominal = Comparison(plans[0].spacecraft, tuple(plans), named=named, timed=timed)
     if not _flies(nominal.spacecraft, samples):
         return nominal
-    from nutdamp.montecarlo.study import SAMPLES
     from nutdamp.planning.screening import fly_compared
 
     feasible = [plan for plan in plans if plan.feasible]
-    count = SAMPLES if samples is None else samples
-    most = work.CASES * max(1.0, count / SAMPLES)
+    count = work.SAMPLES if samples is None else samples
+    most = work.CASES * max(1.0, count / work.SAMPLES)
     with work.budget("the dispersed cases", most), work.steps(len(feasible) + 1.0, SEARCH):
         flown = fly_compared(feasible, count, lambda shares: recommend(nominal.eligible, shares).plan)
     return replace(nominal, flown=flown)

@@ -20,7 +20,7 @@ import numpy as np
 from nutdamp.common import results, work
 from nutdamp.common.results import Note, note
 from nutdamp.errors import Infeasible
-from nutdamp.montecarlo.study import SAMPLES, SEED, study_of
+from nutdamp.montecarlo.study import SEED, study_of
 from nutdamp.planning import chance_plan, screening
 from nutdamp.planning import plan as planning
 from nutdamp.planning.chance_plan import Tightening, tightening
@@ -155,7 +155,7 @@ def compare(
     variations: Sequence[Variation],
     watch: Callable[[int], None] = lambda _: None,
     *,
-    samples: int = SAMPLES,
+    samples: int = work.SAMPLES,
 ) -> RobustComparison:
     """Make the plans of the ``variations``, let dispersed cases fly each, and recommend one; no schedule comes twice.
 

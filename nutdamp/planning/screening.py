@@ -87,7 +87,7 @@ def cases_of(results: Results, requested: int | None = None) -> Cases:
         distribution = results.distribution(part.value)
         assert distribution is not None
         levels[part] = float(distribution.quantiles(np.array([probability]))[0])
-    count = results.requested if requested is None else requested
+    count = requested or results.requested
     return Cases(results.done, count, results.study.seed, results.met_fraction, probability, levels)
 
 

@@ -47,11 +47,8 @@ class Windows:
     def allows(self, start: float, on_time: float, ready: float) -> bool:
         """True if a pulse may be on from ``start`` for ``on_time`` s when the actuators are ``ready`` (s)."""
         slack = touching(start + on_time)
-        return (
-            start >= ready - slack
-            and start + on_time <= self.horizon + slack
-            and self.blocked_until(start, on_time) is None
-        )
+        within = ready - slack <= start and start + on_time <= self.horizon + slack
+        return within and self.blocked_until(start, on_time) is None
 
     def allowed(self, starts: Vector, on_times: Vector, ready: Vector | float) -> NDArray[np.bool_]:
         """`allows` for many pulses at once, (n,) each; a pulse whose on-time is not a number is not allowed."""

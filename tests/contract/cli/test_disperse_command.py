@@ -20,9 +20,6 @@ from support.golden import check_text
 from support.markup import parsed
 from support.process import Run, environment
 
-from nutdamp.cli import options
-from nutdamp.montecarlo import study as dispersion
-
 pytestmark = pytest.mark.usefixtures("plans_shared")
 
 PERCENTS = ("50", "90", "95", "99", "99.7")
@@ -103,7 +100,6 @@ def test_the_screen(run: Run, kind: str) -> None:
 
 def test_what_is_dispersed_is_the_scheme_the_schedule_or_the_recommended_plan(run: Run, body: Path) -> None:
     """By so many cases as other commands do; and the example of dispersions, where there are none, can be pasted."""
-    assert options.SAMPLES == dispersion.SAMPLES
     data = result(run, TWO)
     assert (data["scheme"], data["samples"], data["seed"]) == ("two-pulse", 20_000, 1)
     assert call(run, "plan body.yaml --scheme one-pulse --csv p.csv").returncode in (0, 4)
