@@ -245,6 +245,7 @@ class _ScheduleReader:
         if channel is not None and on_time > 0.0:
             self.commanded[row.line] = row
             return channel_pulse(channel, t, on_time) if start is None else on_command(channel, start, on_time)
+        _compare_centre(row, t, t - 0.5 * on_time, on_time)
         return self._as_given(row, name, t, on_time)
 
     def _timing(self, row: Row, channel: Channel | None) -> tuple[float, float, float | None] | None:
@@ -272,8 +273,6 @@ class _ScheduleReader:
             apart = f"where times are {math.ulp(t + 0.5 * on_time):.2g} s apart"
             row.fault("on_time_s", f"{on_time:g} s is too short at {t:g} s, {apart}")
             return None
-        meant = f"start_s + on_time_s/2 = {t:g}" if lead is None else f"the centroid of the thrust, {t:g}"
-        _compare(row, (STARTS[1],), [t], meant, scale=max(t, on_time))
         begins = max(start, 0.0) if column == STARTS[0] else t - centre
         return t, on_time, None if lead is None else begins
 
@@ -292,6 +291,8 @@ class _ScheduleReader:
         return thrust.centroid
 
     def _expect(self, row: Row, pulse: Pulse) -> None:
+        if row.get(STARTS[0]):  # else the centre is that of an even thrust
+            _compare_centre(row, pulse.t, *pulse.loaded)
         if pulse.torque is None:
             return
         inertia, named = self.spacecraft.inertia, shown(pulse.channel)
@@ -391,6 +392,13 @@ def _compare(
         given = ", ".join(map(_brief, texts))
         given = f"{columns[0]} = {given}" if len(columns) == 1 else f"{columns[0]} to {columns[-1]} = ({given})"
         row.warn(columns[0], f"{given} contradicts {meant}: ignored")
+
+
+def _compare_centre(row: Row, t: float, start: float, on_time: float) -> None:
+    """Compare the centre with that of the thrust, which lies in the middle unless valve or tank shape it."""
+    even = abs(t - start - 0.5 * on_time) <= AGREES * on_time
+    meant = f"start_s + on_time_s/2 = {t:g}" if even else f"the centroid of the thrust, {t:g}"
+    _compare(row, (STARTS[1],), [t], meant, scale=max(t, on_time))
 
 
 def _vector(parts: Vector) -> str:

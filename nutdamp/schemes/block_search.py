@@ -495,7 +495,8 @@ class BlockSearch:
     def commanded(self, delay: Array) -> Array:
         """The nearest delay that can be commanded, of those within a spin turn."""
         step = self.commands.delay_step
-        return np.asarray(np.clip(np.rint(delay / step), 0, len(self._delays) - 1) * step)
+        counts = np.clip(np.rint(delay / step), 0, len(self._delays) - 1)
+        return np.asarray((counts + 0.0) * step)  # 0, not -0
 
     def doubted(self) -> None:
         """Fly sequences cheaper than the best of the flights, the cheapest first, until one complies."""

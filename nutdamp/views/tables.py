@@ -26,7 +26,7 @@ from nutdamp.files.tabular import csv_text, number, truth
 from nutdamp.units import screen_unit
 
 NARROW = 60  # characters below which a table becomes one block a row
-GAP = 2  # characters between two columns
+GAPS = (2, 1)  # characters between two columns, and where there is little room
 WORD = re.compile(r"(?:[<≤≥✗] )?\S+(?: %(?!\S))?")  # pattern of the words that a column keeps on one line
 WIDTH = 80  # columns of a default screen
 
@@ -80,15 +80,17 @@ class FittedColumns(Table):
     """Headings of columns whose cells stay on one line."""
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
-        room = options.max_width - GAP * (len(self.columns) - 1)
         texts = [[str(column.header), *(_cell(cell).plain for cell in column.cells)] for column in self.columns]
-        widths = _widths(texts, room, [str(column.header) in self.whole for column in self.columns])
-        if options.max_width < NARROW or widths is None:
-            yield from self._blocks()
-            return
-        for column, width in zip(self.columns, widths, strict=True):
-            column.width = width
-        yield from super().__rich_console__(console, options)
+        unbroken = [str(column.header) in self.whole for column in self.columns]
+        for gap in GAPS if options.max_width >= NARROW else ():
+            widths = _widths(texts, options.max_width - gap * (len(self.columns) - 1), unbroken)
+            if widths is not None:
+                self.padding = (0, gap, 0, 0)
+                for column, width in zip(self.columns, widths, strict=True):
+                    column.width = width
+                yield from super().__rich_console__(console, options)
+                return
+        yield from self._blocks()
 
     def _blocks(self) -> RenderResult:
         names = [str(column.header).replace("\n", ", ").strip(", ") for column in self.columns]
@@ -123,7 +125,7 @@ def _widths(columns: list[list[str]], room: int, unbroken: list[bool]) -> list[i
 
 def columns(*names: str, text: tuple[str, ...] = ()) -> FittedColumns:
     """A table of numbers, flush right under their headings, but for the first column and those named ``text``."""
-    table = FittedColumns(box=None, pad_edge=False, header_style="bold", padding=(0, GAP, 0, 0))
+    table = FittedColumns(box=None, pad_edge=False, header_style="bold")
     for index, name in enumerate(names):
         table.add_column(name, justify="left" if index == 0 or name in text else "right")
     return table

@@ -108,6 +108,10 @@ def test_a_row_becomes_a_block_on_a_narrow_screen_or_where_it_does_not_fit() -> 
     assert rendered(table, NARROW) == lines
     block = ["pulse 1", "  start, s  0.2917", "  channel   -M1", "  start, s  12.5"]
     assert rendered(table, NARROW - 1) == rendered(table, 20) == block
+    wide = columns("number", *(f"column {number}" for number in range(6)))
+    wide.add_row("1", *["0.123456"] * 6)
+    assert rendered(wide, 66)[-1] == "  ".join(["1     ", *["0.123456"] * 6])
+    assert rendered(wide, 65)[-1] == rendered(wide, 60)[-1] == " ".join(["1     ", *["0.123456"] * 6])
     table = columns("name", "value")
     table.add_row("a" * 50, "1.25")
     assert rendered(table, 70)[0].startswith("name  ")

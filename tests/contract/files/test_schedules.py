@@ -23,6 +23,7 @@ from nutdamp.files import tabular
 from nutdamp.files.reader import example_text, read_spacecraft
 from nutdamp.files.schedules import BLOCKS_HEADER, read_blocks, read_pulses
 from nutdamp.flight import propagation
+from nutdamp.physics.thruster import Tank
 from nutdamp.planning import plan as planning
 from nutdamp.planning.decision import infeasibility
 from nutdamp.schemes.block_model import fired
@@ -100,6 +101,16 @@ def test_what_was_written_is_read_without_a_word_and_three_columns_are_enough(re
     # Where a start is left blank the centre counts.
     mixed, _ = read("start_s,t_s,on_time_s,channel\n,2,1,+M1\n4,,1,+M1\n")
     assert [pulse.start for pulse in mixed] == [1.5, 4.0]
+
+
+def test_the_centre_of_a_pulse_from_a_falling_tank_is_read_as_it_was_written(read: Read) -> None:
+    """The thrust falls within the pulse, so that its centroid is before the middle."""
+    body = replace(EXAMPLE, tank=Tank(0.03, 22e5, 8e5, 1.0))
+    plan = planning.plan(body, "four-pulse")
+    assert all(pulse.t < pulse.loaded[0] + 0.4999 * pulse.loaded[1] for pulse in plan.pulses)
+    again, warnings = read(pulse_table(plan.flight).csv(), body)
+    assert warnings == []
+    assert [pulse.t for pulse in again] == pytest.approx([pulse.t for pulse in plan.pulses], rel=1e-12)
 
 
 def test_steered_pulses_and_ideal_impulses_have_a_torque_or_an_impulse(read: Read) -> None:

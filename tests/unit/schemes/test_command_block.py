@@ -288,6 +288,14 @@ def test_where_there_are_no_blocks_the_reason_is_said() -> None:
     check_text("blocks.why-not", "\n".join(f"{name}: {decision.infeasibility(plan)}" for name, plan in plans.items()))
 
 
+def test_a_delay_just_below_none_is_none_without_a_sign() -> None:
+    body = a_turn()
+    assert body.commands is not None
+    delays = BlockSearch(body, body.channels, body.commands).commanded(np.array([-0.3, 0.3]) * body.commands.delay_step)
+    assert delays.tolist() == [0.0, 0.0]
+    assert not np.signbit(delays).any()
+
+
 @pytest.mark.weekly
 def test_no_other_block_is_better_is_said_of_the_best_one_alone() -> None:
     """Where another was taken because it does better when flown, the note says no more than that."""
