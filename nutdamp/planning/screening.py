@@ -202,7 +202,13 @@ def _undecided(
         return ahead[chosen]
     if chosen is None or chosen not in flown or not shares or shares[chosen].met:
         return None
-    return next((ahead[plan] for plan in ahead if shares[plan].high >= shares[chosen].low + LIKELIER), None)
+    worth = shares[chosen].low + LIKELIER
+
+    def may_win(plan: Plan) -> bool:
+        best = replace(shares[plan], low=shares[plan].high)
+        return best.high >= worth and choose({**shares, plan: best}) is plan
+
+    return next((ahead[plan] for plan in ahead if may_win(plan)), None)
 
 
 def shares_of(plans: Sequence[Plan], flown: Mapping[Plan, PlanCandidate]) -> dict[Plan, Share]:

@@ -110,6 +110,17 @@ def test_plans_compared_fly_as_many_cases_as_decide(staged: dict[Plan, list[tupl
             assert (compared.cases(plan) is None) == (plan not in flown)
 
 
+def test_a_plan_that_may_not_be_chosen_flies_until_its_verdict_is_known(
+    staged: dict[Plan, list[tuple[float, float]]],
+) -> None:
+    """Such as one that cannot be commanded: whatever its share, the one to fly stays the same."""
+    plans = [judged(f"{n}", 0.0, impulse=1.0 + n, required=HALF_A_DEGREE) for n in range(3)]
+    shares = ([(0.1, 0.3)] * 2 + [(0.2, 0.2)], [(0.998, 1.0)] * 3, [(0.4, 1.0), (0.5, 0.9), (0.7, 0.7)])
+    staged.update(zip(plans, shares, strict=True))
+    flown = screening.fly_compared(plans, ALL, partial(chosen_of, plans[:1]))
+    assert flown_of(plans, flown) == [ALL, SHORT, LONG]
+
+
 def test_without_a_requirement_the_plan_to_fly_has_all_cases_and_a_budget_ends_them(
     staged: dict[Plan, list[tuple[float, float]]],
 ) -> None:
