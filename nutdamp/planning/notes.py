@@ -217,7 +217,7 @@ def _missed(chosen: Plan, compared: Comparison) -> Iterator[Note]:
         if share.met is None:
             yield note("undecided-cases")
         else:
-            schemes = ", ".join(plan.scheme for plan in compared.plans if plan in compared.shares)
+            schemes = ", ".join(plan.scheme for plan, each in compared.shares.items() if each.met is False)
             yield note("too-few-cases", schemes=schemes, required_share=100.0 * share.probability)
         return
     left = chosen.left

@@ -237,9 +237,8 @@ def lasting(flown: Flight) -> str:
     """Time of the end shown where the motion does not last, and the cause of its change; empty where it lasts."""
     body = flown.spacecraft
     causes = [*["dissipation"] * (body.growth != 0.0), *["disturbances"] * bool(body.disturbances)]
-    last = f"as the last pulse ends, at {moment(flown.schedule.end)}"
-    end = last if flown.until is None else f"at {moment(flown.until)}"
-    return f"{end}; changed further by {' and '.join(causes)}" if causes else ""
+    end = moment(flown.schedule.end if flown.until is None else flown.until)
+    return f"at {end}; then changing by {' and '.join(causes)}" if causes else ""
 
 
 def heading(spacecraft: Spacecraft) -> dict[str, Any]:

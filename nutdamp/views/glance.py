@@ -210,17 +210,18 @@ def glance(
     plan = decision.plan
     head += [coloured(verdict(decision), decision.met), *warnings]
 
-    def screen(first: int) -> RenderableType:
+    def screen(first: int, *apart: Text) -> RenderableType:
         fired: list[RenderableType] = []
         if plan.pulses.blocks:
-            fired = [Text(), parts.block_table(plan.flight).screen("screen", first=first)]
+            fired = [*apart, parts.block_table(plan.flight).screen("screen", first=first)]
         elif len(plan.pulses):
             shown = parts.pulse_table(plan.flight, least=limits(body)[0])
-            fired = [Text(), shown.screen("screen", between=", ", first=first if len(shown.rows) > ROWS else None)]
+            fired = [*apart, shown.screen("screen", between=", ", first=first if len(shown.rows) > ROWS else None)]
         required, middle = requirement_rows(decision), [ends(decision), *fired]
         return _fitted(head, required, middle, more, table, blocks=bool(plan.pulses.blocks))
 
-    return next((shown for shown in map(screen, (FIRST, FIRST // 2)) if tables.lines_of(shown) <= LINES), screen(1))
+    sizes = (screen(first, Text()) for first in (FIRST, FIRST // 2, 1))
+    return next((shown for shown in sizes if tables.lines_of(shown) <= LINES), screen(1))
 
 
 def notes(compared: Comparison, decision: Decision | None, robust: str = "") -> list[Note]:

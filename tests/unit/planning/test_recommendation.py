@@ -28,7 +28,7 @@ import nutdamp
 from nutdamp.files.reader import read_spacecraft
 from nutdamp.planning import plan as planning
 from nutdamp.planning.decision import Comparison, compare, decide, usual
-from nutdamp.planning.notes import alternatives, reasons
+from nutdamp.planning.notes import alternatives, comparison_warnings, reasons
 from nutdamp.planning.plan import Plan, Share, Standing
 from nutdamp.planning.recommendation import Gain, Ground, cheapest, recommend
 from nutdamp.planning.screening import Cases, PlanCandidate
@@ -329,6 +329,10 @@ def test_only_what_the_spacecraft_can_fire_is_recommended_unless_named_or_timed(
         compared = Comparison(bodies[1], plans, named=named, timed=free)
         assert compared.eligible == eligible
         assert compared.recommended is (min(eligible, key=lambda one: one.pulses.cost) if eligible else None)
+    # A plan that would comply, were it one that can be fired, is not among those of which too few cases do.
+    few = with_shares([timed, replace(block, scheme="block")], "1; 0.5")
+    warnings = {each.code: each.values["schemes"] for each in comparison_warnings(few)}
+    assert warnings == {"too-few-cases": "block", "blocks-cannot": "real"}
     alone = Comparison(bodies[1], (timed,))
     assert (decide(alone), noted(reasons(alone))) == (None, "no-blocks")
 
