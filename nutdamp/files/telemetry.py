@@ -34,6 +34,7 @@ from nutdamp.estimation.parameters import (
 from nutdamp.files.ccsds.message import (
     AEM_METADATA,
     BEFORE,
+    LINE_END,
     QUATERNION_ANGVEL,
     Checked,
     Frames,
@@ -86,7 +87,7 @@ def is_history(path: str) -> bool:
 def read_history(path: str) -> History:
     """The history in a message; raises CannotRead, or FaultyFile with its faults."""
     text = kvn_text(path)
-    lines, data = text.splitlines(), list[tuple[int, str]]()
+    lines, data = LINE_END.split(text), list[tuple[int, str]]()
     inside = False
     for number, line in enumerate(lines):
         word = line.strip()

@@ -288,7 +288,7 @@ def _fill(place: Element, block: MessageBlock, layout: Layout | None = None) -> 
 
 _PAIR = re.compile(r"([A-Z0-9_]+)\s*=\s*(.*?)(?:\s+\[([^\]]*)\])?")
 _WORD = re.compile(r"[A-Z0-9_]+")
-_LINE_END = re.compile(r"\r\n|\n\r|\n|\r")
+LINE_END = re.compile(r"\r\n|\n\r|\n|\r")
 
 
 def to_kvn(message: Message) -> str:
@@ -318,7 +318,7 @@ def from_kvn(text: str, name: str) -> tuple[list[MessageBlock], list[Fault]]:
     begun: list[tuple[str, int, list[MessageEntry]]] = [("", 1, [])]
     faults: list[Fault] = []
     within: str | None = None
-    for line, raw in enumerate(_LINE_END.split(text), start=1):
+    for line, raw in enumerate(LINE_END.split(text), start=1):
         content = raw.strip()
         if not content or content.split(maxsplit=1)[0] == "COMMENT":
             continue

@@ -127,10 +127,11 @@ def test_records_out_of_order_and_of_wrong_length_are_faults_with_lines(tmp_path
     first = lines.index("DATA_START") + 1
     lines[first], lines[first + 1] = lines[first + 1], lines[first]
     lines[first + 3] += " 1.0"
-    path.write_text("\n".join(lines))
-    with pytest.raises(FaultyFile) as wrong:
-        read_history(str(path))
-    assert [fault.line for fault in wrong.value.faults] == [first + 2, first + 4]
+    for end in ("\n", "\r\n", "\r", "\n\r"):  # those of the standard
+        path.write_bytes(end.join(lines).encode())
+        with pytest.raises(FaultyFile) as wrong:
+            read_history(str(path))
+        assert [fault.line for fault in wrong.value.faults] == [first + 2, first + 4]
 
 
 @pytest.mark.parametrize(("arguments", "status"), [
