@@ -34,14 +34,11 @@ from nutdamp.estimation.parameters import (
 from nutdamp.files.ccsds.message import (
     AEM_METADATA,
     BEFORE,
-    LINE_END,
     QUATERNION_ANGVEL,
     Checked,
     Frames,
     MessageBlock,
-    expect_version,
-    from_kvn,
-    kvn_text,
+    read_kvn,
     unit_quaternion,
 )
 from nutdamp.files.tabular import HEADER as TRACK
@@ -86,26 +83,14 @@ def is_history(path: str) -> bool:
 
 def read_history(path: str) -> History:
     """The history in a message; raises CannotRead, or FaultyFile with its faults."""
-    text = kvn_text(path)
-    lines, data = LINE_END.split(text), list[tuple[int, str]]()
-    inside = False
-    for number, line in enumerate(lines):
-        word = line.strip()
-        if word in ("DATA_START", "DATA_STOP"):
-            inside = word == "DATA_START"
-        elif inside and word and word.split(maxsplit=1)[0] != "COMMENT":
-            data.append((number + 1, word))
-            lines[number] = ""
-    blocks, faults = from_kvn("\n".join(lines), path)
-    expect_version(path, blocks[0], AEM_VERSION, faults)
+    blocks, faults = read_kvn(path, AEM_VERSION)
     reader = _HistoryReader(path, faults)
     segments = [block for block in blocks[1:] if block.name in ("META", "DATA")]
-    ends = [block.line for block in segments[2::2]] + [len(lines) + 1]
-    for metadata, records, end in zip(segments[::2], segments[1::2], ends, strict=False):
+    for metadata, records in zip(segments[::2], segments[1::2], strict=False):
         if (metadata.name, records.name) != ("META", "DATA"):
             faults.append(Fault(path, metadata.line, 1, metadata.name, "expected META_START … META_STOP, then data"))
             break
-        reader.take(metadata, [row for row in data if records.line < row[0] < end])
+        reader.take(metadata, records)
     if not segments or len(segments) % 2:
         faults.append(Fault(path, 1, 1, "DATA_START", "missing; each block of metadata is followed by data"))
     if not faults and not reader.times:
@@ -127,7 +112,7 @@ class _HistoryReader(Frames):
         self.quaternions: list[Vector] = []
         self.rates: list[Vector] | None = []
 
-    def take(self, metadata: MessageBlock, rows: list[tuple[int, str]]) -> None:
+    def take(self, metadata: MessageBlock, records: MessageBlock) -> None:
         block = Checked(self.path, metadata, AEM_METADATA, self.faults)
         self.name = block.text("OBJECT_NAME") or self.name
         self.take_system(block)
@@ -142,8 +127,8 @@ class _HistoryReader(Frames):
             return
         if not turning:
             self.rates = None
-        for line, row in rows:
-            self._record(line, row.split(), COLUMNS[kind], forward=forward, in_body=in_body)
+        for record in records.entries:
+            self._record(record.line, record.value.split(), COLUMNS[kind], forward=forward, in_body=in_body)
 
     def _record(self, line: int, cells: list[str], columns: int, *, forward: bool, in_body: bool) -> None:
         try:

@@ -171,7 +171,7 @@ AEM_RECORDS = {
 
 
 class MessageEntry(NamedTuple):
-    """A keyword with its value, as texts; ``line`` counts from 1 in a message that was read."""
+    """A keyword (none in data lines) with its value, as texts; ``line`` counts from 1 in a message that was read."""
 
     keyword: str
     value: str
@@ -205,12 +205,15 @@ class Message(NamedTuple):
     segments: tuple[Segment, ...]
 
 
-def block(name: str, keywords: tuple[Keyword, ...], values: dict[str, str | float], *comments: str) -> MessageBlock:
-    """A block with ``values`` in the order of the table; numbers in the unit of the table."""
+Values = Sequence[str | float | None]
+
+
+def block(name: str, keywords: tuple[Keyword, ...], values: Values, *comments: str) -> MessageBlock:
+    """A block of ``values`` of the first ``keywords``, None where one is left out; numbers in the unit of the table."""
     entries = tuple(
         MessageEntry(keyword.name, value if isinstance(value, str) else number(value), keyword.unit)
-        for keyword in keywords
-        if (value := values.get(keyword.name)) is not None
+        for keyword, value in zip(keywords, values, strict=False)
+        if value is not None
     )
     return MessageBlock(name, entries, tuple(comment(text) for text in comments))
 
@@ -288,7 +291,7 @@ def _fill(place: Element, block: MessageBlock, layout: Layout | None = None) -> 
 
 _PAIR = re.compile(r"([A-Z0-9_]+)\s*=\s*(.*?)(?:\s+\[([^\]]*)\])?")
 _WORD = re.compile(r"[A-Z0-9_]+")
-LINE_END = re.compile(r"\r\n|\n\r|\n|\r")
+_LINE_END = re.compile(r"\r\n|\n\r|\n|\r")
 
 
 def to_kvn(message: Message) -> str:
@@ -313,18 +316,50 @@ def _block(block: MessageBlock) -> list[str]:
     ]
 
 
-def from_kvn(text: str, name: str) -> tuple[list[MessageBlock], list[Fault]]:
-    """The blocks of the file ``name``, the first for keywords outside of blocks, and the faults of notation."""
+LARGEST = 1e15  # larger magnitudes are nothing physical
+MOST_BYTES = 16 << 20  # size of a message, many times more than its most manoeuvres take
+
+
+BEFORE = b"\xef\xbb\xbf\xff\xfe\0 \t\r\n"
+"""Bytes that may come before the first character of a text, in UTF-8 and UTF-16."""
+
+VERSIONS = re.compile("CCSDS_[A-Z]+_VERS")  # first keywords of messages
+
+
+def read_kvn(path: str, keyword: str) -> tuple[list[MessageBlock], list[Fault]]:
+    """The blocks of a message that begins with ``keyword``, first what is in no block, and the faults of notation.
+
+    Raises CannotRead, or FaultyFile for XML, another message, and another version, which makes no sense by the tables.
+    """
+    data = read_limited(path, MOST_BYTES)
+    if data.lstrip(BEFORE).startswith(b"<"):
+        cure = "write the message in keyword = value notation (KVN)"
+        raise FaultyFile([Fault(path, 1, 1, "", f"XML is not read; {cure}")])
+    blocks, faults = _from_kvn(utf8_text(data, path), path)
+    first = next(iter(blocks[0].entries), None)
+    if first is None or not VERSIONS.fullmatch(first.keyword):
+        kind = keyword.split("_")[1]
+        raise FaultyFile([*faults, Fault(path, 1, 1, "", f"not an {kind}: its first line is {keyword} = {VERSION}")])
+    if first.keyword != keyword:
+        raise FaultyFile([Fault(path, first.line, 1, first.keyword, f"another message; expected {keyword}")])
+    if first.value != VERSION:
+        problem = f"version {first.value!r} is not read, its keywords are others; expected version {VERSION}"
+        raise FaultyFile([Fault(path, first.line, 1, keyword, problem)])
+    return blocks, faults
+
+
+def _from_kvn(text: str, name: str) -> tuple[list[MessageBlock], list[Fault]]:
     begun: list[tuple[str, int, list[MessageEntry]]] = [("", 1, [])]
     faults: list[Fault] = []
     within: str | None = None
-    for line, raw in enumerate(LINE_END.split(text), start=1):
+    for line, raw in enumerate(_LINE_END.split(text), start=1):
         content = raw.strip()
         if not content or content.split(maxsplit=1)[0] == "COMMENT":
             continue
-        pair = _PAIR.fullmatch(content)
-        if pair is not None:
-            entries = begun[0 if within is None else -1][2]
+        pair, entries = _PAIR.fullmatch(content), begun[0 if within is None else -1][2]
+        if within == "DATA" and content not in ("DATA_START", "DATA_STOP"):
+            entries.append(MessageEntry("", content, line=line))
+        elif pair is not None:
             entries.append(MessageEntry(pair[1], pair[2], pair[3] or "", line))
         elif _WORD.fullmatch(content) and content.endswith("_START"):
             if within is not None:
@@ -343,38 +378,6 @@ def from_kvn(text: str, name: str) -> tuple[list[MessageBlock], list[Fault]]:
     return [MessageBlock(word, tuple(entries), line=line) for word, line, entries in begun], faults
 
 
-LARGEST = 1e15  # larger magnitudes are nothing physical
-MOST_BYTES = 16 << 20  # size of a message, many times more than its most manoeuvres take
-
-
-BEFORE = b"\xef\xbb\xbf\xff\xfe\0 \t\r\n"
-"""Bytes that may come before the first character of a text, in UTF-8 and UTF-16."""
-
-VERSIONS = re.compile("CCSDS_[A-Z]+_VERS")  # first keywords of messages
-
-
-def kvn_text(path: str) -> str:
-    """Text of a message in keyword = value notation; raises CannotRead, or FaultyFile for XML."""
-    data = read_limited(path, MOST_BYTES)
-    if data.lstrip(BEFORE).startswith(b"<"):
-        cure = "write the message in keyword = value notation (KVN)"
-        raise FaultyFile([Fault(path, 1, 1, "", f"XML is not read; {cure}")])
-    return utf8_text(data, path)
-
-
-def expect_version(path: str, outside: MessageBlock, keyword: str, faults: list[Fault]) -> None:
-    """Raise FaultyFile for another message, or another version of it, which makes no sense by these tables."""
-    first = outside.entries[0] if outside.entries else None
-    if first is None or not VERSIONS.fullmatch(first.keyword):
-        kind = keyword.split("_")[1]
-        raise FaultyFile([*faults, Fault(path, 1, 1, "", f"not an {kind}: its first line is {keyword} = {VERSION}")])
-    if first.keyword != keyword:
-        raise FaultyFile([Fault(path, first.line, 1, first.keyword, f"another message; expected {keyword}")])
-    if first.value != VERSION:
-        problem = f"version {first.value!r} is not read, its keywords are others; expected version {VERSION}"
-        raise FaultyFile([Fault(path, first.line, 1, keyword, problem)])
-
-
 _NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
 
 
@@ -384,6 +387,7 @@ class Checked:
     def __init__(self, file: str, block: MessageBlock, keywords: tuple[Keyword, ...], faults: list[Fault]) -> None:
         self.file, self.block, self.faults = file, block, faults
         self.entries: dict[str, MessageEntry] = {}
+        self._numbers: dict[str, float] = {}
         known = {keyword.name: keyword for keyword in keywords}
         order, last = list(known), ""
         for entry in block.entries:
@@ -413,6 +417,8 @@ class Checked:
             self.fault(keyword.name, f"{entry.value[:40]!r} is not a number")
         elif not keyword.text and not abs(float(entry.value)) <= LARGEST:
             self.fault(keyword.name, f"{entry.value[:40]} is beyond anything physical")
+        elif not keyword.text:
+            self._numbers[keyword.name] = float(entry.value)
         if entry.unit and entry.unit != keyword.unit:
             expected = f"[{keyword.unit}]" if keyword.unit else "no unit"
             self.fault(keyword.name, f"expected {expected}, got [{entry.unit}]")
@@ -429,13 +435,12 @@ class Checked:
 
     def number(self, keyword: str) -> float | None:
         """The value as a number."""
-        text = self.text(keyword)
-        return float(text) if text and _NUMBER.fullmatch(text) and abs(float(text)) <= LARGEST else None
+        return self._numbers.get(keyword)
 
     def numbers(self, *keywords: str) -> list[float] | None:
         """Several numbers; None where one cannot be read."""
-        values = [self.number(keyword) for keyword in keywords]
-        return None if None in values else [value for value in values if value is not None]
+        values = [self._numbers[keyword] for keyword in keywords if keyword in self._numbers]
+        return values if len(values) == len(keywords) else None
 
     def epoch(self, keyword: str, system: str) -> Epoch | None:
         """The value as a moment of a time system, see `Epoch.parse`."""

@@ -18,6 +18,7 @@ import numpy as np
 from nutdamp.common.time import DIGITS, Epoch
 from nutdamp.errors import BadRequest, Fault, FaultyFile, printable
 from nutdamp.files.ccsds.message import (
+    ANGVEL,
     APM_BLOCKS,
     APM_METADATA,
     HEADER,
@@ -26,9 +27,7 @@ from nutdamp.files.ccsds.message import (
     Frames,
     Keyword,
     MessageBlock,
-    expect_version,
-    from_kvn,
-    kvn_text,
+    read_kvn,
     unit_quaternion,
 )
 from nutdamp.files.editing import Edits, Later, attitude_edits, carry_text, epoch_after, inertia_edits, rate_edits
@@ -54,7 +53,6 @@ class Manoeuvre(NamedTuple):
     duration: float
     torque: Vector
     mass: float | None
-    line: int
 
 
 class ApmContents(NamedTuple):
@@ -78,8 +76,7 @@ class ApmContents(NamedTuple):
 
 def read_apm(path: str) -> ApmContents:
     """The contents of a message; raises CannotRead, or FaultyFile with every fault of the file."""
-    blocks, faults = from_kvn(kvn_text(path), path)
-    expect_version(path, blocks[0], _VERSION, faults)
+    blocks, faults = read_kvn(path, _VERSION)
     contents = _MessageReader(path, blocks, faults).read()
     if faults or contents is None:
         raise FaultyFile(faults)
@@ -167,7 +164,7 @@ class _MessageReader(Frames):
         block = self._first("ANGVEL")
         if block is None:
             return None
-        forward, parts = self.endpoints(block), block.numbers("ANGVEL_X", "ANGVEL_Y", "ANGVEL_Z")
+        forward, parts = self.endpoints(block), block.numbers(*ANGVEL)
         axes = block.text("ANGVEL_FRAME")
         if parts is None or axes is None or forward is None:
             return None
@@ -207,8 +204,7 @@ class _MessageReader(Frames):
             rate += 2.0 * math.pi / values[1] * momentum
         elif with_momentum and (values := block.numbers(*MOMENTUM)) is not None:
             right, up, about_momentum = map(math.radians, values)
-            momentum = np.array([math.cos(up) * math.cos(right), math.cos(up) * math.sin(right), math.sin(up)])
-            rate += about_momentum * (attitude.matrix(turn).T @ momentum)
+            rate += about_momentum * (attitude.matrix(turn).T @ attitude.on_sphere(right, up))
         off = 0.0 if quaternion is None else min(np.linalg.norm(quaternion - sign * turn) for sign in (1.0, -1.0))
         if off > 0.5 * AGREES:
             self.remark(f"line {block.block.line}: SPIN gives another attitude than the blocks before it, which count")
@@ -249,7 +245,7 @@ class _MessageReader(Frames):
                     block.fault("MAN_EPOCH_START", f"begins before the block of line {last[1]}; put them in order")
                 last = begins, block.block.line
             if begins is not None and epoch is not None and duration is not None and torque is not None:
-                manoeuvres.append(Manoeuvre(begins.since(epoch), duration, np.array(torque), mass, block.block.line))
+                manoeuvres.append(Manoeuvre(begins.since(epoch), duration, np.array(torque), mass))
         return tuple(manoeuvres)
 
 
@@ -278,8 +274,8 @@ def imported(contents: ApmContents, path: str) -> tuple[str, Spacecraft, Schedul
     if contents.tensor is None:
         problem = "missing; a spacecraft file needs moments of inertia: --into merges the message into one that has"
         raise FaultyFile([Fault(path, 1, 1, "INERTIA", f"{problem} them")])
-    bare = _read(_file_text(contents, path, None), contents, path)
-    torques = [bare.inertia.axes.T @ manoeuvre.torque for manoeuvre in contents.manoeuvres]
+    _, axes = principal_axes(contents.tensor)
+    torques = [axes.T @ manoeuvre.torque for manoeuvre in contents.manoeuvres]
     sizes = [float(np.linalg.norm(torque)) for torque in torques]
     transverse = all(abs(torque[2]) <= ALIKE * size for torque, size in zip(torques, sizes, strict=True))
     alike = sizes and transverse and max(sizes) - min(sizes) <= ALIKE * max(sizes)
