@@ -36,7 +36,7 @@ from nutdamp.files.telemetry import History
 from nutdamp.files.yaml import Node
 from nutdamp.physics import attitude
 from nutdamp.physics.body import principal_axes
-from nutdamp.spacecraft.model import Attitude, Inertia, Spacecraft, SpinState, Vector
+from nutdamp.spacecraft.model import Attitude, Inertia, Spacecraft, Vector
 from nutdamp.spacecraft.schedule import STEERABLE, Pulse, Schedule
 
 AGREES = 1e-4  # difference up to which SPIN agrees with the other blocks: rad, and relative for rates
@@ -399,7 +399,7 @@ def merged_text(source: Source, message: ApmContents | History, at: float = 0.0,
     if turn is not None:
         quaternion = attitude.multiply(turn, attitude.from_matrix(axes))
         after = replace(after, attitude=Attitude(turn, epoch_after(epoch.text, 0.0), message.frame))
-    later = Later(before, after, SpinState.of(after.omega0, quaternion))
+    later = Later(before, after, quaternion)
 
     def edits(tree: Node) -> Edits:
         if inertia:

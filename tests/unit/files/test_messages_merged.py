@@ -10,6 +10,8 @@ from support.process import Run
 
 import nutdamp
 from nutdamp.errors import BadRequest, FaultyFile
+from nutdamp.files.ccsds.read import merged_text, read_apm
+from nutdamp.files.reader import Source
 from nutdamp.files.telemetry import read_history
 from nutdamp.physics import attitude
 from nutdamp.spacecraft.model import Spacecraft
@@ -82,6 +84,12 @@ def test_inertia_is_merged_only_where_it_is_asked_for(run: Run, tmp_path: Path) 
         result = run("import", path.name, "--into", "other.yaml", "-o", "merged.yaml", *flag)
         assert result.returncode == 0, result.stderr
         assert nutdamp.load(tmp_path / "merged.yaml").inertia.tensor[1, 1] == pytest.approx(moment)
+
+
+def test_an_attitude_is_written_as_the_message_has_it(tmp_path: Path) -> None:
+    """Without the rounding of a turn to the principal axes and back."""
+    path, _ = exported(tmp_path, SPACECRAFT.replace("[0.9, 0.1, -0.2, 0.3]", "[0.8, 0, 0.6, 0]"), "apm")
+    assert "quaternion: [0.8, 0, 0.6, 0]," in merged_text(Source(TENSOR, "f.yaml"), read_apm(str(path)), inertia=True)
 
 
 def test_a_file_without_attitude_gets_one(run: Run, tmp_path: Path) -> None:
