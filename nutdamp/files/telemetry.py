@@ -47,7 +47,7 @@ from nutdamp.files.yaml import read_bytes
 from nutdamp.physics import attitude
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.schedule import Schedule
-from nutdamp.units import shown
+from nutdamp.units import KINDS, shown
 
 AEM_VERSION = "CCSDS_AEM_VERS"  # keyword of the first line
 COLUMNS = {"QUATERNION": 4, QUATERNION_ANGVEL: 7}  # numbers in a record of each ATTITUDE_TYPE read, besides its time
@@ -181,8 +181,15 @@ LIMITS = {ANGLES[0]: (-360.0, 360.0), ANGLES[1]: (-90.0, 90.0), CROSSED[0]: (-36
 """Least and largest angles of columns, deg."""
 
 UNIT_LENGTH = 0.01  # deviation from length one that a measured axis or quaternion may have
-UNKNOWN = re.compile(r"omega|axis|accel|sun|rate|gyro|cross|q[_0-9]|(ra|dec)(_|$)", re.IGNORECASE)
-"""Names of columns that are meant to be measured."""
+MEANT: dict[str, Sequence[str]] = {
+    "omega|rate|gyro": ["omega_1_rad_s … omega_3_rad_s or omega_1_deg_s … omega_3_deg_s"],
+    "accel": [ACCELERATIONS],
+    "sun": [SUN_PULSE, ASPECTS],
+    "cross": [*CROSSED, *TOWARDS],
+    "q[_0-9]": QUATERNION,
+    "axis|(ra|dec)(_|$)": [*ANGLES, *AXIS],
+}
+"""Beginnings of names of columns that are meant to be measured, and the columns that there are of the kind."""
 
 SAME = 0.03  # part by which a ratio of rates may differ from that of two units
 
@@ -207,10 +214,7 @@ def read_telemetry(
 def _read_samples(path: str | Path, spacecraft: Spacecraft, schedule: Schedule) -> tuple[Record, list[str]]:
     table = Table(path, (*TIMES, *MEASURED, *TRACK), "samples")
     _expect_columns(table)
-    table.check()
-    times = _times(table, spacecraft)
-    columns = {name: _column(table, name) for name in MEASURED if name in table.header}
-    _expect_angles(table, columns)
+    times, columns = _samples(table, spacecraft)
     _expect_whole(table, columns, spacecraft)
     table.check()
     signals = _signals(table, columns, spacecraft)
@@ -222,14 +226,14 @@ def _read_samples(path: str | Path, spacecraft: Spacecraft, schedule: Schedule) 
 
 def _with_pulses(record: Record, pulses: Vector, aspects: Vector | None) -> Record:
     """The record with Sun pulses, and Sun aspect angles (k,) at them among its samples."""
+    record = replace(record, sun_pulses=pulses, sun_step=0.0)
     if aspects is None or not np.isfinite(aspects).any():
-        return replace(record, sun_pulses=pulses, sun_step=0.0)
+        return record
     times = np.union1d(record.times, pulses)
     signals = {name: _spread(times, record.times, values) for name, values in record.signals.items()}
     at_pulses = _spread(times, pulses, aspects)
-    before = signals.get(SUN_ASPECT, np.full(len(times), math.nan))
-    signals[SUN_ASPECT] = np.where(np.isfinite(at_pulses), at_pulses, before)
-    return replace(record, times=times, signals=signals, sun_pulses=pulses, sun_step=0.0)
+    signals[SUN_ASPECT] = np.where(np.isfinite(at_pulses), at_pulses, signals.get(SUN_ASPECT, math.nan))
+    return replace(record, times=times, signals=signals)
 
 
 def _spread(times: Vector, those: Vector, values: Vector) -> Vector:
@@ -244,19 +248,23 @@ def _read_sun_pulses(path: str | Path, spacecraft: Spacecraft) -> tuple[Vector, 
     table = Table(path, (*TIMES, ASPECTS), "Sun pulses")
     _expect_time(table)
     table.expect()
-    table.check()
-    times = _times(table, spacecraft)
-    columns = {ASPECTS: _column(table, ASPECTS)} if ASPECTS in table.header else {}
-    _expect_angles(table, columns)
+    times, columns = _samples(table, spacecraft)
     table.check()
     return times, np.radians(columns[ASPECTS]) if columns else None
 
 
-def _expect_angles(table: Table, columns: Mapping[str, Vector]) -> None:
+def _samples(table: Table, spacecraft: Spacecraft) -> tuple[Vector, dict[str, Vector]]:
+    """Times of the rows (n,) s, and the columns (n,) of measurements, NaN where they are empty."""
+    times, columns = _times(table, spacecraft), {}
+    for name in (name for name in MEASURED if name in table.known and name in table.header):
+        numbers = (row.number(name) if row[name].lower() not in ("", "nan") else None for row in table.rows)
+        columns[name] = np.array([math.nan if number is None else number for number in numbers])
     for name, (least, most) in LIMITS.items():
-        if name in columns:
-            wrong = (columns[name] < least) | (columns[name] > most)
-            _fault_first(table, wrong, name, f"expected an angle of {least:g} to {most:g} deg")
+        if name not in columns:
+            continue
+        wrong = (columns[name] < least) | (columns[name] > most)
+        _fault_first(table, wrong, name, f"expected an angle of {least:g} to {most:g} deg")
+    return times, columns
 
 
 def _fault_first(table: Table, wrong: NDArray[np.bool_], name: str, problem: str) -> None:
@@ -290,11 +298,12 @@ def _expect_time(table: Table) -> None:
 def _expect_columns(table: Table) -> None:
     _expect_time(table)
     header = table.header
-    measured = [name for name in MEASURED if name in header]
     for name in header:
-        if name not in table.known and UNKNOWN.match(name):
-            table.fault(1, name, f"{shown(name)} is no column of telemetry{_instead(name)}")
-    if not measured and not table.faults:
+        kind = next((kind for kind in MEANT if re.match(kind, name, re.IGNORECASE)), None)
+        if name not in table.known and kind is not None:
+            problem = f"{shown(name)} is no column of telemetry; expected {', '.join(MEANT[kind])}"
+            table.fault(1, name, problem)
+    if not table.faults and not {*MEASURED} & {*header}:
         table.fault(1, "", f"no column of samples; expected some of {', '.join(MEASURED)}")
     for name in GYROS:
         if f"{name}_rad_s" in header and f"{name}_deg_s" in header:
@@ -310,23 +319,12 @@ def _expect_columns(table: Table) -> None:
     table.expect()
 
 
-def _instead(name: str) -> str:
-    kinds: tuple[tuple[str | tuple[str, ...], Sequence[str]], ...] = (
-        (("omega", "rate", "gyro"), ["omega_1_rad_s … omega_3_rad_s or omega_1_deg_s … omega_3_deg_s"]),
-        ("accel", [ACCELERATIONS]),
-        ("sun", [SUN_PULSE, ASPECTS]),
-        ("cross", [*CROSSED, *TOWARDS]),
-        ("q", QUATERNION),
-        ("", [*ANGLES, *AXIS]),
-    )
-    return next(f"; expected {', '.join(columns)}" for words, columns in kinds if name.lower().startswith(words))
-
-
 def _times(table: Table, spacecraft: Spacecraft) -> Vector:
     """Times of the rows, s from t = 0 of the spacecraft file; raises FaultyFile where they do not rise."""
-    column = TIMES[0] if TIMES[0] in table.header else TIMES[1]
+    table.check()
     if not table.rows:
         table.fault(1, "", "no rows of samples below the names of the columns")
+    column = TIMES[0] if TIMES[0] in table.header else TIMES[1]
     given = None if spacecraft.attitude is None else spacecraft.attitude.epoch
     if column == TIMES[1] and given is None:
         table.fault(1, column, "the spacecraft file has no attitude.epoch to count from; expected the column t_s")
@@ -345,12 +343,6 @@ def _times(table: Table, spacecraft: Spacecraft) -> Vector:
         times += [] if time is None else [time]
     table.check()
     return np.array(times)
-
-
-def _column(table: Table, name: str) -> Vector:
-    """A column (n,), NaN where it is empty."""
-    numbers = (row.number(name) if row[name].lower() not in ("", "nan") else None for row in table.rows)
-    return np.array([math.nan if number is None else number for number in numbers])
 
 
 def _signals(table: Table, columns: Mapping[str, Vector], spacecraft: Spacecraft) -> dict[str, Vector]:
@@ -397,13 +389,10 @@ def _expect_unit(table: Table, signals: Mapping[str, Vector], spin: float) -> No
     if name not in signals or spin == 0.0:
         return
     column = next(entry for entry in table.header if RATES.get(entry, ("",))[0] == name)
-    ratio = abs(float(np.nanmedian(signals[name])) / spin)
-    turned, per_minute = 180.0 / math.pi, 30.0 / math.pi
-    of_values = ((turned, "deg/s"), (per_minute, "rpm"))
-    if RATES[column][1] != 1.0:
-        of_values = ((1.0 / turned, "rad/s"), (1.0 / 6.0, "rpm"))
-    meant = [(size, f"are the values of this column in {unit}") for size, unit in of_values]
-    meant += [(1.0 / turned, "is the spin of the file in deg/s"), (1.0 / per_minute, "is the spin of the file in rpm")]
+    ratio, units = abs(float(np.nanmedian(signals[name])) / spin), KINDS["rate"].factors.items()
+    own = RATES[column][1]
+    meant = [(own / size, f"are the values of this column in {unit}") for unit, size in units if size != own]
+    meant += [(size, f"is the spin of the file in {unit}") for unit, size in units if size != 1.0]
     words = next((words for size, words in meant if abs(ratio / size - 1.0) < SAME), None)
     if words is not None:
         seen = f"its median is {ratio:.3g} times the spin of the spacecraft file ({spin:.4g} rad/s)"
