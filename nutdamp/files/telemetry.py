@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.common.time import Epoch
-from nutdamp.errors import BadRequest, Fault, FaultyFile
+from nutdamp.errors import BadRequest, FaultyFile
 from nutdamp.estimation.parameters import (
     ACCELERATION,
     AXIS,
@@ -35,10 +35,8 @@ from nutdamp.files.ccsds.message import (
     AEM_METADATA,
     BEFORE,
     QUATERNION_ANGVEL,
-    Checked,
-    Frames,
     MessageBlock,
-    read_kvn,
+    MessageReader,
     unit_quaternion,
 )
 from nutdamp.files.tabular import HEADER as TRACK
@@ -83,37 +81,35 @@ def is_history(path: str) -> bool:
 
 def read_history(path: str) -> History:
     """The history in a message; raises CannotRead, or FaultyFile with its faults."""
-    blocks, faults = read_kvn(path, AEM_VERSION)
-    reader = _HistoryReader(path, faults)
-    segments = [block for block in blocks[1:] if block.name in ("META", "DATA")]
+    reader = _HistoryReader(path)
+    segments = [block for block in reader.blocks[1:] if block.name in ("META", "DATA")]
     for metadata, records in zip(segments[::2], segments[1::2], strict=False):
         if (metadata.name, records.name) != ("META", "DATA"):
-            faults.append(Fault(path, metadata.line, 1, metadata.name, "expected META_START … META_STOP, then data"))
+            reader.fault(metadata.line, metadata.name, "expected META_START … META_STOP, then data")
             break
         reader.take(metadata, records)
     if not segments or len(segments) % 2:
-        faults.append(Fault(path, 1, 1, "DATA_START", "missing; each block of metadata is followed by data"))
-    if not faults and not reader.times:
-        faults.append(Fault(path, segments[0].line, 1, "DATA_START", "no records"))
-    if faults:
-        raise FaultyFile(faults)
+        reader.fault(1, "DATA_START", "missing; each block of metadata is followed by data")
+    if not reader.faults and not reader.times:
+        reader.fault(segments[0].line, "DATA_START", "no records")
+    if reader.faults:
+        raise FaultyFile(reader.faults)
     first = reader.times[0]
     times, turns = np.array([time.since(first) for time in reader.times]), np.array(reader.quaternions)
     rates = None if reader.rates is None else np.array(reader.rates)
     return History(reader.name, first, reader.frame, times, turns, rates, tuple(reader.remarks))
 
 
-class _HistoryReader(Frames):
-    def __init__(self, path: str, faults: list[Fault]) -> None:
-        super().__init__()
-        self.path, self.faults = path, faults
+class _HistoryReader(MessageReader):
+    def __init__(self, path: str) -> None:
+        super().__init__(path, AEM_VERSION)
         self.name = "UNKNOWN"
         self.times: list[Epoch] = []
         self.quaternions: list[Vector] = []
         self.rates: list[Vector] | None = []
 
     def take(self, metadata: MessageBlock, records: MessageBlock) -> None:
-        block = Checked(self.path, metadata, AEM_METADATA, self.faults)
+        block = self.checked(metadata, AEM_METADATA)
         self.name = block.text("OBJECT_NAME") or self.name
         self.take_system(block)
         forward, kind = self.endpoints(block), block.text("ATTITUDE_TYPE")
@@ -137,12 +133,12 @@ class _HistoryReader(Frames):
                 raise ValueError(f"expected a time and {columns} numbers")
             parts = unit_quaternion([numbers[3], *numbers[:3]])
         except ValueError as wrong:
-            self.faults.append(Fault(self.path, line, 1, "DATA", str(wrong)))
+            self.fault(line, "DATA", str(wrong))
             return
         if self.times and time == self.times[-1]:  # a segment begins where the one before ends
             return
         if self.times and time < self.times[-1]:
-            self.faults.append(Fault(self.path, line, 1, "DATA", "comes before the record above; put them in order"))
+            self.fault(line, "DATA", "comes before the record above; put them in order")
             return
         quaternion = parts if forward else attitude.conjugate(parts)
         self.times.append(time)

@@ -326,11 +326,8 @@ BEFORE = b"\xef\xbb\xbf\xff\xfe\0 \t\r\n"
 VERSIONS = re.compile("CCSDS_[A-Z]+_VERS")  # first keywords of messages
 
 
-def read_kvn(path: str, keyword: str) -> tuple[list[MessageBlock], list[Fault]]:
-    """The blocks of a message that begins with ``keyword``, first what is in no block, and the faults of notation.
-
-    Raises CannotRead, or FaultyFile for XML, another message, and another version, which makes no sense by the tables.
-    """
+def _read_kvn(path: str, keyword: str) -> tuple[list[MessageBlock], list[Fault]]:
+    """The blocks of a message, first what is in no block, and the faults of notation; raises as `MessageReader`."""
     data = read_limited(path, MOST_BYTES)
     if data.lstrip(BEFORE).startswith(b"<"):
         cure = "write the message in keyword = value notation (KVN)"
@@ -475,14 +472,27 @@ SAME_AXES = {"ICRF": "GCRF"}  # frames whose axes are those of another that a sp
 BODY = re.compile(r"SC_BODY(_[A-Z0-9]+)?")  # frames fixed in the body
 
 
-class Frames:
-    """Inertial and body frame of all blocks of one message, and its time system; problems go to the blocks."""
+class MessageReader:
+    """Reader of a message in KVN that begins with ``keyword``: its blocks, which share frames and a time system.
 
-    def __init__(self) -> None:
+    Raises CannotRead, or FaultyFile for XML, another message, and another version, which makes no sense by the tables.
+    """
+
+    def __init__(self, path: str, keyword: str) -> None:
+        self.path = path
+        self.blocks, self.faults = _read_kvn(path, keyword)
         self.remarks: list[str] = []
         self.body: str | None = None
         self.frame: str | None = None
         self.system = "UTC"
+
+    def checked(self, block: MessageBlock, keywords: tuple[Keyword, ...]) -> Checked:
+        """A block by its table."""
+        return Checked(self.path, block, keywords, self.faults)
+
+    def fault(self, line: int, where: str, problem: str) -> None:
+        """Keep a fault of the message."""
+        self.faults.append(Fault(self.path, line, 1, where, problem))
 
     def take_system(self, block: Checked) -> None:
         """Take the time system of the metadata."""

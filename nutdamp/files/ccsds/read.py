@@ -24,10 +24,8 @@ from nutdamp.files.ccsds.message import (
     HEADER,
     MOMENTUM,
     Checked,
-    Frames,
     Keyword,
-    MessageBlock,
-    read_kvn,
+    MessageReader,
     unit_quaternion,
 )
 from nutdamp.files.editing import Edits, Later, attitude_edits, carry_text, epoch_after, inertia_edits, rate_edits
@@ -76,39 +74,35 @@ class ApmContents(NamedTuple):
 
 def read_apm(path: str) -> ApmContents:
     """The contents of a message; raises CannotRead, or FaultyFile with every fault of the file."""
-    blocks, faults = read_kvn(path, _VERSION)
-    contents = _MessageReader(path, blocks, faults).read()
-    if faults or contents is None:
-        raise FaultyFile(faults)
+    reader = _ApmReader(path)
+    contents = reader.read()
+    if reader.faults or contents is None:
+        raise FaultyFile(reader.faults)
     return contents
 
 
-class _MessageReader(Frames):
-    def __init__(self, path: str, blocks: list[MessageBlock], faults: list[Fault]) -> None:
-        super().__init__()
-        self.path, self.faults = path, faults
-        self.outside = Checked(path, blocks[0], _OUTSIDE, faults)
-        self.blocks: dict[str, list[Checked]] = {name: [] for name in APM_BLOCKS}
+class _ApmReader(MessageReader):
+    def __init__(self, path: str) -> None:
+        super().__init__(path, _VERSION)
+        self.outside = self.checked(self.blocks[0], _OUTSIDE)
+        self.by_name: dict[str, list[Checked]] = {name: [] for name in APM_BLOCKS}
         self.nutation: float | None = None
         order, last = list(APM_BLOCKS), ""
-        for block in blocks[1:]:
+        for block in self.blocks[1:]:
             name, line = block.name, block.line
             if name not in APM_BLOCKS:
                 known = ", ".join(f"{each}_START" for each in order)
-                self._fault(line, f"{name}_START", f"unknown block; known are {known}")
+                self.fault(line, f"{name}_START", f"unknown block; known are {known}")
                 continue
             if last and order.index(name) < order.index(last):
-                self._fault(line, name, f"comes after {last}; the order is {', '.join(order)}")
-            elif self.blocks[name] and name != "MAN":
-                self._fault(line, name, "a second block of this kind; which one counts is not said")
+                self.fault(line, name, f"comes after {last}; the order is {', '.join(order)}")
+            elif self.by_name[name] and name != "MAN":
+                self.fault(line, name, "a second block of this kind; which one counts is not said")
             last = name
-            self.blocks[name].append(Checked(path, block, APM_BLOCKS[name].keywords, faults))
-
-    def _fault(self, line: int, where: str, problem: str) -> None:
-        self.faults.append(Fault(self.path, line, 1, where, problem))
+            self.by_name[name].append(self.checked(block, APM_BLOCKS[name].keywords))
 
     def _first(self, name: str) -> Checked | None:
-        return next(iter(self.blocks[name]), None)
+        return next(iter(self.by_name[name]), None)
 
     def read(self) -> ApmContents | None:
         outside = self.outside
@@ -117,7 +111,7 @@ class _MessageReader(Frames):
         quaternion, rates = self._spin(quaternion, self._rates(quaternion))
         tensor, manoeuvres = self._inertia(), self._manoeuvres(epoch)
         if rates is None and not self.faults:
-            self._fault(1, "ANGVEL", "missing; without an ANGVEL or a SPIN block the motion is not known")
+            self.fault(1, "ANGVEL", "missing; without an ANGVEL or a SPIN block the motion is not known")
         if self.faults or epoch is None or rates is None:
             return None
         if quaternion is None:
@@ -133,7 +127,7 @@ class _MessageReader(Frames):
             tensor=tensor,
             nutation=self.nutation,
             manoeuvres=manoeuvres,
-            lines={name: blocks[0].block.line for name, blocks in self.blocks.items() if blocks},
+            lines={name: blocks[0].block.line for name, blocks in self.by_name.items() if blocks},
             remarks=tuple(self.remarks),
         )
 
@@ -227,7 +221,7 @@ class _MessageReader(Frames):
     def _manoeuvres(self, epoch: Epoch | None) -> tuple[Manoeuvre, ...]:
         manoeuvres: list[Manoeuvre] = []
         last: tuple[Epoch, int] | None = None
-        for block in self.blocks["MAN"]:
+        for block in self.by_name["MAN"]:
             begins, duration = block.epoch("MAN_EPOCH_START", self.system), block.number("MAN_DURATION")
             torque, mass = block.numbers("MAN_TOR_X", "MAN_TOR_Y", "MAN_TOR_Z"), block.number("MAN_DELTA_MASS")
             frame = block.text("MAN_REF_FRAME")
