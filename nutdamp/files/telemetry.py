@@ -1,8 +1,6 @@
 """Telemetry from CSV files and attitude ephemeris messages: times, and measurements of the motion.
 
-An empty cell of CSV is a missing sample; a track of ``simulate --csv`` is such a file. An attitude history (AEM,
-version 2, in KVN) gives the quaternions, and the rates where it has them; the other forms of an ephemeris leave the
-rates open or hold for symmetric bodies alone.
+An empty cell of CSV is a missing sample; a track of ``simulate --csv`` is such a file.
 """
 
 from __future__ import annotations
@@ -12,13 +10,12 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.common.time import Epoch
-from nutdamp.errors import BadRequest, FaultyFile
+from nutdamp.errors import BadRequest
 from nutdamp.estimation.parameters import (
     ACCELERATION,
     AXIS,
@@ -31,121 +28,12 @@ from nutdamp.estimation.parameters import (
     Record,
     of_quaternions,
 )
-from nutdamp.files.ccsds.message import (
-    AEM_METADATA,
-    BEFORE,
-    QUATERNION_ANGVEL,
-    MessageBlock,
-    MessageReader,
-    unit_quaternion,
-)
+from nutdamp.files.ccsds.read import History, is_history, read_history
 from nutdamp.files.tabular import HEADER as TRACK
 from nutdamp.files.tabular import Table
-from nutdamp.files.yaml import read_bytes
-from nutdamp.physics import attitude
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.schedule import Schedule
 from nutdamp.units import KINDS, shown
-
-AEM_VERSION = "CCSDS_AEM_VERS"  # keyword of the first line
-COLUMNS = {"QUATERNION": 4, QUATERNION_ANGVEL: 7}  # numbers in a record of each ATTITUDE_TYPE read, besides its time
-
-
-class History(NamedTuple):
-    """Attitude of an object at ``times`` (n,) s after ``epoch``: ``quaternions`` (n, 4) body -> frame, scalar first.
-
-    ``rates`` (n, 3) rad/s in body axes, or None where the message has none.
-    """
-
-    name: str
-    epoch: Epoch
-    frame: str | None
-    times: Vector
-    quaternions: Vector
-    rates: Vector | None
-    remarks: tuple[str, ...]
-
-    def at(self, time: float) -> int:
-        """Index of the first record from ``time`` s on; raises BadRequest past the last."""
-        index = int(np.searchsorted(self.times, time))
-        if index == len(self.times):
-            raise BadRequest(f"the history ends {self.times[-1]:.6g} s after its first record: expected a time in it")
-        return index
-
-
-def is_history(path: str) -> bool:
-    """True for a file that begins as an AEM does, not for standard input; raises CannotRead."""
-    beginning = b"" if path == "-" else read_bytes(path, 200)
-    return beginning.lstrip(BEFORE).startswith(AEM_VERSION.encode())
-
-
-def read_history(path: str) -> History:
-    """The history in a message; raises CannotRead, or FaultyFile with its faults."""
-    reader = _HistoryReader(path)
-    segments = [block for block in reader.blocks[1:] if block.name in ("META", "DATA")]
-    for metadata, records in zip(segments[::2], segments[1::2], strict=False):
-        if (metadata.name, records.name) != ("META", "DATA"):
-            reader.fault(metadata.line, metadata.name, "expected META_START … META_STOP, then data")
-            break
-        reader.take(metadata, records)
-    if not segments or len(segments) % 2:
-        reader.fault(1, "DATA_START", "missing; each block of metadata is followed by data")
-    if not reader.faults and not reader.times:
-        reader.fault(segments[0].line, "DATA_START", "no records")
-    if reader.faults:
-        raise FaultyFile(reader.faults)
-    first = reader.times[0]
-    times, turns = np.array([time.since(first) for time in reader.times]), np.array(reader.quaternions)
-    rates = None if reader.rates is None else np.array(reader.rates)
-    return History(reader.name, first, reader.frame, times, turns, rates, tuple(reader.remarks))
-
-
-class _HistoryReader(MessageReader):
-    def __init__(self, path: str) -> None:
-        super().__init__(path, AEM_VERSION)
-        self.name = "UNKNOWN"
-        self.times: list[Epoch] = []
-        self.quaternions: list[Vector] = []
-        self.rates: list[Vector] | None = []
-
-    def take(self, metadata: MessageBlock, records: MessageBlock) -> None:
-        block = self.checked(metadata, AEM_METADATA)
-        self.name = block.text("OBJECT_NAME") or self.name
-        self.take_system(block)
-        forward, kind = self.endpoints(block), block.text("ATTITUDE_TYPE")
-        if kind is not None and kind not in COLUMNS:
-            block.fault("ATTITUDE_TYPE", f"{kind!r} is not read; expected {' or '.join(COLUMNS)}")
-        axes, turning = block.text("ANGVEL_FRAME"), kind == QUATERNION_ANGVEL
-        if turning and axes is None:
-            block.fault("ANGVEL_FRAME", f"missing; {QUATERNION_ANGVEL} needs the frame of the rates")
-        in_body = not turning or axes is None or self.rates_in_body(block, axes)
-        if self.faults or kind is None or forward is None:
-            return
-        if not turning:
-            self.rates = None
-        for record in records.entries:
-            self._record(record.line, record.value.split(), COLUMNS[kind], forward=forward, in_body=in_body)
-
-    def _record(self, line: int, cells: list[str], columns: int, *, forward: bool, in_body: bool) -> None:
-        try:
-            time, numbers = Epoch.parse(cells[0], self.system), [float(cell) for cell in cells[1:]]
-            if len(numbers) != columns or not all(map(math.isfinite, numbers)):
-                raise ValueError(f"expected a time and {columns} numbers")
-            parts = unit_quaternion([numbers[3], *numbers[:3]])
-        except ValueError as wrong:
-            self.fault(line, "DATA", str(wrong))
-            return
-        if self.times and time == self.times[-1]:  # a segment begins where the one before ends
-            return
-        if self.times and time < self.times[-1]:
-            self.fault(line, "DATA", "comes before the record above; put them in order")
-            return
-        quaternion = parts if forward else attitude.conjugate(parts)
-        self.times.append(time)
-        self.quaternions.append(quaternion)
-        if self.rates is not None:
-            rates = np.radians(numbers[4:]) * (1.0 if forward else -1.0)
-            self.rates.append(rates if in_body else np.asarray(attitude.matrix(quaternion).T @ rates))
 
 
 def record_of(history: History, spacecraft: Spacecraft, schedule: Schedule) -> Record:

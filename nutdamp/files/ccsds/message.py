@@ -326,55 +326,6 @@ BEFORE = b"\xef\xbb\xbf\xff\xfe\0 \t\r\n"
 VERSIONS = re.compile("CCSDS_[A-Z]+_VERS")  # first keywords of messages
 
 
-def _read_kvn(path: str, keyword: str) -> tuple[list[MessageBlock], list[Fault]]:
-    """The blocks of a message, first what is in no block, and the faults of notation; raises as `MessageReader`."""
-    data = read_limited(path, MOST_BYTES)
-    if data.lstrip(BEFORE).startswith(b"<"):
-        cure = "write the message in keyword = value notation (KVN)"
-        raise FaultyFile([Fault(path, 1, 1, "", f"XML is not read; {cure}")])
-    blocks, faults = _from_kvn(utf8_text(data, path), path)
-    first = next(iter(blocks[0].entries), None)
-    if first is None or not VERSIONS.fullmatch(first.keyword):
-        kind = keyword.split("_")[1]
-        raise FaultyFile([*faults, Fault(path, 1, 1, "", f"not an {kind}: its first line is {keyword} = {VERSION}")])
-    if first.keyword != keyword:
-        raise FaultyFile([Fault(path, first.line, 1, first.keyword, f"another message; expected {keyword}")])
-    if first.value != VERSION:
-        problem = f"version {first.value!r} is not read, its keywords are others; expected version {VERSION}"
-        raise FaultyFile([Fault(path, first.line, 1, keyword, problem)])
-    return blocks, faults
-
-
-def _from_kvn(text: str, name: str) -> tuple[list[MessageBlock], list[Fault]]:
-    begun: list[tuple[str, int, list[MessageEntry]]] = [("", 1, [])]
-    faults: list[Fault] = []
-    within: str | None = None
-    for line, raw in enumerate(_LINE_END.split(text), start=1):
-        content = raw.strip()
-        if not content or content.split(maxsplit=1)[0] == "COMMENT":
-            continue
-        pair, entries = _PAIR.fullmatch(content), begun[0 if within is None else -1][2]
-        if within == "DATA" and content not in ("DATA_START", "DATA_STOP"):
-            entries.append(MessageEntry("", content, line=line))
-        elif pair is not None:
-            entries.append(MessageEntry(pair[1], pair[2], pair[3] or "", line))
-        elif _WORD.fullmatch(content) and content.endswith("_START"):
-            if within is not None:
-                faults.append(Fault(name, line, 1, content, f"{within}_STOP is missing before it"))
-            within = content.removesuffix("_START")
-            begun.append((within, line, []))
-        elif within is not None and content == f"{within}_STOP":
-            within = None
-        elif _WORD.fullmatch(content) and content.endswith("_STOP"):
-            expected = "no block is open" if within is None else f"expected {within}_STOP"
-            faults.append(Fault(name, line, 1, content, expected))
-        else:
-            faults.append(Fault(name, line, 1, "", f"{content[:40]!r} is no KEYWORD = value"))
-    if within is not None:
-        faults.append(Fault(name, begun[-1][1], 1, f"{within}_START", f"{within}_STOP is missing"))
-    return [MessageBlock(word, tuple(entries), line=line) for word, line, entries in begun], faults
-
-
 _NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
 
 
@@ -479,12 +430,52 @@ class MessageReader:
     """
 
     def __init__(self, path: str, keyword: str) -> None:
-        self.path = path
-        self.blocks, self.faults = _read_kvn(path, keyword)
-        self.remarks: list[str] = []
+        self.path, self.faults, self.remarks = path, list[Fault](), list[str]()
         self.body: str | None = None
         self.frame: str | None = None
         self.system = "UTC"
+        data = read_limited(path, MOST_BYTES)
+        if data.lstrip(BEFORE).startswith(b"<"):
+            cure = "write the message in keyword = value notation (KVN)"
+            raise FaultyFile([Fault(path, 1, 1, "", f"XML is not read; {cure}")])
+        self.outside, *self.blocks = self._parsed(utf8_text(data, path))
+        first = next(iter(self.outside.entries), None)
+        if first is None or not VERSIONS.fullmatch(first.keyword):
+            self.fault(1, "", f"not an {keyword.split('_')[1]}: its first line is {keyword} = {VERSION}")
+            raise FaultyFile(self.faults)
+        if first.keyword != keyword:
+            raise FaultyFile([Fault(path, first.line, 1, first.keyword, f"another message; expected {keyword}")])
+        if first.value != VERSION:
+            problem = f"version {first.value!r} is not read, its keywords are others; expected version {VERSION}"
+            raise FaultyFile([Fault(path, first.line, 1, keyword, problem)])
+
+    def _parsed(self, text: str) -> list[MessageBlock]:
+        """The blocks of a text, first what is in no block; keeps the faults of notation."""
+        begun: list[tuple[str, int, list[MessageEntry]]] = [("", 1, [])]
+        within: str | None = None
+        for line, raw in enumerate(_LINE_END.split(text), start=1):
+            content = raw.strip()
+            if not content or content.split(maxsplit=1)[0] == "COMMENT":
+                continue
+            pair, entries = _PAIR.fullmatch(content), begun[0 if within is None else -1][2]
+            if within == "DATA" and content not in ("DATA_START", "DATA_STOP"):
+                entries.append(MessageEntry("", content, line=line))
+            elif pair is not None:
+                entries.append(MessageEntry(pair[1], pair[2], pair[3] or "", line))
+            elif _WORD.fullmatch(content) and content.endswith("_START"):
+                if within is not None:
+                    self.fault(line, content, f"{within}_STOP is missing before it")
+                within = content.removesuffix("_START")
+                begun.append((within, line, []))
+            elif within is not None and content == f"{within}_STOP":
+                within = None
+            elif _WORD.fullmatch(content) and content.endswith("_STOP"):
+                self.fault(line, content, "no block is open" if within is None else f"expected {within}_STOP")
+            else:
+                self.fault(line, "", f"{content[:40]!r} is no KEYWORD = value")
+        if within is not None:
+            self.fault(begun[-1][1], f"{within}_START", f"{within}_STOP is missing")
+        return [MessageBlock(word, tuple(entries), line=line) for word, line, entries in begun]
 
     def checked(self, block: MessageBlock, keywords: tuple[Keyword, ...]) -> Checked:
         """A block by its table."""

@@ -1,8 +1,9 @@
-"""Attitude messages turned into a spacecraft file and a schedule, or merged into a spacecraft file.
+"""Attitude messages read in KVN, turned into a spacecraft file and a schedule, or merged into a spacecraft file.
 
-Attitude parameter messages are read in KVN. Attitude and rates come from QUAT (or EULER) and ANGVEL, or else from SPIN
-by annex F5. A merge sets attitude, epoch and rates, and the inertia where that is asked for; all else of the file
-stays, with its comments and units.
+In a parameter message (APM) attitude and rates come from QUAT (or EULER) and ANGVEL, or else from SPIN by annex F5. A
+history (AEM) gives quaternions, and rates where it has them; the other forms of an ephemeris leave the rates open or
+hold for symmetric bodies alone. A merge sets attitude, epoch and rates, and the inertia where that is asked for; all
+else of the file stays, with its comments and units.
 """
 
 from __future__ import annotations
@@ -17,21 +18,11 @@ import numpy as np
 
 from nutdamp.common.time import DIGITS, Epoch
 from nutdamp.errors import BadRequest, Fault, FaultyFile, printable
-from nutdamp.files.ccsds.message import (
-    ANGVEL,
-    APM_BLOCKS,
-    APM_METADATA,
-    HEADER,
-    MOMENTUM,
-    Checked,
-    Keyword,
-    MessageReader,
-    unit_quaternion,
-)
+from nutdamp.files.ccsds import message
+from nutdamp.files.ccsds.message import QUATERNION_ANGVEL, Checked, Keyword, MessageBlock, MessageReader
 from nutdamp.files.editing import Edits, Later, attitude_edits, carry_text, epoch_after, inertia_edits, rate_edits
 from nutdamp.files.reader import Source, read_spacecraft
-from nutdamp.files.telemetry import History
-from nutdamp.files.yaml import Node
+from nutdamp.files.yaml import Node, read_bytes
 from nutdamp.physics import attitude
 from nutdamp.physics.body import principal_axes
 from nutdamp.spacecraft.model import Attitude, Inertia, Spacecraft, Vector
@@ -40,7 +31,7 @@ from nutdamp.spacecraft.schedule import STEERABLE, Pulse, Schedule
 AGREES = 1e-4  # difference up to which SPIN agrees with the other blocks: rad, and relative for rates
 
 _VERSION = "CCSDS_APM_VERS"
-_OUTSIDE = (Keyword(_VERSION, text=True), *HEADER, *APM_METADATA, Keyword("EPOCH", text=True))
+_OUTSIDE = (Keyword(_VERSION, text=True), *message.HEADER, *message.APM_METADATA, Keyword("EPOCH", text=True))
 _NUTATION = ("NUTATION", "NUTATION_PER", "NUTATION_PHASE")
 
 
@@ -84,13 +75,13 @@ def read_apm(path: str) -> ApmContents:
 class _ApmReader(MessageReader):
     def __init__(self, path: str) -> None:
         super().__init__(path, _VERSION)
-        self.outside = self.checked(self.blocks[0], _OUTSIDE)
-        self.by_name: dict[str, list[Checked]] = {name: [] for name in APM_BLOCKS}
+        self.about = self.checked(self.outside, _OUTSIDE)
+        self.by_name: dict[str, list[Checked]] = {name: [] for name in message.APM_BLOCKS}
         self.nutation: float | None = None
-        order, last = list(APM_BLOCKS), ""
-        for block in self.blocks[1:]:
+        order, last = list(message.APM_BLOCKS), ""
+        for block in self.blocks:
             name, line = block.name, block.line
-            if name not in APM_BLOCKS:
+            if name not in message.APM_BLOCKS:
                 known = ", ".join(f"{each}_START" for each in order)
                 self.fault(line, f"{name}_START", f"unknown block; known are {known}")
                 continue
@@ -99,13 +90,13 @@ class _ApmReader(MessageReader):
             elif self.by_name[name] and name != "MAN":
                 self.fault(line, name, "a second block of this kind; which one counts is not said")
             last = name
-            self.by_name[name].append(self.checked(block, APM_BLOCKS[name].keywords))
+            self.by_name[name].append(self.checked(block, message.APM_BLOCKS[name].keywords))
 
     def _first(self, name: str) -> Checked | None:
         return next(iter(self.by_name[name]), None)
 
     def read(self) -> ApmContents | None:
-        outside = self.outside
+        outside = self.about
         self.take_system(outside)
         epoch, quaternion = outside.epoch("EPOCH", self.system), self._attitude()
         quaternion, rates = self._spin(quaternion, self._rates(quaternion))
@@ -139,7 +130,7 @@ class _ApmReader(MessageReader):
         if block is not None:
             forward, parts = self.endpoints(block), block.numbers("QC", "Q1", "Q2", "Q3")
             try:
-                turn = None if parts is None else unit_quaternion(parts)
+                turn = None if parts is None else message.unit_quaternion(parts)
             except ValueError as wrong:
                 block.fault("Q1", str(wrong))
         elif (block := self._first("EULER")) is not None:
@@ -158,7 +149,7 @@ class _ApmReader(MessageReader):
         block = self._first("ANGVEL")
         if block is None:
             return None
-        forward, parts = self.endpoints(block), block.numbers(*ANGVEL)
+        forward, parts = self.endpoints(block), block.numbers(*message.ANGVEL)
         axes = block.text("ANGVEL_FRAME")
         if parts is None or axes is None or forward is None:
             return None
@@ -179,7 +170,7 @@ class _ApmReader(MessageReader):
         if block is None or self.endpoints(block, reversible=False) is None:
             return quaternion, rates
         angles = block.numbers("SPIN_ALPHA", "SPIN_DELTA", "SPIN_ANGLE", "SPIN_ANGLE_VEL")
-        nutating, with_momentum = block.has(_NUTATION), block.has(MOMENTUM)
+        nutating, with_momentum = block.has(_NUTATION), block.has(message.MOMENTUM)
         if nutating and with_momentum:
             block.fault("MOMENTUM_ALPHA", "given together with NUTATION; keep one set of the two")
         if angles is None:
@@ -196,7 +187,7 @@ class _ApmReader(MessageReader):
             side = math.sin(tilt)
             momentum = np.array([side * math.cos(phase), -side * math.sin(phase), math.cos(tilt)])
             rate += 2.0 * math.pi / values[1] * momentum
-        elif with_momentum and (values := block.numbers(*MOMENTUM)) is not None:
+        elif with_momentum and (values := block.numbers(*message.MOMENTUM)) is not None:
             right, up, about_momentum = map(math.radians, values)
             rate += about_momentum * (attitude.matrix(turn).T @ attitude.on_sphere(right, up))
         off = 0.0 if quaternion is None else min(np.linalg.norm(quaternion - sign * turn) for sign in (1.0, -1.0))
@@ -251,6 +242,107 @@ def euler(sequence: str, *angles: float) -> Vector:
         step[0], step[1 + "XYZ".index(axis)] = math.cos(0.5 * angle), math.sin(0.5 * angle)
         turn = attitude.multiply(turn, step)
     return turn
+
+
+AEM_VERSION = "CCSDS_AEM_VERS"  # keyword of the first line
+COLUMNS = {"QUATERNION": 4, QUATERNION_ANGVEL: 7}  # numbers in a record of each ATTITUDE_TYPE read, besides its time
+
+
+class History(NamedTuple):
+    """Attitude of an object at ``times`` (n,) s after ``epoch``: ``quaternions`` (n, 4) body -> frame, scalar first.
+
+    ``rates`` (n, 3) rad/s in body axes, or None where the message has none.
+    """
+
+    name: str
+    epoch: Epoch
+    frame: str | None
+    times: Vector
+    quaternions: Vector
+    rates: Vector | None
+    remarks: tuple[str, ...]
+
+    def at(self, time: float) -> int:
+        """Index of the first record from ``time`` s on; raises BadRequest past the last."""
+        index = int(np.searchsorted(self.times, time))
+        if index == len(self.times):
+            raise BadRequest(f"the history ends {self.times[-1]:.6g} s after its first record: expected a time in it")
+        return index
+
+
+def is_history(path: str) -> bool:
+    """True for a file that begins as an AEM does, not for standard input; raises CannotRead."""
+    beginning = b"" if path == "-" else read_bytes(path, 200)
+    return beginning.lstrip(message.BEFORE).startswith(AEM_VERSION.encode())
+
+
+def read_history(path: str) -> History:
+    """The history in a message; raises CannotRead, or FaultyFile with its faults."""
+    reader = _HistoryReader(path)
+    segments = [block for block in reader.blocks if block.name in ("META", "DATA")]
+    for metadata, records in zip(segments[::2], segments[1::2], strict=False):
+        if (metadata.name, records.name) != ("META", "DATA"):
+            reader.fault(metadata.line, metadata.name, "expected META_START … META_STOP, then data")
+            break
+        reader.take(metadata, records)
+    if not segments or len(segments) % 2:
+        reader.fault(1, "DATA_START", "missing; each block of metadata is followed by data")
+    if not reader.faults and not reader.times:
+        reader.fault(segments[0].line, "DATA_START", "no records")
+    if reader.faults:
+        raise FaultyFile(reader.faults)
+    first = reader.times[0]
+    times, turns = np.array([time.since(first) for time in reader.times]), np.array(reader.quaternions)
+    rates = None if reader.rates is None else np.array(reader.rates)
+    return History(reader.name, first, reader.frame, times, turns, rates, tuple(reader.remarks))
+
+
+class _HistoryReader(MessageReader):
+    def __init__(self, path: str) -> None:
+        super().__init__(path, AEM_VERSION)
+        self.name = "UNKNOWN"
+        self.times: list[Epoch] = []
+        self.quaternions: list[Vector] = []
+        self.rates: list[Vector] | None = []
+
+    def take(self, metadata: MessageBlock, records: MessageBlock) -> None:
+        block = self.checked(metadata, message.AEM_METADATA)
+        self.name = block.text("OBJECT_NAME") or self.name
+        self.take_system(block)
+        forward, kind = self.endpoints(block), block.text("ATTITUDE_TYPE")
+        if kind is not None and kind not in COLUMNS:
+            block.fault("ATTITUDE_TYPE", f"{kind!r} is not read; expected {' or '.join(COLUMNS)}")
+        axes, turning = block.text("ANGVEL_FRAME"), kind == QUATERNION_ANGVEL
+        if turning and axes is None:
+            block.fault("ANGVEL_FRAME", f"missing; {QUATERNION_ANGVEL} needs the frame of the rates")
+        in_body = not turning or axes is None or self.rates_in_body(block, axes)
+        if self.faults or kind is None or forward is None:
+            return
+        if not turning:
+            self.rates = None
+        for record in records.entries:
+            self._record(record.line, record.value.split(), COLUMNS[kind], forward=forward, in_body=in_body)
+
+    def _record(self, line: int, cells: list[str], columns: int, *, forward: bool, in_body: bool) -> None:
+        try:
+            time, numbers = Epoch.parse(cells[0], self.system), [float(cell) for cell in cells[1:]]
+            if len(numbers) != columns or not all(map(math.isfinite, numbers)):
+                raise ValueError(f"expected a time and {columns} numbers")
+            parts = message.unit_quaternion([numbers[3], *numbers[:3]])
+        except ValueError as wrong:
+            self.fault(line, "DATA", str(wrong))
+            return
+        if self.times and time == self.times[-1]:  # a segment begins where the one before ends
+            return
+        if self.times and time < self.times[-1]:
+            self.fault(line, "DATA", "comes before the record above; put them in order")
+            return
+        quaternion = parts if forward else attitude.conjugate(parts)
+        self.times.append(time)
+        self.quaternions.append(quaternion)
+        if self.rates is not None:
+            rates = np.radians(numbers[4:]) * (1.0 if forward else -1.0)
+            self.rates.append(rates if in_body else np.asarray(attitude.matrix(quaternion).T @ rates))
 
 
 ALIKE = 1e-9  # relative difference up to which torques count as transverse, and as of one magnitude
@@ -370,17 +462,17 @@ def _schedule(manoeuvres: tuple[Manoeuvre, ...], body: Spacecraft) -> Schedule:
     return Schedule(tuple(pulses))
 
 
-def merged_text(source: Source, message: ApmContents | History, at: float = 0.0, *, inertia: bool) -> str:
+def merged_text(source: Source, contents: ApmContents | History, at: float = 0.0, *, inertia: bool) -> str:
     """The text of a spacecraft file with the motion of a message, of a history the record from ``at`` s on.
 
     Raises BadRequest where the message has no ``inertia`` to merge, and where the file would be none for nutdamp.
     """
-    if isinstance(message, History):
-        index, tensor = message.at(at), None
-        turn, given = message.quaternions[index], None if message.rates is None else message.rates[index]
-        epoch = message.epoch.plus(float(message.times[index]))
+    if isinstance(contents, History):
+        index, tensor = contents.at(at), None
+        turn, given = contents.quaternions[index], None if contents.rates is None else contents.rates[index]
+        epoch = contents.epoch.plus(float(contents.times[index]))
     else:
-        turn, given, tensor, epoch = message.quaternion, message.rates, message.tensor, message.epoch
+        turn, given, tensor, epoch = contents.quaternion, contents.rates, contents.tensor, contents.epoch
     if inertia and tensor is None:
         raise BadRequest("the message has no inertia to merge")
     before = source.read(lambda _: None)
@@ -392,7 +484,7 @@ def merged_text(source: Source, message: ApmContents | History, at: float = 0.0,
     quaternion = before.initial.quaternion
     if turn is not None:
         quaternion = attitude.multiply(turn, attitude.from_matrix(axes))
-        after = replace(after, attitude=Attitude(turn, epoch_after(epoch.text, 0.0), message.frame))
+        after = replace(after, attitude=Attitude(turn, epoch_after(epoch.text, 0.0), contents.frame))
     later = Later(before, after, quaternion)
 
     def edits(tree: Node) -> Edits:

@@ -16,27 +16,8 @@ from nutdamp import __version__
 from nutdamp.common.numerics import cleaned
 from nutdamp.common.time import Epoch
 from nutdamp.errors import BadRequest
-from nutdamp.files.ccsds.message import (
-    AEM_METADATA,
-    AEM_RECORDS,
-    APM_METADATA,
-    BODY_FRAME,
-    HEADER,
-    LAYOUTS,
-    MOMENTUM,
-    OPM_METADATA,
-    QUATERNION_ANGVEL,
-    SPIN,
-    SPIN_NUTATION_MOM,
-    Keyword,
-    Message,
-    MessageBlock,
-    Segment,
-    Values,
-    block,
-    label,
-    number,
-)
+from nutdamp.files.ccsds import message
+from nutdamp.files.ccsds.message import BODY_FRAME, QUATERNION_ANGVEL, SPIN, SPIN_NUTATION_MOM, block, label
 from nutdamp.files.export import AttitudeSegment, Reference, interpolated
 from nutdamp.flight.dynamics import shed
 from nutdamp.flight.end_state import momentum_gained
@@ -94,7 +75,7 @@ def _on_sphere(vectors: Vector) -> tuple[Vector, Vector]:
 ORIGINATOR = "NUTDAMP"
 
 
-def apm(plan: Plan, reference: Reference, created: Epoch) -> Message:
+def apm(plan: Plan, reference: Reference, created: Epoch) -> message.Message:
     """The message for a plan, made at ``created``; raises BadRequest for an ideal impulse, which has no duration."""
     body, frames = plan.spacecraft, (reference.frame, BODY_FRAME)
     motion = body.inertia.in_file_axes(body.initial.rates, body.initial.quaternion)
@@ -102,30 +83,32 @@ def apm(plan: Plan, reference: Reference, created: Epoch) -> Message:
     # The quaternion from A to B turns the axes of A into those of B (annex F2), as body -> inertial turns vectors.
     scalar, *vector = quaternion.tolist()
     blocks = [
-        block("", (Keyword("EPOCH"),), [reference.epoch.text], *_unsaid(body)),
+        block("", (message.Keyword("EPOCH"),), [reference.epoch.text], *_unsaid(body)),
         _block("QUAT", [*frames, *vector, scalar]),
         _block("ANGVEL", [*frames, BODY_FRAME, *np.degrees(rates)]),
     ]
     if spinning(body.inertia):
         spin = spin_values(body.inertia, *(values[None] for values in motion))
-        values = [float(value[0]) for name, value in spin.items() if name not in MOMENTUM]
+        values = [float(value[0]) for name, value in spin.items() if name not in message.MOMENTUM]
         blocks.append(_block("SPIN", [*frames, *values]))
     # The products are minus the entries off the diagonal (annex F6).
     (xx, xy, xz), (_, yy, yz), (_, _, zz) = body.inertia.tensor.tolist()
     blocks.append(_block("INERTIA", [BODY_FRAME, xx, yy, zz, -xy, -xz, -yz]))
     blocks += _manoeuvres("MAN", plan, reference)
-    about = block("", APM_METADATA, [*_identity(body), None, "UTC"])
-    return Message("APM", _header(plan, created), (Segment(about, tuple(blocks)),))
+    about = block("", message.APM_METADATA, [*_identity(body), None, "UTC"])
+    return message.Message("APM", _header(plan, created), (message.Segment(about, tuple(blocks)),))
 
 
-def _block(name: str, values: Values, *comments: str) -> MessageBlock:
-    return block(name, LAYOUTS[name].keywords, values, *comments)
+def _block(name: str, values: message.Values, *comments: str) -> message.MessageBlock:
+    return block(name, message.LAYOUTS[name].keywords, values, *comments)
 
 
-def _header(plan: Plan, created: Epoch) -> MessageBlock:
+def _header(plan: Plan, created: Epoch) -> message.MessageBlock:
     moment = created.text.partition(".")[0]
     values = [None, moment, ORIGINATOR, label(f"{plan.scheme}-{moment}")]
-    return block("", HEADER, values, f"nutdamp {__version__}: {plan.scheme} schedule for {plan.spacecraft.name}")
+    return block(
+        "", message.HEADER, values, f"nutdamp {__version__}: {plan.scheme} schedule for {plan.spacecraft.name}"
+    )
 
 
 def _identity(body: Spacecraft) -> tuple[str, str]:
@@ -146,7 +129,7 @@ def _unsaid(body: Spacecraft) -> list[str]:
     return [remark for remark, holds in remarks.items() if holds]
 
 
-def _manoeuvres(name: str, plan: Plan, reference: Reference) -> Iterator[MessageBlock]:
+def _manoeuvres(name: str, plan: Plan, reference: Reference) -> Iterator[message.MessageBlock]:
     """Blocks of the pulses: MAN with their torques, MANEUVER with their velocity changes."""
     for place, pulse in enumerate(sorted(plan.pulses, key=lambda pulse: pulse.start), start=1):
         timing = (reference.epoch.plus(max(pulse.start, 0.0)).text, pulse.on_time)
@@ -186,7 +169,7 @@ def _velocity_change(plan: Plan, pulse: Pulse, place: int) -> Vector:
 
 def aem(
     plan: Plan, flown: Flight, until: float, reference: Reference, created: Epoch, kind: str = QUATERNION_ANGVEL
-) -> Message:
+) -> message.Message:
     """The message for the flight of a plan from 0 to ``until`` s, in segments that end at the edges of pulses.
 
     ``kind`` is the ATTITUDE_TYPE, SPIN where the body has not the nutation of SPIN/NUTATION_MOM.
@@ -195,17 +178,20 @@ def aem(
     if kind == SPIN_NUTATION_MOM and not spinning(body.inertia):
         kind = SPIN
     segments = tuple(_segment(body, stretch, reference, kind) for stretch in interpolated(flown, until))
-    return Message("AEM", _header(plan, created), segments)
+    return message.Message("AEM", _header(plan, created), segments)
 
 
 ALONE = "SPIN_ANGLE_VEL is the rate about the third axis at that moment; no transverse rates, no nutation."
 """Comment on records of the spin alone."""
 
 
-def _segment(body: Spacecraft, stretch: AttitudeSegment, reference: Reference, kind: str) -> Segment:
+def _segment(body: Spacecraft, stretch: AttitudeSegment, reference: Reference, kind: str) -> message.Segment:
     times = [reference.epoch.plus(seconds).text for seconds in stretch.t.tolist()]
     useable = (times[0], None, None, times[-1])  # all of it
-    axes, method = BODY_FRAME if kind == QUATERNION_ANGVEL else None, "LAGRANGE" if kind == SPIN else "HERMITE"
+    axes, method = (
+        BODY_FRAME if kind == QUATERNION_ANGVEL else None,
+        "LAGRANGE" if kind == SPIN else "HERMITE",
+    )
     values = [*_identity(body), None, reference.frame, BODY_FRAME, "UTC", *useable, kind, axes, method, "3"]
     comments = [f"pulses completed: {stretch.completed}", *[ALONE] * (kind == SPIN)]
     if kind == QUATERNION_ANGVEL:
@@ -214,9 +200,11 @@ def _segment(body: Spacecraft, stretch: AttitudeSegment, reference: Reference, k
         spin = spin_values(body.inertia, stretch.rates, stretch.quaternion)
         if kind == SPIN:
             spin["SPIN_ANGLE_VEL"] = np.degrees(stretch.rates[:, 2])
-        columns = np.column_stack([spin[keyword.name] for keyword in AEM_RECORDS[kind].keywords[1:]])
-    records = tuple((time, *map(number, row)) for time, row in zip(times, columns.tolist(), strict=True))
-    return Segment(block("", AEM_METADATA, values, *comments), records=records, record=AEM_RECORDS[kind])
+        columns = np.column_stack([spin[keyword.name] for keyword in message.AEM_RECORDS[kind].keywords[1:]])
+    records = tuple((time, *map(message.number, row)) for time, row in zip(times, columns.tolist(), strict=True))
+    return message.Segment(
+        block("", message.AEM_METADATA, values, *comments), records=records, record=message.AEM_RECORDS[kind]
+    )
 
 
 PART = (
@@ -227,7 +215,7 @@ PART = (
 KILO = 1e-3
 
 
-def opm(plan: Plan, reference: Reference, created: Epoch) -> Message:
+def opm(plan: Plan, reference: Reference, created: Epoch) -> message.Message:
     """The message for a plan, made at ``created``; raises BadRequest where mass, forces or propellant are unknown."""
     body = plan.spacecraft
     if body.mass is None:
@@ -239,5 +227,5 @@ def opm(plan: Plan, reference: Reference, created: Epoch) -> Message:
         state = KILO * np.concatenate([orbit.position, orbit.velocity])
         blocks.append(_block("STATE", [reference.epoch.text, *state]))
     blocks += [_block("SPACECRAFT", [body.mass]), *_manoeuvres("MANEUVER", plan, reference)]
-    metadata = block("", OPM_METADATA, about, *(PART if orbit is None else ()))
-    return Message("OPM", _header(plan, created), (Segment(metadata, tuple(blocks)),))
+    metadata = block("", message.OPM_METADATA, about, *(PART if orbit is None else ()))
+    return message.Message("OPM", _header(plan, created), (message.Segment(metadata, tuple(blocks)),))

@@ -10,9 +10,8 @@ from support.process import Run
 
 import nutdamp
 from nutdamp.errors import BadRequest, FaultyFile
-from nutdamp.files.ccsds.read import merged_text, read_apm
+from nutdamp.files.ccsds.read import merged_text, read_apm, read_history
 from nutdamp.files.reader import Source
-from nutdamp.files.telemetry import read_history
 from nutdamp.physics import attitude
 from nutdamp.spacecraft.model import Spacecraft
 
