@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -22,7 +22,6 @@ from nutdamp.files.editing import (
     Edit,
     Edits,
     Later,
-    Setting,
     as_before,
     carry_text,
     epoch_after,
@@ -155,14 +154,13 @@ UNWRITTEN = {
 """Estimates of sensors that have no key in the file: the bias of a loop is one for both of its gyros."""
 
 
-def fitted_text(text: str, name: str, settings: Sequence[Setting], fit: Fit, carried: Carried) -> str:
-    """The text of a spacecraft file ``name`` with ``settings`` and the estimates; raises BadRequest for aliases."""
-    return carry_text(text, name, settings, lambda tree: _fitted_edits(tree, fit, carried))
+def fitted_text(fit: Fit, carried: Carried) -> str:
+    """The text of the file that the fitted spacecraft was read from, with the estimates.
 
-
-def fitted_file(fit: Fit, carried: Carried) -> str:
-    """`fitted_text` of the file that the fitted spacecraft was read from; raises BadRequest where there is none."""
-    return fitted_text(*_expected(fit.model.spacecraft.source, "fit"), fit, carried)
+    Raises BadRequest for aliases, and where no file was read.
+    """
+    source = _expected(fit.model.spacecraft.source, "fit")
+    return carry_text(*source, lambda tree: _fitted_edits(tree, fit, carried))
 
 
 def fitted_spacecraft(_: object, text: str) -> Spacecraft:

@@ -34,11 +34,18 @@ _STEP = re.compile(rf"\.?(?P<word>[^.\[\]='\"]+|{_QUOTED})|\[(?P<entry>[0-9]{{1,
 
 
 class Setting(NamedTuple):
-    """A key, its new value (a text is YAML) and its name in messages; entries of lists go by position or ``name``."""
+    """A key and its new value (a text is YAML), given in a ``call``; entries of lists go by position or ``name``."""
 
+    call: str
     path: KeyPath
     value: object
-    label: str
+
+    @property
+    def label(self) -> str:
+        """Its name in messages."""
+        text = self.value if isinstance(self.value, str) else shown(self.value)
+        brief = text if len(text) <= 40 and text.isprintable() else shown(text)
+        return f"{self.call} {dotted(self.path)}={brief}"
 
     def node(self) -> tuple[Node, list[Fault]]:
         """The value as part of a tree, and its faults; raises `FaultyFile` for a text that is not YAML."""
@@ -56,7 +63,7 @@ def parse_setting(text: str) -> Setting:
     path, end = _parse_path(text)
     if not path or text[end : end + 1] != "=":
         raise ValueError(f"{shown(text)} is not KEY=VALUE, such as limits.horizon=300s or thrusters.T1.force=12N")
-    return _labelled("--set", path, text[end + 1 :])
+    return Setting("--set", path, text[end + 1 :])
 
 
 def settings_of(values: Mapping[str, object]) -> tuple[Setting, ...]:
@@ -66,7 +73,7 @@ def settings_of(values: Mapping[str, object]) -> tuple[Setting, ...]:
         path, end = _parse_path(key)
         if not path or end < len(key):
             raise BadRequest(f"{shown(key)} is not a key of a spacecraft file, such as limits.horizon")
-        settings.append(_labelled("set", path, value))
+        settings.append(Setting("set", path, value))
     return tuple(settings)
 
 
@@ -81,19 +88,13 @@ def settings_within(values: Mapping[str, object], behind: KeyPath = ()) -> Itera
         if isinstance(value, Mapping):
             yield from settings_within(value, path)
         else:
-            yield _labelled("with_", path, value)
+            yield Setting("with_", path, value)
 
 
 def text_of(values: Mapping[str, object], name: str) -> str:
     """The text of a spacecraft file with these keys and values, as JSON; raises BadRequest."""
     plain = _of_python(values, Place(setting=name)).plain()
     return json.dumps(plain, indent=2, ensure_ascii=False) + "\n"
-
-
-def _labelled(call: str, path: KeyPath, value: object) -> Setting:
-    text = value if isinstance(value, str) else shown(value)
-    brief = text if len(text) <= 40 and text.isprintable() else shown(text)
-    return Setting(path, value, f"{call} {dotted(path)}={brief}")
 
 
 def overlay(root: Node, settings: Iterable[Setting]) -> tuple[Node, list[Fault]]:

@@ -330,10 +330,10 @@ _NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
 
 
 class Checked:
-    """A block by keyword; problems go to ``faults``, and an unreadable value is then None."""
+    """A block by keyword; problems are faults of its message, and an unreadable value is then None."""
 
-    def __init__(self, file: str, block: MessageBlock, keywords: tuple[Keyword, ...], faults: list[Fault]) -> None:
-        self.file, self.block, self.faults = file, block, faults
+    def __init__(self, message: MessageReader, block: MessageBlock, keywords: tuple[Keyword, ...]) -> None:
+        self.message, self.block = message, block
         self.entries: dict[str, MessageEntry] = {}
         self._numbers: dict[str, float] = {}
         known = {keyword.name: keyword for keyword in keywords}
@@ -343,10 +343,9 @@ class Checked:
             if name not in known:
                 close = nearest(name, order)
                 cure = f"did you mean {close}?" if close else f"known here: {', '.join(order)}"
-                self.faults.append(Fault(file, entry.line, 1, name, f"unknown keyword; {cure}"))
+                message.fault(entry.line, name, f"unknown keyword; {cure}")
             elif name in self.entries:
-                first = self.entries[name].line
-                self.faults.append(Fault(file, entry.line, 1, name, f"given again, first in line {first}"))
+                message.fault(entry.line, name, f"given again, first in line {self.entries[name].line}")
             else:
                 self.entries[name] = entry
                 if last and order.index(name) < order.index(last):
@@ -373,9 +372,7 @@ class Checked:
 
     def fault(self, keyword: str, problem: str) -> None:
         """Something wrong with a keyword, or, where it is missing, with the block."""
-        entry = self.entries.get(keyword)
-        line = self.block.line if entry is None else entry.line
-        self.faults.append(Fault(self.file, line, 1, keyword, problem))
+        self.message.fault(self.entries.get(keyword, self.block).line, keyword, problem)
 
     def text(self, keyword: str) -> str | None:
         """The value as it is; None where it is missing or empty."""
@@ -476,10 +473,6 @@ class MessageReader:
         if within is not None:
             self.fault(begun[-1][1], f"{within}_START", f"{within}_STOP is missing")
         return [MessageBlock(word, tuple(entries), line=line) for word, line, entries in begun]
-
-    def checked(self, block: MessageBlock, keywords: tuple[Keyword, ...]) -> Checked:
-        """A block by its table."""
-        return Checked(self.path, block, keywords, self.faults)
 
     def fault(self, line: int, where: str, problem: str) -> None:
         """Keep a fault of the message."""

@@ -65,17 +65,13 @@ class ApmContents(NamedTuple):
 
 def read_apm(path: str) -> ApmContents:
     """The contents of a message; raises CannotRead, or FaultyFile with every fault of the file."""
-    reader = _ApmReader(path)
-    contents = reader.read()
-    if reader.faults or contents is None:
-        raise FaultyFile(reader.faults)
-    return contents
+    return _ApmReader(path).read()
 
 
 class _ApmReader(MessageReader):
     def __init__(self, path: str) -> None:
         super().__init__(path, _VERSION)
-        self.about = self.checked(self.outside, _OUTSIDE)
+        self.about = Checked(self, self.outside, _OUTSIDE)
         self.by_name: dict[str, list[Checked]] = {name: [] for name in message.APM_BLOCKS}
         self.nutation: float | None = None
         order, last = list(message.APM_BLOCKS), ""
@@ -90,12 +86,12 @@ class _ApmReader(MessageReader):
             elif self.by_name[name] and name != "MAN":
                 self.fault(line, name, "a second block of this kind; which one counts is not said")
             last = name
-            self.by_name[name].append(self.checked(block, message.APM_BLOCKS[name].keywords))
+            self.by_name[name].append(Checked(self, block, message.APM_BLOCKS[name].keywords))
 
     def _first(self, name: str) -> Checked | None:
         return next(iter(self.by_name[name]), None)
 
-    def read(self) -> ApmContents | None:
+    def read(self) -> ApmContents:
         outside = self.about
         self.take_system(outside)
         epoch, quaternion = outside.epoch("EPOCH", self.system), self._attitude()
@@ -104,7 +100,7 @@ class _ApmReader(MessageReader):
         if rates is None and not self.faults:
             self.fault(1, "ANGVEL", "missing; without an ANGVEL or a SPIN block the motion is not known")
         if self.faults or epoch is None or rates is None:
-            return None
+            raise FaultyFile(self.faults)
         if quaternion is None:
             self.remarks.append("the message gives no attitude: frame and epoch are left out")
         object_id = outside.text("OBJECT_ID")
@@ -262,12 +258,13 @@ class History(NamedTuple):
     rates: Vector | None
     remarks: tuple[str, ...]
 
-    def at(self, time: float) -> int:
-        """Index of the first record from ``time`` s on; raises BadRequest past the last."""
+    def at(self, time: float) -> tuple[Epoch, Vector, Vector | None]:
+        """Epoch, quaternion and rates of the first record from ``time`` s on; raises BadRequest past the last."""
         index = int(np.searchsorted(self.times, time))
         if index == len(self.times):
             raise BadRequest(f"the history ends {self.times[-1]:.6g} s after its first record: expected a time in it")
-        return index
+        rates = None if self.rates is None else self.rates[index]
+        return self.epoch.plus(float(self.times[index])), self.quaternions[index], rates
 
 
 def is_history(path: str) -> bool:
@@ -306,7 +303,7 @@ class _HistoryReader(MessageReader):
         self.rates: list[Vector] | None = []
 
     def take(self, metadata: MessageBlock, records: MessageBlock) -> None:
-        block = self.checked(metadata, message.AEM_METADATA)
+        block = Checked(self, metadata, message.AEM_METADATA)
         self.name = block.text("OBJECT_NAME") or self.name
         self.take_system(block)
         forward, kind = self.endpoints(block), block.text("ATTITUDE_TYPE")
@@ -366,8 +363,15 @@ def imported(contents: ApmContents, path: str) -> tuple[str, Spacecraft, Schedul
     transverse = all(abs(torque[2]) <= ALIKE * size for torque, size in zip(torques, sizes, strict=True))
     alike = sizes and transverse and max(sizes) - min(sizes) <= ALIKE * max(sizes)
     text = _file_text(contents, path, sizes[0] if alike else None)
-    body = _read(text, contents, path)
-    return text, body, _schedule(contents.manoeuvres, body)
+    try:
+        return text, read_spacecraft(text, path), _schedule(contents.manoeuvres, torques)
+    except FaultyFile as wrong:  # its faults are those of the message
+        faults = []
+        for fault in wrong.faults:
+            block = _BLOCKS.get(fault.where.partition(".")[0].partition("[")[0], "")
+            line = contents.lines.get(block, contents.lines.get("SPIN", 1) if block == "ANGVEL" else 1)
+            faults.append(Fault(path, line, 1, block or fault.where, fault.problem))
+        raise FaultyFile(faults) from None
 
 
 def contradictions(contents: ApmContents, body: Spacecraft) -> list[str]:
@@ -379,19 +383,6 @@ def contradictions(contents: ApmContents, body: Spacecraft) -> list[str]:
         f"SPIN says a nutation of {math.degrees(abs(stated)):.4g} deg, but with this INERTIA NUTATION_PER gives one "
         f"of {math.degrees(follows):.4g} deg, which the file has; one of the three is wrong"
     ]
-
-
-def _read(text: str, contents: ApmContents, path: str) -> Spacecraft:
-    """The spacecraft in the text; its faults are those of the message that it came from."""
-    try:
-        return read_spacecraft(text, path)
-    except FaultyFile as wrong:
-        faults = []
-        for fault in wrong.faults:
-            block = _BLOCKS.get(fault.where.partition(".")[0].partition("[")[0], "")
-            line = contents.lines.get(block, contents.lines.get("SPIN", 1) if block == "ANGVEL" else 1)
-            faults.append(Fault(path, line, 1, block or fault.where, fault.problem))
-        raise FaultyFile(faults) from None
 
 
 def _file_text(contents: ApmContents, path: str, torquer: float | None) -> str:
@@ -448,17 +439,17 @@ def _actuators(manoeuvres: tuple[Manoeuvre, ...], torquer: float | None) -> list
     ]
 
 
-def _schedule(manoeuvres: tuple[Manoeuvre, ...], body: Spacecraft) -> Schedule:
+def _schedule(manoeuvres: tuple[Manoeuvre, ...], torques: list[Vector]) -> Schedule:
     """The manoeuvres as pulses of the steerable torquer; one that overlaps another has a name of its own."""
     pulses: list[Pulse] = []
     free = 0.0
-    for number, manoeuvre in enumerate(manoeuvres, start=1):
-        torque, lasts = body.inertia.axes.T @ manoeuvre.torque, manoeuvre.duration
-        alone = manoeuvre.start >= free - 1e-9
+    for number, (manoeuvre, torque) in enumerate(zip(manoeuvres, torques, strict=True), start=1):
+        start, lasts, used = manoeuvre.start, manoeuvre.duration, manoeuvre.mass
+        alone = start >= free - 1e-9
+        spent = None if used is None else -used
         channel = STEERABLE if alone else f"MAN{number}"
-        used = None if manoeuvre.mass is None else -manoeuvre.mass
-        pulses.append(Pulse(manoeuvre.start + 0.5 * lasts, lasts, channel, torque * lasts, torque, propellant=used))
-        free = max(free, manoeuvre.start + lasts) if alone else free
+        pulses.append(Pulse(start + 0.5 * lasts, lasts, channel, torque * lasts, torque, propellant=spent))
+        free = max(free, start + lasts) if alone else free
     return Schedule(tuple(pulses))
 
 
@@ -467,12 +458,11 @@ def merged_text(source: Source, contents: ApmContents | History, at: float = 0.0
 
     Raises BadRequest where the message has no ``inertia`` to merge, and where the file would be none for nutdamp.
     """
-    if isinstance(contents, History):
-        index, tensor = contents.at(at), None
-        turn, given = contents.quaternions[index], None if contents.rates is None else contents.rates[index]
-        epoch = contents.epoch.plus(float(contents.times[index]))
+    given: Vector | None
+    if isinstance(contents, ApmContents):
+        epoch, turn, given, tensor = contents.epoch, contents.quaternion, contents.rates, contents.tensor
     else:
-        turn, given, tensor, epoch = contents.quaternion, contents.rates, contents.tensor, contents.epoch
+        (epoch, turn, given), tensor = contents.at(at), None
     if inertia and tensor is None:
         raise BadRequest("the message has no inertia to merge")
     before = source.read(lambda _: None)
