@@ -13,6 +13,7 @@ import unicodedata
 from collections.abc import Sequence
 from decimal import Decimal
 from itertools import groupby
+from operator import attrgetter
 from typing import NamedTuple
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
@@ -35,108 +36,92 @@ SIGNIFICANT = 16  # most digits that a number may have
 
 
 class Keyword(NamedTuple):
-    """One row of a table: its unit, whether it must be there, and the XML tag that wraps it besides the block's."""
+    """One row of a table: its unit (None of texts), whether it must be there, and the XML tag besides the block's."""
 
     name: str
-    unit: str = ""
+    unit: str | None = None
     required: bool = True
     tag: str = ""
-    text: bool = False
 
 
-class Layout(NamedTuple):
+class Layout:
     """A block: its tag in XML and its keywords in their order."""
 
-    tag: str
-    keywords: tuple[Keyword, ...]
+    def __init__(self, tag: str, *keywords: Keyword) -> None:
+        self.tag, self.keywords = tag, keywords
 
 
-def _text(*names: str, required: bool = True) -> tuple[Keyword, ...]:
-    return tuple(Keyword(name, required=required, text=True) for name in names)
-
-
-def _numbers(*names: str, unit: str = "", required: bool = True, tag: str = "") -> tuple[Keyword, ...]:
+def _rows(*names: str, unit: str | None = None, required: bool = True, tag: str = "") -> tuple[Keyword, ...]:
     return tuple(Keyword(name, unit, required, tag) for name in names)
 
 
-_FRAMES = _text("REF_FRAME_A", "REF_FRAME_B")
-_QUATERNION = _numbers("Q1", "Q2", "Q3", "QC", tag="quaternion")
+_FRAMES = _rows("REF_FRAME_A", "REF_FRAME_B")
+_QUATERNION = _rows("Q1", "Q2", "Q3", "QC", unit="", tag="quaternion")
 ANGVEL = ("ANGVEL_X", "ANGVEL_Y", "ANGVEL_Z")
 
-_SPIN = (*_numbers("SPIN_ALPHA", "SPIN_DELTA", "SPIN_ANGLE", unit="deg"), *_numbers("SPIN_ANGLE_VEL", unit="deg/s"))
+_SPIN = (*_rows("SPIN_ALPHA", "SPIN_DELTA", "SPIN_ANGLE", unit="deg"), *_rows("SPIN_ANGLE_VEL", unit="deg/s"))
 MOMENTUM = ("MOMENTUM_ALPHA", "MOMENTUM_DELTA", "NUTATION_VEL")  # direction of H, rate of the spin axis about it
 
 HEADER = (
-    *_text("CLASSIFICATION", required=False),
-    *_text("CREATION_DATE", "ORIGINATOR"),
-    *_text("MESSAGE_ID", required=False),
+    *_rows("CLASSIFICATION", required=False),
+    *_rows("CREATION_DATE", "ORIGINATOR"),
+    *_rows("MESSAGE_ID", required=False),
 )
 
-APM_METADATA = (*_text("OBJECT_NAME", "OBJECT_ID"), *_text("CENTER_NAME", required=False), *_text("TIME_SYSTEM"))
+APM_METADATA = (*_rows("OBJECT_NAME", "OBJECT_ID"), *_rows("CENTER_NAME", required=False), *_rows("TIME_SYSTEM"))
 
 APM_BLOCKS: dict[str, Layout] = {
     "QUAT": Layout(
         "quaternionState",
-        (
-            *_FRAMES,
-            *_QUATERNION,
-            *_numbers("Q1_DOT", "Q2_DOT", "Q3_DOT", "QC_DOT", unit="1/s", required=False, tag="quaternionDot"),
-        ),
+        *_FRAMES,
+        *_QUATERNION,
+        *_rows("Q1_DOT", "Q2_DOT", "Q3_DOT", "QC_DOT", unit="1/s", required=False, tag="quaternionDot"),
     ),
     "EULER": Layout(
         "eulerAngleState",
-        (
-            *_FRAMES,
-            *_text("EULER_ROT_SEQ"),
-            *_numbers("ANGLE_1", "ANGLE_2", "ANGLE_3", unit="deg"),
-            *_numbers("ANGLE_1_DOT", "ANGLE_2_DOT", "ANGLE_3_DOT", unit="deg/s", required=False),
-        ),
+        *_FRAMES,
+        *_rows("EULER_ROT_SEQ"),
+        *_rows("ANGLE_1", "ANGLE_2", "ANGLE_3", unit="deg"),
+        *_rows("ANGLE_1_DOT", "ANGLE_2_DOT", "ANGLE_3_DOT", unit="deg/s", required=False),
     ),
-    "ANGVEL": Layout("angularVelocity", (*_FRAMES, *_text("ANGVEL_FRAME"), *_numbers(*ANGVEL, unit="deg/s"))),
+    "ANGVEL": Layout("angularVelocity", *_FRAMES, *_rows("ANGVEL_FRAME"), *_rows(*ANGVEL, unit="deg/s")),
     "SPIN": Layout(
         "spin",
-        (
-            *_FRAMES,
-            *_SPIN,
-            *_numbers("NUTATION", unit="deg", required=False),
-            *_numbers("NUTATION_PER", unit="s", required=False),
-            *_numbers("NUTATION_PHASE", *MOMENTUM[:2], unit="deg", required=False),
-            *_numbers(MOMENTUM[2], unit="deg/s", required=False),
-        ),
+        *_FRAMES,
+        *_SPIN,
+        *_rows("NUTATION", unit="deg", required=False),
+        *_rows("NUTATION_PER", unit="s", required=False),
+        *_rows("NUTATION_PHASE", *MOMENTUM[:2], unit="deg", required=False),
+        *_rows(MOMENTUM[2], unit="deg/s", required=False),
     ),
     "INERTIA": Layout(
-        "inertia", (*_text("INERTIA_REF_FRAME"), *_numbers("IXX", "IYY", "IZZ", "IXY", "IXZ", "IYZ", unit="kg*m**2"))
+        "inertia", *_rows("INERTIA_REF_FRAME"), *_rows("IXX", "IYY", "IZZ", "IXY", "IXZ", "IYZ", unit="kg*m**2")
     ),
     "MAN": Layout(
         "maneuverParameters",
-        (
-            *_text("MAN_EPOCH_START"),
-            *_numbers("MAN_DURATION", unit="s"),
-            *_text("MAN_REF_FRAME"),
-            *_numbers("MAN_TOR_X", "MAN_TOR_Y", "MAN_TOR_Z", unit="N*m"),
-            *_numbers("MAN_DELTA_MASS", unit="kg", required=False),
-        ),
+        *_rows("MAN_EPOCH_START"),
+        *_rows("MAN_DURATION", unit="s"),
+        *_rows("MAN_REF_FRAME"),
+        *_rows("MAN_TOR_X", "MAN_TOR_Y", "MAN_TOR_Z", unit="N*m"),
+        *_rows("MAN_DELTA_MASS", unit="kg", required=False),
     ),
 }
 """The blocks of an APM's data, in their order."""
 
-OPM_METADATA = _text("OBJECT_NAME", "OBJECT_ID", "CENTER_NAME", "REF_FRAME", "TIME_SYSTEM")
+OPM_METADATA = _rows("OBJECT_NAME", "OBJECT_ID", "CENTER_NAME", "REF_FRAME", "TIME_SYSTEM")
 
 OPM_BLOCKS: dict[str, Layout] = {
     "STATE": Layout(
-        "stateVector",
-        (*_text("EPOCH"), *_numbers("X", "Y", "Z", unit="km"), *_numbers("X_DOT", "Y_DOT", "Z_DOT", unit="km/s")),
+        "stateVector", *_rows("EPOCH"), *_rows("X", "Y", "Z", unit="km"), *_rows("X_DOT", "Y_DOT", "Z_DOT", unit="km/s")
     ),
-    "SPACECRAFT": Layout("spacecraftParameters", _numbers("MASS", unit="kg", required=False)),
+    "SPACECRAFT": Layout("spacecraftParameters", *_rows("MASS", unit="kg", required=False)),
     "MANEUVER": Layout(
         "maneuverParameters",
-        (
-            *_text("MAN_EPOCH_IGNITION"),
-            *_numbers("MAN_DURATION", unit="s"),
-            *_numbers("MAN_DELTA_MASS", unit="kg"),
-            *_text("MAN_REF_FRAME"),
-            *_numbers("MAN_DV_1", "MAN_DV_2", "MAN_DV_3", unit="km/s"),
-        ),
+        *_rows("MAN_EPOCH_IGNITION"),
+        *_rows("MAN_DURATION", unit="s"),
+        *_rows("MAN_DELTA_MASS", unit="kg"),
+        *_rows("MAN_REF_FRAME"),
+        *_rows("MAN_DV_1", "MAN_DV_2", "MAN_DV_3", unit="km/s"),
     ),
 }
 """Keywords written in the blocks of an OPM, in their order; the names of the blocks are not in the message."""
@@ -145,12 +130,12 @@ LAYOUTS = {**APM_BLOCKS, **OPM_BLOCKS}
 
 
 AEM_METADATA = (
-    *_text("OBJECT_NAME", "OBJECT_ID"),
-    *_text("CENTER_NAME", required=False),
-    *_text("REF_FRAME_A", "REF_FRAME_B", "TIME_SYSTEM", "START_TIME"),
-    *_text("USEABLE_START_TIME", "USEABLE_STOP_TIME", required=False),
-    *_text("STOP_TIME", "ATTITUDE_TYPE"),
-    *_text("ANGVEL_FRAME", "INTERPOLATION_METHOD", "INTERPOLATION_DEGREE", required=False),
+    *_rows("OBJECT_NAME", "OBJECT_ID"),
+    *_rows("CENTER_NAME", required=False),
+    *_rows("REF_FRAME_A", "REF_FRAME_B", "TIME_SYSTEM", "START_TIME"),
+    *_rows("USEABLE_START_TIME", "USEABLE_STOP_TIME", required=False),
+    *_rows("STOP_TIME", "ATTITUDE_TYPE"),
+    *_rows("ANGVEL_FRAME", "INTERPOLATION_METHOD", "INTERPOLATION_DEGREE", required=False),
 )
 """Table 4-3, but for the keywords of Euler angles."""
 
@@ -159,23 +144,26 @@ QUATERNION_ANGVEL, SPIN, SPIN_NUTATION_MOM = "QUATERNION/ANGVEL", "SPIN", "SPIN/
 
 AEM_RECORDS = {
     QUATERNION_ANGVEL: Layout(
-        "quaternionAngVel", (*_text("EPOCH"), *_QUATERNION, *_numbers(*ANGVEL, unit="deg/s", tag="angVel"))
+        "quaternionAngVel", *_rows("EPOCH"), *_QUATERNION, *_rows(*ANGVEL, unit="deg/s", tag="angVel")
     ),
-    SPIN: Layout("spin", (*_text("EPOCH"), *_SPIN)),
+    SPIN: Layout("spin", *_rows("EPOCH"), *_SPIN),
     SPIN_NUTATION_MOM: Layout(
-        "spinNutationMom",
-        (*_text("EPOCH"), *_SPIN, *_numbers(*MOMENTUM[:2], unit="deg"), *_numbers(MOMENTUM[2], unit="deg/s")),
+        "spinNutationMom", *_rows("EPOCH"), *_SPIN, *_rows(*MOMENTUM[:2], unit="deg"), *_rows(MOMENTUM[2], unit="deg/s")
     ),
 }
 """A data line of each ATTITUDE_TYPE (table 4-4)."""
 
 
 class MessageEntry(NamedTuple):
-    """A keyword (none in data lines) with its value, as texts; ``line`` counts from 1 in a message that was read."""
+    """A keyword (none in data lines) with its value, as texts.
+
+    ``tag`` wraps it in XML besides that of the block; ``line`` counts from 1 in a message that was read.
+    """
 
     keyword: str
     value: str
-    unit: str = ""
+    unit: str | None = None
+    tag: str = ""
     line: int = 0
 
 
@@ -211,7 +199,7 @@ Values = Sequence[str | float | None]
 def block(name: str, keywords: tuple[Keyword, ...], values: Values, *comments: str) -> MessageBlock:
     """A block of ``values`` of the first ``keywords``, None where one is left out; numbers in the unit of the table."""
     entries = tuple(
-        MessageEntry(keyword.name, value if isinstance(value, str) else number(value), keyword.unit)
+        MessageEntry(keyword.name, value if isinstance(value, str) else number(value), keyword.unit, keyword.tag)
         for keyword, value in zip(keywords, values, strict=False)
         if value is not None
     )
@@ -266,24 +254,20 @@ def to_xml(message: Message) -> str:
         place = SubElement(body, "segment")
         _fill(SubElement(place, "metadata"), segment.metadata)
         data = SubElement(place, "data")
-        for block in segment.blocks:
-            layout = LAYOUTS.get(block.name)
-            _fill(data if layout is None else SubElement(data, layout.tag), block, layout)
+        for part in segment.blocks:
+            _fill(SubElement(data, LAYOUTS[part.name].tag) if part.name else data, part)
         for record in segment.records:
             assert segment.record is not None
-            tag, rows = segment.record
-            entries = (MessageEntry(row.name, value, row.unit) for row, value in zip(rows, record, strict=True))
-            place = SubElement(SubElement(data, "attitudeState"), tag)
-            _fill(place, MessageBlock("", tuple(entries)), segment.record)
+            place = SubElement(SubElement(data, "attitudeState"), segment.record.tag)
+            _fill(place, block("", segment.record.keywords, record))
     indent(root)
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{tostring(root, encoding="unicode")}\n'
 
 
-def _fill(place: Element, block: MessageBlock, layout: Layout | None = None) -> None:
+def _fill(place: Element, block: MessageBlock) -> None:
     for comment in block.comments:
         SubElement(place, "COMMENT").text = comment
-    wraps = {keyword.name: keyword.tag for keyword in layout.keywords} if layout else {}
-    for tag, group in groupby(block.entries, lambda entry: wraps.get(entry.keyword, "")):
+    for tag, group in groupby(block.entries, attrgetter("tag")):
         parent = SubElement(place, tag) if tag else place
         for entry in group:
             SubElement(parent, entry.keyword, {"units": entry.unit} if entry.unit else {}).text = entry.value
@@ -312,7 +296,7 @@ def _block(block: MessageBlock) -> list[str]:
     width = max((len(entry.keyword) for entry in block.entries), default=0)
     return [
         *(f"COMMENT {comment}" for comment in block.comments),
-        *(f"{word:<{width}} = {value}" + (f" [{unit}]" if unit else "") for word, value, unit, _ in block.entries),
+        *(f"{word:<{width}} = {value}" + (f" [{unit}]" if unit else "") for word, value, unit, *_ in block.entries),
     ]
 
 
@@ -360,11 +344,11 @@ class Checked:
     def _form(self, entry: MessageEntry, keyword: Keyword) -> None:
         if not entry.value:
             self.fault(keyword.name, "empty; expected a value")
-        elif not keyword.text and not _NUMBER.fullmatch(entry.value):
+        elif keyword.unit is not None and not _NUMBER.fullmatch(entry.value):
             self.fault(keyword.name, f"{entry.value[:40]!r} is not a number")
-        elif not keyword.text and not abs(float(entry.value)) <= LARGEST:
+        elif keyword.unit is not None and not abs(float(entry.value)) <= LARGEST:
             self.fault(keyword.name, f"{entry.value[:40]} is beyond anything physical")
-        elif not keyword.text:
+        elif keyword.unit is not None:
             self._numbers[keyword.name] = float(entry.value)
         if entry.unit and entry.unit != keyword.unit:
             expected = f"[{keyword.unit}]" if keyword.unit else "no unit"
@@ -458,7 +442,7 @@ class MessageReader:
             if within == "DATA" and content not in ("DATA_START", "DATA_STOP"):
                 entries.append(MessageEntry("", content, line=line))
             elif pair is not None:
-                entries.append(MessageEntry(pair[1], pair[2], pair[3] or "", line))
+                entries.append(MessageEntry(pair[1], pair[2], pair[3], line=line))
             elif _WORD.fullmatch(content) and content.endswith("_START"):
                 if within is not None:
                     self.fault(line, content, f"{within}_STOP is missing before it")

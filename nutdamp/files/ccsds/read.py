@@ -31,7 +31,7 @@ from nutdamp.spacecraft.schedule import STEERABLE, Pulse, Schedule
 AGREES = 1e-4  # difference up to which SPIN agrees with the other blocks: rad, and relative for rates
 
 _VERSION = "CCSDS_APM_VERS"
-_OUTSIDE = (Keyword(_VERSION, text=True), *message.HEADER, *message.APM_METADATA, Keyword("EPOCH", text=True))
+_OUTSIDE = (Keyword(_VERSION), *message.HEADER, *message.APM_METADATA, Keyword("EPOCH"))
 _NUTATION = ("NUTATION", "NUTATION_PER", "NUTATION_PHASE")
 
 
