@@ -312,8 +312,7 @@ def import_command(job: Job, given: tuple[str, ...], into: str | None, inertia: 
     if into is None and (inertia or at is not None):
         raise click.UsageError("--inertia and --at say what to merge: name the spacecraft file with --into")
 
-    from nutdamp.files.ccsds.read import contradictions, imported, merged_text, read_apm
-    from nutdamp.files.telemetry import is_history, read_history
+    from nutdamp.files.ccsds.read import contradictions, imported, is_history, merged_text, read_apm, read_history
     from nutdamp.flight.propagation import flown
     from nutdamp.views.parts import pulse_table
 

@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import cmath
 import math
-import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -20,13 +19,14 @@ from nutdamp.estimation.parameters import ACCELERATION
 from nutdamp.estimation.results import DIGITS, LATE, LEAST_THRUST, WHEEL, Carried, correlations, replaced
 from nutdamp.estimation.search import Fit
 from nutdamp.files.editing import (
+    Edit,
     Edits,
     Later,
-    Setting,
     as_before,
     carry_text,
     epoch_after,
     flow_list,
+    key_text,
     motion_edits,
     overlay,
 )
@@ -34,9 +34,10 @@ from nutdamp.files.fields import KeyPath
 from nutdamp.files.reader import Source
 from nutdamp.files.yaml import Node, Place, read_tree
 from nutdamp.flight.propagation import Flight
+from nutdamp.physics import attitude
 from nutdamp.physics.thruster import Trapezoid
 from nutdamp.planning.plan import Plan
-from nutdamp.spacecraft.model import Spacecraft, SpinState
+from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.schedule import touching
 from nutdamp.units import parse
 
@@ -50,16 +51,20 @@ def later(flight: Flight, time: float) -> Later:
     moment = np.array([time])
     rates, quaternions = flight.motion(moment)
     moments = np.broadcast_to(flight.moments_at(moment), (1, 3))[0].tolist()
-    state, inertia = SpinState.of(rates[0], quaternions[0]), before.inertia
-    used, tank = float(flight.schedule.used_by(moment)[0]), before.tank
+    used, inertia, tank, turned = (
+        float(flight.schedule.used_by(moment)[0]),
+        before.inertia,
+        before.tank,
+        before.attitude,
+    )
     if tank is not None:
         left = tank.propellant - tank.used - used
         if left <= 0.0:
             raise BadRequest(f"no propellant is left in the tank at {time:.6g} s: no file can hold that")
         tank = replace(tank, propellant=left, pressure=tank.pressure_after(tank.used + used), used=0.0)
-    changed = before.attitude
-    if changed is not None and changed.epoch is not None:
-        changed = replace(changed, epoch=epoch_after(changed.epoch, time))
+    if turned is not None:
+        of_file = attitude.multiply(quaternions[0], attitude.from_matrix(inertia.axes.T))
+        turned = replace(turned, quaternion=of_file, epoch=turned.epoch and epoch_after(turned.epoch, time))
     center, per_kg = before.center_of_mass, before.center_of_mass_per_kg
     if per_kg is not None and used != 0.0:
         center = np.asarray((np.zeros(3) if center is None else center) + used * (inertia.axes @ per_kg))
@@ -67,7 +72,7 @@ def later(flight: Flight, time: float) -> Later:
         before,
         inertia=replace(inertia, moments=tuple(moments)),
         omega0=rates[0],
-        attitude=changed,
+        attitude=turned,
         center_of_mass=center,
         mass=None if before.mass is None else before.mass - used,
         tank=tank,
@@ -75,10 +80,13 @@ def later(flight: Flight, time: float) -> Later:
             replace(each, transverse=each.transverse * cmath.exp(1j * each.rate * time)) for each in before.disturbances
         ),
     )
-    moved_on = Later(before, after, state)
-    if changed is None:
-        return moved_on
-    return moved_on._replace(after=replace(after, attitude=replace(changed, quaternion=moved_on.quaternion)))
+    return Later(before, after, quaternions[0])
+
+
+def _expected(source: object, what: str) -> Source:
+    if not isinstance(source, Source):
+        raise BadRequest(f"{what}: expected a spacecraft from nutdamp.load, read or example, with no field replaced")
+    return source
 
 
 def carried_text(flight: Flight, time: float, source: object) -> str:
@@ -86,27 +94,23 @@ def carried_text(flight: Flight, time: float, source: object) -> str:
 
     Raises BadRequest as `later` does, for values that an alias stands for, and where no file was read.
     """
-    if not isinstance(source, Source):
-        raise BadRequest("carried: expected a spacecraft from nutdamp.load, read or example, with no field replaced")
-    of_file = source.read(lambda _: None)
+    given = _expected(source, "carried")
+    of_file = given.read(lambda _: None)
     moved_on = later(replace(flight, spacecraft=replace(flight.spacecraft, goal=of_file.goal)), time)
-    return carry_text(*source, lambda tree: _edits(tree, moved_on))
+    return carry_text(*given, lambda tree: _edits(tree, moved_on))
 
 
 def carried_spacecraft(plan: Plan, time: float) -> Spacecraft:
     """Spacecraft of `carried_text` for the flight of a plan; raises as that does."""
-    source = plan.spacecraft.source
-    text = carried_text(plan.reaching(time), time, source)
-    return Source(text, source.name if isinstance(source, Source) else "carried").read()
+    source = _expected(plan.spacecraft.source, "carried")
+    return Source(carried_text(plan.reaching(time), time, source), source.name).read()
 
 
 def carried_notes(spacecraft: Spacecraft, time: float, source: Source) -> Iterator[Note]:
     """Notes on what in the file still is that of the old t = 0, ``time`` s earlier."""
-    limits = spacecraft.limits
     if time == 0.0:
         return
-    if limits.blackout or limits.earliest > 0.0 or limits.horizon is not None:
-        yield note("limits-count-anew", at_s=time)
+    yield from _limits_anew(spacecraft, time)
     if spacecraft.orbit is not None:
         yield note("orbit-as-before", at_s=time)
     sun = overlay(read_tree(source.text, source.name)[0], source.settings)[0].get("sun")
@@ -114,28 +118,30 @@ def carried_notes(spacecraft: Spacecraft, time: float, source: Source) -> Iterat
         yield note("sun-as-before", at_s=time)
 
 
+def _limits_anew(spacecraft: Spacecraft, time: float) -> Iterator[Note]:
+    limits = spacecraft.limits
+    if limits.blackout or limits.earliest > 0.0 or limits.horizon is not None:
+        yield note("limits-count-anew", at_s=time)
+
+
 def _edits(tree: Node, moved_on: Later) -> Edits:
     before, after = moved_on.before, moved_on.after
     same = after.inertia.moments == before.inertia.moments
-    yield from (edit for edit in motion_edits(tree, moved_on) if not (same and edit[0][0] == "inertia"))
+    yield from (edit for edit in motion_edits(tree, moved_on) if not (same and edit.path[0] == "inertia"))
     if after.mass is not None and after.mass != before.mass:
-        yield ("mass",), as_before(tree.get("mass"), after.mass, "mass", "kg")
+        yield Edit(("mass",), after.mass, "mass")
     if after.center_of_mass is not None and before.center_of_mass is not None:
         for axis in np.flatnonzero(after.center_of_mass != before.center_of_mass).tolist():
-            value = float(after.center_of_mass[axis])
-            yield ("center_of_mass", axis), as_before(tree.get("center_of_mass", axis), value, "length", "m")
+            yield Edit(("center_of_mass", axis), float(after.center_of_mass[axis]), "length")
     elif after.center_of_mass is not None:
-        yield ("center_of_mass",), flow_list(after.center_of_mass)
+        yield Edit(("center_of_mass",), flow_list(after.center_of_mass))
     if after.tank is not None and before.tank is not None and after.tank.propellant != before.tank.propellant:
-        for key, kind, unit in (("propellant", "mass", "kg"), ("pressure", "pressure", "Pa")):
-            yield ("tank", key), as_before(tree.get("tank", key), float(getattr(after.tank, key)), kind, unit)
+        yield Edit(("tank", "propellant"), float(after.tank.propellant), "mass")
+        yield Edit(("tank", "pressure"), float(after.tank.pressure), "pressure")
     for index, (old, new) in enumerate(zip(before.disturbances, after.disturbances, strict=True)):
-        if old.rate == 0.0:
-            continue
-        torque = before.inertia.in_file(np.array([new.transverse.real, new.transverse.imag, 0.0]))
-        for axis in range(2):
-            path = ("disturbances", index, "torque", axis)
-            yield path, as_before(tree.get(*path), float(torque[axis]), "torque", "N m")
+        torque = before.inertia.in_file(np.array([new.transverse.real, new.transverse.imag, 0.0])).tolist()
+        for axis in range(2) if old.rate != 0.0 else ():
+            yield Edit(("disturbances", index, "torque", axis), torque[axis], "torque")
 
 
 SEEN = 3.0  # standard deviations from which on a growth of the nutation, or a delay, counts as seen
@@ -148,17 +154,13 @@ UNWRITTEN = {
 """Estimates of sensors that have no key in the file: the bias of a loop is one for both of its gyros."""
 
 
-def fitted_text(text: str, name: str, settings: Sequence[Setting], fit: Fit, carried: Carried) -> str:
-    """The text of a spacecraft file ``name`` with ``settings`` and the estimates; raises BadRequest for aliases."""
-    return carry_text(text, name, settings, lambda tree: _fitted_edits(tree, fit, carried))
+def fitted_text(fit: Fit, carried: Carried) -> str:
+    """The text of the file that the fitted spacecraft was read from, with the estimates.
 
-
-def fitted_file(fit: Fit, carried: Carried) -> str:
-    """`fitted_text` of the file that the fitted spacecraft was read from; raises BadRequest where there is none."""
-    source = fit.model.spacecraft.source
-    if not isinstance(source, Source):
-        raise BadRequest("fit: expected a spacecraft from nutdamp.load, read or example, with no field replaced")
-    return fitted_text(*source, fit, carried)
+    Raises BadRequest for aliases, and where no file was read.
+    """
+    source = _expected(fit.model.spacecraft.source, "fit")
+    return carry_text(*source, lambda tree: _fitted_edits(tree, fit, carried))
 
 
 def fitted_spacecraft(_: object, text: str) -> Spacecraft:
@@ -168,50 +170,53 @@ def fitted_spacecraft(_: object, text: str) -> Spacecraft:
 
 def notes(fit: Fit, carried: Carried) -> Iterator[Note]:
     """Estimates that the file cannot hold, and entries that still count from the old t = 0."""
-    body = fit.model.spacecraft
-    growth = fit.index("growth")
-    value = 0.0 if growth is None else float(fit.values[growth])
-    seen_to_grow = growth is not None and abs(value) > SEEN * fit.sigmas[growth]
-    if seen_to_grow and not (carried.body.inertia.wheel or _grows_so(carried, value)):
-        yield note("fit-growth", growth=f"{value:+.3g} 1/s")
-    fitted = dict(zip((parameter.name for parameter in fit.model.parameters), fit.values.tolist(), strict=True))
-    large = np.abs(fit.values) > SEEN * fit.sigmas
-    written, seen = dict(_delays(fit)), []
-    for name, value in (pair for pair, counts in zip(fitted.items(), large, strict=True) if counts):
+    body, large = fit.model.spacecraft, _seen(fit)
+    growth = large.get("growth")
+    if growth is not None and not (carried.body.inertia.wheel or _grows_so(carried, growth)):
+        yield note("fit-growth", growth=f"{growth:+.3g} 1/s")
+    written, unwritten = dict(_delays(fit)), []
+    for name, value in large.items():
         kind, _, channel = name.partition(" ")
         if kind == "delay" and channel not in written:
             yield note("fit-delay-not-written", channel=channel, delay_s=value)
         kind, _, which = name.partition("_")
         if kind in UNWRITTEN and which != ACCELERATION:
             what, unit = UNWRITTEN[kind]
-            seen.append(f"{what.format(which)} {math.degrees(value):.3g} {unit}")
-    if seen:
-        yield note("fit-not-written", estimates=", ".join(seen))
-    for name, factor in fitted.items():
-        kind, _, channel = name.partition(" ")
+            unwritten.append(f"{what.format(which)} {math.degrees(value):.3g} {unit}")
+    if unwritten:
+        yield note("fit-not-written", estimates=", ".join(unwritten))
+    for parameter, factor in zip(fit.model.parameters, fit.values.tolist(), strict=True):
+        kind, _, channel = parameter.name.partition(" ")
         if kind == "thrust" and factor <= LEAST_THRUST:
             silent, given = factor > -LEAST_THRUST, 100.0 * factor
             yield note("fit-no-thrust" if silent else "fit-thrust-reversed", channel=channel, thrust_percent=given)
-    limits = body.limits
-    if carried.time != 0.0 and (limits.blackout or limits.earliest > 0.0 or limits.horizon is not None):
-        yield note("limits-count-anew", at_s=carried.time)
+    if carried.time != 0.0:
+        yield from _limits_anew(body, carried.time)
     if body.tank is not None and len(fit.model.record.schedule):
         yield note("fit-tank")
 
 
+def _seen(fit: Fit) -> dict[str, float]:
+    """Estimates of more than `SEEN` standard deviations, by the names of parameters."""
+    rows = zip(fit.model.parameters, fit.values.tolist(), fit.sigmas.tolist(), strict=True)
+    return {parameter.name: value for parameter, value, sigma in rows if abs(value) > SEEN * sigma}
+
+
 def _fitted_edits(tree: Node, fit: Fit, carried: Carried) -> Edits:
-    before = fit.model.spacecraft
+    before, large = fit.model.spacecraft, _seen(fit)
     after, given = replaced(before, carried), before.attitude
     if given is not None and given.epoch is not None and after.attitude is not None and carried.time != 0.0:
         after = replace(after, attitude=replace(after.attitude, epoch=epoch_after(given.epoch, carried.time)))
-    yield from motion_edits(tree, Later(before, after, carried.state))
-    yield from _dissipation(tree, fit, carried)
+    yield from motion_edits(tree, Later(before, after, carried.state.quaternion))
+    if (growth := large.get("growth")) is not None:
+        yield Edit(("dissipation", "time_constant"), 1.0 / abs(growth), "time")
+        if tree.get("dissipation", "nutation") is not None or not _grows_so(carried, growth):
+            yield Edit(("dissipation", "nutation"), "grows" if growth > 0.0 else "decays")
     yield from _thrusts(tree, carried)
     for channel, late in _delays(fit):
         yield from _valve(tree, channel, late)
-    at, path = fit.index("bias_acceleration"), ("loop", "sensor", "bias")
-    if at is not None and abs(fit.values[at]) > SEEN * fit.sigmas[at]:
-        yield path, as_before(tree.get(*path), float(fit.values[at]), "acceleration", "m/s^2")
+    if (bias := large.get(f"bias_{ACCELERATION}")) is not None:
+        yield Edit(("loop", "sensor", "bias"), bias, "acceleration")
     yield from _dispersions(fit, carried)
 
 
@@ -221,25 +226,14 @@ def _grows_so(carried: Carried, growth: float) -> bool:
     return not carried.body.inertia.wheel and (0.5 * (first + second) - third) * growth > 0.0
 
 
-def _dissipation(tree: Node, fit: Fit, carried: Carried) -> Edits:
-    index = fit.index("growth")
-    if index is None or abs(value := float(fit.values[index])) <= SEEN * fit.sigmas[index]:
-        return
-    given = tree.get("dissipation", "time_constant")
-    yield ("dissipation", "time_constant"), as_before(given, 1.0 / abs(value), "time", "s")
-    if tree.get("dissipation", "nutation") is not None or not _grows_so(carried, value):
-        yield ("dissipation", "nutation"), "grows" if value > 0.0 else "decays"
-
-
 def _thrusts(tree: Node, carried: Carried) -> Edits:
     factors = carried.factors
     for name, path in _thrusters(tree).items():
-        parts = [((*path, "force"), "force", "N")]
-        parts += [((*path, "torque", axis), "torque", "N m") for axis in range(3)]
-        for place, kind, unit in parts if name in factors else ():
+        parts = [((*path, "force"), "force"), *(((*path, "torque", axis), "torque") for axis in range(3))]
+        for place, kind in parts if name in factors else ():
             part = tree.get(*place)
             if part is not None:
-                yield place, as_before(part, parse(part.value, kind) * factors[name][0], kind, unit)
+                yield Edit(place, parse(part.value, kind) * factors[name][0], kind)
 
 
 def _thrusters(tree: Node) -> dict[str, KeyPath]:
@@ -253,35 +247,36 @@ def _dispersions(fit: Fit, carried: Carried) -> Edits:
     values = dict(zip(carried.names, carried.values.tolist(), strict=True))
     for key in ("A", "C"):
         if sigmas[key] > 0.0:
-            yield ("dispersions", key), f"{{normal: {100.0 * sigmas[key] / values[key]:.6g} %}}"
+            yield Edit(("dispersions", key), f"{{normal: {100.0 * sigmas[key] / values[key]:.6g} %}}")
     rates = ", ".join(f"{{normal: {math.degrees(sigmas[f'omega0_{axis}']):.6g} deg/s}}" for axis in (1, 2, 3))
-    yield ("dispersions", "omega0"), f"[{rates}]"
+    yield Edit(("dispersions", "omega0"), f"[{rates}]")
     if WHEEL in sigmas:
-        yield ("dispersions", "wheel_momentum"), f"{{normal: {sigmas[WHEEL]:.6g} N m s}}"
+        yield Edit(("dispersions", "wheel_momentum"), f"{{normal: {sigmas[WHEEL]:.6g} N m s}}")
     factors, given = carried.factors, fit.model.spacecraft.dispersions
     if factors:
         before = {} if given is None else given.thrust
         parts = [(name, size.kind, size.size) for name, size in before.items() if name not in factors]
         parts += [(name, "normal", sigma / factor) for name, (factor, sigma) in factors.items()]
-        sizes = (f"{_quoted(name)}: {{{kind}: {100.0 * size:.6g} %}}" for name, kind, size in parts)
-        yield ("dispersions", "thrust"), "{" + ", ".join(sizes) + "}"
+        sizes = (f"{key_text(name)}: {{{kind}: {100.0 * size:.6g} %}}" for name, kind, size in parts)
+        yield Edit(("dispersions", "thrust"), "{" + ", ".join(sizes) + "}")
     if carried.tilt is not None:
-        yield ("dispersions", "attitude"), f"{{normal: {math.degrees(carried.tilt):.6g} deg}}"
+        yield Edit(("dispersions", "attitude"), f"{{normal: {math.degrees(carried.tilt):.6g} deg}}")
     pairs = correlations(carried, given)
     if pairs:
-        rows = ", ".join(f"[{_quoted(first)}, {_quoted(second)}, {value:.{DIGITS}f}]" for first, second, value in pairs)
-        yield ("dispersions", "correlation"), f"[{rows}]"
+        rows = ", ".join(
+            f"[{key_text(first)}, {key_text(second)}, {value:.{DIGITS}f}]" for first, second, value in pairs
+        )
+        yield Edit(("dispersions", "correlation"), f"[{rows}]")
 
 
 def _delays(fit: Fit) -> Iterator[tuple[str, float]]:
     """Channels whose thrust is later than by the file, s, as far as a valve of their own can have such delays."""
+    large = _seen(fit)
     for channel in fit.model.spacecraft.channels:
-        at, known = fit.index(f"delay {channel.name}"), channel.thrusters[0].valve or Trapezoid()
-        if at is None or len(channel.thrusters) > 1 or not isinstance(known, Trapezoid):
+        late, known = large.get(f"delay {channel.name}"), channel.thrusters[0].valve or Trapezoid()
+        if late is None or len(channel.thrusters) > 1 or not isinstance(known, Trapezoid):
             continue
-        late = float(fit.values[at])
-        possible = abs(late) <= LATE and min(known.open_delay, known.close_delay) + late >= 0.0
-        if possible and abs(late) > SEEN * fit.sigmas[at]:
+        if abs(late) <= LATE and min(known.open_delay, known.close_delay) + late >= 0.0:
             yield channel.thrusters[0].name, late
 
 
@@ -294,12 +289,8 @@ def _valve(tree: Node, name: str, late: float) -> Edits:
     for key in ("open_delay", "close_delay"):
         before = known.get(key)
         time = late if before is None else parse(before.value, "time") + late
-        values[key] = as_before(before, time, "time", "s")
+        values[key] = as_before(before, time, "time")
         if own is not None:
-            yield (*path, key), values[key]
+            yield Edit((*path, key), values[key])
     if own is None:
-        yield path, "{" + ", ".join(f"{key}: {value}" for key, value in values.items()) + "}"
-
-
-def _quoted(name: str) -> str:
-    return name if re.fullmatch(r"[A-Za-z_+-][\w +-]*", name) else "'" + name.replace("'", "''") + "'"
+        yield Edit(path, "{" + ", ".join(f"{key}: {value}" for key, value in values.items()) + "}")

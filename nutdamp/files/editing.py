@@ -26,19 +26,26 @@ from nutdamp.files.fields import KeyPath
 from nutdamp.files.yaml import MAX_DEPTH, Node, Place, dotted, read_tree, read_value
 from nutdamp.physics import attitude
 from nutdamp.physics import body as rigid_body
-from nutdamp.spacecraft.model import Spacecraft, SpinState
-from nutdamp.units import parse, shown
+from nutdamp.spacecraft.model import Spacecraft
+from nutdamp.units import KINDS, parse, shown
 
 _QUOTED = r"""'(?:[^'\\]|\\.)*'|"(?:[^"\\]|\\.)*\""""
 _STEP = re.compile(rf"\.?(?P<word>[^.\[\]='\"]+|{_QUOTED})|\[(?P<entry>[0-9]{{1,6}}|[^.\[\]='\"]+|{_QUOTED})\]")
 
 
 class Setting(NamedTuple):
-    """A key, its new value (a text is YAML) and its name in messages; entries of lists go by position or ``name``."""
+    """A key and its new value (a text is YAML), given in a ``call``; entries of lists go by position or ``name``."""
 
+    call: str
     path: KeyPath
     value: object
-    label: str
+
+    @property
+    def label(self) -> str:
+        """Its name in messages."""
+        text = self.value if isinstance(self.value, str) else shown(self.value)
+        brief = text if len(text) <= 40 and text.isprintable() else shown(text)
+        return f"{self.call} {dotted(self.path)}={brief}"
 
     def node(self) -> tuple[Node, list[Fault]]:
         """The value as part of a tree, and its faults; raises `FaultyFile` for a text that is not YAML."""
@@ -56,7 +63,7 @@ def parse_setting(text: str) -> Setting:
     path, end = _parse_path(text)
     if not path or text[end : end + 1] != "=":
         raise ValueError(f"{shown(text)} is not KEY=VALUE, such as limits.horizon=300s or thrusters.T1.force=12N")
-    return _labelled("--set", path, text[end + 1 :])
+    return Setting("--set", path, text[end + 1 :])
 
 
 def settings_of(values: Mapping[str, object]) -> tuple[Setting, ...]:
@@ -66,7 +73,7 @@ def settings_of(values: Mapping[str, object]) -> tuple[Setting, ...]:
         path, end = _parse_path(key)
         if not path or end < len(key):
             raise BadRequest(f"{shown(key)} is not a key of a spacecraft file, such as limits.horizon")
-        settings.append(_labelled("set", path, value))
+        settings.append(Setting("set", path, value))
     return tuple(settings)
 
 
@@ -81,19 +88,13 @@ def settings_within(values: Mapping[str, object], behind: KeyPath = ()) -> Itera
         if isinstance(value, Mapping):
             yield from settings_within(value, path)
         else:
-            yield _labelled("with_", path, value)
+            yield Setting("with_", path, value)
 
 
 def text_of(values: Mapping[str, object], name: str) -> str:
     """The text of a spacecraft file with these keys and values, as JSON; raises BadRequest."""
     plain = _of_python(values, Place(setting=name)).plain()
     return json.dumps(plain, indent=2, ensure_ascii=False) + "\n"
-
-
-def _labelled(call: str, path: KeyPath, value: object) -> Setting:
-    text = value if isinstance(value, str) else shown(value)
-    brief = text if len(text) <= 40 and text.isprintable() else shown(text)
-    return Setting(path, value, f"{call} {dotted(path)}={brief}")
 
 
 def overlay(root: Node, settings: Iterable[Setting]) -> tuple[Node, list[Fault]]:
@@ -203,33 +204,33 @@ def edited(text: str, values: Mapping[KeyPath, str], renamed: Mapping[str, str] 
     for path, value in values.items():
         text = _with(text, path, value)
     for old, new in (renamed or {}).items():
-        key, _ = _find(_root(text), (old,))
+        key, _ = _find(_root(text), old)
         if key is not None:
             text = text[: key.start_mark.index] + new + text[key.end_mark.index :]
     return text
 
 
 def _with(text: str, path: KeyPath, value: str) -> str:
-    nodes: list[yaml.Node] = [_root(text)]  # as far as they are there
-    for length in range(1, len(path) + 1):
-        key, node = _find(nodes[0], path[:length])
+    held: yaml.Node = _root(text)
+    for depth, step in enumerate(path):
+        key, node = _find(held, step)
         if node is None:
-            return _added(text, nodes[-1], path[length - 1 :], value)
-        nodes.append(node)
-        where, begins = dotted(path[:length]), node.start_mark.index
+            return _added(text, held, path[depth:], value)
+        where, begins = dotted(path[: depth + 1]), node.start_mark.index
         if key is not None and begins < key.end_mark.index:
             raise BadRequest(f"{where} is an alias: write its value out, for it to be changed")
         anchor = re.match(r"&(\S+)", text[begins:])
         if anchor and f"*{anchor[1]}" in text:
             raise BadRequest(f"{where} has the alias *{anchor[1]}: write that out, for it to be changed")
-    return text[: nodes[-1].start_mark.index] + value + text[_end(nodes[-1]) :]
+        held = node
+    return text[: held.start_mark.index] + value + text[_end(held) :]
 
 
 def _added(text: str, parent: yaml.Node, path: KeyPath, value: str) -> str:
     """The text with a new key in a mapping; further steps of the path become flow mappings."""
     for step in reversed(path[1:]):
-        value = f"{{{_key(step)}: {value}}}"
-    entry = f"{_key(path[0])}: {value}"
+        value = f"{{{key_text(step)}: {value}}}"
+    entry = f"{key_text(path[0])}: {value}"
     if not isinstance(parent, yaml.MappingNode):
         raise BadRequest(f"{dotted(path)}: its parent holds no keys")
     if parent.flow_style:
@@ -249,18 +250,13 @@ def _root(text: str) -> yaml.MappingNode:
     return root
 
 
-def _find(root: yaml.Node, path: KeyPath) -> tuple[yaml.Node | None, yaml.Node | None]:
-    """The key and the value at a path; None where there is none."""
-    key: yaml.Node | None = None
-    node: yaml.Node | None = root
-    for step in path:
-        entry = None
-        if isinstance(node, yaml.MappingNode):
-            entry = next(((name, value) for name, value in node.value if name.value == step), None)
-        elif isinstance(node, yaml.SequenceNode) and isinstance(step, int) and step < len(node.value):
-            entry = None, node.value[step]
-        key, node = entry or (None, None)
-    return key, node
+def _find(parent: yaml.Node, step: str | int) -> tuple[yaml.Node | None, yaml.Node | None]:
+    """The key, of a mapping, and the value at a step; None where there is none."""
+    if isinstance(parent, yaml.MappingNode):
+        return next(((name, value) for name, value in parent.value if name.value == step), (None, None))
+    if isinstance(parent, yaml.SequenceNode) and isinstance(step, int) and step < len(parent.value):
+        return None, parent.value[step]
+    return None, None
 
 
 def _end(node: yaml.Node) -> int:
@@ -273,31 +269,35 @@ def _end(node: yaml.Node) -> int:
     return int(node.end_mark.index)
 
 
-def _key(step: str | int) -> str:
+def key_text(step: str | int) -> str:
+    """A key as a mapping has it, in quotes unless it is plain words."""
     word = str(step)
-    return word if re.fullmatch(r"[A-Za-z_][\w+-]*|[+-][A-Za-z]\w*", word) else "'" + word.replace("'", "''") + "'"
+    return word if re.fullmatch(r"[+-]?[A-Za-z_][\w+-]*( [\w+-]+)*", word) else "'" + word.replace("'", "''") + "'"
 
 
 NOISE = 1e-13  # nutation, rad, that is rounding
 
-Edits = Iterator[tuple[KeyPath, str]]
-"""Values by their paths."""
+
+class Edit(NamedTuple):
+    """A value at a path: its text, or a number of a ``kind`` of quantity, in SI, for the unit that the file has."""
+
+    path: KeyPath
+    value: str | float
+    kind: str = ""
+
+
+Edits = Iterator[Edit]
 
 
 class Later(NamedTuple):
     """The spacecraft ``before`` of a file, and ``after``: as it is to be at t = 0 from now on.
 
-    ``state`` is the motion of ``after`` in its principal axes and in the frame of ``before``.
+    ``quaternion`` is that of the principal axes of ``after``, in the frame of ``before``.
     """
 
     before: Spacecraft
     after: Spacecraft
-    state: SpinState
-
-    @property
-    def quaternion(self) -> np.ndarray:
-        """Attitude of the axes of the file, (4,), scalar first."""
-        return attitude.multiply(self.state.quaternion, attitude.from_matrix(self.after.inertia.axes.T))
+    quaternion: np.ndarray
 
 
 def motion_edits(tree: Node, later: Later) -> Edits:
@@ -312,36 +312,36 @@ def inertia_edits(tree: Node, later: Later) -> Edits:
     """Moments of inertia, and the momentum of a wheel."""
     inertia = later.after.inertia
     if inertia.wheel != later.before.inertia.wheel:
-        given = tree.get("wheel", "momentum")
-        yield ("wheel", "momentum"), as_before(given, inertia.wheel, "momentum", "N m s")
+        yield Edit(("wheel", "momentum"), inertia.wheel, "momentum")
     if tree.get("inertia", "tensor") is None and inertia.symmetric:
-        for key, value in (("A", inertia.A), ("C", inertia.C)):
-            yield ("inertia", key), as_before(tree.get("inertia", key), value, "inertia", "kg m^2")
+        yield Edit(("inertia", "A"), inertia.A, "inertia")
+        yield Edit(("inertia", "C"), inertia.C, "inertia")
         return
     tensor = inertia.axes @ np.diag(inertia.moments) @ inertia.axes.T
     rows = ", ".join(map(flow_list, 0.5 * (tensor + tensor.T)))
     if tree.get("inertia", "tensor") is None:
-        yield ("inertia",), f"{{tensor: [{rows}]}}"
+        yield Edit(("inertia",), f"{{tensor: [{rows}]}}")
     else:
-        yield ("inertia", "tensor"), f"[{rows}]"
+        yield Edit(("inertia", "tensor"), f"[{rows}]")
 
 
 def rate_edits(tree: Node, later: Later) -> Edits:
     """Rates at t = 0, as the file gives them."""
-    inertia, state, rates = later.after.inertia, later.state, later.after.rates
+    inertia, rates = later.after.inertia, later.after.rates
     if tree.get("state") is None:
-        for index, rate in enumerate(rates):
-            yield ("omega0", index), as_before(tree.get("omega0", index), float(rate), "rate", "rad/s")
+        for index, rate in enumerate(rates.tolist()):
+            yield Edit(("omega0", index), rate, "rate")
     elif inertia.symmetric and inertia.aligned:
-        angle = rigid_body.nutation_angle(inertia.A, inertia.C, abs(state.omega), inertia.equivalent(state.spin))
-        phase = math.atan2(state.omega.imag, state.omega.real)
+        first, second, spin = later.after.omega0.tolist()
+        angle = rigid_body.nutation_angle(inertia.A, inertia.C, math.hypot(first, second), inertia.equivalent(spin))
+        phase = math.atan2(second, first)
         if angle < NOISE:
             angle = phase = 0.0
-        yield ("state", "spin"), as_before(tree.get("state", "spin"), state.spin, "rate", "rad/s")
-        for key, value in (("nutation", angle), ("phase", phase)):
-            yield ("state", key), as_before(tree.get("state", key), value, "angle", "deg")
+        yield Edit(("state", "spin"), spin, "rate")
+        yield Edit(("state", "nutation"), angle, "angle")
+        yield Edit(("state", "phase"), phase, "angle")
     else:
-        yield ("state",), flow_list(rates)
+        yield Edit(("state",), flow_list(rates))
 
 
 def epoch_after(epoch: str, time: float) -> str:
@@ -355,15 +355,15 @@ def attitude_edits(tree: Node, later: Later) -> Edits:
     given, old = later.after.attitude, later.before.attitude
     if given is None:
         return
-    parts = flow_list(later.quaternion)
+    parts = flow_list(given.quaternion)
     keys = {"quaternion": parts, "epoch": given.epoch, "frame": given.frame}
     if tree.get("attitude", "quaternion") is None:  # none, or another form, which holds a direction alone
-        yield ("attitude",), "{" + ", ".join(f"{key}: {value}" for key, value in keys.items() if value) + "}"
+        yield Edit(("attitude",), "{" + ", ".join(f"{key}: {value}" for key, value in keys.items() if value) + "}")
         return
-    yield ("attitude", "quaternion"), parts
+    yield Edit(("attitude", "quaternion"), parts)
     for key in ("epoch", "frame"):
         if (value := keys[key]) is not None and (old is None or value != getattr(old, key)):
-            yield ("attitude", key), value
+            yield Edit(("attitude", key), value)
 
 
 def _goal(tree: Node, later: Later) -> Edits:
@@ -371,12 +371,11 @@ def _goal(tree: Node, later: Later) -> Edits:
     target = later.before.goal.axis
     if target is None or tree.get("goal", "tilt") is None:
         return
-    in_body = attitude.rotate(attitude.conjugate(later.state.quaternion), target)
+    in_body = attitude.rotate(attitude.conjugate(later.quaternion), target)
     to_n = replace(later.after, attitude=None).initial.quaternion
     x, y, z = attitude.rotate(to_n, in_body).tolist()
-    tilt, azimuth = math.atan2(math.hypot(x, y), z), math.atan2(y, x)
-    yield ("goal", "tilt"), as_before(tree.get("goal", "tilt"), tilt, "angle", "deg")
-    yield ("goal", "azimuth"), as_before(tree.get("goal", "azimuth"), azimuth, "angle", "deg")
+    yield Edit(("goal", "tilt"), math.atan2(math.hypot(x, y), z), "angle")
+    yield Edit(("goal", "azimuth"), math.atan2(y, x), "angle")
 
 
 def carry_text(text: str, name: str, settings: Sequence[Setting], edits: Callable[[Node], Edits]) -> str:
@@ -392,18 +391,21 @@ def carry_text(text: str, name: str, settings: Sequence[Setting], edits: Callabl
             held = None if node is None else node.value
             positions += (_entry(held, step, positions) if isinstance(held, list) else step,)
         text = edited(text, {positions: value or "null"})
-    values = dict(edits(read_tree(text, name)[0]))
-    rename = {"state": "omega0"} if ("state",) in values else {}
-    return edited(text, values, rename)
+    tree = read_tree(text, name)[0]
+    values = {
+        path: value if isinstance(value, str) else as_before(tree.get(*path), value, kind)
+        for path, value, kind in edits(tree)
+    }
+    return edited(text, values, {"state": "omega0"} if ("state",) in values else {})
 
 
-def as_before(node: Node | None, value: float, kind: str, unit: str) -> str:
-    """A value as text in the unit that the file has for it; of a new key in ``unit``."""
+def as_before(node: Node | None, value: float, kind: str) -> str:
+    """A value in SI as text in the unit that the file has for it; a new one in SI, angles in deg."""
     before = None if node is None else node.value
     if before is not None and not isinstance(before, str):
         return number(value)
     suffix = re.search(r"[^\d.eE+\s-].*$", (before or "").strip())
-    unit = suffix.group() if suffix else unit
+    unit = suffix.group() if suffix else "deg" if kind == "angle" else KINDS[kind].si
     return f"{number(value / parse(f'1 {unit}', kind))} {unit}"
 
 

@@ -217,8 +217,7 @@ class SamplesWriter:
     """Writer of one row a case: number from 1, true inputs, outputs, then angles to cones; angles in degrees."""
 
     def __init__(self, stream: IO[bytes], study: Study) -> None:
-        self._stream, self._source = stream, study.source()
-        self._inputs = study.model.inputs.drawn
+        self._stream, self._study, self._inputs = stream, study, study.model.inputs.drawn
         self._outputs = [*OUTPUT_COLUMNS, *cone_columns(study.model.spacecraft)]
         header = ["case", *(column(entry) for entry in self._inputs), *self._outputs]
         stream.write(csv_text(header, []).encode())
@@ -226,17 +225,14 @@ class SamplesWriter:
 
     def write(self, first: int, values: Array) -> None:
         """The cases from ``first`` (from 0) on, with their `Results.values` (5 + 2m, n)."""
-        last = first + values.shape[1]
-        for block in range(first // BLOCK, math.ceil(last / BLOCK)):
-            low, high = max(first, block * BLOCK), min(last, (block + 1) * BLOCK)
-            draws, _ = self._source.block(block)
-            columns = [list(map(str, range(low + 1, high + 1)))]
+        for begin in range(0, values.shape[1], BLOCK):  # texts of all would take much memory
+            part = values[:, begin : begin + BLOCK]
+            cases = np.arange(first + begin, first + begin + part.shape[1])
+            draws, columns = self._study.draws_of_all(cases), [list(map(str, (cases + 1).tolist()))]
             for entry in self._inputs:
-                draw = np.broadcast_to(draws[entry.name], BLOCK)[low - block * BLOCK : high - block * BLOCK]
-                truth = entry.nominal + draw
+                truth = np.broadcast_to(entry.nominal + draws[entry.name], len(cases))
                 columns.append(_texts(np.degrees(truth) if entry.unit == "rad" else truth))
-            outputs = values[:, low - first : high - first]
-            for name, row in zip(self._outputs, outputs, strict=True):
+            for name, row in zip(self._outputs, part, strict=True):
                 columns.append(_texts(np.degrees(row) if name.endswith("_deg") else row))
             lines = map(",".join, zip(*columns, strict=True))
             self._stream.write(("\r\n".join(lines) + "\r\n").encode())

@@ -169,11 +169,6 @@ def number(value: float | None) -> str:
     return "" if value is None or not math.isfinite(value) else repr(float(value))
 
 
-def truth(value: bool | None) -> str:
-    """Yes or no as CSV has it; None is empty."""
-    return "" if value is None else str(value).lower()
-
-
 def csv_text(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     """A table as RFC 4180 CSV."""
     stream = io.StringIO()

@@ -1,8 +1,6 @@
 """Telemetry from CSV files and attitude ephemeris messages: times, and measurements of the motion.
 
-An empty cell of CSV is a missing sample; a track of ``simulate --csv`` is such a file. An attitude history (AEM,
-version 2, in KVN) gives the quaternions, and the rates where it has them; the other forms of an ephemeris leave the
-rates open or hold for symmetric bodies alone.
+An empty cell of CSV is a missing sample; a track of ``simulate --csv`` is such a file.
 """
 
 from __future__ import annotations
@@ -12,13 +10,12 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.common.time import Epoch
-from nutdamp.errors import BadRequest, Fault, FaultyFile
+from nutdamp.errors import BadRequest
 from nutdamp.estimation.parameters import (
     ACCELERATION,
     AXIS,
@@ -31,139 +28,12 @@ from nutdamp.estimation.parameters import (
     Record,
     of_quaternions,
 )
-from nutdamp.files.ccsds.message import (
-    AEM_METADATA,
-    BEFORE,
-    QUATERNION_ANGVEL,
-    Checked,
-    Frames,
-    MessageBlock,
-    expect_version,
-    from_kvn,
-    kvn_text,
-    unit_quaternion,
-)
+from nutdamp.files.ccsds.read import History, is_history, read_history
 from nutdamp.files.tabular import HEADER as TRACK
 from nutdamp.files.tabular import Table
-from nutdamp.files.yaml import read_bytes
-from nutdamp.physics import attitude
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.schedule import Schedule
-from nutdamp.units import shown
-
-AEM_VERSION = "CCSDS_AEM_VERS"  # keyword of the first line
-COLUMNS = {"QUATERNION": 4, QUATERNION_ANGVEL: 7}  # numbers in a record of each ATTITUDE_TYPE read, besides its time
-
-
-class History(NamedTuple):
-    """Attitude of an object at ``times`` (n,) s after ``epoch``: ``quaternions`` (n, 4) body -> frame, scalar first.
-
-    ``rates`` (n, 3) rad/s in body axes, or None where the message has none.
-    """
-
-    name: str
-    epoch: Epoch
-    frame: str | None
-    times: Vector
-    quaternions: Vector
-    rates: Vector | None
-    remarks: tuple[str, ...]
-
-    def at(self, time: float) -> int:
-        """Index of the first record from ``time`` s on; raises BadRequest past the last."""
-        index = int(np.searchsorted(self.times, time))
-        if index == len(self.times):
-            raise BadRequest(f"the history ends {self.times[-1]:.6g} s after its first record: expected a time in it")
-        return index
-
-
-def is_history(path: str) -> bool:
-    """True for a file that begins as an AEM does, not for standard input; raises CannotRead."""
-    beginning = b"" if path == "-" else read_bytes(path, 200)
-    return beginning.lstrip(BEFORE).startswith(AEM_VERSION.encode())
-
-
-def read_history(path: str) -> History:
-    """The history in a message; raises CannotRead, or FaultyFile with its faults."""
-    text = kvn_text(path)
-    lines, data = text.splitlines(), list[tuple[int, str]]()
-    inside = False
-    for number, line in enumerate(lines):
-        word = line.strip()
-        if word in ("DATA_START", "DATA_STOP"):
-            inside = word == "DATA_START"
-        elif inside and word and word.split(maxsplit=1)[0] != "COMMENT":
-            data.append((number + 1, word))
-            lines[number] = ""
-    blocks, faults = from_kvn("\n".join(lines), path)
-    expect_version(path, blocks[0], AEM_VERSION, faults)
-    reader = _HistoryReader(path, faults)
-    segments = [block for block in blocks[1:] if block.name in ("META", "DATA")]
-    ends = [block.line for block in segments[2::2]] + [len(lines) + 1]
-    for metadata, records, end in zip(segments[::2], segments[1::2], ends, strict=False):
-        if (metadata.name, records.name) != ("META", "DATA"):
-            faults.append(Fault(path, metadata.line, 1, metadata.name, "expected META_START … META_STOP, then data"))
-            break
-        reader.take(metadata, [row for row in data if records.line < row[0] < end])
-    if not segments or len(segments) % 2:
-        faults.append(Fault(path, 1, 1, "DATA_START", "missing; each block of metadata is followed by data"))
-    if not faults and not reader.times:
-        faults.append(Fault(path, segments[0].line, 1, "DATA_START", "no records"))
-    if faults:
-        raise FaultyFile(faults)
-    first = reader.times[0]
-    times, turns = np.array([time.since(first) for time in reader.times]), np.array(reader.quaternions)
-    rates = None if reader.rates is None else np.array(reader.rates)
-    return History(reader.name, first, reader.frame, times, turns, rates, tuple(reader.remarks))
-
-
-class _HistoryReader(Frames):
-    def __init__(self, path: str, faults: list[Fault]) -> None:
-        super().__init__()
-        self.path, self.faults = path, faults
-        self.name = "UNKNOWN"
-        self.times: list[Epoch] = []
-        self.quaternions: list[Vector] = []
-        self.rates: list[Vector] | None = []
-
-    def take(self, metadata: MessageBlock, rows: list[tuple[int, str]]) -> None:
-        block = Checked(self.path, metadata, AEM_METADATA, self.faults)
-        self.name = block.text("OBJECT_NAME") or self.name
-        self.take_system(block)
-        forward, kind = self.endpoints(block), block.text("ATTITUDE_TYPE")
-        if kind is not None and kind not in COLUMNS:
-            block.fault("ATTITUDE_TYPE", f"{kind!r} is not read; expected {' or '.join(COLUMNS)}")
-        axes, turning = block.text("ANGVEL_FRAME"), kind == QUATERNION_ANGVEL
-        if turning and axes is None:
-            block.fault("ANGVEL_FRAME", f"missing; {QUATERNION_ANGVEL} needs the frame of the rates")
-        in_body = not turning or axes is None or self.rates_in_body(block, axes)
-        if self.faults or kind is None or forward is None:
-            return
-        if not turning:
-            self.rates = None
-        for line, row in rows:
-            self._record(line, row.split(), COLUMNS[kind], forward=forward, in_body=in_body)
-
-    def _record(self, line: int, cells: list[str], columns: int, *, forward: bool, in_body: bool) -> None:
-        try:
-            time, numbers = Epoch.parse(cells[0], self.system), [float(cell) for cell in cells[1:]]
-            if len(numbers) != columns or not all(map(math.isfinite, numbers)):
-                raise ValueError(f"expected a time and {columns} numbers")
-            parts = unit_quaternion([numbers[3], *numbers[:3]])
-        except ValueError as wrong:
-            self.faults.append(Fault(self.path, line, 1, "DATA", str(wrong)))
-            return
-        if self.times and time == self.times[-1]:  # a segment begins where the one before ends
-            return
-        if self.times and time < self.times[-1]:
-            self.faults.append(Fault(self.path, line, 1, "DATA", "comes before the record above; put them in order"))
-            return
-        quaternion = parts if forward else attitude.conjugate(parts)
-        self.times.append(time)
-        self.quaternions.append(quaternion)
-        if self.rates is not None:
-            rates = np.radians(numbers[4:]) * (1.0 if forward else -1.0)
-            self.rates.append(rates if in_body else np.asarray(attitude.matrix(quaternion).T @ rates))
+from nutdamp.units import KINDS, shown
 
 
 def record_of(history: History, spacecraft: Spacecraft, schedule: Schedule) -> Record:
@@ -195,8 +65,15 @@ LIMITS = {ANGLES[0]: (-360.0, 360.0), ANGLES[1]: (-90.0, 90.0), CROSSED[0]: (-36
 """Least and largest angles of columns, deg."""
 
 UNIT_LENGTH = 0.01  # deviation from length one that a measured axis or quaternion may have
-UNKNOWN = re.compile(r"omega|axis|accel|sun|rate|gyro|cross|q[_0-9]|(ra|dec)(_|$)", re.IGNORECASE)
-"""Names of columns that are meant to be measured."""
+MEANT: dict[str, Sequence[str]] = {
+    "omega|rate|gyro": ["omega_1_rad_s … omega_3_rad_s or omega_1_deg_s … omega_3_deg_s"],
+    "accel": [ACCELERATIONS],
+    "sun": [SUN_PULSE, ASPECTS],
+    "cross": [*CROSSED, *TOWARDS],
+    "q[_0-9]": QUATERNION,
+    "axis|(ra|dec)(_|$)": [*ANGLES, *AXIS],
+}
+"""Beginnings of names of columns that are meant to be measured, and the columns that there are of the kind."""
 
 SAME = 0.03  # part by which a ratio of rates may differ from that of two units
 
@@ -221,10 +98,7 @@ def read_telemetry(
 def _read_samples(path: str | Path, spacecraft: Spacecraft, schedule: Schedule) -> tuple[Record, list[str]]:
     table = Table(path, (*TIMES, *MEASURED, *TRACK), "samples")
     _expect_columns(table)
-    table.check()
-    times = _times(table, spacecraft)
-    columns = {name: _column(table, name) for name in MEASURED if name in table.header}
-    _expect_angles(table, columns)
+    times, columns = _samples(table, spacecraft)
     _expect_whole(table, columns, spacecraft)
     table.check()
     signals = _signals(table, columns, spacecraft)
@@ -236,14 +110,14 @@ def _read_samples(path: str | Path, spacecraft: Spacecraft, schedule: Schedule) 
 
 def _with_pulses(record: Record, pulses: Vector, aspects: Vector | None) -> Record:
     """The record with Sun pulses, and Sun aspect angles (k,) at them among its samples."""
+    record = replace(record, sun_pulses=pulses, sun_step=0.0)
     if aspects is None or not np.isfinite(aspects).any():
-        return replace(record, sun_pulses=pulses, sun_step=0.0)
+        return record
     times = np.union1d(record.times, pulses)
     signals = {name: _spread(times, record.times, values) for name, values in record.signals.items()}
     at_pulses = _spread(times, pulses, aspects)
-    before = signals.get(SUN_ASPECT, np.full(len(times), math.nan))
-    signals[SUN_ASPECT] = np.where(np.isfinite(at_pulses), at_pulses, before)
-    return replace(record, times=times, signals=signals, sun_pulses=pulses, sun_step=0.0)
+    signals[SUN_ASPECT] = np.where(np.isfinite(at_pulses), at_pulses, signals.get(SUN_ASPECT, math.nan))
+    return replace(record, times=times, signals=signals)
 
 
 def _spread(times: Vector, those: Vector, values: Vector) -> Vector:
@@ -258,19 +132,23 @@ def _read_sun_pulses(path: str | Path, spacecraft: Spacecraft) -> tuple[Vector, 
     table = Table(path, (*TIMES, ASPECTS), "Sun pulses")
     _expect_time(table)
     table.expect()
-    table.check()
-    times = _times(table, spacecraft)
-    columns = {ASPECTS: _column(table, ASPECTS)} if ASPECTS in table.header else {}
-    _expect_angles(table, columns)
+    times, columns = _samples(table, spacecraft)
     table.check()
     return times, np.radians(columns[ASPECTS]) if columns else None
 
 
-def _expect_angles(table: Table, columns: Mapping[str, Vector]) -> None:
+def _samples(table: Table, spacecraft: Spacecraft) -> tuple[Vector, dict[str, Vector]]:
+    """Times of the rows (n,) s, and the columns (n,) of measurements, NaN where they are empty."""
+    times, columns = _times(table, spacecraft), {}
+    for name in (name for name in MEASURED if name in table.known and name in table.header):
+        numbers = (row.number(name) if row[name].lower() not in ("", "nan") else None for row in table.rows)
+        columns[name] = np.array([math.nan if number is None else number for number in numbers])
     for name, (least, most) in LIMITS.items():
-        if name in columns:
-            wrong = (columns[name] < least) | (columns[name] > most)
-            _fault_first(table, wrong, name, f"expected an angle of {least:g} to {most:g} deg")
+        if name not in columns:
+            continue
+        wrong = (columns[name] < least) | (columns[name] > most)
+        _fault_first(table, wrong, name, f"expected an angle of {least:g} to {most:g} deg")
+    return times, columns
 
 
 def _fault_first(table: Table, wrong: NDArray[np.bool_], name: str, problem: str) -> None:
@@ -304,11 +182,12 @@ def _expect_time(table: Table) -> None:
 def _expect_columns(table: Table) -> None:
     _expect_time(table)
     header = table.header
-    measured = [name for name in MEASURED if name in header]
     for name in header:
-        if name not in table.known and UNKNOWN.match(name):
-            table.fault(1, name, f"{shown(name)} is no column of telemetry{_instead(name)}")
-    if not measured and not table.faults:
+        kind = next((kind for kind in MEANT if re.match(kind, name, re.IGNORECASE)), None)
+        if name not in table.known and kind is not None:
+            problem = f"{shown(name)} is no column of telemetry; expected {', '.join(MEANT[kind])}"
+            table.fault(1, name, problem)
+    if not table.faults and not {*MEASURED} & {*header}:
         table.fault(1, "", f"no column of samples; expected some of {', '.join(MEASURED)}")
     for name in GYROS:
         if f"{name}_rad_s" in header and f"{name}_deg_s" in header:
@@ -324,23 +203,12 @@ def _expect_columns(table: Table) -> None:
     table.expect()
 
 
-def _instead(name: str) -> str:
-    kinds: tuple[tuple[str | tuple[str, ...], Sequence[str]], ...] = (
-        (("omega", "rate", "gyro"), ["omega_1_rad_s … omega_3_rad_s or omega_1_deg_s … omega_3_deg_s"]),
-        ("accel", [ACCELERATIONS]),
-        ("sun", [SUN_PULSE, ASPECTS]),
-        ("cross", [*CROSSED, *TOWARDS]),
-        ("q", QUATERNION),
-        ("", [*ANGLES, *AXIS]),
-    )
-    return next(f"; expected {', '.join(columns)}" for words, columns in kinds if name.lower().startswith(words))
-
-
 def _times(table: Table, spacecraft: Spacecraft) -> Vector:
     """Times of the rows, s from t = 0 of the spacecraft file; raises FaultyFile where they do not rise."""
-    column = TIMES[0] if TIMES[0] in table.header else TIMES[1]
+    table.check()
     if not table.rows:
         table.fault(1, "", "no rows of samples below the names of the columns")
+    column = TIMES[0] if TIMES[0] in table.header else TIMES[1]
     given = None if spacecraft.attitude is None else spacecraft.attitude.epoch
     if column == TIMES[1] and given is None:
         table.fault(1, column, "the spacecraft file has no attitude.epoch to count from; expected the column t_s")
@@ -359,12 +227,6 @@ def _times(table: Table, spacecraft: Spacecraft) -> Vector:
         times += [] if time is None else [time]
     table.check()
     return np.array(times)
-
-
-def _column(table: Table, name: str) -> Vector:
-    """A column (n,), NaN where it is empty."""
-    numbers = (row.number(name) if row[name].lower() not in ("", "nan") else None for row in table.rows)
-    return np.array([math.nan if number is None else number for number in numbers])
 
 
 def _signals(table: Table, columns: Mapping[str, Vector], spacecraft: Spacecraft) -> dict[str, Vector]:
@@ -411,13 +273,10 @@ def _expect_unit(table: Table, signals: Mapping[str, Vector], spin: float) -> No
     if name not in signals or spin == 0.0:
         return
     column = next(entry for entry in table.header if RATES.get(entry, ("",))[0] == name)
-    ratio = abs(float(np.nanmedian(signals[name])) / spin)
-    turned, per_minute = 180.0 / math.pi, 30.0 / math.pi
-    of_values = ((turned, "deg/s"), (per_minute, "rpm"))
-    if RATES[column][1] != 1.0:
-        of_values = ((1.0 / turned, "rad/s"), (1.0 / 6.0, "rpm"))
-    meant = [(size, f"are the values of this column in {unit}") for size, unit in of_values]
-    meant += [(1.0 / turned, "is the spin of the file in deg/s"), (1.0 / per_minute, "is the spin of the file in rpm")]
+    ratio, units = abs(float(np.nanmedian(signals[name])) / spin), KINDS["rate"].factors.items()
+    own = RATES[column][1]
+    meant = [(own / size, f"are the values of this column in {unit}") for unit, size in units if size != own]
+    meant += [(size, f"is the spin of the file in {unit}") for unit, size in units if size != 1.0]
     words = next((words for size, words in meant if abs(ratio / size - 1.0) < SAME), None)
     if words is not None:
         seen = f"its median is {ratio:.3g} times the spin of the spacecraft file ({spin:.4g} rad/s)"

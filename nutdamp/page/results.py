@@ -69,7 +69,7 @@ VIEWS = {
     "LoopVerification.screen": "views.loop:verification_screen",
     "Fitted.data": "views.fit:fit_json core",
     "Fitted.figure": "figures.signals:fit_figure core",
-    "Fitted.text": "files.carried:fitted_file core",
+    "Fitted.text": "files.carried:fitted_text core",
     "Plan.carried": "files.carried:carried_spacecraft",
     "Fitted.spacecraft": "files.carried:fitted_spacecraft",
     "Verified.data": "views.simulation:verification_json plan.flight plan.scheme core",

@@ -22,7 +22,7 @@ from rich.table import Table
 from rich.text import Text
 
 from nutdamp.common.numerics import MISSING
-from nutdamp.files.tabular import csv_text, number, truth
+from nutdamp.files.tabular import csv_text, number
 from nutdamp.units import screen_unit
 
 NARROW = 60  # characters below which a table becomes one block a row
@@ -306,7 +306,7 @@ def _parts(column: Column, row: Any) -> list[Any]:
     if "#" in column.key:
         return [math.nan] * 3 if value is None else [float(part) for part in value]
     if column.kind == YES_NO:
-        return [truth(value)]
+        return ["" if value is None else str(value).lower()]
     if column.kind == TEXT:
         return [value or ""]
     return [math.nan if value is None else value]

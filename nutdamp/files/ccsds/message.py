@@ -13,6 +13,7 @@ import unicodedata
 from collections.abc import Sequence
 from decimal import Decimal
 from itertools import groupby
+from operator import attrgetter
 from typing import NamedTuple
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
@@ -35,108 +36,92 @@ SIGNIFICANT = 16  # most digits that a number may have
 
 
 class Keyword(NamedTuple):
-    """One row of a table: its unit, whether it must be there, and the XML tag that wraps it besides the block's."""
+    """One row of a table: its unit (None of texts), whether it must be there, and the XML tag besides the block's."""
 
     name: str
-    unit: str = ""
+    unit: str | None = None
     required: bool = True
     tag: str = ""
-    text: bool = False
 
 
-class Layout(NamedTuple):
+class Layout:
     """A block: its tag in XML and its keywords in their order."""
 
-    tag: str
-    keywords: tuple[Keyword, ...]
+    def __init__(self, tag: str, *keywords: Keyword) -> None:
+        self.tag, self.keywords = tag, keywords
 
 
-def _text(*names: str, required: bool = True) -> tuple[Keyword, ...]:
-    return tuple(Keyword(name, required=required, text=True) for name in names)
-
-
-def _numbers(*names: str, unit: str = "", required: bool = True, tag: str = "") -> tuple[Keyword, ...]:
+def _rows(*names: str, unit: str | None = None, required: bool = True, tag: str = "") -> tuple[Keyword, ...]:
     return tuple(Keyword(name, unit, required, tag) for name in names)
 
 
-_FRAMES = _text("REF_FRAME_A", "REF_FRAME_B")
-_QUATERNION = _numbers("Q1", "Q2", "Q3", "QC", tag="quaternion")
+_FRAMES = _rows("REF_FRAME_A", "REF_FRAME_B")
+_QUATERNION = _rows("Q1", "Q2", "Q3", "QC", unit="", tag="quaternion")
 ANGVEL = ("ANGVEL_X", "ANGVEL_Y", "ANGVEL_Z")
 
-_SPIN = (*_numbers("SPIN_ALPHA", "SPIN_DELTA", "SPIN_ANGLE", unit="deg"), *_numbers("SPIN_ANGLE_VEL", unit="deg/s"))
+_SPIN = (*_rows("SPIN_ALPHA", "SPIN_DELTA", "SPIN_ANGLE", unit="deg"), *_rows("SPIN_ANGLE_VEL", unit="deg/s"))
 MOMENTUM = ("MOMENTUM_ALPHA", "MOMENTUM_DELTA", "NUTATION_VEL")  # direction of H, rate of the spin axis about it
 
 HEADER = (
-    *_text("CLASSIFICATION", required=False),
-    *_text("CREATION_DATE", "ORIGINATOR"),
-    *_text("MESSAGE_ID", required=False),
+    *_rows("CLASSIFICATION", required=False),
+    *_rows("CREATION_DATE", "ORIGINATOR"),
+    *_rows("MESSAGE_ID", required=False),
 )
 
-APM_METADATA = (*_text("OBJECT_NAME", "OBJECT_ID"), *_text("CENTER_NAME", required=False), *_text("TIME_SYSTEM"))
+APM_METADATA = (*_rows("OBJECT_NAME", "OBJECT_ID"), *_rows("CENTER_NAME", required=False), *_rows("TIME_SYSTEM"))
 
 APM_BLOCKS: dict[str, Layout] = {
     "QUAT": Layout(
         "quaternionState",
-        (
-            *_FRAMES,
-            *_QUATERNION,
-            *_numbers("Q1_DOT", "Q2_DOT", "Q3_DOT", "QC_DOT", unit="1/s", required=False, tag="quaternionDot"),
-        ),
+        *_FRAMES,
+        *_QUATERNION,
+        *_rows("Q1_DOT", "Q2_DOT", "Q3_DOT", "QC_DOT", unit="1/s", required=False, tag="quaternionDot"),
     ),
     "EULER": Layout(
         "eulerAngleState",
-        (
-            *_FRAMES,
-            *_text("EULER_ROT_SEQ"),
-            *_numbers("ANGLE_1", "ANGLE_2", "ANGLE_3", unit="deg"),
-            *_numbers("ANGLE_1_DOT", "ANGLE_2_DOT", "ANGLE_3_DOT", unit="deg/s", required=False),
-        ),
+        *_FRAMES,
+        *_rows("EULER_ROT_SEQ"),
+        *_rows("ANGLE_1", "ANGLE_2", "ANGLE_3", unit="deg"),
+        *_rows("ANGLE_1_DOT", "ANGLE_2_DOT", "ANGLE_3_DOT", unit="deg/s", required=False),
     ),
-    "ANGVEL": Layout("angularVelocity", (*_FRAMES, *_text("ANGVEL_FRAME"), *_numbers(*ANGVEL, unit="deg/s"))),
+    "ANGVEL": Layout("angularVelocity", *_FRAMES, *_rows("ANGVEL_FRAME"), *_rows(*ANGVEL, unit="deg/s")),
     "SPIN": Layout(
         "spin",
-        (
-            *_FRAMES,
-            *_SPIN,
-            *_numbers("NUTATION", unit="deg", required=False),
-            *_numbers("NUTATION_PER", unit="s", required=False),
-            *_numbers("NUTATION_PHASE", *MOMENTUM[:2], unit="deg", required=False),
-            *_numbers(MOMENTUM[2], unit="deg/s", required=False),
-        ),
+        *_FRAMES,
+        *_SPIN,
+        *_rows("NUTATION", unit="deg", required=False),
+        *_rows("NUTATION_PER", unit="s", required=False),
+        *_rows("NUTATION_PHASE", *MOMENTUM[:2], unit="deg", required=False),
+        *_rows(MOMENTUM[2], unit="deg/s", required=False),
     ),
     "INERTIA": Layout(
-        "inertia", (*_text("INERTIA_REF_FRAME"), *_numbers("IXX", "IYY", "IZZ", "IXY", "IXZ", "IYZ", unit="kg*m**2"))
+        "inertia", *_rows("INERTIA_REF_FRAME"), *_rows("IXX", "IYY", "IZZ", "IXY", "IXZ", "IYZ", unit="kg*m**2")
     ),
     "MAN": Layout(
         "maneuverParameters",
-        (
-            *_text("MAN_EPOCH_START"),
-            *_numbers("MAN_DURATION", unit="s"),
-            *_text("MAN_REF_FRAME"),
-            *_numbers("MAN_TOR_X", "MAN_TOR_Y", "MAN_TOR_Z", unit="N*m"),
-            *_numbers("MAN_DELTA_MASS", unit="kg", required=False),
-        ),
+        *_rows("MAN_EPOCH_START"),
+        *_rows("MAN_DURATION", unit="s"),
+        *_rows("MAN_REF_FRAME"),
+        *_rows("MAN_TOR_X", "MAN_TOR_Y", "MAN_TOR_Z", unit="N*m"),
+        *_rows("MAN_DELTA_MASS", unit="kg", required=False),
     ),
 }
 """The blocks of an APM's data, in their order."""
 
-OPM_METADATA = _text("OBJECT_NAME", "OBJECT_ID", "CENTER_NAME", "REF_FRAME", "TIME_SYSTEM")
+OPM_METADATA = _rows("OBJECT_NAME", "OBJECT_ID", "CENTER_NAME", "REF_FRAME", "TIME_SYSTEM")
 
 OPM_BLOCKS: dict[str, Layout] = {
     "STATE": Layout(
-        "stateVector",
-        (*_text("EPOCH"), *_numbers("X", "Y", "Z", unit="km"), *_numbers("X_DOT", "Y_DOT", "Z_DOT", unit="km/s")),
+        "stateVector", *_rows("EPOCH"), *_rows("X", "Y", "Z", unit="km"), *_rows("X_DOT", "Y_DOT", "Z_DOT", unit="km/s")
     ),
-    "SPACECRAFT": Layout("spacecraftParameters", _numbers("MASS", unit="kg", required=False)),
+    "SPACECRAFT": Layout("spacecraftParameters", *_rows("MASS", unit="kg", required=False)),
     "MANEUVER": Layout(
         "maneuverParameters",
-        (
-            *_text("MAN_EPOCH_IGNITION"),
-            *_numbers("MAN_DURATION", unit="s"),
-            *_numbers("MAN_DELTA_MASS", unit="kg"),
-            *_text("MAN_REF_FRAME"),
-            *_numbers("MAN_DV_1", "MAN_DV_2", "MAN_DV_3", unit="km/s"),
-        ),
+        *_rows("MAN_EPOCH_IGNITION"),
+        *_rows("MAN_DURATION", unit="s"),
+        *_rows("MAN_DELTA_MASS", unit="kg"),
+        *_rows("MAN_REF_FRAME"),
+        *_rows("MAN_DV_1", "MAN_DV_2", "MAN_DV_3", unit="km/s"),
     ),
 }
 """Keywords written in the blocks of an OPM, in their order; the names of the blocks are not in the message."""
@@ -145,12 +130,12 @@ LAYOUTS = {**APM_BLOCKS, **OPM_BLOCKS}
 
 
 AEM_METADATA = (
-    *_text("OBJECT_NAME", "OBJECT_ID"),
-    *_text("CENTER_NAME", required=False),
-    *_text("REF_FRAME_A", "REF_FRAME_B", "TIME_SYSTEM", "START_TIME"),
-    *_text("USEABLE_START_TIME", "USEABLE_STOP_TIME", required=False),
-    *_text("STOP_TIME", "ATTITUDE_TYPE"),
-    *_text("ANGVEL_FRAME", "INTERPOLATION_METHOD", "INTERPOLATION_DEGREE", required=False),
+    *_rows("OBJECT_NAME", "OBJECT_ID"),
+    *_rows("CENTER_NAME", required=False),
+    *_rows("REF_FRAME_A", "REF_FRAME_B", "TIME_SYSTEM", "START_TIME"),
+    *_rows("USEABLE_START_TIME", "USEABLE_STOP_TIME", required=False),
+    *_rows("STOP_TIME", "ATTITUDE_TYPE"),
+    *_rows("ANGVEL_FRAME", "INTERPOLATION_METHOD", "INTERPOLATION_DEGREE", required=False),
 )
 """Table 4-3, but for the keywords of Euler angles."""
 
@@ -159,23 +144,26 @@ QUATERNION_ANGVEL, SPIN, SPIN_NUTATION_MOM = "QUATERNION/ANGVEL", "SPIN", "SPIN/
 
 AEM_RECORDS = {
     QUATERNION_ANGVEL: Layout(
-        "quaternionAngVel", (*_text("EPOCH"), *_QUATERNION, *_numbers(*ANGVEL, unit="deg/s", tag="angVel"))
+        "quaternionAngVel", *_rows("EPOCH"), *_QUATERNION, *_rows(*ANGVEL, unit="deg/s", tag="angVel")
     ),
-    SPIN: Layout("spin", (*_text("EPOCH"), *_SPIN)),
+    SPIN: Layout("spin", *_rows("EPOCH"), *_SPIN),
     SPIN_NUTATION_MOM: Layout(
-        "spinNutationMom",
-        (*_text("EPOCH"), *_SPIN, *_numbers(*MOMENTUM[:2], unit="deg"), *_numbers(MOMENTUM[2], unit="deg/s")),
+        "spinNutationMom", *_rows("EPOCH"), *_SPIN, *_rows(*MOMENTUM[:2], unit="deg"), *_rows(MOMENTUM[2], unit="deg/s")
     ),
 }
 """A data line of each ATTITUDE_TYPE (table 4-4)."""
 
 
 class MessageEntry(NamedTuple):
-    """A keyword with its value, as texts; ``line`` counts from 1 in a message that was read."""
+    """A keyword (none in data lines) with its value, as texts.
+
+    ``tag`` wraps it in XML besides that of the block; ``line`` counts from 1 in a message that was read.
+    """
 
     keyword: str
     value: str
-    unit: str = ""
+    unit: str | None = None
+    tag: str = ""
     line: int = 0
 
 
@@ -205,12 +193,15 @@ class Message(NamedTuple):
     segments: tuple[Segment, ...]
 
 
-def block(name: str, keywords: tuple[Keyword, ...], values: dict[str, str | float], *comments: str) -> MessageBlock:
-    """A block with ``values`` in the order of the table; numbers in the unit of the table."""
+Values = Sequence[str | float | None]
+
+
+def block(name: str, keywords: tuple[Keyword, ...], values: Values, *comments: str) -> MessageBlock:
+    """A block of ``values`` of the first ``keywords``, None where one is left out; numbers in the unit of the table."""
     entries = tuple(
-        MessageEntry(keyword.name, value if isinstance(value, str) else number(value), keyword.unit)
-        for keyword in keywords
-        if (value := values.get(keyword.name)) is not None
+        MessageEntry(keyword.name, value if isinstance(value, str) else number(value), keyword.unit, keyword.tag)
+        for keyword, value in zip(keywords, values, strict=False)
+        if value is not None
     )
     return MessageBlock(name, entries, tuple(comment(text) for text in comments))
 
@@ -263,24 +254,20 @@ def to_xml(message: Message) -> str:
         place = SubElement(body, "segment")
         _fill(SubElement(place, "metadata"), segment.metadata)
         data = SubElement(place, "data")
-        for block in segment.blocks:
-            layout = LAYOUTS.get(block.name)
-            _fill(data if layout is None else SubElement(data, layout.tag), block, layout)
+        for part in segment.blocks:
+            _fill(SubElement(data, LAYOUTS[part.name].tag) if part.name else data, part)
         for record in segment.records:
             assert segment.record is not None
-            tag, rows = segment.record
-            entries = (MessageEntry(row.name, value, row.unit) for row, value in zip(rows, record, strict=True))
-            place = SubElement(SubElement(data, "attitudeState"), tag)
-            _fill(place, MessageBlock("", tuple(entries)), segment.record)
+            place = SubElement(SubElement(data, "attitudeState"), segment.record.tag)
+            _fill(place, block("", segment.record.keywords, record))
     indent(root)
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{tostring(root, encoding="unicode")}\n'
 
 
-def _fill(place: Element, block: MessageBlock, layout: Layout | None = None) -> None:
+def _fill(place: Element, block: MessageBlock) -> None:
     for comment in block.comments:
         SubElement(place, "COMMENT").text = comment
-    wraps = {keyword.name: keyword.tag for keyword in layout.keywords} if layout else {}
-    for tag, group in groupby(block.entries, lambda entry: wraps.get(entry.keyword, "")):
+    for tag, group in groupby(block.entries, attrgetter("tag")):
         parent = SubElement(place, tag) if tag else place
         for entry in group:
             SubElement(parent, entry.keyword, {"units": entry.unit} if entry.unit else {}).text = entry.value
@@ -309,38 +296,8 @@ def _block(block: MessageBlock) -> list[str]:
     width = max((len(entry.keyword) for entry in block.entries), default=0)
     return [
         *(f"COMMENT {comment}" for comment in block.comments),
-        *(f"{word:<{width}} = {value}" + (f" [{unit}]" if unit else "") for word, value, unit, _ in block.entries),
+        *(f"{word:<{width}} = {value}" + (f" [{unit}]" if unit else "") for word, value, unit, *_ in block.entries),
     ]
-
-
-def from_kvn(text: str, name: str) -> tuple[list[MessageBlock], list[Fault]]:
-    """The blocks of the file ``name``, the first for keywords outside of blocks, and the faults of notation."""
-    begun: list[tuple[str, int, list[MessageEntry]]] = [("", 1, [])]
-    faults: list[Fault] = []
-    within: str | None = None
-    for line, raw in enumerate(_LINE_END.split(text), start=1):
-        content = raw.strip()
-        if not content or content.split(maxsplit=1)[0] == "COMMENT":
-            continue
-        pair = _PAIR.fullmatch(content)
-        if pair is not None:
-            entries = begun[0 if within is None else -1][2]
-            entries.append(MessageEntry(pair[1], pair[2], pair[3] or "", line))
-        elif _WORD.fullmatch(content) and content.endswith("_START"):
-            if within is not None:
-                faults.append(Fault(name, line, 1, content, f"{within}_STOP is missing before it"))
-            within = content.removesuffix("_START")
-            begun.append((within, line, []))
-        elif within is not None and content == f"{within}_STOP":
-            within = None
-        elif _WORD.fullmatch(content) and content.endswith("_STOP"):
-            expected = "no block is open" if within is None else f"expected {within}_STOP"
-            faults.append(Fault(name, line, 1, content, expected))
-        else:
-            faults.append(Fault(name, line, 1, "", f"{content[:40]!r} is no KEYWORD = value"))
-    if within is not None:
-        faults.append(Fault(name, begun[-1][1], 1, f"{within}_START", f"{within}_STOP is missing"))
-    return [MessageBlock(word, tuple(entries), line=line) for word, line, entries in begun], faults
 
 
 LARGEST = 1e15  # larger magnitudes are nothing physical
@@ -353,37 +310,16 @@ BEFORE = b"\xef\xbb\xbf\xff\xfe\0 \t\r\n"
 VERSIONS = re.compile("CCSDS_[A-Z]+_VERS")  # first keywords of messages
 
 
-def kvn_text(path: str) -> str:
-    """Text of a message in keyword = value notation; raises CannotRead, or FaultyFile for XML."""
-    data = read_limited(path, MOST_BYTES)
-    if data.lstrip(BEFORE).startswith(b"<"):
-        cure = "write the message in keyword = value notation (KVN)"
-        raise FaultyFile([Fault(path, 1, 1, "", f"XML is not read; {cure}")])
-    return utf8_text(data, path)
-
-
-def expect_version(path: str, outside: MessageBlock, keyword: str, faults: list[Fault]) -> None:
-    """Raise FaultyFile for another message, or another version of it, which makes no sense by these tables."""
-    first = outside.entries[0] if outside.entries else None
-    if first is None or not VERSIONS.fullmatch(first.keyword):
-        kind = keyword.split("_")[1]
-        raise FaultyFile([*faults, Fault(path, 1, 1, "", f"not an {kind}: its first line is {keyword} = {VERSION}")])
-    if first.keyword != keyword:
-        raise FaultyFile([Fault(path, first.line, 1, first.keyword, f"another message; expected {keyword}")])
-    if first.value != VERSION:
-        problem = f"version {first.value!r} is not read, its keywords are others; expected version {VERSION}"
-        raise FaultyFile([Fault(path, first.line, 1, keyword, problem)])
-
-
 _NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
 
 
 class Checked:
-    """A block by keyword; problems go to ``faults``, and an unreadable value is then None."""
+    """A block by keyword; problems are faults of its message, and an unreadable value is then None."""
 
-    def __init__(self, file: str, block: MessageBlock, keywords: tuple[Keyword, ...], faults: list[Fault]) -> None:
-        self.file, self.block, self.faults = file, block, faults
+    def __init__(self, message: MessageReader, block: MessageBlock, keywords: tuple[Keyword, ...]) -> None:
+        self.message, self.block = message, block
         self.entries: dict[str, MessageEntry] = {}
+        self._numbers: dict[str, float] = {}
         known = {keyword.name: keyword for keyword in keywords}
         order, last = list(known), ""
         for entry in block.entries:
@@ -391,10 +327,9 @@ class Checked:
             if name not in known:
                 close = nearest(name, order)
                 cure = f"did you mean {close}?" if close else f"known here: {', '.join(order)}"
-                self.faults.append(Fault(file, entry.line, 1, name, f"unknown keyword; {cure}"))
+                message.fault(entry.line, name, f"unknown keyword; {cure}")
             elif name in self.entries:
-                first = self.entries[name].line
-                self.faults.append(Fault(file, entry.line, 1, name, f"given again, first in line {first}"))
+                message.fault(entry.line, name, f"given again, first in line {self.entries[name].line}")
             else:
                 self.entries[name] = entry
                 if last and order.index(name) < order.index(last):
@@ -409,19 +344,19 @@ class Checked:
     def _form(self, entry: MessageEntry, keyword: Keyword) -> None:
         if not entry.value:
             self.fault(keyword.name, "empty; expected a value")
-        elif not keyword.text and not _NUMBER.fullmatch(entry.value):
+        elif keyword.unit is not None and not _NUMBER.fullmatch(entry.value):
             self.fault(keyword.name, f"{entry.value[:40]!r} is not a number")
-        elif not keyword.text and not abs(float(entry.value)) <= LARGEST:
+        elif keyword.unit is not None and not abs(float(entry.value)) <= LARGEST:
             self.fault(keyword.name, f"{entry.value[:40]} is beyond anything physical")
+        elif keyword.unit is not None:
+            self._numbers[keyword.name] = float(entry.value)
         if entry.unit and entry.unit != keyword.unit:
             expected = f"[{keyword.unit}]" if keyword.unit else "no unit"
             self.fault(keyword.name, f"expected {expected}, got [{entry.unit}]")
 
     def fault(self, keyword: str, problem: str) -> None:
         """Something wrong with a keyword, or, where it is missing, with the block."""
-        entry = self.entries.get(keyword)
-        line = self.block.line if entry is None else entry.line
-        self.faults.append(Fault(self.file, line, 1, keyword, problem))
+        self.message.fault(self.entries.get(keyword, self.block).line, keyword, problem)
 
     def text(self, keyword: str) -> str | None:
         """The value as it is; None where it is missing or empty."""
@@ -429,13 +364,12 @@ class Checked:
 
     def number(self, keyword: str) -> float | None:
         """The value as a number."""
-        text = self.text(keyword)
-        return float(text) if text and _NUMBER.fullmatch(text) and abs(float(text)) <= LARGEST else None
+        return self._numbers.get(keyword)
 
     def numbers(self, *keywords: str) -> list[float] | None:
         """Several numbers; None where one cannot be read."""
-        values = [self.number(keyword) for keyword in keywords]
-        return None if None in values else [value for value in values if value is not None]
+        values = [self._numbers[keyword] for keyword in keywords if keyword in self._numbers]
+        return values if len(values) == len(keywords) else None
 
     def epoch(self, keyword: str, system: str) -> Epoch | None:
         """The value as a moment of a time system, see `Epoch.parse`."""
@@ -470,14 +404,63 @@ SAME_AXES = {"ICRF": "GCRF"}  # frames whose axes are those of another that a sp
 BODY = re.compile(r"SC_BODY(_[A-Z0-9]+)?")  # frames fixed in the body
 
 
-class Frames:
-    """Inertial and body frame of all blocks of one message, and its time system; problems go to the blocks."""
+class MessageReader:
+    """Reader of a message in KVN that begins with ``keyword``: its blocks, which share frames and a time system.
 
-    def __init__(self) -> None:
-        self.remarks: list[str] = []
+    Raises CannotRead, or FaultyFile for XML, another message, and another version, which makes no sense by the tables.
+    """
+
+    def __init__(self, path: str, keyword: str) -> None:
+        self.path, self.faults, self.remarks = path, list[Fault](), list[str]()
         self.body: str | None = None
         self.frame: str | None = None
         self.system = "UTC"
+        data = read_limited(path, MOST_BYTES)
+        if data.lstrip(BEFORE).startswith(b"<"):
+            cure = "write the message in keyword = value notation (KVN)"
+            raise FaultyFile([Fault(path, 1, 1, "", f"XML is not read; {cure}")])
+        self.outside, *self.blocks = self._parsed(utf8_text(data, path))
+        first = next(iter(self.outside.entries), None)
+        if first is None or not VERSIONS.fullmatch(first.keyword):
+            self.fault(1, "", f"not an {keyword.split('_')[1]}: its first line is {keyword} = {VERSION}")
+            raise FaultyFile(self.faults)
+        if first.keyword != keyword:
+            raise FaultyFile([Fault(path, first.line, 1, first.keyword, f"another message; expected {keyword}")])
+        if first.value != VERSION:
+            problem = f"version {first.value!r} is not read, its keywords are others; expected version {VERSION}"
+            raise FaultyFile([Fault(path, first.line, 1, keyword, problem)])
+
+    def _parsed(self, text: str) -> list[MessageBlock]:
+        """The blocks of a text, first what is in no block; keeps the faults of notation."""
+        begun: list[tuple[str, int, list[MessageEntry]]] = [("", 1, [])]
+        within: str | None = None
+        for line, raw in enumerate(_LINE_END.split(text), start=1):
+            content = raw.strip()
+            if not content or content.split(maxsplit=1)[0] == "COMMENT":
+                continue
+            pair, entries = _PAIR.fullmatch(content), begun[0 if within is None else -1][2]
+            if within == "DATA" and content not in ("DATA_START", "DATA_STOP"):
+                entries.append(MessageEntry("", content, line=line))
+            elif pair is not None:
+                entries.append(MessageEntry(pair[1], pair[2], pair[3], line=line))
+            elif _WORD.fullmatch(content) and content.endswith("_START"):
+                if within is not None:
+                    self.fault(line, content, f"{within}_STOP is missing before it")
+                within = content.removesuffix("_START")
+                begun.append((within, line, []))
+            elif within is not None and content == f"{within}_STOP":
+                within = None
+            elif _WORD.fullmatch(content) and content.endswith("_STOP"):
+                self.fault(line, content, "no block is open" if within is None else f"expected {within}_STOP")
+            else:
+                self.fault(line, "", f"{content[:40]!r} is no KEYWORD = value")
+        if within is not None:
+            self.fault(begun[-1][1], f"{within}_START", f"{within}_STOP is missing")
+        return [MessageBlock(word, tuple(entries), line=line) for word, line, entries in begun]
+
+    def fault(self, line: int, where: str, problem: str) -> None:
+        """Keep a fault of the message."""
+        self.faults.append(Fault(self.path, line, 1, where, problem))
 
     def take_system(self, block: Checked) -> None:
         """Take the time system of the metadata."""

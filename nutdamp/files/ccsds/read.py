@@ -1,8 +1,9 @@
-"""Attitude messages turned into a spacecraft file and a schedule, or merged into a spacecraft file.
+"""Attitude messages read in KVN, turned into a spacecraft file and a schedule, or merged into a spacecraft file.
 
-Attitude parameter messages are read in KVN. Attitude and rates come from QUAT (or EULER) and ANGVEL, or else from SPIN
-by annex F5. A merge sets attitude, epoch and rates, and the inertia where that is asked for; all else of the file
-stays, with its comments and units.
+In a parameter message (APM) attitude and rates come from QUAT (or EULER) and ANGVEL, or else from SPIN by annex F5. A
+history (AEM) gives quaternions, and rates where it has them; the other forms of an ephemeris leave the rates open or
+hold for symmetric bodies alone. A merge sets attitude, epoch and rates, and the inertia where that is asked for; all
+else of the file stays, with its comments and units.
 """
 
 from __future__ import annotations
@@ -17,33 +18,20 @@ import numpy as np
 
 from nutdamp.common.time import DIGITS, Epoch
 from nutdamp.errors import BadRequest, Fault, FaultyFile, printable
-from nutdamp.files.ccsds.message import (
-    APM_BLOCKS,
-    APM_METADATA,
-    HEADER,
-    MOMENTUM,
-    Checked,
-    Frames,
-    Keyword,
-    MessageBlock,
-    expect_version,
-    from_kvn,
-    kvn_text,
-    unit_quaternion,
-)
+from nutdamp.files.ccsds import message
+from nutdamp.files.ccsds.message import QUATERNION_ANGVEL, Checked, Keyword, MessageBlock, MessageReader
 from nutdamp.files.editing import Edits, Later, attitude_edits, carry_text, epoch_after, inertia_edits, rate_edits
 from nutdamp.files.reader import Source, read_spacecraft
-from nutdamp.files.telemetry import History
-from nutdamp.files.yaml import Node
+from nutdamp.files.yaml import Node, read_bytes
 from nutdamp.physics import attitude
 from nutdamp.physics.body import principal_axes
-from nutdamp.spacecraft.model import Attitude, Inertia, Spacecraft, SpinState, Vector
+from nutdamp.spacecraft.model import Attitude, Inertia, Spacecraft, Vector
 from nutdamp.spacecraft.schedule import STEERABLE, Pulse, Schedule
 
 AGREES = 1e-4  # difference up to which SPIN agrees with the other blocks: rad, and relative for rates
 
 _VERSION = "CCSDS_APM_VERS"
-_OUTSIDE = (Keyword(_VERSION, text=True), *HEADER, *APM_METADATA, Keyword("EPOCH", text=True))
+_OUTSIDE = (Keyword(_VERSION), *message.HEADER, *message.APM_METADATA, Keyword("EPOCH"))
 _NUTATION = ("NUTATION", "NUTATION_PER", "NUTATION_PHASE")
 
 
@@ -54,7 +42,6 @@ class Manoeuvre(NamedTuple):
     duration: float
     torque: Vector
     mass: float | None
-    line: int
 
 
 class ApmContents(NamedTuple):
@@ -78,51 +65,42 @@ class ApmContents(NamedTuple):
 
 def read_apm(path: str) -> ApmContents:
     """The contents of a message; raises CannotRead, or FaultyFile with every fault of the file."""
-    blocks, faults = from_kvn(kvn_text(path), path)
-    expect_version(path, blocks[0], _VERSION, faults)
-    contents = _MessageReader(path, blocks, faults).read()
-    if faults or contents is None:
-        raise FaultyFile(faults)
-    return contents
+    return _ApmReader(path).read()
 
 
-class _MessageReader(Frames):
-    def __init__(self, path: str, blocks: list[MessageBlock], faults: list[Fault]) -> None:
-        super().__init__()
-        self.path, self.faults = path, faults
-        self.outside = Checked(path, blocks[0], _OUTSIDE, faults)
-        self.blocks: dict[str, list[Checked]] = {name: [] for name in APM_BLOCKS}
+class _ApmReader(MessageReader):
+    def __init__(self, path: str) -> None:
+        super().__init__(path, _VERSION)
+        self.about = Checked(self, self.outside, _OUTSIDE)
+        self.by_name: dict[str, list[Checked]] = {name: [] for name in message.APM_BLOCKS}
         self.nutation: float | None = None
-        order, last = list(APM_BLOCKS), ""
-        for block in blocks[1:]:
+        order, last = list(message.APM_BLOCKS), ""
+        for block in self.blocks:
             name, line = block.name, block.line
-            if name not in APM_BLOCKS:
+            if name not in message.APM_BLOCKS:
                 known = ", ".join(f"{each}_START" for each in order)
-                self._fault(line, f"{name}_START", f"unknown block; known are {known}")
+                self.fault(line, f"{name}_START", f"unknown block; known are {known}")
                 continue
             if last and order.index(name) < order.index(last):
-                self._fault(line, name, f"comes after {last}; the order is {', '.join(order)}")
-            elif self.blocks[name] and name != "MAN":
-                self._fault(line, name, "a second block of this kind; which one counts is not said")
+                self.fault(line, name, f"comes after {last}; the order is {', '.join(order)}")
+            elif self.by_name[name] and name != "MAN":
+                self.fault(line, name, "a second block of this kind; which one counts is not said")
             last = name
-            self.blocks[name].append(Checked(path, block, APM_BLOCKS[name].keywords, faults))
-
-    def _fault(self, line: int, where: str, problem: str) -> None:
-        self.faults.append(Fault(self.path, line, 1, where, problem))
+            self.by_name[name].append(Checked(self, block, message.APM_BLOCKS[name].keywords))
 
     def _first(self, name: str) -> Checked | None:
-        return next(iter(self.blocks[name]), None)
+        return next(iter(self.by_name[name]), None)
 
-    def read(self) -> ApmContents | None:
-        outside = self.outside
+    def read(self) -> ApmContents:
+        outside = self.about
         self.take_system(outside)
         epoch, quaternion = outside.epoch("EPOCH", self.system), self._attitude()
         quaternion, rates = self._spin(quaternion, self._rates(quaternion))
         tensor, manoeuvres = self._inertia(), self._manoeuvres(epoch)
         if rates is None and not self.faults:
-            self._fault(1, "ANGVEL", "missing; without an ANGVEL or a SPIN block the motion is not known")
+            self.fault(1, "ANGVEL", "missing; without an ANGVEL or a SPIN block the motion is not known")
         if self.faults or epoch is None or rates is None:
-            return None
+            raise FaultyFile(self.faults)
         if quaternion is None:
             self.remarks.append("the message gives no attitude: frame and epoch are left out")
         object_id = outside.text("OBJECT_ID")
@@ -136,7 +114,7 @@ class _MessageReader(Frames):
             tensor=tensor,
             nutation=self.nutation,
             manoeuvres=manoeuvres,
-            lines={name: blocks[0].block.line for name, blocks in self.blocks.items() if blocks},
+            lines={name: blocks[0].block.line for name, blocks in self.by_name.items() if blocks},
             remarks=tuple(self.remarks),
         )
 
@@ -148,7 +126,7 @@ class _MessageReader(Frames):
         if block is not None:
             forward, parts = self.endpoints(block), block.numbers("QC", "Q1", "Q2", "Q3")
             try:
-                turn = None if parts is None else unit_quaternion(parts)
+                turn = None if parts is None else message.unit_quaternion(parts)
             except ValueError as wrong:
                 block.fault("Q1", str(wrong))
         elif (block := self._first("EULER")) is not None:
@@ -167,7 +145,7 @@ class _MessageReader(Frames):
         block = self._first("ANGVEL")
         if block is None:
             return None
-        forward, parts = self.endpoints(block), block.numbers("ANGVEL_X", "ANGVEL_Y", "ANGVEL_Z")
+        forward, parts = self.endpoints(block), block.numbers(*message.ANGVEL)
         axes = block.text("ANGVEL_FRAME")
         if parts is None or axes is None or forward is None:
             return None
@@ -188,7 +166,7 @@ class _MessageReader(Frames):
         if block is None or self.endpoints(block, reversible=False) is None:
             return quaternion, rates
         angles = block.numbers("SPIN_ALPHA", "SPIN_DELTA", "SPIN_ANGLE", "SPIN_ANGLE_VEL")
-        nutating, with_momentum = block.has(_NUTATION), block.has(MOMENTUM)
+        nutating, with_momentum = block.has(_NUTATION), block.has(message.MOMENTUM)
         if nutating and with_momentum:
             block.fault("MOMENTUM_ALPHA", "given together with NUTATION; keep one set of the two")
         if angles is None:
@@ -205,10 +183,9 @@ class _MessageReader(Frames):
             side = math.sin(tilt)
             momentum = np.array([side * math.cos(phase), -side * math.sin(phase), math.cos(tilt)])
             rate += 2.0 * math.pi / values[1] * momentum
-        elif with_momentum and (values := block.numbers(*MOMENTUM)) is not None:
+        elif with_momentum and (values := block.numbers(*message.MOMENTUM)) is not None:
             right, up, about_momentum = map(math.radians, values)
-            momentum = np.array([math.cos(up) * math.cos(right), math.cos(up) * math.sin(right), math.sin(up)])
-            rate += about_momentum * (attitude.matrix(turn).T @ momentum)
+            rate += about_momentum * (attitude.matrix(turn).T @ attitude.on_sphere(right, up))
         off = 0.0 if quaternion is None else min(np.linalg.norm(quaternion - sign * turn) for sign in (1.0, -1.0))
         if off > 0.5 * AGREES:
             self.remark(f"line {block.block.line}: SPIN gives another attitude than the blocks before it, which count")
@@ -231,7 +208,7 @@ class _MessageReader(Frames):
     def _manoeuvres(self, epoch: Epoch | None) -> tuple[Manoeuvre, ...]:
         manoeuvres: list[Manoeuvre] = []
         last: tuple[Epoch, int] | None = None
-        for block in self.blocks["MAN"]:
+        for block in self.by_name["MAN"]:
             begins, duration = block.epoch("MAN_EPOCH_START", self.system), block.number("MAN_DURATION")
             torque, mass = block.numbers("MAN_TOR_X", "MAN_TOR_Y", "MAN_TOR_Z"), block.number("MAN_DELTA_MASS")
             frame = block.text("MAN_REF_FRAME")
@@ -249,7 +226,7 @@ class _MessageReader(Frames):
                     block.fault("MAN_EPOCH_START", f"begins before the block of line {last[1]}; put them in order")
                 last = begins, block.block.line
             if begins is not None and epoch is not None and duration is not None and torque is not None:
-                manoeuvres.append(Manoeuvre(begins.since(epoch), duration, np.array(torque), mass, block.block.line))
+                manoeuvres.append(Manoeuvre(begins.since(epoch), duration, np.array(torque), mass))
         return tuple(manoeuvres)
 
 
@@ -261,6 +238,108 @@ def euler(sequence: str, *angles: float) -> Vector:
         step[0], step[1 + "XYZ".index(axis)] = math.cos(0.5 * angle), math.sin(0.5 * angle)
         turn = attitude.multiply(turn, step)
     return turn
+
+
+AEM_VERSION = "CCSDS_AEM_VERS"  # keyword of the first line
+COLUMNS = {"QUATERNION": 4, QUATERNION_ANGVEL: 7}  # numbers in a record of each ATTITUDE_TYPE read, besides its time
+
+
+class History(NamedTuple):
+    """Attitude of an object at ``times`` (n,) s after ``epoch``: ``quaternions`` (n, 4) body -> frame, scalar first.
+
+    ``rates`` (n, 3) rad/s in body axes, or None where the message has none.
+    """
+
+    name: str
+    epoch: Epoch
+    frame: str | None
+    times: Vector
+    quaternions: Vector
+    rates: Vector | None
+    remarks: tuple[str, ...]
+
+    def at(self, time: float) -> tuple[Epoch, Vector, Vector | None]:
+        """Epoch, quaternion and rates of the first record from ``time`` s on; raises BadRequest past the last."""
+        index = int(np.searchsorted(self.times, time))
+        if index == len(self.times):
+            raise BadRequest(f"the history ends {self.times[-1]:.6g} s after its first record: expected a time in it")
+        rates = None if self.rates is None else self.rates[index]
+        return self.epoch.plus(float(self.times[index])), self.quaternions[index], rates
+
+
+def is_history(path: str) -> bool:
+    """True for a file that begins as an AEM does, not for standard input; raises CannotRead."""
+    beginning = b"" if path == "-" else read_bytes(path, 200)
+    return beginning.lstrip(message.BEFORE).startswith(AEM_VERSION.encode())
+
+
+def read_history(path: str) -> History:
+    """The history in a message; raises CannotRead, or FaultyFile with its faults."""
+    reader = _HistoryReader(path)
+    segments = [block for block in reader.blocks if block.name in ("META", "DATA")]
+    for metadata, records in zip(segments[::2], segments[1::2], strict=False):
+        if (metadata.name, records.name) != ("META", "DATA"):
+            reader.fault(metadata.line, metadata.name, "expected META_START … META_STOP, then data")
+            break
+        reader.take(metadata, records)
+    if not segments or len(segments) % 2:
+        reader.fault(1, "DATA_START", "missing; each block of metadata is followed by data")
+    if not reader.faults and not reader.times:
+        reader.fault(segments[0].line, "DATA_START", "no records")
+    if reader.faults:
+        raise FaultyFile(reader.faults)
+    first = reader.times[0]
+    times, turns = np.array([time.since(first) for time in reader.times]), np.array(reader.quaternions)
+    rates = None if reader.rates is None else np.array(reader.rates)
+    return History(reader.name, first, reader.frame, times, turns, rates, tuple(reader.remarks))
+
+
+class _HistoryReader(MessageReader):
+    def __init__(self, path: str) -> None:
+        super().__init__(path, AEM_VERSION)
+        self.name = "UNKNOWN"
+        self.times: list[Epoch] = []
+        self.quaternions: list[Vector] = []
+        self.rates: list[Vector] | None = []
+
+    def take(self, metadata: MessageBlock, records: MessageBlock) -> None:
+        block = Checked(self, metadata, message.AEM_METADATA)
+        self.name = block.text("OBJECT_NAME") or self.name
+        self.take_system(block)
+        forward, kind = self.endpoints(block), block.text("ATTITUDE_TYPE")
+        if kind is not None and kind not in COLUMNS:
+            block.fault("ATTITUDE_TYPE", f"{kind!r} is not read; expected {' or '.join(COLUMNS)}")
+        axes, turning = block.text("ANGVEL_FRAME"), kind == QUATERNION_ANGVEL
+        if turning and axes is None:
+            block.fault("ANGVEL_FRAME", f"missing; {QUATERNION_ANGVEL} needs the frame of the rates")
+        in_body = not turning or axes is None or self.rates_in_body(block, axes)
+        if self.faults or kind is None or forward is None:
+            return
+        if not turning:
+            self.rates = None
+        for record in records.entries:
+            self._record(record.line, record.value.split(), COLUMNS[kind], forward=forward, in_body=in_body)
+
+    def _record(self, line: int, cells: list[str], columns: int, *, forward: bool, in_body: bool) -> None:
+        try:
+            time, numbers = Epoch.parse(cells[0], self.system), [float(cell) for cell in cells[1:]]
+            if len(numbers) != columns or not all(map(math.isfinite, numbers)):
+                raise ValueError(f"expected a time and {columns} numbers")
+            parts = message.unit_quaternion([numbers[3], *numbers[:3]])
+        except ValueError as wrong:
+            self.fault(line, "DATA", str(wrong))
+            return
+        if self.times and time == self.times[-1]:  # a segment begins where the one before ends
+            return
+        if self.times and time < self.times[-1]:
+            self.fault(line, "DATA", "comes before the record above; put them in order")
+            return
+        quaternion = parts if forward else attitude.conjugate(parts)
+        self.times.append(time)
+        self.quaternions.append(quaternion)
+        if self.rates is not None:
+            rates = np.radians(numbers[4:]) * (1.0 if forward else -1.0)
+            self.rates.append(rates if in_body else np.asarray(attitude.matrix(quaternion).T @ rates))
 
 
 ALIKE = 1e-9  # relative difference up to which torques count as transverse, and as of one magnitude
@@ -278,14 +357,21 @@ def imported(contents: ApmContents, path: str) -> tuple[str, Spacecraft, Schedul
     if contents.tensor is None:
         problem = "missing; a spacecraft file needs moments of inertia: --into merges the message into one that has"
         raise FaultyFile([Fault(path, 1, 1, "INERTIA", f"{problem} them")])
-    bare = _read(_file_text(contents, path, None), contents, path)
-    torques = [bare.inertia.axes.T @ manoeuvre.torque for manoeuvre in contents.manoeuvres]
+    _, axes = principal_axes(contents.tensor)
+    torques = [axes.T @ manoeuvre.torque for manoeuvre in contents.manoeuvres]
     sizes = [float(np.linalg.norm(torque)) for torque in torques]
     transverse = all(abs(torque[2]) <= ALIKE * size for torque, size in zip(torques, sizes, strict=True))
     alike = sizes and transverse and max(sizes) - min(sizes) <= ALIKE * max(sizes)
     text = _file_text(contents, path, sizes[0] if alike else None)
-    body = _read(text, contents, path)
-    return text, body, _schedule(contents.manoeuvres, body)
+    try:
+        return text, read_spacecraft(text, path), _schedule(contents.manoeuvres, torques)
+    except FaultyFile as wrong:  # its faults are those of the message
+        faults = []
+        for fault in wrong.faults:
+            block = _BLOCKS.get(fault.where.partition(".")[0].partition("[")[0], "")
+            line = contents.lines.get(block, contents.lines.get("SPIN", 1) if block == "ANGVEL" else 1)
+            faults.append(Fault(path, line, 1, block or fault.where, fault.problem))
+        raise FaultyFile(faults) from None
 
 
 def contradictions(contents: ApmContents, body: Spacecraft) -> list[str]:
@@ -297,19 +383,6 @@ def contradictions(contents: ApmContents, body: Spacecraft) -> list[str]:
         f"SPIN says a nutation of {math.degrees(abs(stated)):.4g} deg, but with this INERTIA NUTATION_PER gives one "
         f"of {math.degrees(follows):.4g} deg, which the file has; one of the three is wrong"
     ]
-
-
-def _read(text: str, contents: ApmContents, path: str) -> Spacecraft:
-    """The spacecraft in the text; its faults are those of the message that it came from."""
-    try:
-        return read_spacecraft(text, path)
-    except FaultyFile as wrong:
-        faults = []
-        for fault in wrong.faults:
-            block = _BLOCKS.get(fault.where.partition(".")[0].partition("[")[0], "")
-            line = contents.lines.get(block, contents.lines.get("SPIN", 1) if block == "ANGVEL" else 1)
-            faults.append(Fault(path, line, 1, block or fault.where, fault.problem))
-        raise FaultyFile(faults) from None
 
 
 def _file_text(contents: ApmContents, path: str, torquer: float | None) -> str:
@@ -366,31 +439,30 @@ def _actuators(manoeuvres: tuple[Manoeuvre, ...], torquer: float | None) -> list
     ]
 
 
-def _schedule(manoeuvres: tuple[Manoeuvre, ...], body: Spacecraft) -> Schedule:
+def _schedule(manoeuvres: tuple[Manoeuvre, ...], torques: list[Vector]) -> Schedule:
     """The manoeuvres as pulses of the steerable torquer; one that overlaps another has a name of its own."""
     pulses: list[Pulse] = []
     free = 0.0
-    for number, manoeuvre in enumerate(manoeuvres, start=1):
-        torque, lasts = body.inertia.axes.T @ manoeuvre.torque, manoeuvre.duration
-        alone = manoeuvre.start >= free - 1e-9
+    for number, (manoeuvre, torque) in enumerate(zip(manoeuvres, torques, strict=True), start=1):
+        start, lasts, used = manoeuvre.start, manoeuvre.duration, manoeuvre.mass
+        alone = start >= free - 1e-9
+        spent = None if used is None else -used
         channel = STEERABLE if alone else f"MAN{number}"
-        used = None if manoeuvre.mass is None else -manoeuvre.mass
-        pulses.append(Pulse(manoeuvre.start + 0.5 * lasts, lasts, channel, torque * lasts, torque, propellant=used))
-        free = max(free, manoeuvre.start + lasts) if alone else free
+        pulses.append(Pulse(start + 0.5 * lasts, lasts, channel, torque * lasts, torque, propellant=spent))
+        free = max(free, start + lasts) if alone else free
     return Schedule(tuple(pulses))
 
 
-def merged_text(source: Source, message: ApmContents | History, at: float = 0.0, *, inertia: bool) -> str:
+def merged_text(source: Source, contents: ApmContents | History, at: float = 0.0, *, inertia: bool) -> str:
     """The text of a spacecraft file with the motion of a message, of a history the record from ``at`` s on.
 
     Raises BadRequest where the message has no ``inertia`` to merge, and where the file would be none for nutdamp.
     """
-    if isinstance(message, History):
-        index, tensor = message.at(at), None
-        turn, given = message.quaternions[index], None if message.rates is None else message.rates[index]
-        epoch = message.epoch.plus(float(message.times[index]))
+    given: Vector | None
+    if isinstance(contents, ApmContents):
+        epoch, turn, given, tensor = contents.epoch, contents.quaternion, contents.rates, contents.tensor
     else:
-        turn, given, tensor, epoch = message.quaternion, message.rates, message.tensor, message.epoch
+        (epoch, turn, given), tensor = contents.at(at), None
     if inertia and tensor is None:
         raise BadRequest("the message has no inertia to merge")
     before = source.read(lambda _: None)
@@ -402,8 +474,8 @@ def merged_text(source: Source, message: ApmContents | History, at: float = 0.0,
     quaternion = before.initial.quaternion
     if turn is not None:
         quaternion = attitude.multiply(turn, attitude.from_matrix(axes))
-        after = replace(after, attitude=Attitude(turn, epoch_after(epoch.text, 0.0), message.frame))
-    later = Later(before, after, SpinState.of(after.omega0, quaternion))
+        after = replace(after, attitude=Attitude(turn, epoch_after(epoch.text, 0.0), contents.frame))
+    later = Later(before, after, quaternion)
 
     def edits(tree: Node) -> Edits:
         if inertia:

@@ -7,6 +7,7 @@ motion of bodies symmetric about axis 3: others have the spin alone.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -15,27 +16,8 @@ from nutdamp import __version__
 from nutdamp.common.numerics import cleaned
 from nutdamp.common.time import Epoch
 from nutdamp.errors import BadRequest
-from nutdamp.files.ccsds.message import (
-    AEM_METADATA,
-    AEM_RECORDS,
-    ANGVEL,
-    APM_METADATA,
-    BODY_FRAME,
-    HEADER,
-    LAYOUTS,
-    MOMENTUM,
-    OPM_METADATA,
-    QUATERNION_ANGVEL,
-    SPIN,
-    SPIN_NUTATION_MOM,
-    Keyword,
-    Message,
-    MessageBlock,
-    Segment,
-    block,
-    label,
-    number,
-)
+from nutdamp.files.ccsds import message
+from nutdamp.files.ccsds.message import BODY_FRAME, QUATERNION_ANGVEL, SPIN, SPIN_NUTATION_MOM, block, label
 from nutdamp.files.export import AttitudeSegment, Reference, interpolated
 from nutdamp.flight.dynamics import shed
 from nutdamp.flight.end_state import momentum_gained
@@ -92,51 +74,45 @@ def _on_sphere(vectors: Vector) -> tuple[Vector, Vector]:
 
 ORIGINATOR = "NUTDAMP"
 
-Values = dict[str, str | float]
 
-
-def apm(plan: Plan, reference: Reference, created: Epoch) -> Message:
+def apm(plan: Plan, reference: Reference, created: Epoch) -> message.Message:
     """The message for a plan, made at ``created``; raises BadRequest for an ideal impulse, which has no duration."""
-    body = plan.spacecraft
-    frames: Values = {"REF_FRAME_A": reference.frame, "REF_FRAME_B": BODY_FRAME}
+    body, frames = plan.spacecraft, (reference.frame, BODY_FRAME)
     motion = body.inertia.in_file_axes(body.initial.rates, body.initial.quaternion)
     rates, quaternion = map(cleaned, motion)
-    scalar, *vector = quaternion.tolist()
     # The quaternion from A to B turns the axes of A into those of B (annex F2), as body -> inertial turns vectors.
-    turn = zip(("Q1", "Q2", "Q3", "QC"), (*vector, scalar), strict=True)
+    scalar, *vector = quaternion.tolist()
     blocks = [
-        block("", (Keyword("EPOCH"),), {"EPOCH": reference.epoch.text}, *_unsaid(body)),
-        _block("QUAT", {**frames, **dict(turn)}),
-        _block("ANGVEL", {**frames, "ANGVEL_FRAME": BODY_FRAME, **dict(zip(ANGVEL, np.degrees(rates), strict=True))}),
+        block("", (message.Keyword("EPOCH"),), [reference.epoch.text], *_unsaid(body)),
+        _block("QUAT", [*frames, *vector, scalar]),
+        _block("ANGVEL", [*frames, BODY_FRAME, *np.degrees(rates)]),
     ]
     if spinning(body.inertia):
         spin = spin_values(body.inertia, *(values[None] for values in motion))
-        values = {name: float(value[0]) for name, value in spin.items() if name not in MOMENTUM}
-        blocks.append(_block("SPIN", {**frames, **values}))
+        values = [float(value[0]) for name, value in spin.items() if name not in message.MOMENTUM]
+        blocks.append(_block("SPIN", [*frames, *values]))
     # The products are minus the entries off the diagonal (annex F6).
     (xx, xy, xz), (_, yy, yz), (_, _, zz) = body.inertia.tensor.tolist()
-    parts: Values = {"IXX": xx, "IYY": yy, "IZZ": zz, "IXY": -xy, "IXZ": -xz, "IYZ": -yz}
-    blocks.append(_block("INERTIA", {"INERTIA_REF_FRAME": BODY_FRAME, **parts}))
-    blocks += [
-        _block("MAN", _apm_manoeuvre(pulse, number, body, reference), *_notes_on(pulse, number, reference))
-        for number, pulse in enumerate(sorted(plan.pulses, key=lambda pulse: pulse.start), start=1)
-    ]
-    about = block("", APM_METADATA, {**_identity(body), "TIME_SYSTEM": "UTC"})
-    return Message("APM", _header(plan, created), (Segment(about, tuple(blocks)),))
+    blocks.append(_block("INERTIA", [BODY_FRAME, xx, yy, zz, -xy, -xz, -yz]))
+    blocks += _manoeuvres("MAN", plan, reference)
+    about = block("", message.APM_METADATA, [*_identity(body), None, "UTC"])
+    return message.Message("APM", _header(plan, created), (message.Segment(about, tuple(blocks)),))
 
 
-def _block(name: str, values: Values, *comments: str) -> MessageBlock:
-    return block(name, LAYOUTS[name].keywords, values, *comments)
+def _block(name: str, values: message.Values, *comments: str) -> message.MessageBlock:
+    return block(name, message.LAYOUTS[name].keywords, values, *comments)
 
 
-def _header(plan: Plan, created: Epoch) -> MessageBlock:
+def _header(plan: Plan, created: Epoch) -> message.MessageBlock:
     moment = created.text.partition(".")[0]
-    values: Values = {"CREATION_DATE": moment, "ORIGINATOR": ORIGINATOR, "MESSAGE_ID": label(f"{plan.scheme}-{moment}")}
-    return block("", HEADER, values, f"nutdamp {__version__}: {plan.scheme} schedule for {plan.spacecraft.name}")
+    values = [None, moment, ORIGINATOR, label(f"{plan.scheme}-{moment}")]
+    return block(
+        "", message.HEADER, values, f"nutdamp {__version__}: {plan.scheme} schedule for {plan.spacecraft.name}"
+    )
 
 
-def _identity(body: Spacecraft) -> Values:
-    return {"OBJECT_NAME": label(body.name), "OBJECT_ID": label(body.object_id or "")}
+def _identity(body: Spacecraft) -> tuple[str, str]:
+    return label(body.name), label(body.object_id or "")
 
 
 def _unsaid(body: Spacecraft) -> list[str]:
@@ -153,32 +129,47 @@ def _unsaid(body: Spacecraft) -> list[str]:
     return [remark for remark, holds in remarks.items() if holds]
 
 
-def _notes_on(pulse: Pulse, number: int, reference: Reference) -> list[str]:
-    comments = [f"pulse {number}: {pulse.channel}"]
-    if pulse.through_valve:
-        start, on_time = pulse.loaded
-        comments.append(f"Commanded: {on_time:.9g} s from {reference.epoch.plus(max(start, 0.0)).text} on.")
-        comments.append(f"Start and duration below are those of the thrust: {pulse.on_time:.9g} s at the torque given.")
-    return comments
+def _manoeuvres(name: str, plan: Plan, reference: Reference) -> Iterator[message.MessageBlock]:
+    """Blocks of the pulses: MAN with their torques, MANEUVER with their velocity changes."""
+    for place, pulse in enumerate(sorted(plan.pulses, key=lambda pulse: pulse.start), start=1):
+        timing = (reference.epoch.plus(max(pulse.start, 0.0)).text, pulse.on_time)
+        mass = None if pulse.propellant is None else -pulse.propellant
+        if name == "MAN":
+            values = [*timing, BODY_FRAME, *_torque(plan, pulse, place), mass]
+        else:
+            values = [*timing, mass, reference.frame, *(KILO * _velocity_change(plan, pulse, place))]
+        comments = [f"pulse {place}: {pulse.channel}"]
+        if pulse.through_valve:
+            start, on_time = pulse.loaded
+            comments.append(f"Commanded: {on_time:.9g} s from {reference.epoch.plus(max(start, 0.0)).text} on.")
+            thrust = f"{pulse.on_time:.9g} s at the torque given."
+            comments.append(f"Start and duration below are those of the thrust: {thrust}")
+        yield _block(name, values, *comments)
 
 
-def _apm_manoeuvre(pulse: Pulse, number: int, body: Spacecraft, reference: Reference) -> Values:
+def _torque(plan: Plan, pulse: Pulse, place: int) -> Vector:
     if pulse.torque is None or pulse.on_time == 0.0:
         cure = "give the torquer a torque (steerable: {torque: 20 N m}) and plan again"
-        raise BadRequest(f"pulse {number} is an ideal impulse without a duration, which an APM cannot hold; {cure}")
-    torque = body.inertia.in_file(pulse.torque).tolist()
-    values: Values = {
-        "MAN_EPOCH_START": reference.epoch.plus(max(pulse.start, 0.0)).text,
-        "MAN_DURATION": pulse.on_time,
-        "MAN_REF_FRAME": BODY_FRAME,
-        **dict(zip(("MAN_TOR_X", "MAN_TOR_Y", "MAN_TOR_Z"), torque, strict=True)),
-    }
-    return values if pulse.propellant is None else {**values, "MAN_DELTA_MASS": -pulse.propellant}
+        raise BadRequest(f"pulse {place} is an ideal impulse without a duration, which an APM cannot hold; {cure}")
+    return plan.spacecraft.inertia.in_file(pulse.torque)
+
+
+def _velocity_change(plan: Plan, pulse: Pulse, place: int) -> Vector:
+    """Inertial velocity change (3,) m/s by the force, which turns with the body."""
+    if pulse.force is None:
+        cure = "give the thrusters position, direction and force"
+        raise BadRequest(f"the velocity change by pulse {place} ({pulse.channel}) is not known; {cure}")
+    if pulse.propellant is None:
+        cure = "give the thrusters isp"
+        raise BadRequest(f"the propellant of pulse {place} ({pulse.channel}) is not known, which an OPM needs; {cure}")
+    mass = plan.spacecraft.mass
+    assert mass is not None
+    return cleaned(momentum_gained(replace(plan.flight, schedule=Schedule((pulse,)))) / mass)
 
 
 def aem(
     plan: Plan, flown: Flight, until: float, reference: Reference, created: Epoch, kind: str = QUATERNION_ANGVEL
-) -> Message:
+) -> message.Message:
     """The message for the flight of a plan from 0 to ``until`` s, in segments that end at the edges of pulses.
 
     ``kind`` is the ATTITUDE_TYPE, SPIN where the body has not the nutation of SPIN/NUTATION_MOM.
@@ -187,42 +178,33 @@ def aem(
     if kind == SPIN_NUTATION_MOM and not spinning(body.inertia):
         kind = SPIN
     segments = tuple(_segment(body, stretch, reference, kind) for stretch in interpolated(flown, until))
-    return Message("AEM", _header(plan, created), segments)
+    return message.Message("AEM", _header(plan, created), segments)
 
 
 ALONE = "SPIN_ANGLE_VEL is the rate about the third axis at that moment; no transverse rates, no nutation."
 """Comment on records of the spin alone."""
 
 
-def _segment(body: Spacecraft, stretch: AttitudeSegment, reference: Reference, kind: str) -> Segment:
+def _segment(body: Spacecraft, stretch: AttitudeSegment, reference: Reference, kind: str) -> message.Segment:
     times = [reference.epoch.plus(seconds).text for seconds in stretch.t.tolist()]
-    metadata = block(
-        "",
-        AEM_METADATA,
-        {
-            **_identity(body),
-            "REF_FRAME_A": reference.frame,
-            "REF_FRAME_B": BODY_FRAME,
-            "TIME_SYSTEM": "UTC",
-            "START_TIME": times[0],
-            "STOP_TIME": times[-1],
-            "ATTITUDE_TYPE": kind,
-            **({"ANGVEL_FRAME": BODY_FRAME} if kind == QUATERNION_ANGVEL else {}),
-            "INTERPOLATION_METHOD": "LAGRANGE" if kind == SPIN else "HERMITE",
-            "INTERPOLATION_DEGREE": "3",
-        },
-        f"pulses completed: {stretch.completed}",
-        *[ALONE] * (kind == SPIN),
+    useable = (times[0], None, None, times[-1])  # all of it
+    axes, method = (
+        BODY_FRAME if kind == QUATERNION_ANGVEL else None,
+        "LAGRANGE" if kind == SPIN else "HERMITE",
     )
+    values = [*_identity(body), None, reference.frame, BODY_FRAME, "UTC", *useable, kind, axes, method, "3"]
+    comments = [f"pulses completed: {stretch.completed}", *[ALONE] * (kind == SPIN)]
     if kind == QUATERNION_ANGVEL:
         columns = np.column_stack([stretch.quaternion[:, [1, 2, 3, 0]], np.degrees(stretch.rates)])
     else:
         spin = spin_values(body.inertia, stretch.rates, stretch.quaternion)
         if kind == SPIN:
             spin["SPIN_ANGLE_VEL"] = np.degrees(stretch.rates[:, 2])
-        columns = np.column_stack([spin[keyword.name] for keyword in AEM_RECORDS[kind].keywords[1:]])
-    records = tuple((time, *map(number, row)) for time, row in zip(times, columns.tolist(), strict=True))
-    return Segment(metadata, records=records, record=AEM_RECORDS[kind])
+        columns = np.column_stack([spin[keyword.name] for keyword in message.AEM_RECORDS[kind].keywords[1:]])
+    records = tuple((time, *map(message.number, row)) for time, row in zip(times, columns.tolist(), strict=True))
+    return message.Segment(
+        block("", message.AEM_METADATA, values, *comments), records=records, record=message.AEM_RECORDS[kind]
+    )
 
 
 PART = (
@@ -233,40 +215,17 @@ PART = (
 KILO = 1e-3
 
 
-def opm(plan: Plan, reference: Reference, created: Epoch) -> Message:
+def opm(plan: Plan, reference: Reference, created: Epoch) -> message.Message:
     """The message for a plan, made at ``created``; raises BadRequest where mass, forces or propellant are unknown."""
-    body, flown = plan.spacecraft, plan.flight
+    body = plan.spacecraft
     if body.mass is None:
         raise BadRequest("an OPM needs the velocity change of each pulse; add the key mass to the spacecraft file")
-    orbit = body.orbit
-    centre: Values = {} if orbit is None else {"CENTER_NAME": orbit.center}
-    about = {**_identity(body), **centre, "REF_FRAME": reference.frame, "TIME_SYSTEM": "UTC"}
-    metadata = block("", OPM_METADATA, about, *(PART if orbit is None else ()))
-    blocks = []
+    orbit, blocks = body.orbit, []
+    centre = None if orbit is None else orbit.center
+    about = [*_identity(body), centre, reference.frame, "UTC"]
     if orbit is not None:
-        numbers = (KILO * np.concatenate([orbit.position, orbit.velocity])).tolist()
-        state = dict(zip(("X", "Y", "Z", "X_DOT", "Y_DOT", "Z_DOT"), numbers, strict=True))
-        blocks.append(_block("STATE", {"EPOCH": reference.epoch.text, **state}))
-    blocks.append(_block("SPACECRAFT", {"MASS": body.mass}))
-    for place, pulse in enumerate(sorted(plan.pulses, key=lambda pulse: pulse.start), start=1):
-        values = _opm_manoeuvre(pulse, place, flown, body.mass, reference)
-        blocks.append(_block("MANEUVER", values, *_notes_on(pulse, place, reference)))
-    return Message("OPM", _header(plan, created), (Segment(metadata, tuple(blocks)),))
-
-
-def _opm_manoeuvre(pulse: Pulse, number: int, flown: Flight, mass: float, reference: Reference) -> Values:
-    if pulse.force is None:
-        cure = "give the thrusters position, direction and force"
-        raise BadRequest(f"the velocity change by pulse {number} ({pulse.channel}) is not known; {cure}")
-    # Inertial: along its force as the body turns.
-    velocity = cleaned(momentum_gained(replace(flown, schedule=Schedule((pulse,)))) / mass)
-    if pulse.propellant is None:
-        cure = "give the thrusters isp"
-        raise BadRequest(f"the propellant of pulse {number} ({pulse.channel}) is not known, which an OPM needs; {cure}")
-    return {
-        "MAN_EPOCH_IGNITION": reference.epoch.plus(max(pulse.start, 0.0)).text,
-        "MAN_DURATION": pulse.on_time,
-        "MAN_DELTA_MASS": -pulse.propellant,
-        "MAN_REF_FRAME": reference.frame,
-        **dict(zip(("MAN_DV_1", "MAN_DV_2", "MAN_DV_3"), (KILO * velocity).tolist(), strict=True)),
-    }
+        state = KILO * np.concatenate([orbit.position, orbit.velocity])
+        blocks.append(_block("STATE", [reference.epoch.text, *state]))
+    blocks += [_block("SPACECRAFT", [body.mass]), *_manoeuvres("MANEUVER", plan, reference)]
+    metadata = block("", message.OPM_METADATA, about, *(PART if orbit is None else ()))
+    return message.Message("OPM", _header(plan, created), (message.Segment(metadata, tuple(blocks)),))

@@ -104,7 +104,7 @@ dispersions: {A: {normal: 0.05 %}, C: {normal: 0.05 %}, wheel_momentum: {normal:
     assert at is not None
     assert fitted.values[at] == pytest.approx(61.5, abs=4.0 * fitted.sigmas[at])
     assert fitted.sigmas[at] < 0.1
-    written = nutdamp.read(fitted_text(text, "f.yaml", (), fitted, carried(fitted, 0.0)))
+    written = nutdamp.read(fitted_text(fitted, carried(fitted, 0.0)))
     assert written.inertia.wheel == pytest.approx(float(fitted.values[at]), rel=1e-9)
     assert written.dispersions is not None
     assert written.dispersions.wheel_momentum is not None

@@ -14,7 +14,7 @@ from support.hand_made_fit import silent, told
 from nutdamp.estimation.results import carried, posterior, replaced
 from nutdamp.files.carried import fitted_text, notes
 from nutdamp.files.editing import parse_setting
-from nutdamp.files.reader import read_spacecraft
+from nutdamp.files.reader import Source, read_spacecraft
 from nutdamp.physics.thruster import Trapezoid
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
 
@@ -53,13 +53,13 @@ SIGMAS = {"A": 0.4, "C/A": 1e-3, "omega_1": 1e-3, "thrust T1": 0.01, "attitude_1
 
 
 def test_the_file_holds_all_that_is_known_now() -> None:
-    settings = [parse_setting("thrusters.T3.torque[1]=-9"), parse_setting("mass=200 kg")]
-    body = read_spacecraft(FILE, "f.yaml", settings)
+    settings = (parse_setting("thrusters.T3.torque[1]=-9"), parse_setting("mass=200 kg"))
+    body = Source(FILE, "f.yaml", settings).read()
     fired = Schedule(tuple(channel_pulse(one, t, 0.5) for one, t in zip(body.channels, (3.0, 6.0), strict=False)))
     record = silent(*GYROS, "axis_x", "axis_y", "axis_z", "acceleration", schedule=fired)
     fit = told(body, record, EVERYTHING, SIGMAS)
     known = carried(fit, 7.5)
-    text = fitted_text(FILE, "f.yaml", settings, fit, known)
+    text = fitted_text(fit, known)
     now = read_spacecraft(text, "now.yaml")
     expected = replaced(body, known)
     assert now.inertia.moments == pytest.approx((121.0, 121.0, 84.7))
@@ -110,12 +110,12 @@ def test_bodies_of_any_kind_are_written_as_the_file_has_them(name: str) -> None:
     """Tensors and rates where A, C and angles do not tell it; a growth that dissipation would not cause is said."""
     text, given, unequal = CASES[name]
     text = "name: x\n" + text
-    body = read_spacecraft(text, "f.yaml")
+    body = Source(text, "f.yaml").read()
     values = {"omega_1": 0.11, "omega_3": -2.9 if "axes" in name else 3.2, **given}
     values |= {"unequal_1": 0.05, "unequal_2": 0.02} if unequal else {"growth": -0.002, **given}
     fit = told(body, silent(*GYROS), values, {}, unequal=unequal)
     known = carried(fit, 4.0)
-    written = fitted_text(text, "f.yaml", [], fit, known)
+    written = fitted_text(fit, known)
     now = read_spacecraft(written, "now.yaml")
     bodies = now.inertia, known.body.inertia
     tensors = [body.axes @ np.diag(body.moments) @ body.axes.T for body in bodies]
@@ -128,13 +128,13 @@ def test_bodies_of_any_kind_are_written_as_the_file_has_them(name: str) -> None:
 
 
 def test_thrusters_that_did_not_fire_and_delays_that_no_valve_has_are_said() -> None:
-    body = read_spacecraft(FILE, "f.yaml")
+    body = Source(FILE, "f.yaml").read()
     fired = Schedule(tuple(channel_pulse(one, t, 0.5) for one, t in zip(body.channels, (2.0, 4.0, 6.0), strict=True)))
     values = {"thrust T1": 0.01, "thrust T 2": -0.9, "delay T1": -0.5, "delay T3": -0.02}
     fit = told(body, silent(*GYROS, schedule=fired), values, {})
     known = carried(fit, 0.0)
     check_text("files.fitted-doubts", noted(notes(fit, known)))
-    text = fitted_text(FILE, "f.yaml", [], fit, known)
+    text = fitted_text(fit, known)
     now = read_spacecraft(text, "now.yaml")
     assert "epoch: 2026-03-01T12:00:00Z" in text  # as it was
     assert [one.thrusters[0].torque for one in now.channels[:2]] == [

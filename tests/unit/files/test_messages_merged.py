@@ -10,7 +10,8 @@ from support.process import Run
 
 import nutdamp
 from nutdamp.errors import BadRequest, FaultyFile
-from nutdamp.files.telemetry import read_history
+from nutdamp.files.ccsds.read import merged_text, read_apm, read_history
+from nutdamp.files.reader import Source
 from nutdamp.physics import attitude
 from nutdamp.spacecraft.model import Spacecraft
 
@@ -84,6 +85,12 @@ def test_inertia_is_merged_only_where_it_is_asked_for(run: Run, tmp_path: Path) 
         assert nutdamp.load(tmp_path / "merged.yaml").inertia.tensor[1, 1] == pytest.approx(moment)
 
 
+def test_an_attitude_is_written_as_the_message_has_it(tmp_path: Path) -> None:
+    """Without the rounding of a turn to the principal axes and back."""
+    path, _ = exported(tmp_path, SPACECRAFT.replace("[0.9, 0.1, -0.2, 0.3]", "[0.8, 0, 0.6, 0]"), "apm")
+    assert "quaternion: [0.8, 0, 0.6, 0]," in merged_text(Source(TENSOR, "f.yaml"), read_apm(str(path)), inertia=True)
+
+
 def test_a_file_without_attitude_gets_one(run: Run, tmp_path: Path) -> None:
     path, plan = exported(tmp_path, SPACECRAFT, "apm")
     lines = [line for line in SPACECRAFT.splitlines() if not line.startswith("attitude")]
@@ -127,10 +134,11 @@ def test_records_out_of_order_and_of_wrong_length_are_faults_with_lines(tmp_path
     first = lines.index("DATA_START") + 1
     lines[first], lines[first + 1] = lines[first + 1], lines[first]
     lines[first + 3] += " 1.0"
-    path.write_text("\n".join(lines))
-    with pytest.raises(FaultyFile) as wrong:
-        read_history(str(path))
-    assert [fault.line for fault in wrong.value.faults] == [first + 2, first + 4]
+    for end in ("\n", "\r\n", "\r", "\n\r"):  # those of the standard
+        path.write_bytes(end.join(lines).encode())
+        with pytest.raises(FaultyFile) as wrong:
+            read_history(str(path))
+        assert [fault.line for fault in wrong.value.faults] == [first + 2, first + 4]
 
 
 @pytest.mark.parametrize(("arguments", "status"), [
