@@ -12,7 +12,7 @@ from nutdamp.flight.end_state import Aspect, at_start
 from nutdamp.flight.propagation import Flight
 from nutdamp.planning.decision import TELLING, Comparison, Decision, infeasibility
 from nutdamp.planning.plan import Plan, Standing
-from nutdamp.planning.recommendation import Gain, Ground
+from nutdamp.planning.recommendation import TIES, Gain, Ground
 from nutdamp.schemes import catalogue
 from nutdamp.schemes.catalogue import OPTIMAL
 from nutdamp.schemes.sequential import steady_omega
@@ -319,15 +319,6 @@ def beside(plan: Plan, than: Plan, by_propellant: bool) -> dict[str, Value]:
     return {"cost": cost, "than_cost": than_cost, "unit": shown, "end_s": plan.end, "than_end_s": than.end}
 
 
-TIES = {
-    Ground.PULSES: "tie-pulses",
-    Ground.DELTA_V: "tie-delta-v",
-    Ground.SHIFT: "tie-shift",
-    Ground.END: "tie-end",
-    Ground.NOMINAL: "tie-nominal",
-}
-
-
 def reasons(compared: Comparison) -> Iterator[Note]:
     """Reason for the recommended plan, or for none."""
     recommendation, body = compared.recommendation, compared.spacecraft
@@ -358,7 +349,7 @@ def reasons(compared: Comparison) -> Iterator[Note]:
     else:
         yield note("least-propellant" if recommendation.by_propellant else "least-impulse", count=count)
     if ground in TIES:
-        yield note(TIES[ground])
+        yield note(ground.value)
 
 
 def model_warnings(impulses: Flight, flown: Flight) -> Iterator[Note]:
