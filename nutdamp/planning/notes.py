@@ -11,12 +11,13 @@ from nutdamp.flight import end_state
 from nutdamp.flight.end_state import Aspect, at_start
 from nutdamp.flight.propagation import Flight
 from nutdamp.planning.decision import TELLING, Comparison, Decision, infeasibility
-from nutdamp.planning.plan import Obstacle, Plan, Standing
-from nutdamp.planning.recommendation import Gain, Ground
+from nutdamp.planning.plan import Plan, Standing
+from nutdamp.planning.recommendation import TIES, Gain, Ground
 from nutdamp.schemes import catalogue
 from nutdamp.schemes.catalogue import OPTIMAL
 from nutdamp.schemes.sequential import steady_omega
 from nutdamp.spacecraft import requirements
+from nutdamp.spacecraft.constraints import rounded_off
 from nutdamp.spacecraft.model import LIGHTER, Spacecraft
 from nutdamp.spacecraft.requirements import Part
 
@@ -75,23 +76,43 @@ def _left(plan: Plan) -> Iterator[Note]:
             yield note("fixed-length", off_deg=math.degrees(off))
 
 
+def hindrances(plan: Plan) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Keys of the file for the limits that certainly end a schedule, and for those that may.
+
+    Certainty of the latter takes a plan without them. The horizon ends it where less than a nutation period is left.
+    """
+    body, limits = plan.spacecraft, plan.spacecraft.limits
+    channels = {channel.name: channel for channel in body.channels}
+    fired = [(channels[pulse.channel], pulse.loaded[1]) for pulse in plan.pulses if pulse.channel in channels]
+    full = 0 < len(fired) == len(plan.pulses) and all(on >= each.max_on_time * (1.0 - 1e-9) for each, on in fired)
+    late = body.horizon - plan.pulses.end < body.nutation_period
+    ended = full or late
+    least = not ended and any(0.0 < on <= channel.min_on_time * (1.0 + 1e-9) for channel, on in fired)
+    certain = {"max_on_time": full, "limits.horizon": late, "min_on_time": least}
+    possible = {"limits.tick": limits.tick is not None and not ended, "limits.blackout": bool(limits.blackout)}
+    return tuple(key for key in certain if certain[key]), tuple(key for key in possible if possible[key])
+
+
 def remaining(plan: Plan) -> Note:
-    """Nutation that remains, and the obstacle to less of it."""
-    body, hindrance, left = plan.spacecraft, plan.hindrance, math.degrees(plan.flight.residual.nutation)
-    obstacle = hindrance.obstacle
-    if obstacle is Obstacle.UNPLANNED_DISTURBANCES:
-        return note("remains-unplanned", nutation_deg=left)
-    if obstacle is Obstacle.STEADY_TILT:
-        tilt = math.atan(body.inertia.A * abs(steady_omega(body, plan.pulses.end)) / abs(body.axial))
-        return note("remains-steady-tilt", nutation_deg=left, tilt_deg=math.degrees(tilt))
-    if obstacle is Obstacle.MAX_PULSES:
-        return note("remains-max-pulses", nutation_deg=left, pulses=body.limits.max_pulses)
-    if obstacle is Obstacle.RESOLUTION:
-        return note("remains-rounding", nutation_deg=left, rounding_deg=math.degrees(hindrance.rounding))
-    if obstacle is Obstacle.LIMITS:
-        certain, possible = (", ".join(keys) or "none" for keys in (hindrance.binding, hindrance.suspected))
-        return note("remains-limits", nutation_deg=left, certain=certain, possible=possible)
-    return note("remains-scheme", nutation_deg=left)
+    """Nutation that remains, and the dominant obstacle to less of it."""
+    body, nutation, (certain, possible) = plan.spacecraft, plan.flight.residual.nutation, hindrances(plan)
+    left = math.degrees(nutation)
+    if not {"max_on_time", "limits.horizon"} <= {*certain}:
+        if body.disturbances and not plan.options.with_disturbances:
+            return note("remains-unplanned", nutation_deg=left)
+        if body.disturbances:
+            tilt = math.atan(body.inertia.A * abs(steady_omega(body, plan.pulses.end)) / abs(body.axial))
+            return note("remains-steady-tilt", nutation_deg=left, tilt_deg=math.degrees(tilt))
+        # Worst over root mean square: the centre is off by half the on-time's error and the start's.
+        rounding = math.hypot(1.0, 1.5) * math.fsum(rounded_off(body, plan.pulses))
+        if nutation <= rounding:
+            return note("remains-rounding", nutation_deg=left, rounding_deg=math.degrees(rounding))
+        if len(plan.pulses) == body.limits.max_pulses:
+            return note("remains-max-pulses", nutation_deg=left, pulses=body.limits.max_pulses)
+    if not certain and not possible:
+        return note("remains-scheme", nutation_deg=left)
+    sure, unsure = (", ".join(keys) or "none" for keys in (certain, possible))
+    return note("remains-limits", nutation_deg=left, certain=sure, possible=unsure)
 
 
 def broken_cone(aspect: Aspect) -> Note:
@@ -239,7 +260,7 @@ def _missed(chosen: Plan, compared: Comparison) -> Iterator[Note]:
 
 def _obstacles(plan: Plan, compared: Comparison) -> Iterator[Note]:
     """Causes that prevent a smaller residual; the best cure first."""
-    body, hindrance = plan.spacecraft, plan.hindrance
+    body = plan.spacecraft
     parts = {bound.part for bound in plan.shortfalls}
     if body.disturbances and not plan.options.with_disturbances:
         aware = compared.with_disturbances
@@ -249,18 +270,19 @@ def _obstacles(plan: Plan, compared: Comparison) -> Iterator[Note]:
             yield note("disturbances-helped", scheme=aware.scheme)
         else:
             yield note("disturbances-not-helped")
-    if Part.NUTATION in parts and hindrance.obstacle is not Obstacle.UNPLANNED_DISTURBANCES:
-        if hindrance.obstacle in (Obstacle.LIMITS, Obstacle.SCHEME):
+    if Part.NUTATION in parts and (cause := remaining(plan)).code != "remains-unplanned":
+        if cause.code in ("remains-limits", "remains-scheme"):
+            certain, possible = hindrances(plan)
             yield note(
                 "pulses-at-limits",
                 given_Nms=plan.pulses.total_impulse,
                 needed_Nms=body.least_impulse,
                 end_s=plan.pulses.end,
                 horizon_s=body.horizon,
-                limits=", ".join((*hindrance.binding, *hindrance.suspected)) or "none",
+                limits=", ".join((*certain, *possible)) or "none",
             )
         else:
-            yield remaining(plan).of(plan.scheme)
+            yield cause.of(plan.scheme)
     if Part.DISTANCE in parts and plan.scheme not in (*catalogue.POINTING, *catalogue.COMMANDED):
         yield note("scheme-does-not-turn", scheme=plan.scheme, schemes=", ".join(catalogue.POINTING))
     if parts != {Part.SPIN} and any(channel.damps for channel in body.channels):
@@ -297,15 +319,6 @@ def beside(plan: Plan, than: Plan, by_propellant: bool) -> dict[str, Value]:
     return {"cost": cost, "than_cost": than_cost, "unit": shown, "end_s": plan.end, "than_end_s": than.end}
 
 
-TIES = {
-    Ground.PULSES: "tie-pulses",
-    Ground.DELTA_V: "tie-delta-v",
-    Ground.SHIFT: "tie-shift",
-    Ground.END: "tie-end",
-    Ground.NOMINAL: "tie-nominal",
-}
-
-
 def reasons(compared: Comparison) -> Iterator[Note]:
     """Reason for the recommended plan, or for none."""
     recommendation, body = compared.recommendation, compared.spacecraft
@@ -336,7 +349,7 @@ def reasons(compared: Comparison) -> Iterator[Note]:
     else:
         yield note("least-propellant" if recommendation.by_propellant else "least-impulse", count=count)
     if ground in TIES:
-        yield note(TIES[ground])
+        yield note(ground.value)
 
 
 def model_warnings(impulses: Flight, flown: Flight) -> Iterator[Note]:

@@ -28,7 +28,7 @@ from nutdamp.physics import attitude, precession
 from nutdamp.schemes import catalogue, planner, valve_commands
 from nutdamp.schemes.valve_commands import Legs
 from nutdamp.spacecraft import requirements
-from nutdamp.spacecraft.constraints import Breach, breaches, rounded_off
+from nutdamp.spacecraft.constraints import Breach, breaches
 from nutdamp.spacecraft.model import Keep, Spacecraft, Vector
 from nutdamp.spacecraft.requirements import Bound, Held, Left
 from nutdamp.spacecraft.schedule import Schedule
@@ -166,77 +166,6 @@ class Share:
     def met(self) -> bool | None:
         """Compliance in enough cases; None where the flown ones do not decide it."""
         return True if self.low >= self.probability else False if self.high < self.probability else None
-
-
-class Obstacle(Enum):
-    """Obstacle to less nutation."""
-
-    UNPLANNED_DISTURBANCES = "disturbances that the plan was made without"
-    STEADY_TILT = "disturbances, under which a tilt stays"
-    MAX_PULSES = "limits.max_pulses"
-    RESOLUTION = "limits.tick"
-    LIMITS = "limits of the file that bind"
-    SCHEME = "the scheme"
-
-
-@dataclass(frozen=True, eq=False)
-class Hindrance:
-    """Limiting factors of ``pulses``, which leave ``nutation`` rad; ``aware``: planned with the disturbances."""
-
-    spacecraft: Spacecraft
-    pulses: Schedule
-    aware: bool
-    nutation: float
-
-    @property
-    def obstacle(self) -> Obstacle:
-        """Dominant obstacle."""
-        body, limits = self.spacecraft, self.spacecraft.limits
-        if self.full and self.to_the_end:
-            return Obstacle.LIMITS
-        if body.disturbances:
-            return Obstacle.STEADY_TILT if self.aware else Obstacle.UNPLANNED_DISTURBANCES
-        if self.nutation <= self.rounding:
-            return Obstacle.RESOLUTION
-        if len(self.pulses) == limits.max_pulses:
-            return Obstacle.MAX_PULSES
-        return Obstacle.LIMITS if self.binding or self.suspected else Obstacle.SCHEME
-
-    @property
-    def binding(self) -> tuple[str, ...]:
-        """Keys of the file for the limits that certainly end the schedule."""
-        ends = {"max_on_time": self.full, "limits.horizon": self.to_the_end}
-        if not any(ends.values()):
-            least = {channel.name: channel.min_on_time * (1.0 + 1e-9) for channel in self.spacecraft.channels}
-            ends["min_on_time"] = any(0.0 < pulse.loaded[1] <= least.get(pulse.channel, 0.0) for pulse in self.pulses)
-        return tuple(key for key in ends if ends[key])
-
-    @property
-    def suspected(self) -> tuple[str, ...]:
-        """Keys of the file for limits that may end it: certainty takes a plan without them."""
-        limits = self.spacecraft.limits
-        ticks = limits.tick is not None and not self.full and not self.to_the_end
-        suspects = {"limits.tick": ticks, "limits.blackout": bool(limits.blackout)}
-        return tuple(key for key in suspects if suspects[key])
-
-    @property
-    def full(self) -> bool:
-        """True if every pulse is as long as its channel may be on; False without such a limit."""
-        longest = {channel.name: channel.max_on_time for channel in self.spacecraft.channels}
-        full = [pulse.loaded[1] >= longest.get(pulse.channel, math.inf) * (1.0 - 1e-9) for pulse in self.pulses]
-        return bool(full) and all(full)
-
-    @property
-    def to_the_end(self) -> bool:
-        """True if less than one nutation period is left of the horizon after the last pulse."""
-        body = self.spacecraft
-        return body.horizon - self.pulses.end < body.nutation_period
-
-    @property
-    def rounding(self) -> float:
-        """Largest effect, rad, of half a tick in starts and on-times, to first order; 0 without ticks."""
-        # Worst over root mean square: the centre is off by half the on-time's error and the start's.
-        return math.hypot(1.0, 1.5) * math.fsum(rounded_off(self.spacecraft, self.pulses))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -435,12 +364,6 @@ class Plan(results.Data, results.Tabled):
     def kept(self) -> bool | None:
         """True if the flown spin axis keeps its cones; None where the file names none."""
         return all(aspect.kept for aspect in self.aspects) if self.spacecraft.keep else None
-
-    @property
-    def hindrance(self) -> Hindrance:
-        """Limiting factors of the remaining nutation."""
-        left = self.flight.residual.nutation
-        return Hindrance(self.spacecraft, self.pulses, self.options.with_disturbances, left)
 
 
 def plan(spacecraft: Spacecraft, scheme: str, options: planner.Choice = None) -> Plan:

@@ -31,11 +31,15 @@ class Ground(Enum):
     LEFT = "left"
     NEAREST = "nearest"
     COST = "cost"
-    NOMINAL = "nominal"
-    PULSES = "pulses"
-    DELTA_V = "delta-v"
-    SHIFT = "shift"
-    END = "end"
+    NOMINAL = "tie-nominal"
+    PULSES = "tie-pulses"
+    DELTA_V = "tie-delta-v"
+    SHIFT = "tie-shift"
+    END = "tie-end"
+
+
+TIES = (Ground.NOMINAL, Ground.PULSES, Ground.DELTA_V, Ground.SHIFT, Ground.END)
+"""Grounds among plans of equal cost; the value of each is the code of its note."""
 
 
 class Gain(Enum):

@@ -25,9 +25,9 @@ from nutdamp.planning import chance_plan, screening
 from nutdamp.planning import plan as planning
 from nutdamp.planning.chance_plan import Tightening, tightening
 from nutdamp.planning.decision import Comparison, Decision, attempt
-from nutdamp.planning.notes import TIES, beside
+from nutdamp.planning.notes import beside
 from nutdamp.planning.plan import Plan
-from nutdamp.planning.recommendation import Ground, by_propellant, cheapest
+from nutdamp.planning.recommendation import TIES, Ground, by_propellant, cheapest
 from nutdamp.planning.screening import AS_GOOD, Fresh, PlanCandidate, entered, equal_from, fly_all, fresh_of
 from nutdamp.schemes.catalogue import OPTIMAL, Options
 from nutdamp.spacecraft.constraints import keeps_limits
@@ -336,7 +336,7 @@ def robust_reasons(robust: RobustComparison) -> Iterator[Note]:
         if robust.ground is not None and robust.ground is not Ground.ONLY:
             yield note("equal-least-propellant" if robust.by_propellant else "equal-least-impulse")
         if robust.ground in TIES:
-            yield note(TIES[robust.ground])
+            yield note(robust.ground.value)
 
 
 def robust_cost(robust: RobustComparison) -> Iterator[Note]:

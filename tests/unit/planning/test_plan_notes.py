@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -26,8 +27,8 @@ from support.golden import check_text
 import nutdamp
 from nutdamp.planning import plan as planning
 from nutdamp.planning.decision import Comparison, compare
-from nutdamp.planning.notes import comparison_warnings, plan_notes, reasons
-from nutdamp.planning.plan import Hindrance, Obstacle, Plan
+from nutdamp.planning.notes import comparison_warnings, hindrances, plan_notes, reasons, remaining
+from nutdamp.planning.plan import Plan
 from nutdamp.schemes import catalogue
 from nutdamp.spacecraft.model import Disturbance, Goal, Limits, Requirement, Spacecraft
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
@@ -95,8 +96,8 @@ def test_what_stands_in_the_way_is_named_and_nothing_else() -> None:
     for name, (body, scheme) in HINDERED.items():
         compared = compare(body, (scheme,), catalogue.Options(with_disturbances=name == "steady tilt"))
         (plan,) = compared.plans
-        why = plan.hindrance
-        texts += [f"{name}: {why.obstacle}, binding {why.binding}, suspected {why.suspected}"]
+        certain, possible = hindrances(plan)
+        texts += [f"{name}: {remaining(plan).code}, binding {certain}, suspected {possible}"]
         texts += [noted((*comparison_warnings(compared), *plan_notes(plan)))]
     check_text("notes.hindered", "\n".join(texts))
 
@@ -105,7 +106,7 @@ def test_a_blackout_is_not_said_to_limit_what_it_may_not_touch() -> None:
     """It is over before the first pulse: without it the plan is the same, so it must not be called the limit."""
     dark = planning.plan(replace(SINGLE, limits=Limits(horizon=7.0, blackout=((0.0, 0.1),))), "one-pulse")
     assert dark.pulses.end == planning.plan(SINGLE, "one-pulse").pulses.end
-    assert (dark.hindrance.binding, dark.hindrance.suspected) == (("limits.horizon",), ("limits.blackout",))
+    assert hindrances(dark) == (("limits.horizon",), ("limits.blackout",))
 
 
 @pytest.mark.deep
@@ -115,30 +116,32 @@ def test_no_scheme_is_said_to_leave_the_least_where_another_leaves_less() -> Non
     left = {plan.scheme: plan.flight.residual.nutation for plan in compared if plan.feasible}
     assert max(left.values()) > 1.2 * min(left.values())
     for plan in compared:
-        assert plan.hindrance.obstacle is Obstacle.RESOLUTION
-        assert left[plan.scheme] <= plan.hindrance.rounding
+        assert remaining(plan).code == "remains-rounding"
+        assert math.degrees(left[plan.scheme]) <= float(remaining(plan).values["rounding_deg"] or 0.0)
         assert "remains-rounding" in codes(plan_notes(plan))
 
 
 def test_ticks_explain_what_rounding_to_them_can_leave() -> None:
     """8 N m for 0.1 s: 0.04 N m s by the on-time, 0.004 N m s × ω3 by the start, at worst √(1 + 1.5²) of both."""
     for tick, share, obstacle, suspected in (
-        (0.01, 0.9, Obstacle.RESOLUTION, ("limits.tick",)),
-        (0.01, 1.1, Obstacle.LIMITS, ("limits.tick",)),
-        (None, 0.9, Obstacle.SCHEME, ()),
+        (0.01, 0.9, "remains-rounding", ("limits.tick",)),
+        (0.01, 1.1, "remains-limits", ("limits.tick",)),
+        (None, 0.9, "remains-scheme", ()),
     ):
         body = replace(FIRED, limits=Limits(tick=tick))
         most = math.hypot(1.0, 1.5) * math.hypot(0.04, 0.004 * body.spin) / (body.inertia.C * body.spin)
         made = Schedule((channel_pulse(body.channels[0], 1.0, 0.1),))
-        hindrance = Hindrance(body, made, aware=False, nutation=share * most)
-        assert (hindrance.obstacle, hindrance.binding, hindrance.suspected) == (obstacle, (), suspected)
+        plan = Plan(body, "four-pulse", made)
+        left = replace(plan.flight.residual, nutation=share * most)
+        vars(plan)["flight"] = SimpleNamespace(residual=left)
+        assert (remaining(plan).code, hindrances(plan)) == (obstacle, ((), suspected))
 
 
 def test_the_least_on_time_binds_where_a_pulse_is_no_longer() -> None:
     body = spinner(channels=cross(8.0, min_on_time=0.1))
     for on_time, binding in ((0.1, ("min_on_time",)), (0.11, ())):
         made = Schedule((channel_pulse(body.channels[0], 1.0, 0.5), channel_pulse(body.channels[1], 3.0, on_time)))
-        assert Hindrance(body, made, aware=False, nutation=0.01).binding == binding
+        assert hindrances(Plan(body, "four-pulse", made))[0] == binding
 
 
 SHAKEN = replace(FIRED, disturbances=(Disturbance(0.02 + 0j, rate=-FIRED.spin),), limits=Limits(horizon=20.0))

@@ -13,8 +13,8 @@ from support.process import Run
 import nutdamp
 from nutdamp.common.results import Note, Value, note
 from nutdamp.planning.decision import compare, decide
-from nutdamp.planning.notes import TIES, alternatives, comparison_warnings, decision_notes, plan_notes, reasons
-from nutdamp.planning.recommendation import Gain
+from nutdamp.planning.notes import alternatives, comparison_warnings, decision_notes, plan_notes, reasons
+from nutdamp.planning.recommendation import TIES, Gain
 from nutdamp.views.guide import note_entries
 from nutdamp.views.loop import STOPS
 from nutdamp.views.text import NAME, NOTE, REASON, WARNING, note_json, ordered, screen_line, text
@@ -46,7 +46,7 @@ def test_every_code_has_a_sentence_and_every_sentence_its_values() -> None:
 
 
 def test_every_entry_is_used_and_says_what_it_means() -> None:
-    used = {code for _, code, _ in CALLS} | {*(gain.value for gain in Gain), *TIES.values()}
+    used = {code for _, code, _ in CALLS} | {*(gain.value for gain in Gain), *(tie.value for tie in TIES)}
     used |= {"cone-broken-at-start", "ideal-impulses", "ideal-torquer-assumed", "ideal-torque-missing"}
     used |= {*STOPS.values()}
     assert set(note_entries()) == used
