@@ -50,8 +50,10 @@ def schedule(spacecraft: Spacecraft, options: HalfConeOptions) -> Schedule:
     best: Schedule | None = None
     reasons = list[Infeasible]()
     here = builder.here
-    cones = fewest = _fewest(here)
-    allowed, horizon = here.limits.max_pulses, here.horizon
+    reach, turn = _reach(here), max(here.to_turn - here.nutation, 0.0)
+    pulses = ((cones, (1.0 if cones == 1 else 2.0) * math.tan(turn / (2 * cones))) for cones in range(1, MOST_CONES))
+    fewest = next((cones for cones, pulse in pulses if 0.0 <= pulse <= reach / abs(here.axial)), MOST_CONES)
+    cones, allowed, horizon = fewest, here.limits.max_pulses, here.horizon
     half_turns = int(max(horizon - here.limits.earliest, 0.0) / (math.pi * here.inertia.A / abs(here.axial)))
     while cones <= min(MOST_CONES, half_turns + 1, MOST_CONES if allowed is None else allowed - 1):
         try:
@@ -76,7 +78,7 @@ def schedule(spacecraft: Spacecraft, options: HalfConeOptions) -> Schedule:
         )
     if fewest >= MOST_CONES:
         raise Infeasible(
-            f"one pulse turns H by {turn_of(here, _reach(here))} at most, so more than {MOST_CONES} half "
+            f"one pulse turns H by {turn_of(here, reach)} at most, so more than {MOST_CONES} half "
             "cones would be needed; rhumb-line takes many small pulses"
         )
     raise TooShort(
@@ -92,16 +94,6 @@ def _reach(spacecraft: Spacecraft) -> float:
         return math.inf if torquer.torque is None else precession.reach(torquer.torque, spin, math.inf)
     channels = usable(spacecraft)
     return max((precession.reach(abs(each.transverse), spin, each.max_on_time) for each in channels), default=0.0)
-
-
-def _fewest(spacecraft: Spacecraft) -> int:
-    """Least number of cones whose pulses are not beyond reach."""
-    reach, turn = _reach(spacecraft) / abs(spacecraft.axial), max(spacecraft.to_turn - spacecraft.nutation, 0.0)
-    for cones in range(1, MOST_CONES):
-        pulse = (1.0 if cones == 1 else 2.0) * math.tan(turn / (2 * cones))
-        if 0.0 <= pulse <= reach:
-            return cones
-    return MOST_CONES
 
 
 def _row(builder: FlownBuilder, cones: int) -> Schedule:
