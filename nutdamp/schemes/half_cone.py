@@ -125,13 +125,15 @@ def _fixed(here: Spacecraft, cones: int) -> Pulse:
     count = min(int(max(span, 0.0) / step) + 1, LONGEST_SEARCH)
     times = np.asarray(here.limits.earliest + np.arange(count) * step, dtype=np.float64)
     _, quaternions = Arc.of(here.inertia, here.initial).motion(times)
+    # Half-angle, rad, of equal cones from the best point of the present one, and the pulse for it, N m s.
+    equal = min((here.to_turn + here.nutation) / (2 * cones), 1.0)
+    nominal = abs(here.axial) * (math.tan(here.nutation) + math.tan(equal))
     choices: list[tuple[Vector, Vector, Channel]] = []
     work.spend(PLACE * count * len(channels))
     for channel in channels:
         direction = channel.transverse / abs(channel.transverse)
         push = attitude.rotate(quaternions, np.array([direction.real, direction.imag, 0.0]))
-        costs, sizes = _costs(here, channel, push, cones)
-        on_times = precession.on_times_to_turn(sizes, abs(channel.transverse), here.spin)
+        costs, on_times = _costs(here, channel, push, cones, equal, nominal)
         costs[~windows.allowed(times - 0.5 * on_times, on_times, here.limits.earliest)] = np.inf
         choices.append((costs, on_times, channel))
     least = min((float(costs.min(initial=np.inf)) for costs, _, _ in choices), default=math.inf)
@@ -141,7 +143,7 @@ def _fixed(here: Spacecraft, cones: int) -> Pulse:
             f"with {cones} half cones to go, no channel ({names}) comes into phase with a pulse that its on-times and "
             f"the blackout windows allow in the {span:.4g} s left; --cones with another number, or rhumb-line, can help"
         )
-    near = least + WORTH_WAITING * _equal(here, cones)[1]
+    near = least + WORTH_WAITING * nominal
     pulses = [
         (float(costs[row]), channel_pulse(channel, float(times[row]), float(on_times[row])))
         for costs, on_times, channel in choices
@@ -150,20 +152,15 @@ def _fixed(here: Spacecraft, cones: int) -> Pulse:
     return commandable(here, min(pulses, key=lambda choice: (choice[1].end, choice[0]))[1])
 
 
-def _equal(here: Spacecraft, cones: int) -> tuple[float, float]:
-    """Half-angle, rad, of ``cones`` equal cones from the best point of the present one, and the pulse for it, N m s."""
-    far = here.to_turn + here.nutation
-    equal = min(far / (2 * cones), 1.0)
-    return equal, abs(here.axial) * (math.tan(here.nutation) + math.tan(equal))
-
-
-def _costs(here: Spacecraft, channel: Channel, push: Vector, cones: int) -> tuple[Vector, Vector]:
-    """Cost of the row, (n,) N m s, that begins with a push of H along ``push`` (n, 3), and the size of that, N m s."""
-    equal, nominal = _equal(here, cones)
+def _costs(
+    here: Spacecraft, channel: Channel, push: Vector, cones: int, equal: float, nominal: float
+) -> tuple[Vector, Vector]:
+    """Cost of the row, (n,) N m s, that begins with a push of H along ``push`` (n, 3), and the on-time of that, s."""
     h, reach = abs(here.axial), _reach(here)
     best, chosen = np.full(len(push), np.inf), np.zeros(len(push))
-    for size in np.unique(np.minimum(nominal * SHARES, 0.999 * reach)):
-        on_time = float(precession.on_times_to_turn(np.array([size]), abs(channel.transverse), here.spin)[0])
+    sizes = np.unique(np.minimum(nominal * SHARES, 0.999 * reach))
+    on_times = precession.on_times_to_turn(sizes, abs(channel.transverse), here.spin)
+    for size, on_time in zip(sizes.tolist(), on_times.tolist(), strict=True):
         if not channel.min_on_time <= on_time <= channel.max_on_time:
             continue
         momentum = here.momentum + size * push
@@ -174,5 +171,5 @@ def _costs(here: Spacecraft, channel: Channel, push: Vector, cones: int) -> tupl
         costs[(np.abs(half_angle - equal) > UNEQUAL * equal) | (rest > LAGGING * equal)] = np.inf
         costs[(h * (np.tan(half_angle) + np.tan(rest)) > 1.02 * reach)] = np.inf
         better = costs < best
-        best[better], chosen[better] = costs[better], size
+        best[better], chosen[better] = costs[better], on_time
     return best, chosen
