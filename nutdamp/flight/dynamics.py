@@ -285,11 +285,10 @@ class Supply:
         self._begun = self.used
 
     def behind(self, later: Spacecraft) -> Spacecraft:
-        """Spacecraft ``later``, with all firings so far before its t = 0."""
+        """Spacecraft ``later``, with the moments that it then has, and all firings so far before its t = 0."""
         cold, tank = later.cold, later.tank
         return replace(
             later,
-            inertia=lightened(later, self.since),
             cold=None if cold is None else replace(cold, fired=dict(self.fired)),
             tank=None if tank is None else replace(tank, used=self.used),
         )

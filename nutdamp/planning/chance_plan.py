@@ -24,7 +24,7 @@ from nutdamp.montecarlo.statistics import cases_to_show
 from nutdamp.montecarlo.study import CONFIDENCE, SEED, Results, Study, run, study_of, threads_here
 from nutdamp.planning import plan as planning
 from nutdamp.planning.plan import Plan
-from nutdamp.schemes import catalogue, planner, valve_commands
+from nutdamp.schemes import planner, valve_commands
 from nutdamp.schemes.catalogue import OPTIMAL, OptimalOptions, Options
 from nutdamp.schemes.optimal.chance import ChanceLimit, ChanceProgram, Sure, Uncertain
 from nutdamp.schemes.optimal.linear_program import SLOTS
@@ -219,7 +219,7 @@ def uncertain(body: Spacecraft, on_times: Vector, goal: Vector) -> Uncertain:
 
 def plans(spacecraft: Spacecraft, options: Options | None = None) -> Iterator[tuple[str, Plan]]:
     """Plans that keep the requirement with margins, each with a label; none where nothing is required."""
-    body = planning.known(spacecraft, planner.options_of(catalogue.SCHEMES[OPTIMAL.name], options))
+    body = planning.known(spacecraft, planner.settled(OPTIMAL, options, spacecraft))
     if not requirements.required(spacecraft) or not spacecraft.channels or body.dispersions is None:
         return
     try:

@@ -21,7 +21,7 @@ from nutdamp.planning import plan as planning
 from nutdamp.planning.decision import compare, infeasibility, usual
 from nutdamp.planning.plan import Plan, plan
 from nutdamp.planning.recommendation import by_propellant
-from nutdamp.schemes import catalogue, planner, valve_commands
+from nutdamp.schemes import planner, valve_commands
 from nutdamp.schemes.catalogue import OPTIMAL, OptimalOptions, Options
 from nutdamp.schemes.optimal import bounds
 from nutdamp.schemes.optimal.bounds import Proof, SmallAngles
@@ -99,7 +99,7 @@ def certificate(plan: Plan) -> Certificate:
         raise BadRequest(f"a certificate is of a plan of {OPTIMAL.name}, not of {plan.scheme}")
     if not plan.feasible or known is None or known.first_order is None:
         raise BadRequest(f"{OPTIMAL.name} has no least cost to prove here: {plan.refusal or 'there is no such plan'}")
-    chosen = planner.options_of(catalogue.SCHEMES[OPTIMAL.name], plan.options)
+    chosen = planner.settled(OPTIMAL, plan.options, plan.spacecraft)
     body = planning.known(plan.spacecraft, chosen)
     if body.thrust_laws:
         chosen, body = valve_commands.options(body, chosen), valve_commands.plain(body)

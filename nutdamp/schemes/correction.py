@@ -19,7 +19,7 @@ from nutdamp.common import work
 from nutdamp.common.results import Note
 from nutdamp.errors import Infeasible
 from nutdamp.flight import propagation
-from nutdamp.flight.dynamics import make_dynamics, supplied
+from nutdamp.flight.dynamics import lightened, make_dynamics, supplied
 from nutdamp.physics import attitude, precession
 from nutdamp.schemes.catalogue import OptimalOptions, Scheme, SchemeOptions
 from nutdamp.schemes.sequential import steady_omega
@@ -370,6 +370,7 @@ def _after(spacecraft: Spacecraft, pulse: Pulse) -> tuple[Spacecraft, int]:
     given = spacecraft.attitude or Attitude(settled.quaternion)
     after = replace(
         spacecraft,
+        inertia=lightened(spacecraft, pulse.propellant or 0.0),
         omega0=settled.rates,
         attitude=replace(given, quaternion=attitude.multiply(settled.quaternion, to_principal), epoch=None),
         disturbances=tuple(

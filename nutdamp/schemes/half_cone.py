@@ -50,8 +50,10 @@ def schedule(spacecraft: Spacecraft, options: HalfConeOptions) -> Schedule:
     best: Schedule | None = None
     reasons = list[Infeasible]()
     here = builder.here
-    cones = fewest = _fewest(here)
-    allowed, horizon = here.limits.max_pulses, here.horizon
+    reach, turn = _reach(here), max(here.to_turn - here.nutation, 0.0)
+    pulses = ((cones, (1.0 if cones == 1 else 2.0) * math.tan(turn / (2 * cones))) for cones in range(1, MOST_CONES))
+    fewest = next((cones for cones, pulse in pulses if 0.0 <= pulse <= reach / abs(here.axial)), MOST_CONES)
+    cones, allowed, horizon = fewest, here.limits.max_pulses, here.horizon
     half_turns = int(max(horizon - here.limits.earliest, 0.0) / (math.pi * here.inertia.A / abs(here.axial)))
     while cones <= min(MOST_CONES, half_turns + 1, MOST_CONES if allowed is None else allowed - 1):
         try:
@@ -76,7 +78,7 @@ def schedule(spacecraft: Spacecraft, options: HalfConeOptions) -> Schedule:
         )
     if fewest >= MOST_CONES:
         raise Infeasible(
-            f"one pulse turns H by {turn_of(here, _reach(here))} at most, so more than {MOST_CONES} half "
+            f"one pulse turns H by {turn_of(here, reach)} at most, so more than {MOST_CONES} half "
             "cones would be needed; rhumb-line takes many small pulses"
         )
     raise TooShort(
@@ -92,16 +94,6 @@ def _reach(spacecraft: Spacecraft) -> float:
         return math.inf if torquer.torque is None else precession.reach(torquer.torque, spin, math.inf)
     channels = usable(spacecraft)
     return max((precession.reach(abs(each.transverse), spin, each.max_on_time) for each in channels), default=0.0)
-
-
-def _fewest(spacecraft: Spacecraft) -> int:
-    """Least number of cones whose pulses are not beyond reach."""
-    reach, turn = _reach(spacecraft) / abs(spacecraft.axial), max(spacecraft.to_turn - spacecraft.nutation, 0.0)
-    for cones in range(1, MOST_CONES):
-        pulse = (1.0 if cones == 1 else 2.0) * math.tan(turn / (2 * cones))
-        if 0.0 <= pulse <= reach:
-            return cones
-    return MOST_CONES
 
 
 def _row(builder: FlownBuilder, cones: int) -> Schedule:
@@ -133,13 +125,15 @@ def _fixed(here: Spacecraft, cones: int) -> Pulse:
     count = min(int(max(span, 0.0) / step) + 1, LONGEST_SEARCH)
     times = np.asarray(here.limits.earliest + np.arange(count) * step, dtype=np.float64)
     _, quaternions = Arc.of(here.inertia, here.initial).motion(times)
+    # Half-angle, rad, of equal cones from the best point of the present one, and the pulse for it, N m s.
+    equal = min((here.to_turn + here.nutation) / (2 * cones), 1.0)
+    nominal = abs(here.axial) * (math.tan(here.nutation) + math.tan(equal))
     choices: list[tuple[Vector, Vector, Channel]] = []
     work.spend(PLACE * count * len(channels))
     for channel in channels:
         direction = channel.transverse / abs(channel.transverse)
         push = attitude.rotate(quaternions, np.array([direction.real, direction.imag, 0.0]))
-        costs, sizes = _costs(here, channel, push, cones)
-        on_times = precession.on_times_to_turn(sizes, abs(channel.transverse), here.spin)
+        costs, on_times = _costs(here, channel, push, cones, equal, nominal)
         costs[~windows.allowed(times - 0.5 * on_times, on_times, here.limits.earliest)] = np.inf
         choices.append((costs, on_times, channel))
     least = min((float(costs.min(initial=np.inf)) for costs, _, _ in choices), default=math.inf)
@@ -149,7 +143,7 @@ def _fixed(here: Spacecraft, cones: int) -> Pulse:
             f"with {cones} half cones to go, no channel ({names}) comes into phase with a pulse that its on-times and "
             f"the blackout windows allow in the {span:.4g} s left; --cones with another number, or rhumb-line, can help"
         )
-    near = least + WORTH_WAITING * _equal(here, cones)[1]
+    near = least + WORTH_WAITING * nominal
     pulses = [
         (float(costs[row]), channel_pulse(channel, float(times[row]), float(on_times[row])))
         for costs, on_times, channel in choices
@@ -158,20 +152,15 @@ def _fixed(here: Spacecraft, cones: int) -> Pulse:
     return commandable(here, min(pulses, key=lambda choice: (choice[1].end, choice[0]))[1])
 
 
-def _equal(here: Spacecraft, cones: int) -> tuple[float, float]:
-    """Half-angle, rad, of ``cones`` equal cones from the best point of the present one, and the pulse for it, N m s."""
-    far = here.to_turn + here.nutation
-    equal = min(far / (2 * cones), 1.0)
-    return equal, abs(here.axial) * (math.tan(here.nutation) + math.tan(equal))
-
-
-def _costs(here: Spacecraft, channel: Channel, push: Vector, cones: int) -> tuple[Vector, Vector]:
-    """Cost of the row, (n,) N m s, that begins with a push of H along ``push`` (n, 3), and the size of that, N m s."""
-    equal, nominal = _equal(here, cones)
+def _costs(
+    here: Spacecraft, channel: Channel, push: Vector, cones: int, equal: float, nominal: float
+) -> tuple[Vector, Vector]:
+    """Cost of the row, (n,) N m s, that begins with a push of H along ``push`` (n, 3), and the on-time of that, s."""
     h, reach = abs(here.axial), _reach(here)
     best, chosen = np.full(len(push), np.inf), np.zeros(len(push))
-    for size in np.unique(np.minimum(nominal * SHARES, 0.999 * reach)):
-        on_time = float(precession.on_times_to_turn(np.array([size]), abs(channel.transverse), here.spin)[0])
+    sizes = np.unique(np.minimum(nominal * SHARES, 0.999 * reach))
+    on_times = precession.on_times_to_turn(sizes, abs(channel.transverse), here.spin)
+    for size, on_time in zip(sizes.tolist(), on_times.tolist(), strict=True):
         if not channel.min_on_time <= on_time <= channel.max_on_time:
             continue
         momentum = here.momentum + size * push
@@ -182,5 +171,5 @@ def _costs(here: Spacecraft, channel: Channel, push: Vector, cones: int) -> tupl
         costs[(np.abs(half_angle - equal) > UNEQUAL * equal) | (rest > LAGGING * equal)] = np.inf
         costs[(h * (np.tan(half_angle) + np.tan(rest)) > 1.02 * reach)] = np.inf
         better = costs < best
-        best[better], chosen[better] = costs[better], size
+        best[better], chosen[better] = costs[better], on_time
     return best, chosen

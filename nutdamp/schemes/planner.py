@@ -23,22 +23,18 @@ LONGER = 4.0  # multiple of the horizon, and of the default one, up to which a s
 Choice = Options | SchemeOptions | None  # options of one scheme, of several, or None for the defaults
 
 
-def options_of(scheme: Scheme, chosen: Choice) -> SchemeOptions:
-    """Options of a scheme; raises BadRequest for those of another."""
-    if chosen is None:
-        return scheme.options()
-    if isinstance(chosen, Options):
-        return chosen.of(scheme.options)
-    if isinstance(chosen, scheme.options):
-        return chosen
-    raise BadRequest(f"options of {scheme.name}: expected {scheme.options.__name__}(…), got {as_given(chosen)}")
-
-
 def settled(scheme: Scheme, chosen: Choice, spacecraft: Spacecraft) -> SchemeOptions:
-    """Options of a scheme for a ``spacecraft``: H is kept where it has a target, or a bound on its shift."""
-    required = spacecraft.requirement
+    """Options of a scheme for a ``spacecraft``: H is kept where it has a target, or a bound on its shift.
+
+    Raises BadRequest for the options of another scheme.
+    """
+    own, required = chosen or scheme.options(), spacecraft.requirement
+    if isinstance(own, Options):
+        own = own.of(scheme.options)
+    if not isinstance(own, scheme.options):
+        raise BadRequest(f"options of {scheme.name}: expected {scheme.options.__name__}(…), got {as_given(chosen)}")
     bound = required is not None and required.momentum_shift is not None
-    return options_of(scheme, chosen).settled(keeps_axis=bound or spacecraft.goal.axis is not None)
+    return own.settled(keeps_axis=bound or spacecraft.goal.axis is not None)
 
 
 def schedule(name: str, spacecraft: Spacecraft, options: Choice = None) -> Schedule:

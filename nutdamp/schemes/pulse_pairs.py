@@ -44,7 +44,6 @@ SMALLEST = 0.1  # least share of both jumps that each real pulse of the two gets
 APART = 0.5
 NOTHING = 1e-12  # jumps below this times C|ω3| are left out
 SHORTLIST = 8  # candidates that are flown and corrected, at most
-FURTHER = 60  # further whole turns of the spin axis that the second pulse may wait for, at most
 PAIR = 5e-5  # units of `work` of each moment of each pair of channels
 ON_CONE = 1e-3  # share of its natural size below which the first jump counts as nothing
 BESIDE = 0.05  # distance beside the target, over the angles at hand, of a search that finds nothing on it
@@ -344,7 +343,7 @@ class _PairSearch:
                 break
             after, body = self.after(one, times)
             promising = adjoining & (after.cost <= DEAREST * self.floor)[:-1]
-            for further in range(FURTHER):
+            for further in range(FURTHER_TURNS):
                 if not np.nanmin(times + after.wait + further * after.turn, initial=np.inf) < self.windows.horizon:
                     break
                 work.spend(PAIR * len(times) * len(self.channels))

@@ -109,7 +109,7 @@ class Train:
         most = here.limits.max_pulses
         self.most = MOST_PULSES if most is None else most  # pulses allowed, and not shorter than they can be
         if self.shortest > 0.0:
-            self.most = min(self.most, int(_ratio(self.needed, self.turns_by(self.shortest))))
+            self.most = min(self.most, int(self.needed / self.turns_by(self.shortest)))
 
     def turns_by(self, size: float) -> float:
         """Turn of H by a pulse of a ``size`` as in `Attempt`, N m s."""
@@ -174,30 +174,14 @@ class Train:
             raise self._in_phase(fewest, counts[-1])
         return tried[: 2 * TRIES]
 
-    def lengths_near(self, given: float) -> list[float]:
-        """On-times (s) of trains that may close, in the order of their distance from the ``given`` one."""
-        counts = range(2, min(len(self.left), self.most) + 1)
-        sizes = {self.size(count) for count in counts if self.left[count - 1] <= OPEN}
-        if self.here.limits.tick is not None:
-            sizes |= {self.windows.nearest_tick(given), self.windows.tick_after(given)}
-        possible = [size for size in sizes if self.shortest <= size <= self.widest and size > 0.0]
-        return sorted(possible, key=lambda size: abs(size - given))
-
     def _fewest(self, each: float) -> int:
-        """Least number of pulses that turn H by up to ``each`` N m s; two at least, to close."""
-        return max(math.ceil(_ratio(self.needed, each) - 1e-9), 2)
+        """Least number of pulses that turn H by up to ``each`` N m s, a billion at most; two at least, to close."""
+        return max(math.ceil(self.needed / max(each, 1e-9 * self.needed) - 1e-9), 2)
 
     @cached_property
     def left(self) -> Vector:
         """Sum of the phasors of the first 1, 2, … pulses and the nutation at the start, in pulses, (n,)."""
-        shots = self._shots()
-        turned = self.here.nutation_rate * np.array([t for t, _ in shots])
-        sums = np.cumsum(np.exp(1j * (np.angle(np.array([push for _, push in shots])) + turned)))
-        counts = np.arange(1, len(shots) + 1)
-        return np.asarray(np.abs(self.here.inertia.A * self.here.initial.omega * counts / self.needed + sums))
-
-    def _shots(self) -> list[tuple[float, complex]]:
-        """Moments (s) of right phase within the limits, undisturbed, and the direction in the body of each push."""
+        # Moments (s) of right phase within the limits, undisturbed, and the direction in the body of each push.
         shots: list[tuple[float, complex]] = []
         ready, on_time = self.here.limits.earliest, 0.0 if self.ideal else self.on_time
         firsts = [(_aligned(self.here, channel, self.ahead, ready), channel.transverse) for channel in self.channels]
@@ -227,7 +211,10 @@ class Train:
             ready = t + 0.5 * on_time + gap
             if not firsts:
                 ready = max(t + self.turn / self.options.per_turn - 0.5 * on_time, ready)
-        return shots
+        turned = self.here.nutation_rate * np.array([t for t, _ in shots])
+        sums = np.cumsum(np.exp(1j * (np.angle(np.array([push for _, push in shots])) + turned)))
+        counts = np.arange(1, len(shots) + 1)
+        return np.asarray(np.abs(self.here.inertia.A * self.here.initial.omega * counts / self.needed + sums))
 
     def next_pulse(self, here: Spacecraft, remaining: int, attempt: Attempt) -> Pulse | None:
         """Next pulse of ``remaining`` ones from the motion of ``here``; None where the limits leave no time."""
@@ -340,11 +327,6 @@ def _spread(channels: list[Channel], count: int) -> list[Channel]:
     return chosen
 
 
-def _ratio(whole: float, part: float) -> float:
-    """Ratio of ``whole`` to ``part``; a billion at most."""
-    return whole / part if whole < 1e9 * part else 1e9
-
-
 EXACT, CLEARLY = 1e-10, 0.01
 """rad of flown residual that count as nothing, and relative saving that is worth more pulses."""
 
@@ -379,18 +361,23 @@ def _train(spacecraft: Spacecraft, options: RhumbLineOptions) -> Schedule:
 
 def _another(spacecraft: Spacecraft, options: RhumbLineOptions) -> str:
     """Advice on a pulse length that works instead of the requested one, the nearest first."""
-    builder, exact = FlownBuilder(spacecraft), 0.0 if spacecraft.limits.tick is None else tolerable(spacecraft)
+    builder, given, ticks = FlownBuilder(spacecraft), options.on_time or 0.0, spacecraft.limits.tick is not None
     with suppress(Infeasible):
         if spacecraft.least_impulse > 1e-9 * abs(spacecraft.axial):
             builder = one_pulse.damped(builder)
-        lengths = Train(builder.here, replace(options, on_time=None)).lengths_near(options.on_time or 0.0)
-        for length in lengths[:OTHERS]:
+        train = Train(builder.here, replace(options, on_time=None))
+        counts = range(2, min(len(train.left), train.most) + 1)
+        lengths = {train.size(count) for count in counts if train.left[count - 1] <= OPEN}
+        if ticks:
+            lengths |= {train.windows.nearest_tick(given), train.windows.tick_after(given)}
+        possible = [length for length in lengths if train.shortest <= length <= train.widest and length > 0.0]
+        for length in sorted(possible, key=lambda length: abs(length - given))[:OTHERS]:
             digits = 3 - math.floor(math.log10(length))
             rounded = math.ceil(length * 10.0**digits) / 10.0**digits  # up: so that no more pulses are needed
             with suppress(Infeasible):
-                train = _train(spacecraft, replace(options, on_time=rounded))
-                if correction.left(spacecraft, train) <= max(10.0 * EXACT, exact):
-                    return f"--on-time {rounded:.4g}s works, with {len(train)} pulses in all"
+                whole = _train(spacecraft, replace(options, on_time=rounded))
+                if correction.left(spacecraft, whole) <= max(10.0 * EXACT, ticks * tolerable(spacecraft)):
+                    return f"--on-time {rounded:.4g}s works, with {len(whole)} pulses in all"
     return "no other length was found that works"
 
 

@@ -222,22 +222,6 @@ class ImpulseBuilder:
 FADED = 1e-6  # fraction of the nutation below which pulses have nothing to do: dissipation has removed it
 
 
-def no_channels(spacecraft: Spacecraft) -> str:
-    """Error where no body-fixed channel can damp."""
-    if any(channel.damps for channel in spacecraft.channels):
-        ticks = "" if spacecraft.limits.tick is None else ", as a multiple of limits.tick"
-        time = spacecraft.horizon - spacecraft.limits.earliest
-        if time <= 0.0:  # by the file, or where other pulses of the scheme come first
-            return "limits.earliest, or the pulses before, leave no time within limits.horizon"
-        return (
-            f"no channel can be on for as long as its min_on_time requires{ticks}, at most for its max_on_time, within "
-            f"the {time:.4g} s from limits.earliest to limits.horizon"
-        )
-    if spacecraft.channels:
-        return "no channel has a torque more transverse than axial, so none can damp a nutation"
-    return "the file names no thrusters, and this scheme fires body-fixed ones"
-
-
 def bounded_by(spacecraft: Spacecraft) -> str:
     """Limits on a schedule of its channels, by name: the horizon, and those that the file sets."""
     limits, channels = spacecraft.limits, spacecraft.channels
@@ -257,9 +241,20 @@ NO_AXIAL = "no channel has a torque about axis 3, so none can set the spin; leav
 
 def at_hand(spacecraft: Spacecraft, channels: list[Channel]) -> list[Channel]:
     """Damping ``channels``; raises Infeasible where there are none."""
-    if not channels:
-        raise Infeasible(no_channels(spacecraft))
-    return channels
+    if channels:
+        return channels
+    if not spacecraft.channels:
+        raise Infeasible("the file names no thrusters, and this scheme fires body-fixed ones")
+    if not any(channel.damps for channel in spacecraft.channels):
+        raise Infeasible("no channel has a torque more transverse than axial, so none can damp a nutation")
+    ticks = "" if spacecraft.limits.tick is None else ", as a multiple of limits.tick"
+    time = spacecraft.horizon - spacecraft.limits.earliest
+    if time <= 0.0:  # by the file, or where other pulses of the scheme come first
+        raise Infeasible("limits.earliest, or the pulses before, leave no time within limits.horizon")
+    raise Infeasible(
+        f"no channel can be on for as long as its min_on_time requires{ticks}, at most for its max_on_time, within "
+        f"the {time:.4g} s from limits.earliest to limits.horizon"
+    )
 
 
 def expect_aim(spacecraft: Spacecraft) -> None:
@@ -336,25 +331,24 @@ class SymmetricModel:
         """Schedule with the true actuators."""
         if self.spacecraft.inertia.symmetric:
             return schedule
+        torquer, windows = self.spacecraft.torquer, Windows(self.spacecraft)
         ready, pulses = self.spacecraft.limits.earliest, list[Pulse]()
         for pulse in schedule:
             channel = channel_of(self.spacecraft, pulse)
-            true = self._steered(pulse, ready) if channel is None else channel_pulse(channel, pulse.t, pulse.on_time)
+            if channel is not None:
+                true = channel_pulse(channel, pulse.t, pulse.on_time)
+            else:  # longer or shorter, and so moved where the limits require it
+                assert torquer is not None
+                first, second = pulse.impulse[:2] / self.stretch
+                impulse, t, on_time = math.hypot(first, second), pulse.t, 0.0
+                if torquer.torque is not None:
+                    on_time = windows.on_time(impulse / torquer.torque, 0.0, math.inf)
+                    start = windows.earliest_start(on_time, max(pulse.start, ready))
+                    t = t if start is None else start + 0.5 * on_time
+                true = steerable_pulse(torquer, t, math.atan2(second, first), impulse=impulse, on_time=on_time)
             pulses.append(true)
             ready = true.end + self.spacecraft.limits.gap
         return Schedule(tuple(pulses), schedule.notes, schedule.bounds)
-
-    def _steered(self, pulse: Pulse, ready: float) -> Pulse:
-        """Steerable pulse of the true torquer: longer or shorter, and so moved where the limits require it."""
-        torquer, windows = self.spacecraft.torquer, Windows(self.spacecraft)
-        assert torquer is not None
-        first, second = pulse.impulse[:2] / self.stretch
-        impulse, t, on_time = math.hypot(first, second), pulse.t, 0.0
-        if torquer.torque is not None:
-            on_time = windows.on_time(impulse / torquer.torque, 0.0, math.inf)
-            start = windows.earliest_start(on_time, max(pulse.start, ready))
-            t = t if start is None else start + 0.5 * on_time
-        return steerable_pulse(torquer, t, math.atan2(second, first), impulse=impulse, on_time=on_time)
 
 
 def model_of(spacecraft: Spacecraft, *, turning: bool = False) -> SymmetricModel:

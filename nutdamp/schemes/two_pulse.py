@@ -182,22 +182,18 @@ def _candidates(spacecraft: Spacecraft, one: Channel, two: Channel, literal: boo
     count = int(max(spacecraft.horizon - first_wait, 0.0) * abs(rate) / (2 * math.pi)) + 1
     turns = _turns(count, turn + turning * first_wait, 2 * math.pi * turning / abs(rate))
     waits = first_wait + 2 * math.pi / abs(rate) * turns
-    halves = _halves(spacecraft, literal)
     if literal:  # halves and wait as printed; the pair must do with the direction it finds
-        count = max(int(spacecraft.horizon / halves.wait), 1) // 2 + 1
-        odd = 2 * _turns(count, turn + turning * halves.wait, 2 * turning * halves.wait) + 1
-        waits = halves.wait * odd
+        wait = _halves(spacecraft, literal).wait
+        count = max(int(spacecraft.horizon / wait), 1) // 2 + 1
+        waits = wait * (2 * _turns(count, turn + turning * wait, 2 * turning * wait) + 1)
     miss = np.angle(np.exp(1j * (turn + turning * waits)))
     factor = 1.0 / np.cos(0.5 * miss)
     # Worth placing: each wait clearly cheaper than all before it, and the cheapest few.
     before = np.concatenate([[np.inf], np.minimum.accumulate(factor)[:-1]])
     better = np.flatnonzero(factor * CLOSE_IN_COST < before)
     cheapest = np.argsort(factor, kind="stable")[:SHORTLIST]
-    placed = (
-        _place(spacecraft, (one, two), halves, float(waits[index]), float(miss[index]), literal)
-        for index in sorted({*better.tolist(), *cheapest.tolist()})
-        if factor[index] <= DEAREST
-    )
+    worth = (index for index in sorted({*better.tolist(), *cheapest.tolist()}) if factor[index] <= DEAREST)
+    placed = (_place(spacecraft, (one, two), float(waits[index]), float(miss[index]), literal) for index in worth)
     return [candidate for candidate in placed if candidate is not None]
 
 
@@ -221,12 +217,7 @@ def _turns(count: int, miss: float, step: float) -> Vector:
 
 
 def _place(
-    spacecraft: Spacecraft,
-    pair: tuple[Channel, Channel],
-    halves: rigid_body.HalfPulses,
-    wait: float,
-    miss: float,
-    literal: bool,
+    spacecraft: Spacecraft, pair: tuple[Channel, Channel], wait: float, miss: float, literal: bool
 ) -> PairCandidate | None:
     """First allowed moment at which the pair opposes ω; None where the limits leave none."""
     windows, turning = Windows(spacecraft), spacecraft.nutation_rate
@@ -236,17 +227,19 @@ def _place(
     phase = rigid_body.phase_to_oppose(omega0, pair[0].transverse * cmath.exp(0.5j * miss))
     if turning == 0.0 and abs(phase) > ALIGNED:
         return None
-    period = 2 * math.pi / abs(turning) if turning != 0.0 else math.inf
+    period = spacecraft.body_period
 
     def opposed_from(time: float) -> float:
-        aligned = phase / turning if turning != 0.0 else time
-        return aligned + max(math.ceil((time - aligned) / period), 0) * period if turning != 0.0 else time
+        if turning == 0.0:
+            return time
+        return phase / turning + max(math.ceil((time - phase / turning) / period), 0) * period
 
     grown = 1.0 if literal else _grown(spacecraft, opposed_from(spacecraft.limits.earliest) + 0.5 * wait)
     if grown < FADED:
         return None
     (long, lacks), (longer, more) = (
-        _nearest(spacecraft, channel, grown * half * factor) for channel, half in zip(pair, halves[:2], strict=True)
+        _nearest(spacecraft, channel, grown * half * factor)
+        for channel, half in zip(pair, _halves(spacecraft, literal)[:2], strict=True)
     )
     short = (lacks + more) / factor
     if short >= 1.0 or wait - 0.5 * (long + longer) < spacecraft.limits.gap:
@@ -258,10 +251,8 @@ def _place(
         free = [(windows.blocked_until(*start), start[0]) for start in starts]
         delay = max((end - start for end, start in free if end is not None), default=0.0)
         if delay == 0.0:
-            schedule = Schedule((channel_pulse(pair[0], *timing[0]), channel_pulse(pair[1], *timing[1])))
-            return PairCandidate(
-                schedule.cost, schedule.end, pair, timing, short if short > 1e-9 else 0.0, miss, factor
-            )
+            pulses = Schedule((channel_pulse(pair[0], *timing[0]), channel_pulse(pair[1], *timing[1])))
+            return PairCandidate(pulses.cost, pulses.end, pair, timing, short if short > 1e-9 else 0.0, miss, factor)
         first += delay if turning == 0.0 else max(math.ceil(delay / period), 1) * period
     return None
 

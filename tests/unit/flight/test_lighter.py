@@ -29,6 +29,7 @@ from nutdamp.physics.thruster import Tank, Trapezoid
 from nutdamp.planning import plan as planning
 from nutdamp.schemes import command_block
 from nutdamp.schemes.catalogue import CommandBlockOptions
+from nutdamp.schemes.valve_commands import Legs
 from nutdamp.spacecraft.model import Requirement, Spacecraft
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse, on_command
 from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
@@ -142,6 +143,17 @@ def test_what_is_left_out_is_of_second_order(missed: Callable[[Spacecraft, Sched
     long, short = (missed(body, fires(body, 0, on_time=on_time)) for on_time in (0.05, 0.025))
     assert long > 1e-9
     assert short < 0.3 * long
+
+
+@pytest.mark.parametrize("shed", [AXIAL, deep(THREE)])
+def test_a_further_leg_begins_where_the_one_before_ends(shed: Shed) -> None:
+    body, legs = craft(shed), Legs(craft(shed))
+    made = fires(body, 0, 2, 1, 3, 0)
+    legs.fire(made)
+    flight = flown(body, made)
+    assert legs.here.inertia.moments == pytest.approx(flight.last_moments, rel=1e-12)
+    assert legs.here.omega0 == pytest.approx(flight.settled.rates, abs=1e-12)
+    assert legs.here.momentum == pytest.approx(flight.last_momentum, rel=1e-12, abs=1e-9)
 
 
 @pytest.mark.parametrize("scheme", ["one-pulse", deep("four-pulse"), weekly("optimal")])

@@ -20,6 +20,7 @@ from support.places import CASES, case
 
 import nutdamp
 from nutdamp.common import work
+from nutdamp.errors import Infeasible
 from nutdamp.files.reader import load_spacecraft, read_spacecraft
 from nutdamp.planning.decision import infeasibility
 from nutdamp.planning.plan import plan
@@ -31,7 +32,7 @@ from nutdamp.schemes.optimal.linear_program import Burn
 from nutdamp.schemes.optimal.problem import DEARER, Problem
 from nutdamp.schemes.optimal.refinement import EndEquations
 from nutdamp.schemes.optimal.search import HALVINGS, _LeastCostSearch
-from nutdamp.schemes.sequential import bounded_by, no_channels
+from nutdamp.schemes.sequential import at_hand, bounded_by
 from nutdamp.spacecraft.model import Goal, Limits, Spacecraft
 from nutdamp.spacecraft.requirements import DAMPED_ANGLE, SAME_COST
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
@@ -89,7 +90,9 @@ def test_other_horizons_and_schemes_are_tried_where_the_program_leads_nowhere_or
 def test_ticks_are_among_the_limits_named_where_the_file_sets_them(tick: float | None, named: bool) -> None:
     body = replace(BODY, limits=replace(BODY.limits, tick=tick))
     brief = replace(body, channels=cross(8.0, min_on_time=500.0))
-    for said in (bounded_by(body), Problem(body, PLAIN).not_found(), no_channels(brief)):
+    with pytest.raises(Infeasible) as none:
+        at_hand(brief, [])
+    for said in (bounded_by(body), Problem(body, PLAIN).not_found(), str(none.value)):
         assert ("tick" in said) is named
 
 
