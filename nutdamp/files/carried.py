@@ -51,12 +51,8 @@ def later(flight: Flight, time: float) -> Later:
     moment = np.array([time])
     rates, quaternions = flight.motion(moment)
     moments = np.broadcast_to(flight.moments_at(moment), (1, 3))[0].tolist()
-    used, inertia, tank, turned = (
-        float(flight.schedule.used_by(moment)[0]),
-        before.inertia,
-        before.tank,
-        before.attitude,
-    )
+    used = float(flight.schedule.used_by(moment)[0])
+    inertia, tank, turned = before.inertia, before.tank, before.attitude
     if tank is not None:
         left = tank.propellant - tank.used - used
         if left <= 0.0:

@@ -109,7 +109,7 @@ class Train:
         most = here.limits.max_pulses
         self.most = MOST_PULSES if most is None else most  # pulses allowed, and not shorter than they can be
         if self.shortest > 0.0:
-            self.most = min(self.most, int(self.needed / self.turns_by(self.shortest)))
+            self.most = min(self.most, int(_ratio(self.needed, self.turns_by(self.shortest))))
 
     def turns_by(self, size: float) -> float:
         """Turn of H by a pulse of a ``size`` as in `Attempt`, N m s."""
@@ -175,8 +175,8 @@ class Train:
         return tried[: 2 * TRIES]
 
     def _fewest(self, each: float) -> int:
-        """Least number of pulses that turn H by up to ``each`` N m s, a billion at most; two at least, to close."""
-        return max(math.ceil(self.needed / max(each, 1e-9 * self.needed) - 1e-9), 2)
+        """Least number of pulses that turn H by up to ``each`` N m s; two at least, to close."""
+        return max(math.ceil(_ratio(self.needed, each) - 1e-9), 2)
 
     @cached_property
     def left(self) -> Vector:
@@ -325,6 +325,11 @@ def _spread(channels: list[Channel], count: int) -> list[Channel]:
             )
         chosen.append(channels[off.index(max(off))])
     return chosen
+
+
+def _ratio(whole: float, part: float) -> float:
+    """Ratio of ``whole`` to ``part``; a billion at most, also where the part is nothing."""
+    return whole / part if whole < 1e9 * part else 1e9
 
 
 EXACT, CLEARLY = 1e-10, 0.01

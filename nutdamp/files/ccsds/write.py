@@ -188,10 +188,8 @@ ALONE = "SPIN_ANGLE_VEL is the rate about the third axis at that moment; no tran
 def _segment(body: Spacecraft, stretch: AttitudeSegment, reference: Reference, kind: str) -> message.Segment:
     times = [reference.epoch.plus(seconds).text for seconds in stretch.t.tolist()]
     useable = (times[0], None, None, times[-1])  # all of it
-    axes, method = (
-        BODY_FRAME if kind == QUATERNION_ANGVEL else None,
-        "LAGRANGE" if kind == SPIN else "HERMITE",
-    )
+    axes = BODY_FRAME if kind == QUATERNION_ANGVEL else None
+    method = "LAGRANGE" if kind == SPIN else "HERMITE"
     values = [*_identity(body), None, reference.frame, BODY_FRAME, "UTC", *useable, kind, axes, method, "3"]
     comments = [f"pulses completed: {stretch.completed}", *[ALONE] * (kind == SPIN)]
     if kind == QUATERNION_ANGVEL:

@@ -261,6 +261,13 @@ def test_a_train_keeps_the_narrowest_bounds_of_its_channels() -> None:
     assert (train.shortest, train.longest) == (0.05, 0.9)
 
 
+def test_a_shortest_pulse_next_to_nothing_bounds_the_number_of_pulses_as_none_does() -> None:
+    """More of them would be needed than a float can hold."""
+    plans = [train(still(channels=(channel("T", 8.0, 0.0, 0.0, min_on_time=least),))) for least in (0.0, 1e-320)]
+    any_length, shortest = ([(pulse.t, pulse.on_time) for pulse in plan.pulses] for plan in plans)
+    assert any_length == shortest
+
+
 def test_ideal_impulses_turn_a_few_degrees_each_where_there_are_too_few_moments() -> None:
     """Of a heavy body as of a light one."""
     for size in (1.0, 300.0):
