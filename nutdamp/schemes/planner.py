@@ -61,7 +61,8 @@ def schedule(name: str, spacecraft: Spacecraft, options: Choice = None) -> Sched
     try:
         whole = planned(model.body, chosen)
     except TooShort as short:
-        cure = short.cure or _longer_horizon(model.body, lambda body: planned(body, chosen))
+        with work.budget("a longer horizon", work.CURE):
+            cure = short.cure or _longer_horizon(model.body, lambda body: planned(body, chosen))
         raise TooShort(short.why, cure) from None
     return _corrected(scheme, model, whole, chosen)
 

@@ -22,7 +22,7 @@ from nutdamp.flight.end_state import left_by
 from nutdamp.schemes.catalogue import HalfConeOptions, RhumbLineOptions, SchemeOptions, TwoPulseOptions
 from nutdamp.schemes.correction import bounded_step
 from nutdamp.schemes.optimal.descent import Task
-from nutdamp.schemes.optimal.linear_program import GrowingProgram, Solution
+from nutdamp.schemes.optimal.linear_program import GrowingProgram, Shares, Solution
 from nutdamp.schemes.optimal.problem import LEFT, UNMET, Problem
 from nutdamp.schemes.optimal.refinement import Influence, along, misses, small_angles
 from nutdamp.spacecraft import requirements
@@ -252,16 +252,17 @@ def _pieces(problem: Problem, influence: Influence, horizon: float) -> Pieces | 
     whole = np.einsum("nek,ck->ecn", influence.rows(centres) * lost[:, None], torques) * (width / size)
     equations, slots = len(influence.goal), len(free)
     program = GrowingProgram(influence.goal / size, np.ones(slots), np.ones(equations))
-    slack = np.vstack([np.hstack([np.eye(equations), -np.eye(equations)]), np.zeros((slots, 2 * equations))])
+    slack = np.hstack([np.eye(equations), -np.eye(equations)])
     program.add(np.full(2 * equations, 1e4 * slots), slack, np.full(2 * equations, np.inf))
-    rows = np.vstack([whole.reshape(equations, -1), np.tile(np.eye(slots), len(channels))])
-    program.add(np.repeat(problem.costs / float(problem.costs.max()), slots), rows, np.ones(rows.shape[1]))
+    every = np.ones(slots * len(channels))
+    cost = np.repeat(problem.costs / float(problem.costs.max()), slots)
+    program.add(cost, whole.reshape(equations, -1), every, Shares(np.tile(np.arange(slots), len(channels)), every))
     optimum = program.optimum()
     if optimum is None or float(optimum.x[: 2 * equations].sum()) > UNMET:
         return None
-    every = np.zeros((len(channels), count + 1))  # and one slot more, in which nothing fires
-    every[:, free] = optimum.x[2 * equations :].reshape(len(channels), slots) * width
-    return _in_order(every, width)
+    fired = np.zeros((len(channels), count + 1))  # and one slot more, in which nothing fires
+    fired[:, free] = optimum.x[2 * equations :].reshape(len(channels), slots) * width
+    return _in_order(fired, width)
 
 
 def _in_order(times: Vector, width: float) -> Pieces | None:

@@ -218,13 +218,13 @@ class Program:
         else:
             reach = np.abs(self._coefficients(columns)).max(axis=1, initial=0.0)
         # Where H may end off its target, the shares of the directions add up to no more than `off`.
-        shares, longest = min(ring.shape[1], 1), len(self._longest(columns))
-        work.spend(LIMITED * longest)
-        limits = np.concatenate([np.full(shares, self.off / self._scale), np.ones(longest)])
+        shares, limited = min(ring.shape[1], 1), int(self._longest(columns).limit.max(initial=-1)) + 1
+        work.spend(LIMITED * limited)
+        limits = np.concatenate([np.full(shares, self.off / self._scale), np.ones(limited)])
         master = GrowingProgram(self.influence.goal / self._scale, limits, np.maximum(reach, TINIEST))
-        rows = np.zeros((count + len(limits), 2 * count + ring.shape[1]))
+        rows = np.zeros((count + shares, 2 * count + ring.shape[1]))
         rows[:count] = np.hstack([np.eye(count), -np.eye(count), ring])
-        rows[count : count + shares, 2 * count :] = 1.0
+        rows[count:, 2 * count :] = 1.0
         cost = np.repeat([SLACK_COST, 0.0], [2 * count, ring.shape[1]])
         master.add(cost, rows, np.full(len(cost), np.inf))
         self._add(master, columns)
@@ -233,19 +233,17 @@ class Program:
     def _add(self, master: GrowingProgram, columns: ProgramColumns) -> None:
         """Let the program have these columns."""
         most = np.where(columns.width > 0.0, columns.width / self._unit[columns.channel], np.inf)
-        shares = np.zeros((int(self.off > 0.0), len(most)))
-        rows = np.vstack([self._coefficients(columns), shares, self._longest(columns)])
-        master.add(self._costs(columns.channel, columns.t), rows, most)
+        share = self._longest(columns)
+        share = share._replace(limit=share.limit + np.where(share.limit < 0, 0, int(self.off > 0.0)))
+        master.add(self._costs(columns.channel, columns.t), self._coefficients(columns), most, share)
 
-    def _longest(self, columns: ProgramColumns) -> Vector:
-        """Rows (burns, n) that hold each burn's on-time, over the longest that its channel may be on."""
+    def _longest(self, columns: ProgramColumns) -> Shares:
+        """Shares in the limits, one per burn, that hold its on-time, over the longest that its channel may be on."""
         longest = np.array([channel.max_on_time for channel in self.channels])[columns.channel]
-        bounded = np.flatnonzero((columns.burn >= 0) & np.isfinite(longest))
-        used = np.bincount(columns.burn[bounded]) > 0
-        row = (np.cumsum(used) - 1)[columns.burn[bounded]]
-        rows = np.zeros((int(used.sum()), len(columns.t)))
-        rows[row, bounded] = self._unit[columns.channel[bounded]] / longest[bounded]
-        return rows
+        bounded = (columns.burn >= 0) & np.isfinite(longest)
+        limit = np.full(len(longest), -1)
+        limit[bounded] = np.unique(columns.burn[bounded], return_inverse=True)[1]
+        return Shares(limit, self._unit[columns.channel] / longest)
 
     def _costs(self, channel: NDArray[np.int_], times: Vector) -> Vector:
         """Cost of one unit of each ``channel`` at these ``times``, over the dearest channel's."""
@@ -394,6 +392,10 @@ WAYS: tuple[tuple[Literal["simplex", "ipm"], bool, float], ...] = (
 """Method, presolving, and factor of the costs, tried in turn: where the dual simplex loses its way at one scale of the
 costs, against which its tolerances count, it mostly does not at another; interior points do not know the trouble."""
 
+INTERIOR, LARGE = WAYS[3], 10_000
+"""Way tried first for more unknowns than that: a step of the dual simplex then passes thousands of their bounds, at a
+time that grows with the square of their number, where interior points take 0.4 s instead of 10 s for 75,000."""
+
 MOST_STEPS = 100_000  # steps of the simplex or of the interior points, in one way of solving
 SMALL, NONZERO = 10_000, 1e-2  # coefficients that count for nothing here, and units of `work` of each above them
 
@@ -404,6 +406,13 @@ class Optimum(NamedTuple):
     x: Vector
     prices: Vector
     shadows: Vector
+
+
+class Shares(NamedTuple):
+    """The ``limit`` (n,), a number from 0 on or -1 for none, in which each unknown has this ``share`` (n,)."""
+
+    limit: NDArray[np.int_]
+    share: Vector
 
 
 class GrowingProgram:
@@ -421,12 +430,21 @@ class GrowingProgram:
         for lower, upper in zip(least.tolist(), [*(right / level).tolist(), *limits.tolist()], strict=True):
             self._highs.addRow(lower, upper, 0, np.zeros(0, dtype=np.int32), np.zeros(0))
 
-    def add(self, cost: Vector, rows: Vector, most: Vector) -> None:
-        """More unknowns: ``cost`` (n,), coefficients ``rows`` (m + k, n) and the ``most`` (n,) that they may be."""
+    def add(self, cost: Vector, rows: Vector, most: Vector, shares: Shares | None = None) -> None:
+        """More unknowns: ``cost`` (n,), coefficients ``rows`` (m + k, n) and the ``most`` (n,) that they may be.
+
+        ``rows`` may end before the last limits; ``shares`` are further coefficients, in one limit each.
+        """
         rows = rows / np.concatenate([self._level, np.ones(len(rows) - len(self._level))])[:, None]
         column, row = np.nonzero(rows.T)
+        values = rows.T[column, row]
+        if shares is not None and (limited := np.flatnonzero(shares.limit >= 0)).size:
+            column = np.concatenate([column, limited])
+            order = np.argsort(column, kind="stable")
+            column = column[order]
+            row = np.concatenate([row, len(self._level) + shares.limit[limited]])[order]
+            values = np.concatenate([values, shares.share[limited]])[order]
         starts = np.searchsorted(column, np.arange(len(cost))).astype(np.int32)
-        values = np.ascontiguousarray(rows.T[column, row])
         self._costs = np.concatenate([self._costs, cost])
         zeros = np.zeros(len(cost))
         self._highs.addCols(len(cost), cost, zeros, most, len(values), starts, row.astype(np.int32), values)
@@ -438,7 +456,7 @@ class GrowingProgram:
 
     def optimum(self) -> Optimum | None:
         """The cheapest solution, from the last one's basis if there is one; None where no way of solving succeeds."""
-        optimum = self._solved(*WAYS[0])
+        optimum = self._solved(*(WAYS[0] if len(self._costs) <= LARGE else INTERIOR))
         for way in WAYS:
             if optimum is None:
                 self._highs.clearSolver()

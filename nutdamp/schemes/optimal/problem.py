@@ -44,7 +44,7 @@ def thinned(program: Program, solution: Solution, cost: float, *, fewest: bool) 
     allowed = program.spacecraft.limits.max_pulses
     if fewest or (allowed is not None and high > allowed):
         most = math.inf
-    while low < high:
+    while low < high and not work.exhausted():
         middle = (low + high) // 2
         trial = program.solve(program.about(order[:middle]))
         if trial.unmet <= UNMET and trial.cost <= most:

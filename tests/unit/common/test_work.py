@@ -116,6 +116,20 @@ def test_damping_of_thousands_of_turns_before_a_turn_of_the_axis_is_cut_too(
     assert spent.done < 1500.0  # of 39,000 without a bound
 
 
+def test_a_longer_horizon_is_sought_within_bounds(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What only names a cure leaves the other schemes of a comparison their search."""
+    body = aimed(spinner(150.0, 100.0, 0.3, channels=cross(1.0), limits=Limits(horizon=60.0)), 40.0, 10.0)
+    units, named = [], []
+    for most in (0.0, 50.0, work.CURE):
+        monkeypatch.setattr(work, "CURE", most)
+        with work.budget("test", 1e9) as spent:
+            plan = planning.plan(body, "rhumb-line")
+        units.append(spent.done)
+        named.append("limits.horizon" in infeasibility(plan))
+    assert named == [False, True, True]
+    assert units[0] < units[1] < units[0] + 100.0 < units[2]
+
+
 def test_linear_programs_count_by_their_size(monkeypatch: pytest.MonkeyPatch) -> None:
     """On a sphere pulses of every turn do alike, and all slots of a long horizon get into the program."""
     body = spinner(7500.0, 7500.0, 0.018, degrees=0.5, channels=cross(3e-4), limits=Limits(horizon=2e5))

@@ -152,6 +152,22 @@ def test_every_way_of_solving_finds_the_same(ways: int, monkeypatch: pytest.Monk
     check_same(usual, solved(small(1).grown()))
 
 
+def test_many_unknowns_begin_with_interior_points(monkeypatch: pytest.MonkeyPatch) -> None:
+    ways = list[str]()
+
+    def never(_: int, method: str) -> bool:
+        ways.append(method)
+        return False
+
+    Failing(monkeypatch, never)
+    optima = list[Optimum]()
+    for large in (12, 11):
+        monkeypatch.setattr(linear_program, "LARGE", large)
+        optima.append(solved(small(3).grown()))
+    check_same(*optima)
+    assert ways == ["simplex", "ipm"]
+
+
 def test_the_basis_is_kept() -> None:
     """From the last basis, columns that change nothing take no step; from none they take several."""
     program = small(2).grown()
