@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -280,7 +281,9 @@ def _screen(
 
     if verbose:
         return robust_screen(dispersed)
-    return glance(dispersed.joined, decided, dispersed.name, robust_notes(dispersed))
+    joined = dispersed.joined
+    named = decided and replace(decided, plan=joined[dispersed.name])
+    return glance(joined, named, robust_notes(dispersed))
 
 
 @click.command("animate", cls=SessionCommand)

@@ -26,10 +26,11 @@ from nutdamp.planning import plan as planning
 from nutdamp.planning.chance_plan import Tightening, tightening
 from nutdamp.planning.decision import Comparison, Decision, attempt
 from nutdamp.planning.notes import beside
-from nutdamp.planning.plan import Plan
+from nutdamp.planning.plan import Plan, Standing
 from nutdamp.planning.recommendation import TIES, Ground, by_propellant, cheapest
 from nutdamp.planning.screening import AS_GOOD, Fresh, PlanCandidate, entered, equal_from, fly_all, fresh_of
 from nutdamp.schemes.catalogue import OPTIMAL, Options
+from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import keeps_limits
 from nutdamp.spacecraft.model import Spacecraft, required_share
 
@@ -231,8 +232,13 @@ def _flown(
 
 
 def _trimmed(ranks: RobustComparison) -> RobustComparison:
-    """Comparison with the robust plan's on-times as short as the required share allows, in fresh cases too."""
+    """Comparison with the robust plan's on-times as short as the required share allows, in fresh cases too.
+
+    Unless they also do what is not required, and would be short of it.
+    """
     chosen = ranks.chosen
+    if not all(bound.required for bound in requirements.bounds(ranks.comparison.spacecraft)):
+        return ranks
     if chosen is None or chosen.met is None or chosen.met < ranks.probability or ranks.lucky or ranks.fresh is None:
         return ranks
     best = screening.shortest(chosen, ranks.fresh)
@@ -252,11 +258,15 @@ def ranked(
 ) -> RobustComparison:
     """Comparison of flown candidates, and the choice: the `cheapest` of the equals.
 
-    With the ``refused`` ones too few of other cases comply: they are taken where there is no plan with which enough do.
+    Of plans with which enough cases comply those that damp what is not required too, else those that leave least. With
+    the ``refused`` ones too few of other cases comply: they are taken where there is no plan with which enough do.
     """
     recommended = None if comparison.recommended is None else _kind(comparison.recommended)
     usual = next((candidate for candidate in candidates if _kind(candidate.plan) == recommended), None)
     enough = [candidate for candidate in candidates if candidate.met is not None and candidate.met >= probability]
+    damping = [candidate for candidate in enough if candidate.plan.standing is Standing.COMPLIES]
+    least = min((candidate.left for candidate in enough), default=0.0)
+    enough = damping or [candidate for candidate in enough if candidate.left <= AS_GOOD * least]
     equals = [candidate for candidate in enough if candidate not in refused] or enough
     if candidates and not equals:  # those as good as the best, but for what the sampling may make of them
         top = min(candidates, key=attrgetter("rank"))

@@ -192,19 +192,15 @@ NOTES = 3  # notes that are shown, at most
 DIGITS = 8  # figures of a value beside its limit, at most
 
 
-def glance(
-    compared: Comparison, decision: Decision | None, robust: str = "", beside: Sequence[Note] = ()
-) -> RenderableType:
-    """The screen of a comparison and the plan to fly, or of the reason why there is none.
+def glance(compared: Comparison, decision: Decision | None, robust: Sequence[Note] | None = None) -> RenderableType:
+    """The screen of a comparison and the plan to fly, one of those compared, or of the reason why there is none.
 
-    ``robust``: its name among those compared, where dispersed cases chose it; ``beside``: notes on that choice.
+    ``robust``: notes on the choice, where dispersed cases made it.
     """
     body = compared.spacecraft
-    head = [*parts.title(body), headline(compared, decision, robust)]
-    warnings, more = screen_lines([*beside, *notes(compared, decision, robust)])
-    name = robust or ("" if decision is None else decision.plan.scheme)
-    chosen = next((plan for plan in compared.plans if plan.scheme == name), None)
-    table = scheme_table(compared, chosen).screen("screen", between=" ")
+    head = [*parts.title(body), headline(compared, decision)]
+    warnings, more = screen_lines([*(robust or ()), *notes(compared, decision, robust=robust is not None)])
+    table = scheme_table(compared, None if decision is None else decision.plan).screen("screen", between=" ")
     if decision is None:
         return _fitted(head, [], [], more, table)
     plan = decision.plan
@@ -224,17 +220,17 @@ def glance(
     return next((shown for shown in sizes if tables.lines_of(shown) <= LINES), screen(1))
 
 
-def notes(compared: Comparison, decision: Decision | None, robust: str = "") -> list[Note]:
+def notes(compared: Comparison, decision: Decision | None, *, robust: bool = False) -> list[Note]:
     """Warnings, then notes in the order of their worth; a ``robust`` plan was made for what others miss."""
     infeasible = [note for plan in compared.plans if not plan.feasible for note in plan_notes(plan)]
     if decision is None:
         return infeasible
-    own = plan_notes(decision.plan, cones=False) if decision.plan in compared.plans else ()
+    own = plan_notes(decision.plan, cones=False) if decision.plan is compared.recommended else ()
     missed = () if robust else comparison_warnings(compared, cones=False)
     return ordered([*missed, *decision_notes(decision), *alternatives(compared), *infeasible, *own])
 
 
-def headline(compared: Comparison, decision: Decision | None, robust: str = "") -> Text:
+def headline(compared: Comparison, decision: Decision | None) -> Text:
     """Headline of the plan to fly: scheme, pulses, cost and end; or that it is not enough, not needed, not found."""
     if decision is None:
         return Text.assemble(("NO PLAN", "bold red"), f": {joined(reasons(compared))}")
@@ -246,7 +242,7 @@ def headline(compared: Comparison, decision: Decision | None, robust: str = "") 
     count = f"{blocks}pulses {len(pulses)}, {decisions.spent(pulses)}, ends at {pulses.end:.4g} s"
     lead = ("NOT ENOUGH: ", "bold red") if decision.met is False else ("FLY ", "bold")
     ideal = " (ideal impulses)" * pulses.idealised
-    return Text.assemble(lead, (robust or plan.scheme, "bold"), f"{ideal}: {count}")
+    return Text.assemble(lead, (plan.scheme, "bold"), f"{ideal}: {count}")
 
 
 class RequirementRow(NamedTuple):

@@ -29,14 +29,14 @@ from nutdamp.planning import plan as planning
 from nutdamp.planning import robust, screening
 from nutdamp.planning.chance_plan import Tightening
 from nutdamp.planning.decision import Comparison, compare
-from nutdamp.planning.plan import Plan, Share
+from nutdamp.planning.plan import Plan, Share, Standing
 from nutdamp.planning.recommendation import Ground
 from nutdamp.planning.robust import robust_reasons
 from nutdamp.planning.screening import Cases, PlanCandidate
 from nutdamp.schemes import four_pulse
 from nutdamp.schemes.catalogue import CLASSIC, Options
 from nutdamp.spacecraft.equipment import Block, Steerable
-from nutdamp.spacecraft.model import Goal, Limits, Requirement, Spacecraft
+from nutdamp.spacecraft.model import Goal, Keep, Limits, Requirement, Spacecraft
 from nutdamp.spacecraft.requirements import Part
 from nutdamp.spacecraft.schedule import Schedule
 from nutdamp.spacecraft.tolerances import Dispersions
@@ -236,6 +236,23 @@ def asked(least: list[float], plan: Plan, *, first: list[Plan] | None = None) ->
         return [short.on_time / long.on_time for short, long in zip(one.pulses, plan.pulses, strict=True)]
 
     return ratios(screening.trimmed(plan, complies))
+
+
+@pytest.mark.parametrize("keeps_axis", [True, False])
+def test_what_is_not_required_is_damped_all_the_same(keeps_axis: bool) -> None:
+    """A requirement that any pulse meets, or none, as of the axis or of a direction, asks for no shorter one."""
+    shift = Requirement(momentum_shift=math.radians(20.0))
+    body = dispersed(requirement=shift if keeps_axis else None)
+    star = Keep("star", np.array([1.0, 0.0, 0.0]), math.radians(2.0))
+    found = planned(body if keeps_axis else replace(body, keep=(star,)), "optimal", samples=250, trials=0)
+    whole = best(found)
+    assert (whole.met, whole.plan) == (1.0, found.comparison.recommended)
+    short = screening._scaled(whole.plan, [0.5] * len(whole.plan.pulses), lambda _: True)
+    assert short is not None
+    cheaper = screening.entered(short, "short", study_of(short.spacecraft, short.pulses), 250)
+    assert (cheaper.met, short.standing is Standing.COMPLIES) == (1.0, False)
+    ranks = [robust.ranked(found.comparison, entries, 250, 0.9) for entries in ([cheaper], [cheaper, whole])]
+    assert [each.chosen for each in ranks] == [cheaper, whole]
 
 
 def test_on_times_are_shortened_together_and_then_each_alone() -> None:
