@@ -452,7 +452,8 @@ class _Light:
 
     def __init__(self, moments: Array, falling: Falling, unit: float) -> None:
         self.parts = moments, unit * falling.rate, 0.5 * unit**2 * falling.growth
-        self.unit, self.products = unit, list[Array]()
+        self.couplings = [unit * (part[[1, 2, 0]] - part[[2, 0, 1]]) for part in self.parts]
+        self.products = list[Array]()
 
     def change(self, series: Array, product: Array, k: int) -> Array:
         """Terms of I1 and I2 in coefficient k + 1 of ω, (3,); ``product``: coefficient k of (ω2 ω3, ω3 ω1, ω1 ω2).
@@ -461,10 +462,9 @@ class _Light:
         """
         self.products.append(product)
         total = np.zeros(3)
-        for order, part in enumerate(self.parts[1:], start=1):
-            if order <= k:
-                total += self.unit * (np.roll(part, -1) - np.roll(part, -2)) * self.products[k - order]
-                total -= (k + 1 - order) * part * series[k + 1 - order, :3]
+        for order in range(1, min(k, 2) + 1):
+            total += self.couplings[order] * self.products[k - order]
+            total -= (k + 1 - order) * self.parts[order] * series[k + 1 - order, :3]
         return np.asarray(total / ((k + 1) * self.parts[0]))
 
     def momentum(self, series: Array, k: int) -> Array:

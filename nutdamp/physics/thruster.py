@@ -43,7 +43,7 @@ class Cold:
         return np.exp(-before / self.pulses) if np.ndim(self.pulses) else math.exp(-before / self.pulses)
 
 
-PIECES = 16  # parts of a pulse, each with the specific impulse of its middle
+SETTLED, REPEATS = 1e-7, 20  # relative step after which Newton's next one is below a rounding, and most steps
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,17 +84,8 @@ class Tank:
         ``flow`` is that of a full tank, kg/s, times the specific impulse where the tank has it. With p = p0/(1 + κu/U),
         κ = p0/p1 - 1, and the thrust as its power x, (1 + κu/U)^(x+1) grows linearly in time, past the last kg too.
         """
-        if self.isp is None:
-            return self._burn(used, flow, time)
-        gone, acts, step = 0.0 * time, 0.0 * time, time / PIECES
-        for _ in range(PIECES):
-            half, _ = self._burn(used + gone, flow / self.isp_after(used + gone), 0.5 * step)
-            more, level = self._burn(used + gone, flow / self.isp_after(used + gone + half), step)
-            gone, acts = gone + more, acts + level / PIECES
-        return gone, acts
-
-    def _burn(self, used: Any, flow: Any, time: Any) -> tuple[Any, Any]:
-        """`burn` with one specific impulse."""
+        if self.isp is not None:
+            return self._burn(used, flow * time)
         full, power = self.pressure / self.final_pressure - 1.0, self.exponent + 1.0
         grown = 1.0 + full * np.minimum(used, self.propellant) / self.propellant
         level = grown ** (-self.exponent)
@@ -103,6 +94,25 @@ class Tank:
         safe = np.where(still, 1.0, rise)
         share = np.where(still, 1.0, np.expm1(np.log1p(safe) / power) * power / safe)[()]
         return flow * level * time * share, level * share
+
+    def _burn(self, used: Any, given: Any) -> tuple[Any, Any]:
+        """`burn` with the specific impulses of the table; ``given`` is the flow times the time.
+
+        That is the integral over the propellant m of I(m)/F(m), specific impulse over thrust, and the thrust that acts
+        the integral of I(m) over the same: of m/given by Newton's method.
+        """
+        speed, (nodes, weights) = self.thrust_factor(used) / self.isp_after(used), gauss_legendre(NODES)
+        first = (-1, *[1] * np.ndim(speed * given))
+        along, weights = np.append(0.5 * (1.0 + nodes), 1.0).reshape(first), weights.reshape(first)  # and the end
+        for _ in range(REPEATS):
+            pressure = self.pressure_after(used + speed * given * along)
+            slowness = self._isp_at(pressure) / (pressure / self.pressure) ** self.exponent
+            step = (0.5 * speed * (weights * slowness[:-1]).sum(axis=0) - 1.0) / slowness[-1]
+            speed = speed - step
+            if np.all(np.abs(step) <= SETTLED * np.abs(speed)):
+                break
+        isp = self.isp_after(used + speed * given * along[:-1])
+        return speed * given, 0.5 * speed * (weights * isp).sum(axis=0)
 
     def share(self, used: Any, more: Any) -> Any:
         """Fraction fired of a pulse that takes ``more`` kg after ``used``: 1, or as far as the propellant lasts."""
@@ -114,10 +124,11 @@ class Tank:
 
     def isp_after(self, used: Any) -> Any:
         """Specific impulse, s; None where the thrusters have their own."""
-        if self.isp is None:
-            return None
-        pressures, values = zip(*self.isp, strict=True)
-        pressure = self.pressure_after(used)
+        return None if self.isp is None else self._isp_at(self.pressure_after(used))
+
+    def _isp_at(self, pressure: Any) -> Any:
+        """Specific impulse of the table, s."""
+        pressures, values = zip(*self.isp or (), strict=True)
         isp = np.interp(np.real(pressure), pressures, values)
         if not np.iscomplexobj(pressure):
             return isp
