@@ -363,6 +363,23 @@ class Supply:
         share = self.draw(0.0 if propellant is None else propellant)
         return level * share, None if propellant is None else propellant * share
 
+    def train(self, channel: Channel, on_times: Vector, count: int) -> tuple[Vector, Vector]:
+        """Sums of the levels of 1 to ``count`` pulses of effective ``on_times`` (n,) s, and propellant used after them.
+
+        In kg; (n, count) each. None is fired.
+        """
+        flow, tank, cold = self.full_flow(channel), self.spacecraft.tank, self.spacecraft.cold
+        numbers = np.arange(count)
+        warmth = np.ones(count) if cold is None else cold.factor(self.fired[channel.name] + numbers)
+        warm = np.cumsum(warmth)
+        used = np.full((len(on_times), count), float(self.used))
+        if tank is None or flow is None:
+            level = 1.0 if tank is None else tank.thrust_factor(self.used)
+            return level * warm + 0.0 * used, used if flow is None else used + flow * on_times[:, None] * warm
+        gone, mean = tank.burn(self.used, flow, on_times[:, None] * warm)  # what comes between pulses takes none
+        levels, taken = (np.diff(total, axis=1, prepend=0.0) for total in (mean * warm, gone))
+        return np.cumsum(levels * tank.share(used + gone - taken, taken), axis=1), used + gone
+
     def count(self, pulses: Iterable[Pulse]) -> None:
         """Take pulses into account that are as strong as they really are."""
         for pulse in pulses:

@@ -34,13 +34,14 @@ class Cold:
     pulses: Any  # over which that decays to 1
     fired: Mapping[str, int] = field(default_factory=dict)  # pulses by channel before t = 0
 
-    def factor(self, before: int) -> Any:
+    def factor(self, before: Any) -> Any:
         """Thrust factor of the pulse after ``before`` others: 1 - (1 - first) exp(-k/pulses)."""
         return 1.0 - (1.0 - self.first) * self.decay(before)
 
-    def decay(self, before: int) -> Any:
+    def decay(self, before: Any) -> Any:
         """Remaining difference to a warm nozzle, over that of the first pulse."""
-        return np.exp(-before / self.pulses) if np.ndim(self.pulses) else math.exp(-before / self.pulses)
+        lasts = -before / self.pulses
+        return np.exp(lasts) if np.ndim(lasts) else math.exp(lasts)
 
 
 SETTLED, REPEATS = 1e-7, 20  # relative step after which Newton's next one is below a rounding, and most steps

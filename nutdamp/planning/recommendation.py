@@ -88,7 +88,7 @@ def recommend(plans: Sequence[Plan], shares: Mapping[Plan, Share] | None = None)
     if shares and standing is Standing.MISSES and most > 0.0 and len(those) > 1:
         best, _ = cheapest([plan for plan in those if shares[plan].low >= most])
         return Recommendation(best, standing, Ground.CASES, len(those), by_propellant(those))
-    best, ground = _nearest(those)
+    best, ground = nearest(those)
     return Recommendation(best, standing, ground, len(those), by_propellant(those))
 
 
@@ -122,7 +122,7 @@ def cheapest(plans: Sequence[Plan], usual: Plan | None = None) -> tuple[Plan, Gr
     return min(equal, key=lambda plan: plan.pulses.end), Ground.END
 
 
-def _nearest(plans: Sequence[Plan]) -> tuple[Plan, Ground]:
+def nearest(plans: Sequence[Plan]) -> tuple[Plan, Ground]:
     """Plan of least residual but for `DAMPED_ANGLE`, nearest to the requirement, then `cheapest`; deciding ground."""
     if len(plans) == 1:
         return plans[0], Ground.ONLY

@@ -27,9 +27,9 @@ from nutdamp.planning.chance_plan import Tightening, tightening
 from nutdamp.planning.decision import Comparison, Decision, attempt
 from nutdamp.planning.notes import beside
 from nutdamp.planning.plan import Plan, Standing
-from nutdamp.planning.recommendation import TIES, Ground, by_propellant, cheapest
+from nutdamp.planning.recommendation import TIES, Ground, by_propellant, cheapest, nearest
 from nutdamp.planning.screening import AS_GOOD, Fresh, PlanCandidate, entered, equal_from, fly_all, fresh_of
-from nutdamp.schemes.catalogue import OPTIMAL, Options
+from nutdamp.schemes.catalogue import OPTIMAL, SCHEMES, Options
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import keeps_limits
 from nutdamp.spacecraft.model import Spacecraft, required_share
@@ -141,7 +141,10 @@ def variations_of(comparison: Comparison, options: Options | None = None) -> lis
     """Variations of `compare`: the plans compared, and variants of each."""
     body, options = comparison.spacecraft, options or Options()
     tried = list[Variation]()
+    timed = body.commands is None or not comparison.only_commanded
     for base in (plan for plan in comparison.plans if plan.failure is None):
+        if not (timed or SCHEMES[base.scheme].reads_commands or not SCHEMES[base.scheme].fires):
+            continue  # none of its variants may be chosen
         tried.append(Variation(partial(list, [("as planned", base)]), VariationKind.PLANNED))
         tried.append(Variation(partial(_alignments, body, base.scheme, options)))
         tried += [Variation(partial(_planned, *other, base.scheme, options)) for other in _others(body, base)]
@@ -260,6 +263,7 @@ def ranked(
 
     Of plans with which enough cases comply those that damp what is not required too, else those that leave least. With
     the ``refused`` ones too few of other cases comply: they are taken where there is no plan with which enough do.
+    Where no case complies with any plan, it is the `nearest`.
     """
     recommended = None if comparison.recommended is None else _kind(comparison.recommended)
     usual = next((candidate for candidate in candidates if _kind(candidate.plan) == recommended), None)
@@ -277,7 +281,9 @@ def ranked(
             equals = [candidate for candidate in candidates if candidate.met is not None and candidate.met >= low]
     chosen, ground = None, None
     if equals:
-        best, ground = cheapest([equal.plan for equal in equals], None if usual is None else usual.plan)
+        plans = [equal.plan for equal in equals]
+        hopeless = all(equal.met == 0.0 for equal in equals)
+        best, ground = nearest(plans) if hopeless else cheapest(plans, None if usual is None else usual.plan)
         chosen = next(equal for equal in equals if equal.plan is best)
     by_rank = sorted(candidates, key=lambda each: (each is not chosen, each.rank, each.plan.pulses.cost))
     known = by_propellant([equal.plan for equal in equals])
@@ -341,9 +347,11 @@ def robust_reasons(robust: RobustComparison) -> Iterator[Note]:
             yield note("robust-least-left", count=count, equals=robust.equals, required_share=required)
         elif chosen.met >= robust.probability:
             yield note("robust-complies", count=count, equals=robust.equals, required_share=required)
-        else:
+        elif chosen.met > 0.0:
             yield note("robust-most-cases", count=count, equals=robust.equals)
-        if robust.ground is not None and robust.ground is not Ground.ONLY:
+        if robust.ground in (Ground.LEFT, Ground.NEAREST):
+            yield note("nearest" if robust.ground is Ground.NEAREST else "least-left", count=count)
+        elif robust.ground is not None and robust.ground is not Ground.ONLY:
             yield note("equal-least-propellant" if robust.by_propellant else "equal-least-impulse")
         if robust.ground in TIES:
             yield note(robust.ground.value)

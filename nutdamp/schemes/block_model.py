@@ -356,10 +356,7 @@ class BlockModel:
         fired, used, most = int(state.fired.get(channel.name, 0)), float(state.used), int(np.max(count))
         key = (channel.name, fired, used, most, on_times.tobytes())
         if key not in self._tables:
-            supply = Supply(self.body, Counter({channel.name: fired}), np.full(len(on_times), used))
-            pulses = [(supply.take(channel, on_times)[0] + 0.0 * on_times, supply.used) for _ in range(most)]
-            levels, spent = (np.array(rows).T for rows in zip(*pulses, strict=True))
-            self._tables[key] = np.cumsum(levels, axis=1), spent
+            self._tables[key] = Supply(self.body, Counter({channel.name: fired}), used).train(channel, on_times, most)
         at = index.reshape(np.shape(width)), np.asarray(count) - 1
         full, spent = self._tables[key]
         return full[at], spent[at]

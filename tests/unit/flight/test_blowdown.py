@@ -120,6 +120,24 @@ def test_a_burn_with_a_table_is_that_of_its_differential_equation(time: float, w
         assert many[0, 0] == pytest.approx(one, rel=1e-14)
 
 
+@spread("name", TANKS, quick=2, deep=3)
+@pytest.mark.parametrize("cold", [None, Cold(0.8, 3.0, {"+1": 2})])
+def test_a_train_is_its_pulses(name: str, cold: Cold | None) -> None:
+    """One after another, up to the last of the propellant."""
+    body, on_times = replace(carrier(TANKS[name]), cold=cold), np.array([0.4, 2.0])
+    jet, count = body.channels[0], 30 if name == "small" else 9
+    levels, used = Supply(body).train(jet, on_times, count)
+    for row, on_time in enumerate(on_times.tolist()):
+        supply, total = Supply(body), 0.0
+        for number in range(count):
+            total += supply.take(jet, on_time)[0]
+            assert levels[row, number] == pytest.approx(total, rel=1e-12)
+            if supply.shortage:
+                break
+            assert used[row, number] == pytest.approx(supply.used, rel=1e-12)
+        assert (supply.shortage is not None) is (name == "small" and row == 1)
+
+
 def test_an_on_time_is_found_for_each_impulse() -> None:
     body = replace(carrier(SMALL), cold=Cold(0.8, 3.0))
     for effective in (0.05, 0.5, 2.0):

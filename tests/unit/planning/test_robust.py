@@ -255,6 +255,21 @@ def test_what_is_not_required_is_damped_all_the_same(keeps_axis: bool) -> None:
     assert [each.chosen for each in ranks] == [cheaper, whole]
 
 
+@pytest.mark.usefixtures("untightened")
+def test_where_no_case_complies_the_nearest_plan_is_taken_at_any_cost() -> None:
+    body = dispersed(requirement=Requirement(math.radians(1e-4)))
+    body = replace(body, dispersions=Dispersions(A=share_of(0.1)))
+    found = planned(body, "two-pulse", samples=250, trials=0)
+    whole = best(found)
+    schedule = screening._longer(whole.plan, [0.5] * len(whole.plan.pulses))
+    short = planning.judged(body, "short", schedule, whole.plan.options)
+    cheaper = screening.entered(short, "short", study_of(body, schedule), 250)
+    assert (whole.met, cheaper.met, found.meets_requirement) == (0.0, 0.0, False)
+    ranks = robust.ranked(found.comparison, [cheaper, whole], 250, 0.9)
+    assert (ranks.chosen, ranks.ground) == (whole, Ground.LEFT)
+    assert [reason.code for reason in robust_reasons(ranks)] == ["least-left"]
+
+
 def test_on_times_are_shortened_together_and_then_each_alone() -> None:
     plan = planning.plan(dispersed(requirement=WIDE), "two-pulse")
     for least, together in (([0.9, 0.9], 0.9), ([0.93, 0.6], 0.93), ([0.6, 0.93], 0.93), ([0.5, 0.5], 0.8)):
