@@ -131,7 +131,7 @@ def _recommended(job: Job, *, judged: bool) -> Plan:
     show_failures(compared)
     if plan is not None:
         job.remark(f"using recommended plan: {plan.scheme}")
-    job.note(comparison_warnings(compared, cones=not judged))
+    job.note(comparison_warnings(compared, tabulated=judged))
     if plan is None:
         raise Infeasible(f"{joined(reasons(compared))}; `nutdamp plan` says more")
     return plan

@@ -207,14 +207,17 @@ def _growing(decision: Decision) -> Iterator[Note]:
             yield note("grows-again-in-cases", share=f"{100.0 * cases.probability:.10g}", **values)
 
 
-def comparison_warnings(compared: Comparison, *, cones: bool = True) -> Iterator[Note]:
-    """Requirements that the recommended plan misses, the causes, and, with ``cones``, those that the axis breaks."""
+def comparison_warnings(compared: Comparison, *, tabulated: bool = False) -> Iterator[Note]:
+    """Requirements that the recommended plan misses, the causes, and cones that the axis breaks.
+
+    ``tabulated``: a table of the requirement beside them shows what is missed and broken.
+    """
     chosen = compared.recommended
     if chosen is None:
         return
-    yield from _missed(chosen, compared)
+    yield from _missed(chosen, compared, tabulated=tabulated)
     broken = [aspect for aspect in chosen.aspects if not aspect.kept]
-    yield from (broken_cone(aspect).of(chosen.scheme) for aspect in broken if cones)
+    yield from (broken_cone(aspect).of(chosen.scheme) for aspect in broken if not tabulated)
     if broken:
         keeping = [plan.scheme for plan in compared.plans if plan.feasible and plan.kept]
         yield note("plans-keep-cones", schemes=", ".join(keeping) or "none")
@@ -227,7 +230,7 @@ def comparison_warnings(compared: Comparison, *, cones: bool = True) -> Iterator
         yield note("blocks-cannot", schemes=", ".join(better))
 
 
-def _missed(chosen: Plan, compared: Comparison) -> Iterator[Note]:
+def _missed(chosen: Plan, compared: Comparison, *, tabulated: bool) -> Iterator[Note]:
     """Requirements that the recommended plan misses, and the causes."""
     if compared.recommendation.standing is Standing.COMPLIES:
         return
@@ -244,6 +247,8 @@ def _missed(chosen: Plan, compared: Comparison) -> Iterator[Note]:
     left = chosen.left
     assert left is not None
     for bound in chosen.shortfalls:
+        if bound.required and tabulated:
+            continue
         if bound.part is Part.SPIN:
             goal = chosen.spacecraft.goal.spin or 0.0
             yield note("spin-missed", scheme=chosen.scheme, spin_rpm=RPM * left.spin, goal_rpm=RPM * goal)

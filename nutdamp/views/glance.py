@@ -226,7 +226,7 @@ def notes(compared: Comparison, decision: Decision | None, *, robust: bool = Fal
     if decision is None:
         return infeasible
     own = plan_notes(decision.plan, cones=False) if decision.plan is compared.recommended else ()
-    missed = () if robust else comparison_warnings(compared, cones=False)
+    missed = () if robust else comparison_warnings(compared, tabulated=True)
     return ordered([*missed, *decision_notes(decision), *alternatives(compared), *infeasible, *own])
 
 
@@ -375,7 +375,7 @@ def comparison_screen(compared: Comparison) -> RenderableType:
         results += [Text(), parts.blocks_screen(decided.plan.flight, decided.plan.delta_v)]
     elif len(decided.plan.pulses):
         results += [Text(), parts.pulse_table(decided.plan.flight).screen("full")]
-    why, warnings = joined(reasons(compared)), comparison_warnings(compared, cones=False)
+    why, warnings = joined(reasons(compared)), comparison_warnings(compared, tabulated=True)
     return Group(
         *lead,
         Text.assemble("Recommended: ", (decided.plan.scheme, "bold"), f" – {why}."),

@@ -246,7 +246,7 @@ def test_a_cone_that_is_broken_is_not_met_whatever_is_left_and_plans_that_keep_t
         "none",
     ]
     assert "cone-broken" in codes(comparison_warnings(compared))
-    assert "cone-broken" not in codes(comparison_warnings(compared, cones=False))  # the verdict names them
+    assert "cone-broken" not in codes(comparison_warnings(compared, tabulated=True))
     assert codes(reasons(compared)) == ["cheapest-at-end"]
     check_text("plan.cones", "\n".join([decisions.verdict(broken), *(" | ".join(row) for row in rows)]))
 
