@@ -265,17 +265,21 @@ def ranked(
     the ``refused`` ones too few of other cases comply: they are taken where there is no plan with which enough do.
     Where no case complies with any plan, it is the `nearest`.
     """
+
+    def damping(equal: list[PlanCandidate]) -> list[PlanCandidate]:
+        return [candidate for candidate in equal if candidate.plan.standing is Standing.COMPLIES]
+
     recommended = None if comparison.recommended is None else _kind(comparison.recommended)
     usual = next((candidate for candidate in candidates if _kind(candidate.plan) == recommended), None)
     enough = [candidate for candidate in candidates if candidate.met is not None and candidate.met >= probability]
-    damping = [candidate for candidate in enough if candidate.plan.standing is Standing.COMPLIES]
     least = min((candidate.left for candidate in enough), default=0.0)
-    enough = damping or [candidate for candidate in enough if candidate.left <= AS_GOOD * least]
+    enough = damping(enough) or [candidate for candidate in enough if candidate.left <= AS_GOOD * least]
     equals = [candidate for candidate in enough if candidate not in refused] or enough
     if candidates and not equals:  # those as good as the best, but for what the sampling may make of them
         top = min(candidates, key=attrgetter("rank"))
         if top.met is None:
             equals = [candidate for candidate in candidates if candidate.rank <= AS_GOOD * top.rank]
+            equals = damping(equals) or equals
         else:
             low = equal_from(top.met, samples)
             equals = [candidate for candidate in candidates if candidate.met is not None and candidate.met >= low]
