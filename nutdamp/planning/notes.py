@@ -228,6 +228,9 @@ def comparison_warnings(compared: Comparison, *, tabulated: bool = False) -> Ite
     better = [scheme for scheme in others if compared.meets(compared[scheme])]
     if better and chosen.commandable and not compared.meets(chosen):
         yield note("blocks-cannot", schemes=", ".join(better))
+    cut = [plan.scheme for plan in compared.plans if plan.cut]
+    if cut and compared.recommendation.standing is not Standing.COMPLIES:
+        yield note("searches-ended", schemes=", ".join(cut))
 
 
 def _missed(chosen: Plan, compared: Comparison, *, tabulated: bool) -> Iterator[Note]:

@@ -15,9 +15,10 @@ from nutdamp.files.reader import load_spacecraft
 from nutdamp.flight import dynamics, propagation
 from nutdamp.planning import plan as planning
 from nutdamp.planning.decision import CUT, compare, infeasibility
-from nutdamp.planning.notes import plan_notes
+from nutdamp.planning.notes import comparison_warnings, plan_notes
+from nutdamp.planning.plan import Standing
 from nutdamp.schemes.optimal import linear_program
-from nutdamp.spacecraft.model import Disturbance, Limits
+from nutdamp.spacecraft.model import Disturbance, Goal, Limits
 from nutdamp.spacecraft.schedule import Schedule
 
 
@@ -89,6 +90,10 @@ def test_a_search_that_is_cut_ends_soon_with_what_it_has(most: float, monkeypatc
     with work.budget("test", 1e9) as spent:
         compared = compare(body, ("one-pulse", "optimal"))
     assert compared.plans[-1].cut
+    for other in (compared, compare(replace(body, goal=Goal(), requirement=None), ("one-pulse", "optimal"))):
+        missed = other.recommendation.standing is not Standing.COMPLIES
+        assert (missed, other.plans[-1].cut) == (other is compared, True)
+        assert ("searches-ended" in codes(comparison_warnings(other))) is missed
     assert spent.done < 330.0
 
 
