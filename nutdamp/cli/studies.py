@@ -288,6 +288,7 @@ def disperse_command(
     from nutdamp.spacecraft.requirements import expect_loop
     from nutdamp.spacecraft.tolerances import expect_dispersions
     from nutdamp.views.dispersion import dispersion_brief
+    from nutdamp.views.loop_cases import loop_cases_brief
 
     if looped:
         expect_loop(body)
@@ -297,15 +298,16 @@ def disperse_command(
     if case is not None:
         deliver_case(job, plan, case - 1, seed=seed, until=until)
         return
-    brief: list[Callable[[], RenderableType]] = []
+    brief: Callable[[], RenderableType]
     with stoppable() as stopped, job.working("flying"):
         hooks: dict[str, Any] = {"seed": seed, "csv": job.written["csv"], "stopped": stopped}
         if plan is None:
-            flown: Dispersed = api.disperse_loop(body, samples, until=until, remark=job.remark, **hooks)
+            flown: Dispersed = (loops := api.disperse_loop(body, samples, until=until, remark=job.remark, **hooks))
+            brief = partial(loop_cases_brief, loops.core)
         else:
             flown = study = api.disperse(plan, samples or SAMPLES, threads=threads, remark=job.remark, **hooks)
-            brief += [partial(dispersion_brief, study.core, scheme=plan.scheme)] * (not verbose)
-    job.deliver(flown, *brief, unsaved=[flown.unsaved], worst=worst)
+            brief = partial(dispersion_brief, study.core, scheme=plan.scheme)
+    job.deliver(flown, *[brief] * (not verbose), unsaved=[flown.unsaved], worst=worst)
     if stopped.number is not None and flown.core.done < flown.core.requested:
         say(f"interrupted: {flown.core.done} of {flown.core.requested} cases are done")
         sys.exit(128 + stopped.number)

@@ -15,7 +15,6 @@ import numpy as np
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from nutdamp.common.results import note
 from nutdamp.files.export import column, cone_columns
 from nutdamp.flight.end_state import aspects
 from nutdamp.flight.propagation import IDEAL_IMPULSES, Flight, model_name
@@ -81,10 +80,8 @@ EMPTY = "the pulses take more propellant than there is, so that the last ones do
 def dispersion_brief(results: Results, *, scheme: str) -> RenderableType:
     """The default screen of ``disperse``: verdict, percentiles, what counts most, and the worst case."""
     head = [_title(results, scheme), *requirement_lines(results), *cone_lines(results), *_emptied(results)]
-    notes, case = list(tolerances.main_causes(results)), f" · {_again(results)} (worst)" * _varies(results)
-    if unused := results.study.model.inputs.unused:
-        named = ", ".join(tolerances.in_words(entry.name) for entry in unused)
-        notes.append(note("dispersions-without-effect", dispersions=named))
+    notes, case = [*tolerances.main_causes(results)], f" · {_again(results)} (worst)" * _varies(results)
+    notes += tolerances.unused_notes(results.study.model.inputs.unused)
     return summary(head, lambda **_: _percentiles(results).screen("screen"), notes, f"--plot cases.png{case}")
 
 

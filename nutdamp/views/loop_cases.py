@@ -13,6 +13,7 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from nutdamp import __version__
+from nutdamp.common.results import Note
 from nutdamp.control_loop.dispersion import LoopResults, LoopStudy
 from nutdamp.control_loop.law import Ending
 from nutdamp.control_loop.simulation import FlownLoops
@@ -22,9 +23,19 @@ from nutdamp.montecarlo.study import CONFIDENCE
 from nutdamp.views import decisions, dispersion
 from nutdamp.views.dispersion import CaseRow, StudyOutput, row_json
 from nutdamp.views.loop import described
+from nutdamp.views.parts import summary
 from nutdamp.views.tables import TEXT, Column, DataTable, Shared
 from nutdamp.views.text import degrees, duration
-from nutdamp.views.tolerances import MOST_ROWS, correlation_json, in_words, inputs_table, size_text, unused_table
+from nutdamp.views.tolerances import (
+    MOST_ROWS,
+    correlation_json,
+    in_words,
+    inputs_table,
+    leading,
+    size_text,
+    unused_notes,
+    unused_table,
+)
 
 SHOWN_OUTPUTS = (  # the outputs, in the order of `OUTPUTS`
     StudyOutput("settled", "settled_s", "first quiet", "s", ranks=True),
@@ -58,21 +69,47 @@ def _flown_case(study: LoopStudy, case: int, flown: FlownLoops) -> CaseRow:
     return CaseRow(case, study.draws_of(case), values, flown.aspects[:, :, 0], flown.pilots[0].ending[0])
 
 
-def loop_cases_screen(results: LoopResults, *, worst: int) -> Group:
-    """All tables of ``disperse --loop``."""
+def loop_cases_brief(results: LoopResults) -> RenderableType:
+    """The default screen of ``disperse --loop``: verdict, percentiles, what counts most, and the worst case."""
+    notes = list[Note]()
+    for output, part in zip(SHARED, ("the time to quiet", "the largest nutation", "propellant"), strict=True):
+        shares = results.shares(output.name)
+        notes += leading(part, {in_words(name): share for name, share in shares.items()})
+    notes += unused_notes(results.study.model.inputs.unused)
+    steps = f"--csv cases.csv · {_again(results, results.worst.cases[0])} (worst)"
+    return summary(
+        [*_title(results), *_verdicts(results)], lambda **_: _percentiles(results).screen("screen"), notes, steps
+    )
+
+
+def _title(results: LoopResults) -> list[RenderableType]:
     study = results.study
     drawn = f"cases: {results.done:,}, seed {study.seed}"
     drawn += f", unphysical ones drawn again: {results.redrawn:,}" if results.redrawn else ""
     title = Text.assemble((study.spacecraft.name, "bold"), f": loop, 0 to {duration(study.until)}, {drawn}")
-    parts: list[RenderableType] = [title, Text(described(study.law.loop)), Text(), _percentiles(results).screen("full")]
-    parts += [dispersion.angles_note(study.spacecraft), Text(), *_settled(results), _dead_band(results)]
-    parts += [*dispersion.requirement_lines(results), *dispersion.cone_lines(results), *_shares(results)]
+    return [title, Text(described(study.law.loop))]
+
+
+def _verdicts(results: LoopResults) -> list[RenderableType]:
+    stated = [*dispersion.requirement_lines(results), *dispersion.cone_lines(results)]
+    return [*_settled(results), _dead_band(results), *stated]
+
+
+def _again(results: LoopResults, case: int) -> str:
+    return f"--seed {results.study.seed} --case {case + 1}"
+
+
+def loop_cases_screen(results: LoopResults, *, worst: int) -> Group:
+    """All tables of ``disperse --loop``."""
+    study = results.study
+    parts: list[RenderableType] = [*_title(results), Text(), _percentiles(results).screen("full")]
+    parts += [dispersion.angles_note(study.spacecraft), Text(), *_verdicts(results), *_shares(results)]
     anew = ", ".join(f"{in_words(entry.name)} {size_text(entry)}" for entry in study.model.of_firings)
     if anew:
         parts.append(Text(f"Each firing draws anew, one sigma or bias: {anew}.", "dim"))
     rows = _worst(results, worst)
     if rows:
-        table, options = _cases(study, rows), f"--seed {study.seed} --case {rows[0].case + 1}"
+        table, options = _cases(study, rows), _again(results, rows[0].case)
         parts += [Text(), Text(table.title, style="bold"), table.screen("screen")]
         parts.append(Text(f"Inspect one: {options}; firing by firing: nutdamp loop {options}", "dim"))
     return Group(*parts, *unused_table(study.model.inputs.unused))

@@ -136,10 +136,21 @@ def main_causes(results: Results) -> Iterator[Note]:
             entries = [first.inputs[row] for row in rows]
             key = _named(entries)[0] if len(rows) > 1 else in_words(entries[0].tolerance)
             sums[key] = sums.get(key, 0.0) + float(shares[rows].sum())
-        ranked = sorted(sums.items(), key=lambda item: -item[1])
-        leading = [f"{key} ({100 * share:.1f} %)" for key, share in ranked if share >= 0.1]
-        if any(sums.values()):
-            yield note("main-causes", part=name, causes=", ".join(leading or [ranked[0][0]]))
+        yield from leading(name, sums)
+
+
+def leading(part: str, shares: Mapping[str, float]) -> Iterator[Note]:
+    """The largest ``shares`` of the variance of ``part``, by the names of their inputs for people."""
+    ranked = sorted(shares.items(), key=lambda item: -item[1])
+    causes = [f"{key} ({100 * share:.1f} %)" for key, share in ranked if share >= 0.1]
+    if any(shares.values()):
+        yield note("main-causes", part=part, causes=", ".join(causes or [ranked[0][0]]))
+
+
+def unused_notes(unused: Sequence[Unused]) -> Iterator[Note]:
+    """Dispersions of the file that change nothing."""
+    if unused:
+        yield note("dispersions-without-effect", dispersions=", ".join(in_words(entry.name) for entry in unused))
 
 
 def budgeted_outputs(study: Study) -> tuple[tuple[str, str], tuple[str, str]]:
