@@ -73,6 +73,9 @@ class Shared:
     VERDICT = "verdict"
 
 
+EMPTY = ("", MISSING)  # cells that need no line of their own in a block
+
+
 class FittedColumns(Table):
     """A table of numbers; where the screen is too narrow to show them whole, each row is a block of its own."""
 
@@ -99,7 +102,9 @@ class FittedColumns(Table):
             if first.plain.strip():
                 named = f"{names[0]}:" if " " in names[0] else names[0]
                 yield Text(f"{named} {first.plain.strip()}".strip(), style="bold")
-            rows = [(name, cell) for name, cell in zip(names[1:], others, strict=True) if cell.plain.strip()]
+            rows = [
+                (name, cell) for name, cell in zip(names[1:], others, strict=True) if cell.plain.strip() not in EMPTY
+            ]
             if rows:
                 yield Padding(facts(rows), (0, 0, 0, 2))
 

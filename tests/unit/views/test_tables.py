@@ -37,8 +37,8 @@ TABLE = DataTable(
 )  # fmt: skip
 
 
-def screen(table: DataTable, first: int | None = None) -> list[list[str]]:
-    console = Console(width=80, file=io.StringIO())
+def screen(table: DataTable, first: int | None = None, width: int = 80) -> list[list[str]]:
+    console = Console(width=width, file=io.StringIO())
     with console.capture() as captured:
         console.print(table.screen("screen", first=first))
     return [line.split() for line in captured.get().splitlines()]
@@ -68,6 +68,11 @@ def test_a_screen_shows_texts_and_a_dash_for_the_unknown() -> None:
     heads, units, *rows = screen(TABLE)
     assert [heads, units] == [["size"], ["name", "count", "mm", "verdict"]]
     assert rows == [["one", "1", "500.0", "met"], ["two", "2", "–", "–"], ["three", "3", "250.0", "NOT", "met"]]
+
+
+def test_below_60_columns_each_row_is_a_block_of_what_is_known() -> None:
+    name, values = TABLE.screen("screen").columns[0].header, ["count", "size,", "verdict"]
+    assert [line[0] for line in screen(TABLE, width=59)] == [name, *values, name, "count", name, *values]
 
 
 def test_of_many_rows_the_first_ones_and_the_last_are_shown_where_that_saves_room() -> None:
