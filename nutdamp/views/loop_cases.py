@@ -27,6 +27,7 @@ from nutdamp.views.parts import summary
 from nutdamp.views.tables import TEXT, Column, DataTable, Shared
 from nutdamp.views.text import degrees, duration
 from nutdamp.views.tolerances import (
+    MAIN,
     MOST_ROWS,
     correlation_json,
     in_words,
@@ -74,6 +75,8 @@ def loop_cases_brief(results: LoopResults) -> RenderableType:
     notes = list[Note]()
     for output, part in zip(SHARED, ("the time to quiet", "the largest nutation", "propellant"), strict=True):
         shares = results.shares(output.name)
+        if max(shares.values(), default=0.0) < MAIN:  # the rest is noise
+            continue
         notes += leading(part, {in_words(name): share for name, share in shares.items()})
     notes += unused_notes(results.study.model.inputs.unused)
     steps = f"--csv cases.csv · {_again(results, results.worst.cases[0])} (worst)"

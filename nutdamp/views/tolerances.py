@@ -31,6 +31,7 @@ SHOWN = {  # units for people of those of inputs, and the factor
 }
 
 
+MAIN = 0.1  # least share of the variance of a main cause
 MOST_ROWS = 12  # largest number of inputs that the budget names; the rest is summed up
 TINY = 1e-300
 ROUNDING = 1e-12  # rad; a smaller variation is rounding
@@ -142,7 +143,7 @@ def main_causes(results: Results) -> Iterator[Note]:
 def leading(part: str, shares: Mapping[str, float]) -> Iterator[Note]:
     """The largest ``shares`` of the variance of ``part``, by the names of their inputs for people."""
     ranked = sorted(shares.items(), key=lambda item: -item[1])
-    causes = [f"{key} ({100 * share:.1f} %)" for key, share in ranked if share >= 0.1]
+    causes = [f"{key} ({100 * share:.1f} %)" for key, share in ranked if share >= MAIN]
     if any(shares.values()):
         yield note("main-causes", part=part, causes=", ".join(causes or [ranked[0][0]]))
 

@@ -231,8 +231,12 @@ def test_what_a_file_lacks_and_what_does_not_go_together_is_said(run: Run, stage
 @pytest.mark.deep
 def test_cases_their_table_their_files(run: Run, stage: Path, tmp_path: Path) -> None:
     command = ("disperse", "stage.yaml", "--loop", "--until", "8s", "--samples", "120", "--worst", "2")
-    screen = run(*command, "--csv", "c.csv", "--json", "c.json", "--plot", "c.svg")
+    screen = run(*command, "-v", "--csv", "c.csv", "--json", "c.json", "--plot", "c.svg")
     assert screen.returncode == 0, screen.stderr
+    brief = run(*command).stdout
+    assert len(brief.splitlines()) <= 40
+    assert f"--case {json.loads((tmp_path / 'c.json').read_text())['worst'][0]['case']} (worst)" in flat(brief)
+    check_text("loop.cases-brief", brief.split("\n\n")[0])
     verdicts, inputs = screen.stdout.split("\n\n")[2:4]
     check_text("loop.cases", "\n".join([verdicts, *inputs.splitlines()[-3:]]))
     study = json.loads((tmp_path / "c.json").read_text())
