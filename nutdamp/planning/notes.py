@@ -230,7 +230,7 @@ def comparison_warnings(compared: Comparison, *, tabulated: bool = False) -> Ite
         yield note("blocks-cannot", schemes=", ".join(better))
     cut = [plan.scheme for plan in compared.plans if plan.cut]
     if cut and compared.recommendation.standing is not Standing.COMPLIES:
-        yield note("searches-ended", schemes=", ".join(cut))
+        yield note("search-incomplete", schemes=", ".join(cut))
 
 
 def _missed(chosen: Plan, compared: Comparison, *, tabulated: bool) -> Iterator[Note]:

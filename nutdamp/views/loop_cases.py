@@ -74,15 +74,12 @@ def loop_cases_brief(results: LoopResults) -> RenderableType:
     """The default screen of ``disperse --loop``: verdict, percentiles, what counts most, and the worst case."""
     notes = list[Note]()
     for output, part in zip(SHARED, ("the time to quiet", "the largest nutation", "propellant"), strict=True):
-        shares = results.shares(output.name)
-        if max(shares.values(), default=0.0) < MAIN:  # the rest is noise
-            continue
-        notes += leading(part, {in_words(name): share for name, share in shares.items()})
+        shares = results.shares(output.name).items()  # the rest is noise
+        notes += leading(part, {in_words(name): share for name, share in shares if share >= MAIN})
     notes += unused_notes(results.study.model.inputs.unused)
-    steps = f"--csv cases.csv · {_again(results, results.worst.cases[0])} (worst)"
-    return summary(
-        [*_title(results), *_verdicts(results)], lambda **_: _percentiles(results).screen("screen"), notes, steps
-    )
+    worst = [f"{_again(results, case)} (worst)" for case in results.worst.cases[:1].tolist()]
+    head, table = [*_title(results), *_verdicts(results)], _percentiles(results)
+    return summary(head, lambda **_: table.screen("screen"), notes, " · ".join(["--csv cases.csv", *worst]))
 
 
 def _title(results: LoopResults) -> list[RenderableType]:

@@ -381,19 +381,21 @@ class Program:
         return np.asarray(np.clip(slot, 0, len(self.centres) - 1))
 
 
-WAYS: tuple[tuple[Literal["simplex", "ipm"], bool, float], ...] = (
+Way = tuple[Literal["simplex", "ipm"], bool, float]
+INTERIOR: Way = ("ipm", True, 1.0)
+WAYS: tuple[Way, ...] = (
     ("simplex", False, 1.0),
     ("simplex", True, 1.0),
     ("simplex", True, 1e3),
-    ("ipm", True, 1.0),
+    INTERIOR,
     ("simplex", False, 1e-2),
     ("ipm", False, 1e3),
 )
 """Method, presolving, and factor of the costs, tried in turn: where the dual simplex loses its way at one scale of the
 costs, against which its tolerances count, it mostly does not at another; interior points do not know the trouble."""
 
-INTERIOR, LARGE = WAYS[3], 10_000
-"""Way tried first for more unknowns than that: a step of the dual simplex then passes thousands of their bounds, at a
+LARGE = 10_000
+"""Unknowns above which `INTERIOR` comes first: a step of the dual simplex then passes thousands of their bounds, at a
 time that grows with the square of their number, where interior points take 0.4 s instead of 10 s for 75,000."""
 
 MOST_STEPS = 100_000  # steps of the simplex or of the interior points, in one way of solving

@@ -93,7 +93,7 @@ def test_a_search_that_is_cut_ends_soon_with_what_it_has(most: float, monkeypatc
     for other in (compared, compare(replace(body, goal=Goal(), requirement=None), ("one-pulse", "optimal"))):
         missed = other.recommendation.standing is not Standing.COMPLIES
         assert (missed, other.plans[-1].cut) == (other is compared, True)
-        assert ("searches-ended" in codes(comparison_warnings(other))) is missed
+        assert ("search-incomplete" in codes(comparison_warnings(other))) is missed
     assert spent.done < 330.0
 
 
@@ -132,7 +132,7 @@ def test_a_longer_horizon_is_sought_within_bounds(monkeypatch: pytest.MonkeyPatc
         units.append(spent.done)
         named.append("limits.horizon" in infeasibility(plan))
     assert named == [False, True, True]
-    assert units[0] < units[1] < units[0] + 100.0 < units[2]
+    assert units[0] < units[1] < units[0] + 2.0 * 50.0 < units[2]  # the try under way when it is spent is finished
 
 
 def test_linear_programs_count_by_their_size(monkeypatch: pytest.MonkeyPatch) -> None:

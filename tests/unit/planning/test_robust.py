@@ -548,6 +548,8 @@ def test_the_robust_plan_of_a_spacecraft_with_commands_can_be_commanded_unless_p
     body = replace(nutdamp.load(case("cbp1004.yaml")), dispersions=EXACT)
     compared = compare(body, ("command-block", "two-pulse"), samples=200)
     alone = compare(body, ("two-pulse",), samples=200)
+    few, many = (robust.variations_of(each) for each in (compared, replace(compared, timed=True)))
+    assert 1 < len(few) < len(many) == len(few) + len(robust.variations_of(alone))  # no timed plan is made in vain
     for one, commanded in ((compared, True), (replace(compared, timed=True), False), (alone, False)):
         trials = [robust.Variation(partial(list, [("as planned", plan)])) for plan in one]
         found = robust.compare(one, trials, samples=200)

@@ -18,6 +18,7 @@ from support.golden import check_text
 from support.optimal import flies
 from support.places import case
 
+from nutdamp.common import work
 from nutdamp.files.reader import load_spacecraft
 from nutdamp.flight import propagation
 from nutdamp.planning.decision import infeasibility
@@ -25,7 +26,7 @@ from nutdamp.planning.plan import plan
 from nutdamp.schemes.catalogue import OptimalOptions
 from nutdamp.schemes.optimal import linear_program, refinement
 from nutdamp.schemes.optimal.linear_program import GrowingProgram, Optimum, Program
-from nutdamp.schemes.optimal.problem import Problem
+from nutdamp.schemes.optimal.problem import Problem, thinned
 from nutdamp.schemes.optimal.refinement import EndEquations
 from nutdamp.spacecraft.model import Goal, Limits, Vector
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
@@ -166,6 +167,17 @@ def test_many_unknowns_begin_with_interior_points(monkeypatch: pytest.MonkeyPatc
         optima.append(solved(small(3).grown()))
     check_same(*optima)
     assert ways == ["simplex", "ipm"]
+
+
+def test_no_burns_are_left_out_once_the_work_is_spent() -> None:
+    program = Problem(BODY, OptimalOptions()).program()
+    solution = program.solve()
+    assert len(solution.burns) > 1
+    for most in (0.0, 1e9):
+        with work.budget("test", most) as spent:
+            fewer = thinned(program, solution, solution.cost, fewest=True)
+        assert (spent.done > 0.0, len(fewer.burns) <= len(solution.burns)) == (most > 0.0, True)
+        assert fewer is solution or most > 0.0
 
 
 def test_the_basis_is_kept() -> None:
