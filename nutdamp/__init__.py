@@ -32,18 +32,19 @@ if TYPE_CHECKING:
     from nutdamp.control_loop.evaluation import LoopPlan as LoopPlan
     from nutdamp.control_loop.evaluation import LoopVerification as LoopVerification
     from nutdamp.errors import NutdampError as NutdampError
-    from nutdamp.estimation.forecast import Fitted as Fitted
+    from nutdamp.estimation.results import Fitted as Fitted
     from nutdamp.flight.propagation import Flight as Flight
     from nutdamp.flight.propagation import Residual as Residual
     from nutdamp.flight.propagation import Track as Track
-    from nutdamp.montecarlo.study import Dispersion as Dispersion
     from nutdamp.page.report import Report as Report
     from nutdamp.planning.decision import Comparison as Comparison
     from nutdamp.planning.decision import Simulation as Simulation
     from nutdamp.planning.plan import Plan as Plan
     from nutdamp.planning.plan import Verified as Verified
     from nutdamp.planning.robust import RobustComparison as RobustComparison
+    from nutdamp.planning.screening import Dispersion as Dispersion
     from nutdamp.planning.tradeoff import Trade as Trade
+    from nutdamp.planning.verdict import Verdict as Verdict
     from nutdamp.schemes.catalogue import FourPulseOptions as FourPulseOptions
     from nutdamp.schemes.catalogue import HalfConeOptions as HalfConeOptions
     from nutdamp.schemes.catalogue import OptimalOptions as OptimalOptions
@@ -53,7 +54,7 @@ if TYPE_CHECKING:
     from nutdamp.spacecraft.model import Spacecraft as Spacecraft
     from nutdamp.views.check import CheckedFile as CheckedFile
 
-__version__ = "0.3.0.dev0"
+__version__ = "0.4.0.dev0"
 
 _HOMES: dict[str, tuple[str, ...]] = {
     "nutdamp.api": (
@@ -81,14 +82,15 @@ _HOMES: dict[str, tuple[str, ...]] = {
     "nutdamp.control_loop.dispersion": ("LoopDispersion",),
     "nutdamp.control_loop.evaluation": ("LoopPlan", "LoopVerification"),
     "nutdamp.errors": ("NutdampError",),
-    "nutdamp.estimation.forecast": ("Fitted",),
+    "nutdamp.estimation.results": ("Fitted",),
     "nutdamp.flight.propagation": ("Flight", "Residual", "Track"),
-    "nutdamp.montecarlo.study": ("Dispersion",),
     "nutdamp.page.report": ("Report",),
     "nutdamp.planning.decision": ("Comparison", "Simulation"),
     "nutdamp.planning.plan": ("Plan", "Verified"),
     "nutdamp.planning.robust": ("RobustComparison",),
+    "nutdamp.planning.screening": ("Dispersion",),
     "nutdamp.planning.tradeoff": ("Trade",),
+    "nutdamp.planning.verdict": ("Verdict",),
     "nutdamp.schemes.catalogue": (
         "FourPulseOptions",
         "HalfConeOptions",

@@ -14,6 +14,7 @@ package a NutdampError.
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from os import PathLike
@@ -28,12 +29,13 @@ if TYPE_CHECKING:
     from nutdamp.control_loop.budget import Budget
     from nutdamp.control_loop.dispersion import LoopDispersion
     from nutdamp.control_loop.evaluation import LoopPlan, LoopVerification
-    from nutdamp.estimation.forecast import Fitted
-    from nutdamp.montecarlo.study import Dispersion
+    from nutdamp.estimation.results import Fitted
+    from nutdamp.montecarlo.study import Results
     from nutdamp.page.report import Report
     from nutdamp.planning.decision import Comparison, Simulation
     from nutdamp.planning.plan import Plan, Verified
     from nutdamp.planning.robust import RobustComparison
+    from nutdamp.planning.screening import Dispersion
     from nutdamp.planning.tradeoff import Trade
     from nutdamp.schemes.planner import Choice
     from nutdamp.spacecraft.model import Spacecraft
@@ -189,6 +191,8 @@ def robust(
 ) -> RobustComparison:
     """Search the cheapest plan with which enough dispersed cases comply, as ``nutdamp plan --robust`` does.
 
+    Raises BadRequest where the spacecraft file has no dispersions.
+
     Parameters
     ----------
     compared
@@ -198,9 +202,8 @@ def robust(
 
     Examples
     --------
-    >>> nutdamp.robust(nutdamp.compare(nutdamp.example("magnus-a03"), ["two-pulse"]))
-    Traceback (most recent call last):
-    nutdamp.errors.BadRequest: the spacecraft file has no dispersions: ...
+    >>> nutdamp.robust(nutdamp.compare(nutdamp.example(), ["two-pulse"])).verdict.met
+    True
     """
     from nutdamp.planning import robust as search
     from nutdamp.planning.decision import Comparison
@@ -245,7 +248,7 @@ def simulate(plan: Plan, until: float | None = None, *, flown: bool = False, sam
 
     Examples
     --------
-    >>> nutdamp.simulate(nutdamp.plan(nutdamp.example(), "two-pulse"), 20.0, flown=True).decision.met
+    >>> nutdamp.simulate(nutdamp.plan(nutdamp.example(), "two-pulse"), 20.0, flown=True).verdict.met
     True
     """
     from nutdamp.figures.geometry import shown_until
@@ -265,6 +268,7 @@ def trade(
     least: str = "propellant",
     *,
     with_disturbances: bool = False,
+    nominal: bool = False,
     progress: Progress = lambda _done, _all: None,
 ) -> Trade:
     """Trade time against cost, as ``nutdamp trade`` does.
@@ -277,6 +281,8 @@ def trade(
         How far from its target H may end, rad; a front for each.
     least, progress
         ``propellant`` or ``impulse``; called with the number of horizons tried, and that of all.
+    nominal
+        Judge schedules by nominal values, without dispersed cases.
 
     Examples
     --------
@@ -289,12 +295,12 @@ def trade(
     count, shifts = units.count("points", points), units.shifts(allow)
     options = OptimalOptions(least=units.one_of("least", least, LEAST[:2]), with_disturbances=with_disturbances)
     with work.steps(count * len({*shifts}), hook=progress) as task:
-        return tradeoff.Trade(body, tradeoff.fronts(body, options, count=count, shifts=shifts, progress=task.reach))
+        return tradeoff.trade(body, options, count=count, shifts=shifts, nominal=nominal, progress=task.reach)
 
 
 def disperse(
     plan: Plan,
-    samples: int = work.SAMPLES,
+    samples: int | None = None,
     *,
     seed: int = 1,
     threads: int | None = None,
@@ -308,7 +314,8 @@ def disperse(
     Parameters
     ----------
     samples, seed
-        Number of cases, and the seed of their draws: a whole number from 0 to 2**64 - 1.
+        Number of cases, default as many as show the share required, 20,000 or more; and the seed of their draws: a
+        whole number from 0 to 2**64 - 1.
     threads
         Default: the processors there are.
     csv
@@ -325,21 +332,23 @@ def disperse(
     from nutdamp.files import export as rows
     from nutdamp.montecarlo import study as dispersion
     from nutdamp.planning.plan import feasible
+    from nutdamp.planning.screening import Dispersion
 
     study = dispersion.study_of(feasible(plan).spacecraft, plan.pulses, seed=units.seed(seed))
-    cases = dispersion.Results(study, units.count("samples", samples))
+    count = None if samples is None else units.count("samples", samples)
     if study.lightening_error:
         remark(study.lightening_error)
     if csv is not None:
-        rows.check_room(units.path("csv", csv), study, cases.requested)
+        rows.check_room(units.path("csv", csv), study, count or work.SAMPLES)
 
-    def fly(collect: Callable[..., None] | None) -> None:
-        with work.steps(cases.requested, hook=progress) as task:
-            count = threads or dispersion.threads_here()
-            dispersion.run(cases, threads=count, watch=task.reach, stopped=stopped, collect=collect)
+    def fly(collect: Callable[..., None] | None) -> Results:
+        run = functools.partial(dispersion.run, threads=threads or dispersion.threads_here(), stopped=stopped)
+        with work.steps(count or work.SAMPLES, hook=progress) as task:
+            stage = functools.partial(run, watch=task.reach, collect=collect)
+            return dispersion.flown_in_stages(study, count, fly=stage, stopped=stopped)
 
-    unsaved = rows.streamed(csv, cases, rows.SamplesWriter, fly)
-    return dispersion.Dispersion(cases, unsaved, plan.scheme)
+    flown, unsaved = rows.streamed(csv, study, rows.SamplesWriter, fly)
+    return Dispersion(flown, unsaved, plan=plan)
 
 
 def disperse_loop(
@@ -356,11 +365,6 @@ def disperse_loop(
     """Fly the closed loop of the file in dispersed cases to ``until`` s, as ``nutdamp disperse --loop`` does.
 
     ``samples``: default what shows the share required. Others: see `disperse`. Raises Infeasible where it cannot damp.
-
-    Examples
-    --------
-    >>> nutdamp.disperse_loop(nutdamp.example("upper-stage"), 2, until=60.0)
-    <LoopDispersion: 2 of 2 cases comply>
     """
     from nutdamp.control_loop import dispersion
     from nutdamp.files.export import streamed
@@ -375,11 +379,11 @@ def disperse_loop(
         remark(f"{what}, which takes {study.price_alone(count)}")
     cases = dispersion.LoopResults(study, count)
 
-    def fly(collect: Callable[..., None] | None) -> None:
+    def fly(collect: Callable[..., None] | None) -> dispersion.LoopResults:
         with work.steps(count, hook=progress) as task:
-            dispersion.run(cases, watch=task.reach, stopped=stopped, collect=collect)
+            return dispersion.run(cases, watch=task.reach, stopped=stopped, collect=collect)
 
-    return dispersion.LoopDispersion(cases, streamed(csv, cases, LoopCasesWriter, fly))
+    return dispersion.LoopDispersion(*streamed(csv, study, LoopCasesWriter, fly))
 
 
 def loop(spacecraft: Spacecraft, until: float | None = None, *, seed: int = 1, case: int | None = None) -> LoopPlan:
@@ -387,10 +391,10 @@ def loop(spacecraft: Spacecraft, until: float | None = None, *, seed: int = 1, c
 
     Parameters
     ----------
-    until, seed
-        End, s, default the horizon after the nutation is at ``start``; of the noise of the sensor.
-    case
-        Number (from 1) of a dispersed case of `disperse_loop` with that seed.
+    until
+        End, s, default the horizon after the nutation is at ``start``.
+    seed, case
+        Of the noise of the sensor; number (from 1) of a dispersed case of `disperse_loop` with that seed.
 
     Examples
     --------
@@ -445,10 +449,8 @@ def budget(
 
     Parameters
     ----------
-    thresholds
-        Pairs (start, stop), rad, default those of the loop in the file.
-    largest
-        Nutation by which damping must begin, rad, default the one required.
+    thresholds, largest
+        Pairs (start, stop), rad, default those of the loop; nutation by which damping must begin, default as required.
     seed, progress
         Of the noise of the sensor; called with the number of pairs done, and that of all.
 
@@ -512,10 +514,8 @@ def fit(
 
     Parameters
     ----------
-    telemetry, sun_pulses
-        Names of the CSV files; ``sun_pulses`` are times of Sun pulses.
-    schedule
-        Pulses fired during the record: a plan of `load_schedule`, or the name of its file.
+    telemetry, sun_pulses, schedule
+        Names of the CSV files, and of that of the pulses fired during the record, or a plan of `load_schedule`.
     ignored
         Called with columns that are ignored, in place of Python warnings of them and of doubts about the estimates.
 
@@ -527,8 +527,7 @@ def fit(
     'Sounder-1'
     """
     from nutdamp.estimation.fit import fit as fitted
-    from nutdamp.estimation.forecast import Fitted
-    from nutdamp.estimation.results import doubts
+    from nutdamp.estimation.results import Fitted, doubts
     from nutdamp.files.schedules import read_pulses
     from nutdamp.files.telemetry import read_telemetry
     from nutdamp.planning.plan import Plan
@@ -576,7 +575,7 @@ def report(
 
     Examples
     --------
-    >>> nutdamp.report(nutdamp.example(), "report.html", ["two-pulse"], disperse=0).met
+    >>> nutdamp.report(nutdamp.example(), "report.html", ["two-pulse"], disperse=0).verdict.met
     True
     """
     from nutdamp.files.tabular import write_whole

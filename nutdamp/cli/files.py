@@ -9,7 +9,6 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import click
-from click.shell_completion import CompletionItem
 
 from nutdamp.cli.job import (
     DEFAULT_FILE,
@@ -32,18 +31,15 @@ from nutdamp.cli.options import (
     Grouped,
     NameType,
     goal_options,
-    is_number,
 )
 from nutdamp.cli.plan import compared_with, flown_options, fronts_of, plan_or_read, robust_of, scheme_option
-from nutdamp.cli.screen import console, say, show, show_failures, units_of_screen
+from nutdamp.cli.screen import console, look_of_screen, say, show, show_failures
 from nutdamp.common.work import SAMPLES
 from nutdamp.errors import BadRequest, nearest, printable
 from nutdamp.schemes.catalogue import LEAST, PLANNED
 from nutdamp.views.exchange import FORMATS, expect_possible, export_notes, lacking
 
 if TYPE_CHECKING:
-    from rich.console import RenderableType
-
     from nutdamp.errors import Fault
     from nutdamp.files.editing import Setting
 
@@ -68,7 +64,12 @@ def check_command(
     for given in inputs:
         doubts: list[Fault] = []
         try:
-            result = checked(given.source(remark), given.path, doubts, lambda doubt: say(doubt.as_warning))
+            result = checked(
+                given.source(remark, lambda text: say(f"warning: {text}")),
+                given.path,
+                doubts,
+                lambda doubt: say(doubt.as_warning),
+            )
         except (FaultyFile, CannotRead) as wrong:
             tell(wrong)
             failures.add(BAD_INPUT if isinstance(wrong, FaultyFile) else UNREADABLE)
@@ -76,7 +77,7 @@ def check_command(
             continue
         reports.append(result.to_dict())
         if not silent:
-            with units_of_screen():
+            with look_of_screen():
                 show(check_screen(result.spacecraft, verbose=verbose))
             if len(files) > 1:
                 click.echo()
@@ -141,17 +142,9 @@ def _verify_loop(job: Job) -> None:
         leave(failed=True)
 
 
-def _completed_examples(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:  # noqa: ARG001
-    from nutdamp.files.reader import example_names, example_subject
-
-    return [CompletionItem(name, help=example_subject(name)) for name in example_names() if name.startswith(incomplete)]
-
-
 @click.command("init")
 @click.argument("file", type=FILE, default=DEFAULT_FILE, metavar="[FILE]")
-@click.option(
-    "--from", "name", metavar="NAME", shell_complete=_completed_examples, help="One of the examples of --list instead."
-)
+@click.option("--from", "name", metavar="NAME", help="One of the examples of --list instead.")
 @click.option("--list", "listed", is_flag=True, help="List the examples that there are, and write nothing.")
 @click.option("--force", is_flag=True, help="Replace an existing file.")
 @quiet_option
@@ -192,29 +185,18 @@ def schema_command(output: str) -> None:
     write_whole(output, json_text(json_schema()))
 
 
-def _completed_topics(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:  # noqa: ARG001
-    from nutdamp.views.guide import NAMES, page_or_topic
-
-    return [CompletionItem(name, help=page_or_topic(name).summary) for name in NAMES if name.startswith(incomplete)]
-
-
 @click.command("explain")
-@click.argument("topic", nargs=-1, metavar="[TOPIC]", shell_complete=_completed_topics)
+@click.argument("topic", nargs=-1, metavar="[TOPIC]")
 def explain_command(topic: tuple[str, ...]) -> None:
     """Explain a page of the guide, a scheme, an equation, a heading of a table, or a key of the spacecraft file.
 
     TOPIC is a page or a scheme; a number such as 17, K7 or 24.4, or `equations` for all; a word such as `tilt`, `H`
     or `on_time_s`; `file.thrusters`. Without it the pages are listed. On a terminal long pages go through a pager.
     """
-    from nutdamp.views import explain, guide
+    from nutdamp.views import explain
 
     requested, shown = " ".join(topic).strip(), console()
-    if not requested:
-        screen: RenderableType = explain.topics_screen()
-    elif requested.casefold() == guide.OVERVIEW:
-        screen = explain.equations_screen()
-    else:
-        screen = explain.topic_screen(explain.explained(requested))
+    screen = explain.topic_screen(explain.explained(requested)) if requested else explain.topics_screen()
     if shown.is_terminal and on_keyboard():
         with shown.capture() as captured:
             shown.print(screen)
@@ -229,13 +211,14 @@ def on_keyboard() -> bool:
     return sys.stdin.isatty()
 
 
-@click.command("export", cls=SessionCommand, context_settings={"allow_extra_args": True})
+@click.command("export", cls=SessionCommand)
 @spacecraft_argument
 @click.option(
     "--format",
     "form",
     type=NameType(tuple(FORMATS)),
-    help=f"Required. {'; '.join(f'{row.name}: {row.summary}' for row in FORMATS.values())}.",
+    required=True,
+    help=f"{'; '.join(f'{row.name}: {row.summary}' for row in FORMATS.values())}.",
 )
 @click.option("--xml", is_flag=True, help="CCSDS: XML instead of keyword = value; also where FILE ends in .xml.")
 @flown_options("Export")
@@ -245,18 +228,16 @@ def on_keyboard() -> bool:
 )
 @click.option("-o", "--output", type=OUTPUT, default="-", help="Where to write it; default standard output.")
 @quiet_option
-@click.pass_context
-def export_command(ctx: click.Context, job: Job, form: str | None, xml: bool, until: float | None) -> None:
+def export_command(job: Job, form: str, xml: bool, until: float | None) -> None:
     """Write a schedule in a format that other tools read.
 
     The CCSDS messages and stk need attitude.epoch and attitude.frame in the spacecraft file; opm also mass, and orbit
     for its state. Vectors are in the axes of that file, those of opm in attitude.frame.
     """
     from nutdamp.api import export
-    from nutdamp.planning.decision import compare_plans, decide
-    from nutdamp.views.decisions import verdict
+    from nutdamp.views.verdict import stated
 
-    form, output = _format(form, job.given, ctx.args), job.written["output"] or "-"
+    output = job.written["output"] or "-"
     notation = xml or (FORMATS[form].message and output.lower().endswith(".xml"))
     expect_possible(form, xml=notation, until=until)
     job.begin()
@@ -268,24 +249,10 @@ def export_command(ctx: click.Context, job: Job, form: str | None, xml: bool, un
     job.note(export_notes(plan, form))
     if output != "-":
         job.remark(f"wrote {printable(output)}: {plan.scheme}, {len(plan.pulses)} pulses")
-    decided = decide(compare_plans((plan,)))
-    if decided is not None and decided.met is False:
-        job.remark(f"{plan.scheme} does not meet the requirement: {verdict(decided)}")
-        leave(missed=True)
-
-
-def _format(form: str | None, spacecraft: FileInput, more: list[str]) -> str:
-    """The format named; a usage error that shows how to name it, also where it was given as if it were a file."""
-    words = [word for word in (spacecraft.path, *more) if word is not None]
-    meant = next((word.lower() for word in words if word.lower() in FORMATS), None)
-    if more and (meant is None or form is not None):
-        raise click.UsageError(f"not expected here: {' '.join(more)}")
-    if form is not None:
-        return form
-    if meant is None:
-        raise click.UsageError(f"name the format: --format {', '.join([*FORMATS][:-1])} or {[*FORMATS][-1]}")
-    named = [word for word in words if word.lower() != meant]
-    raise click.UsageError(f"the format is an option: nutdamp export {shlex.join([*named, '--format', meant])}")
+    judged = plan.verdict
+    if judged.status.exit_status:
+        job.doubt(f"{plan.scheme}: {stated(judged)[0]}")
+    leave(judged.status)
 
 
 @click.command("import", cls=SessionCommand)
@@ -322,7 +289,7 @@ def import_command(job: Job, given: tuple[str, ...], into: str | None, inertia: 
         message = read_history(file) if is_history(file) else read_apm(file)
         for entry in message.remarks:
             job.remark(f"{file}: {entry}")
-        merged = merged_text(FileInput(into).source(job.remark), message, at or 0.0, inertia=inertia)
+        merged = merged_text(FileInput(into).source(job.remark, job.doubt), message, at or 0.0, inertia=inertia)
         deliver([(output, lambda: merged)])
         return
     if is_history(file):
@@ -339,22 +306,6 @@ def import_command(job: Job, given: tuple[str, ...], into: str | None, inertia: 
 
 
 POINTS = 6  # horizons tried for each front where no number follows ``--trade``
-COUNTS = {"--disperse": SAMPLES, "--trade": POINTS}  # options that may come without a number, and their values then
-
-
-class ReportCommand(SessionCommand):
-    """``report``, in which the options of `COUNTS` may come without a number."""
-
-    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Put in a number where none follows: any other word is a file or an option."""
-        given: list[str] = []
-        for index, word in enumerate(args):
-            given.append(word)
-            following = args[index + 1 : index + 2]
-            if word in COUNTS and "--" not in given and not (following and is_number(following[0])):
-                given[-1] = f"{word}={COUNTS[word]}"
-        return super().parse_args(ctx, given)
-
 
 CONTROL = (  # options of configuration control on a page, and their subjects
     ("title", "Title of the page."),
@@ -374,7 +325,7 @@ def control_options(command: Callable[..., Any]) -> Callable[..., Any]:
     return command
 
 
-@click.command("report", cls=ReportCommand)
+@click.command("report", cls=SessionCommand)
 @spacecraft_argument
 @scheme_option("names", multiple=True, type=NameType(PLANNED), help="Compare this one only; repeatable.")
 @click.option("--schedule", type=FILE, help="Report the pulses of a CSV file, as `plan --csv` writes it.")
@@ -392,6 +343,8 @@ def control_options(command: Callable[..., Any]) -> Callable[..., Any]:
 @click.option(
     "--disperse",
     type=Count(),
+    is_flag=False,
+    flag_value=SAMPLES,
     metavar="[N]",
     help=f"Number of dispersed cases; {SAMPLES} where no number follows, and where something is required.",
 )
@@ -399,6 +352,8 @@ def control_options(command: Callable[..., Any]) -> Callable[..., Any]:
 @click.option(
     "--trade",
     type=click.IntRange(1, 1000),
+    is_flag=False,
+    flag_value=POINTS,
     metavar="[POINTS]",
     help=f"Show what an earlier end costs, as `nutdamp trade` does; {POINTS} points where no number follows.",
 )
@@ -442,12 +397,13 @@ def report_command(
     compared = compare_plans((plan_or_read(job),), samples=samples) if read else compared_with(job, names, samples)
     if robust:
         compared = robust_of(job, compared).joined
-    fronts = () if trade is None else fronts_of(job, trade, (0.0, math.inf), LEAST[0]).fronts
+    fronts = () if trade is None else fronts_of(job, trade, (0.0, math.inf), LEAST[0], nominal=nominal).fronts
     with job.working("writing the page"):
-        report = made_of(compared, repeated(shlex.join(["nutdamp", *sys.argv[1:]]), job.source), kept, fronts)
+        repeat = repeated(shlex.join(["nutdamp", *sys.argv[1:]]), job.source, job.aim.words)
+        report = made_of(compared, repeat, kept, fronts)
     deliver([(output, lambda: report.content)])
     if not report.good:
-        job.remark(report.verdict)
+        job.remark(report.summary)
     if output != "-":
         job.remark(f"wrote {printable(output)}")
-    leave(failed=show_failures(compared), infeasible=compared.recommended is None, missed=report.met is False)
+    leave(compared.verdict.status, failed=show_failures(compared))

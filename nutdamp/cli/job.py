@@ -30,7 +30,7 @@ from nutdamp.cli.options import (
     OutputName,
     options_in,
 )
-from nutdamp.cli.screen import UNITS, say, show, units_of_screen, working
+from nutdamp.cli.screen import QUIET, UNITS, look_of_screen, say, show, working
 from nutdamp.errors import Fault, FaultyFile, NutdampError, Unsuitable, printable
 from nutdamp.schemes.catalogue import SCHEMES, SUNLIT, Options, names_of
 from nutdamp.units import SI, US
@@ -50,14 +50,19 @@ if TYPE_CHECKING:
 
 
 DEFAULT_FILE = "spacecraft.yaml"
-FIGURES = ("overview", "motion", "sphere", "history")  # pictures that ``--plot`` can draw, the default first
+FIGURES = ("overview", "motion")  # pictures that ``--plot`` can draw, the default first
 
 
 def _units(ctx: click.Context, _: click.Parameter, value: str) -> None:
     ctx.meta[UNITS] = value
 
 
-quiet_option = click.option("-q", "--quiet", is_flag=True, help="Hide progress and notes.")
+def _quiet(ctx: click.Context, _: click.Parameter, value: bool) -> bool:
+    ctx.meta[QUIET] = value
+    return value
+
+
+quiet_option = click.option("-q", "--quiet", is_flag=True, callback=_quiet, help="Hide progress, notes and next steps.")
 
 
 def screen_options(command: Command) -> Command:
@@ -79,8 +84,8 @@ class FileInput(NamedTuple):
         """The file that is read, if any."""
         return DEFAULT_FILE if self.path is None and Path(DEFAULT_FILE).exists() else self.path
 
-    def source(self, remark: Callable[[str], None]) -> Source:
-        """The text of the file, else of the built-in example, and its name."""
+    def source(self, remark: Callable[[str], None], doubt: Callable[[str], None]) -> Source:
+        """The text of the file, else of the built-in example, which is a ``doubt``, and its name."""
         from nutdamp.files.reader import Source, example_text
         from nutdamp.files.yaml import read_text
 
@@ -89,8 +94,8 @@ class FileInput(NamedTuple):
             if self.path is None:
                 remark(f"reading {path}")
             return Source(read_text(Path(path)), path, self.settings)
-        remark("no spacecraft file given: using the built-in example (see `nutdamp init`)")
-        return Source(example_text(), "example.yaml", self.settings)
+        doubt("no spacecraft file given: using the built-in example (see `nutdamp init`)")
+        return Source(example_text(), "example.yaml", self.settings, built_in=True)
 
 
 def _settings(ctx: click.Context, param: click.Parameter, texts: tuple[str, ...]) -> tuple[Setting, ...]:
@@ -119,9 +124,9 @@ def placed(wrong: Unsuitable, given: FileInput) -> NutdampError:
         return wrong
     from nutdamp.files.yaml import dotted, read_tree
 
-    text, name, _ = given.source(lambda _: None)
-    place = read_tree(text, name)[0].place_of(wrong.where)
-    return FaultyFile([Fault(name, place.line, place.column, dotted(wrong.where), wrong.problem)])
+    source = given.source(lambda _: None, lambda _: None)
+    place = read_tree(source.text, source.name)[0].place_of(wrong.where)
+    return FaultyFile([Fault(source.name, place.line, place.column, dotted(wrong.where), wrong.problem)])
 
 
 def defaulted(name: str, kind: click.ParamType[Any], default: object, text: str, **more: Any) -> Callable[..., Any]:
@@ -231,9 +236,9 @@ class Job:
             image.ending(plot)
         elif self.figure != self.usual:
             raise click.UsageError("--figure says what --plot draws: name a file with --plot")
-        self.source = self.given.source(self.remark)
+        self.source = self.given.source(self.remark, self.doubt)
         body = self.source.read(lambda doubt: say(doubt.as_warning))
-        self.spacecraft = self.aim.applied(body, self.remark) if any(given is not None for given in self.aim) else body
+        self.spacecraft = self.aim.applied(body, self.doubt) if any(given is not None for given in self.aim) else body
         from nutdamp.files.tabular import check_place
 
         for path in filter(None, self.written.values()):
@@ -249,12 +254,12 @@ class Job:
             say(text)
 
     def note(self, notes: Iterable[Note]) -> None:
-        """Print notes on results on standard error, unless quiet."""
-        from nutdamp.views.text import screen_line
+        """Print notes on results on standard error; where quiet the warnings among them."""
+        from nutdamp.views.text import ordered, screen_line
 
-        with units_of_screen():
-            for entry in notes:
-                self.remark(screen_line(entry).plain)
+        with look_of_screen():
+            for entry in ordered(notes):
+                say(screen_line(entry).plain)
 
     def doubt(self, *warnings: str) -> None:
         """Print warnings about the data on standard error, quiet or not."""
@@ -343,7 +348,7 @@ def deliver(
     failures = list(unsaved)
     # All content is made before any file is written, so that a failure leaves no file behind.
     contents = [(path, _file_of(make(), path)) for path, make in outputs if path is not None]
-    with units_of_screen():
+    with look_of_screen():
         shown = [make() for make in screens]
     if contents:
         from nutdamp.errors import CannotWrite

@@ -15,12 +15,16 @@ from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
 from types import FrameType
+from typing import TYPE_CHECKING
 
 import click
 
 from nutdamp import __version__
 from nutdamp.cli.screen import say
 from nutdamp.errors import Infeasible, nearest
+
+if TYPE_CHECKING:
+    from nutdamp.planning.verdict import Status
 
 DONE = 0
 UNREADABLE = 1
@@ -73,11 +77,11 @@ def run(group: click.Group) -> None:
     sys.exit(status if isinstance(status, int) else DONE)
 
 
-def leave(*, failed: bool = False, infeasible: bool = False, missed: bool = False) -> None:
-    """End with the exit status of the first that holds: a bug or disagreement, no result, the requirement missed."""
-    for holds, status in ((failed, INTERNAL), (infeasible, INFEASIBLE), (missed, REQUIREMENT_MISSED)):
-        if holds:
-            sys.exit(status)
+def leave(judged: Status | None = None, *, failed: bool = False, infeasible: bool = False) -> None:
+    """End with the exit status of the first that holds: a bug or disagreement, no result, a verdict that says so."""
+    status = 0 if judged is None else judged.exit_status
+    if failed or infeasible or status:
+        sys.exit(INTERNAL if failed else INFEASIBLE if infeasible else status)
 
 
 class Interruption:
@@ -210,8 +214,8 @@ class _CommandGroup(click.Group):
     cls=_CommandGroup,
     context_settings={"help_option_names": ["-h", "--help"]},
     epilog=(
-        "Exit status: 0 done; 1 could not read or write; 2 bad command line or bad file; 3 none of the "
-        "schemes is feasible; 4 no feasible plan meets the requirement; 130 interrupted; 143 terminated."
+        "Exit status: 0 done; 1 could not read or write; 2 bad command line or bad file; 3 no plan is feasible; 4 the "
+        "plan is not shown to meet the requirement, or cannot be commanded; 130 interrupted; 143 terminated."
     ),
 )
 @click.version_option(__version__, prog_name="nutdamp")

@@ -13,7 +13,6 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import click
-from click.shell_completion import CompletionItem
 
 from nutdamp import units
 from nutdamp.cli.screen import debug_option
@@ -67,22 +66,12 @@ def is_number(word: str) -> bool:
     return True
 
 
-class FileName(ParamType[str]):
-    """A file name as it is, which shells complete; whether it can be read or written is seen when it is."""
+class FileName(click.Path):
+    """A file name as it is; whether it can be read or written is seen when it is."""
 
-    name = "file"
-    completed_as = "file"
-
-    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:  # noqa: ARG002
-        """Leave it to the shell to complete the name."""
-        return [CompletionItem(incomplete, type=self.completed_as)]
-
-
-class FolderName(FileName):
-    """The same for a folder."""
-
-    name = "folder"
-    completed_as = "dir"
+    def __init__(self) -> None:
+        super().__init__(readable=False)
+        self.name = "file"
 
 
 class OutputName(FileName):
@@ -91,7 +80,7 @@ class OutputName(FileName):
 
 FILE = FileName()
 OUTPUT = OutputName()
-FOLDER = FolderName()
+FOLDER = click.Path(readable=False)
 
 
 class UnitType(ParamType[float]):
@@ -260,8 +249,18 @@ class Aim(NamedTuple):
     spin: float | str | None = None
     sun: Angles | None = None
 
-    def applied(self, spacecraft: Spacecraft, remark: Callable[[str], None]) -> Spacecraft:
-        """The spacecraft with this goal; a usage error where it cannot be one, a remark where it is hardly meant."""
+    @property
+    def words(self) -> tuple[str, ...]:
+        """Options that give target and spin to any command; ``--sun`` only goes with a scheme that reads it."""
+        words = []
+        if self.target is not None:
+            words.append(f"--target={self.target.first!r}rad,{self.target.second!r}rad")
+        if self.spin is not None:
+            words.append("--spin=keep" if self.spin == "keep" else f"--spin={self.spin!r}rad/s")
+        return tuple(words)
+
+    def applied(self, spacecraft: Spacecraft, doubt: Callable[[str], None]) -> Spacecraft:
+        """The spacecraft with this goal; a usage error where it cannot be one, a doubt where it is hardly meant."""
         goal = spacecraft.goal
         if self.target is not None:
             goal = dataclasses.replace(goal, axis=_direction(spacecraft, self.target, "--target"))
@@ -274,10 +273,10 @@ class Aim(NamedTuple):
                 raise click.BadParameter(problem, param_hint="--spin")
             goal = dataclasses.replace(goal, spin=spin)
         if isinstance(self.spin, Bare) and (self.spin.is_integer() or abs(self.spin) > FASTEST):
-            remark(f"--spin: warning: {reading_of(self.spin, 'rate', 'rpm')}")
+            doubt(f"--spin: {reading_of(self.spin, 'rate', 'rpm')}")
         for option, angles in (("--target", self.target), ("--sun", self.sun)):
             for reading in () if angles is None else angles.readings:
-                remark(f"{option}: warning: {reading}")
+                doubt(f"{option}: {reading}")
         return dataclasses.replace(spacecraft, goal=goal)
 
 
@@ -292,17 +291,17 @@ def _direction(spacecraft: Spacecraft, angles: Angles, option: str) -> Vector:
     raise click.BadParameter("; ".join((problem, *angles.readings)), param_hint=option)
 
 
-def expect_read(names: Sequence[str], options: Options, body: Spacecraft, remark: Callable[[str], None]) -> None:
-    """Remark on options that none of the schemes ``names`` reads; a usage error where that is the goal itself."""
+def expect_read(names: Sequence[str], options: Options, body: Spacecraft, doubt: Callable[[str], None]) -> None:
+    """Warn of options that none of the schemes ``names`` reads; a usage error where that is the goal itself."""
     planned = [SCHEMES[name] for name in names]
     for option in options.without_effect([scheme.options for scheme in planned]) if planned else ():
         readers = [name for name, scheme in SCHEMES.items() if option in names_of(scheme.options)]
-        remark(f"warning: --{option.replace('_', '-')} ignored: it is for {' and '.join(readers)}")
+        doubt(f"--{option.replace('_', '-')} ignored: it is for {' and '.join(readers)}")
     if body.goal.sun is not None:
         without = [scheme.name for scheme in planned if not scheme.reads_sun]
         if len(without) == len(planned):
             raise click.UsageError(NO_SUN)
         if without:
-            remark(f"--sun is read by {' and '.join(SUNLIT)} alone: {', '.join(without)} plan without it")
+            doubt(f"--sun is read by {' and '.join(SUNLIT)} alone: {', '.join(without)} plan without it")
     if planned and body.goal.axis is None and all(scheme.only_points for scheme in planned):
         raise click.UsageError(f"no target of the spin axis for {' and '.join(names)}: --target, or goal in the file")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -32,7 +31,7 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
 
     from nutdamp.errors import CannotWrite
-    from nutdamp.planning.decision import Comparison, Decision
+    from nutdamp.planning.decision import Comparison
     from nutdamp.planning.plan import Plan
     from nutdamp.planning.robust import RobustComparison
     from nutdamp.planning.tradeoff import Trade
@@ -68,7 +67,7 @@ def compared_with(job: Job, names: Sequence[str], samples: int | None = None, *,
     from nutdamp.api import compare
     from nutdamp.planning.decision import usual
 
-    expect_read(tuple(dict.fromkeys(names)) or usual(job.spacecraft), job.options, job.spacecraft, job.remark)
+    expect_read(tuple(dict.fromkeys(names)) or usual(job.spacecraft), job.options, job.spacecraft, job.doubt)
     with job.working("planning"):
         return compare(job.spacecraft, names, job.options, samples=samples, timed=timed)
 
@@ -81,13 +80,13 @@ def robust_of(job: Job, compared: Comparison) -> RobustComparison:
         return robust(compared, job.options)
 
 
-def fronts_of(job: Job, points: int, shifts: Sequence[float], least: str) -> Trade:
+def fronts_of(job: Job, points: int, shifts: Sequence[float], least: str, *, nominal: bool = False) -> Trade:
     """The fronts of time against cost."""
     from nutdamp.api import trade
 
     known = job.options.with_disturbances
     with job.working("searching"):
-        return trade(job.spacecraft, points, shifts, least, with_disturbances=known)
+        return trade(job.spacecraft, points, shifts, least, with_disturbances=known, nominal=nominal)
 
 
 def plan_or_read(job: Job, *, jitter: bool = False, judged: bool = False) -> Plan:
@@ -96,14 +95,13 @@ def plan_or_read(job: Job, *, jitter: bool = False, judged: bool = False) -> Pla
     ``jitter``: that of the Sun pulses, with `JITTER_SEED`; ``judged``: a verdict names the cones that are broken.
     """
     from nutdamp import api
-    from nutdamp.planning.decision import infeasibility
-    from nutdamp.planning.notes import plan_notes
+    from nutdamp.planning.notes import infeasibility, plan_notes
 
     scheme, schedule, blocks = job.flown
     if schedule is not None:
         from nutdamp.files.schedules import read_plan
 
-        expect_read((), job.options, job.spacecraft, job.remark)
+        expect_read((), job.options, job.spacecraft, job.doubt)
         plan, warnings = read_plan(schedule, job.spacecraft, job.options.of(SchemeOptions))
         job.doubt(*warnings)
         return plan
@@ -112,7 +110,7 @@ def plan_or_read(job: Job, *, jitter: bool = False, judged: bool = False) -> Pla
     if scheme is None:
         plan = _recommended(job, judged=judged)
     else:
-        expect_read((scheme,), job.options, job.spacecraft, job.remark)
+        expect_read((scheme,), job.options, job.spacecraft, job.doubt)
         with job.working("planning"):
             plan = api.plan(job.spacecraft, scheme, job.options)
     if not plan.feasible:
@@ -140,7 +138,7 @@ def _recommended(job: Job, *, judged: bool) -> Plan:
 def _fired(job: Job, path: str, *, jitter: bool) -> Plan:
     """The pulses that the command blocks of a file fire, as a plan; raises Infeasible where there is no Sun pulse."""
     from nutdamp.files.schedules import read_blocks
-    from nutdamp.planning.decision import broken_limits
+    from nutdamp.planning.notes import broken_limits
     from nutdamp.planning.plan import Plan
     from nutdamp.schemes.block_model import fired
 
@@ -151,9 +149,6 @@ def _fired(job: Job, path: str, *, jitter: bool) -> Plan:
     pulses = fired(body, blocks, JITTER_SEED if jitter else None)
     job.doubt(*warnings, *broken_limits(body, pulses))
     return Plan(body, printable(path), pulses, options=job.options.of(SchemeOptions), from_file=True)
-
-
-PRIMER = "primer"  # the picture of the certificate; the others are of one plan
 
 
 @click.command("plan", cls=SessionCommand)
@@ -170,7 +165,7 @@ PRIMER = "primer"  # the picture of the certificate; the others are of one plan
 @click.option("--json", type=OUTPUT, help="Write all plans and residuals.")
 @click.option("--certificate", type=OUTPUT, help="Write the proof of the least cost (JSON).")
 @carry_options("end of the last pulse")
-@plot_options((*FIGURES, PRIMER))
+@plot_options(FIGURES)
 @screen_options
 def plan_command(
     job: Job, names: tuple[str, ...], robust: bool, nominal: bool, timed: bool, at: float | None, verbose: bool
@@ -180,9 +175,8 @@ def plan_command(
     SPACECRAFT is a YAML file, or - for standard input; default spacecraft.yaml here, else the built-in example.
     A FILE of - is standard output.
     """
-    figure = job.figure or FIGURES[0]
     csv, blocks, certificate, plot = (job.written[name] for name in ("csv", "blocks", "certificate", "plot"))
-    for option, path in (("csv", csv), ("plot", plot if figure in FIGURES else None)):
+    for option, path in (("csv", csv), ("plot", plot)):
         if path is not None and len(set(names)) > 1:
             cure = "name one --scheme, or none for the recommended one"
             raise click.UsageError(f"--{option} writes one schedule: {cure}")
@@ -190,7 +184,6 @@ def plan_command(
     if robust and nominal:
         raise click.UsageError("--robust goes by dispersed cases, which --nominal leaves out: name one of them")
 
-    from nutdamp.planning.decision import decide
     from nutdamp.planning.notes import comparison_warnings
     from nutdamp.spacecraft.tolerances import expect_dispersions
     from nutdamp.views.glance import scheme_table
@@ -198,28 +191,26 @@ def plan_command(
 
     if robust:
         expect_dispersions(body.dispersions)
-    proofs = [path for path in (certificate, plot if figure == PRIMER else None) if path is not None]
-    if proofs:
+    if certificate is not None:
         _expect_certified(names, body)
     compared = compared_with(job, names, 0 if nominal else None, timed=timed)
     dispersed = robust_of(job, compared) if robust else None
-    decided = decide(compared) if dispersed is None else dispersed.decision
-    chosen = None if decided is None else decided.plan
-    for path in filter(None, () if chosen else (csv, blocks, plot if figure in FIGURES else None)):
+    shown = compared if dispersed is None else dispersed.joined
+    judged, chosen = shown.verdict, shown.recommended
+    for path in filter(None, () if chosen is not None else (csv, blocks, plot)):
         say(f"{printable(path)} was not written: no plan is feasible")
-    files, unproved = _certified(job, compared, chosen, proofs)
-    more: Files = {"json": (dispersed or compared).to_dict, **files}
-    more["table"] = lambda: scheme_table(compared, chosen).csv()
+    files, unproved = _certified(job, compared, chosen, certificate)
+    more: Files = {"json": (compared if dispersed is None else dispersed).to_dict, **files}
+    more["table"] = lambda: scheme_table(shown, chosen).csv()
     if chosen is not None:
         more["csv"] = lambda: pulse_table(chosen.flight).csv()
-        more |= {"plot": partial(chosen.figure, figure)} if figure in FIGURES else {}
+        more["plot"] = partial(shown.figure, job.figure or FIGURES[0])
     more |= job.carried(chosen, at)
     more |= {} if blocks is None else _blocks_file(job, compared, chosen)
     if job.silent:
         job.note(comparison_warnings(compared))
-    job.deliver(None, partial(_screen, compared, decided, dispersed, verbose), more=more, unsaved=unproved)
-    missed = decided is not None and decided.met is False
-    leave(failed=show_failures(compared), infeasible=decided is None, missed=missed)
+    job.deliver(None, partial(_screen, compared, dispersed, verbose), more=more, unsaved=unproved)
+    leave(judged.status, failed=show_failures(compared))
 
 
 def _blocks_file(job: Job, compared: Comparison, chosen: Plan | None) -> Files:
@@ -231,7 +222,7 @@ def _blocks_file(job: Job, compared: Comparison, chosen: Plan | None) -> Files:
             raise BadRequest("--blocks: no plan is made of command blocks; run --scheme command-block for the reason")
         return {}
     if source is not chosen:
-        job.remark(f"writing the blocks of {source.scheme}, which is not the recommended plan")
+        job.doubt(f"writing the blocks of {source.scheme}, which is not the recommended plan")
     from nutdamp.views.parts import block_table
 
     return {"blocks": lambda: block_table(source.flight).csv()}
@@ -249,13 +240,12 @@ def _expect_certified(names: Sequence[str], body: Spacecraft) -> None:
 
 
 def _certified(
-    job: Job, compared: Comparison, chosen: Plan | None, paths: Sequence[str]
+    job: Job, compared: Comparison, chosen: Plan | None, path: str | None
 ) -> tuple[Files, list[CannotWrite]]:
-    """The files of the certificate of the plan of optimal; where it has none, errors of the ``paths`` not written."""
-    if not paths:
+    """File of the certificate of optimal; else the error of the ``path`` that is not written."""
+    if path is None:
         return {}, []
     from nutdamp.errors import CannotWrite
-    from nutdamp.figures.studies import certificate_figure
     from nutdamp.planning.tradeoff import certificate
     from nutdamp.schemes.catalogue import OPTIMAL
     from nutdamp.views.decisions import certificate_json
@@ -263,27 +253,20 @@ def _certified(
     try:
         proof = certificate(next(plan for plan in compared if plan.scheme == OPTIMAL.name))
     except BadRequest as reason:
-        return {}, [CannotWrite(path, f"there is no certificate: {reason}") for path in paths]
+        return {}, [CannotWrite(path, f"there is no certificate: {reason}")]
     if proof.plan is not chosen:
-        job.remark(f"the certificate is of {proof.plan.scheme} for nominal values, which is not the recommended plan")
-    drawn: Files = {"plot": partial(certificate_figure, proof)} if job.figure == PRIMER else {}
-    return {"certificate": partial(certificate_json, proof), **drawn}, []
+        job.doubt(f"the certificate is of {proof.plan.scheme} for nominal values, which is not the recommended plan")
+    return {"certificate": partial(certificate_json, proof)}, []
 
 
-def _screen(
-    compared: Comparison, decided: Decision | None, dispersed: RobustComparison | None, verbose: bool
-) -> RenderableType:
+def _screen(compared: Comparison, dispersed: RobustComparison | None, verbose: bool) -> RenderableType:
     from nutdamp.views.glance import comparison_screen, glance
 
     if dispersed is None:
-        return comparison_screen(compared) if verbose else glance(compared, decided)
+        return comparison_screen(compared) if verbose else glance(compared)
     from nutdamp.views.robust import robust_notes, robust_screen
 
-    if verbose:
-        return robust_screen(dispersed)
-    joined = dispersed.joined
-    named = decided and replace(decided, plan=joined[dispersed.name])
-    return glance(joined, named, robust_notes(dispersed))
+    return robust_screen(dispersed) if verbose else glance(dispersed.joined, robust_notes(dispersed))
 
 
 @click.command("animate", cls=SessionCommand)
@@ -307,19 +290,18 @@ def animate_command(job: Job, until: float | None, seconds: float | None, fps: i
     output = job.written["output"] or ""
     image.film_format(output)
     body = job.begin()
-    pulses = plan_or_read(job).pulses
+    plan = plan_or_read(job)
 
     from nutdamp.figures.geometry import shown_until
-    from nutdamp.flight import propagation
 
-    end = shown_until(body, pulses) if until is None else until
+    end = shown_until(body, plan.pulses) if until is None else until
     timed = image.timing(body, end, fps, seconds)
     if not timed.smooth:
         job.remark(
             f"only {timed.frames / timed.turns:.1f} frames show a nutation turn, which may seem to run backwards: "
             f"--seconds {timed.turns * image.SMOOTH / fps:.0f} would show it, or an earlier --until"
         )
-    flight = propagation.flown(body, pulses, end)
+    flight = plan.reaching(end)
     with job.working("filming"):
         deliver([(output, lambda: lambda stream: image.film(stream, flight, timed, output, width))])
     if output != "-":
@@ -343,10 +325,10 @@ def animate_command(job: Job, until: float | None, seconds: float | None, fps: i
 def simulate_command(job: Job, real: bool, until: float | None, samples: int, at: float | None, verbose: bool) -> None:
     """Propagate a schedule; show cone angles around each pulse, how it ends by both models, and the axis track.
 
-    Exit status 4 where all pulses are fired, and with real widths the end does not meet the requirement, or the axis
-    breaks a cone of keep; so for free motion too. SPACECRAFT is a YAML file, or - for standard
-    input; without it spacecraft.yaml in this folder, else the built-in example. A FILE of - is standard output, for
-    --schedule standard input.
+    The verdict is on the whole schedule, in dispersed cases where the file has them; of free motion on its end. Exit
+    status 4 where it is not FLY or NO PULSE. SPACECRAFT is a YAML file, or - for standard input; without it
+    spacecraft.yaml in this folder, else the built-in example. A FILE of - is standard output, for --schedule standard
+    input.
     """
     job.begin()
     plan = plan_or_read(job, jitter=True, judged=not job.silent)
@@ -360,4 +342,4 @@ def simulate_command(job: Job, real: bool, until: float | None, samples: int, at
         job.note(model_warnings(simulation.impulses, simulation.flown))
     screen = partial(simulation_screen, simulation, verbose=verbose)
     job.deliver(simulation, screen, more=job.carried(plan, at, simulation.until))
-    leave(missed=simulation.decision.met is False and len(simulation.flown.schedule) == len(plan.pulses))
+    leave(simulation.verdict.status)

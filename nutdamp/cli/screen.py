@@ -10,7 +10,7 @@ import math
 import sys
 import threading
 from collections.abc import Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import contextmanager
 from dataclasses import dataclass
 from time import monotonic as clock
 from typing import TYPE_CHECKING
@@ -81,10 +81,18 @@ class _Visible:
 UNITS = "nutdamp.units"  # key of ``--units`` in the context of a command line
 
 
-def units_of_screen() -> AbstractContextManager[None]:
-    """Context of texts for people: in the units of ``--units``."""
+QUIET = "nutdamp.quiet"  # key of ``--quiet`` in the context of a command line
+
+
+@contextmanager
+def look_of_screen() -> Iterator[None]:
+    """Context of texts for people: in the units of ``--units``, without notes where ``--quiet`` says so."""
+    from nutdamp.views.text import quietly
+
     context = click.get_current_context(silent=True)
-    return screen_units(SI if context is None else context.meta.get(UNITS, SI))
+    meta = {} if context is None else context.meta
+    with screen_units(meta.get(UNITS, SI)), quietly(meta.get(QUIET, False)):
+        yield
 
 
 DEBUG = "nutdamp.debug"  # key of ``--debug`` in the context of a command line

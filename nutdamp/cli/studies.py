@@ -46,9 +46,10 @@ from nutdamp.units import LARGEST_SEED, shifts, thresholds, tilt
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
+    from nutdamp.control_loop.dispersion import LoopDispersion
     from nutdamp.errors import CannotWrite
-    from nutdamp.montecarlo.study import Dispersed
     from nutdamp.planning.plan import Plan
+    from nutdamp.planning.screening import Dispersion
     from nutdamp.planning.tradeoff import Front
 
 
@@ -69,7 +70,12 @@ if TYPE_CHECKING:
 @click.option("--csv", type=OUTPUT, help="Write the points.")
 @click.option("--json", type=OUTPUT, help="Write the points with their pulses.")
 @click.option("--plot", type=OUTPUT, help="Draw the fronts (.png, .svg, .pdf; needs the extra plot).")
-@click.option("--schedules", type=FOLDER, help="Write each schedule as FOLDER/point-N.csv, as `plan --csv` does.")
+@click.option(
+    "--schedules",
+    type=FOLDER,
+    metavar="FOLDER",
+    help="Write each schedule as FOLDER/point-N.csv, as `plan --csv` does.",
+)
 @screen_options
 def trade_command(
     job: Job, allow: tuple[float, ...], points: int, least: str, schedules: str | None, verbose: bool
@@ -77,26 +83,31 @@ def trade_command(
     """Trade time against propellant: the cheapest schedules found for ends from the earliest to the horizon.
 
     Each front is of the scheme optimal (of the others where that finds none) and holds no schedule that another beats
-    in both. SPACECRAFT and FILE are as for `nutdamp plan`.
+    in both. Exit status 4 where none of the schedules may be flown, by their verdicts, and 3 where there is none.
+    SPACECRAFT and FILE are as for `nutdamp plan`.
     """
-    from nutdamp.planning.decision import CUT
+    from nutdamp.planning.notes import CUT
     from nutdamp.planning.tradeoff import numbered
     from nutdamp.views.trade import schedule_paths, trade_brief
 
     allowed = allow or (0.0, math.inf)
     for shift in allow:
         if isinstance(shift, Bare) and shift:
-            job.remark(f"--allow: warning: {reading_of(shift, 'angle', 'deg')}")
+            job.doubt(f"--allow: {reading_of(shift, 'angle', 'deg')}")
     job.begin([] if schedules is None else schedule_paths(schedules, points * len({*allowed})))
-    expect_read((OPTIMAL.name,), job.options, job.spacecraft, job.remark)
+    expect_read((OPTIMAL.name,), job.options, job.spacecraft, job.doubt)
     traded = fronts_of(job, points, allowed, least)
     for index, _, point in numbered(traded.fronts):
         if point.plan.cut:
-            job.remark(f"point {index}: {CUT}")
+            job.doubt(f"point {index}: {CUT}")
     files, unsaved = ([], []) if schedules is None else _schedules(traded.fronts, schedules)
     brief = [] if verbose else [partial(trade_brief, traded.spacecraft, traded.fronts)]
     job.deliver(traded, *brief, files=files, unsaved=unsaved)
-    leave(infeasible=not traded.plans)
+    judged = [point.verdict.status for _, _, point in numbered(traded.fronts)]
+    best = next((status for status in judged if not status.exit_status), judged[0] if judged else None)
+    if not judged and traded.recommended is not None and traded.recommended.verdict.idle:
+        best = traded.recommended.verdict.status
+    leave(best, infeasible=best is None)
 
 
 def _schedules(fronts: Sequence[Front], folder: str) -> tuple[list[Output], list[CannotWrite]]:
@@ -149,7 +160,7 @@ def loop_command(
     job.deliver(plan, partial(loop_screen, plan, verbose=verbose), more=track | job.carried(plan, at))
     if run.stop.fault:
         say(f"nutdamp: {text(stopped(run))}")
-    leave(infeasible=run.stop.fault, missed=plan.meets_requirement is False)
+    leave(plan.verdict.status)
 
 
 @click.command("budget", cls=SessionCommand)
@@ -180,7 +191,7 @@ def budget_command(job: Job, pairs: tuple[Angles, ...], largest: float | None, s
     """
     body = job.begin()
     for reading in (text for pair in pairs for text in pair.readings):
-        job.remark(f"--thresholds: warning: {reading}")
+        job.doubt(f"--thresholds: {reading}")
 
     from nutdamp.api import budget
     from nutdamp.views.loop import budget_screen
@@ -188,7 +199,7 @@ def budget_command(job: Job, pairs: tuple[Angles, ...], largest: float | None, s
     with job.working("following cycles"):
         result = budget(body, pairs, largest=largest, seed=seed)
     job.deliver(result, partial(budget_screen, result, verbose=verbose))
-    leave(infeasible=not result.feasible, missed=result.meets_requirement is False)
+    leave(result.status)
 
 
 @click.command("fit", cls=SessionCommand)
@@ -200,9 +211,8 @@ def budget_command(job: Job, pairs: tuple[Angles, ...], largest: float | None, s
 @click.option("-o", "--output", type=OUTPUT, help="Write the spacecraft file with the estimates in it.")
 @click.option("--json", type=OUTPUT, help="Write estimates, covariance and signals.")
 @click.option("--plot", type=OUTPUT, help="Draw data, fit and residuals (.png, .svg, .pdf; needs extra plot).")
-@click.option("--next", "ahead", is_flag=True, help="Say whether a longer coast or a probe pulse would pay.")
 @screen_options
-def fit_command(job: Job, telemetry: str, sun_pulses: str | None, at: float, ahead: bool, verbose: bool) -> None:
+def fit_command(job: Job, telemetry: str, sun_pulses: str | None, at: float, verbose: bool) -> None:
     """Estimate motion, C/A, dissipation and sensor errors from telemetry, and thrust factors from pulses fired in it.
 
     TELEMETRY.csv has t_s or utc, and any of omega_1_rad_s, omega_2_rad_s, omega_3_rad_s (or _deg_s), axis_ra_deg and
@@ -229,10 +239,8 @@ def fit_command(job: Job, telemetry: str, sun_pulses: str | None, at: float, ahe
     with job.working("fitting"):
         fitted = fit(telemetry, body, schedule=job.flown.schedule, sun_pulses=sun_pulses, ignored=job.doubt)
     job.note(notes(fitted.core, carried(fitted.core, at)))
-    with job.working("looking ahead"):
-        prospects = fitted.outlook(at) if ahead else None
-    files: Files = {"output": partial(fitted.text, at), "json": partial(fitted.to_dict, at, prospects)}
-    job.deliver(fitted, partial(fit_screen, fitted.core, at, prospects, verbose=verbose), more=files)
+    files: Files = {"output": partial(fitted.text, at), "json": partial(fitted.to_dict, at)}
+    job.deliver(fitted, partial(fit_screen, fitted.core, at, verbose=verbose), more=files)
 
 
 FIGURES = ("overview", "cases", "momentum")  # figures that ``--plot`` draws
@@ -271,9 +279,9 @@ def disperse_command(
 ) -> None:
     """Fly one schedule, or the closed loop, in many cases, dispersed as the spacecraft file says.
 
-    Shows percentiles of what is left, the share of cases that comply, and which tolerance counts; with -v the tolerance
-    budget and the worst cases. Ctrl-C ends the run and shows what is done. SPACECRAFT and FILE are as for `nutdamp
-    plan`.
+    Shows the verdict, each bound with the share of cases that keep it, percentiles of what is left, and which tolerance
+    counts; with -v the tolerance budget and the worst cases. Exit status 4 where these cases do not show that enough
+    comply. Ctrl-C ends the run and shows what is done. SPACECRAFT and FILE are as for `nutdamp plan`.
     """
     if case is not None and (job.written["csv"] or job.written["plot"]):
         raise click.UsageError("--case shows a single case: --csv and --plot are for a study")
@@ -302,16 +310,17 @@ def disperse_command(
     with stoppable() as stopped, job.working("flying"):
         hooks: dict[str, Any] = {"seed": seed, "csv": job.written["csv"], "stopped": stopped}
         if plan is None:
-            flown: Dispersed = (loops := api.disperse_loop(body, samples, until=until, remark=job.remark, **hooks))
-            brief = partial(loop_cases_brief, loops.core)
+            loops = api.disperse_loop(body, samples, until=until, remark=job.remark, **hooks)
+            flown: LoopDispersion | Dispersion = loops
+            brief = partial(loop_cases_brief, loops)
         else:
-            flown = study = api.disperse(plan, samples or SAMPLES, threads=threads, remark=job.remark, **hooks)
-            brief = partial(dispersion_brief, study.core, scheme=plan.scheme)
+            flown = study = api.disperse(plan, samples, threads=threads, remark=job.remark, **hooks)
+            brief = partial(dispersion_brief, study)
     job.deliver(flown, *[brief] * (not verbose), unsaved=[flown.unsaved], worst=worst)
     if stopped.number is not None and flown.core.done < flown.core.requested:
         say(f"interrupted: {flown.core.done} of {flown.core.requested} cases are done")
         sys.exit(128 + stopped.number)
-    leave(missed=flown.meets_requirement is False)
+    leave(flown.verdict.status)
 
 
 def deliver_case(job: Job, plan: Plan | None, case: int, *, seed: int, until: float | None) -> None:

@@ -109,8 +109,9 @@ class Drawn:
     def figure(self, name: str | None = None) -> Figure:
         """Matplotlib figure that the command of this result draws with ``--plot``, by its name if it has several.
 
-        Of plans and flights that is ``overview`` (the default), ``motion``, ``sphere`` or ``history``. Raises
-        BadRequest for other names, MissingExtra without matplotlib, Infeasible for a plan without a schedule.
+        Of plans and flights that is ``overview`` (the default) or ``motion``.
+        Raises BadRequest for other names, MissingExtra without matplotlib, Infeasible for a plan
+        without a schedule.
         """
         drawn: Figure = view(self, "figure", *([] if name is None else [name]))
         return drawn

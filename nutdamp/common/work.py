@@ -18,7 +18,8 @@ SCHEME = 9_000.0  # units for the search of one scheme
 COMMAND = 20_000.0  # units for all searches of one comparison: two that take all of theirs leave some to others
 CURE = 1_000.0  # units for the search of a limit that would make a scheme feasible
 CASES, SAMPLES = 20_000.0, 20_000  # units for the dispersed cases of one comparison by so many, the default number
-FRONTS = 30_000.0  # units for the searches of all points of `trade`
+MORE_CASES = 5_000.0  # units for cases beyond that number, where they leave it undecided whether enough comply
+FRONTS = 30_000.0  # units for all points of `trade` but those that `plan` finds
 FIT, FITTED = 4_500.0, 600  # units that a fit may spend on a record of so many rows; in proportion if more
 
 

@@ -22,10 +22,12 @@ from nutdamp.control_loop.stability import FARTHEST, Band, Odds, dead_band, expe
 from nutdamp.errors import Infeasible
 from nutdamp.flight.dynamics import Supply
 from nutdamp.physics.thruster import Ramp, shape_factor
+from nutdamp.planning.verdict import Status, status_of
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import commandable
 from nutdamp.spacecraft.equipment import Loop
 from nutdamp.spacecraft.model import Spacecraft, Vector
+from nutdamp.spacecraft.requirements import Part
 from nutdamp.spacecraft.schedule import Pulse, channel_pulse
 
 Rows = NDArray[np.int64]
@@ -383,6 +385,7 @@ class Map:
 
 DAY = 86400.0
 YEAR = 365.25 * DAY  # s
+LASTING = YEAR  # s that a tank must last: the time for which propellant is budgeted
 
 # Noise of estimates (one sigma), over the start threshold, above which the map underestimates firings, and the share by
 # which their number is then known at best: flown loops fire up to a fifth more at 0.2 of start.
@@ -418,11 +421,16 @@ class HeldNutation:
 
     @property
     def meets_requirement(self) -> bool | None:
-        """True if the nutation stays within the requirement; None without one, False without a limit cycle."""
-        required = self.spacecraft.requirement
-        if required is None or required.nutation is None:
+        """True if the nutation stays within the requirement, and the tank lasts `LASTING` s.
+
+        None where neither is given, False without a limit cycle.
+        """
+        bounds = [bound for bound in requirements.required(self.spacecraft) if bound.part is Part.NUTATION]
+        if not bounds and self.spacecraft.tank is None:
             return None
-        return self.cycle is not None and self.cycle.largest <= required.nutation
+        if self.cycle is None or (self.lasts is not None and self.lasts < LASTING):
+            return False
+        return all(bool(bound.met(self.cycle.largest)) for bound in bounds)
 
     @property
     def slows(self) -> float | None:
@@ -457,6 +465,11 @@ class Budget(results.Data, results.Written):
         """True if some pair of thresholds meets the requirement; None where nothing is required of a loop."""
         meets = [pair.meets_requirement for pair in self.held]
         return None if not meets or None in meets else any(meets)
+
+    @property
+    def status(self) -> Status:
+        """Status of the best pair of thresholds."""
+        return status_of(met=self.meets_requirement, feasible=self.feasible)
 
 
 def budget(

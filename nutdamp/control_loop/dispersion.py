@@ -22,16 +22,17 @@ from nutdamp.control_loop.law import Ending, Law
 from nutdamp.control_loop.simulation import Fleet, FlownLoops, expects_alone, fly_alone, until_default
 from nutdamp.control_loop.stability import Band, dead_band, expect_in_time
 from nutdamp.errors import BadRequest
-from nutdamp.montecarlo.cases import DispersedModel, cold_of, cones_used, rotated, tank_of, triple
+from nutdamp.montecarlo.cases import DispersedModel, cold_of, rotated, tank_of, triple
 from nutdamp.montecarlo.inputs import BLOCK, BY_VALVE, Draws, Inputs, independent, some_of, with_sensor
 from nutdamp.montecarlo.propagated import carried
-from nutdamp.montecarlo.statistics import Exact, cases_to_show
-from nutdamp.montecarlo.study import Counted, Dispersed, DrawnCases
+from nutdamp.montecarlo.statistics import Exact, cases_to_show, correlated_shares
+from nutdamp.montecarlo.study import Counted, Dispersed, DrawnCases, by_tolerance
 from nutdamp.physics import attitude
+from nutdamp.planning.verdict import Verdict, cases_of, judge_loop
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.equipment import ACCELEROMETER, Channel, Loop, Sensor
 from nutdamp.spacecraft.model import Attitude, Inertia, Spacecraft, Vector, required_share
-from nutdamp.spacecraft.requirements import Left
+from nutdamp.spacecraft.requirements import Bound, Left, Part
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
 from nutdamp.spacecraft.tolerances import expect_dispersions
 
@@ -201,9 +202,14 @@ class LoopStudy(DrawnCases):
         return self.model.loops(self.draws_of(number), np.array([number]), self.seed)[0]
 
     @cached_property
+    def nominal_measured(self) -> tuple[Array, Left, Array]:
+        """`measured` of the file itself, with the noise of the seed."""
+        return self.measured(self._nominal_flown)
+
+    @property
     def nominal(self) -> Array:
         """Outputs (8,) of the file itself, with the noise of the seed."""
-        return self.measured(self._nominal_flown)[0][:, 0]
+        return np.asarray(self.nominal_measured[0][:, 0])
 
     @property
     def nominal_aspects(self) -> Array:
@@ -245,8 +251,8 @@ class LoopStudy(DrawnCases):
             return fly_alone(self.law, cases, self.until, watch)
         return Fleet(self.law, cases, self.until).fly(watch)
 
-    def measured(self, flown: FlownLoops) -> tuple[Array, Array]:
-        """Outputs (8, n) of loops, and their severity (n,): infinite where a loop does not settle, or was stopped."""
+    def measured(self, flown: FlownLoops) -> tuple[Array, Left, Array]:
+        """Outputs (8, n) of loops, their residuals, and their severity (n,): infinite where a loop is `lost`."""
         cases, pilots, body = flown.cases, flown.pilots, self.spacecraft
         before = np.array([case.truth.omega0 for case in cases]).T
         start, end = triple(flown.momentum(before)), triple(flown.momentum(flown.rates))
@@ -262,10 +268,9 @@ class LoopStudy(DrawnCases):
         out[6] = [math.fsum(math.nan if kg is None else kg for kg in pulses) for pulses in used]
         out[7] = [len(pilot.fired) for pilot in pilots]
         aim = out[3] if body.goal.axis is None else out[4]
-        shares = list(cones_used(body.keep, flown.aspects))
-        severity = np.asarray(requirements.severity(body, Left(out[2], aim, flown.rates[2]), shares))
+        left = Left(out[2], aim, flown.rates[2], flown.aspects if body.keep else None)
         lost = np.array([pilot.lost for pilot in pilots])
-        return out, np.where(lost, math.inf, severity)
+        return out, left, np.where(lost, math.inf, requirements.severity(body, left))
 
 
 def loop_study(spacecraft: Spacecraft, until: float | None = None, *, seed: int = 1) -> LoopStudy:
@@ -291,7 +296,7 @@ class LoopResults(Counted):
         super().__post_init__()
         self.values = np.empty((len(OUTPUTS), self.requested))
         self.angles = np.empty((len(self.study.spacecraft.keep), 2, self.requested))
-        self.lost = np.zeros(0, dtype=bool)
+        self.lost, self.spin = np.zeros(0, dtype=bool), np.empty(self.requested)
 
     def of(self, output: str) -> Array:
         """Known values of an output, (m,)."""
@@ -318,13 +323,19 @@ class LoopResults(Counted):
         """Cases that fall quiet with no more nutation than the dead band of the file."""
         return int(np.count_nonzero(self.of("quiet") <= self.study.band.most))
 
-    def take(self, values: Array, severity: Array, angles: Array, stops: list[Ending]) -> None:
-        """Counts further cases: `LoopStudy.measured`, ``angles`` (m, 2, n), and why they were flown no further."""
+    def spread(self, bound: Bound) -> Exact | None:
+        """Distribution of the value of a bound's part, of the cases that settle; None where none does."""
+        return None if self.lost.all() else Exact(self._values(bound)[~self.lost])
+
+    def take(self, values: Array, left: Left, severity: Array, angles: Array, stops: list[Ending]) -> None:
+        """Count further cases: `LoopStudy.measured`, ``angles`` (m, 2, n), and why they were flown no further."""
         rows = slice(self.done, self.done + values.shape[1])
         self.values[:, rows], self.angles[:, :, rows] = values, angles
+        goal = self.study.spacecraft.goal.spin
+        self.spin[rows] = math.nan if goal is None else abs(left.spin - goal)
         self.stops.update(stops)
         self.lost = np.concatenate([self.lost, np.isinf(severity)])
-        self.count(severity, angles, severity <= 1.0)
+        self.count(severity, left, ~np.isinf(severity))
 
     def shares(self, output: str) -> dict[str, float]:
         """Share of each input in the variance of an output over the cases that settle: its squared correlation.
@@ -332,17 +343,30 @@ class LoopResults(Counted):
         What chance adds to that over few cases is taken off; empty where they are too few, or nothing varies. Of
         inputs that are correlated each has what it adds to those before it.
         """
-        rows = np.flatnonzero(~self.lost & ~np.isnan(self.values[OUTPUTS.index(output), : self.done]))
-        model = self.study.model
-        inputs = [entry for entry in model.inputs.drawn if entry.sigma > 0.0]
-        values = self.values[OUTPUTS.index(output)][rows]
-        if len(rows) < FEW or np.ptp(values) <= 1e-12 * np.abs(values).max():
+        return self._shares(self.values[OUTPUTS.index(output), : self.done])
+
+    def _shares(self, values: Array) -> dict[str, float]:
+        rows, model = np.flatnonzero(~self.lost & ~np.isnan(values)), self.study.model
+        if len(rows) < FEW:
             return {}
+        inputs = [entry for entry in model.inputs.drawn if entry.sigma > 0.0]
         draws = self.study.draws_of_all(np.arange(self.done))
         drawn = independent({entry.name: np.asarray(draws[entry.name]) for entry in inputs}, inputs, model.groups)
-        chance = 1.0 / (len(rows) - 1)
-        squares = {entry.name: float(np.corrcoef(drawn[entry.name][rows], values)[0, 1] ** 2) for entry in inputs}
-        return {name: max((square - chance) / (1.0 - chance), 0.0) for name, square in squares.items()}
+        return correlated_shares({entry.name: drawn[entry.name][rows] for entry in inputs}, values[rows])
+
+    def contributions(self, bound: Bound) -> dict[str, float]:
+        """Share of each tolerance in the variance of the value of a bound's part over the cases that settle."""
+        model = self.study.model
+        return by_tolerance(model.inputs.drawn, model.groups, self._shares(self._values(bound)))
+
+    def _values(self, bound: Bound) -> Array:
+        """Values of a bound's part, (done,)."""
+        if bound.keep is not None:
+            angles = self.angles[self.study.spacecraft.keep.index(bound.keep)]
+            return np.asarray(angles[0 if bound.inner else 1, : self.done])
+        if bound.part is Part.SPIN:
+            return self.spin[: self.done]
+        return self.values[OUTPUTS.index(bound.part.value), : self.done]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -350,6 +374,16 @@ class LoopDispersion(Dispersed):
     """Closed loop of a file flown in dispersed cases."""
 
     core: LoopResults
+
+    @cached_property
+    def verdict(self) -> Verdict:
+        """Judgement of the loop by these cases, and by nominal values with the noise of the seed."""
+        study, body = self.core.study, self.core.study.spacecraft
+        cases, (_, left, severity) = cases_of(self.core), study.nominal_measured
+        nutation, aim, spin = (float(np.ravel(part)[0]) for part in (left.nutation, left.aim, left.spin))
+        alone = Left(nutation, aim, spin, None if left.angles is None else left.angles[:, :, 0])
+        lost = math.isinf(severity[0])
+        return judge_loop(body, requirements.held(body, alone), cases, self.core, lost=lost)
 
 
 def run(
@@ -380,9 +414,9 @@ def run(
             flown = study.fly(cases, partial(_seen, watch, stopped, first))
         except _Interrupted:
             break
-        values, severity = study.measured(flown)
+        values, left, severity = study.measured(flown)
         stops = [pilot.ending[0] for pilot in flown.pilots]
-        results.take(values, severity, flown.aspects, stops)
+        results.take(values, left, severity, flown.aspects, stops)
         if collect is not None:
             collect(first, values, stops, flown.aspects)
         watch(results.done)

@@ -17,14 +17,15 @@ from nutdamp.control_loop.simulation import SEED, LoopRun, fly, largest_since
 from nutdamp.control_loop.stability import Band, Margin, dead_band, expect_in_time, margins
 from nutdamp.errors import BadRequest, Infeasible
 from nutdamp.flight.dynamics import Dynamics, Path, Push
-from nutdamp.flight.end_state import Aspect, aspects, left_by, seen_at
+from nutdamp.flight.end_state import Aspect, aspects, left_on_the_way, seen_at
 from nutdamp.flight.propagation import Flight
 from nutdamp.flight.verification import EulerEquations
 from nutdamp.physics.taylor import NOTHING
 from nutdamp.planning.plan import Plan
+from nutdamp.planning.verdict import LOOP, Verdict, judge_loop
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import Spacecraft, SpinState, Vector
-from nutdamp.spacecraft.requirements import Left
+from nutdamp.spacecraft.requirements import Held, Left, Part
 
 AGREE = 1e-6  # s; firings that begin and last alike to this are the same
 EVALUATIONS = 1_000_000  # evaluations of Euler's equations by DOP853, at most: a loop flies on where a schedule is over
@@ -116,7 +117,10 @@ def verify_loop(spacecraft: Spacecraft, until: float | None = None, *, seed: int
     return LoopVerification(run, other, "", equations.evaluations, pairs)
 
 
-LOOP = "loop"  # name in place of a scheme
+HELD = 1.05
+"""Nutation, over the start threshold, that a loop may let stand without a requirement: it grows while the loop waits
+for the phase of its firing, by a twentieth where a time constant is ten nutation periods (upper-stage: 0.1 %).
+"""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -152,14 +156,39 @@ class LoopPlan(Plan):
 
     @property
     def left(self) -> Left:
-        """Largest nutation since the loop first settled; direction of H and spin at the end."""
-        return left_by(self.flight)._replace(nutation=self.largest[0])
+        """Largest nutation since the loop first settled; direction of H and spin at the end, angles to cones."""
+        return left_on_the_way(self.flight, self.aspects)._replace(nutation=self.largest[0])
+
+    @property
+    def held(self) -> tuple[Held, ...]:
+        """Residual beside each bound; without a requirement the nutation is judged by the thresholds of the loop."""
+        limit = max(self.band.most, HELD * self.flown_run.loop.start + self.band.noise)
+        lines = super().held
+        return tuple(
+            line
+            if line.bound.required or line.bound.part is not Part.NUTATION
+            else Held(line.bound._replace(limit=limit), line.left)
+            for line in lines
+        )
 
     @property
     def meets_requirement(self) -> bool | None:
         """Compliance as of any plan; False where the loop was stopped or never settled."""
         meets = super().meets_requirement
         return False if meets is not None and self.flown_run.lost else meets
+
+    @cached_property
+    def verdict(self) -> Verdict:
+        """Judgement of this run: by its bounds, and by whether the loop was stopped or never falls quiet."""
+        run = self.flown_run
+        return judge_loop(
+            self.spacecraft,
+            self.held,
+            flight=self.flight,
+            observed=self.aspects,
+            feasible=not run.stop.fault,
+            lost=run.lost,
+        )
 
     @cached_property
     def aspects(self) -> tuple[Aspect, ...]:

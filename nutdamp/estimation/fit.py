@@ -43,7 +43,14 @@ COARSE = 10  # a record that has so few different values is one of coarse steps
 
 
 def expect_alive(model: Model) -> None:
-    """Raise Infeasible for a sensor that does not change, all along while another one shows a nutation, or for long."""
+    """Raise Infeasible for a sensor that does not change, all along while another one shows a nutation, or for long.
+
+    So it does for gyros that show no motion at all, not even the spin.
+    """
+    gyros = np.isin(np.array(model.signals)[model.signal], GYROS)
+    held = model.spacecraft.inertia.wheel != 0.0  # by a wheel a body may stand still
+    if GYROS[2] in model.signals and not held and not model.measured[gyros].any():
+        raise Infeasible("the gyros show 0 all along: they are off; leave their columns out")
     shows = [index for index, name in enumerate(model.signals) if KIND[name].nutation]
     varying = [index for index in shows if _run(model, index)[3] > 1]
     for index, signal in enumerate(model.signals):
@@ -334,7 +341,8 @@ def _expect_seen(fitted: Fit) -> None:
     omega, across = fitted.values[at], fitted.covariance[np.ix_(at, at)]
     # Its size counts: where the phase is hardly known, the rate across it is not either.
     size = float(np.linalg.norm(omega))
-    sigma = size / math.sqrt(float(omega @ np.linalg.pinv(across, hermitian=True) @ omega))
+    way = omega / size if size > 0.0 else np.array([1.0, 0.0])
+    sigma = 1.0 / math.sqrt(float(way @ np.linalg.pinv(across, hermitian=True) @ way))
     if size < SEEN * sigma:
         expect_explained(fitted)
         least = math.degrees(SEEN * sigma)
@@ -409,13 +417,6 @@ def _as_noisy(model: Model, values: Vector, noise: Vector, used: NDArray[np.bool
         covariance = covariance_of(model, scaled)
         noise = np.maximum(plain(model, left, used, np.sum((scaled @ covariance) * scaled, axis=1)), floor)
     return Fit(model, values, covariance, noise, used, left, slopes)
-
-
-def estimated(model: Model, values: Vector, noise: Vector) -> Fit:
-    """The fit of a record that has no samples yet: ``values`` as they are, with the covariance that they would have."""
-    slopes, count = jacobian(model, values, range(len(values)), one_sided=True), len(model.measured)
-    covariance = covariance_of(model, slopes / noise[model.signal, None])
-    return Fit(model, values, covariance, noise, np.ones(count, dtype=bool), np.zeros(count), slopes)
 
 
 def _shown(fitted: Fit, wider: Model, at: Vector, which: Sequence[int]) -> bool:

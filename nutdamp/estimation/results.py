@@ -1,6 +1,6 @@
 """Estimates of a fit with their standard deviations, the spacecraft at an epoch, and checks of consistency.
 
-The checks name what makes a fit doubtful though its sigmas are small.
+The checks name what makes a fit doubtful though its sigmas are small. `Fitted` is the result in the library.
 """
 
 from __future__ import annotations
@@ -8,10 +8,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from os import PathLike
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from nutdamp.common import results
+from nutdamp.common.numerics import finite
 from nutdamp.common.results import Note, note
 from nutdamp.estimation import initial_guess
 from nutdamp.estimation.fit import step
@@ -158,25 +161,6 @@ def replaced(spacecraft: Spacecraft, known: Carried) -> Spacecraft:
         inertia=known.body.inertia,
         omega0=known.state.rates,
         attitude=None if spacecraft.attitude is None else replace(spacecraft.attitude, quaternion=known.quaternion),
-    )
-
-
-def posterior(given: Dispersions | None, known: Carried) -> Dispersions:
-    """The dispersions of the file, those of what is estimated as they are known now."""
-    sigmas = dict(zip(known.names, known.sigmas.tolist(), strict=True))
-    of_A, of_C = (Tolerance("normal", sigmas[name]) if sigmas[name] > 0.0 else None for name in ("A", "C"))
-    first, second, third = (Tolerance("normal", sigmas[f"omega0_{number}"]) for number in (1, 2, 3))
-    of_file = given or EXACT
-    thrust = {name: Tolerance("normal", sigma / factor, True) for name, (factor, sigma) in known.factors.items()}
-    return replace(
-        of_file,
-        A=of_A,
-        C=of_C,
-        wheel_momentum=Tolerance("normal", sigmas[WHEEL]) if WHEEL in sigmas else of_file.wheel_momentum,
-        omega0=(first, second, third),
-        thrust={**of_file.thrust, **thrust},
-        attitude=of_file.attitude if known.tilt is None else Tolerance("normal", known.tilt),
-        correlation=correlations(known, given),
     )
 
 
@@ -381,3 +365,41 @@ def _of_schedule(fitted: Fit) -> Iterator[Note]:
             yield note("fit-late" if value < 0.0 else "fit-early", channel=channel, by_s=float(abs(value)))
         if kind == "thrust" and value < -SURE * sigma:
             yield note("fit-reversed", channel=channel, thrust_percent=100.0 * float(value))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Fitted(results.Data, results.Drawn):
+    """Spacecraft estimated from telemetry; ``core`` holds parameters, covariance, noise and residuals.
+
+    ``warnings`` are those of reading the record.
+    """
+
+    core: Fit
+    warnings: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        return f"<Fitted {self.core.model.spacecraft.name}: {len(self.core.named)} parameters>"
+
+    def estimates(self, at: float = 0.0) -> tuple[Estimate, ...]:
+        """Estimates with their sigmas; the motion is that at ``at`` s."""
+        return estimates(self.core, at)
+
+    def text(self, at: float = 0.0) -> str:
+        """Spacecraft file with the estimates in it and t = 0 at ``at`` s, as ``fit -o`` writes it.
+
+        Raises BadRequest for a spacecraft that was not read from a file.
+        """
+        return str(results.view(self, "text", carried(self.core, at)))
+
+    def spacecraft(self, at: float = 0.0) -> Spacecraft:
+        """Spacecraft of that file."""
+        body: Spacecraft = results.view(self, "spacecraft", self.text(at))
+        return body
+
+    def write(self, path: str | PathLike[str], at: float = 0.0) -> None:
+        """Write `text` to a file, as ``fit -o`` does; raises BadRequest or CannotWrite."""
+        results.view(self, "write", path, self.text(at))
+
+    def to_dict(self, at: float = 0.0) -> dict[str, Any]:
+        """Contents of the file of ``fit --json``."""
+        return finite(results.view(self, "data", carried(self.core, at), self.warnings))

@@ -11,12 +11,15 @@ normal noise as far as the motion is linear over the errors.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import least_squares
 
 from nutdamp.common import work
 from nutdamp.common.numerics import chi_square_tail
@@ -30,18 +33,34 @@ EVALUATIONS = 60  # trials of one of the last least-squares searches, at most
 TRIAL = 40  # trials of one from a start, at most, which may lead nowhere
 GRADIENT = 1e-8  # slope of a cost that is least
 STEP = 1e-10  # relative change of it, and of the values, from which on a search is over
-DAMPINGS = 10  # steps, at most, in which the length of a step is found
 
 
 def least(model: Model) -> Vector:
     """Noise that each signal has at least: that of its steps, and rounding."""
-    sigmas = []
+    # A signal of zeros has no digits, but its prediction is rounded, as rates and angles are.
+    turned = _usual(model, "rad/s") * model.record.length
+    rounding, sigmas = float(np.finfo(float).eps) * (1.0 + turned), []
     for index, name in enumerate(model.signals):
-        values = model.measured[model.signal == index]
-        step = model.record.sun_step if name == SUN_PULSE else 0.0 if KIND[name].off else quantisation(values)
-        size = _spin_periods(model, name) if KIND[name].off else float(np.abs(values).max())
-        sigmas.append(max(step / math.sqrt(12.0), ROUNDING * size))
+        kind, values = KIND[name], model.measured[model.signal == index]
+        step, size = 0.0, _usual(model, kind.unit)
+        largest = size if kind.off else float(np.abs(values).max())
+        if name == SUN_PULSE:
+            step = model.record.sun_step
+        elif not kind.off:
+            step = quantisation(values)
+        sigmas.append(max(step / math.sqrt(12.0), ROUNDING * largest, rounding * size))
     return np.array(sigmas)
+
+
+def _usual(model: Model, unit: str) -> float:
+    """Size of the motion in the ``unit`` of a signal: a radian, H3/C, what 1 m off the axis feels.
+
+    Of times that in which the body spins by a radian.
+    """
+    if unit == "s":
+        return 1.0 / abs(model.spacecraft.spin)
+    pace = abs(model.spacecraft.axial) / model.spacecraft.inertia.C
+    return {"rad": 1.0, "rad/s": pace, "m/s²": pace * pace}[unit]
 
 
 def robust(model: Model, left: Vector) -> Vector:
@@ -78,15 +97,12 @@ def scales_of(model: Model) -> Vector:
     """Sizes that residuals of each signal are compared with before its noise is known: a tenth of what varies."""
     scales = []
     for index, name in enumerate(model.signals):
-        values = model.measured[model.signal == index]
+        kind, values = KIND[name], model.measured[model.signal == index]
         spread = NORMAL_MAD * float(np.median(np.abs(values - np.median(values))))
-        scales.append(0.1 * spread or KIND[name].spread * _spin_periods(model, name))
+        varies = spread > ROUNDING * _usual(model, kind.unit)
+        usual = kind.spread * (_usual(model, "s") if kind.unit == "s" else 1.0)
+        scales.append(0.1 * spread if varies else usual)
     return np.array(scales)
-
-
-def _spin_periods(model: Model, name: str) -> float:
-    """One radian of the spin, s, of times; else 1."""
-    return 1.0 / abs(model.spacecraft.spin) if KIND[name].unit == "s" else 1.0
 
 
 def share_left(model: Model, values: Vector) -> float:
@@ -131,111 +147,40 @@ def search(
     units, weights = units_of(model), 1.0 / noise[model.signal[rows]]
     bound, nominal = model.prior[0] * units, model.prior[1]
 
+    best, place = math.inf, values / units
+
     def errors(scaled: Vector) -> Vector:
+        nonlocal best, place
         try:
             left = residuals(model, scaled * units)[rows] * weights
         except Infeasible:  # a trial too far to be flown: the search comes nearer
             return np.full(int(rows.sum()) + len(nominal), math.inf)
-        return np.concatenate([left, bound @ scaled - nominal])
+        every = np.concatenate([left, bound @ scaled - nominal])
+        cost = float(np.sum(np.sqrt(1.0 + every * every) - 1.0 if robust else 0.5 * every * every))
+        if cost < best:
+            best, place = cost, scaled.copy()
+        return every
 
-    def derivatives(scaled: Vector) -> Matrix | None:
+    def derivatives(scaled: Vector) -> Matrix:
         if work.exhausted():
-            return None
+            raise _SpentError
         slopes = jacobian(model, scaled * units, range(len(units)), one_sided=True)[rows] * units
         return np.concatenate([-slopes * weights[:, None], bound])
 
-    scaled, cost = _minimum(errors, derivatives, values / units, robust=robust, near=near)
-    return scaled * units, cost
+    # Not so far from the minimum, where steps as long as the derivatives allow lead astray.
+    scale: Literal["jac"] | float = "jac" if near else 1.0
+    loss: Literal["soft_l1", "linear"] = "soft_l1" if robust else "linear"
+    most = EVALUATIONS if near else TRIAL
+    if np.isfinite(errors(place)).all():
+        with suppress(_SpentError):
+            least_squares(
+                errors, place, derivatives, loss=loss, x_scale=scale, ftol=STEP, xtol=STEP, gtol=GRADIENT, max_nfev=most
+            )
+    return place * units, best
 
 
-def _minimum(
-    errors: Callable[[Vector], Vector],
-    derivatives: Callable[[Vector], Matrix | None],
-    x: Vector,
-    *,
-    robust: bool,
-    near: bool,
-) -> tuple[Vector, float]:
-    """Least Σ r²/2, or Σ (√(1 + r²) - 1) where ``robust``, of ``errors`` r from ``x`` on, and its place.
-
-    Steps of Gauss and Newton within a trust region (Moré 1978), an ellipsoid along the ``derivatives``; not so far
-    from the minimum, where steps as long as these allow lead astray. It ends where there are no derivatives.
-    """
-    left = errors(x)
-    cost, damping, spans = _cost(left, robust), 0.0, np.zeros(len(x))
-    radius, trials = 0.0, 1
-    while trials < (EVALUATIONS if near else TRIAL) and math.isfinite(cost):
-        slopes = derivatives(x)
-        if slopes is None:
-            break
-        root = np.sqrt(1.0 + left * left) if robust else np.ones(len(left))
-        curved = np.sqrt(np.maximum(root**-3.0, np.finfo(float).eps))  # of the loss; root**-1 is its slope
-        slopes *= curved[:, None]
-        both = np.column_stack([slopes, left / root / curved])
-        triangle = np.asarray(np.linalg.qr(both, mode="r"), dtype=np.float64)
-        spans = np.maximum(spans, np.linalg.norm(slopes, axis=0)) if near else np.ones(len(x))
-        spans[spans == 0.0] = 1.0
-        if np.abs(triangle[:, :-1].T @ triangle[:, -1]).max() < GRADIENT:
-            break
-        radius = radius or float(np.linalg.norm(x * spans)) or 1.0
-        turned, sizes, axes = np.linalg.svd(triangle[:, :-1] / spans, full_matrices=False)
-        along = turned.T @ triangle[:, -1]
-        gain = -1.0
-        while gain <= 0.0 and trials < (EVALUATIONS if near else TRIAL):
-            damping = _damping(sizes, along, radius, damping)
-            share = _share(sizes, along, damping)
-            step, length = -(axes.T @ share) / spans, float(np.linalg.norm(share))
-            trial = errors(x + step)
-            trials += 1
-            expected = float(along @ (sizes * share) - 0.5 * np.sum((sizes * share) ** 2))
-            gain = cost - _cost(trial, robust)
-            if not math.isfinite(gain):
-                radius, gain = 0.25 * length, -1.0
-                continue
-            ratio = gain / expected if expected > 0.0 else 0.0
-            before = radius
-            if ratio < 0.25:
-                radius = 0.25 * length
-            elif ratio > 0.75 and length > 0.95 * radius:
-                radius *= 2.0
-            damping *= before / radius if radius > 0.0 else 0.0
-            tiny = float(np.linalg.norm(step)) < STEP * (STEP + float(np.linalg.norm(x)))
-            if tiny or (gain < STEP * cost and ratio > 0.25):
-                return (x + step, cost - gain) if gain > 0.0 else (x, cost)
-        if gain > 0.0:
-            x, left, cost = x + step, trial, cost - gain
-    return x, cost
-
-
-def _cost(left: Vector, robust: bool) -> float:
-    squares = left * left
-    return float(np.sum(np.sqrt(1.0 + squares) - 1.0 if robust else 0.5 * squares))
-
-
-def _share(sizes: Vector, along: Vector, damping: float) -> Vector:
-    """Step against a gradient, along the singular vectors of sizes ``sizes``; none where these are nothing."""
-    least = np.finfo(float).eps * sizes[0] * len(sizes)
-    return np.where(sizes > least, sizes, 0.0) * along / np.where(sizes > least, sizes * sizes + damping, 1.0)
-
-
-def _damping(sizes: Vector, along: Vector, radius: float, damping: float) -> float:
-    """Damping by which a step is as long as the ``radius``, to a hundredth; 0 where it is shorter. By Newton."""
-    length = float(np.linalg.norm(_share(sizes, along, 0.0)))
-    if length <= radius:
-        return 0.0
-    low, high = 0.0, float(np.linalg.norm(sizes * along)) / radius
-    for _ in range(DAMPINGS):
-        if not low < damping < high:
-            damping = max(1e-3 * high, math.sqrt(low * high))
-        share = _share(sizes, along, damping)
-        length = float(np.linalg.norm(share))
-        excess = length - radius
-        slope = -float(np.sum(share * share / (sizes * sizes + damping))) / length
-        low, high = (low, damping) if excess < 0.0 else (damping, high)
-        if abs(excess) < 0.01 * radius:
-            break
-        damping -= length / radius * excess / slope
-    return damping
+class _SpentError(Exception):
+    """The budget of work is spent: the search ends with the best values so far."""
 
 
 def covariance_of(model: Model, scaled: Matrix) -> Matrix:

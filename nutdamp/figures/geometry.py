@@ -265,7 +265,9 @@ def cones(flight: Flight, rates: Vector, quaternion: Vector) -> DrawnCones:
     axis = attitude.rotate(quaternion, np.array([0.0, 0.0, flight.spacecraft.sense]))
     turning = attitude.rotate(quaternion, rates)
     momentum = attitude.rotate(quaternion, moments * rates + np.array([0.0, 0.0, wheel]))
-    rotation, direction = turning / np.linalg.norm(turning), momentum / np.linalg.norm(momentum)
+    direction = momentum / np.linalg.norm(momentum)
+    # A despun body at rest has H in its wheel alone, and no ω: cones without rims.
+    rotation = turning / np.linalg.norm(turning) if turning.any() else direction
     if moments[0] == moments[1]:
         space = around(direction, rotation)
         return DrawnCones(axis, direction, rotation, around(axis, rotation), space, space)

@@ -1,18 +1,16 @@
-"""The overview of a plan: axis track beside nutation, firings and rates over time."""
+"""The overview of a plan: pole curve, axis track and globe above the course of the motion."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from nutdamp.figures import geometry, sphere, style
-from nutdamp.figures.style import FIRED, GREY, INK, MISSED, MOMENTUM, MOTION, PULSE, THIN, TURNED, UNCHECKED
-from nutdamp.flight import propagation
+from nutdamp.figures.style import FIRED, GREY, INK, MOMENTUM, MOTION, PULSE, THIN, TURNED
 from nutdamp.flight.propagation import Flight, Track, model_name
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.equipment import Channel
@@ -21,6 +19,7 @@ from nutdamp.spacecraft.requirements import Part
 from nutdamp.spacecraft.schedule import STEERABLE
 from nutdamp.views.parts import angle_names, angle_texts
 from nutdamp.views.text import steering
+from nutdamp.views.verdict import stated
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,10 +27,13 @@ if TYPE_CHECKING:
     from matplotlib.gridspec import SubplotSpec
 
     from nutdamp.planning.plan import Plan
+    from nutdamp.planning.verdict import Verdict
 
 ROWS = 1000  # rows of the track of a plan; the figures draw a finer one where they need it
 TALL = 4.0  # inches of the two planes of the motion on the sheet with all
+BROAD = 12.0  # width of the sheet with the globe, inches: its panels are as large as without
 ALIKE = math.radians(2.0)  # channels whose torques point within this angle share one arrow
+ACROSS = 1e-9  # transverse over axial torque below which it has no direction to be drawn
 NUMBERED = 17  # largest number of firings of a path that are numbered, and have arrowheads
 
 CROWD, NEAR = 3, 0.05
@@ -44,17 +46,28 @@ ROOM, INSET = 1.8, (0.675, 0.17, 0.315, 0.66)
 
 
 @style.styled()
-def flight_figure(name: str, flight: Flight, track: Track, *, narrow: bool = False) -> Figure:
-    """The figure ``overview``, ``motion``, ``sphere`` or ``history``; raises KeyError for others.
+def flight_figure(name: str, flight: Flight, track: Track, judged: Verdict | None = None) -> Figure:
+    """The figure ``overview`` or ``motion``, with the verdict on its plan; raises KeyError for others.
 
-    Where the rows of ``track`` are too few for a smooth curve, a finer one is drawn. ``narrow``: for a phone, which has
-    ``history`` alone. Raises MissingExtra without matplotlib.
+    Where the rows of ``track`` are too few for a smooth curve, a finer one is drawn.
+    Raises MissingExtra without matplotlib.
     """
+    return _finished(DRAWN[name], flight, track, judged)
+
+
+@style.styled()
+def history_figure(flight: Flight, track: Track, judged: Verdict | None = None, *, narrow: bool = False) -> Figure:
+    """Nutation, firings and rates over time, as on the report; ``narrow``: for a phone."""
+    return _finished(partial(history, narrow=narrow), flight, track, judged)
+
+
+def _finished(draw: Callable[[Flight, Track], Figure], flight: Flight, track: Track, judged: Verdict | None) -> Figure:
+    """A figure of as many rows as it needs, with its heading and its labels in place."""
     seen = geometry.drawn(flight, track)
-    figure = (partial(history, narrow=True) if narrow else DRAWN[name])(flight, seen)
+    figure = draw(flight, seen)
     until, end = float(seen.t[-1]), float(track.t[-1])
     part = f"; drawn: the first {until:.4g} s of {end:.4g} s" if until < 0.99 * end else ""
-    style.heading(figure, flight.spacecraft, title(flight) + part)
+    style.heading(figure, flight.spacecraft, title(flight) + part, None if judged is None else stated(judged))
     style.settle(figure)
     return figure
 
@@ -75,13 +88,20 @@ def title(flight: Flight) -> str:
 
 
 def overview(flight: Flight, track: Track) -> Figure:
-    """Motion above history: one sheet of A4 across, or longer."""
+    """Motion, and the globe where it has something to show, above history."""
     sizes = [*_courses(flight, track).values()]
-    figure = style.sheet(9.6, TALL + 1.6 + sum(sizes))
-    ratio = ROOM if geometry.momentum_inset(flight, track) is not None else 1.0
-    grid = figure.add_gridspec(1 + len(sizes), 2, height_ratios=[TALL, *sizes], width_ratios=[1.0, ratio])
+    ratios = [1.0, ROOM if geometry.momentum_inset(flight, track) is not None else 1.0]
+    width, tall, globe = 9.6, TALL, sphere.has_globe(flight, track)
+    if globe:
+        ratios.append(1.0)
+        width, tall = BROAD, BROAD / sum(ratios)
+    figure = style.sheet(width, tall + 1.6 + sum(sizes))
+    shape: dict[str, Any] = {"height_ratios": [tall, *sizes], "width_ratios": ratios}
+    grid = figure.add_gridspec(1 + len(sizes), len(ratios), **shape)
     _pole_curve(figure.add_subplot(grid[0, 0]), flight, track)
     _axis_track(figure.add_subplot(grid[0, 1]), flight, track)
+    if globe:
+        sphere.draw_globe(figure.add_subplot(grid[0, 2]), flight, track)
     _draw_courses(figure, [grid[row + 1, :] for row in range(len(sizes))], flight, track)
     return figure
 
@@ -100,7 +120,7 @@ def _pole_curve(axes: Axes, flight: Flight, track: Track) -> None:
     """Path of the rotation vector in the 1-2 plane of the body (Magnus 1970 fig. 5), firings and channels marked."""
     rates = geometry.pole_path(track)
     _path(axes, flight, track, rates)
-    arrows = _directions(axes, flight, float(np.hypot(*rates.T).max()))
+    arrows = _directions(axes, flight, float(np.abs(rates).max()))
     style.square(axes, rates, margin=0.45 if arrows else 0.12, centre=True)
     title = "Pole curve: ω in the body" + ("\narrows: torque of the channels" if arrows else "")
     axes.set(xlabel=f"ω1, °/s{geometry.pole_note(flight)}", ylabel="ω2, °/s", title=title)
@@ -131,7 +151,7 @@ def _inset(axes: Axes, flight: Flight, track: Track, small: Vector) -> None:
     momentum = geometry.sky_paths(flight, track)[1]
     stations = _momentum(inset, flight, track, momentum, float(np.ptp(small, axis=0).max()))
     for number in style.thinned(len(stations) - 1, NUMBERED):
-        style.add(inset, str(number + 1), stations[number + 1], FIRED, meant=style.meant(stations, number + 1))
+        style.add(inset, str(number + 1), stations[number + 1], FIRED)
     style.add(inset, "t = 0", stations[0], INK, role="vital")
     style.target(inset, geometry.sky_target(flight, track))
     style.square(inset, small, margin=0.25)
@@ -195,13 +215,10 @@ def _path(axes: Axes, flight: Flight, track: Track, points: Vector) -> None:
 
 def _number(axes: Axes, firings: Sequence[Vector], width: float) -> None:
     """Numbers of firings beside their stretches of a path, (n, 2) each; first and last of those in one place."""
-    some = [rows[:: max(len(rows) // 20, 1)] for rows in firings]
     for group in together([rows[len(rows) // 2] for rows in firings], width):
         first, last, middle = group[0] + 1, group[-1] + 1, firings[group[len(group) // 2]]
-        others = [rows for other, rows in enumerate(some) if other not in group]
-        meant = np.vstack([some[number] for number in group]), np.vstack([np.empty((0, 2)), *others])
         text = f"{'firing ' * (first == 1)}{first}" + (f"\N{EN DASH}{last}" if first != last else "")
-        style.add(axes, text, middle[len(middle) // 2], FIRED, meant=meant)
+        style.add(axes, text, middle[len(middle) // 2], FIRED)
 
 
 def together(places: Sequence[Vector], width: float) -> list[list[int]]:
@@ -227,12 +244,15 @@ def _halfway(rows: Vector) -> int:
 def _directions(axes: Axes, flight: Flight, size: float) -> bool:
     """Torque directions of the channels, as arrows outside the curve; True where there are any."""
     used = {pulse.channel for pulse in flight.schedule}
-    channels = [entry for entry in flight.spacecraft.channels if entry.damps and (entry.name in used or not used)]
-    channels = channels or [entry for entry in flight.spacecraft.channels if entry.name in used]
+    fired = [entry for entry in flight.spacecraft.channels if entry.name in used or not used]
+    # Where only channels for the spin fire, those that push across the axis beyond rounding.
+    across = [entry for entry in fired if abs(entry.transverse) > ACROSS * abs(entry.axial)]
+    channels = [entry for entry in fired if entry.damps] or (across if used else [])
     groups: list[list[Channel]] = []
     for channel in channels:
-        across = channel.transverse.conjugate()
-        group = next((group for group in groups if abs(np.angle(group[0].transverse * across)) < ALIKE), [])
+        back = channel.transverse.conjugate()
+        alike = (entry for entry in groups if abs(np.angle(entry[0].transverse * back)) < ALIKE)
+        group = next(alike, [])
         if not group:
             groups.append(group)
         group.append(channel)
@@ -249,7 +269,7 @@ def _directions(axes: Axes, flight: Flight, size: float) -> bool:
 def shown(plan: Plan) -> tuple[Flight, Track]:
     """A plan flown through its real widths as far as its pictures reach."""
     end = geometry.shown_until(plan.spacecraft, plan.pulses)
-    flown = replace(propagation.flown(plan.spacecraft, plan.pulses, end), scheme=plan.scheme)
+    flown = plan.reaching(end)
     return flown, flown.sampled(ROWS, end)
 
 
@@ -319,22 +339,8 @@ def nutation_history(axes: Axes, flight: Flight, track: Track) -> None:
     axes.plot(track.t, np.where(angles > low, angles, 0.1 * low), color=MOTION, label="nutation θ")
     _bands(axes, flight, track)
     style.log_angles(axes, low, 2.0 * (most if limit is None else max(most, limit)))
-    text, colour = _verdict(flight)
     last = f"θ at {style.number(float(track.t[-1]))} s: {style.angle(float(track.nutation[-1]))}"
-    axes.set_title(last + text, loc="right", color=colour, **style.NOTE)
-
-
-def _verdict(flight: Flight) -> tuple[str, str]:
-    """Words, and their colour, for the requirement after the last firing; empty without one."""
-    body, left = flight.spacecraft, flight.residual
-    limits = {part: style.limit_of(body, part) for part in (Part.NUTATION, requirements.aim(body))}
-    required = {part: limit for part, limit in limits.items() if limit is not None}
-    if not required:
-        return "", INK
-    missed = [part.label for part, limit in required.items() if math.degrees(getattr(left, part.value)) > limit]
-    if missed:
-        return f"; NOT met: {', '.join(missed)}", MISSED
-    return ("; tolerances not checked", UNCHECKED) if body.dispersions is None else ("", INK)
+    axes.set_title(last, loc="right", color=INK, **style.NOTE)
 
 
 def _rate_history(axes: Axes, flight: Flight, track: Track) -> None:
@@ -408,4 +414,4 @@ def _bar(axes: Axes, flight: Flight, block: geometry.FiredBlock, row: int) -> No
     style.add(axes, f"{block.name}: {how}", place, INK, role="bar")
 
 
-DRAWN = {"overview": overview, "motion": motion, "sphere": sphere.sphere, "history": history}
+DRAWN = {"overview": overview, "motion": motion}

@@ -1,25 +1,28 @@
-"""The spherical view: body cone rolling on space cone, spin axis and angular momentum."""
+"""The globe of the overview, and the body cone rolling on the space cone in the film."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from nutdamp.figures import geometry, style
 from nutdamp.figures.geometry import DrawnCones
-from nutdamp.figures.style import FAINT, GREY, INK, MOMENTUM, MOTION, PULSE, TURNED
+from nutdamp.figures.style import FAINT, GREY, INK, MOMENTUM, MOTION, PULSE
 from nutdamp.flight.propagation import Flight, Track
-from nutdamp.spacecraft.model import Vector
+from nutdamp.physics.attitude import angle_between
+from nutdamp.spacecraft.model import Keep, Vector
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 
 ELEVATION = math.radians(28.0)  # direction from which the sphere is seen: above the plane square to H(0)
+STEEPEST = math.radians(65.0)  # elevation of the globe where all that it shows is near H(0)
 ASIDE = math.radians(65.0)  # the spin axis leans to the right at t = 0, this far round from the viewer
+MOVES = math.radians(2.0)  # motion of the spin axis below which it is a point on the globe
 
 WIDE, DRAWN = math.radians(14.0), math.radians(28.0)
 """Below the first angle from H(0) everything is magnified, to the second one at most."""
@@ -29,8 +32,6 @@ RIM = 0.7  # width of rims and edges of cones, points: thinner than the path of 
 
 DIRECTIONS = (("+", MOMENTUM, "H"), ("o", INK, "ω"), ("s", MOTION, "spin axis"))
 """Marks in the plane picture, colours and names of the three directions that lie in one plane."""
-
-HIDDEN = 0.04  # share of the space cone below which the body cone lies under the marks of spin axis and ω
 
 STEPS = (1.0, 2.0, 3.0, 5.0)
 
@@ -43,7 +44,8 @@ class View(NamedTuple):
 
     plane: Vector
     azimuth: float
-    magnified: float
+    magnified: float = 1.0
+    elevation: float = ELEVATION
 
     @property
     def scale(self) -> str:
@@ -53,8 +55,9 @@ class View(NamedTuple):
     def seen(self, directions: Vector) -> tuple[Vector, Vector]:
         """Places on paper (n, 2), and heights towards the viewer (n,)."""
         local = np.atleast_2d(directions) @ self.plane.T * np.array([self.magnified, self.magnified, 1.0])
-        sine, cosine, rise = math.sin(self.azimuth), math.cos(self.azimuth), math.cos(ELEVATION)
-        right, near = np.array([-sine, cosine, 0.0]), np.array([rise * cosine, rise * sine, math.sin(ELEVATION)])
+        sine, cosine = math.sin(self.azimuth), math.cos(self.azimuth)
+        level, rise = math.cos(self.elevation), math.sin(self.elevation)
+        right, near = np.array([-sine, cosine, 0.0]), np.array([level * cosine, level * sine, rise])
         places = np.column_stack([local @ right, local @ np.cross(near, right)])
         return places, np.asarray(local @ near, dtype=np.float64)
 
@@ -78,25 +81,59 @@ def magnification(widest: float) -> float:
     return decade * max(step for step in STEPS if step * decade <= room * (1.0 + 1e-12))
 
 
-def sphere(flight: Flight, track: Track) -> Figure:
-    """Body cone and space cone at t = 0 with the path of the spin axis, seen from outside."""
-    figure = style.sheet(5.4, 5.2)
-    axes = figure.subplots()
-    looked, rolling = view(flight, track), geometry.cones(flight, track.rates[0], track.quaternion[0])
+def directed(flight: Flight) -> list[tuple[Keep, Vector]]:
+    """The Sun and the cones to keep about inertial directions, and these directions, (3,) each."""
+    watched = flight.spacecraft.watched
+    return [(cone, cone.direction) for cone in watched if cone.direction is not None]
+
+
+def has_globe(flight: Flight, track: Track) -> bool:
+    """True where there is a direction to be shown, and the spin axis moves by more than `MOVES`."""
+    moved = float(angle_between(track.axis, track.axis[0]).max())
+    return moved > MOVES and bool(len(geometry.aimed(flight)) or directed(flight))
+
+
+def draw_globe(axes: Axes, flight: Flight, track: Track) -> None:
+    """Path of the spin axis on the sphere, with target, Sun and cones to keep on its front."""
+    cones, plane = directed(flight), geometry.sky_plane(flight, track.momentum[0])
+    directions = [direction for _, direction in cones]
+    shown = np.vstack([track.axis[:1], geometry.aimed(flight), *directions])
+    across, aside, along = (plane @ shown.sum(axis=0)).tolist()
+    rise = math.atan2(along, math.hypot(across, aside))
+    looked = View(plane, math.atan2(aside, across), elevation=min(max(rise, ELEVATION), STEEPEST))
     draw_ground(axes, looked, track)
-    fired = _draw_path(axes, looked, flight, track)
-    draw_cones(axes, looked, rolling)
+    _draw_path(axes, looked, flight, track)
     style.target(axes, looked.seen(geometry.aimed(flight))[0], "_target")
-    tips = looked.seen(_directions(rolling))[0]
-    for number, (_, colour, name) in enumerate(DIRECTIONS):
-        meant = style.meant(tips, number)
-        style.add(axes, name, tips[number], TURNED if colour == MOMENTUM else colour, role="vital", meant=meant)
-    _name_lines(axes, rolling, fired=fired)
-    frame(axes, looked, np.vstack([rolling.body, rolling.space, track.axis, track.momentum, geometry.aimed(flight)]))
-    before = ", before firing 1" * any(pulse.thrust[0] <= 0.0 for pulse in flight.schedule.pulses[:1])
-    axes.set_title(f"Cones at t = 0{before}{looked.scale}")
-    style.legend(figure, [axes], 4)
-    return figure
+    (start,), _ = looked.seen(track.axis[0])
+    axes.plot(*start, "o", color=MOTION, markersize=4.5)
+    labels = [("t = 0", start)]
+    for cone, direction in cones:
+        labels += _draw_keep(axes, looked, cone, direction)
+    frame(axes, looked, track.axis)
+    for name, place in labels:
+        style.add(axes, name, place, INK, role="vital")
+    axes.set_title("Spin axis on the globe\nrings 30°, 60°, 90° from H(0)")
+
+
+def _draw_keep(axes: Axes, looked: View, cone: Keep, direction: Vector) -> Iterator[tuple[str, Vector]]:
+    """The ``direction`` of a cone, and the circles between which the spin axis is to stay.
+
+    Yields the label of each, and its place (2,).
+    """
+    (place,), (height,) = looked.seen(direction)
+    axes.plot(*place, "o", color=INK, markersize=6, markerfacecolor="none", zorder=4)
+    yield cone.name + " (behind)" * bool(height < 0.0), place
+    square = np.cross(direction, np.eye(3)[np.argmin(np.abs(direction))])
+    square /= np.linalg.norm(square)
+    bounds = [("≥", cone.least, cone.least > 0.0), ("≤", cone.most, cone.most < math.pi)]
+    for sign, angle, bounded in bounds:
+        if not bounded:
+            continue
+        rim = geometry.around(direction, math.cos(angle) * direction + math.sin(angle) * square)
+        draw_line(axes, looked, rim, GREY, 1.0)
+        places, heights = looked.seen(rim)
+        front = places if heights.max() < 0.0 else places[heights >= 0.0]
+        yield f"{sign} {math.degrees(angle):.4g}° from {cone.name}", front[np.argmin(front[:, 1])]
 
 
 def draw_ground(axes: Axes, looked: View, track: Track) -> None:
@@ -111,9 +148,8 @@ def draw_ground(axes: Axes, looked: View, track: Track) -> None:
     axes.plot(*geometry.once(momentum).T, **style.PATH_OF_H)
 
 
-def _draw_path(axes: Axes, looked: View, flight: Flight, track: Track) -> bool:
-    """The path of the spin axis, with the firings in it; True where any of them moves it (an impulse does not)."""
-    fired = False
+def _draw_path(axes: Axes, looked: View, flight: Flight, track: Track) -> None:
+    """The path of the spin axis, with the firings in it that move it (an impulse does not)."""
     thin = style.thickness(looked.seen(track.axis)[0]) / style.LINE
     for stretch in geometry.stretches(flight, track):
         rows = slice(stretch.first, stretch.last + 1)
@@ -121,8 +157,6 @@ def _draw_path(axes: Axes, looked: View, flight: Flight, track: Track) -> bool:
             draw_line(axes, looked, track.axis[rows], MOTION, thin)
         elif np.any(np.ptp(track.axis[rows], axis=0) > geometry.NO_CONE):
             draw_line(axes, looked, track.axis[rows], PULSE, 1.8 * thin)
-            fired = True
-    return fired
 
 
 def draw_cones(axes: Axes, looked: View, rolling: DrawnCones) -> None:
@@ -135,21 +169,6 @@ def draw_cones(axes: Axes, looked: View, rolling: DrawnCones) -> None:
     for tip, (_, colour, _) in zip(looked.seen(_directions(rolling))[0], DIRECTIONS, strict=True):
         axes.plot(*np.outer(tip, [0.0, 0.97]), color=colour, linewidth=1.2)
         style.head(axes, np.outer([0.9, 1.0], tip), 1, colour)
-
-
-def _name_lines(axes: Axes, rolling: DrawnCones, *, fired: bool) -> None:
-    """The two cones, the path of the spin axis and that of H for the legend."""
-    if len(rolling.body):
-        about = (rolling.axis, rolling.momentum)
-        body, space = (float(np.arccos(np.clip(rolling.rotation @ axis, -1.0, 1.0))) for axis in about)
-        # Where the body cone is so small that the marks of the axes in it hide it.
-        hidden = f" ({style.angle(body)}, under the marks)" if body < HIDDEN * max(space, body) else ""
-        axes.fill([], [], facecolor=(MOMENTUM, SPACE), edgecolor=MOMENTUM, label="space cone")
-        axes.fill([], [], facecolor=(MOTION, BODY), edgecolor=MOTION, label=f"body cone{hidden}")
-    axes.plot([], [], color=MOTION, linewidth=style.LINE, label="path of the spin axis")
-    if fired:
-        axes.plot([], [], color=PULSE, linewidth=1.8, label="firing")
-    axes.plot([], [], label="path of H", **style.PATH_OF_H)
 
 
 def name_directions(axes: Axes) -> None:

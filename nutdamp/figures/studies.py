@@ -1,4 +1,4 @@
-"""Pictures of studies: dispersed cases, fronts of cost over time and proofs of a least cost."""
+"""Pictures of studies: dispersed cases and fronts of cost over time."""
 
 from __future__ import annotations
 
@@ -11,33 +11,33 @@ import numpy as np
 
 from nutdamp.common.numerics import down
 from nutdamp.figures import geometry, style
-from nutdamp.figures.style import GREY, INK, MISSED, MOMENTUM, MOTION, PULSE
+from nutdamp.figures.style import GREY, INK, MISSED, MOMENTUM, MOTION
 from nutdamp.flight.propagation import model_name
 from nutdamp.montecarlo.statistics import VECTORS, Distribution
 from nutdamp.montecarlo.study import EARLY, Results
 from nutdamp.physics import attitude
 from nutdamp.planning.plan import Plan
-from nutdamp.planning.tradeoff import Certificate, Front, numbered
+from nutdamp.planning.tradeoff import Front, numbered
+from nutdamp.planning.verdict import Verdict
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.requirements import Part
-from nutdamp.views.decisions import cases_verdict, exact_percent
 from nutdamp.views.text import cost as written
 from nutdamp.views.text import text
 from nutdamp.views.trade import FAILS, fails, front_name, missing, schemes_of
+from nutdamp.views.verdict import exact_percent, stated
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from nutdamp.control_loop.dispersion import LoopResults
+    from nutdamp.control_loop.dispersion import LoopDispersion, LoopResults
+    from nutdamp.planning.screening import Dispersion
 
 
-BINS = 60  # bars of a histogram, at most
 TAIL, KNEE = 2.0, 0.999  # the axis is logarithmic where the largest value is more than TAIL times the quantile KNEE
-DECADES = 6.0  # largest number of decades of that axis: its first bin holds all smaller values
+DECADES = 6.0  # largest number of decades of that axis
 STEPS = 400  # steps of the curve of the cases within a value, besides the last ones
-HIGHEST = 60.0  # height of the highest bar of a histogram, on the scale of the curve over it, %
 ALIKE = 1e-9  # relative difference up to which the values of all cases are one, but for rounding
 
 NOTHING, NEXT_TO_NOTHING = 1e-6, "1e-6°"
@@ -55,33 +55,34 @@ PANELS = {"overview": 3, "cases": 2, "momentum": 1}
 """Panels of each figure: nutation and momentum, their cases, and the final directions of H."""
 
 
-def dispersion_figure(results: Results, name: str = "overview", *, scheme: str) -> Figure:
+def dispersion_figure(flown: Dispersion, name: str = "overview") -> Figure:
     """The figure ``overview``, ``cases`` or ``momentum``; raises KeyError for others."""
-    return _figure(results, name, f"{scheme} by {model_name([results.study.model.schedule])}")
+    how = f"{flown.plan.scheme} by {model_name([flown.core.study.model.schedule])}"
+    return _figure(flown.core, flown.verdict, name, how)
 
 
-def loop_cases_figure(results: LoopResults) -> Figure:
+def loop_cases_figure(flown: LoopDispersion) -> Figure:
     """Largest nutation after the loop falls quiet, and how far H has moved, of dispersed cases of a loop."""
-    return _figure(results, "cases", "closed loop by real pulse widths")
+    return _figure(flown.core, flown.verdict, "cases", "closed loop by real pulse widths")
 
 
 @style.styled()
-def _figure(results: Results | LoopResults, name: str, how: str) -> Figure:
-    panels, body, share = PANELS[name], results.study.model.spacecraft, results.met_fraction
+def _figure(results: Results | LoopResults, judged: Verdict, name: str, how: str) -> Figure:
+    panels, body = PANELS[name], results.study.model.spacecraft
     figure = style.sheet((4.1, 7.4, 10.8)[panels - 1], 4.4 if panels != 2 else 3.9)
     axes = list(figure.subplots(1, panels, squeeze=False)[0])
     if name != "momentum":
-        _cases(axes[:2], results, body)
+        _cases(axes[:2], results, judged)
     if isinstance(results, Results) and name != "cases":
         _momentum(axes[-1], results)
     style.legend(figure, axes, 2 if name == "momentum" else 8)
-    verdict = "" if share is None else f"\nrequirement {cases_verdict(share, results.probability)}"
-    style.heading(figure, body, f"{how}, {results.done:,} dispersed cases{verdict}")
+    style.heading(figure, body, f"{how}, {results.done:,} dispersed cases", stated(judged))
     return figure
 
 
-def _cases(panels: list[Axes], results: Results | LoopResults, body: Spacecraft) -> None:
-    """Share of the cases within each value of nutation and momentum shift, over a histogram."""
+def _cases(panels: list[Axes], results: Results | LoopResults, judged: Verdict) -> None:
+    """Share of the cases within each value of nutation and momentum shift."""
+    body, lines = results.study.model.spacecraft, {line.bound.part: line for line in judged.required}
     for axes, part in zip(panels, (Part.NUTATION, requirements.aim(body)), strict=True):
         distribution, limit = results.distribution(part.value), style.limit_of(body, part)
         nutation = "nutation left" if isinstance(results, Results) else "largest nutation"
@@ -95,10 +96,10 @@ def _cases(panels: list[Axes], results: Results | LoopResults, body: Spacecraft)
         reached = math.degrees(float(distribution.quantiles(np.array([results.probability]))[0]))
         share = exact_percent(results.probability)
         shown = limit if limit is not None and limit <= FAR * math.degrees(distribution.maximum) else None
-        draw_distribution(axes, distribution, f"{name}, °", shown, min(BINS, 2 * math.isqrt(results.done)))
+        draw_distribution(axes, distribution, f"{name}, °", shown)
         axes.axvline(reached, color=GREY, linewidth=0.8, linestyle=":")
         axes.plot(reached, 100.0 * results.probability, "o", color=INK, markersize=4)
-        missed = limit is not None and reached > limit
+        missed = part in lines and not lines[part].met
         text = f"{name}\n{share} within {style.number(reached)}°{required}"
         axes.set_title(text, color=MISSED if missed else INK, **TITLE)
 
@@ -111,24 +112,19 @@ def _alike(distribution: Distribution) -> str | None:
     return f"{style.number(most)}°" if most - least <= ALIKE * most else None
 
 
-def draw_distribution(axes: Axes, distribution: Distribution, name: str, limit: float | None, bins: int) -> None:
-    """Curve and histogram to the largest value: on a log axis where few cases lie far beyond the others."""
-    low, high = distribution.minimum, distribution.maximum
-    if high > TAIL * float(distribution.quantiles(np.array([KNEE]))[0]):
-        axes.set_xscale("log")
-        style.log_axis(axes.xaxis)
-        edges = np.geomspace(max(low, high * 10.0**-DECADES), high, bins + 1)
-        name += " (log)"
-    else:
-        edges = np.linspace(low, high, bins + 1)
-        axes.locator_params(axis="x", nbins=6)
-    counts = distribution.histogram(np.concatenate([[min(low, edges[0])], edges[1:-1], [high]]))
-    bars = HIGHEST * counts / max(counts.max(), 1.0)
-    look: dict[str, Any] = {"facecolor": (MOTION, 0.3), "edgecolor": MOTION, "linewidth": 0.5}
-    axes.stairs(bars, np.degrees(edges), fill=True, label="histogram, scaled", **look)
+def draw_distribution(axes: Axes, distribution: Distribution, name: str, limit: float | None) -> None:
+    """Curve of the cases within a value: on a log axis where few lie far beyond the others."""
+    high = distribution.maximum
     shares = np.append(np.linspace(0.0, 0.99, STEPS), 1.0 - np.geomspace(0.01, 1e-6, STEPS))
     values = np.degrees(np.append(distribution.quantiles(shares), high))
     axes.plot(values, 100.0 * np.append(shares, 1.0), color=MOTION, linewidth=1.6, label="cases within")
+    if high > TAIL * float(distribution.quantiles(np.array([KNEE]))[0]):
+        axes.set_xscale("log")
+        style.log_axis(axes.xaxis)
+        axes.set_xlim(left=math.degrees(max(distribution.minimum, high * 10.0**-DECADES)))
+        name += " (log)"
+    else:
+        axes.locator_params(axis="x", nbins=6)
     if limit is not None:
         axes.axvline(limit, **style.LIMIT)
         axes.set_xlim(right=max(axes.get_xlim()[1], 1.04 * limit))
@@ -304,63 +300,5 @@ def _draw_fronts(axes: Axes, spacecraft: Spacecraft, fronts: Sequence[Front], sc
     failing = [(point.plan.pulses.end, scale * point.cost) for _, _, point in numbered(fronts) if fails(point)]
     if failing:
         axes.plot(*np.transpose(failing), "x", label=FAILS, **CROSS)
-    places = np.array([place[:2] for place in shown])
-    for row, (_, _, numbers) in enumerate(shown):
-        text, meant = ", ".join(map(str, numbers)), style.meant(places, row)
-        style.add(axes, text, places[row], INK, role="vital", meant=meant)
-
-
-ROWS = 6000  # moments of the envelope, over all windows
-
-AFTER = 1.25  # end of the time shown over that of the last firing of the plan
-TURNS = 2.0  # periods of the nutation shown at least
-
-SHALLOW = 1e-3  # depth of the envelope below 0 that is the step of the linear program in time
-
-
-@style.styled()
-def certificate_figure(proof: Certificate) -> Figure:
-    """Envelope of 1 − q of all channels, as far as the plan fires, with the firings of program and plan.
-
-    q is the worth of a second of firing over its cost, by the prices of the proof: where 1 − q > 0, to fire costs more
-    than it is worth.
-    """
-    times = moments(proof)
-    curves = [1.0 - proof.primer(span).max(axis=1) for span in times]
-    names = [channel.name for channel in proof.program.channels]
-    program = [(burn.t, burn.channel.name) for burn in proof.burns]
-    plan = [(pulse.t, pulse.channel) for pulse in proof.plan.pulses]
-    figure = style.sheet(7.4, 3.9)
-    axes = figure.subplots()
-    for span, curve in zip(times, curves, strict=True):
-        axes.plot(span, curve, color=MOTION, label="least 1 − q of all channels")
-    last, later = float(times[-1][-1]), 0
-    for name, fired, mark in (("program", program, "o"), ("plan", plan, "x")):
-        shown = [(t, 1.0 - proof.primer(np.array([t]))[0, names.index(channel)]) for t, channel in fired if t <= last]
-        later += len(fired) - len(shown)
-        look = {"color": PULSE, "markersize": 5, "linestyle": "", "fillstyle": "none", "markeredgewidth": 1.3}
-        axes.plot(*np.array(shown).reshape(-1, 2).T, marker=mark, label=f"firings of the {name}", **look)  # type: ignore[arg-type]
-    axes.axhline(0.0, color=GREY, linewidth=1.0)
-    lowest = min(float(curve.min()) for curve in curves)
-    axes.margins(x=0.02, y=0.08)
-    axes.set(xlabel="time, s", ylabel="1 − q: cost less worth, over cost")
-    text = "below 0 a firing would be worth more than it costs: nowhere here"
-    if lowest < -SHALLOW:
-        gain = written(proof.proof.gained, proof.problem.unit)
-        text = f"below 0 a channel is on for long: the gain there, {gain}, is taken off the bound"
-    text += f"; firings of the program after {style.number(last)} s: {later}" * bool(later)
-    axes.set_title(text, loc="left", color=INK, **style.NOTE)
-    axes.grid()
-    style.legend(figure, [axes])
-    bound = written(proof.proof.bound, proof.problem.unit)
-    style.heading(figure, proof.spacecraft, f"primer by the linear program of small angles\nsmall-angle bound {bound}")
-    return figure
-
-
-def moments(proof: Certificate) -> list[Vector]:
-    """Moments (n,) s of each window that matters: until soon after the last firing of the plan."""
-    shortest = TURNS * proof.spacecraft.body_period
-    until = max(AFTER * proof.plan.pulses.end, min(shortest, proof.windows[-1][1]))
-    spans = [(begins, min(ends, until)) for begins, ends in proof.windows if begins < until]
-    pace = ROWS / max(sum(ends - begins for begins, ends in spans), 1e-9)
-    return [np.linspace(begins, ends, int((ends - begins) * pace) + 2) for begins, ends in spans]
+    for end, cost, numbers in shown:
+        style.add(axes, ", ".join(map(str, numbers)), np.array([end, cost]), INK)

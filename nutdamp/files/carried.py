@@ -93,7 +93,7 @@ def carried_text(flight: Flight, time: float, source: object) -> str:
     given = _expected(source, "carried")
     of_file = given.read(lambda _: None)
     moved_on = later(replace(flight, spacecraft=replace(flight.spacecraft, goal=of_file.goal)), time)
-    return carry_text(*given, lambda tree: _edits(tree, moved_on))
+    return carry_text(*given[:3], lambda tree: _edits(tree, moved_on))
 
 
 def carried_spacecraft(plan: Plan, time: float) -> Spacecraft:
@@ -156,7 +156,7 @@ def fitted_text(fit: Fit, carried: Carried) -> str:
     Raises BadRequest for aliases, and where no file was read.
     """
     source = _expected(fit.model.spacecraft.source, "fit")
-    return carry_text(*source, lambda tree: _fitted_edits(tree, fit, carried))
+    return carry_text(*source[:3], lambda tree: _fitted_edits(tree, fit, carried))
 
 
 def fitted_spacecraft(_: object, text: str) -> Spacecraft:

@@ -11,7 +11,7 @@ import shutil
 from collections.abc import Callable, Iterable, Iterator
 from os import PathLike, fspath
 from pathlib import Path
-from typing import IO, Any, NamedTuple
+from typing import IO, Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
@@ -44,7 +44,8 @@ def basilisk_script(plan: Plan) -> str:
         problem = "a Basilisk script flies constant moments of inertia: leave tank.inertia_per_kg out of the spacecraft"
         raise BadRequest(f"{problem} file, and plan without it, if the moments may count as constant")
     rates, quaternion = body.inertia.in_file_axes(body.initial.rates, body.initial.quaternion)
-    title = " ".join(f"{plan.scheme} schedule for {body.name}".split()).replace("\\", "/").replace('"', "'")
+    about = f"{plan.scheme} schedule for {body.name}, status {plan.verdict.status.value}"
+    title = " ".join(about.split()).replace("\\", "/").replace('"', "'")
     return SCRIPT.read_text(encoding="utf-8").format(
         title=title,
         version=__version__,
@@ -162,8 +163,11 @@ def interpolated(flown: Flight, until: float) -> Iterator[AttitudeSegment]:
         yield AttitudeSegment(t, rates, quaternion, leg.completed)
 
 
-def stk_attitude(flown: Flight, until: float, reference: Reference) -> str:
-    """The text of the file from 0 to ``until`` s; where rates jump, the second row comes a nanosecond later."""
+def stk_attitude(flown: Flight, until: float, reference: Reference, about: str = "") -> str:
+    """The text of the file from 0 to ``until`` s, with a comment ``about`` it.
+
+    Where rates jump, the second row comes a nanosecond later.
+    """
     rows: list[str] = []
     last: tuple[float, list[float]] | None = None
     for stretch in interpolated(flown, until):
@@ -180,7 +184,7 @@ def stk_attitude(flown: Flight, until: float, reference: Reference) -> str:
     months = ("Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec")
     lines = [
         "stk.v.11.0",
-        f"# nutdamp {__version__}: {' '.join(flown.spacecraft.name.split())}",
+        f"# nutdamp {__version__}: {' '.join(f'{flown.spacecraft.name} {about}'.split())}",
         "BEGIN Attitude",
         f"NumberOfAttitudePoints {len(rows)}",
         f"ScenarioEpoch {day.day} {months[day.month - 1]} {day.year} {clock}",
@@ -214,17 +218,18 @@ def column(entry: DispersedInput) -> str:
 
 
 class SamplesWriter:
-    """Writer of one row a case: number from 1, true inputs, outputs, then angles to cones; angles in degrees."""
+    """Writer of one row a case: number from 1, true inputs, outputs, angles to cones, spin error; angles in degrees."""
 
     def __init__(self, stream: IO[bytes], study: Study) -> None:
         self._stream, self._study, self._inputs = stream, study, study.model.inputs.drawn
-        self._outputs = [*OUTPUT_COLUMNS, *cone_columns(study.model.spacecraft)]
+        body = study.model.spacecraft
+        self._outputs = [*OUTPUT_COLUMNS, *cone_columns(body), *["spin_error_rad_s"] * (body.goal.spin is not None)]
         header = ["case", *(column(entry) for entry in self._inputs), *self._outputs]
         stream.write(csv_text(header, []).encode())
         stream.flush()  # a full disk is better reported before the first case is flown
 
     def write(self, first: int, values: Array) -> None:
-        """The cases from ``first`` (from 0) on, with their `Results.values` (5 + 2m, n)."""
+        """The cases from ``first`` (from 0) on, with their `Results.values`."""
         for begin in range(0, values.shape[1], BLOCK):  # texts of all would take much memory
             part = values[:, begin : begin + BLOCK]
             cases = np.arange(first + begin, first + begin + part.shape[1])
@@ -257,29 +262,40 @@ def check_room(path: str, study: Study, samples: int) -> None:
         raise CannotWrite(path, f"{samples} rows take more than {room}")
 
 
+class FlownCases(Protocol):
+    """Results of cases, of which ``done`` have flown."""
+
+    done: int
+
+
+Flown = TypeVar("Flown", bound=FlownCases)
+
+
 def streamed(
     path: PathLike[str] | str | None,
-    cases: Any,
+    study: Any,
     writer: Callable[[IO[bytes], Any], Any],
-    fly: Callable[[Callable[..., None] | None], None],
-) -> CannotWrite | None:
-    """Fly ``cases``, and write them with a ``writer`` to a file, if one is named; the error if they are not all saved.
+    fly: Callable[[Callable[..., None] | None], Flown],
+) -> tuple[Flown, CannotWrite | None]:
+    """Fly cases of a ``study``, and write them with a ``writer`` to a file, if one is named.
 
-    Raises CannotWrite where no case has flown yet, KeyboardInterrupt where the flight ended before the first.
+    Returns what ``fly`` does, and the error if they are not all saved. Raises CannotWrite where no case has flown yet,
+    KeyboardInterrupt where the flight ended before the first.
     """
+    results: list[Flown] = []
 
-    def fly_some(collect: Callable[..., None] | None) -> None:
-        fly(collect)
-        if not cases.done:
+    def fly_some(collect: Callable[..., None] | None) -> Flown:
+        results.append(fly(collect))
+        if not results[0].done:
             raise KeyboardInterrupt  # so that no file is written
+        return results[0]
 
     if path is None:
-        fly_some(None)
-        return None
+        return fly_some(None), None
     full: list[OSError] = []
     try:
         with whole_file(fspath(path)) as stream:
-            rows = writer(stream, cases.study)
+            rows = writer(stream, study)
 
             def collect(*part: Any) -> None:
                 try:
@@ -294,7 +310,7 @@ def streamed(
             if full:
                 raise full[0]
     except CannotWrite as wrong:
-        if not cases.done:
+        if not results:
             raise
-        return wrong
-    return None
+        return results[0], wrong
+    return results[0], None

@@ -28,6 +28,7 @@ from nutdamp.files.fields import (
     Within,
 )
 from nutdamp.files.study_keys import DispersionsSection, LoopSection
+from nutdamp.spacecraft.tolerances import SpinTolerance
 from nutdamp.units import shown
 
 
@@ -73,6 +74,20 @@ class _OrWord(Rule):
         return {"anyOf": [inner(), {"const": self.word}]}
 
 
+class _ShareOrRate(Rule):
+    """Annotation of a tolerance of a rate: a share of its goal, in %, or a rate."""
+
+    share, rate = Quantity("ratio", exclusiveMinimum=0), Quantity("rate", exclusiveMinimum=0)
+
+    def read(self, value: Any, inner: Callable[[Any], Any]) -> SpinTolerance:
+        relative = isinstance(value, str) and value.rstrip().endswith("%")
+        return SpinTolerance((self.share if relative else self.rate).read(value, inner), relative)
+
+    def schema(self, inner: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+        number, rate = self.rate.schema(inner)["anyOf"]
+        return {"anyOf": [number, rate, self.share.schema(inner)["anyOf"][1]]}
+
+
 class _DateAndTime(Rule):
     def read(self, value: Any, inner: Callable[[Any], Any]) -> Any:
         text = inner(value)
@@ -101,6 +116,7 @@ Declination = Annotated[float, Quantity("angle", minimum=-RIGHT_ANGLE, maximum=R
 Force = Annotated[float, Quantity("force", exclusiveMinimum=0)]
 Lever = Annotated[float, Quantity("length", exclusiveMinimum=0)]
 Torque = Annotated[float, Quantity("torque", exclusiveMinimum=0)]
+SpinError = Annotated[SpinTolerance, _ShareOrRate()]
 Probability = Annotated[float, Quantity("ratio", exclusiveMinimum=0, exclusiveMaximum=1)]
 Rates = Annotated[list[Rate], THREE]
 Travel = Annotated[list[Annotated[float, Quantity("travel")]], THREE]
@@ -363,6 +379,9 @@ class RequirementSection(Section):
         "Largest nutation angle on the way, rad, above 0 and below 90 deg: a cone of the spin axis about the angular "
         "momentum, see keep.",
         "2 deg",
+    )
+    spin: SpinError | None = Field(
+        "Tolerance of the spin about goal.spin, or --spin, at the end, rad/s or % of it; default 1 %.", "0.5 %"
     )
     probability: Probability | None = Field(
         "How surely dispersed flights must meet it, above 0 and below 1 (or in %).", "99.7 %"

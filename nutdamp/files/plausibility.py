@@ -1,12 +1,8 @@
-"""Warnings of numbers that probably lack a unit, and recognition of files that are no spacecraft files.
-
-Foreign files are of kinds that nutdamp writes or imports, known by their first lines.
-"""
+"""Warnings of numbers that probably lack a unit."""
 
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterator
 
 from nutdamp.files.fields import KeyPath
@@ -15,33 +11,6 @@ from nutdamp.files.study_keys import VALVE_TIMES
 from nutdamp.files.yaml import Node
 from nutdamp.physics.body import momentary
 from nutdamp.units import KINDS
-
-LOOKED_AT = 4000  # characters from the beginning that are looked at
-
-
-_MADE_FROM = "name the spacecraft file that it was made from"
-FOREIGN = {
-    r"[^\n]*\bstart_s\b[^\n]*,|[^\n]*\bt_s,[^\n]*\bon_time_s\b": (
-        "a schedule, as `plan --csv` writes it; name it with --schedule, behind its spacecraft file"
-    ),
-    r"[^\n]*\bomega_1_rad_s\b": f"a track, as `simulate --csv` writes it; {_MADE_FROM}",
-    r'\s*\{\s*"nutdamp"': f"a result in JSON, as nutdamp writes it; {_MADE_FROM}",
-    r"\s*(?:COMMENT[^\n]*\n\s*)*CCSDS_APM_VERS": (
-        "a CCSDS attitude parameter message; `nutdamp import FILE` makes a spacecraft file of it"
-    ),
-    r"\s*(?:COMMENT[^\n]*\n\s*)*CCSDS_\w+_VERS|\s*<\?xml|\s*<!DOCTYPE|\s*<html": (
-        "a CCSDS message, or another XML or HTML text; "
-        "a spacecraft file is in YAML; `nutdamp init` writes one to start from"
-    ),
-}
-"""Kinds of file by the pattern of their first lines, with the cure; the first that fits counts."""
-
-
-def foreign(text: str) -> str | None:
-    """Message for a text of a known kind that is no spacecraft file, with the cure; None for any other text."""
-    kinds = (kind for pattern, kind in FOREIGN.items() if re.match(pattern, text[:LOOKED_AT]))
-    return next((f"expected a spacecraft file, got {kind}" for kind in kinds), None)
-
 
 FAR = 50.0  # m; few spacecraft reach further from their centre of mass, and many a drawing counts in mm
 

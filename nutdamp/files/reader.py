@@ -24,10 +24,10 @@ from nutdamp.errors import Fault, FaultyFile, in_order, nearest, warn
 from nutdamp.files import keys
 from nutdamp.files.editing import Setting, overlay, settings_of, settings_within, text_of
 from nutdamp.files.fields import REQUIRED, KeyPath, Problems, Rule, Section, section_of
-from nutdamp.files.plausibility import doubts, foreign
+from nutdamp.files.plausibility import doubts
 from nutdamp.files.rules import CANCELLED, MOMENT, Finding, Vector, disturbance_kind, findings, force_vector, symmetric
 from nutdamp.files.study_keys import LoopSection, by_name, dispersions, thrust_behind
-from nutdamp.files.study_rules import dispersion_findings, loop_findings
+from nutdamp.files.study_rules import correlation_findings, dispersion_findings, loop_findings
 from nutdamp.files.thruster_rules import thrust_findings
 from nutdamp.files.yaml import Node, dotted, read_text, read_tree
 from nutdamp.physics import attitude, sky
@@ -74,10 +74,8 @@ def example_subject(name: str) -> str:
     return " ".join(line.removeprefix("#").strip() for line in sentence.splitlines())
 
 
-def _contents(text: str, name: str, settings: Sequence[Setting], warn: Warn) -> keys.SpacecraftFile:
-    other = foreign(text.removeprefix("\ufeff"))
-    if other is not None:
-        raise FaultyFile([Fault(name, 1, 1, "", other)])
+def _contents(text: str, name: str, settings: Sequence[Setting], warn: Warn) -> tuple[keys.SpacecraftFile, Node]:
+    """The contents of a file without faults, and its tree."""
     root, faults = read_tree(text, name)
     root, unplaced = overlay(root, settings)
     faults += unplaced
@@ -87,14 +85,15 @@ def _contents(text: str, name: str, settings: Sequence[Setting], warn: Warn) -> 
         faulty += loop_findings(root)
     problems: Problems = []
     contents = keys.SpacecraftFile.read(root.plain(), problems)
-    judged = {finding.path for finding in faulty if not finding.at_key}
-    faulty += [Finding(path, problem) for path, problem in problems if path not in judged]
+    unreadable = {path for path, _ in problems}
+    faulty = [finding for finding in faulty if finding.at_key or finding.path not in unreadable]
+    faulty += [Finding(path, problem) for path, problem in problems]
     faults += [_placed(finding, root, name) for finding in faulty]
     for doubt in in_order(_placed(finding, root, name) for finding in doubts(root)):
         warn(doubt)
     if faults or contents is None:
         raise FaultyFile(faults)
-    return contents
+    return contents, root
 
 
 def _placed(finding: Finding, root: Node, name: str) -> Fault:
@@ -152,7 +151,7 @@ def load_spacecraft(path: str | Path, settings: Sequence[Setting] = (), warn: Wa
 
 def read_spacecraft(text: str, name: str, settings: Sequence[Setting] = (), warn: Warn = lambda _: None) -> Spacecraft:
     """The spacecraft in the text of a file ``name``, with ``settings``; raises `FaultyFile` with all faults."""
-    contents = _contents(text, name, settings, warn)
+    contents, root = _contents(text, name, settings, warn)
     given = contents.inertia
     tensor = np.diag(np.array([given.A, given.A, given.C], dtype=float))
     moments, axes = principal_axes(tensor if given.tensor is None else symmetric(np.array(given.tensor)))
@@ -164,7 +163,7 @@ def read_spacecraft(text: str, name: str, settings: Sequence[Setting] = (), warn
     steerable, sunward = _part(Steerable, contents.steerable), _sun(contents)
     torquer = steerable if thrusters else steerable or Steerable()
     asked = contents.requirement
-    asks_nothing = asked is None or (asked.nutation is None and asked.momentum_shift is None)
+    asks_nothing = asked is None or all(each is None for each in (asked.nutation, asked.momentum_shift, asked.spin))
     loss, per_kg, limits = contents.dissipation, contents.center_of_mass_per_kg, contents.limits
     spacecraft = Spacecraft(
         name=contents.name,
@@ -192,20 +191,28 @@ def read_spacecraft(text: str, name: str, settings: Sequence[Setting] = (), warn
         commands=_given(contents.commands, _commands),
         loop=_given(contents.loop, _loop, axes, center),
     )
+    faults = [_placed(finding, root, name) for finding in correlation_findings(spacecraft)]
+    if faults:
+        raise FaultyFile(faults)
     return replace(spacecraft, goal=_goal(contents.goal, spacecraft))
 
 
 class Source(NamedTuple):
-    """Origin of a spacecraft: the text of the file, its name in messages, and the keys set beside it."""
+    """Origin of a spacecraft: the text of the file, its name in messages, and the keys set beside it.
+
+    ``built_in``: the built-in example, since no file was named.
+    """
 
     text: str
     name: str
     settings: tuple[Setting, ...] = ()
+    built_in: bool = False
 
     def read(self, doubt: Callable[[Fault], object] = lambda doubt: warn(doubt.as_warning)) -> Spacecraft:
         """The spacecraft; ``doubt`` is called with numbers that are hardly meant. Raises FaultyFile."""
         doubts: list[Fault] = []
-        body = read_spacecraft(*self, doubts.append)
+        body = read_spacecraft(self.text, self.name, self.settings, doubts.append)
+        object.__setattr__(body, "built_in", self.built_in)
         for each in doubts:
             doubt(each)
         object.__setattr__(body, "source", self)  # not a field, so that `dataclasses.replace` drops it

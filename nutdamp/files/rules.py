@@ -1,4 +1,4 @@
-"""Constraints between the keys of a spacecraft file: body, motion, goal, disturbances, limits and directions in space.
+"""Constraints between the keys of a spacecraft file: a table of the plain ones, and those of body, motion and sky.
 
 The rules read the raw tree (`Facts`) and skip unreadable values, so that they work beside any other fault.
 """
@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from functools import partial
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -20,7 +22,7 @@ from nutdamp.physics import attitude, sky
 from nutdamp.physics import body as rigid_body
 from nutdamp.spacecraft.model import Inertia
 from nutdamp.spacecraft.schedule import STEERABLE
-from nutdamp.units import parse, shown
+from nutdamp.units import KINDS, bar, parse, shown
 
 Vector = NDArray[np.float64]
 
@@ -84,117 +86,207 @@ class Facts:
         """Paths of the entries at ``path``."""
         return [(*path, step) for step, _ in self.children(*path)]
 
-
-ALONG = 1e-3  # rad from the spin axis, up to which the Sun counts as along it
-
-
-def _command_blocks(facts: Facts) -> Iterator[Finding]:
-    if facts.has("commands") and not facts.has("sun_sensor"):
-        yield Finding(("commands",), "needs the key sun_sensor, whose pulse fires the blocks", True)
-    if facts.has("sun_sensor") and not facts.has("sun"):
-        yield Finding(("sun_sensor",), "needs the key sun: [right ascension, declination], or sun: epoch", True)
-    least, most = (facts.number("time", "commands", "width", key) for key in ("min", "max"))
-    spin = spin_of(facts)
-    if spin:
-        turn = 2.0 * math.pi / abs(spin)
-        if most is not None and most >= turn:
-            problem = f"{most:g} s is not less than a spin turn of {turn:.4g} s, in which the next Sun pulse comes"
-            yield Finding(("commands", "width", "max"), problem)
-        yield from _sun_in_view(facts, math.copysign(1.0, spin) * spin_axis(facts))
-    if least is not None and most is not None and least > most:
-        yield Finding(("commands", "width", "min"), f"{least:g} s exceeds max; expected at most {most:g} s")
+    def matching(self, pattern: str) -> list[KeyPath]:
+        """Paths of a pattern such as ``thrusters.*.force``, the last step of which need not be there."""
+        paths: list[KeyPath] = [()]
+        for step in pattern.split("."):
+            deeper = [self.below(*path) if step == "*" else [(*path, step)] for path in paths]
+            paths = [path for each in deeper for path in each]
+        return paths
 
 
-def _sun_in_view(facts: Facts, axis: Vector) -> Iterator[Finding]:
-    """A Sun that gives no pulse: along the spin ``axis`` (3,) in the body at t = 0, or out of the sensor's view."""
-    angle = _sun_angle(facts, axis) if facts.has("sun_sensor") else None
-    if angle is None:
+KEEP = "keep one of the two"
+SKY = "[right ascension, declination]"
+SUN = f": {SKY}, or sun: epoch"
+POINTING = ", which says where the body points at t = 0"
+SAMPLED = ", such as rate: 100 Hz: it applies to samples"
+MOUNTING = ".position .direction .force"
+COMPONENT = "expected at least one component other than 0"
+
+RULES = (
+    # Path; kind of rule; other keys (one beside it begins with a dot), or the quantity; the cure.
+    ("omega0", "missing", ".state", "give omega0: [ω1, ω2, ω3], or state: {spin: …, nutation: …}"),
+    ("state", "beside", ".omega0", KEEP),
+    ("inertia.A", "missing", ".tensor", "the transverse moment of inertia, in kg m^2"),
+    ("inertia.C", "missing", ".tensor", "the axial moment of inertia, in kg m^2"),
+    ("inertia.tensor", "beside", ".A .C", "keep either tensor, or A and C"),
+    ("attitude.quaternion", "missing", ".spin_axis", f"turn from body to frame, scalar first, or spin_axis: {SKY}"),
+    ("attitude.quaternion", "not zero", "number", "expected a rotation, such as [1, 0, 0, 0]"),
+    ("attitude.spin_axis", "beside", ".quaternion", KEEP),
+    ("attitude.of", "beside", ".quaternion", KEEP),
+    ("attitude.phase", "beside", ".quaternion", KEEP),
+    ("attitude.sun_phase", "beside", ".quaternion .phase", KEEP),
+    ("attitude.sun_phase", "needs", "sun", SUN),
+    ("sun", "needs", "attitude", POINTING),
+    ("sun_sensor", "needs", "sun", SUN),
+    ("commands", "needs", "sun_sensor", ", whose pulse fires the blocks"),
+    ("commands.width.min", "at most", ".max", "time"),
+    ("orbit", "needs", "attitude.epoch attitude.frame", ": the moment of the position and the axes that it is in"),
+    ("orbit.position", "not zero", "length", "expected the position of the spacecraft relative to center"),
+    ("keep", "once", "name", "take another"),
+    ("keep.*.direction", "needs", "attitude", POINTING),
+    ("keep.*.min", "missing", ".max", "give min, max or both, else the cone has no effect"),
+    ("keep.*.min", "at most", ".max", "angle"),
+    ("goal.tilt", "beside", ".right_ascension .declination", "keep tilt and azimuth, or the other pair"),
+    ("goal.tilt", "completes", ".azimuth", "names no direction"),
+    ("goal.declination", "completes", ".right_ascension", "names no direction"),
+    ("goal.right_ascension", "completes", ".declination", "names no direction"),
+    ("goal.right_ascension", "needs", "attitude", f"{POINTING}; without it give tilt and azimuth"),
+    ("goal.spin", "not zero", "rate", "expected a rate about axis 3"),
+    ("limits.earliest", "below", ".horizon", "time"),
+    ("disturbances", "once", "name", "take another"),
+    ("disturbances.*.torque", "not zero", "torque", COMPONENT),
+    ("disturbances.*.rate", "not zero", "rate", "leave rate out for a torque fixed in the body"),
+    ("thrusters", "once", "name", "take another"),
+    ("thrusters.*.torque", "missing", MOUNTING, "give torque, or position, direction and force"),
+    ("thrusters.*.torque", "beside", MOUNTING, "keep torque, or position, direction and force"),
+    ("thrusters.*.torque", "not zero", "torque", COMPONENT),
+    ("thrusters.*.position", "completes", ".direction .force", "cannot give a torque"),
+    ("thrusters.*.direction", "completes", ".position .force", "cannot give a torque"),
+    ("thrusters.*.force", "completes", ".position .direction", "cannot give a torque"),
+    ("thrusters.*.direction", "not zero", "number", "expected a direction, such as [1, 0, 0]"),
+    ("thrusters.*.lever_arm", "beside", ".position", "leave it out, position gives the arm"),
+    ("thrusters.*.min_on_time", "at most", ".max_on_time", "time"),
+    ("thrusters.*.impulse_bit", "beside", ".valve", KEEP),
+    ("thrusters.*.impulse_bit", "rising", "time impulse time", "expected rows that rise"),
+    ("channels.*", "once", "", "expected once in a channel"),
+    ("valve", "needs", "thrusters", ", which it belongs to"),
+    ("cold", "needs", "thrusters", ", whose nozzles are meant"),
+    ("tank", "needs", "thrusters", ", which it feeds"),
+    ("tank.final_pressure", "at most", ".pressure", "pressure"),
+    ("tank.propellant", "below", "mass", "mass"),
+    ("tank.isp", "rising", "pressure", "expected rows that rise"),
+    ("loop", "needs", "thrusters", ", which it fires"),
+    ("loop.stop", "below", ".start", "angle"),
+    ("loop.sensor.noise", "needs", "loop.sensor.rate", SAMPLED),
+    ("loop.sensor.quantisation", "needs", "loop.sensor.rate", SAMPLED),
+    ("loop.sensor.low_pass", "needs", "loop.sensor.rate", SAMPLED),
+    ("loop.sensor.axis", "not zero", "number", "expected a direction, such as [0, 0, 1]"),
+    ("loop.sensor.scale", "not zero", "ratio", "the sensor would show nothing; expected about 100 %"),
+    ("loop.faults.reversed", "once", "", "expected each channel once"),
+)
+
+
+def _others(path: KeyPath, others: str) -> list[KeyPath]:
+    """Paths of the other keys in a row of the table."""
+    return [(*path[:-1], other[1:]) if other.startswith(".") else tuple(other.split(".")) for other in others.split()]
+
+
+def _beside(facts: Facts, path: KeyPath, others: str, cure: str) -> Iterator[Finding]:
+    there = [str(other[-1]) for other in _others(path, others) if facts.has(*other)]
+    if there and facts.has(*path):
+        yield Finding(path, f"given together with {' and '.join(there)}; {cure}", True)
+
+
+def _needs(facts: Facts, path: KeyPath, others: str, why: str) -> Iterator[Finding]:
+    lacking = [dotted(other) for other in _others(path, others) if not facts.has(*other)]
+    if lacking and facts.has(*path):
+        yield Finding(path, f"needs {' and '.join(lacking)}{why}", True)
+
+
+def _missing(facts: Facts, path: KeyPath, others: str, cure: str) -> Iterator[Finding]:
+    """A key that must be there unless one of the others is."""
+    there = any(facts.has(*other) for other in (path, *_others(path, others)))
+    if not there and facts.is_mapping(*path[:-1]):
+        yield Finding(path, f"missing; {cure}")
+
+
+def _completes(facts: Facts, path: KeyPath, others: str, what: str) -> Iterator[Finding]:
+    """A key that must be there beside each of the others."""
+    there = [str(other[-1]) for other in _others(path, others) if facts.has(*other)]
+    if there and not facts.has(*path):
+        yield Finding(path, f"missing; {' and '.join(there)} alone {what}")
+
+
+def _bounded(facts: Facts, path: KeyPath, other: str, kind: str, *, equal: bool) -> Iterator[Finding]:
+    (bound,) = _others(path, other)
+    value, limit = facts.number(kind, *path), facts.number(kind, *bound)
+    if value is None or limit is None or limit <= 0.0:
         return
-    if min(angle, math.pi - angle) < ALONG:
-        yield Finding(("sun",), "lies along the spin axis at t = 0, so that no Sun pulse comes to fire blocks")
-        return
-    middle = facts.number("angle", "sun_sensor", "elevation") or 0.0
-    half_width = facts.number("angle", "sun_sensor", "half_width")
-    if half_width is not None and abs(0.5 * math.pi - angle - middle) > half_width:
-        low, high = (math.degrees(0.5 * math.pi - middle + side * half_width) for side in (-1.0, 1.0))
-        problem = (
-            f"never sees the Sun, which is {math.degrees(angle):.4g} deg from the spin axis at t = 0; "
-            f"it sees from {max(low, 0.0):.4g} to {min(high, 180.0):.4g} deg"
-        )
-        yield Finding(("sun_sensor",), problem, True)
+    if value > limit and equal:
+        problem = f"exceeds {bound[-1]}; expected at most {amount(kind, limit)}"
+        yield Finding(path, f"{amount(kind, value)} {problem}")
+    elif value >= limit and not equal:
+        problem = f"is not below {bound[-1]}; expected less than {amount(kind, limit)}"
+        yield Finding(path, f"{amount(kind, value)} {problem}")
 
 
-def _sun_angle(facts: Facts, axis: Vector) -> float | None:
-    """Angle of the Sun from the spin ``axis`` (3,) in the body at t = 0, rad; None where it cannot be read."""
-    direction, turned = _to_sun(facts), facts.vector("number", 4, "attitude", "quaternion")
-    if direction is None:
-        return None
-    if turned is not None and np.any(turned):
-        seen = attitude.rotate(attitude.conjugate(turned / np.linalg.norm(turned)), direction)
-        return float(attitude.angle_between(seen, axis))
-    given = facts.vector("angle", 2, "attitude", "spin_axis")
-    if given is None or facts.text("attitude", "of") == "momentum":
-        return None
-    return float(attitude.angle_between(attitude.on_sphere(*given.tolist()), direction))
+def _not_zero(facts: Facts, path: KeyPath, kind: str, cure: str) -> Iterator[Finding]:
+    """A quantity, or a list of such, that is no zero."""
+    size = len(facts.children(*path))
+    numbers = facts.vector(kind, size, *path) if size else facts.number(kind, *path)
+    if numbers is not None and np.max(np.abs(numbers)) < SMALLEST:
+        yield Finding(path, f"zero; {cure}")
 
 
-def _orbit(facts: Facts) -> Iterator[Finding]:
-    missing = " and ".join(f"attitude.{key}" for key in ("epoch", "frame") if not facts.has("attitude", key))
-    if missing and facts.has("orbit"):
-        yield Finding(("orbit",), f"needs {missing}: the moment of the position and the axes that it is in", True)
-    position = facts.vector("length", 3, "orbit", "position")
-    if position is not None and not position.any():
-        yield Finding(("orbit", "position"), "is zero; expected the position of the spacecraft relative to center")
-    center = facts.text("orbit", "center")
-    if center is not None and not (center.strip() and center.isascii() and center.isprintable()):
-        yield Finding(("orbit", "center"), f"{shown(center)} is no name of a body; expected one such as EARTH")
+def _rising(facts: Facts, path: KeyPath, kinds: str, cure: str) -> Iterator[Finding]:
+    """A list of rows, of quantities of these kinds, in which each rises."""
+    for column, kind in enumerate(kinds.split()):
+        values = [facts.number(kind, *row, column) for row in facts.below(*path)]
+        for row, (before, value) in enumerate(pairwise(values), start=1):
+            if before is not None and value is not None and value <= before:
+                last = f"that of the row before, {amount(kind, before)}"
+                problem = f"{amount(kind, value)} is not above {last}; {cure}"
+                yield Finding((*path, row, column), problem)
 
 
-def _to_sun(facts: Facts) -> Vector | None:
-    """The direction (3,) to the Sun, given or of the epoch; None where it cannot be read."""
-    given = facts.vector("angle", 2, "sun")
-    if given is not None:
-        return attitude.on_sphere(*given.tolist())
-    epoch = facts.text("attitude", "epoch")
-    if facts.text("sun") != "epoch" or epoch is None:
-        return None
-    try:
-        return sky.direction(Epoch.parse(epoch).days_of_j2000)
-    except ValueError:
-        return None
+def _once(facts: Facts, path: KeyPath, key: str, cure: str) -> Iterator[Finding]:
+    """A list of which no two entries have the same text, or the same at a ``key``."""
+    first: dict[str, KeyPath] = {}
+    for entry in facts.below(*path):
+        place: KeyPath = (*entry, key) if key else entry
+        name = facts.text(*place)
+        if name is not None and (other := first.setdefault(name, entry)) != entry:
+            yield Finding(place, f"{shown(name)} is given twice, first in {dotted(other)}; {cure}")
 
 
-def _sun(facts: Facts) -> Iterator[Finding]:
-    yield from _direction(facts, ("sun",))
-    if facts.text("sun") == "epoch" and facts.has("attitude") and _to_sun(facts) is None:
-        epoch, cure = facts.text("attitude", "epoch"), "give [right ascension, declination]"
-        problem = f"the Sun is computed for epochs from 1972 on, not for {epoch}; {cure}"
-        yield Finding(("sun",), problem if epoch else f"epoch needs attitude.epoch, the date of t = 0; or {cure}")
+RULE_KINDS: dict[str, Callable[[Facts, KeyPath, str, str], Iterator[Finding]]] = {
+    "beside": _beside,
+    "needs": _needs,
+    "missing": _missing,
+    "completes": _completes,
+    "at most": partial(_bounded, equal=True),
+    "below": partial(_bounded, equal=False),
+    "not zero": _not_zero,
+    "rising": _rising,
+    "once": _once,
+}
 
 
-def _cones(facts: Facts) -> Iterator[Finding]:
-    for path in facts.below("keep"):
-        yield from _direction(facts, (*path, "direction"))
-        if facts.text(*path, "direction") == "sun" and not facts.has("sun"):
-            yield Finding((*path, "direction"), "needs the key sun: [right ascension, declination], or sun: epoch")
-        least, most = (facts.number("angle", *path, key) for key in ("min", "max"))
-        if not facts.has(*path, "min") and not facts.has(*path, "max"):
-            yield Finding((*path, "min"), "missing; give min, max or both, else the cone has no effect")
-        if least is not None and most is not None and most < least <= math.pi:  # more than that is out of range
-            problem = f"{math.degrees(least):g} deg exceeds max; expected at most {math.degrees(most):g} deg"
-            yield Finding((*path, "min"), problem)
+def amount(kind: str, value: float) -> str:
+    """A quantity as people read it, angles in deg."""
+    if kind == "angle":
+        return f"{math.degrees(value):g} deg"
+    return bar(value) if kind == "pressure" else f"{value:g} {KINDS[kind].si}"
 
 
-def _direction(facts: Facts, path: KeyPath) -> Iterator[Finding]:
-    if not facts.has("attitude") and facts.has(*path):  # at the key, since its value is judged too
-        yield Finding(path, "needs attitude, which says where the body points at t = 0", True)
-    declination = facts.number("angle", *path, 1)
-    if declination is not None and abs(declination) > 0.5 * math.pi * (1.0 + 1e-12):
-        angle = f"{math.degrees(declination):g} deg"
-        yield Finding((*path, 1), f"{angle} is no declination; expected an angle from -90 deg to 90 deg")
+def findings(root: Node) -> Iterator[Finding]:
+    """All faults of the table, and those of body, motion and sky."""
+    facts = Facts(root)
+    for pattern, kind, others, cure in RULES:
+        for path in facts.matching(pattern):
+            yield from RULE_KINDS[kind](facts, path, others, cure)
+    for rule in (_names, _inertia, _motion, _disturbances, _blackout, _sun, _declinations):
+        yield from rule(facts)
 
 
-CANCELLED = 1e-12  # a sum that is smaller than its terms by this factor is rounding; it counts as zero
+def _names(facts: Facts) -> Iterator[Finding]:
+    lists = ("name", "thrusters.*.name", "disturbances.*.name", "keep.*.name", "orbit.center")
+    named = [(path, facts.text(*path), False) for each in lists for path in facts.matching(each)]
+    named += [(path, str(path[-1]), True) for path in facts.below("channels")]
+    for path, name, at_key in named:
+        if name is None:
+            continue
+        if not name.strip() or not name.isprintable():
+            yield Finding(path, f"{shown(name)} is no name; expected printable characters", at_key)
+        elif name == STEERABLE and path[0] in ("thrusters", "channels"):
+            problem = f"the name {STEERABLE!r} is kept for the steerable torquer; take another"
+            yield Finding(path, problem, at_key)
+
+
+CANCELLED = 1e-12  # a sum that is smaller than its terms by this factor is rounding, and counts as zero
+
+SYMMETRIC = 1e-9  # asymmetry of an inertia tensor that is rounding, relative to its largest entry
 
 
 def norm(vector: Vector) -> float:
@@ -208,59 +300,16 @@ def force_vector(direction: Iterable[float], force: float) -> Vector:
     return np.array([part / math.hypot(*components) * force for part in components])
 
 
-SYMMETRIC = 1e-9  # asymmetry of an inertia tensor that passes for rounding, relative to its largest entry
-
-
-def findings(root: Node) -> Iterator[Finding]:
-    """All faults between the keys of a file."""
-    facts = Facts(root)
-    of_body = (_names, _inertia, _motion, _attitude, _disturbances, _dissipation, _limits, _goal)
-    for rule in (*of_body, _orbit, _sun, _command_blocks, _cones):
-        yield from rule(facts)
-
-
 def symmetric(tensor: Vector) -> Vector:
     """A tensor without the asymmetry that passes for rounding."""
     return 0.5 * (tensor + tensor.T)
 
 
-def _names(facts: Facts) -> Iterator[Finding]:
-    lists = ("thrusters", "disturbances", "keep")
-    entries: list[KeyPath] = [(*path, "name") for key in lists for path in facts.below(key)]
-    named = [(path, facts.text(*path), False) for path in (("name",), *entries)]
-    named += [(path, str(path[-1]), True) for path in facts.below("channels")]
-    for path, name, at_key in named:
-        if name is None:
-            continue
-        if not name.strip() or not name.isprintable():
-            yield Finding(path, f"{shown(name)} is no name; expected printable characters", at_key)
-        elif name[0] in "=@":
-            yield Finding(path, f"{shown(name)} would be a formula in a spreadsheet; take another", at_key)
-        elif name == STEERABLE and path[0] in ("thrusters", "channels"):
-            yield Finding(path, f"the name {STEERABLE!r} is kept for the steerable torquer; take another", at_key)
-    first: dict[tuple[str | int, str], KeyPath] = {}
-    for path in entries:
-        name = facts.text(*path)
-        if name is not None and (other := first.setdefault((path[0], name), path)) != path:
-            place = facts.root.place_of(other)
-            where = place.setting or f"line {place.line}"
-            yield Finding(path, f"duplicate name; {dotted(other[:2])} has it already ({where}); take another")
-
-
 def _inertia(facts: Facts) -> Iterator[Finding]:
-    node = facts.root.get("inertia")
-    keys = [key for key in ("A", "C", "tensor") if facts.has("inertia", key)]
-    if "tensor" in keys:
-        if len(keys) > 1:
-            yield Finding(("inertia", "tensor"), "given together with A or C; keep either tensor, or A and C", True)
-        tensor = tensor_of(facts)
-        fault = None if tensor is None else tensor_fault(tensor) or _spin_axis_fault(tensor, facts)
-        if fault is not None:
-            yield fault
-    elif node is not None and isinstance(node.value, dict) and not any(map(MOMENT.fullmatch, node.keys)):
-        for key, what in (("A", "transverse"), ("C", "axial")):
-            if key not in keys:
-                yield Finding(("inertia", key), f"missing; the {what} moment of inertia, in kg m^2")
+    tensor = tensor_of(facts)
+    fault = None if tensor is None else tensor_fault(tensor) or _spin_axis_fault(tensor, facts)
+    if fault is not None:
+        yield fault
     A, C = facts.number("inertia", "inertia", "A"), facts.number("inertia", "inertia", "C")
     if A is not None and C is not None and C > 2 * A > 0:
         most = "not physically possible (A and C swapped?); at most 2 A (a flat disc)"
@@ -283,14 +332,19 @@ def tensor_fault(tensor: Vector) -> Finding | None:
         column, row = map(int, np.unravel_index(np.argmax(skew), skew.shape))
         mirrored = f"{tensor[column, row]:g} at [{column}][{row}]; both must be equal"
         return Finding((*path, row, column), f"not symmetric: {tensor[row, column]:g} here, but {mirrored}")
-    moments = np.linalg.eigvalsh(symmetric(tensor))
+    fault = moments_fault(np.asarray(np.linalg.eigvalsh(symmetric(tensor))))
+    return None if fault is None else Finding(path, fault)
+
+
+def moments_fault(moments: Vector) -> str | None:
+    """The reason why no body has these principal moments (3,) kg m²."""
     values = f"principal moments {', '.join(f'{moment:g}' for moment in moments)} kg m^2"
-    least = max(SMALLEST, 1e-14 * moments[2])
-    if moments[0] <= least:
-        wrong = " or ".join(f"{moment:g}" for moment in moments if moment <= least)
-        return Finding(path, f"{values}; all three must be above 0, not {wrong}")
-    if moments[2] > (moments[0] + moments[1]) * (1 + SYMMETRIC):
-        return Finding(path, f"{values}: the largest must not exceed the sum of the other two (triangle inequality)")
+    least, middle, largest = np.sort(moments).tolist()
+    if least <= (smallest := max(SMALLEST, 1e-14 * largest)):
+        wrong = " or ".join(f"{moment:g}" for moment in moments if moment <= smallest)
+        return f"{values}; all three must be above 0, not {wrong}"
+    if largest > (least + middle) * (1 + SYMMETRIC):
+        return f"{values}: the largest must not exceed the sum of the other two (triangle inequality)"
     return None
 
 
@@ -352,31 +406,25 @@ def spin_of(facts: Facts) -> float | None:
 
 
 def _motion(facts: Facts) -> Iterator[Finding]:
-    if facts.has("omega0") and facts.has("state"):
-        yield Finding(("state",), "given together with omega0; keep one of the two", True)
-    if not facts.has("omega0") and not facts.has("state"):
-        yield Finding(("omega0",), "missing; give omega0: [ω1, ω2, ω3], or state: {spin: …, nutation: …}")
     for path, spin in ((("state", "spin"), facts.number("rate", "state", "spin")), _spin_of_omega0(facts)):
         if spin is not None and abs(spin) < SMALLEST and not wheel_of(facts):
             yield Finding(path, "the spin is zero; expected a rate about axis 3, or a wheel; nothing nutates without")
     spin, inertia = spin_of(facts), inertia_of(facts)
-    if spin is not None and inertia is not None and inertia.wheel:
-        axial, path = inertia.axial(spin), ("wheel", "momentum")
-        if abs(axial) <= CANCELLED * abs(inertia.wheel):
-            momentum = f"{inertia.C * spin:.4g} N m s"
-            yield Finding(path, f"cancels the C ω3 of the body, {momentum}: without momentum nothing nutates")
-        elif spin == 0.0 and facts.has("sun_sensor"):
-            cure = "there are no Sun pulses; leave it out"
-            yield Finding(("sun_sensor",), f"the body does not turn about axis 3: {cure}", True)
-        elif axial * spin < 0.0 and facts.has("sun_sensor"):
-            problem = "turns the angular momentum against the spin: blocks fired from the Sun pulse are not planned"
-            yield Finding(path, f"{problem} then; leave sun_sensor out")
-
-
-def spin_axis(facts: Facts) -> Vector:
-    """Principal axis 3 in the axes of the file, (3,); the file's third where the tensor cannot be read."""
-    principal = principal_of(facts)
-    return np.array([0.0, 0.0, 1.0]) if principal is None else principal[1][:, 2]
+    final = facts.number("rate", "goal", "spin")
+    if final is not None and spin is not None and final * spin < 0.0:
+        yield Finding(("goal", "spin"), "of the other sign than the spin at t = 0; the spin cannot be reversed")
+    if spin is None or inertia is None or not inertia.wheel:
+        return
+    axial, path = inertia.axial(spin), ("wheel", "momentum")
+    if abs(axial) <= CANCELLED * abs(inertia.wheel):
+        momentum = f"{inertia.C * spin:.4g} N m s"
+        yield Finding(path, f"cancels the C ω3 of the body, {momentum}: without momentum nothing nutates")
+    elif axial * spin < 0.0 and facts.has("sun_sensor"):
+        problem = "turns the angular momentum against the spin: blocks fired from the Sun pulse are not planned"
+        yield Finding(path, f"{problem} then; leave sun_sensor out")
+    if facts.has("dissipation") and not facts.has("dissipation", "nutation"):
+        problem = "missing; with a wheel the place of the loss decides: give grows or decays"
+        yield Finding(("dissipation", "nutation"), problem)
 
 
 def _spin_of_omega0(facts: Facts) -> tuple[KeyPath, float | None]:
@@ -386,39 +434,9 @@ def _spin_of_omega0(facts: Facts) -> tuple[KeyPath, float | None]:
         return (), None
     if tensor is None:
         return ("omega0", 2), float(omega0[2])
-    spin = float(spin_axis(facts) @ omega0)
+    _, axes = rigid_body.principal_axes(symmetric(tensor))
+    spin = float(axes[:, 2] @ omega0)
     return ("omega0",), spin if abs(spin) > CANCELLED * norm(omega0) else 0.0
-
-
-def _attitude(facts: Facts) -> Iterator[Finding]:
-    by_axis = [key for key in ("spin_axis", "phase", "sun_phase", "of") if facts.has("attitude", key)]
-    if facts.has("attitude", "quaternion"):
-        for key in by_axis:
-            yield Finding(("attitude", key), "given together with quaternion; keep one of the two", True)
-    elif facts.is_mapping("attitude"):
-        if "spin_axis" not in by_axis:
-            cure = "or spin_axis: [right ascension, declination]"
-            yield Finding(("attitude", "quaternion"), f"missing; turn from body to frame, scalar first, {cure}")
-        if "sun_phase" in by_axis:
-            yield from _sun_phase(facts)
-    yield from _direction(facts, ("attitude", "spin_axis"))
-    quaternion = facts.vector("number", 4, "attitude", "quaternion")
-    if quaternion is not None and norm(quaternion) < SMALLEST:
-        yield Finding(("attitude", "quaternion"), "zero; expected a rotation, such as [1, 0, 0, 0]")
-
-
-def _sun_phase(facts: Facts) -> Iterator[Finding]:
-    """Faults of an attitude whose phase counts from the side of the Sun."""
-    path = ("attitude", "sun_phase")
-    if facts.has("attitude", "phase"):
-        yield Finding(path, "given together with phase; keep one of the two", True)
-    if not facts.has("sun"):
-        yield Finding(path, "needs the key sun: [right ascension, declination], or sun: epoch", True)
-    axis, direction = facts.vector("angle", 2, "attitude", "spin_axis"), _to_sun(facts)
-    if axis is not None and direction is not None:
-        angle = float(attitude.angle_between(attitude.on_sphere(*axis.tolist()), direction))
-        if min(angle, math.pi - angle) < ALONG:
-            yield Finding(path, "the Sun lies along spin_axis, which has no side of the Sun then; give phase", True)
 
 
 def disturbance_kind(kind: str | None, turns: bool) -> str:
@@ -429,88 +447,68 @@ def disturbance_kind(kind: str | None, turns: bool) -> str:
 def _disturbances(facts: Facts) -> Iterator[Finding]:
     for path in filter(lambda path: facts.is_mapping(*path), facts.below("disturbances")):
         turning = [key for key in ("rate", "fixed_in") if facts.has(*path, key)]
-        unreadable = facts.has(*path, "kind") and facts.text(*path, "kind") is None
-        kind = "" if unreadable else disturbance_kind(facts.text(*path, "kind"), bool(turning))
-        yield from _turning(facts, path, kind, turning)
-        yield from _disturbing_torque(facts, path, kind)
+        stated = facts.value(*path, "kind")
+        kind = disturbance_kind(None if stated is None else str(stated), bool(turning))
+        if kind in ("constant", "axial"):
+            for key in turning:
+                problem = f"goes with kind rotating, not {kind}; leave one of the two out"
+                yield Finding((*path, key), problem, True)
+        elif len(turning) == 2:
+            yield Finding((*path, "fixed_in"), f"given together with rate; {KEEP}", True)
+        elif kind == "rotating" and not turning:
+            cure = "give rate: … rad/s, as seen in the body, or fixed_in: inertial"
+            yield Finding((*path, "rate"), f"missing; {cure}")
+        if kind in ("constant", "rotating") and facts.number("torque", *path, "torque") is not None:
+            problem = "expected three components, [M1, M2, M3], got a single torque"
+            cure = "; or, for a torque about axis 3 only, kind: axial"
+            yield Finding((*path, "torque"), problem + cure)
 
 
-def _turning(facts: Facts, path: KeyPath, kind: str, turning: list[str]) -> Iterator[Finding]:
-    """Faults of rate and fixed_in of a disturbance, of which ``turning`` are given."""
-    if kind in ("constant", "axial"):
-        for key in turning:
-            yield Finding((*path, key), f"goes with kind rotating, not {kind}; leave one of the two out", True)
-        return
-    if len(turning) == 2:
-        yield Finding((*path, "fixed_in"), "given together with rate; keep one of the two", True)
-    elif kind == "rotating" and not turning:
-        yield Finding((*path, "rate"), "missing; give rate: … rad/s, as seen in the body, or fixed_in: inertial")
-    rate = facts.number("rate", *path, "rate")
-    if rate is not None and abs(rate) < SMALLEST:
-        yield Finding((*path, "rate"), "zero; for a torque fixed in the body say kind: constant and leave rate out")
-    if facts.text(*path, "fixed_in") == "body":
-        problem = "expected 'inertial', got 'body'; for a torque fixed in the body say kind: constant"
-        yield Finding((*path, "fixed_in"), f"{problem} and leave fixed_in out")
-
-
-def _disturbing_torque(facts: Facts, path: KeyPath, kind: str) -> Iterator[Finding]:
-    path = (*path, "torque")
-    single, torque = facts.number("torque", *path), facts.vector("torque", 3, *path)
-    if single is not None and kind in ("constant", "rotating"):
-        cure = "; or, for a torque about axis 3 only, kind: axial" if kind == "constant" else ""
-        yield Finding(path, f"expected three components, [M1, M2, M3], got a single torque{cure}")
-    elif single is not None and abs(single) < SMALLEST:
-        yield Finding(path, "zero; expected a torque other than 0")
-    if torque is None:
-        return
-    size = norm(torque)
-    if size < SMALLEST:
-        yield Finding(path, "zero; expected at least one component other than 0")
-    elif kind == "axial" and norm(torque[:2]) > CANCELLED * size:
-        yield Finding(path, "an axial torque has no transverse components; expected [0, 0, M3], or kind: constant")
-    elif kind == "rotating" and abs(torque[2]) > CANCELLED * size:
-        problem = "a rotating torque has no part about axis 3; expected 0"
-        yield Finding((*path, 2), f"{problem}, and this part as a disturbance of its own, kind: axial")
-
-
-def _dissipation(facts: Facts) -> Iterator[Finding]:
-    time_constant = facts.number("time", "dissipation", "time_constant")
-    if time_constant == 0.0:
-        path: KeyPath = ("dissipation", "time_constant")
-        yield Finding(path, "zero; expected a time above 0, or leave dissipation out for none")
-    path, inertia = ("dissipation", "nutation"), inertia_of(facts)
-    if time_constant is not None and wheel_of(facts) and not facts.has(*path):
-        yield Finding(path, "missing; with a wheel the place of the loss decides: give grows or decays")
-    elif inertia is not None and inertia.a == inertia.wheel == 0.0 and facts.has(*path):
-        yield Finding(path, "the nutation of a sphere neither grows nor decays; leave it out", True)
-
-
-def _limits(facts: Facts) -> Iterator[Finding]:
-    earliest, horizon = facts.number("time", "limits", "earliest"), facts.number("time", "limits", "horizon")
-    if earliest is not None and horizon is not None and earliest >= horizon > 0:
-        yield Finding(("limits", "earliest"), f"not before the horizon; expected less than {horizon:g} s")
+def _blackout(facts: Facts) -> Iterator[Finding]:
     for path in facts.below("limits", "blackout"):
         window = facts.vector("time", 2, *path)
         if window is not None and window[1] < window[0]:
             yield Finding(path, "ends before it begins; expected [begin, end]")
 
 
-def _goal(facts: Facts) -> Iterator[Finding]:
-    pairs = (("tilt", "azimuth"), ("right_ascension", "declination"))
-    in_n, in_sky = ([key for key in pair if facts.has("goal", key)] for pair in pairs)
-    if in_n and in_sky:
-        problem = f"given together with {' and '.join(in_sky)}; keep tilt and azimuth, or the other pair"
-        yield Finding(("goal", in_n[0]), problem, True)
-    elif in_n == ["azimuth"]:
-        yield Finding(("goal", "tilt"), "missing; azimuth alone names no direction")
-    elif len(in_sky) == 1:
-        (other,) = {*pairs[1]} - {*in_sky}
-        yield Finding(("goal", other), f"missing; {in_sky[0]} alone names no direction")
-    elif in_sky and not facts.has("attitude"):
-        problem = "needs attitude, which says where the body points at t = 0; without it give tilt and azimuth"
-        yield Finding(("goal", in_sky[0]), problem, True)
-    final, spin = facts.number("rate", "goal", "spin"), spin_of(facts)
-    if final is not None and abs(final) < SMALLEST:
-        yield Finding(("goal", "spin"), "zero; expected a rate about axis 3")
-    elif final is not None and spin is not None and final * spin < 0.0:
-        yield Finding(("goal", "spin"), "of the other sign than the spin at t = 0; the spin cannot be reversed")
+ALONG = 1e-3  # rad from the spin axis, up to which the Sun counts as along it
+
+
+def _sun(facts: Facts) -> Iterator[Finding]:
+    """Faults of the Sun: one that is asked for and not there, or that cannot be computed, or has no side."""
+    for path in facts.matching("keep.*.direction"):
+        if facts.text(*path) == "sun" and not facts.has("sun"):
+            yield Finding(path, f"needs sun{SUN}")
+    sun, axis = _to_sun(facts), facts.vector("angle", 2, "attitude", "spin_axis")
+    if sun is None and facts.text("sun") == "epoch" and facts.has("attitude"):
+        epoch, cure = facts.text("attitude", "epoch"), f"give {SKY}"
+        problem = f"the Sun is computed for epochs from 1972 on, not for {epoch}; {cure}"
+        yield Finding(("sun",), problem if epoch else f"epoch needs attitude.epoch, the date of t = 0; or {cure}")
+    if sun is not None and axis is not None and facts.has("attitude", "sun_phase"):
+        angle = float(attitude.angle_between(attitude.on_sphere(*axis.tolist()), sun))
+        if min(angle, math.pi - angle) < ALONG:
+            problem = "the Sun lies along spin_axis, which has no side of the Sun then; give phase"
+            yield Finding(("attitude", "sun_phase"), problem, True)
+
+
+def _to_sun(facts: Facts) -> Vector | None:
+    """The direction (3,) to the Sun, given or of the epoch; None where it cannot be read."""
+    given = facts.vector("angle", 2, "sun")
+    if given is not None:
+        return attitude.on_sphere(*given.tolist())
+    epoch = facts.text("attitude", "epoch")
+    if facts.text("sun") != "epoch" or epoch is None:
+        return None
+    try:
+        return sky.direction(Epoch.parse(epoch).days_of_j2000)
+    except ValueError:
+        return None
+
+
+def _declinations(facts: Facts) -> Iterator[Finding]:
+    for pattern in ("sun", "attitude.spin_axis", "keep.*.direction"):
+        for path in facts.matching(pattern):
+            angle = facts.number("angle", *path, 1)
+            if angle is not None and abs(angle) > 0.5 * math.pi * (1.0 + 1e-12):
+                problem = f"{math.degrees(angle):g} deg is no declination; expected -90 deg to 90 deg"
+                yield Finding((*path, 1), problem)

@@ -1,25 +1,22 @@
 """Schedules and command blocks as CSV, written and read.
 
-Three columns are enough, and rule: start_s (or t_s, the centre), on_time_s and channel. The others are only compared
-with the spacecraft file. Pulses of the steerable torquer, and of channels that the file does not know, take their
-torque (or impulse) from the schedule.
+Three columns are enough, and rule: start_s (or t_s, the centre), on_time_s and channel. Torque and impulse columns are
+read for pulses of the steerable torquer, ideal ones, and those of channels that the spacecraft file does not know.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
-from nutdamp.common.time import Epoch
 from nutdamp.errors import nearest, printable
 from nutdamp.files.tabular import Row, Table
 from nutdamp.flight.dynamics import Supply
-from nutdamp.planning.decision import broken_limits
+from nutdamp.planning.notes import broken_limits
 from nutdamp.planning.plan import Plan
-from nutdamp.schemes.block_model import fired, spin_turn
 from nutdamp.schemes.catalogue import SchemeOptions
 from nutdamp.spacecraft.equipment import Block, Channel
 from nutdamp.spacecraft.model import Spacecraft, Vector
@@ -74,32 +71,7 @@ def read_blocks(path: str | Path, spacecraft: Spacecraft) -> tuple[tuple[Block, 
     if total > MOST_FIRED:
         table.fault(1, "count", f"the blocks fire {total} pulses; expected at most {MOST_FIRED}")
     table.check()
-    _expect_utc(table, spacecraft, blocks)
     return tuple(blocks), table.warned
-
-
-def _expect_utc(table: Table, spacecraft: Spacecraft, blocks: Sequence[Block]) -> None:
-    """Faults of a first_utc that is no time, or over a spin turn off its first pulse: so much may a delay be edited."""
-    parsed: dict[int, Epoch] = {}
-    for row in table.rows:
-        try:
-            if row.get("first_utc"):
-                parsed[row.line] = Epoch.parse(row["first_utc"])
-        except ValueError:
-            example = "2026-03-01T12:00:00Z"
-            row.fault("first_utc", f"{shown(row['first_utc'])} is no date and time; expected {example}")
-    table.check()
-    place = spacecraft.attitude
-    if not parsed or place is None or place.epoch is None:
-        return
-    pulses, epoch, number = fired(spacecraft, blocks).pulses, Epoch.parse(place.epoch), 0
-    for row, block in zip(table.rows, blocks, strict=True):
-        begins = pulses[number].loaded[0]
-        number += block.count
-        if row.line in parsed and abs(parsed[row.line].since(epoch) - begins) > spin_turn(spacecraft):
-            cure = "correct first_sun_pulse, or leave first_utc empty"
-            row.fault("first_utc", f"its first pulse begins at {spacecraft.utc(begins)}; {cure}")
-    table.check()
 
 
 TIMES = ("delay", "width")
@@ -179,21 +151,37 @@ def _against_commands(row: Row, block: Block, spacecraft: Spacecraft) -> None:
     off += [("every", str(block.every), f"only {allowed}")] * (block.every not in commands.every)
     for column, value, possible in off:
         row.warn(column, f"{column} = {value} cannot be commanded, {possible}: flown as given")
-    for name, time in zip(TIMES, (block.delay, block.width), strict=True):
-        counts, right = row.get(f"{name}_counts", ""), commands.counts(name, time)
-        if counts and f"{name}_s" in row and counts != str(right):
-            meant = f"{name}_s = {time:g}, which is {right}"
-            row.warn(f"{name}_counts", f"{name}_counts = {counts} contradicts {meant}: ignored")
 
-
-AGREES = 1e-6  # relative difference up to which columns of a schedule agree
 
 STARTS = ("start_s", "t_s")
+
+AGREES = 1e-6  # relative difference up to which a torque is that of the torquer
 
 
 def read_pulses(path: str | Path, spacecraft: Spacecraft) -> tuple[Schedule, list[str]]:
     """A schedule from a CSV file, and warnings; raises CannotRead, and FaultyFile with every fault of the file."""
-    return _ScheduleReader(Table(path, (*PULSES_HEADER, *EFFECTIVE, UTC), "pulses"), spacecraft).read()
+    table = Table(path, (*PULSES_HEADER, *EFFECTIVE, UTC), "pulses")
+    if not {*STARTS} & {*table.header}:
+        missing = f"the column is missing (or {STARTS[1]}, the centre)"
+        table.fault(1, STARTS[0], missing + table.misspelt(STARTS[0]))
+    steered = {*TORQUE, *IMPULSE} & {*table.header}  # then a pulse without channel is one of the torquer
+    table.expect("on_time_s", *(() if steered else ("channel",)))
+    channels = {channel.name: channel for channel in spacecraft.channels}
+    pulses = []
+    for row in table.rows:
+        pulse = _pulse(row, spacecraft, channels)
+        if pulse is not None:
+            pulses.append((row.line, pulse))
+    for line, other in overlapping(pulses):
+        table.fault(line, STARTS[0], f"its channel is still firing the pulse of line {other}")
+    table.check()
+    supply = Supply(spacecraft)
+    if not supply.steady:  # pulses have the strength of their place in the sequence
+        pulses.sort(key=lambda row: row[1].loaded[0])
+    supplied = tuple(supply.fire(pulse, channels.get(pulse.channel)) for _, pulse in pulses)
+    if supply.shortage is not None:
+        table.rows[-1].warn("tank", f"{supply.shortage}: the last pulses do not fire")
+    return Schedule(supplied), table.warned
 
 
 def read_plan(
@@ -205,169 +193,113 @@ def read_plan(
     return plan, (*warnings, *broken_limits(spacecraft, pulses))
 
 
-class _ScheduleReader:
-    def __init__(self, table: Table, spacecraft: Spacecraft) -> None:
-        self.table, self.spacecraft = table, spacecraft
-        self.channels = {channel.name: channel for channel in spacecraft.channels}
-        self.commanded: dict[int, Row] = {}  # of pulses of a channel of the file, by line
+Channels = Mapping[str, Channel]
 
-    def read(self) -> tuple[Schedule, list[str]]:
-        header = self.table.header
-        if not set(STARTS) & set(header):
-            missing = f"the column is missing (or {STARTS[1]}, the centre)"
-            self.table.fault(1, STARTS[0], missing + self.table.misspelt(STARTS[0]))
-        bare = not {*TORQUE, *IMPULSE} & set(header)  # else a pulse without channel is one of the torquer
-        self.table.expect("on_time_s", *["channel"] * bare)
-        pulses = [(row.line, pulse) for row in self.table.rows if (pulse := self._pulse(row)) is not None]
-        for line, other in overlapping(pulses):
-            self.table.fault(line, STARTS[0], f"its channel is still firing the pulse of line {other}")
-        self.table.check()
-        # Pulses have the strength of their place in the sequence.
-        supply, supplied = Supply(self.spacecraft), []
-        for line, pulse in pulses if supply.steady else sorted(pulses, key=lambda row: row[1].loaded[0]):
-            supplied.append(supply.fire(pulse, self.channels.get(pulse.channel)))
-            if line in self.commanded:
-                self._expect(self.commanded[line], supplied[-1])
-        if supply.shortage is not None:
-            self.table.rows[-1].warn("tank", f"{supply.shortage}: the last pulses do not fire")
-        return Schedule(tuple(supplied)), self.table.warned
 
-    def _pulse(self, row: Row) -> Pulse | None:
-        name = row.get("channel") or STEERABLE
-        if not name.isprintable():
-            row.fault("channel", f"{shown(name)} is no name of a channel; printable characters are expected")
-            return None
-        channel = self.channels.get(name)
-        timing = self._timing(row, channel)
-        if timing is None:
-            return None
-        t, on_time, start = timing
-        if channel is not None and on_time > 0.0:
-            self.commanded[row.line] = row
-            return channel_pulse(channel, t, on_time) if start is None else on_command(channel, start, on_time)
-        _compare_centre(row, t, t - 0.5 * on_time, on_time)
-        return self._as_given(row, name, t, on_time)
+def _pulse(row: Row, spacecraft: Spacecraft, channels: Channels) -> Pulse | None:
+    """The pulse of a row, with a full tank; None for a fault."""
+    name = row.get("channel") or STEERABLE
+    if not name.isprintable():
+        row.fault("channel", f"{shown(name)} is no name of a channel; printable characters are expected")
+        return None
+    channel = channels.get(name)
+    timing = _timing(row, channel)
+    if timing is None:
+        return None
+    t, on_time, start = timing
+    if channel is not None and on_time > 0.0:
+        return channel_pulse(channel, t, on_time) if start is None else on_command(channel, start, on_time)
+    faults = len(row.table.faults)
+    torque = _numbers(row, TORQUE) if on_time > 0.0 else None
+    impulse = _numbers(row, IMPULSE) if torque is None else torque * on_time
+    if impulse is None:
+        if len(row.table.faults) == faults:
+            row.fault("on_time_s" if channel else "channel", _missing(name, channels, on_time))
+        return None
+    given = spacecraft.inertia.axes.T @ impulse
+    push = None if on_time == 0.0 else given / on_time
+    propellant = _propellant(row, name, spacecraft, channels, given, push)
+    return Pulse(t, on_time, name, given, push, None, propellant)
 
-    def _timing(self, row: Row, channel: Channel | None) -> tuple[float, float, float | None] | None:
-        """Centre (of the thrust) and on-time, s, and through a valve the start of the command, s."""
-        column = next((column for column in STARTS if row.get(column)), None)
-        if column is None:
-            row.fault(STARTS[0], "the time is missing")
-            return None
-        time, on_time = row.number(column), row.number("on_time_s")
-        if time is None or on_time is None:
-            return None
-        if on_time < 0.0:
-            least, most = (0.0, math.inf) if channel is None else (channel.min_on_time, channel.max_on_time)
-            allowed = f"{least:g} s or more" if most == math.inf else f"{least:g} s to {most:g} s"
-            row.fault("on_time_s", f"{on_time:g} s is negative; {allowed} is expected (0 for an ideal impulse)")
-            return None
-        lead = None if channel is None or on_time == 0.0 else self._lead(row, channel, on_time)
-        centre = 0.5 * on_time if lead is None else lead
-        start = time if column == STARTS[0] else time - centre
-        if start < -1e-9:
-            row.fault(column, f"the pulse would start at {start:g} s; 0 s or later is expected")
-            return None
-        t = max(start, 0.0) + centre if column == STARTS[0] else max(time, centre)
-        if not Pulse(t, on_time, "", np.zeros(3)).resolved:
-            apart = f"where times are {math.ulp(t + 0.5 * on_time):.2g} s apart"
-            row.fault("on_time_s", f"{on_time:g} s is too short at {t:g} s, {apart}")
-            return None
-        begins = max(start, 0.0) if column == STARTS[0] else t - centre
-        return t, on_time, None if lead is None else begins
 
-    def _lead(self, row: Row, channel: Channel, on_time: float) -> float | None:
-        """Time (s) from the start of a command to the centroid of its thrust; None without a valve."""
-        if channel.valve is None:
-            return None
-        least, most = channel.valve.known
-        named, thrust = shown(channel.name), channel.valve.thrust(on_time)
-        if not least <= on_time <= most:
-            known = f"{least:g} s to {most:g} s"
-            row.fault("on_time_s", f"{on_time:g} s is outside the impulse_bit of {named}, {known}")
-        if not thrust.ramps:
-            short = f"{on_time:g} s is too short for the valve of {named}: it does not open"
-            row.warn(f"closed {channel.name}", short)
-        return thrust.centroid
+def _timing(row: Row, channel: Channel | None) -> tuple[float, float, float | None] | None:
+    """Centre (of the thrust) and on-time, s, and through a valve the start of the command, s."""
+    column = next((column for column in STARTS if row.get(column)), None)
+    if column is None:
+        row.fault(STARTS[0], "the time is missing")
+        return None
+    time, on_time = row.number(column), row.number("on_time_s")
+    if time is None or on_time is None:
+        return None
+    if on_time < 0.0:
+        least, most = (0.0, math.inf) if channel is None else (channel.min_on_time, channel.max_on_time)
+        allowed = f"{least:g} s or more" if most == math.inf else f"{least:g} s to {most:g} s"
+        row.fault("on_time_s", f"{on_time:g} s is negative; {allowed} is expected (0 for an ideal impulse)")
+        return None
+    lead = None if channel is None or on_time == 0.0 else _lead(row, channel, on_time)
+    centre = 0.5 * on_time if lead is None else lead
+    start = time if column == STARTS[0] else time - centre
+    if start < -1e-9:
+        row.fault(column, f"the pulse would start at {start:g} s; 0 s or later is expected")
+        return None
+    t = max(start, 0.0) + centre if column == STARTS[0] else max(time, centre)
+    if not Pulse(t, on_time, "", np.zeros(3)).resolved:
+        apart = f"where times are {math.ulp(t + 0.5 * on_time):.2g} s apart"
+        row.fault("on_time_s", f"{on_time:g} s is too short at {t:g} s, {apart}")
+        return None
+    begins = max(start, 0.0) if column == STARTS[0] else t - centre
+    return t, on_time, None if lead is None else begins
 
-    def _expect(self, row: Row, pulse: Pulse) -> None:
-        if row.get(STARTS[0]):  # else the centre is that of an even thrust
-            _compare_centre(row, pulse.t, *pulse.loaded)
-        if pulse.torque is None:
-            return
-        inertia, named = self.spacecraft.inertia, shown(pulse.channel)
-        torque, impulse = inertia.in_file(pulse.torque), inertia.in_file(pulse.impulse)
-        _compare(row, TORQUE, torque, f"that of {named} in the spacecraft file, {_vector(torque)}")
-        length = "effective_on_time_s" if pulse.through_valve else "on_time_s"
-        _compare(row, IMPULSE, impulse, f"torque of {named} × {length}, {_vector(impulse)}")
-        if pulse.propellant is not None:
-            _compare(row, ("propellant_kg",), [pulse.propellant], f"{pulse.propellant:g} by the spacecraft file")
-        if pulse.through_valve:
-            meant = f"what the valve of {named} makes of the command"
-            for column, value in zip(EFFECTIVE, (pulse.start, pulse.on_time), strict=True):
-                _compare(row, (column,), [value], f"{meant}, {value:g}", scale=pulse.over)
-        self._compare_dates(row, pulse)
 
-    def _as_given(self, row: Row, name: str, t: float, on_time: float) -> Pulse | None:
-        """A pulse whose torque or impulse the schedule must give: ideal, steered, or of a channel not in the file."""
-        inertia, channel, faults = self.spacecraft.inertia, self.channels.get(name), len(self.table.faults)
-        torque = _numbers(row, TORQUE) if on_time > 0.0 else None
-        impulse = _numbers(row, IMPULSE)
-        if torque is not None:
-            impulse = torque * on_time
-            _compare(row, IMPULSE, impulse, f"torque × on_time_s, {_vector(impulse)}")
-        if impulse is None:
-            if len(self.table.faults) == faults:
-                row.fault("on_time_s" if channel else "channel", self._missing(name, channel, on_time))
-            return None
-        given = inertia.axes.T @ impulse
-        push = None if on_time == 0.0 else given / on_time
-        pulse = Pulse(t, on_time, name, given, push, None, self._propellant(row, name, given, push))
-        self._compare_dates(row, pulse)
-        return pulse
+def _lead(row: Row, channel: Channel, on_time: float) -> float | None:
+    """Time (s) from the start of a command to the centroid of its thrust; None without a valve."""
+    if channel.valve is None:
+        return None
+    least, most = channel.valve.known
+    named, thrust = shown(channel.name), channel.valve.thrust(on_time)
+    if not least <= on_time <= most:
+        known = f"{least:g} s to {most:g} s"
+        row.fault("on_time_s", f"{on_time:g} s is outside the impulse_bit of {named}, {known}")
+    if not thrust.ramps:
+        short = f"{on_time:g} s is too short for the valve of {named}: it does not open"
+        row.warn(f"closed {channel.name}", short)
+    return thrust.centroid
 
-    def _missing(self, name: str, channel: Channel | None, on_time: float) -> str:
-        """Columns missing in a row whose torque or impulse does not follow from the spacecraft file."""
-        impulse, torque = (f"{columns[0]} to {columns[-1]}" for columns in (IMPULSE, TORQUE))
-        columns = impulse if on_time == 0.0 else f"{torque} (or {impulse})"
-        if channel is not None:
-            return f"with an on-time of 0 {shown(name)} fires nothing, unless {columns} give an ideal impulse"
-        close = nearest(name, list(self.channels))
-        known = f" (it has {', '.join(map(shown, self.channels))})" if self.channels else ""
-        known = f" (did you mean {shown(close)}?)" if close else known
-        kind = "a steered pulse" if name == STEERABLE else f"{shown(name)}, not in the spacecraft file{known},"
-        return f"{kind} needs {columns}"
 
-    def _propellant(self, row: Row, name: str, impulse: Vector, torque: Vector | None) -> float | None:
-        """Propellant of a pulse that flies as the schedule has it, kg; warns of differences from the file."""
-        named = shown(name)
-        if name in self.channels:
-            ideal = f"{named} has an on-time of 0: flown as an ideal impulse, its propellant is unknown"
-            row.warn(f"ideal {name}", ideal)
-            return None
-        torquer = self.spacecraft.torquer
-        if name != STEERABLE or torquer is None:
-            known = ", ".join(map(shown, self.channels)) or STEERABLE
-            missing = f"channel {named} is not in the spacecraft file ({known})"
-            row.warn(f"unknown {name}", f"{missing}: flown as given, propellant unknown")
-            return None
-        size = 0.0 if torque is None else float(np.linalg.norm(torque))
-        if torque is not None and torquer.torque is not None and abs(size - torquer.torque) > AGREES * torquer.torque:
-            text = f"{size:g} N m is not the torque of the steerable torquer, {torquer.torque:g} N m: flown as given"
-            row.warn("steerable torque", text)
-        rate = torquer.propellant_per_impulse
-        return None if rate is None else rate * float(np.linalg.norm(impulse))
+def _missing(name: str, channels: Channels, on_time: float) -> str:
+    """Columns missing in a row whose torque or impulse does not follow from the spacecraft file."""
+    impulse, torque = (f"{columns[0]} to {columns[-1]}" for columns in (IMPULSE, TORQUE))
+    columns = impulse if on_time == 0.0 else f"{torque} (or {impulse})"
+    if name in channels:
+        return f"with an on-time of 0 {shown(name)} fires nothing, unless {columns} give an ideal impulse"
+    if name == STEERABLE:
+        return f"a steered pulse needs {columns}"
+    close = nearest(name, channels)
+    known = f" (it has {', '.join(map(shown, channels))})" if channels else ""
+    known = f" (did you mean {shown(close)}?)" if close else known
+    return f"{shown(name)}, not in the spacecraft file{known}, needs {columns}"
 
-    def _compare_dates(self, row: Row, pulse: Pulse) -> None:
-        expected = self.spacecraft.utc(pulse.loaded[0])
-        if not row.get(UTC) or expected is None:
-            return
-        try:
-            off = abs(Epoch.parse(row[UTC]).since(Epoch.parse(expected)))
-        except ValueError:
-            off = math.inf
-        if not off <= AGREES * max(pulse.t, 1.0):
-            row.warn(UTC, f"{UTC} = {shown(row[UTC])} contradicts start_s, which is {expected}: ignored")
+
+def _propellant(
+    row: Row, name: str, spacecraft: Spacecraft, channels: Channels, impulse: Vector, torque: Vector | None
+) -> float | None:
+    """Propellant of a pulse that flies as the schedule has it, kg, with a warning where it is not known."""
+    named, torquer = shown(name), spacecraft.torquer
+    if name in channels:
+        ideal = f"{named} has an on-time of 0: flown as an ideal impulse, its propellant is unknown"
+        row.warn(f"ideal {name}", ideal)
+        return None
+    if name != STEERABLE or torquer is None:
+        known = ", ".join(map(shown, channels)) or STEERABLE
+        missing = f"channel {named} is not in the spacecraft file ({known})"
+        row.warn(f"unknown {name}", f"{missing}: flown as given, propellant unknown")
+        return None
+    size = 0.0 if torque is None else float(np.linalg.norm(torque))
+    if torque is not None and torquer.torque is not None and abs(size - torquer.torque) > AGREES * torquer.torque:
+        text = f"{size:g} N m is not the torque of the steerable torquer, {torquer.torque:g} N m: flown as given"
+        row.warn("steerable torque", text)
+    rate = torquer.propellant_per_impulse
+    return None if rate is None else rate * float(np.linalg.norm(impulse))
 
 
 def _numbers(row: Row, columns: Sequence[str]) -> Vector | None:
@@ -376,38 +308,3 @@ def _numbers(row: Row, columns: Sequence[str]) -> Vector | None:
         return None
     numbers = [row.number(column) for column in columns]
     return None if None in numbers else np.array(numbers, dtype=float)
-
-
-def _compare(
-    row: Row, columns: Sequence[str], expected: Sequence[float] | Vector, meant: str, scale: float | None = None
-) -> None:
-    texts = [row.get(column, "") for column in columns]
-    if not any(texts):
-        return
-    try:
-        off = float(np.linalg.norm(np.array([float(text) for text in texts]) - expected))
-    except ValueError:
-        off = math.inf
-    if not off <= AGREES * (float(np.linalg.norm(expected)) if scale is None else scale):
-        given = ", ".join(map(_brief, texts))
-        given = f"{columns[0]} = {given}" if len(columns) == 1 else f"{columns[0]} to {columns[-1]} = ({given})"
-        row.warn(columns[0], f"{given} contradicts {meant}: ignored")
-
-
-def _compare_centre(row: Row, t: float, start: float, on_time: float) -> None:
-    """Compare the centre with that of the thrust, which lies in the middle unless valve or tank shape it."""
-    even = abs(t - start - 0.5 * on_time) <= AGREES * on_time
-    meant = f"start_s + on_time_s/2 = {t:g}" if even else f"the centroid of the thrust, {t:g}"
-    _compare(row, (STARTS[1],), [t], meant, scale=max(t, on_time))
-
-
-def _vector(parts: Vector) -> str:
-    return "(" + ", ".join(f"{part:g}" for part in parts.tolist()) + ")"
-
-
-def _brief(text: str) -> str:
-    """The text of a cell, a number in six digits."""
-    try:
-        return f"{float(text):g}"
-    except ValueError:
-        return shown(text)

@@ -15,7 +15,7 @@ import re
 import sys
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any
 
@@ -29,15 +29,7 @@ from nutdamp.flight.propagation import Track, in_file_axes
 from nutdamp.spacecraft.model import Inertia
 from nutdamp.units import shown
 
-if sys.platform != "win32":
-    import fcntl
-
 STDOUT = "-"  # file name that means standard output
-
-PREFIX, SUFFIX = ".nutdamp-", ".part"
-"""Begin and end of the names of temporary files."""
-
-ATTEMPTS = 10  # temporary files that are made before giving up, where others remove them
 
 
 def write_whole(path: str, content: str | bytes | Callable[[IO[bytes]], object]) -> None:
@@ -83,8 +75,6 @@ def check_place(path: str) -> Path:
         return Path(path)
     try:
         target = Path(path).resolve()
-        if target.is_symlink() or target.parent.is_symlink():  # `resolve` may give up on a circle without a word
-            raise CannotWrite(path, "too many levels of symbolic links")
         if target.is_dir():
             raise CannotWrite(path, "it is a directory")
         if not target.parent.is_dir():
@@ -111,57 +101,21 @@ def make_folder(path: str) -> None:
 
 @contextmanager
 def _replacing(target: Path) -> Iterator[IO[bytes]]:
-    remove_abandoned(target.parent)
-    handle, temporary = _locked_file(target.parent)
+    """A temporary file that takes the place of ``target`` where the block ends well, with its mode."""
+    handle, name = tempfile.mkstemp(prefix=".nutdamp-", suffix=".part", dir=target.parent)
+    temporary = Path(name)
     try:
         with os.fdopen(handle, "wb") as stream:
             yield stream
             stream.flush()
             os.fsync(stream.fileno())
-            if target.exists():
-                temporary.chmod(target.stat().st_mode & 0o7777)
-            else:
-                mask = os.umask(0)
-                os.umask(mask)
-                temporary.chmod(0o666 & ~mask)
-            if sys.platform == "win32":
-                stream.close()  # there an open file cannot be renamed; here it keeps its lock until it is
-            temporary.replace(target)
+        mask = os.umask(0)
+        os.umask(mask)
+        temporary.chmod(target.stat().st_mode & 0o7777 if target.exists() else 0o666 & ~mask)
+        temporary.replace(target)
     except BaseException:
         temporary.unlink(missing_ok=True)
         raise
-
-
-def _locked_file(folder: Path) -> tuple[int, Path]:
-    """A new temporary file in ``folder``, open, and locked until it is closed or the process ends."""
-    for _ in range(ATTEMPTS):
-        handle, name = tempfile.mkstemp(prefix=PREFIX, suffix=SUFFIX, dir=folder)
-        with suppress(OSError):  # of a file system that knows no locks
-            _lock(handle)
-        if Path(name).exists():
-            return handle, Path(name)
-        os.close(handle)  # another run took it for abandoned just before it was locked
-    raise FileNotFoundError(f"temporary files in {folder} are removed as soon as they are made")
-
-
-def remove_abandoned(folder: Path) -> None:
-    """Remove the temporary files of runs that were killed: those that no process has locked."""
-    if sys.platform == "win32":
-        return
-    for path in folder.glob(f"{PREFIX}*{SUFFIX}"):
-        with suppress(OSError):
-            handle = os.open(path, os.O_RDWR | os.O_NOFOLLOW)
-            try:
-                _lock(handle)
-                path.unlink()
-            finally:
-                os.close(handle)
-
-
-def _lock(handle: int) -> None:
-    """Lock an open file until it is closed or the process ends. Raises OSError, also where another process has."""
-    if sys.platform != "win32":
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
 def number(value: float | None) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from itertools import compress, pairwise
 from typing import NamedTuple
@@ -14,8 +14,8 @@ from nutdamp.flight import propagation
 from nutdamp.flight.propagation import Flight
 from nutdamp.physics import attitude
 from nutdamp.spacecraft import requirements
-from nutdamp.spacecraft.model import SLACK, Keep, Spacecraft, SpinState, Vector
-from nutdamp.spacecraft.requirements import Left, Part
+from nutdamp.spacecraft.model import Keep, Spacecraft, SpinState, Vector
+from nutdamp.spacecraft.requirements import Bound, Left, Part
 from nutdamp.spacecraft.schedule import Pulse, Schedule
 
 SHARE = 0.1  # tolerance of the impulse sum, as a fraction of a bound of the requirement
@@ -114,19 +114,25 @@ def left_by(flight: Flight) -> Left:
     return Left(residual.nutation, residual.axis_error, flight.settled.spin)
 
 
+def left_on_the_way(flight: Flight, observed: Sequence[Aspect]) -> Left:
+    """`left_by` a flight, with the angles ``observed`` to the cones that the file keeps."""
+    cones = observed[: len(flight.spacecraft.keep)]
+    return left_by(flight)._replace(angles=[(aspect.least, aspect.largest) for aspect in cones])
+
+
 def tolerated(spacecraft: Spacecraft) -> dict[Part, float]:
     """Tolerated difference between models, by part: `SHARE` of what is required, `ANGLE` where nothing bounds it."""
-    required = {bound.part: SHARE * bound.most for bound in requirements.required(spacecraft)}
+    required = {bound.part: SHARE * bound.limit for bound in requirements.required(spacecraft)}
     return {Part.NUTATION: ANGLE, requirements.aim(spacecraft): ANGLE, **required}
 
 
 def deviations(flown: Flight, other: Flight) -> tuple[Deviation, ...]:
     """Parts in which two flights of one spacecraft end farther apart than `tolerated`."""
-    body = flown.spacecraft
     ends = [left_by(flight) for flight in (flown, other)]
     differences = []
-    for part, most in tolerated(body).items():
-        first, second = (end.spin if part is Part.SPIN else requirements.left_of(part, end, body) for end in ends)
+    for part, most in tolerated(flown.spacecraft).items():
+        values = ({Part.NUTATION: end.nutation, Part.SPIN: end.spin}.get(part, end.aim) for end in ends)
+        first, second = values
         if abs(first - second) > most:
             differences.append(Deviation(part, abs(first - second), most))
     return tuple(differences)
@@ -149,21 +155,18 @@ class Aspect(NamedTuple):
     largest_at: float
 
     @property
-    def too_near(self) -> bool:
-        """True if the axis comes nearer than allowed."""
-        return self.least < self.keep.least - SLACK
-
-    @property
-    def broken_at(self) -> tuple[float, float, float]:
-        """Angle, rad, its time, s, and the bound, rad, where a cone is broken."""
-        if self.too_near:
-            return self.least, self.least_at, self.keep.least
-        return self.largest, self.largest_at, self.keep.most
+    def broken_at(self) -> tuple[Bound, float, float] | None:
+        """First bound that is broken, the angle, rad, and its time, s; None for a cone that is kept."""
+        for bound in requirements.edges(self.keep):
+            angle, at = (self.least, self.least_at) if bound.inner else (self.largest, self.largest_at)
+            if not bound.met(angle):
+                return bound, angle, at
+        return None
 
     @property
     def kept(self) -> bool:
         """True if the axis keeps both bounds."""
-        return bool(self.keep.used(self.least, self.largest) <= 1.0)
+        return self.broken_at is None
 
 
 def aspects(flown: Flight, until: float | None = None) -> tuple[Aspect, ...]:

@@ -373,7 +373,8 @@ def _conserved(flown: Flight) -> tuple[Conservation, Conservation]:
         moments = flown.moments_at(np.array([leg.start])).ravel()
         size = np.linalg.norm(turning * moments + (0.0, 0.0, flown.spacecraft.inertia.wheel), axis=1)
         for index, value in enumerate((size, turning**2 @ moments)):
-            worst[index] = max(worst[index], float(np.ptp(value) / np.max(value)))
+            whole = float(np.max(value)) or 1.0  # the energy of a despun body at rest is zero
+            worst[index] = max(worst[index], float(np.ptp(value)) / whole)
     body = flown.spacecraft
     outside, inside = ("disturbances",) * bool(body.disturbances), ("dissipation",) * (body.growth != 0.0)
     return Conservation("|H|", worst[0], outside), Conservation("energy", worst[1], (*outside, *inside))

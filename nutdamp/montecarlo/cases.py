@@ -22,7 +22,7 @@ from nutdamp.physics.energy_sink import TINY
 from nutdamp.physics.sky import AxisWatch
 from nutdamp.physics.thruster import Cold, Measured, Opened, Tank, Trapezoid, possible, spread
 from nutdamp.spacecraft.equipment import Thruster
-from nutdamp.spacecraft.model import Keep, Spacecraft, Vector
+from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.schedule import STEERABLE, Pulse, Schedule
 
 Cases = Any  # one number for all cases, or an array (n,): real, or complex for complex-step derivatives
@@ -458,12 +458,6 @@ def in_body(body: Spacecraft, tilt: tuple[Any, Any], count: int, direction: Vect
     """An inertial ``direction`` (3,) in the true axes of t = 0 of bodies off by a ``tilt``, (3, n)."""
     x, y, z = attitude.rotate(attitude.conjugate(body.initial.quaternion), direction).tolist()
     return np.array([np.broadcast_to(part, count) for part in rotated((x, y, z), (-tilt[0], -tilt[1]))])
-
-
-def cones_used(keep: Sequence[Keep], aspects: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Used fraction of cones by cone and case (m, n), see `Keep.used`, from angles (m, 2, n) on the way."""
-    used = [cone.used(*angles) for cone, angles in zip(keep, aspects, strict=True)]
-    return np.array(used).reshape(aspects[:, 0].shape)
 
 
 def number_of(cases: DispersedCases) -> int:

@@ -1,4 +1,4 @@
-"""Statistics of a study: output vectors, percentiles, exact binomial intervals, sensitivities.
+"""Statistics of a study: output vectors, percentiles, intervals of shares, sensitivities.
 
 First-order sensitivities are those of the closed form by complex-step differentiation (Squire & Trapp 1998). The shares
 from the cases are first-order Sobol indices, from the means of the outcome over equally likely intervals of each input
@@ -21,80 +21,24 @@ from nutdamp.montecarlo.inputs import DispersedInput, Group, mixing
 from nutdamp.montecarlo.propagated import ClosedForm, Ends
 from nutdamp.physics.attitude import angle_of_parts
 
-STEPS = 200  # Newton steps and halvings in which a quantile is found, at most; half a dozen do mostly
-ACCURACY = 4e-16  # relative change of a quantile, or of a continued fraction, that is rounding
-LARGE = 20.0  # argument from which Stirling's series of the logarithm of Γ is exact to rounding
+SHOWN, CERTAIN = 1.9599639845400536, 4.891638475714779
+"""Standard deviations of a normal distribution within which 95 % of it lie, and all but a millionth."""
 
 
-def binomial_interval(successes: int, trials: int, confidence: float = 0.95) -> tuple[float, float]:
-    """Exact confidence interval of a probability from ``successes`` of ``trials``, Clopper & Pearson 1934."""
-    tail, failures = 0.5 * (1.0 - confidence), trials - successes
-    low = 0.0 if successes == 0 else _quantile(successes, failures + 1, tail, upper=False)
-    high = 1.0 if failures == 0 else _quantile(successes + 1, failures, tail, upper=True)
-    return low, high
+def share_interval(successes: int, trials: int, sigmas: float = SHOWN) -> tuple[float, float]:
+    """Confidence interval of a probability from ``successes`` of ``trials``, Wilson 1927; all without a trial."""
+    if trials == 0:
+        return 0.0, 1.0
+    share, spread = successes / trials, sigmas * sigmas / trials
+    middle = (share + 0.5 * spread) / (1.0 + spread)
+    half = math.sqrt(spread * (share * (1.0 - share) + 0.25 * spread)) / (1.0 + spread)
+    low = middle - half if successes else 0.0
+    return low, middle + half if successes < trials else 1.0
 
 
-def cases_to_show(probability: float, confidence: float = 0.95) -> int:
-    """Fewest cases, all good, after which the lower end of `binomial_interval` reaches ``probability``."""
-    return math.ceil(math.log(0.5 * (1.0 - confidence)) / math.log(probability))
-
-
-def _quantile(a: float, b: float, tail: float, *, upper: bool) -> float:
-    """Quantile of a beta distribution with ``tail`` below (``upper``: above) by Newton's method and bisection."""
-    low, high, x = 0.0, 1.0, a / (a + b)
-    for _ in range(STEPS):
-        below, above, density = _beta(a, b, x)
-        excess = tail - above if upper else below - tail
-        low, high = (low, x) if excess > 0.0 else (x, high)
-        new = x - excess / density if density > 0.0 else low
-        if not low < new < high:
-            new = 0.5 * (low + high)
-        if abs(new - x) <= ACCURACY * x:
-            return new
-        x = new
-    return x
-
-
-def _beta(a: float, b: float, x: float) -> tuple[float, float, float]:
-    """Shares of a beta distribution below and above ``x``, and its density (Abramowitz & Stegun 26.5.1, 26.5.8)."""
-    n = a + b
-    off = x * n - a
-    power = a * _logarithm(off / a, x * n / a) + b * _logarithm(-off / b, (1.0 - x) * n / b)
-    kernel = math.exp(power + 0.5 * math.log(a * b / (2.0 * math.pi * n)) + _rest(n) - _rest(a) - _rest(b))
-    if x * (n + 2.0) < a + 1.0:
-        below = kernel / a * _fraction(a, b, x)
-        return below, 1.0 - below, kernel / (x * (1.0 - x))
-    above = kernel / b * _fraction(b, a, 1.0 - x)
-    return 1.0 - above, above, kernel / (x * (1.0 - x))
-
-
-def _logarithm(more: float, ratio: float) -> float:
-    """Logarithm of a ``ratio`` that is 1 + ``more``, by the more exact of the two."""
-    return math.log1p(more) if abs(more) < 0.5 else math.log(ratio)
-
-
-def _rest(z: float) -> float:
-    """Remainder of Stirling's formula: ln Γ(z) - (z - 1/2) ln z + z - ln(2π)/2."""
-    if z < LARGE:
-        return math.lgamma(z) - (z - 0.5) * math.log(z) + z - 0.5 * math.log(2.0 * math.pi)
-    square = 1.0 / (z * z)
-    return (1 / 12 - square * (1 / 360 - square * (1 / 1260 - square * (1 / 1680 - square / 1188)))) / z
-
-
-def _fraction(a: float, b: float, x: float) -> float:
-    """Continued fraction of the incomplete beta function, by Lentz's method, in some √(a + b) terms."""
-    c, d = 1.0, 1.0 / (1.0 - (a + b) * x / (a + 1.0))
-    value = d
-    for m in range(1, 100 + 20 * math.isqrt(int(a + b))):
-        for term in (
-            m * (b - m) * x / ((a + 2 * m - 1.0) * (a + 2 * m)),
-            -(a + m) * (a + b + m) * x / ((a + 2 * m) * (a + 2 * m + 1.0)),
-        ):
-            c, d = 1.0 + term / c, 1.0 / (1.0 + term * d)
-            value *= c * d
-        if abs(c * d - 1.0) <= ACCURACY:
-            break
-    return value
+def cases_to_show(probability: float) -> int:
+    """Fewest cases, all good, after which the lower end of `share_interval` reaches ``probability`` (below 1)."""
+    return math.ceil(SHOWN * SHOWN * probability / (1.0 - probability))
 
 
 Array = NDArray[np.float64]
@@ -105,13 +49,14 @@ VECTORS = {
     "axis_error": slice(5, 8),
     "spin_change": slice(8, 9),
     "propellant": slice(9, 10),
+    "spin": slice(10, 11),
 }
-"""Rows of `vectors` by output."""
+"""Rows of `vectors` by output, and of the spin at the end."""
 
-OUTPUTS = tuple(VECTORS)
+OUTPUTS = tuple(VECTORS)[:5]
 """In rad, rad, rad, rad/s and kg; the angles are called as the values of `nutdamp.spacecraft.requirements.Part`."""
 
-ROWS = 10  # rows of `vectors`
+ROWS = 11  # rows of `vectors`
 
 
 def measure(model: DispersedModel, ends: Ends, count: int) -> Array:
@@ -128,7 +73,7 @@ def measure(model: DispersedModel, ends: Ends, count: int) -> Array:
 
 
 def vectors(model: DispersedModel, ends: Ends, count: int) -> NDArray[Any]:
-    """Quantities (10, n) of ``count`` cases that are linear for small dispersions; `VECTORS` names the rows.
+    """Quantities (11, n) of ``count`` cases that are linear for small dispersions; `VECTORS` names the rows.
 
     Nutation is the transverse momentum over the axial one, the momentum shift the change of its direction, the axis
     error that direction less the target, in the body axes of t = 0.
@@ -141,6 +86,7 @@ def vectors(model: DispersedModel, ends: Ends, count: int) -> NDArray[Any]:
         *map(operator.sub, pointed, model.target),
         ends.spin_change,
         0.0 if ends.propellant is None else ends.propellant,
+        ends.spin,
     )
     return np.array([np.broadcast_to(row, count) for row in rows])
 
@@ -179,9 +125,9 @@ class Exact:
         low, high = ordered[ranks], ordered[above]
         return np.asarray(np.where(share < 0.5, low + (high - low) * share, high - (high - low) * (1.0 - share)))
 
-    def histogram(self, edges: Array) -> Array:
-        """Cases between each two of ``edges``."""
-        return np.histogram(self.values, edges)[0].astype(float)
+    def sizes(self) -> Exact:
+        """Distribution of the absolute values."""
+        return Exact(np.abs(self.values))
 
 
 class Sketch:
@@ -212,9 +158,13 @@ class Sketch:
         values = np.where(ranks == below[-1] - 1, self.maximum, np.where(ranks == 0, self.minimum, values))
         return np.asarray(np.clip(values, self.minimum, self.maximum))
 
-    def histogram(self, edges: Array) -> Array:
-        """Cases between each two of ``edges``."""
-        return np.histogram(_middles(), edges, weights=self.counts.astype(float))[0]
+    def sizes(self) -> Sketch:
+        """Distribution of the absolute values; its minimum is 0 where there are both signs."""
+        folded = Sketch()
+        folded.counts[_SIZES:] = self.counts[_SIZES:] + self.counts[:_SIZES][::-1]
+        folded.minimum = max(self.minimum, -self.maximum, 0.0)
+        folded.maximum = max(self.maximum, -self.minimum)
+        return folded
 
 
 Distribution = Exact | Sketch  # an output over all cases so far
@@ -259,7 +209,7 @@ class FirstOrder:
     """Outcome to first order about nominal values (and biases)."""
 
     inputs: tuple[DispersedInput, ...]
-    jacobian: Array  # derivative of each row of `vectors` by each input, in its unit, (10, d)
+    jacobian: Array  # derivative of each row of `vectors` by each input, in its unit, (11, d)
     groups: tuple[Group, ...]  # of correlated inputs
 
     @property
@@ -319,7 +269,7 @@ def first_order(model: DispersedModel) -> FirstOrder:
 
 
 def _varied(model: DispersedModel, fly: Callable[[DispersedCases], Ends], steps: NDArray[Any]) -> NDArray[Any]:
-    """Outcome (10, d k) about nominal values (and biases), with each input off by its ``steps`` (d, k) in turn."""
+    """Outcome (11, d k) about nominal values (and biases), with each input off by its ``steps`` (d, k) in turn."""
     draws: dict[str, NDArray[Any]] = {}
     for index, entry in enumerate(model.inputs.drawn):
         draw = np.zeros_like(steps)
@@ -329,7 +279,7 @@ def _varied(model: DispersedModel, fly: Callable[[DispersedCases], Ends], steps:
 
 
 def sampled_shares(draws: Mapping[str, Array], outcome: Array) -> dict[str, dict[str, float]]:
-    """First-order Sobol index of each input, by output, from ``draws`` (n,) and the outcome (10, n) of `vectors`.
+    """First-order Sobol index of each input, by output, from ``draws`` (n,) and the outcome (11, n) of `vectors`.
 
     What the averaging over few cases adds by chance, (classes - 1)/n of the variance, is taken off; nothing is below 0.
     """
@@ -346,9 +296,20 @@ def sampled_shares(draws: Mapping[str, Array], outcome: Array) -> dict[str, dict
         sums = np.add.reduceat(centred.take(order, axis=1), starts, axis=1)
         between = (sums**2 / np.diff(starts, append=count)).sum(axis=1)
         chance = (len(starts) - 1) / count
-        shares[name] = dict.fromkeys(OUTPUTS, 0.0)
+        shares[name] = dict.fromkeys(VECTORS, 0.0)
         for output, rows in VECTORS.items():
             if variances[output] > 0.0 and chance < 1.0:
                 share = float(between[rows].sum()) / variances[output]
                 shares[name][output] = max(0.0, (share - chance) / (1.0 - chance))
     return shares
+
+
+def correlated_shares(draws: Mapping[str, Array], values: Array) -> dict[str, float]:
+    """Squared correlation of each input's ``draws`` (n,) with ``values`` (n,), less what chance adds; for angles to
+    cones and loops, which have no derivatives. Empty where the values do not vary.
+    """
+    if len(values) < 3 or np.ptp(values) <= 1e-12 * np.abs(values).max():
+        return {}
+    chance = 1.0 / (len(values) - 1)
+    squares = {name: float(np.corrcoef(draw, values)[0, 1] ** 2) for name, draw in draws.items()}
+    return {name: max((square - chance) / (1.0 - chance), 0.0) for name, square in squares.items()}

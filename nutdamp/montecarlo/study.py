@@ -3,47 +3,48 @@
 from __future__ import annotations
 
 import math
-import operator
 import os
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.common import results
+from nutdamp.common import results, work
 from nutdamp.common.numerics import finite
 from nutdamp.errors import CannotWrite
 from nutdamp.flight import propagation
 from nutdamp.flight.dynamics import shed
 from nutdamp.flight.end_state import aspects
 from nutdamp.flight.propagation import Flight
-from nutdamp.montecarlo.cases import DispersedModel, cones_used
-from nutdamp.montecarlo.inputs import BLOCK, Draws, DrawSource, independent, some_of
+from nutdamp.montecarlo.cases import DispersedModel
+from nutdamp.montecarlo.inputs import BLOCK, DispersedInput, Draws, DrawSource, Group, independent, some_of, together
 from nutdamp.montecarlo.propagated import Ends, RealWidths
 from nutdamp.montecarlo.statistics import (
+    CERTAIN,
     EXACT_CASES,
     OUTPUTS,
     ROWS,
+    SHOWN,
     Distribution,
     Exact,
     FirstOrder,
     Sketch,
     Worst,
     as_flown,
-    binomial_interval,
+    correlated_shares,
     measure,
     sampled_shares,
+    share_interval,
     vectors,
 )
 from nutdamp.physics import batch
 from nutdamp.spacecraft import requirements
-from nutdamp.spacecraft.equipment import Block
 from nutdamp.spacecraft.model import Spacecraft, required_share
-from nutdamp.spacecraft.requirements import Left, Part
+from nutdamp.spacecraft.requirements import Bound, Left, Part
 from nutdamp.spacecraft.schedule import Schedule
 from nutdamp.spacecraft.tolerances import expect_dispersions
 
@@ -59,7 +60,6 @@ class Round:
     def __init__(self, results: Results, first: int, last: int, out: Array) -> None:
         self.results, self.first, self.last, self.out = results, first, last, out
         self.severity, self.emptied = np.empty(last - first), np.zeros(last - first, dtype=bool)
-        self.aspects = out[len(OUTPUTS) :].reshape(-1, 2, last - first)  # the same memory
         self.portions = range(first // PORTION, math.ceil(last / PORTION))
         self.left = iter(self.portions)
         self.flown = self.redrawn = 0  # cases
@@ -112,13 +112,11 @@ class Round:
         # Whole strides are flown, even for fewer cases: what flies them may let one depend on its stride.
         low, high = begin - begin % STRIDE, end + -end % STRIDE
         ends = study.flies(study.model.cases(some_of(draws, slice(low - start, high - start))))
-        outputs = measure(study.model, ends, high - low)
+        values = study.values(ends, high - low)
         inner, place = slice(begin - low, end - low), slice(begin - self.first, end - self.first)
-        self.out[: len(OUTPUTS), place] = outputs[:, inner]
-        self.severity[place] = study.severity(outputs, ends)[inner]
+        self.out[:, place] = values[:, inner]
+        self.severity[place] = study.severity(values, ends.drained)[inner]
         self.emptied[place] = np.broadcast_to(np.real(ends.drained) > 1.0, high - low)[inner]
-        if ends.aspects is not None:
-            self.aspects[:, :, place] = ends.aspects[:, :, inner]
         if low < early.shape[1]:
             early[:, begin:end] = vectors(study.model, ends, high - low)[:, inner]
         return int(np.count_nonzero((redrawn >= begin - start) & (redrawn < end - start)))
@@ -128,8 +126,24 @@ ROUND = 64 * BLOCK  # cases between two looks at the results
 FREED = 32_000_000  # bytes of the largest block that counts for that
 EARLY = 2 * BLOCK  # number of first cases whose outcome is kept whole for `sampled_shares`
 KEPT_WORST = 1_000  # worst cases that are kept
-CONFIDENCE = 0.95  # confidence level of the interval about the fraction that complies
+
+STAGES = (2_048, 8_192, 20_000, 40_000, 80_000, 160_000)
+"""Numbers of cases after which a share is judged: by its interval of all but a millionth, at the last by that of 95 %.
+Two screen plans, the third is flown of every plan that is shown; the others where that leaves it undecided."""
+
 WORTH_SAYING = math.radians(1e-4)  # rad by which cases of falling moments must err for that to be said
+
+
+def by_tolerance(
+    inputs: Sequence[DispersedInput], groups: Sequence[Group], shares: Mapping[str, float]
+) -> dict[str, float]:
+    """Sums of the ``shares`` of inputs by the key of the file that they belong to, of correlated ones by name."""
+    sums: dict[str, float] = {}
+    for rows in together(inputs, groups):
+        entries = [inputs[row] for row in rows]
+        name = entries[0].tolerance if len(entries) == 1 else " and ".join(entry.name for entry in entries)
+        sums[name] = sums.get(name, 0.0) + math.fsum(shares.get(entry.name, 0.0) for entry in entries)
+    return {name: share for name, share in sums.items() if share > 0.0}
 
 
 def threads_here() -> int:
@@ -184,6 +198,24 @@ class Study(DrawnCases):
         """End state of one case with these deviations; none: of the estimate itself."""
         return self.flies(self.model.cases({name: np.atleast_1d(draw) for name, draw in draws.items()}))
 
+    def values(self, ends: Ends, count: int) -> Array:
+        """Rows of `Results.values` of ``count`` cases: `OUTPUTS`, angles to the cones, error of a spin required."""
+        body = self.model.spacecraft
+        rows = [measure(self.model, ends, count)]
+        if ends.aspects is not None:
+            rows.append(np.broadcast_to(ends.aspects, (*ends.aspects.shape[:2], count)).reshape(-1, count))
+        if body.goal.spin is not None:
+            rows.append(np.broadcast_to(abs(ends.spin - body.goal.spin), (1, count)))
+        return np.concatenate(rows)
+
+    def left(self, values: Array) -> Left:
+        """Residual of cases by their `values`, whose spin is as far off the goal, above it."""
+        body, aim = self.model.spacecraft, OUTPUTS.index(requirements.aim(self.model.spacecraft).value)
+        cones = len(body.keep)
+        angles = values[len(OUTPUTS) : len(OUTPUTS) + 2 * cones].reshape(cones, 2, -1) if cones else None
+        spin = math.nan if body.goal.spin is None else body.goal.spin + values[-1]
+        return Left(values[0], values[aim], spin, angles)
+
     def outputs_of(self, draws: Draws) -> Array:
         """Outputs (5,) of one case with these deviations; none: of the estimate itself."""
         return measure(self.model, self.ends_of(draws), 1)[:, 0]
@@ -199,11 +231,9 @@ class Study(DrawnCases):
         seen = aspects(self.nominal)[: len(self.model.spacecraft.keep)]
         return np.array([(aspect.least, aspect.largest) for aspect in seen])
 
-    def severity(self, values: Array, ends: Ends) -> Array:
-        """Severity of cases, (n,), by their outputs (5, n), cones and propellant; see `requirements.severity`."""
-        body, aim = self.model.spacecraft, OUTPUTS.index(requirements.aim(self.model.spacecraft).value)
-        shares = [*([] if ends.aspects is None else cones_used(body.keep, ends.aspects)), ends.drained]
-        return np.asarray(requirements.severity(body, Left(values[0], values[aim], ends.spin), shares))
+    def severity(self, values: Array, drained: Any) -> Array:
+        """Severity of cases, (n,), by their `values` and the propellant they take; see `requirements.severity`."""
+        return np.asarray(requirements.severity(self.model.spacecraft, self.left(values), drained))
 
     @property
     def lightening_error(self) -> str:
@@ -222,7 +252,10 @@ class Study(DrawnCases):
 
 @dataclass(eq=False)
 class Counted:
-    """Results of a study so far: the cases from 0 to ``done`` of the ``requested``, of which ``met`` comply."""
+    """Results of a study so far: the cases from 0 to ``done`` of the ``requested``, of which ``met`` comply.
+
+    ``kept``: those that keep each of the ``bounds`` at the end and on the way, required or not.
+    """
 
     study: Any
     requested: int
@@ -230,20 +263,36 @@ class Counted:
     redrawn: int = 0
     met: int = 0
     worst: Worst = field(default_factory=lambda: Worst(KEPT_WORST))
+    bounds: tuple[Bound, ...] = field(init=False)
+    kept: NDArray[np.int64] = field(init=False)
     broken: NDArray[np.int64] = field(init=False)  # cases that break each cone, (m,)
     aspects: Array = field(init=False)  # least and largest angle to it in all cases, (m, 2) rad
 
     def __post_init__(self) -> None:
-        cones = len(self.study.model.spacecraft.keep)
-        self.broken, self.aspects = np.zeros(cones, dtype=np.int64), np.tile([math.pi, 0.0], (cones, 1))
+        body = self.study.model.spacecraft
+        self.bounds = (*requirements.bounds(body), *requirements.cones(body))
+        self.kept = np.zeros(len(self.bounds), dtype=np.int64)
+        self.broken, self.aspects = (
+            np.zeros(len(body.keep), dtype=np.int64),
+            np.tile([math.pi, 0.0], (len(body.keep), 1)),
+        )
 
-    def count(self, severity: Array, angles: Array, good: NDArray[np.bool_]) -> None:
-        """Count cases from ``done`` on: their `Study.severity` (n,), ``angles`` (m, 2, n) to cones, who may comply."""
-        broken = cones_used(self.study.model.spacecraft.keep, angles) > 1.0
-        self.met += int(np.count_nonzero(good & ~broken.any(axis=0)))
-        self.broken += broken.sum(axis=1)
-        self.aspects[:, 0] = np.minimum(self.aspects[:, 0], angles[:, 0].min(axis=1))
-        self.aspects[:, 1] = np.maximum(self.aspects[:, 1], angles[:, 1].max(axis=1))
+    def count(self, severity: Array, left: Left, able: NDArray[np.bool_]) -> None:
+        """Count cases from ``done`` on: their `Study.severity` (n,), residual, and who may comply at all."""
+        body = self.study.model.spacecraft
+        complies, astray = able.copy(), np.zeros((len(body.keep), len(severity)), dtype=bool)
+        for row, bound in enumerate(self.bounds):
+            met = np.broadcast_to(bound.met(requirements.left_of(bound, left, body)), len(severity))
+            self.kept[row] += np.count_nonzero(met)
+            if bound.required:
+                complies &= met
+            if bound.keep is not None:
+                astray[body.keep.index(bound.keep)] |= ~met
+        self.met += int(np.count_nonzero(complies))
+        self.broken += astray.sum(axis=1)
+        if left.angles is not None:
+            self.aspects[:, 0] = np.minimum(self.aspects[:, 0], left.angles[:, 0].min(axis=1))
+            self.aspects[:, 1] = np.maximum(self.aspects[:, 1], left.angles[:, 1].max(axis=1))
         self.worst.add(self.done, severity)
         self.done += len(severity)
 
@@ -253,20 +302,37 @@ class Counted:
         return self.met / self.done if self.done and requirements.judged(self.study.model.spacecraft) else None
 
     @property
-    def interval(self) -> tuple[float, float]:
-        """Exact interval about `met_fraction`."""
-        return binomial_interval(self.met, self.done, CONFIDENCE)
-
-    @property
     def probability(self) -> float:
         """Share of cases that must comply."""
         return required_share(self.study.model.spacecraft.requirement)
 
-    @property
-    def meets_requirement(self) -> bool | None:
-        """True if enough cases comply; None where nothing is required."""
-        fraction = self.met_fraction
-        return None if fraction is None else fraction >= self.probability
+    def interval(self, *, certain: bool = False) -> tuple[float, float]:
+        """Interval of the share that complies: of 95 %, where it must be ``certain`` of all but a millionth."""
+        return share_interval(self.met, self.done, CERTAIN if certain else SHOWN)
+
+    def shown(self, *, certain: bool = False) -> bool | None:
+        """Compliance of enough cases, or of too few, beyond the interval; None where that is not decided.
+
+        True where nothing is required.
+        """
+        if self.met_fraction is None:
+            return True
+        return requirements.enough(*self.interval(certain=certain), self.probability)
+
+    def level(self, bound: Bound) -> float | None:
+        """Value of a bound's part that the share of cases required keeps; None where it is not known."""
+        spread, share = self.spread(bound), self.probability
+        if spread is None:
+            return None
+        return float(spread.quantiles(np.array([1.0 - share if bound.inner else share]))[0])
+
+    def spread(self, bound: Bound) -> Distribution | None:
+        """Distribution of the value of a bound's part."""
+        raise NotImplementedError
+
+    def contributions(self, bound: Bound) -> dict[str, float]:
+        """Share of each tolerance of the file in the variance of the value of a bound's part."""
+        raise NotImplementedError
 
 
 @dataclass(eq=False)
@@ -283,12 +349,13 @@ class Results(Counted):
         super().__post_init__()
         exact = self.requested <= EXACT_CASES
         self.values = np.empty((self.rows, self.requested)) if exact else None
-        self.sketches = [] if exact else [Sketch() for _ in OUTPUTS]
+        self.sketches = [] if exact else [Sketch() for _ in range(self.rows)]
 
     @property
     def rows(self) -> int:
-        """Rows of ``values``."""
-        return len(OUTPUTS) + 2 * len(self.study.model.spacecraft.keep)
+        """Rows of ``values``: see `Study.values`."""
+        body = self.study.model.spacecraft
+        return len(OUTPUTS) + 2 * len(body.keep) + (body.goal.spin is not None)
 
     @property
     def exact(self) -> bool:
@@ -297,7 +364,16 @@ class Results(Counted):
 
     def distribution(self, output: str) -> Distribution | None:
         """Distribution of an output; None where it is unknown (propellant)."""
-        row = OUTPUTS.index(output)
+        return self._row(OUTPUTS.index(output))
+
+    def spread(self, bound: Bound) -> Distribution | None:
+        """Distribution of the value of a bound's part."""
+        if bound.keep is not None:
+            place = self.study.model.spacecraft.keep.index(bound.keep)
+            return self._row(len(OUTPUTS) + 2 * place + (not bound.inner))
+        return self._row(-1 if bound.part is Part.SPIN else OUTPUTS.index(bound.part.value))
+
+    def _row(self, row: int) -> Distribution | None:
         if self.values is None:
             return self.sketches[row] if math.isfinite(self.sketches[row].minimum) else None
         values = self.values[row, : self.done]
@@ -311,18 +387,36 @@ class Results(Counted):
         drawn = {name: draw for name, draw in draws.items() if not isinstance(draw, float)}  # not of a bias
         return sampled_shares(independent(drawn, model.inputs.drawn, model.groups), self.early[:, :count])
 
-    def take(self, values: Array, severity: Array, angles: Array, emptied: NDArray[np.bool_]) -> None:
-        """Count further cases: outputs (5, n), see `count`; ``emptied`` (n,): whose tank runs empty."""
-        missed = (severity > 1.0) & bool(requirements.required(self.study.model.spacecraft))
+    def contributions(self, bound: Bound) -> dict[str, float]:
+        """Share of each tolerance in the variance of the value of a bound's part; correlated ones together.
+
+        By first order; of the angle to a cone, which has no derivative, the squared correlation over the first cases.
+        """
+        first, groups = self.study.first_order, self.study.model.groups
+        if bound.keep is None:
+            each = dict(
+                zip((entry.name for entry in first.inputs), first.shares(bound.part.value).tolist(), strict=True)
+            )
+        else:
+            count = min(self.done, EARLY)
+            spread = self.spread(bound)
+            drawn = self.study.draws_of_all(np.arange(count))
+            draws = {name: draw for name, draw in drawn.items() if not isinstance(draw, float)}
+            values = spread.values[:count] if isinstance(spread, Exact) else np.empty(0)
+            each = correlated_shares(independent(draws, self.study.model.inputs.drawn, groups), values)
+        return by_tolerance(first.inputs, groups, each)
+
+    def take(self, values: Array, severity: Array, emptied: NDArray[np.bool_]) -> None:
+        """Count further cases by their ``values``, see `count`; ``emptied`` (n,): whose tank runs empty."""
         self.emptied += int(np.count_nonzero(emptied))
         for sketch, row in zip(self.sketches, values, strict=False):
             sketch.add(row)
-        self.count(severity, angles, ~(missed | emptied))
+        self.count(severity, self.study.left(values), ~emptied)
 
     def extended(self, requested: int) -> Results:
         """Copy with room for ``requested`` cases: no fewer than are done, and no more than `EXACT_CASES`."""
         more = replace(self, requested=requested)
-        more.broken, more.aspects = self.broken, self.aspects
+        more.kept, more.broken, more.aspects = self.kept, self.broken, self.aspects
         assert self.values is not None
         assert more.values is not None
         more.values[:, : self.done] = self.values[:, : self.done]
@@ -353,11 +447,60 @@ def run(
         if done == 0:
             break
         results.redrawn += redrawn
-        results.take(out[:, :done], flights.severity[:done], flights.aspects[:, :, :done], flights.emptied[:done])
+        results.take(out[:, :done], flights.severity[:done], flights.emptied[:done])
         if collect is not None:
             collect(first, out[:, :done])
         watch(results.done)
     return results
+
+
+def affordable(study: Study, samples: int) -> bool:
+    """True if the open budget of work suffices for so many cases, which are flown at once."""
+    return study.flies.effort * samples <= work.left()
+
+
+def next_stage(
+    begun: Results, samples: int | None = None, *, fly: Callable[[Results], object] | None = None
+) -> Results:
+    """Results with the cases of the next stage, of ``samples`` in all, default of as many of `STAGES` as it takes.
+
+    The same ones where no more are to be flown: the share is known beyond the default number, or the budgets
+    `work.CASES`, beyond it `work.MORE_CASES`, allow no more. The first stage is flown in any case. ``fly`` flies the
+    cases that results lack, default `run`.
+    """
+    stages = STAGES if samples is None else (*(stage for stage in STAGES if stage < samples), samples)
+    if samples is not None and samples > EXACT_CASES:
+        stages = (samples,)  # they are counted and not kept: from the first one on
+    stage = next((count for count in stages if count > begun.done), None)
+    beyond = samples is None and stage is not None and stage > work.SAMPLES
+    if stage is None or (beyond and begun.shown(certain=True) is not None):
+        return begun
+    study = begun.study
+    most = work.MORE_CASES if beyond else work.CASES * max(stage / work.SAMPLES, 1.0)
+    with work.budget("the dispersed cases", most):
+        if begun.done and not affordable(study, stage - begun.done):
+            return begun
+        further = begun.extended(stage) if stage <= EXACT_CASES else Results(study, stage)
+        work.spend(study.flies.effort * (stage - begun.done))
+        if fly is None:
+            run(further, threads=threads_here())
+        else:
+            fly(further)
+    return further
+
+
+def flown_in_stages(
+    study: Study,
+    samples: int | None = None,
+    *,
+    fly: Callable[[Results], object] | None = None,
+    stopped: Callable[[], bool] = lambda: False,
+) -> Results:
+    """Results of all stages of a study, see `next_stage`, unless ``stopped`` says so."""
+    done, further = None, Results(study, 0)
+    while further is not done and not stopped():
+        done, further = further, next_stage(further, samples, fly=fly)
+    return further
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -372,25 +515,12 @@ class Dispersed(results.Data, results.Drawn):
         """Share of the cases that meet the requirement; None where nothing is required."""
         return self.core.met_fraction
 
-    @property
-    def meets_requirement(self) -> bool | None:
-        """True where as many cases meet it as the file requires; None where nothing is required."""
-        return self.core.meets_requirement
-
     def to_dict(self, worst: int = 5) -> dict[str, Any]:
         """Contents of the file that the command writes with ``--json``, with as many ``worst`` cases."""
         return finite(results.view(self, "data", worst=worst))
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__}: {self.core.met} of {self.core.done} cases comply>"
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Dispersion(Dispersed):
-    """Schedule of a ``scheme`` flown in dispersed cases."""
-
-    core: Results
-    scheme: str = ""
 
 
 SEED = 1  # default seed of the draws
@@ -400,93 +530,3 @@ def study_of(spacecraft: Spacecraft, schedule: Schedule, *, seed: int = SEED) ->
     """Study of ``schedule`` with the dispersions of ``spacecraft``; raises BadRequest where it has none."""
     expect_dispersions(spacecraft.dispersions)
     return Study(DispersedModel(spacecraft, schedule), seed)
-
-
-CASES = 2 * STRIDE  # dispersed cases that are flown for each range: the first ones of the study
-TAILS = (0.0015, 0.9985)  # quantiles of the cases between which a flight is as expected
-STEPS, HALVINGS = 16, 5  # even steps in which the edge of a window is sought, and halvings of the one that holds it
-
-
-class Range(NamedTuple):
-    """Least and largest value."""
-
-    least: float
-    most: float
-
-
-class Checkpoints:
-    """Ranges of the first cases of a ``study``."""
-
-    def __init__(self, study: Study) -> None:
-        self.study, self._draws = study, study.draws_of_all(np.arange(CASES))
-        self._initial = study.model.cases(self._draws)
-
-    @property
-    def spin(self) -> Range:
-        """Spin at t = 0, rad/s."""
-        return _range(self._initial.omega0[2])
-
-    @property
-    def nutation(self) -> Range:
-        """Angle from H to the spin axis at t = 0, rad."""
-        first, second, axial = map(operator.mul, self._initial.moments, self._initial.omega0)
-        return _range(np.arctan2(np.hypot(first, second), np.abs(axial + self._initial.wheel)))
-
-    def nutation_after(self, counts: Sequence[int]) -> Iterator[Range]:
-        """Nutation, rad, after the first ``counts`` pulses."""
-        body, schedule = self.study.model.spacecraft, self.study.model.schedule
-        for count in counts:
-            part = study_of(body, first_pulses(schedule, count), seed=self.study.seed)
-            yield _range(self._flown(part, self._draws)[0][0])
-
-    def window(self, probability: float) -> Range | None:
-        """Shifts (s) of all pulses, to half a turn, with which the share ``probability`` complies; None without any."""
-        if not self._complies(0.0, probability):
-            return None
-        first = min(pulse.loaded[0] for pulse in self.study.model.schedule)
-        half = math.pi / self.study.model.spacecraft.fastest
-        return Range(-self._reach(-1.0, min(half, first), probability), self._reach(1.0, half, probability))
-
-    def _reach(self, sense: float, most: float, probability: float) -> float:
-        """Largest shift one way, s, up to ``most``: in even steps, then by halving the one that is too far."""
-        step = most / STEPS
-        good = next(
-            (step * count for count in range(STEPS) if not self._complies(sense * step * (count + 1), probability)),
-            most,
-        )
-        if good < most:
-            for _ in range(HALVINGS):
-                step *= 0.5
-                good += step * self._complies(sense * (good + step), probability)
-        return good
-
-    def _complies(self, shift: float, probability: float) -> bool:
-        """True where the share ``probability`` of the cases complies with all pulses ``shift`` s later."""
-        late = self._draws.get("timing offset", 0.0) + shift
-        _, severity = self._flown(self.study, {**self._draws, "timing offset": late})
-        return float(np.mean(severity <= 1.0)) >= probability
-
-    def _flown(self, study: Study, draws: Draws) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Outputs (5, n) and severity (n,) of the cases."""
-        ends = study.flies(study.model.cases(draws))
-        outputs = measure(study.model, ends, CASES)
-        return outputs, np.broadcast_to(study.severity(outputs, ends), CASES)
-
-
-def _range(values: object) -> Range:
-    return Range(*np.quantile(np.broadcast_to(np.asarray(values, dtype=np.float64), CASES), TAILS).tolist())
-
-
-def first_pulses(schedule: Schedule, count: int) -> Schedule:
-    """First ``count`` pulses of a schedule, and the blocks cut to them."""
-    blocks, left = list[Block](), count
-    for block in schedule.blocks:
-        if left > 0:
-            blocks.append(replace(block, count=min(block.count, left)))
-        left -= block.count
-    return replace(schedule, pulses=schedule.pulses[:count], blocks=tuple(blocks))
-
-
-def even(count: int, most: int) -> list[int]:
-    """Up to ``most`` (two or more) of the numbers 1 … ``count``, evenly spaced, with the first and the last."""
-    return sorted({round(number) for number in np.linspace(1, count, min(most, count)).tolist()})

@@ -1,20 +1,24 @@
-// The workbench: firings moved and stretched by hand, other values of C/A and thrust, flown at once by (17), `motion`.
+// The workbench: firings moved and stretched by hand, other values of C/A and thrust, flown at once by
+// `motion`. It shows values beside their limits and judges nothing: that is for `nutdamp simulate`.
 const DEGREE = Math.PI / 180;
+const EDITED = "EDITED – NOT THE PLAN ABOVE";
 const short = (value) => String(Number(value.toPrecision(6)));
 
 // A pulse as `motion` takes it: its impulse goes with its on-time and with the thrust.
-const fired = ({ t, on, plan }, thrust) => {
+const fired = ({ start, on, plan }, thrust) => {
   const scale = thrust * (plan.on > 0 ? on / plan.on : 1);
-  return { t, on, impulse: plan.impulse.map((part) => scale * part), push: plan.torque ? thrust * plan.torque[2] : 0 };
+  const impulse = plan.impulse.map((part) => scale * part);
+  return { start, end: start + on, impulse, torque: plan.torque?.map((part) => thrust * part) };
 };
+
+const inOrder = (pulses) => [...pulses].sort((one, other) => one.start - other.start);
 
 // Limits of the file that the pulses break, in words; with the slack of `constraints.breaches`.
 const brokenLimits = (limits, pulses) => {
   const broken = [];
   let ready = -Infinity;
-  for (const { t, on, number, plan } of [...pulses].sort((one, other) => one.t - other.t)) {
-    const [start, end] = [t - 0.5 * on, t + 0.5 * on];
-    const slack = Math.max(1e-9, Number.EPSILON * end);
+  for (const { start, on, number, plan } of inOrder(pulses)) {
+    const end = start + on, slack = Math.max(1e-9, Number.EPSILON * end);
     const off = (value) => limits.tick !== null
       && Math.abs(value - Math.round(value / limits.tick) * limits.tick) > slack + 1e-6 * limits.tick;
     const tests = [
@@ -42,16 +46,16 @@ const scheduleCsv = (pulses, axes) => {
   const inFile = (vector) => (axes ? axes.map((row) => motion.dot(row, vector)) : vector);
   const names = ["torque", "impulse"].flatMap((name) => [1, 2, 3].map((axis) => `${name}_${axis}_${name === "torque" ? "Nm" : "Nms"}`));
   const quoted = (text) => (/[",\r\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text);
-  const lines = [...pulses].sort((one, other) => one.t - other.t).map((pulse) => [
-    pulse.t - 0.5 * pulse.on, pulse.on, quoted(pulse.plan.channel),
+  const lines = inOrder(pulses).map((pulse) => [
+    pulse.start, pulse.on, quoted(pulse.plan.channel),
     ...(pulse.plan.torque ? inFile(pulse.plan.torque) : ["", "", ""]), ...inFile(fired(pulse, 1).impulse),
   ].join(","));
   return [["start_s", "on_time_s", "channel", ...names].join(","), ...lines, ""].join("\n");
 };
 
-// Rows of a motion by impulses, in the units of the rows of the page.
-const impulseRows = (data, body, arcs, pulses) => {
-  const { bench, digits, until } = data;
+// Columns of a flight in the units of those of the page.
+const flownColumns = (data, body, flown, pulses) => {
+  const { bench, digits } = data;
   const [left, top, right, bottom] = bench.frame;
   const placed = ([x, y], [middle, height, half]) => [
     left + ((x - middle + half) / (2 * half)) * (right - left), bottom - ((y - height + half) / (2 * half)) * (bottom - top),
@@ -68,18 +72,18 @@ const impulseRows = (data, body, arcs, pulses) => {
     return bench.framed ? [about, Math.atan2(z, across) / DEGREE] : [Math.atan2(across, z) / DEGREE, about];
   };
   const firingAt = (t) => {
-    const text = pulses.filter(({ t: centre, on }) => Math.abs(t - centre) <= 0.5 * on + 1e-9)
+    const text = pulses.filter(({ start, on }) => start <= t && t <= start + on)
       .map(({ plan, number }) => `${number}: ${plan.text}`).join(" and ") || data.firings[0];
     if (!data.firings.includes(text)) data.firings.push(text);
     return data.firings.indexOf(text);
   };
   const whole = (value, name) => (value === null ? data.none : value * 10 ** digits[name]);
-  const row = (t, state) => {
+  const row = ([t, state]) => {
     const { nutation, bodyCone, spaceCone } = motion.cones(body, state);
     const axis = motion.axis(body, state), momentum = motion.momentum(body, state);
     const size = Math.hypot(...momentum);
     const vectors = {
-      pole: placed(state.omega.map((rate) => rate / DEGREE), bench.pole), sky: placed(onSky(axis), bench.sky),
+      pole: placed([state[0] / DEGREE, state[1] / DEGREE], bench.pole), sky: placed(onSky(axis), bench.sky),
       momentum: placed(onSky(momentum), bench.sky), axis, H: momentum.map((part) => part / size),
       angle: pointing(axis).map((value) => whole(value, "angle")),
       aspect: data.named.filter((direction) => direction.watched)
@@ -92,14 +96,7 @@ const impulseRows = (data, body, arcs, pulses) => {
       ...Object.entries(vectors).flatMap(([name, parts]) => parts.map((value, index) => [`${name}${index + 1}`, value])),
     ]);
   };
-  const rows = [], step = until / (data.samples - 1);
-  arcs.forEach(({ start, state }, index) => {
-    if (start > until) return;
-    const end = Math.min(arcs[index + 1]?.start ?? until, until);
-    const inner = [];
-    for (let number = Math.floor(start / step) + 1; number * step < end; number += 1) inner.push(number * step);
-    for (const t of [start, ...inner, end]) rows.push(row(t, motion.arc(body, state, t - start)));
-  });
+  const rows = flown.filter(([t]) => t <= data.until).map(row);
   return Object.fromEntries(Object.keys(rows[0]).map((name) => [name, rows.map((entry) => entry[name])]));
 };
 
@@ -107,22 +104,27 @@ const impulseRows = (data, body, arcs, pulses) => {
 function workbench(view, data, show) {
   const { bench } = data;
   const part = (name) => view.querySelector(`[data-part="${name}"]`);
-  const planned = () => bench.pulses.map((plan, index) => ({ t: plan.t, on: plan.on, plan, number: index + 1 }));
+  const planned = () => bench.pulses.map((plan, index) => {
+    const { start, on } = plan;
+    return { start, on, plan, number: index + 1 };
+  });
   const [ratio, thrust, select, begin, width] = ["ratio", "thrust", "pulse", "begin", "width"].map(part);
   const step = bench.limits.tick ?? bench.step;
   const snapped = (value) => Number((Math.round(value / step) * step).toPrecision(12));
+  const times = Array.from({ length: data.samples }, (_, row) => (row / (data.samples - 1)) * data.until);
   let pulses = planned(), waiting = false;
 
   // ---- the end
   const flight = (list, percent) => {
     const [body, start] = motion.changed(bench.body, bench.start, 1 + percent.ratio / 100, bench.framed);
-    const arcs = motion.fly(body, start, list.map((pulse) => fired(pulse, 1 + percent.thrust / 100)));
-    const left = motion.residual(body, arcs);
-    return { body, arcs, left: { ...left, spin: Math.abs(left.spin - (bench.spin ?? left.spin)) } };
+    const firings = list.map((pulse) => fired(pulse, 1 + percent.thrust / 100));
+    const { rows, settled } = motion.fly(body, start, firings, times);
+    const left = motion.residual(body, start, settled);
+    return { body, rows, left: { ...left, spin: Math.abs(left.spin - (bench.spin ?? left.spin)) } };
   };
   const percents = () => ({ ratio: Number(ratio.value), thrust: Number(thrust.value) });
   const unchanged = () => Object.values(percents()).every((value) => value === 0)
-    && pulses.every(({ t, on, plan }) => t === plan.t && on === plan.on);
+    && pulses.every(({ start, on, plan }) => start === plan.start && on === plan.on);
   const valueText = (key, value) => {
     const shown = key === "spin" ? value : value / DEGREE;
     const text = shown === 0 ? "0" : shown < 1e-9 ? "< 1e-9" : shown.toPrecision(4);
@@ -132,38 +134,30 @@ function workbench(view, data, show) {
     cell.value = String(value);
     cell.textContent = valueText(key, value);
   };
-  const judge = (cell, met) => {
-    cell.textContent = met ? "met" : "NOT met";
-    cell.classList.toggle("missed", !met);
-  };
   const keys = [...view.querySelectorAll("[data-row]")].map((row) => row.dataset.row);
-  const summary = (left, broken) => [
-    ...keys.map((key) => `${key.replace("_", " ")} ${valueText(key, left[key])} ${part(`verdict-${key}`).textContent}`),
-    broken.length ? `limits NOT met: ${broken.join("; ")}` : "limits met",
-  ].join(", ");
-  const showEnd = ({ left }) => {
+  const showEnd = (left) => {
     const broken = brokenLimits(bench.limits, pulses);
-    for (const key of keys) {
-      put(part(`now-${key}`), key, left[key]);
-      if (key in bench.required) judge(part(`verdict-${key}`), left[key] <= bench.required[key]);
-    }
-    judge(part("verdict-limits"), broken.length === 0);
-    part("broken").textContent = broken.join("; ");
-    return summary(left, broken);
+    for (const key of keys) put(part(`now-${key}`), key, left[key]);
+    part("broken").textContent = broken.length ? `limits broken: ${broken.join("; ")}` : "";
+    const values = keys.map((key) => {
+      const limit = part(`limit-${key}`).textContent;
+      return `${key.replace("_", " ")} ${valueText(key, left[key])}, limit ${limit}`;
+    });
+    return [...values, part("broken").textContent].filter(Boolean).join("; ");
   };
 
   // ---- what is changed, and how it is shown
   const bars = pulses.map((_, index) => firingBar(index));
-  const showPulses = () => pulses.forEach(({ t, on }, index) => {
+  const showPulses = () => pulses.forEach(({ start, on }, index) => {
     const across = (time) => 100 * (data.lead + ((1 - data.lead) * time) / data.until);
-    bars[index].style.left = `${across(t - 0.5 * on)}%`;
-    bars[index].style.width = `${across(0.5 * on) - across(-0.5 * on)}%`;
+    bars[index].style.left = `${across(start)}%`;
+    bars[index].style.width = `${across(on) - across(0)}%`;
     bars[index].classList.toggle("chosen", index === select.selectedIndex);
   });
   const showFields = () => {
-    const { t, on, plan } = pulses[select.selectedIndex];
-    begin.value = Number((t - 0.5 * on).toFixed(9));
-    width.value = plan.on > 0 ? Number(on.toFixed(9)) : "";
+    const { start, on, plan } = pulses[select.selectedIndex];
+    begin.value = start;
+    width.value = plan.on > 0 ? on : "";
     width.disabled = plan.on === 0;
   };
   const showPercents = (text) => {
@@ -172,16 +166,21 @@ function workbench(view, data, show) {
       part(name).setAttribute("aria-valuetext", `${value} %: ${text}`);
     }
   };
+  const showEdited = (text) => {
+    for (const banner of document.querySelectorAll(".edited")) {
+      if (banner.textContent !== text) banner.textContent = text; // else it would be read out again
+    }
+  };
   const draw = () => {
     waiting = false;
-    const now = flight(pulses, percents()), plan = unchanged();
-    const text = showEnd(now);
+    const { body, rows, left } = flight(pulses, percents()), plan = unchanged();
+    const text = showEnd(left);
     showPulses();
     showPercents(text);
+    showEdited(plan ? "" : EDITED);
     view.classList.toggle("changed", !plan);
     part("reset").disabled = plan;
-    part("shown").textContent = plan ? part("shown").dataset.plan : part("shown").dataset.changed;
-    show(plan ? null : impulseRows(data, now.body, now.arcs, pulses));
+    show(plan ? null : flownColumns(data, body, rows, pulses));
     return text;
   };
   const soon = () => {
@@ -190,7 +189,7 @@ function workbench(view, data, show) {
   };
   const settled = () => (part("summary").textContent = draw());
   const change = (index, start, on) => {
-    pulses[index] = { ...pulses[index], on, t: start + 0.5 * on };
+    pulses[index] = { ...pulses[index], start, on };
     soon();
   };
 
@@ -214,7 +213,7 @@ function workbench(view, data, show) {
     event.preventDefault();
     event.stopPropagation();
     select.selectedIndex = index;
-    const { t, on } = pulses[index], start = t - 0.5 * on, end = t + 0.5 * on, grip = event.target.className;
+    const { start, on } = pulses[index], end = start + on, grip = event.target.className;
     const second = data.until / ((1 - data.lead) * part("firings").getBoundingClientRect().width);
     const moved = (now) => {
       const by = (now.clientX - event.clientX) * second;
@@ -252,12 +251,11 @@ function workbench(view, data, show) {
       part("copied").textContent = "Press Ctrl+C to copy.";
     }
   };
-  // Of start and on-time only the one that is typed changes: what a field shows of the other is rounded.
   const typed = (field, apply) => {
     field.step = step;
     field.addEventListener("input", () => {
-      const { t, on } = pulses[select.selectedIndex], value = field.valueAsNumber;
-      if (value >= 0) apply(value, t - 0.5 * on, on);
+      const { start, on } = pulses[select.selectedIndex], value = field.valueAsNumber;
+      if (value >= 0) apply(value, start, on);
     });
     field.addEventListener("change", () => {
       showFields();
@@ -283,11 +281,11 @@ function workbench(view, data, show) {
     begin.focus();
   });
   part("copy-csv").addEventListener("click", () => copy(scheduleCsv(pulses, bench.axes), "CSV"));
-  part("copy-command").addEventListener("click", () => copy(part("copy-command").dataset.command, "Command"));
+  part("copy-command").addEventListener("click", () => copy(part("command").textContent, "Command"));
 
-  const { left } = flight(pulses, { ratio: 0, thrust: 0 });
-  for (const key of keys) put(part(`plan-${key}`), key, left[key]);
   [ratio.value, thrust.value, select.selectedIndex] = [0, 0, 0];
+  const { left } = flight(pulses, percents());
+  for (const key of keys) put(part(`plan-${key}`), key, left[key]);
   showFields();
   draw();
 }

@@ -5,6 +5,7 @@ The name of its class is that of the macro of the templates that shows a block.
 
 from __future__ import annotations
 
+import base64
 import math
 import os
 from collections.abc import Iterator
@@ -22,7 +23,6 @@ from nutdamp.views.text import sentence
 
 if TYPE_CHECKING:
     from nutdamp.spacecraft.model import Vector
-    from nutdamp.views.glance import RequirementRow
 
 
 class Cell(NamedTuple):
@@ -100,6 +100,18 @@ class Listing(NamedTuple):
     text: str
 
 
+class Download(NamedTuple):
+    """A file that the page holds, to be saved from it."""
+
+    name: str
+    text: str
+
+    @property
+    def content(self) -> str:
+        """The text as base64."""
+        return base64.b64encode(self.text.encode()).decode()
+
+
 class Beside(NamedTuple):
     """Blocks side by side where there is room; ``still``: shown only where no script moves the view before them."""
 
@@ -173,19 +185,26 @@ class Strip(NamedTuple):
 
 
 class Workbench(NamedTuple):
-    """Names of each quantity for the script and for people, its bound in words; the pulses by number and channel."""
+    """Names of each quantity for the script and for people, its bound in words; the pulses by number and channel.
+
+    ``rolling``: the cones roll on each other; ``command``: that which flies the pulses copied to ``file``.
+    """
 
     rows: tuple[tuple[str, str, str], ...]
     pulses: tuple[str, ...]
+    rolling: bool
+    file: str
+    command: str
 
 
 class Moving(NamedTuple):
-    """Fixed parts of the moving view, and its moving parts as the JSON ``data``.
+    """Fixed parts of the moving view of the plan of a ``scheme``, and its moving parts as the JSON ``data``.
 
     ``longitude``: name of the numbers of the globe; ``how``: the model that is flown; ``absent``: the reason for
-    which there is no ``workbench``; ``command``: that which writes the same rows.
+    which there is no ``workbench``; ``command``: that which writes the same rows, if any.
     """
 
+    scheme: str
     panels: tuple[Panel, ...]
     strip: Strip
     speeds: tuple[tuple[float, str], ...]
@@ -202,7 +221,7 @@ class Moving(NamedTuple):
     data: str
 
 
-Block = Sheet | FactList | Prose | Points | Picture | Listing | Moving | Beside | Details
+Block = Sheet | FactList | Prose | Points | Picture | Listing | Download | Moving | Beside | Details
 
 
 class PageSection(NamedTuple):
@@ -261,12 +280,24 @@ class Contender(NamedTuple):
     chosen: bool
 
 
+class Bar(NamedTuple):
+    """A bound with its texts; ``used``: shares of the limit that the nominal value and that of the cases take.
+
+    NaN where one is not known.
+    """
+
+    label: str
+    texts: tuple[str, ...]
+    used: tuple[float, ...]
+    met: bool
+
+
 @dataclass(frozen=True, slots=True)
 class Page:
     """A whole report: title, decision, motion, schemes at a glance, and sections.
 
-    ``state``: "met", "caution" where tolerances were not checked or a limit is broken, "missed". ``good``: nothing is
-    missed at all, required or not. ``source``: the beginning of the hash of the input file.
+    ``state``: value of the `Light` of the verdict; ``broken``: limits that the schedule of a file breaks. ``source``:
+    the beginning of the hash of the input file.
     """
 
     title: str
@@ -277,10 +308,9 @@ class Page:
     notes: tuple[str, ...]
     contenders: tuple[Contender, ...]
     made_by: str
-    good: bool = False
-    met: bool | None = None
     verdict: str = ""
-    margins: tuple[RequirementRow, ...] = ()
+    broken: tuple[str, ...] = ()
+    margins: tuple[Bar, ...] = ()
     facts: FactList | None = None
     warnings: tuple[str, ...] = ()
     motion: tuple[Block, ...] = ()

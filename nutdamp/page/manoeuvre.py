@@ -5,35 +5,36 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from itertools import accumulate
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from nutdamp.common.results import note
-from nutdamp.flight.end_state import spin_phases
 from nutdamp.page import document
 from nutdamp.page.document import FactList, Prose, Sheet, sheet
-from nutdamp.planning.decision import Decision
 from nutdamp.planning.notes import ideal_code
 from nutdamp.planning.plan import Plan
-from nutdamp.schemes.block_model import to_sun_pulse
+from nutdamp.planning.verdict import Verdict
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import channel_of
 from nutdamp.spacecraft.equipment import Block
 from nutdamp.spacecraft.model import Spacecraft, required_share
+from nutdamp.spacecraft.requirements import Part
 from nutdamp.spacecraft.schedule import STEERABLE, Pulse
-from nutdamp.views import decisions
 from nutdamp.views.glance import limits
-from nutdamp.views.parts import MILLISECONDS, channel_text
+from nutdamp.views.parts import MILLISECONDS, channel_text, clock, phases, sun_phased
 from nutdamp.views.tables import TEXT, Column, DataTable, Heading, Shared
 from nutdamp.views.text import MISSING, RPM, fixed, sentence, short_angle, text
+from nutdamp.views.verdict import exact_percent, spent
 
 if TYPE_CHECKING:
-    from nutdamp.montecarlo.study import Checkpoints, Results
+    from nutdamp.planning.screening import Checkpoints
 
 
 CHECKED = 24  # largest number of rows with a range of the nutation; of more evenly spaced ones have one
 FINEST = 6  # largest number of decimals of times
+DECIDED = 10.0  # s of a coast in which nobody can look at telemetry, decide and command a hold
 
 ON_HOLD = (
     "Fire none of the rows that are left: they are void. Record spin, nutation and phase with their time. Plan again "
@@ -42,27 +43,39 @@ ON_HOLD = (
 
 
 def manoeuvre_blocks(
-    decision: Decision, dispersed: Results | None, identity: Sequence[tuple[str, str]], summary: str
+    plan: Plan, judged: Verdict, identity: Sequence[tuple[str, str]], summary: str
 ) -> Iterator[document.Block]:
-    """Blocks of the sheet of a plan: ``identity`` of document and file first, then the ``summary`` of the decision."""
-    plan, body = decision.plan, decision.plan.spacecraft
-    obstacles = [] if plan.commandable else [sentence(text(note("not-commandable", scheme=plan.scheme)))]
-    if code := ideal_code(plan):
-        obstacles.append(f"{plan.scheme} cannot be commanded: {text(note(code, scheme=plan.scheme))}.")
-    if obstacles or not len(plan.pulses):
-        yield Prose(" ".join(obstacles) or summary, alarm=bool(obstacles))
+    """Blocks of the sheet of a plan: ``identity`` of document and file first, then the ``summary`` of the verdict.
+
+    Only a plan to fly has conditions to begin, limits to hold, boxes and signatures; ideal impulses have none either.
+    """
+    body, ideal = plan.spacecraft, ideal_code(plan)
+    if not plan.pulses.pulses:
+        yield Prose(summary, alarm=bool(judged.status.exit_status))
         return
+    flies = judged.flies and not ideal
+    if not judged.flies:
+        yield Prose("NOT FOR FLIGHT", alarm=True)
     zero = body.utc(0.0, MILLISECONDS) or "no epoch in the file; times count from t = 0"
     yield FactList("Document and time", (*identity, ("UTC of t = 0", zero)))
-    yield Prose(summary, alarm=decision.met is False)
+    yield Prose(summary, alarm=not judged.flies)
+    if ideal:
+        yield Prose(sentence(text(note(ideal, scheme=plan.scheme))))
     points = None
-    if dispersed is not None:
-        from nutdamp.montecarlo.study import Checkpoints
+    if flies and judged.results is not None:
+        from nutdamp.planning.screening import Checkpoints
 
-        points = Checkpoints(dispersed.study)
-    yield FactList("GO at t = 0 with", tuple(_conditions(decision, points)))
-    yield _fired(plan, points)
-    yield FactList("Totals and hold", (("totals", _totals(plan)), ("on hold", ON_HOLD), ("phase", _phase_note(body))))
+        points = Checkpoints(judged.results.study)
+    if flies and points is None:
+        yield Prose("Tolerances not checked.")
+    if flies:
+        yield FactList(f"GO at t = 0 with{' (nominal)' * (points is None)}", tuple(_conditions(body, points)))
+    yield _fired(plan, judged, points, flies=flies)
+    totals = [("totals", _totals(plan)), ("phase", _phase_note(body))]
+    if not flies:
+        yield FactList("Totals", tuple(totals))
+        return
+    yield FactList("Totals and hold", (totals[0], ("on hold", ON_HOLD), totals[1]))
     yield Sheet(
         "Signatures",
         tuple(Heading(name, number=False) for name in ("sheet", "name", "signature", "date")),
@@ -70,15 +83,13 @@ def manoeuvre_blocks(
     )
 
 
-def _conditions(decision: Decision, points: Checkpoints | None) -> Iterator[tuple[str, str]]:
+def _conditions(body: Spacecraft, points: Checkpoints | None) -> Iterator[tuple[str, str]]:
     """Spin, nutation and phase at which the first row may be fired."""
-    body = decision.plan.spacecraft
     spin, nutation = f"{body.spin * RPM:.5g}", short_angle(body.tilt)
     if points is None:
-        why = "dispersed cases were not flown" if body.dispersions is not None else "the file gives no dispersions"
-        yield "spin", f"{spin} rpm nominal"
-        yield "nutation", f"{nutation} deg nominal"
-        yield "phase window", f"not known: {why}"
+        yield "spin", f"{spin} rpm"
+        yield "nutation", f"{nutation} deg"
+        yield "phase window", "not set: tolerances not checked"
         return
     spins = f"{points.spin.least * RPM:.5g} to {points.spin.most * RPM:.5g} rpm"
     angles = f"{short_angle(points.nutation.least)} to {short_angle(points.nutation.most)} deg"
@@ -90,7 +101,7 @@ def _conditions(decision: Decision, points: Checkpoints | None) -> Iterator[tupl
 def _window(body: Spacecraft, points: Checkpoints) -> str:
     """Shift of all pulses in phase and in time with which enough cases comply; rounded towards none."""
     probability = required_share(body.requirement)
-    share = decisions.exact_percent(probability)
+    share = exact_percent(probability)
     if not requirements.judged(body):
         return "not known: nothing is required"
     window = points.window(probability)
@@ -110,7 +121,8 @@ def _inwards(value: float, digits: int) -> str:
 class SheetRow(NamedTuple):
     """A pulse or block, from 0: its first pulse, Sun or spin phase at its start and nutation after it, rad.
 
-    ``hold``: range of the nutation outside of which nothing more is fired.
+    ``hold``: range of the nutation outside of which nothing more is fired, of the last row the limit to accept;
+    ``decide``: time by which that must be known.
     """
 
     at: int
@@ -119,20 +131,38 @@ class SheetRow(NamedTuple):
     phase: float
     nutation: float
     hold: str
+    decide: str
 
 
-def _fired(plan: Plan, points: Checkpoints | None) -> Sheet:
+def _fired(plan: Plan, judged: Verdict, points: Checkpoints | None, *, flies: bool) -> Sheet:
     """One row a pulse or block, as it is commanded, with the nutation after it."""
-    flown, pulses = plan.flight, plan.pulses.pulses
+    flown, body, pulses = plan.flight, plan.spacecraft, plan.pulses.pulses
     blocks: Sequence[Block | None] = plan.pulses.blocks or [None] * len(pulses)
     counts = [*accumulate(1 if block is None else block.count for block in blocks)]
     firsts = [pulses[count] for count in (0, *counts[:-1])]
     starts = np.array([pulse.loaded[0] for pulse in firsts])
-    phases = -to_sun_pulse(flown, starts) if _senses(plan.spacecraft) else spin_phases(flown, starts)
+    turned = phases(flown)[np.array([0, *counts[:-1]])]
     angles = flown.around_pulses()[1].nutation[np.array(counts) - 1].tolist()
-    holds = [MISSING] * len(counts) if points is None else _ranges(points, counts, angles)
-    rows = [*map(SheetRow, range(len(counts)), firsts, blocks, phases.tolist(), angles, holds)]
-    return sheet(DataTable("Fire", [*_columns(plan, rows)], rows, points), "sheet", folds=True)
+    ends = [pulses[count - 1].over for count in counts]
+    decide = [_deadline(body, end, start) for end, start in zip(ends, starts[1:].tolist(), strict=False)]
+    holds = ["not set"] * len(counts) if points is None else _ranges(points, counts, angles)
+    holds[-1] = _accepted(judged, angles[-1])
+    columns = zip(firsts, blocks, turned.tolist(), angles, holds, [*decide, MISSING], strict=True)
+    rows = [SheetRow(index, *row) for index, row in enumerate(columns)]
+    return sheet(DataTable("Fire" if flies else "Pulses", [*_columns(plan, rows)], rows, flies), "sheet", folds=True)
+
+
+def _accepted(judged: Verdict, angle: float) -> str:
+    """Nutation to be accepted at the end: up to the limit of the requirement."""
+    limit = next((line.bound.limit for line in judged.lines if line.bound.part is Part.NUTATION), angle)
+    return f"accept ≤ {short_angle(limit)}"
+
+
+def _deadline(body: Spacecraft, end: float, start: float) -> str:
+    """Time by which it must be known whether the next row is fired: its start; a short coast leaves no time."""
+    if start - end < DECIDED:
+        return "automatic"
+    return clock(body, start) or f"{math.floor(10.0 * start) / 10.0:.1f} s"
 
 
 def _columns(plan: Plan, rows: Sequence[SheetRow]) -> Iterator[Column]:
@@ -145,15 +175,15 @@ def _columns(plan: Plan, rows: Sequence[SheetRow]) -> Iterator[Column]:
     def seconds(time: float) -> str:
         return f"{time:.{digits}f}"
 
-    def date(row: SheetRow) -> str | None:
-        return body.utc(row.pulse.loaded[0], min(digits, MILLISECONDS))
+    def start(row: SheetRow) -> str | None:
+        return clock(body, row.pulse.loaded[0], min(digits, MILLISECONDS))
 
     yield column("block" if blocks else "pulse", "", lambda row: row.at + 1)
-    if all(map(date, rows)):
-        yield column(Shared.START, "UTC", date)._replace(kind=TEXT)
+    if all(map(start, rows)):
+        yield column(Shared.START, "UTC", start)._replace(kind=TEXT)
     else:
         yield column(Shared.START, "s", lambda row: row.pulse.loaded[0], seconds)
-    phase = "Sun phase" if _senses(body) else "spin phase"
+    phase = "Sun phase" if sun_phased(body) else "spin phase"
     yield column(phase, "deg", lambda row: math.degrees(row.phase) % 360.0, lambda angle: fixed(angle, 1, 360.0))
     yield column(Shared.THRUSTERS, "", lambda row: _thrusters(row.pulse, body))._replace(kind=TEXT)
     if blocks:
@@ -163,12 +193,15 @@ def _columns(plan: Plan, rows: Sequence[SheetRow]) -> Iterator[Column]:
         yield column(Shared.ON_TIME, f"s{counts}", lambda row: _counted(body, "width", row.block.width))
         yield column(Shared.PULSES, "", lambda row: row.block.count)
         yield column(Shared.EVERY, "spin", lambda row: row.block.every)
+    elif plan.pulses.idealised:
+        yield column(Shared.IMPULSE, "N m s", lambda row: row.pulse.magnitude, lambda size: f"{size:.4g}")
     else:
         yield column(Shared.ON_TIME, "s", lambda row: row.pulse.loaded[1], seconds)
     least, _ = limits(body)
     yield column(Shared.NUTATION_AFTER, "deg", lambda row: row.nutation, lambda angle: short_angle(angle, least))
-    yield column("hold if outside", "deg", lambda row: row.hold)._replace(when=lambda points: points is not None)
-    yield column("done", "", lambda _: "☐")._replace(kind=TEXT)
+    for name, value in (("hold if outside", "hold"), ("decide before", "decide")):
+        yield column(name, "deg" * (value == "hold"), attrgetter(value))._replace(when=bool)
+    yield column("done", "", lambda _: "☐")._replace(kind=TEXT, when=bool)
 
 
 def _counted(body: Spacecraft, which: str, value: float) -> str:
@@ -178,8 +211,8 @@ def _counted(body: Spacecraft, which: str, value: float) -> str:
 
 
 def _ranges(points: Checkpoints, counts: Sequence[int], expected: Sequence[float]) -> list[str]:
-    """Range of the nutation in flown cases after each row that has one, with that ``expected`` (rad) in it."""
-    from nutdamp.montecarlo.study import even
+    """Range of the nutation after each row that has one, of cases that end well, with that ``expected`` (rad) in it."""
+    from nutdamp.planning.screening import even
 
     limit = limits(points.study.model.spacecraft)[0]
     rows = [number - 1 for number in even(len(counts), CHECKED)]
@@ -199,12 +232,8 @@ def _thrusters(pulse: Pulse, body: Spacecraft) -> str:
     return pulse.channel if members in ([], [pulse.channel]) else f"{pulse.channel} ({', '.join(members)})"
 
 
-def _senses(body: Spacecraft) -> bool:
-    return body.sun is not None and body.sun_sensor is not None
-
-
 def _phase_note(body: Spacecraft) -> str:
-    if _senses(body):
+    if sun_phased(body):
         return "Sun phase: angle from the Sun sensor to the Sun about axis 3, against the spin, at the commanded start."
     falls = ", positive about +3, so that it falls with this spin" * (body.spin < 0.0)
     return f"Spin phase: angle by which the body has turned about axis 3 since t = 0{falls}, at the commanded start."
@@ -215,7 +244,7 @@ def _totals(plan: Plan) -> str:
     on = math.fsum(pulse.loaded[1] for pulse in pulses)
     date = body.utc(pulses.end, min(digits, MILLISECONDS))
     ends = f"{pulses.end:.{digits}f} s" + (f" ({date})" if date else "")
-    return f"pulses: {len(pulses)}; on-time {on:.{digits}f} s; {decisions.spent(pulses)}; the last ends at {ends}"
+    return f"pulses: {len(pulses)}; on-time {on:.{digits}f} s; {spent(pulses)}; the last ends at {ends}"
 
 
 def _decimals(body: Spacecraft) -> int:

@@ -1,14 +1,15 @@
 """The view of the motion that the script of a page moves: its rows as whole numbers, scales, workbench.
 
 The script reads rows and draws them: each number that it shows is one row of the track, rounded here. Only where the
-schedule is changed in the workbench it computes rows of its own: the motion of `propagation.by_impulses` for a
-symmetric body between ideal coasts; where the flight has more in it, `absence` gives the reason, and there is none.
+schedule is changed in the workbench it computes rows of its own, the motion of `propagation.flown` for a rigid body and
+pulses of constant thrust; where the flight has more in it, `absence` gives the reason, and there is no workbench.
 """
 
 from __future__ import annotations
 
 import json
 import math
+import shlex
 from collections.abc import Iterable, Sequence
 from typing import Any
 
@@ -20,6 +21,7 @@ from nutdamp.flight.propagation import Flight, Track
 from nutdamp.page.document import EDGES, Circle, Moving, NamedDirection, Panel, Scale, Strip, Workbench
 from nutdamp.physics import attitude
 from nutdamp.planning.plan import Plan
+from nutdamp.schemes.catalogue import SCHEMES
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import channel_of
 from nutdamp.spacecraft.model import Spacecraft, Vector
@@ -40,14 +42,6 @@ NONE = -(10**8)  # entry of a row for an angle that does not exist
 QUICK, UNHURRIED, SLOW = 4.0, 15.0, 120.0  # seconds that playing takes at the quickest, at first, and at the slowest
 
 
-def moving_of(plan: Plan) -> Moving:
-    """The view of a plan flown through the real pulse widths."""
-    body, pulses = plan.spacecraft, plan.pulses
-    # To the millisecond, so that the same rows can be had from ``simulate`` by a short number.
-    until = math.ceil(1e3 * geometry.shown_until(body, pulses)) / 1e3
-    return moving(propagation.flown(body, pulses, until), until, plan.scheme, named_directions(body))
-
-
 def named_directions(body: Spacecraft) -> tuple[NamedDirection, ...]:
     """Directions of the globe besides the track: the target, the Sun, the cones that the spin axis keeps."""
     directions = []
@@ -66,9 +60,13 @@ def named_directions(body: Spacecraft) -> tuple[NamedDirection, ...]:
     return tuple(directions)
 
 
-def moving(flown: Flight, until: float, scheme: str, named: Sequence[NamedDirection] = ()) -> Moving:
-    """The view of a flight of ``scheme`` to ``until`` s, with ``named`` directions and circles on its globe."""
-    body, turns = flown.spacecraft, until / geometry.quickest(flown)
+def moving_of(plan: Plan, craft: str = "SPACECRAFT") -> Moving:
+    """The view of a plan flown through the real pulse widths; ``craft``: words of a command for the spacecraft."""
+    body, named = plan.spacecraft, named_directions(plan.spacecraft)
+    # To the millisecond, so that the same rows can be had from ``simulate`` by a short number.
+    until = math.ceil(1e3 * geometry.shown_until(body, plan.pulses)) / 1e3
+    flown = propagation.flown(body, plan.pulses, until)
+    turns = until / geometry.quickest(flown)
     samples = min(max(math.ceil(ROWS_A_TURN * turns), LEAST_ROWS), MOST_ROWS) + 1
     track = flown.sampled(samples, until)
     panels, columns, target, rooms = _panels(flown, track, named)
@@ -119,13 +117,25 @@ def moving(flown: Flight, until: float, scheme: str, named: Sequence[NamedDirect
         "bench": None if absent else workbench_data(flown, track, *rooms, until),
     }
     return Moving(
-        panels, strip, *_speeds(until), angle_names(body), tuple(named), utc is not None,
+        plan.scheme, panels, strip, *_speeds(until), angle_names(body), named, utc is not None,
         "azimuths" if body.attitude is None else "right ascensions", turns > STEEP,
-        propagation.model_name([flown.schedule]), None if absent else workbench_of(flown), absent,
-        ("nutdamp simulate SPACECRAFT", f"--scheme {scheme}", "--flown", f"--until {until:.12g}",
-         f"--samples {samples}", "--csv FILE"),
+        propagation.model_name([flown.schedule]), None if absent else workbench_of(flown, craft), absent,
+        _command(plan, craft, until, samples),
         json.dumps(data, separators=(",", ":"), ensure_ascii=False).replace("<", "\\u003c"),
     )  # fmt: skip
+
+
+def _command(plan: Plan, craft: str, until: float, samples: int) -> tuple[str, ...]:
+    """Command that writes the rows of a plan; none where no scheme by its name and no file gives its pulses."""
+    if plan.from_file:
+        pulses = [f"--{'blocks' if plan.pulses.blocks else 'schedule'} {shlex.quote(plan.scheme)}"]
+    elif plan.scheme in SCHEMES and plan.spacecraft.goal.sun is None:
+        disturbed = ["--with-disturbances"] * plan.options.with_disturbances
+        pulses = [f"--scheme {plan.scheme}", *disturbed]
+    else:
+        return ()
+    rows = ("--flown", f"--until {until:.12g}", f"--samples {samples}", "--csv FILE")
+    return (f"nutdamp simulate {craft}".rstrip(), *pulses, *rows)
 
 
 Room = tuple[Vector, float]  # middle (2,) and half the side of a square panel
@@ -305,7 +315,7 @@ def absence(body: Spacecraft, schedule: Schedule) -> str:
     """Reason for which there is no workbench, a few words; empty where there is one."""
     kinds = (
         (not len(schedule), "no pulses"),
-        (not body.inertia.symmetric, "I1 ≠ I2"),
+        (bool(schedule.blocks), "command blocks"),
         (body.inertia.wheel != 0.0, "a wheel"),
         (body.growth != 0.0, "energy dissipation"),
         (bool(body.disturbances), "disturbance torques"),
@@ -314,10 +324,13 @@ def absence(body: Spacecraft, schedule: Schedule) -> str:
     return next((reason for holds, reason in kinds if holds), "")
 
 
-def workbench_of(flown: Flight) -> Workbench:
-    """The workbench of a flight; there must be one by `absence`."""
+EDITED = "edited.csv"  # file that the command of the workbench flies
+
+
+def workbench_of(flown: Flight, craft: str) -> Workbench:
+    """The workbench of a flight, which must have one by `absence`; ``craft`` as in `moving_of`."""
     body = flown.spacecraft
-    limits = {bound.part: bound.most for bound in requirements.required(body)}
+    limits = {bound.part: bound.limit for bound in requirements.required(body)}
     parts = [Part.NUTATION, Part.SHIFT, *[Part.DISTANCE] * (body.goal.axis is not None)]
     rows = [
         (part.value, part.label, f"≤ {most(limits[part]).removesuffix(' deg')}°" if part in limits else "")
@@ -325,7 +338,8 @@ def workbench_of(flown: Flight) -> Workbench:
     ]
     if Part.SPIN in limits:
         rows.append((Part.SPIN.value, Part.SPIN.label, f"≤ {quantity(limits[Part.SPIN], 'rad/s')}"))
-    return Workbench(tuple(rows), _pulse_names(flown))
+    command = " ".join(filter(None, ("nutdamp simulate", craft, f"--schedule {EDITED} --flown")))
+    return Workbench(tuple(rows), _pulse_names(flown), body.inertia.symmetric, EDITED, command)
 
 
 def workbench_data(flown: Flight, track: Track, pole: Room, sky: Room, until: float) -> dict[str, Any]:
@@ -333,21 +347,20 @@ def workbench_data(flown: Flight, track: Track, pole: Room, sky: Room, until: fl
 
     ``pole`` and ``sky`` are the rooms of the panels, deg/s and deg; ``track`` is shown to ``until`` s.
     """
-    body, limits, start = flown.spacecraft, flown.spacecraft.limits, flown.spacecraft.initial
+    body, limits = flown.spacecraft, flown.spacecraft.limits
     target, channels = body.goal.axis, geometry.channels_fired(flown)
     return {
         "body": {
-            "A": body.inertia.A,
-            "C": body.inertia.C,
+            "moments": body.inertia.moments,
             "sense": math.copysign(1.0, body.spin),
             "target": None if target is None else target.tolist(),
         },
-        "start": {"omega": body.omega0[:2].tolist(), "spin": start.spin, "turn": start.quaternion.tolist()},
+        "start": [*body.omega0.tolist(), *body.initial.quaternion.tolist()],
         "framed": body.attitude is not None,
         "axes": None if body.inertia.aligned else body.inertia.axes.tolist(),
         "pulses": [
             {
-                "t": pulse.t,
+                "start": pulse.start,
                 "on": pulse.on_time,
                 "channel": pulse.channel,
                 "row": channels.index(pulse.channel),
@@ -363,11 +376,10 @@ def workbench_data(flown: Flight, track: Track, pole: Room, sky: Room, until: fl
             "earliest": limits.earliest,
             "horizon": body.horizon,
             "gap": limits.gap,
-            "tick": None if flown.schedule.blocks else limits.tick,
+            "tick": limits.tick,
             "blackout": limits.blackout,
             "most": limits.max_pulses,
         },
-        "required": {bound.part.value: bound.most for bound in requirements.required(body)},
         "spin": body.goal.spin,
         "frame": EDGES,
         "plane": geometry.sky_plane(flown, track.momentum[0]).tolist(),

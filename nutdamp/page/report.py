@@ -10,6 +10,7 @@ import hashlib
 import math
 import platform
 import re
+import shlex
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
@@ -21,9 +22,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from rich.console import Group
+from rich.text import Text
 
 from nutdamp import __version__
 from nutdamp.common import work
+from nutdamp.common.numerics import RPM
 from nutdamp.errors import BadRequest, MissingExtra, printable
 from nutdamp.figures import image, overview, studies
 from nutdamp.figures.style import require
@@ -34,18 +37,20 @@ from nutdamp.page import document
 from nutdamp.page.document import Block, Control, Details, FactList, Page, PageSection, Picture, Points, Prose
 from nutdamp.page.manoeuvre import manoeuvre_blocks
 from nutdamp.page.moving import moving_of
-from nutdamp.planning.decision import Comparison, Decision, broken_limits, decide
-from nutdamp.planning.notes import plan_notes, reasons
-from nutdamp.planning.plan import Plan, Standing, unrounded
+from nutdamp.planning.decision import Comparison
+from nutdamp.planning.notes import broken_limits, plan_notes, reasons
+from nutdamp.planning.plan import NO_NUTATION, Plan, unrounded
 from nutdamp.planning.tradeoff import Front
+from nutdamp.planning.verdict import Light, Line, Verdict
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.views import decisions, glance, guide
+from nutdamp.views import verdict as verdicts
 from nutdamp.views.check import check_screen
 from nutdamp.views.glance import scheme_table
-from nutdamp.views.guide import Formula, Topic
-from nutdamp.views.parts import beyond_floors, pulse_table, turn_floor
+from nutdamp.views.guide import Topic
+from nutdamp.views.parts import NOTES, pulse_table
 from nutdamp.views.simulation import BUDGET, BUDGET_NOTE, budget_table, conservation, methods_table, verdict
-from nutdamp.views.text import WARNING, joined, quantity, sentence, severity, text
+from nutdamp.views.text import WARNING, joined, sentence, severity, text
 from nutdamp.views.trade import front_parts, trade_notes
 
 if TYPE_CHECKING:
@@ -53,7 +58,7 @@ if TYPE_CHECKING:
     from markupsafe import Markup
     from matplotlib.figure import Figure
 
-    from nutdamp.montecarlo.study import Results
+    from nutdamp.planning.screening import Dispersion
 
 
 ENDINGS = (".html", ".htm")  # endings of the files that a page is written to
@@ -135,34 +140,32 @@ def _labelled(svg: str, described: str) -> Markup:
 
 @dataclass(frozen=True, eq=False)
 class Report:
-    """The report page: its comparison, its dispersed cases, the page itself, and ``content``, the text of its file."""
+    """The report page: its comparison, the page itself, and ``content``, the text of its file."""
 
     comparison: Comparison
-    dispersed: Results | None
     page: Page = field(repr=False)
     content: str = field(repr=False)
 
     @property
-    def verdict(self) -> str:
+    def verdict(self) -> Verdict:
+        """Judgement of the plan of the page."""
+        return self.comparison.verdict
+
+    @property
+    def summary(self) -> str:
         """Headline, verdict and warnings at the top of the page."""
         return self.page.summary
 
     @property
-    def met(self) -> bool | None:
-        """True where the requirement is met; None where nothing is required, and without a feasible plan."""
-        return self.page.met
-
-    @property
     def good(self) -> bool:
         """True where nothing is missed, whether required or not."""
-        return self.page.good
+        return self.verdict.good and not self.page.broken
 
 
 def made_of(compared: Comparison, repeat: Repeat, control: Control, traded: Sequence[Front] = ()) -> Report:
     """The report, not yet written. Raises MissingExtra without the extra plot."""
-    chosen = compared.recommended
     page = report_page(compared, repeat, traded=traded, control=control)
-    return Report(compared, None if chosen is None else compared.results(chosen), page, page_html(page))
+    return Report(compared, page, page_html(page))
 
 
 DOTS = ("end", "impulse", "propellant", "nutation", "momentum shift", "axis error")
@@ -172,13 +175,22 @@ DOTS = ("end", "impulse", "propellant", "nutation", "momentum shift", "axis erro
 class Repeat(NamedTuple):
     """Data to make the page again: the command, and the input file by name and text.
 
-    ``settings``: keys that the command sets in place of those in the file, and their values.
+    ``settings``: keys that the command sets in place of those in the file, and their values; ``goal``: its options of
+    the goal.
     """
 
     command: str
     name: str
     text: str
     settings: tuple[tuple[str, str], ...] = ()
+    goal: tuple[str, ...] = ()
+
+    def craft(self, *, built_in: bool = False) -> str:
+        """Words of a command for the spacecraft: none for the built-in one, SPACECRAFT where no file has it."""
+        if not built_in and not Path(self.name).is_file():
+            return "SPACECRAFT"
+        keys = (f"--set={key}={value}" for key, value in self.settings)
+        return printable(shlex.join([*[self.name] * (not built_in), *keys, *self.goal]))
 
     @property
     def digest(self) -> str:
@@ -193,91 +205,115 @@ def called(body: Spacecraft, how: str) -> Repeat:
     return Repeat(f"nutdamp.report(spacecraft, {how})", "", "")
 
 
-def repeated(command: str, source: Source) -> Repeat:
+def repeated(command: str, source: Source, goal: tuple[str, ...] = ()) -> Repeat:
     """The command or call that makes a page again from a file."""
     settings = tuple((dotted(setting.path), str(setting.value)) for setting in source.settings)
-    return Repeat(command, source.name, source.text, settings)
+    return Repeat(command, source.name, source.text, settings, goal)
 
 
 def report_page(
     compared: Comparison, repeat: Repeat, *, traded: Sequence[Front] = (), control: Control = document.UNCONTROLLED
 ) -> Page:
     """The page; raises MissingExtra without matplotlib. ``traded``: fronts of time against cost."""
-    body, decided = compared.spacecraft, decide(compared)
-    headline = glance.headline(compared, decided)
-    lead = headline.spans[0].end
-    remarks = glance.notes(compared, decided)
+    body, judged, chosen = compared.spacecraft, compared.verdict, compared.recommended
+    lead, about = verdicts.headline(judged, compared)
+    remarks = glance.notes(compared)
     notes = [text(note) for note in remarks if severity(note) != WARNING]
+    warnings = [text(note) for note in remarks if severity(note) == WARNING]
     with work.steps(2.0) as task:  # pictures, and the flights of the verification
         page = Page(
             title=control.title or _title(body),
             control=control,
             source=f"input {repeat.digest[:8]}" * bool(repeat.digest),
-            state=_state(decided),
-            headline=(headline.plain[:lead], headline.plain[lead:]),
-            notes=tuple(notes[: glance.NOTES]),
-            contenders=tuple(_contender(compared, plan, decided) for plan in compared.plans),
+            state=judged.light.value,
+            headline=(lead, about),
+            notes=tuple(notes[:NOTES]),
+            contenders=tuple(_contender(compared, plan) for plan in compared.plans),
             made_by=f"nutdamp {__version__}",
+            verdict="" if chosen is None else verdicts.statement(judged),
+            warnings=tuple(warnings),
         )
-        if decided is not None:
+        if chosen is not None:
+            broken = _broken(chosen)
             page = replace(
                 page,
-                good=_good(decided),
-                met=decided.met,
-                verdict=decisions.verdict(decided),
-                margins=tuple(glance.requirement_rows(decided)),
-                facts=document.facts_of("Final state, after the last pulse", glance.ends(decided)),
-                warnings=(*(text(note) for note in remarks if severity(note) == WARNING), *_broken(decided.plan)),
-                motion=(moving_of(decided.plan), document.Beside(flight_pictures(decided.plan), still=True)),
+                broken=tuple(broken),
+                state=Light.AMBER.value if broken and judged.light is Light.GREEN else page.state,
+                margins=tuple(_bar(judged, line) for line in judged.lines),
+                facts=document.facts_of("Final state, after the last pulse", glance.ends(chosen)),
+                warnings=(*warnings, *broken),
+                motion=(
+                    moving_of(chosen, repeat.craft(built_in=compared.spacecraft.built_in)),
+                    document.Beside(flight_pictures(chosen, judged), still=True),
+                ),
             )
         task.reach(1.0)
-        sections = _sections(compared, decided, repeat, page, traded, notes[glance.NOTES :])
+        sections = _sections(compared, judged, repeat, page, traded, notes[NOTES:])
         return replace(page, sections=tuple(sections))
+
+
+def _bar(judged: Verdict, line: Line) -> document.Bar:
+    """A required bound with its bar."""
+    bound, dispersed = line.bound, line.dispersed
+    level = "" if judged.cases is None else f"{verdicts.exact_percent(judged.cases.probability)} within "
+    alone = "" if line.share is None or judged.cases is None else verdicts.percent(line.share, judged.cases.probability)
+    texts = (
+        f"nominal {verdicts.value(bound, line.nominal)}",
+        "" if dispersed is None else level + verdicts.value(bound, dispersed),
+        f"limit {verdicts.limit(bound)}",
+        f"margin {verdicts.margin(line)}",
+        f"{alone} keep it" * bool(alone),
+        verdicts.line_word(line),
+    )
+    used = tuple(math.nan if size is None else float(bound.used(size)) for size in (line.nominal, dispersed))
+    return document.Bar(bound.label, texts, used, line.met)
 
 
 def _sections(
     compared: Comparison,
-    decided: Decision | None,
+    judged: Verdict,
     repeat: Repeat,
     page: Page,
     traded: Sequence[Front],
     more_notes: Sequence[str],
 ) -> Iterator[PageSection]:
     """Sections below the first screen."""
-    dispersed = None if decided is None else compared.results(decided.plan)
-    if decided is not None and dispersed is not None:
-        yield PageSection("dispersion", "Dispersion", tuple(_dispersion(decided.plan, dispersed)))
+    chosen, dispersed = compared.recommended, _cases_of(compared)
+    if dispersed is not None:
+        yield PageSection("dispersion", "Dispersion", tuple(_dispersion(dispersed)))
     yield PageSection("schemes", "Schemes compared", tuple(_schemes(compared, more_notes)))
     if traded:
         yield PageSection("trade", "Time against cost", tuple(_trade(compared, traded)))
-    if decided is not None:
-        title = f"Manoeuvre sheet: {compared.spacecraft.name}, {decided.plan.scheme}"
+    if chosen is not None:
+        title = f"Manoeuvre sheet: {compared.spacecraft.name}, {chosen.scheme}"
         identity = [("document", page.control.line), ("input file", _file_line(repeat))]
         known = [(name, text) for name, text in identity if text]
-        blocks = manoeuvre_blocks(decided, dispersed, known, page.summary)
+        blocks = manoeuvre_blocks(chosen, judged, known, page.summary)
         # Before the sheet, which is a page of its own in print: one line after it would be another.
-        yield PageSection("verification", "Verification", tuple(_verification(decided.plan)))
+        yield PageSection("verification", "Verification", tuple(_verification(chosen)))
         yield PageSection("manoeuvre", title, tuple(blocks))
-    yield PageSection("background", "Background", tuple(_background(compared, decided, dispersed, repeat)))
+    yield PageSection("background", "Background", tuple(_background(compared, judged, repeat)))
+
+
+def _cases_of(compared: Comparison) -> Dispersion | None:
+    """Dispersed cases of the plan of the page; None where they were not flown."""
+    from nutdamp.montecarlo.study import Results
+    from nutdamp.planning.screening import Dispersion
+
+    judged, chosen = compared.verdict, compared.recommended
+    if chosen is None or not isinstance(judged.results, Results):
+        return None
+    dispersion = Dispersion(judged.results, plan=chosen)
+    vars(dispersion)["verdict"] = judged
+    return dispersion
 
 
 def _title(body: Spacecraft) -> str:
-    turn = "" if body.goal.axis is None else f", turn by {math.degrees(body.to_turn):.4g}°"
-    return f"{body.name} · damp {math.degrees(body.tilt):.4g}° nutation{turn}"
-
-
-def _state(decided: Decision | None) -> str:
-    """Name of the colour of the decision."""
-    if decided is None or decided.met is False:
-        return "missed"
-    return "met" if decided.cases is not None and _good(decided) else "caution"
-
-
-def _good(decided: Decision) -> bool:
-    """True where nothing is missed, whether required or not."""
-    plan = decided.plan
-    kept = plan.standing is Standing.COMPLIES and plan.commandable and not _broken(plan)
-    return kept and decided.met is not False
+    aims = [f"damp {math.degrees(body.tilt):.4g}° nutation"] * (body.tilt > NO_NUTATION)
+    aims += [f"turn by {math.degrees(body.to_turn):.4g}°"] * (body.goal.axis is not None)
+    aims += [] if body.goal.spin is None else [f"spin at {RPM * body.goal.spin:.4g} rpm"]
+    aims += ["built-in example"] * body.built_in
+    return " · ".join([body.name, ", ".join(aims)]) if aims else body.name
 
 
 def _broken(plan: Plan) -> list[str]:
@@ -285,29 +321,32 @@ def _broken(plan: Plan) -> list[str]:
     return broken_limits(plan.spacecraft, plan.pulses) if plan.from_file else []
 
 
-def _contender(compared: Comparison, plan: Plan, decided: Decision | None) -> document.Contender:
-    """One scheme with its cost, and the share of cases that comply or the verdict."""
+def _contender(compared: Comparison, plan: Plan) -> document.Contender:
+    """One scheme with its cost, and the verdict on it."""
     if not plan.feasible:
         return document.Contender(plan.scheme, (decisions.no_plan(plan),), False)
-    share = compared.shares.get(plan)
-    word = decisions.share_text(share) if share is not None else decisions.VERDICT[compared.meets(plan)]
-    word += ", timed" * (not plan.commandable)
-    chosen = decided is not None and plan is decided.plan
-    return document.Contender(plan.scheme, (decisions.spent(plan.pulses), word), chosen)
+    texts = verdicts.spent(plan.pulses), verdicts.scheme_word(compared, plan)
+    return document.Contender(plan.scheme, texts, plan is compared.recommended)
 
 
-def _dispersion(chosen: Plan, dispersed: Results) -> Iterator[Block]:
+def _dispersion(dispersed: Dispersion) -> Iterator[Block]:
     """Verdict, distributions and percentiles of the cases; budget and worst cases behind a title."""
-    from nutdamp.views.dispersion import cone_lines, dispersion_screen, requirement_lines
+    from nutdamp.views.dispersion import cone_lines, dispersion_screen, verdict_lines
 
-    lines = [Prose(document.plain(line)) for line in (*requirement_lines(dispersed), *cone_lines(dispersed))]
-    lines += [Prose(f"Note: {note}.")] if (note := dispersed.study.lightening_error) else []
+    judged, results = dispersed.verdict, dispersed.core
+    told = [line for line in verdict_lines(judged, results) if isinstance(line, Text)]
+    lines = [Prose(document.plain(line)) for line in (*told, *cone_lines(results))]
+    lines += [Prose(f"Note: {note}.")] if (note := results.study.lightening_error) else []
+    required = document.sheet(verdicts.bound_table(judged))
     yield from lines
-    yield document.Beside(dispersion_pictures(dispersed, chosen.scheme))
-    screen = dispersion_screen(dispersed, scheme=chosen.scheme, worst=5)
-    title, percentiles, *rest = document.blocks_of("What is left, by share of the cases", screen)
-    yield percentiles
-    yield Details("Tolerance budget and worst cases", (title, *(block for block in rest if block not in lines)))
+    yield required
+    yield document.Beside(dispersion_pictures(dispersed))
+    rest = [
+        block
+        for block in document.blocks_of("What is left, by share of the cases", dispersion_screen(dispersed, worst=5))
+        if block not in lines and getattr(block, "rows", ()) != required.rows
+    ]
+    yield Details("Percentiles, tolerance budget and worst cases", tuple(rest))
 
 
 def _schemes(compared: Comparison, more_notes: Sequence[str]) -> Iterator[Block]:
@@ -327,7 +366,8 @@ def _trade(compared: Comparison, traded: Sequence[Front]) -> Iterator[Block]:
     if any(len(front.points) > 1 for front in traded):  # one point for each shows no trade
         yield trade_picture(compared, traded)
     chosen = compared.recommended
-    yield from (Prose(sentence(text(note))) for note in (trade_notes(traded, chosen) if chosen is not None else ()))
+    notes = () if chosen is None else trade_notes(traded, chosen, compared.verdict)
+    yield from (Prose(sentence(text(note))) for note in notes)
     yield from document.blocks_of("Schedules by their ends", Group(*front_parts(compared.spacecraft, traded)))
 
 
@@ -341,18 +381,17 @@ def _verification(chosen: Plan) -> Iterator[Block]:
     yield Details("Independent flights and error budget", (flights, *[Points(missing)] * bool(missing), *budget))
 
 
-def _background(
-    compared: Comparison, decided: Decision | None, dispersed: Results | None, repeat: Repeat
-) -> Iterator[Block]:
+def _background(compared: Comparison, judged: Verdict, repeat: Repeat) -> Iterator[Block]:
     body = compared.spacecraft
     yield Details("Spacecraft", tuple(document.blocks_of("What actuators and tolerances do", check_screen(body))))
-    if decided is not None:
-        ends = document.facts_of("Final state", decisions.end_facts(decided))
-        fired = pulse_table(decided.plan.flight, scheme=decided.plan.scheme)
+    chosen = compared.recommended
+    if chosen is not None:
+        ends = document.facts_of("Final state", decisions.end_facts(chosen))
+        fired = pulse_table(chosen.flight, scheme=chosen.scheme)
         yield Details("Pulses and final state, all values", (document.sheet(fired), ends))
     yield Details("Method and symbols", tuple(_method(compared)))
     yield Details("Assumptions", (Points(tuple(("", limit) for limit in assumptions(compared))),))
-    yield Details("Input file, and how to repeat the page", tuple(_repeat(repeat, dispersed)))
+    yield Details("Input file, and how to repeat the page", tuple(_repeat(repeat, judged)))
 
 
 def _file_line(repeat: Repeat) -> str:
@@ -360,15 +399,16 @@ def _file_line(repeat: Repeat) -> str:
     return f"{printable(Path(repeat.name).name)}, SHA-256 {repeat.digest}" if repeat.text else ""
 
 
-def _repeat(repeat: Repeat, dispersed: Results | None) -> Iterator[Block]:
+def _repeat(repeat: Repeat, judged: Verdict) -> Iterator[Block]:
     yield document.Listing("Command", printable(repeat.command))
-    facts = [("seed of the dispersed cases", str(dispersed.study.seed))] if dispersed is not None else []
+    facts = [] if judged.cases is None else [("seed of the dispersed cases", str(judged.cases.seed))]
     facts += [("input file", _file_line(repeat))] if repeat.text else []
     yield FactList("Versions", (*_versions(), *facts))
     if repeat.settings:
         yield FactList("Set in place of what the file says", repeat.settings)
     if repeat.text:
-        yield document.Listing(f"Input file {printable(repeat.name)}", repeat.text.rstrip("\n"))
+        stem = "spacecraft" if repeat.name == "-" else printable(Path(repeat.name).stem)
+        yield document.Download(f"{stem}.yaml", repeat.text)
 
 
 def _versions() -> Iterator[tuple[str, str]]:
@@ -409,12 +449,12 @@ PICTURES = {
 """Captions and descriptions of the pictures."""
 
 
-def flight_pictures(plan: Plan) -> tuple[Picture, ...]:
+def flight_pictures(plan: Plan, judged: Verdict) -> tuple[Picture, ...]:
     """Motion and history of a plan, from its flight through the real widths; raises MissingExtra."""
     flown, track = overview.shown(plan)
-    motion, history = (overview.flight_figure(name, flown, track) for name in ("motion", "history"))
-    narrow = overview.flight_figure("history", flown, track, narrow=True)
-    return _picture("motion", motion), _picture("history", history, narrow)
+    motion = overview.flight_figure("motion", flown, track, judged)
+    history = (overview.history_figure(flown, track, judged, narrow=narrow) for narrow in (False, True))
+    return _picture("motion", motion), _picture("history", *history)
 
 
 def trade_picture(compared: Comparison, fronts: Sequence[Front]) -> Picture:
@@ -423,17 +463,16 @@ def trade_picture(compared: Comparison, fronts: Sequence[Front]) -> Picture:
     return _picture("trade", draw(), draw(narrow=True))
 
 
-def dispersion_pictures(dispersed: Results, scheme: str) -> tuple[Picture, ...]:
+def dispersion_pictures(dispersed: Dispersion) -> tuple[Picture, ...]:
     """Distribution of the cases of a study, and where H ends; raises MissingExtra."""
-    names = ("cases", "momentum")
-    return tuple(_picture(name, studies.dispersion_figure(dispersed, name, scheme=scheme)) for name in names)
+    return tuple(_picture(name, studies.dispersion_figure(dispersed, name)) for name in ("cases", "momentum"))
 
 
 def _picture(name: str, figure: Figure, narrow: Figure | None = None) -> Picture:
     """A picture with its title as text of the page, and the ``narrow`` drawing for a phone."""
     title = str(figure.get_label()) or figure.get_suptitle()
-    phone = "" if narrow is None else image.untitled_svg(narrow)
-    return Picture(image.untitled_svg(figure), title, *PICTURES[name], phone)
+    phone = "" if narrow is None else image.svg(narrow, titled=False)
+    return Picture(image.svg(figure, titled=False), title, *PICTURES[name], phone)
 
 
 EQUATIONS = ("1", "17", "18", "19")  # equations of Magnus that every plan and flight rest on, as the guide numbers them
@@ -457,12 +496,10 @@ def _method(compared: Comparison) -> Iterator[Block]:
     formulas += [] if scheme is None else [(scheme, 0)]
     lines: list[str] = []
     for topic, which in formulas:
-        shown = [block for block in topic.blocks if isinstance(block, Formula)][which]
-        lines += [f"{topic.name}  {topic.summary}", *(f"    {line}" for line in shown.lines), ""]
+        lines += [f"{topic.name}  {topic.summary}", topic.formulas[which].rstrip("\n"), ""]
     yield document.Listing("Equations", "\n".join(lines))
-    symbols = _symbols(topics, scheme, " ".join([*lines, "θ"]))
-    yield FactList("Symbols", (*symbols, *_floors(compared.spacecraft)))
-    yield Points((("", guide.SOURCES[0]),))
+    yield FactList("Symbols", tuple(_symbols(topics, scheme, " ".join([*lines, "θ"]))))
+    yield Points((("", guide.SOURCE),))
 
 
 def _symbols(topics: Sequence[Topic], scheme: Topic | None, listed: str) -> Iterator[tuple[str, str]]:
@@ -470,19 +507,8 @@ def _symbols(topics: Sequence[Topic], scheme: Topic | None, listed: str) -> Iter
     rows = (row for topic in topics for row in topic.rows)
     yield from {symbol: text for symbol, text in rows if symbol.removesuffix(")") in listed}.items()
     if scheme is not None:
-        part = next(part for part in scheme.parts if any(isinstance(block, Formula) for block in part.blocks))
-        yield scheme.name, " ".join(block for block in part.blocks if isinstance(block, str))
-
-
-def _floors(body: Spacecraft) -> Iterator[tuple[str, str]]:
-    """The bounds that the impulses of plans are compared with."""
-    beyond = beyond_floors(body)
-    holds = f"no floor here, with {beyond}" if beyond else "no schedule that does so takes less"
-    yield "A|ω0|", f"{quantity(body.least_impulse, 'N m s')}, the impulse that takes out the nutation; {holds}"
-    if body.goal.axis is not None:
-        turning = quantity(body.turning_impulse, "N m s")
-        words = f"{turning}, the impulse that turns the spin by β, the angle from H to the target; {holds}"
-        yield turn_floor(body), words
+        _, rest = scheme.text.split(scheme.formulas[0])
+        yield scheme.name, " ".join(rest.partition("\n###")[0].split())
 
 
 def _any_of(*schemes: str) -> Callable[[Comparison], bool]:

@@ -16,7 +16,7 @@ from nutdamp.planning.decision import Comparison, Simulation
 from nutdamp.planning.notes import comparison_warnings, plan_notes, reasons
 from nutdamp.planning.plan import Plan, feasible
 from nutdamp.spacecraft.model import Spacecraft
-from nutdamp.views.decisions import decided_json
+from nutdamp.views.decisions import comparison_json
 from nutdamp.views.glance import scheme_table
 from nutdamp.views.parts import pulse_table
 from nutdamp.views.tables import DataTable
@@ -45,7 +45,8 @@ VIEWS = {
     },
     "Plan.data": "views.decisions:plan_json",
     "Plan.sentences": "page.results:remarks",
-    "Plan.reason": "planning.decision:infeasibility",
+    "Plan.verdict": "planning.screening:verdict_of",
+    "Plan.reason": "planning.notes:infeasibility",
     "Comparison.data": "views.decisions:comparison_json",
     "Comparison.sentences": "page.results:remarks",
     "Comparison.reason": "page.results:comparison_reason",
@@ -54,14 +55,14 @@ VIEWS = {
     **{f"Simulation.{what}": f"page.results:{what} shown" for what in ("line", "html")},
     "Trade.data": "views.trade:trade_json spacecraft fronts",
     "Trade.csv": "views.trade:trade_csv fronts",
-    "Trade.figure": "figures.studies:trade_figure spacecraft fronts",
+    "Trade.figure": "figures.studies:trade_figure spacecraft fronts recommended",
     "Trade.screen": "views.trade:trade_screen spacecraft fronts",
-    "Dispersion.data": "views.dispersion:dispersion_json core scheme=scheme",
-    "Dispersion.figure": "figures.studies:dispersion_figure core scheme=scheme",
-    "Dispersion.screen": "views.dispersion:dispersion_screen core scheme=scheme nominal=core.study.nominal",
-    "LoopDispersion.data": "views.loop_cases:loop_cases_json core",
-    "LoopDispersion.figure": "figures.studies:loop_cases_figure core",
-    "LoopDispersion.screen": "views.loop_cases:loop_cases_screen core",
+    "Dispersion.data": "views.dispersion:dispersion_json",
+    "Dispersion.figure": "figures.studies:dispersion_figure",
+    "Dispersion.screen": "views.dispersion:dispersion_screen",
+    "LoopDispersion.data": "views.loop_cases:loop_cases_json",
+    "LoopDispersion.figure": "figures.studies:loop_cases_figure",
+    "LoopDispersion.screen": "views.loop_cases:loop_cases_screen",
     "LoopPlan.data": "views.loop:loop_json",
     "LoopPlan.figure": "figures.signals:loop_figure",
     "LoopPlan.screen": "views.loop:loop_screen",
@@ -98,7 +99,7 @@ def robust_data(robust: RobustComparison) -> dict[str, Any]:
     """The object of ``plan --robust --json``."""
     from nutdamp.views.robust import robust_json
 
-    return {**decided_json(robust.comparison, robust.decision), "robust": robust_json(robust)}
+    return {**comparison_json(robust.joined), "robust": robust_json(robust)}
 
 
 def _rows(result: Plan | Comparison) -> DataTable:
@@ -128,6 +129,7 @@ def figure(result: Plan | Comparison | Flight | Simulation, name: str = "overvie
     """Figure by its name of a flight, of that of a plan or of the recommended one; raises BadRequest, Infeasible."""
     from nutdamp.figures import overview
 
+    judged = None if isinstance(result, Flight) else result.verdict
     if isinstance(result, Comparison):
         if result.recommended is None:
             raise Infeasible(result.reason)
@@ -138,8 +140,9 @@ def figure(result: Plan | Comparison | Flight | Simulation, name: str = "overvie
         flight, track = result, result.sampled(result.samples, overview.until(result))
     else:
         flight, track = result.shown, result.pictured
+    named = units.instance("name", name, str, "the name of a figure")
     try:
-        return overview.flight_figure(units.instance("name", name, str, "the name of a figure"), flight, track)
+        return overview.flight_figure(named, flight, track, judged)
     except KeyError:
         raise BadRequest(f"there is no figure {name!r}; expected one of {', '.join(overview.DRAWN)}") from None
 

@@ -110,7 +110,7 @@ for (const view of document.querySelectorAll(".moving")) {
 
   // ---- rolling cones: seen along H, angles true to scale
   const degree = Math.PI / 180;
-  const rolling = data.bench && conesIn(part("cones"));
+  const rolling = part("cones") && conesIn(part("cones"));
   function conesIn(svg) {
     const shapes = [["circle", "space"], ["circle", "body"], ["path", "mark"], ["path", "contact"], ["path", "cursor"]];
     const [space, body, mark, contact, cross] = shapes.map(([tag, look]) => make(svg, tag, { class: look }));

@@ -21,7 +21,7 @@ from nutdamp.flight import propagation
 from nutdamp.montecarlo.cases import DispersedModel
 from nutdamp.montecarlo.inputs import DispersedInput, mixing
 from nutdamp.montecarlo.statistics import cases_to_show
-from nutdamp.montecarlo.study import CONFIDENCE, SEED, Results, Study, run, study_of, threads_here
+from nutdamp.montecarlo.study import SEED, Results, Study, run, study_of, threads_here
 from nutdamp.planning import plan as planning
 from nutdamp.planning.plan import Plan
 from nutdamp.schemes import planner, valve_commands
@@ -56,7 +56,7 @@ class Tightening:
     """Inputs of the ``tolerances`` that are to be ``factor`` times as large; all others stay.
 
     ``inputs``: one of each size in the file, True for a share of the nominal value. Of ``cases`` new ones of ``seed``
-    the share ``complied``; it is ``least`` at least, by the exact interval of `CONFIDENCE`.
+    the share ``complied``; it is ``least`` at least, by the interval of 95 %.
     """
 
     tolerances: tuple[str, ...]
@@ -88,7 +88,7 @@ def tightening(plan: Plan, probability: float) -> Tightening | None:
         for entry, share in zip(study.first_order.inputs, study.first_order.shares(output).tolist(), strict=True):
             shares[entry.tolerance] = max(shares.get(entry.tolerance, 0.0), share)
     ranked = [name for name in sorted(shares, key=lambda name: -shares[name]) if hasattr(given, name)]
-    fresh = min(max(SAMPLES, 2 * cases_to_show(probability, CONFIDENCE)), MOST_CASES) if probability < 1.0 else SAMPLES
+    fresh = min(max(SAMPLES, 2 * cases_to_show(probability)), MOST_CASES) if probability < 1.0 else SAMPLES
     for count in range(1, min(len(ranked), MOST_TOLERANCES) + 1):
         names = tuple(ranked[:count])
         if not complying(names, 0.0):
@@ -100,9 +100,9 @@ def tightening(plan: Plan, probability: float) -> Tightening | None:
         # The tries all had the same draws, and the largest size that passes passes by luck too.
         for seed in range(FRESH, FRESH + CHECKS):
             trial = tried(names, low, fresh, seed)
-            if trial.interval[0] >= probability:
-                share = trial.met_fraction or 0.0
-                return Tightening(names, low, _stated(study, given, names), fresh, seed, share, trial.interval[0])
+            if trial.shown():
+                share, least = trial.met_fraction or 0.0, trial.interval()[0]
+                return Tightening(names, low, _stated(study, given, names), fresh, seed, share, least)
             low *= SMALLER
     return None
 
@@ -234,7 +234,7 @@ def level(results: Results) -> float:
     last = int((1.0 - results.probability) * results.done + ROUNDING)
     severities = results.worst.severities
     if results.study.model.spacecraft.keep or last >= len(severities):
-        return 1.0 if results.meets_requirement else math.inf
+        return 1.0 if (results.met_fraction or 0.0) >= results.probability else math.inf
     return float(severities[last])
 
 
@@ -245,7 +245,7 @@ class _MarginSearch:
         self.spacecraft, self.body = spacecraft, body
         self.plain = valve_commands.plain(body) if body.thrust_laws else body
         self.model = model_of(self.plain)
-        parts = {bound.part: bound.most for bound in requirements.required(spacecraft)}
+        parts = {bound.part: bound.limit for bound in requirements.required(spacecraft)}
         aim = requirements.aim(spacecraft)
         aimed = aim in parts or body.goal.axis is not None
         self.equations = EndEquations(shift=aimed, spin=body.goal.spin is not None)
@@ -282,7 +282,7 @@ class _MarginSearch:
         seen: dict[float, tuple[float, float]] = {}
         first, closer = self._first(), 0
         while closer < TRIES:
-            if any(level <= 1.0 for _, level in seen.values()):
+            if any(requirements.complies(level) for _, level in seen.values()):
                 margin, closer = self._between(seen), closer + 1
             elif len(seen) < len(first) + ROUNDS:
                 margin = first[len(seen)] if len(seen) < len(first) else self._next(seen)
@@ -311,7 +311,7 @@ class _MarginSearch:
 
     def _between(self, seen: dict[float, tuple[float, float]]) -> float:
         """Margin towards the least with which enough cases comply, by the levels beside it."""
-        least = min(margin for margin, (_, level) in seen.items() if level <= 1.0)
+        least = min(margin for margin, (_, level) in seen.items() if requirements.complies(level))
         most = max((margin for margin in seen if margin < least), default=0.0)
         over, under = seen[most][1] if most else math.inf, seen[least][1]
         if math.isinf(over):

@@ -1,32 +1,229 @@
-"""Comparison of plans, the decision on one of them line by line, and simulations to a given time."""
+"""Comparison of plans: the verdict on each, the recommendation by residuals and cost; simulations to a given time."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from enum import Enum
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 from nutdamp.common import results, work
+from nutdamp.common.numerics import RPM
+from nutdamp.common.results import Note, note
 from nutdamp.errors import NutdampError
-from nutdamp.flight import end_state, propagation
-from nutdamp.flight.end_state import Aspect, left_by, seen_at
+from nutdamp.flight import propagation
+from nutdamp.flight.end_state import seen_at
 from nutdamp.flight.propagation import Extremes, Flight, Track, extremes
-from nutdamp.planning.plan import Plan, Share, Standing, plan, reaches_spin, spinning
-from nutdamp.planning.recommendation import Recommendation, recommend
+from nutdamp.planning.plan import Plan, Standing, judge, plan, reaches_spin, spinning
+from nutdamp.planning.verdict import Cases, Cheaper, Line, Verdict, no_plan
 from nutdamp.schemes import catalogue, planner
 from nutdamp.spacecraft import requirements
-from nutdamp.spacecraft.constraints import Breach, Limit, breaches
-from nutdamp.spacecraft.model import Spacecraft
-from nutdamp.spacecraft.requirements import NEGLIGIBLE, Bound, Held
-from nutdamp.spacecraft.schedule import Schedule
+from nutdamp.spacecraft.model import Spacecraft, required_share
+from nutdamp.spacecraft.requirements import DAMPED_ANGLE, NEGLIGIBLE, SAME_COST, Part, missed, required
 
 if TYPE_CHECKING:
-    from nutdamp.montecarlo.study import Results
-    from nutdamp.planning.screening import Cases, PlanCandidate
+    from nutdamp.planning.screening import FlownPlan
 
 PICTURED = 100_000  # largest number of rows of the track of a picture
+
+
+STEADIER_SHIFT = 0.2  # share of the recommended plan's momentum shift below which another plan keeps H much better
+FEWER_PULSES = 0.5  # share of its pulses up to which another plan is much simpler
+SOONER_END = 0.5  # share of its end up to which another one, a nutation period earlier at least, is much sooner
+STEADIER_COST = 1.1  # largest cost ratio at which a smaller momentum shift is worth a note
+FEWER_COST = 1.05  # largest cost ratio at which fewer pulses are
+SOONER_COST = 1.05  # largest cost ratio at which an earlier end is
+REAL_COST = 1.1  # largest cost ratio of a plan with real widths beside one of ideal impulses that is worth a note
+
+SAME_ANGLE, SAME_SPEED = 1e-9, 1e-5
+"""rad and m/s by which shifts of H and ΔV may differ and be equal: the rounding of a flight."""
+
+
+class Ground(Enum):
+    """Deciding ground among the plans of one standing."""
+
+    ONLY = "only"
+    CASES = "cases"
+    """Most cases comply, where too few do with each plan."""
+    ROBUST = "robust"
+    """Made for dispersed cases."""
+    LEFT = "left"
+    NEAREST = "nearest"
+    COST = "cost"
+    NOMINAL = "tie-nominal"
+    PULSES = "tie-pulses"
+    DELTA_V = "tie-delta-v"
+    SHIFT = "tie-shift"
+    END = "tie-end"
+
+
+TIES = (Ground.NOMINAL, Ground.PULSES, Ground.DELTA_V, Ground.SHIFT, Ground.END)
+"""Grounds among plans of equal cost; the value of each is the code of its note."""
+
+
+class Gain(Enum):
+    """Advantage of another plan over the recommended one, by the code of its note."""
+
+    STEADIER = "smaller-shift"
+    SIMPLER = "fewer-pulses"
+    SOONER = "ends-sooner"
+    REAL = "real-widths"
+    COMMANDED = "as-blocks"
+
+
+@dataclass(frozen=True, eq=False)
+class Recommendation:
+    """Recommended plan of the ``count`` of its ``standing``, by propellant or by impulse; None where none is feasible.
+
+    ``least``: what is saved, of `catalogue.LEAST`; ``alternatives``: the cheapest plan that gains so much.
+    """
+
+    plan: Plan | None = None
+    standing: Standing | None = None
+    ground: Ground | None = None
+    count: int = 0
+    by_propellant: bool = True
+    least: str = catalogue.LEAST[0]
+    alternatives: Mapping[Gain, Plan] = field(default_factory=dict)
+
+
+def recommend(
+    plans: Sequence[Plan], cases: Mapping[Plan, Cases] | None = None, least: str = catalogue.LEAST[0]
+) -> Recommendation:
+    """Recommendation: of the plans that meet the requirement, and damp where it bounds nothing, the `cheapest`.
+
+    Where there is none, that with least nutation left (least distance from a target axis where that is more). Of plans
+    that reach as much those that keep all cones count alone. With ``cases`` a plan meets the requirement in enough of
+    them or not at all; where none does, it is that with which most comply. ``least``: of `catalogue.LEAST`.
+    """
+    feasible = [plan for plan in plans if plan.flown is not None]
+    if not feasible:
+        return Recommendation()
+    enough = {plan for plan in feasible if not cases or cases[plan].enough}
+    reached = {plan: plan.standing if plan in enough else Standing.MISSES for plan in feasible}
+    standing = next(standing for standing in Standing if standing in reached.values())
+    those = [plan for plan in feasible if reached[plan] is standing]
+    those = [plan for plan in those if plan.kept is not False] or those
+    if standing is Standing.COMPLIES:
+        best, ground = cheapest(those, least=least)
+        gains = _alternatives(best, those)
+        return Recommendation(best, standing, ground, len(those), by_propellant(those), least, gains)
+    most = max(_complying(cases[plan]) for plan in those) if cases else 0.0
+    if cases and standing is Standing.MISSES and most > 0.0 and len(those) > 1:
+        best, _ = cheapest([plan for plan in those if _complying(cases[plan]) >= most], least=least)
+        return Recommendation(best, standing, Ground.CASES, len(those), by_propellant(those), least)
+    best, ground = nearest(those)
+    return Recommendation(best, standing, ground, len(those), by_propellant(those), least)
+
+
+def _complying(cases: Cases) -> float:
+    """Share that complies, the lower end of its interval where more cases are to fly."""
+    return (cases.complying or 0.0) if cases.final else cases.low
+
+
+def spent(plan: Plan, least: str, unit: str) -> float:
+    """Amount of what is saved that a plan takes: propellant or impulse, in ``unit``, its end, s, or pulses."""
+    if least == "time":
+        return plan.pulses.end
+    if least == "pulses":
+        return float(len(plan.pulses))
+    return plan.pulses.total_impulse if least == "impulse" else plan.pulses.cost_in(unit)
+
+
+def cheapest(plans: Sequence[Plan], usual: Plan | None = None, least: str = catalogue.LEAST[0]) -> tuple[Plan, Ground]:
+    """Plan of least propellant (impulse where one is unknown), or of what else is saved, and the deciding ground.
+
+    Of costs within `SAME_COST` the ``usual`` one, else that with less propellant where that was not compared, fewer
+    pulses, less ΔV, less momentum shift (distance from the target axis), the earlier end; the first of these that
+    leaves one decides.
+    """
+    if len(plans) == 1:
+        return plans[0], Ground.ONLY
+    unit = _unit(plans)
+    fewest = min(spent(plan, least, unit) for plan in plans)
+    equal = [plan for plan in plans if spent(plan, least, unit) <= fewest * (1.0 + SAME_COST)]
+    if len(equal) > 1 and least != catalogue.LEAST[0]:
+        fewest = min(plan.pulses.cost_in(unit) for plan in equal)
+        equal = [plan for plan in equal if plan.pulses.cost_in(unit) <= fewest * (1.0 + SAME_COST)]
+    if len(equal) == 1:
+        return equal[0], Ground.COST
+    if usual is not None and any(plan is usual for plan in equal):
+        return usual, Ground.NOMINAL
+    for ground, measure, same in (
+        (Ground.PULSES, lambda plan: float(len(plan.pulses)), 0.0),
+        (Ground.DELTA_V, speed, SAME_SPEED),
+        (Ground.SHIFT, _off, SAME_ANGLE),
+    ):
+        values = [value for plan in equal if (value := measure(plan)) is not None]
+        if len(values) < len(equal):  # not known of all
+            continue
+        fewest = min(values) + same
+        equal = [plan for plan, value in zip(equal, values, strict=True) if value <= fewest]
+        if len(equal) == 1:
+            return equal[0], ground
+    return min(equal, key=lambda plan: plan.pulses.end), Ground.END
+
+
+def nearest(plans: Sequence[Plan]) -> tuple[Plan, Ground]:
+    """Plan of least residual but for `DAMPED_ANGLE`, nearest to the requirement, then `cheapest`; deciding ground."""
+    if len(plans) == 1:
+        return plans[0], Ground.ONLY
+    least = min(map(_missed, plans))
+    as_little = [plan for plan in plans if _missed(plan) <= least + DAMPED_ANGLE]
+    if len(as_little) == 1:
+        return as_little[0], Ground.LEFT
+    body = as_little[0].spacecraft
+    least = min(plan.severity for plan in as_little)
+    rounding = NEGLIGIBLE / min((bound.limit for bound in required(body) if bound.part is not Part.SPIN), default=1.0)
+    near = [plan for plan in as_little if plan.severity <= least * (1.0 + SAME_COST) + rounding]
+    return (near[0], Ground.NEAREST) if len(near) == 1 else cheapest(near)
+
+
+def _alternatives(best: Plan, plans: Sequence[Plan]) -> dict[Gain, Plan]:
+    """Cheapest of the ``plans`` with each gain on the ``best`` for little more; of command blocks at any cost."""
+    unit, body = _unit(plans), best.spacecraft
+    turned = 0.0 if body.goal.axis is not None or _off(best) <= DAMPED_ANGLE else STEADIER_SHIFT * _off(best)
+    few = FEWER_PULSES * len(best.pulses)
+    soon = min(SOONER_END * best.pulses.end, best.pulses.end - body.inertial_period)
+    gains_of: dict[Gain, Plan] = {}
+    for gain, ratio, gains in (
+        (Gain.STEADIER, STEADIER_COST, lambda plan: _off(plan) < turned),
+        (Gain.SIMPLER, FEWER_COST, lambda plan: len(plan.pulses) <= few),
+        (Gain.SOONER, SOONER_COST, lambda plan: plan.pulses.end <= soon),
+        (Gain.REAL, REAL_COST, lambda plan: best.pulses.idealised and not plan.pulses.idealised),
+        (Gain.COMMANDED, math.inf, lambda plan: bool(plan.pulses.blocks) and not best.pulses.blocks),
+    ):
+        most = ratio * best.pulses.cost_in(unit)
+        those = [plan for plan in plans if len(plan.pulses) and gains(plan) and plan.pulses.cost_in(unit) <= most]
+        if those:
+            gains_of[gain] = min(those, key=lambda plan: plan.pulses.cost_in(unit))
+    return gains_of
+
+
+def by_propellant(plans: Sequence[Plan]) -> bool:
+    """True if propellant is known for all plans, which are compared by it; else by impulse."""
+    return all(plan.pulses.propellant is not None for plan in plans)
+
+
+def _unit(plans: Sequence[Plan]) -> str:
+    return "kg" if by_propellant(plans) else "N m s"
+
+
+def speed(plan: Plan) -> float | None:
+    """|ΔV| in m/s; None where unknown."""
+    return None if plan.delta_v is None else math.hypot(*plan.delta_v.tolist())
+
+
+def _off(plan: Plan) -> float:
+    assert plan.flown is not None
+    return plan.flown.axis_error
+
+
+def _missed(plan: Plan) -> float:
+    assert plan.flown is not None
+    return float(missed(plan.spacecraft, plan.flown.nutation, plan.flown.axis_error))
 
 
 BUG = "internal error, please report"
@@ -41,14 +238,17 @@ class Comparison(results.Data, results.Tabled):
     """Plans for one spacecraft, and the recommended one; ``comparison["two-pulse"]`` is one of them.
 
     ``flown``: the feasible ones in dispersed cases; None where these were not to be flown. ``named``: their schemes
-    were; ``timed``: pulses may be timed one by one though the spacecraft takes commands.
+    were; ``timed``: pulses may be timed one by one though the spacecraft takes commands; ``least``: what is saved;
+    ``preferred``: the robust plan, which is recommended whatever the others cost.
     """
 
     spacecraft: Spacecraft
     plans: tuple[Plan, ...]
-    flown: Mapping[Plan, PlanCandidate] | None = field(default=None, repr=False)
+    flown: Mapping[Plan, FlownPlan] | None = field(default=None, repr=False)
     named: bool = False
     timed: bool = False
+    least: str = catalogue.LEAST[0]
+    preferred: Plan | None = None
 
     def __len__(self) -> int:
         return len(self.plans)
@@ -72,7 +272,10 @@ class Comparison(results.Data, results.Tabled):
     @cached_property
     def recommendation(self) -> Recommendation:
         """Recommended plan and deciding ground."""
-        return recommend(self.eligible, self.shares)
+        if self.preferred is None:
+            return recommend(self.eligible, self.cases, self.least)
+        standing = self.preferred.standing if self.verdicts[self.preferred].met is not False else Standing.MISSES
+        return Recommendation(self.preferred, standing, Ground.ROBUST, 1, by_propellant([self.preferred]), self.least)
 
     @property
     def only_commanded(self) -> bool:
@@ -85,34 +288,63 @@ class Comparison(results.Data, results.Tabled):
         return tuple(plan for plan in self.plans if plan.feasible and (plan.commandable or not self.only_commanded))
 
     @property
-    def needless(self) -> bool:
-        """True if no pulse is needed: the recommended plan has none, or those named are not needed."""
-        chosen = self.recommended
-        return requirements.unaided(self.spacecraft) and (self.named or chosen is None or not len(chosen.pulses))
+    def nominal(self) -> bool:
+        """True if dispersed cases were left out though the file gives dispersions."""
+        return self.flown is None and self.spacecraft.dispersions is not None
 
     @cached_property
-    def shares(self) -> Mapping[Plan, Share]:
-        """Share of dispersed cases that comply with each feasible plan; empty where they do not decide."""
-        if self.flown is None:
+    def cases(self) -> Mapping[Plan, Cases]:
+        """Dispersed cases of each feasible plan, from none to all where they have not flown; empty if not to decide."""
+        if self.flown is None or not requirements.judged(self.spacecraft):
             return {}
-        from nutdamp.planning.screening import shares_of
+        unknown = Cases(0, 0, required_share(self.spacecraft.requirement), 0.0, final=False)
+        feasible = (plan for plan in self.plans if plan.feasible)
+        return {plan: self.flown[plan].cases if plan in self.flown else unknown for plan in feasible}
 
-        return shares_of([plan for plan in self.plans if plan.feasible], self.flown)
+    @cached_property
+    def verdicts(self) -> Mapping[Plan, Verdict]:
+        """Judgement of each plan, by its dispersed cases where they were flown."""
+        return {plan: self._judged(plan) for plan in self.plans}
 
-    def cases(self, plan: Plan) -> Cases | None:
-        """Dispersed cases of a plan; None where they were not flown."""
-        candidate = (self.flown or {}).get(plan)
-        return None if candidate is None else candidate.cases
+    def _judged(self, plan: Plan) -> Verdict:
+        flown = (self.flown or {}).get(plan)
+        cases, cored = (None, None) if flown is None else (flown.cases, flown.results)
+        return judge(plan, cases, cored, nominal=self.nominal, timed=self.timed)
 
-    def results(self, plan: Plan) -> Results | None:
-        """All dispersed results of a plan; None where they have not flown."""
-        candidate = (self.flown or {}).get(plan)
-        return None if candidate is None or not candidate.cases.decided else candidate.results
+    @cached_property
+    def verdict(self) -> Verdict:
+        """Judgement of the recommended plan, with the plans that cost less; of no plan where none is feasible."""
+        plan = self.recommended
+        if plan is None:
+            return no_plan(self.spacecraft)
+        return replace(self.verdicts[plan], cheaper=tuple(self._cheaper(plan)))
 
-    def meets(self, plan: Plan) -> bool | None:
-        """True if a plan meets the requirement, in enough dispersed cases too where they decide."""
-        met = plan.meets_requirement
-        return bool(self.shares[plan].met) if met and plan in self.shares else met
+    def _cheaper(self, chosen: Plan) -> Iterator[Cheaper]:
+        """Compared plans that take less of what is saved, with the reason why they are not recommended."""
+        feasible = [plan for plan in self.plans if plan.feasible]
+        unit = "kg" if by_propellant(feasible) else "N m s"
+        most = spent(chosen, self.least, unit) * (1.0 - SAME_COST)
+        for other in feasible:
+            why = self.shortcoming(other)
+            if other is not chosen and spent(other, self.least, unit) < most and why is not None:
+                yield Cheaper(other.scheme, other.pulses, why)
+
+    def shortcoming(self, plan: Plan) -> Note | None:
+        """Reason for which a feasible plan may not be recommended, whatever it costs; None where there is none."""
+        verdict = self.verdicts[plan]
+        missed = next((line for line in verdict.lines if not line.bound.met(line.nominal)), None)
+        if missed is not None:
+            return note_on(missed)
+        if not plan.commandable and self.only_commanded:
+            return note("why-single-pulses")
+        cases = verdict.cases
+        if requirements.judged(self.spacecraft) and self.flown is not None:
+            if cases is None or cases.complying is None:
+                return note("why-cases-unknown")
+            if cases.enough is not True:
+                share = cases.complying if cases.final else cases.high
+                return note("why-few-comply" if cases.final else "why-few-may-comply", complying_percent=100.0 * share)
+        return None
 
     @property
     def recommended(self) -> Plan | None:
@@ -172,7 +404,7 @@ def compare(
 ) -> Comparison:
     """Plan the schemes named, else the `usual` ones, and recommend one; one that has a bug takes no other down.
 
-    With dispersions each plan flies as many of ``samples`` cases (default `work.SAMPLES`, without a requirement 0) as
+    With dispersions each plan flies as many of ``samples`` cases (default as `disperse`, without a requirement 0) as
     it takes to know whether enough comply. ``timed``: see `Comparison`. Raises NutdampError, such as BadRequest, and
     KeyError for a name not in `schemes.NAMES`.
     """
@@ -187,24 +419,35 @@ def compare(
             for name, size in sizes:
                 with work.steps(1.0, size):
                     plans.append(attempt(spacecraft, name, options))
-        return compare_plans(plans, named=bool(names), samples=samples, timed=timed)
+        least = (
+            options.chosen.get("least") if isinstance(options, catalogue.Options) else getattr(options, "least", None)
+        )
+        return compare_plans(plans, named=bool(names), samples=samples, timed=timed, least=least or catalogue.LEAST[0])
 
 
 def compare_plans(
-    plans: Sequence[Plan], *, named: bool = True, samples: int | None = None, timed: bool = False
+    plans: Sequence[Plan],
+    *,
+    named: bool = True,
+    samples: int | None = None,
+    timed: bool = False,
+    least: str = catalogue.LEAST[0],
 ) -> Comparison:
     """Comparison of plans of one spacecraft, as the schedule of a file, in the dispersed cases of `compare`."""
-    nominal = Comparison(plans[0].spacecraft, tuple(plans), named=named, timed=timed)
+    nominal = Comparison(plans[0].spacecraft, tuple(plans), named=named, timed=timed, least=least)
     if not _flies(nominal.spacecraft, samples):
         return nominal
     from nutdamp.planning.screening import fly_compared
 
     feasible = [plan for plan in plans if plan.feasible]
-    count = work.SAMPLES if samples is None else samples
-    most = work.CASES * max(1.0, count / work.SAMPLES)
-    with work.budget("the dispersed cases", most), work.steps(len(feasible) + 1.0, SEARCH):
-        flown = fly_compared(feasible, count, lambda shares: recommend(nominal.eligible, shares).plan)
-    return replace(nominal, flown=flown)
+    with work.steps(len(feasible) + 1.0, SEARCH):
+        eligible = nominal.eligible
+        flown = fly_compared(feasible, samples, lambda cases: recommend(eligible, cases, least).plan, eligible)
+    compared = replace(nominal, flown=flown)
+    for flown_plan in flown.values():
+        if flown_plan.final and samples is None:  # by the cases of any other command: they need not fly again
+            vars(flown_plan.plan)["verdict"] = judge(flown_plan.plan, flown_plan.cases, flown_plan.results)
+    return compared
 
 
 def _flies(spacecraft: Spacecraft, samples: int | None) -> bool:
@@ -226,107 +469,25 @@ def attempt(spacecraft: Spacecraft, scheme: str, options: planner.Choice) -> Pla
     return planned
 
 
-@dataclass(frozen=True, slots=True)
-class Line:
-    """Part of the requirement: its bound, and its residual with ``nominal`` values (rad, rad/s).
-
-    ``dispersed``: what the share of cases required does not exceed; None, as ``met``, where that is not known.
-    """
-
-    bound: Bound
-    nominal: float
-    dispersed: float | None
-    met: bool | None
-
-    @property
-    def margin(self) -> float:
-        """Margin to the bound, rad (rad/s): of the dispersed value, where it is known."""
-        return self.bound.most - (self.nominal if self.dispersed is None else self.dispersed)
+WHY = {
+    Part.NUTATION: "why-nutation",
+    Part.SHIFT: "why-momentum-shift",
+    Part.DISTANCE: "why-axis-error",
+    Part.SPIN: "why-spin",
+    Part.DURING: "why-nutation-during",
+    Part.CONE: "why-cone",
+}
+"""Codes of the notes on a bound that a plan breaks."""
 
 
-@dataclass(frozen=True, eq=False)
-class Decision:
-    """Plan to decide on, the parts of its requirement, and its dispersed ``cases``, None if not flown.
-
-    ``unknown``: cases were to decide, but not all of them could be flown within the budget of work.
-    ``seen``: the flight through the real widths by a certain time; None for that to the end of the last pulse.
-    """
-
-    plan: Plan
-    cases: Cases | None = None
-    unknown: bool = False
-    seen: Flight | None = None
-
-    @property
-    def flight(self) -> Flight:
-        """Judged flight."""
-        return self.plan.flight if self.seen is None else self.seen
-
-    @property
-    def lines(self) -> tuple[Line, ...]:
-        """Required parts, and those with a definition of damped or reached."""
-        required, body = requirements.required(self.plan.spacecraft), self.plan.spacecraft
-        enough = None if self.cases is None else self.cases.met
-        # Of a sole part the count of cases and the percentile, which lies between two of them, say the same.
-        counted = enough or (enough is not None and len(required) == 1 and not body.keep)
-        lines = []
-        for bound, nominal, kept in ((held.bound, held.left, held.met) for held in self._held):
-            dispersed = None if self.cases is None else self.cases.levels.get(bound.part)
-            met: bool | None = kept and (dispersed is None or dispersed <= bound.most)
-            if bound.required and enough is not None and (counted or dispersed is None):
-                met = kept and enough if counted else None
-            lines.append(Line(bound, nominal, dispersed, met))
-        return tuple(lines)
-
-    @property
-    def _held(self) -> tuple[Held, ...]:
-        return self.plan.held if self.seen is None else requirements.held(self.plan.spacecraft, left_by(self.seen))
-
-    @cached_property
-    def aspects(self) -> tuple[Aspect, ...]:
-        """Extreme angles of the spin axis from each watched direction, with nominal values."""
-        return self.plan.aspects if self.seen is None else end_state.aspects(self.seen, self.seen.until)
-
-    @property
-    def strays(self) -> tuple[Aspect, ...]:
-        """Members of `aspects` that break a cone."""
-        return tuple(aspect for aspect in self.aspects if not aspect.kept)
-
-    @property
-    def damped(self) -> bool:
-        """True if all of `lines` is kept with nominal values, unrequired parts included."""
-        return all(line.met for line in self._held)
-
-    @property
-    def nominal(self) -> bool | None:
-        """Compliance at the end with nominal values; None where nothing is required."""
-        required = [line.met for line in self._held if line.bound.required]
-        return all(required) if required else None
-
-    @property
-    def met(self) -> bool | None:
-        """Compliance with nominal values and in enough cases; None where nothing is required.
-
-        It is not where the spin axis breaks a cone on the way.
-        """
-        if self.strays or (self.unknown and self.nominal):
-            return False
-        return self.nominal if not self.nominal or self.cases is None else self.cases.met
-
-    @property
-    def undispersed(self) -> bool:
-        """True if the file gives dispersions and no such cases were flown."""
-        return self.cases is None and not self.unknown and self.plan.spacecraft.dispersions is not None
-
-
-def decide(compared: Comparison) -> Decision | None:
-    """Decision on the recommended plan, by its dispersed cases where they were flown; None without one."""
-    plan = compared.recommended
-    if plan is None:
-        return None
-    cases, share = compared.cases(plan), compared.shares.get(plan)
-    undecided = share is not None and share.met is None
-    return Decision(plan, None if undecided else cases, undecided)
+def note_on(line: Line) -> Note:
+    """Note on a bound that the nominal value of a plan breaks."""
+    bound, code = line.bound, WHY[line.bound.part]
+    if bound.part is Part.SPIN:
+        return note(code, off_rpm=RPM * line.nominal)
+    if bound.part is Part.CONE and bound.keep is not None:
+        return note(code, angle_deg=math.degrees(line.nominal), direction=bound.keep.name)
+    return note(code, angle_deg=math.degrees(line.nominal))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -363,9 +524,10 @@ class Simulation(results.Data, results.Tabled):
         return replace(self.flown if self.real else self.impulses, scheme=self.plan.scheme)
 
     @cached_property
-    def decision(self) -> Decision:
-        """Compliance of the flight through the real widths."""
-        return Decision(self.plan, seen=self.flown)
+    def verdict(self) -> Verdict:
+        """Judgement of the plan; of free motion that fails at t = 0, that at the end of the simulation."""
+        judged = self.plan.verdict
+        return judged if self.plan.pulses.pulses or judged.met else judge(self.plan, seen=self.flown)
 
     @cached_property
     def extremes(self) -> Extremes:
@@ -380,68 +542,3 @@ class Simulation(results.Data, results.Tabled):
     def pictured(self) -> Track:
         """Track of pictures, of at most 100,000 rows."""
         return self._both[self.real].sampled(min(self.samples, PICTURED), self.drawn_to)
-
-
-TELLING = math.radians(1e-6)  # remaining nutation angle in rad from which there is a note on it
-
-CUT = "the search ended at its limit of work"
-
-
-def infeasibility(plan: Plan) -> str:
-    """Reason for the lack of a schedule; empty where there is one."""
-    if plan.breach is not None:
-        why = f"the only schedule found breaks a limit: {_broken(plan.breach)}"
-    elif plan.astray is not None:
-        why = strays(plan.astray)
-        if math.isfinite(plan.astray.least_at):
-            why += "; no way round it was found within the limits"
-    elif plan.worse is not None:
-        why = f"the best schedule found would leave {math.degrees(plan.worse):.3g}° of nutation"
-        decayed = requirements.decayed(plan.spacecraft, plan.worse_at)
-        if decayed < plan.spacecraft.nutation:
-            why += f" at {plan.worse_at:.4g} s; without a pulse it decays to {math.degrees(decayed):.3g}° by then"
-    else:
-        why = plan.refusal or ""
-    return f"{why}; {CUT}" if why and plan.cut else why
-
-
-def strays(aspect: Aspect) -> str:
-    """Message on a broken cone."""
-    keep, (angle, at, limit) = aspect.keep, aspect.broken_at
-    bound = f"{'min' if aspect.too_near else 'max'} = {math.degrees(limit):.6g}°"
-    seen = f"{math.degrees(angle) if angle > NEGLIGIBLE else 0.0:.4g}°"
-    if math.isinf(at):
-        return f"the target is {seen} from {keep.name} ({bound})"
-    return f"the spin axis comes to {seen} from {keep.name} at {at:.4g} s ({bound})"
-
-
-def broken_limits(spacecraft: Spacecraft, schedule: Schedule) -> list[str]:
-    """Broken limits of a schedule, each in a sentence with the first pulse that breaks it and the number of others."""
-    grouped: dict[tuple[Limit, tuple[float, float] | None], list[Breach]] = {}
-    for breach in breaches(spacecraft, schedule):
-        grouped.setdefault((breach.limit, breach.window), []).append(breach)
-    counts = [(_broken(broken[0]), len(broken) - 1) for broken in grouped.values()]
-    return [text + f"; further pulses alike: {more}" * (more > 0) for text, more in counts]
-
-
-def _broken(breach: Breach) -> str:
-    """Message on a pulse that breaks a limit."""
-    pulse, bound, limit = breach.pulse, f"{breach.bound:.6g} s", breach.limit
-    if limit is Limit.MAX_PULSES:
-        return f"{breach.number} pulses are more than {breach.bound:.0f}"
-    begins, ends = breach.window or (math.nan, math.nan)
-    start, on_time = pulse.loaded
-    on = f"is on for {on_time:.6g} s"
-    early = f"comes less than {bound} after the one before" if breach.bound else "starts before the one before ends"
-    how = {
-        Limit.RESOLUTION: f"is too short for its time, where times are {breach.by:.2g} s apart",
-        Limit.EARLIEST: f"starts before {bound}",
-        Limit.HORIZON: f"ends after the horizon of {bound}",
-        Limit.GAP: early,
-        Limit.BLACKOUT: f"lies in the blackout window {begins:.6g} s to {ends:.6g} s",
-        Limit.MIN_ON_TIME: f"{on}, less than the shortest on-time of {bound}",
-        Limit.MAX_ON_TIME: f"{on}, more than the longest on-time of {bound}",
-        Limit.START_TICK: f"does not start on a tick of {bound}",
-        Limit.ON_TIME_TICK: f"has an on-time that is not a multiple of the tick of {bound}",
-    }[limit]
-    return f"pulse {breach.number} ({pulse.channel}, {start:.6g} s to {pulse.over:.6g} s) {how}"

@@ -10,16 +10,83 @@ from nutdamp.common.results import Note, Value, note
 from nutdamp.flight import end_state
 from nutdamp.flight.end_state import Aspect, at_start
 from nutdamp.flight.propagation import Flight
-from nutdamp.planning.decision import TELLING, Comparison, Decision, infeasibility
+from nutdamp.planning.decision import TIES, Comparison, Gain, Ground, Recommendation
 from nutdamp.planning.plan import Plan, Standing
-from nutdamp.planning.recommendation import TIES, Gain, Ground
+from nutdamp.planning.verdict import Verdict
 from nutdamp.schemes import catalogue
 from nutdamp.schemes.catalogue import OPTIMAL
 from nutdamp.schemes.sequential import steady_omega
 from nutdamp.spacecraft import requirements
-from nutdamp.spacecraft.constraints import rounded_off
+from nutdamp.spacecraft.constraints import Breach, Limit, breaches, rounded_off
 from nutdamp.spacecraft.model import LIGHTER, Spacecraft
-from nutdamp.spacecraft.requirements import Part
+from nutdamp.spacecraft.requirements import NEGLIGIBLE, Part
+from nutdamp.spacecraft.schedule import Schedule
+
+TELLING = math.radians(1e-6)  # remaining nutation angle in rad from which there is a note on it
+
+CUT = "the search ended at its limit of work"
+
+
+def infeasibility(plan: Plan) -> str:
+    """Reason for the lack of a schedule; empty where there is one."""
+    if plan.breach is not None:
+        why = f"the only schedule found breaks a limit: {_broken(plan.breach)}"
+    elif plan.astray is not None:
+        why = strays(plan.astray)
+        if math.isfinite(plan.astray.least_at):
+            why += "; no way round it was found within the limits"
+    elif plan.worse is not None:
+        why = f"the best schedule found would leave {math.degrees(plan.worse):.3g}° of nutation"
+        decayed = requirements.decayed(plan.spacecraft, plan.worse_at)
+        if decayed < plan.spacecraft.nutation:
+            why += f" at {plan.worse_at:.4g} s; without a pulse it decays to {math.degrees(decayed):.3g}° by then"
+    else:
+        why = plan.refusal or ""
+    return f"{why}; {CUT}" if why and plan.cut else why
+
+
+def strays(aspect: Aspect) -> str:
+    """Message on a broken cone."""
+    assert aspect.broken_at is not None
+    bound, angle, at = aspect.broken_at
+    limit = f"{'min' if bound.inner else 'max'} = {math.degrees(bound.limit):.6g}°"
+    seen = f"{math.degrees(angle) if angle > NEGLIGIBLE else 0.0:.4g}°"
+    if math.isinf(at):
+        return f"the target is {seen} from {aspect.keep.name} ({limit})"
+    return f"the spin axis comes to {seen} from {aspect.keep.name} at {at:.4g} s ({limit})"
+
+
+def broken_limits(spacecraft: Spacecraft, schedule: Schedule) -> list[str]:
+    """Broken limits of a schedule, each in a sentence with the first pulse that breaks it and the number of others."""
+    grouped: dict[tuple[Limit, tuple[float, float] | None], list[Breach]] = {}
+    for breach in breaches(spacecraft, schedule):
+        grouped.setdefault((breach.limit, breach.window), []).append(breach)
+    counts = [(_broken(broken[0]), len(broken) - 1) for broken in grouped.values()]
+    return [text + f"; further pulses alike: {more}" * (more > 0) for text, more in counts]
+
+
+def _broken(breach: Breach) -> str:
+    """Message on a pulse that breaks a limit."""
+    pulse, bound, limit = breach.pulse, f"{breach.bound:.6g} s", breach.limit
+    if limit is Limit.MAX_PULSES:
+        return f"{breach.number} pulses are more than {breach.bound:.0f}"
+    begins, ends = breach.window or (math.nan, math.nan)
+    start, on_time = pulse.loaded
+    on = f"is on for {on_time:.6g} s"
+    early = f"comes less than {bound} after the one before" if breach.bound else "starts before the one before ends"
+    how = {
+        Limit.RESOLUTION: f"is too short for its time, where times are {breach.by:.2g} s apart",
+        Limit.EARLIEST: f"starts before {bound}",
+        Limit.HORIZON: f"ends after the horizon of {bound}",
+        Limit.GAP: early,
+        Limit.BLACKOUT: f"lies in the blackout window {begins:.6g} s to {ends:.6g} s",
+        Limit.MIN_ON_TIME: f"{on}, less than the shortest on-time of {bound}",
+        Limit.MAX_ON_TIME: f"{on}, more than the longest on-time of {bound}",
+        Limit.START_TICK: f"does not start on a tick of {bound}",
+        Limit.ON_TIME_TICK: f"has an on-time that is not a multiple of the tick of {bound}",
+    }[limit]
+    return f"pulse {breach.number} ({pulse.channel}, {start:.6g} s to {pulse.over:.6g} s) {how}"
+
 
 TURNED = math.radians(0.1)  # turn of H, rad, from which it is mentioned
 
@@ -117,23 +184,31 @@ def remaining(plan: Plan) -> Note:
 
 def broken_cone(aspect: Aspect) -> Note:
     """A cone about a direction that the spin axis breaks."""
-    angle, at, limit = aspect.broken_at
-    angle, limit = math.degrees(angle), math.degrees(limit)
+    assert aspect.broken_at is not None
+    bound, angle, at = aspect.broken_at
+    angle, limit = math.degrees(angle), math.degrees(bound.limit)
     return note("cone-broken", angle_deg=angle, direction=aspect.keep.name, at_s=at, limit_deg=limit)
 
 
-def decision_notes(decision: Decision, *, looped: bool = False) -> Iterator[Note]:
-    """Notes beside the verdict; ``looped``: it is the flight of a closed loop, which goes on firing."""
-    plan, body, final = decision.plan, decision.plan.spacecraft, decision.flight.residual
-    if decision.undispersed and requirements.judged(body):
-        yield note("tolerances-not-checked")
-    if body.dispersions is None and requirements.judged(body):
-        yield note("no-tolerances")
+def verdict_notes(verdict: Verdict, plan: Plan, *, looped: bool = False) -> Iterator[Note]:
+    """Notes beside the verdict on a plan; ``looped``: it is that of a closed loop, which goes on firing."""
+    body, flight = plan.spacecraft, verdict.flight or plan.flight
+    final = flight.residual
+    if verdict.unshown:
+        yield note("probability-without-tolerances" if body.dispersions is None else "undecided-cases")
+    if verdict.cases is None and requirements.judged(body):
+        yield note("no-tolerances" if body.dispersions is None else "tolerances-not-checked")
+    if body.goal.spin is None and body.requirement is not None and body.requirement.spin is not None:
+        yield note("spin-required-without-goal")
+    if verdict.empties:
+        yield note("tank-empties")
+    if verdict.met is False:
+        yield from main_causes(verdict)
     if code := ideal_code(plan):
         yield note(code, scheme=plan.scheme)
     if looped:
         return
-    if not plan.commandable:
+    if verdict.status.barred:
         yield note("not-commandable", scheme=plan.scheme)
     now, limit = body.nutation, _limit_of(body, Part.NUTATION)
     if requirements.only_nutation(body):
@@ -143,24 +218,35 @@ def decision_notes(decision: Decision, *, looped: bool = False) -> Iterator[Note
         if idle:
             yield note("met-without-pulse-until", until_s=idle, nutation_deg=math.degrees(now), limit_deg=limit)
     if len(plan.pulses):
-        yield from _growing(decision)
+        yield from _growing(flight, verdict)
     limited = body.goal.axis is not None or _limit_of(body, Part.SHIFT) is not None
     if not limited and final.momentum_shift > TURNED:
         yield note("momentum-shift", scheme=plan.scheme, momentum_shift_deg=math.degrees(final.momentum_shift))
-    yield from _spin_change(decision)
+    yield from _spin_change(plan, flight)
     if body.loop is not None:
         yield note("loop-not-judged")
 
 
-def _spin_change(decision: Decision) -> Iterator[Note]:
+def main_causes(verdict: Verdict) -> Iterator[Note]:
+    """Inputs that decide the failing cases."""
+    if verdict.causes and verdict.tightest is not None:
+        part = verdict.tightest.bound.label
+        causes = ", ".join(f"{cause.input} ({100.0 * cause.share:.3g} %)" for cause in verdict.causes)
+        if verdict.met is False:
+            yield note("causes-of-failure", part=part, causes=causes)
+        else:
+            yield note("main-causes", part=part, causes=causes)
+
+
+def _spin_change(plan: Plan, flight: Flight) -> Iterator[Note]:
     """Change of the spin that nobody asked for, and its causes: axial impulses of channels, then what else acts."""
-    plan, body = decision.plan, decision.plan.spacecraft
-    before, after = RPM * body.spin, RPM * decision.flight.final.spin
+    body = plan.spacecraft
+    before, after = RPM * body.spin, RPM * flight.final.spin
     # One of five digits has to change.
     resolution = 10.0 ** (math.floor(math.log10(max(abs(before), abs(after), 1e-9))) - 4)
     if body.goal.spin is not None or abs(after - before) <= resolution:
         return
-    pulses, causes, explained = decision.flight.schedule, list[str](), 0.0
+    pulses, causes, explained = flight.schedule, list[str](), 0.0
     for name in dict.fromkeys(pulse.channel for pulse in pulses):
         impulse = math.fsum(float(pulse.impulse[2]) for pulse in pulses if pulse.channel == name)
         explained += RPM * impulse / body.inertia.C
@@ -188,14 +274,14 @@ def ideal_code(plan: Plan) -> str:
 
 
 def _limit_of(body: Spacecraft, part: Part) -> float | None:
-    most = next((bound.most for bound in requirements.required(body) if bound.part is part), None)
+    most = next((bound.limit for bound in requirements.required(body) if bound.part is part), None)
     return None if most is None else math.degrees(most)
 
 
-def _growing(decision: Decision) -> Iterator[Note]:
+def _growing(flight: Flight, verdict: Verdict) -> Iterator[Note]:
     """Time for which nutation that grows keeps the requirement after the last pulse."""
-    body, flight, cases = decision.plan.spacecraft, decision.flight, decision.cases
-    left = flight.final.nutation if cases is None else cases.levels[Part.NUTATION]
+    body, cases = flight.spacecraft, verdict.cases
+    left = next((line.value for line in verdict.lines if line.bound.part is Part.NUTATION), flight.final.nutation)
     again = requirements.to_required(body, left, growing=True)
     if again and left > TELLING:
         after = flight.schedule.end if flight.until is None else flight.until
@@ -225,8 +311,8 @@ def comparison_warnings(compared: Comparison, *, tabulated: bool = False) -> Ite
         if not aspect.kept:
             yield Note("cone-broken-at-start", tuple(item for item in broken_cone(aspect).items if item[0] != "at_s"))
     others = [plan.scheme for plan in compared.plans if plan.feasible and not plan.commandable]
-    better = [scheme for scheme in others if compared.meets(compared[scheme])]
-    if better and chosen.commandable and not compared.meets(chosen):
+    better = [scheme for scheme in others if compared.verdicts[compared[scheme]].met]
+    if better and chosen.commandable and compared.verdicts[chosen].met is False:
         yield note("blocks-cannot", schemes=", ".join(better))
     cut = [plan.scheme for plan in compared.plans if plan.cut]
     if cut and compared.recommendation.standing is not Standing.COMPLIES:
@@ -237,15 +323,12 @@ def _missed(chosen: Plan, compared: Comparison, *, tabulated: bool) -> Iterator[
     """Requirements that the recommended plan misses, and the causes."""
     if compared.recommendation.standing is Standing.COMPLIES:
         return
-    share = compared.shares.get(chosen)
-    if share is not None and not share.met and chosen.standing is not Standing.MISSES:
-        if chosen.kept is False:  # the cones are the reason
-            return
-        if share.met is None:
-            yield note("undecided-cases")
-        else:
-            schemes = ", ".join(plan.scheme for plan, each in compared.shares.items() if each.met is False)
-            yield note("too-few-cases", schemes=schemes, required_share=100.0 * share.probability)
+    cases = compared.verdicts[chosen].cases
+    if chosen.standing is not Standing.MISSES and compared.cases and not compared.cases[chosen].enough:
+        if chosen.kept is not False and cases is not None and cases.enough is False:  # else the cones are the reason
+            missing = ((plan, each) for plan, each in compared.cases.items() if each.enough is False)
+            schemes = ", ".join(plan.scheme for plan, _ in missing)
+            yield note("too-few-cases", schemes=schemes, required_share=100.0 * cases.probability)
         return
     left = chosen.left
     assert left is not None
@@ -259,9 +342,9 @@ def _missed(chosen: Plan, compared: Comparison, *, tabulated: bool) -> Iterator[
         yield note(
             "requirement-missed" if bound.required else "not-damped",
             scheme=chosen.scheme,
-            left_deg=math.degrees(requirements.left_of(bound.part, left, chosen.spacecraft)),
-            part=bound.part.label,
-            limit_deg=math.degrees(bound.most),
+            left_deg=math.degrees(requirements.left_of(bound, left, chosen.spacecraft)),
+            part=bound.label,
+            limit_deg=math.degrees(bound.limit),
         )
     yield from _obstacles(chosen, compared)
 
@@ -279,15 +362,16 @@ def _obstacles(plan: Plan, compared: Comparison) -> Iterator[Note]:
         else:
             yield note("disturbances-not-helped")
     if Part.NUTATION in parts and (cause := remaining(plan)).code != "remains-unplanned":
-        if cause.code in ("remains-limits", "remains-scheme"):
-            certain, possible = hindrances(plan)
+        reached = [limit for limits in hindrances(plan) for limit in limits]
+        short = plan.pulses.total_impulse < body.least_impulse and cause.code != "remains-max-pulses"
+        if reached and short:
             yield note(
                 "pulses-at-limits",
                 given_Nms=plan.pulses.total_impulse,
                 needed_Nms=body.least_impulse,
                 end_s=plan.pulses.end,
                 horizon_s=body.horizon,
-                limits=", ".join((*certain, *possible)) or "none",
+                limits=", ".join(reached),
             )
         else:
             yield cause.of(plan.scheme)
@@ -327,6 +411,14 @@ def beside(plan: Plan, than: Plan, by_propellant: bool) -> dict[str, Value]:
     return {"cost": cost, "than_cost": than_cost, "unit": shown, "end_s": plan.end, "than_end_s": than.end}
 
 
+LEAST_CODES = {"impulse": "least-impulse", "time": "least-time", "pulses": "least-pulses"}
+"""Codes of the notes on the plan that takes least of what is saved, but propellant."""
+
+
+def _by_cost(recommendation: Recommendation) -> str:
+    return "least-propellant" if recommendation.by_propellant else "least-impulse"
+
+
 def reasons(compared: Comparison) -> Iterator[Note]:
     """Reason for the recommended plan, or for none."""
     recommendation, body = compared.recommendation, compared.spacecraft
@@ -348,6 +440,8 @@ def reasons(compared: Comparison) -> Iterator[Note]:
         return
     if ground is Ground.CASES:
         yield note("most-cases", count=count)
+    elif ground is Ground.ROBUST:
+        yield note("made-for-cases")
     elif recommendation.standing is not Standing.COMPLIES:
         yield note("nearest" if ground is Ground.NEAREST else "least-left", count=count)
     elif recommendation.plan.kept is False:
@@ -355,7 +449,7 @@ def reasons(compared: Comparison) -> Iterator[Note]:
     elif not requirements.required(body):
         yield note("damps-at-least", count=count)
     else:
-        yield note("least-propellant" if recommendation.by_propellant else "least-impulse", count=count)
+        yield note(LEAST_CODES.get(recommendation.least, _by_cost(recommendation)), count=count)
     if ground in TIES:
         yield note(ground.value)
 

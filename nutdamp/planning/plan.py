@@ -22,9 +22,10 @@ from nutdamp.common.numerics import cleaned
 from nutdamp.common.results import note
 from nutdamp.errors import Infeasible
 from nutdamp.flight import end_state, propagation
-from nutdamp.flight.end_state import Aspect, left_by, seen_at
+from nutdamp.flight.end_state import Aspect, left_on_the_way, seen_at
 from nutdamp.flight.propagation import Flight, Residual
 from nutdamp.physics import attitude, precession
+from nutdamp.planning.verdict import Cases, JudgedCases, Verdict, judge_schedule, no_plan
 from nutdamp.schemes import catalogue, planner, valve_commands
 from nutdamp.schemes.valve_commands import Legs
 from nutdamp.spacecraft import requirements
@@ -149,25 +150,6 @@ class Standing(Enum):
     MISSES = "misses"  # does not meet it, or, without one, does not damp
 
 
-@dataclass(frozen=True, slots=True)
-class Share:
-    """Share of cases that comply, ``low`` to ``high``, equal where all flew; ``probability`` of them must."""
-
-    low: float
-    high: float
-    probability: float
-
-    @property
-    def exact(self) -> float | None:
-        """Share; None where not all cases have flown."""
-        return self.low if self.low == self.high else None
-
-    @property
-    def met(self) -> bool | None:
-        """Compliance in enough cases; None where the flown ones do not decide it."""
-        return True if self.low >= self.probability else False if self.high < self.probability else None
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class Plan(results.Data, results.Tabled):
     """Schedule of a scheme for a spacecraft, and its judgement.
@@ -230,6 +212,9 @@ class Plan(results.Data, results.Tabled):
     def __len__(self) -> int:
         return len(self.pulses)
 
+    def __bool__(self) -> bool:
+        return True  # a plan without pulses is one
+
     def fly(self, until: float | None = None, *, samples: int = 1000, by_impulses: bool = False) -> Flight:
         """Fly the schedule through its real pulse widths, or by the impulse sum (17), until ``until`` s.
 
@@ -258,7 +243,7 @@ class Plan(results.Data, results.Tabled):
 
     def reaching(self, time: float) -> Flight:
         """Flight through the real pulse widths as far as ``time`` s at least."""
-        return propagation.flown(self.spacecraft, self.pulses, time)
+        return replace(propagation.flown(self.spacecraft, self.pulses, time), scheme=self.scheme)
 
     @cached_property
     def residual(self) -> Residual | None:
@@ -278,12 +263,17 @@ class Plan(results.Data, results.Tabled):
     @property
     def left(self) -> Left | None:
         """Flown residual for `requirements`."""
-        return left_by(self.flight) if self.feasible else None
+        return left_on_the_way(self.flight, self.aspects) if self.feasible else None
 
     @property
     def commandable(self) -> bool:
         """True if the spacecraft can fire it: by command blocks only, or nothing, where it takes such."""
-        return self.spacecraft.commands is None or bool(self.pulses.blocks) or not len(self.pulses)
+        return self.spacecraft.commands is None or bool(self.pulses.blocks) or not self.pulses.pulses
+
+    @property
+    def held(self) -> tuple[Held, ...]:
+        """Flown residual beside each bound of `requirements`, end and way; empty for an infeasible plan."""
+        return () if self.left is None else requirements.held(self.spacecraft, self.left)
 
     @property
     def meets_requirement(self) -> bool | None:
@@ -296,27 +286,28 @@ class Plan(results.Data, results.Tabled):
     @property
     def ends_well(self) -> bool | None:
         """Compliance of the flown residual at the end; None where nothing is required."""
-        required = [line.met for line in self.held if line.bound.required]
+        required = [line.met for line in self.held if line.bound.required and line.bound.keep is None]
         return all(required) if required else None
 
     @property
-    def held(self) -> tuple[Held, ...]:
-        """Flown residual beside each of the `requirements.bounds`; empty for an infeasible plan."""
-        return () if self.left is None else requirements.held(self.spacecraft, self.left)
-
-    @property
     def shortfalls(self) -> tuple[Bound, ...]:
-        """Members of `requirements.bounds` that the flown residual breaks."""
-        return tuple(line.bound for line in self.held if not line.met)
+        """Bounds at the end that the flown residual breaks."""
+        return tuple(line.bound for line in self.held if not line.met and line.bound.keep is None)
 
     @property
     def standing(self) -> Standing:
         """Standing at the end, regardless of cones; an infeasible plan misses all."""
-        if self.left is None or self.ends_well is False:
+        if not self.feasible or self.ends_well is False:
             return Standing.MISSES
         if not self.shortfalls:
             return Standing.COMPLIES
         return Standing.MISSES if self.ends_well is None else Standing.MEETS
+
+    @cached_property
+    def verdict(self) -> Verdict:
+        """Judgement of the plan: nominal values, and the dispersed cases of its file."""
+        judgement: Verdict = results.view(self, "verdict")
+        return judgement
 
     @property
     def severity(self) -> float:
@@ -363,7 +354,7 @@ class Plan(results.Data, results.Tabled):
     @property
     def kept(self) -> bool | None:
         """True if the flown spin axis keeps its cones; None where the file names none."""
-        return all(aspect.kept for aspect in self.aspects) if self.spacecraft.keep else None
+        return all(line.met for line in self.held if line.bound.keep is not None) if self.spacecraft.keep else None
 
 
 def plan(spacecraft: Spacecraft, scheme: str, options: planner.Choice = None) -> Plan:
@@ -451,6 +442,40 @@ def judged(spacecraft: Spacecraft, scheme: str, schedule: Schedule, options: cat
     return flown
 
 
+def judge(
+    plan: Plan,
+    cases: Cases | None = None,
+    results: JudgedCases | None = None,
+    *,
+    nominal: bool = False,
+    timed: bool = False,
+    seen: Flight | None = None,
+) -> Verdict:
+    """Judgement of a plan by its nominal values and by dispersed ``cases``, of which ``results`` has all.
+
+    ``nominal``: cases are left out on request; ``timed``: pulses may be commanded one by one; ``seen``: the flight to
+    be judged, default that of the plan.
+    """
+    body = plan.spacecraft
+    if not plan.feasible:
+        return no_plan(body, plan.scheme, plan.why or "")
+    flight, observed, held = plan.flight, plan.aspects, plan.held
+    if seen is not None:
+        flight, observed = seen, end_state.aspects(seen, seen.until)
+        held = requirements.held(body, left_on_the_way(flight, observed))
+    return judge_schedule(
+        flight,
+        observed,
+        held,
+        cases,
+        results,
+        scheme=plan.scheme,
+        schedule=plan.pulses,
+        sendable=plan.commandable or timed,
+        nominal=nominal,
+    )
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Verified(results.Data):
     """A ``plan`` flown by independent methods: ``core`` holds them, conserved quantities and the error budget."""
@@ -478,6 +503,6 @@ def feasible(plan: Plan) -> Plan:
 def unrounded(plan_: Plan) -> Schedule | None:
     """Schedule with commands of any resolution; None without a tick, such a schedule, or a scheme that planned it."""
     body = plan_.spacecraft
-    if body.limits.tick is None or plan_.from_file:
+    if body.limits.tick is None or plan_.from_file or plan_.scheme not in catalogue.SCHEMES:
         return None
     return plan(replace(body, limits=replace(body.limits, tick=None)), plan_.scheme, plan_.options).schedule

@@ -1,4 +1,4 @@
-"""Robust plans: selection by the share of complying cases, and on-times shortened to the required share.
+"""Robust plans: selection by the share of complying cases.
 
 Candidates are the schedules of the schemes, and variants: later starts, channels left unused, other alignments; of
 `optimal` its earliest ends too, for errors of the rates grow with time, and those of `chance_plan`.
@@ -7,11 +7,11 @@ Candidates are the schedules of the schemes, and variants: later starts, channel
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from enum import IntEnum
-from functools import partial
+from functools import cached_property, partial
 from operator import attrgetter
 from typing import NamedTuple
 
@@ -20,16 +20,16 @@ import numpy as np
 from nutdamp.common import results, work
 from nutdamp.common.results import Note, note
 from nutdamp.errors import Infeasible
-from nutdamp.montecarlo.study import SEED, study_of
-from nutdamp.planning import chance_plan, screening
+from nutdamp.montecarlo.study import flown_in_stages, study_of
+from nutdamp.planning import chance_plan
 from nutdamp.planning import plan as planning
 from nutdamp.planning.chance_plan import Tightening, tightening
-from nutdamp.planning.decision import Comparison, Decision, attempt
+from nutdamp.planning.decision import TIES, Comparison, Ground, attempt, by_propellant, cheapest, nearest
 from nutdamp.planning.notes import beside
 from nutdamp.planning.plan import Plan, Standing
-from nutdamp.planning.recommendation import TIES, Ground, by_propellant, cheapest, nearest
-from nutdamp.planning.screening import AS_GOOD, Fresh, PlanCandidate, entered, equal_from, fly_all, fresh_of
-from nutdamp.schemes.catalogue import OPTIMAL, SCHEMES, Options
+from nutdamp.planning.screening import FlownPlan, entered
+from nutdamp.planning.verdict import Cases, Verdict, cases_of
+from nutdamp.schemes.catalogue import LEAST, OPTIMAL, SCHEMES, Options
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import keeps_limits
 from nutdamp.spacecraft.model import Spacecraft, required_share
@@ -39,7 +39,10 @@ LATER = (0.25, 0.5, 0.75, 1.0, 2.0)
 WITHIN = (1.5, 2.0)  # ends by which the scheme optimal is to be done with least cost, over the earliest one
 
 ROBUST = "robust"  # name of the robust plan beside those of schemes
-CHECKED = 6  # plans with which just enough cases seem to comply that are tried in such cases, one after the other
+FRESH = 211  # seed of cases that nothing was chosen by
+
+AS_GOOD = 1.05
+"""Without a requirement: candidates within this factor of the least angle count as equal, so far apart may be luck."""
 
 
 class Cost(NamedTuple):
@@ -55,23 +58,24 @@ class Cost(NamedTuple):
 class RobustComparison(results.Data):
     """Candidates from the best down; ``usual`` is recommended by the comparison, ``chosen`` the robust plan.
 
-    ``ground`` decided among the ``equals`` candidates that comply often enough, or are as good as the best, by
-    propellant or by impulse. Each flew ``samples`` cases of ``seed``. ``tightening``: tolerances with which enough
-    cases would comply, where too few do. ``fresh``: the robust plan in cases by which it was not chosen, if required.
+    ``ground`` decided among the ``equals`` candidates, by propellant or by impulse. ``tightening``: tolerances with
+    which enough cases would comply, where too few do. ``fresh``: the robust plan in cases by which it was not chosen.
     """
 
     comparison: Comparison
-    candidates: tuple[PlanCandidate, ...]
-    usual: PlanCandidate | None
-    chosen: PlanCandidate | None
+    candidates: tuple[FlownPlan, ...]
+    usual: FlownPlan | None
+    chosen: FlownPlan | None
     ground: Ground | None
     equals: int
-    by_propellant: bool
     probability: float
-    samples: int
-    seed: int
     tightening: Tightening | None = None
-    fresh: Fresh | None = None
+    fresh: Cases | None = None
+
+    @property
+    def by_propellant(self) -> bool:
+        """True if the propellant of all candidates is known, which are compared by it."""
+        return by_propellant([candidate.plan for candidate in self.candidates])
 
     @property
     def cost(self) -> Cost | None:
@@ -87,41 +91,27 @@ class RobustComparison(results.Data):
         )
 
     @property
-    def meets_requirement(self) -> bool | None:
-        """Compliance of the robust plan in enough cases and nominally; None where nothing is required."""
-        return None if self.decision is None else self.decision.met
+    def verdict(self) -> Verdict:
+        """Judgement of the robust plan, by the cases that `nutdamp.montecarlo.study` draws for any schedule."""
+        return self.joined.verdict
 
-    @property
-    def decision(self) -> Decision | None:
-        """Decision on the robust plan, by the cases that `nutdamp.montecarlo.study` draws for any schedule."""
-        return None if self.chosen is None else Decision(self.chosen.plan, self.chosen.cases)
-
-    @property
+    @cached_property
     def joined(self) -> Comparison:
-        """Comparison with the robust plan in it as `ROBUST`, unless it is one of those compared."""
-        if self.chosen is None or self.name != ROBUST:
+        """Comparison with the robust plan in it as `ROBUST`, unless it is one of those compared, as recommended."""
+        if self.chosen is None:
             return self.comparison
-        plan = replace(self.chosen.plan, scheme=ROBUST)
-        flown = None if self.comparison.flown is None else {**self.comparison.flown, plan: self.chosen}
-        return replace(self.comparison, plans=(*self.comparison.plans, plan), flown=flown)
+        kind = _kind(self.chosen.plan)
+        plans, flown = self.comparison.plans, dict(self.comparison.flown or {})
+        same = next((plan for plan in plans if plan.feasible and _kind(plan) == kind), None)
+        plan = same or replace(self.chosen.plan, scheme=ROBUST)
+        flown[plan] = self.chosen
+        return replace(self.comparison, plans=plans if same else (*plans, plan), flown=flown, preferred=plan)
 
     @property
     def name(self) -> str:
         """Name of the robust plan in `joined`; empty where there is none."""
-        if self.chosen is None:
-            return ""
-        kind = _kind(self.chosen.plan)
-        return next((plan.scheme for plan in self.comparison.plans if plan.feasible and _kind(plan) == kind), ROBUST)
-
-    @property
-    def lucky(self) -> bool:
-        """True if enough cases comply, but too few of those by which the plan was not chosen."""
-        return self.fresh is not None and self.fresh.met < self.probability <= (self.met or 0.0)
-
-    @property
-    def met(self) -> float | None:
-        """Share of cases that comply with the robust plan."""
-        return None if self.chosen is None else self.chosen.met
+        plan = self.joined.recommended
+        return "" if self.chosen is None or plan is None else plan.scheme
 
 
 class VariationKind(IntEnum):
@@ -155,20 +145,15 @@ def variations_of(comparison: Comparison, options: Options | None = None) -> lis
 
 
 def compare(
-    comparison: Comparison,
-    variations: Sequence[Variation],
-    watch: Callable[[int], None] = lambda _: None,
-    *,
-    samples: int = work.SAMPLES,
+    comparison: Comparison, variations: Sequence[Variation], watch: Callable[[int], None] = lambda _: None
 ) -> RobustComparison:
     """Make the plans of the ``variations``, let dispersed cases fly each, and recommend one; no schedule comes twice.
 
-    ``samples`` cases of those that may be chosen; ``watch`` is called with how many variations are done, then now and
-    then. Raises BadRequest for a spacecraft without dispersions.
+    The cheapest plan of which enough cases comply, in fresh ones too, beyond the intervals of both. ``watch`` is called
+    with how many variations are done. Raises BadRequest for a spacecraft without dispersions.
     """
     body = comparison.spacecraft
-    probability = required_share(body.requirement)
-    entries: dict[object, PlanCandidate] = {}
+    entries: dict[object, FlownPlan] = {}
     # No early end costs less than the plan of the whole horizon that leaves as little.
     least = min((plan.pulses.cost for plan in comparison.plans if plan.scheme == OPTIMAL.name), default=0.0)
     with work.budget("the robust plans", work.FRONTS) as budget:
@@ -186,114 +171,120 @@ def compare(
                 if comparison.only_commanded and not own.commandable:
                     continue
                 planned = True
-                known = None if comparison.flown is None else comparison.flown.get(plan)
                 with suppress(Infeasible):  # cases that cannot be flown, such as those that take too long
-                    if known is not None and known.cases.requested == samples:
-                        entries[kind] = replace(known, variant=variant)
-                    else:
-                        entries[kind] = entered(own, variant, study_of(body, own.pulses), samples)
+                    known = (comparison.flown or {}).get(plan)
+                    candidate = entered(own, None, variant) if known is None else replace(known, variant=variant)
+                    if candidate is not None:
+                        entries[kind] = candidate
             if planned and variation.kind in (VariationKind.MARGINS, VariationKind.EARLY):
-                ranks = _flown(comparison, entries, samples, probability)
-                cheap = ranks.chosen is not None and ranks.chosen.plan.pulses.cost <= least
+                chosen, ground, fresh = _confirmed(entries, comparison.recommended, comparison.least)
+                cheap = chosen is not None and comparison.least == LEAST[0] and chosen.plan.pulses.cost <= least
                 done = variation.kind is VariationKind.EARLY or cheap
-                if done and ranks.meets_requirement and not ranks.lucky:  # other variants seldom cost less
-                    return _trimmed(ranks)
-    return _trimmed(_flown(comparison, entries, samples, probability, partial(watch, len(variations))))
+                if chosen is not None and done:  # other variants seldom cost less
+                    return _result(comparison, entries, chosen, ground, fresh)
+    watch(len(variations))
+    chosen, ground, fresh = _confirmed(entries, comparison.recommended, comparison.least)
+    if chosen is not None:
+        return _result(comparison, entries, chosen, ground, fresh)
+    chosen, ground, equals = _nearest(list(entries.values()), comparison.recommended, comparison.least)
+    if chosen is None or not requirements.judged(body):
+        return _result(comparison, entries, chosen, ground, equals=equals)
+    needed = None if chosen.cases.enough else tightening(chosen.plan, required_share(body.requirement))
+    return _result(comparison, entries, chosen, ground, _fresh(chosen), needed, equals)
 
 
-def _flown(
-    comparison: Comparison,
-    entries: dict[object, PlanCandidate],
-    samples: int,
-    probability: float,
-    watch: Callable[[], None] = lambda: None,
-) -> RobustComparison:
-    """Comparison of the ``entries`` in all cases, where they may be chosen, and the choice, checked in fresh cases.
+def _confirmed(
+    entries: Mapping[object, FlownPlan], usual: Plan | None, saved: str = LEAST[0]
+) -> tuple[FlownPlan | None, Ground | None, Cases | None]:
+    """`cheapest` plan of which enough cases comply, in fresh ones too; deciding ground, and these. None without one.
 
-    Against selection by luck a plan with which too few of those comply gives way to the next one with which enough seem
-    to. `Tightening` where too few comply all the same.
+    Plans that damp all come first; those that leave undamped what is not required follow by what they leave. Of equal
+    costs the ``usual`` one; ``saved``: see `LEAST`. None where nothing is required.
     """
-    candidates = list(entries.values())
+    if not entries or not requirements.judged(next(iter(entries.values())).plan.spacecraft):
+        return None, None, None
+
+    def undamped(each: FlownPlan) -> float:
+        return 0.0 if each.plan.standing is Standing.COMPLIES else each.left
+
+    hopeful = {each.plan: each for each in entries.values() if each.plan.meets_requirement is not False}
+    while hopeful := {plan: each for plan, each in hopeful.items() if each.cases.enough is not False}:
+        least = min(map(undamped, hopeful.values()))
+        plan, ground = cheapest([plan for plan, each in hopeful.items() if undamped(each) == least], usual, saved)
+        candidate = hopeful.pop(plan)
+        with suppress(Infeasible):
+            candidate.decide(None)
+            if candidate.cases.enough:
+                candidate.finish(None)
+            if candidate.cases.enough:
+                fresh = _fresh(candidate)
+                if fresh is not None and fresh.enough:
+                    return candidate, ground, fresh
+    return None, None, None
+
+
+def _fresh(candidate: FlownPlan) -> Cases | None:
+    """Plan in cases that it was not chosen by; None where one of them cannot be flown."""
+    plan = candidate.plan
+    try:
+        return cases_of(flown_in_stages(study_of(plan.spacecraft, plan.pulses, seed=FRESH)))
+    except Infeasible:
+        return None
+
+
+def _nearest(
+    candidates: Sequence[FlownPlan], usual: Plan | None, saved: str = LEAST[0]
+) -> tuple[FlownPlan | None, Ground | None, int]:
+    """Plan with which most cases comply, or that leaves least where nothing is required or no case complies.
+
+    Of plans as good, but for what the sampling may make of them, the cheapest, of equal costs the ``usual`` one; and
+    how many are as good.
+    """
+    if not candidates:
+        return None, None, 0
+    if not requirements.judged(candidates[0].plan.spacecraft):
+        least = min(candidate.left for candidate in candidates)
+        equals = [candidate.plan for candidate in candidates if candidate.left <= AS_GOOD * least]
+        best, ground = cheapest([plan for plan in equals if plan.standing is Standing.COMPLIES] or equals, usual, saved)
+    elif all(candidate.cases.complying == 0.0 for candidate in candidates):
+        equals = [candidate.plan for candidate in candidates]
+        best, ground = nearest(equals)
+    else:
+        hopeful = max(candidate.cases.low for candidate in candidates)
+        for candidate in candidates:
+            if candidate.cases.high >= hopeful:
+                with suppress(Infeasible):
+                    candidate.finish(None)
+        final = [candidate for candidate in candidates if candidate.final]
+        most = max(final, key=lambda candidate: candidate.cases.complying or 0.0)
+        equals = [each.plan for each in final if (each.cases.complying or 0.0) >= most.cases.low]
+        best, ground = cheapest(equals, usual, saved)
+    return next(each for each in candidates if each.plan is best), ground, len(equals)
+
+
+def _result(
+    comparison: Comparison,
+    entries: Mapping[object, FlownPlan],
+    chosen: FlownPlan | None,
+    ground: Ground | None,
+    fresh: Cases | None = None,
+    needed: Tightening | None = None,
+    equals: int | None = None,
+) -> RobustComparison:
+    """Result of the search, its candidates by rank; ``equals``: default those of which enough cases comply."""
     usual = None if comparison.recommended is None else entries.get(_kind(comparison.recommended))
-    fly_all(candidates, samples, probability, [] if usual is None else [usual], watch)
-    ranks = ranked(comparison, candidates, samples, probability)
-    refused: list[PlanCandidate] = []
-    while (chosen := ranks.chosen) is not None:
-        if not chosen.cases.decided and chosen not in refused:  # it came after one that was refused
-            flyable = [chosen]
-            fly_all(flyable, samples, 0.0)
-            refused += [] if flyable else [chosen]
-        else:
-            ranks = replace(ranks, fresh=fresh_of(chosen, samples))
-            if not ranks.lucky or chosen in refused or len(refused) == CHECKED:
-                break
-            refused.append(chosen)
-        ranks = ranked(comparison, candidates, samples, probability, refused=refused)
-    if chosen is None or ranks.met is None or ranks.met >= probability:
-        return ranks
-    return replace(ranks, tightening=tightening(chosen.plan, probability))
+    if chosen is not None:
+        chosen.finish(None)
 
+    def rank(each: FlownPlan) -> tuple[bool, float, float]:
+        missed = each.left if each.cases.complying is None else 1.0 - each.cases.complying
+        return each is not chosen, missed, each.plan.pulses.cost
 
-def _trimmed(ranks: RobustComparison) -> RobustComparison:
-    """Comparison with the robust plan's on-times as short as the required share allows, in fresh cases too.
-
-    Unless they also do what is not required, and would be short of it.
-    """
-    chosen = ranks.chosen
-    if not all(bound.required for bound in requirements.bounds(ranks.comparison.spacecraft)):
-        return ranks
-    if chosen is None or chosen.met is None or chosen.met < ranks.probability or ranks.lucky or ranks.fresh is None:
-        return ranks
-    best = screening.shortest(chosen, ranks.fresh)
-    if best.candidate is chosen:
-        return ranks
-    candidates = best.candidate, *ranks.candidates
-    return replace(ranks, chosen=best.candidate, candidates=candidates, ground=Ground.COST, fresh=best.fresh)
-
-
-def ranked(
-    comparison: Comparison,
-    candidates: Sequence[PlanCandidate],
-    samples: int,
-    probability: float,
-    *,
-    refused: Sequence[PlanCandidate] = (),
-) -> RobustComparison:
-    """Comparison of flown candidates, and the choice: the `cheapest` of the equals.
-
-    Of plans with which enough cases comply those that damp what is not required too, else those that leave least. With
-    the ``refused`` ones too few of other cases comply: they are taken where there is no plan with which enough do.
-    Where no case complies with any plan, it is the `nearest`.
-    """
-
-    def damping(equal: list[PlanCandidate]) -> list[PlanCandidate]:
-        return [candidate for candidate in equal if candidate.plan.standing is Standing.COMPLIES]
-
-    recommended = None if comparison.recommended is None else _kind(comparison.recommended)
-    usual = next((candidate for candidate in candidates if _kind(candidate.plan) == recommended), None)
-    enough = [candidate for candidate in candidates if candidate.met is not None and candidate.met >= probability]
-    least = min((candidate.left for candidate in enough), default=0.0)
-    enough = damping(enough) or [candidate for candidate in enough if candidate.left <= AS_GOOD * least]
-    equals = [candidate for candidate in enough if candidate not in refused] or enough
-    if candidates and not equals:  # those as good as the best, but for what the sampling may make of them
-        top = min(candidates, key=attrgetter("rank"))
-        if top.met is None:
-            equals = [candidate for candidate in candidates if candidate.rank <= AS_GOOD * top.rank]
-            equals = damping(equals) or equals
-        else:
-            low = equal_from(top.met, samples)
-            equals = [candidate for candidate in candidates if candidate.met is not None and candidate.met >= low]
-    chosen, ground = None, None
-    if equals:
-        plans = [equal.plan for equal in equals]
-        hopeless = all(equal.met == 0.0 for equal in equals)
-        best, ground = nearest(plans) if hopeless else cheapest(plans, None if usual is None else usual.plan)
-        chosen = next(equal for equal in equals if equal.plan is best)
-    by_rank = sorted(candidates, key=lambda each: (each is not chosen, each.rank, each.plan.pulses.cost))
-    known = by_propellant([equal.plan for equal in equals])
-    return RobustComparison(
-        comparison, tuple(by_rank), usual, chosen, ground, len(equals), known, probability, samples, SEED
-    )
+    candidates = tuple(sorted(entries.values(), key=rank))
+    if equals is None:
+        equals = sum(each.cases.enough is True for each in candidates)
+    probability = required_share(comparison.spacecraft.requirement)
+    return RobustComparison(comparison, candidates, usual, chosen, ground, equals, probability, needed, fresh)
 
 
 def _kind(plan: Plan) -> object:
@@ -347,11 +338,12 @@ def robust_reasons(robust: RobustComparison) -> Iterator[Note]:
     elif count == 1:
         yield note("as-requested" if len(robust.comparison.plans) == 1 else "only-plan")
     else:
-        if chosen.met is None:
+        share = chosen.cases.complying
+        if share is None:
             yield note("robust-least-left", count=count, equals=robust.equals, required_share=required)
-        elif chosen.met >= robust.probability:
+        elif chosen.cases.enough:
             yield note("robust-complies", count=count, equals=robust.equals, required_share=required)
-        elif chosen.met > 0.0:
+        elif share > 0.0:
             yield note("robust-most-cases", count=count, equals=robust.equals)
         if robust.ground in (Ground.LEFT, Ground.NEAREST):
             yield note("nearest" if robust.ground is Ground.NEAREST else "least-left", count=count)
@@ -371,8 +363,10 @@ def robust_cost(robust: RobustComparison) -> Iterator[Note]:
         return
     known = by_propellant([chosen.plan, usual.plan])
     figures = {"scheme": usual.plan.scheme, **beside(chosen.plan, usual.plan, known)}
-    if chosen.met is not None and usual.met is not None:
-        yield note("robust-cost", share=f"{100.0 * chosen.met:.4g}", than_share=f"{100.0 * usual.met:.4g}", **figures)
+    complying, than = chosen.cases.complying, usual.cases.complying
+    if complying is not None and than is not None:
+        share, than_share = f"{100.0 * complying:.4g}", f"{100.0 * than:.4g}"
+        yield note("robust-cost", share=share, than_share=than_share, **figures)
     else:
-        left, than = math.degrees(chosen.left), math.degrees(usual.left)
-        yield note("robust-cost-left", left_deg=left, than_left_deg=than, **figures)
+        left, than_left = math.degrees(chosen.left), math.degrees(usual.left)
+        yield note("robust-cost-left", left_deg=left, than_left_deg=than_left, **figures)

@@ -18,9 +18,10 @@ import numpy as np
 from nutdamp.common import results, work
 from nutdamp.errors import BadRequest, Infeasible
 from nutdamp.planning import plan as planning
-from nutdamp.planning.decision import compare, infeasibility, usual
-from nutdamp.planning.plan import Plan, plan
-from nutdamp.planning.recommendation import by_propellant
+from nutdamp.planning.decision import by_propellant, compare, usual
+from nutdamp.planning.notes import infeasibility
+from nutdamp.planning.plan import Plan, judge, plan
+from nutdamp.planning.verdict import Verdict
 from nutdamp.schemes import planner, valve_commands
 from nutdamp.schemes.catalogue import OPTIMAL, OptimalOptions, Options
 from nutdamp.schemes.optimal import bounds
@@ -118,11 +119,20 @@ def certificate(plan: Plan) -> Certificate:
 
 
 class Point(NamedTuple):
-    """Schedule of a front: a ``plan``, the ``horizon`` (s) of its search, the ``unit`` of costs (kg or N m s)."""
+    """Schedule of a front: a ``plan``, the ``horizon`` (s) of its search, the ``unit`` of costs (kg or N m s).
+
+    ``nominal``: it is judged by nominal values alone.
+    """
 
     plan: Plan
     horizon: float
     unit: str
+    nominal: bool = False
+
+    @property
+    def verdict(self) -> Verdict:
+        """Judgement of the schedule, as of any other."""
+        return judge(self.plan, nominal=True) if self.nominal else self.plan.verdict
 
     @property
     def cost(self) -> float:
@@ -168,49 +178,58 @@ def fronts(
     *,
     count: int,
     shifts: Sequence[float],
+    nominal: bool = False,
     progress: Callable[[int], None] = lambda _: None,
 ) -> tuple[Front, ...]:
     """Fronts for each of the ``shifts`` (rad, infinite for any), of at most ``count`` searches each.
 
     What is traded is propellant, with ``options.least`` of impulse that (then pulses do not tell their propellant).
-    A schedule counts for every front whose shift it keeps. Where optimal finds none, those of the other schemes count
-    that comply but for where H ends. ``progress``: called with how many of the count × len(shifts) searches are done.
+    A schedule counts for every front whose shift it keeps; that of the whole horizon is what
+    `plan` finds. Where optimal finds none, those of the other schemes count that comply but for
+    where H ends. ``nominal``: see `Point`. ``progress``: called with how many of the
+    count × len(shifts) searches are done.
     """
     if options.least == "impulse":
         # The search for the fastest saves time, and counts in kg whatever it can: one unit for all points.
         spacecraft = replace(spacecraft, channels=tuple(channel.of(isp=None) for channel in spacecraft.channels))
-    ordered, done = sorted(set(shifts)), 0
+    ordered, done, unspent = sorted(set(shifts)), 0, work.FRONTS
     entries: list[tuple[float, Plan, float]] = []
     why: dict[float, str] = {}
 
     def search(body: Spacecraft, chosen: OptimalOptions) -> Plan:
-        # The schedules of the whole horizon and the fastest, between which the others lie, may cost what a scheme may;
-        # of what they leave, all searches to come have equal shares.
+        # The fastest schedule, from which on the others lie, may cost what a scheme may; of what
+        # is left, all searches to come have equal shares.
         nonlocal done
         share = 1 if chosen.least == "time" else count * len(ordered) - done
-        with work.budget("a point", (spent.most - spent.done) / share):
+        with work.budget("a point", work.left() / share):
             planned = plan(body, OPTIMAL.name, chosen)
         done += 1
         progress(done)
         return planned
 
-    with work.budget("the fronts", work.FRONTS) as spent:
-        for number, shift in enumerate(ordered, start=1):
-            anywhere = math.isinf(shift)
-            allowing = replace(options, free_axis=anywhere, shift=None if anywhere or shift == 0.0 else shift)
-            searched = _searched(spacecraft, allowing, count, search)
-            if isinstance(searched, str):
-                why[shift] = searched
-            else:
-                entries += [(shift, *entry) for entry in searched]
-            done = count * number
+    for number, shift in enumerate(ordered, start=1):
+        anywhere = math.isinf(shift)
+        allowing = replace(options, free_axis=anywhere, shift=None if anywhere or shift == 0.0 else shift)
+        # The very search of `plan`, with its budget: one question, one answer.
+        whole = plan(spacecraft, OPTIMAL.name, allowing)
+        done += 1
+        progress(done)
+        if whole.schedule is None or whole.schedule.bounds is None:
+            why[shift] = infeasibility(whole) or "there is nothing to do"
+        else:
+            entries.append((shift, whole, spacecraft.horizon))
+            with work.budget("the fronts", unspent) as spent:
+                entries += [(shift, *entry) for entry in _sooner(whole, allowing, count, search)]
+            unspent -= spent.done
+        done = count * number
     others = _others(spacecraft, options) if why else []
     plans = [*(plan for _, plan, _ in entries), *others]
     counted = [plan.pulses.bounds for plan in plans if plan.pulses.bounds is not None]
     in_kg = options.least != "impulse" and by_propellant(plans) and all(known.unit == "kg" for known in counted)
     unit = "kg" if in_kg else "N m s"
-    made_for = [(kept, Point(plan, horizon, unit)) for kept, plan, horizon in entries]
-    return tuple(_fronts(ordered, made_for, [Point(plan, spacecraft.horizon, unit) for plan in others], why))
+    made_for = [(kept, Point(plan, horizon, unit, nominal)) for kept, plan, horizon in entries]
+    rivals = [Point(plan, spacecraft.horizon, unit, nominal) for plan in others]
+    return tuple(_fronts(ordered, made_for, rivals, why))
 
 
 def _fronts(
@@ -231,31 +250,30 @@ def _fronts(
 def _others(spacecraft: Spacecraft, options: OptimalOptions) -> list[Plan]:
     """Plans of the other usual schemes that comply but for the end of H."""
     names = [name for name in usual(spacecraft) if name != OPTIMAL.name]
-    plans = compare(spacecraft, names, Options(with_disturbances=options.with_disturbances))
+    plans = compare(spacecraft, names, Options(with_disturbances=options.with_disturbances), samples=0)
     ends = {Part.SHIFT, Part.DISTANCE}
     return [plan for plan in plans if len(plan.pulses) and {bound.part for bound in plan.shortfalls} <= ends]
 
 
-def _searched(
-    spacecraft: Spacecraft, options: OptimalOptions, count: int, search: Callable[[Spacecraft, OptimalOptions], Plan]
-) -> list[tuple[Plan, float]] | str:
-    """Schedules of the whole horizon, the fastest, and between, each with its horizon, s; or why there is none."""
-    whole = search(spacecraft, options)
-    if whole.schedule is None or whole.schedule.bounds is None:
-        return infeasibility(whole) or "there is nothing to do"
-    entries = [(whole, spacecraft.horizon)]
+def _sooner(
+    whole: Plan,
+    options: OptimalOptions,
+    count: int,
+    search: Callable[[Spacecraft, OptimalOptions], Plan],
+) -> Iterator[tuple[Plan, float]]:
+    """The fastest schedule, and those up to that of the ``whole`` horizon, with horizons in s."""
+    spacecraft = whole.spacecraft
     fastest = search(spacecraft, replace(options, least="time")) if count > 1 else whole
     if fastest.schedule is None or not len(fastest.schedule):
-        return entries
-    entries.append((fastest, spacecraft.horizon))
+        return
+    yield fastest, spacecraft.horizon
     begin, end, last = spacecraft.limits.earliest, fastest.pulses.end, max(whole.pulses.end, fastest.pulses.end)
     for share in np.linspace(0.0, 1.0, count)[1:-1]:
         horizon = begin + (end - begin) * ((last - begin) / (end - begin)) ** float(share)
         body = replace(spacecraft, limits=replace(spacecraft.limits, horizon=horizon))
         planned = search(body, options)
         if planned.schedule is not None and planned.schedule.bounds is not None:
-            entries.append((planned, horizon))
-    return entries
+            yield planned, horizon
 
 
 def undominated(points: Sequence[Point], stricter: Sequence[Point] = ()) -> tuple[Point, ...]:
@@ -277,10 +295,14 @@ def numbered(all_fronts: Sequence[Front]) -> Iterator[tuple[int, Front, Point]]:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Trade(results.Data, results.Written):
-    """Time against cost: ``fronts`` of schedules of the scheme optimal, one for each momentum shift allowed."""
+    """Time against cost: ``fronts`` of schedules of the scheme optimal, one for each momentum shift allowed.
+
+    ``recommended``: the plan that ``nutdamp plan`` recommends, if any.
+    """
 
     spacecraft: Spacecraft
     fronts: tuple[Front, ...]
+    recommended: Plan | None = None
 
     def __repr__(self) -> str:
         return f"<Trade of {self.spacecraft.name}, fronts: {len(self.fronts)}, schedules: {len(self.plans)}>"
@@ -289,3 +311,19 @@ class Trade(results.Data, results.Written):
     def plans(self) -> tuple[Plan, ...]:
         """Plans of all points, front after front, each from its earliest end to its latest."""
         return tuple(point.plan for _, _, point in numbered(self.fronts))
+
+
+def trade(
+    spacecraft: Spacecraft,
+    options: OptimalOptions,
+    *,
+    count: int,
+    shifts: Sequence[float],
+    nominal: bool = False,
+    progress: Callable[[int], None] = lambda _: None,
+) -> Trade:
+    """Trade of the `fronts`, with the plan that a comparison of the usual schemes recommends."""
+    traded = fronts(spacecraft, options, count=count, shifts=shifts, nominal=nominal, progress=progress)
+    usual_options = Options(least=options.least, with_disturbances=options.with_disturbances)
+    compared = compare(spacecraft, options=usual_options, samples=0 if nominal else None)
+    return Trade(spacecraft, traded, compared.recommended)

@@ -29,7 +29,7 @@ from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import Windows, commandable_widths, keeps_limits
 from nutdamp.spacecraft.equipment import Block, Channel, Commands
 from nutdamp.spacecraft.model import Spacecraft
-from nutdamp.spacecraft.requirements import SAME_COST, Left, Part
+from nutdamp.spacecraft.requirements import SAME_COST, Left, Part, complies
 from nutdamp.spacecraft.schedule import Schedule
 
 GENTLE = 10  # multiple of `FLOWN`: sequences among which those with the smallest pulses are flown too
@@ -104,10 +104,13 @@ class BlockFlights:
         self.body, self.known = spacecraft, math.inf
         self.damps = spacecraft.goal.axis is None and spacecraft.goal.spin is None
         lower = 0.98 * spacecraft.nutation if self.damps else math.inf  # blocks without a goal are to lower it
-        self.bounds = [
-            bound._replace(most=min(bound.most, lower)) if bound.part is Part.NUTATION else bound
-            for bound in requirements.bounds(spacecraft)
-        ]
+        self.bounds = []
+        for bound in requirements.bounds(spacecraft):
+            if bound.part is Part.NUTATION:
+                bound = bound._replace(limit=min(bound.limit, lower))
+            elif bound.part is Part.SPIN:
+                bound = bound._replace(limit=requirements.AIMED_SPIN * bound.limit)
+            self.bounds.append(bound)
         self.of: dict[Blocks, FlownSequence] = {}
         self._fired: dict[Blocks, Schedule | Infeasible] = {}
 
@@ -118,7 +121,7 @@ class BlockFlights:
     def shares(self, left: Left) -> dict[Part, NDArray[np.float64]]:
         """Share of each bound that is ``left``."""
         left_of, body = requirements.left_of, self.body
-        return {bound.part: np.asarray(left_of(bound.part, left, body) / bound.most) for bound in self.bounds}
+        return {bound.part: np.asarray(bound.used(left_of(bound, left, body))) for bound in self.bounds}
 
     def fired(self, sequences: Sequence[BlockSequence]) -> Iterator[BlockSequence]:
         """The sequences that cost no more than one that complied in a flight; a dozen of them are fired together."""
@@ -145,7 +148,7 @@ class BlockFlights:
             if isinstance(schedule, Infeasible):
                 raise schedule
             share = float(self.share(left_by(propagation.flown(self.body, schedule))))
-            missed = float(f"{share:.9g}") if share > 1.0 else 0.0  # rounding is no reason to wait for a Sun pulse
+            missed = 0.0 if complies(share) else float(f"{share:.9g}")  # rounding is no reason to wait for a Sun pulse
             rank = not keeps_limits(self.body, schedule), missed, schedule.cost, schedule.end
             self.of[sequence.blocks] = FlownSequence(rank, schedule, sequence)
             if rank[:2] == (False, 0.0):
@@ -184,7 +187,7 @@ class BlockSearch:
         self.body, self.channels, self.commands = spacecraft, channels, commands
         self.model = BlockModel(spacecraft)
         self.flights = BlockFlights(spacecraft)
-        self._most = {bound.part: bound.most for bound in self.flights.bounds}
+        self._most = {bound.part: bound.limit for bound in self.flights.bounds}
         self._named = {channel.name: channel for channel in channels}
         self.looked = 0
         self.most = math.inf  # what a sequence may cost
@@ -324,7 +327,7 @@ class BlockSearch:
             wait, delay, width, count, every = (np.broadcast_to(part, shape)[at] for part in trial)
             every = np.where(count > 1, every, self.commands.every[0])
             share, ends = severity.ravel()[index], np.broadcast_to(after.sun_pulse, shape)[at]
-            ranks = np.where(share <= 1.0, 0.0, share), cost.ravel()[index], ends
+            ranks = np.where(complies(share), 0.0, share), cost.ravel()[index], ends
             columns = following[at[0]] + wait, np.round(delay, 12), np.round(width, 12), count, every
             lists = zip(*(column.tolist() for column in (at[0], share, *ranks, *columns)), strict=True)
             for parent, severe, failed, spent, end, *block in lists:
@@ -519,7 +522,8 @@ class BlockSearch:
         chosen = by_blocks((*first, *clear, *of_each_kind(ranked.values())))
         for blocks, sequence in chosen.items():  # ranked by the closed form alone
             share = float(self.flights.share(self.model.left(self.state(blocks))))
-            chosen[blocks] = sequence._replace(rank=(share if share > 1.0 else 0.0, *sequence.rank[1:]), share=share)
+            missed = 0.0 if complies(share) else share
+            chosen[blocks] = sequence._replace(rank=(missed, *sequence.rank[1:]), share=share)
         return list(chosen.values())
 
     def _around(self, before: BlockSequence, last: Block) -> Trial:
@@ -563,7 +567,7 @@ def _least_of_all(keys: Array, most: int) -> NDArray[np.intp]:
 def _in_order(shares: Array, cost: Array) -> Array:
     """Keys that put first what keeps its bounds, by cost, and then what does not, by the share of a bound."""
     dearest = float(np.max(cost, where=np.isfinite(cost), initial=1e-300))
-    return np.where(shares <= 1.0, cost / dearest - 2.0 + 1e-9 * shares, shares)
+    return np.where(complies(shares), cost / dearest - 2.0 + 1e-9 * shares, shares)
 
 
 def _promising(sequences: Iterable[BlockSequence], most: int) -> list[BlockSequence]:

@@ -27,7 +27,7 @@ from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import OFF_TICK, commandable_widths, usable
 from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Requirement, Spacecraft
-from nutdamp.spacecraft.requirements import SAME_COST, Part
+from nutdamp.spacecraft.requirements import SAME_COST, Left, Part, left_of
 from nutdamp.spacecraft.schedule import Schedule
 
 SLOWEST = 0.01  # least share of |H3| that a spin leg is reckoned to leave
@@ -49,7 +49,8 @@ def cures(search: BlockSearch, chosen: FlownSequence, most: int) -> list[Note]:
     """Keys of the file that keep the blocks ``chosen``, of up to ``most``, from leaving less."""
     left = left_by(propagation.flown(search.body, chosen.schedule))
     shares = search.flights.shares(left)
-    missed = {bound.part: bound.most for bound in search.flights.bounds if float(shares[bound.part]) > 1.0}
+    broken = [bound for bound in search.flights.bounds if not requirements.complies(shares[bound.part])]
+    missed = {bound.part: bound.limit for bound in broken}
     more = [note("more-blocks", blocks=BLOCKS)] * (len(chosen.schedule.blocks) == most < BLOCKS)
     named = [*more, *too_coarse(search.model, search.channels, missed), *used_up(search.body, chosen.schedule)]
     return named or [note("finer-commands")]
@@ -95,8 +96,8 @@ def schedule(spacecraft: Spacecraft, options: CommandBlockOptions) -> Schedule:
         raise Infeasible("the file describes no commands: command blocks need the keys sun, sun_sensor and commands")
     tick, spacecraft = spacecraft.limits.tick, replace(spacecraft, limits=replace(spacecraft.limits, tick=None))
     goal, most = spacecraft.goal.spin, options.max_blocks
-    most_of = {bound.part: bound.most for bound in requirements.bounds(spacecraft)}
-    alone = goal is None or (spacecraft.goal.axis is None and spacecraft.nutation <= most_of[Part.NUTATION])
+    nutation = next(bound for bound in requirements.bounds(spacecraft) if bound.part is Part.NUTATION)
+    alone = goal is None or (spacecraft.goal.axis is None and bool(nutation.met(spacecraft.nutation)))
     if goal is not None:
         expect_spin(spacecraft, goal, alone=alone)
     if alone:
@@ -104,7 +105,7 @@ def schedule(spacecraft: Spacecraft, options: CommandBlockOptions) -> Schedule:
     else:
         chosen = spin_and_turn(spacecraft, most)
         missed = [*used_up(spacecraft, chosen.schedule)] or [note("finer-commands")]
-        in_legs = (note("blocks-in-legs"), *missed * (chosen.rank[1] > 1.0))
+        in_legs = (note("blocks-in-legs"), *missed * (not requirements.complies(chosen.rank[1])))
         chosen = chosen._replace(schedule=replace(chosen.schedule, notes=in_legs))
     notes, steps = chosen.schedule.notes, np.array([commands.delay_step, *commands.widths]) / (tick or 1.0)
     if tick is not None and np.abs(steps - np.rint(steps)).max() > OFF_TICK:
@@ -162,7 +163,7 @@ def _searched(spacecraft: Spacecraft, most: int | None) -> FlownSequence:
     chosen = min(equal, key=lambda flight: (len(flight.schedule), flight.schedule.end, flight.rank))
     first = chosen.sequence.rank[:2] <= best[0].rank[:2]
     notes = [scope_note(search, chosen, first=first)]
-    if chosen.rank[1] > 1.0:
+    if not requirements.complies(chosen.rank[1]):
         notes += cures(search, chosen, most or BLOCKS)
     return chosen._replace(schedule=replace(chosen.schedule, notes=tuple(notes)))
 
@@ -202,7 +203,8 @@ def _flown(body: Spacecraft, flights: BlockFlights, most: int | None, aim: float
     """
     legs, goal, gained = Legs(body), body.goal.spin, 0.0
     assert goal is not None
-    bounds = {bound.part: bound.most for bound in requirements.bounds(body)}
+    ends = [bound for bound in requirements.bounds(body) if bound.part is not Part.SPIN]
+    bounds = {bound.part: bound.limit for bound in ends}
     nutation, shift = bounds[Part.NUTATION], bounds.get(requirements.aim(body))
     for number in range(LEGS):
         here, turns = legs.here, turns_first == (number % 2 == 0)
@@ -210,7 +212,8 @@ def _flown(body: Spacecraft, flights: BlockFlights, most: int | None, aim: float
         slower = min(max(abs(body.inertia.axial(goal) / here.axial), SLOWEST), 1.0)  # nutation opens by its inverse
         there = requirements.spins_at(here, aim)
         if turns:
-            there = here.nutation <= nutation and (shift is None or here.to_turn <= shift)
+            now = Left(here.nutation, here.to_turn, here.spin)
+            there = all(bool(bound.met(left_of(bound, now, body))) for bound in ends)
         room = None if most is None else most - len(legs.blocks) - (number == 0)
         if turns and not requirements.spins_at(here, goal):
             allowed = MARGIN * slower * nutation, None if shift is None else MARGIN * shift

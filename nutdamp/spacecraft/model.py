@@ -32,7 +32,7 @@ from nutdamp.spacecraft.equipment import Loop as Loop
 from nutdamp.spacecraft.equipment import Steerable as Steerable
 from nutdamp.spacecraft.equipment import SunSensor as SunSensor
 from nutdamp.spacecraft.equipment import Thruster as Thruster
-from nutdamp.spacecraft.tolerances import Dispersions
+from nutdamp.spacecraft.tolerances import Dispersions, SpinTolerance
 
 Vector = NDArray[np.float64]
 
@@ -43,12 +43,13 @@ SLACK = 1e-9  # rad by which a bound of `Keep` may be passed: rounding
 class Requirement:
     """Requirement at the end: nutation angle and shift of the angular momentum, rad; None requires nothing.
 
-    ``probability`` (0 to 1) is how surely a dispersed flight must meet it.
+    ``probability`` (0 to 1) is how surely a dispersed flight must meet it; ``spin``: tolerance of the goal's spin.
     """
 
     nutation: float | None = None
     momentum_shift: float | None = None
     probability: float | None = None
+    spin: SpinTolerance | None = None
 
 
 PROBABILITY = 0.997  # share of cases that must comply where the requirement gives none
@@ -100,14 +101,6 @@ class Keep:
     direction: Vector | None
     least: float = 0.0
     most: float = math.pi
-
-    def used(self, least: Any, largest: Any) -> Any:
-        """Used fraction of a bound where the angles on the way are from ``least`` to ``largest`` rad.
-
-        1 or less is kept. Numbers, or arrays over cases.
-        """
-        near = (self.least - SLACK) / np.maximum(least, SLACK)
-        return np.maximum(near, largest / (self.most + SLACK))
 
 
 VALVES, COLD, BLOWDOWN, LIGHTER = "valves", "cold pulses", "blowdown", "falling moments"
@@ -307,7 +300,8 @@ class Spacecraft(results.Data, results.Shown):
     which carry ``orbit``; ``sun`` (3,) is the inertial unit vector to the Sun, where it is known; ``keep`` are
     cones for the spin axis; ``commands`` is what blocks fired from the Sun pulses of ``sun_sensor`` may hold;
     ``cold`` and ``tank`` make pulses weaker than the thrusters say, None where they are not; ``loop`` damps by what
-    a sensor shows; ``source`` is what it was read from, None once a field is replaced.
+    a sensor shows; ``built_in``: the built-in example, since no file was named; ``source`` is what it was read from,
+    None once a field is replaced.
     """
 
     name: str
@@ -335,6 +329,7 @@ class Spacecraft(results.Data, results.Shown):
     loop: Loop | None = None
     center_of_mass: Vector | None = None
     center_of_mass_per_kg: Vector | None = None
+    built_in: bool = False
     source: SourceFile | None = field(default=None, init=False)
 
     def with_(self, **keys: object) -> Spacecraft:

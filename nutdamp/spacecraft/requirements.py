@@ -6,7 +6,6 @@ The only definition of compliance, for one plan or many dispersed cases: all fun
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from enum import Enum
 from typing import Any, NamedTuple
 
@@ -14,7 +13,8 @@ import numpy as np
 
 from nutdamp.errors import BadRequest
 from nutdamp.spacecraft.equipment import Loop
-from nutdamp.spacecraft.model import Spacecraft
+from nutdamp.spacecraft.model import SLACK, Keep, Spacecraft
+from nutdamp.spacecraft.tolerances import SpinTolerance
 
 DAMPED_SHARE = 0.01
 """Fraction of the initial nutation (of the turn to a target axis) below which it counts as damped (reached)."""
@@ -22,7 +22,9 @@ DAMPED_SHARE = 0.01
 DAMPED_ANGLE = math.radians(1e-3)  # rad that may be left in any case
 SAME_COST = 1e-3  # costs that differ by less, relatively, are equal: then other things decide
 NEGLIGIBLE = math.radians(1e-9)  # rad below which angles are rounding, and shown as nothing
-SPIN_TOLERANCE = 1e-3  # relative tolerance of the spin at the end against the goal
+
+AIMED_SPIN = 0.1
+"""Fraction of the tolerance of the spin to which plans set it: the rest is for what disperses. 0.1 % by default."""
 
 
 class Part(Enum):
@@ -32,19 +34,50 @@ class Part(Enum):
     SHIFT = "momentum_shift"
     DISTANCE = "axis_error"
     SPIN = "spin"
+    DURING = "nutation_during"
+    CONE = "cone"
 
     @property
     def label(self) -> str:
         """Name in texts."""
-        return "spin error" if self is Part.SPIN else self.value.replace("_", " ")
+        return LABELS.get(self, self.value.replace("_", " "))
+
+
+LABELS = {Part.SPIN: "spin error", Part.DURING: "nutation on the way"}
 
 
 class Bound(NamedTuple):
-    """Upper bound of a part; ``required`` by file or command line, else the definition of damped."""
+    """Bound of a part: its value may not exceed ``limit``, or, of the inner edge of a cone, not fall below it.
+
+    ``required`` by file or command line, else the definition of damped. ``keep``: the cone of a bound on the way.
+    """
 
     part: Part
-    most: float
+    limit: float
     required: bool
+    keep: Keep | None = None
+    inner: bool = False
+
+    @property
+    def label(self) -> str:
+        """Name in texts."""
+        named = self.part is Part.CONE and self.keep is not None
+        return f"axis from {self.keep.name}" if named and self.keep else self.part.label
+
+    def met(self, value: Any) -> Any:
+        """True where a value keeps the bound: numbers, or arrays over cases."""
+        slack = 0.0 if self.keep is None else SLACK
+        return value >= self.limit - slack if self.inner else value <= self.limit + slack
+
+    def margin(self, value: Any) -> Any:
+        """Distance of a value to the bound, positive where it keeps it."""
+        return value - self.limit if self.inner else self.limit - value
+
+    def used(self, value: Any) -> Any:
+        """Used fraction of the bound: 1 or less where it is kept."""
+        if self.keep is None:
+            return value / self.limit
+        return (self.limit - SLACK) / np.maximum(value, SLACK) if self.inner else value / (self.limit + SLACK)
 
 
 class Held(NamedTuple):
@@ -56,18 +89,25 @@ class Held(NamedTuple):
     @property
     def met(self) -> bool:
         """True if the bound is met."""
-        return self.left <= self.bound.most
+        return bool(self.bound.met(self.left))
+
+    @property
+    def margin(self) -> float:
+        """Distance to the bound."""
+        return float(self.bound.margin(self.left))
 
 
 class Left(NamedTuple):
     """Residual: ``nutation`` and ``aim`` rad (H from the target axis, else from its start), ``spin`` rad/s.
 
-    Each is a number or an array over cases.
+    ``angles`` (m, 2): least and largest angle, rad, from each of the m cones of the file on the way; None where they
+    were not observed. Each is a number or an array over cases, the angles (m, 2, n).
     """
 
     nutation: Any
     aim: Any
     spin: Any
+    angles: Any = None
 
 
 def aim(spacecraft: Spacecraft) -> Part:
@@ -75,8 +115,15 @@ def aim(spacecraft: Spacecraft) -> Part:
     return Part.SHIFT if spacecraft.goal.axis is None else Part.DISTANCE
 
 
+def spin_tolerance(spacecraft: Spacecraft, spin: float) -> float:
+    """Tolerance, rad/s, about a ``spin`` that is required; of a halt it counts from the spin at t = 0."""
+    requested = spacecraft.requirement
+    tolerance = SpinTolerance() if requested is None or requested.spin is None else requested.spin
+    return tolerance.size * (abs(spin) or abs(spacecraft.spin)) if tolerance.relative else tolerance.size
+
+
 def required(spacecraft: Spacecraft) -> tuple[Bound, ...]:
-    """Bounds of the requirement, and of the spin where the goal names one; empty without a requirement."""
+    """Bounds at the end by the requirement, and of the spin where the goal names one; empty without a requirement."""
     requested, goal = spacecraft.requirement, spacecraft.goal
     bounds = []
     if requested is not None and requested.nutation is not None:
@@ -84,13 +131,13 @@ def required(spacecraft: Spacecraft) -> tuple[Bound, ...]:
     if requested is not None and requested.momentum_shift is not None:
         bounds.append(Bound(aim(spacecraft), requested.momentum_shift, True))
     if goal.spin is not None:
-        bounds.append(Bound(Part.SPIN, SPIN_TOLERANCE * abs(goal.spin), True))
+        bounds.append(Bound(Part.SPIN, spin_tolerance(spacecraft, goal.spin), True))
     return tuple(bounds)
 
 
 def spins_at(spacecraft: Spacecraft, spin: float) -> bool:
-    """True where the body spins at ``spin`` rad/s, within the tolerance of a goal."""
-    return abs(spacecraft.spin - spin) <= SPIN_TOLERANCE * abs(spin)
+    """True where the body spins at ``spin`` rad/s as nearly as plans set it."""
+    return abs(spacecraft.spin - spin) <= AIMED_SPIN * spin_tolerance(spacecraft, spin)
 
 
 def judged(spacecraft: Spacecraft) -> bool:
@@ -99,7 +146,7 @@ def judged(spacecraft: Spacecraft) -> bool:
 
 
 def bounds(spacecraft: Spacecraft) -> tuple[Bound, ...]:
-    """Bounds `required`; for nutation and target axis without one, those that define damped."""
+    """Bounds `required` at the end; for nutation and target axis without one, those that define damped."""
     limits = required(spacecraft)
     limited = {bound.part for bound in limits}
     if Part.NUTATION not in limited:
@@ -109,19 +156,35 @@ def bounds(spacecraft: Spacecraft) -> tuple[Bound, ...]:
     return limits
 
 
-def left_of(part: Part, left: Left, spacecraft: Spacecraft) -> Any:
-    """Residual of a part, to be compared with the ``most`` of its bound."""
-    if part is Part.NUTATION:
+def edges(keep: Keep) -> tuple[Bound, ...]:
+    """Bounds of a cone: its inner edge, then its outer one; of the cone about H that of the nutation on the way."""
+    part = Part.DURING if keep.direction is None else Part.CONE
+    inner = (Bound(part, keep.least, True, keep, inner=True),) if keep.least > 0.0 else ()
+    outer = (Bound(part, keep.most, True, keep),) if keep.most < math.pi else ()
+    return inner + outer
+
+
+def cones(spacecraft: Spacecraft) -> tuple[Bound, ...]:
+    """Bounds of all cones on the way."""
+    return tuple(bound for keep in spacecraft.keep for bound in edges(keep))
+
+
+def left_of(bound: Bound, left: Left, spacecraft: Spacecraft) -> Any:
+    """Residual to be compared with a bound."""
+    if bound.keep is not None:
+        return left.angles[spacecraft.keep.index(bound.keep)][0 if bound.inner else 1]
+    if bound.part is Part.NUTATION:
         return left.nutation
-    if part is Part.SPIN:
+    if bound.part is Part.SPIN:
         assert spacecraft.goal.spin is not None
         return abs(left.spin - spacecraft.goal.spin)
     return left.aim
 
 
 def held(spacecraft: Spacecraft, left: Left) -> tuple[Held, ...]:
-    """Residual of one motion beside each of the `bounds`."""
-    return tuple(Held(bound, float(left_of(bound.part, left, spacecraft))) for bound in bounds(spacecraft))
+    """Residual of one motion beside each of the `bounds` at the end, and the `cones` where they were observed."""
+    way = () if left.angles is None else cones(spacecraft)
+    return tuple(Held(bound, float(left_of(bound, left, spacecraft))) for bound in (*bounds(spacecraft), *way))
 
 
 def unaided(spacecraft: Spacecraft) -> bool:
@@ -200,20 +263,29 @@ def missed(spacecraft: Spacecraft, nutation: Any, aim: Any) -> Any:
     return nutation if spacecraft.goal.axis is None else np.maximum(nutation, aim)
 
 
-def severity(spacecraft: Spacecraft, left: Left, used: Sequence[Any] = ()) -> Any:
-    """Largest used fraction of a `required` bound: 1 or less complies.
+def severity(spacecraft: Spacecraft, left: Left, drained: Any = 0.0) -> Any:
+    """Largest used fraction of a `required` bound at the end: 1 or less complies; numbers, or arrays over cases.
 
-    Without such bounds what is `missed`, rad. Where more than all of a cone, or of the propellant, is ``used`` (shares)
-    on the way, it is no less than that.
+    Without such bounds what is `missed`, rad. Where a cone is broken, or more than all propellant ``drained`` (a
+    fraction), it is no less than that.
     """
-    parts: list[Any] = [left_of(bound.part, left, spacecraft) / bound.most for bound in required(spacecraft)]
-    if not parts:
-        parts = [missed(spacecraft, left.nutation, left.aim)]
+    ends = [bound.used(left_of(bound, left, spacecraft)) for bound in required(spacecraft)]
+    parts = ends or [missed(spacecraft, left.nutation, left.aim)]
     shares = np.asarray(np.maximum.reduce(np.broadcast_arrays(*parts)), dtype=float)
-    if not len(used):
-        return shares
-    worst = np.maximum.reduce(np.broadcast_arrays(*used))
+    way = () if left.angles is None else cones(spacecraft)
+    used = [bound.used(left_of(bound, left, spacecraft)) for bound in way]
+    worst = np.maximum.reduce(np.broadcast_arrays(np.real(drained), *used))
     return np.where(worst > 1.0, np.maximum(worst, shares), shares)
+
+
+def complies(severity: Any) -> Any:
+    """True where a `severity`, or the used fraction of a bound, is kept: numbers, or arrays over cases."""
+    return severity <= 1.0
+
+
+def enough(low: float, high: float, probability: float) -> bool | None:
+    """True where a share of cases between ``low`` and ``high`` is as much as must comply, False for less, else None."""
+    return True if low >= probability else False if high < probability else None
 
 
 LOOP = """the spacecraft file has no loop: it names no sensor to fire by. For example:

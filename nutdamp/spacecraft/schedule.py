@@ -223,7 +223,8 @@ class Bounds(NamedTuple):
 
     ``first_order`` is that of the small-angle program; None where that was not solved. ``rigorous`` holds at any angle
     for all schedules that leave no more than this one; None where nothing is known to hold: I1 ≠ I2, dissipation,
-    disturbances. ``keeping`` is the first-order one of schedules that keep H, where this one need not; None for others.
+    disturbances, a goal for the spin. ``keeping`` is the first-order one of schedules that keep H, where this one need
+    not; None for others.
     """
 
     first_order: float | None

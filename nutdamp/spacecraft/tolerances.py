@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 from nutdamp.errors import BadRequest
 
@@ -32,6 +32,13 @@ class Tolerance:
     kind: str
     size: float
     relative: bool = False
+
+
+class SpinTolerance(NamedTuple):
+    """Tolerance of the spin at the end about its goal: ``relative`` to it, else in rad/s."""
+
+    size: float = 0.01
+    relative: bool = True
 
 
 Known = Tolerance | None

@@ -9,7 +9,6 @@ from functools import partial
 from typing import Any
 
 from rich.console import RenderableType
-from rich.text import Text
 
 from nutdamp import __version__
 from nutdamp.common.numerics import finite
@@ -25,7 +24,7 @@ from nutdamp.planning.capability import Acting, ChannelSteps, Consequence
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.views.decisions import aspects_json, direction_json, spacecraft_json
 from nutdamp.views.loop import described, margin_table, warnings
-from nutdamp.views.parts import derived_table, summary
+from nutdamp.views.parts import derived_table, named, summary
 from nutdamp.views.tables import TEXT, Column, DataTable, Shared, angle_of, file_columns, to_figures, values_of
 from nutdamp.views.text import degrees, duration, moment, quantity, small_angle, vector
 from nutdamp.views.tolerances import correlation_json, in_words, size_text, without_effect
@@ -155,7 +154,7 @@ def check_screen(spacecraft: Spacecraft, *, verbose: bool = True) -> RenderableT
     """The screen of ``check`` for one valid file."""
     table, tolerances = channel_table(spacecraft), tolerance_table(spacecraft)
     counted = f" (channels: {len(table.rows)}, tolerances: {len(tolerances.rows)})"
-    head = [Text.assemble((f"{spacecraft.name}   ", "bold"), ("VALID", "bold green"), counted)]
+    head = [named(spacecraft, "   ", ("VALID", "bold green"), counted)]
     known = (*_spin_axis(spacecraft), *sun_pulse_facts(spacecraft)) if verbose else ()
     tables = [turn_table(spacecraft), valve_table(spacecraft), *map(tank_table, filter(None, [spacecraft.tank]))]
     tables += [disturbance_table(spacecraft), _margins(spacecraft), tolerances]

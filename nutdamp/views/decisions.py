@@ -1,43 +1,37 @@
-"""Words of a decision, for all screens, pages and files: requirement met or not, margins, and final motion.
+"""Final motion and cost in words; plans, comparisons, certificates and spacecraft as JSON-ready dictionaries.
 
-And plans, decisions, certificates and spacecraft as JSON-ready dictionaries: vectors in the axes of the file, degrees.
+Vectors are in the axes of the file, angles in degrees.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from rich.console import RenderableType
 from rich.table import Table
-from rich.text import Text
 
 from nutdamp import __version__
 from nutdamp.common.numerics import cleaned
 from nutdamp.common.results import note
 from nutdamp.flight.end_state import Aspect
 from nutdamp.flight.propagation import Flight, Residual
-from nutdamp.planning.decision import Comparison, Decision, Line, decide, infeasibility, strays
-from nutdamp.planning.notes import alternatives, comparison_warnings, decision_notes, plan_notes, reasons
-from nutdamp.planning.plan import Plan, Share
+from nutdamp.planning.decision import Comparison
+from nutdamp.planning.notes import alternatives, comparison_warnings, infeasibility, plan_notes, reasons, verdict_notes
+from nutdamp.planning.plan import Plan
+from nutdamp.planning.verdict import Verdict, lines_of
 from nutdamp.schemes import catalogue
-from nutdamp.spacecraft import requirements
-from nutdamp.spacecraft.model import SLACK, Spacecraft, Vector
-from nutdamp.spacecraft.requirements import Bound, Part
+from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.schedule import Schedule
-from nutdamp.views.parts import aspect_facts, commanded, cone_margins, direction_text, required, spin_text
-from nutdamp.views.tables import TEXT, Column, DataTable, Shared, facts, values_of
-from nutdamp.views.text import MISSING, degrees, duration, joined, mass, moment, most, note_json, quantity, text
+from nutdamp.views.parts import aspect_facts, commanded, direction_text, spin_text
+from nutdamp.views.tables import facts, values_of
+from nutdamp.views.text import degrees, joined, moment, note_json, ordered, text
+from nutdamp.views.verdict import cases_json, line_json, spent, verdict_json
 
 if TYPE_CHECKING:
     from nutdamp.planning.tradeoff import Certificate
     from nutdamp.schemes.optimal.linear_program import Burn
-
-
-VERDICT = {True: "met", False: "NOT met", None: MISSING}  # words for the values of `Plan.meets_requirement`
 
 
 def no_plan(plan: Plan) -> str:
@@ -48,171 +42,18 @@ def no_plan(plan: Plan) -> str:
     return f"internal error,\nplease report:\n{type(plan.failure).__name__}"
 
 
-def needless(compared: Comparison) -> str | None:
-    """Clause that nothing has to be done, where that is so."""
-    body = compared.spacecraft
-    if not compared.needless:
-        return None
-    there, verdict = f"nutation {degrees(body.nutation)} at t = 0", "damped"
-    if body.goal.axis is not None:
-        there += f", H {degrees(body.to_turn)} from the target"
-    if requirements.required(body):
-        nominal = ", with nominal values" * (body.dispersions is not None and compared.flown is None)
-        verdict = f"requirement met ({required(body)}){nominal}"
-    lasting = f", up to the horizon of {duration(body.horizon)}" if body.growth > 0.0 else ""
-    return f"{there}: {verdict}{lasting}"
-
-
-UNDECIDED = "the share of cases that comply is undecided"  # verdict on dispersed cases that do not decide
-ROUNDING = 1e-9  # share by which costs that are equal may differ
 FARTHER = 1.1  # factor of distance or of time by which H ends farther off, or later, for a plan to be worse in it
 
 
-def cases_verdict(share: float, probability: float) -> str:
-    """Verdict on the share of cases: "met: 99.9 % of cases comply (99.7 % required)"."""
-    return f"{VERDICT[share >= probability]}: {cases_share(share, probability)}"
+def cost(schedule: Schedule) -> Iterator[tuple[str, str]]:
+    """Cost and end of a schedule: names and values."""
+    yield "impulse" if schedule.propellant is None else "propellant", f"{spent(schedule)}, pulses: {len(schedule)}"
+    yield "last pulse ends", moment(schedule.end) if len(schedule) else "no pulse is needed"
 
 
-def cases_share(share: float, probability: float) -> str:
-    """Share of cases that comply, and the share required."""
-    return f"{percent(share, probability)} of cases comply ({exact_percent(probability)} required)"
-
-
-def share_text(share: Share | None) -> str:
-    """The share of cases that comply with a plan; where not all have flown, the side of the required one it is on."""
-    if share is None or (share.exact is None and share.met is None):
-        return MISSING
-    if share.exact is not None:
-        return percent(share.exact, share.probability)
-    return f"{'≥' if share.met else '<'} {exact_percent(share.probability)}"
-
-
-def percent(share: float, *others: float) -> str:
-    """A share in percent to one decimal; to more where it would be taken for one of the ``others``, or for all."""
-    distinct = [other for other in (*others, 0.0, 1.0) if other != share]
-    for digits in range(1, 12):
-        text = f"{100.0 * share:.{digits}f}"
-        if all(float(text) != float(f"{100.0 * other:.10g}") for other in distinct):
-            return f"{text} %"
-    return f"{100.0 * share:.12g} %"
-
-
-def exact_percent(share: float) -> str:
-    """A share that a file gives, in percent as it was written."""
-    return f"{100.0 * share:.10g} %"
-
-
-KEPT = {True: "kept", False: "NOT kept"}  # words for a cone about a direction that the spin axis has to keep
-COUNT = "cases that comply"  # name of the row of the decision and of the column of the comparison
-
-
-def verdict(decision: Decision) -> str:
-    """Verdict on the requirement, in words that leave no doubt about its subject."""
-    broken, cases = " and ".join(map(strays, decision.strays)), decision.cases
-    if not broken:
-        return _at_end(decision)
-    # Cases that break a cone do not comply, so that a verdict on cases covers more than the end.
-    if cases is not None and cases.complying is not None:
-        return f"NOT met: {broken}; {cases_share(cases.complying, cases.probability)}"
-    return f"NOT met: {broken}; otherwise {_at_end(decision)}"
-
-
-def statement(decision: Decision) -> Text:
-    """The verdict as a sentence."""
-    lead = "Requirement: " if decision.nominal is None and not decision.strays else "Requirement "
-    return Text.assemble(lead, coloured(verdict(decision), decision.met), ".")
-
-
-def _at_end(decision: Decision) -> str:
-    """Verdict on the end, regardless of cones on the way."""
-    cases, nominal = decision.cases, decision.nominal
-    if nominal is None:
-        what, done = ("nutation", "damped") if decision.plan.spacecraft.goal.axis is None else ("target", "reached")
-        return f"no requirement in file; {what} {'NOT ' * (not decision.damped)}{done} with nominal values"
-    if decision.unknown:
-        return f"NOT met{' with nominal values' * (not nominal)}: {UNDECIDED}"
-    if cases is not None and cases.complying is not None:
-        if nominal:
-            return cases_verdict(cases.complying, cases.probability)
-        return f"NOT met with nominal values; {cases_share(cases.complying, cases.probability)}"
-    return f"{'met' if nominal else 'NOT met'} with nominal values"
-
-
-def decision_table(decision: Decision, values: str = Shared.NOMINAL) -> DataTable:
-    """One row a part of the requirement, and one for the share of cases that comply; ``values`` heads the residuals."""
-    cases = decision.cases
-    level = "" if cases is None else f"({exact_percent(cases.probability)})"
-    columns = (
-        Column("", "requirement", "", itemgetter(0), where="screen", kind=TEXT),
-        Column("", "limit", "", itemgetter(1), where="screen"),
-        Column("", values, "", itemgetter(2), where="screen"),
-        Column("", "dispersed", level, itemgetter(3), where="screen" * bool(level)),
-        Column("", "margin", "", itemgetter(4), where="screen"),
-        Column("", Shared.VERDICT, "", itemgetter(5), where="screen", kind=TEXT, met=itemgetter(6)),
-    )
-    return DataTable("Requirement", columns, list(_margins(decision)))
-
-
-def _margins(decision: Decision) -> Iterator[tuple[str, str, str, str, str, str, bool | None]]:
-    """Requirement, limit, value with nominal values and in cases, margin and verdict as text; whether it is met."""
-    cases = decision.cases
-    for line in decision.lines:
-        nominal, dispersed, margin = (size(line.bound, each) for each in (line.nominal, line.dispersed, line.margin))
-        words = VERDICT[line.met]
-        if not line.bound.required and line.met is not None:
-            words = "NOT " * (not line.met) + ("reached" if line.bound.part is Part.DISTANCE else "damped")
-        yield line.bound.part.label, limit(line.bound), nominal, dispersed, margin, words, line.met
-    for aspect in decision.aspects:
-        for bound, angle, left in cone_margins(aspect):
-            words = KEPT[left >= -SLACK] + " (nominal)" * (cases is not None)
-            name = f"axis from {aspect.keep.name}"
-            yield name, bound, degrees(angle), "", degrees(left), words, left >= -SLACK
-    if cases is not None and cases.complying is not None:
-        least, share = exact_percent(cases.probability), percent(cases.complying, cases.probability)
-        margin = f"{100.0 * (cases.complying - cases.probability):.3g} points"
-        yield COUNT, f"≥ {least}", "", share, margin, VERDICT[cases.met], cases.met
-
-
-def coloured(text: str, met: bool | None) -> Text:
-    """A verdict in its colour."""
-    return Text(text, "" if met is None else "green" if met else "bold red")
-
-
-def limit(bound: Bound) -> str:
-    """The bound of a part."""
-    return f"≤ {quantity(bound.most, 'rad/s') if bound.part is Part.SPIN else most(bound.most)}"
-
-
-def size(bound: Bound, value: float | None) -> str:
-    """The residual of a part, in rad/s or degrees."""
-    return quantity(value, "rad/s") if bound.part is Part.SPIN else degrees(value)
-
-
-def spent(pulses: Schedule) -> str:
-    """The propellant, or the impulse where it is not known."""
-    return quantity(pulses.total_impulse, "N m s") if pulses.propellant is None else mass(pulses.propellant)
-
-
-def cost(decision: Decision) -> Iterator[tuple[str, str]]:
-    """Cost and end of the plan: names and values."""
-    pulses = decision.flight.schedule
-    yield "impulse" if pulses.propellant is None else "propellant", f"{spent(pulses)}, pulses: {len(pulses)}"
-    yield "last pulse ends", moment(pulses.end) if len(pulses) else "no pulse is needed"
-
-
-def end_facts(decision: Decision) -> Table:
+def end_facts(plan: Plan) -> Table:
     """Final spin axis, H and spin, cost, and end time."""
-    return facts([*end_rows(decision.flight, decision.aspects), *cost(decision)])
-
-
-def figures(decision: Decision) -> list[RenderableType]:
-    """The numbers of a decision on a screen: margins, then the final motion."""
-    return [Text(), decision_table(decision).screen("screen"), Text(), end_facts(decision)]
-
-
-def margin_lines(decision: Decision, values: str = Shared.NOMINAL) -> list[RenderableType]:
-    """The margins of a flight, where there are any; ``values`` heads the residuals."""
-    return [decision_table(decision, values).screen("screen")] if decision.lines or decision.aspects else []
+    return facts([*end_rows(plan.flight, plan.aspects), *cost(plan.pulses)])
 
 
 def end_rows(flown: Flight, watched: Iterable[Aspect]) -> Iterator[tuple[str, str]]:
@@ -247,34 +88,30 @@ def heading(spacecraft: Spacecraft) -> dict[str, Any]:
 
 
 def comparison_json(compared: Comparison) -> dict[str, Any]:
-    """The object of ``plan --json``: the plans, the decision on one of them, and the words of both."""
-    return decided_json(compared, decide(compared))
-
-
-def decided_json(compared: Comparison, decided: Decision | None) -> dict[str, Any]:
-    """`comparison_json` with a decision that is known already."""
-    beside = () if decided is None else decision_notes(decided)
+    """The object of ``plan --json``: the plans, the verdict on one of them, and the words of both."""
+    judged, chosen = compared.verdict, compared.recommended
+    beside = () if chosen is None else verdict_notes(judged, chosen)
     return {
         **heading(compared.spacecraft),
         "plans": [compared_json(compared, plan) for plan in compared.plans],
-        **values_of(compared, "recommended=recommended.scheme", "no_pulse_needed=needless"),
+        "recommended": None if chosen is None else chosen.scheme,
+        "no_pulse_needed": judged.idle,
         "reason": joined(reasons(compared)),
-        "notes": [note_json(note) for note in (*comparison_warnings(compared), *beside, *alternatives(compared))],
-        "decision": None if decided is None else decision_json(decided),
+        "notes": [
+            note_json(note) for note in ordered((*comparison_warnings(compared), *beside, *alternatives(compared)))
+        ],
+        "decision": decision_json(judged),
     }
 
 
 def compared_json(compared: Comparison, plan: Plan) -> dict[str, Any]:
-    """One of the plans compared; ``cases``: the share of dispersed cases that comply, null where not all have flown."""
-    data, share, cases = plan_json(plan), compared.shares.get(plan), compared.cases(plan)
-    data["meets_requirement"] = compared.meets(plan)
+    """One of the plans compared; ``cases``: the share of dispersed cases that comply, with its interval."""
+    data, judged = plan_json(plan), compared.verdicts[plan]
+    data |= {"status": judged.status.value, "meets_requirement": judged.met}
     if plan.spacecraft.commands is not None:
         data["can_be_commanded"] = plan.commandable if plan.feasible else None
-    if compared.shares:
-        data["cases"] = share and {
-            "samples": 0 if cases is None else cases.samples,
-            **values_of(share, "met_fraction=exact", "low", "high", "probability", "met"),
-        }
+    if compared.cases:
+        data["cases"] = cases_json(judged.cases)
     return data
 
 
@@ -302,7 +139,7 @@ def plan_json(plan: Plan) -> dict[str, Any]:
         **values_of(plan, "scheme", "feasible"),
         "why": infeasibility(plan) or None,
         "meets_requirement": plan.meets_requirement,
-        "requirement": requirement_json(plan),
+        "requirement": [line_json(line) for line in lines_of(plan.held, None, 1.0)] or None,
         "pulses": commanded(plan.pulses, body).json(),
         **values_of(schedule, "total_impulse_Nms"),
         "least_impulse_Nms": None if schedule is None else body.least_impulse,
@@ -317,21 +154,6 @@ def plan_json(plan: Plan) -> dict[str, Any]:
         "bounds": None if plan.pulses.bounds is None else plan.pulses.bounds._asdict(),
         "notes": [note_json(note) for note in plan_notes(plan)] if plan.feasible else [],
     }
-
-
-def requirement_json(plan: Plan) -> list[dict[str, Any]] | None:
-    """The requirement and the residuals, part by part; None where nothing is required, or without a schedule."""
-    return [
-        {"part": part.bound.part.value, **_in_unit(part.bound, left=part.left, most=part.bound.most), "met": part.met}
-        for part in plan.held
-        if part.bound.required
-    ] or None
-
-
-def _in_unit(bound: Bound, **values: float | None) -> dict[str, float | None]:
-    """Values of a part by their names, in the unit that the names get in files."""
-    unit, scale = ("rad_s", 1.0) if bound.part is Part.SPIN else ("deg", 180.0 / math.pi)
-    return {f"{name}_{unit}": None if value is None else scale * value for name, value in values.items()}
 
 
 def final_json(flown: Flight) -> dict[str, Any]:
@@ -377,25 +199,17 @@ def residual_json(residual: Residual | None) -> dict[str, float | None]:
     )
 
 
-def decision_json(decision: Decision) -> dict[str, Any]:
-    """The verdict on a plan, part by part with margins, its end and cost; ``cases`` is null where none were flown."""
-    cases = decision.cases
+def decision_json(judged: Verdict) -> dict[str, Any]:
+    """The verdict on a plan, its end and cost."""
+    data = verdict_json(judged)
+    if judged.flight is None:
+        return data
     return {
-        **values_of(decision, "scheme=plan.scheme", "met"),
-        "verdict": verdict(decision),
-        "requirement": [_line_json(line) for line in decision.lines],
-        "cases": cases and values_of(cases, "samples", "seed", "met_fraction=complying", "probability", "met"),
-        "final": final_json(decision.flight),
-        **aspects_json(decision.aspects),
-        **values_of(decision.flight.schedule, "propellant_kg", "total_impulse_Nms", "end_s"),
+        **data,
+        "final": final_json(judged.flight),
+        **aspects_json(judged.aspects),
+        **values_of(judged.schedule, "propellant_kg", "total_impulse_Nms", "end_s"),
     }
-
-
-def _line_json(line: Line) -> dict[str, Any]:
-    """A part: its limit, its residual with nominal values and in the share of cases required, and the margin."""
-    values = {"limit": line.bound.most, "nominal": line.nominal, "dispersed": line.dispersed, "margin": line.margin}
-    part = values_of(line.bound, "part=part.value", "required")
-    return {**part, **_in_unit(line.bound, **values), "met": line.met}
 
 
 PROVES = (

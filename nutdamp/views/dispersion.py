@@ -16,16 +16,19 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from nutdamp.files.export import column, cone_columns
-from nutdamp.flight.end_state import aspects
-from nutdamp.flight.propagation import IDEAL_IMPULSES, Flight, model_name
+from nutdamp.flight.propagation import IDEAL_IMPULSES, model_name
 from nutdamp.montecarlo.inputs import DispersedInput
 from nutdamp.montecarlo.statistics import OUTPUTS, Array, Distribution, cases_to_show
-from nutdamp.montecarlo.study import CONFIDENCE, Results, Study
+from nutdamp.montecarlo.study import Results, Study
+from nutdamp.planning.notes import main_causes
+from nutdamp.planning.screening import Dispersion
+from nutdamp.planning.verdict import Verdict
 from nutdamp.spacecraft.model import Keep, Spacecraft
 from nutdamp.spacecraft.requirements import Part
 from nutdamp.units import screen_unit
 from nutdamp.views import decisions, tolerances
-from nutdamp.views.parts import bounds_text, requested, summary
+from nutdamp.views import verdict as verdicts
+from nutdamp.views.parts import bounds_text, named, summary
 from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, Shared, facts, to_figures, values_of
 from nutdamp.views.text import degrees, digits
 
@@ -42,7 +45,10 @@ BOTH = "screen full"  # the default screen, and that of all values
 
 
 class StudyOutput(NamedTuple):
-    """An output: ``key`` in files, heading and unit for people, factor to it; ``ranks``: worst cases show it."""
+    """An output: ``key`` in files, heading and unit for people, factor to it.
+
+    ``ranks``: worst cases show it; ``signed``: screens have percentiles of its size.
+    """
 
     name: str
     key: str
@@ -50,6 +56,7 @@ class StudyOutput(NamedTuple):
     unit: str = "deg"
     scale: float = 1.0
     ranks: bool = False
+    signed: bool = False
 
     @property
     def shown_unit(self) -> tuple[str, float]:
@@ -58,8 +65,9 @@ class StudyOutput(NamedTuple):
 
     @property
     def label(self) -> str:
-        """Heading and unit."""
-        return f"{self.heading}, {self.shown_unit[0]}" if self.unit else self.heading
+        """Heading and unit of its percentiles."""
+        heading = f"|{self.heading}|" if self.signed else self.heading
+        return f"{heading}, {self.shown_unit[0]}" if self.unit else heading
 
 
 FLOWN_OUTPUTS = (  # the outputs of a schedule, in the order of `OUTPUTS`
@@ -67,7 +75,7 @@ FLOWN_OUTPUTS = (  # the outputs of a schedule, in the order of `OUTPUTS`
         StudyOutput(part.value, f"{part.value}_deg", part.label, ranks=True)
         for part in (Part.NUTATION, Part.SHIFT, Part.DISTANCE)
     ),
-    StudyOutput("spin_change", "spin_change_rad_s", "spin change", "mrad/s", 1e3),
+    StudyOutput("spin_change", "spin_change_rad_s", "spin change", "mrad/s", 1e3, signed=True),
     StudyOutput("propellant", "propellant_kg", "propellant", "g", 1e3),
 )
 
@@ -77,25 +85,27 @@ EMPTY = "the pulses take more propellant than there is, so that the last ones do
 """Note on a case whose tank runs empty."""
 
 
-def dispersion_brief(results: Results, *, scheme: str) -> RenderableType:
+def dispersion_brief(flown: Dispersion) -> RenderableType:
     """The default screen of ``disperse``: verdict, percentiles, what counts most, and the worst case."""
-    head = [_title(results, scheme), *requirement_lines(results), *cone_lines(results), *_emptied(results)]
-    notes, case = [*tolerances.main_causes(results)], f" · {_again(results)} (worst)" * _varies(results)
+    results, judged = flown.core, flown.verdict
+    head = [_title(results, flown.plan.scheme), *verdict_lines(judged, results), *_emptied(results)]
+    notes, case = [*main_causes(judged)], f" · {_again(results)} (worst)" * _varies(results)
     notes += tolerances.unused_notes(results.study.model.inputs.unused)
     return summary(head, lambda **_: _percentiles(results).screen("screen"), notes, f"--plot cases.png{case}")
 
 
-def dispersion_screen(results: Results, *, scheme: str, worst: int, nominal: Flight | None = None) -> Group:
-    """All tables of ``disperse``; ``nominal``: the nominal case, where its end is to be shown too."""
-    study, body = results.study, results.study.model.spacecraft
-    parts: list[RenderableType] = [_title(results, scheme), Text(), _percentiles(results).screen("full")]
+def dispersion_screen(flown: Dispersion, *, worst: int) -> Group:
+    """All tables of ``disperse``."""
+    results, study, body = flown.core, flown.core.study, flown.plan.spacecraft
+    head = [_title(results, flown.plan.scheme), *verdict_lines(flown.verdict, results)]
+    parts: list[RenderableType] = [*head, Text(), _percentiles(results).screen("full")]
     parts.append(angles_note(body))
     if not results.exact:
         parts.append(Text("Percentiles are right to 0.006 % of their value; nominal and max are exact.", style="dim"))
-    if nominal is not None:
-        parts += [Text(), Text("Nominal case", style="bold"), facts(decisions.end_rows(nominal, aspects(nominal)))]
-    parts += [Text(), *requirement_lines(results), *cone_lines(results), *_emptied(results)]
-    parts += [Text(), *tolerances.tolerance_budget(results)]
+    ends = facts(decisions.end_rows(flown.plan.flight, flown.plan.aspects))
+    parts += [Text(), Text("Nominal case", style="bold"), ends]
+    events = [*cone_lines(results), *_emptied(results)]
+    parts += [*[Text()] * bool(events), *events, Text(), *tolerances.tolerance_budget(results)]
     if worst and _varies(results):
         cases = case_table(study, FLOWN_OUTPUTS, _worst(results, worst), _effects(study))
         parts += [Text(), Text(cases.title, "bold"), cases.screen("screen")]
@@ -103,22 +113,23 @@ def dispersion_screen(results: Results, *, scheme: str, worst: int, nominal: Fli
     return Group(*parts, *tolerances.unused_table(study.model.inputs.unused))
 
 
-def dispersion_json(results: Results, *, scheme: str, worst: int) -> dict[str, Any]:
+def dispersion_json(flown: Dispersion, *, worst: int) -> dict[str, Any]:
     """Percentiles, requirement, tolerance budget, ``worst`` cases and end of the nominal one; degrees, else SI.
 
     ``shares`` are of the nutation, of other outputs below their names; with ``correlation`` each is the increment over
     those before it. ``effect_deg``: on the nutation, of one sigma of an input alone (or all of a bias).
     """
-    study, body = results.study, results.study.model.spacecraft
+    results, study, body = flown.core, flown.core.study, flown.plan.spacecraft
     return {
         **decisions.heading(body),
-        "scheme": scheme,
+        "scheme": flown.plan.scheme,
         **counts_json(results),
         "final": decisions.final_json(study.nominal),
         "target": decisions.target_json(body),
         "exact_percentiles": results.exact,
         "percentiles": percentiles_of(results, FLOWN_OUTPUTS, study.outputs_of({})),
-        "requirement": requirement_of(results),
+        "requirement": requirement_of(flown.verdict),
+        "decision": verdicts.verdict_json(flown.verdict),
         **cones_json(results),
         **({"tank_empty_fraction": results.emptied / results.done} if body.tank else {}),
         "shares": list(_shares(results)),
@@ -146,7 +157,7 @@ def _title(results: Results, scheme: str) -> Text:
     drawn = f"cases: {results.done:,}, seed {study.seed}"
     if results.redrawn:
         drawn += f", unphysical and drawn again: {results.redrawn:,}"
-    return Text.assemble((study.model.spacecraft.name, "bold"), f": {scheme}, {how}; {drawn}")
+    return named(study.model.spacecraft, f": {scheme}, {how}; {drawn}")
 
 
 def _again(results: Results) -> str:
@@ -160,14 +171,12 @@ def _varies(results: Results) -> bool:
 # --- percentiles
 
 
-def percentiles_json(
-    column: str, nominal: float | None, distribution: Distribution | None, *, lower: bool = False
-) -> dict[str, float | None]:
-    """The ``nominal`` value and the distribution in the unit of a ``column``; ``lower``: values that cases reach."""
+def percentiles_json(column: str, nominal: float | None, distribution: Distribution | None) -> dict[str, float | None]:
+    """The ``nominal`` value and the distribution in the unit of a ``column``."""
     spread: list[float | None] = [None] * (len(PERCENTS) + 2)
     if distribution is not None:
         shares = np.array(PERCENTS) / 100.0
-        levels = distribution.quantiles(1.0 - shares if lower else shares).tolist()
+        levels = distribution.quantiles(shares).tolist()
         spread = [distribution.minimum, *levels, distribution.maximum]
     values = zip(("nominal", "min", *LEVELS, "max"), (nominal, *spread), strict=True)
     return {name: None if value is None else shown(column, value) for name, value in values}
@@ -184,39 +193,38 @@ def percentiles_of(
 
 
 def _percentiles(results: Results) -> DataTable:
-    """One row an output: values by shares of the cases; where any are negative, lower ones in a row of their own."""
+    """One row an output: values by shares of the cases."""
     rows = []
     nominal = results.study.outputs_of({}).tolist()
     for output, plan in zip(FLOWN_OUTPUTS, nominal, strict=True):
-        distribution, signs = results.distribution(output.name), [""]
-        unit, scale = output.shown_unit
-        if distribution is not None and distribution.minimum < 0.0:
-            signs = [" ≤", " ≥"] if distribution.maximum > 0.0 else [" ≥"]
-        for sign in signs:
-            given = percentiles_json(output.key, plan, distribution, lower=sign == " ≥")
-            row = percentile_row(f"{output.heading}{sign}, {unit}", scale, given, lower=sign == " ≥")
-            if distribution is not None:  # the nominal value has digits of its own: other places show it alone
-                plain = scale * (given["nominal"] or 0.0)
-                row["nominal"] = "0" if abs(plain) < NOTHING else digits(plain, 4)
-            rows.append(row)
+        distribution = results.distribution(output.name)
+        row = percentile_row(output, plan, distribution)
+        if distribution is not None:  # with digits of its own: other places show it alone
+            plain = abs(output.shown_unit[1] * shown(output.key, plan))
+            row["nominal"] = "0" if plain < NOTHING else digits(plain, 4)
+        rows.append(row)
     return DataTable("Percentiles", PERCENTILES, rows)
 
 
 def percentile_row(
-    name: str, scale: float, given: Mapping[str, float | None], *, lower: bool = False, whole: bool = False
+    output: StudyOutput, nominal: float | None, distribution: Distribution | None
 ) -> dict[str, str | None]:
-    """A row of `PERCENTILES`: values of `percentiles_json` times ``scale``, to the digits of the largest.
-
-    ``lower``: the least value is the worst; ``whole``: they are counts.
-    """
-    values = {key: math.nan if value is None else scale * value for key, value in given.items()}
-    largest = max(abs(values["min"]), abs(values["max"]))
+    """A row of `PERCENTILES`: values, or their sizes, to the digits of the largest."""
+    if output.signed and nominal is not None and distribution is not None:
+        nominal, distribution = abs(nominal), distribution.sizes()
+    scale = output.shown_unit[1]
+    values = {
+        key: math.nan if value is None else scale * value
+        for key, value in percentiles_json(output.key, nominal, distribution).items()
+    }
 
     def text(value: float) -> str | None:
-        return None if math.isnan(value) else f"{value:.0f}" if whole else beside(value, largest)
+        if math.isnan(value):
+            return None
+        return beside(value, abs(values["max"])) if output.unit else f"{value:.0f}"
 
     row = {key: text(value) for key, value in values.items()}
-    row[""], row["max"] = name, row["min" if lower else "max"]
+    row[""] = output.label
     return row
 
 
@@ -253,36 +261,34 @@ def angles_note(body: Spacecraft) -> Text:
 # --- requirement and cones
 
 
-def requirement_lines(results: Results | LoopResults) -> list[RenderableType]:
-    """The requirement, and the verdict on the number of cases that comply."""
-    share, probability = results.met_fraction, results.probability
-    if share is None:
-        return [Text("The file has no requirement to meet.")]
-    low, high = results.interval
-    required = requested(results.study.model.spacecraft)
-    verdict = Text(decisions.cases_verdict(share, probability), "green" if results.meets_requirement else "red")
-    interval = " to ".join(decisions.percent(bound, probability) for bound in (low, high))
-    text = Text.assemble(("Requirement ", "bold"), f"({required}) ", verdict, f"; 95 % interval {interval}.")
-    if results.meets_requirement and low < probability:
-        few, level = cases_to_show(probability), decisions.exact_percent(probability)
-        hint = f" It takes at least {few:,}." if results.done < few else ""
-        text.append(f" The interval reaches below {level}: more --samples would show it.{hint}")
-    return [text]
+def verdict_lines(judged: Verdict, results: Results | LoopResults) -> list[RenderableType]:
+    """The verdict, a row for each bound, and what more cases would show."""
+    parts: list[RenderableType] = [verdicts.coloured(*verdicts.stated(judged))]
+    if judged.cases is not None and judged.cases.complying is not None:
+        low, high, probability = judged.cases.low, judged.cases.high, judged.cases.probability
+        few = cases_to_show(probability) if probability < 1.0 else 0
+        if not judged.unshown:
+            ends = (verdicts.percent(share, probability) for share in (low, high))
+            parts.append(Text("95 % interval {} to {}".format(*ends)))
+        elif results.done < few:
+            parts.append(Text(f"It takes at least {few:,} cases to show it."))
+    parts.append(verdicts.bound_table(judged).screen("screen"))
+    return parts
 
 
-def requirement_of(results: Results | LoopResults) -> dict[str, Any] | None:
+def requirement_of(judged: Verdict) -> dict[str, Any] | None:
     """The share of cases that comply beside the one required; None where nothing is."""
-    if results.met_fraction is None:
+    entry = verdicts.cases_json(judged.cases)
+    if entry is None:
         return None
-    low, high = results.interval
-    met = {"met_fraction": results.met_fraction, "low": low, "high": high, "confidence": CONFIDENCE}
-    return met | values_of(results, "probability", "met=meets_requirement")
+    kept = {name: entry[name] for name in ("met_fraction", "low", "high", "probability")}
+    return {**kept, "confidence": 0.95, "met": judged.met}
 
 
 def cone_lines(results: Results | LoopResults) -> Iterator[Text]:
     """Number of cases that break each cone, and range of the angles from the spin axis to its direction."""
     for keep, entry in _cones(results):
-        share = decisions.percent(entry["broken_fraction"], 1.0 - results.probability)
+        share = verdicts.percent(entry["broken_fraction"], 1.0 - results.probability)
         bounds = ("least_deg", "largest_deg", "nominal_least_deg", "nominal_largest_deg")
         least, most, *alone = (degrees(math.radians(entry[key])) for key in bounds)
         yield Text.assemble(
@@ -312,7 +318,7 @@ def _cones(results: Results | LoopResults) -> Iterator[tuple[Keep, dict[str, Any
 
 def _emptied(results: Results) -> Iterator[Text]:
     if results.emptied:
-        share = decisions.percent(results.emptied / results.done, 1.0 - results.probability)
+        share = verdicts.percent(results.emptied / results.done, 1.0 - results.probability)
         yield Text.assemble(("Tank ", "bold"), (f"empty too soon in {share} of cases", "red"), f": {EMPTY}.")
 
 
@@ -423,7 +429,7 @@ def case_screen(study: Study, case: int, draws: dict[str, float], *, scheme: str
     rows = [_flown(study, ESTIMATE, {}), _flown(study, case, draws)]
     outcome = case_table(study, FLOWN_OUTPUTS, rows, _effects(study))
     empty = [Text(f"Tank empty too soon: {EMPTY}.", "red")] * bool(study.ends_of(draws).drained > 1.0)
-    title = Text.assemble((study.model.spacecraft.name, "bold"), f": {scheme}, seed {study.seed}, case {case + 1}")
+    title = named(study.model.spacecraft, f": {scheme}, seed {study.seed}, case {case + 1}")
     inputs = tolerances.inputs_table(study.model.inputs.drawn, draws)
     return Group(title, Text(), inputs, Text(), outcome.transposed("case"), *empty)
 

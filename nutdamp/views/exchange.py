@@ -93,7 +93,8 @@ def _dated(plan: Plan, row: Format, until: float, xml: bool) -> str:
         cure = "an earlier --until" if row.track else "a shorter horizon"
         raise Unsuitable(("attitude", "epoch"), f"{last:.4g} s after it the year 9999 is over; {cure} helps")
     if not row.message:
-        return stk_attitude(flown(body, plan.pulses, until), until, place)
+        about = f"{plan.scheme}, status {plan.verdict.status.value}"
+        return stk_attitude(flown(body, plan.pulses, until), until, place, about)
     now = Epoch.parse(datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%dT%H:%M:%SZ"))
     if row.track:
         form = message.SPIN_NUTATION_MOM if row.nutates else message.QUATERNION_ANGVEL

@@ -1,4 +1,4 @@
-"""The fit to telemetry: estimates and their accuracy, signals and their residuals, forecast with more telemetry."""
+"""The fit to telemetry: estimates and their accuracy, signals and their residuals."""
 
 from __future__ import annotations
 
@@ -10,16 +10,15 @@ from rich.console import RenderableType
 from rich.text import Text
 
 from nutdamp.common.results import Note, note
-from nutdamp.estimation.forecast import Outlook
 from nutdamp.estimation.parameters import KIND, in_moments, untold
 from nutdamp.estimation.results import UNTOLD, Carried, Estimate, carried, correlated, doubts, estimates
 from nutdamp.estimation.search import Fit
 from nutdamp.files.carried import notes
 from nutdamp.units import screen_unit
-from nutdamp.views.decisions import exact_percent, heading, percent
+from nutdamp.views.decisions import heading
 from nutdamp.views.parts import opening, summary
-from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, Shared, angle_of, file_columns, to_figures, values_of
-from nutdamp.views.text import mass, note_json
+from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, to_figures, values_of
+from nutdamp.views.text import note_json
 
 FAR = 4.0  # sigmas of the file from which on a change is remarked upon
 NOTHING = 1e-3  # sigmas below which a value, or a change, is zero
@@ -104,32 +103,8 @@ def signal_table(fit: Fit) -> DataTable:
     return DataTable("Signals", columns, range(len(of_signal)))
 
 
-def prospect_table(ahead: Outlook) -> DataTable:
-    """A row for each coast and probe pulse of the forecast."""
-    now, level = ahead.now, exact_percent(ahead.probability)
-
-    columns = (
-        Column("coast_s", "", "", lambda row: row.length, where="json"),
-        Column("", "coast", "s", lambda row: f"{row.length:.4g}{' (now)' * (row is now)}", where="screen", kind=TEXT),
-        Column("probe", "", "", lambda row: row.probe or None, where="json", kind=TEXT),
-        Column("", "probe pulse", "", lambda row: f"{row.probe}, {row.on_time:.3g} s" if row.probe else None,
-               where="screen"),
-        *file_columns("json", "on_time_s"),
-        Column("sigma_C_over_A", "sigma of C/A", "", lambda row: row.ratio, to_figures(2), "screen json"),
-        *file_columns("json", "sigma_thrust=thrust"),
-        Column("", "sigma of thrust", "%", lambda row: 100.0 * row.thrust if row.probe else None,
-               to_figures(2), "screen"),
-        Column("nutation_deg", f"nutation {level}", "deg", angle_of("nutation"), to_figures(3), "screen json"),
-        Column("met_fraction", "comply", "%", lambda row: row.met, to_figures(4, 100.0), "screen json"),
-        Column("propellant_kg", Shared.PROPELLANT, "g", lambda row: row.propellant, to_figures(3, 1e3), "screen json"),
-        Column("gain_deg_kg", "gain", "deg/g", lambda row: (rate := ahead.gain(row)) and math.degrees(rate),
-               to_figures(2, 1e-3), "screen json"),
-    )  # fmt: skip
-    return DataTable("Forecast with more telemetry", columns, (*ahead.coasts, *ahead.probes))
-
-
-def fit_screen(fit: Fit, time: float, ahead: Outlook | None = None, *, verbose: bool = True) -> RenderableType:
-    """The screen of ``fit``; the motion is that at ``time`` s, ``ahead`` the forecast with more telemetry."""
+def fit_screen(fit: Fit, time: float, *, verbose: bool = True) -> RenderableType:
+    """The screen of ``fit``; the motion is that at ``time`` s."""
     rows, names = estimates(fit, time), fit.model.signals
     colored = [name for at, name in enumerate(names) if fit.resolved[at] and not fit.white(at)]
     test = f"residuals NOT white: {', '.join(colored)}; the sigmas are too small" if colored else "residuals: noise"
@@ -141,9 +116,9 @@ def fit_screen(fit: Fit, time: float, ahead: Outlook | None = None, *, verbose: 
     return summary(
         [*head, Text(f"motion at t = {time:g} s")],
         lambda first=None: table.screen("screen", first=first and max(first, 3)),
-        [*(advice(ahead) if ahead is not None else ()), *told(fit, rows)],
-        "-o now.yaml · --plot fit.png" + " · --next" * (ahead is None),
-        more=[each.screen("screen") for each in (signal_table(fit), *map(prospect_table, filter(None, [ahead])))],
+        [*told(fit, rows)],
+        "-o now.yaml · --plot fit.png",
+        more=[signal_table(fit).screen("screen")],
         verbose=verbose,
     )
 
@@ -156,37 +131,6 @@ def _record(fit: Fit) -> str:
     turns = f", nutation periods: {record.length * rate / (2.0 * math.pi):.3g}" if rate else ""
     fired = f", pulses fired meanwhile: {len(record.fired)}" if len(record.schedule) else ""
     return f"{record.start:g} s to {record.end:g} s{turns}{fired}"
-
-
-def advice(ahead: Outlook) -> Iterator[Note]:
-    """Value of more telemetry."""
-    now, longer, probe = ahead.now, ahead.longer, ahead.probe
-    level = 100.0 * ahead.probability
-    scheme, today = ahead.scheme, math.degrees(now.nutation)
-    if ahead.enough:
-        met = percent(now.met or 0.0, ahead.probability)
-        yield note("telemetry-enough", scheme=scheme, now_deg=today, level_share=level, complying=met)
-        return
-    coast = ahead.coasts[-1] if longer is None else longer
-    yield note(
-        "coast-does-not-pay" if longer is None else "coast-pays",
-        scheme=scheme,
-        now_deg=today,
-        level_share=level,
-        coast_s=coast.length,
-        left_deg=math.degrees(coast.nutation),
-    )
-    if probe is not None:
-        left = math.degrees(probe.nutation)
-        yield note("probe-pays", channel=probe.probe, on_s=probe.on_time, coast_s=probe.length, left_deg=left)
-        if probe.propellant is not None and ahead.propellant is not None:
-            yield note("probe-propellant", probe=mass(probe.propellant), plan=mass(ahead.propellant))
-        thrifty = ahead.thrifty
-        if thrifty is not None and thrifty is not probe:
-            left, taken = math.degrees(thrifty.nutation), mass(thrifty.propellant)
-            yield note("probe-thrifty", channel=thrifty.probe, propellant=taken, left_deg=left)
-    elif ahead.probes:
-        yield note("no-probe-pays")
 
 
 def told(fit: Fit, rows: Sequence[Estimate]) -> Iterator[Note]:
@@ -209,8 +153,8 @@ def told(fit: Fit, rows: Sequence[Estimate]) -> Iterator[Note]:
         yield note("fit-one-moment")
 
 
-def fit_json(fit: Fit, at_time: Carried, ahead: Outlook | None = None, warnings: Sequence[str] = ()) -> dict[str, Any]:
-    """Estimates with sigmas, values of the file, signals, covariance of the inputs of dispersions; prospects.
+def fit_json(fit: Fit, at_time: Carried, warnings: Sequence[str] = ()) -> dict[str, Any]:
+    """Estimates with sigmas, values of the file, signals, covariance of the inputs of dispersions.
 
     ``warnings`` of reading the record go into the notes, before the doubts about the estimates.
     """
@@ -239,10 +183,4 @@ def fit_json(fit: Fit, at_time: Carried, ahead: Outlook | None = None, warnings:
                 *(*doubts(fit), *untold(model.record), *notes(fit, at_time)),
             )
         ],
-        "next": ahead
-        and {
-            **values_of(ahead, "scheme", "propellant_kg", "probability", "longer_coast_s=longer.length"),
-            **values_of(ahead, "probe=probe.probe", "probe_per_propellant=thrifty.probe"),
-            "prospects": prospect_table(ahead).json(),
-        },
     }

@@ -1,8 +1,4 @@
-"""The screens of ``plan``: what to fire on top, by default in at most `LINES` lines of `WIDTH` columns.
-
-The headline, requirements that are not met, warnings and the end of the flight are never dropped; the rest gives way in
-the order of its worth and stands on the full screen (``-v``). The schemes compared are one row each.
-"""
+"""The screens of ``plan``: what to fire on top, then the schemes compared, one row each."""
 
 from __future__ import annotations
 
@@ -10,7 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from operator import attrgetter
-from typing import Any, NamedTuple
+from typing import Any
 
 from rich.console import Group, RenderableType
 from rich.table import Table
@@ -19,18 +15,29 @@ from rich.text import Text
 from nutdamp.common.numerics import RPM
 from nutdamp.common.results import Note
 from nutdamp.errors import listed
-from nutdamp.flight.end_state import at_start
 from nutdamp.flight.propagation import REAL_WIDTHS, model_name
-from nutdamp.planning.decision import Comparison, Decision, decide, infeasibility
-from nutdamp.planning.notes import alternatives, comparison_warnings, decision_notes, plan_notes, reasons
+from nutdamp.planning.decision import Comparison, speed
+from nutdamp.planning.notes import alternatives, comparison_warnings, infeasibility, plan_notes, reasons, verdict_notes
 from nutdamp.planning.plan import Plan
+from nutdamp.planning.verdict import Verdict
 from nutdamp.spacecraft import requirements
-from nutdamp.spacecraft.model import SLACK, Spacecraft
+from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.requirements import Bound, Part
-from nutdamp.views import decisions, parts, tables
-from nutdamp.views.decisions import COUNT, coloured, lasting, limit, size, verdict
+from nutdamp.spacecraft.schedule import Schedule
+from nutdamp.views import decisions, parts
+from nutdamp.views import verdict as verdicts
+from nutdamp.views.decisions import lasting
 from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable, Shared, angle_of, facts, to_figures
-from nutdamp.views.text import degrees, digits, joined, ordered, screen_line, screen_lines, short_angle, small_angle
+from nutdamp.views.text import (
+    digits,
+    joined,
+    ordered,
+    screen_line,
+    sentence,
+    short_angle,
+    small_angle,
+    text,
+)
 
 NOT = "✗"  # sign before a value above the requirement
 SHORT_NAMES = ("RA", "dec")  # right ascension and declination, where there is little room
@@ -48,7 +55,7 @@ def scheme_table(compared: Comparison, chosen: Plan | None) -> DataTable:
 
 def limits(body: Spacecraft) -> tuple[float, float]:
     """Limits, rad, of the nutation and of the end of H, infinite where there are none."""
-    most = {bound.part: bound.most for bound in requirements.required(body)}
+    most = {bound.part: bound.limit for bound in requirements.required(body)}
     ends = [most[part] for part in (Part.SHIFT, Part.DISTANCE) if part in most]
     return most.get(Part.NUTATION, math.inf), min(ends, default=math.inf)
 
@@ -60,10 +67,8 @@ def _feasible(get: Callable[[Plan], Any] | str) -> Callable[[Plan], Any]:
 
 
 def scheme_verdict(compared: Comparison, plan: Plan) -> str:
-    """Verdict on a plan, or the reason in a word why there is none."""
-    if not plan.feasible:
-        return decisions.no_plan(plan)
-    return decisions.VERDICT[compared.meets(plan)] + ", timed" * (not plan.commandable)
+    """Verdict on a plan, or why it is not recommended, or why there is none."""
+    return verdicts.scheme_word(compared, plan) if plan.feasible else decisions.no_plan(plan)
 
 
 def _four(value: float) -> str:
@@ -75,10 +80,13 @@ def _columns(compared: Comparison, chosen: Plan | None) -> Iterator[Column]:
     feasible = [plan for plan in compared.plans if plan.feasible]
     fuelled = any(plan.pulses.propellant is not None for plan in feasible)
     aimed, everywhere = body.goal.axis is not None, "screen full page"
-    met = _feasible(compared.meets)
 
-    def share(plan: Plan) -> str:
-        return decisions.share_text(compared.shares.get(plan)).removesuffix(" %")
+    def met(plan: Plan) -> bool | None:
+        return compared.verdicts[plan].met if plan.feasible else None
+
+    def share(plan: Plan) -> float | None:
+        cases = compared.verdicts[plan].cases
+        return None if cases is None or not cases.final else cases.complying
 
     def shortly(largest: float) -> Callable[[float], str]:
         return lambda angle: short_angle(math.radians(angle), largest)
@@ -86,9 +94,9 @@ def _columns(compared: Comparison, chosen: Plan | None) -> Iterator[Column]:
     yield Column("scheme", Shared.SCHEME, "", attrgetter("scheme"), where=f"{everywhere} csv", kind=TEXT)
     yield Column("feasible", "", "", attrgetter("feasible"), where="csv", kind=YES_NO)
     yield Column("recommended", "", "", lambda plan: plan is chosen, where="csv", kind=YES_NO)
-    yield Column("meets_requirement", "", "", compared.meets, where="csv", kind=YES_NO)
-    exact = {plan: known.exact for plan, known in compared.shares.items()}
-    yield Column("met_fraction", "", "", exact.get, where="csv")
+    yield Column("status", "", "", lambda plan: compared.verdicts[plan].status.value, where="csv", kind=TEXT)
+    yield Column("meets_requirement", "", "", met, where="csv", kind=YES_NO)
+    yield Column("met_fraction", "", "", share, where="csv")
     count = _feasible(lambda plan: len(plan.pulses))
     yield Column("", Shared.PULSES, "", count, where=everywhere, kind=WHOLE)
     yield Column("pulses", "", "", lambda plan: len(plan.pulses), where="csv", kind=WHOLE)
@@ -98,8 +106,6 @@ def _columns(compared: Comparison, chosen: Plan | None) -> Iterator[Column]:
     where = "full page csv" + " screen" * (not fuelled)
     yield Column("total_impulse_Nms", Shared.IMPULSE, "N m s", impulse, _four, where)
     yield Column("least_impulse_Nms", "", "", _feasible("spacecraft.least_impulse"), where="csv")
-    for name, whole in ratios(body):
-        yield Column("", f"impulse over {name}", "", _feasible(_over(whole)), lambda value: f"{value:.4f}", "full page")
     spent = _feasible("pulses.propellant")
     yield Column("propellant_kg", Shared.PROPELLANT, "kg", spent, where="csv")
     if fuelled:
@@ -122,26 +128,10 @@ def _columns(compared: Comparison, chosen: Plan | None) -> Iterator[Column]:
         yield Column("", "final spin", "rad/s", _feasible("flight.settled.spin"), to_figures(6), "full")
     where = "full csv" + " page" * any(plan.spin_change for plan in compared.plans)
     yield Column("spin_change_rad_s", "spin change", "rad/s", attrgetter("spin_change"), _four, where)
-    where = "csv" + " full page" * any(plan.delta_v is not None for plan in compared.plans)
-    yield Column("delta_v_m_s", "|ΔV|", "m/s", lambda plan: None if plan.delta_v is None else math.hypot(*plan.delta_v),
-                 _four, where)  # fmt: skip
-    if compared.shares:
-        yield Column("", Shared.CASES, "%", share, where="screen", kind=TEXT)
-        yield Column("", COUNT, "%", share, where="full page", kind=TEXT)
+    yield Column("delta_v_m_s", "", "", speed, where="csv")
     yield from _bounds(compared)
     yield Column("", Shared.VERDICT, "", partial(scheme_verdict, compared), where=everywhere, kind=TEXT, met=met)
     yield Column("why", "", "", infeasibility, where="csv", kind=TEXT)
-
-
-def ratios(body: Spacecraft) -> Iterator[tuple[str, float]]:
-    """The floors of impulse, N m s, by name: A|ω0|, and with a target C|ω3|β."""
-    yield "A|ω0|", body.least_impulse
-    if body.goal.axis is not None:
-        yield parts.turn_floor(body), parts.turning(body)
-
-
-def _over(whole: float) -> Callable[[Plan], float | None]:
-    return lambda plan: plan.pulses.total_impulse / whole if whole > 0.0 else None
 
 
 def _directions(body: Spacecraft) -> Iterator[Column]:
@@ -163,224 +153,123 @@ def _shown_direction(at: int, plan: Plan) -> str:
 
 
 def _bounds(compared: Comparison) -> Iterator[Column]:
-    if not requirements.judged(compared.spacecraft):
-        return
-    for bound in requirements.required(compared.spacecraft):
-        name, cell = f"{bound.part.label} {limit(bound)}", partial(_part, bound)
-        yield Column("", name, "", _feasible(cell), where="full", kind=TEXT)
-    for at, cone in enumerate(at_start(compared.spacecraft)[: len(compared.spacecraft.keep)]):
-        for kept, _, _ in parts.cone_margins(cone):
-            name = f"axis from {cone.keep.name} {kept}"
-            yield Column("", name, "", _feasible(partial(_cone, at, kept)), where="full", kind=TEXT)
+    body = compared.spacecraft
+    for bound in (*requirements.required(body), *requirements.cones(body)):
+        name = f"{bound.label} {verdicts.limit(bound)}"
+        yield Column("", name, "", _feasible(partial(_bound, bound)), where="full", kind=TEXT)
 
 
-def _part(bound: Bound, plan: Plan) -> str:
-    (part,) = (part for part in plan.held if part.bound == bound)
-    shown = size(bound, part.left).removesuffix(" deg")  # the heading has the unit
-    return shown if part.met else f"{NOT} {shown}"
+def _bound(bound: Bound, plan: Plan) -> str:
+    line = next(line for line in plan.held if line.bound == bound)
+    shown = verdicts.value(bound, line.left).removesuffix(" deg")  # the heading has the unit
+    return shown if line.met else f"{NOT} {shown}"
 
 
-def _cone(at: int, kept: str, plan: Plan) -> str:
-    angles = ((angle, left) for bound, angle, left in parts.cone_margins(plan.aspects[at]) if bound == kept)
-    return next(f"{NOT} " * (left < -SLACK) + degrees(angle).removesuffix(" deg") for angle, left in angles)
-
-
-LINES = 24  # lines of the screen
-ROWS, FIRST = 6, 4  # pulses or blocks that are shown one by one; of more the first and the last
-TIGHTEST = 2  # requirements that are shown where there is no room for all that are met
-NOTES = 3  # notes that are shown, at most
-DIGITS = 8  # figures of a value beside its limit, at most
-
-
-def glance(compared: Comparison, decision: Decision | None, robust: Sequence[Note] | None = None) -> RenderableType:
+def glance(compared: Comparison, robust: Sequence[Note] | None = None) -> RenderableType:
     """The screen of a comparison and the plan to fly, one of those compared, or of the reason why there is none.
 
     ``robust``: notes on the choice, where dispersed cases made it.
     """
-    body = compared.spacecraft
-    head = [*parts.title(body), headline(compared, decision)]
-    warnings, more = screen_lines([*(robust or ()), *notes(compared, decision, robust=robust is not None)])
-    table = scheme_table(compared, None if decision is None else decision.plan).screen("screen", between=" ")
-    if decision is None:
-        return _fitted(head, [], [], more, table)
-    plan = decision.plan
-    head += [coloured(verdict(decision), decision.met), *warnings]
+    judged, plan = compared.verdict, compared.recommended
+    head, fired = [*parts.title(compared.spacecraft), headline(compared)], None
+    ending: list[RenderableType] = []
+    if plan is not None:
+        head.append(verdicts.coloured(verdicts.statement(judged), judged.light))
+        ending = [verdicts.bound_table(judged).screen("screen"), ends(plan), Text()]
+        least = limits(compared.spacecraft)[0]
+        fired = parts.block_table(plan.flight) if plan.pulses.blocks else parts.pulse_table(plan.flight, least=least)
+    schemes = scheme_table(compared, plan).screen("screen", between=" ")
 
-    def screen(first: int, *apart: Text) -> RenderableType:
-        fired: list[RenderableType] = []
-        if plan.pulses.blocks:
-            fired = [*apart, parts.block_table(plan.flight).screen("screen", first=first)]
-        elif len(plan.pulses):
-            shown = parts.pulse_table(plan.flight, least=limits(body)[0])
-            fired = [*apart, shown.screen("screen", between=", ", first=first if len(shown.rows) > ROWS else None)]
-        required, middle = requirement_rows(decision), [ends(decision), *fired]
-        return _fitted(head, required, middle, more, table, blocks=bool(plan.pulses.blocks))
+    def table(first: int | None = None) -> RenderableType:
+        rows = [*ending, fired.screen("screen", first=first), Text()] if fired is not None and fired.rows else ending
+        return Group(*rows, schemes)
 
-    sizes = (screen(first, Text()) for first in (FIRST, FIRST // 2, 1))
-    return next((shown for shown in sizes if tables.lines_of(shown) <= LINES), screen(1))
+    written = "--blocks blocks.csv" if plan is not None and plan.pulses.blocks else "--csv pulses.csv"
+    every = [*(robust or ()), *notes(compared, robust=robust is not None)]
+    return parts.summary(head, table, every, f"{written} · --plot plan.png · nutdamp report")
 
 
-def notes(compared: Comparison, decision: Decision | None, *, robust: bool = False) -> list[Note]:
+def notes(compared: Comparison, *, robust: bool = False) -> list[Note]:
     """Warnings, then notes in the order of their worth; a ``robust`` plan was made for what others miss."""
+    chosen = compared.recommended
     infeasible = [note for plan in compared.plans if not plan.feasible for note in plan_notes(plan)]
-    if decision is None:
-        return infeasible
-    own = plan_notes(decision.plan, cones=False) if decision.plan is compared.recommended else ()
+    if chosen is None:
+        return ordered(infeasible)
+    own = plan_notes(chosen, cones=False)
     missed = () if robust else comparison_warnings(compared, tabulated=True)
-    return ordered([*missed, *decision_notes(decision), *alternatives(compared), *infeasible, *own])
+    beside = verdict_notes(compared.verdict, chosen)
+    return ordered([*missed, *beside, *alternatives(compared), *infeasible, *own])
 
 
-def headline(compared: Comparison, decision: Decision | None) -> Text:
+def headline(compared: Comparison) -> Text:
     """Headline of the plan to fly: scheme, pulses, cost and end; or that it is not enough, not needed, not found."""
-    if decision is None:
-        return Text.assemble(("NO PLAN", "bold red"), f": {joined(reasons(compared))}")
-    plan = decision.plan
-    pulses = plan.pulses
-    if not len(pulses):
-        return Text.assemble(("NO PULSE needed", "bold"), f": {decisions.needless(compared) or 'nothing is fired'}")
-    blocks = f"blocks {len(pulses.blocks)}, " if pulses.blocks else ""
-    count = f"{blocks}pulses {len(pulses)}, {decisions.spent(pulses)}, ends at {pulses.end:.4g} s"
-    lead = ("NOT ENOUGH: ", "bold red") if decision.met is False else ("FLY ", "bold")
-    ideal = " (ideal impulses)" * pulses.idealised
-    return Text.assemble(lead, (plan.scheme, "bold"), f"{ideal}: {count}")
+    judged = compared.verdict
+    lead, about = verdicts.headline(judged, compared)
+    return Text.assemble((lead, f"bold {verdicts.STYLES[judged.light]}"), about)
 
 
-class RequirementRow(NamedTuple):
-    """Requirement in words: its label, values in the cases and nominally, limit, verdict and margin.
-
-    ``used``: shares of the limit that the nominal value and that of the cases take, NaN where it is not known.
-    """
-
-    label: str
-    dispersed: str
-    nominal: str
-    limit: str
-    verdict: Text
-    margin: str
-    used: tuple[float, float]
-
-    @property
-    def met(self) -> bool:
-        """True unless it is missed."""
-        return self.verdict.plain != decisions.VERDICT[False]
-
-    @property
-    def worth(self) -> tuple[float, bool]:
-        """Order in which requirements are shown: the least share of the limit that is left first."""
-        worst = self.used[0] if math.isnan(self.used[1]) else self.used[1]
-        return (math.inf if math.isnan(worst) else 1.0 - worst), self.met
-
-
-def requirement_rows(decision: Decision) -> list[RequirementRow]:
-    """Rows of what is required."""
-    rows = []
-    cases = decision.cases
-    level = "" if cases is None else f"{decisions.exact_percent(cases.probability)}: "
-    for line in decision.lines:
-        if not line.bound.required:
-            continue
-        bound, values = line.bound, (line.nominal, None if cases is None else line.dispersed)
-        dispersed = "" if values[1] is None else level + _left(bound, values[1])
-        words = dispersed, f"nominal {_left(bound, line.nominal)}", f"limit {limit(bound)[2:]}"
-        used = [math.nan if value is None else value / bound.most for value in values]
-        met, spin = coloured(decisions.VERDICT[line.met], line.met), bound.part is Part.SPIN
-        left = size(bound, line.margin) if spin else f"{short_angle(line.margin, bound.most)} deg"
-        rows.append(RequirementRow(bound.part.label, *words, met, left, (used[0], used[1])))
-    for aspect in decision.aspects:
-        name, keep = f"axis from {aspect.keep.name}", aspect.keep
-        for text, angle, margin in parts.cone_margins(aspect):
-            kept, least = margin >= -SLACK, margin == aspect.least - keep.least
-            used_up = keep.least / max(angle, SLACK) if least else angle / keep.most
-            words, met = ("", f"nominal {degrees(angle)}", f"limit {text}"), coloured(decisions.VERDICT[kept], kept)
-            rows.append(RequirementRow(name, *words, met, f"{short_angle(margin)} deg", (used_up, math.nan)))
-    return rows
-
-
-def _left(bound: Bound, value: float | None) -> str:
-    """Residual of a part, with as many digits as it takes to stand on its side of the limit."""
-    if bound.part is Part.SPIN or value is None or math.isnan(value):
-        return size(bound, value)
-    text, figures, shown = short_angle(value, bound.most), 3, float(f"{math.degrees(bound.most):.4g}")
-    while (float(text) > shown) != (value > bound.most) and figures < DIGITS:
-        figures += 1
-        text = f"{math.degrees(value):.{figures}g}"
-    return f"{text} deg"
-
-
-def ends(decision: Decision) -> Table:
+def ends(plan: Plan) -> Table:
     """End of the flight, flown and by the impulse sum (17), and where the spin axis points."""
-    plan, left, body = decision.plan, decision.flight.residual, decision.plan.spacecraft
+    flight, body = plan.flight, plan.spacecraft
+    left = flight.residual
     formula, (least, turn) = plan.residual, limits(body)
-    angles = [f"nutation {short_angle(left.nutation, least)}", f"body cone {short_angle(left.body_cone, least)}"]
-    angles += [f"space cone {short_angle(left.space_cone, least)}"]
+    angles = [f"nutation {short_angle(left.nutation, least)}"]
+    if not body.inertia.wheel and left.body_cone < 0.5 * math.pi:  # where ω need not lie near H, cones tell nothing
+        angles += [f"body cone {short_angle(left.body_cone, least)}"]
+        angles += [f"space cone {short_angle(left.space_cone, least)}"]
     if formula is not None and (by_impulses := short_angle(formula.nutation, least)) not in angles[0].split():
         angles[0] += f" (17: {by_impulses})"
     rows = [("after pulses, deg", "  ".join(angles))]
-    first, second = parts.angle_texts(body, decision.flight.final.axis)
+    first, second = parts.angle_texts(body, flight.final.axis)
     names = parts.angle_names(body) if body.attitude is None else SHORT_NAMES
     turned = f"turned by {short_angle(left.momentum_shift, turn)} deg"
     turned = turned if body.goal.axis is None else f"{short_angle(left.axis_error, turn)} deg off target"
-    spun = abs(decision.flight.final.spin - body.spin) > requirements.SPIN_TOLERANCE * abs(body.spin)
-    spin = f"; spin {decision.flight.final.spin * RPM:.5g} rpm" * spun
+    final = flight.final.spin
+    spin = f"; spin {final * RPM:.5g} rpm" * (not requirements.spins_at(body, final))
     rows.append(("axis", f"{names[0]} {first}, {names[1]} {second}; H {turned}{spin}"))
-    if len(plan.pulses) and lasting(decision.flight):
-        rows.append(("", lasting(decision.flight)))
+    if len(plan.pulses) and lasting(flight):
+        rows.append(("", lasting(flight)))
     return facts(rows)
 
 
-def _fitted(
-    head: Sequence[Text],
-    required: Sequence[RequirementRow],
-    middle: Sequence[RenderableType],
-    more: Sequence[Text],
-    schemes: RenderableType,
-    *,
-    blocks: bool = False,
-) -> RenderableType:
-    """All parts within the lines there are; notes go first, then requirements that are met with room."""
-    lines = tables.lines_of(*head, *middle, schemes) + len(required) + 2
-    apart = [Text()] * (lines <= LINES)
-    lines -= 1 - len(apart)
-    shown = list(required)
-    if lines > LINES and len(required) > TIGHTEST:
-        tight = sorted(required, key=lambda row: row.worth)[:TIGHTEST]
-        shown = [row for row in required if not row.met or row in tight]
-        lines -= len(required) - len(shown)
-    shown_notes: list[Text] = []
-    for note in more:
-        lines += tables.lines_of(note)
-        if lines > LINES or len(shown_notes) == NOTES:
-            break
-        shown_notes.append(note)
-    hidden = len(more) - len(shown_notes) + len(required) - len(shown)
-    further = f"-v all values ({hidden} more)" if hidden else "-v all values"
-    written = "--blocks blocks.csv" if blocks else "--csv pulses.csv"
-    steps = Text(f"{further} · {written} · --plot plan.png · nutdamp report", style="dim")
-    return Group(*head, *[facts(row[:5] for row in shown)] * bool(shown), *middle, *apart, schemes, *shown_notes, steps)
-
-
 def comparison_screen(compared: Comparison) -> RenderableType:
-    """All tables of ``plan``, the decision on top."""
-    decided, needless = decide(compared), decisions.needless(compared)
-    schemes = scheme_table(compared, compared.recommended).transposed("full")
+    """All tables of ``plan``, the verdict on top."""
+    judged, chosen = compared.verdict, compared.recommended
+    schemes = scheme_table(compared, chosen).transposed("full")
     results: list[RenderableType] = [Text(), parts.derived_table(compared.spacecraft), Text(), schemes]
-    lead: list[RenderableType] = [Text(compared.spacecraft.name, style="bold")]
-    if needless is not None:
-        lead.append(Text.assemble(("No pulse needed: ", "bold"), f"{needless}."))
+    lead: list[RenderableType] = [parts.named(compared.spacecraft), headline(compared)]
     remarks = [note for plan in compared.plans for note in plan_notes(plan)]
     results += [Text(), *map(screen_line, ordered(remarks))] if remarks else []
-    if decided is None:
-        return Group(*lead, Text(f"No recommendation: {joined(reasons(compared))}.", style="bold"), *results)
-    if decided.plan.pulses.blocks:
-        results += [Text(), parts.blocks_screen(decided.plan.flight, decided.plan.delta_v)]
-    elif len(decided.plan.pulses):
-        results += [Text(), parts.pulse_table(decided.plan.flight).screen("full")]
+    if chosen is None:
+        return Group(*lead, *results)
+    pulses = chosen.pulses
+    if pulses.blocks:
+        results += [Text(), parts.blocks_screen(chosen.flight, chosen.delta_v)]
+    elif len(pulses):
+        results += [Text(), parts.pulse_table(chosen.flight).screen("full"), Text(), _on_times(pulses)]
     why, warnings = joined(reasons(compared)), comparison_warnings(compared, tabulated=True)
+    beside = [*warnings, *verdict_notes(judged, chosen), *alternatives(compared)]
     return Group(
         *lead,
-        Text.assemble("Recommended: ", (decided.plan.scheme, "bold"), f" – {why}."),
-        decisions.statement(decided),
-        *map(screen_line, ordered([*warnings, *decision_notes(decided), *alternatives(compared)])),
-        *decisions.figures(decided),
+        Text(sentence(verdicts.statement(judged)), verdicts.STYLES[judged.light]),
+        Text(sentence(f"{chosen.scheme}: {why}")),
+        *_cheaper(judged),
+        *map(screen_line, ordered(beside)),
+        *(Text(), verdicts.bound_table(judged).screen("screen")),
+        *(Text(), decisions.end_facts(chosen)),
         *results,
     )
+
+
+def _cheaper(judged: Verdict) -> Iterator[Text]:
+    """Plans that cost less, with the reasons why they are not recommended."""
+    for cheaper in judged.cheaper:
+        yield Text(f"cheaper: {cheaper.scheme}, {verdicts.spent(cheaper.schedule)}, {text(cheaper.why)}", "dim")
+
+
+def _on_times(pulses: Schedule) -> Table:
+    """Total on-time of each thruster, as commanded."""
+    totals: dict[str, float] = {}
+    for pulse in pulses:
+        totals[pulse.channel] = totals.get(pulse.channel, 0.0) + pulse.loaded[1]
+    return facts((f"on-time of {channel}", f"{total:.4f} s") for channel, total in totals.items())

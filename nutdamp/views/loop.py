@@ -19,12 +19,13 @@ from nutdamp.control_loop.evaluation import AGREE, LoopPlan, LoopVerification
 from nutdamp.control_loop.law import Ending
 from nutdamp.control_loop.simulation import LoopRun
 from nutdamp.control_loop.stability import SURELY, Margin, dead_band, feeding, margins, too_late
-from nutdamp.planning.decision import Decision
-from nutdamp.planning.notes import decision_notes
+from nutdamp.planning.notes import verdict_notes
+from nutdamp.planning.verdict import Verdict
 from nutdamp.spacecraft.equipment import GYRO, Loop
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.views import decisions, tables
-from nutdamp.views.decisions import VERDICT, heading
+from nutdamp.views import verdict as verdicts
+from nutdamp.views.decisions import heading
 from nutdamp.views.parts import opening, pulse_table, seconds, summary
 from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable, Shared, angle_of, facts, to_figures
 from nutdamp.views.text import (
@@ -105,26 +106,26 @@ def margin_table(rows: tuple[Margin, ...]) -> DataTable:
 
 def loop_screen(plan: LoopPlan, *, verbose: bool = True) -> RenderableType:
     """The screen of ``loop``."""
-    run, decision = plan.flown_run, Decision(plan)
-    (_, spent), (_, end) = decisions.cost(decision)
+    run, judged = plan.flown_run, plan.verdict
+    (_, spent), (_, end) = decisions.cost(plan.flight.schedule)
     fired = f"{spent}, last ends at {end}" if run.fired else "no firing"
     headline = Text.assemble("LOOP ", (run.loop.law, "bold"), f": {fired}; first quiet {_settled(run)}")
-    head = [*opening(plan.spacecraft, verbose), headline, *_verdict(plan, decision)]
-    head += decisions.margin_lines(decision, Shared.THIS_CASE if run.case else Shared.NOMINAL)
+    head = [*opening(plan.spacecraft, verbose), headline, *_verdict(plan)]
+    head.append(verdicts.bound_table(judged).screen("screen"))
     return summary(
         head,
         partial(firing_table(run).screen, "screen", first=SHOWN - 1) if run.fired else None,
-        _notes(plan, decision),
+        _notes(plan, judged),
         "--plot loop.png · nutdamp disperse --loop",
         more=[margin_table(plan.margins).screen("screen"), facts(decisions.end_rows(plan.flight, plan.aspects))],
         verbose=verbose,
     )
 
 
-def _notes(plan: LoopPlan, decision: Decision) -> Iterator[Note]:
+def _notes(plan: LoopPlan, judged: Verdict) -> Iterator[Note]:
     run, band, share = plan.flown_run, math.degrees(plan.band.most), 100.0 * SURELY
     yield from warnings(plan.spacecraft)
-    yield from decision_notes(decision, looped=True)
+    yield from verdict_notes(judged, plan, looped=True)
     if run.settled is None:
         yield note("dead-band", band_deg=band, cases_share=share)
     else:
@@ -140,19 +141,18 @@ def _notes(plan: LoopPlan, decision: Decision) -> Iterator[Note]:
         yield note("loop-case-flown", until_s=run.until, seed=run.seed, case=run.case)
 
 
-def _verdict(plan: LoopPlan, decision: Decision) -> Iterator[Text]:
-    run = plan.flown_run
+def _verdict(plan: LoopPlan) -> Iterator[Text]:
+    run, judged = plan.flown_run, plan.verdict
+    case = "" if run.case is None else f"dispersed case {run.case} of seed {run.seed}: "
+    words = verdicts.loop_sentence(judged)
     if run.stop.fault:
         yield screen_line(stopped(run))
-    elif run.case is not None:
-        met = {None: "", True: " meets the requirement", False: " does NOT meet the requirement"}
-        yield Text(f"Dispersed case {run.case} of seed {run.seed}{met[plan.meets_requirement]}.")
-    elif run.lost and decision.nominal and not decision.strays:
+    elif run.lost:
         full = run.stop is Ending.FULL
         why = "limits.max_pulses is reached" if full else "the loop is never down to its stop threshold"
-        yield Text.assemble("Requirement ", (f"NOT met: {why}", "bold red"), ".")
+        yield verdicts.coloured(f"{case}{verdicts.lead(judged)}: {why}", judged.light)
     else:
-        yield decisions.statement(decision)
+        yield verdicts.coloured(f"{case}{words}", judged.light)
 
 
 def described(loop: Loop, *, thresholds: bool = True) -> str:
@@ -249,8 +249,8 @@ def loop_json(plan: LoopPlan) -> dict[str, Any]:
         **tables.values_of(run, "law=loop.law", "seed", "case", "until_s"),
         "stopped": run.stop.name.lower(),
         "channel": run.channel,
-        "meets_requirement": False if run.stop.fault else plan.meets_requirement,
-        "requirement": decisions.requirement_json(plan),
+        "meets_requirement": plan.verdict.met,
+        "decision": verdicts.verdict_json(plan.verdict),
         "quiet_s": list(run.quiet),
         "largest_since_quiet_deg": None if run.settled is None else math.degrees(plan.largest[0]),
         "dead_band_deg": math.degrees(plan.band.most),
@@ -260,7 +260,7 @@ def loop_json(plan: LoopPlan) -> dict[str, Any]:
         "final": decisions.final_json(plan.flight),
         "target": decisions.target_json(body),
         "margins": margin_table(plan.margins).json(),
-        "notes": [note_json(entry) for entry in (*faults, *ordered(_notes(plan, Decision(plan))))],
+        "notes": [note_json(entry) for entry in (*faults, *ordered(_notes(plan, plan.verdict)))],
     }
 
 
@@ -310,7 +310,7 @@ HELD = (
     Column("tank_lasts_days", "tank", "days", lambda held: None if held.lasts is None else held.lasts / DAY,
            to_figures(4), "screen", lambda budget: budget.spacecraft.tank is not None),
     Column("tank_lasts_days", "", "", lambda held: None if held.lasts is None else held.lasts / DAY, where=FILES),
-    Column("", Shared.VERDICT, "", lambda held: VERDICT[bool(held.meets_requirement)], where="screen", kind=TEXT,
+    Column("", Shared.VERDICT, "", lambda held: verdicts.MET[bool(held.meets_requirement)], where="screen", kind=TEXT,
            when=lambda budget: budget.meets_requirement is not None, met=lambda held: held.meets_requirement),
     Column("meets_requirement", "", "", lambda held: held.meets_requirement, where=FILES, kind=YES_NO),
     Column("why", "", "", lambda held: held.why or None, where=FILES, kind=TEXT),
@@ -430,6 +430,7 @@ def budget_json(budget: Budget) -> dict[str, Any]:
         **tables.values_of(
             budget, "growth_1_s=spacecraft.growth", "largest_deg", "until_largest_s", "law=spacecraft.loop.law"
         ),
+        "status": budget.status.value,
         "meets_requirement": budget.meets_requirement,
         "thresholds": [
             row | {"other": None if held.other is None else rates}

@@ -14,16 +14,15 @@ from rich.text import Text
 
 from nutdamp import __version__
 from nutdamp.common.results import Note
-from nutdamp.control_loop.dispersion import LoopResults, LoopStudy
+from nutdamp.control_loop.dispersion import LoopDispersion, LoopResults, LoopStudy
 from nutdamp.control_loop.law import Ending
 from nutdamp.control_loop.simulation import FlownLoops
 from nutdamp.montecarlo.inputs import DispersedInput
-from nutdamp.montecarlo.statistics import Array, Exact, binomial_interval
-from nutdamp.montecarlo.study import CONFIDENCE
+from nutdamp.montecarlo.statistics import Array, share_interval
 from nutdamp.views import decisions, dispersion
 from nutdamp.views.dispersion import CaseRow, StudyOutput, row_json
 from nutdamp.views.loop import described
-from nutdamp.views.parts import summary
+from nutdamp.views.parts import named, summary
 from nutdamp.views.tables import TEXT, Column, DataTable, Shared
 from nutdamp.views.text import degrees, duration
 from nutdamp.views.tolerances import (
@@ -37,6 +36,7 @@ from nutdamp.views.tolerances import (
     unused_notes,
     unused_table,
 )
+from nutdamp.views.verdict import percent, verdict_json
 
 SHOWN_OUTPUTS = (  # the outputs, in the order of `OUTPUTS`
     StudyOutput("settled", "settled_s", "first quiet", "s", ranks=True),
@@ -44,7 +44,7 @@ SHOWN_OUTPUTS = (  # the outputs, in the order of `OUTPUTS`
     StudyOutput("nutation", "largest_nutation_deg", "largest", ranks=True),
     StudyOutput("momentum_shift", "momentum_shift_deg", "momentum shift"),
     StudyOutput("axis_error", "axis_error_deg", "axis error"),
-    StudyOutput("spin_change", "spin_change_rad_s", "spin off", "mrad/s", 1e3),
+    StudyOutput("spin_change", "spin_change_rad_s", "spin off", "mrad/s", 1e3, signed=True),
     StudyOutput("propellant", "propellant_kg", "propellant", "g", 1e3, ranks=True),
     StudyOutput("firings", "firings", "firings", "", ranks=True),
 )
@@ -70,15 +70,16 @@ def _flown_case(study: LoopStudy, case: int, flown: FlownLoops) -> CaseRow:
     return CaseRow(case, study.draws_of(case), values, flown.aspects[:, :, 0], flown.pilots[0].ending[0])
 
 
-def loop_cases_brief(results: LoopResults) -> RenderableType:
+def loop_cases_brief(flown: LoopDispersion) -> RenderableType:
     """The default screen of ``disperse --loop``: verdict, percentiles, what counts most, and the worst case."""
+    results = flown.core
     notes = list[Note]()
     for output, part in zip(SHARED, ("the time to quiet", "the largest nutation", "propellant"), strict=True):
         shares = results.shares(output.name).items()  # the rest is noise
         notes += leading(part, {in_words(name): share for name, share in shares if share >= MAIN})
     notes += unused_notes(results.study.model.inputs.unused)
     worst = [f"{_again(results, case)} (worst)" for case in results.worst.cases[:1].tolist()]
-    head, table = [*_title(results), *_verdicts(results)], _percentiles(results)
+    head, table = [*_title(results), *_verdicts(flown)], _percentiles(results)
     return summary(head, lambda **_: table.screen("screen"), notes, " · ".join(["--csv cases.csv", *worst]))
 
 
@@ -86,24 +87,24 @@ def _title(results: LoopResults) -> list[RenderableType]:
     study = results.study
     drawn = f"cases: {results.done:,}, seed {study.seed}"
     drawn += f", unphysical ones drawn again: {results.redrawn:,}" if results.redrawn else ""
-    title = Text.assemble((study.spacecraft.name, "bold"), f": loop, 0 to {duration(study.until)}, {drawn}")
+    title = named(study.spacecraft, f": loop, 0 to {duration(study.until)}, {drawn}")
     return [title, Text(described(study.law.loop))]
 
 
-def _verdicts(results: LoopResults) -> list[RenderableType]:
-    stated = [*dispersion.requirement_lines(results), *dispersion.cone_lines(results)]
-    return [*_settled(results), _dead_band(results), *stated]
+def _verdicts(flown: LoopDispersion) -> list[RenderableType]:
+    results = flown.core
+    return [*dispersion.verdict_lines(flown.verdict, results), *_settled(results), _dead_band(results)]
 
 
 def _again(results: LoopResults, case: int) -> str:
     return f"--seed {results.study.seed} --case {case + 1}"
 
 
-def loop_cases_screen(results: LoopResults, *, worst: int) -> Group:
+def loop_cases_screen(flown: LoopDispersion, *, worst: int) -> Group:
     """All tables of ``disperse --loop``."""
-    study = results.study
+    results, study = flown.core, flown.core.study
     parts: list[RenderableType] = [*_title(results), Text(), _percentiles(results).screen("full")]
-    parts += [dispersion.angles_note(study.spacecraft), Text(), *_verdicts(results), *_shares(results)]
+    parts += [dispersion.angles_note(study.spacecraft), Text(), *_verdicts(flown), *_shares(results)]
     anew = ", ".join(f"{in_words(entry.name)} {size_text(entry)}" for entry in study.model.of_firings)
     if anew:
         parts.append(Text(f"Each firing draws anew, one sigma or bias: {anew}.", "dim"))
@@ -119,19 +120,16 @@ def _percentiles(results: LoopResults) -> DataTable:
     rows = []
     for output, plan in zip(SHOWN_OUTPUTS, results.study.nominal.tolist(), strict=True):
         distribution = results.distribution(output.name)
-        if distribution is not None and output.name == "spin_change":  # up or down, the largest change is the worst
-            distribution, plan = Exact(np.abs(results.of(output.name))), abs(plan)
-        given = dispersion.percentiles_json(output.key, None if distribution is None else plan, distribution)
-        whole, (_, factor) = output.name == "firings", output.shown_unit
-        rows.append(dispersion.percentile_row(output.label, factor, given, whole=whole))
+        nominal = None if distribution is None else plan
+        rows.append(dispersion.percentile_row(output, nominal, distribution))
     return DataTable("Percentiles", dispersion.PERCENTILES, rows)
 
 
 def _share(count: int, of: int) -> str:
     if not of:
         return "no case"
-    low, high = binomial_interval(count, of, CONFIDENCE)
-    share, least, most = (decisions.percent(fraction, 0.99) for fraction in (count / of, low, high))
+    low, high = share_interval(count, of)
+    share, least, most = (percent(fraction, 0.99) for fraction in (count / of, low, high))
     return f"{share} of cases (95 % interval {least} to {most})"
 
 
@@ -188,7 +186,7 @@ def loop_case_screen(study: LoopStudy, case: int, flown: FlownLoops) -> Group:
     row = _flown_case(study, case, flown)
     nominal = CaseRow(dispersion.ESTIMATE, {}, study.nominal.tolist(), study.nominal_aspects)
     table = _cases(study, [nominal, row]).transposed("case", names="")
-    title = Text.assemble((study.spacecraft.name, "bold"), f": loop, seed {study.seed}, case {case + 1}")
+    title = named(study.spacecraft, f": loop, seed {study.seed}, case {case + 1}")
     parts: list[RenderableType] = [title, Text(), inputs_table(study.model.inputs.drawn, row.draws), Text(), table]
     if row.stop is not None and row.stop is not Ending.END:
         parts.append(Text.assemble(("Stopped: ", "bold red"), f"{row.stop.value}."))
@@ -196,9 +194,9 @@ def loop_case_screen(study: LoopStudy, case: int, flown: FlownLoops) -> Group:
     return Group(*parts)
 
 
-def loop_cases_json(results: LoopResults, *, worst: int) -> dict[str, Any]:
+def loop_cases_json(flown: LoopDispersion, *, worst: int) -> dict[str, Any]:
     """Percentiles, the shares that fall quiet and keep the dead band, requirement, worst cases; degrees, else SI."""
-    study = results.study
+    results, study = flown.core, flown.core.study
     return {
         **decisions.heading(study.spacecraft),
         "law": study.law.loop.law,
@@ -213,7 +211,8 @@ def loop_cases_json(results: LoopResults, *, worst: int) -> dict[str, Any]:
             **_fraction(results.within, len(results.of("quiet"))),
         },
         "stopped": {stop.name.lower(): count for stop, count in results.stops.items() if stop is not Ending.END},
-        "requirement": dispersion.requirement_of(results),
+        "requirement": dispersion.requirement_of(flown.verdict),
+        "decision": verdict_json(flown.verdict),
         **dispersion.cones_json(results),
         "shares": {output.key: results.shares(output.name) for output in SHARED},
         **correlation_json(study.spacecraft),
@@ -232,8 +231,8 @@ def loop_case_json(study: LoopStudy, case: int, flown: FlownLoops) -> dict[str, 
 
 
 def _fraction(count: int, of: int) -> dict[str, float | None]:
-    low, high = binomial_interval(count, of, CONFIDENCE) if of else (None, None)
-    return {"fraction": count / of if of else None, "low": low, "high": high, "confidence": CONFIDENCE}
+    low, high = share_interval(count, of) if of else (None, None)
+    return {"fraction": count / of if of else None, "low": low, "high": high, "confidence": 0.95}
 
 
 class LoopCasesWriter:

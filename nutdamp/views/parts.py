@@ -20,6 +20,7 @@ from nutdamp.flight.end_state import Aspect, at_start, spin_phases
 from nutdamp.flight.propagation import Flight, Track
 from nutdamp.physics import attitude
 from nutdamp.planning.plan import NO_NUTATION
+from nutdamp.schemes.block_model import to_sun_pulse
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.equipment import Block
 from nutdamp.spacecraft.model import Keep, Spacecraft, Vector
@@ -38,6 +39,7 @@ from nutdamp.views.text import (
     most,
     pointing,
     quantity,
+    quiet,
     screen_lines,
     short_angle,
     small_angle,
@@ -85,8 +87,32 @@ def _vector(name: str, unit: str) -> Column:
     return Column(f"{name}#_{unit}", name, unit, components, where=FILES)
 
 
-def _date(row: PulseRow) -> str | None:
-    return row.body.utc(row.pulse.loaded[0], MILLISECONDS)
+def clock(body: Spacecraft, time: float, digits: int = MILLISECONDS) -> str | None:
+    """Time of day in UTC, with the day where it is another one than at t = 0; None without an epoch."""
+    zero, date = body.utc(0.0, digits), body.utc(time, digits)
+    if date is None or zero is None:
+        return None
+    day, of_day = date.removesuffix("Z").split("T")
+    return of_day if zero.startswith(day) else f"{day[5:]} {of_day}"
+
+
+def _clock(row: PulseRow) -> str | None:
+    return clock(row.body, row.pulse.loaded[0])
+
+
+def sun_phased(body: Spacecraft) -> bool:
+    """True where phases count from the Sun sensor, else from t = 0."""
+    return body.sun is not None and body.sun_sensor is not None
+
+
+def phases(flown: Flight) -> Vector:
+    """Phase of the body at the commanded start of each pulse, rad: from the Sun sensor to the Sun, or since t = 0."""
+    starts = np.array([pulse.loaded[0] for pulse in flown.schedule])
+    return -to_sun_pulse(flown, starts) if sun_phased(flown.spacecraft) else spin_phases(flown, starts)
+
+
+def _phase(row: PulseRow) -> str:
+    return f"{math.degrees(row.phase) % 360.0:.1f}"
 
 
 def _valves(schedule: Schedule) -> bool:
@@ -97,11 +123,7 @@ PEOPLE, FILES = "screen full simulate page", "csv json flown"
 PULSES = (
     Column("pulse", "pulse", "", lambda row: row.at + 1, where=f"{PEOPLE} csv", kind=WHOLE),
     Column("t_s", "centre", "s", lambda row: row.pulse.t, seconds, FILES),
-    Column("start_s", Shared.START, "s", lambda row: row.pulse.loaded[0], seconds, f"{PEOPLE} {FILES}"),
-    Column("", Shared.START, "UTC", _date, lambda date: date[5:].replace("T", " ").removesuffix("Z"), "full",
-           kind=TEXT),
-    Column("", Shared.START, "UTC", _date, where="page", kind=TEXT),
-    Column("", "spin phase", "deg", lambda row: row.phase, lambda phase: longitude(phase).removesuffix(" deg"), "page"),
+    Column("start_s", Shared.START, "s", lambda row: row.pulse.loaded[0], seconds, FILES),
     Column("on_time_s", Shared.ON_TIME, "s", lambda row: row.pulse.loaded[1],
            lambda value: seconds(value) if value else "ideal", f"{PEOPLE} {FILES}"),
     Column("", Shared.EFFECTIVE, "s", lambda row: row.pulse.on_time, seconds, "full page", _valves),
@@ -132,12 +154,11 @@ def commanded(schedule: Schedule, body: Spacecraft) -> DataTable:
 def pulse_table(flown: Flight, *, scheme: str = "", least: float = math.inf) -> DataTable:
     """The pulses of a flight with the cone angles before and after each.
 
-    ``scheme``: its name, on pages, which have spin phases; ``least``: limit of the nutation, rad, on default screens.
+    ``scheme``: its name, on pages; ``least``: limit of the nutation, rad, on default screens.
     """
     before, after = flown.around_pulses()
     pulses, body = flown.schedule.pulses, flown.spacecraft
-    phases = spin_phases(flown, np.array([pulse.loaded[0] for pulse in pulses])) if scheme else np.zeros(len(pulses))
-    phased = enumerate(zip(pulses, phases.tolist(), strict=True))
+    phased = enumerate(zip(pulses, phases(flown).tolist(), strict=True))
     rows = [PulseRow(index, pulse, body, before, after, phase) for index, (pulse, phase) in phased]
     left = Column("", Shared.NUTATION_AFTER, "deg", lambda row: float(row.after.nutation[row.at]),
                   lambda angle: short_angle(angle, least), "screen")  # fmt: skip
@@ -145,9 +166,14 @@ def pulse_table(flown: Flight, *, scheme: str = "", least: float = math.inf) -> 
 
 
 def _dated(body: Spacecraft) -> tuple[Column, ...]:
-    """The columns for a spacecraft: without an epoch there are none of dates."""
-    dated = body.utc(0.0) is not None
-    return PULSES if dated else tuple(column for column in PULSES if "UTC" not in (column.unit, column.key.upper()))
+    """The columns for a spacecraft: one time of the start for people, UTC where there is an epoch, and one phase."""
+    if body.utc(0.0) is None:
+        start = Column("", Shared.START, "s", lambda row: row.pulse.loaded[0], seconds, PEOPLE)
+        columns = tuple(column for column in PULSES if column.key != "utc")
+    else:
+        start, columns = Column("", Shared.START, "UTC", _clock, where=PEOPLE, kind=TEXT), PULSES
+    phase = Column("", "Sun phase" if sun_phased(body) else "spin phase", "deg", _phase, where=PEOPLE)
+    return (columns[0], start, phase, *columns[1:])
 
 
 class BlockRow(NamedTuple):
@@ -217,12 +243,13 @@ def shown_rows(table: DataTable, blocks: tuple[Block, ...]) -> DataTable:
 
 
 LINES = 40  # lines of a default screen
-SIZES = ((14, 3), (8, 3), (4, 3), (4, 2), (4, 1), (1, 0))  # rows before the last one, and notes: the first that fits
+NOTES = 3  # notes on it, at most, besides warnings
+SIZES = ((14, NOTES), (8, NOTES), (4, NOTES), (1, 0))  # rows before the last one, and notes: the first that fits
 
 
 def opening(body: Spacecraft, verbose: bool) -> Iterator[RenderableType]:
     """Name and motion of a spacecraft at t = 0; ``verbose``: all its derived quantities."""
-    yield from (Text(body.name, style="bold"), derived_table(body), Text()) if verbose else title(body)
+    yield from (named(body), derived_table(body), Text()) if verbose else title(body)
 
 
 def summary(
@@ -247,6 +274,8 @@ def summary(
 
     def screen(rows: int, count: int) -> Group:
         body = [Text(), table(first=rows)] if table is not None else []
+        if quiet():
+            return Group(*head, *warnings, *body)
         hidden = f" ({len(others) - count} more)" if len(others) > count else ""
         last = Text(f"-v all values{hidden} · {steps}", style="dim")
         return Group(*head, *warnings, *body, *[Text()] * bool(body), *others[:count], last)
@@ -290,9 +319,14 @@ def _effects(flown: Flight, velocity: Vector | None) -> Iterator[tuple[str, str]
 def title(body: Spacecraft) -> list[Text]:
     """Name of a spacecraft and its motion at t = 0, on one line where they fit."""
     what = f"{body.inertia.shape}, {body.spin * RPM:.4g} rpm, nutation {short_angle(body.widest.nutation)} deg"
-    name = Text(body.name, style="bold")
-    fits = len(body.name) + len(what) + 3 <= WIDTH
+    name = named(body)
+    fits = len(name) + len(what) + 3 <= WIDTH
     return [Text.assemble(name, f"   {what}")] if fits else [name, Text(what)]
+
+
+def named(body: Spacecraft, *more: str | tuple[str, str]) -> Text:
+    """Name of a spacecraft, with a word where it is one that nobody asked for, and ``more`` text after it."""
+    return Text.assemble((body.name, "bold"), " (built-in example)" * body.built_in, *more)
 
 
 def angle_names(body: Spacecraft) -> tuple[str, str]:
@@ -341,24 +375,15 @@ def requested(body: Spacecraft) -> str:
     return listed([*filter(None, [required(body)]), *cones])
 
 
-def cone_margins(aspect: Aspect) -> Iterator[tuple[str, float, float]]:
-    """Each bound of a cone, the angle that comes nearest to it, and its margin, rad."""
-    keep = aspect.keep
-    if keep.least > 0.0:
-        yield f"≥ {most(keep.least)}", aspect.least, aspect.least - keep.least
-    if keep.most < math.pi:
-        yield f"≤ {most(keep.most)}", aspect.largest, keep.most - aspect.largest
-
-
 def required(spacecraft: Spacecraft) -> str:
     """The requirement, on one line; empty where there is none."""
     texts = []
     for bound in requirements.required(spacecraft):
         if bound.part is Part.SPIN:
-            tolerance, spin = 100.0 * requirements.SPIN_TOLERANCE, (spacecraft.goal.spin or 0.0) * RPM
-            texts.append(f"spin within {tolerance:g} % of {spin:.5g} rpm")
+            spin = (spacecraft.goal.spin or 0.0) * RPM
+            texts.append(f"spin within {RPM * bound.limit:.4g} rpm of {spin:.5g} rpm")
         else:
-            texts.append(f"{bound.part.label} within {most(bound.most)}")
+            texts.append(f"{bound.label} within {most(bound.limit)}")
     return listed(texts)
 
 
@@ -370,16 +395,6 @@ def beyond_floors(spacecraft: Spacecraft) -> str:
         *["disturbances"] * bool(spacecraft.disturbances),
     ]
     return " and ".join(causes)
-
-
-def turn_floor(spacecraft: Spacecraft) -> str:
-    """Symbol of the least impulse that turns H to its target."""
-    return "|H3|β" if spacecraft.inertia.wheel else "C|ω3|β"
-
-
-def turning(spacecraft: Spacecraft) -> float:
-    """C |ω3| β in N m s, |H3| β with a wheel; 0 where H points at the target already, but for rounding."""
-    return 0.0 if spacecraft.to_turn < NO_NUTATION else spacecraft.turning_impulse
 
 
 def derived_table(spacecraft: Spacecraft, more: Iterable[tuple[str, str]] = ()) -> Table:
@@ -413,10 +428,12 @@ def _derived(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
     name = "impulse" if beyond else "least impulse"
     yield name, f"A|ω0| = {quantity(spacecraft.least_impulse, 'N m s')}; {floor}"
     if spacecraft.goal.axis is not None:
-        turn = quantity(turning(spacecraft), "N m s")
+        symbol = "|H3|β" if inertia.wheel else "C|ω3|β"
+        there = spacecraft.to_turn < NO_NUTATION  # but for rounding
+        turn = quantity(0.0 if there else spacecraft.turning_impulse, "N m s")
         least = "" if beyond else ", the least to turn H"
         yield "target", direction_text(spacecraft, spacecraft.goal.axis)
-        yield "", f"β = {degrees(spacecraft.to_turn)} from H; {turn_floor(spacecraft)} = {turn}{least}"
+        yield "", f"β = {degrees(spacecraft.to_turn)} from H; {symbol} = {turn}{least}"
     if spacecraft.goal.spin is not None:
         yield "final spin", spin_text(spacecraft.goal.spin)
     actuators, torquer = [], spacecraft.torquer

@@ -11,51 +11,32 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from nutdamp.common.results import Note, note
-from nutdamp.errors import listed
-from nutdamp.montecarlo.study import CONFIDENCE
-from nutdamp.planning.decision import infeasibility
-from nutdamp.planning.notes import decision_notes
 from nutdamp.planning.robust import RobustComparison, robust_cost, robust_reasons
-from nutdamp.planning.screening import PlanCandidate
+from nutdamp.planning.screening import FlownPlan
 from nutdamp.spacecraft import requirements
-from nutdamp.views import decisions
-from nutdamp.views.decisions import KEPT, figures, final_json, plan_json, statement, target_json
-from nutdamp.views.parts import derived_table, pulse_table
+from nutdamp.views.decisions import final_json, plan_json, target_json
+from nutdamp.views.glance import comparison_screen
 from nutdamp.views.tables import TEXT, Column, DataTable, Shared, angle_of, file_columns, to_figures, values_of
-from nutdamp.views.text import joined, note_json, ordered, screen_line, small_angle
+from nutdamp.views.text import joined, note_json, screen_line, small_angle
 from nutdamp.views.tolerances import in_words, stated_text
+from nutdamp.views.verdict import cases_json, exact_percent, percent, share_text
 
 MOST_ROWS = 12  # largest number of candidates in the table
 
 
 def robust_screen(robust: RobustComparison) -> RenderableType:
     """All tables of ``plan --robust``."""
-    body, decided = robust.comparison.spacecraft, robust.decision
     reason = joined(robust_reasons(robust))
-    reasons = [
-        Text.assemble((f"{plan.scheme}: ", "bold"), "infeasible: " * (plan.failure is None), f"{infeasibility(plan)}")
-        for plan in robust.comparison.plans
-        if not plan.feasible
-    ]
-    if decided is None or robust.chosen is None:
-        none = Text(f"No recommendation: {reason}.", style="bold")
-        return Group(Text(body.name, style="bold"), none, *reasons, Text(), derived_table(body))
-    named = f"{decided.plan.scheme}, {robust.chosen.variant}"
-    flown = f"Dispersed cases of each plan: {'up to ' * bool(_fewer(robust))}{robust.samples:,}"
-    parts: list[RenderableType] = [
-        Text(body.name, style="bold"),
-        Text.assemble("Robust plan: ", (named, "bold"), f" – {reason}."),
-        statement(decided),
-        *map(screen_line, ordered(decision_notes(decided))),
-        *map(Text, _fresh(robust)),
-        *map(screen_line, robust_notes(robust)),
-        *figures(decided),
-        *(Text(), derived_table(body), Text()),
-        Text(f"{flown}, full simulation, seed {robust.seed}", style="bold"),
-        *(Text(), *_candidates(robust), *reasons),
-    ]
-    if len(decided.plan.pulses):
-        parts += [Text(), pulse_table(decided.plan.flight).screen("full")]
+    parts: list[RenderableType] = [comparison_screen(robust.joined)]
+    if robust.chosen is not None:
+        named = f"{robust.chosen.plan.scheme}, {robust.chosen.variant}"
+        parts += [
+            Text(),
+            Text.assemble("Robust plan: ", (named, "bold"), f" – {reason}."),
+            *map(Text, _fresh(robust)),
+            *map(screen_line, robust_notes(robust)),
+            *(Text(), *_candidates(robust)),
+        ]
     return Group(*parts)
 
 
@@ -73,11 +54,11 @@ def robust_notes(robust: RobustComparison) -> list[Note]:
         "tolerances-needed",
         required_share=100.0 * robust.probability,
         tolerances=", ".join(sizes),
-        complied=decisions.percent(needed.complied, robust.probability),
+        complied=percent(needed.complied, robust.probability),
         cases=f"{needed.cases:,}",
         seed=needed.seed,
         least=f"{math.floor(1e4 * needed.least) / 100.0:.4g} %",
-        confidence_share=100.0 * CONFIDENCE,
+        confidence_share=95.0,
     )
     return [tighter, *robust_cost(robust)]
 
@@ -88,18 +69,14 @@ def robust_json(robust: RobustComparison) -> dict[str, Any]:
     given = [entry for entry in (*robust.candidates, chosen, robust.usual) if entry is not None]
     entries = dict(zip(map(id, given), _table(robust, given).json(), strict=True))
     return {
-        **values_of(robust, "probability", "samples", "seed"),
+        **values_of(robust, "probability"),
         "target": target_json(robust.comparison.spacecraft),
         "candidates": [entries[id(candidate)] for candidate in robust.candidates],
         "recommended": None if chosen is None else {**entries[id(chosen)], "plan": plan_json(chosen.plan)},
         "reason": joined(robust_reasons(robust)),
         "notes": [note_json(note) for note in robust_notes(robust)],
-        "meets_requirement": robust.meets_requirement,
-        "fresh": fresh
-        and {
-            **values_of(fresh, "samples=cases.samples", "seed=cases.seed", "met_fraction=met"),
-            "interval": list(fresh.interval),
-        },
+        "meets_requirement": robust.verdict.met,
+        "fresh": cases_json(fresh),
         "tightening": needed
         and {
             "factor": needed.factor,
@@ -118,14 +95,14 @@ def robust_json(robust: RobustComparison) -> dict[str, Any]:
     }
 
 
-def _table(robust: RobustComparison, candidates: list[PlanCandidate]) -> DataTable:
+def _table(robust: RobustComparison, candidates: list[FlownPlan]) -> DataTable:
     mark = next((index for index, entry in enumerate(candidates) if entry is robust.chosen), None)
     return DataTable("Candidates", tuple(_columns(robust)), candidates, robust, mark)
 
 
 def _columns(robust: RobustComparison) -> Iterator[Column]:
     """Columns of the candidates; ``full``: of the screen, with propellant only where all have it."""
-    body, level = robust.comparison.spacecraft, decisions.exact_percent(robust.probability)
+    body, level = robust.comparison.spacecraft, exact_percent(robust.probability)
     fuelled = all(candidate.plan.pulses.propellant is not None for candidate in robust.candidates)
     yield Column("scheme", "plan", "", attrgetter("plan.scheme"), where="full json", kind=TEXT)
     yield from file_columns("json", "variant")
@@ -136,26 +113,23 @@ def _columns(robust: RobustComparison) -> Iterator[Column]:
     yield Column("total_impulse_Nms", Shared.IMPULSE, "N m s", impulse, to_figures(4), where)
     yield from file_columns("json", "propellant_kg=plan.pulses.propellant")
     yield Column("", Shared.PROPELLANT, "g", attrgetter("plan.pulses.propellant"), to_figures(4, 1e3), "full" * fuelled)
-    yield from file_columns("json", "nominal_nutation_deg=plan.flown.nutation", "nutation_deg")
-    yield from file_columns("json", f"{requirements.aim(body).value}_deg=off")
-    yield Column("", Shared.NOMINAL, "deg", angle_of("nominal"), small_angle, "full")
+    yield from file_columns("json", "nominal_nutation_deg=plan.flown.nutation", "left_deg=left")
+    yield Column("", Shared.NOMINAL, "deg", angle_of("plan.flown.nutation"), small_angle, "full")
     yield Column("", level, "deg", angle_of("left"), small_angle, "full")
-    yield Column("", "nominal cones", "", lambda row: KEPT[row.plan.kept is not False], where="full" * bool(body.keep))
-    yield from file_columns("json", "samples=cases.samples", "met_fraction=met")
-    yield Column("", "cases that comply", "", attrgetter("share"), decisions.share_text,
-                 "full" * requirements.judged(body))  # fmt: skip
+    yield from file_columns("json", "samples=cases.samples", "met_fraction=cases.complying")
+    yield Column("", "cases that comply", "", attrgetter("cases"), share_text, "full" * requirements.judged(body))
     yield Column("final", "", "", lambda row: final_json(row.plan.flight), where="json")
 
 
 def _candidates(robust: RobustComparison) -> list[RenderableType]:
     named = list(robust.candidates[:MOST_ROWS])
     named += [entry for entry in (robust.chosen, robust.usual) if entry is not None and entry not in named]
-    rest, fewer = len(robust.candidates) - len(named), [f"{count:,}" for count in _fewer(robust)]
-    level, pointed = decisions.exact_percent(robust.probability), robust.comparison.spacecraft.goal.axis is not None
+    rest = len(robust.candidates) - len(named)
+    level, pointed = exact_percent(robust.probability), robust.comparison.spacecraft.goal.axis is not None
     left = "nutation" + " or axis error" * pointed
     notes = [
         *[f"Plans that rank below these: {rest}."] * bool(rest),
-        *[f"Losing plans stopped early, after {listed(fewer, 'or')} cases."] * bool(fewer),
+        *["Losing plans stopped early."] * any(not entry.final for entry in robust.candidates),
         f"nominal, {level}: the {left} left with nominal values, and not exceeded in so many cases.",
         *["* is recommended without --robust."] * (robust.usual is not None),
     ]
@@ -163,15 +137,9 @@ def _candidates(robust: RobustComparison) -> list[RenderableType]:
 
 
 def _fresh(robust: RobustComparison) -> Iterator[str]:
-    if robust.fresh is not None and robust.chosen is not None:
-        cases = robust.fresh.cases
-        shares = (robust.fresh.met, *robust.fresh.interval)
-        met, low, high = (decisions.percent(share, robust.probability) for share in shares)
-        few = f", fewer than the {decisions.exact_percent(robust.probability)} required" * robust.lucky
-        new = f"{cases.samples:,} new cases (seed {cases.seed}), not used for the choice"
-        yield f"Of {new}, {met} comply{few}; 95 % interval {low} to {high}."
-
-
-def _fewer(robust: RobustComparison) -> list[int]:
-    """Numbers of cases after which plans were given up."""
-    return sorted({candidate.cases.samples for candidate in robust.candidates} - {robust.samples})
+    fresh = robust.fresh
+    if fresh is not None and fresh.complying is not None:
+        shares = (percent(share, robust.probability) for share in (fresh.complying, fresh.low, fresh.high))
+        met, low, high = shares
+        new = f"{fresh.samples:,} new cases (seed {fresh.seed}), not used for the choice"
+        yield f"Of {new}, {met} comply; 95 % interval {low} to {high}."

@@ -26,12 +26,14 @@ from nutdamp.flight.propagation import IMPULSE_SUM, REAL_WIDTHS, Flight
 from nutdamp.flight.verification import AGREE, AS_FLOWN, IDEAL, WITHOUT, Conservation, Verification
 from nutdamp.physics.attitude import full_turn
 from nutdamp.planning.decision import Simulation
-from nutdamp.planning.notes import decision_notes, model_warnings
+from nutdamp.planning.notes import model_warnings, verdict_notes
 from nutdamp.planning.plan import Plan
+from nutdamp.planning.verdict import Light
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.requirements import Part
 from nutdamp.spacecraft.schedule import Pulse, Schedule
 from nutdamp.views import decisions, parts, tables
+from nutdamp.views import verdict as verdicts
 from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, FittedColumns, Shared, angle_of, facts, to_figures
 from nutdamp.views.text import MISSING, degrees, longitude, moment, pointing, screen_line, small_angle
 
@@ -56,12 +58,13 @@ def _columns(simulation: Simulation) -> Iterator[Column]:
 
 def simulation_screen(simulation: Simulation, *, verbose: bool = True) -> RenderableType:
     """The screen of ``simulate``."""
-    decided, body, extremes = simulation.decision, simulation.flown.spacecraft, simulation.extremes
-    (_, spent), (_, end) = decisions.cost(decided)
-    fired = f"{spent}, last ends at {end}" if len(simulation.flown.schedule) else "no pulse"
+    judged, body, extremes = simulation.verdict, simulation.flown.spacecraft, simulation.extremes
+    pulses = simulation.flown.schedule
+    fired = verdicts.fired(pulses) if len(pulses) else "no pulse"
     track = f"track by the {simulation.shown.model}, 0 to {moment(extremes.until)}"
     headline = Text.assemble("SIMULATED ", (simulation.plan.scheme, "bold"), f": {fired}; {track}")
-    head = [*parts.opening(body, verbose), headline, decisions.statement(decided), *decisions.margin_lines(decided)]
+    head = [*parts.opening(body, verbose), headline, verdicts.coloured(*verdicts.stated(judged))]
+    head += [verdicts.bound_table(judged).screen("screen")] if judged.lines else []
     ends = DataTable("", tuple(_columns(simulation)), (simulation.impulses, simulation.flown))
     return parts.summary(
         head,
@@ -78,7 +81,7 @@ def _notes(simulation: Simulation) -> Iterator[Note]:
     if begun < pulses:
         yield note("track-cut", until_s=extremes.until, begun=begun, pulses=pulses)
     yield from model_warnings(simulation.impulses, simulation.flown)
-    yield from decision_notes(simulation.decision)
+    yield from verdict_notes(simulation.verdict, simulation.plan)
     (near, near_at), (far, far_at) = extremes.nearest, extremes.farthest
     near, far = math.degrees(near), math.degrees(far)
     yield note("axis-track", nearest_deg=near, nearest_s=near_at, farthest_deg=far, farthest_s=far_at)
@@ -130,7 +133,7 @@ def simulation_json(simulation: Simulation) -> dict[str, Any]:
         "differ": [bound.part.value for bound in end_state.deviations(impulses, flown)],
         "target": decisions.target_json(flight.spacecraft),
         **decisions.aspects_json(aspects(flight, extremes.until)),
-        "decision": decisions.decision_json(simulation.decision),
+        "decision": decisions.decision_json(simulation.verdict),
         "until_s": extremes.until,
         "axis_track": {
             "frame": "N" if attitude is None else attitude.frame,
@@ -283,12 +286,12 @@ def verification_brief(plan: Plan, verification: Verification) -> RenderableType
 def _head(plan: Plan, verification: Verification) -> Iterator[Text]:
     """Title, verdict, and the residual of the flown motion beside the requirement."""
     body = plan.spacecraft
-    yield Text.assemble((body.name, "bold"), f": {plan.scheme}; Δ: maximum difference from the flown motion")
-    yield decisions.coloured(verdict(verification), verification.agree)
-    if required := parts.requested(body):
-        left = "; ".join(f"{line.bound.part.label} {decisions.size(line.bound, line.left)}" for line in plan.held)
-        met = decisions.coloured(decisions.VERDICT[plan.meets_requirement], plan.meets_requirement)
-        yield Text.assemble(("Requirement ", "bold"), f"({required}) ", met, f" with nominal values: {left}.")
+    yield parts.named(body, f": {plan.scheme}; Δ: maximum difference from the flown motion")
+    yield verdicts.coloured(verdict(verification), Light.GREEN if verification.agree else Light.RED)
+    judged = plan.verdict
+    lead, about = verdicts.headline(judged)
+    yield Text.assemble((lead, verdicts.STYLES[judged.light]), about)
+    yield verdicts.coloured(verdicts.statement(judged), judged.light)
 
 
 def verification_screen(plan: Plan, verification: Verification) -> RenderableType:

@@ -76,6 +76,9 @@ class Shared:
 EMPTY = ("", MISSING)  # cells that need no line of their own in a block
 
 
+SHORT = 12  # characters of a verdict that stays on one line: "NOT met" does, a reason need not
+
+
 class FittedColumns(Table):
     """A table of numbers; where the screen is too narrow to show them whole, each row is a block of its own."""
 
@@ -116,16 +119,22 @@ def _cell(cell: RenderableType) -> Text:
 def _widths(columns: list[list[str]], room: int, unbroken: list[bool]) -> list[int] | None:
     """Characters for each column such that no word and no cell of ``unbroken`` ones is cut; None without ``room``."""
     least = [max((cell_len(word) for text in texts for word in WORD.findall(text)), default=0) for texts in columns]
-    whole = [max(cell_len(line) for text in texts for line in text.split("\n")) for texts in columns]
-    least = [most if kept else fewest for fewest, most, kept in zip(least, whole, unbroken, strict=True)]
-    spare = room - sum(least)
+    whole, rows = ([_longest(texts[begin:]) for texts in columns] for begin in (0, 1))
+    widths = [most if kept else fewest for fewest, most, kept in zip(least, whole, unbroken, strict=True)]
+    spare = room - sum(widths)
     if spare < 0:
         return None
-    widths = []
-    for most, fewest in zip(whole, least, strict=True):
-        widths.append(fewest + min(most - fewest, spare))
-        spare -= widths[-1] - fewest
+    for wanted in (rows, whole):  # a heading is broken before a row is
+        for at in (0, *range(len(widths) - 1, 0, -1)):  # names of rows first, then reasons, which stand last
+            wider = max(min(wanted[at] - widths[at], spare), 0)
+            widths[at] += wider
+            spare -= wider
     return widths
+
+
+def _longest(texts: list[str]) -> int:
+    """Characters of the longest line."""
+    return max((cell_len(line) for text in texts for line in text.split("\n")), default=0)
 
 
 def columns(*names: str, text: tuple[str, ...] = ()) -> FittedColumns:
@@ -245,7 +254,8 @@ class DataTable:
         headed = [(column.headed(between), column) for column in shown]
         text = tuple(name for name, column in headed if column.kind == TEXT)
         table = columns(*(name for name, _ in headed), text=text)
-        table.whole = tuple(name for name, column in headed if column.met)
+        cells = {name: [_text(column, row) for row in self.rows] for name, column in headed if column.met}
+        table.whole = tuple(name for name, texts in cells.items() if max(map(len, texts), default=0) <= SHORT)
         last = len(self.rows) - 1
         cut = last if first is None or last < first + 2 else first
         for index, row in enumerate(self.rows):

@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from typing import Any
 
 from rich.text import Text
@@ -17,6 +19,7 @@ from nutdamp.common.numerics import MISSING as MISSING
 from nutdamp.common.numerics import RPM as RPM
 from nutdamp.common.numerics import cleaned
 from nutdamp.common.results import Note, Value
+from nutdamp.errors import listed
 from nutdamp.schemes.catalogue import NAMES
 from nutdamp.units import screen_unit
 from nutdamp.views.guide import note_entries
@@ -97,8 +100,15 @@ def cost(value: float | None, unit: str) -> str:
     return f"{digits(factor * size, 4)} {unit}"
 
 
+LONG_TIME, LONGEST_TIME = 1e3, 3.6e6
+"""Times, s, between which durations are written as h:mm:ss: beyond a thousand hours these mislead."""
+
+
 def duration(value: float | None) -> str:
-    """A time given in s, in ms below a tenth of a second."""
+    """A time given in s, in ms below a tenth of a second, from 1,000 s on in hours, minutes and seconds."""
+    if value is not None and LONG_TIME <= value < LONGEST_TIME:
+        whole = round(value)
+        return f"{whole // 3600}:{whole // 60 % 60:02d}:{whole % 60:02d}"
     if value is None or not math.isfinite(value) or value == 0.0 or value >= 0.1:
         return quantity(value, "s")
     return quantity(1e3 * value, "ms")
@@ -199,9 +209,36 @@ def screen_line(note: Note) -> Text:
     return Text.assemble((f"{level}[{note.code}]: ", "bold red" if level == WARNING else "bold"), text(note))
 
 
+_quiet: ContextVar[bool] = ContextVar("quiet", default=False)
+
+
+def quiet() -> bool:
+    """True where screens leave out notes and next steps, and warnings stay."""
+    return _quiet.get()
+
+
+@contextmanager
+def quietly(hidden: bool) -> Iterator[None]:
+    """Context in which screens are `quiet`, if notes are to be ``hidden``."""
+    token = _quiet.set(hidden)
+    try:
+        yield
+    finally:
+        _quiet.reset(token)
+
+
 def ordered(notes: Iterable[Note]) -> list[Note]:
-    """Notes without repetition, warnings first."""
-    return sorted(dict.fromkeys(notes), key=lambda note: severity(note) != WARNING)
+    """Notes without repetition, warnings first; those that say the same of several schemes are one, which names all."""
+    merged: dict[Note, list[str]] = {}
+    for entry in notes:
+        alike = Note(entry.code, tuple(item for item in entry.items if item[0] != "scheme"))
+        schemes = merged.setdefault(alike, [])
+        scheme = entry.values.get("scheme")
+        if scheme is not None and str(scheme) not in schemes:
+            schemes.append(str(scheme))
+    every = [alike.of(listed(schemes)) if schemes else alike for alike, schemes in merged.items()]
+    shown = [entry for entry in every if severity(entry) == WARNING or not quiet()]
+    return sorted(shown, key=lambda note: severity(note) != WARNING)
 
 
 def screen_lines(notes: Iterable[Note]) -> tuple[list[Text], list[Text]]:

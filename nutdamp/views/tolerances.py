@@ -20,7 +20,7 @@ from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.requirements import Part
 from nutdamp.units import screen_unit
 from nutdamp.views.tables import TEXT, Column, DataTable, FittedColumns, Shared, facts
-from nutdamp.views.text import quantity, sentences
+from nutdamp.views.text import quantity
 
 SHOWN = {  # units for people of those of inputs, and the factor
     "rad": ("deg", 180.0 / math.pi),
@@ -119,25 +119,11 @@ def tolerance_budget(results: Results) -> list[RenderableType]:
     )
     if study.model.groups:
         caption += " Correlated inputs vary together: their effect is the root mean square of the group."
-    causes = map(Text, sentences(main_causes(results)))
-    return [Text(table.title, "bold"), table.screen("screen"), Text(caption, "dim"), *causes]
+    return [Text(table.title, "bold"), table.screen("screen"), Text(caption, "dim")]
 
 
 def _percent(share: float) -> str:
     return f"{100 * share:.1f}" if share >= 5e-4 else "0"
-
-
-def main_causes(results: Results) -> Iterator[Note]:
-    """The tolerances of the file with the largest shares of each residual."""
-    first = results.study.first_order
-    for output, name in budgeted_outputs(results.study):
-        sums: dict[str, float] = {}
-        shares = first.shares(output)
-        for rows in together(first.inputs, results.study.model.groups):
-            entries = [first.inputs[row] for row in rows]
-            key = _named(entries)[0] if len(rows) > 1 else in_words(entries[0].tolerance)
-            sums[key] = sums.get(key, 0.0) + float(shares[rows].sum())
-        yield from leading(name, sums)
 
 
 def leading(part: str, shares: Mapping[str, float]) -> Iterator[Note]:

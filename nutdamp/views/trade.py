@@ -14,21 +14,22 @@ from rich.text import Text
 
 from nutdamp.common.results import Note, note
 from nutdamp.planning import notes
+from nutdamp.planning.decision import SAME_ANGLE
 from nutdamp.planning.plan import Plan
-from nutdamp.planning.recommendation import SAME_ANGLE
 from nutdamp.planning.tradeoff import Front, Point, numbered
+from nutdamp.planning.verdict import Light, Verdict
 from nutdamp.schemes.catalogue import OPTIMAL
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.requirements import DAMPED_ANGLE, SAME_COST, Part
-from nutdamp.views import decisions
 from nutdamp.views.decisions import FARTHER, heading, plan_json
-from nutdamp.views.parts import derived_table, pulse_table, requested, summary
+from nutdamp.views.parts import derived_table, named, pulse_table, requested, summary
 from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable, Shared, angle_of, file_columns, values_of
 from nutdamp.views.text import cost, degrees, fixed, sentences, small_angle
+from nutdamp.views.verdict import coloured, lead, share_text, verdict_json
 
 ROWS = 18  # points on the default screen, at most: evenly some of more
 SOONER = 0.05  # share of its time by which a plan that costs as much has to end sooner to be worth a remark
-FAILS = "does not meet the requirement with nominal values"  # or breaks a cone
+FAILS = "is not to be flown"  # by its verdict
 
 
 class TradeRow(NamedTuple):
@@ -42,6 +43,11 @@ class TradeRow(NamedTuple):
     def plan(self) -> Plan:
         """The schedule."""
         return self.point.plan
+
+    @property
+    def verdict(self) -> Verdict:
+        """Judgement of the schedule."""
+        return self.point.verdict
 
     @property
     def least(self) -> float | None:
@@ -66,7 +72,8 @@ def _columns(rows: Sequence[TradeRow]) -> Iterator[Column]:
     """``full`` is the table of one front, ``brief`` that of all."""
     first = rows[0].number if rows else 1
     others = any(row.plan.scheme != OPTIMAL.name for row in rows)
-    judged = any(row.plan.meets_requirement is not None for row in rows)
+    judged = any(row.verdict.met is not None for row in rows)
+    flown = any(row.verdict.cases is not None for row in rows)
     bounded = any(row.least is not None for row in rows)
     yield Column("point", "point", "", attrgetter("number"), where="csv full brief", kind=WHOLE)
     yield Column("", "H within", "deg", lambda row: _allowed(row.front), where="brief")
@@ -86,9 +93,13 @@ def _columns(rows: Sequence[TradeRow]) -> Iterator[Column]:
     yield Column("", "vs first", "%", _saved, where="" if others else "brief")
     scheme = "csv full brief" if others else "csv"
     yield Column("scheme", Shared.SCHEME, "", attrgetter("plan.scheme"), where=scheme, kind=TEXT)
-    met = attrgetter("plan.meets_requirement")
+    yield Column("status", "", "", attrgetter("verdict.status.value"), where="csv", kind=TEXT)
+    yield from file_columns("csv", "share=verdict.cases.complying")
+    met = attrgetter("verdict.met")
     yield Column("meets_requirement", "", "", met, where="csv", kind=YES_NO)
-    yield Column("", Shared.VERDICT, "", met, decisions.VERDICT.__getitem__, "full brief" * judged, kind=TEXT, met=met)
+    yield Column("", "comply", "", attrgetter("verdict.cases"), share_text, "full brief" * flown)
+    word = attrgetter("verdict")
+    yield Column("", Shared.VERDICT, "", word, lead, "full brief" * judged, kind=TEXT, met=met)
 
 
 def _allowed(front: Front) -> str:
@@ -105,8 +116,6 @@ def trade_brief(spacecraft: Spacecraft, fronts: Sequence[Front]) -> RenderableTy
     points, notes = rows_of(fronts), missing(spacecraft, fronts)
     if points and spacecraft.commands is not None:
         notes.append(note("trade-not-commandable"))
-    if points and spacecraft.dispersions is not None:
-        notes.append(note("trade-not-dispersed"))
     shown = {round(at) for at in np.linspace(0, len(points) - 1, ROWS).tolist()} if points else ()
     rows = [points[index] for index in sorted(shown)]
     if len(rows) < len(points):
@@ -121,7 +130,7 @@ def trade_brief(spacecraft: Spacecraft, fronts: Sequence[Front]) -> RenderableTy
 
 def _head(spacecraft: Spacecraft, fronts: Sequence[Front]) -> Iterator[Text]:
     points = rows_of(fronts)
-    yield Text.assemble((spacecraft.name, "bold"), f": finish time against cost; schedules: {len(points)}")
+    yield named(spacecraft, f": finish time against cost; schedules: {len(points)}")
     if not points:
         yield Text("NO SCHEDULE", "bold red")
         return
@@ -131,8 +140,9 @@ def _head(spacecraft: Spacecraft, fronts: Sequence[Front]) -> Iterator[Text]:
         costs = f"{row.spent(row.point.cost)}, ends at {row.plan.pulses.end:.3f} s (point {row.number})"
         yield Text.assemble((f"{name}: ", "bold"), costs)
     if required := requested(spacecraft):
-        met = Text(f"met by {len(good)} of {len(points)} schedules", "green" if good else "bold red")
-        yield Text.assemble(("Requirement ", "bold"), f"({required}) ", met, ", with nominal values.")
+        light = next((row.verdict.light for row in good), Light.RED)
+        words = f"{len(good)} of {len(points)} schedules may be flown"
+        yield Text.assemble(("Requirement ", "bold"), f"({required}) ", coloured(words, light))
 
 
 def trade_screen(spacecraft: Spacecraft, fronts: Sequence[Front]) -> RenderableType:
@@ -164,8 +174,8 @@ def _ends_off(fronts: Sequence[Front]) -> Iterator[Note]:
 
 
 def fails(point: Point) -> bool:
-    """True where it does not meet the requirement of the file, or breaks a cone."""
-    return point.plan.meets_requirement is False
+    """True where the schedule is not to be flown, by its verdict."""
+    return bool(point.verdict.status.exit_status)
 
 
 def _without_optimal(front: Front) -> str:
@@ -209,7 +219,17 @@ def trade_json(spacecraft: Spacecraft, fronts: Sequence[Front]) -> dict[str, Any
     entries = []
     for front in fronts:
         rows = [row for row in rows_of(fronts) if row.front is front]
-        points = [values_of(row, "point=number", "horizon_s=point.horizon") | plan_json(row.plan) for row in rows]
+        points = [
+            {
+                **values_of(row, "point=number", "horizon_s=point.horizon"),
+                **plan_json(row.plan),
+                "status": row.verdict.status.value,
+                "meets_requirement": row.verdict.met,
+                **values_of(row, "share=verdict.cases.complying"),
+                "decision": verdict_json(row.verdict),
+            }
+            for row in rows
+        ]
         entries.append({**values_of(front, "shift_allowed_deg=shift", "why"), "points": points})
     return {**heading(spacecraft), "fronts": entries}
 
@@ -228,13 +248,14 @@ def schedule_paths(folder: str, count: int) -> list[str]:
 # --- beside a recommended plan
 
 
-def _better(fronts: Sequence[Front], chosen: Plan) -> tuple[float, float, TradeRow] | None:
+def _better(fronts: Sequence[Front], chosen: Plan, *, misses: bool) -> tuple[float, float, TradeRow] | None:
     """Share of the cost saved, s earlier, and the cheapest, then earliest, point that is better than ``chosen``."""
-    until, misses, better = chosen.pulses.end, chosen.meets_requirement is False, []
+    until, better = chosen.pulses.end, []
     for row in rows_of(fronts):
         saved, end = 1.0 - row.point.cost / chosen.pulses.cost_in(row.point.unit), row.plan.pulses.end
         cheaper = saved > SAME_COST and end <= until
-        if row.plan.meets_requirement and (misses or cheaper or _sooner(row.plan, chosen, saved)):
+        able = row.verdict.met and not fails(row.point)
+        if able and (misses or cheaper or _sooner(row.plan, chosen, saved)):
             better.append((saved if misses or saved > SAME_COST else 0.0, until - end, row))
     return max(better, key=itemgetter(0, 1), default=None)
 
@@ -246,16 +267,16 @@ def _sooner(plan: Plan, chosen: Plan, saved: float) -> bool:
     return abs(saved) <= SAME_COST and ends_sooner and shifts[0] <= FARTHER * shifts[1] + SAME_ANGLE
 
 
-def trade_notes(fronts: Sequence[Front], chosen: Plan) -> Iterator[Note]:
-    """The schedule of a front that is better than the ``chosen`` plan, with its command; or that costs more than it."""
-    better = _better(fronts, chosen)
+def trade_notes(fronts: Sequence[Front], chosen: Plan, judged: Verdict) -> Iterator[Note]:
+    """The schedule of a front that is better than the ``chosen`` plan, with its command; or that costs more."""
+    better = _better(fronts, chosen, misses=judged.met is False)
     if better is not None:
         row, shift = better[2], better[2].front.shift
         bound = "--free-axis " if math.isinf(shift) else f'--shift "{degrees(shift)}" ' * (shift > 0.0)
         horizon = f'--set "limits.horizon={row.point.horizon:.6g} s"'
         command = f"nutdamp plan SPACECRAFT --scheme {row.plan.scheme} {bound}{horizon}"
         shown = notes.figures(row.plan, chosen, row.point.unit == "kg")
-        if chosen.meets_requirement is False:
+        if judged.met is False:
             yield note("trade-meets", point=row.number, command=command, **shown)
         else:
             yield note("trade-better", point=row.number, command=command, **shown)

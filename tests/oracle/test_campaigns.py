@@ -24,8 +24,8 @@ from nutdamp.flight import propagation
 from nutdamp.flight.propagation import Flight
 from nutdamp.physics import attitude
 from nutdamp.planning import plan as planning
-from nutdamp.planning.decision import Decision
-from nutdamp.planning.notes import decision_notes
+from nutdamp.planning.notes import verdict_notes
+from nutdamp.planning.plan import judge
 from nutdamp.schemes.block_model import BlockModel, fired
 from nutdamp.schemes.catalogue import Options
 from nutdamp.spacecraft.equipment import Block
@@ -139,7 +139,8 @@ def test_the_spin_of_ace_rises_as_reported(date: str) -> None:
     body = at_rest("ace", one.before)
     body = replace(body, sun=body.direction_in_n(math.radians(one.sun[0]), 0.3))
     schedule = fired(body, (Block("P1", 1, 5.0, WIDTH, one.pulses),))
-    values = one_of(decision_notes(Decision(planning.Plan(body, "command-block", schedule))), "spin-change")
+    plan = planning.Plan(body, "command-block", schedule)
+    values = one_of(verdict_notes(judge(plan), plan), "spin-change")
     before, after, cause = (values[key] for key in ("before_rpm", "after_rpm", "cause"))
     assert isinstance(before, float)
     assert isinstance(after, float)

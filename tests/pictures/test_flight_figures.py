@@ -13,11 +13,11 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 from matplotlib.text import Annotation
-from support.builders import cross, spinner
+from support.builders import channel, cross, spinner
 from support.cases import deep, spread, weekly
 from support.colours import contrast
-from support.dispersed import normal
 from support.golden import check_text
+from support.layout import check_layout
 from support.shown import (
     BODY,
     H_MARKS,
@@ -29,19 +29,20 @@ from support.shown import (
     flown,
     heading,
     kicks,
-    legend_words,
     notes,
     points,
 )
 
 import nutdamp.api  # noqa: F401 - figures of flights are declared there
 from nutdamp.figures import geometry, overview, sphere, style
+from nutdamp.figures.image import Scene, Timing
 from nutdamp.flight import propagation
 from nutdamp.physics.attitude import angle_between
 from nutdamp.planning import plan as planning
-from nutdamp.spacecraft.model import Inertia, Requirement
-from nutdamp.spacecraft.schedule import Schedule
-from nutdamp.spacecraft.tolerances import Dispersions
+from nutdamp.planning.verdict import Cases
+from nutdamp.spacecraft.model import Goal, Keep, Requirement, Spacecraft, Vector
+from nutdamp.spacecraft.schedule import Schedule, channel_pulse
+from nutdamp.views.verdict import statement
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 
@@ -81,7 +82,7 @@ def test_a_turn_says_how_far_to_which_target_and_marks_it_where_h_ends() -> None
     assert target == pytest.approx(110.0 * np.array([math.cos(math.radians(20.0)), math.sin(math.radians(20.0))]))
     assert points(space, H_MARKS)[-1] == pytest.approx(target, abs=1e-6)
     check_text("pictures.title-turn", drawn("motion", "far target").get_suptitle())
-    for name, places_ in (("overview", (1,)), ("motion", (1,)), ("sphere", (0,))):
+    for name, places_ in (("overview", (1, 2)), ("motion", (1,))):
         for place in places_:
             axes = drawn(name, "far target").axes[place]
             (mark,) = (one for one in axes.lines if one.get_marker() == "*")
@@ -96,7 +97,7 @@ def test_a_turn_says_how_far_to_which_target_and_marks_it_where_h_ends() -> None
 @pytest.mark.parametrize("name", NAMES)
 def test_planes_have_equal_scales_and_all_axes_their_units(name: str, case: str) -> None:
     for axes in drawn(name, case).axes:
-        if axes.get_title().startswith(("Pole", "Axis", "Cones")):
+        if axes.get_title().startswith(("Pole", "Axis", "Spin")):
             assert axes.get_aspect() == 1.0
             width, height = axes.get_window_extent().size
             (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
@@ -120,6 +121,17 @@ def test_the_pole_curve_shows_where_the_channels_push() -> None:
         assert ways[name] / np.linalg.norm(ways[name]) == pytest.approx(way, abs=1e-9)
     few = flight_picture("motion", SIXTEEN, kicks(SIXTEEN, 3, 0.45, 0.05)).axes[0]
     assert {note.get_text() for note in few.texts if note.get_text().startswith("T")} == {"T0", "T1", "T2"}
+
+
+@pytest.mark.parametrize("name", ["overview", "motion"])
+@pytest.mark.parametrize(("across", "drawn_too"), [(0.0, False), (1e-16, False), (0.5, True)])
+def test_a_torque_along_the_spin_axis_has_no_arrow(name: str, across: float, drawn_too: bool) -> None:
+    """Not even one of rounding, where nothing else fires."""
+    body = replace(WIDE, channels=(*WIDE.channels, channel("UP", across, 0.0, 2.0)))
+    pulses = Schedule((channel_pulse(body.channels[-1], 1.0, 0.5),))
+    axes = panel(flight_picture(name, body, pulses), "Pole curve")
+    assert ("UP" in {note.get_text() for note in notes(axes)}) is drawn_too
+    assert ("arrows" in axes.get_title()) is drawn_too
 
 
 def test_bars_stand_where_the_thrusters_are_on_and_are_all_numbered() -> None:
@@ -187,21 +199,17 @@ def test_the_log_axis_reaches_the_requirement_and_what_is_left() -> None:
 
 
 @pytest.mark.parametrize(
-    ("limits", "tolerances", "colour"),
-    [
-        (Requirement(0.02), None, style.MISSED),
-        (Requirement(0.12), None, style.UNCHECKED),
-        (Requirement(0.12), Dispersions(A=normal(0.01, relative=True)), style.INK),
-        (None, None, style.INK),
-    ],
+    ("limits", "share", "colour"),
+    [(0.02, None, style.MISSED), (0.12, None, style.UNCHECKED), (0.12, 1.0, style.INK), (0.12, 0.5, style.MISSED)],
 )
-def test_the_verdict_is_red_where_it_is_not_met_and_amber_where_no_tolerance_is_known(
-    limits: Requirement | None, tolerances: Dispersions | None, colour: str
-) -> None:
-    body = replace(WIDE, requirement=limits, dispersions=tolerances)  # 5° of nutation, 0.087 rad
-    axes = flight_picture("history", body, Schedule()).axes[0]
-    assert to_hex(axes._right_title.get_color()) == colour  # type: ignore[attr-defined]  # there is no other way to it
-    assert ("NOT met" in axes.get_title("right")) is (colour == style.MISSED)
+def test_the_title_has_the_verdict_in_its_colour(limits: float, share: float | None, colour: str) -> None:
+    """Red where it is not met, amber where cases do not show it, of 5° (0.087 rad) of nutation."""
+    plan = planning.Plan(replace(WIDE, requirement=Requirement(limits)), "none", Schedule())
+    verdict = planning.judge(plan, None if share is None else Cases(100, 1, 0.9, share, share, share))
+    figure = overview.history_figure(*overview.shown(plan), verdict)
+    assert figure._suptitle is not None  # type: ignore[attr-defined]  # there is no other way to it
+    assert to_hex(figure._suptitle.get_color()) == colour  # type: ignore[attr-defined]
+    assert heading(figure).endswith(statement(verdict))
 
 
 # --- how far they reach, and titles ----------------------------------------------------------------------------------
@@ -238,15 +246,15 @@ def test_a_slow_nutation_leaves_no_sheet_blank() -> None:
 def test_flights_from_python_end_alike_unless_they_name_an_end() -> None:
     plan = planning.plan(BODY, "two-pulse")
     for made, end in ((plan.fly(), geometry.shown_until(BODY, plan.pulses)), (plan.fly(30.0), 30.0)):
-        assert made.figure("history").axes[0].get_xlim()[1] == pytest.approx(end)
+        assert made.figure().axes[-1].get_xlim()[1] == pytest.approx(end)
 
 
 @pytest.mark.deep
 def test_of_a_very_long_time_all_pictures_say_how_much_is_drawn() -> None:
     made = propagation.flown(WIDE, Schedule(), 1e6)
     track = made.sampled(1000, 1e6)
-    axes = overview.flight_figure("history", made, track).axes[-1]
-    until = re.search(r"the first ([\d.]+) s of 1e\+06 s", heading(overview.flight_figure("history", made, track)))
+    figure = overview.history_figure(made, track)
+    axes, until = figure.axes[-1], re.search(r"the first ([\d.]+) s of 1e\+06 s", heading(figure))
     assert until is not None
     assert float(until[1]) == pytest.approx(axes.get_xlim()[1], rel=1e-3)
     assert heading(overview.flight_figure("motion", made, track)).endswith(f"drawn: the first {until[1]} s of 1e+06 s")
@@ -265,19 +273,21 @@ def test_titles_name_scheme_model_and_result_in_lines_that_fit() -> None:
 @pytest.mark.deep
 @pytest.mark.parametrize("case", ["celestial", "three moments"])
 def test_views_of_the_sky_say_how_they_lie(case: str) -> None:
-    titles = [axes.get_title() for name in ("motion", "sphere") for axes in drawn(name, case).axes]
+    titles = [axes.get_title() for axes in drawn("overview", case).axes]
     right = "east" if case == "celestial" else "inertial x"
     assert sum(f"H towards you, {right} to the right" in title for title in titles) == 1
 
 
-# --- the spherical view ----------------------------------------------------------------------------------------------
+# --- the cones of the film -------------------------------------------------------------------------------------------
 
 
 @pytest.mark.deep
 def test_what_is_magnified_says_so() -> None:
     for case in ("0.01°", "wide pulses", "needle at 60°"):
-        told = re.search(r"angles × (\S+)\)", panel(drawn("sphere", case), "Cones").get_title())
-        assert (float(told[1]) if told else 1.0) == sphere.view(*flown(case)).magnified
+        made, track = flown(case)
+        scene = style.styled()(Scene)(made, Timing(float(track.t[-1]), 2, 10, 1.0), 320)
+        told = re.search(r"angles × (\S+)\)", scene.space.get_title())
+        assert (float(told[1]) if told else 1.0) == scene.looked.magnified
     for widest in np.radians([1e-7, 1e-3, 0.01, 0.3, 1.0, 5.0, 13.9, 14.1, 80.0]).tolist():
         much = sphere.magnification(widest)
         if widest >= sphere.WIDE:
@@ -304,8 +314,9 @@ def test_seen_from_outside_the_three_axes_lie_in_one_plane_and_the_cones_touch()
 def test_cones_are_filled_from_their_apex_to_all_of_their_rim(case: str) -> None:
     made, track = flown(case)
     looked, cones = sphere.view(made, track), geometry.cones(made, track.rates[0], track.quaternion[0])
-    figure = drawn("sphere", case)
-    filled = [patch for patch in figure.axes[0].patches if isinstance(patch, Polygon) and len(patch.get_xy()) > 3]
+    axes = Figure().subplots()
+    sphere.draw_cones(axes, looked, cones)
+    filled = [patch for patch in axes.patches if isinstance(patch, Polygon) and len(patch.get_xy()) > 3]
     assert len(filled) == 2
     for patch, rim, within in zip(filled, (cones.space, cones.body), (cones.swept, cones.body), strict=True):
         seen = np.vstack([looked.seen(rim)[0], looked.seen(within)[0], [[0.0, 0.0]]])
@@ -314,17 +325,54 @@ def test_cones_are_filled_from_their_apex_to_all_of_their_rim(case: str) -> None
         cross_product = edges[:, 0] * to_points[..., 1] - edges[:, 1] * to_points[..., 0]
         assert (cross_product >= -1e-12).all()  # convex, and nothing of the cone outside
         assert {tuple(point) for point in patch.get_xy().round(12)} <= {tuple(point) for point in seen.round(12)}
-    named = {"space cone", "body cone", "path of the spin axis", "path of H"}
-    assert named <= legend_words(figure)
 
 
-@pytest.mark.deep
-def test_the_legend_of_the_sphere_names_what_is_seen() -> None:
-    """Pulses where they move the axis; a body cone, of about C/A of the nutation, that lies under the marks."""
-    plan = planning.plan(BODY, "two-pulse")
-    for made, named in ((propagation.by_impulses(BODY, plan.pulses), False), (plan.flight, True)):
-        assert ("firing" in legend_words(overview.flight_figure("sphere", made, made.sampled(400, 20.0)))) is named
-    for moment, hidden in ((80.0, False), (1.5, True)):
-        body = replace(spinner(), inertia=Inertia((120.0, 120.0, moment)), omega0=np.array([0.003, 0.0, 3.0]))
-        (name,) = (word for word in legend_words(flight_picture("sphere", body, Schedule())) if "body cone" in word)
-        assert ("under the marks" in name) is hidden
+# --- the globe -------------------------------------------------------------------------------------------------------
+
+SUN, TURN = np.array([0.6, 0.0, 0.8]), Goal(axis=np.array([0.0, 0.6, 0.8]))
+
+
+@pytest.mark.parametrize(
+    ("body", "drawn_too"),
+    [
+        (replace(WIDE, goal=TURN), True),
+        (replace(WIDE, sun=SUN), True),
+        (replace(WIDE, keep=(Keep("Moon", SUN, 0.2),)), True),
+        (replace(WIDE, keep=(Keep("H", None, 0.0, 0.2),)), False),
+        (WIDE, False),
+        (replace(spinner(degrees=0.99), sun=SUN), False),
+        (replace(spinner(degrees=1.01), sun=SUN), True),
+    ],
+)
+def test_the_overview_has_a_globe_where_a_direction_is_given_and_the_axis_moves(
+    body: Spacecraft, drawn_too: bool
+) -> None:
+    """By more than 2 degrees: twice the nutation, while H stands still."""
+    figure = flight_picture("overview", body, Schedule())
+    assert [axes.get_title()[:10] for axes in figure.axes[:3]].count("Spin axis ") == drawn_too
+    check_layout(figure)
+
+
+def test_the_globe_shows_where_the_axis_the_sun_and_the_cones_are() -> None:
+    """Angles on the unit sphere, whose front is what is not dotted; what is behind is named so."""
+    cones = Keep("Sun", SUN, 0.3, 1.2), Keep("below", np.array([-0.6, 0.0, -0.8]), 0.4)
+    body = replace(WIDE, sun=SUN, keep=cones)
+    made, track = overview.shown(planning.Plan(body, "trial", Schedule()))
+    figure = overview.flight_figure("overview", made, track)
+    check_layout(figure)
+    axes = panel(figure, "Spin axis")
+    places = {note.get_text(): np.asarray(note.xy) for note in notes(axes)}
+    named = {"Sun", "below (behind)", "t = 0", "≥ 17.19° from Sun", "≤ 68.75° from Sun"}
+    assert named <= {*places}
+    front = on_globe(places["Sun"])
+    lines = [np.asarray(line.get_xydata()) for line in axes.lines if line.get_color() == style.GREY]
+    circles = [line[np.isfinite(line).all(axis=1)] for line in lines if len(line) == geometry.RIM]
+    for circle, angle in zip(circles, (0.3, 1.2), strict=False):
+        assert np.degrees(angle_between(on_globe(circle), front)) == pytest.approx(np.degrees(angle), abs=1e-6)
+        assert len(circle) > geometry.RIM / 2
+    assert angle_between(on_globe(places["t = 0"]), front) == pytest.approx(angle_between(track.axis[0], SUN))
+
+
+def on_globe(places: Vector) -> Vector:
+    """Unit vectors (n, 3) of places (n, 2) in front, towards the viewer."""
+    return np.concatenate([places, np.sqrt(1.0 - np.sum(places**2, axis=-1, keepdims=True))], axis=-1)

@@ -22,8 +22,7 @@ from nutdamp.errors import Infeasible
 from nutdamp.files.reader import load_spacecraft
 from nutdamp.flight import propagation
 from nutdamp.planning import plan as planning
-from nutdamp.planning.decision import infeasibility
-from nutdamp.planning.notes import plan_notes
+from nutdamp.planning.notes import infeasibility, plan_notes
 from nutdamp.schemes import pulse_pairs
 from nutdamp.schemes.catalogue import CLASSIC, Options
 from nutdamp.schemes.sequential import MOST_PULSES, ImpulseBuilder

@@ -16,7 +16,6 @@ from nutdamp.planning.plan import Plan, Standing
 from nutdamp.schemes.catalogue import Options
 from nutdamp.spacecraft.model import Requirement, Spacecraft
 from nutdamp.spacecraft.requirements import Part
-from nutdamp.views import decisions
 
 COUNT = 200
 
@@ -74,7 +73,7 @@ def standing(number: int, compared: Comparison) -> Standing | None:
     good = [one for one in feasible if complies(body, *left(one))]
     assert (chosen in good) == bool(good) != bool(warnings), number
     aim = 0.0 if body.goal.axis is None else body.to_turn
-    assert (decisions.needless(compared) is not None) == complies(body, body.nutation, aim), number
+    assert compared.verdict.idle == complies(body, body.nutation, aim), number
     if good:
         assert cost(chosen, tuple(good)) <= 1.001 * min(cost(one, tuple(good)) for one in good)
         return chosen.standing

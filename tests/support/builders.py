@@ -12,16 +12,18 @@ from types import FrameType
 import numpy as np
 from support import reference
 
+from nutdamp.common import results
 from nutdamp.common.results import Note, Value
 from nutdamp.flight.propagation import Residual
-from nutdamp.planning.decision import Comparison
+from nutdamp.planning.decision import Comparison, recommend
 from nutdamp.planning.notes import comparison_warnings, reasons
 from nutdamp.planning.plan import Plan
-from nutdamp.planning.recommendation import recommend
 from nutdamp.spacecraft.equipment import Channel, Steerable, Thruster
 from nutdamp.spacecraft.model import Attitude, Goal, Inertia, Limits, Requirement, Spacecraft, Vector
 from nutdamp.spacecraft.requirements import Left
 from nutdamp.spacecraft.schedule import Pulse, Schedule
+
+results.register("nutdamp.page.results")  # which has the words of a plan that is infeasible
 
 
 def spinner(

@@ -31,6 +31,8 @@ WIDER = {
 """Tolerances of the built-in example with which no plan that is made without them complies often enough."""
 WIDE = [part for key, size in WIDER.items() for part in ("--set", f"dispersions.{key}={{normal: {size}}}")]
 """Sets them."""
+BUILT_IN = "warning: no spacecraft file given: using the built-in example (see `nutdamp init`)\n"
+"""First line of standard error where no file is named, with -q too."""
 SCHEDULE = "t_s,on_time_s,channel,impulse_1_Nms,impulse_2_Nms,impulse_3_Nms\n1,0,steerable,4,0,0\n"
 
 
@@ -59,7 +61,9 @@ def refusals(run: Run, folder: Path, commands: Iterable[str], status: int = 2, s
         assert (refused.returncode, refused.stdout) == (status, ""), command
         assert "Traceback" not in refused.stderr, command
         assert contents(folder) == before, command
-        shown = refused.stderr.rpartition("\nError: ")[2].replace(str(folder), "FOLDER").rstrip("\n")
+        shown = (
+            refused.stderr.removeprefix(BUILT_IN).rpartition("\nError: ")[2].replace(str(folder), "FOLDER").rstrip("\n")
+        )
         shown = re.sub("^No such option.*", "No such option", shown)  # each version of click says more in its own way
         said.append(f"$ {command}\n{shown}")
     return "\n".join(said)

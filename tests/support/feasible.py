@@ -6,7 +6,7 @@ from support.checker import violations
 
 from nutdamp.flight import propagation
 from nutdamp.planning import plan as planning
-from nutdamp.planning.decision import infeasibility
+from nutdamp.planning.notes import infeasibility
 from nutdamp.schemes.catalogue import Options
 from nutdamp.spacecraft.model import Spacecraft
 

@@ -4,38 +4,116 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from typing import Any, Literal, NamedTuple, get_args, get_origin
 
+from nutdamp.errors import listed
+from nutdamp.files import fields
+from nutdamp.files.fields import Quantity, Section, section_of
+from nutdamp.files.keys import SpacecraftFile
+from nutdamp.files.study_keys import QUANTITIES, ToleranceSection, unit_kinds
 from nutdamp.units import KINDS, Kind
-from nutdamp.views.explain import file_topic
-from nutdamp.views.guide import FOLDER, Topic, TopicRows
+from nutdamp.views.guide import FOLDER
 
 
-def markdown(title: str, summary: str, topic: Topic) -> str:
-    """A topic as a page; names of keys are anchors of their sections."""
-    return "\n\n".join([f"# {title}", summary, *_parts(topic)]) + "\n"
+class KeyGuide(NamedTuple):
+    """A key of the file: its ``path`` as `explain` takes it, such as ``thrusters.force``, and its declaration.
+
+    ``section`` is the model of its value, where that is a mapping or a list of mappings.
+    """
+
+    path: str
+    field: fields.Key
+    section: type[Section] | None
+
+    @property
+    def parent(self) -> str:
+        """Path of the mapping it is in; empty at the root."""
+        return self.path.rpartition(".")[0]
+
+    @property
+    def name(self) -> str:
+        """Last step of the path."""
+        return self.path.rpartition(".")[2]
+
+    @property
+    def text(self) -> str:
+        """Description, unit, default and example."""
+        unit, default, example = "", "", next(iter(self.field.examples), None)
+        if self.section is ToleranceSection:
+            names = [unit for kind in unit_kinds(QUANTITIES[self.name]) for unit in KINDS[kind].factors]
+            unit = f"unit {listed([*dict.fromkeys(names)], 'or')}"
+        elif self.section is None:
+            unit = _what(self.field)
+        value = self.field.default
+        if value is fields.REQUIRED:
+            default = "required"
+        elif "default" not in self.field.description.casefold():
+            default = "default none" if value is None or value == [] else f"default {value:g}"
+        facts = [unit, default, "" if example is None else f"example: `{flow(example)}`"]
+        return f"{self.field.description} {'; '.join(filter(None, facts))}"
 
 
-def _parts(topic: Topic) -> Iterator[str]:
-    for part in topic.parts:
-        if part.title == "See also":
-            continue
-        if part.title:
-            yield f"## {part.title}"
-        for block in part.blocks:
-            if isinstance(block, TopicRows):
-                yield "\n".join(f"- **{name}**: {_listed(text)}" for name, text in block.rows)
-            else:
-                yield str(block)
+def keys(model: type[Section] = SpacecraftFile, prefix: str = "") -> Iterator[KeyGuide]:
+    """All keys of the file, each before those below it."""
+    for name, field in model.fields().items():
+        section = section_of(field.type)
+        yield KeyGuide(f"{prefix}{name}", field, section)
+        if section is not None:
+            yield from keys(section, f"{prefix}{name}.")
 
 
-def _listed(text: str) -> str:
-    """Description and facts on one line, an example as code."""
-    description, _, facts = text.partition("\n")
-    before, example, value = facts.partition("example: ")
-    return " ".join(filter(None, [description, f"{before}{example}`{value}`" if example else before]))
+def _what(field: fields.Key) -> str:
+    parts = list(_within(field.type))
+    quantity = next((part for part in parts if isinstance(part, Quantity)), None)
+    if quantity is not None:
+        factors = KINDS[quantity.kind].factors
+        return f"unit {listed([*factors], 'or')}" if factors else "plain numbers, without unit"
+    choices = next((get_args(part) for part in parts if get_origin(part) is Literal), ())
+    plain = next((part for part in parts if get_origin(part) in (list, dict) or isinstance(part, type)), None)
+    return listed(choices, "or") if choices else "a whole number" if plain is int else "a text" if plain is str else ""
 
 
-BEGIN = """`nutdamp init` writes one with comments, `nutdamp init --from ace` one of the
+def _within(annotation: Any) -> Iterator[Any]:
+    yield annotation
+    for part in get_args(annotation):
+        yield from _within(part)
+
+
+def flow(value: object) -> str:
+    """A value as YAML on one line."""
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{key}: {flow(held)}" for key, held in value.items()) + "}"
+    if isinstance(value, list):
+        return "[" + ", ".join(map(flow, value)) + "]"
+    return str(value)
+
+
+def _sections(key: KeyGuide, every: list[KeyGuide]) -> Iterator[str]:
+    """The keys below ``key``, section by section; those of tolerances, which are all alike, once."""
+    if key.section is None:
+        return
+    children = [entry for entry in every if entry.parent == key.path]
+    about = " ".join((key.section.__doc__ or "").split())
+    yield f"## {key.path}\n\n{about}\n\n{_listed(children)}"
+    below = [child for child in children if child.section is not None]
+    if below and all(child.section is ToleranceSection for child in below):
+        alike = [entry for entry in every if entry.parent == below[0].path]
+        names = ", ".join(child.name for child in below)
+        yield f"## {key.path}: each of {names}\n\n{_listed(alike)}"
+        return
+    for child in below:
+        yield from _sections(child, every)
+
+
+def _listed(keys: list[KeyGuide]) -> str:
+    return "\n".join(f"- **{key.name}**: {key.text}" for key in keys)
+
+
+BEGIN = """# The spacecraft file
+
+every key of the spacecraft file; file.thrusters, file.limits.tick
+
+`nutdamp init` writes one with comments, `nutdamp init --from ace` one of the
 examples in `configs/`, each with its sources (`--list` names them):
 
 ```yaml
@@ -46,7 +124,17 @@ thrusters:
   - {name: T1, position: [0, 0.5, 0.8], direction: [1, 0, 0], force: 10 N, isp: 220 s, max_on_time: 2 s}
 ```
 
-A number that is unlikely in SI, such as a position of 800, is accepted with a warning that names the likely unit."""
+A number that is unlikely in SI, such as a position of 800, is accepted with a warning that names the likely unit.
+
+A value is a number in SI or a text with a unit. Any key can also be given as --set KEY=VALUE, entries of a list \
+by name or position: --set thrusters.T1.force=12N, --set omega0[2]=3."""
+
+
+def _file() -> str:
+    every = list(keys())
+    roots = [key for key in every if not key.parent]
+    sections = [part for key in roots for part in _sections(key, every)]
+    return "\n\n".join([BEGIN, _listed(roots), *sections]) + "\n"
 
 
 def _line(kind: Kind) -> str:
@@ -60,13 +148,9 @@ def _line(kind: Kind) -> str:
 
 def pages() -> dict[str, str]:
     """The text of each such page."""
-    file = markdown(
-        "The spacecraft file", "every key of the spacecraft file; file.thrusters, file.limits.tick", file_topic()
-    )
-    title, summary, rest = file.split("\n\n", 2)
     rows = "".join(f"- **{kind.noun.partition(' ')[2]}**: {_line(kind)}\n" for kind in KINDS.values())
     units = re.sub(r"(- \*\*.*\n)+", lambda _: rows, (FOLDER / "units.md").read_text(encoding="utf-8"))
-    return {"file": "\n\n".join([title, summary, BEGIN, rest]), "units": units}
+    return {"file": _file(), "units": units}
 
 
 if __name__ == "__main__":

@@ -38,11 +38,8 @@ def _drawn(figure: Figure) -> dict[Text, Vector]:
     return found
 
 
-def check_layout(figure: Figure, *, crowded: bool = False) -> None:
-    """Fails where a text is cut by the edge of the sheet, covers another, or is struck by the line from a label.
-
-    Where labels are ``crowded`` lines may cross others.
-    """
+def check_layout(figure: Figure) -> None:
+    """Fails where a text is cut by the edge of the sheet or covers another."""
     width, height = figure.bbox.size
     found = [(text.get_text(), box) for text, box in texts(figure)]
     for text, (left, low, right, high) in found:
@@ -53,14 +50,3 @@ def check_layout(figure: Figure, *, crowded: bool = False) -> None:
     for (text, one), (other_text, other) in combinations(found, 2):
         overlap = np.minimum(one[2:], other[2:]) - np.maximum(one[:2], other[:2])
         assert not (overlap > 1.5).all(), f"{text!r} and {other_text!r}"
-    for way in [] if crowded else leaders(figure):
-        for text, box in found:
-            inside = (way > box[:2] + 2.0) & (way < box[2:] - 2.0)
-            assert not inside.all(axis=1).any(), f"a line through {text!r}"
-
-
-def leaders(figure: Figure) -> list[Vector]:
-    """The lines from labels to what they are of, points in pixels."""
-    lines = [line for axes in figure.axes for line in axes.lines if line.get_label() == "_leader"]
-    ends = [np.asarray(line.get_transform().transform(line.get_xydata())) for line in lines]
-    return [np.linspace(begin, end, 200) for begin, end in ends]

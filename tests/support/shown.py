@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 from dataclasses import replace
 from functools import cache
 
@@ -15,12 +16,12 @@ from support.markup import Node, parsed
 from nutdamp.figures import geometry, overview
 from nutdamp.files.reader import read_spacecraft
 from nutdamp.flight.propagation import Flight, Track
-from nutdamp.montecarlo import study as dispersion
-from nutdamp.montecarlo.study import Results, run
+from nutdamp.montecarlo.study import Results, run, study_of
 from nutdamp.page.document import Page
 from nutdamp.page.report import page_html
 from nutdamp.planning import plan as planning
 from nutdamp.planning.decision import Comparison, compare
+from nutdamp.planning.screening import Dispersion
 from nutdamp.schemes.catalogue import CLASSIC
 from nutdamp.spacecraft.equipment import Steerable
 from nutdamp.spacecraft.model import Attitude, Limits, Requirement, Spacecraft, Vector
@@ -36,7 +37,7 @@ def kicks(body: Spacecraft, count: int, step: float, on_time: float) -> Schedule
     return Schedule(tuple(channel_pulse(channels[n % len(channels)], 0.5 + n * step, on_time) for n in range(count)))
 
 
-NAMES = ("overview", "motion", "sphere", "history")
+NAMES = ("overview", "motion", "history")  # the last one is the picture of the report
 TORQUER = Steerable(50.0)
 STEERED = spinner(steerable=TORQUER, requirement=Requirement(0.01))
 SIXTEEN = spinner(degrees=8.0, channels=fan(16, 20.0))
@@ -83,18 +84,26 @@ def flown(case: str) -> tuple[Flight, Track]:
 @cache
 def drawn(name: str, case: str) -> Figure:
     """A figure of a case."""
-    return overview.flight_figure(name, *flown(case))
+    return figure_of(name, *flown(case))
 
 
 def flight_picture(name: str, body: Spacecraft, pulses: Schedule | str = "two-pulse") -> Figure:
     """A figure of a schedule, or of the one of a scheme."""
     plan = planning.plan(body, pulses) if isinstance(pulses, str) else planning.Plan(body, "trial", pulses)
-    return overview.flight_figure(name, *overview.shown(plan))
+    return figure_of(name, *overview.shown(plan))
 
 
-def studied(body: Spacecraft, count: int, scheme: str = "two-pulse") -> Results:
+def figure_of(name: str, flight: Flight, track: Track) -> Figure:
+    """One of `NAMES`."""
+    if name == "history":
+        return overview.history_figure(flight, track)
+    return overview.flight_figure(name, flight, track)
+
+
+def studied(body: Spacecraft, count: int, scheme: str = "two-pulse") -> Dispersion:
     """Dispersed cases of the plan of a scheme, flown."""
-    return run(Results(dispersion.study_of(body, planning.plan(body, scheme).pulses), count), threads=1)
+    plan = planning.plan(body, scheme)
+    return Dispersion(run(Results(study_of(body, plan.pulses), count), threads=1), plan=plan)
 
 
 def points(axes: Axes, label: str) -> Vector:
@@ -138,6 +147,13 @@ def compared_text(text: str, names: tuple[str, ...] = CLASSIC) -> Comparison:
 def tree(page: Page | str) -> Node:
     """What a page holds."""
     return parsed((page if isinstance(page, str) else page_html(page)).removeprefix("<!DOCTYPE html>"))
+
+
+def downloaded(link: Node) -> str:
+    """The text of the file that a link holds."""
+    head, _, content = link.attributes["href"].partition(",")
+    assert head == "data:text/yaml;base64"
+    return base64.b64decode(content).decode()
 
 
 def section(page: Node, name: str) -> Node:

@@ -61,7 +61,7 @@ explain 17
 explain file.thrusters
 explain weather; 2
 plan
-plan smoke.yaml --scheme two-pulse --json plan.json --csv pulses.csv --plot plan.png --figure history
+plan smoke.yaml --scheme two-pulse --json plan.json --csv pulses.csv --plot plan.png
 plan smoke.yaml --scheme optimal --set limits.horizon=20s --csv optimal.csv
 plan smoke.yaml --scheme optimal --set limits.horizon=20s --free-axis --least time
 plan --scheme half-cone --target 10deg,45deg --nominal --json target.json
@@ -73,7 +73,7 @@ plan smoke.yaml --scheme half-cone; 2
 plan smoke.yaml --scheme two-pulse --set limits.horizon=1ms; 3
 simulate smoke.yaml --scheme two-pulse --csv track.csv --json track.json --plot motion.svg --figure motion
 simulate smoke.yaml --schedule pulses.csv --flown
-simulate smoke.yaml --scheme none --until 10s --plot history.pdf --figure history
+simulate smoke.yaml --scheme none --until 10s --plot free.pdf
 trade --points 1 --csv trade.csv --json trade.json --plot trade.png --schedules folder
 disperse smoke.yaml --schedule pulses.csv --samples 200 --csv c.csv --json d.json --plot d.png --figure cases
 disperse smoke.yaml --scheme two-pulse --case 7 --json case.json

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import inspect
 import re
 from collections import defaultdict
 from collections.abc import Iterator
@@ -16,7 +17,7 @@ LOOSE = {"__init__", "__main__", "api", "errors", "units"}
 LONGEST, SHORTEST = 600, 80
 """Lines of a module, but of a scheme."""
 
-FLOORS = 22
+FLOORS = 25
 """Longest chain of imports, those within functions and for types alone too."""
 
 MOST_MODULES, MOST_OUTSIDE = 135, 112
@@ -146,3 +147,101 @@ def test_docstrings_say_what_a_thing_is(package: str) -> None:
         if RIDDLES.match(text)
     ]
     assert riddles == []
+
+
+# --- one judgement
+
+REQUIREMENTS, VERDICT, WORDS = "spacecraft/requirements.py", "planning/verdict.py", "views/verdict.py"
+REQUIRED = {"nutation", "momentum_shift", "spin"}
+"""Fields of a requirement."""
+
+COMPARE = {
+    "planning/decision.py": "severities of plans with each other",
+    "schemes/optimal/search.py": "leads of a search that come near enough to be refined",
+    "page/moving.py": "what lies within the scale of a drawing",
+    WORDS: "digits that keep a number on its side of the limit",
+}
+"""Modules that compare with the limit of a bound, but judge nothing by it."""
+
+SHARES = {
+    VERDICT: "share of the cases that keep one bound alone",
+    "planning/chance_plan.py": "trials of margins and of tolerances, whose plans are judged like all others",
+    "planning/screening.py": "shifts of a schedule that is judged, for the phase window of its sheet",
+}
+"""Modules that compare a share of cases with the one required, but give no plan a status by it."""
+
+SAID = re.compile(r"\b((NOT )?met|FLY|NO PULSE|NO PLAN|(NOT )?ENOUGH|NOT SHOWN|CANNOT BE COMMANDED)\b")
+WORDED = {
+    (VERDICT, "met"): "value of `Light`, the class of a part of the page",
+    ("views/dispersion.py", "met"): "key of JSON",
+    ("views/trade.py", "verdict.met"): "path of an attribute",
+    ("planning/notes.py", "met-without-pulse-from"): "code of a note",
+    ("planning/notes.py", "met-without-pulse-until"): "code of a note",
+    ("files/study_rules.py", "given alone; name what must be met with it: nutation, momentum_shift or spin"): "a fault",
+}
+"""Texts with a word of the verdict that do not tell one."""
+
+
+def named(node: ast.AST) -> str:
+    """Last part of a name; empty for what is none."""
+    return node.id if isinstance(node, ast.Name) else getattr(node, "attr", "")
+
+
+def limits(node: ast.AST, stored: set[str]) -> bool:
+    """True for an expression with the limit of a bound or a field of a requirement, maybe under a name ``stored``."""
+    for part in ast.walk(node):
+        owner = named(part.value) if isinstance(part, ast.Attribute) else ""
+        if owner in ("requirement", "required", "requested") and named(part) in REQUIRED:
+            return True
+        if (owner, named(part)) == ("bound", "limit") or named(part) in stored:
+            return True
+    return False
+
+
+def sizes(node: ast.AST) -> Iterator[list[ast.expr]]:
+    """Both sides of the comparisons of sizes in a tree, or all of a chain."""
+    for part in ast.walk(node):
+        if isinstance(part, ast.Compare) and isinstance(part.ops[0], ast.Lt | ast.LtE | ast.Gt | ast.GtE):
+            yield [part.left, *part.comparators]
+
+
+def judges(function: ast.FunctionDef) -> bool:
+    """True where a function compares something with a limit, by whatever name it has it, or a severity with 1."""
+    stored = set[str]()
+    for node in 3 * [*ast.walk(function)]:  # names of names too
+        if isinstance(node, ast.Assign) and not isinstance(node.value, ast.BoolOp) and limits(node.value, stored):
+            stored |= {named(part) for target in node.targets for part in getattr(target, "elts", [target])}
+    return any(
+        any(limits(side, stored) for side in sides)
+        or ({"severity", "severities", "shares"} & {*map(named, sides)} and ast.unparse(sides[-1]) == "1.0")
+        for sides in sizes(function)
+    )
+
+
+def test_only_the_requirements_compare_a_residual_with_a_bound() -> None:
+    functions = [(path, node) for path, tree in trees().items() for node in ast.walk(tree)]
+    judging = {path for path, node in functions if isinstance(node, ast.FunctionDef) and judges(node)}
+    assert judging == {REQUIREMENTS, *COMPARE}
+
+
+def test_only_the_requirements_compare_a_share_with_the_one_required() -> None:
+    written = ((path, sides) for path, tree in trees().items() for sides in sizes(tree))
+    shares = ((path, sides) for path, sides in written if "probability" in map(named, sides))
+    assert {path for path, sides in shares if not isinstance(sides[-1], ast.Constant)} == {REQUIREMENTS, *SHARES}
+
+
+def test_only_the_verdict_makes_a_status_and_only_its_view_names_one() -> None:
+    makes, names, words = set(), set(), set()
+    for path, tree in trees().items():
+        prose = {*documented(tree)}
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Call) and named(node.func) in ("Verdict", "Status"):
+                makes.add(path)
+            elif isinstance(node, ast.Attribute) and named(node.value) == "Status":
+                names.add(path)
+            elif isinstance(node, ast.Constant) and isinstance(node.value, str) and path != WORDS:
+                words |= {
+                    (path, text) for text in {node.value} if SAID.search(text) and inspect.cleandoc(text) not in prose
+                }
+    assert (makes, names) == ({VERDICT}, {VERDICT, WORDS})
+    assert words == {*WORDED}

@@ -485,7 +485,7 @@ def merged_text(source: Source, contents: ApmContents | History, at: float = 0.0
         if turn is not None:
             yield from attitude_edits(tree, later)
 
-    text = carry_text(*source, edits)
+    text = carry_text(*source[:3], edits)
     try:
         Source(text, source.name).read(lambda _: None)
     except FaultyFile as wrong:

@@ -106,9 +106,8 @@ def _block(name: str, values: message.Values, *comments: str) -> message.Message
 def _header(plan: Plan, created: Epoch) -> message.MessageBlock:
     moment = created.text.partition(".")[0]
     values = [None, moment, ORIGINATOR, label(f"{plan.scheme}-{moment}")]
-    return block(
-        "", message.HEADER, values, f"nutdamp {__version__}: {plan.scheme} schedule for {plan.spacecraft.name}"
-    )
+    about = f"nutdamp {__version__}: {plan.scheme} schedule for {plan.spacecraft.name}"
+    return block("", message.HEADER, values, about, f"status: {plan.verdict.status.value}")
 
 
 def _identity(body: Spacecraft) -> tuple[str, str]:

@@ -1,13 +1,13 @@
 """Lower bounds of the cost of a schedule, by duality and by the length of the way.
 
-The rigorous ones hold at any angle for a symmetric body left alone: no dissipation, no disturbances. They concern
-schedules that leave no more than `Allowed`, and know of no gaps, ticks and on-times, which can only raise the cost.
+The rigorous ones hold at any angle for a symmetric body left alone: no dissipation, no disturbances, no goal for the
+spin. They concern schedules that leave no more than `Allowed`, and know of no gaps, ticks and on-times, which can only
+raise the cost.
 
 *Nutation.* w = A ω e^{iφ} with φ = a ∫ω3 dt obeys dw/dt = M e^{iφ}, at any angle. Let y be complex with
 Re(y* m e^{iφ}) ≤ c for the torque m and the cost c per second of every channel, and every phase φ at which it may be
 on. Then Σ ∫ c dt ≥ Re(y* (w(end) - w(0))) ≥ -Re(y* A ω0) - |y| A |ω(end)|. Axial torque changes ω3, and so the phases,
-by no more than what a schedule of a given cost can give to the spin. A final *spin* costs impulse too: with M3 in place
-of one component, and |m| in place of the other.
+by no more than what a schedule of a given cost can give to the spin.
 
 *Turn.* Where ω3 stays, H·e3 = Cω3, so H never comes nearer to the origin than r = C|ω3|. From |H0| = r/cos θ0 the
 shortest way round that sphere to the direction of the target is the tangent, r tan θ0, and an arc of the sphere.
@@ -21,7 +21,6 @@ each stretch is taken off: ∫ max(0, q - 1) c dt. Between the times looked at, 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -142,11 +141,10 @@ LOOKS, NARROWINGS = 33, 9  # directions looked at at once, and narrowings of the
 
 
 class Allowed(NamedTuple):
-    """Largest end errors: ``nutation`` and distance ``off`` the target, rad, ``spin`` as a share of the final one."""
+    """Largest end errors: ``nutation`` and distance ``off`` the target, rad."""
 
     nutation: float = 0.0
     off: float = 0.0
-    spin: float = 0.0
 
 
 def rigorous(
@@ -160,13 +158,13 @@ def rigorous(
     channels = usable(spacecraft, axial=True)
     if spacecraft.disturbances or spacecraft.growth != 0.0 or any(channel.name not in prices for channel in channels):
         return None
+    if spacecraft.goal.spin is not None:
+        return None
     if allowed.nutation >= 0.5 * math.pi:  # the spin axis points away from H
         return None
     costs = np.array([prices[channel.name] for channel in channels])
     torques = np.array([channel.torque for channel in channels])
     lower_bounds = [_nutation(spacecraft, torques, costs, cost, allowed)]
-    if spacecraft.goal.spin is not None:
-        lower_bounds.append(_nutation_and_spin(spacecraft, spacecraft.goal.spin, torques, costs, allowed))
     if shift and not torques[:, 2].any():
         # The way of H to the direction of the target, round the sphere of radius |H3|.
         nutation, beta = spacecraft.nutation, max(spacecraft.to_turn - allowed.off, 0.0)
@@ -196,50 +194,17 @@ def _nutation(spacecraft: Spacecraft, torques: Vector, costs: Vector, cost: floa
     wide = np.minimum(over[np.append(first[1:], True)] - low, math.tau)
     points = (torques[:, 0] + 1j * torques[:, 1]) / costs
     strength, angle = np.abs(points), np.angle(points)
-
-    def value(directions: Vector) -> Vector:
+    best, middle, reach = 0.0, float(np.angle(goal)), math.acos(stays / abs(goal))
+    for _ in range(NARROWINGS):  # the bound has one peak in these directions of y
+        directions = middle + reach * np.linspace(-1.0, 1.0, LOOKS)
         # From the begin of each arc to the direction, for each channel: inside, the whole strength is to be had.
         apart = np.mod(directions[:, None, None] - angle[:, None] - low, math.tau)
         beside = np.maximum(np.cos(apart), np.cos(apart - wide))
-        reach = (strength * np.where(apart <= wide, 1.0, beside).max(axis=2)).max(axis=1)
-        return _ratio(abs(goal) * np.cos(directions - np.angle(goal)) - stays, abs(goal), reach, float(strength.max()))
-
-    return _largest(value, float(np.angle(goal)), math.acos(stays / abs(goal)))
-
-
-def _nutation_and_spin(spacecraft: Spacecraft, final: float, torques: Vector, costs: Vector, allowed: Allowed) -> float:
-    """Least cost of taking the nutation out and changing the spin to ``final``, whatever the phases."""
-    C, off = spacecraft.inertia.C, abs(final) * allowed.spin
-    stays = (abs(spacecraft.inertia.axial(final)) + C * off) * math.tan(allowed.nutation)
-    change = final - spacecraft.spin
-    change = math.copysign(max(abs(change) - off, 0.0), change)
-    goal = complex(max(spacecraft.least_impulse - stays, 0.0), C * change)
-    if goal == 0.0:
-        return 0.0
-    points = np.column_stack([np.hypot(torques[:, 0], torques[:, 1]), torques[:, 2]]) / costs[:, None]
-
-    def value(directions: Vector) -> Vector:
-        inside = np.clip(directions, -0.5 * math.pi, 0.5 * math.pi)  # more than is needed may be taken of the nutation
-        toward = np.array([np.cos(inside), np.sin(inside)])
-        gain = np.array([goal.real, goal.imag]) @ toward
-        return _ratio(gain, abs(goal), (points @ toward).max(axis=0), float(np.abs(points).max()))
-
-    return _largest(value, float(np.angle(goal)), 0.5 * math.pi)
-
-
-def _ratio(gain: Vector, most: float, reach: Vector, strongest: float) -> Vector:
-    """Cost (n,) of a ``gain`` of up to ``most``, where one unit of cost reaches up to ``strongest``, here ``reach``."""
-    gain, reach = gain - ROUNDING * most, reach + ROUNDING * strongest
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(gain <= 0.0, 0.0, np.where(reach > 0.0, gain / reach, np.inf))
-
-
-def _largest(value: Callable[[Vector], Vector], middle: float, reach: float) -> float:
-    """The largest ``value`` (n,) -> (n,) of directions up to ``reach`` rad from ``middle``; it has one peak there."""
-    best = 0.0
-    for _ in range(NARROWINGS):
-        directions = middle + reach * np.linspace(-1.0, 1.0, LOOKS)
-        values = value(directions)
+        effect = (strength * np.where(apart <= wide, 1.0, beside).max(axis=2)).max(axis=1)
+        effect += ROUNDING * float(strength.max())
+        gain = abs(goal) * (np.cos(directions - np.angle(goal)) - ROUNDING) - stays
+        with np.errstate(divide="ignore", invalid="ignore"):
+            values = np.where(gain <= 0.0, 0.0, np.where(effect > 0.0, gain / effect, np.inf))
         index = int(np.argmax(values))
         best = max(best, float(values[index]))
         middle, reach = float(directions[index]), 2.0 * reach / (LOOKS - 1)

@@ -381,18 +381,11 @@ class Program:
         return np.asarray(np.clip(slot, 0, len(self.centres) - 1))
 
 
-Way = tuple[Literal["simplex", "ipm"], bool, float]
-INTERIOR: Way = ("ipm", True, 1.0)
-WAYS: tuple[Way, ...] = (
-    ("simplex", False, 1.0),
-    ("simplex", True, 1.0),
-    ("simplex", True, 1e3),
-    INTERIOR,
-    ("simplex", False, 1e-2),
-    ("ipm", False, 1e3),
-)
-"""Method, presolving, and factor of the costs, tried in turn: where the dual simplex loses its way at one scale of the
-costs, against which its tolerances count, it mostly does not at another; interior points do not know the trouble."""
+Way = tuple[Literal["simplex", "ipm"], bool]
+SIMPLEX: Way = ("simplex", False)
+INTERIOR: Way = ("ipm", True)
+"""Method and presolving: where the dual simplex loses its way, interior points, which do not know the trouble, mostly
+find the solution."""
 
 LARGE = 10_000
 """Unknowns above which `INTERIOR` comes first: a step of the dual simplex then passes thousands of their bounds, at a
@@ -458,33 +451,27 @@ class GrowingProgram:
 
     def optimum(self) -> Optimum | None:
         """The cheapest solution, from the last one's basis if there is one; None where no way of solving succeeds."""
-        optimum = self._solved(*(WAYS[0] if len(self._costs) <= LARGE else INTERIOR))
-        for way in WAYS:
-            if optimum is None:
-                self._highs.clearSolver()
-                optimum = self._solved(*way)
+        first, second = (SIMPLEX, INTERIOR) if len(self._costs) <= LARGE else (INTERIOR, SIMPLEX)
+        optimum = self._solved(*first)
+        if optimum is None:
+            self._highs.clearSolver()
+            optimum = self._solved(*second)
         return optimum
 
-    def _solved(self, method: str, presolve: bool, factor: float) -> Optimum | None:
+    def _solved(self, method: str, presolve: bool) -> Optimum | None:
         highs = self._highs
         highs.setOptionValue("solver", method)
         highs.setOptionValue("presolve", "on" if presolve else "off")
-        every = np.arange(len(self._costs), dtype=np.int32)
-        if factor != 1.0:
-            highs.changeColsCost(len(every), every, factor * self._costs)
         work.spend(NONZERO * max(highs.getNumNz() - SMALL, 0))
         if highs.run() == highspy.HighsStatus.kError:
             # Threads are set once in a process, by whoever solves first; zero takes what there is.
             highs.setOptionValue("threads", 0)
             highs.run()
-        optimum = None
-        if highs.getModelStatus() == highspy.HighsModelStatus.kOptimal:
-            solution = highs.getSolution()
-            prices, shadows = np.split(np.array(solution.row_dual) / factor, [len(self._level)])
-            optimum = Optimum(np.array(solution.col_value), prices / self._level, shadows)
-        if factor != 1.0:
-            highs.changeColsCost(len(every), every, self._costs)
-        return optimum
+        if highs.getModelStatus() != highspy.HighsModelStatus.kOptimal:
+            return None
+        solution = highs.getSolution()
+        prices, shadows = np.split(np.array(solution.row_dual), [len(self._level)])
+        return Optimum(np.array(solution.col_value), prices / self._level, shadows)
 
 
 class _SilentSolver(highspy.Highs):

@@ -235,14 +235,13 @@ class Problem:
 
     def left(self, flown: Flight) -> float:
         """Largest end error of a flight, rad: nutation, distance from the target, and spin as a share of itself."""
-        nutation, off, spin = self.leaves(flown)
+        (nutation, off), goal = self.leaves(flown), self.spacecraft.goal
+        spin = 0.0 if goal.spin is None else abs(flown.settled.spin / goal.spin - 1.0)
         return max(nutation, max(off - (self.options.shift or 0.0), 0.0), spin)
 
     def leaves(self, flown: Flight) -> Allowed:
-        """End errors of a flight in the requested quantities."""
-        residual, goal = flown.residual, self.spacecraft.goal
-        off = residual.axis_error if self.equations.shift else 0.0
-        return Allowed(residual.nutation, off, 0.0 if goal.spin is None else abs(flown.settled.spin / goal.spin - 1.0))
+        """End errors of the axis and of H in a flight."""
+        return Allowed(flown.residual.nutation, flown.residual.axis_error if self.equations.shift else 0.0)
 
     def not_found(self) -> str:
         """Reason for no schedule although the program has solutions: the limits that it does not know of."""

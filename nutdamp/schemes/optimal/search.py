@@ -220,7 +220,7 @@ class _LeastCostSearch(Problem):
             still = self.keeping(best)
             best = still if self.astray(best) and not self.astray(still) else self.cheaper(best, still)
         if best is None and first.unmet <= UNMET:  # channels that stand still in space may leave a little
-            most = min(bound.most for bound in requirements.bounds(self.spacecraft) if bound.part is not Part.SPIN)
+            most = min(bound.limit for bound in requirements.bounds(self.spacecraft) if bound.part is not Part.SPIN)
             there = [each for each in self.nearest if each.left <= NEARLY * most]
             best = min(there, key=lambda each: each.price).schedule if there else None
         if best is None:

@@ -37,7 +37,7 @@ def test_dispersed_cases_decide_unless_nominal_values_shall(run: Run) -> None:
     two, four = found["by scheme"]["two-pulse"], found["by scheme"]["four-pulse"]
     assert two["meets_requirement"] is True
     assert four["meets_requirement"] is False
-    assert four["cases"]["met_fraction"] is None  # it was flown no further than it took to know
+    assert four["cases"]["samples"] == 2_048  # it was flown no further than it took to know
     assert four["cases"]["high"] < 0.997
     assert two["cases"]["samples"] == 20_000
     nominal = planned(run, *QUICK, "--nominal")
@@ -61,17 +61,14 @@ def test_a_robust_plan_is_compared_by_the_same_cases(run: Run) -> None:
 
 def test_no_plan_complies_often_enough(run: Run) -> None:
     ended = run("plan", *QUICK, "--set", LOOSE)
-    assert ended.returncode == 4
-    warning = next(line for line in ended.stdout.replace("\n", " ").split("  ") if "warning" in line)
-    check_text("decision.too-few", warning[warning.index("warning") :])
+    assert (ended.returncode, "warning[too-few-cases]: " in ended.stdout) == (4, True)
     assert run("plan", *QUICK, "--set", LOOSE, "--nominal").returncode == 0
 
 
 def test_an_undecided_share_does_not_meet(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(work, "CASES", 1.0)
     found = planned(run, "--scheme", "two-pulse", status=4)
-    assert found["decision"]["met"] is False
-    check_text("decision.undecided", found["decision"]["verdict"])
+    assert (found["decision"]["status"], found["decision"]["met"]) == ("not-shown", False)
 
 
 def test_no_requirement_no_cases(run: Run) -> None:
@@ -99,9 +96,11 @@ def test_a_spacecraft_with_commands_fires_command_blocks(run: Run) -> None:
     assert found["recommended"] == "command-block"
     assert found["by scheme"]["two-pulse"]["can_be_commanded"] is False
     assert found["by scheme"]["two-pulse"]["propellant_kg"] < found["by scheme"]["command-block"]["propellant_kg"]
+    assert {each["code"] for each in found["decision"]["cheaper"]} == {"why-single-pulses"}
     assert planned(run, body, *schemes, "--timed")["recommended"] == "two-pulse"
-    assert planned(run, body, "--scheme", "two-pulse")["recommended"] == "two-pulse"  # named, and marked
-    assert "cannot be commanded" in run("plan", body, "--scheme", "two-pulse").stdout
+    named = planned(run, body, "--scheme", "two-pulse", status=4)
+    assert (named["recommended"], named["decision"]["status"]) == ("two-pulse", "not-commandable")
+    assert "CANNOT BE COMMANDED" in run("plan", body, "--scheme", "two-pulse").stdout
 
 
 def test_no_plan_can_be_commanded() -> None:
@@ -154,13 +153,6 @@ def test_command_blocks_set_the_spin(run: Run) -> None:
     found = planned(run, str(case("isee3-spinup.yaml")), "--spin", "19.733rpm")
     assert found["recommended"] == "command-block"
     assert all(found["by scheme"][name]["meets_requirement"] for name in ("command-block", "optimal"))
-
-
-@pytest.mark.deep
-def test_a_robust_plan_uses_its_slack(run: Run) -> None:
-    robust = planned(run, str(case("rob2.yaml")), "--robust")["robust"]["recommended"]
-    assert robust["met_fraction"] >= 0.997
-    assert 1e3 * robust["propellant_kg"] < 1.7995  # a local search found 1.791 g
 
 
 @pytest.mark.parametrize(("name", "more"), [("tail_pulse", ("--at", "60s")), ("fit-dead-gyro", ())])

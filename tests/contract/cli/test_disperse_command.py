@@ -14,10 +14,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support.cases import weekly
-from support.commands import WIDE, call, names, result, rows, transcript, words
+from support.commands import call, names, result, rows, transcript
 from support.dispersed import FILE
 from support.golden import check_text
-from support.markup import parsed
 from support.process import Run, environment
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
@@ -80,7 +79,7 @@ def test_runs_agree_on_any_threads_and_a_worst_case_can_be_run_again(run: Run) -
 FEW = f"{TWO} --samples 50 --set"
 SCREENS = {
     "all cases": [f"{TWO} --samples 2000", f"{TWO} --samples 2000 -v"],
-    "requirements": [f"{FEW} 'requirement={{nutation: 9 deg}}'", f"{FEW} 'requirement={{nutation: 0.1 deg}}'; 4",
+    "requirements": [f"{FEW} 'requirement={{nutation: 9 deg}}'; 4", f"{FEW} 'requirement={{nutation: 0.1 deg}}'; 4",
                      f"{FEW} 'requirement={{}}'"],
     "refused": [f"{FEW} 'dispersions.C={{bias: 250 %}}'; 2"],
     "weak": ["disperse body.yaml --samples 9 --set 'limits={horizon: 4 s}' --set 'requirement={}' "
@@ -129,72 +128,48 @@ def test_tables_that_the_disk_does_not_hold_are_exit_1(run: Run, body: Path) -> 
     assert names(body.parent) == ["body.yaml"]
 
 
-@pytest.mark.weekly
-def test_every_command_gives_the_same_share_for_the_same_plan(run: Run, tmp_path: Path) -> None:
-    """`disperse`, `plan`, `plan --robust` and `report` of the built-in example, 20,000 cases of seed 1."""
-    sentence = r"((?:NOT )?met: [\d.]+ % of cases comply \([\d.]+ % required\))"
-    two = ("--scheme", "two-pulse", *WIDE)
-    usual, planned = run("plan", *two, "--json", "plan.json"), run("plan", "--robust", *two, "--json", "robust.json")
-    dispersed = run("disperse", *two, "--json", "s.json")
-    assert run("report", *two, "-o", "r.html").returncode == usual.returncode == 4
-    report = parsed((tmp_path / "r.html").read_text(encoding="utf-8")).text
-    robust = json.loads((tmp_path / "robust.json").read_text())["robust"]
-    (share,) = [plan["met_fraction"] for plan in robust["candidates"] if plan["variant"] == "as planned"]
-    assert (planned.returncode, robust["recommended"]["met_fraction"]) == (4, share)
-    assert json.loads((tmp_path / "s.json").read_text())["requirement"]["met_fraction"] == share
-    (cases,) = (plan["cases"] for plan in json.loads((tmp_path / "plan.json").read_text())["plans"])
-    assert (cases["met_fraction"], cases["samples"], cases["met"]) == (share, 20_000, False)
-    verdicts = {
-        text
-        for shown in (usual.stdout, planned.stdout, dispersed.stdout, report)
-        for text in re.findall(sentence, words(shown))
-    }
-    (verdict,) = verdicts
-    assert verdict.startswith(f"NOT met: {100 * share:.1f} % of cases comply")
-
-
 @pytest.mark.deep
 def test_it_says_where_the_nominal_case_ends_and_where_it_should(run: Run, tmp_path: Path) -> None:
     goal = ("--scheme", "half-cone", "--target", "10deg,45deg")
     shown = run("disperse", *goal, "--samples", "200", "-v", "--json", "d.json").stdout
-    data, simulated = json.loads((tmp_path / "d.json").read_text()), result(run, " ".join(("simulate", *goal)))
+    simulated = result(run, " ".join(("simulate", *goal)), status=4)
+    data = json.loads((tmp_path / "d.json").read_text())
     for name in ("axis", "momentum"):
         assert data["final"][name] == pytest.approx(simulated["final"][name], abs=1e-6)
     assert data["target"]["axis"] == pytest.approx({"tilt_deg": 10.0, "azimuth_deg": 45.0})
     assert re.search(r"^target +tilt 10\.0000 deg, azimuth 45\.0000 deg; H ends .+ deg off$", shown, re.MULTILINE)
     assert re.search(r"^spin axis ends at +tilt 1[01]\.[0-9]{4} deg", shown, re.MULTILINE)
-    assert "Main causes of axis error: " in words(shown)
-    assert "Main causes of momentum shift: " not in words(shown)
 
 
-def row_of(screen: str, name: str) -> dict[str, list[float]]:
-    """Numbers of the rows of that name, by the sign that stands behind it."""
-    found = re.findall(rf"^{name} ?([≤≥]?), \S+ +([\d.e -]+)$", screen, re.MULTILINE)
-    return {sign: [float(number) for number in numbers.split()] for sign, numbers in found}
+def row_of(screen: str, name: str) -> list[float]:
+    """Numbers of the row of that name."""
+    (numbers,) = re.findall(rf"^{re.escape(name)}, \S+ +([\d.e -]+)$", screen, re.MULTILINE)
+    return [float(number) for number in numbers.split()]
 
 
-def test_spin_changes_have_both_tails_where_they_have_both_signs(run: Run, tmp_path: Path) -> None:
-    """So many of the cases do not exceed a value of the one row, and stay above that of the other."""
-    shown = run(
-        "disperse", "--scheme", "two-pulse", "--samples", "400", "-q", "-v", "--csv", "s.csv", columns=140
-    ).stdout
-    changes = 1e3 * np.array([float(row["spin_change_rad_s"]) for row in rows((tmp_path / "s.csv").read_text())])
-    assert changes.min() < 0.0 < changes.max()
-    tails, shares = row_of(shown, "spin change"), np.array([float(percent) / 100.0 for percent in PERCENTS])
-    assert tails["≤"][1:] == pytest.approx([*np.quantile(changes, shares), changes.max()], abs=1e-3)
-    assert tails["≥"][1:] == pytest.approx([*np.quantile(changes, 1.0 - shares), changes.min()], abs=1e-3)
+@pytest.mark.parametrize(
+    ("file", "scheme", "lost"), [("sounder-1", "two-pulse", False), ("upper-stage", "one-pulse", True)]
+)
+def test_of_spin_changes_the_size_is_shown_and_files_have_the_sign(
+    run: Run, tmp_path: Path, file: str, scheme: str, lost: bool
+) -> None:
+    """Up or down, the largest change is the worst."""
+    command = [] if file == "sounder-1" else ["body.yaml"]
+    run("init", "--from", "upper-stage", "body.yaml")
+    files = ["--csv", "s.csv", "--json", "s.json"]
+    shown = run("disperse", *command, "--scheme", scheme, "--samples", "400", "-q", "-v", *files, columns=140).stdout
+    changes = np.array([float(row["spin_change_rad_s"]) for row in rows((tmp_path / "s.csv").read_text())])
+    assert (changes.max() <= 0.0) == lost
+    shares = np.array([float(percent) / 100.0 for percent in PERCENTS])
+    sizes = 1e3 * np.abs(changes)
+    assert row_of(shown, "|spin change|")[1:] == pytest.approx([*np.quantile(sizes, shares), sizes.max()], abs=1e-3)
+    signed = json.loads((tmp_path / "s.json").read_text())["percentiles"]["spin_change_rad_s"]
+    assert (signed["min"], signed["max"]) == pytest.approx((changes.min(), changes.max()))
 
 
-def test_spin_that_is_only_lost_has_one_row_and_one_case_the_nominal_one_of_all(run: Run) -> None:
-    """What counts is how much is lost, so the row falls to the largest loss."""
-    run("init", "--from", "upper-stage", "stage.yaml")
-    loss = run("disperse", "stage.yaml", "--scheme", "one-pulse", "--samples", "100", "-q", "-v", columns=140).stdout
-    ((sign, numbers),) = row_of(loss, "spin change").items()
-    assert sign == "≥"
-    assert numbers[1:] == sorted(numbers[1:], reverse=True)
-    assert numbers[-1] < 0.0
+def test_one_case_has_the_nominal_one_of_all(run: Run) -> None:
     for number in (["--samples", "100"], ["--case", "7"]):
-        (shift,) = row_of(run("disperse", "--scheme", "four-pulse", *number).stdout, "momentum shift").values()
+        shift = row_of(run("disperse", "--scheme", "four-pulse", *number).stdout, "momentum shift")
         assert shift[0] == 0.1684
 
 
@@ -219,7 +194,7 @@ def test_an_interrupted_run_keeps_what_is_done(run: Run, body: Path, number: sig
     assert process.returncode == 128 + number
     assert "interrupted: " in err
     assert "Traceback" not in err
-    assert "Requirement" in out
+    assert "\nrequirement " in out
     assert names(body.parent) == ["body.yaml", "s.csv", "s.json"]
     data = json.loads((body.parent / "s.json").read_text())
     assert data["interrupted"]

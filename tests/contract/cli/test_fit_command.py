@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support.commands import WIDE
+from support.commands import BUILT_IN, WIDE
 from support.golden import check_text
 from support.process import Run
 from support.synthetic import Array, motion
@@ -115,7 +115,7 @@ def test_the_picture_has_a_heading_and_shows_no_rounding_as_noise(run: Run, tmp_
 
 
 def faults(text: str) -> list[str]:
-    return [line for line in text.splitlines() if line and not line.startswith(("Usage", "Try", "no spacecraft"))]
+    return [line for line in text.removeprefix(BUILT_IN).splitlines() if line and not line.startswith(("Usage", "Try"))]
 
 
 def test_faults_and_records_without_content(run: Run, tmp_path: Path) -> None:
@@ -192,58 +192,17 @@ def test_a_schedule_that_does_not_match_the_record_is_doubted(run: Run, tmp_path
         shown[name] = fit(run, "gyro.csv", "--schedule", "s.csv", "-o", f"{name}.yaml", columns=140)
         assert "e+0" not in shown[name]
     for name, text in (
-        ("late", "the times of +M2 in the schedule are 1.000 s late against the record"),
+        ("late", "the times of +M2 in the schedule are 1 s late against the record"),
         ("late", "the delay of +M2, -1000 ms, is not written"),
         ("other", "-M2 gave -100 % of its thrust: it pushes the other way: another channel, or reversed?"),
         ("after", "pulses fired meanwhile: 1"),
-        ("after", "1 of 2 pulses of the schedule is outside the record, 0 s to 30 s"),
+        ("after", "1 of 2 pulses of the schedule are outside the record, 0 s to 30 s"),
     ):
         assert text in shown[name]
     assert "thrust factor of +M1" not in shown["after"]
     known = nutdamp.load(tmp_path / "after.yaml").dispersions
     assert known is not None
     assert known.thrust["+M1"].size == 0.01
-
-
-@pytest.mark.deep
-@pytest.mark.parametrize("probability", [99.7, 90.0])
-def test_what_a_longer_coast_or_a_probe_pulse_would_leave(run: Run, tmp_path: Path, probability: float) -> None:
-    """The nutation shown is that of as many cases as the file requires."""
-    flight(tmp_path, 6)
-    keys = ("requirement.nutation=0.1 deg", f"requirement.probability={probability}%", "limits.max_pulses=2")
-    limits = [part for key in keys for part in ("--set", key)]
-    shown = fit(run, "flight.csv", "-q", "--next", "--at", "90s", "--json", "f.json", *limits)
-    ahead = results(tmp_path)["next"]
-    assert ahead["probability"] == pytest.approx(probability / 100.0)
-    assert [f"in {share:g} % of cases" in shown for share in (probability, 189.7 - probability)] == [True, False]
-    coasts, probes = (
-        [each for each in ahead["prospects"] if (each["probe"] is None) is coast] for coast in (True, False)
-    )
-    assert [each["coast_s"] for each in coasts] == pytest.approx([15.0, 30.0, 60.0, 120.0, 240.0])
-    assert all(each["propellant_kg"] is None for each in coasts)
-    assert all(0.0 < each["propellant_kg"] < ahead["propellant_kg"] for each in probes)
-    # 1 % of thrust becomes what is left of it beside A, whose scale no record tells.
-    assert all(0.0014 < each["sigma_thrust"] < 0.0024 for each in probes)
-    if ahead["probe"] is not None:
-        assert "the probe pulse takes" in shown
-    if probability == 99.7:
-        # C/A is told to the bias of the third gyro by any of them, and the nutation that is left comes from the thrust.
-        assert ahead["longer_coast_s"] is None
-        assert "a coast of 240 s would leave" in shown
-        assert "it does not pay" in shown
-        assert ahead["probe"] in {each["probe"] for each in probes}
-        assert f"one probe pulse of {ahead['probe']}" in shown
-        assert min(each["nutation_deg"] for each in probes) < 0.9 * coasts[2]["nutation_deg"]
-
-
-@pytest.mark.deep
-def test_nothing_pays_where_as_many_cases_comply_as_must(run: Run, tmp_path: Path) -> None:
-    flight(tmp_path, 6)
-    shown = fit(run, "flight.csv", "-q", "--next", "--at", "90s", "--json", "f.json")
-    assert "neither a longer coast nor a probe pulse is needed" in shown
-    assert "pays" not in shown
-    ahead = results(tmp_path)["next"]
-    assert (ahead["longer_coast_s"], ahead["probe"]) == (None, None)
 
 
 @pytest.mark.deep
@@ -266,8 +225,6 @@ def test_the_library_gives_the_same_file_and_fits_it_again_with_what_was_known(r
     assert after["A"].sigma == pytest.approx(before["A"].sigma, rel=0.01)
     assert after["A"].value == pytest.approx(before["A"].value, abs=0.05 * before["A"].sigma)
     assert after["C/A"].sigma == pytest.approx(before["C/A"].sigma / math.sqrt(2.0), rel=0.05)
-    # The prospect of the record as it is agrees with its fit.
-    assert first.outlook(90.0).now.ratio == pytest.approx(before["C/A"].sigma, rel=0.02)
 
 
 @pytest.mark.weekly

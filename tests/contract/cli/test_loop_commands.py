@@ -104,7 +104,7 @@ def test_what_is_wired_backwards_is_named(run: Run, file: str, tmp_path: Path, s
     assert written["notes"][0]["severity"] == "warning"
     assert f"warning[{written['notes'][0]['code']}]: the loop was stopped" in flat(screen.stdout)
     assert f"warning[{code}]: " in checked.stdout
-    assert written["meets_requirement"] is False
+    assert (written["decision"]["status"], written["meets_requirement"]) == ("no-plan", None)
 
 
 def test_too_late_is_refused_with_what_is_allowed(run: Run, file: str) -> None:
@@ -125,7 +125,7 @@ def test_a_loop_that_is_never_quiet_misses_the_requirement(run: Run, file: str, 
     written = json.loads((tmp_path / "loop.json").read_text())
     assert (screen.returncode, written["meets_requirement"], written["quiet_s"]) == (4, False, [])
     assert written["flown"]["nutation_deg"] < 0.3
-    assert "Requirement NOT met: the loop is never down to its stop threshold" in flat(screen.stdout)
+    assert "NOT ENOUGH: the loop is never down to its stop threshold" in flat(screen.stdout)
     cases = (*settings("dispersions={A: {normal: 0.01 %}}"), "--samples", "20", "--json", "-", "-q")
     study = json.loads(run("disperse", file, "--loop", *never, *cases).stdout)
     assert study["requirement"]["met_fraction"] == 0.0
@@ -167,19 +167,11 @@ def test_picture(run: Run, file: str, tmp_path: Path, sensor: str) -> None:
 
 
 SENSELESS = (
-    "loop.sensor.rate=1e9Hz",
-    "loop.sensor.delay=1e6s",
-    "loop.sensor.low_pass=30s",
-    "loop.settle=30s",
-    "loop.sensor.scale=2000%",
-    "loop.sensor.scale=-1%",
-    "loop.sensor={kind: gyro, bias: 2 deg/s}",
     "dispersions.sensor_bias={normal: 0.01 deg/s}",
     "dispersions.sensor_bias={normal: 3 kg}",
     "dispersions.sensor_scale={normal: 60 %}",
     "dispersions.sensor_noise={normal: -5 %}",
     "dispersions.sensor_noise={uniform: 120 %}",
-    "dispersions.sensor_delay={bias: -30 ms}",
     "dispersions.sensor_delay={normal: 5 ms, uniform: 5 ms}",
     "dispersions.sensor_dealy={normal: 5 ms}",
 )
@@ -232,7 +224,7 @@ def test_what_a_file_lacks_and_what_does_not_go_together_is_said(run: Run, stage
 def test_cases_their_table_their_files(run: Run, stage: Path, tmp_path: Path) -> None:
     command = ("disperse", "stage.yaml", "--loop", "--until", "8s", "--samples", "120", "--worst", "2")
     screen = run(*command, "-v", "--csv", "c.csv", "--json", "c.json", "--plot", "c.svg")
-    assert screen.returncode == 0, screen.stderr
+    assert screen.returncode == 4, screen.stderr  # so few cases do not show it
     brief = run(*command).stdout
     assert len(brief.splitlines()) <= 40
     assert f"--case {json.loads((tmp_path / 'c.json').read_text())['worst'][0]['case']} (worst)" in flat(brief)
@@ -255,7 +247,7 @@ def test_cases_their_table_their_files(run: Run, stage: Path, tmp_path: Path) ->
     assert alone["largest_nutation_deg"] == pytest.approx(worst["largest_nutation_deg"], rel=1e-12)
     loop = run("loop", "stage.yaml", "--until", "8s", "--case", str(worst["case"]), "--json", "l.json")
     assert loop.returncode == 0, loop.stderr
-    assert f"Dispersed case {worst['case']} of seed 1 meets the requirement." in flat(loop.stdout)
+    assert f"dispersed case {worst['case']} of seed 1: ENOUGH: " in flat(loop.stdout)
     flown = json.loads((tmp_path / "l.json").read_text())
     assert (flown["seed"], flown["case"], len(flown["pulses"])) == (1, worst["case"], worst["firings"])
     assert flown["quiet_s"][0] == pytest.approx(worst["settled_s"], abs=1e-9)
@@ -305,18 +297,16 @@ def test_a_requirement_missed_and_faults_are_said(run: Run, stage: Path) -> None
     late = run(*command, *settings("loop.predict=false", "loop.sensor.delay=600ms"))
     assert (late.returncode, late.stdout) == (3, "")
     priced = run(*command[:-1], "2", "--set", "disturbances=[{torque: [0, 0.1 N m, 0]}]")
-    assert priced.returncode == 0, priced.stderr
+    assert (priced.returncode, "NOT SHOWN: 100.0 % of cases" in priced.stdout) == (4, True)
     assert "the cases fly one by one" in flat(priced.stderr)
 
 
 def test_a_dispersed_case_is_headed_so_and_changes_of_spin_have_no_sign(run: Run, file: str) -> None:
     dispersed = (*settings("dispersions={A: {normal: 1 %}}"), "--until", "20s")
-    shown = run("loop", file, *dispersed, "--case", "2").stdout
-    head = next(line for line in shown.splitlines() if " limit " in line)
-    assert ("this case" in head, "nominal" in head) == (True, False)
+    assert "\ndispersed case 2 of seed 1: ENOUGH: " in run("loop", file, *dispersed, "--case", "2").stdout
     shown = run("disperse", file, "--loop", *dispersed, "--samples", "20").stdout
-    (row,) = (line for line in shown.splitlines() if line.startswith("spin off, mrad/s"))
-    assert "-" not in row.removeprefix("spin off, mrad/s")
+    (row,) = (line for line in shown.splitlines() if line.startswith("|spin off|, mrad/s"))
+    assert "-" not in row.removeprefix("|spin off|, mrad/s")
     assert beside(-1e-9, 1.0) == "0.000"
 
 
@@ -376,4 +366,4 @@ def test_without_a_loop_a_budget_says_what_is_missing(run: Run) -> None:
 def test_thresholds_without_a_unit_are_read_and_said(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     follow_few_cycles(monkeypatch)
     done = run("budget", STAGE, "--thresholds", "1,0.5")
-    assert "--thresholds: warning:" in done.stderr
+    assert "warning: --thresholds:" in done.stderr

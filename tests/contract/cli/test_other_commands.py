@@ -1,4 +1,4 @@
-"""``check``, ``init``, ``schema``, help, version and completion; what each command loads, and files of other kinds."""
+"""``check``, ``init``, ``schema``, help, version and completion; what each command loads."""
 
 from __future__ import annotations
 
@@ -214,17 +214,6 @@ def test_what_is_no_text_is_refused(run: Run, tmp_path: Path) -> None:
         assert refusals(run, tmp_path, ["plan broken.yaml"]).splitlines()[1].startswith("broken.yaml:1:")
 
 
-def test_a_file_of_another_kind_is_called_what_it_is(run: Run, tmp_path: Path) -> None:
-    """Their faults, such as a text where a mapping is expected, named no cure."""
-    for command in ("plan --nominal --csv pulses", "simulate --csv track", "plan --nominal --json plan"):
-        assert call(run, f"{command} --scheme four-pulse").returncode == 0
-    (tmp_path / "apm").write_text("COMMENT a\nCCSDS_APM_VERS = 2.0\n")
-    (tmp_path / "xml").write_text('<?xml version="1.0"?>\n<apm id="CCSDS_APM_VERS" version="2.0">\n')
-    (tmp_path / "oem").write_text("CCSDS_OEM_VERS = 2.0\n")
-    kinds = ("pulses", "track", "plan", "apm", "xml", "oem")
-    check_text("cli.check.kinds", refusals(run, tmp_path, [f"plan {kind}" for kind in kinds]))
-
-
 # --- help and completion ----------------------------------------------------------------------------------------------
 
 
@@ -250,13 +239,12 @@ COMPLETED = {
         ("plan", "sp"), ("check a.yaml", "sp"), ("init", "sp"), ("import apm", "sp"), ("simulate --schedule", "pul"),
         ("plan --csv", "out"), ("plan --json", "out"), ("plan --plot", "out"), ("report -o", "out"),
         ("schema --output", "out"))},
-    "trade --schedules out": "dir out", "ver": "plain verify", "plan --targ": "plain --target",
-    "plan --scheme two": "plain two-pulse", "init --from lun": "plain lunar-prospector",
-    "explain nu": "plain nutation",
+    "trade --schedules out": "file out", "ver": "plain verify", "plan --targ": "plain --target",
+    "plan --scheme two": "plain two-pulse",
 }  # fmt: skip
 
 
-def test_shells_complete_commands_options_choices_topics_and_leave_files_to_the_shell() -> None:
+def test_shells_complete_commands_options_choices_and_leave_files_to_the_shell() -> None:
     shell = ShellComplete(group, {}, "nutdamp", "_NUTDAMP_COMPLETE")
     for words, expected in COMPLETED.items():
         *before, last = words.split()

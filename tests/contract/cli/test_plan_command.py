@@ -77,11 +77,13 @@ def test_the_screen_of_awkward_spacecraft_and_requests(run: Run, tmp_path: Path,
 
 def test_the_built_in_example_is_planned_in_an_empty_folder(run: Run) -> None:
     """No line is cut or wider than the screen; what it shows is the first session of the README."""
-    ended, wide = run("plan", "-v", columns=80), run("plan", "-v", "--quiet", columns=140)
+    ended, wide = (run("plan", "-v", columns=columns) for columns in (80, 140))
     assert ended.returncode == 0
-    assert ("built-in example" in ended.stderr, wide.stderr) == (True, "")
+    assert ended.stderr == wide.stderr == run("plan", "--quiet").stderr
+    assert ended.stderr.startswith("warning: no spacecraft file given: using the built-in example")
+    assert ended.stdout.startswith("Sounder-1 (built-in example)\n")
     assert all(len(line) <= 80 for line in ended.stdout.splitlines())
-    assert words(wide.stdout).replace(" ", "") == words(ended.stdout).replace(" ", "")
+    assert sorted(wide.stdout.split()) == sorted(ended.stdout.split())
     assert 80 < max(len(line) for line in wide.stdout.splitlines()) <= 140
 
 
@@ -91,7 +93,7 @@ CONTRACT = {
     "body_nutation_period_s inertial_nutation_period_s",
     "plan": "scheme feasible why meets_requirement pulses total_impulse_Nms least_impulse_Nms propellant_kg end_s "
     "delta_v_m_s spin_change_rad_s residual flown",
-    "cases": "samples met_fraction low high probability met",
+    "cases": "samples seed met_fraction low high probability",
     "residual": "nutation_deg body_cone_deg space_cone_deg momentum_shift_deg axis_error_deg",
     "pulse": "t_s start_s on_time_s channel torque_Nm impulse_Nms propellant_kg",
 }
@@ -114,9 +116,9 @@ def test_json_and_csv_follow_the_contract_and_agree(run: Run, tmp_path: Path) ->
             assert pulse["impulse_Nms"] == pytest.approx([m * pulse["on_time_s"] for m in pulse["torque_Nm"]])
     assert (data["no_pulse_needed"], data["recommended"]) == (False, "two-pulse")
     nutation, shift = data["plans"][0]["requirement"]
-    assert (nutation["part"], nutation["met"], nutation["most_deg"]) == ("nutation", True, pytest.approx(0.5))
-    assert (shift["part"], shift["met"], shift["most_deg"]) == ("momentum_shift", False, pytest.approx(0.2))
-    assert shift["left_deg"] == pytest.approx(data["plans"][0]["flown"]["momentum_shift_deg"])
+    assert (nutation["part"], nutation["met"], nutation["limit_deg"]) == ("nutation", True, pytest.approx(0.5))
+    assert (shift["part"], shift["met"], shift["limit_deg"]) == ("momentum_shift", False, pytest.approx(0.2))
+    assert shift["nominal_deg"] == pytest.approx(data["plans"][0]["flown"]["momentum_shift_deg"])
     text = (tmp_path / "pulses.csv").read_bytes().decode()
     assert text.endswith("\r\n")  # RFC 4180
     (first, second) = rows(run("plan", "--nominal", "--scheme", "two-pulse", "--csv", "-").stdout)
@@ -169,14 +171,12 @@ def test_literal_reproduces_the_printed_scheme(run: Run, tmp_path: Path) -> None
 
 @pytest.mark.deep
 def test_a_target_compares_the_schemes_that_can_point(run: Run) -> None:
-    """Propellant, time and residual of each against C|ω3|β, in one table that fits the screen."""
+    """Propellant, time and residual of each, in one table that fits the screen."""
     alone = run("plan", "-v", "--quiet", "--nominal", "--target", "10deg,45deg", "--scheme", "rhumb-line").stdout
     assert "β = 10 deg from H" in alone
     compared = run("plan", "-v", "--quiet", "--nominal", "--target", "2deg,45deg").stdout
-    assert all(name in compared for name in ("two-pulse", "half-cone", "rhumb-line", "optimal", "over C|ω3|β"))
+    assert all(name in compared for name in ("two-pulse", "half-cone", "rhumb-line", "optimal"))
     along_h = run("plan", "-v", "-", "--target", "0deg,0deg", stdin=EXACT).stdout
-    (row,) = [line for line in along_h.splitlines() if "over C|ω3|β" in line]
-    assert set(row.split()[3:]) == {"–"}  # not a ratio of rounding
     assert "C|ω3|β = 0 N m s" in along_h
     assert all(len(line) <= 80 and "…" not in line for line in (compared + along_h).splitlines())
 
@@ -214,7 +214,6 @@ def test_numbers_hardly_meant_and_options_that_no_scheme_reads_are_reported(run:
     written(tmp_path, x_yaml=EXACT)
     said = (f"$ plan {options}\n" + run("plan", "x.yaml", *shlex.split(options)).stderr for options in REPORTED)
     check_text("cli.plan.reported", "".join(said))
-    assert run("plan", "x.yaml", "--scheme", "one-pulse", "--least", "time", "--quiet").stderr == ""
 
 
 @pytest.mark.deep
@@ -241,14 +240,14 @@ def faulty(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_after_an_internal_error_the_comparison_goes_on_and_is_exit_1(run: Run, tmp_path: Path) -> None:
     ended = run("plan", "-v", "--nominal", "--json", "plan.json", "--csv", "pulses.csv")
     assert ended.returncode == 1
-    assert "Recommended: optimal" in ended.stdout
+    assert "\nFLY optimal: " in ended.stdout
     check_text("cli.plan.internal-error", ended.stderr)
     one, two, four, _ = json.loads((tmp_path / "plan.json").read_text())["plans"]
     assert (one["feasible"], two["feasible"], four["feasible"]) == (True, False, True)
     assert two["why"] == "internal error, please report: ZeroDivisionError"
     assert (tmp_path / "pulses.csv").exists()
     alone = run("plan", "-v", "--scheme", "two-pulse", "--debug")
-    assert (alone.returncode, "No recommendation" in alone.stdout) == (1, True)
+    assert (alone.returncode, "NO PLAN" in alone.stdout) == (1, True)
     assert "Traceback" in alone.stderr
     assert "ZeroDivisionError: float division by zero" in alone.stderr
     written(tmp_path, x_yaml=EXACT)
@@ -265,7 +264,7 @@ def test_pages_and_robust_plans_go_on_too(run: Run, tmp_path: Path) -> None:
     robust = run("plan", "-v", "sat.yaml", "--robust", "--scheme", "two-pulse", "--scheme", "four-pulse")
     assert robust.returncode == 1
     assert "Robust plan: four-pulse" in robust.stdout
-    assert "two-pulse: internal error, please report: ZeroDivisionError" in robust.stdout
+    assert "two-pulse: internal error, please report: ZeroDivisionError" in robust.stderr
 
 
 # --- robust plans -----------------------------------------------------------------------------------------------------
@@ -289,13 +288,12 @@ def test_the_screen_the_json_and_the_csv_tell_of_the_same_robust_plan(run: Run, 
     ended = run(*command)
     assert ended.returncode == 0, ended.stderr
     said, data = words(ended.stdout), json.loads((tmp_path / "plan.json").read_text("utf-8"))
-    assert re.search(r"Dispersed cases of each plan: (up to )?20,000, full simulation, seed 1", said)
     assert "four-pulse, recommended without --robust" in said
     assert "Robust plan: four-pulse, without b" in said
-    assert data["recommended"] == "four-pulse"
+    assert data["recommended"] == data["decision"]["scheme"] == "robust"
     best, usual, cost = (data["robust"][key] for key in ("recommended", "against", "cost"))
     assert (best["variant"], usual["variant"]) == ("without b", "as planned")
-    assert best["nutation_deg"] < usual["nutation_deg"]
+    assert best["left_deg"] < usual["left_deg"]
     assert cost["propellant_kg"] == pytest.approx(best["propellant_kg"] - usual["propellant_kg"])
     assert cost["end_s"] == pytest.approx(best["end_s"] - usual["end_s"])
     fired = [row["channel"] for row in rows((tmp_path / "pulses.csv").read_text("utf-8"))]
@@ -306,48 +304,26 @@ def test_the_screen_the_json_and_the_csv_tell_of_the_same_robust_plan(run: Run, 
 
 
 @pytest.mark.deep
-@pytest.mark.parametrize(("degrees", "status"), [(3.0, 0), (0.001, 4)])
-def test_the_requirement_with_its_probability(run: Run, tmp_path: Path, degrees: float, status: int) -> None:
-    """On ticks no on-times are trimmed."""
+@pytest.mark.parametrize(("degrees", "status"), [(3.0, "FLY four-pulse: "), (0.001, "NOT ENOUGH: robust: ")])
+def test_the_requirement_with_its_probability(run: Run, tmp_path: Path, degrees: float, status: str) -> None:
     requirement = f"requirement: {{nutation: {degrees} deg, probability: 95 %}}\nlimits: {{tick: 1 ms}}\n"
     written(tmp_path, sat_yaml=UNTRUSTED + requirement)
     ended = run("plan", "-v", "sat.yaml", "--scheme", "four-pulse", "--robust")
-    assert ended.returncode == status, ended.stdout
-    verdict = "Requirement " + ("met: 100.0 % of cases" if status == 0 else r"NOT met: [\d.]+ % of cases")
-    assert re.search(verdict + r" comply \(95 % required\)", words(ended.stdout))
+    assert ended.returncode == (0 if status.startswith("FLY") else 4), ended.stdout
+    assert ended.stdout.startswith(f"Sat\n{status}")
+    assert re.search(r"[\d.]+ % of cases comply \(95 % required\)", words(ended.stdout))
 
 
-@pytest.mark.weekly
-def test_the_plan_picked_for_wide_tolerances_complies_where_no_scheme_does(run: Run, tmp_path: Path) -> None:
-    """85.6 % of cases comply with two-pulse, the best of the plans that do not end as early as they can."""
-    ended = run("plan", "-v", "--robust", "--json", "plan.json", *WIDE)
-    assert ended.returncode == 0
-    data = json.loads((tmp_path / "plan.json").read_text("utf-8"))["robust"]
-    for part in (
-        "Robust plan: optimal, against dispersions, ",
-        "at least 99.7 % of cases comply with it, of ",
-        "Requirement met: 99.",
-        "Against two-pulse, recommended without --robust: 99.",
-        " instead of 85.6 % of cases comply",
-        f"Of 20,000 new cases (seed {data['fresh']['seed']}), not used for the choice, 99.",
-    ):
-        assert part in words(ended.stdout)
-    assert data["fresh"]["interval"][0] < data["fresh"]["met_fraction"] < data["fresh"]["interval"][1]
-    late = ("against", "earliest end", "by ")
-    shares = [plan["met_fraction"] for plan in data["candidates"] if not plan["variant"].startswith(late)]
-    # three sigmas of the first 2,048 cases, after which these plans cannot be chosen any more
-    assert max(shares) == pytest.approx(0.8562, abs=0.025)
-    enough = [plan["propellant_kg"] for plan in data["candidates"] if plan["met_fraction"] >= 0.997]
-    assert data["recommended"]["propellant_kg"] == min(enough)
-    assert (data["against"]["scheme"], data["against"]["met_fraction"]) == ("two-pulse", pytest.approx(max(shares)))
-    (best, *others) = data["candidates"]
-    assert best["variant"] == data["recommended"]["variant"]
-    kind, _, how = best["variant"].rpartition(", ")
-    (untrimmed,) = (plan for plan in others if plan["variant"] == kind)
-    assert how == "trimmed"
-    assert 0.997 <= best["met_fraction"] < untrimmed["met_fraction"]
-    assert 0.8 < best["propellant_kg"] / untrimmed["propellant_kg"] < 0.999
-    assert data["fresh"]["met_fraction"] >= 0.997
+@pytest.mark.deep
+def test_the_plan_made_for_wide_tolerances_complies_where_no_scheme_does(run: Run) -> None:
+    """85.6 % of cases comply with two-pulse, the best of them; the cheapest plan that new cases confirm flies."""
+    data = result(run, shlex.join(["plan", "--robust", *WIDE]))
+    robust, fresh = data["robust"], data["robust"]["fresh"]
+    assert data["decision"]["status"] == "fly"
+    assert 0.997 <= fresh["low"] < fresh["met_fraction"] < fresh["high"]
+    assert (robust["against"]["scheme"], robust["against"]["met_fraction"]) == ("two-pulse", 0.8562)
+    enough = [plan["propellant_kg"] for plan in robust["candidates"] if plan["met_fraction"] >= 0.997]
+    assert robust["recommended"]["propellant_kg"] == min(enough) < max(enough)
 
 
 @pytest.mark.weekly

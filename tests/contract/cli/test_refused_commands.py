@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from support.commands import DATED, EXACT, SCHEDULE, contents, refusals, written
+from support.commands import BUILT_IN, DATED, EXACT, SCHEDULE, contents, refusals, written
 from support.golden import check_text
 from support.process import Run
 
@@ -23,7 +23,7 @@ USAGE = {
                 "simulate --scheme one-pulse --until '1 m'", "simulate --scheme one-pulse --samples 1",
                 "disperse --samples 0", "disperse --samples -5", "disperse --samples 1.5", "disperse --samples many",
                 "disperse --case 0", "disperse --threads 0", "disperse --seed -1", "report --disperse 0",
-                "report --disperse -3", "report --disperse nan", "report --disperse 1.5", "report --trade 0",
+                "report --disperse nan", "report --disperse 1.5", "report --trade 0",
                 "animate -o a.gif --until '-1 s'", "animate -o a.gif --seconds 0", "animate -o a.gif --fps 0",
                 "animate -o a.gif --width 10", "export dated.yaml --format aem --until '0 s'",
                 "export --format spin-table --scheme none --until '1e9 s'"],
@@ -35,9 +35,8 @@ USAGE = {
                 "disperse --samples 10 --plot x.jpg", "animate -o a.webm", "report -o report.pdf",
                 "report -o report.md", "report -o report"],
     "figures": ["plan --plot a.png --figure globe", "disperse --figure cases"],
-    "dropped figures": ["plan --plot a.png --figure timeline", "disperse --plot a.png --figure budget"],
-    "left out": ["animate", "import", "export dated.yaml", "export", "export stk", "export AEM 'my body.yaml'",
-                 "export body.yaml apm", "export body.yaml other.yaml", "export body.yaml --format apm x y"],
+    "dropped figures": ["plan --plot a.png --figure history", "disperse --plot a.png --figure budget"],
+    "left out": ["animate", "import", "export dated.yaml", "export --format apm body.yaml other.yaml"],
     "contradictions": ["plan --scheme one-pulse --scheme two-pulse --csv x.csv",
                        "plan --scheme one-pulse --scheme two-pulse --plot a.png",
                        "simulate --scheme one-pulse --schedule x.csv", "disperse --scheme two-pulse --schedule x.csv",
@@ -110,7 +109,7 @@ def test_one_file_for_two_purposes_is_exit_2(run: Run, tmp_path: Path) -> None:
 
 def test_what_is_no_file_may_be_named_twice_and_an_output_may_get_the_name_that_is_read_unnamed(run: Run) -> None:
     ended = run("plan", "--scheme", "one-pulse", "--quiet", "--csv", os.devnull, "--json", os.devnull)
-    assert (ended.returncode, ended.stderr) == (4, "")
+    assert (ended.returncode, ended.stderr) == (4, BUILT_IN)
     assert run("plan", "--scheme", "two-pulse", "--quiet", "--csv", "spacecraft.yaml").returncode == 0
 
 
@@ -206,6 +205,6 @@ def test_every_command_that_reads_a_spacecraft_sets(run: Run, tmp_path: Path, co
     """A fault of a setting reaches the user from each of them, so each of them reads it."""
     ended = run(*command.split(), "-q", "--set", "limits.horizn=3 s", "--set", "mass=-1 kg")
     assert ended.returncode == 2
-    check_text("cli.refused.set", ended.stderr)
+    check_text("cli.refused.set", ended.stderr.removeprefix(BUILT_IN))
     assert "--set KEY=VALUE" in run(command.split()[0], "--help").stdout
     assert contents(tmp_path) == {}

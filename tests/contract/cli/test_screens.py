@@ -67,7 +67,7 @@ def test_default_screens_are_short_and_cut_nothing(run: Run, name: str) -> None:
     text = (places.CONFIGS / f"{name}.yaml").read_text(encoding="utf-8")
     commands += ["loop"] * ("\nloop:" in text) + ["budget"] * ("\nloop:" in text and "\ndissipation:" in text)
     for command in commands:
-        usual, wide = (call(run, f"{command} {places.CONFIGS}/{name}.yaml -q", columns=width) for width in (80, 200))
+        usual, wide = (call(run, f"{command} {places.CONFIGS}/{name}.yaml", columns=width) for width in (80, 200))
         assert usual.returncode in (0, 4), usual.stderr
         lines = usual.stdout.splitlines()
         assert len(lines) <= 40
@@ -90,7 +90,7 @@ def test_a_width_into_which_nothing_fits_hides_nothing(run: Run) -> None:
     assert none.stdout == usual.stdout
     for ended in (one, seven):
         assert ended.returncode == 0
-        assert "Recommended" in ended.stdout
+        assert "FLY two-pulse:" in ended.stdout
 
 
 def rendered(table: Table, width: int) -> list[str]:
@@ -138,8 +138,8 @@ def test_four_or_five_schemes_fit_a_usual_screen(run: Run, name: str) -> None:
 
 def test_a_scheme_without_thrusters_says_so_and_a_bound_keeps_its_sign_on_its_line(run: Run) -> None:
     """Long names of channels are broken, not "< 1e-9" after the last pulse."""
-    (line,) = re.findall("^verdict .*\n.*thrusters", call(run, f"plan {STEERED} -v -q").stdout, re.MULTILINE)
-    assert line.split()[-4:] == ["no", "no", "thrusters", "thrusters"]
+    (verdicts,) = re.findall("^verdict .*?\n\n", call(run, f"plan {STEERED} -v -q").stdout, re.MULTILINE | re.DOTALL)
+    assert verdicts.split().count("no") == verdicts.split().count("thrusters") == 2
     shown = call(run, f"plan {STEERED} --scheme two-pulse -v -q").stdout
     assert re.search("  < 1e-9$", shown, re.MULTILINE)
     assert not re.search("<$", shown, re.MULTILINE)

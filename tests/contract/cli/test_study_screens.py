@@ -52,12 +52,12 @@ def check_screen(shown: str) -> None:
      "trade --points 2 --allow 0"],
 )  # fmt: skip
 def test_a_default_screen_fits_a_terminal(run: Run, command: str) -> None:
-    check_screen(call(run, f"{command} -q", columns=WIDTH).stdout)
+    check_screen(call(run, command, columns=WIDTH).stdout)
 
 
 @spread("command", COMMANDS, quick=0, deep=len(COMMANDS))
 def test_the_default_screen_of_every_shipped_file_fits_a_terminal(run: Run, command: str) -> None:
-    check_screen(call(run, f"{command} -q", columns=WIDTH).stdout)
+    check_screen(call(run, command, columns=WIDTH).stdout)
 
 
 def rendered(screen: RenderableType) -> str:
@@ -73,10 +73,10 @@ def test_of_many_points_some_are_shown_the_first_and_the_last_among_them() -> No
     fronts = [Front(0.01 * at, (Point(plan, 60.0, "N m s"),) * 20) for at in range(5)]
     shown = rendered(trade_brief(body, fronts))
     check_screen(shown)
-    rows = re.findall(r"^(\d+) .*met$", shown, re.MULTILINE)
+    rows = re.findall(r"^(\d+) .*FLY$", shown, re.MULTILINE)
     assert (len(rows), rows[0], rows[-1]) == (ROWS, "1", "100")
     assert f"note[trade-points]: points on this screen: {ROWS} of 100" in shown
-    assert len(re.findall(r"^\d+ .*met$", rendered(trade_screen(body, fronts)), re.MULTILINE)) == 100
+    assert len(re.findall(r"^\d+ .*FLY$", rendered(trade_screen(body, fronts)), re.MULTILINE)) == 100
 
 
 def test_a_trade_without_a_schedule_says_why() -> None:

@@ -16,7 +16,7 @@ from support import places
 from support.broken import BASE, BODY, BROKEN, SPIN, THRUSTERS
 from support.builders import within
 from support.cases import deep
-from support.contract import check_faults, faults, slips
+from support.contract import check_faults, slips
 from support.golden import check_text
 
 import nutdamp
@@ -290,30 +290,29 @@ ACCELEROMETER = {"kind": "accelerometer", "rate": "100 Hz", "position": "[1 m, 0
 
 SENSELESS = {
     "sensor.kind": "star; 1",
-    "sensor.rate": "0; -1; .nan; 100 m; 0.5 Hz; 1e9",
-    "sensor.quantisation": "-1e-3; .inf; 2 deg/s; 1 m/s^2",
-    "sensor.noise": "-1 deg/s; .nan; 1.0; 2 rpm; 1 m/s^2",
-    "sensor.bias": ".inf; -2 deg/s; 1 m/s^2",
-    "sensor.scale": "0; .inf; 2000 %; -0.01",
-    "sensor.delay": "-1; .nan; 1e6; 1 deg",
-    "sensor.low_pass": "-1; .inf; 1e6",
+    "sensor.rate": "0; -1; .nan; 100 m; 0.5 Hz",
+    "sensor.quantisation": "-1e-3; .inf; 1 m/s^2",
+    "sensor.noise": "-1 deg/s; .nan; 1 m/s^2",
+    "sensor.bias": ".inf; 1 m/s^2",
+    "sensor.scale": "0; .inf",
+    "sensor.delay": "-1; .nan; 1 deg",
+    "sensor.low_pass": "-1; .inf",
     "sensor.position": "[1, 0, 0]",
     "sensor.axis": "[0, 0, 1]",
     "law": "three-pulse",
     "start": "0; 2; 90 deg; .nan",
     "stop": "0.2 deg; -1 deg; .inf",
-    "settle": "-1; 1e6",
-    "min_interval": "-1; 1e9",
+    "settle": "-1",
+    "min_interval": "-1",
     "predict": "1",
     "alias": "'no'",
     "on_time": "0; 1 s; .inf",
     "faults.reversed": "[X]; +M1; [+M1, +M1]",
 }
 OF_ACCELEROMETER = {
-    "sensor.quantisation": "1e3; 1 deg/s",
-    "sensor.noise": "-1; 1 m/s^2; 1 deg/s",
-    "sensor.bias": "1e9",
-    "sensor.position": "[0, 0, 0]; [1, 0]; [1e9 m, 0, 0]",
+    "sensor.quantisation": "1 deg/s",
+    "sensor.noise": "-1; 1 deg/s",
+    "sensor.position": "[0, 0, 0]; [1, 0]",
     "sensor.axis": "[0, 0, 0]; [1, 1]",
 }
 
@@ -344,9 +343,3 @@ def test_senseless_values_of_every_key_are_refused_where_they_stand() -> None:
         cases = [(key, value) for key, values in table.items() for value in values.split("; ")]
         texts = {f"{key} -> {value}": (sensor, key, value) for key, value in cases}
         check_faults(f"files.loop-{name}", lambda case: looped(*case), texts)
-
-
-def test_a_bias_that_may_be_larger_than_start_is_refused() -> None:
-    text = f"{LOOPING}loop: {{sensor: {{kind: gyro, rate: 100 Hz}}, start: 0.2 deg}}\n"
-    dispersed = f"{text}dispersions: {{sensor_bias: {{normal: 100 deg/s}}}}\n"
-    check_text("files.loop-bias", "\n".join(faults(read_spacecraft, dispersed, "f.yaml")))

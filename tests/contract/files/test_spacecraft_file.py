@@ -27,7 +27,8 @@ from nutdamp.flight import propagation
 from nutdamp.flight.end_state import seen_at
 from nutdamp.montecarlo.study import Results, run, study_of
 from nutdamp.physics import attitude
-from nutdamp.planning.decision import broken_limits, compare, infeasibility
+from nutdamp.planning.decision import compare
+from nutdamp.planning.notes import broken_limits, infeasibility
 from nutdamp.schemes.catalogue import CLASSIC
 from nutdamp.spacecraft.equipment import Channel, Steerable
 from nutdamp.spacecraft.model import Disturbance, Limits, Spacecraft

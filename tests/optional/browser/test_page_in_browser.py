@@ -107,6 +107,16 @@ def test_it_fits_paper_and_prints_to_four_pages_of_a4_besides_the_sheet(tab: Bro
         assert box == pytest.approx((0, 0, 210 / 25.4 * 72, 297 / 25.4 * 72), abs=0.5)
 
 
+def test_the_input_file_is_saved_from_the_page_without_a_network(tab: Browse) -> None:
+    """The policy of the page allows it."""
+    with tab(EXAMPLE) as page:
+        page.evaluate("document.querySelectorAll('details').forEach((one) => { one.open = true; })")
+        with page.expect_download() as saved:
+            page.locator("a[download]").click()
+        assert saved.value.suggested_filename == "example.yaml"
+        assert Path(saved.value.path()).read_text(encoding="utf-8") == example_text()
+
+
 def test_the_sheet_has_a_row_for_each_of_twenty_pulses(tab: Browse) -> None:
     with tab(LONG, 1280) as page:
         assert (

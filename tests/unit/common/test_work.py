@@ -14,8 +14,8 @@ from nutdamp.common import work
 from nutdamp.files.reader import load_spacecraft
 from nutdamp.flight import dynamics, propagation
 from nutdamp.planning import plan as planning
-from nutdamp.planning.decision import CUT, compare, infeasibility
-from nutdamp.planning.notes import comparison_warnings, plan_notes
+from nutdamp.planning.decision import compare
+from nutdamp.planning.notes import CUT, comparison_warnings, infeasibility, plan_notes
 from nutdamp.planning.plan import Standing
 from nutdamp.schemes.optimal import linear_program
 from nutdamp.spacecraft.model import Disturbance, Goal, Limits

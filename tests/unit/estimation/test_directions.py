@@ -17,13 +17,11 @@ from support.synthetic import Array
 
 import nutdamp
 from nutdamp.errors import Unsuitable
-from nutdamp.estimation import forecast
 from nutdamp.estimation.fit import fit
 from nutdamp.estimation.model import Model
-from nutdamp.estimation.parameters import DIRECTION, GYROS, SEEN, SUN_ASPECT, Record, of_quaternions
+from nutdamp.estimation.parameters import DIRECTION, SEEN, SUN_ASPECT, Record, of_quaternions
 from nutdamp.estimation.results import carried, doubts
 from nutdamp.estimation.search import Fit
-from nutdamp.planning import decision
 from nutdamp.spacecraft.model import Spacecraft
 
 FILE: dict[str, object] = {
@@ -213,17 +211,3 @@ def test_the_file_must_have_what_a_direction_needs() -> None:
             fit(bare, Record(record.times, record.signals))
         texts.append(str(raised.value))
     check_text("estimation.directions-refused", "\n".join(texts))
-
-
-@pytest.mark.deep
-def test_the_forecast_imagines_directions_as_often_as_they_came(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The prospect of the record as it is agrees with its fit."""
-    monkeypatch.setattr(forecast, "CASES", 50)
-    monkeypatch.setattr(forecast, "LENGTHS", (1.0,))
-    monkeypatch.setattr(decision, "usual", lambda _: ("one-pulse",))
-    flown = fly(1, "three stars", 20.0)
-    gyro = np.random.default_rng(3).normal(size=len(flown.record.times))
-    signals = {**flown.record.signals, GYROS[2]: flown.truth["omega_3"] + 1e-3 * gyro}
-    fitted = fit(flown.spacecraft, Record(flown.record.times, signals))
-    ahead = forecast.outlook(fitted, flown.record.end)
-    assert ahead.now.ratio == pytest.approx(float(fitted.sigmas[fitted.index("C/A") or 0]), rel=0.3)

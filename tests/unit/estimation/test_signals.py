@@ -400,6 +400,16 @@ def test_sensors_that_are_stuck_are_named() -> None:
     fit(BODY, Record(times, seen | {"omega_3": np.full(120, 3.0)}))
 
 
+def test_signals_of_zeros_are_gyros_that_are_off_or_no_nutation() -> None:
+    """They have no digits that would say how exact they are."""
+    times, zeros = np.linspace(0.0, 60.0, 240), np.zeros(240)
+    axis = dict(zip(AXIS, np.tile([[0.6], [0.0], [0.8]], 240), strict=True))
+    off = Record(times, dict.fromkeys(GYROS, zeros))
+    assert "the gyros show 0 all along" in refusal(Infeasible, BODY, off)
+    for signals in (dict.fromkeys(GYROS[:2], zeros), axis, axis | {GYROS[2]: zeros + 3.0}):
+        assert "no nutation is seen" in refusal(Infeasible, BODY, Record(times, signals))
+
+
 @spread("share", [0.82, 0.86, 0.9], quick=0, deep=1)
 def test_a_small_pulse_in_the_last_fifth_that_the_axis_shows_is_told(share: float) -> None:
     """It moves the axis by no more than its noise; what is estimated would be some sigmas off."""

@@ -114,6 +114,15 @@ def test_without_nutation_there_are_no_cones() -> None:
     assert np.isnan(geometry.body_mark(found, body.initial.quaternion)).all()
 
 
+def test_a_despun_body_at_rest_has_no_cones() -> None:
+    """H is that of its wheel, and there is no ω to have a direction."""
+    state = {"spin": 0.0, "nutation": 0.0}
+    body = nutdamp.load({"name": "still", "inertia": {"A": 120, "C": 80}, "wheel": {"momentum": 42}, "state": state})
+    found = geometry.cones(propagation.flown(body, Schedule(), 1.0), body.omega0, body.initial.quaternion)
+    assert len(found.body) == len(found.space) == 0
+    assert found.rotation == pytest.approx(found.momentum)
+
+
 # --- the sky ---------------------------------------------------------------------------------------------------------
 
 

@@ -11,7 +11,7 @@ from support.builders import noted
 from support.golden import check_text
 from support.hand_made_fit import silent, told
 
-from nutdamp.estimation.results import carried, posterior, replaced
+from nutdamp.estimation.results import carried, correlations, replaced
 from nutdamp.files.carried import fitted_text, notes
 from nutdamp.files.editing import parse_setting
 from nutdamp.files.reader import Source, read_spacecraft
@@ -78,18 +78,17 @@ def test_the_file_holds_all_that_is_known_now() -> None:
     assert np.ravel(delays) == pytest.approx([0.015, 0.017, 0.005, 0.005, 0.01, 0.012])
     assert now.loop is not None
     assert now.loop.sensor.bias == pytest.approx(0.03)
-    spread, kept = now.dispersions, posterior(body.dispersions, known)
+    spread, sigmas = now.dispersions, dict(zip(known.names, known.sigmas, strict=True))
     assert spread is not None
     assert spread.A is not None
     assert spread.A.size == pytest.approx(0.4 / 121.0, rel=1e-5)
-    for one, other in zip((*spread.omega0, spread.attitude), (*kept.omega0, kept.attitude), strict=True):
-        assert one is not None
-        assert other is not None
-        assert one.size == pytest.approx(other.size, rel=1e-5)
+    sizes = [tolerance and tolerance.size for tolerance in (*spread.omega0, spread.attitude)]
+    rates = [sigmas[f"omega0_{axis}"] for axis in (1, 2, 3)]
+    assert sizes == pytest.approx([*rates, known.tilt], rel=1e-5)
     assert {name: one.size for name, one in spread.thrust.items()} == pytest.approx(
         {"T1": 0.01 / 0.96, "T 2": 1e-7 / 1.05, "T3": 0.02}, rel=1e-5
     )
-    assert spread.correlation == kept.correlation
+    assert spread.correlation == correlations(known, body.dispersions)
     assert re.findall("#.*", text) == re.findall("#.*", FILE)
     units = "kg m^2", "rpm", "deg", "N", "N m", "ms"
     assert [bool(re.search(rf"[\d.] {re.escape(unit)}\b", text)) for unit in units] == [True] * 6

@@ -1,48 +1,22 @@
-"""Files are written whole or not at all, and what killed runs left behind is cleared away."""
+"""Files are written whole or not at all."""
 
 from __future__ import annotations
 
 import json
 import os
-import signal
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 from nutdamp.errors import CannotWrite
-from nutdamp.files.tabular import PREFIX, SUFFIX, json_text, make_folder, whole_file, write_whole
-
-KILLED = """
-import os, signal
-from nutdamp.files.tabular import whole_file
-
-with whole_file("x.csv") as stream:
-    stream.write(b"half")
-    os.kill(os.getpid(), signal.SIGKILL)
-"""
+from nutdamp.files.tabular import json_text, make_folder, whole_file, write_whole
 
 
 def hidden(folder: Path) -> list[str]:
-    return sorted(path.name for path in folder.iterdir() if path.name.startswith("."))
+    return [path.name for path in folder.iterdir() if path.name.startswith(".")]
 
 
-@pytest.mark.skipif(os.name != "posix", reason="kills a process")
-def test_the_next_write_removes_what_a_killed_run_left_and_nothing_else(tmp_path: Path) -> None:
-    killed = subprocess.run([sys.executable, "-c", KILLED], cwd=tmp_path, check=False)
-    assert (killed.returncode, len(hidden(tmp_path))) == (-signal.SIGKILL, 1)
-    (tmp_path / ".x.csv.mine").write_text("a hidden file of somebody else")
-    (tmp_path / f"{PREFIX}folder{SUFFIX}").mkdir()  # what cannot be removed is no hindrance
-    (tmp_path / f"{PREFIX}link{SUFFIX}").symlink_to(tmp_path / "mine")
-    (tmp_path / "mine").write_text("mine")
-    write_whole(str(tmp_path / "another.csv"), "1")
-    assert hidden(tmp_path) == [f"{PREFIX}folder{SUFFIX}", f"{PREFIX}link{SUFFIX}", ".x.csv.mine"]
-    assert [(tmp_path / name).read_text() for name in ("another.csv", "mine")] == ["1", "mine"]
-    assert not (tmp_path / "x.csv").exists()
-
-
-def test_a_file_that_is_being_written_is_no_leftover(tmp_path: Path) -> None:
+def test_what_another_run_is_writing_is_left_alone(tmp_path: Path) -> None:
     with whole_file(str(tmp_path / "slow.csv")) as stream:
         stream.write(b"slow")
         write_whole(str(tmp_path / "quick.csv"), "quick")

@@ -151,6 +151,12 @@ def test_momentum_and_energy_keep_on_coasts_of_a_free_body_alone() -> None:
     assert verified.energy.drift > 1e-4
 
 
+def test_a_body_at_rest_keeps_its_energy_of_nothing() -> None:
+    still = replace(spinner(), inertia=replace(spinner().inertia, wheel=42.0), omega0=np.zeros(3))
+    verified = verify(still, Schedule())
+    assert (verified.momentum.drift, verified.energy.drift) == (0.0, 0.0)
+
+
 def test_what_a_budget_row_says_is_what_that_imperfection_does(planned: Planner) -> None:
     """On a plan that is exact for ideal impulses, each row alone is the flight with that imperfection alone."""
     ideal = read_spacecraft("name: X\ninertia: {A: 120, C: 80}\nstate: {spin: 3, nutation: 5 deg}\n", "x")

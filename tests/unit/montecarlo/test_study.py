@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import itertools
 import math
+import threading
 from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scipy.special import betaincinv
+from scipy.stats import binomtest, norm
 from support import dispersed
 from support.cases import deep
 from support.golden import refused
@@ -20,20 +22,22 @@ from nutdamp.montecarlo.cases import DispersedCases, DispersedModel
 from nutdamp.montecarlo.inputs import BLOCK
 from nutdamp.montecarlo.propagated import ClosedForm, Ends
 from nutdamp.montecarlo.statistics import (
+    CERTAIN,
     OUTPUTS,
     ROWS,
+    SHOWN,
     VECTORS,
     Exact,
     FirstOrder,
     Sketch,
     Worst,
-    binomial_interval,
     cases_to_show,
     first_order,
     sampled_shares,
+    share_interval,
     vectors,
 )
-from nutdamp.montecarlo.study import EARLY, PORTION, Results, Study, run, study_of
+from nutdamp.montecarlo.study import EARLY, PORTION, Results, Study, flown_in_stages, run, study_of
 from nutdamp.spacecraft.model import Goal, Requirement
 from nutdamp.spacecraft.schedule import Schedule
 from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
@@ -127,12 +131,56 @@ def test_the_worst_miss_the_requirement_most(plain: Results) -> None:
     assert plain.worst.cases[0] == np.argmax(severity)
     assert plain.met == np.count_nonzero(severity <= 1.0)
     assert plain.met_fraction == plain.met / MANY
-    low, high = plain.interval
+    low, high = plain.interval()
     assert low < plain.met_fraction < high
-    assert plain.meets_requirement is (plain.met_fraction >= 0.85)
     free = run(Results(a_study(requirement=None), 1_000))
-    assert free.met_fraction is free.meets_requirement is None
+    assert (free.met_fraction, free.shown()) == (None, True)
     assert free.worst.cases[0] == np.argmax(values_of(free)[0])
+
+
+def test_a_share_is_shown_beyond_its_interval_at_first_of_all_but_a_millionth_at_last_of_95_percent() -> None:
+    for met, early, last in (
+        (950, True, True),
+        (880, None, True),
+        (850, None, None),
+        (820, None, False),
+        (750, False, False),
+    ):
+        results = Results(a_study(), 1_000, 1_000, met=met)
+        assert (results.shown(certain=True), results.shown()) == (early, last)
+
+
+# Cases asked for, share of them that complies where 0.85 must, units a case; the stages flown.
+STAGED: list[tuple[int | None, float, float, list[int]]] = [
+    (None, 0.5, 1e-9, [2_048, 8_192, 20_000]),  # one share is shown, of as many cases, however early it is decided
+    (None, 0.85, 1e-9, [2_048, 8_192, 20_000, 40_000, 80_000, 160_000]),
+    (None, 0.85, 0.2, [2_048, 8_192, 20_000, 40_000]),  # within the budget for more cases
+    (None, 0.86, 1e-9, [2_048, 8_192, 20_000, 40_000]),
+    (None, 0.85, 2.0, [2_048, 8_192]),  # within that of the default number
+    (None, 0.85, 1e9, [2_048]),  # the first are flown in any case
+    (1_000, 0.85, 1e9, [1_000]),
+    (3_000, 0.85, 1e-9, [2_048, 3_000]),
+    (60_000, 0.85, 1e-9, [60_000]),  # they are counted and not kept: all at once
+]
+
+
+@pytest.mark.parametrize(("samples", "share", "effort", "stages"), STAGED)
+def test_cases_are_flown_in_stages_until_the_share_is_shown(
+    samples: int | None, share: float, effort: float, stages: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if samples == 60_000:
+        monkeypatch.setattr(dispersion, "EXACT_CASES", 50_000)
+    study, seen = a_study(), list[int]()
+    vars(study)["flies"] = SimpleNamespace(effort=effort)
+
+    def fly(results: Results) -> None:
+        results.done = results.requested
+        results.met = round(share * results.done)
+        seen.append(results.done)
+
+    assert flown_in_stages(study, samples, fly=fly).done == stages[-1]
+    assert seen == stages
+    assert flown_in_stages(study, samples, fly=fly, stopped=lambda: True).done == 0
 
 
 def test_with_a_target_the_distance_from_it_counts_and_not_the_shift() -> None:
@@ -161,6 +209,27 @@ def test_a_failure_in_a_thread_is_a_failure_of_the_run() -> None:
     vars(study)["flies"] = fail
     with pytest.raises(ZeroDivisionError):
         run(Results(study, MANY), threads=2)
+
+
+def test_an_interrupt_does_not_wait_for_the_cases_that_are_in_work() -> None:
+    """The flight of the first portion goes on until the interrupt has come out."""
+    study, begun, over = a_study(), threading.Event(), threading.Event()
+    real = study.flies
+
+    def fly(cases: DispersedCases) -> Ends:
+        begun.set()
+        over.wait(60.0)
+        return real(cases)
+
+    def interrupt(_: int) -> None:
+        assert begun.wait(60.0)
+        raise KeyboardInterrupt
+
+    vars(study)["flies"] = fly
+    with pytest.raises(KeyboardInterrupt):
+        run(Results(study, 2_048), watch=interrupt)
+    assert not over.is_set()
+    over.set()
 
 
 def test_biases_alone_no_dispersions_and_unknown_propellant() -> None:
@@ -208,27 +277,29 @@ def test_sketched_percentiles_are_right_to_a_thousandth_whatever_the_portions_an
     assert int(extremes.counts.sum()) == 5
 
 
-def test_histograms_of_both_agree() -> None:
-    values, edges = np.random.default_rng(4).rayleigh(size=100_000), np.linspace(0.0, 4.0, 21)
-    exact, rough = Exact(values).histogram(edges), sketched(values).histogram(edges)
-    assert exact.sum() == np.count_nonzero(values <= 4.0)
-    # Each edge may be off by 0.05 % of its value x, where x times the density is 2/e at most.
-    assert rough == pytest.approx(exact, abs=2 * 0.0005 * 2 / math.e * len(values))
+@pytest.mark.parametrize("shift", [-9.0, 0.3, 9.0])
+def test_sizes_are_those_of_the_values(shift: float) -> None:
+    """Of a sketch as exact as its other percentiles; of both signs, of losses alone, of gains alone."""
+    values = np.random.default_rng(6).normal(size=50_001) + shift
+    assert np.array_equal(Exact(values).sizes().values, np.abs(values))
+    rough, upper = sketched(values).sizes(), PROBABILITIES[PROBABILITIES > 0.4]
+    assert rough.quantiles(upper) == pytest.approx(np.quantile(np.abs(values), upper, method="lower"), rel=0.0005)
+    assert int(rough.counts.sum()) == len(values)
+    assert rough.maximum == np.abs(values).max()
+    assert 0.0 <= rough.minimum <= np.abs(values).min()
 
 
 @pytest.mark.parametrize("trials", [1, 2, 20, 1000, 10**6, 10**7])
 def test_the_interval_is_that_of_scipy(trials: int) -> None:
-    """Whose inverse of the incomplete beta function comes from Boost, and shares nothing with nutdamp's."""
+    """Wilson's, and all where nothing was tried; as many good cases as it takes show a share."""
     some = np.random.default_rng(trials).integers(trials + 1, size=4).tolist()
-    within = 1e-12 + 1e-15 * trials
     for seen in {0, 1, trials // 2, round(0.997 * trials), trials - 1, trials, *some}:
-        for confidence in (0.9, 0.95, 0.997):
-            low, high = binomial_interval(seen, trials, confidence)
-            tail, failures = 0.5 * (1.0 - confidence), trials - seen
-            assert low == pytest.approx(betaincinv(seen, failures + 1, tail) if seen else 0.0, rel=within)
-            assert high == pytest.approx(betaincinv(seen + 1, failures, 1.0 - tail) if failures else 1.0, rel=within)
-    few = cases_to_show(0.997)  # how many it takes
-    assert binomial_interval(few, few)[0] >= 0.997 > binomial_interval(few - 1, few - 1)[0]
+        for sigmas, confidence in ((SHOWN, 0.95), (CERTAIN, 1.0 - 1e-6), (1.0, norm.cdf(1.0) - norm.cdf(-1.0))):
+            expected = binomtest(seen, trials).proportion_ci(confidence, method="wilson")
+            assert share_interval(seen, trials, sigmas) == pytest.approx(expected, rel=1e-9, abs=1e-15)
+    assert share_interval(0, 0) == (0.0, 1.0)
+    few = cases_to_show(0.997)
+    assert share_interval(few, few)[0] >= 0.997 > share_interval(few - 1, few - 1)[0]
 
 
 def test_the_worst_cases_are_found_whatever_the_portions() -> None:

@@ -12,7 +12,6 @@ from support.builders import channel, spinner
 from support.golden import check_text
 from support.single_case import flown_outputs
 
-from nutdamp.errors import FaultyFile
 from nutdamp.files.reader import read_spacecraft
 from nutdamp.flight.dynamics import supplied
 from nutdamp.flight.propagation import flown
@@ -232,26 +231,6 @@ ALL_VALVES = (
 
 def craft(dispersions: str, more: str = "") -> Spacecraft:
     return read_spacecraft(f"{FILE}{more}dispersions: {{{dispersions}}}\n", "sat.yaml")
-
-
-def test_draws_that_make_a_number_negative_are_refused_where_they_are_written() -> None:
-    faults = []
-    for tolerance in (
-        "open_delay: {normal: 3 ms}",
-        "close_delay: {uniform: 13 ms}",
-        "rise_time: {a: {triangular: 6 ms}}",
-        "fall_time: {c: {bias: -11 ms}}",
-        "tank_pressure: {uniform: 7 bar}",
-        "tank_pressure: {normal: 10 %}",
-        "tank_final_pressure: {uniform: 17 bar}",
-        "tank_propellant: {normal: 40 %}",
-        "tank_propellant: {normal: 51 %}",
-    ):
-        with pytest.raises(FaultyFile) as caught:
-            craft(tolerance, "tank: {propellant: 2 kg, pressure: 22 bar, final_pressure: 16 bar}\n")
-        (fault,) = caught.value.faults
-        faults.append(f"{fault.where}: {fault.problem}")
-    check_text("montecarlo.negative-draws", "\n".join(faults))
 
 
 def test_the_few_draws_below_zero_are_drawn_again() -> None:

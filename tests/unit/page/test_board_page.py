@@ -22,8 +22,9 @@ from support.shown import cells, facts, section, sheet, tree
 import nutdamp
 from nutdamp.flight import propagation
 from nutdamp.flight.end_state import spin_phases
-from nutdamp.page.document import Control, number_in
+from nutdamp.page.document import Control
 from nutdamp.page.report import Repeat
+from nutdamp.physics.attitude import matrix
 from nutdamp.planning.decision import Comparison, compare
 from nutdamp.schemes.catalogue import CLASSIC
 from nutdamp.spacecraft.model import Disturbance
@@ -71,12 +72,12 @@ def test_where_it_points_is_what_the_json_says(run: Run) -> None:
 def test_pulses_have_date_phase_and_cones() -> None:
     body, chosen = compared_ace().spacecraft, compared_ace().recommended
     assert chosen is not None
+    assert body.sun is not None
     around = dict(zip(("before", "after"), chosen.flight.around_pulses(), strict=True))
     for index, (pulse, row) in enumerate(zip(chosen.pulses, sheet(ace(), "Pulses of"), strict=True)):
-        assert row["start UTC"] == body.utc(pulse.start, 3)
-        spins = chosen.flight.motion(np.linspace(0.0, pulse.start, 20_001))[0][:, 2]
-        turned = math.degrees(float(spins.mean()) * pulse.start) % 360.0
-        assert float(row["spin phase deg"]) == pytest.approx(turned, abs=0.1)
+        assert f"T{row['start UTC']}Z" in (body.utc(pulse.start, 3) or "")
+        x, y, _ = matrix(chosen.flight.motion(np.array([pulse.start]))[1][0]).T @ body.sun
+        assert float(row["Sun phase deg"]) == pytest.approx(-math.degrees(math.atan2(y, x)) % 360.0, abs=0.051)
         for cone in ("nutation", "body_cone", "space_cone"):
             for when, track in around.items():
                 shown = float(row[f"{cone.replace('_', ' ')} {when} deg"])
@@ -108,7 +109,6 @@ def test_the_verification_is_a_line_and_the_equations_are_those_of_the_guide() -
         assert re.search(rf"^{re.escape(number)} ", listing, re.MULTILINE)
     symbols = facts(ace(), "Symbols")
     assert symbols["J_v"] == "impulse of pulse v, N m s: about axis 1, + i times that about axis 2"
-    assert symbols["A|ω0|"].endswith("no floor here, with I1 ≠ I2")
 
 
 @pytest.mark.deep
@@ -157,21 +157,20 @@ def test_the_top_of_the_page_has_the_words_of_the_screen(run: Run, tmp_path: Pat
     loose = () if met else ("--set", "dispersions.A={normal: 1 %}")
     schemes = [part for name in CLASSIC for part in ("--scheme", name)]
     screen = run("report", *schemes, *loose, "-o", "page.html")
-    lines = run("plan", *schemes, *loose, columns=80).stdout.splitlines()
+    lines = run("plan", *schemes, *loose, columns=120).stdout.splitlines()
     assert screen.returncode == (0 if met else 4)
     shown = tree((tmp_path / "page.html").read_text("utf-8"))
     assert decision(shown).attributes["class"] == ("met" if met else "missed")
     assert [node.text for node in decision(shown).all("p")[:2]] == lines[1:3]
     margins = {row[0].text: [cell.text for cell in row[2:]] for row in cells(decision(shown).all("table")[0])}
-    required = [line for line in lines if " limit " in line]
+    required = [re.split(r"  +", line) for line in lines if line.partition("  ")[0] in margins]
     assert len(required) == len(margins)
-    for line in required:
-        label, dispersed, nominal, limit, word = re.split(r"  +", line)
-        assert margins[label][:3] + margins[label][4:] == [nominal, dispersed, limit, word]
-    rows = sheet(shown, "Cost and residuals")
-    best = max(rows, key=lambda row: number_in(row["cases that comply %"]) or 0.0)["scheme"]
+    for label, limit, nominal, level, alone, margin, word in required:
+        texts = [f"nominal {nominal}", f"99.7 % within {level}", f"limit {limit}", f"margin {margin}"]
+        assert margins[label] == [*texts, f"{alone} keep it", word]
+    scheme = lines[1].partition(": pulses")[0].split()[-1]
     (chosen,) = (one.text for one in shown.all("li") if one.attributes.get("class") == "mark")
-    assert chosen.startswith(best)
+    assert chosen.startswith(scheme)
     assert ("plan --robust searches a plan made for the tolerances" in decision(shown).text) is not met
 
 
@@ -186,16 +185,10 @@ def test_the_notes_name_the_plan_that_can_be_sent_or_fired_as_it_stands(run: Run
 
 
 @pytest.mark.deep
-def test_a_turn_is_compared_with_what_the_symbols_explain() -> None:
+def test_a_turn_is_in_the_title() -> None:
     """A body that is to turn to a target 10° away; within 9 s there is no plan, and the page says so."""
     body = nutdamp.example().with_(goal={"tilt": "10 deg", "azimuth": "45 deg"}, limits={"horizon": "100 s"})
     shown = tree(plain_page(compare(body, ["rhumb-line"], samples=0)))
     assert shown.all("h1")[0].text == "Sounder-1 · damp 5° nutation, turn by 10°"
-    row, *_ = sheet(shown, "Cost and residuals")
-    for name in ("A|ω0|", "C|ω3|β"):
-        whole, _, said = facts(shown, "Symbols")[name].partition(" N m s, ")
-        share = float(row["impulse N m s"]) / float(whole)
-        assert share == pytest.approx(float(row[f"impulse over {name}"]), rel=1e-3)
-        assert said.endswith("no schedule that does so takes less")
     late = plain_page(compare(body.with_(limits={"horizon": "9 s"}), ["rhumb-line"]))
     assert (late.state, late.headline[0]) == ("missed", "NO PLAN")

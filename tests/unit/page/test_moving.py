@@ -24,14 +24,18 @@ from support.process import Run
 from support.shown import WIDE, compared_text, tree
 
 from nutdamp.files.reader import example_text, read_spacecraft
+from nutdamp.files.schedules import read_blocks, read_plan
 from nutdamp.flight import propagation
 from nutdamp.page import moving
-from nutdamp.page.document import EDGES, Circle, Moving, NamedDirection, PageSection
+from nutdamp.page.document import EDGES, Moving, PageSection
 from nutdamp.page.moving import LEAD, MOST_ROWS, NONE, SPHERE, absence, moving_of, strip_of
 from nutdamp.page.report import page_html
 from nutdamp.planning import plan as planning
 from nutdamp.planning.plan import Plan
-from nutdamp.spacecraft.model import Limits, Requirement
+from nutdamp.schemes.block_model import fired
+from nutdamp.schemes.catalogue import Options
+from nutdamp.spacecraft.equipment import Block
+from nutdamp.spacecraft.model import Goal, Keep, Limits, Requirement
 from nutdamp.spacecraft.schedule import Schedule
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
@@ -78,6 +82,45 @@ def simulated(run: Run, text: str) -> list[dict[str, str]]:
     screen = run(*shlex.split(command)[1:], "-", "-q", stdin=text)
     assert screen.returncode in (0, 4), screen.stderr
     return list(csv.DictReader(io.StringIO(screen.stdout)))
+
+
+@pytest.mark.parametrize("name", ["schedule", "blocks", "disturbances", deep("scheme")])
+def test_the_command_in_the_caption_gives_the_rows_of_the_view(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    """It names the file that the plan came from, whatever its name."""
+    monkeypatch.chdir(tmp_path)
+    text = case("cb1015.yaml").read_text(encoding="utf-8") if name == "blocks" else TEXTS["example"]
+    text += "disturbances: [{torque: [20 mN m, 0, 0]}]\n" * (name == "disturbances")
+    Path("my craft.yaml").write_text(text, encoding="utf-8")
+    body = read_spacecraft(text, "my craft.yaml")
+    if name == "blocks":
+        block = {"block": "1", "channel": "J2", "first_sun_pulse": "6", "count": "1", "every": "1"}
+        block |= {"delay_s": "0.972287825122", "width_s": "0.487394"}
+        Path("b 2.csv").write_text(f"{','.join(block)}\n{','.join(block.values())}\n", encoding="utf-8")
+        plan = Plan(body, "b 2.csv", fired(body, read_blocks("b 2.csv", body)[0]), from_file=True)
+    elif name == "schedule":
+        planning.plan(body, "two-pulse").to_csv("p 2.csv")
+        plan, _ = read_plan("p 2.csv", body)
+    else:
+        plan = planning.plan(body, "two-pulse", Options(with_disturbances=name == "disturbances"))
+    made = moving_of(plan, "'my craft.yaml'")
+    assert made.scheme == plan.scheme
+    *words, file = shlex.split(" ".join(made.command))
+    assert file == "FILE"
+    done = run(*words[1:], "-", "-q")
+    assert done.returncode in (0, 4), done.stderr
+    rows, data = list(csv.DictReader(io.StringIO(done.stdout))), json.loads(made.data)
+    digits = data["digits"]["cone"]
+    shown = [f"{value / 10**digits:.{digits}f}" for value in accumulate(data["columns"]["theta"])]
+    assert shown == [f"{float(row['nutation_deg']):z.{digits}f}" for row in rows]
+
+
+def test_no_command_is_named_that_would_fly_other_pulses() -> None:
+    plan = chosen(TEXTS["example"])
+    sunlit = replace(plan.spacecraft, goal=Goal(sun=np.array([1.0, 0.0, 0.0])))
+    for other in (replace(plan, scheme="robust"), replace(plan, spacecraft=sunlit)):
+        assert moving_of(other).command == ()
 
 
 def column(track: list[dict[str, str]], *keys: str) -> np.ndarray:
@@ -218,9 +261,10 @@ def test_the_target_is_a_mark_and_a_circle_and_further_circles_are_taken_as_data
     assert (math.degrees(math.atan2(y, x)), math.degrees(math.asin(z))) == pytest.approx((-90, -30), abs=1e-3)
     assert data["target"] is not None
     plan = chosen(TEXTS["target"])
-    star = NamedDirection("star", np.array([0.0, 0.6, 0.8]), "watched", (Circle("near it", 0.2, "keep-out"),))
-    assert json.loads(moving.moving(plan.flight, 60.0, plan.scheme, [star]).data)["named"] == [
-        {"name": "star", "kind": "watched", "axis": [0.0, 0.6, 0.8], "circles": [{"radius": 0.2, "kind": "keep-out"}]}
+    star = replace(plan.spacecraft, keep=(Keep("star", np.array([0.0, 0.6, 0.8]), 0.2),))
+    assert json.loads(moving_of(replace(plan, spacecraft=star)).data)["named"] == [
+        named,
+        {"name": "star", "kind": "watched", "axis": [0.0, 0.6, 0.8], "circles": [{"radius": 0.2, "kind": "keep-out"}]},
     ]
 
 
@@ -294,12 +338,21 @@ def test_other_bodies_have_none_and_the_view_has_the_reason(more: str, reason: s
     assert data["bench"] is None
 
 
-def test_three_moments_and_schedules_without_pulses_have_none() -> None:
-    plan = chosen(TEXTS["example"])
+def test_schedules_without_pulses_command_blocks_and_wheels_have_none() -> None:
+    plan = chosen(TEXTS["three"])
     assert absence(plan.spacecraft, plan.pulses) == ""
     assert absence(plan.spacecraft, Schedule()) == "no pulses"
-    inertia = replace(plan.spacecraft.inertia, moments=(120.0, 100.0, 60.0))
-    assert absence(replace(plan.spacecraft, inertia=inertia), plan.pulses) == "I1 ≠ I2"
+    blocks = replace(plan.pulses, blocks=(Block("T1", 1, 0.1, 0.1, 3),))
+    assert absence(plan.spacecraft, blocks) == "command blocks"
+    inertia = replace(plan.spacecraft.inertia, wheel=1.0)
+    assert absence(replace(plan.spacecraft, inertia=inertia), plan.pulses) == "a wheel"
+
+
+def test_cones_roll_on_a_symmetric_body_alone() -> None:
+    for name in ("example", "three"):
+        workbench = view(TEXTS[name])[0].workbench
+        assert workbench is not None
+        assert workbench.rolling == (name == "example")
 
 
 def test_its_data_are_the_plan_and_the_limits_of_the_file() -> None:
@@ -308,8 +361,8 @@ def test_its_data_are_the_plan_and_the_limits_of_the_file() -> None:
     )
     made, data, _ = view(text)
     bench, pulses = data["bench"], chosen(text).pulses.pulses
-    assert [(entry["t"], entry["on"], entry["channel"]) for entry in bench["pulses"]] == [
-        (pulse.t, pulse.on_time, pulse.channel) for pulse in pulses
+    assert [(entry["start"], entry["on"], entry["channel"]) for entry in bench["pulses"]] == [
+        (pulse.start, pulse.on_time, pulse.channel) for pulse in pulses
     ]
     assert [entry["impulse"] for entry in bench["pulses"]] == [pulse.impulse.tolist() for pulse in pulses]
     assert {(entry["least"], entry["most"]) for entry in bench["pulses"]} == {(0.02, 2.0)}

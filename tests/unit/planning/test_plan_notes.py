@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,19 +20,27 @@ from support.builders import (
     cross,
     judged,
     noted,
+    one_of,
     recommended,
     spinner,
 )
 from support.golden import check_text
+from support.places import case
 
 import nutdamp
+from nutdamp.common.results import Note
+from nutdamp.flight.end_state import seen_at
+from nutdamp.flight.propagation import by_impulses
+from nutdamp.montecarlo.study import Results, run, study_of
 from nutdamp.planning import plan as planning
 from nutdamp.planning.decision import Comparison, compare
-from nutdamp.planning.notes import comparison_warnings, hindrances, plan_notes, reasons, remaining
-from nutdamp.planning.plan import Plan
+from nutdamp.planning.notes import comparison_warnings, hindrances, plan_notes, reasons, remaining, verdict_notes
+from nutdamp.planning.plan import Plan, judge
+from nutdamp.planning.verdict import Cases, cases_of
 from nutdamp.schemes import catalogue
-from nutdamp.spacecraft.model import Disturbance, Goal, Limits, Requirement, Spacecraft
-from nutdamp.spacecraft.schedule import Schedule, channel_pulse
+from nutdamp.spacecraft.model import Disturbance, Goal, Inertia, Keep, Limits, Requirement, Spacecraft
+from nutdamp.spacecraft.requirements import bounds
+from nutdamp.spacecraft.schedule import Pulse, Schedule, channel_pulse
 
 FIRED = spinner(channels=cross(8.0))
 
@@ -167,3 +176,109 @@ def test_planning_with_disturbances_is_tried_only_where_it_was_not_done() -> Non
     assert compare(SHAKEN, ("two-pulse",), AWARE).with_disturbances is None
     nothing_fits = replace(SHAKEN, limits=Limits(horizon=1e-6))
     assert compare(nothing_fits, ("two-pulse",)).with_disturbances is None  # and no recommended plan to compare with
+
+
+def noted_beside(made: Plan, cases: Cases | None = None, *, looped: bool = False) -> list[Note]:
+    """The notes beside the verdict on a plan, by nominal values or by cases."""
+    return list(verdict_notes(judge(made, cases, nominal=cases is None), made, looped=looped))
+
+
+def test_what_a_plan_does_to_axis_and_spin_that_nothing_asks_for_is_noted() -> None:
+    """Beyond 0.1° and a digit of the spin shown; not where the shift is limited, or target or spin are asked for."""
+    free = nutdamp.example().replace(requirement=Requirement(nutation=math.radians(0.5)))
+    turning, steady = (planning.plan(free, scheme) for scheme in ("one-pulse", "two-pulse"))
+    turned = turning.flight.residual.momentum_shift
+    assert turned > math.radians(0.1) > steady.flight.residual.momentum_shift
+    goal = replace(turning, spacecraft=replace(free, goal=Goal(axis=free.direction_in_n(0.1, 0.0))))
+    limited = planning.plan(nutdamp.example(), "one-pulse")
+    plans = (turning, steady, goal, limited)
+    assert [made for made in plans if "momentum-shift" in codes(noted_beside(made))] == [turning]
+    assert one_of(noted_beside(turning), "momentum-shift")["momentum_shift_deg"] == math.degrees(turned)
+    up = nutdamp.load(case("genesis-spinup.yaml"))
+    for share, change in ((5e-5, False), (8e-5, True), (-8e-5, True)):
+        fired = Pulse(1.0, 0.0, "T", np.array([0.0, 0.0, share * up.spin * up.inertia.C]))
+        for asked in (False, True):
+            aimed = replace(up, goal=Goal(spin=up.spin * (1.0 + share)) if asked else Goal())
+            notes = noted_beside(Plan(aimed, "trial", Schedule((fired,))))
+            assert ("spin-change" in codes(notes)) == (change and not asked)
+            if change and not asked:
+                values = one_of(notes, "spin-change")
+                assert values["before_rpm"] == pytest.approx(1.6)
+                assert values["after_rpm"] == pytest.approx(1.6 * (1.0 + share))
+                assert values["cause"] == f"T {1.6 * share:+.3g} rpm"
+
+
+STAGE = nutdamp.example("upper-stage")
+OBLATE = Inertia((4200.0, 4200.0, 5000.0))
+
+
+def idle(body: Spacecraft, degrees: float, t: float) -> float:
+    """Degrees that ``degrees`` of nutation come to in ``t`` s without a pulse, by a flight."""
+    slope = math.tan(math.radians(degrees)) / math.tan(body.nutation)
+    left = replace(body, omega0=np.array([*(slope * body.omega0[:2]), body.omega0[2]]))
+    return math.degrees(seen_at(by_impulses(left, Schedule(()), t), t).final.nutation)
+
+
+def test_nutation_that_grows_or_decays_is_said_to_keep_the_requirement_for_a_while_or_from_when_on() -> None:
+    """Before any pulse and again after the last one; the times end where a flight without pulses says."""
+    made = planning.plan(STAGE, "two-pulse")
+    levels = {bound: math.radians(0.54) for bound in bounds(STAGE)}
+    wide = noted_beside(made, Cases(20_000, 1, 0.99, 1.0, 1.0, 1.0, levels=levels))
+    after, before = (one_of(wide, code) for code in ("grows-again-in-cases", "met-without-pulse-until"))
+    assert codes(noted_beside(made)) == ["tolerances-not-checked", "met-without-pulse-until", "loop-not-judged"]
+    assert codes(noted_beside(made, looped=True)) == ["tolerances-not-checked"]
+    assert [after["left_deg"], after["after_s"]] == pytest.approx([0.54, made.end])
+    for start, lasting in ((1.0, before["until_s"]), (0.54, after["lasting_s"])):
+        assert isinstance(lasting, float)
+        assert idle(STAGE, start, lasting) == pytest.approx(2.0, rel=1e-4)
+    body = replace(STAGE, inertia=OBLATE, omega0=np.array([5.0, 5.0, 1.0]) * STAGE.omega0, loop=None)
+    body = replace(body, requirement=Requirement(nutation=math.radians(0.5)))
+    decays = one_of(noted_beside(planning.plan(body, "two-pulse")), "met-without-pulse-from")
+    assert isinstance(decays["from_s"], float)
+    assert idle(body, math.degrees(body.nutation), decays["from_s"]) == pytest.approx(0.5, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"dissipation": None},
+        {"inertia": OBLATE},  # it decays
+        {"requirement": Requirement(nutation=math.radians(5.0))},  # kept up to the horizon
+        {"requirement": Requirement(nutation=math.radians(0.5))},  # not kept at t = 0
+        {"requirement": None},
+        {"keep": (Keep("star", np.array([1.0, 0.0, 0.0]), 0.1),)},
+    ],
+)
+def test_where_nothing_grows_beyond_what_is_required_nothing_is_said(change: dict[str, Any]) -> None:
+    body = replace(STAGE, loop=None, dispersions=None, **change)
+    assert set(codes(noted_beside(planning.plan(body, "two-pulse")))) <= {"no-tolerances"}
+
+
+def test_what_is_not_shown_and_what_decides_the_failing_cases_is_said() -> None:
+    made = planning.plan(nutdamp.example(), "four-pulse")
+    results = run(Results(study_of(made.spacecraft, made.pulses), 500))
+    cases = cases_of(results)
+    for probability, expected in (
+        (0.997, ["causes-of-failure"]),
+        (0.9, ["undecided-cases", "causes-of-failure"]),
+        (0.8, []),
+    ):
+        verdict = judge(made, replace(cases, probability=probability), results)
+        assert codes(verdict_notes(verdict, made)) == expected
+    certain = replace(made.spacecraft, requirement=Requirement(0.01, probability=0.9), dispersions=None)
+    made = replace(made, spacecraft=certain)
+    assert codes(verdict_notes(judge(made), made))[:2] == ["probability-without-tolerances", "no-tolerances"]
+
+
+def test_plans_that_keep_the_cones_are_named_where_the_recommended_one_does_not() -> None:
+    """One-pulse leaves the axis where it no longer passes the star, but shifts H by more than is required."""
+    body = nutdamp.example()
+    star = Keep("star", body.direction_in_n(math.radians(8.0), math.radians(210.0)), math.radians(5.2))
+    compared = compare(replace(body, keep=(star,)), catalogue.CLASSIC, samples=0)
+    assert [plan.kept for plan in compared] == [True, False, False]
+    alone = Comparison(compared.spacecraft, (compared["two-pulse"],))
+    named = [one_of(comparison_warnings(each), "plans-keep-cones")["schemes"] for each in (compared, alone)]
+    assert named == ["one-pulse", "none"]
+    for tabulated in (False, True):
+        assert ("cone-broken" in codes(comparison_warnings(compared, tabulated=tabulated))) is not tabulated
+    assert codes(reasons(compared)) == ["cheapest-at-end"]

@@ -20,10 +20,9 @@ from nutdamp.flight import end_state
 from nutdamp.flight.end_state import seen_at
 from nutdamp.flight.propagation import by_impulses
 from nutdamp.planning import plan as planning
-from nutdamp.planning.decision import broken_limits, compare, infeasibility
-from nutdamp.planning.notes import plan_notes, reasons
+from nutdamp.planning.decision import Ground, compare
+from nutdamp.planning.notes import broken_limits, infeasibility, plan_notes, reasons
 from nutdamp.planning.plan import Standing, plan
-from nutdamp.planning.recommendation import Ground
 from nutdamp.schemes import catalogue, two_pulse
 from nutdamp.schemes.catalogue import CLASSIC, OptimalOptions, SchemeOptions
 from nutdamp.spacecraft.constraints import Limit, Windows, breaches, keeps_limits

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
 from dataclasses import replace
 from functools import partial
 
+import numpy as np
 import pytest
 from support import places
 from support.builders import HALF_A_DEGREE, judged
+from support.dispersed import normal
 
 import nutdamp
 from nutdamp.common import work
@@ -16,127 +18,153 @@ from nutdamp.errors import Infeasible
 from nutdamp.files.reader import load_spacecraft
 from nutdamp.montecarlo import study as dispersion
 from nutdamp.montecarlo.propagated import RealWidths
-from nutdamp.montecarlo.study import SEED
+from nutdamp.montecarlo.study import SEED, STAGES, Results, run, study_of
 from nutdamp.planning import screening
-from nutdamp.planning.decision import Comparison, compare, decide
-from nutdamp.planning.plan import Plan, Share
-from nutdamp.planning.recommendation import recommend
-from nutdamp.planning.screening import Cases, PlanCandidate
+from nutdamp.planning.decision import Comparison, compare, recommend
+from nutdamp.planning.plan import Plan
+from nutdamp.planning.screening import FlownPlan, unflown
+from nutdamp.planning.verdict import Cases, Status
+from nutdamp.schemes.catalogue import CLASSIC
+from nutdamp.spacecraft.model import Requirement
+from nutdamp.spacecraft.tolerances import Dispersions
 
-SHORT, LONG, ALL = 2_048, 8_192, 20_000
-NEVER = "cannot be flown"
+SHORT, LONG, ALL = STAGES[:3]
+FAILS = (-1.0, -1.0)  # a case cannot be flown
+Told = list[tuple[float, float]]
 
-# Of each plan, the cheapest first, between which shares of all cases those lie that comply, as far as 2,048, 8,192 and
-# 20,000 cases tell; how many it flies; which of them is recommended, and whether enough comply.
-FLOWN: list[tuple[list[tuple[list[tuple[float, float]], int]], int, bool | None]] = [
+# Of each plan, the cheapest first, between which shares of all cases those lie that comply, as far as the cases of each
+# stage tell; how many it flies; which of them is recommended, and its status.
+FLOWN: list[tuple[list[tuple[Told, int]], int, Status]] = [
     # As many as it takes to know whether enough comply, and all with the plan to fly.
-    (
-        [([(0.9, 0.95)], SHORT), ([(0.99, 1.0), (0.996, 0.999), (0.998,) * 2], ALL)],
-        1,
-        True,
-    ),
-    (
-        [([(0.998, 1.0), (0.998, 1.0), (0.9985,) * 2], ALL), ([(0.99, 1.0), (0.998, 0.9995)], LONG)],
-        0,
-        True,
-    ),
-    ([([(0.99, 1.0), (0.99, 0.998), (0.996,) * 2], ALL), ([(0.998, 1.0), (0.998, 1.0), (0.999,) * 2], ALL)], 1, True),
-    # Too few with each: all that may be as good as the best.
+    ([([(0.9, 0.95)], SHORT), ([(0.99, 1.0), (0.996, 0.999), (0.998, 0.998)], ALL)], 1, Status.FLY),
+    ([([(0.998, 1.0)] * 2 + [(0.9985,) * 2], ALL), ([(0.99, 1.0), (0.998, 0.9995)], LONG)], 0, Status.FLY),
+    ([([(0.99, 1.0), (0.99, 0.998), (0.996,) * 2], ALL), ([(0.998, 1.0)] * 2 + [(0.999,) * 2], ALL)], 1, Status.FLY),
+    # Too few with each: all that may be better than the best by a hundredth.
     (
         [
             ([(0.5, 0.6), (0.55, 0.57), (0.56,) * 2], ALL),
-            ([(0.3, 0.58), (0.4, 0.5)], LONG),
-            ([(0.2, 0.55)], SHORT),
+            ([(0.3, 0.58), (0.4, 0.5), (0.45,) * 2], ALL),
+            ([(0.2, 0.569)], SHORT),
         ],
         0,
-        False,
+        Status.NOT_ENOUGH,
     ),
-    ([([(0.5, 0.6), (0.51, 0.56), (0.52,) * 2], ALL), ([(0.4, 0.6), (0.5, 0.58), (0.54,) * 2], ALL)], 1, False),
+    (
+        [([(0.5, 0.6), (0.51, 0.56), (0.52,) * 2], ALL), ([(0.4, 0.6), (0.5, 0.58), (0.54,) * 2], ALL)],
+        1,
+        Status.NOT_ENOUGH,
+    ),
+    # Not known with all cases that are flown.
+    ([([(0.9, 0.95)], SHORT), ([(0.99, 1.0)] * 3, ALL)], 1, Status.NOT_SHOWN),
     # Plans with a case that cannot be flown are out, at once or later.
-    ([([], 0), ([(0.998, 1.0)] * 2 + [(0.999,) * 2], ALL)], 1, True),
-    ([([(0.998, 1.0)], 0), ([(0.998, 1.0)] * 2 + [(0.999,) * 2], ALL)], 1, True),
+    ([([FAILS], 0), ([(0.998, 1.0)] * 2 + [(0.999,) * 2], ALL)], 1, Status.FLY),
+    ([([(0.998, 1.0), FAILS], 0), ([(0.998, 1.0)] * 2 + [(0.999,) * 2], ALL)], 1, Status.FLY),
 ]
 
 
 @pytest.fixture
-def staged(monkeypatch: pytest.MonkeyPatch) -> dict[Plan, list[tuple[float, float]]]:
-    """What cases tell of plans, by stage, instead of flying them; each takes a unit of work."""
-    known: dict[Plan, list[tuple[float, float]]] = {}
+def staged(monkeypatch: pytest.MonkeyPatch) -> dict[float, Told]:
+    """What cases tell of plans by their impulse, by stage, instead of flying them; each stage takes a unit of work."""
+    known: dict[float, Told] = {}
 
-    def told(one: PlanCandidate, stage: int) -> None:
+    def next_stage(begun: tuple[float, int], samples: int | None) -> tuple[float, int]:
+        study, stage = begun[0], begun[1] + 1
+        if stage == len(known[study]) or (stage > 0 and work.exhausted()):
+            return begun
         work.spend(1.0)
-        if stage >= len(known[one.plan]):
-            raise Infeasible(NEVER)
-        one.share = Share(*known[one.plan][stage], 0.997)
-        one.cases = replace(one.cases, samples=(*screening.STAGES, ALL)[stage], complying=one.share.low)
+        if known[study][stage] == FAILS:
+            raise Infeasible("a case cannot be flown")
+        return study, stage
 
-    def entered(plan: Plan, variant: str, study: object, samples: int) -> PlanCandidate:
-        made = PlanCandidate(plan, variant, Cases(0, samples, SEED, 0.0, 0.997, {}))
-        told(made, 0)
-        return made
+    def cases_of(results: tuple[float, int], *, final: bool) -> Cases:
+        low, high = known[results[0]][results[1]]
+        return Cases(STAGES[results[1]], SEED, 0.997, low, low, high, final)
 
-    def further(one: PlanCandidate, samples: int) -> None:
-        assert samples == ALL
-        told(one, 1 + screening.STAGES.index(one.cases.samples))
-
-    monkeypatch.setattr(screening, "entered", entered)
-    monkeypatch.setattr(screening, "_further", further)
-    monkeypatch.setattr(screening, "study_of", lambda *_: None)
+    monkeypatch.setattr(screening, "study_of", lambda _, schedule: schedule.total_impulse)
+    monkeypatch.setattr(screening, "Results", lambda study, _: (study, -1))
+    monkeypatch.setattr(screening, "next_stage", next_stage)
+    monkeypatch.setattr(screening, "cases_of", cases_of)
     monkeypatch.setattr(screening, "affordable", lambda *_: not work.exhausted())
     return known
 
 
-def chosen_of(plans: list[Plan], shares: Mapping[Plan, Share]) -> Plan | None:
-    return recommend(plans, shares).plan
+def required(count: int) -> list[Plan]:
+    return [judged(f"{n}", 0.0, impulse=1.0 + n, required=HALF_A_DEGREE) for n in range(count)]
 
 
-def flown_of(plans: list[Plan], flown: dict[Plan, PlanCandidate]) -> list[int]:
+def recommending(plans: list[Plan]) -> partial[Plan | None]:
+    return partial(lambda among, cases: recommend(among, cases).plan, plans)
+
+
+def flown_of(plans: list[Plan], flown: dict[Plan, FlownPlan]) -> list[int]:
     return [flown[one].cases.samples if one in flown else 0 for one in plans]
 
 
-def test_plans_compared_fly_as_many_cases_as_decide(staged: dict[Plan, list[tuple[float, float]]]) -> None:
-    for given, chosen, met in FLOWN:
-        plans = [judged(f"{n}", 0.0, impulse=1.0 + n, required=HALF_A_DEGREE) for n in range(len(given))]
-        staged.update({plan: told for plan, (told, _) in zip(plans, given, strict=True)})
-        flown = screening.fly_compared(plans, ALL, partial(chosen_of, plans))
-        assert flown_of(plans, flown) == [count for _, count in given]
-        compared = Comparison(plans[0].spacecraft, tuple(plans), flown)
-        assert compared.recommended is plans[chosen]
-        assert compared.meets(plans[chosen]) is met
-        for plan in plans:
-            expected = Share(*staged[plan][-1], 0.997) if plan in flown else Share(0.0, 1.0, 0.997)
-            if plan not in flown or flown[plan].cases.decided:
-                assert compared.shares[plan] == expected
-            assert (compared.cases(plan) is None) == (plan not in flown)
-
-
-def test_a_plan_that_may_not_be_chosen_flies_until_its_verdict_is_known(
-    staged: dict[Plan, list[tuple[float, float]]],
+@pytest.mark.parametrize(("told", "chosen", "status"), FLOWN)
+def test_plans_compared_fly_as_many_cases_as_decide(
+    told: list[tuple[Told, int]], chosen: int, status: Status, staged: dict[float, Told]
 ) -> None:
+    plans = required(len(told))
+    staged.update({plan.total_impulse: shares for plan, (shares, _) in zip(plans, told, strict=True)})
+    flown = screening.fly_compared(plans, None, recommending(plans), plans)
+    assert flown_of(plans, flown) == [count for _, count in told]
+    compared = Comparison(plans[0].spacecraft, tuple(plans), flown)
+    assert compared.recommended is plans[chosen]
+    assert compared.verdict.status is status
+    assert flown[plans[chosen]].final
+    assert compared.cases == {plan: flown[plan].cases if plan in flown else unflown(plan) for plan in plans}
+
+
+def test_a_plan_that_may_not_be_chosen_flies_until_its_verdict_is_known(staged: dict[float, Told]) -> None:
     """Such as one that cannot be commanded: whatever its share, the one to fly stays the same."""
-    plans = [judged(f"{n}", 0.0, impulse=1.0 + n, required=HALF_A_DEGREE) for n in range(3)]
+    plans = required(3)
     shares = ([(0.1, 0.3)] * 2 + [(0.2, 0.2)], [(0.998, 1.0)] * 3, [(0.4, 1.0), (0.5, 0.9), (0.7, 0.7)])
-    staged.update(zip(plans, shares, strict=True))
-    flown = screening.fly_compared(plans, ALL, partial(chosen_of, plans[:1]))
+    staged.update({plan.total_impulse: told for plan, told in zip(plans, shares, strict=True)})
+    flown = screening.fly_compared(plans, None, recommending(plans[:1]), plans[:1])
     assert flown_of(plans, flown) == [ALL, SHORT, LONG]
 
 
 def test_without_a_requirement_the_plan_to_fly_has_all_cases_and_a_budget_ends_them(
-    staged: dict[Plan, list[tuple[float, float]]],
+    staged: dict[float, Told],
 ) -> None:
     free = [judged(f"{n}", 0.0, impulse=1.0 + n) for n in range(2)]
-    staged.update({plan: [(0.0, 0.0)] * 3 for plan in free})
-    flown = screening.fly_compared(free, ALL, lambda shares: recommend(free, shares).plan)
-    assert flown_of(free, flown) == [ALL, SHORT]
-    bound = [judged(f"{n}", 0.0, impulse=1.0 + n, required=HALF_A_DEGREE) for n in range(2)]
-    staged.update({plan: [(0.99, 1.0), (0.99, 0.999), (0.998, 0.998)] for plan in bound})
-    for units, expected in ((0.5, [SHORT, 0]), (2.0, [SHORT, SHORT]), (3.0, [LONG, SHORT]), (6.0, [ALL, ALL])):
+    staged.update({plan.total_impulse: [(1.0, 1.0)] * 3 for plan in free})
+    assert flown_of(free, screening.fly_compared(free, None, recommending(free), free)) == [ALL, SHORT]
+    bound = required(2)
+    staged.update({plan.total_impulse: [(0.99, 1.0), (0.99, 0.999), (0.998, 0.998)] for plan in bound})
+    for units, *expected in ((0.5, SHORT, 0), (2.0, LONG, 0), (3.0, ALL, 0), (4.0, ALL, SHORT), (6.0, ALL, ALL)):
         with work.budget("cases", units):
-            flown = screening.fly_compared(bound, ALL, lambda shares: recommend(bound, shares).plan)
+            flown = screening.fly_compared(bound, None, recommending(bound), bound)
         assert flown_of(bound, flown) == expected
-        decision = decide(Comparison(bound[0].spacecraft, tuple(bound), flown))
-        assert decision is not None
-        assert (decision.unknown, decision.met) == (units < 6.0, units == 6.0)
+        status = Comparison(bound[0].spacecraft, tuple(bound), flown).verdict.status
+        assert status is (Status.FLY if units >= 3.0 else Status.NOT_SHOWN)
+
+
+@pytest.mark.deep
+def test_cases_of_a_comparison_are_those_of_a_study_of_each_plan() -> None:
+    """Of the seed of any study, the first ones first; and no more than were asked for."""
+    spread = Dispersions(A=normal(0.01, relative=True), thrust_per_pulse=normal(0.02, relative=True))
+    body = replace(nutdamp.example(), dispersions=spread, requirement=Requirement(math.radians(0.4), None, 0.6))
+    compared = compare(body, CLASSIC, samples=3_000)
+    assert compared.recommended is not None
+    assert compared.flown is not None
+    for plan in compared:
+        verdict, flown = compared.verdicts[plan], compared.flown[plan]
+        assert verdict.cases is flown.cases is compared.cases[plan]
+        again = run(Results(study_of(body, plan.pulses), flown.cases.samples))
+        assert (flown.cases.complying, flown.cases.seed) == (again.met_fraction, SEED)
+        assert (flown.cases.low, flown.cases.high) == again.interval(certain=not flown.final)
+        assert flown.final == (flown.cases.samples == 3_000)
+        levels = {bound.part.value: level for bound, level in flown.cases.levels.items()}
+        assert flown.left == levels["nutation"] == np.quantile(again.values[0], 0.6)  # type: ignore[index]
+    assert compared.flown[compared.recommended].final
+    assert {flown.cases.samples for flown in compared.flown.values()} == {2_048, 3_000}
+    nominal = [compare(body, CLASSIC, samples=0), compare(replace(body, dispersions=None), CLASSIC)]
+    nominal += [compare(replace(body, requirement=None), CLASSIC)]
+    for one in nominal:
+        assert (one.flown, one.cases, one.verdict.cases) == (None, {}, None)
+    with work.budget("nothing", 0.0):
+        assert compare(body, ["two-pulse"]).flown == {}
 
 
 @pytest.mark.deep
@@ -144,17 +172,14 @@ def test_more_cases_than_are_kept_one_by_one_are_counted_and_have_the_budget_of_
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     body, samples = nutdamp.example(), 24_000
-    kept = compare(body, ["two-pulse"], samples=samples)
+    kept = compare(body, ["two-pulse"], samples=samples).verdict
     monkeypatch.setattr(dispersion, "EXACT_CASES", 20_000)
-    monkeypatch.setattr(screening, "EXACT_CASES", 20_000)
     monkeypatch.setattr(work, "CASES", 305.0)  # for 20,000 cases; so many take 360 units
-    counted = compare(body, ["two-pulse"], samples=samples)
-    told = [one.shares[one.plans[0]].exact for one in (kept, counted)]
-    assert told[0] is not None
-    assert told[0] == told[1]
-    decided = decide(counted)
-    assert decided is not None
-    assert (decided.unknown, decided.met) == (False, True)
+    counted = compare(body, ["two-pulse"], samples=samples).verdict
+    assert kept.cases is not None
+    assert counted.cases is not None
+    assert counted.cases.samples == samples
+    assert (counted.cases.complying, counted.status) == (kept.cases.complying, Status.FLY)
 
 
 def test_what_costs_more_than_is_left_of_the_budget_is_not_begun(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -162,7 +187,4 @@ def test_what_costs_more_than_is_left_of_the_budget_is_not_begun(monkeypatch: py
     body = load_spacecraft(places.case("rob2.yaml"))
     monkeypatch.setattr(RealWidths, "effort", 1e9)
     compared = compare(body, ["two-pulse"])
-    assert compared.flown == {}
-    decided = decide(compared)
-    assert decided is not None
-    assert (decided.unknown, decided.met) == (True, False)
+    assert (compared.flown, compared.verdict.status) == ({}, Status.NOT_SHOWN)

@@ -21,8 +21,7 @@ from nutdamp.errors import SenselessOption
 from nutdamp.flight import propagation
 from nutdamp.physics import body as rigid_body
 from nutdamp.planning import plan as planning
-from nutdamp.planning.decision import infeasibility
-from nutdamp.planning.notes import plan_notes
+from nutdamp.planning.notes import infeasibility, plan_notes
 from nutdamp.schemes.catalogue import FourPulseOptions, Options
 from nutdamp.spacecraft.equipment import Channel, Steerable
 from nutdamp.spacecraft.model import Limits, Spacecraft

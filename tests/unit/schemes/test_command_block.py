@@ -23,9 +23,9 @@ from nutdamp.files.reader import read_spacecraft
 from nutdamp.flight import propagation
 from nutdamp.flight.end_state import aspects, left_by
 from nutdamp.physics import attitude
-from nutdamp.planning import decision
 from nutdamp.planning import plan as planning
 from nutdamp.planning.decision import usual
+from nutdamp.planning.notes import infeasibility
 from nutdamp.schemes.block_model import BlockModel, Trial, fired
 from nutdamp.schemes.block_search import FLOWN, BlockFlights, BlockSearch, BlockSequence, FlownSequence
 from nutdamp.schemes.catalogue import Options
@@ -45,7 +45,7 @@ def within(nutation: float, shift: float | None = None) -> Requirement:
 
 def planned(body: Spacecraft, options: Options | None = None, *, met: bool = True) -> planning.Plan:
     plan = planning.plan(body, "command-block", options)
-    assert plan.feasible, decision.infeasibility(plan)
+    assert plan.feasible, infeasibility(plan)
     assert not met or plan.meets_requirement
     return plan
 
@@ -70,7 +70,7 @@ def scanned(body: Spacecraft) -> tuple[float, float]:
     for one, every, wait in itertools.product(body.channels, commands.every, range(24 if body.transverse_rate else 1)):
         after = model.after(model.start, one, Trial(wait, delays, widths, counts, every))
         left = model.left(after)
-        shares = np.max([requirements.left_of(bound.part, left, body) / bound.most for bound in bounds], axis=0)
+        shares = np.max([bound.used(requirements.left_of(bound, left, body)) for bound in bounds], axis=0)
         longer = False if body.goal.axis is None else np.abs(after.longitude - ahead) > math.pi
         shares = np.where(np.isnan(shares) | longer, np.inf, shares)
         cost, failed = np.broadcast_to(widths * counts * one.strength, shares.shape), np.where(shares <= 1, 0.0, shares)
@@ -243,7 +243,7 @@ def test_in_random_cases_blocks_never_bring_the_axis_into_a_cone(seed: int) -> N
     keep = Keep("cone", centre, least=0.4 * min(float(attitude.angle_between(centre, one)) for one in (start, end)))
     plan = planning.plan(replace(body, keep=(keep,), requirement=within(1.0, 0.5)), "command-block")
     if not plan.feasible:
-        assert "from cone" in decision.infeasibility(plan)
+        assert "from cone" in infeasibility(plan)
         return
     motion, nearest, now = reference.Motion(body.omega0, attitude.matrix(body.initial.quaternion)), math.inf, 0.0
     for pulse in plan.pulses:
@@ -285,7 +285,7 @@ def test_where_there_are_no_blocks_the_reason_is_said() -> None:
     for name, aim in (("no keys", False), ("out of view", True), ("dark", True)):  # it is compared where there are keys
         assert ("command-block" in usual(cases[name])) is aim
     assert "command-block" in usual(replace(body, goal=replace(body.goal, axis=None)))
-    check_text("blocks.why-not", "\n".join(f"{name}: {decision.infeasibility(plan)}" for name, plan in plans.items()))
+    check_text("blocks.why-not", "\n".join(f"{name}: {infeasibility(plan)}" for name, plan in plans.items()))
 
 
 def test_a_delay_just_below_none_is_none_without_a_sign() -> None:

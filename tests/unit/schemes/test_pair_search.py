@@ -18,7 +18,7 @@ from support.places import case
 from nutdamp.files.reader import load_spacecraft
 from nutdamp.physics import precession
 from nutdamp.planning import plan as planning
-from nutdamp.planning.decision import infeasibility
+from nutdamp.planning.notes import infeasibility
 from nutdamp.schemes.catalogue import Options
 from nutdamp.schemes.sequential import model_of
 from nutdamp.spacecraft.equipment import Steerable

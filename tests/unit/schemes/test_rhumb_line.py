@@ -18,8 +18,7 @@ from support.golden import check_text
 from nutdamp.files.reader import example_text, read_spacecraft
 from nutdamp.physics import precession
 from nutdamp.planning import plan as planning
-from nutdamp.planning.decision import infeasibility
-from nutdamp.planning.notes import plan_notes
+from nutdamp.planning.notes import infeasibility, plan_notes
 from nutdamp.schemes.catalogue import Options, RhumbLineOptions
 from nutdamp.schemes.rhumb_line import Train
 from nutdamp.spacecraft.equipment import Steerable

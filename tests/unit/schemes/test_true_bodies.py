@@ -23,8 +23,7 @@ from nutdamp.flight import propagation
 from nutdamp.physics import body as rigid_body
 from nutdamp.physics import response, taylor
 from nutdamp.planning import plan as planning
-from nutdamp.planning.decision import infeasibility
-from nutdamp.planning.notes import plan_notes
+from nutdamp.planning.notes import infeasibility, plan_notes
 from nutdamp.planning.plan import plan
 from nutdamp.schemes.catalogue import CLASSIC, Options
 from nutdamp.schemes.sequential import ImpulseBuilder, model_of, steady_omega
@@ -326,7 +325,7 @@ def test_what_dissipation_takes_out_alone_leaves_pulses_that_can_be_commanded() 
 @spread(
     ("name", "options", "status", "said"),
     [
-        ("crash-hang-near-sphere-dissipation", (), 3, r"dissipation takes the nutation out.*? optimal is infeasible:"),
+        ("crash-hang-near-sphere-dissipation", (), 3, r"dissipation takes the nutation out before the channels.*? it"),
         ("crash-dissipation-near-sphere-overflow", (), 3, ""),
         ("crash-halfcone-trim-crash", (), 0, ""),
         ("crash-target-ideal-torquer-dissipation", ("--target", "5deg,0deg"), 0, ""),

@@ -12,9 +12,15 @@ from support.process import Run
 
 import nutdamp
 from nutdamp.common.results import Note, Value, note
-from nutdamp.planning.decision import compare, decide
-from nutdamp.planning.notes import alternatives, comparison_warnings, decision_notes, plan_notes, reasons
-from nutdamp.planning.recommendation import TIES, Gain
+from nutdamp.planning.decision import TIES, WHY, Gain
+from nutdamp.planning.notes import (
+    LEAST_CODES,
+    alternatives,
+    comparison_warnings,
+    plan_notes,
+    reasons,
+    verdict_notes,
+)
 from nutdamp.views.guide import note_entries
 from nutdamp.views.loop import STOPS
 from nutdamp.views.text import NAME, NOTE, REASON, WARNING, note_json, ordered, screen_line, text
@@ -47,8 +53,14 @@ def test_every_code_has_a_sentence_and_every_sentence_its_values() -> None:
 
 def test_every_entry_is_used_and_says_what_it_means() -> None:
     used = {code for _, code, _ in CALLS} | {*(gain.value for gain in Gain), *(tie.value for tie in TIES)}
-    used |= {"cone-broken-at-start", "ideal-impulses", "ideal-torquer-assumed", "ideal-torque-missing"}
-    used |= {*STOPS.values()}
+    used |= {
+        "cone-broken-at-start",
+        "least-propellant",
+        "ideal-impulses",
+        "ideal-torquer-assumed",
+        "ideal-torque-missing",
+    }
+    used |= {"least-propellant", *STOPS.values(), *WHY.values(), *LEAST_CODES.values()}
     assert set(note_entries()) == used
     for entry in note_entries().values():
         assert entry.severity in (WARNING, NOTE, REASON)
@@ -100,12 +112,11 @@ def test_the_json_of_a_plan_has_notes_as_data(run: Run) -> None:
 
 
 def test_notes_of_the_example_are_those_of_its_decision() -> None:
-    compared = compare(nutdamp.example(), samples=0)
+    compared = nutdamp.compare(nutdamp.example(), samples=0)
     assert [entry.code for entry in reasons(compared)] == ["least-propellant"]
     assert not [*comparison_warnings(compared)]
     assert {entry.code for plan in compared.plans for entry in plan_notes(plan)} >= {"half-turns-apart"}
     assert {entry.code for entry in alternatives(compared)} <= {gain.value for gain in Gain}
-    decision = decide(compared)
-    assert decision is not None
-    codes = [entry.code for entry in decision_notes(decision)]
+    assert compared.recommended is not None
+    codes = [entry.code for entry in verdict_notes(compared.verdict, compared.recommended)]
     assert "tolerances-not-checked" in codes

@@ -353,7 +353,7 @@ def test_dates_that_no_calendar_has_are_left_out() -> None:
 def test_a_steering_angle_is_the_same_everywhere() -> None:
     body, pulse = spinner(steerable=Steerable(5.0)), steered(0.75, math.radians(-70.123))
     assert channel_text(pulse, body) == "steerable 289.88°"
-    figure = overview.flight_figure("history", *overview.shown(planning.Plan(body, "x", Schedule((pulse,)))))
+    figure = overview.history_figure(*overview.shown(planning.Plan(body, "x", Schedule((pulse,)))))
     assert any("289.88°" in text.get_text() for text in figure.axes[1].texts)
 
 

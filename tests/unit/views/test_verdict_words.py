@@ -20,14 +20,17 @@ from support.builders import (
 )
 from support.golden import check_text
 
+import nutdamp
 from nutdamp.planning import plan as planning
-from nutdamp.planning.decision import compare, infeasibility
+from nutdamp.planning.notes import infeasibility
 from nutdamp.planning.plan import Plan, Standing
+from nutdamp.planning.verdict import Status
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import Disturbance, Goal, Limits, Requirement
 from nutdamp.spacecraft.requirements import Part
-from nutdamp.views import decisions
+from nutdamp.spacecraft.tolerances import SpinTolerance
 from nutdamp.views.parts import required
+from nutdamp.views.verdict import idle, percent
 
 FIRED = spinner(channels=cross(8.0))
 WIDE = Goal(spin=3.0)
@@ -46,10 +49,13 @@ def test_the_requirement_is_on_one_line() -> None:
     check_text("verdicts.required", required(replace(spinner(requirement=BOTH), goal=WIDE)))
 
 
-def test_a_share_is_never_rounded_to_what_it_is_not() -> None:
-    shares = (0.9991, 0.8562, 0.99696, 0.99704, 0.997, 1.0, 0.00004)
-    pairs = [*((share, 0.997) for share in shares), (0.99999, 1e-9), (0.99996, 0.9973), (0.9999999, 0.999999)]
-    check_text("verdicts.shares", "\n".join(f"{share}: {decisions.cases_verdict(share, of)}" for share, of in pairs))
+@pytest.mark.parametrize(("share", "of", "shown"), [
+    (0.9991, 0.997, "99.9 %"), (0.8562, 0.997, "85.6 %"), (0.99696, 0.997, "99.696 %"), (0.99704, 0.997, "99.704 %"),
+    (0.997, 0.997, "99.7 %"), (1.0, 0.997, "100.0 %"), (0.00004, 0.997, "0.004 %"), (0.99999, 1e-9, "99.999 %"),
+    (0.99996, 0.9973, "99.996 %"), (0.9999999, 0.999999, "99.99999 %"),
+])  # fmt: skip
+def test_a_share_is_never_rounded_to_what_it_is_not(share: float, of: float, shown: str) -> None:
+    assert percent(share, of) == shown
 
 
 TILTING = (Disturbance(0.5 + 0j),)
@@ -58,7 +64,7 @@ TILTING = (Disturbance(0.5 + 0j),)
 def test_the_parts_that_are_missed_and_by_how_much() -> None:
     plan = judged("a", 0.6, shift=0.3, required=BOTH, goal=WIDE, spin=4.0)
     assert [bound.part for bound in plan.shortfalls] == [Part.NUTATION, Part.SHIFT, Part.SPIN]
-    assert plan.severity == pytest.approx(1.0 / 0.003)
+    assert plan.severity == pytest.approx(1.0 / 0.03)
     assert Plan(plan.spacecraft, "x", None, "why").severity == math.inf
 
 
@@ -76,13 +82,13 @@ def test_with_a_target_the_severity_goes_by_the_distance_from_it() -> None:
 def test_the_severity_of_many_is_that_of_each() -> None:
     body, generator = replace(spinner(requirement=BOTH), goal=WIDE), np.random.default_rng(1)
     nutation, aim = generator.uniform(0.0, 0.02, (2, 50))
-    spin = 3.0 + generator.normal(size=50) * 0.003
+    spin = 3.0 + generator.normal(size=50) * 0.03
     many = requirements.severity(body, requirements.Left(nutation, aim, spin))
     for row in range(50):
         alone = requirements.severity(body, requirements.Left(nutation[row], aim[row], spin[row]))
         assert many[row] == alone
         within = nutation[row] <= math.radians(0.5) and aim[row] <= math.radians(0.2)
-        assert (alone <= 1.0) == (within and abs(spin[row] / 3.0 - 1.0) <= 1e-3)
+        assert (alone <= 1.0) == (within and abs(spin[row] / 3.0 - 1.0) <= 1e-2)
 
 
 def test_where_no_pulse_is_needed_it_says_so() -> None:
@@ -97,15 +103,11 @@ def test_where_no_pulse_is_needed_it_says_so() -> None:
         (0.3, HALF_A_DEGREE, Goal(spin=3.1), False),
         (0.3, HALF_A_DEGREE, WIDE, True),
     ]
-    texts = []
     for degrees, limit, goal, needless in rows:
         body = replace(spinner(degrees=degrees, channels=cross(8.0), requirement=limit), goal=goal)
-        compared = compare(body, ("four-pulse",))
-        text = decisions.needless(compared)
-        assert (text is not None) is needless is compared.needless
+        assert requirements.unaided(body) is needless
         assert (planning.plan(body, "none").standing is Standing.COMPLIES) is needless
-        texts += [text] if text else []
-    check_text("verdicts.needless", "\n".join(texts))
+        assert (nutdamp.compare(body, ("none", "four-pulse")).verdict.status is Status.NO_PULSE) is needless
 
 
 def test_with_unequal_moments_the_largest_nutation_counts() -> None:
@@ -119,9 +121,7 @@ def test_with_unequal_moments_the_largest_nutation_counts() -> None:
     for share, kept in ((1.001, True), (0.999, False)):
         needed = replace(body, requirement=Requirement(nutation=share * largest))
         assert requirements.unaided(needed) is kept
-        text = decisions.needless(compare(needed, ("four-pulse",)))
-        assert (text is not None) is kept
-        assert text is None or f"{math.degrees(largest):.4g} deg" in text
+        assert (nutdamp.compare(needed, ("none", "four-pulse")).verdict.status is Status.NO_PULSE) is kept
     easy = replace(body, requirement=Requirement(nutation=1.0))
     assert not requirements.unaided(replace(easy, dissipation=40.0))
     assert not requirements.unaided(replace(easy, goal=Goal(spin=body.spin)))
@@ -135,7 +135,8 @@ def test_what_dissipation_makes_of_it_counts() -> None:
     assert requirements.unaided(growing)
     assert not requirements.unaided(replace(growing, limits=Limits(horizon=21.0)))
     assert not requirements.unaided(replace(calm, dissipation=0.01))  # e-fold 2,000 times: beyond any float
-    check_text("verdicts.needless-growing", decisions.needless(compare(growing, ("four-pulse",))) or "")
+    assert "horizon of 20 s" in idle(nutdamp.compare(growing, ("none",)).verdict)
+    assert "horizon" not in idle(nutdamp.compare(calm, ("none",)).verdict)
     assert not requirements.unaided(replace(calm, disturbances=TILTING))
 
 
@@ -145,7 +146,8 @@ def test_what_dissipation_makes_of_it_counts() -> None:
 )
 def test_changes_of_spin_count(A: float, C: float, degrees: float, horizon: float, kept: bool) -> None:
     """H stays, so the spin falls with cos θ: by the reference integrator too, for either shape."""
-    body = spinner(A, C, degrees=degrees, requirement=Requirement(nutation=math.radians(30)))
+    limit = Requirement(nutation=math.radians(30), spin=SpinTolerance(1e-3))
+    body = spinner(A, C, degrees=degrees, requirement=limit)
     body = replace(body, dissipation=30.0, goal=WIDE, limits=Limits(horizon=horizon))
     ended = reference.fly(body.inertia.moments, body.omega0, [], horizon, growth=body.growth)
     assert bool(abs(ended.rates[2] - 3.0) <= 3e-3) is kept is requirements.unaided(body)

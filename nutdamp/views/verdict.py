@@ -1,0 +1,309 @@
+"""The verdict in words: its headline, its sentence, a row for each bound, and the same as JSON.
+
+All screens, pages, figures and files take these; no other module has a word for a status.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import groupby, pairwise
+from operator import attrgetter
+from typing import Any
+
+from rich.text import Text
+
+from nutdamp.common.numerics import MISSING, RPM
+from nutdamp.planning.decision import Comparison
+from nutdamp.planning.notes import reasons, strays
+from nutdamp.planning.verdict import Cases, Light, Line, Status, Verdict
+from nutdamp.spacecraft.model import required_share
+from nutdamp.spacecraft.requirements import Bound, Part
+from nutdamp.spacecraft.schedule import Schedule
+from nutdamp.views.tables import TEXT, Column, DataTable, Shared, values_of
+from nutdamp.views.text import degrees, duration, joined, mass, most, quantity, short_angle, text
+
+HEADLINES = {
+    Status.FLY: "FLY",
+    Status.NOT_SHOWN: "NOT SHOWN",
+    Status.NOT_ENOUGH: "NOT ENOUGH",
+    Status.NO_PULSE: "NO PULSE",
+    Status.NO_PLAN: "NO PLAN",
+    Status.NOT_COMMANDABLE: "CANNOT BE COMMANDED",
+}
+"""Words of a status."""
+
+STYLES = {Light.GREEN: "green", Light.AMBER: "yellow", Light.RED: "bold red"}
+"""Colours of a verdict on a terminal."""
+
+MET = {True: "met", False: "NOT met", None: MISSING}
+"""Words for one bound, or for the requirement as a whole."""
+
+DAMPED = {Part.DISTANCE: "reached"}
+"""Words for a bound that nobody requires; of others damped."""
+
+TRAIN, EVEN = 5, 0.05
+"""Pulses of one channel, at least, that are a train, and the share by which their distances may differ: the widths of
+their commands change as the nutation falls."""
+
+FIGURES = 8  # of a value beside its limit, at most
+
+
+def lead(verdict: Verdict) -> str:
+    """Words of the status; where nothing is required they say so."""
+    nothing = verdict.flies and not verdict.required
+    return HEADLINES[verdict.status] + ", nothing required" * nothing
+
+
+def spent(schedule: Schedule) -> str:
+    """Propellant, or the impulse where it is not known."""
+    if schedule.propellant is None:
+        return quantity(schedule.total_impulse, "N m s")
+    return mass(schedule.propellant)
+
+
+def fired(schedule: Schedule) -> str:
+    """Number of pulses, of blocks and of trains; cost, and end of the last one."""
+    trains, single = [], 0
+    for channel, run in groupby(schedule, attrgetter("channel")):
+        del channel
+        times = [pulse.t for pulse in run]
+        gaps = [later - sooner for sooner, later in pairwise(times)]
+        if len(times) >= TRAIN and max(gaps) - min(gaps) <= EVEN * max(gaps):
+            trains.append(len(times))
+        else:
+            single += len(times)
+    if schedule.blocks or not trains:
+        count = f"pulses {len(schedule)}"
+    else:
+        count = " and ".join([*(f"train of {number}" for number in trains), *[f"pulses {single}"] * bool(single)])
+    blocks = f"blocks {len(schedule.blocks)}, " if schedule.blocks else ""
+    return f"{blocks}{count}, {spent(schedule)}, ends at {duration(schedule.end)}"
+
+
+def headline(verdict: Verdict, compared: Comparison | None = None) -> tuple[str, str]:
+    """Headline in two parts, the status and what it is about; of no plan the reasons of the comparison."""
+    words, pulses = lead(verdict), verdict.schedule
+    if verdict.status is Status.NO_PLAN:
+        why = verdict.why if compared is None else joined(reasons(compared))
+        return words, f": {why}" * bool(why)
+    if verdict.idle:
+        return words, f" needed: {idle(verdict)}"
+    ideal = " (ideal impulses)" * pulses.idealised
+    about = f" {verdict.scheme}{ideal}" if words == HEADLINES[Status.FLY] else f": {verdict.scheme}{ideal}"
+    date = verdict.spacecraft.utc(pulses.end)
+    return words, f"{about}: {fired(pulses)}" + ("" if date is None else f", {date[:10]}")
+
+
+def idle(verdict: Verdict) -> str:
+    """Clause on a motion that needs no pulse."""
+    body = verdict.spacecraft
+    there = f"nutation {degrees(body.nutation)} at t = 0"
+    if body.goal.axis is not None:
+        there += f", H {degrees(body.to_turn)} from the target"
+    return there + (f", kept up to the horizon of {duration(body.horizon)}" if body.growth > 0.0 else "")
+
+
+def statement(verdict: Verdict) -> str:
+    """Sentence on the requirement, in words that leave no doubt about its subject; without a full stop."""
+    cases, body = verdict.cases, verdict.spacecraft
+    if verdict.status is Status.NO_PLAN:
+        return verdict.why or "no plan is feasible"
+    broken = " and ".join(strays(aspect) for aspect in verdict.aspects if not aspect.kept)
+    counted = "" if cases is None or cases.complying is None else share_sentence(cases)
+    if not verdict.required:
+        bounds = [line for line in verdict.lines if not line.bound.required]
+        return f"no requirement in file; {', '.join(map(bound_word, bounds))} with nominal values"
+    if verdict.status is Status.NOT_ENOUGH and not verdict.nominally_met:
+        return "; ".join(filter(None, (f"{MET[False]} with nominal values", broken, counted)))
+    if cases is None or cases.complying is None:
+        if verdict.unshown:
+            share = exact_percent(required_share(body.requirement))
+            untold = body.dispersions is None
+            lacks = "the file gives no dispersions" if untold else "cases could not be flown"
+            return f"{share} of cases required, {lacks}; {MET[True]} with nominal values"
+        return f"{MET[True]} with nominal values"
+    if verdict.unshown:
+        low, high = (percent(share, cases.probability) for share in (cases.low, cases.high))
+        return f"{counted}; 95 % interval {low} to {high}"
+    return counted
+
+
+def stated(verdict: Verdict) -> tuple[str, Light]:
+    """Status and sentence on one line, and their colour."""
+    if verdict.flight is None and verdict.cases is not None:  # a closed loop in dispersed cases
+        return loop_sentence(verdict), verdict.light
+    return f"{lead(verdict)}: {statement(verdict)}", verdict.light
+
+
+def loop_sentence(verdict: Verdict) -> str:
+    """Status and sentence of a closed loop, which fires by what it sees and not by a plan."""
+    words = "ENOUGH" if verdict.flies else lead(verdict)
+    if not verdict.required:
+        return f"HELD: the loop falls quiet; {', '.join(map(bound_word, verdict.lines))}"
+    return f"{words}: {statement(verdict)}"
+
+
+def bound_word(line: Line) -> str:
+    """Verdict on one bound with its subject, where it is not required."""
+    subject = "target" if line.bound.part is Part.DISTANCE else line.bound.label
+    return f"{subject} {line_word(line)}"
+
+
+def line_word(line: Line) -> str:
+    """Verdict on one bound."""
+    if line.bound.required:
+        return MET[line.met]
+    return "NOT " * (not line.met) + DAMPED.get(line.bound.part, "damped")
+
+
+def share_sentence(cases: Cases) -> str:
+    """Share of cases that comply, and the share required."""
+    share = share_text(cases)
+    return f"{share} of cases comply ({exact_percent(cases.probability)} required)"
+
+
+def share_text(cases: Cases | None) -> str:
+    """Share that complies; where not all cases have flown, the end of its interval towards the share required."""
+    if cases is None or cases.complying is None:
+        return MISSING
+    if cases.final:
+        return percent(cases.complying, cases.probability)
+    if cases.enough:
+        return f"at least {percent(cases.low, cases.probability)}"
+    return f"at most {percent(cases.high, cases.probability)}"
+
+
+def percent(share: float, *others: float) -> str:
+    """A share in percent to one decimal; to more where it would be taken for one of the ``others``, or for all."""
+    distinct = [other for other in (*others, 0.0, 1.0) if other != share]
+    for digits in range(1, 12):
+        shown = f"{100.0 * share:.{digits}f}"
+        if all(float(shown) != float(f"{100.0 * other:.10g}") for other in distinct):
+            return f"{shown} %"
+    return f"{100.0 * share:.12g} %"
+
+
+def exact_percent(share: float) -> str:
+    """A share that a file gives, in percent as it was written."""
+    return f"{100.0 * share:.10g} %"
+
+
+def coloured(words: str, light: Light) -> Text:
+    """A verdict in its colour."""
+    return Text(words, STYLES[light])
+
+
+# --- a row for each bound
+
+
+def limit(bound: Bound) -> str:
+    """The limit of a bound with its sign and unit."""
+    size = f"{RPM * bound.limit:.4g} rpm" if bound.part is Part.SPIN else most(bound.limit)
+    return f"{'≥' if bound.inner else '≤'} {size}"
+
+
+def value(bound: Bound, number: float | None) -> str:
+    """Value of a bound's part, with as many digits as it takes to stand on its side of the limit; rounding is 0."""
+    if number is None or math.isnan(number):
+        return MISSING
+    scale, unit = (RPM, "rpm") if bound.part is Part.SPIN else (math.degrees(1.0), "deg")
+    if bound.part is Part.SPIN:
+        shown = "0" if abs(number) < SMALL * bound.limit else f"{scale * number:.3g}"
+    else:
+        shown = short_angle(number, bound.limit)
+    edge, figures = float(f"{scale * bound.limit:.4g}"), 3
+    while (float(shown) > edge) != (number > bound.limit) and number != bound.limit and figures < FIGURES:
+        figures += 1
+        shown = f"{scale * number:.{figures}g}"
+    return f"{shown} {unit}"
+
+
+SMALL = 1e-3  # share of a limit of the spin below which what is left of it is shown as 0
+
+
+def margin(line: Line) -> str:
+    """Margin of a bound."""
+    if line.bound.part is Part.SPIN:
+        return f"{RPM * line.margin:.3g} rpm"
+    return f"{short_angle(line.margin, line.bound.limit)} deg"
+
+
+def bound_table(verdict: Verdict, lines: Sequence[Line] | None = None, title: str = "Requirement") -> DataTable:
+    """One row a bound: limit, nominal value, that in the share of cases required, cases that keep it alone, margin."""
+    cases = verdict.cases
+    level = Shared.NOMINAL if cases is None else f"{exact_percent(cases.probability)} within"
+    dispersed = "page screen" * (cases is not None)
+    everywhere = "page screen"
+
+    def alone(line: Line) -> str:
+        return MISSING if line.share is None or cases is None else percent(line.share, cases.probability)
+
+    columns = (
+        Column("", "requirement", "", lambda line: line.bound.label, where=everywhere, kind=TEXT),
+        Column("", "limit", "", lambda line: limit(line.bound), where=everywhere),
+        Column("", Shared.NOMINAL, "", lambda line: value(line.bound, line.nominal), where=everywhere),
+        Column("", level, "", lambda line: value(line.bound, line.dispersed), where=dispersed),
+        Column("", "keep it", "", alone, where=dispersed),
+        Column("", "margin", "", margin, where=everywhere),
+        Column("", "", "", line_word, where=everywhere, kind=TEXT, met=lambda line: line.met),
+    )
+    return DataTable(title, columns, verdict.lines if lines is None else lines)
+
+
+def worth(line: Line) -> float:
+    """Order in which bounds are shown where there is little room: the least share of the limit that is left first."""
+    return float(1.0 - line.bound.used(line.value))
+
+
+def scheme_word(compared: Comparison, plan: Any) -> str:
+    """Verdict on one of the plans compared, or in short why it is not recommended."""
+    verdict, why = compared.verdicts[plan], compared.shortcoming(plan)
+    if why is not None:
+        return text(why)
+    if verdict.required:
+        return MET[True]
+    return ", ".join(line_word(line) for line in verdict.lines)
+
+
+# --- files
+
+
+def in_unit(bound: Bound, **values: float | None) -> dict[str, float | None]:
+    """Values of a part by their names, in the unit that the names get in files."""
+    unit, scale = ("rad_s", 1.0) if bound.part is Part.SPIN else ("deg", math.degrees(1.0))
+    return {f"{name}_{unit}": None if size is None else scale * size for name, size in values.items()}
+
+
+def line_json(line: Line) -> dict[str, Any]:
+    """A bound: its limit, values, share of the cases that keep it alone, and margin."""
+    bound = line.bound
+    named = {"part": bound.part.value, "required": bound.required}
+    if bound.part is Part.CONE and bound.keep is not None:
+        named |= {"name": bound.keep.name, "edge": "min" if bound.inner else "max"}
+    values = in_unit(bound, limit=bound.limit, nominal=line.nominal, dispersed=line.dispersed, margin=line.margin)
+    return {**named, **values, "share": line.share, "met": line.met}
+
+
+def cases_json(cases: Cases | None) -> dict[str, Any] | None:
+    """Share of the cases that comply, its interval, and the share required; None where none were flown."""
+    if cases is None or cases.complying is None:
+        return None
+    return values_of(cases, "samples", "seed", "met_fraction=complying", "low", "high", "probability")
+
+
+def verdict_json(verdict: Verdict) -> dict[str, Any]:
+    """The object ``decision`` of every JSON file."""
+    return {
+        "status": verdict.status.value,
+        "scheme": verdict.scheme or None,
+        "met": verdict.met,
+        "verdict": statement(verdict),
+        "requirement": [line_json(line) for line in verdict.lines],
+        "causes": [cause._asdict() for cause in verdict.causes],
+        "cheaper": [
+            {"scheme": cheaper.scheme, "code": cheaper.why.code, "text": text(cheaper.why)}
+            for cheaper in verdict.cheaper
+        ],
+        "cases": cases_json(verdict.cases),
+    }
