@@ -201,7 +201,7 @@ def _completes(facts: Facts, path: KeyPath, others: str, what: str) -> Iterator[
 def _bounded(facts: Facts, path: KeyPath, other: str, kind: str, *, equal: bool) -> Iterator[Finding]:
     (bound,) = _others(path, other)
     value, limit = facts.number(kind, *path), facts.number(kind, *bound)
-    if value is None or limit is None or limit <= 0.0:
+    if value is None or limit is None:
         return
     if value > limit and equal:
         problem = f"exceeds {bound[-1]}; expected at most {amount(kind, limit)}"
