@@ -74,7 +74,12 @@ def example_subject(name: str) -> str:
     return " ".join(line.removeprefix("#").strip() for line in sentence.splitlines())
 
 
-def _contents(text: str, name: str, settings: Sequence[Setting], warn: Warn) -> tuple[keys.SpacecraftFile, Node]:
+def _contents(
+    text: str,
+    name: str,
+    settings: Sequence[Setting],
+    warn: Warn,
+) -> tuple[keys.SpacecraftFile, Node]:
     """The contents of a file without faults, and its tree."""
     root, faults = read_tree(text, name)
     root, unplaced = overlay(root, settings)

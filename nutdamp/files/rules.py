@@ -1,4 +1,4 @@
-"""Constraints between the keys of a spacecraft file: a table of the plain ones, and those of body, motion and sky.
+"""Constraints between the keys of a spacecraft file: the plain ones in a table; body, motion, sky.
 
 The rules read the raw tree (`Facts`) and skip unreadable values, so that they work beside any other fault.
 """
@@ -87,7 +87,7 @@ class Facts:
         return [(*path, step) for step, _ in self.children(*path)]
 
     def matching(self, pattern: str) -> list[KeyPath]:
-        """Paths of a pattern such as ``thrusters.*.force``, the last step of which need not be there."""
+        """Paths of a pattern such as ``thrusters.*.force``; its last step need not be there."""
         paths: list[KeyPath] = [()]
         for step in pattern.split("."):
             deeper = [self.below(*path) if step == "*" else [(*path, step)] for path in paths]
@@ -110,7 +110,12 @@ RULES = (
     ("inertia.A", "missing", ".tensor", "the transverse moment of inertia, in kg m^2"),
     ("inertia.C", "missing", ".tensor", "the axial moment of inertia, in kg m^2"),
     ("inertia.tensor", "beside", ".A .C", "keep either tensor, or A and C"),
-    ("attitude.quaternion", "missing", ".spin_axis", f"turn from body to frame, scalar first, or spin_axis: {SKY}"),
+    (
+        "attitude.quaternion",
+        "missing",
+        ".spin_axis",
+        f"turn from body to frame, scalar first, or spin_axis: {SKY}",
+    ),
     ("attitude.quaternion", "not zero", "number", "expected a rotation, such as [1, 0, 0, 0]"),
     ("attitude.spin_axis", "beside", ".quaternion", KEEP),
     ("attitude.of", "beside", ".quaternion", KEEP),
@@ -121,13 +126,28 @@ RULES = (
     ("sun_sensor", "needs", "sun", SUN),
     ("commands", "needs", "sun_sensor", ", whose pulse fires the blocks"),
     ("commands.width.min", "at most", ".max", "time"),
-    ("orbit", "needs", "attitude.epoch attitude.frame", ": the moment of the position and the axes that it is in"),
-    ("orbit.position", "not zero", "length", "expected the position of the spacecraft relative to center"),
+    (
+        "orbit",
+        "needs",
+        "attitude.epoch attitude.frame",
+        ": the moment of the position and the axes that it is in",
+    ),
+    (
+        "orbit.position",
+        "not zero",
+        "length",
+        "expected the position of the spacecraft relative to center",
+    ),
     ("keep", "once", "name", "take another"),
     ("keep.*.direction", "needs", "attitude", POINTING),
     ("keep.*.min", "missing", ".max", "give min, max or both, else the cone has no effect"),
     ("keep.*.min", "at most", ".max", "angle"),
-    ("goal.tilt", "beside", ".right_ascension .declination", "keep tilt and azimuth, or the other pair"),
+    (
+        "goal.tilt",
+        "beside",
+        ".right_ascension .declination",
+        "keep tilt and azimuth, or the other pair",
+    ),
     ("goal.tilt", "completes", ".azimuth", "names no direction"),
     ("goal.declination", "completes", ".right_ascension", "names no direction"),
     ("goal.right_ascension", "completes", ".declination", "names no direction"),
@@ -162,14 +182,23 @@ RULES = (
     ("loop.sensor.quantisation", "needs", "loop.sensor.rate", SAMPLED),
     ("loop.sensor.low_pass", "needs", "loop.sensor.rate", SAMPLED),
     ("loop.sensor.axis", "not zero", "number", "expected a direction, such as [0, 0, 1]"),
-    ("loop.sensor.scale", "not zero", "ratio", "the sensor would show nothing; expected about 100 %"),
+    (
+        "loop.sensor.scale",
+        "not zero",
+        "ratio",
+        "the sensor would show nothing; expected about 100 %",
+    ),
     ("loop.faults.reversed", "once", "", "expected each channel once"),
 )
 
 
 def _others(path: KeyPath, others: str) -> list[KeyPath]:
     """Paths of the other keys in a row of the table."""
-    return [(*path[:-1], other[1:]) if other.startswith(".") else tuple(other.split(".")) for other in others.split()]
+    paths: list[KeyPath] = []
+    for other in others.split():
+        beside = other.startswith(".")
+        paths.append((*path[:-1], other[1:]) if beside else tuple(other.split(".")))
+    return paths
 
 
 def _beside(facts: Facts, path: KeyPath, others: str, cure: str) -> Iterator[Finding]:
@@ -198,7 +227,14 @@ def _completes(facts: Facts, path: KeyPath, others: str, what: str) -> Iterator[
         yield Finding(path, f"missing; {' and '.join(there)} alone {what}")
 
 
-def _bounded(facts: Facts, path: KeyPath, other: str, kind: str, *, equal: bool) -> Iterator[Finding]:
+def _bounded(
+    facts: Facts,
+    path: KeyPath,
+    other: str,
+    kind: str,
+    *,
+    equal: bool,
+) -> Iterator[Finding]:
     (bound,) = _others(path, other)
     value, limit = facts.number(kind, *path), facts.number(kind, *bound)
     if value is None or limit is None:
@@ -284,7 +320,7 @@ def _names(facts: Facts) -> Iterator[Finding]:
             yield Finding(path, problem, at_key)
 
 
-CANCELLED = 1e-12  # a sum that is smaller than its terms by this factor is rounding, and counts as zero
+CANCELLED = 1e-12  # a sum that is smaller than its terms by this factor counts as zero
 
 SYMMETRIC = 1e-9  # asymmetry of an inertia tensor that is rounding, relative to its largest entry
 
@@ -344,7 +380,8 @@ def moments_fault(moments: Vector) -> str | None:
         wrong = " or ".join(f"{moment:g}" for moment in moments if moment <= smallest)
         return f"{values}; all three must be above 0, not {wrong}"
     if largest > (least + middle) * (1 + SYMMETRIC):
-        return f"{values}: the largest must not exceed the sum of the other two (triangle inequality)"
+        limit = "the largest must not exceed the sum of the other two (triangle inequality)"
+        return f"{values}: {limit}"
     return None
 
 
@@ -375,7 +412,11 @@ def wheel_of(facts: Facts) -> float:
 
 def _spin_axis_fault(tensor: Vector, facts: Facts) -> Finding | None:
     """The reason why free spin about principal axis 3 is unstable, and its growth, if the spin is known."""
-    moments, spin, wheel = rigid_body.principal_axes(symmetric(tensor))[0], spin_of(facts), wheel_of(facts)
+    moments, spin, wheel = (
+        rigid_body.principal_axes(symmetric(tensor))[0],
+        spin_of(facts),
+        wheel_of(facts),
+    )
     if wheel != 0.0:
         if spin is None or (grows := rigid_body.growth(moments, spin, wheel)).stable:
             return None
@@ -387,7 +428,10 @@ def _spin_axis_fault(tensor: Vector, facts: Facts) -> Finding | None:
     values = ", ".join(f"{name} = {moment:.10g}" for moment, name in named)
     kind, growth = rigid_body.axis_class(moments), ""
     if kind == "degenerate":
-        problem, growth = f"the same principal moment as just one other axis ({values} kg m^2)", " and drifts evenly"
+        problem, growth = (
+            f"the same principal moment as just one other axis ({values} kg m^2)",
+            " and drifts evenly",
+        )
     elif kind == "intermediate":
         problem = f"the middle principal moment ({values} kg m^2)"
         if spin is not None:
@@ -406,22 +450,29 @@ def spin_of(facts: Facts) -> float | None:
 
 
 def _motion(facts: Facts) -> Iterator[Finding]:
-    for path, spin in ((("state", "spin"), facts.number("rate", "state", "spin")), _spin_of_omega0(facts)):
+    for path, spin in (
+        (("state", "spin"), facts.number("rate", "state", "spin")),
+        _spin_of_omega0(facts),
+    ):
         if spin is not None and abs(spin) < SMALLEST and not wheel_of(facts):
-            yield Finding(path, "the spin is zero; expected a rate about axis 3, or a wheel; nothing nutates without")
+            cure = "expected a rate about axis 3, or a wheel; nothing nutates without"
+            yield Finding(path, f"the spin is zero; {cure}")
     spin, inertia = spin_of(facts), inertia_of(facts)
     final = facts.number("rate", "goal", "spin")
     if final is not None and spin is not None and final * spin < 0.0:
-        yield Finding(("goal", "spin"), "of the other sign than the spin at t = 0; the spin cannot be reversed")
+        yield Finding(
+            ("goal", "spin"),
+            "of the other sign than the spin at t = 0; the spin cannot be reversed",
+        )
     if spin is None or inertia is None or not inertia.wheel:
         return
     axial, path = inertia.axial(spin), ("wheel", "momentum")
     if abs(axial) <= CANCELLED * abs(inertia.wheel):
-        momentum = f"{inertia.C * spin:.4g} N m s"
-        yield Finding(path, f"cancels the C ω3 of the body, {momentum}: without momentum nothing nutates")
+        problem = f"cancels the C ω3 of the body, {inertia.C * spin:.4g} N m s"
+        yield Finding(path, f"{problem}: without momentum nothing nutates")
     elif axial * spin < 0.0 and facts.has("sun_sensor"):
-        problem = "turns the angular momentum against the spin: blocks fired from the Sun pulse are not planned"
-        yield Finding(path, f"{problem} then; leave sun_sensor out")
+        problem = "turns the angular momentum against the spin: blocks fired from the Sun pulse"
+        yield Finding(path, f"{problem} are not planned then; leave sun_sensor out")
     if facts.has("dissipation") and not facts.has("dissipation", "nutation"):
         problem = "missing; with a wheel the place of the loss decides: give grows or decays"
         yield Finding(("dissipation", "nutation"), problem)
@@ -475,7 +526,7 @@ ALONG = 1e-3  # rad from the spin axis, up to which the Sun counts as along it
 
 
 def _sun(facts: Facts) -> Iterator[Finding]:
-    """Faults of the Sun: one that is asked for and not there, or that cannot be computed, or has no side."""
+    """A Sun that is asked for and not there, cannot be computed, or has no side."""
     for path in facts.matching("keep.*.direction"):
         if facts.text(*path) == "sun" and not facts.has("sun"):
             yield Finding(path, f"needs sun{SUN}")
@@ -483,7 +534,10 @@ def _sun(facts: Facts) -> Iterator[Finding]:
     if sun is None and facts.text("sun") == "epoch" and facts.has("attitude"):
         epoch, cure = facts.text("attitude", "epoch"), f"give {SKY}"
         problem = f"the Sun is computed for epochs from 1972 on, not for {epoch}; {cure}"
-        yield Finding(("sun",), problem if epoch else f"epoch needs attitude.epoch, the date of t = 0; or {cure}")
+        yield Finding(
+            ("sun",),
+            problem if epoch else f"epoch needs attitude.epoch, the date of t = 0; or {cure}",
+        )
     if sun is not None and axis is not None and facts.has("attitude", "sun_phase"):
         angle = float(attitude.angle_between(attitude.on_sphere(*axis.tolist()), sun))
         if min(angle, math.pi - angle) < ALONG:
@@ -510,5 +564,5 @@ def _declinations(facts: Facts) -> Iterator[Finding]:
         for path in facts.matching(pattern):
             angle = facts.number("angle", *path, 1)
             if angle is not None and abs(angle) > 0.5 * math.pi * (1.0 + 1e-12):
-                problem = f"{math.degrees(angle):g} deg is no declination; expected -90 deg to 90 deg"
-                yield Finding((*path, 1), problem)
+                problem = f"{math.degrees(angle):g} deg is no declination"
+                yield Finding((*path, 1), f"{problem}; expected -90 deg to 90 deg")

@@ -1,7 +1,8 @@
 """Schedules and command blocks as CSV, written and read.
 
-Three columns are enough, and rule: start_s (or t_s, the centre), on_time_s and channel. Torque and impulse columns are
-read for pulses of the steerable torquer, ideal ones, and those of channels that the spacecraft file does not know.
+Three columns are enough, and rule: start_s (or t_s, the centre), on_time_s and channel. Torque and
+impulse columns are read for pulses of the steerable torquer, ideal ones, and those of channels that
+the spacecraft file does not know.
 """
 
 from __future__ import annotations
@@ -20,7 +21,14 @@ from nutdamp.planning.plan import Plan
 from nutdamp.schemes.catalogue import SchemeOptions
 from nutdamp.spacecraft.equipment import Block, Channel
 from nutdamp.spacecraft.model import Spacecraft, Vector
-from nutdamp.spacecraft.schedule import STEERABLE, Pulse, Schedule, channel_pulse, on_command, overlapping
+from nutdamp.spacecraft.schedule import (
+    STEERABLE,
+    Pulse,
+    Schedule,
+    channel_pulse,
+    on_command,
+    overlapping,
+)
 from nutdamp.units import shown
 
 TORQUE = ("torque_1_Nm", "torque_2_Nm", "torque_3_Nm")
@@ -95,7 +103,10 @@ def _block(row: Row, spacecraft: Spacecraft) -> Block | None:
         row.fault("channel", f"the spacecraft file has no channel {shown(name)}; {cure}")
     delay, width = (_time(row, spacecraft, name) for name in TIMES)
     if width == 0.0:
-        row.fault("width_s" if "width_s" in row else "width_counts", "0 s fires nothing; expected a time above 0")
+        row.fault(
+            "width_s" if "width_s" in row else "width_counts",
+            "0 s fires nothing; expected a time above 0",
+        )
     numbers = [1, 1, 1]
     for place, (column, most) in enumerate((("first_sun_pulse", LATEST), ("count", MOST_FIRED), ("every", LATEST))):
         value = row.number(column) if column != "every" or row.get("every") else 1.0
@@ -126,7 +137,10 @@ def _time(row: Row, spacecraft: Spacecraft, name: str) -> float | None:
     time = commands.time(name, value)
     if time is None:
         most = len(commands.widths)
-        row.fault(column, f"expected the number of an entry of commands.width, 1 to {most}, got {row[column]}")
+        row.fault(
+            column,
+            f"expected the number of an entry of commands.width, 1 to {most}, got {row[column]}",
+        )
     return time
 
 
@@ -164,7 +178,8 @@ def read_pulses(path: str | Path, spacecraft: Spacecraft) -> tuple[Schedule, lis
     if not {*STARTS} & {*table.header}:
         missing = f"the column is missing (or {STARTS[1]}, the centre)"
         table.fault(1, STARTS[0], missing + table.misspelt(STARTS[0]))
-    steered = {*TORQUE, *IMPULSE} & {*table.header}  # then a pulse without channel is one of the torquer
+    # With torques or impulses a pulse without channel is one of the torquer.
+    steered = {*TORQUE, *IMPULSE} & {*table.header}
     table.expect("on_time_s", *(() if steered else ("channel",)))
     channels = {channel.name: channel for channel in spacecraft.channels}
     pulses = []
@@ -200,7 +215,8 @@ def _pulse(row: Row, spacecraft: Spacecraft, channels: Channels) -> Pulse | None
     """The pulse of a row, with a full tank; None for a fault."""
     name = row.get("channel") or STEERABLE
     if not name.isprintable():
-        row.fault("channel", f"{shown(name)} is no name of a channel; printable characters are expected")
+        problem = f"{shown(name)} is no name of a channel"
+        row.fault("channel", f"{problem}; printable characters are expected")
         return None
     channel = channels.get(name)
     timing = _timing(row, channel)
@@ -208,7 +224,9 @@ def _pulse(row: Row, spacecraft: Spacecraft, channels: Channels) -> Pulse | None
         return None
     t, on_time, start = timing
     if channel is not None and on_time > 0.0:
-        return channel_pulse(channel, t, on_time) if start is None else on_command(channel, start, on_time)
+        if start is None:
+            return channel_pulse(channel, t, on_time)
+        return on_command(channel, start, on_time)
     faults = len(row.table.faults)
     torque = _numbers(row, TORQUE) if on_time > 0.0 else None
     impulse = _numbers(row, IMPULSE) if torque is None else torque * on_time
@@ -232,9 +250,13 @@ def _timing(row: Row, channel: Channel | None) -> tuple[float, float, float | No
     if time is None or on_time is None:
         return None
     if on_time < 0.0:
-        least, most = (0.0, math.inf) if channel is None else (channel.min_on_time, channel.max_on_time)
+        least = 0.0 if channel is None else channel.min_on_time
+        most = math.inf if channel is None else channel.max_on_time
         allowed = f"{least:g} s or more" if most == math.inf else f"{least:g} s to {most:g} s"
-        row.fault("on_time_s", f"{on_time:g} s is negative; {allowed} is expected (0 for an ideal impulse)")
+        row.fault(
+            "on_time_s",
+            f"{on_time:g} s is negative; {allowed} is expected (0 for an ideal impulse)",
+        )
         return None
     lead = None if channel is None or on_time == 0.0 else _lead(row, channel, on_time)
     centre = 0.5 * on_time if lead is None else lead
@@ -271,7 +293,8 @@ def _missing(name: str, channels: Channels, on_time: float) -> str:
     impulse, torque = (f"{columns[0]} to {columns[-1]}" for columns in (IMPULSE, TORQUE))
     columns = impulse if on_time == 0.0 else f"{torque} (or {impulse})"
     if name in channels:
-        return f"with an on-time of 0 {shown(name)} fires nothing, unless {columns} give an ideal impulse"
+        nothing = f"with an on-time of 0 {shown(name)} fires nothing"
+        return f"{nothing}, unless {columns} give an ideal impulse"
     if name == STEERABLE:
         return f"a steered pulse needs {columns}"
     close = nearest(name, channels)
@@ -281,9 +304,14 @@ def _missing(name: str, channels: Channels, on_time: float) -> str:
 
 
 def _propellant(
-    row: Row, name: str, spacecraft: Spacecraft, channels: Channels, impulse: Vector, torque: Vector | None
+    row: Row,
+    name: str,
+    spacecraft: Spacecraft,
+    channels: Channels,
+    impulse: Vector,
+    torque: Vector | None,
 ) -> float | None:
-    """Propellant of a pulse that flies as the schedule has it, kg, with a warning where it is not known."""
+    """Propellant, kg, of a pulse flown as the schedule has it; a warning where it is not known."""
     named, torquer = shown(name), spacecraft.torquer
     if name in channels:
         ideal = f"{named} has an on-time of 0: flown as an ideal impulse, its propellant is unknown"
@@ -294,10 +322,11 @@ def _propellant(
         missing = f"channel {named} is not in the spacecraft file ({known})"
         row.warn(f"unknown {name}", f"{missing}: flown as given, propellant unknown")
         return None
-    size = 0.0 if torque is None else float(np.linalg.norm(torque))
-    if torque is not None and torquer.torque is not None and abs(size - torquer.torque) > AGREES * torquer.torque:
-        text = f"{size:g} N m is not the torque of the steerable torquer, {torquer.torque:g} N m: flown as given"
-        row.warn("steerable torque", text)
+    if torque is not None and torquer.torque is not None:
+        size = float(np.linalg.norm(torque))
+        if abs(size - torquer.torque) > AGREES * torquer.torque:
+            others = f"the torque of the steerable torquer, {torquer.torque:g} N m"
+            row.warn("steerable torque", f"{size:g} N m is not {others}: flown as given")
     rate = torquer.propellant_per_impulse
     return None if rate is None else rate * float(np.linalg.norm(impulse))
 

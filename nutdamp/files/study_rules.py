@@ -1,4 +1,4 @@
-"""Constraints on keys for studies that a row of a table cannot say: dispersions, correlations, the closed loop."""
+"""Constraints on keys for studies that no row of a table says: dispersions, correlations, loop."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from nutdamp.spacecraft.tolerances import KINDS, READING
 from nutdamp.units import shown
 
 LARGEST_SIGMA, LARGEST_OFFSET = 0.5, 1.0
-"""One sigma of a normal distribution, and half widths and fixed offsets of others, in % of a value or of a right angle:
-beyond the first one draw in forty would turn the sign of the value, beyond the second all may."""
+"""One sigma of a normal distribution, and half widths and fixed offsets of others, in % of a value
+or of a right angle: beyond the first one draw in forty would turn its sign, beyond the second any."""
 
 
 def dispersion_findings(root: Node) -> Iterator[Finding]:
@@ -81,7 +81,13 @@ def _distributions(facts: Facts) -> Iterator[Finding]:
 
 
 def _example(kind: str) -> str:
-    sizes = {"inertia": "2 %", "mass": "1 %", "pressure": "2 %", "rate": "0.1 deg/s", "force": "3 %"}
+    sizes = {
+        "inertia": "2 %",
+        "mass": "1 %",
+        "pressure": "2 %",
+        "rate": "0.1 deg/s",
+        "force": "3 %",
+    }
     sizes |= {"ratio": "1 %", "angle": "0.5 deg", "length": "5 mm", READING: "0.01 deg/s"}
     return f"{{normal: {sizes.get(kind, '5 ms')}}}, or uniform, triangular, bias"
 
@@ -105,9 +111,11 @@ def _size_fault(facts: Facts, path: KeyPath, key: str, value: object) -> str | N
         return None
     share = abs(size) if relative else abs(size) / RIGHT_ANGLE
     if key == "normal" and share > LARGEST_SIGMA:
-        return f"{shown(value)} is out of range; expected {what} of at most {_percent(LARGEST_SIGMA, relative)}"
+        most = _percent(LARGEST_SIGMA, relative)
+        return f"{shown(value)} is out of range; expected {what} of at most {most}"
     if key != "normal" and share >= LARGEST_OFFSET:
-        return f"{shown(value)} is out of range; expected {what} below {_percent(LARGEST_OFFSET, relative)}"
+        most = _percent(LARGEST_OFFSET, relative)
+        return f"{shown(value)} is out of range; expected {what} below {most}"
     return None
 
 
@@ -125,7 +133,10 @@ def _of_sensor(facts: Facts) -> Iterator[Finding]:
         for distribution in KINDS if key == "sensor_bias" and kind is not None else ():
             text = facts.text(*path, distribution)
             if text is not None and facts.number(wrong, *path, distribution) is not None:
-                yield Finding((*path, distribution), f"{shown(text)} is not in the unit of the sensor: {right}")
+                yield Finding(
+                    (*path, distribution),
+                    f"{shown(text)} is not in the unit of the sensor: {right}",
+                )
 
 
 def correlation_findings(spacecraft: Spacecraft) -> Iterator[Finding]:
@@ -143,7 +154,9 @@ def correlation_findings(spacecraft: Spacecraft) -> Iterator[Finding]:
         for place, name in enumerate((first, second)):
             if name not in known:
                 close = nearest(name, known)
-                cure = f"did you mean {shown(close)}?" if close else f"known here: {', '.join(known) or 'none'}"
+                cure = f"known here: {', '.join(known) or 'none'}"
+                if close is not None:
+                    cure = f"did you mean {shown(close)}?"
                 problem = f"the dispersions have no input called {shown(name)}; {cure}"
                 found.append(Finding((*path, row, place), problem))
             elif name in fixed:
@@ -162,8 +175,9 @@ def correlation_findings(spacecraft: Spacecraft) -> Iterator[Finding]:
     yield from found
     for group in () if found else grouped(pairs):
         if not positive_definite(group):
-            problem = f"not positive definite for {', '.join(group.names)}: no numbers have these correlations"
-            yield Finding(path, f"{problem}; pairs that are not given count as 0")
+            problem = f"not positive definite for {', '.join(group.names)}"
+            why = "no numbers have these correlations; pairs that are not given count as 0"
+            yield Finding(path, f"{problem}: {why}")
 
 
 SAMPLES = 4.0  # samples a nutation period without which the phase of the nutation is hardly seen
@@ -179,7 +193,11 @@ def loop_findings(root: Node) -> Iterator[Finding]:
     if law == "bang" and not facts.has("loop", "on_time"):
         yield Finding(("loop", "on_time"), "missing; the law bang fires pulses of this length")
     if law == "one-pulse" and facts.has("loop", "on_time"):
-        yield Finding(("loop", "on_time"), "is for four-pulse and bang; one-pulse fires for as long as it takes", True)
+        yield Finding(
+            ("loop", "on_time"),
+            "is for four-pulse and bang; one-pulse fires for as long as it takes",
+            True,
+        )
     yield from _channels(facts)
     yield from _sensor(facts)
     inertia, spin = inertia_of(facts), spin_of(facts)
@@ -188,15 +206,17 @@ def loop_findings(root: Node) -> Iterator[Finding]:
     rate, alias = facts.number("frequency", *SENSOR, "rate"), facts.value("loop", "alias")
     least = SAMPLES * abs(inertia.nutation_rate(spin)) / (2.0 * math.pi)
     if rate is not None and 0.0 < rate < least and alias is not True:
-        problem = f"{rate:g} Hz is below four times the nutation frequency; expected at least {least:.4g} Hz"
-        yield Finding((*SENSOR, "rate"), f"{problem}, or alias: true beside start")
+        problem = f"{rate:g} Hz is below four times the nutation frequency"
+        cure = f"expected at least {least:.4g} Hz, or alias: true beside start"
+        yield Finding((*SENSOR, "rate"), f"{problem}; {cure}")
     if facts.text(*SENSOR, "kind") == "accelerometer":
         yield from _accelerometer(facts, inertia)
 
 
 def _channels(facts: Facts) -> Iterator[Finding]:
     """Channels that are not there, and an on-time that one does not allow."""
-    times = {facts.text(*path, "name"): on_times_of(facts, path) for path in facts.below("thrusters")}
+    thrusters = facts.below("thrusters")
+    times = {facts.text(*path, "name"): on_times_of(facts, path) for path in thrusters}
     named = {str(path[-1]): facts.below(*path) for path in facts.below("channels")}
     channels = {name: [facts.text(*entry) for entry in entries] for name, entries in named.items()}
     channels = channels or {name: [name] for name in times if name is not None}
@@ -204,25 +224,36 @@ def _channels(facts: Facts) -> Iterator[Finding]:
     for name, members in channels.items():
         allowed = [times[member] for member in members if member in times]
         if on_time is not None and allowed:
-            least, most = max(shortest for shortest, _ in allowed), min(longest for _, longest in allowed)
+            least, most = (
+                max(shortest for shortest, _ in allowed),
+                min(longest for _, longest in allowed),
+            )
             if not least <= on_time <= most:
                 problem = f"{on_time:g} s is outside what {name} allows: {span(least, most, 's')}"
                 yield Finding(("loop", "on_time"), problem)
     for path in facts.below("loop", "faults", "reversed"):
         turned = facts.text(*path)
         if turned is not None and turned not in channels:
-            yield Finding(path, f"no channel is called {shown(turned)}; {instead(turned, list(channels))}")
+            problem = f"no channel is called {shown(turned)}"
+            yield Finding(path, f"{problem}; {instead(turned, list(channels))}")
 
 
 def _sensor(facts: Facts) -> Iterator[Finding]:
     kind = facts.text(*SENSOR, "kind")
-    needed = {"rate": "samples, of which a sine is made", "position": "where it is, from the centre of mass"}
+    needed = {
+        "rate": "samples, of which a sine is made",
+        "position": "where it is, from the centre of mass",
+    }
     for key, what in needed.items():
         if kind == "accelerometer" and not facts.has(*SENSOR, key):
             yield Finding((*SENSOR, key), f"missing; an accelerometer needs {key}: {what}")
     for key in ("position", "axis"):
         if kind == "gyro" and facts.has(*SENSOR, key):
-            yield Finding((*SENSOR, key), "is for kind: accelerometer; a gyro measures the same everywhere", True)
+            yield Finding(
+                (*SENSOR, key),
+                "is for kind: accelerometer; a gyro measures the same everywhere",
+                True,
+            )
     other, right = "acceleration" if kind == "gyro" else "rate", UNITS_OF.get(kind or "")
     for key in ("noise", "bias", "quantisation") if right else ():
         text = facts.text(*SENSOR, key)
@@ -241,6 +272,7 @@ def _accelerometer(facts: Facts, inertia: Inertia) -> Iterator[Finding]:
     axis = facts.vector("number", 3, *SENSOR, "axis") if facts.has(*SENSOR, "axis") else np.array([0.0, 0.0, 1.0])
     if position is None or axis is None or not axis.any():
         return
-    if is_blind(inertia.moments, inertia.axes.T @ position, inertia.axes.T @ axis / math.hypot(*axis)):
-        problem = "blind: here it shows nothing of the nutation; move it off axis 3, or turn its axis"
-        yield Finding((*SENSOR, "position"), problem)
+    turn = inertia.axes.T
+    if is_blind(inertia.moments, turn @ position, turn @ axis / math.hypot(*axis)):
+        problem = "blind: here it shows nothing of the nutation"
+        yield Finding((*SENSOR, "position"), f"{problem}; move it off axis 3, or turn its axis")

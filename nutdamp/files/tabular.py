@@ -101,7 +101,7 @@ def make_folder(path: str) -> None:
 
 @contextmanager
 def _replacing(target: Path) -> Iterator[IO[bytes]]:
-    """A temporary file that takes the place of ``target`` where the block ends well, with its mode."""
+    """A temporary file that takes the place and mode of ``target`` where the block ends well."""
     handle, name = tempfile.mkstemp(prefix=".nutdamp-", suffix=".part", dir=target.parent)
     temporary = Path(name)
     try:

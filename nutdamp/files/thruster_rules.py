@@ -1,4 +1,4 @@
-"""Constraints between the keys of thrusters, channels, valves and the tank that a row of a table cannot say."""
+"""Constraints between the keys of thrusters, channels and the tank that no row of a table says."""
 
 from __future__ import annotations
 
@@ -74,8 +74,8 @@ def thrust_findings(root: Node) -> Iterator[Finding]:
     """Faults of thrusters, channels and the tank beside those of the table."""
     facts = Facts(root)
     for path in facts.below("thrusters"):
-        torque = torque_of(facts, path)
-        if torque is not None and not facts.has(*path, "torque") and norm(torque[0]) <= CANCELLED * torque[1]:
+        torque = None if facts.has(*path, "torque") else torque_of(facts, path)
+        if torque is not None and norm(torque[0]) <= CANCELLED * torque[1]:
             cure = "the force passes through the centre of mass; move or turn the thruster"
             yield Finding((*path, "position"), f"no torque: {cure}")
     yield from _channels(facts)
@@ -87,13 +87,14 @@ def _channels(facts: Facts) -> Iterator[Finding]:
     paths = {facts.text(*path, "name"): path for path in facts.below("thrusters")}
     names = [name for name in paths if name is not None]
     for path in facts.below("channels"):
-        entries = facts.below(*path)
-        for entry in entries:
+        valves = []
+        for entry in facts.below(*path):
             name = facts.text(*entry)
-            if name is not None and name not in paths:
+            if name in paths:
+                valves.append(_valve(facts, paths[name]))
+            elif name is not None:
                 yield Finding(entry, f"no thruster is called {shown(name)}; {instead(name, names)}")
         # A channel has one valve, so that thrusters with another one would not fire as planned.
-        valves = [_valve(facts, paths[name]) for entry in entries if (name := facts.text(*entry)) in paths]
         if any(valve != valves[0] for valve in valves):
             problem = "its thrusters do not have the same valve or impulse_bit"
             yield Finding(path, f"{problem}; write them alike, or use channels of their own")
@@ -109,7 +110,8 @@ def _propellant(facts: Facts) -> Iterator[Finding]:
     """Missing keys without which a tank, or a table of impulses, is of no use."""
     problem, forces = "missing; tank needs to know the propellant that is used", thrusts(facts)
     for path in facts.below("thrusters"):
-        unknown = forces.get(facts.text(*path, "name") or "", 0.0) is None and not facts.has(*path, "force")
+        thrust = forces.get(facts.text(*path, "name") or "", 0.0)
+        unknown = thrust is None and not facts.has(*path, "force")
         if facts.has("tank") and not facts.has("tank", "isp") and not facts.has(*path, "isp"):
             yield Finding((*path, "isp"), f"{problem}, by isp here or in tank")
         if facts.has("tank") and unknown:
