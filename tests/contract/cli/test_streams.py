@@ -94,7 +94,7 @@ def test_no_blanks_fill_up_lines_in_a_pipe(run: Run) -> None:
     [
         deep("simulate --scheme two-pulse --csv big.csv --json small.json", "momentum shift"),
         deep("disperse --scheme two-pulse --samples 2000 --csv big.csv --json small.json", "nutation, deg"),
-        weekly("plan --plot big.svg --json small.json", "recommended"),
+        weekly("plan --plot big.svg --json small.json", "fly two-pulse"),
         weekly("trade --points 1 --plot big.png --json small.json", "cheapest: "),
     ],
 )
