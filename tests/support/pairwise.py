@@ -20,20 +20,16 @@ def rows(factors: Sequence[Sequence[str]], first: Iterable[Row] = ()) -> list[Ro
 
     Greedy: a row begins with the first pair that no other has, and takes on what adds most of those.
     """
-    both = combinations(range(len(factors)), 2)
+    numbers = range(len(factors))
+    both = combinations(numbers, 2)
     missing = dict.fromkeys(pairs({i: a, j: b})[0] for i, j in both for a in factors[i] for b in factors[j])
-    made = [*first]
-    for row in made:
-        for pair in pairs(dict(enumerate(row))):
-            missing.pop(pair, None)
-    while missing:
-        chosen = dict(next(iter(missing)))
-        for number in set(range(len(factors))) - {*chosen}:
-            added = {
-                value: sum(pair in missing for pair in pairs({**chosen, number: value})) for value in factors[number]
-            }
-            chosen[number] = max(added, key=added.__getitem__)
-        made.append(tuple(chosen[number] for number in range(len(factors))))
+    made, waiting = list[Row](), [dict(enumerate(row)) for row in first]
+    while missing or waiting:
+        chosen = waiting.pop(0) if waiting else dict(next(iter(missing)))
+        for number in set(numbers) - {*chosen}:
+            rivals = {value: pairs({**chosen, number: value}) for value in factors[number]}
+            chosen[number] = max(rivals, key=lambda value: len(missing.keys() & {*rivals[value]}))
+        made.append(tuple(chosen[number] for number in numbers))
         for pair in pairs(chosen):
             missing.pop(pair, None)
     return made

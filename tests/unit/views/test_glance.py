@@ -1,4 +1,4 @@
-"""The default screen of `plan`: what to fire on top, in 24 lines of 80 columns."""
+"""The default screen of `plan`: what to fire on top, in 40 lines of 80 columns."""
 
 from __future__ import annotations
 

@@ -16,6 +16,7 @@ from support.builders import (
     cross,
     judged,
     off_target,
+    pulse,
     spinner,
 )
 from support.golden import check_text
@@ -27,10 +28,12 @@ from nutdamp.planning.plan import Plan, Standing
 from nutdamp.planning.verdict import Status
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import Disturbance, Goal, Limits, Requirement
-from nutdamp.spacecraft.requirements import Part
+from nutdamp.spacecraft.requirements import Bound, Part
+from nutdamp.spacecraft.schedule import Schedule
 from nutdamp.spacecraft.tolerances import SpinTolerance
+from nutdamp.views import verdict
 from nutdamp.views.parts import required
-from nutdamp.views.verdict import idle, percent
+from nutdamp.views.verdict import fired, idle, percent
 
 FIRED = spinner(channels=cross(8.0))
 WIDE = Goal(spin=3.0)
@@ -56,6 +59,27 @@ def test_the_requirement_is_on_one_line() -> None:
 ])  # fmt: skip
 def test_a_share_is_never_rounded_to_what_it_is_not(share: float, of: float, shown: str) -> None:
     assert percent(share, of) == shown
+
+
+@pytest.mark.parametrize(("part", "unit"), [(Part.NUTATION, math.radians(1.0)), (Part.SPIN, math.pi / 30.0)])
+@pytest.mark.parametrize("size", [0.5, 0.1684, 0.003491])
+def test_a_value_is_shown_on_its_side_of_its_limit(part: Part, unit: float, size: float) -> None:
+    bound = Bound(part, size * unit, True)
+    for off in (0.1, 1e-3, 1e-5, 1e-6, -1e-6, -1e-4, -0.3):
+        texts = verdict.value(bound, bound.limit * (1.0 + off)), verdict.limit(bound)
+        shown, edge = (float(text.split()[-2]) for text in texts)
+        assert edge == size
+        assert (shown > edge) is (off > 0.0)
+
+
+def test_pulses_at_even_distances_are_a_train() -> None:
+    even, other = (
+        Schedule(tuple(pulse(t, 0.1, np.ones(3)) for t in times)) for times in ((1, 3, 5, 7, 9), (1, 3, 4, 9))
+    )
+    single = Schedule((*even.pulses, pulse(30.0, 0.1, np.ones(3), "U")))
+    assert [fired(made).partition(", ")[0] for made in (even, other, single)] == [
+        "train of 5", "pulses 4", "train of 5 and pulses 1",
+    ]  # fmt: skip
 
 
 TILTING = (Disturbance(0.5 + 0j),)
