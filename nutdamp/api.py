@@ -365,6 +365,11 @@ def disperse_loop(
     """Fly the closed loop of the file in dispersed cases to ``until`` s, as ``nutdamp disperse --loop`` does.
 
     ``samples``: default what shows the share required. Others: see `disperse`. Raises Infeasible where it cannot damp.
+
+    Examples
+    --------
+    >>> nutdamp.disperse_loop(nutdamp.example("upper-stage"), 20, until=60.0)
+    <LoopDispersion: 20 of 20 cases comply>
     """
     from nutdamp.control_loop import dispersion
     from nutdamp.files.export import streamed
