@@ -366,8 +366,6 @@ def disperse_loop(
 
     ``samples``: default what shows the share required. Others: see `disperse`. Raises Infeasible where it cannot damp.
 
-    Examples
-    --------
     >>> nutdamp.disperse_loop(nutdamp.example("upper-stage"), 20, until=60.0)
     <LoopDispersion: 20 of 20 cases comply>
     """

@@ -294,7 +294,10 @@ def _direction(spacecraft: Spacecraft, angles: Angles, option: str) -> Vector:
 def expect_read(names: Sequence[str], options: Options, body: Spacecraft, doubt: Callable[[str], None]) -> None:
     """Warn of options that none of the schemes ``names`` reads; a usage error where that is the goal itself."""
     planned = [SCHEMES[name] for name in names]
-    for option in options.without_effect([scheme.options for scheme in planned]) if planned else ():
+    unread = [*options.without_effect([scheme.options for scheme in planned])] if planned else []
+    if len(planned) > 1 and "least" in unread:  # it chooses among them, whether they read it or not
+        unread.remove("least")
+    for option in unread:
         readers = [name for name, scheme in SCHEMES.items() if option in names_of(scheme.options)]
         doubt(f"--{option.replace('_', '-')} ignored: it is for {' and '.join(readers)}")
     if body.goal.sun is not None:

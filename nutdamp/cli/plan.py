@@ -39,7 +39,6 @@ if TYPE_CHECKING:
 
 
 scheme_option = partial(click.option, "--scheme", metavar="SCHEME")  # a line does not hold all the names
-JITTER_SEED = 1  # seed of the errors of the Sun pulses from which blocks are fired: the same in every run
 
 
 def flown_options(verb: str, scheme: str | None = None) -> Callable[[Command], Command]:
@@ -89,10 +88,10 @@ def fronts_of(job: Job, points: int, shifts: Sequence[float], least: str, *, nom
         return trade(job.spacecraft, points, shifts, least, with_disturbances=known, nominal=nominal)
 
 
-def plan_or_read(job: Job, *, jitter: bool = False, judged: bool = False) -> Plan:
+def plan_or_read(job: Job, *, judged: bool = False) -> Plan:
     """The pulses that a command flies, as a plan; raises Infeasible where there is none.
 
-    ``jitter``: that of the Sun pulses, with `JITTER_SEED`; ``judged``: a verdict names the cones that are broken.
+    ``judged``: a verdict names the cones that are broken.
     """
     from nutdamp import api
     from nutdamp.planning.notes import infeasibility, plan_notes
@@ -106,7 +105,7 @@ def plan_or_read(job: Job, *, jitter: bool = False, judged: bool = False) -> Pla
         job.doubt(*warnings)
         return plan
     if blocks is not None:
-        return _fired(job, blocks, jitter=jitter)
+        return _fired(job, blocks)
     if scheme is None:
         plan = _recommended(job, judged=judged)
     else:
@@ -135,7 +134,7 @@ def _recommended(job: Job, *, judged: bool) -> Plan:
     return plan
 
 
-def _fired(job: Job, path: str, *, jitter: bool) -> Plan:
+def _fired(job: Job, path: str) -> Plan:
     """The pulses that the command blocks of a file fire, as a plan; raises Infeasible where there is no Sun pulse."""
     from nutdamp.files.schedules import read_blocks
     from nutdamp.planning.notes import broken_limits
@@ -144,9 +143,7 @@ def _fired(job: Job, path: str, *, jitter: bool) -> Plan:
 
     body = job.spacecraft
     blocks, warnings = read_blocks(path, body)
-    if jitter and body.sun_sensor is not None and body.sun_sensor.jitter > 0.0:
-        job.remark(f"the Sun pulses come with a jitter of {body.sun_sensor.jitter:g} s (one sigma, seed {JITTER_SEED})")
-    pulses = fired(body, blocks, JITTER_SEED if jitter else None)
+    pulses = fired(body, blocks)
     job.doubt(*warnings, *broken_limits(body, pulses))
     return Plan(body, printable(path), pulses, options=job.options.of(SchemeOptions), from_file=True)
 
@@ -331,7 +328,7 @@ def simulate_command(job: Job, real: bool, until: float | None, samples: int, at
     input.
     """
     job.begin()
-    plan = plan_or_read(job, jitter=True, judged=not job.silent)
+    plan = plan_or_read(job, judged=not job.silent)
 
     from nutdamp.api import simulate
     from nutdamp.planning.notes import model_warnings

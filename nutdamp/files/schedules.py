@@ -19,6 +19,7 @@ from nutdamp.flight.dynamics import Supply
 from nutdamp.planning.notes import broken_limits
 from nutdamp.planning.plan import Plan
 from nutdamp.schemes.catalogue import SchemeOptions
+from nutdamp.spacecraft.constraints import misfits
 from nutdamp.spacecraft.equipment import Block, Channel
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.schedule import (
@@ -50,7 +51,6 @@ BLOCKS_HEADER = (
     *("impulse_Nms", "nutation_after_deg"),
 )
 
-COUNTS = 1e-6  # share of a step by which a time may be off the commands that there are: the rounding of files
 MOST_FIRED = 5_000  # pulses that the blocks of a file may fire: many more than any campaign, and flown within seconds
 LATEST = 100_000  # number of the last Sun pulse that may fire a block
 
@@ -73,7 +73,8 @@ def read_blocks(path: str | Path, spacecraft: Spacecraft) -> tuple[tuple[Block, 
         if block.first <= over:
             problem = f"Sun pulse {block.first} comes before the block before is over; expected {over + 1} or later"
             row.fault("first_sun_pulse", problem)
-        _against_commands(row, block, spacecraft)
+        for column, value, possible in misfits(spacecraft.commands, block):
+            row.warn(column, f"{column} = {value} cannot be commanded, {possible}: flown as given")
         blocks.append(block)
     total = sum(block.count for block in blocks)
     if total > MOST_FIRED:
@@ -142,29 +143,6 @@ def _time(row: Row, spacecraft: Spacecraft, name: str) -> float | None:
             f"expected the number of an entry of commands.width, 1 to {most}, got {row[column]}",
         )
     return time
-
-
-def _against_commands(row: Row, block: Block, spacecraft: Spacecraft) -> None:
-    """Warn of pulses that cannot be commanded: they are flown as given."""
-    commands = spacecraft.commands
-    if commands is None:
-        return
-    longest = math.floor(commands.delay_max / commands.delay_step * (1.0 + COUNTS)) * commands.delay_step
-    nearest_delay = min(round(block.delay / commands.delay_step) * commands.delay_step, longest)
-    nearest_width = float(commands.widths[np.abs(commands.widths - block.width).argmin()])
-    allowed = ", ".join(map(str, commands.every))
-    off = [
-        (column, f"{given:.6g} s", f"{near:.6g} s is the nearest")
-        for column, given, near, slack in (
-            ("delay_s", block.delay, nearest_delay, COUNTS * commands.delay_step),
-            ("width_s", block.width, nearest_width, COUNTS * block.width),
-        )
-        if abs(given - near) > slack
-    ]
-    off += [("count", str(block.count), f"{commands.max_count} is the most")] * (block.count > commands.max_count)
-    off += [("every", str(block.every), f"only {allowed}")] * (block.every not in commands.every)
-    for column, value, possible in off:
-        row.warn(column, f"{column} = {value} cannot be commanded, {possible}: flown as given")
 
 
 STARTS = ("start_s", "t_s")

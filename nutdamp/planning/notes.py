@@ -209,7 +209,8 @@ def verdict_notes(verdict: Verdict, plan: Plan, *, looped: bool = False) -> Iter
     if looped:
         return
     if verdict.status.barred:
-        yield note("not-commandable", scheme=plan.scheme)
+        single = body.commands is not None and not plan.pulses.blocks
+        yield note("not-commandable" if single else "breaks-limits", scheme=plan.scheme)
     now, limit = body.nutation, _limit_of(body, Part.NUTATION)
     if requirements.only_nutation(body):
         idle, damped = (requirements.to_required(body, now, growing=growing) for growing in (True, False))
@@ -218,6 +219,8 @@ def verdict_notes(verdict: Verdict, plan: Plan, *, looped: bool = False) -> Iter
         if idle:
             yield note("met-without-pulse-until", until_s=idle, nutation_deg=math.degrees(now), limit_deg=limit)
     if len(plan.pulses):
+        if verdict.required and requirements.unaided(body):
+            yield note("met-without-pulse", scheme=plan.scheme)
         yield from _growing(flight, verdict)
     limited = body.goal.axis is not None or _limit_of(body, Part.SHIFT) is not None
     if not limited and final.momentum_shift > TURNED:
@@ -328,7 +331,8 @@ def _missed(chosen: Plan, compared: Comparison, *, tabulated: bool) -> Iterator[
         if chosen.kept is not False and cases is not None and cases.enough is False:  # else the cones are the reason
             missing = ((plan, each) for plan, each in compared.cases.items() if each.enough is False)
             schemes = ", ".join(plan.scheme for plan, _ in missing)
-            yield note("too-few-cases", schemes=schemes, required_share=100.0 * cases.probability)
+            code = "too-few-cases" if compared.preferred is None else "too-few-cases-robust"
+            yield note(code, schemes=schemes, required_share=100.0 * cases.probability)
         return
     left = chosen.left
     assert left is not None
@@ -441,7 +445,8 @@ def reasons(compared: Comparison) -> Iterator[Note]:
     if ground is Ground.CASES:
         yield note("most-cases", count=count)
     elif ground is Ground.ROBUST:
-        yield note("made-for-cases")
+        complies = recommendation.standing is not Standing.MISSES
+        yield note("made-for-cases" if complies else "made-for-most-cases")
     elif recommendation.standing is not Standing.COMPLIES:
         yield note("nearest" if ground is Ground.NEAREST else "least-left", count=count)
     elif recommendation.plan.kept is False:

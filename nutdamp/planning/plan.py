@@ -29,7 +29,7 @@ from nutdamp.planning.verdict import Cases, JudgedCases, Verdict, judge_schedule
 from nutdamp.schemes import catalogue, planner, valve_commands
 from nutdamp.schemes.valve_commands import Legs
 from nutdamp.spacecraft import requirements
-from nutdamp.spacecraft.constraints import Breach, breaches
+from nutdamp.spacecraft.constraints import Breach, breaches, keeps_limits, misfits
 from nutdamp.spacecraft.model import Keep, Spacecraft, Vector
 from nutdamp.spacecraft.requirements import Bound, Held, Left
 from nutdamp.spacecraft.schedule import Schedule
@@ -265,10 +265,18 @@ class Plan(results.Data, results.Tabled):
         """Flown residual for `requirements`."""
         return left_on_the_way(self.flight, self.aspects) if self.feasible else None
 
-    @property
+    @cached_property
     def commandable(self) -> bool:
-        """True if the spacecraft can fire it: by command blocks only, or nothing, where it takes such."""
-        return self.spacecraft.commands is None or bool(self.pulses.blocks) or not self.pulses.pulses
+        """True if the spacecraft can fire it: by command blocks only, or nothing, where it takes such.
+
+        Pulses and blocks read from a file have to keep its limits and commands too.
+        """
+        body, pulses = self.spacecraft, self.pulses
+        if self.from_file:
+            off = any(misfits(body.commands, block) for block in pulses.blocks)
+            if off or not keeps_limits(body, pulses):
+                return False
+        return body.commands is None or bool(pulses.blocks) or not pulses.pulses
 
     @property
     def held(self) -> tuple[Held, ...]:

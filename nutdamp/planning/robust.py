@@ -29,7 +29,8 @@ from nutdamp.planning.notes import beside
 from nutdamp.planning.plan import Plan, Standing
 from nutdamp.planning.screening import FlownPlan, entered
 from nutdamp.planning.verdict import Cases, Verdict, cases_of
-from nutdamp.schemes.catalogue import LEAST, OPTIMAL, SCHEMES, Options
+from nutdamp.schemes import planner
+from nutdamp.schemes.catalogue import LEAST, OPTIMAL, SCHEMES, OptimalOptions, Options
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import keeps_limits
 from nutdamp.spacecraft.model import Spacecraft, required_share
@@ -314,16 +315,24 @@ def _others(body: Spacecraft, base: Plan) -> Iterator[tuple[str, Spacecraft]]:
 
 
 def _early(body: Spacecraft, options: Options) -> Iterator[tuple[str, Plan]]:
-    """Earliest end of `optimal`, and its cheapest plans that end little later."""
-    first = attempt(body, OPTIMAL.name, Options(**{**options.chosen, "least": "time"}))
-    if not first.feasible:
-        return
-    yield "earliest end", first
-    for times in WITHIN:
-        horizon = times * first.end
-        if horizon < body.horizon:
-            soon = replace(body, limits=replace(body.limits, horizon=horizon))
-            yield f"by {horizon:.4g} s", attempt(soon, OPTIMAL.name, options)
+    """Earliest end of `optimal`, and its cheapest plans that end little later; the same with H kept where it is free.
+
+    Free, the pulses on either side of a long axial one damp what the moments of inertia decide; spin-up.yaml:
+    73 % of its cases comply, and 99.98 % with H kept.
+    """
+    settled = planner.settled(SCHEMES[OPTIMAL.name], options, body)
+    free = isinstance(settled, OptimalOptions) and settled.free_axis is True
+    for label, choice in (("", {}), (", H kept", {"free_axis": False, "shift": 0.0}))[: 1 + free]:
+        chosen = Options(**{**options.chosen, **choice})
+        first = attempt(body, OPTIMAL.name, Options(**{**chosen.chosen, "least": "time"}))
+        if not first.feasible:
+            continue
+        yield f"earliest end{label}", first
+        for times in WITHIN:
+            horizon = times * first.end
+            if horizon < body.horizon:
+                soon = replace(body, limits=replace(body.limits, horizon=horizon))
+                yield f"by {horizon:.4g} s{label}", attempt(soon, OPTIMAL.name, chosen)
 
 
 def _planned(variant: str, body: Spacecraft, scheme: str, options: Options) -> list[tuple[str, Plan]]:

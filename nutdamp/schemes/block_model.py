@@ -172,28 +172,28 @@ def first_sun_pulse(spacecraft: Spacecraft) -> float:
     raise sun_pulses.failures[0] or Infeasible("")
 
 
-def fired(spacecraft: Spacecraft, blocks: Sequence[Block], seed: int | None = None) -> Schedule:
+def fired(spacecraft: Spacecraft, blocks: Sequence[Block]) -> Schedule:
     """Pulses fired by ``blocks``; raises what `fire_all` gives as reasons."""
-    (schedule,), _ = fire_all(spacecraft, [blocks], seed)
+    (schedule,), _ = fire_all(spacecraft, [blocks])
     if isinstance(schedule, Infeasible):
         raise schedule
     return schedule
 
 
 def fire_all(
-    spacecraft: Spacecraft, sequences: Sequence[Sequence[Block]], seed: int | None = None
+    spacecraft: Spacecraft, sequences: Sequence[Sequence[Block]]
 ) -> tuple[list[Schedule | Infeasible], list[NDArray[np.bool_]]]:
     """Pulses fired by each of the sequences of blocks, with the Sun pulses of its own motion, and `SunPulses.seen`.
 
-    With a ``seed`` the Sun pulses have the jitter of the sensor. In the place of a schedule is the reason where there
-    is no Sun pulse, a channel is not known, a pulse would begin before the one before is over, or the tank is empty.
+    Sun pulses come without the jitter of the sensor, which dispersed cases draw. In the place of a schedule is the
+    reason where there is no Sun pulse, a channel is not known, a pulse would begin before the one before is over, or
+    the tank is empty.
     """
     sun_pulses = SunPulses(spacecraft, [[n for block in blocks for n in block.sun_pulses] for blocks in sequences])
     supplies, pulses = [Supply(spacecraft) for _ in sequences], [list[Pulse]() for _ in sequences]
     firings = [iter([block for block in blocks for _ in block.sun_pulses]) for blocks in sequences]
     channels = {channel.name: channel for channel in spacecraft.channels}
-    clock, sensor, errors = sun_pulses.clock, spacecraft.sun_sensor, np.random.default_rng(seed)
-    jitter, count = 0.0 if seed is None or sensor is None else sensor.jitter, len(sequences)
+    clock, count = sun_pulses.clock, len(sequences)
     arcs, per_kg = spacecraft.inertia.symmetric and not spacecraft.disturbances, shed(spacecraft)
     over = np.zeros(count)
     for motion, flights in sun_pulses:
@@ -206,7 +206,7 @@ def fire_all(
                 sun_pulses.fail(flight, Infeasible(f"the spacecraft has no channel {block.channel}"))
                 continue
             given[flight] = supplies[flight].fire(on_command(channel, 0.0, block.width), channel)
-            delays[flight], widths[flight] = jitter * errors.standard_normal() + block.delay, block.width
+            delays[flight], widths[flight] = block.delay, block.width
             due = float(motion.since[flight] + delays[flight])
             if due < over[flight] - 1e-9:
                 text = f"a pulse of {block.channel} would begin at {due:.6g} s, before the one before is over"

@@ -18,11 +18,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.spacecraft.equipment import Channel, Commands
+from nutdamp.spacecraft.equipment import Block, Channel, Commands
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.schedule import RESOLUTION, TOUCHING, Pulse, Schedule, channel_pulse, on_command, touching
 
-OFF_TICK = 1e-6  # share of a tick by which starts and on-times may be off their ticks: the rounding of files
+OFF_TICK = 1e-6  # share of a tick, or step of commands, by which times may be off it: the rounding of files
 
 
 class Windows:
@@ -220,6 +220,27 @@ def for_pairs(spacecraft: Spacecraft) -> list[Channel]:
 def channel_of(spacecraft: Spacecraft, pulse: Pulse) -> Channel | None:
     """Channel that fires the pulse; None for a steerable torquer."""
     return next((channel for channel in spacecraft.channels if channel.name == pulse.channel), None)
+
+
+def misfits(commands: Commands | None, block: Block) -> list[tuple[str, str, str]]:
+    """Values of a block that are no command of the file: the column, the value, and what is nearest or allowed."""
+    if commands is None:
+        return []
+    longest = math.floor(commands.delay_max / commands.delay_step * (1.0 + OFF_TICK)) * commands.delay_step
+    nearest_delay = min(round(block.delay / commands.delay_step) * commands.delay_step, longest)
+    nearest_width = float(commands.widths[np.abs(commands.widths - block.width).argmin()])
+    off = [
+        (column, f"{value:.6g} s", f"{near:.6g} s is the nearest")
+        for column, value, near, slack in (
+            ("delay_s", block.delay, nearest_delay, OFF_TICK * commands.delay_step),
+            ("width_s", block.width, nearest_width, OFF_TICK * block.width),
+        )
+        if abs(value - near) > slack
+    ]
+    off += [("count", str(block.count), f"{commands.max_count} is the most")] * (block.count > commands.max_count)
+    allowed = ", ".join(map(str, commands.every))
+    off += [("every", str(block.every), f"only {allowed}")] * (block.every not in commands.every)
+    return off
 
 
 def commandable(spacecraft: Spacecraft, pulse: Pulse) -> Pulse:

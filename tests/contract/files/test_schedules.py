@@ -18,7 +18,6 @@ from support.golden import check_text
 from support.process import Run
 from support.spinners import FILE
 
-from nutdamp.cli.plan import JITTER_SEED
 from nutdamp.files import tabular
 from nutdamp.files.reader import example_text, read_spacecraft
 from nutdamp.files.schedules import BLOCKS_HEADER, read_blocks, read_pulses
@@ -282,17 +281,14 @@ def test_all_faults_of_a_file_are_listed_and_what_cannot_be_commanded_is_named(b
     check_text("files.blocks-warned", "\n".join(blocks(every + "T1,3,4.899,0.153,4,3\nT1,20,1.001,0.1,300,1\n")[1]))
 
 
-def test_the_jitter_of_the_sun_pulse_moves_the_pulses_and_is_the_same_each_time(run: Run, blocks: ReadBlocks) -> None:
-    given, _ = blocks(HEAD + "T1,1,1,0.1,40\n")
+def test_a_single_flight_has_no_jitter_of_the_sun_pulses(run: Run, blocks: ReadBlocks) -> None:
+    """Its verdict would be that of one draw; `disperse` gives each case its own."""
+    read, _ = blocks(HEAD + "T1,1,1,0.1,40\n")
     shaky = FILE.replace("{azimuth: 35 deg}", "{azimuth: 35 deg, jitter: 5 ms}")
     flown = run("simulate", "-", *BLOCKS, "--json", "-", "--samples", "2", stdin=shaky)
     assert flown.returncode == 4  # it leaves more nutation than the requirement allows
-    check_text("files.blocks-jitter", flown.stderr)
     starts = [pulse["start_s"] for pulse in json.loads(flown.stdout)["pulses"]]
-    again = fired(read_spacecraft(shaky, "f.yaml"), given, JITTER_SEED)
-    assert starts == [pulse.start for pulse in again.pulses]
-    still = [pulse.start for pulse in fired(CRAFT, given).pulses]
-    assert 0.003 < np.std(np.subtract(starts, still)) < 0.007
+    assert starts == [pulse.start for pulse in fired(CRAFT, read).pulses]
 
 
 def test_where_no_blocks_can_be_written_or_fired(run: Run, tmp_path: Path) -> None:
