@@ -561,7 +561,7 @@ def report(
     points: int | None = None,
     **control: str,
 ) -> Report:
-    """Compare the schemes named, as `compare` does, and write the page of ``nutdamp report``.
+    """Compare the schemes named, and write the page of ``nutdamp report``; raises MissingExtra without the extra plot.
 
     Parameters
     ----------
@@ -573,8 +573,6 @@ def report(
         Horizons tried for each front of time against cost, none by default.
     control
         Texts of title, document, issue, author, date; see ``report --help``.
-
-    Raises MissingExtra without the extra plot.
 
     Examples
     --------

@@ -220,7 +220,7 @@ def verdict_notes(verdict: Verdict, plan: Plan, *, looped: bool = False) -> Iter
             yield note("met-without-pulse-until", until_s=idle, nutation_deg=math.degrees(now), limit_deg=limit)
     if len(plan.pulses):
         if verdict.required and requirements.unaided(body):
-            yield note("met-without-pulse", scheme=plan.scheme)
+            yield note("pulses-unneeded", scheme=plan.scheme)
         yield from _growing(flight, verdict)
     limited = body.goal.axis is not None or _limit_of(body, Part.SHIFT) is not None
     if not limited and final.momentum_shift > TURNED:
@@ -331,8 +331,8 @@ def _missed(chosen: Plan, compared: Comparison, *, tabulated: bool) -> Iterator[
         if chosen.kept is not False and cases is not None and cases.enough is False:  # else the cones are the reason
             missing = ((plan, each) for plan, each in compared.cases.items() if each.enough is False)
             schemes = ", ".join(plan.scheme for plan, _ in missing)
-            code = "too-few-cases" if compared.preferred is None else "too-few-cases-robust"
-            yield note(code, schemes=schemes, required_share=100.0 * cases.probability)
+            searched, share = compared.preferred is not None, 100.0 * cases.probability
+            yield note("too-few-cases-robust" if searched else "too-few-cases", schemes=schemes, required_share=share)
         return
     left = chosen.left
     assert left is not None

@@ -110,6 +110,8 @@ def compared_json(compared: Comparison, plan: Plan) -> dict[str, Any]:
     data |= {"status": judged.status.value, "meets_requirement": judged.met}
     if plan.spacecraft.commands is not None:
         data["can_be_commanded"] = plan.commandable if plan.feasible else None
+    if judged.lines:
+        data["requirement"] = [line_json(line) for line in judged.lines]
     if compared.cases:
         data["cases"] = cases_json(judged.cases)
     return data

@@ -116,7 +116,8 @@ def test_json_and_csv_follow_the_contract_and_agree(run: Run, tmp_path: Path) ->
             assert pulse["impulse_Nms"] == pytest.approx([m * pulse["on_time_s"] for m in pulse["torque_Nm"]])
     assert (data["no_pulse_needed"], data["recommended"]) == (False, "two-pulse")
     nutation, shift = data["plans"][0]["requirement"]
-    assert (nutation["part"], nutation["met"], nutation["limit_deg"]) == ("nutation", True, pytest.approx(0.5))
+    assert (nutation["part"], nutation["met"], nutation["limit_deg"]) == ("nutation", False, pytest.approx(0.5))
+    assert nutation["nominal_deg"] < 0.5 < nutation["dispersed_deg"]  # met with nominal values, in too few cases
     assert (shift["part"], shift["met"], shift["limit_deg"]) == ("momentum_shift", False, pytest.approx(0.2))
     assert shift["nominal_deg"] == pytest.approx(data["plans"][0]["flown"]["momentum_shift_deg"])
     text = (tmp_path / "pulses.csv").read_bytes().decode()

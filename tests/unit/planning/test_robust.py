@@ -239,6 +239,14 @@ def test_the_earliest_end_is_a_candidate() -> None:
 
 
 @pytest.mark.deep
+def test_the_spin_is_set_with_h_kept_where_that_damps_in_more_cases() -> None:
+    """Where H may end anywhere no plan has more than 80 %."""
+    body = nutdamp.load(case("rim-spin-up.yaml")).with_(goal={"spin": "20 rpm"})
+    robust_plan = planned(body, "optimal")
+    assert (robust_plan.verdict.status, best(robust_plan).variant[-6:]) == (Status.FLY, "H kept")
+
+
+@pytest.mark.deep
 @pytest.mark.usefixtures("untightened")
 @pytest.mark.parametrize(("shift", "scheme"), [(5.0, "four-pulse"), (0.1, "two-pulse")])
 def test_of_plans_with_which_all_cases_comply_the_cheapest(shift: float, scheme: str) -> None:

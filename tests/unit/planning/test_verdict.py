@@ -121,6 +121,19 @@ def test_pulses_that_cannot_be_sent_to_a_spacecraft_that_takes_commands() -> Non
     assert compare(body, ["two-pulse"], timed=True).verdict.status is not Status.NOT_COMMANDABLE
 
 
+@pytest.mark.parametrize(("limits", "status"), [({}, "fly"), ({"gap": "60 s"}, "not-commandable")])
+def test_a_schedule_read_from_a_file_keeps_the_limits_or_cannot_be_commanded(
+    run: Run, tmp_path: Path, limits: Mapping[str, str], status: str
+) -> None:
+    sent = str(tmp_path / "sent.csv")
+    run("plan", "-q", "--scheme", "two-pulse", "--csv", sent)
+    setting = [part for key, value in limits.items() for part in ("--set", f"limits.{key}={value}")]
+    flown = run("simulate", "-q", "--schedule", sent, "--json", "-", *setting)
+    data = json.loads(flown.stdout)
+    assert (data["decision"]["status"], flown.returncode) == (status, EXITS[Status(status)])
+    assert ("warning: pulse 2 " in flown.stderr) is bool(limits)
+
+
 # --- lines
 
 
