@@ -17,7 +17,6 @@ from rich.theme import Theme
 from nutdamp.errors import BadRequest, nearest
 from nutdamp.views import guide
 from nutdamp.views.guide import Topic
-from nutdamp.views.tables import facts
 
 
 def _notes() -> Iterator[tuple[str, str]]:
@@ -216,4 +215,8 @@ def topic_screen(topic: Topic) -> RenderableType:
 
 def _pairs(rows: Iterable[tuple[str, str]]) -> Table:
     """Names to the left and their texts to the right."""
-    return facts((name, Text(text, overflow="fold")) for name, text in rows)
+    table = Table.grid(padding=(0, 2))
+    table.add_column(style="dim", overflow="fold")
+    for name, text in rows:
+        table.add_row(name, Text(text, overflow="fold"))
+    return table

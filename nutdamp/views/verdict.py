@@ -267,8 +267,9 @@ def line_json(line: Line) -> dict[str, Any]:
     if bound.part is Part.CONE and bound.keep is not None:
         named |= {"name": bound.keep.name, "edge": "min" if bound.inner else "max"}
     unit, scale = ("rad_s", 1.0) if bound.part is Part.SPIN else ("deg", math.degrees(1.0))
-    sizes = {"limit": bound.limit, "nominal": line.nominal, "dispersed": line.dispersed, "margin": line.margin}
-    values = {f"{name}_{unit}": None if size is None else scale * size for name, size in sizes.items()}
+    sizes = (bound.limit, line.nominal, line.dispersed, line.margin)
+    named_sizes = zip(("limit", "nominal", "dispersed", "margin"), sizes, strict=True)
+    values = {f"{name}_{unit}": None if size is None else scale * size for name, size in named_sizes}
     return {**named, **values, "share": line.share, "met": line.met}
 
 
