@@ -214,11 +214,8 @@ class Scene:
         self.plane = geometry.sky_plane(flight, track.momentum[0])
         self.looked = sphere.view(flight, self.path)
         self._changing: list[Artist] = []
-        self._lay_out()
-
-    def _lay_out(self) -> None:
-        """Draw the parts that do not move, and make room for those that do."""
-        figure, flight = self.figure, self.flight
+        # The parts that do not move, with room for those that do.
+        figure = self.figure
         grid = figure.add_gridspec(2, 2, height_ratios=[5, 1.5])
         self.space, self.sky = figure.add_subplot(grid[0, 0]), figure.add_subplot(grid[0, 1])
         self.strip = figure.add_subplot(grid[1, :])

@@ -140,26 +140,20 @@ def _axis_track(axes: Axes, flight: Flight, track: Track) -> None:
         ticks = [tick for tick in axes.get_xticks() if abs(tick - middle[0]) <= half]
         axes.set_xlim(middle[0] - half, middle[0] + (2.0 * ROOM - 1.0) * half)
         axes.set_xticks(ticks)
-        _inset(axes, flight, track, small)
+        inset = axes.inset_axes(INSET)
+        stations = _momentum(inset, flight, track, momentum, float(np.ptp(small, axis=0).max()))
+        for number in style.thinned(len(stations) - 1, NUMBERED):
+            style.add(inset, str(number + 1), stations[number + 1], FIRED)
+        style.add(inset, "t = 0", stations[0], INK, role="vital")
+        style.target(inset, target)
+        style.square(inset, small, margin=0.25)
+        inset.locator_params(nbins=3)
+        inset.tick_params(labelsize=style.SMALL)
+        much = min(INSET[2] * ROOM, INSET[3]) * float(np.ptp(axes.get_ylim()) / np.ptp(inset.get_ylim()))
+        inset.set_title(f"H after each firing (× {much:.2g})", **style.NOTE)
+        axes.indicate_inset_zoom(inset, edgecolor=GREY, linewidth=THIN, alpha=1.0)
     x, y, sense = geometry.sky_names(flight)
     axes.set(xlabel=x, ylabel=y, title=f"Axis track: spin axis in space\n{sense}")
-
-
-def _inset(axes: Axes, flight: Flight, track: Track, small: Vector) -> None:
-    """Path of H, enlarged, beside the axis track; ``small``: `geometry.momentum_inset`."""
-    inset = axes.inset_axes(INSET)
-    momentum = geometry.sky_paths(flight, track)[1]
-    stations = _momentum(inset, flight, track, momentum, float(np.ptp(small, axis=0).max()))
-    for number in style.thinned(len(stations) - 1, NUMBERED):
-        style.add(inset, str(number + 1), stations[number + 1], FIRED)
-    style.add(inset, "t = 0", stations[0], INK, role="vital")
-    style.target(inset, geometry.sky_target(flight, track))
-    style.square(inset, small, margin=0.25)
-    inset.locator_params(nbins=3)
-    inset.tick_params(labelsize=style.SMALL)
-    much = min(INSET[2] * ROOM, INSET[3]) * float(np.ptp(axes.get_ylim()) / np.ptp(inset.get_ylim()))
-    inset.set_title(f"H after each firing (× {much:.2g})", **style.NOTE)
-    axes.indicate_inset_zoom(inset, edgecolor=GREY, linewidth=THIN, alpha=1.0)
 
 
 def _momentum(axes: Axes, flight: Flight, track: Track, momentum: Vector, width: float) -> Vector:
@@ -200,7 +194,12 @@ def _path(axes: Axes, flight: Flight, track: Track, points: Vector) -> None:
         firings.append(rows)
         if stretch.pulse in numbered and np.hypot(*(rows[-1] - rows[0])) > 0.03 * width:
             style.head(axes, _refined(rows), len(_refined(rows)) - 1, PULSE, size)
-    _number(axes, [_refined(rows) for rows in firings], width)
+    refined = [_refined(rows) for rows in firings]
+    # First and last number of those in one place, beside the middle one.
+    for group in together([rows[len(rows) // 2] for rows in refined], width):
+        first, last, middle = group[0] + 1, group[-1] + 1, refined[group[len(group) // 2]]
+        text = f"{'firing ' * (first == 1)}{first}" + (f"\N{EN DASH}{last}" if first != last else "")
+        style.add(axes, text, middle[len(middle) // 2], FIRED)
     axes.plot(*style.joined(coasts).T, color=MOTION, linewidth=thin * style.LINE, label="path")
     if firings:
         axes.plot(*style.joined(firings).T, color=PULSE, linewidth=max(2.2 * thin, style.LINE), label="firing")
@@ -211,14 +210,6 @@ def _path(axes: Axes, flight: Flight, track: Track, points: Vector) -> None:
     style.add(axes, "t = 0", points[0], INK, role="vital")
     if firings:
         style.add(axes, "end", points[-1], INK)
-
-
-def _number(axes: Axes, firings: Sequence[Vector], width: float) -> None:
-    """Numbers of firings beside their stretches of a path, (n, 2) each; first and last of those in one place."""
-    for group in together([rows[len(rows) // 2] for rows in firings], width):
-        first, last, middle = group[0] + 1, group[-1] + 1, firings[group[len(group) // 2]]
-        text = f"{'firing ' * (first == 1)}{first}" + (f"\N{EN DASH}{last}" if first != last else "")
-        style.add(axes, text, middle[len(middle) // 2], FIRED)
 
 
 def together(places: Sequence[Vector], width: float) -> list[list[int]]:

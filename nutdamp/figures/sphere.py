@@ -102,7 +102,13 @@ def draw_globe(axes: Axes, flight: Flight, track: Track) -> None:
     rise = math.atan2(along, math.hypot(across, aside))
     looked = View(plane, math.atan2(aside, across), elevation=min(max(rise, ELEVATION), STEEPEST))
     draw_ground(axes, looked, track)
-    _draw_path(axes, looked, flight, track)
+    thin = style.thickness(looked.seen(track.axis)[0]) / style.LINE
+    for stretch in geometry.stretches(flight, track):
+        rows = slice(stretch.first, stretch.last + 1)
+        if stretch.pulse is None:
+            draw_line(axes, looked, track.axis[rows], MOTION, thin)
+        elif np.any(np.ptp(track.axis[rows], axis=0) > geometry.NO_CONE):  # an impulse does not move it
+            draw_line(axes, looked, track.axis[rows], PULSE, 1.8 * thin)
     style.target(axes, looked.seen(geometry.aimed(flight))[0], "_target")
     (start,), _ = looked.seen(track.axis[0])
     axes.plot(*start, "o", color=MOTION, markersize=4.5)
@@ -146,17 +152,6 @@ def draw_ground(axes: Axes, looked: View, track: Track) -> None:
             draw_line(axes, looked, ring @ looked.plane, FAINT, 0.6, back=False)
     momentum, _ = looked.seen(track.momentum / np.linalg.norm(track.momentum, axis=1, keepdims=True))
     axes.plot(*geometry.once(momentum).T, **style.PATH_OF_H)
-
-
-def _draw_path(axes: Axes, looked: View, flight: Flight, track: Track) -> None:
-    """The path of the spin axis, with the firings in it that move it (an impulse does not)."""
-    thin = style.thickness(looked.seen(track.axis)[0]) / style.LINE
-    for stretch in geometry.stretches(flight, track):
-        rows = slice(stretch.first, stretch.last + 1)
-        if stretch.pulse is None:
-            draw_line(axes, looked, track.axis[rows], MOTION, thin)
-        elif np.any(np.ptp(track.axis[rows], axis=0) > geometry.NO_CONE):
-            draw_line(axes, looked, track.axis[rows], PULSE, 1.8 * thin)
 
 
 def draw_cones(axes: Axes, looked: View, rolling: DrawnCones) -> None:

@@ -225,6 +225,8 @@ def trade_figure(
 
     ``chosen``: a plan to be marked among them. Fronts without points are named, with reasons. ``narrow``: for phones.
     """
+    from matplotlib.ticker import LogLocator, MaxNLocator
+
     width = style.PHONE if narrow else 7.4
     figure = style.sheet(width, 4.8)
     points = [point for _, _, point in numbered(fronts)]
@@ -257,22 +259,15 @@ def trade_figure(
     axes.set_xlim(right=reach if reach > 1.03 * max(ends) else 1.03 * reach)
     axes.margins(y=0.12)
     axes.set(xlabel="end of the last firing, s", ylabel=unit)
-    if log:
-        _graduate(axes)
+    if log:  # ticks at 1, 2 and 5 of each decade, or evenly spaced within part of one
+        low, high = axes.get_xlim()
+        few = sum(low <= value <= high for value in LogLocator(subs=(1.0, 2.0, 5.0)).tick_values(low, high)) < FEWEST
+        axes.xaxis.set_major_locator(MaxNLocator(6) if few else LogLocator(subs=(1.0, 2.0, 5.0)))
+        style.log_axis(axes.xaxis)
     axes.grid(True, which="both")
     style.legend(figure, [axes], 3)
     style.settle(figure)
     return figure
-
-
-def _graduate(axes: Axes) -> None:
-    """Ticks at 1, 2 and 5 of each decade, or evenly spaced within part of one."""
-    from matplotlib.ticker import LogLocator, MaxNLocator
-
-    low, high = axes.get_xlim()
-    few = sum(low <= value <= high for value in LogLocator(subs=(1.0, 2.0, 5.0)).tick_values(low, high)) < FEWEST
-    axes.xaxis.set_major_locator(MaxNLocator(6) if few else LogLocator(subs=(1.0, 2.0, 5.0)))
-    style.log_axis(axes.xaxis)
 
 
 def _draw_fronts(axes: Axes, spacecraft: Spacecraft, fronts: Sequence[Front], scale: float, reach: float) -> None:

@@ -154,7 +154,10 @@ class Sketch:
         """Quantiles to 0.006 % of their value."""
         below = np.cumsum(self.counts)
         ranks = np.floor(np.asarray(probabilities) * (below[-1] - 1)).astype(np.int64)
-        values = _middles()[np.searchsorted(below, ranks, side="right")]
+        lows = ((np.arange(_SIZES, dtype=np.int64) + _LOWEST) << _SHIFT).view(np.float64)  # of the bins
+        middles = lows * (1.0 + 0.5 ** (SHARPNESS + 1))
+        middles[0] = 0.0
+        values = np.concatenate([-middles[::-1], middles])[np.searchsorted(below, ranks, side="right")]
         values = np.where(ranks == below[-1] - 1, self.maximum, np.where(ranks == 0, self.minimum, values))
         return np.asarray(np.clip(values, self.minimum, self.maximum))
 
@@ -168,14 +171,6 @@ class Sketch:
 
 
 Distribution = Exact | Sketch  # an output over all cases so far
-
-
-def _middles() -> Array:
-    """Representative value of each bin of a sketch."""
-    low = ((np.arange(_SIZES, dtype=np.int64) + _LOWEST) << _SHIFT).view(np.float64)
-    sizes = low * (1.0 + 0.5 ** (SHARPNESS + 1))
-    sizes[0] = 0.0
-    return np.concatenate([-sizes[::-1], sizes])
 
 
 class Worst:

@@ -379,13 +379,16 @@ class Results(Counted):
         values = self.values[row, : self.done]
         return None if not len(values) or math.isnan(values[0]) else Exact(values)
 
+    def _early_draws(self) -> dict[str, Array]:
+        """Draws of the first cases, without biases; of correlated inputs the independent normals behind them."""
+        model, draws = self.study.model, self.study.draws_of_all(np.arange(min(self.done, EARLY)))
+        varied = {name: draw for name, draw in draws.items() if not isinstance(draw, float)}
+        return independent(varied, model.inputs.drawn, model.groups)
+
     @cached_property
     def shares(self) -> dict[str, dict[str, float]]:
         """`sampled_shares` of the first cases, of correlated inputs like `FirstOrder.shares`; call it at the end."""
-        count, model = min(self.done, EARLY), self.study.model
-        draws = self.study.draws_of_all(np.arange(count))
-        drawn = {name: draw for name, draw in draws.items() if not isinstance(draw, float)}  # not of a bias
-        return sampled_shares(independent(drawn, model.inputs.drawn, model.groups), self.early[:, :count])
+        return sampled_shares(self._early_draws(), self.early[:, : min(self.done, EARLY)])
 
     def contributions(self, bound: Bound) -> dict[str, float]:
         """Share of each tolerance in the variance of the value of a bound's part; correlated ones together.
@@ -398,12 +401,9 @@ class Results(Counted):
                 zip((entry.name for entry in first.inputs), first.shares(bound.part.value).tolist(), strict=True)
             )
         else:
-            count = min(self.done, EARLY)
             spread = self.spread(bound)
-            drawn = self.study.draws_of_all(np.arange(count))
-            draws = {name: draw for name, draw in drawn.items() if not isinstance(draw, float)}
-            values = spread.values[:count] if isinstance(spread, Exact) else np.empty(0)
-            each = correlated_shares(independent(draws, self.study.model.inputs.drawn, groups), values)
+            values = spread.values[:EARLY] if isinstance(spread, Exact) else np.empty(0)
+            each = correlated_shares(self._early_draws(), values)
         return by_tolerance(first.inputs, groups, each)
 
     def take(self, values: Array, severity: Array, emptied: NDArray[np.bool_]) -> None:

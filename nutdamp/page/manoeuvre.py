@@ -146,16 +146,11 @@ def _fired(plan: Plan, judged: Verdict, points: Checkpoints | None, *, flies: bo
     ends = [pulses[count - 1].over for count in counts]
     decide = [_deadline(body, end, start) for end, start in zip(ends, starts[1:].tolist(), strict=False)]
     holds = ["not set"] * len(counts) if points is None else _ranges(points, counts, angles)
-    holds[-1] = _accepted(judged, angles[-1])
+    limit = next((line.bound.limit for line in judged.lines if line.bound.part is Part.NUTATION), angles[-1])
+    holds[-1] = f"accept ≤ {short_angle(limit)}"
     columns = zip(firsts, blocks, turned.tolist(), angles, holds, [*decide, MISSING], strict=True)
     rows = [SheetRow(index, *row) for index, row in enumerate(columns)]
     return sheet(DataTable("Fire" if flies else "Pulses", [*_columns(plan, rows)], rows, flies), "sheet", folds=True)
-
-
-def _accepted(judged: Verdict, angle: float) -> str:
-    """Nutation to be accepted at the end: up to the limit of the requirement."""
-    limit = next((line.bound.limit for line in judged.lines if line.bound.part is Part.NUTATION), angle)
-    return f"accept ≤ {short_angle(limit)}"
 
 
 def _deadline(body: Spacecraft, end: float, start: float) -> str:

@@ -71,17 +71,25 @@ def moving_of(plan: Plan, craft: str = "SPACECRAFT") -> Moving:
     track = flown.sampled(samples, until)
     panels, columns, target, rooms = _panels(flown, track, named)
     strip, span = strip_of(flown, track, until)
-    firing, texts = _firing(flown, track)
+    texts, firing, names = {"none": 0}, [], _pulse_names(flown)
+    for time in track.t.tolist():  # the number of the text that names the firings at each row
+        on = (name for name, (begins, ends) in zip(names, flown.spans, strict=True) if begins <= time <= ends)
+        firing.append(texts.setdefault(" and ".join(on) or "none", len(texts)))
     largest = math.degrees(float(track.nutation.max()))
     # Four figures of the largest nutation.
     cone = ANGLE_DIGITS if largest < geometry.LEAST else max(ANGLE_DIGITS, 3 - math.floor(math.log10(largest)))
     clock = max(3, math.ceil(-math.log10(until / (samples - 1))) + 1)
+    # The angles of the spin axis, as every table shows them, in units of their last decimal.
+    pointing = [
+        [NONE if text == MISSING else round(float(text.removesuffix(" deg")) * 10**ANGLE_DIGITS) for text in column]
+        for column in zip(*(angle_texts(body, axis) for axis in track.axis), strict=True)
+    ]
     columns |= {
         "t": _whole(track.t, clock),
         "theta": _whole(np.degrees(track.nutation), cone),
         "mu": _whole(np.degrees(track.body_cone), cone),
         "lambda": _whole(np.degrees(track.space_cone), cone),
-        **_numbered("angle", _pointing(body, track.axis)),
+        **_numbered("angle", pointing),
         "firing": firing,
     }
     if named:
@@ -98,9 +106,10 @@ def moving_of(plan: Plan, craft: str = "SPACECRAFT") -> Moving:
         "samples": samples,
         "lead": LEAD,
         "span": span,
-        "columns": {name: _steps(values) for name, values in columns.items()},
+        # The first number and the difference of each from the one before: short where little changes.
+        "columns": {name: np.diff(values, prepend=0).tolist() for name, values in columns.items()},
         "none": NONE,
-        "firings": texts,
+        "firings": [*texts],
         "utc": utc,
         "target": target,
         "named": [
@@ -174,20 +183,6 @@ def _whole(values: Vector, digits: int) -> list[int]:
     return [round(round(value, digits) * 10**digits) for value in values.tolist()]
 
 
-def _steps(values: Sequence[int]) -> list[int]:
-    """The first number and the difference of each from the one before: short where little changes."""
-    return [now - before for before, now in zip([0, *values], values, strict=False)]
-
-
-def _pointing(body: Spacecraft, axes: Vector) -> list[list[int]]:
-    """Two columns: the angles of directions (n, 3), as every table shows them, in units of their last decimal."""
-    columns = zip(*(angle_texts(body, axis) for axis in axes), strict=True)
-    return [
-        [NONE if text == MISSING else round(float(text.removesuffix(" deg")) * 10**ANGLE_DIGITS) for text in column]
-        for column in columns
-    ]
-
-
 def _dates(body: Spacecraft, track: Track, digits: int) -> dict[str, Any] | None:
     """UTC of each row: their common beginning, and the rest of each; None without an epoch."""
     dates = [date for time in track.t.tolist() if (date := body.utc(time, digits)) is not None]
@@ -197,15 +192,6 @@ def _dates(body: Spacecraft, track: Track, digits: int) -> dict[str, Any] | None
     pairs = enumerate(zip(dates[0], dates[-1], strict=False))
     common = next((place for place, (first, last) in pairs if first != last), len(dates[0]))
     return {"head": dates[0][:common], "tails": [date[common:] for date in dates]}
-
-
-def _firing(flown: Flight, track: Track) -> tuple[list[int], list[str]]:
-    """For each row the number of the text that names the firings; the first text is that of none."""
-    texts, column, names = {"none": 0}, [], _pulse_names(flown)
-    for time in track.t.tolist():
-        on = (name for name, (begins, ends) in zip(names, flown.spans, strict=True) if begins <= time <= ends)
-        column.append(texts.setdefault(" and ".join(on) or "none", len(texts)))
-    return column, [*texts]
 
 
 def _pulse_names(flown: Flight) -> tuple[str, ...]:

@@ -109,7 +109,9 @@ def _templates() -> Environment:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    environment.filters.update(labelled=_labelled, css=_css, whole=_whole)
+    # Text within a string of a style sheet: all but letters and digits by their numbers.
+    environment.filters["css"] = lambda text: re.sub("[^A-Za-z0-9]", lambda char: f"\\{ord(char[0]):x} ", text)
+    environment.filters.update(labelled=_labelled, whole=_whole)
     return environment
 
 
@@ -124,11 +126,6 @@ def _whole(text: str) -> Markup:
     parts = [escape(part) for part in WHOLE.split(text)]
     parts[1::2] = [f'<span class="whole-word">{part}</span>' for part in parts[1::2]]
     return Markup("".join(parts))
-
-
-def _css(text: str) -> str:
-    """Text within a string of a style sheet: all but letters and digits by their numbers."""
-    return "".join(char if char.isascii() and char.isalnum() else f"\\{ord(char):x} " for char in text)
 
 
 def _labelled(svg: str, described: str) -> Markup:
@@ -228,13 +225,20 @@ def report_page(
             state=judged.light.value,
             headline=(lead, about),
             notes=tuple(notes[:NOTES]),
-            contenders=tuple(_contender(compared, plan) for plan in compared.plans),
+            contenders=tuple(
+                document.Contender(
+                    plan.scheme,
+                    (*[verdicts.spent(plan.pulses)] * plan.feasible, glance.scheme_verdict(compared, plan)),
+                    plan is chosen,
+                )
+                for plan in compared.plans
+            ),
             made_by=f"nutdamp {__version__}",
             verdict="" if chosen is None else verdicts.statement(judged),
             warnings=tuple(warnings),
         )
         if chosen is not None:
-            broken = _broken(chosen)
+            broken = broken_limits(body, chosen.pulses) if chosen.from_file else []  # schemes break none
             page = replace(
                 page,
                 broken=tuple(broken),
@@ -314,19 +318,6 @@ def _title(body: Spacecraft) -> str:
     aims += [] if body.goal.spin is None else [f"spin at {RPM * body.goal.spin:.4g} rpm"]
     aims += ["built-in example"] * body.built_in
     return " · ".join([body.name, ", ".join(aims)]) if aims else body.name
-
-
-def _broken(plan: Plan) -> list[str]:
-    """The limits that the schedule of a file breaks; schemes never do."""
-    return broken_limits(plan.spacecraft, plan.pulses) if plan.from_file else []
-
-
-def _contender(compared: Comparison, plan: Plan) -> document.Contender:
-    """One scheme with its cost, and the verdict on it."""
-    if not plan.feasible:
-        return document.Contender(plan.scheme, (decisions.no_plan(plan),), False)
-    texts = verdicts.spent(plan.pulses), verdicts.scheme_word(compared, plan)
-    return document.Contender(plan.scheme, texts, plan is compared.recommended)
 
 
 def _dispersion(dispersed: Dispersion) -> Iterator[Block]:

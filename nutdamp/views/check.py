@@ -251,8 +251,15 @@ def failed_json(name: str | None, wrong: FaultyFile | CannotRead, doubts: Sequen
 
 def _faults_json(faults: Sequence[Fault]) -> list[dict[str, Any]]:
     """Faults, each with its ``place`` as messages have it; line and column are null where it is no place in a file."""
-    places = [{"place": fault.place, "line": fault.line or None, "column": fault.column or None} for fault in faults]
-    return [place | values_of(fault, "where", "problem") for place, fault in zip(places, faults, strict=True)]
+    return [
+        {
+            "place": fault.place,
+            "line": fault.line or None,
+            "column": fault.column or None,
+            **values_of(fault, "where", "problem"),
+        }
+        for fault in faults
+    ]
 
 
 @dataclass(frozen=True, eq=False)
@@ -287,6 +294,12 @@ def checked(
 def checked_json(name: str | None, spacecraft: Spacecraft, doubts: Sequence[Fault] = ()) -> dict[str, Any]:
     """A valid file: derived quantities, channels with their steps, the mounting angle for two pulses."""
     pair, axis = capability.nearest_pair(spacecraft), capability.spin_axis(spacecraft)
+    clock, commands = capability.sun_clock(spacecraft), spacecraft.commands
+    channels, pulses = channel_table(spacecraft).json(), capability.acting(spacecraft)
+    for entry, channel in zip(channels, spacecraft.channels, strict=True):
+        if channel.valve is not None:
+            own = [[pulse] for pulse in pulses if pulse.channel is channel]
+            entry["commands"] = DataTable("", VALVES, own).json()
     inputs, unused = ((), ()) if spacecraft.dispersions is None else reachable(spacecraft)
     return {
         "file": name,
@@ -294,7 +307,7 @@ def checked_json(name: str | None, spacecraft: Spacecraft, doubts: Sequence[Faul
         "faults": [],
         "warnings": _faults_json(doubts),
         "spacecraft": spacecraft_json(spacecraft),
-        "channels": list(_channels_json(spacecraft)),
+        "channels": channels,
         **({} if spacecraft.tank is None else {"tank": tank_table(spacecraft.tank).json()}),
         "spin_axis": {
             **values_of(axis, "class=kind", "squared_exponent_1_s2=exponent", "growth_time_s", "tilt_deg"),
@@ -303,7 +316,14 @@ def checked_json(name: str | None, spacecraft: Spacecraft, doubts: Sequence[Faul
         },
         **aspects_json(at_start(spacecraft)),
         "sun": None if spacecraft.sun is None else direction_json(spacecraft, spacecraft.sun),
-        "sun_pulses": _sun_pulses_json(spacecraft),
+        "sun_pulses": clock
+        and {
+            **values_of(clock, "period_s=turn", "first_s"),
+            "why": clock.refusal or None,
+            "delay_step_deg": commands and math.degrees(abs(spacecraft.spin)) * commands.delay_step,
+            "delay_max_deg": commands and math.degrees(abs(spacecraft.spin)) * commands.delay_max,
+            "channels": turn_table(spacecraft).json(),
+        },
         "disturbances": disturbance_table(spacecraft).json(),
         **({} if spacecraft.loop is None else {"loop": _margins(spacecraft).json()}),
         "dispersions": spacecraft.dispersions
@@ -317,25 +337,4 @@ def checked_json(name: str | None, spacecraft: Spacecraft, doubts: Sequence[Faul
             "nearest": None if pair is None else [pair.first.name, pair.second.name],
             "nearest_off_deg": None if pair is None else abs(math.degrees(pair.miss)),
         },
-    }
-
-
-def _channels_json(spacecraft: Spacecraft) -> Iterator[dict[str, Any]]:
-    pulses = capability.acting(spacecraft)
-    for row, channel in zip(channel_table(spacecraft).json(), spacecraft.channels, strict=True):
-        own = [[pulse] for pulse in pulses if pulse.channel is channel]
-        yield row if channel.valve is None else row | {"commands": DataTable("", VALVES, own).json()}
-
-
-def _sun_pulses_json(spacecraft: Spacecraft) -> dict[str, Any] | None:
-    clock, commands = capability.sun_clock(spacecraft), spacecraft.commands
-    if clock is None:
-        return None
-    spin = math.degrees(abs(spacecraft.spin))
-    return {
-        **values_of(clock, "period_s=turn", "first_s"),
-        "why": clock.refusal or None,
-        "delay_step_deg": commands and spin * commands.delay_step,
-        "delay_max_deg": commands and spin * commands.delay_max,
-        "channels": turn_table(spacecraft).json(),
     }

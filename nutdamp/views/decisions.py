@@ -31,7 +31,6 @@ from nutdamp.views.verdict import cases_json, line_json, spent, verdict_json
 
 if TYPE_CHECKING:
     from nutdamp.planning.tradeoff import Certificate
-    from nutdamp.schemes.optimal.linear_program import Burn
 
 
 def no_plan(plan: Plan) -> str:
@@ -262,7 +261,13 @@ def certificate_json(certificate: Certificate) -> dict[str, Any]:
             for channel, cost, strong in zip(program.channels, program.costs, program.strong, strict=True)
         ],
         **values_of(certificate.proof, "gained", "bound"),
-        "burns": [_burn(certificate, burn) for burn in certificate.burns],
+        "burns": [
+            {
+                **values_of(burn, "channel=channel.name", "t_s", "on_time_s"),
+                "q": float(certificate.primer(np.array([burn.t]))[0, program.channels.index(burn.channel)]),
+            }
+            for burn in certificate.burns
+        ],
         "burns_cost": certificate.cost,
         "plan": {
             "cost": pulses.cost_in(certificate.problem.unit),
@@ -273,9 +278,3 @@ def certificate_json(certificate: Certificate) -> dict[str, Any]:
             for times in certificate.moments()
         ],
     }
-
-
-def _burn(certificate: Certificate, burn: Burn) -> dict[str, Any]:
-    at = certificate.program.channels.index(burn.channel)
-    q = certificate.primer(np.array([burn.t]))[0, at]
-    return {**values_of(burn, "channel=channel.name", "t_s", "on_time_s"), "q": float(q)}

@@ -89,7 +89,7 @@ def dispersion_brief(flown: Dispersion) -> RenderableType:
     """The default screen of ``disperse``: verdict, percentiles, what counts most, and the worst case."""
     results, judged = flown.core, flown.verdict
     head = [_title(results, flown.plan.scheme), *verdict_lines(judged, results), *_emptied(results)]
-    notes, case = [*main_causes(judged)], f" · {_again(results)} (worst)" * _varies(results)
+    notes, case = [*main_causes(judged)], f" · {again(results)} (worst)" * _varies(results)
     notes += tolerances.unused_notes(results.study.model.inputs.unused)
     return summary(head, lambda **_: _percentiles(results).screen("screen"), notes, f"--plot cases.png{case}")
 
@@ -109,7 +109,7 @@ def dispersion_screen(flown: Dispersion, *, worst: int) -> Group:
     if worst and _varies(results):
         cases = case_table(study, FLOWN_OUTPUTS, _worst(results, worst), _effects(study))
         parts += [Text(), Text(cases.title, "bold"), cases.screen("screen")]
-        parts.append(Text(f"Inspect one: nutdamp disperse, as here, with {_again(results)}", "dim"))
+        parts.append(Text(f"Inspect one: nutdamp disperse, as here, with {again(results)}", "dim"))
     return Group(*parts, *tolerances.unused_table(study.model.inputs.unused))
 
 
@@ -160,7 +160,8 @@ def _title(results: Results, scheme: str) -> Text:
     return named(study.model.spacecraft, f": {scheme}, {how}; {drawn}")
 
 
-def _again(results: Results) -> str:
+def again(results: Results | LoopResults) -> str:
+    """Options that show the worst case alone."""
     return f"--seed {results.study.seed} --case {results.worst.cases[0] + 1}"
 
 

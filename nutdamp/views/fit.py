@@ -110,8 +110,15 @@ def fit_screen(fit: Fit, time: float, *, verbose: bool = True) -> RenderableType
     test = f"residuals NOT white: {', '.join(colored)}; the sigmas are too small" if colored else "residuals: noise"
     if outliers := int((~fit.used).sum()):
         test += f"; outliers left out: {outliers}"
-    headline = Text.assemble("FIT ", (", ".join(names), "bold"), f", {_record(fit)}")
-    head = [*opening(fit.model.spacecraft, verbose), headline, Text(test, "bold red" if colored else "green")]
+    record, values, body = fit.model.record, fit.named, fit.model.spacecraft
+    wheel = values.get("wheel", body.inertia.wheel) / in_moments(body, values)[0]
+    # Of the nutation in the body, small angles.
+    rate = abs((1.0 - values["C/A"]) * values.get("omega_3", body.spin) - wheel)
+    turns = f", nutation periods: {record.length * rate / (2.0 * math.pi):.3g}" if rate else ""
+    fired = f", pulses fired meanwhile: {len(record.fired)}" if len(record.schedule) else ""
+    what = f", {record.start:g} s to {record.end:g} s{turns}{fired}"
+    headline = Text.assemble("FIT ", (", ".join(names), "bold"), what)
+    head = [*opening(body, verbose), headline, Text(test, "bold red" if colored else "green")]
     table = DataTable("Estimates", ESTIMATES, rows)
     return summary(
         [*head, Text(f"motion at t = {time:g} s")],
@@ -121,16 +128,6 @@ def fit_screen(fit: Fit, time: float, *, verbose: bool = True) -> RenderableType
         more=[signal_table(fit).screen("screen")],
         verbose=verbose,
     )
-
-
-def _record(fit: Fit) -> str:
-    record, values = fit.model.record, fit.named
-    body = fit.model.spacecraft
-    wheel = values.get("wheel", body.inertia.wheel) / in_moments(body, values)[0]
-    rate = abs((1.0 - values["C/A"]) * values.get("omega_3", body.spin) - wheel)  # in the body, small angles
-    turns = f", nutation periods: {record.length * rate / (2.0 * math.pi):.3g}" if rate else ""
-    fired = f", pulses fired meanwhile: {len(record.fired)}" if len(record.schedule) else ""
-    return f"{record.start:g} s to {record.end:g} s{turns}{fired}"
 
 
 def told(fit: Fit, rows: Sequence[Estimate]) -> Iterator[Note]:

@@ -19,11 +19,9 @@ from nutdamp.flight.propagation import REAL_WIDTHS, model_name
 from nutdamp.planning.decision import Comparison, speed
 from nutdamp.planning.notes import alternatives, comparison_warnings, infeasibility, plan_notes, reasons, verdict_notes
 from nutdamp.planning.plan import Plan
-from nutdamp.planning.verdict import Verdict
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.requirements import Bound, Part
-from nutdamp.spacecraft.schedule import Schedule
 from nutdamp.views import decisions, parts
 from nutdamp.views import verdict as verdicts
 from nutdamp.views.decisions import lasting
@@ -122,19 +120,6 @@ def _columns(compared: Comparison, chosen: Plan | None) -> Iterator[Column]:
         if "screen" in where:
             yield Column("", heading, "", angle, shortly(least[name != "nutation"]), "screen")
         yield Column(f"{name}_deg", heading, "deg", angle, small_angle, where.removeprefix("screen ") + " csv")
-    yield from _directions(body)
-    yield Column("spin_rad_s", "", "", _feasible("flight.final.spin"), where="csv")
-    if body.goal.spin is not None:
-        yield Column("", "final spin", "rad/s", _feasible("flight.settled.spin"), to_figures(6), "full")
-    where = "full csv" + " page" * any(plan.spin_change for plan in compared.plans)
-    yield Column("spin_change_rad_s", "spin change", "rad/s", attrgetter("spin_change"), _four, where)
-    yield Column("delta_v_m_s", "", "", speed, where="csv")
-    yield from _bounds(compared)
-    yield Column("", Shared.VERDICT, "", partial(scheme_verdict, compared), where=everywhere, kind=TEXT, met=met)
-    yield Column("why", "", "", infeasibility, where="csv", kind=TEXT)
-
-
-def _directions(body: Spacecraft) -> Iterator[Column]:
     keys = ("tilt_deg", "azimuth_deg") if body.attitude is None else ("right_ascension_deg", "declination_deg")
     names = parts.angle_names(body) if body.attitude is None else SHORT_NAMES
     for at, key in enumerate(keys):
@@ -142,6 +127,17 @@ def _directions(body: Spacecraft) -> Iterator[Column]:
         yield Column("", f"axis {names[at]}", "deg", _feasible(partial(_shown_direction, at)), where="full page")
     for key in keys:
         yield Column(f"momentum_{key}", "", "", _feasible(partial(_direction, "momentum", key)), where="csv")
+    yield Column("spin_rad_s", "", "", _feasible("flight.final.spin"), where="csv")
+    if body.goal.spin is not None:
+        yield Column("", "final spin", "rad/s", _feasible("flight.settled.spin"), to_figures(6), "full")
+    where = "full csv" + " page" * any(plan.spin_change for plan in compared.plans)
+    yield Column("spin_change_rad_s", "spin change", "rad/s", attrgetter("spin_change"), _four, where)
+    yield Column("delta_v_m_s", "", "", speed, where="csv")
+    for bound in (*requirements.required(body), *requirements.cones(body)):
+        name = f"{bound.label} {verdicts.limit(bound)}"
+        yield Column("", name, "", _feasible(partial(_bound, bound)), where="full", kind=TEXT)
+    yield Column("", Shared.VERDICT, "", partial(scheme_verdict, compared), where=everywhere, kind=TEXT, met=met)
+    yield Column("why", "", "", infeasibility, where="csv", kind=TEXT)
 
 
 def _direction(which: str, key: str, plan: Plan) -> float | None:
@@ -150,13 +146,6 @@ def _direction(which: str, key: str, plan: Plan) -> float | None:
 
 def _shown_direction(at: int, plan: Plan) -> str:
     return parts.angle_texts(plan.spacecraft, plan.flight.final.axis)[at].removesuffix(" deg")
-
-
-def _bounds(compared: Comparison) -> Iterator[Column]:
-    body = compared.spacecraft
-    for bound in (*requirements.required(body), *requirements.cones(body)):
-        name = f"{bound.label} {verdicts.limit(bound)}"
-        yield Column("", name, "", _feasible(partial(_bound, bound)), where="full", kind=TEXT)
 
 
 def _bound(bound: Bound, plan: Plan) -> str:
@@ -246,30 +235,23 @@ def comparison_screen(compared: Comparison) -> RenderableType:
     if pulses.blocks:
         results += [Text(), parts.blocks_screen(chosen.flight, chosen.delta_v)]
     elif len(pulses):
-        results += [Text(), parts.pulse_table(chosen.flight).screen("full"), Text(), _on_times(pulses)]
+        totals: dict[str, float] = {}
+        for pulse in pulses:
+            totals[pulse.channel] = totals.get(pulse.channel, 0.0) + pulse.loaded[1]
+        on_times = facts((f"on-time of {channel}", f"{total:.4f} s") for channel, total in totals.items())
+        results += [Text(), parts.pulse_table(chosen.flight).screen("full"), Text(), on_times]
     why, warnings = joined(reasons(compared)), comparison_warnings(compared, tabulated=True)
     beside = [*warnings, *verdict_notes(judged, chosen), *alternatives(compared)]
     return Group(
         *lead,
         Text(sentence(verdicts.statement(judged)), verdicts.STYLES[judged.light]),
         Text(sentence(f"{chosen.scheme}: {why}")),
-        *_cheaper(judged),
+        *(
+            Text(f"cheaper: {cheaper.scheme}, {verdicts.spent(cheaper.schedule)}, {text(cheaper.why)}", "dim")
+            for cheaper in judged.cheaper
+        ),
         *map(screen_line, ordered(beside)),
         *(Text(), verdicts.bound_table(judged).screen("screen")),
         *(Text(), decisions.end_facts(chosen)),
         *results,
     )
-
-
-def _cheaper(judged: Verdict) -> Iterator[Text]:
-    """Plans that cost less, with the reasons why they are not recommended."""
-    for cheaper in judged.cheaper:
-        yield Text(f"cheaper: {cheaper.scheme}, {verdicts.spent(cheaper.schedule)}, {text(cheaper.why)}", "dim")
-
-
-def _on_times(pulses: Schedule) -> Table:
-    """Total on-time of each thruster, as commanded."""
-    totals: dict[str, float] = {}
-    for pulse in pulses:
-        totals[pulse.channel] = totals.get(pulse.channel, 0.0) + pulse.loaded[1]
-    return facts((f"on-time of {channel}", f"{total:.4f} s") for channel, total in totals.items())

@@ -78,7 +78,7 @@ def loop_cases_brief(flown: LoopDispersion) -> RenderableType:
         shares = results.shares(output.name).items()  # the rest is noise
         notes += leading(part, {in_words(name): share for name, share in shares if share >= MAIN})
     notes += unused_notes(results.study.model.inputs.unused)
-    worst = [f"{_again(results, case)} (worst)" for case in results.worst.cases[:1].tolist()]
+    worst = [f"{dispersion.again(results)} (worst)"] * bool(len(results.worst.cases))
     head, table = [*_title(results), *_verdicts(flown)], _percentiles(results)
     return summary(head, lambda **_: table.screen("screen"), notes, " · ".join(["--csv cases.csv", *worst]))
 
@@ -91,13 +91,23 @@ def _title(results: LoopResults) -> list[RenderableType]:
     return [title, Text(described(study.law.loop))]
 
 
-def _verdicts(flown: LoopDispersion) -> list[RenderableType]:
+def _verdicts(flown: LoopDispersion) -> Iterator[RenderableType]:
     results = flown.core
-    return [*dispersion.verdict_lines(flown.verdict, results), *_settled(results), _dead_band(results)]
-
-
-def _again(results: LoopResults, case: int) -> str:
-    return f"--seed {results.study.seed} --case {case + 1}"
+    yield from dispersion.verdict_lines(flown.verdict, results)
+    stopped = [(stop, count) for stop, count in results.stops.most_common() if stop is not Ending.END]
+    lasting = "and is not stopped, " if stopped else ""
+    yield Text.assemble(("Falls quiet ", "bold"), f"{lasting}in {_share(results.settled, results.done)}.")
+    parts = [f"stopped in {count:,}: {stop.value}" for stop, count in stopped]
+    never = results.done - results.settled - sum(count for _, count in stopped)
+    if never:
+        parts.append(f"not down to the stop threshold in {never:,}")
+    if parts:
+        yield Text(f"Of the others: {'; '.join(parts)}.")
+    if results.idle:
+        yield Text(f"In {results.idle:,} cases the sensor never shows the start threshold, and nothing fires.")
+    expected = degrees(results.study.band.most)
+    share = _share(results.within, len(results.of("quiet")))
+    yield Text.assemble(("Dead band ", "bold"), f"(at most {expected}, from the nominal sensor): kept in {share}.")
 
 
 def loop_cases_screen(flown: LoopDispersion, *, worst: int) -> Group:
@@ -110,7 +120,7 @@ def loop_cases_screen(flown: LoopDispersion, *, worst: int) -> Group:
         parts.append(Text(f"Each firing draws anew, one sigma or bias: {anew}.", "dim"))
     rows = _worst(results, worst)
     if rows:
-        table, options = _cases(study, rows), _again(results, rows[0].case)
+        table, options = _cases(study, rows), dispersion.again(results)
         parts += [Text(), Text(table.title, style="bold"), table.screen("screen")]
         parts.append(Text(f"Inspect one: {options}; firing by firing: nutdamp loop {options}", "dim"))
     return Group(*parts, *unused_table(study.model.inputs.unused))
@@ -131,26 +141,6 @@ def _share(count: int, of: int) -> str:
     low, high = share_interval(count, of)
     share, least, most = (percent(fraction, 0.99) for fraction in (count / of, low, high))
     return f"{share} of cases (95 % interval {least} to {most})"
-
-
-def _settled(results: LoopResults) -> Iterator[RenderableType]:
-    stopped = [(stop, count) for stop, count in results.stops.most_common() if stop is not Ending.END]
-    lasting = "and is not stopped, " if stopped else ""
-    yield Text.assemble(("Falls quiet ", "bold"), f"{lasting}in {_share(results.settled, results.done)}.")
-    parts = [f"stopped in {count:,}: {stop.value}" for stop, count in stopped]
-    never = results.done - results.settled - sum(count for _, count in stopped)
-    if never:
-        parts.append(f"not down to the stop threshold in {never:,}")
-    if parts:
-        yield Text(f"Of the others: {'; '.join(parts)}.")
-    if results.idle:
-        yield Text(f"In {results.idle:,} cases the sensor never shows the start threshold, and nothing fires.")
-
-
-def _dead_band(results: LoopResults) -> Text:
-    expected = degrees(results.study.band.most)
-    share = _share(results.within, len(results.of("quiet")))
-    return Text.assemble(("Dead band ", "bold"), f"(at most {expected}, from the nominal sensor): kept in {share}.")
 
 
 def _shares(results: LoopResults) -> Iterator[RenderableType]:

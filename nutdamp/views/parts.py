@@ -96,10 +96,6 @@ def clock(body: Spacecraft, time: float, digits: int = MILLISECONDS) -> str | No
     return of_day if zero.startswith(day) else f"{day[5:]} {of_day}"
 
 
-def _clock(row: PulseRow) -> str | None:
-    return clock(row.body, row.pulse.loaded[0])
-
-
 def sun_phased(body: Spacecraft) -> bool:
     """True where phases count from the Sun sensor, else from t = 0."""
     return body.sun is not None and body.sun_sensor is not None
@@ -109,10 +105,6 @@ def phases(flown: Flight) -> Vector:
     """Phase of the body at the commanded start of each pulse, rad: from the Sun sensor to the Sun, or since t = 0."""
     starts = np.array([pulse.loaded[0] for pulse in flown.schedule])
     return -to_sun_pulse(flown, starts) if sun_phased(flown.spacecraft) else spin_phases(flown, starts)
-
-
-def _phase(row: PulseRow) -> str:
-    return f"{math.degrees(row.phase) % 360.0:.1f}"
 
 
 def _valves(schedule: Schedule) -> bool:
@@ -171,8 +163,11 @@ def _dated(body: Spacecraft) -> tuple[Column, ...]:
         start = Column("", Shared.START, "s", lambda row: row.pulse.loaded[0], seconds, PEOPLE)
         columns = tuple(column for column in PULSES if column.key != "utc")
     else:
-        start, columns = Column("", Shared.START, "UTC", _clock, where=PEOPLE, kind=TEXT), PULSES
-    phase = Column("", "Sun phase" if sun_phased(body) else "spin phase", "deg", _phase, where=PEOPLE)
+        start = Column("", Shared.START, "UTC", lambda row: clock(row.body, row.pulse.loaded[0]), where=PEOPLE,
+                       kind=TEXT)  # fmt: skip
+        columns = PULSES
+    phase = Column("", "Sun phase" if sun_phased(body) else "spin phase", "deg",
+                   lambda row: math.degrees(row.phase) % 360.0, lambda angle: f"{angle:.1f}", PEOPLE)  # fmt: skip
     return (columns[0], start, phase, *columns[1:])
 
 
@@ -387,16 +382,6 @@ def required(spacecraft: Spacecraft) -> str:
     return listed(texts)
 
 
-def beyond_floors(spacecraft: Spacecraft) -> str:
-    """Actions that break the floors A|ω0| and C|ω3|β, in words; empty where they hold."""
-    causes = [
-        *["I1 ≠ I2"] * (not spacecraft.inertia.symmetric),
-        *["dissipation"] * (spacecraft.growth != 0.0),
-        *["disturbances"] * bool(spacecraft.disturbances),
-    ]
-    return " and ".join(causes)
-
-
 def derived_table(spacecraft: Spacecraft, more: Iterable[tuple[str, str]] = ()) -> Table:
     """Derived quantities of the spacecraft at t = 0, and ``more`` of them (name, value)."""
     return facts([*_derived(spacecraft), *aspect_facts(at_start(spacecraft)), *more])
@@ -423,7 +408,12 @@ def _derived(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
     yield "nutation period", f"{in_body}, {duration(spacecraft.inertial_period)} inertially"
     if spacecraft.dissipation is not None:
         yield "dissipation", _dissipation(spacecraft, spacecraft.dissipation)
-    beyond = beyond_floors(spacecraft)
+    causes = [  # that break the floors A|ω0| and C|ω3|β
+        *["I1 ≠ I2"] * (not inertia.symmetric),
+        *["dissipation"] * (spacecraft.growth != 0.0),
+        *["disturbances"] * bool(spacecraft.disturbances),
+    ]
+    beyond = " and ".join(causes)
     floor = f"no least impulse with {beyond}" if beyond else "lower bound"
     name = "impulse" if beyond else "least impulse"
     yield name, f"A|ω0| = {quantity(spacecraft.least_impulse, 'N m s')}; {floor}"

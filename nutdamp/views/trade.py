@@ -40,16 +40,6 @@ class TradeRow(NamedTuple):
     point: Point
 
     @property
-    def plan(self) -> Plan:
-        """The schedule."""
-        return self.point.plan
-
-    @property
-    def verdict(self) -> Verdict:
-        """Judgement of the schedule."""
-        return self.point.verdict
-
-    @property
     def least(self) -> float | None:
         """Lower bound of the cost for small angles."""
         return self.front.least(self.point)
@@ -71,39 +61,40 @@ def _table(rows: Sequence[TradeRow]) -> DataTable:
 def _columns(rows: Sequence[TradeRow]) -> Iterator[Column]:
     """``full`` is the table of one front, ``brief`` that of all."""
     first = rows[0].number if rows else 1
-    others = any(row.plan.scheme != OPTIMAL.name for row in rows)
-    judged = any(row.verdict.met is not None for row in rows)
-    flown = any(row.verdict.cases is not None for row in rows)
+    others = any(row.point.plan.scheme != OPTIMAL.name for row in rows)
+    judged = any(row.point.verdict.met is not None for row in rows)
+    flown = any(row.point.verdict.cases is not None for row in rows)
     bounded = any(row.least is not None for row in rows)
     yield Column("point", "point", "", attrgetter("number"), where="csv full brief", kind=WHOLE)
-    yield Column("", "H within", "deg", lambda row: _allowed(row.front), where="brief")
+    yield Column("", "H within", "deg", attrgetter("front.shift"),
+                 lambda shift: "any" if math.isinf(shift) else degrees(shift).removesuffix(" deg"),
+                 "brief")  # fmt: skip
     yield from file_columns("csv", "shift_allowed_deg=front.shift")
-    yield Column("end_s", Shared.END, "s", attrgetter("plan.pulses.end"), lambda end: f"{end:.3f}", "csv full brief")
+    yield Column(
+        "end_s", Shared.END, "s", attrgetter("point.plan.pulses.end"), lambda end: f"{end:.3f}", "csv full brief"
+    )
     yield Column("", "cost", "", lambda row: row.spent(row.point.cost), where="full brief")
     yield Column("", "small-angle bound", "", lambda row: row.spent(row.least), where="full" * bounded)
-    yield Column("pulses", Shared.PULSES, "", lambda row: len(row.plan.pulses), where="csv full brief", kind=WHOLE)
-    spent = ("propellant_kg=plan.pulses.propellant", "total_impulse_Nms=plan.pulses.total_impulse")
+    yield Column(
+        "pulses", Shared.PULSES, "", lambda row: len(row.point.plan.pulses), where="csv full brief", kind=WHOLE
+    )
+    spent = ("propellant_kg=point.plan.pulses.propellant", "total_impulse_Nms=point.plan.pulses.total_impulse")
     yield from file_columns("csv", *spent, "first_order_least=least")
     yield Column("least_unit", "", "", attrgetter("point.unit"), where="csv", kind=TEXT)
-    yield from file_columns("csv", "nutation_deg=plan.flight.residual.nutation")
-    shift = angle_of("plan.flight.residual.momentum_shift")
+    yield from file_columns("csv", "nutation_deg=point.plan.flight.residual.nutation")
+    shift = angle_of("point.plan.flight.residual.momentum_shift")
     yield Column("momentum_shift_deg", Part.SHIFT.label, "deg", shift, small_angle, "csv full brief")
-    yield from file_columns("csv", "axis_error_deg=plan.flight.residual.axis_error")
+    yield from file_columns("csv", "axis_error_deg=point.plan.flight.residual.axis_error")
     yield Column("", f"vs point {first}", "%", _saved, where="full")
     yield Column("", "vs first", "%", _saved, where="" if others else "brief")
     scheme = "csv full brief" if others else "csv"
-    yield Column("scheme", Shared.SCHEME, "", attrgetter("plan.scheme"), where=scheme, kind=TEXT)
-    yield Column("status", "", "", attrgetter("verdict.status.value"), where="csv", kind=TEXT)
-    yield from file_columns("csv", "share=verdict.cases.complying")
-    met = attrgetter("verdict.met")
-    yield Column("meets_requirement", "", "", met, where="csv", kind=YES_NO)
-    yield Column("", "comply", "", attrgetter("verdict.cases"), share_text, "full brief" * flown)
-    word = attrgetter("verdict")
-    yield Column("", Shared.VERDICT, "", word, lead, "full brief" * judged, kind=TEXT, met=met)
-
-
-def _allowed(front: Front) -> str:
-    return "any" if math.isinf(front.shift) else degrees(front.shift).removesuffix(" deg")
+    yield Column("scheme", Shared.SCHEME, "", attrgetter("point.plan.scheme"), where=scheme, kind=TEXT)
+    yield Column("status", "", "", attrgetter("point.verdict.status.value"), where="csv", kind=TEXT)
+    yield from file_columns("csv", "share=point.verdict.cases.complying")
+    yield Column("meets_requirement", "", "", lambda row: row.point.verdict.met, where="csv", kind=YES_NO)
+    yield Column("", "comply", "", attrgetter("point.verdict.cases"), share_text, "full brief" * flown)
+    yield Column("", Shared.VERDICT, "", attrgetter("point.verdict"), lead, "full brief" * judged, kind=TEXT,
+                 met=lambda row: row.point.verdict.met)  # fmt: skip
 
 
 def _saved(row: TradeRow) -> str:
@@ -136,11 +127,11 @@ def _head(spacecraft: Spacecraft, fronts: Sequence[Front]) -> Iterator[Text]:
         return
     good = [row for row in points if not fails(row.point)]
     for name, order in (("Cheapest", itemgetter(0, 1)), ("Earliest", itemgetter(1, 0))):
-        row = min(good or points, key=lambda row: order((row.point.cost, row.plan.pulses.end)))
-        costs = f"{row.spent(row.point.cost)}, ends at {row.plan.pulses.end:.3f} s (point {row.number})"
+        row = min(good or points, key=lambda row: order((row.point.cost, row.point.plan.pulses.end)))
+        costs = f"{row.spent(row.point.cost)}, ends at {row.point.plan.pulses.end:.3f} s (point {row.number})"
         yield Text.assemble((f"{name}: ", "bold"), costs)
     if required := requested(spacecraft):
-        light = next((row.verdict.light for row in good), Light.RED)
+        light = next((row.point.verdict.light for row in good), Light.RED)
         words = f"{len(good)} of {len(points)} schedules may be flown"
         yield Text.assemble(("Requirement ", "bold"), f"({required}) ", coloured(words, light))
 
@@ -168,7 +159,7 @@ def front_parts(spacecraft: Spacecraft, fronts: Sequence[Front]) -> list[Rendera
 
 
 def _ends_off(fronts: Sequence[Front]) -> Iterator[Note]:
-    off = [row.plan.flight.residual.axis_error for row in rows_of(fronts) if row.front.shift == 0.0]
+    off = [row.point.plan.flight.residual.axis_error for row in rows_of(fronts) if row.front.shift == 0.0]
     if max(off, default=0.0) > DAMPED_ANGLE:
         yield note("trade-ends-off")
 
@@ -222,11 +213,11 @@ def trade_json(spacecraft: Spacecraft, fronts: Sequence[Front]) -> dict[str, Any
         points = [
             {
                 **values_of(row, "point=number", "horizon_s=point.horizon"),
-                **plan_json(row.plan),
-                "status": row.verdict.status.value,
-                "meets_requirement": row.verdict.met,
-                **values_of(row, "share=verdict.cases.complying"),
-                "decision": verdict_json(row.verdict),
+                **plan_json(row.point.plan),
+                "status": row.point.verdict.status.value,
+                "meets_requirement": row.point.verdict.met,
+                **values_of(row, "share=point.verdict.cases.complying"),
+                "decision": verdict_json(row.point.verdict),
             }
             for row in rows
         ]
@@ -236,7 +227,7 @@ def trade_json(spacecraft: Spacecraft, fronts: Sequence[Front]) -> dict[str, Any
 
 def schedule_files(fronts: Sequence[Front], folder: str) -> list[tuple[str, str]]:
     """The pulses of every point: (path in ``folder``, contents)."""
-    files = [pulse_table(row.plan.flight).csv() for row in rows_of(fronts)]
+    files = [pulse_table(row.point.plan.flight).csv() for row in rows_of(fronts)]
     return list(zip(schedule_paths(folder, len(files)), files, strict=True))
 
 
@@ -252,10 +243,10 @@ def _better(fronts: Sequence[Front], chosen: Plan, *, misses: bool) -> tuple[flo
     """Share of the cost saved, s earlier, and the cheapest, then earliest, point that is better than ``chosen``."""
     until, better = chosen.pulses.end, []
     for row in rows_of(fronts):
-        saved, end = 1.0 - row.point.cost / chosen.pulses.cost_in(row.point.unit), row.plan.pulses.end
+        saved, end = 1.0 - row.point.cost / chosen.pulses.cost_in(row.point.unit), row.point.plan.pulses.end
         cheaper = saved > SAME_COST and end <= until
-        able = row.verdict.met and not fails(row.point)
-        if able and (misses or cheaper or _sooner(row.plan, chosen, saved)):
+        able = row.point.verdict.met and not fails(row.point)
+        if able and (misses or cheaper or _sooner(row.point.plan, chosen, saved)):
             better.append((saved if misses or saved > SAME_COST else 0.0, until - end, row))
     return max(better, key=itemgetter(0, 1), default=None)
 
@@ -274,13 +265,13 @@ def trade_notes(fronts: Sequence[Front], chosen: Plan, judged: Verdict) -> Itera
         row, shift = better[2], better[2].front.shift
         bound = "--free-axis " if math.isinf(shift) else f'--shift "{degrees(shift)}" ' * (shift > 0.0)
         horizon = f'--set "limits.horizon={row.point.horizon:.6g} s"'
-        command = f"nutdamp plan SPACECRAFT --scheme {row.plan.scheme} {bound}{horizon}"
-        shown = notes.figures(row.plan, chosen, row.point.unit == "kg")
+        command = f"nutdamp plan SPACECRAFT --scheme {row.point.plan.scheme} {bound}{horizon}"
+        shown = notes.figures(row.point.plan, chosen, row.point.unit == "kg")
         if judged.met is False:
             yield note("trade-meets", point=row.number, command=command, **shown)
         else:
             yield note("trade-better", point=row.number, command=command, **shown)
-    rows = [row for row in rows_of(fronts) if row.plan.pulses.end <= chosen.pulses.end and not fails(row.point)]
+    rows = [row for row in rows_of(fronts) if row.point.plan.pulses.end <= chosen.pulses.end and not fails(row.point)]
     nearest = min(rows, key=lambda row: row.point.cost, default=None)
     if nearest is None:
         return

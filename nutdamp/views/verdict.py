@@ -110,7 +110,9 @@ def statement(verdict: Verdict) -> str:
     if verdict.status is Status.NO_PLAN:
         return verdict.why or "no plan is feasible"
     broken = " and ".join(strays(aspect) for aspect in verdict.aspects if not aspect.kept)
-    counted = "" if cases is None or cases.complying is None else share_sentence(cases)
+    counted = ""
+    if cases is not None and cases.complying is not None:
+        counted = f"{share_text(cases)} of cases comply ({exact_percent(cases.probability)} required)"
     if not verdict.required:
         bounds = [line for line in verdict.lines if not line.bound.required]
         return f"no requirement in file; {', '.join(map(bound_word, bounds))} with nominal values"
@@ -155,12 +157,6 @@ def line_word(line: Line) -> str:
     if line.bound.required:
         return MET[line.met]
     return "NOT " * (not line.met) + DAMPED.get(line.bound.part, "damped")
-
-
-def share_sentence(cases: Cases) -> str:
-    """Share of cases that comply, and the share required."""
-    share = share_text(cases)
-    return f"{share} of cases comply ({exact_percent(cases.probability)} required)"
 
 
 def share_text(cases: Cases | None) -> str:
@@ -251,11 +247,6 @@ def bound_table(verdict: Verdict, lines: Sequence[Line] | None = None, title: st
     return DataTable(title, columns, verdict.lines if lines is None else lines)
 
 
-def worth(line: Line) -> float:
-    """Order in which bounds are shown where there is little room: the least share of the limit that is left first."""
-    return float(1.0 - line.bound.used(line.value))
-
-
 def scheme_word(compared: Comparison, plan: Any) -> str:
     """Verdict on one of the plans compared, or in short why it is not recommended."""
     verdict, why = compared.verdicts[plan], compared.shortcoming(plan)
@@ -269,19 +260,16 @@ def scheme_word(compared: Comparison, plan: Any) -> str:
 # --- files
 
 
-def in_unit(bound: Bound, **values: float | None) -> dict[str, float | None]:
-    """Values of a part by their names, in the unit that the names get in files."""
-    unit, scale = ("rad_s", 1.0) if bound.part is Part.SPIN else ("deg", math.degrees(1.0))
-    return {f"{name}_{unit}": None if size is None else scale * size for name, size in values.items()}
-
-
 def line_json(line: Line) -> dict[str, Any]:
     """A bound: its limit, values, share of the cases that keep it alone, and margin."""
     bound = line.bound
     named = {"part": bound.part.value, "required": bound.required}
     if bound.part is Part.CONE and bound.keep is not None:
         named |= {"name": bound.keep.name, "edge": "min" if bound.inner else "max"}
-    values = in_unit(bound, limit=bound.limit, nominal=line.nominal, dispersed=line.dispersed, margin=line.margin)
+    unit, scale = ("rad_s", 1.0) if bound.part is Part.SPIN else ("deg", math.degrees(1.0))
+    sizes = (bound.limit, line.nominal, line.dispersed, line.margin)
+    named_sizes = zip(("limit", "nominal", "dispersed", "margin"), sizes, strict=True)
+    values = {f"{name}_{unit}": None if size is None else scale * size for name, size in named_sizes}
     return {**named, **values, "share": line.share, "met": line.met}
 
 

@@ -174,7 +174,6 @@ SAID = re.compile(r"\b((NOT )?met|FLY|NO PULSE|NO PLAN|(NOT )?ENOUGH|NOT SHOWN|C
 WORDED = {
     (VERDICT, "met"): "value of `Light`, the class of a part of the page",
     ("views/dispersion.py", "met"): "key of JSON",
-    ("views/trade.py", "verdict.met"): "path of an attribute",
     ("planning/notes.py", "met-without-pulse-from"): "code of a note",
     ("planning/notes.py", "met-without-pulse-until"): "code of a note",
     ("files/study_rules.py", "given alone; name what must be met with it: nutation, momentum_shift or spin"): "a fault",
