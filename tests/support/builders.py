@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from types import FrameType
+from typing import TypeVar
 
 import numpy as np
 from support import reference
@@ -22,6 +23,8 @@ from nutdamp.spacecraft.equipment import Channel, Steerable, Thruster
 from nutdamp.spacecraft.model import Attitude, Goal, Inertia, Limits, Requirement, Spacecraft, Vector
 from nutdamp.spacecraft.requirements import Left
 from nutdamp.spacecraft.schedule import Pulse, Schedule
+
+T = TypeVar("T")
 
 results.register("nutdamp.page.results")  # which has the words of a plan that is infeasible
 
@@ -128,6 +131,12 @@ class Outcome:
         before = reference.momentum(moments, reference.Motion(spacecraft.omega0, rotation))
         self.shift = reference.angle(before, reference.momentum(moments, self.motion))
         self.spin: float = float(self.motion.rates[2])
+
+
+def present(value: T | None) -> T:
+    """The value, which must be there."""
+    assert value is not None
+    return value
 
 
 def transverse(vector: Vector) -> complex:

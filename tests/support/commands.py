@@ -77,8 +77,7 @@ def transcript(run: Run, commands: Iterable[str], only: str = "") -> str:
     shown = ""
     for line in commands:
         command, _, status = line.partition("; ")
-        ended = call(run, command)
-        assert ended.returncode == int(status or 0), f"{command}\n{ended.stderr}"
+        ended = call(run, command, status=int(status or 0))
         kept = "\n\n".join(part for part in ended.stdout.split("\n\n") if re.search(only, part)).rstrip()
         shown += f"$ {command}\n{kept}\n{ended.stderr}\n"
     return shown
@@ -96,8 +95,7 @@ def call(run: Run, command: str, **options: Any) -> subprocess.CompletedProcess[
 
 def result(run: Run, command: str, *, status: int = 0, stdin: str | None = None) -> Any:
     """The JSON that a command prints, and nothing else, with ``--json -`` where it is not export."""
-    ended = call(run, command if command.startswith("export") else f"{command} --json -", stdin=stdin)
-    assert ended.returncode == status, ended.stderr
+    ended = call(run, command if command.startswith("export") else f"{command} --json -", stdin=stdin, status=status)
     return json.loads(ended.stdout)
 
 

@@ -6,13 +6,14 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import strategies as st
 from scipy.integrate import simpson
 from support import messages, reference
+from support.builders import present
 from support.cases import deep
 from support.golden import check_text
 
@@ -28,14 +29,7 @@ QUICK = ("steerable-stage", "tilted tensor, backwards", "oblate, backwards")
 CASES = pytest.mark.parametrize("case", [name if name in QUICK else deep(name) for name in messages.CASES])
 """Names of the plans of `support.messages`."""
 
-T = TypeVar("T")
 Write = Callable[..., Path]
-
-
-def known(value: T | None) -> T:
-    """The value, which must be there."""
-    assert value is not None
-    return value
 
 
 def faults(read: Callable[..., object], *given: Any) -> list[str]:
@@ -116,8 +110,8 @@ def velocity_change(plan: Plan, pulse: Pulse) -> Vector:
     start = messages.columns(body, body.initial.quaternion) @ body.inertia.axes
     times = np.linspace(pulse.start, pulse.end, 33)
     moved = motions(body, plan.pulses, times.tolist(), start)
-    pushes = np.array([motion.rotation @ known(pulse.force) for motion in moved])
-    return np.asarray(simpson(pushes, x=times, axis=0) / known(body.mass))
+    pushes = np.array([motion.rotation @ present(pulse.force) for motion in moved])
+    return np.asarray(simpson(pushes, x=times, axis=0) / present(body.mass))
 
 
 @st.composite

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 from support import places
+from support.builders import present
 from support.cases import deep
 from support.pages import plain_page
 from support.places import case
@@ -63,9 +64,7 @@ limits: {max_pulses: 1}
 
 
 def chosen(text: str) -> Plan:
-    plan = compared_text(text).recommended
-    assert plan is not None
-    return plan
+    return present(compared_text(text).recommended)
 
 
 @cache
@@ -79,8 +78,7 @@ def view(text: str) -> tuple[Moving, dict[str, Any], dict[str, list[int]]]:
 def simulated(run: Run, text: str) -> list[dict[str, str]]:
     """What the command in the caption writes."""
     command = " ".join(view(text)[0].command).replace("SPACECRAFT", "-").removesuffix("FILE")
-    screen = run(*shlex.split(command)[1:], "-", "-q", stdin=text)
-    assert screen.returncode in (0, 4), screen.stderr
+    screen = run(*shlex.split(command)[1:], "-", "-q", stdin=text, status=(0, 4))
     return list(csv.DictReader(io.StringIO(screen.stdout)))
 
 
@@ -108,8 +106,7 @@ def test_the_command_in_the_caption_gives_the_rows_of_the_view(
     assert made.scheme == plan.scheme
     *words, file = shlex.split(" ".join(made.command))
     assert file == "FILE"
-    done = run(*words[1:], "-", "-q")
-    assert done.returncode in (0, 4), done.stderr
+    done = run(*words[1:], "-", "-q", status=(0, 4))
     rows, data = list(csv.DictReader(io.StringIO(done.stdout))), json.loads(made.data)
     digits = data["digits"]["cone"]
     shown = [f"{value / 10**digits:.{digits}f}" for value in accumulate(data["columns"]["theta"])]
@@ -350,9 +347,7 @@ def test_schedules_without_pulses_command_blocks_and_wheels_have_none() -> None:
 
 def test_cones_roll_on_a_symmetric_body_alone() -> None:
     for name in ("example", "three"):
-        workbench = view(TEXTS[name])[0].workbench
-        assert workbench is not None
-        assert workbench.rolling == (name == "example")
+        assert present(view(TEXTS[name])[0].workbench).rolling == (name == "example")
 
 
 def test_its_data_are_the_plan_and_the_limits_of_the_file() -> None:
@@ -368,8 +363,7 @@ def test_its_data_are_the_plan_and_the_limits_of_the_file() -> None:
     assert {(entry["least"], entry["most"]) for entry in bench["pulses"]} == {(0.02, 2.0)}
     limits = {"earliest": 1.0, "horizon": 60.0, "gap": 0.2, "tick": 1e-3, "blackout": [[30.0, 31.0]], "most": None}
     assert bench["limits"] == limits
-    assert made.workbench is not None
-    assert [(key, limit) for key, _, limit in made.workbench.rows] == [
+    assert [(key, limit) for key, _, limit in present(made.workbench).rows] == [
         ("nutation", "≤ 0.5°"),
         ("momentum_shift", "≤ 0.2°"),
     ]
@@ -377,8 +371,7 @@ def test_its_data_are_the_plan_and_the_limits_of_the_file() -> None:
 
 def test_with_a_target_the_axis_error_is_bounded_and_ideal_impulses_have_no_on_time() -> None:
     made, data, _ = view(TEXTS["target"])
-    assert made.workbench is not None
-    rows = [(key, limit) for key, _, limit in made.workbench.rows]
+    rows = [(key, limit) for key, _, limit in present(made.workbench).rows]
     assert rows == [("nutation", ""), ("momentum_shift", ""), ("axis_error", "≤ 4°")]
     pulses = data["bench"]["pulses"]
     assert {(entry["on"], entry["torque"], entry["most"]) for entry in pulses} == {(0.0, None, None)}

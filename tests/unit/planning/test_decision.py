@@ -17,6 +17,7 @@ from support.builders import (
     cross,
     judged,
     noted,
+    present,
     recommended,
     spinner,
 )
@@ -273,8 +274,7 @@ def test_what_is_to_be_saved_decides_on_the_plan() -> None:
     )
     for least, best in (("propellant", "frugal"), ("time", "soon"), ("pulses", "late")):
         found = recommend(plans, least=least)
-        assert found.plan is not None
-        assert (found.plan.scheme, found.ground, found.least, found.count) == (best, Ground.COST, least, 3)
+        assert (present(found.plan).scheme, found.ground, found.least, found.count) == (best, Ground.COST, least, 3)
         compared = Comparison(plans[0].spacecraft, tuple(plans), least=least)
         assert [each.why.code for each in compared.verdict.cheaper] == ["why-nutation"] * (least != "propellant")
 
@@ -294,8 +294,7 @@ def test_where_thrusters_are_too_weak_the_plan_that_leaves_least(degrees: int) -
     text = case("nothing-damps.yaml").read_text(encoding="utf-8").replace("8 deg", f"{degrees} deg")
     compared = compare(read_spacecraft(text, "nothing-damps.yaml"), catalogue.CLASSIC)
     left = {one.scheme: one.flown.nutation for one in compared.plans if one.flown is not None}
-    assert compared.recommended is not None
-    assert compared.recommended.scheme == min(left, key=lambda name: left[name]) == "four-pulse"
+    assert present(compared.recommended).scheme == min(left, key=lambda name: left[name]) == "four-pulse"
     check_text(f"plan.weak-{degrees}", recommended("weak", compared))
 
 
@@ -361,8 +360,7 @@ def test_the_cheapest_plan_that_gains_much_for_little_more_is_an_alternative() -
 
 def test_only_what_the_spacecraft_can_fire_is_recommended_unless_named_or_timed() -> None:
     """Where it takes commands: command blocks, and no pulse at all."""
-    commands = nutdamp.load(case("cbp1004.yaml")).commands
-    assert commands is not None
+    commands = present(nutdamp.load(case("cbp1004.yaml")).commands)
     given = fired(0.1), fired(0.2, BLOCK), made("none", 0.1, 0.0, pulses=0, required=BOTH)
     bodies = [replace(given[0].spacecraft, commands=one) for one in (None, commands)]
     for_free, commanded = ([replace(one, spacecraft=body) for one in given] for body in bodies)
@@ -429,6 +427,6 @@ def test_optimal_keeps_a_spin_without_a_channel_for_it() -> None:
 def test_examples_have_such_alternatives(name: str, gain: Gain) -> None:
     body = nutdamp.example(name)
     found = compare(body, usual(body), timed=gain is Gain.COMMANDED)
-    assert found.recommended is not None
-    assert (found.recommended.pulses.idealised, bool(found.recommended.pulses.blocks)) == (gain is Gain.REAL, False)
+    pulses = present(found.recommended).pulses
+    assert (pulses.idealised, bool(pulses.blocks)) == (gain is Gain.REAL, False)
     assert bool(found.recommendation.alternatives[gain].pulses.blocks) is (gain is Gain.COMMANDED)
