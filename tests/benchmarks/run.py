@@ -9,8 +9,6 @@ down slows them all; times are medians: of processor time, but of the time passe
 A limit that is missed is marked, and the exit status is 1.
 """
 
-from __future__ import annotations
-
 import argparse
 import cmath
 import json

@@ -6,8 +6,6 @@ Nothing of nutdamp takes part. Each case of the file gives a body, its motion at
 the motion at the end of the last pulse, in the frame N: rates, attitude, H, nutation angle and shift of H.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import sys

@@ -1,7 +1,5 @@
 """Figures of flights: what their lines hold, titles, labels, cones; that nothing overlaps or is cut."""
 
-from __future__ import annotations
-
 import math
 import re
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Pictures as files, inline SVG and films: formats, the same bytes each time, what a frame shows, what is refused."""
 
-from __future__ import annotations
-
 import hashlib
 import io
 import math

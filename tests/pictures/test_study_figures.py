@@ -1,7 +1,5 @@
 """Fronts of cost against time, figures of studies and of loops, and what is said of them."""
 
-from __future__ import annotations
-
 import math
 import re
 from dataclasses import replace

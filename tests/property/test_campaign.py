@@ -1,7 +1,5 @@
 """A campaign: ACE follows the Sun by a turn a week, each planned from the file that the one before led to."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

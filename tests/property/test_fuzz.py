@@ -1,7 +1,5 @@
 """Valid spacecraft, ordinary and degenerate, through every command and scheme: no traceback, no NaN, a proper exit."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

@@ -1,7 +1,5 @@
 """Every scheme under any limits ends: a feasible plan keeps them all and comes nearer, an infeasible one says why."""
 
-from __future__ import annotations
-
 import itertools
 import math
 import re

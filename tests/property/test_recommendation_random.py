@@ -1,7 +1,5 @@
 """Random spacecraft, weak and strong, under any limits: no plan beats the recommended one in all that counts."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Any

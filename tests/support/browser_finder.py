@@ -1,7 +1,5 @@
 """Where a browser of the Chromium family is, in which tests look at pages."""
 
-from __future__ import annotations
-
 import shutil
 
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome", "microsoft-edge", "msedge")

@@ -1,7 +1,5 @@
 """Spacecraft for the tests in one line each, in principal axes and SI, and a guard against endless loops."""
 
-from __future__ import annotations
-
 import math
 import sys
 from collections.abc import Iterable, Iterator

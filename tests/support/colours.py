@@ -1,7 +1,5 @@
 """How well what is drawn can be seen, on the light page and on the dark one (WCAG 2.1)."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

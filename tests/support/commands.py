@@ -1,7 +1,5 @@
 """Commands as users run them: what refused ones say as one text, and the JSON, CSV and folders of others."""
 
-from __future__ import annotations
-
 import csv
 import json
 import os

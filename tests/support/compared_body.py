@@ -1,7 +1,5 @@
 """A body with requirement and tolerances whose schemes, trades and dispersed cases are drawn."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """What tests of files share: plans that are exported, their motion, and the faults of what must be refused."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """Dispersed spacecraft with schedules for the tests."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Random spacecraft files over the whole schema: every section and key comes, together with others that it needs."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

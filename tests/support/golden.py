@@ -8,8 +8,6 @@ writes the texts of the tests that run (without arguments of all but the weekly 
 Read the difference as one would read the screen.
 """
 
-from __future__ import annotations
-
 import contextlib
 import fcntl
 import os

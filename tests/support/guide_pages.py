@@ -1,7 +1,5 @@
 """Pages and lists of the guide that are made from the code: ``python tests/support/guide_pages.py`` writes them."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from typing import Any, Literal, NamedTuple, get_args, get_origin

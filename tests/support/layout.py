@@ -1,7 +1,5 @@
 """What stands where in a figure: every text that is drawn, none cut, none over another."""
 
-from __future__ import annotations
-
 from itertools import combinations
 from unittest import mock
 

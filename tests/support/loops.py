@@ -1,7 +1,5 @@
 """Bodies, sensors and thresholds of closed loops in one line each; angles are given in degrees."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Any

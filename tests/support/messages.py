@@ -1,7 +1,5 @@
 """Plans to write as messages: every file in configs/ that has an epoch, and bodies that none of them is."""
 
-from __future__ import annotations
-
 import math
 from functools import cache
 

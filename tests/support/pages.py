@@ -1,7 +1,5 @@
 """Pages of `report` for tests of their texts, without the pictures, which take most of the time."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any

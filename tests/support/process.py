@@ -1,7 +1,5 @@
 """Running the command line: within this process, which is quick, or as a process of its own."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import os

@@ -1,7 +1,5 @@
 """Random spacecraft with all kinds of limits and actuators; what a test draws of them it draws from a seed."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Synthetic telemetry by DOP853 (tests/reference.py) with noise, gaps, outliers, steps and biases."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Synthetic telemetry of every kind of column, as CSV files: bodies within the tolerances of files, flown by DOP853."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A spacecraft whose principal axes are not those of its file, as a file and as a dict."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

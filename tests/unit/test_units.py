@@ -1,7 +1,5 @@
 """Quantities with units, as in files and on command lines; errors cross the border between processes whole."""
 
-from __future__ import annotations
-
 import math
 import pickle
 import re

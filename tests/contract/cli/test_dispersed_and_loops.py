@@ -1,7 +1,5 @@
 """disperse, loop, disperse --loop and budget as users run them: what they show, write, name and refuse."""
 
-from __future__ import annotations
-
 import csv
 import json
 import os

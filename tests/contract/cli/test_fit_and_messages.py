@@ -1,7 +1,5 @@
 """fit, export and import: telemetry and messages in, estimates, messages and spacecraft files out."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

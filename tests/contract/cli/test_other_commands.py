@@ -1,7 +1,5 @@
 """``check``, ``init``, ``schema``, ``simulate``, help, version and completion; what each command loads."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """Pictures by command: --plot and --figure, films by animate, and pages by report."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

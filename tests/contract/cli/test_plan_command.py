@@ -1,7 +1,5 @@
 """``nutdamp plan``: what it prints and writes, of nominal and of robust plans, and what it leaves with."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

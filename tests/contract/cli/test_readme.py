@@ -5,8 +5,6 @@ untried commands.
 With `NUTDAMP_WRITE_TEXTS=1` in the environment the test of the sessions writes the output of today into the pages.
 """
 
-from __future__ import annotations
-
 import ast
 import io
 import itertools

@@ -1,7 +1,5 @@
 """Screens: narrow ones, those of studies, other units; progress of long runs, how they stop."""
 
-from __future__ import annotations
-
 import io
 import math
 import os

@@ -1,7 +1,5 @@
 """Where output goes when a stream, a disk or a signal is in its way; command lines that are refused before the work."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

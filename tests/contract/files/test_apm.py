@@ -1,7 +1,5 @@
 """APMs: every form that the standard allows is read, what is wrong is reported by line; there and back."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Schedules, command blocks and telemetry that people wrote or edited: what is read, and every fault with its place."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json

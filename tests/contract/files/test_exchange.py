@@ -1,7 +1,5 @@
 """What is exported keeps the form of CCSDS 504.0-B-2 and 502.0-B-3; attitude histories."""
 
-from __future__ import annotations
-
 import ast
 import csv
 import io

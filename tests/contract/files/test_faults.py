@@ -1,7 +1,5 @@
 """Spacecraft files that are refused or doubted: each gives exactly its faults, at their places, with a cure."""
 
-from __future__ import annotations
-
 import copy
 import json
 import warnings

@@ -1,7 +1,5 @@
 """Spacecraft files that are sound: what each key becomes, in SI and principal axes."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

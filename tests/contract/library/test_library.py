@@ -1,7 +1,5 @@
 """nutdamp as a library: names, spacecraft from files and dicts, what it refuses; plans, flights and studies."""
 
-from __future__ import annotations
-
 import csv
 import doctest
 import io

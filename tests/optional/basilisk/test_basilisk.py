@@ -1,7 +1,5 @@
 """Flights by Basilisk against `propagation.flown`: agreement to 1e-8 rad is promised, and far less is found."""
 
-from __future__ import annotations
-
 import math
 import sys
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The script for Basilisk runs as it is, and ends with the residual that the plan has."""
 
-from __future__ import annotations
-
 import math
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """A browser for the tests of pages: playwright with Chromium, Chrome or Edge."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager

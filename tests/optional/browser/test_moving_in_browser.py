@@ -1,7 +1,5 @@
 """The page of report and its moving view in a real browser. Needs the extra ``browser``."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json

@@ -1,7 +1,5 @@
 """The workbench in a real browser: what it computes is what `flown` does; drag, keys, limits and copies."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json

@@ -1,7 +1,5 @@
 """Messages read back by Orekit and by ccsds-ndm-py, and where the Sun is seen: every number that goes in comes out."""
 
-from __future__ import annotations
-
 import math
 import re
 from importlib import import_module

@@ -1,7 +1,5 @@
 """Searches are bounded by counted work: they end with the best found so far, and say so; instants of time."""
 
-from __future__ import annotations
-
 import datetime
 import math
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """What pictures are made of: cones that touch and roll, angles on the sky, stretches of the track."""
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 

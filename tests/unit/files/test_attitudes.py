@@ -1,7 +1,5 @@
 """Attitudes of files: by the direction of an axis and a phase, or merged from messages."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

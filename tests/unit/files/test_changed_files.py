@@ -1,7 +1,5 @@
 """Spacecraft files with other values: set beside them, carried on by a flight, estimated by a fit."""
 
-from __future__ import annotations
-
 import copy
 import dataclasses
 import json

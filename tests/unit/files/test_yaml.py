@@ -1,7 +1,5 @@
 """YAML text -> plain values that know their places -> sections as classes; and files written whole or not at all."""
 
-from __future__ import annotations
-
 import json
 import math
 import os

@@ -1,7 +1,5 @@
 """What a dispersed case is, against vector algebra for single cases; draws, their distributions and correlations."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Iterable, Mapping

@@ -1,7 +1,5 @@
 """Dispersed cases against an independent integrator and single flights: ends, cones kept, derivatives."""
 
-from __future__ import annotations
-
 import csv
 import json
 import math

@@ -1,7 +1,5 @@
 """Studies: what is counted, whatever threads and interruptions; percentiles, intervals; sensitivities and shares."""
 
-from __future__ import annotations
-
 import itertools
 import math
 import threading

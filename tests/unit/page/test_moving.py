@@ -1,7 +1,5 @@
 """The rows of the moving view, without a browser: they are those of ``simulate``, and lie where the scales say."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json

@@ -1,7 +1,5 @@
 """The page of report, without a browser: what stands on it, its manoeuvre sheet, and what a board needs."""
 
-from __future__ import annotations
-
 import base64
 import hashlib
 import math

@@ -1,7 +1,5 @@
 """Comparisons: the rule of the recommendation on plans whose figures are given, its notes, and why none is cheaper."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Plans judged, and why there is none; their numbers; ways round cones."""
 
-from __future__ import annotations
-
 import itertools
 import math
 import re

@@ -1,7 +1,5 @@
 """Robust planning: the cheapest plan of which enough cases comply, in fresh ones too; else that with most of them."""
 
-from __future__ import annotations
-
 import math
 import re
 from dataclasses import replace

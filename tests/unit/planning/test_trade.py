@@ -1,7 +1,5 @@
 """Fronts of time against propellant: no point beaten by another; certificates of the least cost of optimal."""
 
-from __future__ import annotations
-
 import csv
 import io
 import itertools

@@ -1,7 +1,5 @@
 """The verdict: status, bounds and causes follow from the numbers of plan and cases; notes on plans and comparisons."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json

@@ -1,7 +1,5 @@
 """When a pulse may be on, where the center of mass is, and what keeps a bound."""
 
-from __future__ import annotations
-
 import cmath
 import itertools
 import math

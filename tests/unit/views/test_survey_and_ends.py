@@ -1,7 +1,5 @@
 """``check``: what actuators and disturbances do; where spin axis and H end, when pulses start, what is shown as 0."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json

@@ -1,7 +1,5 @@
 """One declaration of a table gives screens, pages, CSV, JSON and arrays that agree; the default screen of plan."""
 
-from __future__ import annotations
-
 import csv
 import io
 import math

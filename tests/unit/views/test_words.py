@@ -1,7 +1,5 @@
 """Verdicts in words and what they go by; each code of a note has a sentence, whose values are given."""
 
-from __future__ import annotations
-
 import ast
 import json
 import math
