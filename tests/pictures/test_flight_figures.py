@@ -17,9 +17,8 @@ from matplotlib.text import Annotation
 from support import places
 from support.builders import aimed, channel, cross, present, spinner
 from support.cases import deep, spread, weekly
-from support.colours import check_colours, contrast, pages
 from support.golden import check_text
-from support.layout import check_layout, texts
+from support.layout import check_colours, check_layout, contrast, pages, texts
 from support.shown import (
     BODY,
     CASES,
@@ -40,8 +39,6 @@ from support.shown import (
 
 from nutdamp.figures import geometry, overview, sphere, style
 from nutdamp.figures.image import Scene, Timing
-from nutdamp.figures.overview import together
-from nutdamp.figures.style import GREY, INK, PULSE
 from nutdamp.files.reader import load_spacecraft
 from nutdamp.flight import propagation
 from nutdamp.physics.attitude import angle_between
@@ -392,7 +389,7 @@ def test_vital_labels_are_never_left_out_and_others_where_there_is_no_room(role:
     figure = Figure((3.0, 2.0), layout="constrained")
     axes = figure.subplots()
     for number in range(30):
-        style.add(axes, f"label {number}", np.full(2, 0.5), INK, role=role)
+        style.add(axes, f"label {number}", np.full(2, 0.5), style.INK, role=role)
     style.settle(figure)
     assert all(one.get_visible() for one in axes.texts) == complete
 
@@ -495,10 +492,10 @@ def test_of_many_the_first_the_last_and_round_numbers_are_shown(count: int, most
 def test_pulses_in_one_place_of_a_path_have_one_number() -> None:
     """Three in a row at least, each beside the one before; with more than can be numbered, none are gathered."""
     near, far = np.zeros(2), np.array([1.0, 0.0])
-    assert together([far, near, near, near, far], 2.0) == [[0], [1, 2, 3], [4]]
-    assert together([near, near, far, far], 2.0) == [[0], [1], [2], [3]]
-    assert together([far * 0.09 * step for step in range(4)], 2.0) == [[0, 1, 2, 3]]
-    assert all(len(group) == 1 for group in together([near] * 40, 2.0))
+    assert overview.together([far, near, near, near, far], 2.0) == [[0], [1, 2, 3], [4]]
+    assert overview.together([near, near, far, far], 2.0) == [[0], [1], [2], [3]]
+    assert overview.together([far * 0.09 * step for step in range(4)], 2.0) == [[0, 1, 2, 3]]
+    assert all(len(group) == 1 for group in overview.together([near] * 40, 2.0))
 
 
 @pytest.mark.deep
@@ -510,7 +507,7 @@ def test_firings_that_cannot_be_told_apart_are_drawn_as_one() -> None:
     assert every[0].on == pytest.approx(1.2)
     assert (every[0].begins, every[0].ends) == pytest.approx((made.schedule.pulses[0].start, made.schedule.end))
     patches = drawn("history", "120 pulses").axes[2].patches
-    assert len([patch for patch in patches if to_hex(patch.get_facecolor()) == PULSE.lower()]) == 1
+    assert len([patch for patch in patches if to_hex(patch.get_facecolor()) == style.PULSE.lower()]) == 1
     apart, track = flown("16 channels")
     assert [block.many for block in geometry.blocks(apart, float(track.t[-1]))] == [1] * 32
     pair = replace(made, schedule=Schedule(kicks(BODY, 2, 0.01, 0.005).pulses))  # close together, yet two bars
@@ -573,4 +570,4 @@ def test_no_text_is_cut_in_the_pictures_of_the_configs(path: Path) -> None:
 @pytest.mark.parametrize("name", [*map(deep, NAMES[:2]), "history"])
 def test_words_and_swatches_can_be_seen_on_white_and_in_the_dark(name: str, case: str) -> None:
     check_colours(drawn(name, case))
-    assert all(contrast(GREY, paper) > 3.0 for paper, _ in pages())
+    assert all(contrast(style.GREY, paper) > 3.0 for paper, _ in pages())

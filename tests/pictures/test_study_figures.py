@@ -8,16 +8,15 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch
 from matplotlib.text import Annotation
-from support.builders import aimed, present, spinner
+from support.builders import aimed, cross, present, spinner
 from support.cases import deep, weekly
-from support.colours import check_colours
-from support.compared_body import BODY, REQUIRED, TOLERANCES, line
 from support.dispersed import jet, normal
 from support.golden import check_text
-from support.layout import check_layout, texts
+from support.layout import check_colours, check_layout, texts
 from support.shown import WIDE, check_star, heading, legend_words, studied
 from support.spinners import commanded
 
@@ -34,18 +33,37 @@ from nutdamp.page.report import dispersion_pictures
 from nutdamp.planning import plan as planning
 from nutdamp.planning import tradeoff
 from nutdamp.planning.decision import compare
-from nutdamp.planning.plan import Plan
 from nutdamp.planning.screening import Dispersion
-from nutdamp.planning.tradeoff import Front, Point
 from nutdamp.planning.verdict import Status
 from nutdamp.schemes.catalogue import OptimalOptions
 from nutdamp.spacecraft.equipment import Channel, Loop, Sensor, Steerable
-from nutdamp.spacecraft.model import Requirement, Spacecraft
+from nutdamp.spacecraft.model import Limits, Requirement, Spacecraft, Vector
 from nutdamp.spacecraft.schedule import Bounds, Schedule
 from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
 from nutdamp.views.text import cost, sentences, text
 from nutdamp.views.trade import FAILS, fails, front_parts, trade_notes
 from nutdamp.views.verdict import lead, statement
+
+REQUIRED = Requirement(math.radians(0.5), math.radians(0.2), 0.997)
+TOLERANCES = Dispersions(
+    A=normal(0.005, relative=True),
+    C=normal(0.005, relative=True),
+    omega0=(normal(0.002),) * 3,
+    thrust=dict.fromkeys(("+1", "-1", "+2", "-2"), normal(0.02, relative=True)),
+    timing=Tolerance("uniform", 0.005),
+    timing_offset=Tolerance("bias", 0.002),
+    attitude=normal(0.002),
+)
+BODY = replace(
+    spinner(channels=cross(8.0, min_on_time=0.02, max_on_time=2.0), requirement=REQUIRED, limits=Limits(horizon=40.0)),
+    dispersions=TOLERANCES,
+)
+
+
+def line(axes: Axes, label: str) -> Vector:
+    (found,) = (one for one in axes.lines if str(one.get_label()).startswith(label))
+    return np.asarray(found.get_xydata(), dtype=np.float64)
+
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 
@@ -53,21 +71,23 @@ pytestmark = pytest.mark.usefixtures("plans_shared")
 
 
 @cache
-def traded() -> tuple[Front, ...]:
+def traded() -> tuple[tradeoff.Front, ...]:
     """Two hand-made fronts that begin with one schedule: later ends cost less, and a free H less still."""
     strict = ((0.0, 1.0), (4.0, 0.97), (10.0, 0.95), (20.0, 0.94))
     free = ((5.0, 0.94), (12.0, 0.91), (22.0, 0.895))
     first, *others = (traded_point(*one) for one in strict)
-    return Front(0.0, (first, *others)), Front(math.inf, (first, *(traded_point(*one) for one in free)))
+    return tradeoff.Front(0.0, (first, *others)), tradeoff.Front(
+        math.inf, (first, *(traded_point(*one) for one in free))
+    )
 
 
-def traded_point(later: float, share: float) -> Point:
+def traded_point(later: float, share: float) -> tradeoff.Point:
     """The two pulses of the compared body, ``later`` s and of a ``share`` of their impulse."""
     made = planning.plan(BODY, "two-pulse")
     pulses = tuple(replace(one, t=one.t + later, impulse=one.impulse * share) for one in made.pulses)
     least = share * made.total_impulse
     schedule = Schedule(pulses, bounds=Bounds(0.99 * least, 0.9 * least, "N m s", 40.0))
-    return Point(replace(made, scheme="optimal", schedule=schedule), 40.0, "N m s")
+    return tradeoff.Point(replace(made, scheme="optimal", schedule=schedule), 40.0, "N m s")
 
 
 @pytest.mark.deep
@@ -99,11 +119,11 @@ def test_no_number_lies_under_the_mark_of_the_recommended_plan(front: int) -> No
 
 @pytest.mark.deep
 def test_fronts_without_points_say_why() -> None:
-    figure = studies.trade_figure(spinner(), (Front(0.0, (), "no channel"),))
+    figure = studies.trade_figure(spinner(), (tradeoff.Front(0.0, (), "no channel"),))
     check_layout(figure)
     assert not figure.axes
     assert any("H ends where it was \N{EN DASH} none: no channel" in text.get_text() for text, _ in texts(figure))
-    missing = Front(0.0, (), "within 40 s H cannot be kept where it is; " + "set limits.horizon to more " * 5)
+    missing = tradeoff.Front(0.0, (), "within 40 s H cannot be kept where it is; " + "set limits.horizon to more " * 5)
     figure = studies.trade_figure(BODY, (missing, traded()[1]))
     check_layout(figure)
     said = " ".join(figure.axes[0].get_title(loc="left").split())
@@ -133,7 +153,7 @@ def test_points_that_do_not_meet_the_requirement_are_crossed_out_and_all_have_th
 @pytest.mark.parametrize(("count", "later", "cheaper"), [(5, 0.4, 0.004), (80, 0.006, 0.0022)])
 def test_of_points_close_together_those_are_numbered_that_have_room(count: int, later: float, cheaper: float) -> None:
     """Each nearest to its own number."""
-    close = Front(0.0, tuple(traded_point(later * step, 1.0 - cheaper * step) for step in range(count)))
+    close = tradeoff.Front(0.0, tuple(traded_point(later * step, 1.0 - cheaper * step) for step in range(count)))
     figure = studies.trade_figure(BODY, (close,))
     check_layout(figure)
     (axes,) = figure.axes
@@ -153,7 +173,7 @@ def test_of_points_close_together_those_are_numbered_that_have_room(count: int, 
 EASY = replace(WIDE, requirement=Requirement(nutation=math.radians(30.0)))
 
 
-def front_of(body: Spacecraft, *shares: float) -> Front:
+def front_of(body: Spacecraft, *shares: float) -> tradeoff.Front:
     """One schedule a share of the cost, with H anywhere, all of which end as the plan of two-pulse does."""
     plan = planning.plan(body, "two-pulse")
     bounds = Bounds(plan.pulses.cost_in("N m s"), None, "N m s", 60.0)
@@ -161,18 +181,18 @@ def front_of(body: Spacecraft, *shares: float) -> Front:
     for share in shares:
         pulses = tuple(replace(one, impulse=share * one.impulse) for one in plan.pulses)
         schedule = replace(plan.pulses, pulses=pulses, bounds=bounds)
-        points.append(Point(replace(plan, schedule=schedule), 42.0, "N m s"))
-    return Front(math.inf, tuple(points))
+        points.append(tradeoff.Point(replace(plan, schedule=schedule), 42.0, "N m s"))
+    return tradeoff.Front(math.inf, tuple(points))
 
 
-def half_of(front: Front) -> Front:
+def half_of(front: tradeoff.Front) -> tradeoff.Front:
     """A front of the first pulse alone of its first point, which leaves nutation and shifts H."""
     point = front.points[0]
     half = replace(point.plan, schedule=replace(point.plan.pulses, pulses=point.plan.pulses.pulses[:1]))
     return replace(front, points=(point._replace(plan=half),))
 
 
-def codes(fronts: tuple[Front, ...], chosen: Plan) -> list[str]:
+def codes(fronts: tuple[tradeoff.Front, ...], chosen: planning.Plan) -> list[str]:
     """Codes of the notes on a trade beside a plan."""
     return [note.code for note in trade_notes(fronts, chosen, chosen.verdict)]
 

@@ -12,7 +12,6 @@ import numpy as np
 from support import reference
 
 from nutdamp.common import results
-from nutdamp.common.results import Note, Value
 from nutdamp.flight.propagation import Residual
 from nutdamp.planning.decision import Comparison, recommend
 from nutdamp.planning.notes import comparison_warnings, reasons
@@ -214,22 +213,22 @@ def chosen(*plans: Plan) -> str | None:
     return None if best is None else best.scheme
 
 
-def noted(notes: Iterable[Note]) -> str:
+def noted(notes: Iterable[results.Note]) -> str:
     """Codes of notes with their values, one a line: ``momentum-shift scheme=x momentum_shift_deg=0.25``."""
     return "\n".join(" ".join((entry.code, *map(_valued, entry.items))) for entry in notes)
 
 
-def _valued(item: tuple[str, Value]) -> str:
+def _valued(item: tuple[str, results.Value]) -> str:
     name, value = item
     return f"{name}={value:.4g}" if isinstance(value, float) else f"{name}={value}"
 
 
-def codes(notes: Iterable[Note]) -> list[str]:
+def codes(notes: Iterable[results.Note]) -> list[str]:
     """Codes of notes."""
     return [entry.code for entry in notes]
 
 
-def one_of(notes: Iterable[Note], code: str) -> dict[str, Value]:
+def one_of(notes: Iterable[results.Note], code: str) -> dict[str, results.Value]:
     """Values of the one note with a code."""
     (entry,) = (entry for entry in notes if entry.code == code)
     return entry.values

@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from support.process import Run, environment
+from support.process import Run, Status, environment
 
 EXACT = "name: X\ninertia: {A: 120, C: 80}\nomega0: [0.1, 0, 3]\n"
 """The shortest spacecraft file: ideal impulses, and no requirement."""
@@ -91,10 +91,10 @@ def call(run: Run, command: str, **options: Any) -> subprocess.CompletedProcess[
     return run(*shlex.split(command), **options)
 
 
-def result(run: Run, command: str, *, status: int = 0, stdin: str | None = None) -> Any:
+def result(run: Run, command: str, *, status: Status = 0, stdin: str | None = None) -> Any:
     """The JSON that a command prints, and nothing else, with ``--json -`` where it is not export."""
-    ended = call(run, command if command.startswith("export") else f"{command} --json -", stdin=stdin, status=status)
-    return json.loads(ended.stdout)
+    line = command if command.startswith("export") else f"{command} --json -"
+    return json.loads(call(run, line, stdin=stdin, status=status).stdout)
 
 
 def rows(text: str) -> list[dict[str, str]]:

@@ -19,7 +19,6 @@ from nutdamp.errors import FaultyFile, printable
 from nutdamp.files.editing import parse_setting
 from nutdamp.files.reader import load_spacecraft, read_spacecraft
 from nutdamp.planning import plan as planning
-from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.schedule import Pulse, Schedule
 
@@ -71,7 +70,7 @@ thrusters:
 
 
 @cache
-def pushing(name: str, *, orbit: bool = True) -> Plan:
+def pushing(name: str, *, orbit: bool = True) -> planning.Plan:
     """A plan whose pulses change the velocity."""
     body = load_spacecraft(messages.CONFIGS / f"{name}.yaml", [parse_setting(ORBIT)] if orbit else [])
     plan = planning.plan(body, "four-pulse")
@@ -80,7 +79,7 @@ def pushing(name: str, *, orbit: bool = True) -> Plan:
 
 
 @cache
-def valved() -> Plan:
+def valved() -> planning.Plan:
     """A plan whose pulses are fired through valves."""
     text = VALVED + "valve: {open_delay: 15 ms, close_delay: 8 ms}\n"
     return planning.plan(read_spacecraft(text, "f.yaml"), "four-pulse")
@@ -102,7 +101,7 @@ def motions(body: Spacecraft, pulses: Schedule, times: Sequence[float], rotation
     return [at[time] for time in times]
 
 
-def velocity_change(plan: Plan, pulse: Pulse) -> Vector:
+def velocity_change(plan: planning.Plan, pulse: Pulse) -> Vector:
     """∫ R F dt / m of one pulse, m/s, by Simpson on attitudes of the reference integrator."""
     body = plan.spacecraft
     start = messages.columns(body, body.initial.quaternion) @ body.inertia.axes

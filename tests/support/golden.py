@@ -13,8 +13,9 @@ import fcntl
 import os
 import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -44,6 +45,13 @@ def refused(error: type[Exception], key: str) -> Iterator[None]:
     with pytest.raises(error) as raised:
         yield
     check_text(key, str(raised.value))
+
+
+def refusal(error: type[Exception], call: Callable[..., object], *given: Any, **named: Any) -> str:
+    """The text of the ``error`` with which a call is refused."""
+    with pytest.raises(error) as raised:
+        call(*given, **named)
+    return str(raised.value)
 
 
 def load_texts() -> dict[str, str]:

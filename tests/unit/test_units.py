@@ -9,11 +9,10 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from support.golden import check_text
+from support.golden import check_text, refusal
 
 import nutdamp
 from nutdamp import errors
-from nutdamp.errors import Fault
 from nutdamp.units import KINDS, LARGEST, SI, US, parse, pattern, screen_unit, screen_units, shown
 
 UNITS = {
@@ -88,12 +87,7 @@ REFUSED: list[tuple[object, str]] = [
 
 
 def test_refusals_say_what_is_allowed() -> None:
-    said = []
-    for value, kind in REFUSED:
-        with pytest.raises(ValueError) as refusal:  # noqa: PT011 - its text is kept
-            parse(value, kind)
-        said.append(str(refusal.value))
-    check_text("units.refused", "\n".join(said))
+    check_text("units.refused", "\n".join(refusal(ValueError, parse, value, kind) for value, kind in REFUSED))
     for unit in ("Deg", "dg", "secs", "Sec", "hrs", "rp m", "deg°", "M", "KM", "msec", "arcmin"):
         for kind in KINDS:
             with pytest.raises(ValueError, match="is not a"):
@@ -155,7 +149,7 @@ def test_angles_rates_times_and_shares_are_the_same_in_both_systems(unit: str) -
         assert screen_unit(unit, 2.0) == (unit, 2.0)
 
 
-FAULTS = [Fault("b.yaml", 3, 1, "mass", "zero"), Fault("a.yaml", 0, 0, "", "empty")]
+FAULTS = [errors.Fault("b.yaml", 3, 1, "mass", "zero"), errors.Fault("a.yaml", 0, 0, "", "empty")]
 EVERY = [
     errors.NutdampError("anything"),
     errors.FaultyFile(FAULTS),

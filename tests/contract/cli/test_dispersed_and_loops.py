@@ -1,6 +1,5 @@
 """disperse, loop, disperse --loop and budget as users run them: what they show, write, name and refuse."""
 
-import csv
 import json
 import os
 import re
@@ -15,7 +14,7 @@ import numpy as np
 import pytest
 from support import places
 from support.cases import deep, spread, weekly
-from support.commands import call, names, result, rows, transcript
+from support.commands import call, names, result, rows, transcript, words
 from support.dispersed import FILE
 from support.golden import check_text
 from support.loops import follow_few_cycles
@@ -63,12 +62,8 @@ def settings(*each: str) -> list[str]:
     return [part for setting in each for part in ("--set", setting)]
 
 
-def flat(text: str) -> str:
-    return " ".join(text.split())
-
-
 def table(path: Path) -> list[dict[str, str]]:
-    return list(csv.DictReader(path.read_text().splitlines()))
+    return rows(path.read_text())
 
 
 def test_a_loop_is_flown_and_written_and_fired_again(run: Run, file: str, tmp_path: Path) -> None:
@@ -106,7 +101,7 @@ def test_what_is_wired_backwards_is_named(run: Run, file: str, tmp_path: Path, s
     wired, code = ("channel", "channels-reversed") if "faults" in setting else ("sensor", "sensor-reversed")
     check_text(f"loop.wired-{wired}", "\n".join([screen.stderr, *(note["code"] for note in written["notes"])]))
     assert written["notes"][0]["severity"] == "warning"
-    assert f"warning[{written['notes'][0]['code']}]: the loop was stopped" in flat(screen.stdout)
+    assert f"warning[{written['notes'][0]['code']}]: the loop was stopped" in words(screen.stdout)
     assert f"warning[{code}]: " in checked.stdout
     assert (written["decision"]["status"], written["meets_requirement"]) == ("no-plan", None)
 
@@ -116,7 +111,7 @@ def test_too_late_is_refused_with_what_is_allowed(run: Run, file: str) -> None:
     screen = run("loop", file, *late)
     assert (screen.returncode, screen.stdout) == (3, "")
     check_text("loop.refused-too-late", screen.stderr)
-    assert "warning[loop-does-not-damp]: " in flat(run("check", file, *late).stdout)
+    assert "warning[loop-does-not-damp]: " in words(run("check", file, *late).stdout)
     margins = json.loads(run("check", file, *late, "--json", "-").stdout)["files"][0]["loop"]
     assert {each["damps"] for each in margins} == {False}
     assert margins[0]["delay_margin_s"] < 0.0
@@ -129,13 +124,13 @@ def test_a_loop_that_is_never_quiet_misses_the_requirement(run: Run, file: str, 
     written = json.loads((tmp_path / "loop.json").read_text())
     assert (screen.returncode, written["meets_requirement"], written["quiet_s"]) == (4, False, [])
     assert written["flown"]["nutation_deg"] < 0.3
-    assert "NOT ENOUGH: the loop is never down to its stop threshold" in flat(screen.stdout)
+    assert "NOT ENOUGH: the loop is never down to its stop threshold" in words(screen.stdout)
     cases = (*settings("dispersions={A: {normal: 0.01 %}}"), "--samples", "20", "--json", "-", "-q")
     study = json.loads(run("disperse", file, "--loop", *never, *cases).stdout)
     assert study["requirement"]["met_fraction"] == 0.0
     screen = run("loop", file, "--set", "loop.stop=0")
     assert (screen.returncode, "never: loop.stop is 0" in screen.stdout) == (0, True)
-    assert "it never shows the start threshold" in flat(run("loop", file, "--set", "omega0=[0, 0, 3]").stdout)
+    assert "it never shows the start threshold" in words(run("loop", file, "--set", "omega0=[0, 0, 3]").stdout)
 
 
 def test_a_requirement_or_a_cone_that_is_missed_is_exit_4(run: Run, file: str, tmp_path: Path) -> None:
@@ -157,7 +152,7 @@ def test_where_nutation_grows_the_default_end_comes_after_a_cycle(run: Run, file
 
 
 def test_start_below_the_smallest_pulse_is_warned_of(run: Run, file: str) -> None:
-    shown = flat(run("loop", file, *settings("loop.start=0.02deg", "loop.stop=0.001deg"), "--until", "5s").stdout)
+    shown = words(run("loop", file, *settings("loop.start=0.02deg", "loop.stop=0.001deg"), "--until", "5s").stdout)
     assert "warning[start-below-pulse]: loop.start, 0.02 deg, is below 0.02728 deg" in shown
     assert "noise, bias and steps of the sensor" in shown
 
@@ -181,11 +176,10 @@ SENSELESS = (
 
 
 def test_senseless_numbers_of_loop_and_sensor_are_refused(run: Run, stage: Path) -> None:
-    texts = []
-    for setting in SENSELESS:
-        screen = run("check", "stage.yaml", "--set", setting, columns=200, status=2)
-        texts += [line for line in screen.stderr.splitlines() if "warning" not in line]
-    check_text("loop.senseless", "\n".join(texts))
+    check = ("check", "stage.yaml", "--set")
+    screens = (run(*check, setting, columns=200, status=2).stderr for setting in SENSELESS)
+    lines = (line for screen in screens for line in screen.splitlines() if "warning" not in line)
+    check_text("loop.senseless", "\n".join(lines))
     assert run("check", "stage.yaml", "--set", "loop.sensor.bias=3m/s^2").returncode == 0  # it is fitted
 
 
@@ -229,7 +223,7 @@ def test_cases_their_table_their_files(run: Run, stage: Path, tmp_path: Path) ->
     screen = run(*command, "-v", "--csv", "c.csv", "--json", "c.json", "--plot", "c.svg", status=4)
     brief = run(*command).stdout
     assert len(brief.splitlines()) <= 40
-    assert f"--case {json.loads((tmp_path / 'c.json').read_text())['worst'][0]['case']} (worst)" in flat(brief)
+    assert f"--case {json.loads((tmp_path / 'c.json').read_text())['worst'][0]['case']} (worst)" in words(brief)
     check_text("loop.cases-brief", brief.split("\n\n")[0])
     verdicts, inputs = screen.stdout.split("\n\n")[2:4]
     check_text("loop.cases", "\n".join([verdicts, *inputs.splitlines()[-3:]]))
@@ -248,7 +242,7 @@ def test_cases_their_table_their_files(run: Run, stage: Path, tmp_path: Path) ->
     assert alone["inputs"] == worst["inputs"]
     assert alone["largest_nutation_deg"] == pytest.approx(worst["largest_nutation_deg"], rel=1e-12)
     loop = run("loop", "stage.yaml", "--until", "8s", "--case", str(worst["case"]), "--json", "l.json", status=0)
-    assert f"dispersed case {worst['case']} of seed 1: ENOUGH: " in flat(loop.stdout)
+    assert f"dispersed case {worst['case']} of seed 1: ENOUGH: " in words(loop.stdout)
     flown = json.loads((tmp_path / "l.json").read_text())
     assert (flown["seed"], flown["case"], len(flown["pulses"])) == (1, worst["case"], worst["firings"])
     assert flown["quiet_s"][0] == pytest.approx(worst["settled_s"], abs=1e-9)
@@ -293,12 +287,12 @@ def test_a_requirement_missed_and_faults_are_said(run: Run, stage: Path) -> None
     assert (strict.returncode, "NOT met" in strict.stdout) == (4, True)
     wrong = run(*command, "--set", "loop.faults={reversed: [N1, N2]}")
     assert (wrong.returncode, "Of the others: stopped in" in wrong.stdout) == (4, True)
-    assert "Falls quiet and is not stopped, in" in flat(wrong.stdout)
+    assert "Falls quiet and is not stopped, in" in words(wrong.stdout)
     late = run(*command, *settings("loop.predict=false", "loop.sensor.delay=600ms"))
     assert (late.returncode, late.stdout) == (3, "")
     priced = run(*command[:-1], "2", "--set", "disturbances=[{torque: [0, 0.1 N m, 0]}]")
     assert (priced.returncode, "NOT SHOWN: 100.0 % of cases" in priced.stdout) == (4, True)
-    assert "the cases fly one by one" in flat(priced.stderr)
+    assert "the cases fly one by one" in words(priced.stderr)
 
 
 def test_a_dispersed_case_is_headed_so_and_changes_of_spin_have_no_sign(run: Run, file: str) -> None:

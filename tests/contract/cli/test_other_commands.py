@@ -301,8 +301,10 @@ def test_a_command_loads_what_it_needs(tmp_path: Path, commands: list[tuple[str,
 @pytest.mark.deep
 def test_products_of_small_matrices_have_one_thread(tmp_path: Path) -> None:
     """Unless the environment says otherwise."""
-    code = "import os, sys\n{}\nfrom nutdamp.cli.main import main\nsys.argv = ['nutdamp', '--version']\n"
-    code += "try: main()\nfinally: print(os.environ['OPENBLAS_NUM_THREADS'])"
+    code = (
+        "import os, sys\n{}\nfrom nutdamp.cli.main import main\nsys.argv = ['nutdamp', '--version']\n"
+        "try: main()\nfinally: print(os.environ['OPENBLAS_NUM_THREADS'])"
+    )
     for given, used in (
         ("os.environ.pop('OPENBLAS_NUM_THREADS', 0)", "1"),
         ("os.environ['OPENBLAS_NUM_THREADS'] = '3'", "3"),

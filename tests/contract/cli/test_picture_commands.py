@@ -19,7 +19,6 @@ from support.shown import downloaded
 
 from nutdamp import __version__
 from nutdamp.figures import image, style
-from nutdamp.figures.image import Scene, Timing
 from nutdamp.flight.propagation import Flight
 from nutdamp.page import report
 from nutdamp.page.document import Prose
@@ -109,8 +108,8 @@ def test_figure_film_and_page_name_the_plan_that_they_show(
     """Lunar Prospector flies command blocks, though optimal costs less."""
     captions: list[str] = []
 
-    def captioned(_: object, flight: Flight, timed: Timing, *__: object) -> None:
-        captions.append(style.styled()(Scene)(flight, timed, 320).caption(0.0))
+    def captioned(_: object, flight: Flight, timed: image.Timing, *__: object) -> None:
+        captions.append(style.styled()(image.Scene)(flight, timed, 320).caption(0.0))
 
     monkeypatch.setattr(image, "film", captioned)
     craft = str(places.CONFIGS / "lunar-prospector.yaml")

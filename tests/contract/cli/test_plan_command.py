@@ -18,7 +18,6 @@ import nutdamp
 from nutdamp.common import work
 from nutdamp.files.reader import example_text
 from nutdamp.files.schedules import PULSES_HEADER
-from nutdamp.planning.decision import Comparison
 from nutdamp.schemes import two_pulse
 from nutdamp.spacecraft.schedule import Schedule
 
@@ -430,7 +429,7 @@ def test_a_spacecraft_with_commands_fires_command_blocks(run: Run) -> None:
 
 def test_no_plan_can_be_commanded() -> None:
     body = nutdamp.load(case("cbp1004.yaml"))
-    compared = Comparison(body, (nutdamp.plan(body, "two-pulse"),))
+    compared = nutdamp.Comparison(body, (nutdamp.plan(body, "two-pulse"),))
     assert compared.recommended is None
     check_text("decision.none-commanded", compared.reason)
     assert replace(compared, timed=True).recommended is compared.plans[0]

@@ -42,8 +42,6 @@ from nutdamp.schemes.catalogue import NAMES, SCHEMES, names_of
 from nutdamp.spacecraft.tolerances import KINDS as TOLERANCE_KINDS
 from nutdamp.units import KINDS
 from nutdamp.views import explain, guide, loop_cases, simulation
-from nutdamp.views.explain import WIDEST
-from nutdamp.views.guide import EQUATIONS, SYMBOLS
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 
@@ -244,7 +242,7 @@ def test_every_command_on_a_page_runs(run: Run, tmp_path: Path, craft: str) -> N
 FIGURES = guide.found("figures")
 TOPICS = (
     *guide.NAMES,
-    *(equation.number for equation in EQUATIONS),
+    *(equation.number for equation in guide.EQUATIONS),
     "file.thrusters",
     "file.limits.tick",
     "requirement",
@@ -266,7 +264,7 @@ def test_every_topic_and_every_equation_is_listed() -> None:
     lines = explained(columns=80).splitlines()
     assert len(lines) <= 40  # one screen
     assert max(map(len, lines)) <= 80
-    assert all(f"• {equation.number}: {equation.subject}" in equations for equation in EQUATIONS)
+    assert all(f"• {equation.number}: {equation.subject}" in equations for equation in guide.EQUATIONS)
 
 
 @pytest.mark.parametrize("topic", [pytest.param(name, marks=[] if number % 6 == 0 else pytest.mark.deep)
@@ -277,7 +275,7 @@ def test_each_topic_fits_the_screen_and_loses_nothing(topic: str) -> None:
     assert whole.total() > 120
     for columns in (36, 80, 140):
         shown = explained(topic, columns=columns)
-        assert max(map(len, shown.splitlines())) <= min(columns, WIDEST)
+        assert max(map(len, shown.splitlines())) <= min(columns, explain.WIDEST)
         assert letters(shown) == whole
     if topic in guide.NAMES:
         text = re.sub(r"```\w*", "", guide.page_or_topic(topic).text)
@@ -302,7 +300,7 @@ def test_a_scheme_says_how_when_with_which_options_and_within_what_limits() -> N
 
 
 def test_an_equation_has_its_formula_its_symbols_and_what_is_changed() -> None:
-    for equation in EQUATIONS:
+    for equation in guide.EQUATIONS:
         if equation.number in ("energy sink", "gyrostat"):  # of no source
             continue
         shown, formulas = words(explained(equation.number)), equation.topic.formulas
@@ -310,7 +308,7 @@ def test_an_equation_has_its_formula_its_symbols_and_what_is_changed() -> None:
         assert all(words(line) in shown for line in lines)
         assert words(equation.changed.replace("`", "")) in shown
         for symbol in equation.symbols:
-            assert f"{symbol}: {SYMBOLS[symbol]}" in shown
+            assert f"{symbol}: {guide.SYMBOLS[symbol]}" in shown
             assert symbol.strip("'").removesuffix("(t)") in " ".join([*lines, equation.changed])
         assert equation.place in shown
 

@@ -21,12 +21,10 @@ from support import places
 from support.builders import cross, present, spinner
 from support.cases import deep, spread
 from support.commands import call
-from support.places import CASES, CONFIGS
 from support.process import Run
 
 from nutdamp.cli import screen
 from nutdamp.cli.main import stoppable
-from nutdamp.cli.screen import working
 from nutdamp.common import work
 from nutdamp.files.reader import example_text
 from nutdamp.planning import plan as planning
@@ -214,7 +212,7 @@ def test_progress_is_shown_after_a_second_and_a_time_after_a_tenth_of_the_steps(
 ) -> None:
     monkeypatch.setattr(sys, "stderr", Terminal())
     seen: list[str] = []
-    with working("verifying"):
+    with screen.working("verifying"):
         clock.set(0.9)
         assert not lines
         clock.set(1.0)
@@ -250,7 +248,7 @@ def test_no_progress_is_shown_in_a_pipe_or_where_it_is_not_wanted(
     monkeypatch: pytest.MonkeyPatch, clock: Clock, lines: list[Any], stream: io.StringIO, quiet: bool
 ) -> None:
     monkeypatch.setattr(sys, "stderr", stream)
-    with working("planning", quiet=quiet), work.steps(2.0) as task:
+    with screen.working("planning", quiet=quiet), work.steps(2.0) as task:
         task.reach(1.0)
         clock.set(60.0)
         assert (lines, clock.timers, stream.getvalue()) == ([], [], "")
@@ -352,9 +350,9 @@ def units(names: list[str]) -> re.Pattern[str]:
 
 SI_UNITS, US_UNITS = units(list(PAIRS)), units([name for name, _ in PAIRS.values()])
 
-FILES = [path.stem for path in sorted(CONFIGS.glob("*.yaml"))]
+FILES = [path.stem for path in sorted(places.CONFIGS.glob("*.yaml"))]
 LOOPED, DISPERSED = (
-    [name for name in FILES if key in (CONFIGS / f"{name}.yaml").read_text(encoding="utf-8")]
+    [name for name in FILES if key in (places.CONFIGS / f"{name}.yaml").read_text(encoding="utf-8")]
     for key in ("\nloop:", "\ndispersions:")
 )
 SHORT = ["check -v", "simulate -v --scheme two-pulse --samples 100"]
@@ -367,12 +365,12 @@ LOOPS = [
     "loop -v --until 400s", "budget -v", "disperse -v --loop --samples 50", "disperse --loop --samples 9 --case 3",
     "verify --loop --set limits.horizon=300s",
 ]  # fmt: skip
-FITS = [f"fit -v {CASES}/{name}.csv {CASES}/{name}.yaml" for name in ("accelerometer", "axis-tumble")]
+FITS = [f"fit -v {places.CASES}/{name}.csv {places.CASES}/{name}.yaml" for name in ("accelerometer", "axis-tumble")]
 
 
 def of_configs(commands: list[str], names: list[str]) -> list[str]:
     """Each of the commands with each of the files."""
-    return [f"{command} {CONFIGS}/{name}.yaml" for command in commands for name in names]
+    return [f"{command} {places.CONFIGS}/{name}.yaml" for command in commands for name in names]
 
 
 def expect_replaced(run: Run, command: str) -> None:

@@ -25,7 +25,6 @@ from nutdamp.files.schedules import read_pulses
 from nutdamp.flight import propagation
 from nutdamp.physics import attitude
 from nutdamp.planning import plan as planning
-from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft.model import Limits, Spacecraft
 from nutdamp.spacecraft.schedule import Pulse, Schedule
 from nutdamp.views.exchange import export_text
@@ -283,14 +282,14 @@ PLANNED_ALIKE = 1e-6
 """Relative difference of two schedules that were trimmed from states that differ in the last digit."""
 
 Taken = tuple[ApmContents, str, Spacecraft, Schedule]
-Take = Callable[[str | Plan], Taken]
+Take = Callable[[str | planning.Plan], Taken]
 
 
 @pytest.fixture
 def take(write: Write) -> Take:
     """``take(message)``, or that of a plan: what is read, the file it becomes, its spacecraft and schedule."""
 
-    def take(message: str | Plan) -> Taken:
+    def take(message: str | planning.Plan) -> Taken:
         contents = read_apm(str(write(message if isinstance(message, str) else export_text(message, "apm"), "a.apm")))
         return contents, *imported(contents, "a.apm")
 
@@ -372,7 +371,7 @@ def test_overlapping_manoeuvres_keep_apart_and_stand_in_the_order_of_their_start
         (Pulse(2.0, 2.0, "long", 2.0 * torque, torque), Pulse(1.5, 0.2, "short", 0.4 * torque, 2 * torque))
     )
     assert [pulse.channel for pulse in pulses] == ["short", "long"]
-    _, _, back, schedule = take(Plan(messages.spacecraft("prolate"), "by hand", pulses))
+    _, _, back, schedule = take(planning.Plan(messages.spacecraft("prolate"), "by hand", pulses))
     assert back.steerable is None  # of two torques there is none
     assert sorted(pulse.start for pulse in schedule) == pytest.approx([1.0, 1.4])
 

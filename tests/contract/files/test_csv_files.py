@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from support.builders import Outcome, present
+from support.commands import result
 from support.contract import Write, check_faults, faults
 from support.golden import check_text
 from support.process import Run
@@ -304,10 +305,11 @@ def test_where_no_blocks_can_be_written_or_fired(run: Run, tmp_path: Path) -> No
     (tmp_path / "blocks.csv").write_text(HEAD + "+M1,1,0.1,0.1,4\n")
     refused += [run("simulate", *BLOCKS), run("simulate", *BLOCKS, "--scheme", "none")]
     # Delay longer than a spin, no width, rising pressure, min > max of a cone.
-    bad = FILE.replace("delay_max: 4.9 s", "delay_max: 6 s")
-    bad = bad.replace("width: {step: 10 ms, min: 100 ms, max: 500 ms}", "width: []")
-    bad += "keep: [{name: Moon, direction: [10 deg, 5 deg], min: 20 deg, max: 4 deg}]\n"
-    bad += "tank: {propellant: 30 kg, pressure: 8 bar, final_pressure: 22 bar}\n"
+    late = FILE.replace("delay_max: 4.9 s", "delay_max: 6 s")
+    bad = late.replace("width: {step: 10 ms, min: 100 ms, max: 500 ms}", "width: []") + (
+        "keep: [{name: Moon, direction: [10 deg, 5 deg], min: 20 deg, max: 4 deg}]\n"
+        "tank: {propellant: 30 kg, pressure: 8 bar, final_pressure: 22 bar}\n"
+    )
     refused.append(run("plan", "-", stdin=bad))
     assert [screen.returncode for screen in refused] == [2, 3, 2, 2]
     check_text("files.blocks-refused", "\n".join(screen.stderr.rpartition("\n\n")[2] for screen in refused))
@@ -319,13 +321,13 @@ def test_disperse_and_verify_fire_the_blocks_of_a_file(run: Run) -> None:
     text = FILE + "dispersions: {thrust: {normal: 3 %}, A: {normal: 1 %}}\n"
     scheme = ("--scheme", "command-block")
     assert run("plan", "-", *GOAL, *scheme, *BLOCKS, stdin=text).returncode in (0, 4)
-    flown = []
-    for source in (BLOCKS, scheme):
-        screen = run("disperse", "-", *GOAL, *source, "--samples", "100", "--json", "-", stdin=text, status=(0, 4))
-        flown.append(json.loads(screen.stdout))
-    assert flown[0]["requirement"] == flown[1]["requirement"]
-    for name, percentiles in flown[0]["percentiles"].items():
-        assert percentiles == pytest.approx(flown[1]["percentiles"][name], rel=1e-9, abs=1e-9)
+    by_file, by_scheme = (
+        result(run, f"disperse - {' '.join((*GOAL, *source))} --samples 100", stdin=text, status=(0, 4))
+        for source in (BLOCKS, scheme)
+    )
+    assert by_file["requirement"] == by_scheme["requirement"]
+    for name, percentiles in by_file["percentiles"].items():
+        assert percentiles == pytest.approx(by_scheme["percentiles"][name], rel=1e-9, abs=1e-9)
     assert "blocks.csv" in run("verify", "-", *GOAL, *BLOCKS, stdin=text, status=0).stdout
     assert run("verify", "-", *GOAL, *BLOCKS, "--schedule", "blocks.csv", stdin=text).returncode == 2
 

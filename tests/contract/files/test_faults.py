@@ -25,7 +25,6 @@ from nutdamp.files.editing import parse_setting
 from nutdamp.files.reader import example_text, json_schema, load_spacecraft, read_spacecraft
 from nutdamp.files.study_keys import LoopFaultsSection, LoopSection, LoopSensorSection
 from nutdamp.files.yaml import read_tree
-from nutdamp.spacecraft.model import Spacecraft
 
 
 def faults_of(text: str) -> list[Fault]:
@@ -99,7 +98,7 @@ def mutated(draw: st.DrawFn) -> bytes:
     return data[:place] + draw(st.just(b"") | st.binary(max_size=4)) + data[place:]
 
 
-def judge(outcome: Callable[[], Spacecraft]) -> None:
+def judge(outcome: Callable[[], nutdamp.Spacecraft]) -> None:
     """A sound spacecraft or faults; anything else that is raised is a bug."""
     try:
         spacecraft = outcome()
@@ -163,7 +162,7 @@ def whole(lines: str) -> str:
     return lines if lines.startswith("name") else (BODY if lines.startswith(("state", "omega0")) else BASE) + lines
 
 
-def read_lines(lines: str) -> Spacecraft:
+def read_lines(lines: str) -> nutdamp.Spacecraft:
     return read_spacecraft(whole(lines), "f.yaml")
 
 
@@ -222,9 +221,10 @@ UNDOUBTED = (
 
 
 def test_numbers_beyond_what_can_be_meant_are_taken_with_a_warning() -> None:
-    said = []
-    for lines in DOUBTED:
-        said += [lines.strip().replace("\n", " | "), *(f"    {doubt.as_warning}" for doubt in doubts_of(lines))]
+    said = (
+        "\n    ".join([lines.strip().replace("\n", " | "), *(doubt.as_warning for doubt in doubts_of(lines))])
+        for lines in DOUBTED
+    )
     check_text("files.doubts", "\n".join(said))
     # What is set on the command line is doubted too.
     doubts: list[Fault] = []
@@ -318,7 +318,7 @@ OF_ACCELEROMETER = {
 }
 
 
-def looped(sensor: dict[str, str], key: str = "", value: str = "") -> Spacecraft:
+def looped(sensor: dict[str, str], key: str = "", value: str = "") -> nutdamp.Spacecraft:
     """A body with a loop, one key of which has another value."""
     section, _, last = key.rpartition(".")
     loop: dict[str, Any] = {"sensor": dict(sensor), "start": "0.2 deg"}

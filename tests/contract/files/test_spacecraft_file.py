@@ -20,7 +20,6 @@ from support.builders import cross, one_of, present
 from support.cases import spread
 from support.contract import Write, check_faults
 from support.golden import check_text
-from support.places import case
 
 from nutdamp.errors import CannotRead, FaultyFile
 from nutdamp.files import study_rules, thruster_rules
@@ -28,7 +27,6 @@ from nutdamp.files.keys import SpacecraftFile
 from nutdamp.files.reader import example_text, json_schema, load_spacecraft, read_spacecraft
 from nutdamp.files.rules import Facts
 from nutdamp.files.schedules import EFFECTIVE, read_pulses
-from nutdamp.files.thruster_rules import thrusts
 from nutdamp.flight import propagation
 from nutdamp.flight.dynamics import supplied
 from nutdamp.flight.end_state import seen_at
@@ -163,7 +161,7 @@ def test_a_state_is_about_the_principal_axis_and_its_nutation_is_the_largest() -
 
 def test_a_pair_for_velocity_changes_is_flown_and_never_fired_to_damp() -> None:
     """Two thrusters along axis 3 on both sides: their torques cancel, with 3 mm of tolerance in position not quite."""
-    body = load_spacecraft(case("lp71-dv-pair.yaml"))
+    body = load_spacecraft(places.case("lp71-dv-pair.yaml"))
     (pair,) = body.channels
     assert not pair.torque.any()
     assert not pair.damps
@@ -475,7 +473,7 @@ def test_faults_have_their_place() -> None:
 
 
 def test_the_thrusts_of_a_file_are_looked_up_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    calls = []
+    calls, thrusts = [], thruster_rules.thrusts
 
     def counted(facts: Facts) -> dict[str, float | None]:
         calls.append(facts)

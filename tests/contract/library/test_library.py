@@ -21,14 +21,12 @@ import pytest
 from scipy.spatial.transform import Rotation
 from support import places
 from support.builders import present
-from support.golden import check_text, refused
+from support.golden import check_text, refusal, refused
 from support.markup import parsed
 from support.process import Run
-from support.tilted import KEYS, TILTED
 
 import nutdamp
 from nutdamp import errors
-from nutdamp.errors import BadRequest, CannotRead, CannotWrite, FaultyFile, Infeasible
 from nutdamp.figures import style
 from nutdamp.files import schedules, tabular
 from nutdamp.files.reader import read_spacecraft
@@ -36,10 +34,25 @@ from nutdamp.flight import propagation
 from nutdamp.montecarlo.inputs import list_inputs
 from nutdamp.page import report
 from nutdamp.planning import plan as planning
-from nutdamp.planning.decision import Comparison
 from nutdamp.planning.plan import plan
-from nutdamp.schemes.catalogue import OptimalOptions
-from nutdamp.spacecraft.model import Spacecraft
+
+TILTED = """
+name: Tilted
+inertia: {tensor: [[120, 3, 6], [3, 118, -4], [6, -4, 80]]}
+omega0: [0.2, 0.1, 3.0]
+steerable: {torque: 40 N m, isp: 220 s, lever_arm: 1 m}
+requirement: {nutation: 0.5 deg}
+"""
+
+KEYS: dict[str, Any] = {
+    "name": "Tilted",
+    "inertia": {"tensor": np.array([[120, 3, 6], [3, 118, -4], [6, -4, 80]])},
+    "omega0": (0.2, np.float64(0.1), 3.0),
+    "steerable": {"torque": "40 N m", "isp": "220 s", "lever_arm": "1 m"},
+    "requirement": {"nutation": "0.5 deg"},
+    "limits": {"horizon": "100 s", "max_pulses": np.int64(3)},
+}
+
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 
@@ -70,8 +83,10 @@ def test_every_public_name_is_there_and_no_other() -> None:
 
 @pytest.mark.weekly
 def test_a_type_checker_knows_what_comes_back(tmp_path: Path) -> None:
-    lines = ["import nutdamp", 'plan = nutdamp.plan(nutdamp.load("spacecraft.yaml"), "two-pulse")']
-    lines += ["reveal_type(plan.fly().track.rates)", "plan.fly().to_csv(3)\n"]
+    lines = [
+        *("import nutdamp", 'plan = nutdamp.plan(nutdamp.load("spacecraft.yaml"), "two-pulse")'),
+        *("reveal_type(plan.fly().track.rates)", "plan.fly().to_csv(3)\n"),
+    ]
     (tmp_path / "typed.py").write_text("\n".join(lines))
     shown = python(tmp_path, "-m", "mypy", "--strict", "typed.py").stdout
     assert "ndarray" in shown
@@ -132,7 +147,7 @@ def test_every_result_shows_itself_in_one_short_line_and_as_json(tmp_path: Path)
 def test_a_plan_is_of_the_scheme_named_or_the_recommended_one() -> None:
     calm = nutdamp.read("{name: X, inertia: {A: 120, C: 80}, omega0: [0.1, 0, 3]}")
     assert nutdamp.plan(calm).scheme == nutdamp.compare(calm).recommended.scheme  # type: ignore[union-attr]
-    with pytest.raises(Infeasible):
+    with pytest.raises(errors.Infeasible):
         nutdamp.plan(CRAFT.with_(limits={"horizon": "1 ms"}))
     by_keyword = nutdamp.plan(CRAFT, "four-pulse", on_time=0.2)
     assert by_keyword.to_dict() == nutdamp.plan(CRAFT, "four-pulse", Options(on_time=0.2)).to_dict()
@@ -143,7 +158,7 @@ def test_there_is_one_type_of_each_name() -> None:
     """What the library gives is what the modules below make, not something around it."""
     compared = nutdamp.compare(CRAFT, ["two-pulse"], samples=0)
     (plan,) = compared.plans
-    kinds = (Spacecraft, planning.Plan, Comparison, propagation.Flight)
+    kinds = (nutdamp.Spacecraft, planning.Plan, nutdamp.Comparison, propagation.Flight)
     for made, kind in zip((CRAFT, plan, compared, plan.fly()), kinds, strict=True):
         assert type(made) is kind is getattr(nutdamp, kind.__name__)
     assert plan.spacecraft is plan.fly().spacecraft is CRAFT
@@ -172,7 +187,7 @@ def test_a_dict_is_read_as_the_file_is() -> None:
     assert nutdamp.load(KEYS, set={"limits.horizon": 50.0}).limits.horizon == 50.0
     assert nutdamp.load({**KEYS, "name": "1e3"}).name == "1e3"
     assert nutdamp.example("ace").name == "ACE"
-    with refused(FaultyFile, "library.faulty-dict"):
+    with refused(errors.FaultyFile, "library.faulty-dict"):
         nutdamp.load({"nam": "X", "inertia": {"A": "120 s", "C": 80}, "omega0": [0, 0, 3]})
 
 
@@ -218,7 +233,7 @@ WRONG: list[Call] = [
     lambda: LIB.plan(CRAFT, "four-pulse", Options(on_time="3 s")),
     lambda: LIB.plan(CRAFT, "four-pulse", Options(coarse=1)),
     lambda: LIB.plan(CRAFT, "four-pulse", Options(length=0.2)),
-    lambda: LIB.plan(CRAFT, "four-pulse", OptimalOptions(least="time")),
+    lambda: LIB.plan(CRAFT, "four-pulse", nutdamp.OptimalOptions(least="time")),
     lambda: LIB.plan(CRAFT, "four-pulse", {"on_time": 3}),
     lambda: LIB.plan(CRAFT, "three-pulse"),
     lambda: LIB.plan(CALM, "three-pulse"),  # where no nutation is to be damped, too
@@ -274,11 +289,7 @@ WRONG: list[Call] = [
 
 @pytest.mark.usefixtures("plans_shared")
 def test_a_wrong_argument_is_reported_with_what_was_expected() -> None:
-    messages = []
-    for call in WRONG:
-        with pytest.raises(BadRequest) as raised:
-            call()
-        messages.append(str(raised.value).partition("; there are ")[0])
+    messages = (refusal(errors.BadRequest, call).partition("; there are ")[0] for call in WRONG)
     check_text("library.wrong-arguments", "\n".join(messages))
     for below in (planning.plan, planning.alternatives):
         with pytest.raises(KeyError):
@@ -290,11 +301,11 @@ def test_what_cannot_be_says_so_in_an_error_of_the_package(tmp_path: Path) -> No
     assert not infeasible.feasible
     assert len(infeasible.to_numpy()) == len(infeasible) == 0
     calls: list[tuple[type[Exception], Call]] = [
-        (CannotRead, lambda: nutdamp.load(tmp_path / "missing.yaml")),
-        (FaultyFile, lambda: nutdamp.read("name: X\n")),
-        (Infeasible, infeasible.fly),
-        (Infeasible, lambda: infeasible.to_csv(tmp_path / "pulses.csv")),
-        (CannotWrite, lambda: planned().to_csv(tmp_path / "no" / "pulses.csv")),
+        (errors.CannotRead, lambda: nutdamp.load(tmp_path / "missing.yaml")),
+        (errors.FaultyFile, lambda: nutdamp.read("name: X\n")),
+        (errors.Infeasible, infeasible.fly),
+        (errors.Infeasible, lambda: infeasible.to_csv(tmp_path / "pulses.csv")),
+        (errors.CannotWrite, lambda: planned().to_csv(tmp_path / "no" / "pulses.csv")),
     ]
     for kind, call in calls:
         with pytest.raises(kind):
@@ -575,9 +586,9 @@ def test_flights_comparisons_and_plans_draw_themselves() -> None:
     assert len(plan.figure("motion").axes) >= 2
     assert present(compared.recommended).scheme in compared.figure("motion").get_suptitle()
     for name in ("history", "schemes"):
-        with refused(BadRequest, f"library.no-figure-{name}"):
+        with refused(errors.BadRequest, f"library.no-figure-{name}"):
             compared.figure(name)
-    with refused(Infeasible, "library.no-figure-infeasible"):
+    with refused(errors.Infeasible, "library.no-figure-infeasible"):
         nutdamp.plan(CRAFT.with_(limits={"horizon": "1 ms"}), "two-pulse").figure()
 
 

@@ -13,7 +13,6 @@ from nutdamp.errors import BadRequest, Infeasible, MissingExtra
 from nutdamp.files.reader import example_text, read_spacecraft
 from nutdamp.flight import propagation
 from nutdamp.flight.basilisk import BasiliskFlight, fly
-from nutdamp.flight.propagation import Flight
 from nutdamp.physics import attitude
 from nutdamp.schemes import catalogue, planner
 from nutdamp.spacecraft.equipment import Channel, Thruster
@@ -63,7 +62,7 @@ def spinner(name: str, theta: float = math.radians(5.0), *, thrusters: bool = Tr
     )
 
 
-def reference(flown: Flight, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def reference(flown: propagation.Flight, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Rates and quaternions at ``times``, after a jump where there is one."""
     legs = [next(leg for leg in reversed(flown.legs) if leg.start <= time) for time in times]
     rows = [leg.path.motion(np.array([time])) for leg, time in zip(legs, times, strict=True)]

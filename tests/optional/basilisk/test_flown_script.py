@@ -13,7 +13,6 @@ from support.builders import present
 from support.cases import spread
 
 from nutdamp.planning import plan as planning
-from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft.model import Disturbance
 from nutdamp.spacecraft.schedule import Pulse, Schedule
 from nutdamp.views.exchange import export_text
@@ -28,7 +27,7 @@ def _installed() -> None:
     pytest.importorskip("Basilisk", reason=reason)
 
 
-def check(plan: Plan, folder: Path) -> None:
+def check(plan: planning.Plan, folder: Path) -> None:
     """What the script prints in a process without nutdamp's folder on the path is the residual of the plan."""
     script = folder / "fly.py"
     script.write_text(export_text(plan, "basilisk"), encoding="utf-8")
@@ -71,4 +70,4 @@ def test_a_schedule_that_leaves_nutation(case: str, tmp_path: Path) -> None:
             (math.e, 1.234567890123, 'it\'s "C"', [0.3, 0.4, 0.0]),
         )
     )
-    check(Plan(body, "by hand", Schedule(pulses)), tmp_path)
+    check(planning.Plan(body, "by hand", Schedule(pulses)), tmp_path)

@@ -14,7 +14,6 @@ from typing import Any
 import pytest
 from support import places
 from support.cases import spread
-from support.places import case
 from support.process import Run
 
 from nutdamp.files.reader import example_text, read_spacecraft
@@ -29,7 +28,7 @@ pytestmark = [pytest.mark.browser, pytest.mark.usefixtures("plans_shared")]
 CONFIGS = places.CONFIGS
 LEAP = (CONFIGS / "single-thruster.yaml").read_text(encoding="utf-8")
 EXAMPLE = example_text()
-TARGET = case("far-target.yaml").read_text(encoding="utf-8")
+TARGET = places.case("far-target.yaml").read_text(encoding="utf-8")
 
 Browse = Callable[..., Any]
 
@@ -341,8 +340,10 @@ def test_unusual_motions_are_shown_too(browse: Browse, written: Any, name: str) 
 
 
 def test_where_nothing_is_feasible_there_is_no_view(browse: Browse, written: Any) -> None:
-    text = "name: X\ninertia: {A: 120, C: 80}\nomega0: [0.1, 0, 3]\nlimits: {horizon: 1 ms}\n"
-    text += "thrusters: [{name: T, torque: [0, 5, 0], min_on_time: 1 s}]\n"
+    text = (
+        "name: X\ninertia: {A: 120, C: 80}\nomega0: [0.1, 0, 3]\nlimits: {horizon: 1 ms}\n"
+        "thrusters: [{name: T, torque: [0, 5, 0], min_on_time: 1 s}]\n"
+    )
     with browse(written(text)) as page:
         assert page.locator(".moving").count() == 0
         assert page.locator("h1").is_visible()

@@ -17,13 +17,11 @@ import pytest
 from support import places
 from support.cases import spread
 from support.pages import plain_page
-from support.places import case
 from support.process import Run
 from support.shown import compared_text
 
 from nutdamp.files.reader import example_text
 from nutdamp.flight import propagation
-from nutdamp.flight.propagation import Flight
 from nutdamp.page.document import Moving
 from nutdamp.page.moving import EDITED, moving_of
 from nutdamp.page.report import page_html
@@ -55,7 +53,7 @@ requirement: {nutation: 0.5 deg}
 """
 FILES = {
     "example": EXAMPLE,
-    "target": case("far-target.yaml").read_text(encoding="utf-8"),
+    "target": places.case("far-target.yaml").read_text(encoding="utf-8"),
     "nearby": NEARBY,
     "flat": FLAT,
     **{
@@ -103,7 +101,7 @@ def written(paged: Callable[[Moving], Path]) -> Callable[[str], Path]:
     return cache(lambda text: paged(moving_of(chosen(text))))
 
 
-def changed(plan: Plan, times: Times, ratio: float = 0.0, thrust: float = 0.0) -> Flight:
+def changed(plan: Plan, times: Times, ratio: float = 0.0, thrust: float = 0.0) -> propagation.Flight:
     """The flight through real widths with other times, C/A and thrust; the latter in per cent."""
     body, factor, pulses = plan.spacecraft, 1.0 + thrust / 100.0, []
     first, second, third = body.inertia.moments
@@ -133,7 +131,7 @@ def shown(page: Any, column: str = "now") -> dict[str, float]:
     return {key: float(part(page, f"{column}-{key}").get_attribute("value")) for key in keys}
 
 
-def expect(page: Any, flight: Flight) -> None:
+def expect(page: Any, flight: propagation.Flight) -> None:
     values, left = shown(page), flight.residual
     assert {"nutation", "momentum_shift"} <= set(values)
     assert ("axis_error" in values) == (flight.spacecraft.goal.axis is not None)

@@ -14,7 +14,6 @@ from support.contract import PUSHED, pushing, valved, velocity_change
 
 from nutdamp.common.time import Epoch
 from nutdamp.flight import propagation
-from nutdamp.flight.propagation import Flight
 from nutdamp.physics import attitude, sky
 from nutdamp.views.exchange import export_text
 
@@ -122,7 +121,7 @@ def test_epochs_pass_a_leap_second() -> None:
     assert re.search("STOP_TIME += 2017-01-01T", export_text(plan, "aem"))
 
 
-def ephemeris(case: str, xml: bool, form: str = "aem") -> tuple[Flight, Any, list[Any]]:
+def ephemeris(case: str, xml: bool, form: str = "aem") -> tuple[propagation.Flight, Any, list[Any]]:
     """The flight, the epoch, and the segments of a history."""
     plan = messages.planned(case)
     epoch = data_of("apm", export_text(plan, "apm")).getEpoch()
@@ -131,7 +130,7 @@ def ephemeris(case: str, xml: bool, form: str = "aem") -> tuple[Flight, Any, lis
     return propagation.flown(plan.spacecraft, plan.pulses, until), epoch, list(read.getSegments())
 
 
-def motion(flown: Flight, t: float) -> tuple[np.ndarray, np.ndarray]:
+def motion(flown: propagation.Flight, t: float) -> tuple[np.ndarray, np.ndarray]:
     """Rates and columns of axes at ``t`` s, in the axes of the file."""
     leg = next(leg for leg in flown.legs if leg.start <= t <= leg.end and leg.end > leg.start)
     rates, quaternion = leg.path.motion(np.array([t]))

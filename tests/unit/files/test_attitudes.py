@@ -15,7 +15,6 @@ from nutdamp.errors import BadRequest, FaultyFile
 from nutdamp.files.ccsds.read import merged_text, read_apm, read_history
 from nutdamp.files.reader import Source
 from nutdamp.physics import attitude
-from nutdamp.spacecraft.model import Spacecraft
 
 SPACECRAFT = """
 name: Sounder  # flown twice
@@ -39,7 +38,7 @@ def turned(first: np.ndarray, second: np.ndarray) -> float:
     return float(2.0 * np.linalg.norm(attitude.multiply(attitude.conjugate(first), second)[1:]))
 
 
-def quaternion(spacecraft: Spacecraft) -> np.ndarray:
+def quaternion(spacecraft: nutdamp.Spacecraft) -> np.ndarray:
     return present(spacecraft.attitude).quaternion
 
 
@@ -159,7 +158,7 @@ TENSOR = "{tensor: [[120, 2, 1], [2, 110, 0.5], [1, 0.5, 80]]}"
 SYMMETRIC = "{A: 120, C: 80}"
 
 
-def body(given: str, *, spin: float = 3.0, inertia: str = SYMMETRIC, more: str = "") -> Spacecraft:
+def body(given: str, *, spin: float = 3.0, inertia: str = SYMMETRIC, more: str = "") -> nutdamp.Spacecraft:
     return nutdamp.read(f"name: b\ninertia: {inertia}\nomega0: [0.1, -0.2, {spin}]\nattitude: {{{given}}}\n{more}")
 
 

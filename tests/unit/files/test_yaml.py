@@ -112,9 +112,8 @@ def test_duplicate_keys_are_all_reported_with_the_first_place() -> None:
 
 
 def bomb(levels: int) -> str:
-    lines = ["a0: &a0 [" + "x," * 9 + "x]"]
-    lines += [f"a{n}: &a{n} [" + f"*a{n - 1}, " * 9 + f"*a{n - 1}]" for n in range(1, levels)]
-    return "\n".join(lines)
+    lines = (f"a{n}: &a{n} [" + f"*a{n - 1}, " * 9 + f"*a{n - 1}]" for n in range(1, levels))
+    return "\n".join(["a0: &a0 [" + "x," * 9 + "x]", *lines])
 
 
 @spread(

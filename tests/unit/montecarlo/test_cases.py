@@ -559,8 +559,10 @@ def test_a_study_spreads_as_its_valves_do() -> None:
 
 
 def test_bare_numbers_are_dispersed_and_shown_in_parts_of_their_own_values() -> None:
-    more = "cold: {first: 90 %, pulses: 4}\n"
-    more += "tank: {propellant: 2, pressure: 22 bar, final_pressure: 16 bar, exponent: 1.2}\n"
+    more = (
+        "cold: {first: 90 %, pulses: 4}\n"
+        "tank: {propellant: 2, pressure: 22 bar, final_pressure: 16 bar, exponent: 1.2}\n"
+    )
     for line, nominal, shown in (
         ("cold: {normal: 2 %}", 0.9, "2 %"),
         ("cold_pulses: {uniform: 10 %}", 4.0, "5.77 %"),

@@ -26,7 +26,6 @@ from nutdamp.common.numerics import cos_sin
 from nutdamp.files.schedules import read_plan
 from nutdamp.flight import propagation
 from nutdamp.flight.end_state import aspects
-from nutdamp.flight.propagation import Flight
 from nutdamp.montecarlo.cases import DispersedModel
 from nutdamp.montecarlo.propagated import ClosedForm, RealWidths, nodes_for
 from nutdamp.montecarlo.statistics import OUTPUTS, first_order, measure, vectors
@@ -313,7 +312,7 @@ MODELS = {
 }
 
 
-def end_of(made: Flight) -> float:
+def end_of(made: propagation.Flight) -> float:
     """When the axis has gone round H once more after the last pulse."""
     size = float(np.linalg.norm(made.settled.rates * np.asarray(made.moments)))
     return made.schedule.end + math.pi * (made.moments[0] + made.moments[1]) / size

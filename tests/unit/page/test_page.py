@@ -22,7 +22,6 @@ from support.golden import check_text
 from support.markup import Node
 from support.pages import plain_page
 from support.process import Run
-from support.reference import Motion, coast
 from support.shown import cells, downloaded, facts, section, sheet, tree
 from support.spinners import FILE
 
@@ -36,7 +35,6 @@ from nutdamp.montecarlo.study import Results, run, study_of
 from nutdamp.page.document import Control, Prose, Sheet, blocks_of, number_in
 from nutdamp.page.report import CONDITIONS, Repeat, assumptions, block_html, page_html, report_page
 from nutdamp.physics import attitude
-from nutdamp.physics.attitude import matrix
 from nutdamp.planning import plan as planning
 from nutdamp.planning.decision import Comparison, compare
 from nutdamp.planning.screening import CASES, Checkpoints, even, first_pulses
@@ -564,7 +562,7 @@ def test_pulses_have_date_phase_and_cones() -> None:
     around = dict(zip(("before", "after"), chosen.flight.around_pulses(), strict=True))
     for index, (pulse, row) in enumerate(zip(chosen.pulses, sheet(ace(), "Pulses of"), strict=True)):
         assert f"T{row['start UTC']}Z" in (body.utc(pulse.start, 3) or "")
-        x, y, _ = matrix(chosen.flight.motion(np.array([pulse.start]))[1][0]).T @ present(body.sun)
+        x, y, _ = attitude.matrix(chosen.flight.motion(np.array([pulse.start]))[1][0]).T @ present(body.sun)
         assert float(row["Sun phase deg"]) == pytest.approx(-math.degrees(math.atan2(y, x)) % 360.0, abs=0.051)
         for cone in ("nutation", "body_cone", "space_cone"):
             for when, track in around.items():
@@ -581,7 +579,7 @@ def test_the_spin_phase_is_the_integral_of_the_spin() -> None:
     uneven = nutdamp.load(ACE)
     made = propagation.flown(uneven, nutdamp.plan(uneven, "none").pulses, 61.0)
     grid = np.linspace(0.0, 60.0, 6001)
-    motions = coast(made.moments, Motion(uneven.omega0, np.eye(3)), np.zeros(3), grid[1:])
+    motions = reference.coast(made.moments, reference.Motion(uneven.omega0, np.eye(3)), np.zeros(3), grid[1:])
     spins = np.array([uneven.spin, *(one.rates[2] for one in motions)])
     assert spin_phases(made, grid[[-1]])[0] == pytest.approx(np.trapezoid(spins, grid), rel=1e-7)
 

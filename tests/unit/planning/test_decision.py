@@ -28,7 +28,6 @@ from nutdamp.files.reader import read_spacecraft
 from nutdamp.planning import plan as planning
 from nutdamp.planning.decision import Comparison, Gain, Ground, cheapest, compare, recommend, usual
 from nutdamp.planning.notes import alternatives, comparison_warnings, reasons
-from nutdamp.planning.plan import Plan, Standing
 from nutdamp.planning.screening import FlownPlan, unflown
 from nutdamp.planning.verdict import Cases, Status
 from nutdamp.schemes import catalogue
@@ -124,7 +123,7 @@ class Given(Judged):
 
 def made(
     name: str, nutation: float, cost: float | None = None, shift: float = 0.0, end: float = 1.0, **more: Any
-) -> Plan:
+) -> planning.Plan:
     degrees, speed = more.pop("degrees", 5.0), more.pop("speed", None)
     one = judged(name, nutation, propellant=cost, shift=shift, end=end, **more)
     if degrees != 5.0:
@@ -136,7 +135,7 @@ def made(
     return INFEASIBLE if name == "?" else one
 
 
-def plans_of(given: str, text: str) -> list[Plan]:
+def plans_of(given: str, text: str) -> list[planning.Plan]:
     plans = []
     for name, *rest in (one.split() for one in text.split(";")):
         numbers = [None if one == "-" else float(one) for one in rest]
@@ -195,9 +194,9 @@ or else enough comply            | keep | idle ONLY MEETS 1       | idle 4.9 0; 
 """
 
 
-def with_shares(plans: list[Plan], text: str) -> Comparison:
+def with_shares(plans: list[planning.Plan], text: str) -> Comparison:
     """The comparison of plans that flew so many cases that the share that complies is known so closely."""
-    flown: dict[Plan, FlownPlan] = {}
+    flown: dict[planning.Plan, FlownPlan] = {}
     for plan, bounds in zip(plans, text.split(";"), strict=True):
         low, high = (float(bound) for bound in (bounds.split("-") * 2)[:2])
         flown[plan] = FlownPlan(plan, None, cases=Cases(2_048, 1, 0.997, low, low, high, final=low == high))
@@ -213,7 +212,11 @@ def test_plans_with_which_too_few_dispersed_cases_comply_miss_the_requirement() 
         compared = with_shares(plans_of(given, text), shares)
         found, cases = compared.recommendation, compared.cases[compared[best]]
         assert found.plan is compared.recommended is compared[best], what
-        assert (found.ground, found.standing, found.count) == (Ground[ground], Standing[standing], int(count)), what
+        assert (found.ground, found.standing, found.count) == (
+            Ground[ground],
+            planning.Standing[standing],
+            int(count),
+        ), what
         enough = {each: each.meets_requirement and compared.cases[each].low >= 0.997 for each in compared}
         assert {each: verdict.met for each, verdict in compared.verdicts.items()} == enough
         # Undecided where the budget of work ended too early.
@@ -315,14 +318,14 @@ ALONE, BOUND = made("cheap", 0.0, 12.0, 0.11, goal=POINTING), made("ideal", 0.0,
 BLOCK = Block("T", 1, 0.1, 0.1, 1)
 
 
-def fired(cost: float, *blocks: Block) -> Plan:
+def fired(cost: float, *blocks: Block) -> planning.Plan:
     """Real pulse widths, perhaps sent as command blocks."""
     one = made("real", 0.1, cost, 0.15, end=4.0, required=BOTH)
     wide = tuple(replace(each, on_time=0.1, torque=10.0 * each.impulse) for each in one.pulses)
     return replace(one, schedule=Schedule(wide, blocks=blocks))
 
 
-GAINS: list[tuple[Plan, tuple[Plan, ...], Gain, str | None]] = [
+GAINS: list[tuple[planning.Plan, tuple[planning.Plan, ...], Gain, str | None]] = [
     (SHIFTED, (made("still", 0.0, 13.1, 0.35),), Gain.STEADIER, "still"),
     (SHIFTED, (made("still", 0.0, 13.1, 0.37),), Gain.STEADIER, None),
     (SHIFTED, (made("still", 0.0, 13.3, 0.35),), Gain.STEADIER, None),
@@ -401,8 +404,7 @@ def test_none_is_compared_and_recommended_where_no_pulse_is_needed() -> None:
 
 
 def test_the_notes_on_what_a_plan_gains_and_what_it_is_worse_in() -> None:
-    lines = []
-    for best, other in (
+    pairs = (
         (SHIFTED, made("still", 0.0, 12.8, 0.01)),
         (MANY, FEW),
         (made("many", 0.0, 0.1, 1.0, pulses=2), made("both", 0.0, 0.104, 0.01, pulses=1)),
@@ -411,9 +413,9 @@ def test_the_notes_on_what_a_plan_gains_and_what_it_is_worse_in() -> None:
         (SLOW, made("soon", 0.0, 0.1045, 0.2, 50.0)),
         (BOUND, fired(0.109)),
         (BOUND, fired(9.0, BLOCK)),
-    ):
-        lines.append(noted(alternatives(Comparison(best.spacecraft, (best, other)))))
-    check_text("plan.hints", "\n".join(lines))
+    )
+    notes = (noted(alternatives(Comparison(pair[0].spacecraft, pair))) for pair in pairs)
+    check_text("plan.hints", "\n".join(notes))
 
 
 @pytest.mark.deep

@@ -5,7 +5,6 @@ import math
 import re
 from collections.abc import Callable
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -19,7 +18,6 @@ from support.golden import check_text
 
 from nutdamp.files.reader import read_spacecraft
 from nutdamp.flight import end_state
-from nutdamp.flight.end_state import seen_at
 from nutdamp.flight.propagation import by_impulses
 from nutdamp.physics import attitude
 from nutdamp.planning import plan as planning
@@ -27,7 +25,6 @@ from nutdamp.planning.decision import Ground, compare
 from nutdamp.planning.notes import broken_limits, infeasibility, plan_notes, reasons
 from nutdamp.planning.plan import Plan, Standing, plan
 from nutdamp.schemes import catalogue, two_pulse
-from nutdamp.schemes.catalogue import CLASSIC, OptimalOptions, SchemeOptions
 from nutdamp.spacecraft.constraints import Limit, Windows, breaches, keeps_limits
 from nutdamp.spacecraft.equipment import Channel, Steerable
 from nutdamp.spacecraft.model import Keep, Limits, Requirement, Spacecraft, Vector
@@ -35,13 +32,13 @@ from nutdamp.spacecraft.schedule import Schedule, channel_pulse
 from nutdamp.units import STANDARD_GRAVITY
 
 DRIFT_ONLY = Requirement(momentum_shift=math.radians(0.2))
-KEPT = OptimalOptions(free_axis=False)
+KEPT = catalogue.OptimalOptions(free_axis=False)
 """H ends where it was, though nothing in the file asks for it."""
 
 
 def test_compare_keeps_the_order_given_and_recommends_one_of_them() -> None:
-    compared = compare(spinner(channels=cross(20.0), requirement=BOTH), CLASSIC)
-    assert [one.scheme for one in compared.plans] == list(CLASSIC)
+    compared = compare(spinner(channels=cross(20.0), requirement=BOTH), catalogue.CLASSIC)
+    assert [one.scheme for one in compared.plans] == list(catalogue.CLASSIC)
     # one-pulse and four-pulse move H by degrees: only two-pulse meets the shift required.
     assert [one.meets_requirement for one in compared.plans] == [False, True, False]
     recommended = compared.recommendation
@@ -101,10 +98,10 @@ def test_a_scheme_with_a_bug_leaves_the_others_also_where_it_shows_only_when_the
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     body = spinner(channels=cross(20.0))
-    whole = compare(body, CLASSIC)
+    whole = compare(body, catalogue.CLASSIC)
     for error in (ZeroDivisionError, IndexError):
         monkeypatch.setattr(two_pulse, "schedule", raising(error))
-        compared = compare(body, CLASSIC)
+        compared = compare(body, catalogue.CLASSIC)
         (failed,) = compared.failed
         assert (failed.scheme, type(failed.failure)) == ("two-pulse", error)
         assert error.__name__ in infeasibility(failed)
@@ -121,7 +118,7 @@ def test_a_plan_that_would_not_lower_the_nutation_is_infeasible() -> None:
     """A push along the transverse rate, and one against it."""
     body = spinner(channels=cross(40.0), phase=0.0)
     along, against = (
-        planning.judged(body, "one-pulse", Schedule((channel_pulse(one, 0.05, 0.1),)), SchemeOptions())
+        planning.judged(body, "one-pulse", Schedule((channel_pulse(one, 0.05, 0.1),)), catalogue.SchemeOptions())
         for one in body.channels[:2]
     )
     assert (along.feasible, against.feasible) == (False, True)
@@ -142,7 +139,7 @@ SELF_DAMPING = replace(
 
 def idle(body: Spacecraft, t: float) -> float:
     """Nutation, rad, of a flight without pulses."""
-    return seen_at(by_impulses(body, Schedule(), t), t).final.nutation
+    return end_state.seen_at(by_impulses(body, Schedule(), t), t).final.nutation
 
 
 def test_a_plan_that_leaves_more_than_decay_alone_by_its_end_is_infeasible_and_says_so() -> None:
@@ -157,7 +154,11 @@ def test_a_plan_that_leaves_more_than_decay_alone_by_its_end_is_infeasible_and_s
 
 
 @given(
-    st.floats(5.0, 100.0), st.floats(1e-3, 0.5), st.floats(0.5, 20.0), st.sampled_from(CLASSIC), st.floats(0.0, 60.0)
+    st.floats(5.0, 100.0),
+    st.floats(1e-3, 0.5),
+    st.floats(0.5, 20.0),
+    st.sampled_from(catalogue.CLASSIC),
+    st.floats(0.0, 60.0),
 )
 @settings(max_examples=10)
 @pytest.mark.deep
@@ -227,7 +228,7 @@ def test_the_horizon_that_is_named_as_long_enough_is(
     assert named
     assert plan(replace(body, limits=Limits(horizon=float(named[1]))), "optimal", KEPT).feasible, said
     assert ("--free-axis" in said) is freed
-    assert plan(body, "optimal", OptimalOptions(free_axis=True)).feasible is freed
+    assert plan(body, "optimal", catalogue.OptimalOptions(free_axis=True)).feasible is freed
 
 
 TIGHT = Limits(horizon=20.0, earliest=1.0, gap=0.5, max_pulses=3, blackout=((6.0, 7.0),))
@@ -350,7 +351,7 @@ def test_delta_v_is_the_force_turned_into_the_inertial_frame_over_the_mass(
     assert replace(made, schedule=Schedule((unknown, *made.pulses.pulses[1:]))).delta_v is None
 
 
-@pytest.mark.parametrize("scheme", CLASSIC)
+@pytest.mark.parametrize("scheme", catalogue.CLASSIC)
 def test_spin_change_and_propellant(scheme: str) -> None:
     """By the reference integrator, by the sum of axial impulses, and by F t / (Isp g0)."""
     made = plan(BODY, scheme)
@@ -401,7 +402,7 @@ def watched(direction: Vector, least: float = SUN) -> Spacecraft:
 
 
 def length(route: tuple[Vector, ...]) -> float:
-    return sum(float(attitude.angle_between(*leg)) for leg in pairwise((START, *route)))
+    return sum(float(attitude.angle_between(*leg)) for leg in itertools.pairwise((START, *route)))
 
 
 def test_routes_lead_to_the_target_clear_of_the_cone_the_shortest_first(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -412,7 +413,7 @@ def test_routes_lead_to_the_target_clear_of_the_cone_the_shortest_first(monkeypa
     assert 4 <= len(found) <= planning.ROUTES
     for route in found:
         assert np.allclose(route[-1], body.target_axis)
-        for one, two in pairwise((START, *route)):
+        for one, two in itertools.pairwise((START, *route)):
             shares = np.linspace(0.0, 1.0, 50)[:, None]
             points = (1.0 - shares) * one + shares * two  # chords of short legs lie next to their great circles
             assert attitude.angle_between(points, np.asarray(body.keep[0].direction)).min() > SUN

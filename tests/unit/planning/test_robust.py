@@ -29,11 +29,7 @@ from nutdamp.montecarlo.statistics import by_differences
 from nutdamp.montecarlo.study import SEED, STAGES, Results, flown_in_stages, run, study_of
 from nutdamp.planning import chance_plan, robust, screening
 from nutdamp.planning import plan as planning
-from nutdamp.planning.chance_plan import Tightening, scaled
 from nutdamp.planning.decision import Comparison, Ground, compare, recommend
-from nutdamp.planning.plan import Plan
-from nutdamp.planning.robust import FRESH, robust_reasons
-from nutdamp.planning.screening import FlownPlan, unflown
 from nutdamp.planning.verdict import Cases, Status, cases_of
 from nutdamp.schemes import four_pulse
 from nutdamp.schemes.catalogue import CLASSIC, Options
@@ -44,7 +40,6 @@ from nutdamp.spacecraft.schedule import Schedule, channel_pulse
 from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
 from nutdamp.views import text
 from nutdamp.views.robust import robust_json, robust_notes
-from nutdamp.views.text import joined
 from nutdamp.views.tolerances import stated_text
 
 share_of = partial(normal, relative=True)
@@ -76,11 +71,11 @@ def untightened(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(robust, "tightening", lambda *_: None)
 
 
-def best(found: robust.RobustComparison) -> FlownPlan:
+def best(found: robust.RobustComparison) -> screening.FlownPlan:
     return present(found.chosen)
 
 
-def share(body: Spacecraft, plan: Plan, seed: int = SEED, samples: int = 20_000) -> float:
+def share(body: Spacecraft, plan: planning.Plan, seed: int = SEED, samples: int = 20_000) -> float:
     """Of the cases those that comply."""
     return run(Results(study_of(body, plan.pulses, seed=seed), samples)).met_fraction or 0.0
 
@@ -103,19 +98,21 @@ def candidate(
     end: float = 1.0,
     required: Requirement | None = HALF_A_DEGREE,
     flown: float = 0.0,
-) -> FlownPlan:
+) -> screening.FlownPlan:
     """A plan of so many N m s, and degrees of nutation: ``left`` in 99.7 % of cases, ``flown`` with nominal values."""
     made = judged("plan", flown, impulse=impulse, end=end, required=required)
     levels = {bound: math.radians(left) for bound in bounds(made.spacecraft)}
     complying, low, high = (None if required is None else shares[0]), *shares[1:]
-    return FlownPlan(made, None, "as planned", True, Cases(1_000, SEED, 0.997, complying, low, high, levels=levels))
+    return screening.FlownPlan(
+        made, None, "as planned", True, Cases(1_000, SEED, 0.997, complying, low, high, levels=levels)
+    )
 
 
 IDLE = Requirement(momentum_shift=0.1)
 
 # Plans, of which the first is recommended without --robust; those of which enough fresh cases comply too; the chosen
 # one and what decided; None: that with most cases is taken.
-CHOICES: list[tuple[list[FlownPlan], set[int], int | None, Ground | None]] = [
+CHOICES: list[tuple[list[screening.FlownPlan], set[int], int | None, Ground | None]] = [
     ([candidate(2.0, ENOUGH), candidate(1.0, ENOUGH)], {0, 1}, 1, Ground.COST),
     ([candidate(2.0, ENOUGH), candidate(1.0, ENOUGH)], {0}, 0, Ground.ONLY),  # the cheaper one complied by luck
     ([candidate(2.0, ENOUGH), candidate(1.0, TOO_FEW)], {0, 1}, 0, Ground.ONLY),
@@ -144,10 +141,14 @@ CHOICES: list[tuple[list[FlownPlan], set[int], int | None, Ground | None]] = [
 
 @pytest.mark.parametrize(("plans", "fresh", "chosen", "ground"), CHOICES)
 def test_the_cheapest_plan_of_which_enough_cases_comply_in_fresh_ones_too(
-    plans: list[FlownPlan], fresh: set[int], chosen: int | None, ground: Ground | None, monkeypatch: pytest.MonkeyPatch
+    plans: list[screening.FlownPlan],
+    fresh: set[int],
+    chosen: int | None,
+    ground: Ground | None,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     shares = {id(each): ENOUGH if number in fresh else UNKNOWN for number, each in enumerate(plans)}
-    monkeypatch.setattr(robust, "_fresh", lambda each: Cases(1_000, FRESH, 0.997, *shares[id(each)]))
+    monkeypatch.setattr(robust, "_fresh", lambda each: Cases(1_000, robust.FRESH, 0.997, *shares[id(each)]))
     found, decided, _ = robust._confirmed(dict(enumerate(plans)), plans[0].plan)
     assert (found, decided) == (None if chosen is None else plans[chosen], ground)
 
@@ -231,7 +232,7 @@ def test_the_plan_in_which_most_cases_comply_by_flights_one_by_one(moments: tupl
     assert float(np.quantile(flown, 0.9)) == pytest.approx(chosen.left, rel=0.35)
     assert study.outputs_of(study.draws_of(3))[0] == pytest.approx(flown[3], abs=1e-10)
     # And in cases that are new to the choice.
-    assert found.fresh == cases_of(flown_in_stages(study_of(body, pulses, seed=FRESH)))
+    assert found.fresh == cases_of(flown_in_stages(study_of(body, pulses, seed=robust.FRESH)))
     assert found.fresh.complying != chosen.cases.complying
 
 
@@ -261,7 +262,7 @@ def test_of_plans_with_which_all_cases_comply_the_cheapest(shift: float, scheme:
     assert (best(found).plan.scheme, best(found).cases.complying) == (scheme, 1.0)
     assert (found.verdict.status, found.verdict.cases, found.name) == (Status.FLY, best(found).cases, scheme)
     assert found.verdict.cases == cases_of(flown_in_stages(study_of(body, best(found).plan.pulses)))
-    assert present(found.fresh).complying == share(body, best(found).plan, FRESH) >= 0.99
+    assert present(found.fresh).complying == share(body, best(found).plan, robust.FRESH) >= 0.99
     for other in found.candidates:
         if other.plan.pulses.cost < 0.999 * best(found).plan.pulses.cost:
             assert share(body, other.plan) < 0.99
@@ -293,10 +294,13 @@ def test_the_json_has_what_the_best_costs_fresh_cases_and_what_would_have_to_be_
     body = usual.plan.spacecraft
     dear.plan = replace(dear.plan, spacecraft=body)
     compared, of_A = Comparison(body, (usual.plan,)), DispersedInput("A", "A", "normal", 0.6, 120.0, "kg m²")
-    needed, fresh = Tightening(("A",), 0.5, ((of_A, True),), 5_000, 7, 0.998, 0.9971), Cases(1_000, 9, 0.997, *MOST)
+    needed, fresh = (
+        chance_plan.Tightening(("A",), 0.5, ((of_A, True),), 5_000, 7, 0.998, 0.9971),
+        Cases(1_000, 9, 0.997, *MOST),
+    )
     found = robust.RobustComparison(compared, (dear, usual), usual, dear, Ground.ONLY, 1, 0.997, needed, fresh)
     written = robust_json(found)
-    assert (written["reason"], written["meets_requirement"]) == (joined(robust_reasons(found)), False)
+    assert (written["reason"], written["meets_requirement"]) == (text.joined(robust.robust_reasons(found)), False)
     assert [one["met_fraction"] for one in written["candidates"]] == [0.9, 0.875]
     assert (written["recommended"]["left_deg"], written["against"]["left_deg"]) == pytest.approx((0.5, 1.0))
     cost = {"propellant_kg": None, "total_impulse_Nms": 1.0, "end_s": 2.0, "nutation_deg": -0.5}
@@ -389,15 +393,15 @@ def staged(monkeypatch: pytest.MonkeyPatch) -> dict[float, Told]:
     return known
 
 
-def required(count: int) -> list[Plan]:
+def required(count: int) -> list[planning.Plan]:
     return [judged(f"{n}", 0.0, impulse=1.0 + n, required=HALF_A_DEGREE) for n in range(count)]
 
 
-def recommending(plans: list[Plan]) -> partial[Plan | None]:
+def recommending(plans: list[planning.Plan]) -> partial[planning.Plan | None]:
     return partial(lambda among, cases: recommend(among, cases).plan, plans)
 
 
-def flown_of(plans: list[Plan], flown: dict[Plan, FlownPlan]) -> list[int]:
+def flown_of(plans: list[planning.Plan], flown: dict[planning.Plan, screening.FlownPlan]) -> list[int]:
     return [flown[one].cases.samples if one in flown else 0 for one in plans]
 
 
@@ -413,7 +417,7 @@ def test_plans_compared_fly_as_many_cases_as_decide(
     assert compared.recommended is plans[chosen]
     assert compared.verdict.status is status
     assert flown[plans[chosen]].final
-    assert compared.cases == {plan: flown[plan].cases if plan in flown else unflown(plan) for plan in plans}
+    assert compared.cases == {plan: flown[plan].cases if plan in flown else screening.unflown(plan) for plan in plans}
 
 
 def test_a_plan_that_may_not_be_chosen_flies_until_its_verdict_is_known(staged: dict[float, Told]) -> None:
@@ -636,7 +640,7 @@ def test_the_tolerances_that_have_to_shrink_are_named_with_their_sizes(
     assert {one.tolerance for one, _ in needed.inputs} == named
 
     def complying(factor: float, seed: int, cases: int) -> Results:
-        other = replace(body, dispersions=scaled(present(body.dispersions), named, factor))
+        other = replace(body, dispersions=chance_plan.scaled(present(body.dispersions), named, factor))
         return run(Results(study_of(other, pulses, seed=seed), cases), threads=2)
 
     enough, more = (complying(one * needed.factor, 4_711, 2 * needed.cases).met_fraction for one in (1.0, looser))
@@ -724,7 +728,7 @@ def gained(seed: int) -> float:
     return min(chosen, found.probability) - min(late, found.probability)
 
 
-def enough_of_fresh(plan: Plan) -> bool:
+def enough_of_fresh(plan: planning.Plan) -> bool:
     """Enough of the cases comply by which no plan was chosen."""
     return flown_in_stages(study_of(plan.spacecraft, plan.pulses, seed=robust.FRESH)).shown() is True
 

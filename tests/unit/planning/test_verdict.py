@@ -31,7 +31,6 @@ from support.builders import (
 )
 from support.dispersed import normal
 from support.golden import check_text
-from support.places import case
 from support.process import Run
 
 import nutdamp
@@ -42,10 +41,8 @@ from nutdamp.montecarlo.study import Results, run, study_of
 from nutdamp.planning import plan as planning
 from nutdamp.planning.decision import Comparison, compare
 from nutdamp.planning.notes import comparison_warnings, hindrances, plan_notes, reasons, remaining, verdict_notes
-from nutdamp.planning.plan import Plan, judge
 from nutdamp.planning.verdict import Cases, Light, Status, cases_of
 from nutdamp.schemes import catalogue
-from nutdamp.schemes.catalogue import CLASSIC
 from nutdamp.spacecraft.model import Disturbance, Goal, Inertia, Keep, Limits, Requirement, Spacecraft
 from nutdamp.spacecraft.requirements import Part, bounds
 from nutdamp.spacecraft.schedule import Pulse, Schedule, channel_pulse
@@ -89,15 +86,15 @@ def test_the_status_goes_by_nominal_values_and_by_the_interval_of_the_share() ->
     for required, dispersed, left, share, *expected in VERDICTS:
         made = judged("a", left, required=required)
         made = replace(made, spacecraft=replace(made.spacecraft, dispersions=SPREAD if dispersed else None))
-        verdict = judge(made, None if share is None else within(*share))
+        verdict = planning.judge(made, None if share is None else within(*share))
         assert [verdict.status, verdict.light, verdict.met] == expected, (required, dispersed, left, share)
-    alone = judge(made, nominal=True)  # cases are left out on request
+    alone = planning.judge(made, nominal=True)  # cases are left out on request
     assert (alone.status, alone.light) == (Status.FLY, Light.AMBER)
 
 
 def test_where_nothing_fires_nothing_is_to_be_sent() -> None:
     """Whatever can be commanded: what misses the requirement is not enough, all the same."""
-    commands = nutdamp.load(case("cbp1004.yaml")).commands
+    commands = nutdamp.load(places.case("cbp1004.yaml")).commands
     for left, pulses, timed, status in (
         (0.4, 0, False, Status.NO_PULSE),
         (0.6, 0, False, Status.NOT_ENOUGH),
@@ -107,8 +104,8 @@ def test_where_nothing_fires_nothing_is_to_be_sent() -> None:
     ):
         made = judged("a", left, required=HALF_A_DEGREE, pulses=pulses)
         made = replace(made, spacecraft=replace(made.spacecraft, commands=commands))
-        assert judge(made, timed=timed).status is status
-    none = judge(INFEASIBLE)
+        assert planning.judge(made, timed=timed).status is status
+    none = planning.judge(INFEASIBLE)
     assert (none.status, none.light, none.met, none.why, none.lines) == (Status.NO_PLAN, Light.RED, None, "because", ())
 
 
@@ -137,7 +134,7 @@ def test_every_status_of_the_built_in_example(
 
 
 def test_pulses_that_cannot_be_sent_to_a_spacecraft_that_takes_commands() -> None:
-    body = replace(nutdamp.load(case("cbp1004.yaml")), dispersions=None)
+    body = replace(nutdamp.load(places.case("cbp1004.yaml")), dispersions=None)
     assert compare(body, ["two-pulse"]).verdict.status is Status.NOT_COMMANDABLE
     assert compare(body, ["two-pulse"], timed=True).verdict.status is not Status.NOT_COMMANDABLE
 
@@ -145,7 +142,7 @@ def test_pulses_that_cannot_be_sent_to_a_spacecraft_that_takes_commands() -> Non
 # --- lines
 
 
-def cases_with(nutation: tuple[float, float], shift: tuple[float, float], made: Plan) -> Cases:
+def cases_with(nutation: tuple[float, float], shift: tuple[float, float], made: planning.Plan) -> Cases:
     """Cases by the share that keeps each bound of `BOTH`, and the degrees that 99.7 % keep."""
     both = list(zip(bounds(made.spacecraft), (nutation, shift), strict=True))
     shares = {bound: share for bound, (share, _) in both}
@@ -161,19 +158,19 @@ def test_a_line_has_the_margin_of_what_is_judged_and_counts_the_cases_that_keep_
         (((0.7, 0.9), (0.998, 0.16)), Part.NUTATION, (0.4, 0.9, 0.7, -0.4, False), (0.15, 0.16, 0.998, 0.04, True)),
         (((0.997, 0.5), (0.9969, 0.2)), Part.SHIFT, (0.4, 0.5, 0.997, 0.0, True), (0.15, 0.2, 0.9969, 0.0, False)),
     ):
-        verdict = judge(made, None if cases is None else cases_with(*cases, made))
+        verdict = planning.judge(made, None if cases is None else cases_with(*cases, made))
         for line, cells in zip(verdict.lines, expected, strict=True):
             values = [None if value is None else math.degrees(value) for value in (line.nominal, line.dispersed)]
             assert [*values, line.share, math.degrees(line.margin), line.met] == pytest.approx(cells, abs=1e-12)
         assert present(verdict.tightest).bound.part is tightest
         assert verdict.good is (verdict.status is Status.FLY) is all(line.met for line in verdict.lines)
-    free = judge(judged("a", 3.0))
+    free = planning.judge(judged("a", 3.0))
     assert ([line.met for line in free.lines], free.required, free.tightest, free.good) == ([False], (), None, False)
 
 
 @cache
 def example() -> Comparison:
-    return compare(nutdamp.example(), CLASSIC, samples=0)
+    return compare(nutdamp.example(), catalogue.CLASSIC, samples=0)
 
 
 def test_levels_shares_and_interval_are_those_of_the_cases() -> None:
@@ -186,7 +183,7 @@ def test_levels_shares_and_interval_are_those_of_the_cases() -> None:
         assert [*cases.shares.values()] == [*kept.mean(axis=1)]
         assert (cases.complying, cases.samples, cases.final) == (kept.all(axis=0).mean(), 500, final)
         assert (cases.low, cases.high) == results.interval(certain=not final)
-    verdict = judge(one, cases_of(results), results)
+    verdict = planning.judge(one, cases_of(results), results)
     assert [line.share for line in verdict.lines] == [*kept.mean(axis=1)]
     assert verdict.causes
     assert {cause.input for cause in verdict.causes} <= {entry.tolerance for entry in results.study.model.inputs.drawn}
@@ -202,9 +199,9 @@ def test_main_causes_are_at_most_three_that_matter_of_the_tightest_bound() -> No
         ({}, []),
     ):
         told = SimpleNamespace(contributions=lambda bound, shares=shares: shares if bound.part is Part.SHIFT else {})
-        verdict = judge(made, cases_with((0.99, 0.6), (0.9, 0.3), made), told)
+        verdict = planning.judge(made, cases_with((0.99, 0.6), (0.9, 0.3), made), told)
         assert [cause.input for cause in verdict.causes] == named
-    assert judge(made).causes == ()
+    assert planning.judge(made).causes == ()
 
 
 # --- cones
@@ -218,14 +215,16 @@ def watched(least: float, tilt: float = 20.0, azimuth: float = math.degrees(1.0)
 
 
 def test_a_cone_is_a_bound_like_any_other_whatever_is_left_at_the_end() -> None:
-    kept, broken = (judge(planning.plan(watched(least), "four-pulse"), nominal=True) for least in (10.0, 16.0))
+    kept, broken = (planning.judge(planning.plan(watched(least), "four-pulse"), nominal=True) for least in (10.0, 16.0))
     assert [verdict.status for verdict in (kept, broken)] == [Status.FLY, Status.NOT_ENOUGH]
     (aspect,), line = broken.aspects, broken.lines[-1]
     assert (line.bound.part, line.bound.keep, line.bound.inner, line.met) == (Part.CONE, aspect.keep, True, False)
     assert (line.nominal, line.margin) == (aspect.least, aspect.least - math.radians(16.0))
     four = planning.plan(watched(16.0), "four-pulse")
     assert (four.meets_requirement, four.ends_well, broken.tightest) == (False, True, line)
-    assert judge(replace(four, spacecraft=replace(watched(16.0), requirement=None))).status is Status.NOT_ENOUGH
+    assert (
+        planning.judge(replace(four, spacecraft=replace(watched(16.0), requirement=None))).status is Status.NOT_ENOUGH
+    )
 
 
 def test_the_cone_about_h_bounds_the_nutation_on_the_way() -> None:
@@ -246,7 +245,7 @@ def test_spin_is_a_bound_like_any_other_within_one_percent_of_the_goal_unless_re
     tolerance: str | None, rpm: float, complying: float
 ) -> None:
     """Rim spinner with two thrusters that spin it up from 15 rpm."""
-    body = nutdamp.load(case("rim-spin-up.yaml")).with_(goal={"spin": "20 rpm"})
+    body = nutdamp.load(places.case("rim-spin-up.yaml")).with_(goal={"spin": "20 rpm"})
     body = body if tolerance is None else body.with_(requirement={"spin": tolerance})
     verdict = compare(body, ["optimal"], samples=8_192).verdict
     cases, lines = verdict.cases, {line.bound.part: line for line in verdict.lines}
@@ -330,7 +329,7 @@ def test_reasons_and_warnings_are_of_what_decided_and_what_is_missed() -> None:
     damped, far = judged("a", 0.0, propellant=0.1), judged("far", 1e-12, shift=3.5, impulse=20.0, required=BOTH)
     firing = replace(far, spacecraft=replace(far.spacecraft, channels=cross(20.0)))
     short = replace(FIRED, limits=Limits(horizon=0.01))
-    plans: dict[str, tuple[Plan, ...]] = {
+    plans: dict[str, tuple[planning.Plan, ...]] = {
         "one": (damped,),
         "the other infeasible": (damped, INFEASIBLE),
         "required": (judged("a", 0.1, required=HALF_A_DEGREE), INFEASIBLE),
@@ -345,10 +344,12 @@ def test_reasons_and_warnings_are_of_what_decided_and_what_is_missed() -> None:
         "shift missed, without channels": (far,),
         "shift missed, optimal compared": (firing, replace(INFEASIBLE, scheme="optimal")),
     }
-    texts = [recommended(name, Comparison(each[0].spacecraft, each)) for name, each in plans.items()]
     bodies = (short, replace(short, goal=Goal(spin=3.1)), spinner(channels=(channel("A", 0.0, 0.0, 8.0),)))
-    texts += [noted(reasons(compare(body, catalogue.CLASSIC))) for body in bodies]
-    texts += [noted(reasons(compare(short, ("optimal",))))]
+    texts = [
+        *(recommended(name, Comparison(each[0].spacecraft, each)) for name, each in plans.items()),
+        *(noted(reasons(compare(body, catalogue.CLASSIC))) for body in bodies),
+        noted(reasons(compare(short, ("optimal",)))),
+    ]
     check_text("notes.reasons", "\n".join(texts))
     for plan in (damped, judged("a", 0.4, required=HALF_A_DEGREE)):  # they comply
         assert not [*comparison_warnings(Comparison(plan.spacecraft, (plan,)))]
@@ -387,8 +388,10 @@ def test_what_stands_in_the_way_is_named_and_nothing_else() -> None:
         compared = compare(body, (scheme,), catalogue.Options(with_disturbances=name == "steady tilt"))
         (plan,) = compared.plans
         certain, possible = hindrances(plan)
-        texts += [f"{name}: {remaining(plan).code}, binding {certain}, suspected {possible}"]
-        texts += [noted((*comparison_warnings(compared), *plan_notes(plan)))]
+        texts += [
+            f"{name}: {remaining(plan).code}, binding {certain}, suspected {possible}",
+            noted((*comparison_warnings(compared), *plan_notes(plan))),
+        ]
     check_text("notes.hindered", "\n".join(texts))
 
 
@@ -421,7 +424,7 @@ def test_ticks_explain_what_rounding_to_them_can_leave() -> None:
         body = replace(FIRED, limits=Limits(tick=tick))
         most = math.hypot(1.0, 1.5) * math.hypot(0.04, 0.004 * body.spin) / (body.inertia.C * body.spin)
         made = Schedule((channel_pulse(body.channels[0], 1.0, 0.1),))
-        plan = Plan(body, "four-pulse", made)
+        plan = planning.Plan(body, "four-pulse", made)
         left = replace(plan.flight.residual, nutation=share * most)
         vars(plan)["flight"] = SimpleNamespace(residual=left)
         assert (remaining(plan).code, hindrances(plan)) == (obstacle, ((), suspected))
@@ -431,7 +434,7 @@ def test_the_least_on_time_binds_where_a_pulse_is_no_longer() -> None:
     body = spinner(channels=cross(8.0, min_on_time=0.1))
     for on_time, binding in ((0.1, ("min_on_time",)), (0.11, ())):
         made = Schedule((channel_pulse(body.channels[0], 1.0, 0.5), channel_pulse(body.channels[1], 3.0, on_time)))
-        assert hindrances(Plan(body, "four-pulse", made))[0] == binding
+        assert hindrances(planning.Plan(body, "four-pulse", made))[0] == binding
 
 
 SHAKEN = replace(FIRED, disturbances=(Disturbance(0.02 + 0j, rate=-FIRED.spin),), limits=Limits(horizon=20.0))
@@ -457,9 +460,9 @@ def test_planning_with_disturbances_is_tried_only_where_it_was_not_done() -> Non
     assert compare(nothing_fits, ("two-pulse",)).with_disturbances is None  # and no recommended plan to compare with
 
 
-def noted_beside(made: Plan, cases: Cases | None = None, *, looped: bool = False) -> list[Note]:
+def noted_beside(made: planning.Plan, cases: Cases | None = None, *, looped: bool = False) -> list[Note]:
     """The notes beside the verdict on a plan, by nominal values or by cases."""
-    return list(verdict_notes(judge(made, cases, nominal=cases is None), made, looped=looped))
+    return list(verdict_notes(planning.judge(made, cases, nominal=cases is None), made, looped=looped))
 
 
 def test_what_a_plan_does_to_axis_and_spin_that_nothing_asks_for_is_noted() -> None:
@@ -473,12 +476,12 @@ def test_what_a_plan_does_to_axis_and_spin_that_nothing_asks_for_is_noted() -> N
     plans = (turning, steady, goal, limited)
     assert [made for made in plans if "momentum-shift" in codes(noted_beside(made))] == [turning]
     assert one_of(noted_beside(turning), "momentum-shift")["momentum_shift_deg"] == math.degrees(turned)
-    up = nutdamp.load(case("genesis-spinup.yaml"))
+    up = nutdamp.load(places.case("genesis-spinup.yaml"))
     for share, change in ((5e-5, False), (8e-5, True), (-8e-5, True)):
         fired = Pulse(1.0, 0.0, "T", np.array([0.0, 0.0, share * up.spin * up.inertia.C]))
         for asked in (False, True):
             aimed = replace(up, goal=Goal(spin=up.spin * (1.0 + share)) if asked else Goal())
-            notes = noted_beside(Plan(aimed, "trial", Schedule((fired,))))
+            notes = noted_beside(planning.Plan(aimed, "trial", Schedule((fired,))))
             assert ("spin-change" in codes(notes)) == (change and not asked)
             if change and not asked:
                 values = one_of(notes, "spin-change")
@@ -542,11 +545,11 @@ def test_what_is_not_shown_and_what_decides_the_failing_cases_is_said() -> None:
         (0.9, ["undecided-cases", "causes-of-failure"]),
         (0.8, []),
     ):
-        verdict = judge(made, replace(cases, probability=probability), results)
+        verdict = planning.judge(made, replace(cases, probability=probability), results)
         assert codes(verdict_notes(verdict, made)) == expected
     certain = replace(made.spacecraft, requirement=Requirement(0.01, probability=0.9), dispersions=None)
     made = replace(made, spacecraft=certain)
-    assert codes(verdict_notes(judge(made), made))[:2] == ["probability-without-tolerances", "no-tolerances"]
+    assert codes(verdict_notes(planning.judge(made), made))[:2] == ["probability-without-tolerances", "no-tolerances"]
 
 
 def test_plans_that_keep_the_cones_are_named_where_the_recommended_one_does_not() -> None:

@@ -24,7 +24,6 @@ from nutdamp.common import numerics
 from nutdamp.figures import overview
 from nutdamp.files.reader import example_text, read_spacecraft
 from nutdamp.flight import propagation
-from nutdamp.flight.propagation import Residual
 from nutdamp.physics import attitude, response
 from nutdamp.planning import capability
 from nutdamp.planning import plan as planning
@@ -55,7 +54,7 @@ keep: [{name: pole, direction: [10 deg, 86 deg], min: 2 deg}]
 SUN_BODY = read_spacecraft(SUNNY, "sunny.yaml")
 
 
-def fired(body: Spacecraft, on_time: float) -> Residual:
+def fired(body: Spacecraft, on_time: float) -> propagation.Residual:
     """What one pulse of the first channel leaves."""
     return propagation.flown(body, Schedule((channel_pulse(body.channels[0], 5.0, on_time),))).residual
 

@@ -17,7 +17,6 @@ from support.places import CONFIGS
 
 import nutdamp
 from nutdamp.files.schedules import BLOCKS_HEADER, EFFECTIVE, PULSES_HEADER
-from nutdamp.planning.decision import Comparison
 from nutdamp.spacecraft.model import Requirement, Spacecraft
 from nutdamp.units import US, screen_units
 from nutdamp.views.glance import glance
@@ -136,14 +135,14 @@ def test_a_screen_has_the_units_requested_and_files_are_si() -> None:
 # --- the default screen of plan: what to fire on top, in 40 lines of 80 columns
 
 
-def glance_lines(compared: Comparison) -> list[str]:
+def glance_lines(compared: nutdamp.Comparison) -> list[str]:
     console = Console(width=WIDTH, file=io.StringIO(), markup=False, emoji=False, highlight=False)
     with console.capture() as captured:
         console.print(glance(compared))
     return [line.rstrip() for line in captured.get().splitlines()]
 
 
-def compared(body: Spacecraft, *names: str) -> Comparison:
+def compared(body: Spacecraft, *names: str) -> nutdamp.Comparison:
     return nutdamp.compare(body, names, samples=0)
 
 

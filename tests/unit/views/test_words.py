@@ -26,11 +26,9 @@ from nutdamp.planning.notes import (
     reasons,
     verdict_notes,
 )
-from nutdamp.planning.plan import Plan, Standing
 from nutdamp.planning.verdict import Status
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import Disturbance, Goal, Limits, Requirement
-from nutdamp.spacecraft.requirements import Bound, Part
 from nutdamp.spacecraft.schedule import Schedule
 from nutdamp.spacecraft.tolerances import SpinTolerance
 from nutdamp.views import verdict
@@ -38,7 +36,6 @@ from nutdamp.views.guide import note_entries
 from nutdamp.views.loop import STOPS
 from nutdamp.views.parts import required
 from nutdamp.views.text import NAME, NOTE, REASON, WARNING, note_json, ordered, screen_line, text
-from nutdamp.views.verdict import fired, idle, percent
 
 FIRED = spinner(channels=cross(8.0))
 WIDE = Goal(spin=3.0)
@@ -63,13 +60,15 @@ def test_the_requirement_is_on_one_line() -> None:
     (0.99996, 0.9973, "99.996 %"), (0.9999999, 0.999999, "99.99999 %"),
 ])  # fmt: skip
 def test_a_share_is_never_rounded_to_what_it_is_not(share: float, of: float, shown: str) -> None:
-    assert percent(share, of) == shown
+    assert verdict.percent(share, of) == shown
 
 
-@pytest.mark.parametrize(("part", "unit"), [(Part.NUTATION, math.radians(1.0)), (Part.SPIN, math.pi / 30.0)])
+@pytest.mark.parametrize(
+    ("part", "unit"), [(requirements.Part.NUTATION, math.radians(1.0)), (requirements.Part.SPIN, math.pi / 30.0)]
+)
 @pytest.mark.parametrize("size", [0.5, 0.1684, 0.003491])
-def test_a_value_is_shown_on_its_side_of_its_limit(part: Part, unit: float, size: float) -> None:
-    bound = Bound(part, size * unit, True)
+def test_a_value_is_shown_on_its_side_of_its_limit(part: requirements.Part, unit: float, size: float) -> None:
+    bound = requirements.Bound(part, size * unit, True)
     for off in (0.1, 1e-3, 1e-5, 1e-6, -1e-6, -1e-4, -0.3):
         texts = verdict.value(bound, bound.limit * (1.0 + off)), verdict.limit(bound)
         shown, edge = (float(text.split()[-2]) for text in texts)
@@ -82,7 +81,7 @@ def test_pulses_at_even_distances_are_a_train() -> None:
         Schedule(tuple(pulse(t, 0.1, np.ones(3)) for t in times)) for times in ((1, 3, 5, 7, 9), (1, 3, 4, 9))
     )
     single = Schedule((*even.pulses, pulse(30.0, 0.1, np.ones(3), "U")))
-    assert [fired(made).partition(", ")[0] for made in (even, other, single)] == [
+    assert [verdict.fired(made).partition(", ")[0] for made in (even, other, single)] == [
         "train of 5", "pulses 4", "train of 5 and pulses 1",
     ]  # fmt: skip
 
@@ -92,9 +91,13 @@ TILTING = (Disturbance(0.5 + 0j),)
 
 def test_the_parts_that_are_missed_and_by_how_much() -> None:
     plan = judged("a", 0.6, shift=0.3, required=BOTH, goal=WIDE, spin=4.0)
-    assert [bound.part for bound in plan.shortfalls] == [Part.NUTATION, Part.SHIFT, Part.SPIN]
+    assert [bound.part for bound in plan.shortfalls] == [
+        requirements.Part.NUTATION,
+        requirements.Part.SHIFT,
+        requirements.Part.SPIN,
+    ]
     assert plan.severity == pytest.approx(1.0 / 0.03)
-    assert Plan(plan.spacecraft, "x", None, "why").severity == math.inf
+    assert planning.Plan(plan.spacecraft, "x", None, "why").severity == math.inf
 
 
 def test_with_a_target_the_severity_goes_by_the_distance_from_it() -> None:
@@ -134,7 +137,7 @@ def test_where_no_pulse_is_needed_it_says_so() -> None:
     for degrees, limit, goal, needless in rows:
         body = replace(spinner(degrees=degrees, channels=cross(8.0), requirement=limit), goal=goal)
         assert requirements.unaided(body) is needless
-        assert (planning.plan(body, "none").standing is Standing.COMPLIES) is needless
+        assert (planning.plan(body, "none").standing is planning.Standing.COMPLIES) is needless
         assert (nutdamp.compare(body, ("none", "four-pulse")).verdict.status is Status.NO_PULSE) is needless
 
 
@@ -163,8 +166,8 @@ def test_what_dissipation_makes_of_it_counts() -> None:
     assert requirements.unaided(growing)
     assert not requirements.unaided(replace(growing, limits=Limits(horizon=21.0)))
     assert not requirements.unaided(replace(calm, dissipation=0.01))  # e-fold 2,000 times: beyond any float
-    assert "horizon of 20 s" in idle(nutdamp.compare(growing, ("none",)).verdict)
-    assert "horizon" not in idle(nutdamp.compare(calm, ("none",)).verdict)
+    assert "horizon of 20 s" in verdict.idle(nutdamp.compare(growing, ("none",)).verdict)
+    assert "horizon" not in verdict.idle(nutdamp.compare(calm, ("none",)).verdict)
     assert not requirements.unaided(replace(calm, disturbances=TILTING))
 
 
@@ -210,15 +213,13 @@ def test_every_code_has_a_sentence_and_every_sentence_its_values() -> None:
 
 
 def test_every_entry_is_used_and_says_what_it_means() -> None:
-    used = {code for _, code, _ in CALLS} | {*(gain.value for gain in Gain), *(tie.value for tie in TIES)}
-    used |= {
-        "cone-broken-at-start",
-        "least-propellant",
-        "ideal-impulses",
-        "ideal-torquer-assumed",
-        "ideal-torque-missing",
+    used = {
+        *(code for _, code, _ in CALLS),
+        *(gain.value for gain in Gain),
+        *(tie.value for tie in TIES),
+        *("cone-broken-at-start", "ideal-impulses", "ideal-torquer-assumed", "ideal-torque-missing"),
+        *("least-propellant", *STOPS.values(), *WHY.values(), *LEAST_CODES.values()),
     }
-    used |= {"least-propellant", *STOPS.values(), *WHY.values(), *LEAST_CODES.values()}
     assert set(note_entries()) == used
     for entry in note_entries().values():
         assert entry.severity in (WARNING, NOTE, REASON)
