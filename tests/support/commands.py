@@ -1,6 +1,7 @@
 """Commands as users run them: what refused ones say as one text, and the JSON, CSV and folders of others."""
 
 import csv
+import io
 import json
 import os
 import re
@@ -11,6 +12,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+from rich.console import Console, RenderableType
 from support.process import Run, Status, environment
 
 EXACT = "name: X\ninertia: {A: 120, C: 80}\nomega0: [0.1, 0, 3]\n"
@@ -95,6 +97,14 @@ def result(run: Run, command: str, *, status: Status = 0, stdin: str | None = No
     """The JSON that a command prints, and nothing else, with ``--json -`` where it is not export."""
     line = command if command.startswith("export") else f"{command} --json -"
     return json.loads(call(run, line, stdin=stdin, status=status).stdout)
+
+
+def printed(shown: RenderableType, width: int = 80) -> list[str]:
+    """The lines of what is printed on a screen without colours, without blanks at their ends."""
+    console = Console(width=width, file=io.StringIO(), markup=False, emoji=False, highlight=False)
+    with console.capture() as captured:
+        console.print(shown)
+    return [line.rstrip() for line in captured.get().splitlines()]
 
 
 def rows(text: str) -> list[dict[str, str]]:

@@ -15,12 +15,11 @@ from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import pytest
-from rich.console import Console, RenderableType
-from rich.table import Table
+from rich.console import Console
 from support import places
 from support.builders import cross, present, spinner
 from support.cases import deep, spread
-from support.commands import call
+from support.commands import call, printed
 from support.process import Run
 
 from nutdamp.cli import screen
@@ -98,30 +97,23 @@ def test_a_width_into_which_nothing_fits_hides_nothing(run: Run) -> None:
         assert "FLY two-pulse:" in ended.stdout
 
 
-def rendered(table: Table, width: int) -> list[str]:
-    console = Console(width=width, color_system=None)
-    with console.capture() as captured:
-        console.print(table)
-    return [line.rstrip() for line in captured.get().splitlines()]
-
-
 def test_a_row_becomes_a_block_on_a_narrow_screen_or_where_it_does_not_fit() -> None:
     table = columns("pulse\n", "start\ns", "channel\n", text=("channel\n",))
     table.add_row("1", "0.2917", "-M1")
     table.add_row("", "12.5", "")
     lines = ["pulse   start  channel", "            s", "1      0.2917  -M1", "         12.5"]
-    assert rendered(table, NARROW) == lines
+    assert printed(table, NARROW) == lines
     block = ["pulse 1", "  start, s  0.2917", "  channel   -M1", "  start, s  12.5"]
-    assert rendered(table, NARROW - 1) == rendered(table, 20) == block
+    assert printed(table, NARROW - 1) == printed(table, 20) == block
     wide = columns("number", *(f"column {number}" for number in range(6)))
     wide.add_row("1", *["0.123456"] * 6)
-    assert rendered(wide, 66)[-1] == "  ".join(["1     ", *["0.123456"] * 6])
-    assert rendered(wide, 65)[-1] == rendered(wide, 60)[-1] == " ".join(["1     ", *["0.123456"] * 6])
+    assert printed(wide, 66)[-1] == "  ".join(["1     ", *["0.123456"] * 6])
+    assert printed(wide, 65)[-1] == printed(wide, 60)[-1] == " ".join(["1     ", *["0.123456"] * 6])
     table = columns("name", "value")
     table.add_row("a" * 50, "1.25")
-    assert rendered(table, 70)[0].startswith("name  ")
+    assert printed(table, 70)[0].startswith("name  ")
     table.add_row("b" * 80, "2.5")
-    text = "".join(line.strip() for line in rendered(table, 70))
+    text = "".join(line.strip() for line in printed(table, 70))
     assert "b" * 80 in text
     assert "2.5" in text
 
@@ -307,27 +299,20 @@ def test_the_default_screen_of_every_shipped_file_fits_a_terminal(run: Run, comm
     check_screen(call(run, command, columns=WIDTH).stdout)
 
 
-def shown_wide(screen: RenderableType) -> str:
-    console = Console(width=WIDTH, color_system=None)
-    with console.capture() as captured:
-        console.print(screen)
-    return "\n".join(line.rstrip() for line in captured.get().splitlines())
-
-
 def test_of_many_points_some_are_shown_the_first_and_the_last_among_them() -> None:
     body = replace(spinner(channels=cross(8.0)), requirement=Requirement(nutation=0.01))
     plan = planning.plan(body, "two-pulse")
     fronts = [Front(0.01 * at, (Point(plan, 60.0, "N m s"),) * 20) for at in range(5)]
-    shown = shown_wide(trade_brief(body, fronts))
+    shown = "\n".join(printed(trade_brief(body, fronts), WIDTH))
     check_screen(shown)
     rows = re.findall(r"^(\d+) .*FLY$", shown, re.MULTILINE)
     assert (len(rows), rows[0], rows[-1]) == (ROWS, "1", "100")
     assert f"note[trade-points]: points on this screen: {ROWS} of 100" in shown
-    assert len(re.findall(r"^\d+ .*FLY$", shown_wide(trade_screen(body, fronts)), re.MULTILINE)) == 100
+    assert len([line for line in printed(trade_screen(body, fronts), WIDTH) if re.match(r"\d+ .*FLY$", line)]) == 100
 
 
 def test_a_trade_without_a_schedule_says_why() -> None:
-    shown = shown_wide(trade_brief(spinner(), [Front(0.0, (), "no channel")]))
+    shown = "\n".join(printed(trade_brief(spinner(), [Front(0.0, (), "no channel")]), WIDTH))
     assert "NO SCHEDULE" in shown
     assert "H ends where it was – none: no channel" in shown
 

@@ -9,9 +9,9 @@ from types import SimpleNamespace as Row
 
 import numpy as np
 import pytest
-from rich.console import Console
 from support.builders import spinner
 from support.cases import spread
+from support.commands import printed
 from support.golden import check_text
 from support.places import CONFIGS
 
@@ -44,10 +44,7 @@ TABLE = DataTable(
 
 
 def screen(table: DataTable, first: int | None = None, width: int = 80) -> list[list[str]]:
-    console = Console(width=width, file=io.StringIO())
-    with console.capture() as captured:
-        console.print(table.screen("screen", first=first))
-    return [line.split() for line in captured.get().splitlines()]
+    return [line.split() for line in printed(table.screen("screen", first=first), width)]
 
 
 def test_a_file_has_vectors_in_three_columns_and_unknown_values_empty() -> None:
@@ -88,10 +85,7 @@ def test_of_many_rows_the_first_ones_and_the_last_are_shown_where_that_saves_roo
 
 
 def test_quantities_go_down_where_rows_go_across() -> None:
-    console = Console(width=80, file=io.StringIO())
-    with console.capture() as captured:
-        console.print(TABLE.transposed("screen"))
-    assert [line.split() for line in captured.get().splitlines()[:3]] == [
+    assert [line.split() for line in printed(TABLE.transposed("screen"))[:3]] == [
         ["one", "two", "three"],
         ["count", "1", "2", "3"],
         ["size,", "mm", "500.0", "–", "250.0"],
@@ -136,10 +130,7 @@ def test_a_screen_has_the_units_requested_and_files_are_si() -> None:
 
 
 def glance_lines(compared: nutdamp.Comparison) -> list[str]:
-    console = Console(width=WIDTH, file=io.StringIO(), markup=False, emoji=False, highlight=False)
-    with console.capture() as captured:
-        console.print(glance(compared))
-    return [line.rstrip() for line in captured.get().splitlines()]
+    return printed(glance(compared), WIDTH)
 
 
 def compared(body: Spacecraft, *names: str) -> nutdamp.Comparison:
