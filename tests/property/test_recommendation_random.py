@@ -38,11 +38,6 @@ def draw(number: int) -> Spacecraft:
     return aimed(body, rng.uniform(1.0, 30.0), rng.uniform(0.0, 360.0)) if rng.random() < 0.1 else body
 
 
-def compared_but_optimal(body: Spacecraft) -> Comparison:
-    """The rule does not know schemes by name."""
-    return compare(body, [name for name in usual(body) if name != "optimal"], Options())
-
-
 def cost(plan: Plan, others: tuple[Plan, ...]) -> float:
     """Propellant in kg where all know it, else impulse in N m s."""
     known = [plan.pulses.propellant, *(one.pulses.propellant for one in others)]
@@ -100,7 +95,8 @@ def test_nothing_beats_what_is_recommended_and_what_is_said_of_it_is_so() -> Non
     standings, flown = [], 0
     for number in range(COUNT):
         body = draw(number)
-        compared = compared_but_optimal(body)
+        # The rule does not know schemes by name.
+        compared = compare(body, [name for name in usual(body) if name != "optimal"], Options())
         standings.append(standing(number, compared))
         chosen = compared.recommended
         if number % 7 or chosen is None or body.goal.axis is not None or len(chosen.pulses) > 30:

@@ -13,7 +13,7 @@ from support import reference
 
 from nutdamp.common import results
 from nutdamp.flight.propagation import Residual
-from nutdamp.planning.decision import Comparison, recommend
+from nutdamp.planning.decision import Comparison
 from nutdamp.planning.notes import comparison_warnings, reasons
 from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft.equipment import Channel, Steerable, Thruster
@@ -205,12 +205,6 @@ def judged(
     theta, turned = math.radians(nutation), math.radians(shift)
     ended = Residual(theta, theta, 0.0, turned, turned)
     return Judged(spacecraft, name, Schedule(fired), ended=ended, ended_spin=spin)
-
-
-def chosen(*plans: Plan) -> str | None:
-    """Which of the plans is recommended."""
-    best = recommend(plans).plan
-    return None if best is None else best.scheme
 
 
 def noted(notes: Iterable[results.Note]) -> str:

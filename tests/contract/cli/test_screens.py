@@ -118,16 +118,12 @@ def test_a_row_becomes_a_block_on_a_narrow_screen_or_where_it_does_not_fit() -> 
     assert "2.5" in text
 
 
-def comparison(shown: str) -> list[str]:
-    """The lines of the comparison of schemes, of the paragraphs of the screen of ``plan``."""
-    return next(part.splitlines() for part in shown.split("\n\n") if "\nend, s" in part)
-
-
 @pytest.mark.weekly
 @spread("name", ["ace", "single-thruster", "steerable-stage", "magnus-a03"], quick=1, deep=1)
 def test_four_or_five_schemes_fit_a_usual_screen(run: Run, name: str) -> None:
     usual = call(run, f"plan {places.CONFIGS}/{name}.yaml -v -q", columns=80).stdout
-    head, *lines = comparison(usual)
+    (comparison,) = (part for part in usual.split("\n\n") if "\nend, s" in part)
+    head, *lines = comparison.splitlines()
     commanded = ["command-block"] if name == "ace" else []
     assert head.split() == ["one-pulse", "two-pulse", "four-pulse", *commanded, "optimal"]
     assert [line.split("  ")[0] for line in lines[:3]] == ["pulses", "end, s", "impulse, N m s"]

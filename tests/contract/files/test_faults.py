@@ -162,10 +162,6 @@ def whole(lines: str) -> str:
     return lines if lines.startswith("name") else (BODY if lines.startswith(("state", "omega0")) else BASE) + lines
 
 
-def read_lines(lines: str) -> nutdamp.Spacecraft:
-    return read_spacecraft(whole(lines), "f.yaml")
-
-
 def doubts_of(lines: str) -> list[Fault]:
     doubts: list[Fault] = []
     read_spacecraft(whole(lines), "f.yaml", warn=doubts.append)
@@ -253,7 +249,7 @@ def test_an_angle_too_large_is_refused_with_its_likely_unit_where_degrees_are_a_
             for keys in ("Ixx: 120, Iyy: 118, Izz: 80", "I1: 1, I2: 2, I3: 2", "ixx: 1, Jyy: 1, I_zz: 1")
         ),
     )
-    check_faults("files.likely-units", read_lines, angles)
+    check_faults("files.likely-units", lambda lines: read_spacecraft(whole(lines), "f.yaml"), angles)
 
 
 def test_a_refused_file_gives_its_warnings_too() -> None:

@@ -218,13 +218,9 @@ def test_the_spin_has_its_limit_too(browse: Browse, paged: Callable[[Moving], Pa
         assert limit == pytest.approx(1e-3 * spin, rel=1e-3)
 
 
-def place(page: Any, index: int, grip: str) -> tuple[float, float]:
-    box = page.locator(".firing").nth(index).locator(f".{grip}").bounding_box()
-    return box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"]
-
-
 def drag(page: Any, index: int, grip: str, by: float) -> None:
-    x, y = place(page, index, grip)
+    box = page.locator(".firing").nth(index).locator(f".{grip}").bounding_box()
+    x, y = box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"]
     page.mouse.move(x, y)
     page.mouse.down()
     page.mouse.move(x + 0.5 * by, y)

@@ -294,15 +294,11 @@ def test_the_schema_allows_what_is_read_and_nothing_else() -> None:
 # --- files are written whole or not at all
 
 
-def hidden(folder: Path) -> list[str]:
-    return [path.name for path in folder.iterdir() if path.name.startswith(".")]
-
-
 def test_what_another_run_is_writing_is_left_alone(tmp_path: Path) -> None:
     with whole_file(str(tmp_path / "slow.csv")) as stream:
         stream.write(b"slow")
         write_whole(str(tmp_path / "quick.csv"), "quick")
-        assert len(hidden(tmp_path)) == 1
+        assert len([path for path in tmp_path.iterdir() if path.name.startswith(".")]) == 1
     assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"slow.csv": "slow", "quick.csv": "quick"}
 
 

@@ -277,7 +277,7 @@ def test_what_an_earlier_end_costs_stands_on_the_page_with_the_recommended_plan_
     assert 'id="trade"' not in page(example_text())
 
 
-WIDELY_DISPERSED = """name: Wide
+DISPERSED = """name: Wide
 inertia: {A: 120, C: 80}
 state: {spin: 30 rpm, nutation: 5 deg}
 steerable: {torque: 20 N m}
@@ -288,7 +288,7 @@ dispersions: {A: {normal: SIGMA}}
 
 @pytest.mark.parametrize(("sigma", "good"), [deep("5 %", False), weekly("0.1 %", True)])
 def test_dispersions_enter_the_verdict(sigma: str, good: bool) -> None:
-    both = compared_text(WIDELY_DISPERSED.replace("SIGMA", sigma), ("two-pulse",), 1000)
+    both = compared_text(DISPERSED.replace("SIGMA", sigma), ("two-pulse",), 1000)
     assert present(both.recommended).meets_requirement
     results = run(Results(study_of(both.spacecraft, present(both.recommended).pulses), 1000), threads=1)
     distribution = results.distribution("nutation")
@@ -317,13 +317,6 @@ def test_of_several_lines_above_a_table_the_last_is_its_title() -> None:
 
 
 # --- the manoeuvre sheet: what is loaded, when to begin, when to hold, and the cases that say so
-
-DISPERSED = f"""{FILE}
-dispersions:
-  A: {{normal: 2 %}}
-  omega0: [{{normal: 0.1 deg/s}}, {{normal: 0.1 deg/s}}, {{normal: 0.5 %}}]
-  thrust: {{normal: 3 %}}
-"""
 
 
 def turning(text: str, degrees: float, azimuth: float = math.radians(82.0)) -> Spacecraft:
