@@ -1,7 +1,5 @@
 """Fixtures for all tests. Nothing is shared between tests but what a test asks for by name."""
 
-from __future__ import annotations
-
 import functools
 import os
 from collections import defaultdict

@@ -6,8 +6,6 @@ The peers are what one would else write: `scipy.integrate.solve_ivp` (DOP853, rt
 quaternion, one case at a time from edge to edge; and Basilisk, where it is installed.
 """
 
-from __future__ import annotations
-
 import importlib.util
 import json
 import statistics

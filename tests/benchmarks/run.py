@@ -9,8 +9,6 @@ down slows them all; times are medians: of processor time, but of the time passe
 A limit that is missed is marked, and the exit status is 1.
 """
 
-from __future__ import annotations
-
 import argparse
 import cmath
 import json
@@ -137,11 +135,9 @@ direction, two shifts in time."""
 def fan(channels: int, periods: float) -> str:
     """A file with so many channels, evenly spread, and a horizon of so many body nutation periods."""
     horizon = periods * 2 * math.pi / ((120 - 80) / 120 * 3.0)
-    thrusters = []
-    for index in range(channels):
-        torque = cmath.rect(8.0, 0.3 + 2 * math.pi * index / channels)
-        thrusters.append(f"  - {{name: T{index}, torque: [{torque.real}, {torque.imag}, 0]}}\n")
-    return f"{BODY}thrusters:\n{''.join(thrusters)}limits: {{horizon: {horizon} s}}\n"
+    torques = (cmath.rect(8.0, 0.3 + 2 * math.pi * index / channels) for index in range(channels))
+    lines = (f"  - {{name: T{at}, torque: [{torque.real}, {torque.imag}, 0]}}\n" for at, torque in enumerate(torques))
+    return f"{BODY}thrusters:\n{''.join(lines)}limits: {{horizon: {horizon} s}}\n"
 
 
 LOOP = ("-c", "sum(i*i for i in range(2_000_000))")

@@ -6,8 +6,6 @@ Nothing of nutdamp takes part. Each case of the file gives a body, its motion at
 the motion at the end of the last pulse, in the frame N: rates, attitude, H, nutation angle and shift of H.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import sys
@@ -19,16 +17,15 @@ if __name__ == "__main__":
 
 import numpy as np
 from support import reference
-from support.reference import Kick, Push
 
 FILE = Path(__file__).with_name("golden.json")
 
 
-def event(pulse: dict[str, Any]) -> Push | Kick:
+def event(pulse: dict[str, Any]) -> reference.Push | reference.Kick:
     """An impulse (N m s) at a moment, or a torque (N m) between two."""
     if "impulse_Nms" in pulse:
-        return Kick(pulse["t_s"], np.array(pulse["impulse_Nms"], dtype=float))
-    return Push(pulse["start_s"], pulse["end_s"], np.array(pulse["torque_Nm"], dtype=float))
+        return reference.Kick(pulse["t_s"], np.array(pulse["impulse_Nms"], dtype=float))
+    return reference.Push(pulse["start_s"], pulse["end_s"], np.array(pulse["torque_Nm"], dtype=float))
 
 
 def fly(case: dict[str, Any]) -> dict[str, Any]:
@@ -36,7 +33,7 @@ def fly(case: dict[str, Any]) -> dict[str, Any]:
     moments, rates = case["moments_kgm2"], np.array(case["rates_rad_s"], dtype=float)
     start = reference.Motion(rates, reference.frame_n(moments, rates))
     events = [event(pulse) for pulse in case["pulses"]]
-    end = max(one.t if isinstance(one, Kick) else one.end for one in events)
+    end = max(one.t if isinstance(one, reference.Kick) else one.end for one in events)
     motion = reference.fly(moments, rates, events, end, start.rotation)
     before, after = (reference.momentum(moments, one) for one in (start, motion))
     return {

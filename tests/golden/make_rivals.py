@@ -6,8 +6,6 @@ Nothing of nutdamp's planning takes part. Takes some ten minutes of processor ti
 found for one layout: cost in kg (null: none), pulses as channel, start, on-time.
 """
 
-from __future__ import annotations
-
 import json
 import sys
 from concurrent.futures import ProcessPoolExecutor

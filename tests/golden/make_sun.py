@@ -3,8 +3,6 @@
 Days since J2000.0 (TT) and the geocentric direction of the Sun in the celestial reference frame, with aberration.
 """
 
-from __future__ import annotations
-
 from importlib import import_module
 from pathlib import Path
 

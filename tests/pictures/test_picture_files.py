@@ -1,18 +1,19 @@
 """Pictures as files, inline SVG and films: formats, the same bytes each time, what a frame shows, what is refused."""
 
-from __future__ import annotations
-
 import hashlib
 import io
 import math
 import os
 import re
+import shlex
 import shutil
 import subprocess
 import sys
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
+from itertools import combinations
 from pathlib import Path
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -21,20 +22,20 @@ from matplotlib import style as matplotlib_style
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from PIL import Image
-from support import places
+from support import pairwise, places
 from support.builders import spinner
-from support.cases import deep
-from support.golden import check_text
+from support.cases import deep, weekly
+from support.golden import check_text, refusal
+from support.process import Run
 from support.shown import BODY, WIDE, drawn, flight_picture, flown
+from support.smoke import BEGINNINGS
 
 from nutdamp.common import work
 from nutdamp.errors import BadRequest, CannotWrite, MissingExtra
 from nutdamp.figures import geometry, image, overview, style
 from nutdamp.figures.image import Scene, Timing, film_format, timing
 from nutdamp.flight import propagation
-from nutdamp.flight.propagation import Flight
 from nutdamp.physics import attitude
-from nutdamp.physics.attitude import angle_between
 from nutdamp.planning import plan as planning
 from nutdamp.spacecraft.schedule import Pulse, Schedule
 
@@ -52,21 +53,16 @@ def test_the_ending_says_the_format_and_the_same_flight_gives_the_same_file(path
 
 
 def test_other_endings_and_missing_programs_are_named_with_the_cure(monkeypatch: pytest.MonkeyPatch) -> None:
-    figure, said = drawn("history", "no pulses"), []
-    for ending, paths in (
-        (image.ending, ("a.bmp", "a", "png", "a.png.gz", ".png")),
-        (film_format, ("a.webm", "gif")),
-    ):
-        for path in paths:
-            with pytest.raises(BadRequest) as refused:
-                ending(path)
-            said.append(str(refused.value))
+    figure = drawn("history", "no pulses")
+    said = [
+        *(refusal(BadRequest, image.ending, path) for path in ("a.bmp", "a", "png", "a.png.gz", ".png")),
+        *(refusal(BadRequest, film_format, path) for path in ("a.webm", "gif")),
+    ]
     with pytest.raises(BadRequest):
         image.rendered(figure, "a.bmp")
     assert film_format("-") == film_format("b.GIF") == "gif"
     monkeypatch.setenv("PATH", "")
-    with pytest.raises(CannotWrite) as without:
-        film_format("a.mp4")
+    said.append(refusal(CannotWrite, film_format, "a.mp4"))
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     for call in (
         lambda: image.rendered(figure, "a.png"),
@@ -76,7 +72,7 @@ def test_other_endings_and_missing_programs_are_named_with_the_cure(monkeypatch:
     ):
         with pytest.raises(MissingExtra, match=re.escape("pip install 'nutdamp[plot]'")):
             call()
-    check_text("pictures.refused", "\n".join([*said, str(without.value)]))
+    check_text("pictures.refused", "\n".join(said))
 
 
 def test_settings_of_the_user_change_nothing() -> None:
@@ -147,7 +143,7 @@ def plain() -> Iterator[None]:
 
 
 @pytest.fixture
-def damped(plans_shared: None) -> tuple[Flight, float]:
+def damped(plans_shared: None) -> tuple[propagation.Flight, float]:
     """The flight of two pulses of the example of the physics sheet, and its end."""
     pulses = planning.plan(WIDE, "two-pulse").pulses
     end = pulses.end + WIDE.inertial_period
@@ -156,7 +152,7 @@ def damped(plans_shared: None) -> tuple[Flight, float]:
 
 @pytest.mark.deep
 def test_a_gif_has_its_frames_its_size_and_its_pace(
-    damped: tuple[Flight, float], monkeypatch: pytest.MonkeyPatch
+    damped: tuple[propagation.Flight, float], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """And the frames are the scene to the pixel."""
     made, end = damped
@@ -193,13 +189,17 @@ def test_the_film_begins_before_a_pulse_at_once_and_ends_with_the_motion() -> No
     body = spinner(degrees=20.0)
     kick = Schedule((Pulse(0.0, 0.0, "steerable", -body.inertia.A * np.append(body.omega0[:2], 0.0)),))
     scene = Scene(propagation.flown(body, kick, body.inertial_period), Timing(body.inertial_period, 8, 10, 1.0), 400)
-    seen = [np.degrees(angle_between(scene.cones(frame).axis, scene.cones(frame).momentum)) for frame in (0, 1)]
+    seen = [
+        np.degrees(attitude.angle_between(scene.cones(frame).axis, scene.cones(frame).momentum)) for frame in (0, 1)
+    ]
     assert seen == pytest.approx([20.0, 0.0], abs=1e-9)
 
 
 @pytest.mark.deep
 @pytest.mark.usefixtures("plain")
-def test_a_frame_shows_the_cones_of_its_moment_on_scales_that_stand_still(damped: tuple[Flight, float]) -> None:
+def test_a_frame_shows_the_cones_of_its_moment_on_scales_that_stand_still(
+    damped: tuple[propagation.Flight, float],
+) -> None:
     """Marks of H, ω and the spin axis stand where the flight has them, and only once, whatever was shown before."""
     made, end = damped
     timed = Timing(end, 10, 10, 1.0)
@@ -211,7 +211,7 @@ def test_a_frame_shows_the_cones_of_its_moment_on_scales_that_stand_still(damped
         track = made.sampled(2, float(timed.times[number]) or 1e-9)
         squares = [line for line in scene.sky.lines if line.get_marker() == "s" and np.size(line.get_xdata())]
         (place,) = (np.asarray(square.get_xydata(), dtype=float)[0] for square in squares)
-        away = np.degrees(angle_between(track.axis[-1], track.momentum[0]))
+        away = np.degrees(attitude.angle_between(track.axis[-1], track.momentum[0]))
         assert np.hypot(*place) == pytest.approx(away, abs=1e-6)
     assert scales[0] == scales[1] == scales[2]
     assert scene.sky.get_aspect() == scene.space.get_aspect() == 1.0
@@ -245,7 +245,7 @@ def test_where_frames_follow_the_turns_a_mark_over_body_axis_1_shows_how_the_bod
 
 
 @pytest.mark.usefixtures("plain")
-def test_a_firing_is_announced(damped: tuple[Flight, float]) -> None:
+def test_a_firing_is_announced(damped: tuple[propagation.Flight, float]) -> None:
     made, end = damped
     first = made.schedule.pulses[0]
     scene = Scene(made, Timing(end, 100, 20, 1.0), 400)
@@ -268,7 +268,7 @@ def test_the_length_follows_the_turns(turns: float, seconds: float) -> None:
 
 @pytest.mark.deep
 def test_an_ffmpeg_that_fails_is_no_traceback(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, damped: tuple[Flight, float]
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, damped: tuple[propagation.Flight, float]
 ) -> None:
     (tmp_path / "ffmpeg").write_text("#!/bin/sh\ncat > /dev/null\nexit 3\n")
     (tmp_path / "ffmpeg").chmod(0o755)
@@ -278,8 +278,81 @@ def test_an_ffmpeg_that_fails_is_no_traceback(
 
 
 @pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="needs ffmpeg")
-def test_an_mp4_is_one(damped: tuple[Flight, float]) -> None:
+def test_an_mp4_is_one(damped: tuple[propagation.Flight, float]) -> None:
     stream = io.BytesIO()
     image.film(stream, damped[0], Timing(damped[1], 6, 10, 1.0), "a.mp4", 400)
     assert stream.getvalue()[4:8] == b"ftyp"
     assert film_format("a.mp4") == "mp4"
+
+
+# --- every spacecraft with every option, in pairs: nothing breaks, and a file is written
+
+FILES = tuple(sorted(path.stem for path in places.CONFIGS.glob("*.yaml")))
+DISPERSED = {name for name in FILES if "\ndispersions:" in (places.CONFIGS / f"{name}.yaml").read_text("utf-8")}
+SPINS = {"couples-minisat": "--spin=-10rpm", "despun-comsat": ""}
+"""Spins of those that turn the other way, or do not turn at all."""
+
+TOLERANCES = "--set 'dispersions.omega0={normal: 0.05 deg/s}'"
+"""Of the files that have none."""
+
+CASES = ("", "--nominal", "--disperse 300", "--robust", "--robust --disperse 3000")
+GOALS = ("", "--spin 10rpm", "--spin keep", "--target 10deg,45deg")
+SCHEMES = ("", "--scheme two-pulse", "--scheme four-pulse", "--scheme optimal")
+PAGES = ("", "--trade 2", "--with-disturbances", "--title T --document D --issue 1 --author A --date 2026-03-01")
+SAVED = ("", "--least time", "--least pulses", "--least impulse", "--free-axis", "--shift 1deg", "--timed")
+DRAWN = ("--plot p.png", "--figure motion --plot p.svg", "--plot p.pdf")
+OTHERS = (
+    "simulate --plot p.png",
+    "simulate --flown --figure motion --plot p.svg",
+    "simulate --scheme none --until 30s --plot p.svg",
+    *(f"disperse --samples 300 --figure {name} --plot p.svg" for name in ("overview", "cases", "momentum")),
+    "trade --points 2 --plot p.png",
+    "trade --points 2 --allow any --plot p.pdf",
+)
+FIRST = (("genesis", "", "--spin 10rpm", "", ""), ("single-thruster", "--robust --disperse 3000", "", "", ""))
+"""Reports that broke."""
+
+TABLES = {
+    "report -o page.html": ((FILES, CASES, GOALS, SCHEMES, PAGES), FIRST),
+    "plan": ((FILES, ("", "--nominal", "--robust"), GOALS, SCHEMES, DRAWN, SAVED), ()),
+    "": ((FILES, OTHERS, GOALS), ()),
+}
+"""Factors of each command, and rows that are among them."""
+
+DEEP = 4
+"""Rows of each table that run in CI: the first ones by name, others evenly spread."""
+
+
+def listed() -> Iterator[Any]:
+    """All commands, as parameters of a test."""
+    for command, (factors, first) in TABLES.items():
+        rows = pairwise.rows(factors, first)
+        every = len(rows) // (DEEP - len(first))
+        for number, (name, *options) in enumerate(rows):
+            words = " ".join(filter(None, (command, *options)))
+            words = re.sub(r"--spin \S+", SPINS.get(name, r"\g<0>"), words)
+            called, *rest = words.split(" ", 1)
+            flown = name in DISPERSED or not re.search("robust|disperse", words)
+            text = " ".join([called, f"{name}.yaml", *rest, *[TOLERANCES] * (not flown)])
+            yield (deep if number < len(first) or number % every == every // 2 else weekly)(text)
+
+
+@pytest.mark.parametrize("command", [*listed()])
+def test_a_file_is_written_whatever_meets(run: Run, tmp_path: Path, command: str) -> None:
+    name = command.split()[1]
+    (tmp_path / name).write_bytes((places.CONFIGS / name).read_bytes())
+    done = run(*shlex.split(command), status=(0, 3, 4))
+    assert "internal error" not in done.stdout + done.stderr
+    written = tmp_path / re.findall(r"(?:-o|--plot) (\S+)", command)[0]
+    if written.exists() or done.returncode != 3 or command.startswith("report"):
+        assert written.read_bytes().lower().startswith(BEGINNINGS[written.suffix].lower())
+
+
+def test_any_two_options_meet() -> None:
+    for factors, first in TABLES.values():
+        rows = pairwise.rows(factors, first)
+        assert rows[: len(first)] == [*first]
+        for one, other in combinations(range(len(factors)), 2):
+            pairs = {(row[one], row[other]) for row in rows}
+            assert pairs == {(a, b) for a in factors[one] for b in factors[other]}
+        assert len(rows) <= 1.3 * len(factors[0]) * max(map(len, factors[1:]))

@@ -1,7 +1,5 @@
 """Valid spacecraft, ordinary and degenerate, through every command and scheme: no traceback, no NaN, a proper exit."""
 
-from __future__ import annotations
-
 import json
 import math
 import re
@@ -14,10 +12,9 @@ from typing import Any, NoReturn
 import numpy as np
 import pytest
 from support.cases import spread
-from support.equipped import equipped
 from support.planner import Planner
 from support.process import within
-from support.random_bodies import power
+from support.random_bodies import equipped, power
 
 from nutdamp.schemes import planner as schemes
 

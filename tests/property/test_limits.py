@@ -1,7 +1,5 @@
 """Every scheme under any limits ends: a feasible plan keeps them all and comes nearer, an infeasible one says why."""
 
-from __future__ import annotations
-
 import itertools
 import math
 import re
@@ -12,7 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from support.builders import aimed, channel, cross, fan, one_of, spinner, within
+from support.builders import aimed, channel, cross, fan, one_of, present, spinner, within
 from support.cases import spread
 from support.checker import violations
 from support.places import case
@@ -57,8 +55,7 @@ def check(body: Spacecraft, scheme: str, options: Options | None = None, most: i
     assert violations(body, plan.pulses) == []
     assert all(two.t > one.t for one, two in itertools.pairwise(plan.pulses))
     assert left is not None
-    assert residual is not None
-    for angles in (left, residual):
+    for angles in (left, present(residual)):
         assert np.isfinite([angles.nutation, angles.body_cone, angles.space_cone, angles.momentum_shift]).all()
     if body.inertia.symmetric and not body.disturbances and plan.spin_change is not None:
         # After a long wait the clock tells the width of a pulse to its own rounding only.
@@ -178,17 +175,12 @@ TRUE_BODIES = {
 }
 
 
-def check_ends_on_the_target(body: Spacecraft, scheme: str, options: Options | None = None) -> None:
-    plan = planning.plan(body, scheme, options)
-    assert plan.flown is not None, infeasibility(plan)
-    assert max(plan.flown.nutation, plan.flown.axis_error) < 1e-9
-
-
 @spread("scheme", POINTING, quick=1)
 @spread("true_body", TRUE_BODIES.values(), quick=1, ids=TRUE_BODIES)
 def test_what_the_model_does_not_know_is_trimmed(true_body: Spacecraft, scheme: str) -> None:
     for body in (replace(true_body, channels=cross(60.0)), replace(true_body, steerable=Steerable(60.0))):
-        check_ends_on_the_target(aimed(body, 12.0, 45.0), scheme, Options(with_disturbances=True))
+        left = present(planning.plan(aimed(body, 12.0, 45.0), scheme, Options(with_disturbances=True)).flown)
+        assert max(left.nutation, left.axis_error) < 1e-9
 
 
 @pytest.mark.weekly
@@ -198,8 +190,7 @@ def test_the_horizon_that_is_named_is_long_enough_for_the_whole_plan(scheme: str
     """What was named covered the pulses that damp the nutation first, and the way to the target had no room."""
     body = aimed(spinner(channels=cross(20.0, max_on_time=2.0), limits=Limits(horizon=horizon)), 20.0, 45.0)
     why = infeasibility(planning.plan(body, scheme))
-    named = re.search(r"limits\.horizon = (\S+) s is long enough$", why)
-    assert named is not None, why
+    named = present(re.search(r"limits\.horizon = (\S+) s is long enough$", why))
     assert planning.plan(replace(body, limits=Limits(horizon=float(named[1]))), scheme).feasible
     assert all(float(number) == horizon for number in re.findall(r"horizon of (\S+) s", why)), why
 
@@ -267,8 +258,7 @@ def test_what_was_searched_for_ever_is_planned_or_declined(
 
 def test_alignments_that_a_disturbance_moves_before_the_gap_is_over_are_passed_by() -> None:
     """They were awaited in steps of a nanosecond."""
-    left = check(at("never-returns"), "four-pulse", Options(with_disturbances=True), PLENTY).flown
-    assert left is not None
+    left = present(check(at("never-returns"), "four-pulse", Options(with_disturbances=True), PLENTY).flown)
     assert left.nutation < 1e-9
 
 
@@ -317,8 +307,7 @@ def test_windows_that_end_beside_a_tick_are_left_behind(
     windows = Windows(spinner(limits=Limits(horizon=1e9, tick=tick, blackout=blackout)))
     with within(20_000):
         start = windows.earliest_start(0.5 * tick, ready)
-    assert start is not None
-    assert windows.allows(start, 0.5 * tick, ready)
+    assert windows.allows(present(start), 0.5 * tick, ready)
 
 
 def test_a_search_that_gains_a_little_in_every_step_ends() -> None:

@@ -4,8 +4,6 @@ The reference integrates Euler's equations and quaternions of many cases at once
 nutation period, restarted at every edge of every pulse.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from dataclasses import replace

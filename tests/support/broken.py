@@ -1,7 +1,5 @@
 """The broken spacecraft files of files/broken_files.txt, with the faults that must be found in them."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 HEAD = "name: Sat\n"

@@ -1,27 +1,27 @@
 """Spacecraft for the tests in one line each, in principal axes and SI, and a guard against endless loops."""
 
-from __future__ import annotations
-
 import math
 import sys
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from types import FrameType
+from typing import TypeVar
 
 import numpy as np
 from support import reference
 
 from nutdamp.common import results
-from nutdamp.common.results import Note, Value
 from nutdamp.flight.propagation import Residual
-from nutdamp.planning.decision import Comparison, recommend
+from nutdamp.planning.decision import Comparison
 from nutdamp.planning.notes import comparison_warnings, reasons
 from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft.equipment import Channel, Steerable, Thruster
 from nutdamp.spacecraft.model import Attitude, Goal, Inertia, Limits, Requirement, Spacecraft, Vector
 from nutdamp.spacecraft.requirements import Left
 from nutdamp.spacecraft.schedule import Pulse, Schedule
+
+T = TypeVar("T")
 
 results.register("nutdamp.page.results")  # which has the words of a plan that is infeasible
 
@@ -130,6 +130,12 @@ class Outcome:
         self.spin: float = float(self.motion.rates[2])
 
 
+def present(value: T | None) -> T:
+    """The value, which must be there."""
+    assert value is not None
+    return value
+
+
 def transverse(vector: Vector) -> complex:
     """v1 + i v2."""
     return complex(vector[0], vector[1])
@@ -201,28 +207,22 @@ def judged(
     return Judged(spacecraft, name, Schedule(fired), ended=ended, ended_spin=spin)
 
 
-def chosen(*plans: Plan) -> str | None:
-    """Which of the plans is recommended."""
-    best = recommend(plans).plan
-    return None if best is None else best.scheme
-
-
-def noted(notes: Iterable[Note]) -> str:
+def noted(notes: Iterable[results.Note]) -> str:
     """Codes of notes with their values, one a line: ``momentum-shift scheme=x momentum_shift_deg=0.25``."""
     return "\n".join(" ".join((entry.code, *map(_valued, entry.items))) for entry in notes)
 
 
-def _valued(item: tuple[str, Value]) -> str:
+def _valued(item: tuple[str, results.Value]) -> str:
     name, value = item
     return f"{name}={value:.4g}" if isinstance(value, float) else f"{name}={value}"
 
 
-def codes(notes: Iterable[Note]) -> list[str]:
+def codes(notes: Iterable[results.Note]) -> list[str]:
     """Codes of notes."""
     return [entry.code for entry in notes]
 
 
-def one_of(notes: Iterable[Note], code: str) -> dict[str, Value]:
+def one_of(notes: Iterable[results.Note], code: str) -> dict[str, results.Value]:
     """Values of the one note with a code."""
     (entry,) = (entry for entry in notes if entry.code == code)
     return entry.values

@@ -1,7 +1,5 @@
 """Which of many like cases run always (quick), which in CI too (deep), and which by hand (weekly)."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from typing import Any

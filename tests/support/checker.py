@@ -1,7 +1,5 @@
 """Whether a schedule keeps the limits of its spacecraft, written from the contract and not from nutdamp."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

@@ -1,8 +1,7 @@
 """Commands as users run them: what refused ones say as one text, and the JSON, CSV and folders of others."""
 
-from __future__ import annotations
-
 import csv
+import io
 import json
 import os
 import re
@@ -13,7 +12,8 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from support.process import Run, environment
+from rich.console import Console, RenderableType
+from support.process import Run, Status, environment
 
 EXACT = "name: X\ninertia: {A: 120, C: 80}\nomega0: [0.1, 0, 3]\n"
 """The shortest spacecraft file: ideal impulses, and no requirement."""
@@ -77,8 +77,7 @@ def transcript(run: Run, commands: Iterable[str], only: str = "") -> str:
     shown = ""
     for line in commands:
         command, _, status = line.partition("; ")
-        ended = call(run, command)
-        assert ended.returncode == int(status or 0), f"{command}\n{ended.stderr}"
+        ended = call(run, command, status=int(status or 0))
         kept = "\n\n".join(part for part in ended.stdout.split("\n\n") if re.search(only, part)).rstrip()
         shown += f"$ {command}\n{kept}\n{ended.stderr}\n"
     return shown
@@ -94,11 +93,18 @@ def call(run: Run, command: str, **options: Any) -> subprocess.CompletedProcess[
     return run(*shlex.split(command), **options)
 
 
-def result(run: Run, command: str, *, status: int = 0, stdin: str | None = None) -> Any:
+def result(run: Run, command: str, *, status: Status = 0, stdin: str | None = None) -> Any:
     """The JSON that a command prints, and nothing else, with ``--json -`` where it is not export."""
-    ended = call(run, command if command.startswith("export") else f"{command} --json -", stdin=stdin)
-    assert ended.returncode == status, ended.stderr
-    return json.loads(ended.stdout)
+    line = command if command.startswith("export") else f"{command} --json -"
+    return json.loads(call(run, line, stdin=stdin, status=status).stdout)
+
+
+def printed(shown: RenderableType, width: int = 80) -> list[str]:
+    """The lines of what is printed on a screen without colours, without blanks at their ends."""
+    console = Console(width=width, file=io.StringIO(), markup=False, emoji=False, highlight=False)
+    with console.capture() as captured:
+        console.print(shown)
+    return [line.rstrip() for line in captured.get().splitlines()]
 
 
 def rows(text: str) -> list[dict[str, str]]:

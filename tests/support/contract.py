@@ -1,18 +1,17 @@
 """What tests of files share: plans that are exported, their motion, and the faults of what must be refused."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import strategies as st
 from scipy.integrate import simpson
 from support import messages, reference
+from support.builders import present
 from support.cases import deep
 from support.golden import check_text
 
@@ -20,7 +19,6 @@ from nutdamp.errors import FaultyFile, printable
 from nutdamp.files.editing import parse_setting
 from nutdamp.files.reader import load_spacecraft, read_spacecraft
 from nutdamp.planning import plan as planning
-from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.schedule import Pulse, Schedule
 
@@ -28,14 +26,7 @@ QUICK = ("steerable-stage", "tilted tensor, backwards", "oblate, backwards")
 CASES = pytest.mark.parametrize("case", [name if name in QUICK else deep(name) for name in messages.CASES])
 """Names of the plans of `support.messages`."""
 
-T = TypeVar("T")
 Write = Callable[..., Path]
-
-
-def known(value: T | None) -> T:
-    """The value, which must be there."""
-    assert value is not None
-    return value
 
 
 def faults(read: Callable[..., object], *given: Any) -> list[str]:
@@ -79,7 +70,7 @@ thrusters:
 
 
 @cache
-def pushing(name: str, *, orbit: bool = True) -> Plan:
+def pushing(name: str, *, orbit: bool = True) -> planning.Plan:
     """A plan whose pulses change the velocity."""
     body = load_spacecraft(messages.CONFIGS / f"{name}.yaml", [parse_setting(ORBIT)] if orbit else [])
     plan = planning.plan(body, "four-pulse")
@@ -88,7 +79,7 @@ def pushing(name: str, *, orbit: bool = True) -> Plan:
 
 
 @cache
-def valved() -> Plan:
+def valved() -> planning.Plan:
     """A plan whose pulses are fired through valves."""
     text = VALVED + "valve: {open_delay: 15 ms, close_delay: 8 ms}\n"
     return planning.plan(read_spacecraft(text, "f.yaml"), "four-pulse")
@@ -110,14 +101,14 @@ def motions(body: Spacecraft, pulses: Schedule, times: Sequence[float], rotation
     return [at[time] for time in times]
 
 
-def velocity_change(plan: Plan, pulse: Pulse) -> Vector:
+def velocity_change(plan: planning.Plan, pulse: Pulse) -> Vector:
     """∫ R F dt / m of one pulse, m/s, by Simpson on attitudes of the reference integrator."""
     body = plan.spacecraft
     start = messages.columns(body, body.initial.quaternion) @ body.inertia.axes
     times = np.linspace(pulse.start, pulse.end, 33)
     moved = motions(body, plan.pulses, times.tolist(), start)
-    pushes = np.array([motion.rotation @ known(pulse.force) for motion in moved])
-    return np.asarray(simpson(pushes, x=times, axis=0) / known(body.mass))
+    pushes = np.array([motion.rotation @ present(pulse.force) for motion in moved])
+    return np.asarray(simpson(pushes, x=times, axis=0) / present(body.mass))
 
 
 @st.composite

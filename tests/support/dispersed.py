@@ -1,7 +1,5 @@
 """Dispersed spacecraft with schedules for the tests."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import replace
@@ -13,8 +11,8 @@ from nutdamp.montecarlo.cases import DispersedModel
 from nutdamp.montecarlo.inputs import BLOCK, Draws
 from nutdamp.montecarlo.study import Study
 from nutdamp.spacecraft.equipment import Channel, Steerable, Thruster
-from nutdamp.spacecraft.model import Inertia, Limits, Spacecraft
-from nutdamp.spacecraft.schedule import Pulse, Schedule, channel_pulse, steerable_pulse
+from nutdamp.spacecraft.model import Limits
+from nutdamp.spacecraft.schedule import Schedule, channel_pulse, steerable_pulse
 from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
 
 
@@ -123,11 +121,6 @@ def first_cases(study: Study, count: int) -> dict[str, np.ndarray]:
 def one_of(draws: Draws | Mapping[str, np.ndarray], case: int) -> dict[str, float]:
     """The deviations of one case."""
     return {name: float(np.asarray(draw)[case]) for name, draw in draws.items()}
-
-
-def body_of(model: DispersedModel) -> tuple[Spacecraft, tuple[Pulse, ...], Inertia]:
-    """What a model is made of."""
-    return model.spacecraft, model.schedule.pulses, model.spacecraft.inertia
 
 
 FILE = """\

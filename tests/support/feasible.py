@@ -1,7 +1,5 @@
 """Plans that must be feasible and keep the limits, and what they leave."""
 
-from __future__ import annotations
-
 from support.checker import violations
 
 from nutdamp.flight import propagation

@@ -1,7 +1,5 @@
 """Flights that tests of several packages look at: the spin axis on its way, and dispersed command blocks."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from itertools import pairwise

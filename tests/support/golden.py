@@ -8,15 +8,14 @@ writes the texts of the tests that run (without arguments of all but the weekly 
 Read the difference as one would read the screen.
 """
 
-from __future__ import annotations
-
 import contextlib
 import fcntl
 import os
 import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -46,6 +45,13 @@ def refused(error: type[Exception], key: str) -> Iterator[None]:
     with pytest.raises(error) as raised:
         yield
     check_text(key, str(raised.value))
+
+
+def refusal(error: type[Exception], call: Callable[..., object], *given: Any, **named: Any) -> str:
+    """The text of the ``error`` with which a call is refused."""
+    with pytest.raises(error) as raised:
+        call(*given, **named)
+    return str(raised.value)
 
 
 def load_texts() -> dict[str, str]:

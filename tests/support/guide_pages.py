@@ -1,14 +1,11 @@
 """Pages and lists of the guide that are made from the code: ``python tests/support/guide_pages.py`` writes them."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from typing import Any, Literal, NamedTuple, get_args, get_origin
 
 from nutdamp.errors import listed
 from nutdamp.files import fields
-from nutdamp.files.fields import Quantity, Section, section_of
 from nutdamp.files.keys import SpacecraftFile
 from nutdamp.files.study_keys import QUANTITIES, ToleranceSection, unit_kinds
 from nutdamp.units import KINDS, Kind
@@ -23,7 +20,7 @@ class KeyGuide(NamedTuple):
 
     path: str
     field: fields.Key
-    section: type[Section] | None
+    section: type[fields.Section] | None
 
     @property
     def parent(self) -> str:
@@ -53,10 +50,10 @@ class KeyGuide(NamedTuple):
         return f"{self.field.description} {'; '.join(filter(None, facts))}"
 
 
-def keys(model: type[Section] = SpacecraftFile, prefix: str = "") -> Iterator[KeyGuide]:
+def keys(model: type[fields.Section] = SpacecraftFile, prefix: str = "") -> Iterator[KeyGuide]:
     """All keys of the file, each before those below it."""
     for name, field in model.fields().items():
-        section = section_of(field.type)
+        section = fields.section_of(field.type)
         yield KeyGuide(f"{prefix}{name}", field, section)
         if section is not None:
             yield from keys(section, f"{prefix}{name}.")
@@ -64,7 +61,7 @@ def keys(model: type[Section] = SpacecraftFile, prefix: str = "") -> Iterator[Ke
 
 def _what(field: fields.Key) -> str:
     parts = list(_within(field.type))
-    quantity = next((part for part in parts if isinstance(part, Quantity)), None)
+    quantity = next((part for part in parts if isinstance(part, fields.Quantity)), None)
     if quantity is not None:
         factors = KINDS[quantity.kind].factors
         return f"unit {listed([*factors], 'or')}" if factors else "plain numbers, without unit"

@@ -1,7 +1,5 @@
 """Fits whose values and sigmas are given, as if a record had told them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Bodies, sensors and thresholds of closed loops in one line each; angles are given in degrees."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Any
@@ -10,7 +8,6 @@ import pytest
 from support.builders import channel, spinner
 
 from nutdamp.control_loop import budget
-from nutdamp.control_loop.budget import Map
 from nutdamp.spacecraft.equipment import Channel, Loop, Sensor
 from nutdamp.spacecraft.model import Spacecraft, Vector
 
@@ -67,6 +64,6 @@ def transverse_size(rates: Vector) -> float:
 
 def follow_few_cycles(patch: pytest.MonkeyPatch) -> None:
     """Budgets by 8 chains of 4 cycles or 20 firings: known to some 3 %, which changes none of their texts."""
-    patch.setattr(Map.cycle, "__defaults__", (8, 4))
-    patch.setattr(Map.attractors, "__defaults__", (8,))
+    patch.setattr(budget.Map.cycle, "__defaults__", (8, 4))
+    patch.setattr(budget.Map.attractors, "__defaults__", (8,))
     patch.setattr(budget, "FIRINGS", 20)

@@ -1,7 +1,5 @@
 """Plans to write as messages: every file in configs/ that has an epoch, and bodies that none of them is."""
 
-from __future__ import annotations
-
 import math
 from functools import cache
 
@@ -11,7 +9,6 @@ from support import places
 from nutdamp.files.reader import load_spacecraft, read_spacecraft
 from nutdamp.physics import attitude
 from nutdamp.planning import plan as planning
-from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft.model import Spacecraft, Vector
 
 CONFIGS = places.CONFIGS
@@ -56,7 +53,7 @@ def spacecraft(name: str) -> Spacecraft:
 
 
 @cache
-def planned(name: str) -> Plan:
+def planned(name: str) -> planning.Plan:
     """A plan whose pulses have widths, for a case."""
     body = spacecraft(name)
     for scheme in ("two-pulse", "four-pulse", "one-pulse"):

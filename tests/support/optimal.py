@@ -1,7 +1,5 @@
 """What every schedule of the scheme optimal has to do, and random spacecraft to try it on."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -1,7 +1,5 @@
 """Orekit as an independent reader of attitude messages (extra ``interop``), and what it needs to start."""
 
-from __future__ import annotations
-
 import os
 import tempfile
 from contextlib import suppress

@@ -1,7 +1,5 @@
 """Pages of `report` for tests of their texts, without the pictures, which take most of the time."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -9,7 +7,6 @@ from unittest.mock import patch
 
 from nutdamp.page import report
 from nutdamp.page.document import Page, Prose
-from nutdamp.page.report import Repeat, report_page
 from nutdamp.planning.decision import Comparison
 
 
@@ -21,7 +18,7 @@ def unpictured() -> Iterator[None]:
         yield
 
 
-def plain_page(compared: Comparison, repeat: Repeat | None = None, **more: Any) -> Page:
+def plain_page(compared: Comparison, repeat: report.Repeat | None = None, **more: Any) -> Page:
     """The page of a comparison without pictures."""
     with unpictured():
-        return report_page(compared, repeat or Repeat("", "", ""), **more)
+        return report.report_page(compared, repeat or report.Repeat("", "", ""), **more)

@@ -1,7 +1,5 @@
 """Rows of options in which any two of them meet, without a row for every combination."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from itertools import combinations
 

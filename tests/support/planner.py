@@ -1,7 +1,5 @@
 """Schedules kept from test to test: each command of the same spacecraft plans the same pulses, to the last digit."""
 
-from __future__ import annotations
-
 import dataclasses
 import json
 import math

@@ -1,7 +1,5 @@
 """Running the command line: within this process, which is quick, or as a process of its own."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import os
@@ -16,7 +14,10 @@ import pytest
 from nutdamp.cli.main import main
 
 Run = Callable[..., "subprocess.CompletedProcess[str]"]
-"""``run("plan", "--json", "-", stdin=…, columns=80)``: the type of the fixtures that run the command line."""
+"""``run("plan", "--json", "-", stdin=…, columns=80, status=0)``: the type of the fixtures that run the command line."""
+
+Status = int | tuple[int, ...] | None
+"""The exit status that is right, or all of them; any where it is None."""
 
 
 def environment(columns: int) -> dict[str, str]:
@@ -24,8 +25,15 @@ def environment(columns: int) -> dict[str, str]:
     return {"COLUMNS": str(columns), "NO_COLOR": "1", "PYTHONUTF8": "1"}
 
 
+def checked(ended: subprocess.CompletedProcess[str], status: Status) -> subprocess.CompletedProcess[str]:
+    """The command that has ended; fails where its status is not the right one."""
+    right = status if isinstance(status, tuple) else (status,)
+    assert status is None or ended.returncode in right, (ended.returncode, ended.stderr)
+    return ended
+
+
 def within(
-    folder: Path, *arguments: str, stdin: str | None = None, columns: int = 80
+    folder: Path, *arguments: str, stdin: str | None = None, columns: int = 80, status: Status = None
 ) -> subprocess.CompletedProcess[str]:
     """Run the command line in this process, in ``folder``; an error that is a bug of nutdamp is raised."""
     out, err = (io.TextIOWrapper(io.BytesIO(), encoding="utf-8", write_through=True) for _ in range(2))
@@ -40,20 +48,20 @@ def within(
         try:
             main()
         except SystemExit as leave:
-            status = leave.code
+            code = leave.code
         finally:
             signal.signal(signal.SIGTERM, handler)
-    assert isinstance(status, int)
+    assert isinstance(code, int)
     # As a text stream of a process would give them.
     texts = [stream.buffer.getvalue().decode().replace("\r\n", "\n") for stream in (out, err)]
-    return subprocess.CompletedProcess(["nutdamp", *arguments], status, *texts)
+    return checked(subprocess.CompletedProcess(["nutdamp", *arguments], code, *texts), status)
 
 
 def apart(
-    folder: Path, *arguments: str, stdin: str | None = None, columns: int = 80
+    folder: Path, *arguments: str, stdin: str | None = None, columns: int = 80, status: Status = None
 ) -> subprocess.CompletedProcess[str]:
     """Run the command line as a process of its own in ``folder``."""
-    return subprocess.run(
+    ended = subprocess.run(
         [sys.executable, "-m", "nutdamp", *arguments],
         cwd=folder,
         env={**os.environ, **environment(columns)},
@@ -62,3 +70,4 @@ def apart(
         text=True,
         check=False,
     )
+    return checked(ended, status)

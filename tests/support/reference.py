@@ -16,8 +16,6 @@ s the turn of axis 3 away from H at κ sin θ cos θ. No torque of dissipation s
 A ``wheel`` adds its constant momentum h e3 to I ω, wherever H stands.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Iterable, Sequence

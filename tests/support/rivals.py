@@ -4,8 +4,6 @@ Nothing of nutdamp's planning is used. The motion is that of exact torque-free a
 R(t) = Rot(H t/A) R Rot3(aω3 t), between kicks; a pulse of real width is a few kicks, evenly spread over it.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, NamedTuple, cast
 

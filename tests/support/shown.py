@@ -1,7 +1,5 @@
 """What figures and pages show, as tests read it."""
 
-from __future__ import annotations
-
 import base64
 from dataclasses import replace
 from functools import cache

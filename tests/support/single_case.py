@@ -1,7 +1,5 @@
 """One case as a spacecraft and a schedule of its own, so that everything that flies those can fly it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -6,8 +6,6 @@ NUTDAMP is the program to run, by default the one beside this Python. Prints wha
 exit status is not the one expected, a traceback or a warning is printed, or a file is missing or not of its kind.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import re

@@ -1,7 +1,5 @@
 """Spinners that are commanded by blocks, and their flight by an integrator that shares nothing with the planner."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Iterable

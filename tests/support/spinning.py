@@ -1,7 +1,5 @@
 """Bodies and spins that the tables of unit/physics run over, and their motion under torques that change with time."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 

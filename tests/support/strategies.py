@@ -1,7 +1,5 @@
 """Strategies of hypothesis: spinning bodies and schedules."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Synthetic telemetry by DOP853 (tests/reference.py) with noise, gaps, outliers, steps and biases."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 
@@ -12,7 +10,6 @@ from support import reference
 
 import nutdamp
 from nutdamp.estimation.parameters import GYROS, Record
-from nutdamp.spacecraft.model import Spacecraft
 
 Array = NDArray[np.float64]
 
@@ -27,7 +24,7 @@ GYRO_BIAS = math.radians(0.02)
 class Case:
     """A file, the record of a body that differs from it, and the true values of what is estimated."""
 
-    spacecraft: Spacecraft
+    spacecraft: nutdamp.Spacecraft
     record: Record
     truth: dict[str, float]
     noise: float

@@ -1,7 +1,5 @@
 """Synthetic telemetry of every kind of column, as CSV files: bodies within the tolerances of files, flown by DOP853."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +15,6 @@ from nutdamp.common.time import Epoch
 from nutdamp.estimation.parameters import GYROS, Record
 from nutdamp.files.telemetry import read_telemetry
 from nutdamp.physics import attitude
-from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
 
 Array = NDArray[np.float64]
@@ -51,13 +48,13 @@ FARTHEST = math.cos(math.radians(25.0))
 class Telemetry:
     """A file, the record of a body that differs from it, and the true values of what may be estimated."""
 
-    spacecraft: Spacecraft
+    spacecraft: nutdamp.Spacecraft
     record: Record
     truth: dict[str, float]
     kind: str
 
 
-def file_of(draw: np.random.Generator, seed: int) -> tuple[Spacecraft, bool]:
+def file_of(draw: np.random.Generator, seed: int) -> tuple[nutdamp.Spacecraft, bool]:
     """A spacecraft file, and whether it is prolate; the Sun is so far from the axis that it goes round the sensor."""
     body, prolate = _any_file(draw, seed)
     again, up = np.random.default_rng([18, seed]), np.array([0.0, 0.0, 1.0])
@@ -69,7 +66,7 @@ def file_of(draw: np.random.Generator, seed: int) -> tuple[Spacecraft, bool]:
     return body, prolate
 
 
-def _any_file(draw: np.random.Generator, seed: int) -> tuple[Spacecraft, bool]:
+def _any_file(draw: np.random.Generator, seed: int) -> tuple[nutdamp.Spacecraft, bool]:
     prolate = bool(draw.uniform() < 0.6)
     C = 120.0 * (draw.uniform(0.45, 0.85) if prolate else draw.uniform(1.15, 1.7))
     spin = (-1.0 if draw.uniform() < 0.5 else 1.0) * draw.uniform(0.8, 4.0)
@@ -136,12 +133,12 @@ def telemetry(folder: Path, seed: int) -> Telemetry:
     utc = draw.uniform() < 0.3
     begin = Epoch.parse(EPOCH)
     stamps = [begin.plus(float(one)).text if utc else f"{one:.6f}" for one in times]
-    rows = [",".join(["utc" if utc else "t_s", *columns])]
-    for at, stamp in enumerate(stamps):
-        rows.append(
-            ",".join([stamp, *("" if math.isnan(one[at]) else repr(float(one[at])) for one in columns.values())])
-        )
-    path.write_text("\n".join(rows) + "\n", encoding="utf-8")
+    rows = (
+        [stamp, *("" if math.isnan(one[at]) else repr(float(one[at])) for one in columns.values())]
+        for at, stamp in enumerate(stamps)
+    )
+    header = ["utc" if utc else "t_s", *columns]
+    path.write_text("".join(",".join(row) + "\n" for row in (header, *rows)), encoding="utf-8")
     if "sun_times" in kind:
         sun = folder / f"{seed}-sun.csv"
         seen = flight.sun(body, length) + 10.0 ** draw.uniform(-4, -2.5) * draw.normal(
@@ -152,7 +149,7 @@ def telemetry(folder: Path, seed: int) -> Telemetry:
     return Telemetry(body, read_telemetry(path, body, sun, fired)[0], truth, "+".join(kind))
 
 
-def _fired(draw: np.random.Generator, body: Spacecraft, length: float) -> Schedule:
+def _fired(draw: np.random.Generator, body: nutdamp.Spacecraft, length: float) -> Schedule:
     pulses = zip(body.channels, (0.3, 0.65), strict=True)
     return Schedule(tuple(channel_pulse(one, share * length, draw.uniform(0.3, 0.8)) for one, share in pulses))
 
@@ -206,7 +203,7 @@ class _Flight:
         slip = self.growth * along[:, 2:] * np.cross(along, np.array([0.0, 0.0, 1.0]))
         return np.asarray(-np.cross(rates + slip, momentum) / np.array(self.moments))
 
-    def sun(self, body: Spacecraft, length: float) -> Array:
+    def sun(self, body: nutdamp.Spacecraft, length: float) -> Array:
         """When the Sun passes the azimuth of the sensor, s."""
         assert body.sun is not None
         assert body.sun_sensor is not None
@@ -222,7 +219,7 @@ class _Flight:
 def _columns(
     draw: np.random.Generator,
     kind: tuple[str, ...],
-    body: Spacecraft,
+    body: nutdamp.Spacecraft,
     flight: _Flight,
     times: Array,
     truth: dict[str, float],

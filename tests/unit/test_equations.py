@@ -1,7 +1,5 @@
 """Each numbered equation has a place in the code and a test; those without a test of their own are checked here."""
 
-from __future__ import annotations
-
 import itertools
 from importlib import import_module
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The layout of the code, as `nutdamp/guide/contributing.md` describes it."""
 
-from __future__ import annotations
-
 import ast
 import inspect
 import re

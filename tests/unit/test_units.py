@@ -1,15 +1,18 @@
-"""Quantities with units, as they stand in files and on command lines."""
-
-from __future__ import annotations
+"""Quantities with units, as in files and on command lines; errors cross the border between processes whole."""
 
 import math
+import pickle
 import re
+from multiprocessing import get_context
+from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from support.golden import check_text
+from support.golden import check_text, refusal
 
+import nutdamp
+from nutdamp import errors
 from nutdamp.units import KINDS, LARGEST, SI, US, parse, pattern, screen_unit, screen_units, shown
 
 UNITS = {
@@ -84,12 +87,7 @@ REFUSED: list[tuple[object, str]] = [
 
 
 def test_refusals_say_what_is_allowed() -> None:
-    said = []
-    for value, kind in REFUSED:
-        with pytest.raises(ValueError) as refusal:  # noqa: PT011 - its text is kept
-            parse(value, kind)
-        said.append(str(refusal.value))
-    check_text("units.refused", "\n".join(said))
+    check_text("units.refused", "\n".join(refusal(ValueError, parse, value, kind) for value, kind in REFUSED))
     for unit in ("Deg", "dg", "secs", "Sec", "hrs", "rp m", "deg°", "M", "KM", "msec", "arcmin"):
         for kind in KINDS:
             with pytest.raises(ValueError, match="is not a"):
@@ -149,3 +147,36 @@ def test_screens_have_us_units_where_requested(si: str, us: str, factor: float) 
 def test_angles_rates_times_and_shares_are_the_same_in_both_systems(unit: str) -> None:
     with screen_units(US):
         assert screen_unit(unit, 2.0) == (unit, 2.0)
+
+
+FAULTS = [errors.Fault("b.yaml", 3, 1, "mass", "zero"), errors.Fault("a.yaml", 0, 0, "", "empty")]
+EVERY = [
+    errors.NutdampError("anything"),
+    errors.FaultyFile(FAULTS),
+    errors.BadRequest("no such scheme"),
+    errors.Unsuitable(("attitude", "epoch"), "before 1972"),
+    errors.SenselessOption("per_turn", "0", "expected a whole number of at least 1"),
+    errors.CannotRead("in.yaml", "no such file"),
+    errors.CannotWrite("out.csv", "permission denied"),
+    errors.MissingExtra("plot", "a picture"),
+    errors.MissingPandas(),
+    errors.Infeasible("no thrusters"),
+    errors.TooShort("no pulse fits", "limits.horizon = 90 s is long enough"),
+]
+
+
+def test_every_kind_of_error_survives_pickling() -> None:
+    kinds = {kind for kind in vars(errors).values() if isinstance(kind, type) and issubclass(kind, BaseException)}
+    assert {type(error) for error in EVERY} == kinds
+    for error in EVERY:
+        again = pickle.loads(pickle.dumps(error))
+        assert (type(again), str(again), vars(again)) == (type(error), str(error), vars(error))
+    assert str(errors.FaultyFile(FAULTS)) == "a.yaml: empty\nb.yaml:3:1: mass: zero"  # sorted
+
+
+@pytest.mark.deep
+def test_a_pool_of_processes_reports_a_missing_file(tmp_path: Path) -> None:
+    with get_context("spawn").Pool(1) as pool:
+        waiting = pool.apply_async(nutdamp.load, (tmp_path / "missing.yaml",))
+        with pytest.raises(errors.CannotRead, match=r"missing\.yaml"):
+            waiting.get()  # where the error cannot be rebuilt the pool waits for it for ever; see the test above

@@ -1,7 +1,5 @@
 """Pictures by command: --plot and --figure, films by animate, and pages by report."""
 
-from __future__ import annotations
-
 import json
 import os
 import re
@@ -21,7 +19,6 @@ from support.shown import downloaded
 
 from nutdamp import __version__
 from nutdamp.figures import image, style
-from nutdamp.figures.image import Scene, Timing
 from nutdamp.flight.propagation import Flight
 from nutdamp.page import report
 from nutdamp.page.document import Prose
@@ -111,8 +108,8 @@ def test_figure_film_and_page_name_the_plan_that_they_show(
     """Lunar Prospector flies command blocks, though optimal costs less."""
     captions: list[str] = []
 
-    def captioned(_: object, flight: Flight, timed: Timing, *__: object) -> None:
-        captions.append(style.styled()(Scene)(flight, timed, 320).caption(0.0))
+    def captioned(_: object, flight: Flight, timed: image.Timing, *__: object) -> None:
+        captions.append(style.styled()(image.Scene)(flight, timed, 320).caption(0.0))
 
     monkeypatch.setattr(image, "film", captioned)
     craft = str(places.CONFIGS / "lunar-prospector.yaml")
@@ -277,8 +274,7 @@ def test_the_page_is_written_whatever_the_verdict(
     run: Run, tmp_path: Path, more: str, options: str, status: int, said: str
 ) -> None:
     written(tmp_path, craft_yaml=EXACT + more)
-    ended = run("report", "craft.yaml", *options.split())
-    assert ended.returncode == status
+    ended = run("report", "craft.yaml", *options.split(), status=status)
     assert said.rstrip(".").lower() in ended.stderr.lower()
     assert said in verdict_of(tmp_path, "missed")
 
@@ -371,8 +367,7 @@ def test_a_page_shows_what_was_set(run: Run) -> None:
 
 @pytest.mark.weekly
 def test_a_long_name_leaves_no_warning_of_the_picture(run_apart: Run) -> None:
-    ended = run_apart("report", str(places.case("long-name.yaml")), "--scheme", "two-pulse", "-o", "r.html")
-    assert ended.returncode == 0
+    ended = run_apart("report", str(places.case("long-name.yaml")), "--scheme", "two-pulse", "-o", "r.html", status=0)
     assert "Warning" not in ended.stderr
 
 

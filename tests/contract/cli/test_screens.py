@@ -1,31 +1,36 @@
-"""Narrow screens, where each row of a table is a block and no digit is lost; progress of long runs, how they stop."""
-
-from __future__ import annotations
+"""Screens: narrow ones, those of studies, other units; progress of long runs, how they stop."""
 
 import io
+import math
 import os
 import re
 import signal
 import sys
 from collections import Counter
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import pytest
 from rich.console import Console
-from rich.table import Table
 from support import places
-from support.cases import spread
-from support.commands import call
+from support.builders import cross, present, spinner
+from support.cases import deep, spread
+from support.commands import call, printed
 from support.process import Run
 
 from nutdamp.cli import screen
 from nutdamp.cli.main import stoppable
-from nutdamp.cli.screen import working
 from nutdamp.common import work
+from nutdamp.files.reader import example_text
+from nutdamp.planning import plan as planning
+from nutdamp.planning.tradeoff import Front, Point
+from nutdamp.spacecraft.model import Requirement
 from nutdamp.views.tables import NARROW, columns
+from nutdamp.views.trade import ROWS, trade_brief, trade_screen
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 
@@ -53,8 +58,7 @@ def test_no_digit_is_lost_on_a_narrow_screen(run: Run, command: str) -> None:
     """Headings stand in every block, so that a number may come more often, but none less often."""
     wide = call(run, f"{command} -q", columns=300)
     for width in (25, 59, 60, 80):
-        narrow = call(run, f"{command} -q", columns=width)
-        assert narrow.returncode == wide.returncode
+        narrow = call(run, f"{command} -q", columns=width, status=wide.returncode)
         assert "…" not in narrow.stdout
         assert numbers(narrow.stdout) >= numbers(wide.stdout)
         assert max(map(len, narrow.stdout.splitlines())) <= width
@@ -93,44 +97,33 @@ def test_a_width_into_which_nothing_fits_hides_nothing(run: Run) -> None:
         assert "FLY two-pulse:" in ended.stdout
 
 
-def rendered(table: Table, width: int) -> list[str]:
-    console = Console(width=width, color_system=None)
-    with console.capture() as captured:
-        console.print(table)
-    return [line.rstrip() for line in captured.get().splitlines()]
-
-
 def test_a_row_becomes_a_block_on_a_narrow_screen_or_where_it_does_not_fit() -> None:
     table = columns("pulse\n", "start\ns", "channel\n", text=("channel\n",))
     table.add_row("1", "0.2917", "-M1")
     table.add_row("", "12.5", "")
     lines = ["pulse   start  channel", "            s", "1      0.2917  -M1", "         12.5"]
-    assert rendered(table, NARROW) == lines
+    assert printed(table, NARROW) == lines
     block = ["pulse 1", "  start, s  0.2917", "  channel   -M1", "  start, s  12.5"]
-    assert rendered(table, NARROW - 1) == rendered(table, 20) == block
+    assert printed(table, NARROW - 1) == printed(table, 20) == block
     wide = columns("number", *(f"column {number}" for number in range(6)))
     wide.add_row("1", *["0.123456"] * 6)
-    assert rendered(wide, 66)[-1] == "  ".join(["1     ", *["0.123456"] * 6])
-    assert rendered(wide, 65)[-1] == rendered(wide, 60)[-1] == " ".join(["1     ", *["0.123456"] * 6])
+    assert printed(wide, 66)[-1] == "  ".join(["1     ", *["0.123456"] * 6])
+    assert printed(wide, 65)[-1] == printed(wide, 60)[-1] == " ".join(["1     ", *["0.123456"] * 6])
     table = columns("name", "value")
     table.add_row("a" * 50, "1.25")
-    assert rendered(table, 70)[0].startswith("name  ")
+    assert printed(table, 70)[0].startswith("name  ")
     table.add_row("b" * 80, "2.5")
-    text = "".join(line.strip() for line in rendered(table, 70))
+    text = "".join(line.strip() for line in printed(table, 70))
     assert "b" * 80 in text
     assert "2.5" in text
-
-
-def comparison(shown: str) -> list[str]:
-    """The lines of the comparison of schemes, of the paragraphs of the screen of ``plan``."""
-    return next(part.splitlines() for part in shown.split("\n\n") if "\nend, s" in part)
 
 
 @pytest.mark.weekly
 @spread("name", ["ace", "single-thruster", "steerable-stage", "magnus-a03"], quick=1, deep=1)
 def test_four_or_five_schemes_fit_a_usual_screen(run: Run, name: str) -> None:
     usual = call(run, f"plan {places.CONFIGS}/{name}.yaml -v -q", columns=80).stdout
-    head, *lines = comparison(usual)
+    (comparison,) = (part for part in usual.split("\n\n") if "\nend, s" in part)
+    head, *lines = comparison.splitlines()
     commanded = ["command-block"] if name == "ace" else []
     assert head.split() == ["one-pulse", "two-pulse", "four-pulse", *commanded, "optimal"]
     assert [line.split("  ")[0] for line in lines[:3]] == ["pulses", "end, s", "impulse, N m s"]
@@ -207,7 +200,7 @@ def test_progress_is_shown_after_a_second_and_a_time_after_a_tenth_of_the_steps(
 ) -> None:
     monkeypatch.setattr(sys, "stderr", Terminal())
     seen: list[str] = []
-    with working("verifying"):
+    with screen.working("verifying"):
         clock.set(0.9)
         assert not lines
         clock.set(1.0)
@@ -243,7 +236,7 @@ def test_no_progress_is_shown_in_a_pipe_or_where_it_is_not_wanted(
     monkeypatch: pytest.MonkeyPatch, clock: Clock, lines: list[Any], stream: io.StringIO, quiet: bool
 ) -> None:
     monkeypatch.setattr(sys, "stderr", stream)
-    with working("planning", quiet=quiet), work.steps(2.0) as task:
+    with screen.working("planning", quiet=quiet), work.steps(2.0) as task:
         task.reach(1.0)
         clock.set(60.0)
         assert (lines, clock.timers, stream.getvalue()) == ([], [], "")
@@ -259,3 +252,160 @@ def test_a_run_is_requested_to_stop_and_a_second_ctrl_c_interrupts(number: signa
         with pytest.raises(KeyboardInterrupt):
             os.kill(os.getpid(), signal.SIGINT)
     assert (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)) == before
+
+
+# --- disperse, trade and verify: one pattern, that a terminal of 80 columns holds
+
+WIDTH, LINES = 80, 40
+CONFIG_FILES = sorted(places.CONFIGS.glob("*.yaml"))
+DISPERSED_FILES = [path for path in CONFIG_FILES if "\ndispersions:" in path.read_text(encoding="utf-8")]
+STUDIED = [
+    *(f"disperse {path} --samples 200" for path in DISPERSED_FILES),
+    *(f"verify {path}" for path in CONFIG_FILES),
+    *(f"trade {path} --points 2" for path in CONFIG_FILES),
+]
+
+
+def check_screen(shown: str) -> None:
+    """No more lines and columns than there are, no cut value, one table with each of its rows on a line, few notes."""
+    lines = shown.splitlines()
+    assert len(lines) <= LINES
+    assert max(map(len, lines)) <= WIDTH
+    assert "…" not in shown
+    assert sum(line.startswith("note[") for line in lines) <= 3
+    _, *tables, _ = shown.split("\n\n")
+    assert len(tables) <= 1
+    for table in tables:
+        heads = present(re.match(r"(?: .*\n)*.*\n", table))
+        assert not re.search("^ ", table[heads.end() :], re.MULTILINE), "a row goes on in another line"
+    assert lines[-1].startswith("-v all values")
+
+
+@pytest.mark.parametrize(
+    "command",
+    [f"disperse {DISPERSED_FILES[-1]} --scheme one-pulse --samples 200", "verify --scheme two-pulse",
+     "trade --points 2 --allow 0"],
+)  # fmt: skip
+def test_a_default_screen_fits_a_terminal(run: Run, command: str) -> None:
+    check_screen(call(run, command, columns=WIDTH).stdout)
+
+
+@spread("command", STUDIED, quick=0, deep=len(STUDIED))
+def test_the_default_screen_of_every_shipped_file_fits_a_terminal(run: Run, command: str) -> None:
+    check_screen(call(run, command, columns=WIDTH).stdout)
+
+
+def test_of_many_points_some_are_shown_the_first_and_the_last_among_them() -> None:
+    body = replace(spinner(channels=cross(8.0)), requirement=Requirement(nutation=0.01))
+    plan = planning.plan(body, "two-pulse")
+    fronts = [Front(0.01 * at, (Point(plan, 60.0, "N m s"),) * 20) for at in range(5)]
+    shown = "\n".join(printed(trade_brief(body, fronts), WIDTH))
+    check_screen(shown)
+    rows = re.findall(r"^(\d+) .*FLY$", shown, re.MULTILINE)
+    assert (len(rows), rows[0], rows[-1]) == (ROWS, "1", "100")
+    assert f"note[trade-points]: points on this screen: {ROWS} of 100" in shown
+    assert len([line for line in printed(trade_screen(body, fronts), WIDTH) if re.match(r"\d+ .*FLY$", line)]) == 100
+
+
+def test_a_trade_without_a_schedule_says_why() -> None:
+    shown = "\n".join(printed(trade_brief(spinner(), [Front(0.0, (), "no channel")]), WIDTH))
+    assert "NO SCHEDULE" in shown
+    assert "H ends where it was – none: no channel" in shown
+
+
+# --- --units us: no number stays in SI where its dimension has a US unit; files are SI all the same
+
+PAIRS = {
+    "kg m²": ("slug ft²", 1.3558179483314), "kg": ("lbm", 0.45359237), "g": ("lbm", 453.59237),
+    "N m s": ("ft lbf s", 1.3558179483314), "N m": ("ft lbf", 1.3558179483314), "N s": ("lbf s", 4.4482216152605),
+    "N": ("lbf", 4.4482216152605), "mm": ("in", 25.4), "m": ("ft", 0.3048), "bar": ("psi", 0.068947572931684),
+}  # fmt: skip
+"""Units of SI, those of US screens, and how many of the former one of the latter is (NIST SP 811)."""
+
+
+def units(names: list[str]) -> re.Pattern[str]:
+    """Pattern of a unit, behind a number of its own or not: no part of a word, nor of a name such as "+M1"."""
+    words = "|".join(sorted(names, key=len, reverse=True))
+    return re.compile(rf"(?:(-?[0-9.]+(?:e-?[0-9]+)?) )?(?<![\w°µ'|.+-])({words})((?:/\w+²?)?)(?![\w|²'-]| s\b)")
+
+
+SI_UNITS, US_UNITS = units(list(PAIRS)), units([name for name, _ in PAIRS.values()])
+
+FILES = [path.stem for path in sorted(places.CONFIGS.glob("*.yaml"))]
+LOOPED, DISPERSED = (
+    [name for name in FILES if key in (places.CONFIGS / f"{name}.yaml").read_text(encoding="utf-8")]
+    for key in ("\nloop:", "\ndispersions:")
+)
+SHORT = ["check -v", "simulate -v --scheme two-pulse --samples 100"]
+LONG = [
+    "plan --nominal", "plan -v --nominal", "simulate -v --scheme optimal", "verify -v --scheme two-pulse",
+    "trade -v --points 2",
+]  # fmt: skip
+STUDIES = ["disperse --scheme two-pulse --case 3", "disperse -v --samples 500 --scheme two-pulse"]
+LOOPS = [
+    "loop -v --until 400s", "budget -v", "disperse -v --loop --samples 50", "disperse --loop --samples 9 --case 3",
+    "verify --loop --set limits.horizon=300s",
+]  # fmt: skip
+FITS = [f"fit -v {places.CASES}/{name}.csv {places.CASES}/{name}.yaml" for name in ("accelerometer", "axis-tumble")]
+
+
+def of_configs(commands: list[str], names: list[str]) -> list[str]:
+    """Each of the commands with each of the files."""
+    return [f"{command} {places.CONFIGS}/{name}.yaml" for command in commands for name in names]
+
+
+def expect_replaced(run: Run, command: str) -> None:
+    """Each unit is replaced, and each number with one is its value in the other."""
+    si, us = (call(run, f"{command} --units {name}", columns=200) for name in ("si", "us"))
+    assert (us.returncode, si.stdout) == (si.returncode, call(run, command, columns=200).stdout)
+    texts = [ended.stdout + ended.stderr for ended in (si, us)]
+    assert not SI_UNITS.findall(texts[1])
+    # "in" is a word as well.
+    before = [match for match in SI_UNITS.findall(texts[0]) if match[1] != "mm"]
+    after = [match for match in US_UNITS.findall(texts[1]) if match[1] != "in"]
+    assert before or si.returncode == 3  # nothing is feasible
+    assert len(before) == len(after)
+    for (number, unit, per), (other, us_unit, us_per) in zip(before, after, strict=True):
+        name, factor = PAIRS[unit]
+        assert (us_unit, us_per, bool(other)) == (name, per, bool(number))
+        if number:
+            assert math.isclose(float(number), factor * float(other), rel_tol=6e-3, abs_tol=1e-9)
+
+
+@spread("command", [*of_configs(SHORT, FILES), *of_configs(STUDIES, DISPERSED)], quick=4, deep=8)
+def test_no_si_unit_with_a_us_one_is_left_on_a_screen(run: Run, command: str) -> None:
+    expect_replaced(run, command)
+
+
+@pytest.mark.weekly
+@pytest.mark.parametrize("command", [*of_configs(LONG, FILES), *of_configs(LOOPS, LOOPED), *FITS])
+def test_nor_on_the_screens_of_long_studies(run: Run, command: str) -> None:
+    expect_replaced(run, command)
+
+
+def test_tanks_and_tolerances_are_shown_in_us_units(run: Run, tmp_path: Path) -> None:
+    """Pressure and propellant of a tank, and tolerances in their own units."""
+    (tmp_path / "s.yaml").write_text(
+        example_text() + "tank: {propellant: 30 kg, pressure: 22 bar, final_pressure: 8 bar}\n", encoding="utf-8"
+    )
+    shown = run("check", "s.yaml", "-v", "--units", "us", "--set", "mass=250 kg", columns=120).stdout
+    assert re.search(r"^0 +319.1 psi", shown, re.MULTILINE)
+    assert re.search(r"^66.14 +116 psi", shown, re.MULTILINE)
+    assert not SI_UNITS.findall(shown)
+
+
+@pytest.mark.parametrize("command", [
+    "check --json FILE", "simulate --scheme two-pulse --csv FILE", "plan --scheme two-pulse --nominal --json FILE",
+    deep("disperse --scheme two-pulse --samples 9 --json FILE"),
+])  # fmt: skip
+def test_files_are_si(run: Run, tmp_path: Path, command: str) -> None:
+    for units in ("si", "us"):
+        call(run, command.replace("FILE", units) + f" -q --units {units}")
+    assert (tmp_path / "us").read_bytes() == (tmp_path / "si").read_bytes()
+
+
+def test_reasons_without_a_plan_have_no_units(run: Run) -> None:
+    """A torquer too weak for half the nutation."""
+    weak = call(run, "plan -v --scheme two-pulse --set steerable.torque=0.1 --set thrusters=[] --units us -q", status=3)
+    assert "infeasible" in weak.stdout
+    assert not SI_UNITS.findall(weak.stdout)

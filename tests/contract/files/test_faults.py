@@ -1,10 +1,9 @@
 """Spacecraft files that are refused or doubted: each gives exactly its faults, at their places, with a cure."""
 
-from __future__ import annotations
-
+import copy
 import json
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -12,6 +11,7 @@ from typing import Any
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from jsonschema import Draft202012Validator
 from support import places
 from support.broken import BASE, BODY, BROKEN, SPIN, THRUSTERS
 from support.builders import within
@@ -22,9 +22,9 @@ from support.golden import check_text
 import nutdamp
 from nutdamp.errors import Fault, FaultyFile
 from nutdamp.files.editing import parse_setting
-from nutdamp.files.reader import example_text, load_spacecraft, read_spacecraft
+from nutdamp.files.reader import example_text, json_schema, load_spacecraft, read_spacecraft
 from nutdamp.files.study_keys import LoopFaultsSection, LoopSection, LoopSensorSection
-from nutdamp.spacecraft.model import Spacecraft
+from nutdamp.files.yaml import read_tree
 
 
 def faults_of(text: str) -> list[Fault]:
@@ -98,7 +98,7 @@ def mutated(draw: st.DrawFn) -> bytes:
     return data[:place] + draw(st.just(b"") | st.binary(max_size=4)) + data[place:]
 
 
-def judge(outcome: Callable[[], Spacecraft]) -> None:
+def judge(outcome: Callable[[], nutdamp.Spacecraft]) -> None:
     """A sound spacecraft or faults; anything else that is raised is a bug."""
     try:
         spacecraft = outcome()
@@ -162,10 +162,6 @@ def whole(lines: str) -> str:
     return lines if lines.startswith("name") else (BODY if lines.startswith(("state", "omega0")) else BASE) + lines
 
 
-def read_lines(lines: str) -> Spacecraft:
-    return read_spacecraft(whole(lines), "f.yaml")
-
-
 def doubts_of(lines: str) -> list[Fault]:
     doubts: list[Fault] = []
     read_spacecraft(whole(lines), "f.yaml", warn=doubts.append)
@@ -221,9 +217,10 @@ UNDOUBTED = (
 
 
 def test_numbers_beyond_what_can_be_meant_are_taken_with_a_warning() -> None:
-    said = []
-    for lines in DOUBTED:
-        said += [lines.strip().replace("\n", " | "), *(f"    {doubt.as_warning}" for doubt in doubts_of(lines))]
+    said = (
+        "\n    ".join([lines.strip().replace("\n", " | "), *(doubt.as_warning for doubt in doubts_of(lines))])
+        for lines in DOUBTED
+    )
     check_text("files.doubts", "\n".join(said))
     # What is set on the command line is doubted too.
     doubts: list[Fault] = []
@@ -252,7 +249,7 @@ def test_an_angle_too_large_is_refused_with_its_likely_unit_where_degrees_are_a_
             for keys in ("Ixx: 120, Iyy: 118, Izz: 80", "I1: 1, I2: 2, I3: 2", "ixx: 1, Jyy: 1, I_zz: 1")
         ),
     )
-    check_faults("files.likely-units", read_lines, angles)
+    check_faults("files.likely-units", lambda lines: read_spacecraft(whole(lines), "f.yaml"), angles)
 
 
 def test_a_refused_file_gives_its_warnings_too() -> None:
@@ -317,7 +314,7 @@ OF_ACCELEROMETER = {
 }
 
 
-def looped(sensor: dict[str, str], key: str = "", value: str = "") -> Spacecraft:
+def looped(sensor: dict[str, str], key: str = "", value: str = "") -> nutdamp.Spacecraft:
     """A body with a loop, one key of which has another value."""
     section, _, last = key.rpartition(".")
     loop: dict[str, Any] = {"sensor": dict(sensor), "start": "0.2 deg"}
@@ -343,3 +340,165 @@ def test_senseless_values_of_every_key_are_refused_where_they_stand() -> None:
         cases = [(key, value) for key, values in table.items() for value in values.split("; ")]
         texts = {f"{key} -> {value}": (sensor, key, value) for key, value in cases}
         check_faults(f"files.loop-{name}", lambda case: looped(*case), texts)
+
+
+# --- the JSON schema: what it takes and what not, and that it explains every key
+
+SCHEMA = json_schema()
+VALIDATOR = Draft202012Validator(SCHEMA)
+
+
+def plain(text: str) -> Any:
+    """What a text of YAML says."""
+    return read_tree(text, "f.yaml")[0].plain()
+
+
+EVERYTHING = plain("""\
+name: Sat
+mass: 250 kg
+inertia: {A: 120 kg m², C: 80}
+omega0: [0.1, 2 deg/s, 30rpm]
+attitude: {quaternion: [1, 0, 0, 0], epoch: "2026-03-01T12:00:00Z", frame: GCRF}
+thrusters:
+  - {name: a, position: [0, 0, 0.8 m], direction: [1, 0, 0], force: 10 N, isp: 220 s}
+  - {name: b, torque: [8 N m, 8 N*m, 0], lever_arm: 800 mm, min_on_time: 0, max_on_time: 2 s}
+channels: {both: [a, b]}
+steerable: {torque: 20 Nm, isp: 220, lever_arm: 1}
+disturbances:
+  - {name: leak, torque: [20 mN m, 0, 0.1]}
+  - {kind: rotating, torque: [0.1, 0, 0], rate: -3 rad/s}
+  - {torque: [0.1, 0, 0], fixed_in: inertial}
+  - {kind: axial, torque: -1 mN m}
+  - {kind: axial, torque: [0, 0, 1]}
+  - {kind: constant, torque: [0, 0, 1]}
+dissipation: {time_constant: 10 min}
+requirement: {nutation: 0.5 deg, momentum_shift: 3 mrad, probability: 99.7 %}
+dispersions:
+  A: {normal: 2 %}
+  C: {uniform: 1.6 kg m^2}
+  omega0: [{normal: 0.1 deg/s}, {bias: -0.01}, {normal: 1 %}]
+  thrust: {a: {normal: 0.3 N}, b: {triangular: 5 %}}
+  thrust_per_pulse: {normal: 0.01}
+  thrust_direction: {normal: 0.5 deg}
+  position: {b: {normal: 5 mm}}
+  timing: {uniform: 5 ms}
+  timing_offset: {bias: -2 ms}
+  attitude: {normal: 0.2 deg}
+limits: {horizon: 2 min, earliest: 5, gap: 0.5, tick: 1 ms, max_pulses: 8, blackout: [[10, 20]]}
+""")
+
+
+def changed(path: str, value: object) -> dict[str, Any]:
+    """`EVERYTHING` with one value changed, or left out where ``value`` is None."""
+    contents: dict[str, Any] = copy.deepcopy(EVERYTHING)
+    *parents, last = (int(step) if step.isdigit() else step for step in path.split("."))
+    at: Any = contents
+    for step in parents:
+        at = at[step]
+    if value is None:
+        del at[last]
+    else:
+        at[last] = value
+    return contents
+
+
+def nodes(schema: object) -> Iterator[dict[str, Any]]:
+    """All mappings within a schema."""
+    if isinstance(schema, dict):
+        yield schema
+    inner = schema.values() if isinstance(schema, dict) else schema if isinstance(schema, list) else ()
+    for part in inner:
+        yield from nodes(part)
+
+
+def test_it_is_a_schema_of_2020_12_in_plain_json() -> None:
+    Draft202012Validator.check_schema(SCHEMA)
+    assert SCHEMA["$schema"] == "https://json-schema.org/draft/2020-12/schema"
+    assert json.loads(json.dumps(SCHEMA)) == SCHEMA
+
+
+SLIPS_OF_KEYS = """
+mas: [250 kg]
+limits.horizn: [5]
+thrusters.0: [{name: a, position: [0, 0, 0.8], direction: [1, 0, 0]}, {name: a, torque: [8, 0, 0], force: 10}]
+thrusters.0.forse: [5]
+thrusters.0.torque: [[8, 0, 0]]
+thrusters.0.lever_arm: [1]
+name: [null, "", 5]
+inertia: [null, {A: 120}, {A: 0, C: 80}, {A: 120 kg, C: 80}, {A: 1, C: 1, tensor: [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}]
+mass: [true, "250"]
+omega0: [null, [1, 2], [1, 2, 20 Hz]]
+state: [{spin: 3, nutation: 0}]
+attitude.frame: [ICRF]
+attitude.epoch: ["2026-03-01"]
+attitude.quaternion: [["1", 0, 0, 0]]
+channels: [{}, {both: []}]
+disturbances.0.torque: [null, 20 mN m, [1, 2]]
+disturbances.0.kind: [Constant, rotating]
+disturbances.0.nme: [leak]
+disturbances.1.rate: [null, -3 rad]
+disturbances.1.fixed_in: [inertial]
+disturbances.1.kind: [constant]
+disturbances.1.torque: [1]
+disturbances.2.fixed_in: [body]
+disturbances.2.kind: [axial]
+disturbances.3.kind: [null]
+disturbances.3.torque: [1 N]
+disturbances.3.rate: [3]
+dissipation: [600, {}, {time_constant: 0}, {time_constant: 600 N}]
+requirement: [{nutation: 2.0}, {nutation: 0.1, probability: 1}]
+limits: [{max_pulses: 0}, {max_pulses: 1.5}, {blackout: [10, 20]}]
+dispersions.A: [2 %, {}, {normal: 2 mm}, {sigma: 2 %}, {normal: -1}, {normal: 2 %, bias: 1 %}]
+dispersions.omega0: [[{normal: 1}, {normal: 1}]]
+dispersions.thrust.a: [0.3]
+dispersions.position: [{}]
+dispersions.timing: [{normal: 5 %}]
+dispersions.tming: [{normal: 5 ms}]
+"""
+SPELLINGS = """
+thrusters.0.position: [[30 cm, 0.001 km, 5mm]]
+thrusters.0.min_on_time: [0.02 sec]
+limits.horizon: [2 hours]
+omega0.2: [30 RPM]
+omega0.1: [2 degrees/sec, 2°/s]
+requirement.nutation: [0.5°, 0.5 degrees]
+dispersions: [{omega0: {normal: 0.1}, thrust: {normal: 3 %}, A: {bias: -1}}]
+dispersions.timing: [{normal: 0.1 sec}]
+"""
+
+
+def test_what_validates_and_what_not() -> None:
+    VALIDATOR.validate(plain(example_text()))
+    VALIDATOR.validate(EVERYTHING)
+    VALIDATOR.validate({"name": "S", "inertia": {"tensor": [[1, 0, 0]] * 3}, "state": {"spin": 3, "nutation": 0}})
+    for expected, table in ((True, SPELLINGS), (False, SLIPS_OF_KEYS)):
+        for path, values in plain(table).items():
+            for value in values:
+                assert VALIDATOR.is_valid(changed(path, value)) == expected, (path, value)
+
+
+def test_keywords_are_in_the_order_of_the_alphabet_and_keys_in_that_of_the_file() -> None:
+    for section in [SCHEMA, *SCHEMA["$defs"].values()]:
+        for key, field in section["properties"].items():
+            assert list(field) == sorted(field), key
+    names = list(SCHEMA["properties"])
+    assert names.index("name") < names.index("inertia") < names.index("thrusters") < names.index("limits")
+
+
+def test_every_key_is_explained_and_has_an_example_that_is_valid() -> None:
+    """Each example alone, and all of those of the root that go together; no key takes null."""
+    sections = [SCHEMA, *SCHEMA["$defs"].values()]
+    assert sum(len(section["properties"]) for section in sections) > 60
+    for section in sections:
+        assert section["additionalProperties"] is False
+        assert section["description"]
+        for key, field in section["properties"].items():
+            assert len(field["description"]) > 5, key
+            assert field["examples"], key
+            validator = Draft202012Validator({**field, "$defs": SCHEMA["$defs"]})
+            for example in field["examples"]:
+                validator.validate(example)
+    keys = SCHEMA["properties"].items()
+    root = {key: field["examples"][0] for key, field in keys if key not in ("omega0", "channels")}
+    assert read_spacecraft(json.dumps(root), "examples").name == root["name"]
+    assert not any(node.get("type") == "null" or node.get("default", 0) is None for node in nodes(SCHEMA))

@@ -1,7 +1,5 @@
 """The script for Basilisk runs as it is, and ends with the residual that the plan has."""
 
-from __future__ import annotations
-
 import math
 import subprocess
 import sys
@@ -11,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support import messages
+from support.builders import present
 from support.cases import spread
 
 from nutdamp.planning import plan as planning
-from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft.model import Disturbance
 from nutdamp.spacecraft.schedule import Pulse, Schedule
 from nutdamp.views.exchange import export_text
@@ -29,15 +27,14 @@ def _installed() -> None:
     pytest.importorskip("Basilisk", reason=reason)
 
 
-def check(plan: Plan, folder: Path) -> None:
+def check(plan: planning.Plan, folder: Path) -> None:
     """What the script prints in a process without nutdamp's folder on the path is the residual of the plan."""
     script = folder / "fly.py"
     script.write_text(export_text(plan, "basilisk"), encoding="utf-8")
     ran = subprocess.run([sys.executable, "-I", str(script)], cwd=folder, capture_output=True, text=True, check=False)
     assert ran.returncode == 0, ran.stderr
     lines = (line.split("  ", 1) for line in ran.stdout.splitlines() if "  " in line)
-    left = plan.flown
-    assert left is not None
+    left = present(plan.flown)
     assert {name.strip(): value.strip() for name, value in lines} == {
         "nutation left": degrees(left.nutation),
         "body cone": degrees(left.body_cone),
@@ -56,8 +53,7 @@ def test_ideal_impulses_and_disturbances(tmp_path: Path) -> None:
     check(ideal, tmp_path)
     disturbances = (Disturbance(0.05 + 0.02j, axial=0.01), Disturbance(0.03j, rate=-3.0))
     disturbed = planning.plan(replace(messages.spacecraft("oblate"), disturbances=disturbances), "two-pulse")
-    assert disturbed.flown is not None
-    assert disturbed.flown.nutation > math.radians(1e-3)
+    assert present(disturbed.flown).nutation > math.radians(1e-3)
     check(disturbed, tmp_path)
 
 
@@ -74,4 +70,4 @@ def test_a_schedule_that_leaves_nutation(case: str, tmp_path: Path) -> None:
             (math.e, 1.234567890123, 'it\'s "C"', [0.3, 0.4, 0.0]),
         )
     )
-    check(Plan(body, "by hand", Schedule(pulses)), tmp_path)
+    check(planning.Plan(body, "by hand", Schedule(pulses)), tmp_path)

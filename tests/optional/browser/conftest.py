@@ -1,8 +1,7 @@
 """A browser for the tests of pages: playwright with Chromium, Chrome or Edge."""
 
-from __future__ import annotations
-
 import os
+import shutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,17 +9,26 @@ from typing import Any
 
 import pytest
 
+NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome", "microsoft-edge", "msedge")
+"""What the executables are called on Linux and Windows."""
+
+PLACES = (
+    "/Applications/Google Chrome.app/Contents/MacOS/Google Chrome",
+    "/Applications/Chromium.app/Contents/MacOS/Chromium",
+    "/Applications/Microsoft Edge.app/Contents/MacOS/Microsoft Edge",
+)
+"""Where macOS keeps them."""
+
 
 @pytest.fixture(scope="session")
 def chromium() -> Iterator[Any]:
     """A running browser."""
-    from support.browser_finder import browser as found
-
     why = "NOT CHECKED in a browser: "
     playwright = pytest.importorskip(
         "playwright.sync_api", reason=f"{why}playwright is not installed: pip install 'nutdamp[browser]'"
     )
-    executable = found()
+    places = (shutil.which(name) for name in (*NAMES, *PLACES))
+    executable = next((path for path in places if path is not None), None)
     if executable is None:
         pytest.skip(f"{why}no Chromium, Chrome or Edge is installed")
     root = ["--no-sandbox"] if hasattr(os, "geteuid") and os.geteuid() == 0 else []

@@ -1,9 +1,4 @@
-"""Messages read back by Orekit and by ccsds-ndm-py, independent readers: every number that goes in comes out.
-
-ccsds-ndm-py (written in Rust) is strict about form, and knows no attitude.
-"""
-
-from __future__ import annotations
+"""Messages read back by Orekit and by ccsds-ndm-py, and where the Sun is seen: every number that goes in comes out."""
 
 import math
 import re
@@ -14,11 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 from support import messages, orekit
-from support.contract import PUSHED, known, pushing, valved, velocity_change
+from support.builders import present
+from support.contract import PUSHED, pushing, valved, velocity_change
 
+from nutdamp.common.time import Epoch
 from nutdamp.flight import propagation
-from nutdamp.flight.propagation import Flight
-from nutdamp.physics import attitude
+from nutdamp.physics import attitude, sky
 from nutdamp.views.exchange import export_text
 
 pytestmark = [pytest.mark.orekit, pytest.mark.usefixtures("plans_shared")]
@@ -62,7 +58,7 @@ def test_parameters(case: str, xml: bool) -> None:
     body = plan.spacecraft
     data = data_of("apm", export_text(plan, "apm", xml=xml))
     state = data.getAttitude(None, None)
-    frame = (known(body.attitude).frame or "").replace("J2000", "EME2000")
+    frame = (present(body.attitude).frame or "").replace("J2000", "EME2000")
     assert str(state.getReferenceFrame().getName()).replace("J2000", "EME2000") == frame.replace("J2000", "EME2000")
     rates = messages.in_file_axes(body, body.initial.rates)
     assert orekit.components(state.getSpin()) == pytest.approx(rates, rel=1e-12, abs=1e-14)
@@ -76,7 +72,7 @@ def test_parameters(case: str, xml: bool) -> None:
     for manoeuvre, pulse in zip(written, plan.pulses, strict=True):
         assert manoeuvre.getEpochStart().durationFrom(data.getEpoch()) == pytest.approx(pulse.start, abs=0.51e-9)
         assert manoeuvre.getDuration() == pytest.approx(pulse.on_time, rel=1e-15)
-        torque = messages.in_file_axes(body, known(pulse.torque))
+        torque = messages.in_file_axes(body, present(pulse.torque))
         assert orekit.components(manoeuvre.getTorque()) == pytest.approx(torque, rel=1e-14, abs=1e-14)
         if pulse.propellant is not None:
             assert manoeuvre.getDeltaMass() == pytest.approx(-pulse.propellant, rel=1e-15)
@@ -125,7 +121,7 @@ def test_epochs_pass_a_leap_second() -> None:
     assert re.search("STOP_TIME += 2017-01-01T", export_text(plan, "aem"))
 
 
-def ephemeris(case: str, xml: bool, form: str = "aem") -> tuple[Flight, Any, list[Any]]:
+def ephemeris(case: str, xml: bool, form: str = "aem") -> tuple[propagation.Flight, Any, list[Any]]:
     """The flight, the epoch, and the segments of a history."""
     plan = messages.planned(case)
     epoch = data_of("apm", export_text(plan, "apm")).getEpoch()
@@ -134,7 +130,7 @@ def ephemeris(case: str, xml: bool, form: str = "aem") -> tuple[Flight, Any, lis
     return propagation.flown(plan.spacecraft, plan.pulses, until), epoch, list(read.getSegments())
 
 
-def motion(flown: Flight, t: float) -> tuple[np.ndarray, np.ndarray]:
+def motion(flown: propagation.Flight, t: float) -> tuple[np.ndarray, np.ndarray]:
     """Rates and columns of axes at ``t`` s, in the axes of the file."""
     leg = next(leg for leg in flown.legs if leg.start <= t <= leg.end and leg.end > leg.start)
     rates, quaternion = leg.path.motion(np.array([t]))
@@ -154,7 +150,7 @@ def test_attitude_history(case: str, xml: bool, form: str) -> None:
     alone = form == "aem-spin" and not messages.spacecraft(case).inertia.symmetric
     flown, epoch, segments = ephemeris(case, xml, form)
     frames = orekit.java("org.orekit.frames.FramesFactory")
-    frame = frames.getGCRF() if known(flown.spacecraft.attitude).frame == "GCRF" else frames.getEME2000()
+    frame = frames.getGCRF() if present(flown.spacecraft.attitude).frame == "GCRF" else frames.getEME2000()
     worst_turn = worst_rate = 0.0
     for segment in segments:
         provider = segment.getAttitudeProvider()
@@ -216,7 +212,7 @@ def test_orbit_messages(name: str, xml: bool) -> None:
     plan = pushing(name)
     (segment,) = orekit.parse("opm", export_text(plan, "opm", xml=xml)).getSegments()
     data = segment.getData()
-    assert str(segment.getMetadata().getReferenceFrame().getName()) == known(plan.spacecraft.attitude).frame
+    assert str(segment.getMetadata().getReferenceFrame().getName()) == present(plan.spacecraft.attitude).frame
     state = data.getStateVectorBlock()
     coordinates = state.toTimeStampedPVCoordinates()
     assert orekit.components(coordinates.getPosition()) == pytest.approx([7e6, -12e3, 3.5e3], rel=1e-15)
@@ -228,7 +224,7 @@ def test_orbit_messages(name: str, xml: bool) -> None:
         assert manoeuvre.getDuration() == pytest.approx(pulse.on_time, rel=1e-15)
         change = velocity_change(plan, pulse)
         assert orekit.components(manoeuvre.getDV()) == pytest.approx(change, rel=1e-7, abs=1e-12)
-        assert str(manoeuvre.getReferenceFrame().getName()) == known(plan.spacecraft.attitude).frame
+        assert str(manoeuvre.getReferenceFrame().getName()) == present(plan.spacecraft.attitude).frame
         assert manoeuvre.getDeltaMass() == pytest.approx(-(pulse.propellant or 0.0), rel=1e-15)
 
 
@@ -272,3 +268,15 @@ def test_the_second_reader_of_orbit_messages(reader: Any, notation: str) -> None
     message = reader.Opm.from_str(export_text(plan, "opm", xml=notation == "xml"), notation)
     message.validate()
     assert len(message.segment.data.maneuver_parameters) == len(plan.pulses)
+
+
+@pytest.mark.orekit
+@pytest.mark.parametrize("text", ["1998-01-07T02:28:44", "2026-03-20T12:00:00", "2026-09-11T06:30:00"])
+def test_orekit_sees_it_there(text: str) -> None:
+    """Its analytical Sun needs no ephemeris, and errs by up to 0.1 deg itself: a check of frame and time."""
+    orekit.start_or_skip()
+    provider = orekit.java("org.orekit.bodies.AnalyticalSolarPositionProvider")()
+    frame = orekit.java("org.orekit.frames.FramesFactory").getEME2000()
+    seen = orekit.components(provider.getPosition(orekit.date(text), frame))
+    expected = sky.direction(Epoch.parse(f"{text}Z").days_of_j2000)
+    assert math.degrees(attitude.angle_between(seen, expected)) < 0.1

@@ -1,7 +1,5 @@
 """What pictures are made of: cones that touch and roll, angles on the sky, stretches of the track."""
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 
@@ -15,9 +13,7 @@ from support.golden import check_text
 import nutdamp
 from nutdamp.figures import geometry
 from nutdamp.flight import propagation
-from nutdamp.flight.propagation import Flight, Track
 from nutdamp.physics import attitude
-from nutdamp.physics.attitude import angle_between
 from nutdamp.planning import plan as planning
 from nutdamp.spacecraft.equipment import Steerable
 from nutdamp.spacecraft.model import Attitude, Spacecraft, Vector
@@ -37,7 +33,9 @@ BODIES = {
 }
 
 
-def flown(body: Spacecraft, scheme: str = "four-pulse", samples: int = 200) -> tuple[Flight, Track]:
+def flown(
+    body: Spacecraft, scheme: str = "four-pulse", samples: int = 200
+) -> tuple[propagation.Flight, propagation.Track]:
     pulses = planning.plan(body, scheme).pulses
     end = pulses.end + body.inertial_period
     made = propagation.flown(body, pulses, end)
@@ -50,7 +48,7 @@ def test_the_cones_touch_along_the_rotation_vector_at_every_moment(body: Spacecr
     made, track = flown(body, "one-pulse" if body.steerable else "four-pulse")
     for row in range(0, len(track.t), 7):
         found = geometry.cones(made, track.rates[row], track.quaternion[row])
-        assert angle_between(found.axis, track.axis[row]) < 1e-12
+        assert attitude.angle_between(found.axis, track.axis[row]) < 1e-12
         for rim, middle, half in (
             (found.body, found.axis, track.body_cone[row]),
             (found.space, found.momentum, abs(track.space_cone[row])),
@@ -58,8 +56,8 @@ def test_the_cones_touch_along_the_rotation_vector_at_every_moment(body: Spacecr
             if len(rim) == 0:
                 assert half <= 2 * geometry.NO_CONE
                 continue
-            assert angle_between(rim, middle) == pytest.approx(half, abs=1e-12)
-            assert angle_between(rim, found.rotation).min() < 1e-12
+            assert attitude.angle_between(rim, middle) == pytest.approx(half, abs=1e-12)
+            assert attitude.angle_between(rim, found.rotation).min() < 1e-12
             assert np.array_equal(rim[0].round(12), rim[-1].round(12))
 
 
@@ -70,10 +68,10 @@ def test_a_body_cone_rolls_outside_the_space_cone_of_a_prolate_body_and_about_th
     made, track = flown(BODIES[name])
     cones = geometry.cones(made, track.rates[0], track.quaternion[0])
     if made.spacecraft.inertia.A > made.spacecraft.inertia.C:
-        assert (angle_between(cones.body, cones.momentum) >= track.space_cone[0] - 1e-12).all()
-        assert angle_between(cones.axis, cones.momentum) > abs(track.space_cone[0])
+        assert (attitude.angle_between(cones.body, cones.momentum) >= track.space_cone[0] - 1e-12).all()
+        assert attitude.angle_between(cones.axis, cones.momentum) > abs(track.space_cone[0])
     else:
-        assert (angle_between(cones.space, cones.axis) <= track.body_cone[0] + 1e-12).all()
+        assert (attitude.angle_between(cones.space, cones.axis) <= track.body_cone[0] + 1e-12).all()
         assert track.body_cone[0] > track.nutation[0]
 
 
@@ -90,18 +88,18 @@ def test_the_cones_at_one_moment_foretell_the_motion(moments: tuple[float, float
         motion = reference.fly(moments, body.omega0, [], until, attitude.matrix(start.quaternion))
         unit = motion.rates / np.linalg.norm(motion.rates)
         spacing = 2 * math.pi / geometry.RIM
-        assert angle_between(found.space, motion.rotation @ unit).min() < spacing * 0.5
-        assert angle_between(found.body @ back.T, unit).min() < spacing * 0.5
+        assert attitude.angle_between(found.space, motion.rotation @ unit).min() < spacing * 0.5
+        assert attitude.angle_between(found.body @ back.T, unit).min() < spacing * 0.5
 
 
 @pytest.mark.parametrize("body", [BODIES["prolate"], BODIES["oblate, reversed"], spinner(moments=(120, 100, 80))])
 def test_the_mark_stays_where_it_is_in_the_body(body: Spacecraft) -> None:
     made = propagation.flown(body, Schedule(), 4.0)
     track = made.sampled(20, 4.0)
-    marks = []
-    for rates, quaternion in zip(track.rates, track.quaternion, strict=True):
-        mark = geometry.body_mark(geometry.cones(made, rates, quaternion), quaternion)
-        marks.append(attitude.matrix(quaternion).T @ mark)
+    marks = [
+        attitude.matrix(quaternion).T @ geometry.body_mark(geometry.cones(made, rates, quaternion), quaternion)
+        for rates, quaternion in zip(track.rates, track.quaternion, strict=True)
+    ]
     assert np.ptp(marks, axis=0) == pytest.approx(0.0, abs=1e-3)
     assert marks[0][1] == pytest.approx(0.0, abs=1e-3)
     assert marks[0][0] > 0.0
@@ -157,7 +155,9 @@ def test_the_sky_is_right_handed_everywhere(momentum: tuple[float, float, float]
 def test_distances_from_h_are_angles() -> None:
     made, track = flown(BODIES["disc"])
     path, _ = geometry.sky_paths(made, track)
-    assert np.hypot(*path.T) == pytest.approx(np.degrees(angle_between(track.axis, track.momentum[0])), abs=1e-9)
+    assert np.hypot(*path.T) == pytest.approx(
+        np.degrees(attitude.angle_between(track.axis, track.momentum[0])), abs=1e-9
+    )
 
 
 # --- rows ------------------------------------------------------------------------------------------------------------
@@ -196,7 +196,7 @@ SCHEDULES = {
 @pytest.mark.parametrize("pulses", SCHEDULES.values(), ids=SCHEDULES)
 @pytest.mark.parametrize("fly", [propagation.flown, propagation.by_impulses])
 def test_stretches_cover_the_track_and_name_every_pulse_once(pulses: tuple[Pulse, ...], fly: type) -> None:
-    made: Flight = fly(spinner(), Schedule(pulses), 6.0)
+    made: propagation.Flight = fly(spinner(), Schedule(pulses), 6.0)
     track = made.sampled(50, 6.0)
     found = list(geometry.stretches(made, track))
     assert found[0].first == 0
@@ -218,12 +218,12 @@ def test_a_herpolhode_that_never_closes_fills_the_circle_about_it() -> None:
     body = spinner(moments=(120.0, 100.0, 80.0), degrees=25.0)
     made = propagation.flown(body, Schedule(), 600.0)
     found = geometry.cones(made, body.initial.rates, body.initial.quaternion)
-    away = angle_between(found.swept, found.momentum)
+    away = attitude.angle_between(found.swept, found.momentum)
     assert np.ptp(away) < 1e-9
-    assert angle_between(found.space, found.momentum).max() == pytest.approx(away[0])
+    assert attitude.angle_between(found.space, found.momentum).max() == pytest.approx(away[0])
     motion = reference.fly((120.0, 100.0, 80.0), body.omega0, [], 97.3, attitude.matrix(body.initial.quaternion))
     unit = motion.rotation @ (motion.rates / np.linalg.norm(motion.rates))
-    assert angle_between(unit, found.momentum) <= away[0] + 1e-9
+    assert attitude.angle_between(unit, found.momentum) <= away[0] + 1e-9
     still = BODIES["oblate"]
     cones = geometry.cones(propagation.flown(still, Schedule(), 1.0), still.initial.rates, still.initial.quaternion)
     assert np.array_equal(cones.swept, cones.space)

@@ -1,19 +1,23 @@
-"""YAML text -> plain values that know their places, what is refused, and values replaced in place."""
+"""YAML text -> plain values that know their places -> sections as classes; and files written whole or not at all."""
 
-from __future__ import annotations
-
+import json
 import math
+import os
 import sys
 from pathlib import Path
+from typing import Annotated, Any, Literal
 
 import pytest
-from support.builders import within
+from jsonschema import Draft202012Validator
+from support.builders import present, within
 from support.cases import spread
 from support.golden import check_text
 
-from nutdamp.errors import BadRequest, CannotRead, FaultyFile
+from nutdamp.errors import BadRequest, CannotRead, CannotWrite, FaultyFile
 from nutdamp.files.editing import edited
-from nutdamp.files.reader import example_text
+from nutdamp.files.fields import Field, Length, Problems, Quantity, Section, Within
+from nutdamp.files.reader import example_text, section_schema
+from nutdamp.files.tabular import json_text, make_folder, whole_file, write_whole
 from nutdamp.files.yaml import MAX_BYTES, MAX_DEPTH, MAX_NODES, Place, decode, dotted, read_text, read_tree, resolve
 
 
@@ -108,9 +112,8 @@ def test_duplicate_keys_are_all_reported_with_the_first_place() -> None:
 
 
 def bomb(levels: int) -> str:
-    lines = ["a0: &a0 [" + "x," * 9 + "x]"]
-    lines += [f"a{n}: &a{n} [" + f"*a{n - 1}, " * 9 + f"*a{n - 1}]" for n in range(1, levels)]
-    return "\n".join(lines)
+    lines = (f"a{n}: &a{n} [" + f"*a{n - 1}, " * 9 + f"*a{n - 1}]" for n in range(1, levels))
+    return "\n".join(["a0: &a0 [" + "x," * 9 + "x]", *lines])
 
 
 @spread(
@@ -196,3 +199,132 @@ def test_an_alias_and_what_has_one_are_refused_and_an_anchor_without_one_is_no_h
     with pytest.raises(BadRequest, match=r"a has the alias \*x: write that out"):
         edited("a: &x 1\nb: *x\n", {("a",): "2"})
     assert edited("a: &x 1\nb: 3\n", {("a",): "2"}) == "a: 2\nb: 3\n"
+
+
+# --- sections as classes: every type that a key may have, read and in the schema
+
+Time = Annotated[float, Quantity("time", minimum=0)]
+
+
+def key(default: Any = None) -> Any:
+    return Field("What it is.", default=default)
+
+
+class Inner(Section):
+    """Below."""
+
+    t: Time = Field("Time of it, s.", "1 s")
+
+
+class Outer(Section):
+    """Every type."""
+
+    text: Annotated[str, Length(1)] | None = key()
+    whole: Annotated[int, Within(1, 9)] | None = key()
+    flag: bool = key(False)
+    choice: Literal["one", "two"] | None = key()
+    times: Annotated[list[Time], Length(2, 3)] | None = key()
+    pair: tuple[Time, int] | None = key()
+    named: Annotated[dict[str, Inner], Length(1)] | None = key()
+    either: Annotated[list[Time], Length(1)] | Inner | None = key()
+    inner: Inner | None = key()
+    inners: list[Inner] = key([])
+
+
+GOOD: dict[str, tuple[Any, object]] = {
+    "text": ("a", "a"),
+    "whole": (9, 9),
+    "flag": (True, True),
+    "choice": ("two", "two"),
+    "times": (["20 ms", 1], [0.02, 1.0]),
+    "pair": (["20 ms", 3], [0.02, 3]),
+    "either": (["1 min"], [60.0]),
+}
+SECTIONS = {"named": {"a": {"t": 1}}, "either": {"t": 2}, "inner": {"t": 3}, "inners": [{"t": 4}, {"t": "5 s"}]}
+BAD: dict[str, tuple[Any, ...]] = {
+    "text": ("", 3, [3]),
+    "whole": (10, 0, True, 2.0),
+    "flag": ("on",),
+    "choice": ("tow",),
+    "times": ("1 s", [1], [1, 2, 3, 4], [1, -2], [1, 2, 3, "x"]),
+    "pair": ({"a": 1}, [1], [1, "x"]),
+    "named": ({}, {"a": {}}),
+    "either": ({"t": "x"}, "x"),
+    "inner": (3,),
+    "inners": ([{"t": 1}, {"t": [1]}],),
+}
+
+
+def test_what_is_right_is_read_also_within_lists_and_mappings() -> None:
+    problems: Problems = []
+    for name, (value, expected) in GOOD.items():
+        assert getattr(Outer.read({name: value}, problems), name) == expected
+    read = present(Outer.read(SECTIONS, problems))
+    assert read.flag is False  # by default
+    assert isinstance(read.either, Inner)
+    parts = [present(read.named)["a"], read.either, present(read.inner), *read.inners]
+    assert [part.t for part in parts] == [1, 2, 3, 4, 5]
+    assert problems == []
+
+
+def test_what_is_wrong_is_said_where_it_is_and_all_of_it_at_once() -> None:
+    """Each is one fault: also a list too long with a wrong entry."""
+    lines = []
+    for name, value in ((name, value) for name, values in BAD.items() for value in values):
+        problems: Problems = []
+        Outer.read({name: value}, problems)
+        ((where, problem),) = problems
+        lines.append(f"{name}: {value!r} -> {where}: {problem}")
+    check_text("files.sections", "\n".join(lines))
+    problems = []
+    Outer.read({"whole": 0, "times": [-1, "x"], "inner": {}}, problems)
+    assert [where for where, _ in problems] == [("whole",), ("times", 0), ("times", 1), ("inner", "t")]
+
+
+def test_the_schema_allows_what_is_read_and_nothing_else() -> None:
+    parts: dict[str, Any] = {}
+    schema = {**section_schema(Outer, parts), "$defs": parts}
+    Draft202012Validator.check_schema(schema)
+    judge = Draft202012Validator(schema)
+    assert all(judge.is_valid(right) for right in ({}, SECTIONS, *({name: given} for name, (given, _) in GOOD.items())))
+    allowed = [(name, value) for name, values in BAD.items() for value in values if judge.is_valid({name: value})]
+    assert allowed == [("whole", 2.0)]  # JSON knows no other 2
+
+
+# --- files are written whole or not at all
+
+
+def test_what_another_run_is_writing_is_left_alone(tmp_path: Path) -> None:
+    with whole_file(str(tmp_path / "slow.csv")) as stream:
+        stream.write(b"slow")
+        write_whole(str(tmp_path / "quick.csv"), "quick")
+        assert len([path for path in tmp_path.iterdir() if path.name.startswith(".")]) == 1
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"slow.csv": "slow", "quick.csv": "quick"}
+
+
+def test_a_failure_leaves_what_was_there_and_nothing_else(tmp_path: Path) -> None:
+    (tmp_path / "x.csv").write_text("before")
+
+    def fill_the_disk() -> None:
+        with whole_file(str(tmp_path / "x.csv")) as stream:
+            stream.write(b"half")
+            raise OSError(28, "no room")
+
+    with pytest.raises(CannotWrite, match="no room"):
+        fill_the_disk()
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"x.csv": "before"}
+    with pytest.raises(CannotWrite):  # a zero byte is no path
+        write_whole("a\0b", "1")
+    with pytest.raises(CannotWrite):
+        make_folder("a\0b")
+
+
+def test_modes_stay_names_may_be_as_long_as_the_system_allows_and_need_not_be_utf_8_in_json(tmp_path: Path) -> None:
+    path = tmp_path / ("x" * 251 + ".csv")
+    path.write_text("before")
+    path.chmod(0o640)
+    write_whole(str(path), "after")
+    assert (path.read_text(), path.stat().st_mode & 0o777) == ("after", 0o640)
+    content = {"file": os.fsdecode(b"d\xfcse.yaml"), "umlaut": "ü"}
+    write_whole(str(tmp_path / "x.json"), json_text(content))
+    assert json.loads((tmp_path / "x.json").read_text(encoding="utf-8")) == content

@@ -1,33 +1,43 @@
-"""Dispersed cases against an independent integrator and against single flights: by impulse sum and real widths."""
+"""Dispersed cases against an independent integrator and single flights: ends, cones kept, derivatives."""
 
-from __future__ import annotations
-
+import csv
+import json
 import math
 from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
-from support import dispersed, reference
-from support.builders import cross, spinner
+from support import dispersed, places, reference
+from support.builders import cross, present, spinner
 from support.cases import deep, spread
-from support.flights import BODY_ERRORS, by_blocks
+from support.flights import BODY_ERRORS, axis_path, by_blocks
+from support.process import Run
 from support.single_case import flown_outputs, realised, timed
 from support.spinners import commanded, flown_by_reference
 
+import nutdamp
+from nutdamp import load
 from nutdamp.common.numerics import cos_sin
+from nutdamp.files.schedules import read_plan
 from nutdamp.flight import propagation
+from nutdamp.flight.end_state import aspects
 from nutdamp.montecarlo.cases import DispersedModel
 from nutdamp.montecarlo.propagated import ClosedForm, RealWidths, nodes_for
-from nutdamp.montecarlo.statistics import OUTPUTS, measure
+from nutdamp.montecarlo.statistics import OUTPUTS, first_order, measure, vectors
 from nutdamp.montecarlo.study import Results, Study, run, study_of
+from nutdamp.montecarlo.study import run as fly_all
+from nutdamp.physics import attitude
 from nutdamp.physics.thruster import Cold, Tank, Trapezoid
+from nutdamp.planning import decision, robust
+from nutdamp.planning import plan as planning
 from nutdamp.schemes.block_model import fired
 from nutdamp.spacecraft.equipment import Block, Steerable, SunSensor
-from nutdamp.spacecraft.model import Disturbance, Inertia
+from nutdamp.spacecraft.model import Disturbance, Inertia, Keep, Requirement, Spacecraft
 from nutdamp.spacecraft.schedule import Schedule, steerable_pulse
 from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
 
@@ -141,8 +151,8 @@ def test_a_schedule_without_pulses_leaves_what_is_there() -> None:
 
 def test_the_quadrature_of_wide_pulses_is_exact_to_rounding() -> None:
     for phase in (0.0, 1e-9, 0.1, 1.0, 3.0, 10.0, 40.0):
-        places, weights = np.polynomial.legendre.leggauss(nodes_for(phase))
-        mean = 0.5 * float(weights @ np.cos(phase * places))
+        nodes, weights = np.polynomial.legendre.leggauss(nodes_for(phase))
+        mean = 0.5 * float(weights @ np.cos(phase * nodes))
         assert mean == pytest.approx(np.sinc(phase / np.pi), abs=1e-14), phase
     angle = np.concatenate([np.linspace(-400.0, 400.0, 20_001), [0.0, np.pi, -np.pi, 1e-300]])
     assert np.abs(np.subtract(cos_sin(angle), (np.cos(angle), np.sin(angle)))).max() < 1e-15
@@ -217,8 +227,7 @@ def test_blocks_of_many_cases_are_flown_some_at_once(monkeypatch: pytest.MonkeyP
     valve = Trapezoid(open_delay=0.06, close_delay=0.09, rise_time=0.03, fall_time=0.08)
     channels = tuple(one.of(valve=valve) for one in BLOCKS["spin reversed"].spacecraft.channels)
     late = {"T": dispersed.normal(0.01), "+1": dispersed.normal(0.01)}
-    given = replace(BODY_ERRORS, open_delay=late, close_delay=late)
-    whole = by_blocks(given, channels=channels)
+    whole = by_blocks(replace(BODY_ERRORS, open_delay=late, close_delay=late), channels=channels)
     model = DispersedModel(whole.spacecraft, fired(whole.spacecraft, whole.schedule.blocks[:1]))
     draws = dispersed.first_cases(study_of(model.spacecraft, model.schedule), 12)
     at_once = outputs(RealWidths, model, draws)
@@ -257,9 +266,7 @@ def test_an_error_of_the_spin_turns_no_heading() -> None:
     body = replace(body, dispersions=Dispersions(omega0=(None, None, dispersed.normal(0.01, relative=True))))
     made = fired(body, (Block("+1", 1, 1.0, 0.2, 40),))
     own, fixed = (run(Results(study_of(body, one), 128)).values for one in (made, replace(made, blocks=())))
-    assert own is not None
-    assert fixed is not None
-    assert 5.0 * np.std(own[1]) < np.std(fixed[1])
+    assert 5.0 * np.std(present(own)[1]) < np.std(present(fixed)[1])
 
 
 def test_a_sensor_that_loses_the_sun_fires_nothing() -> None:
@@ -281,3 +288,175 @@ def test_sensitivities_are_those_of_pulses_fired_by_the_sun() -> None:
             step = 1e-3 * entry.size
             plus, minus = (flown_outputs(model, {entry.name: sign * step})[at] for sign in (1.0, -1.0))
             assert first.jacobian[8, index] == pytest.approx((plus - minus) / (2.0 * step), rel=1e-4, abs=1e-9)
+
+
+# --- cones that the spin axis keeps: the angles of each case are those of its own flight
+
+
+def with_directions(model: DispersedModel, **fields: object) -> DispersedModel:
+    """The model with directions all over the sky, and one on the spin axis, where angles are near zero."""
+    body = replace(model.spacecraft, **fields)  # type: ignore[arg-type]
+    sky = np.random.default_rng(1).normal(size=(3, 3))
+    ways = (*(way / np.linalg.norm(way) for way in sky), body.axis, None)  # the last: H, wherever it points
+    return DispersedModel(replace(body, keep=tuple(Keep(str(k), way) for k, way in enumerate(ways))), model.schedule)
+
+
+JETS = dispersed.with_jets()
+MODELS = {
+    "prolate": with_directions(JETS),
+    "oblate, spin reversed": with_directions(dispersed.steered(moments=(70.0, 70.0, 110.0), spin=-3.0)),
+    "dissipation": with_directions(dispersed.sinking(JETS)),
+    "three moments": with_directions(dispersed.with_jets(moments=(120.0, 105.0, 80.0))),
+    "disturbances": with_directions(JETS, disturbances=LEAKS, dissipation=400.0),
+    "blocks": with_directions(by_blocks()),
+}
+
+
+def end_of(made: propagation.Flight) -> float:
+    """When the axis has gone round H once more after the last pulse."""
+    size = float(np.linalg.norm(made.settled.rates * np.asarray(made.moments)))
+    return made.schedule.end + math.pi * (made.moments[0] + made.moments[1]) / size
+
+
+def seen_in(model: DispersedModel, draws: dict[str, np.ndarray]) -> np.ndarray:
+    """Least and largest angles (m, 2, n) of the cases."""
+    return present(RealWidths(model)(model.cases(draws)).aspects)
+
+
+@spread("name", MODELS, quick=1, deep=5)
+def test_angles_of_each_case_are_those_of_its_own_flight(name: str) -> None:
+    model = MODELS[name]
+    draws = dispersed.first_cases(Study(model), 16)
+    angles = seen_in(model, draws)
+    for case in range(0, 16, 5):
+        true, made = realised(model, dispersed.one_of(draws, case))
+        alone = propagation.flown(true, made)
+        for one, ends in zip(aspects(alone, end_of(alone)), angles[:, :, case], strict=False):  # a Sun besides
+            within = 2e-8  # near the direction of the axis itself
+            assert ends == pytest.approx((one.least, one.largest), abs=within)
+
+
+def test_the_reference_integrator_sees_the_same_angles() -> None:
+    model = MODELS["three moments"]
+    draws = dispersed.first_cases(Study(model), 6)
+    angles = seen_in(model, draws)
+    true, made = realised(model, dispersed.one_of(draws, 5))
+    path = axis_path(true, made, end_of(propagation.flown(true, made)), 400)
+    for keep, ends in zip(model.spacecraft.keep[:3], angles[:3, :, 5], strict=True):
+        apart = attitude.angle_between(path, np.asarray(keep.direction))
+        assert ends == pytest.approx((apart.min(), apart.max()), abs=1e-5)
+
+
+COUNT = 100
+
+
+def kept(least: float, **fields: object) -> Results:
+    """A study of pulses that leave a nutation, with a cone of ``least`` rad; all cases meet the loose requirement."""
+    axis = JETS.spacecraft.direction_in_n(math.radians(20.0), 0.4)
+    loose = Requirement(math.radians(60.0), math.radians(60.0), 0.9)
+    given = {"keep": (Keep("beacon", axis, least),), "requirement": loose, **fields}
+    body = replace(JETS.spacecraft, **given)  # type: ignore[arg-type]
+    return fly_all(Results(study_of(body, JETS.schedule), COUNT))
+
+
+def test_cases_in_which_the_axis_breaks_a_cone_do_not_comply() -> None:
+    free = kept(0.0)
+    assert (free.met_fraction, free.broken.tolist(), free.shown()) == (1.0, [0], True)
+    angles = seen_in(free.study.model, dispersed.first_cases(free.study, COUNT))[0, 0]
+    assert free.aspects[0, 0] == angles.min()
+    middle = float(np.median(angles))
+    half = kept(middle)
+    assert (half.met_fraction, half.broken.tolist(), half.shown()) == (0.5, [50], False)
+    assert half.aspects == pytest.approx(free.aspects)
+    assert (angles[half.worst.cases[:50]] < middle).all()  # these are the worst cases
+    # Without a requirement cones alone make cases comply or not.
+    least = float(angles.min())
+    for limit, share in ((least - 1e-3, 1.0), (least + 1e-6, 99 / 100)):
+        assert kept(limit, requirement=None).met_fraction == share
+
+
+FILE = """
+name: Keeper
+mass: 250 kg
+inertia: {A: 120 kg m^2, C: 80 kg m^2}
+state: {spin: 30 rpm, nutation: 0 deg}
+attitude: {epoch: 2026-03-01T12:00:00Z, frame: EME2000, quaternion: [1, 0, 0, 0]}
+steerable: {torque: 60 N m, isp: 220 s, lever_arm: 1 m}
+sun: [20 deg, 80 deg]
+goal: {right_ascension: 10 deg, declination: 70 deg}
+keep: [{name: Sun, direction: sun, min: 5 deg}]
+limits: {earliest: 1 s}
+requirement: {nutation: 2 deg, momentum_shift: 3 deg, probability: 60 %}
+dispersions: {A: {normal: 1 %}, C: {normal: 1 %}, omega0: {normal: 0.1 deg/s}, thrust: {normal: 3 %}}
+"""
+"""A rhumb line passes the cone by 0.05 deg with nominal values, half-cones by 1.3 deg."""
+
+
+@pytest.mark.weekly
+def test_disperse_says_how_many_cases_break_the_cone(run: Run) -> None:
+    options = ("disperse", "-", "--scheme", "rhumb-line")
+    counted = run(*options, "--samples", "2000", "--json", "-", stdin=FILE, status=4)
+    study = json.loads(counted.stdout)
+    (cone,) = study["aspects"]
+    assert 0.3 < cone["broken_fraction"] < 0.6
+    assert study["requirement"]["met_fraction"] == pytest.approx(1.0 - cone["broken_fraction"], abs=0.02)
+    assert cone["least_deg"] < 5.0 < cone["nominal_least_deg"] < 5.1
+    assert all(one["aspects"][0]["least_deg"] < 5.0 for one in study["worst"])
+    screen = run(*options, "--samples", "2000", "-v", stdin=FILE).stdout
+    assert f"broken in {100 * cone['broken_fraction']:.1f} % of cases" in " ".join(screen.split())
+    worst = study["worst"][0]
+    row = next(line.split() for line in screen.splitlines() if line.split()[:1] == [str(worst["case"])])
+    assert row[4] == f"{worst['aspects'][0]['least_deg']:.4g}"
+    assert "least from Sun, deg" in run(*options, "--case", "1", stdin=FILE).stdout
+
+
+@pytest.mark.deep
+def test_the_csv_has_the_angles_of_each_case(run: Run, tmp_path: Path) -> None:
+    def csv_of(keep: str) -> tuple[dict[str, Any], str]:
+        text = FILE.replace("keep: [{name: Sun, direction: sun, min: 5 deg}]", keep)
+        options = ("--scheme", "half-cone", "--samples", "300", "--csv", "cases.csv", "--json", "-")
+        study = json.loads(run("disperse", "-", *options, stdin=text).stdout)
+        return study, (tmp_path / "cases.csv").read_text()
+
+    study, content = csv_of("keep: [{name: Sun, direction: sun, min: 5 deg}]")
+    rows = list(csv.DictReader(content.splitlines()))
+    assert list(rows[0])[-3:] == ["propellant_kg", "Sun_least_deg", "Sun_largest_deg"]
+    least, largest = np.array([[float(row[f"Sun_{end}_deg"]) for row in rows] for end in ("least", "largest")])
+    (cone,) = study["aspects"]
+    assert (len(rows), least.min(), largest.max()) == (300, cone["least_deg"], cone["largest_deg"])
+    assert np.mean(least < 5.0) == cone["broken_fraction"]
+    for worst in study["worst"]:
+        (angles,), at = worst["aspects"], worst["case"] - 1
+        assert (least[at], largest[at]) == pytest.approx((angles["least_deg"], angles["largest_deg"]), abs=1e-9)
+    # A cone so far away that nothing is routed changes nothing else.
+    (_, kept_csv), (_, free_csv) = csv_of("keep: [{name: Sun, direction: sun, min: 1 deg}]"), csv_of("")
+    assert free_csv.splitlines() == [line.rsplit(",", 2)[0] for line in kept_csv.splitlines()]
+
+
+@pytest.mark.weekly
+def test_a_robust_plan_keeps_the_cone_in_most_cases(tmp_path: Path) -> None:
+    (tmp_path / "keeper.yaml").write_text(FILE)
+    body: Spacecraft = load(tmp_path / "keeper.yaml")
+    names = "rhumb-line", "half-cone"
+    compared, counted = (decision.compare(body, names, samples=samples) for samples in (0, 1000))
+    assert [one.recommended and one.recommended.scheme for one in (compared, counted)] == list(names)
+    trials = robust.variations_of(compared)
+    judged = robust.compare(compared, trials[:1] + trials[-2:])
+    shares = {one.plan.scheme: one.cases.complying for one in judged.candidates}
+    assert planning.plan(body, "rhumb-line").meets_requirement
+    assert (shares["rhumb-line"] or 1.0) < 0.7
+    assert present(judged.chosen).plan.scheme == "half-cone"
+
+
+def test_the_budget_of_h_is_that_of_real_widths() -> None:
+    """A ΔV of 45 s: by impulses each thrust error turns H by 0.003°, through the widths by a ten-thousandth of it."""
+    body = nutdamp.load(places.case("lp71b.yaml"))
+    study = study_of(body, read_plan(str(places.case("dv45.csv")), body)[0].pulses)
+    flown, closed = study.first_order, first_order(study.model)
+    assert math.degrees(closed.sigma("momentum_shift")) > 0.003
+    assert math.degrees(flown.sigma("momentum_shift")) < 2e-6
+    assert flown.sigma("nutation") == pytest.approx(closed.sigma("nutation"), rel=0.01)
+    step = 1e-4 * flown.inputs[0].size
+    draw = np.array([step, -step])
+    ends = vectors(study.model, study.flies(study.model.cases({flown.inputs[0].name: draw})), 2)
+    assert flown.jacobian[:8, 0] == pytest.approx((ends[:8, 0] - ends[:8, 1]) / (2.0 * step), rel=0.02, abs=1e-9)

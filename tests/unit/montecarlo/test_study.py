@@ -1,7 +1,5 @@
 """Studies: what is counted, whatever threads and interruptions; percentiles, intervals; sensitivities and shares."""
 
-from __future__ import annotations
-
 import itertools
 import math
 import threading
@@ -13,6 +11,7 @@ import numpy as np
 import pytest
 from scipy.stats import binomtest, norm
 from support import dispersed
+from support.builders import present
 from support.cases import deep
 from support.golden import refused
 
@@ -58,8 +57,7 @@ def plain() -> Results:
 
 
 def values_of(results: Results) -> np.ndarray:
-    assert results.values is not None
-    return results.values
+    return present(results.values)
 
 
 def same(first: Results, second: Results) -> None:
@@ -81,8 +79,7 @@ def test_threads_change_nothing_and_what_is_done_is_told(plain: Results) -> None
     def collect(first: int, values: np.ndarray) -> None:
         collected.append((first, values.shape[1]))
 
-    watched = run(Results(a_study(), MANY), threads=3, watch=seen.append, collect=collect)
-    same(plain, watched)
+    same(plain, run(Results(a_study(), MANY), threads=3, watch=seen.append, collect=collect))
     assert seen == sorted(seen)
     assert (seen[-1], collected) == (MANY, [(0, MANY)])
 
@@ -366,9 +363,7 @@ def test_the_percentile_of_a_small_nutation_follows_from_the_covariance() -> Non
 
 
 def test_shares_sum_to_one_a_bias_has_none_and_the_attitude_moves_only_where_the_axis_points() -> None:
-    requested = JETS.spacecraft.dispersions
-    assert requested is not None
-    biased = replace(requested, C=Tolerance("bias", 0.8))
+    biased = replace(present(JETS.spacecraft.dispersions), C=Tolerance("bias", 0.8))
     first = first_order(DispersedModel(replace(JETS.spacecraft, dispersions=biased), JETS.schedule))
     names = [entry.name for entry in first.inputs]
     for output in OUTPUTS:

@@ -1,7 +1,5 @@
 """The rows of the moving view, without a browser: they are those of ``simulate``, and lie where the scales say."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json
@@ -17,9 +15,9 @@ from typing import Any
 import numpy as np
 import pytest
 from support import places
+from support.builders import present
 from support.cases import deep
 from support.pages import plain_page
-from support.places import case
 from support.process import Run
 from support.shown import WIDE, compared_text, tree
 
@@ -28,10 +26,8 @@ from nutdamp.files.schedules import read_blocks, read_plan
 from nutdamp.flight import propagation
 from nutdamp.page import moving
 from nutdamp.page.document import EDGES, Moving, PageSection
-from nutdamp.page.moving import LEAD, MOST_ROWS, NONE, SPHERE, absence, moving_of, strip_of
 from nutdamp.page.report import page_html
 from nutdamp.planning import plan as planning
-from nutdamp.planning.plan import Plan
 from nutdamp.schemes.block_model import fired
 from nutdamp.schemes.catalogue import Options
 from nutdamp.spacecraft.equipment import Block
@@ -43,7 +39,7 @@ pytestmark = pytest.mark.usefixtures("plans_shared")
 CALM = "name: Calm\ninertia: {A: 120, C: 80}\nomega0: [0, 0, 3]\n"
 TEXTS = {
     "example": example_text(),
-    "target": case("far-target.yaml").read_text(encoding="utf-8"),
+    "target": places.case("far-target.yaml").read_text(encoding="utf-8"),
     "three": """name: Three moments
 inertia: {tensor: [[120, 3, 0], [3, 100, 0], [0, 0, 60]]}
 state: {spin: 6 rpm, nutation: 20 deg}
@@ -62,16 +58,14 @@ limits: {max_pulses: 1}
 }
 
 
-def chosen(text: str) -> Plan:
-    plan = compared_text(text).recommended
-    assert plan is not None
-    return plan
+def chosen(text: str) -> planning.Plan:
+    return present(compared_text(text).recommended)
 
 
 @cache
 def view(text: str) -> tuple[Moving, dict[str, Any], dict[str, list[int]]]:
     """The view, its data, and their columns as the script adds them up."""
-    made = moving_of(chosen(text))
+    made = moving.moving_of(chosen(text))
     data = json.loads(made.data)
     return made, data, {name: list(accumulate(steps)) for name, steps in data["columns"].items()}
 
@@ -79,8 +73,7 @@ def view(text: str) -> tuple[Moving, dict[str, Any], dict[str, list[int]]]:
 def simulated(run: Run, text: str) -> list[dict[str, str]]:
     """What the command in the caption writes."""
     command = " ".join(view(text)[0].command).replace("SPACECRAFT", "-").removesuffix("FILE")
-    screen = run(*shlex.split(command)[1:], "-", "-q", stdin=text)
-    assert screen.returncode in (0, 4), screen.stderr
+    screen = run(*shlex.split(command)[1:], "-", "-q", stdin=text, status=(0, 4))
     return list(csv.DictReader(io.StringIO(screen.stdout)))
 
 
@@ -90,26 +83,24 @@ def test_the_command_in_the_caption_gives_the_rows_of_the_view(
 ) -> None:
     """It names the file that the plan came from, whatever its name."""
     monkeypatch.chdir(tmp_path)
-    text = case("cb1015.yaml").read_text(encoding="utf-8") if name == "blocks" else TEXTS["example"]
+    text = places.case("cb1015.yaml").read_text(encoding="utf-8") if name == "blocks" else TEXTS["example"]
     text += "disturbances: [{torque: [20 mN m, 0, 0]}]\n" * (name == "disturbances")
     Path("my craft.yaml").write_text(text, encoding="utf-8")
     body = read_spacecraft(text, "my craft.yaml")
     if name == "blocks":
-        block = {"block": "1", "channel": "J2", "first_sun_pulse": "6", "count": "1", "every": "1"}
-        block |= {"delay_s": "0.972287825122", "width_s": "0.487394"}
-        Path("b 2.csv").write_text(f"{','.join(block)}\n{','.join(block.values())}\n", encoding="utf-8")
-        plan = Plan(body, "b 2.csv", fired(body, read_blocks("b 2.csv", body)[0]), from_file=True)
+        header = "block,channel,first_sun_pulse,count,every,delay_s,width_s"
+        Path("b 2.csv").write_text(f"{header}\n1,J2,6,1,1,0.972287825122,0.487394\n", encoding="utf-8")
+        plan = planning.Plan(body, "b 2.csv", fired(body, read_blocks("b 2.csv", body)[0]), from_file=True)
     elif name == "schedule":
         planning.plan(body, "two-pulse").to_csv("p 2.csv")
         plan, _ = read_plan("p 2.csv", body)
     else:
         plan = planning.plan(body, "two-pulse", Options(with_disturbances=name == "disturbances"))
-    made = moving_of(plan, "'my craft.yaml'")
+    made = moving.moving_of(plan, "'my craft.yaml'")
     assert made.scheme == plan.scheme
     *words, file = shlex.split(" ".join(made.command))
     assert file == "FILE"
-    done = run(*words[1:], "-", "-q")
-    assert done.returncode in (0, 4), done.stderr
+    done = run(*words[1:], "-", "-q", status=(0, 4))
     rows, data = list(csv.DictReader(io.StringIO(done.stdout))), json.loads(made.data)
     digits = data["digits"]["cone"]
     shown = [f"{value / 10**digits:.{digits}f}" for value in accumulate(data["columns"]["theta"])]
@@ -120,7 +111,7 @@ def test_no_command_is_named_that_would_fly_other_pulses() -> None:
     plan = chosen(TEXTS["example"])
     sunlit = replace(plan.spacecraft, goal=Goal(sun=np.array([1.0, 0.0, 0.0])))
     for other in (replace(plan, scheme="robust"), replace(plan, spacecraft=sunlit)):
-        assert moving_of(other).command == ()
+        assert moving.moving_of(other).command == ()
 
 
 def column(track: list[dict[str, str]], *keys: str) -> np.ndarray:
@@ -143,15 +134,15 @@ def test_each_row_is_that_of_simulate(run: Run, name: str) -> None:
     globe = (("axis", axis), ("H", momentum / np.linalg.norm(momentum, axis=1, keepdims=True)))
     assert ("axis1" in rows) == ("H3" in rows) == (name == "target")  # the globe
     for prefix, expected in globe if name == "target" else ():
-        on_sphere = np.array([rows[f"{prefix}{number}"] for number in (1, 2, 3)]).T / SPHERE
-        assert on_sphere == pytest.approx(expected, abs=0.51 / SPHERE)
+        on_sphere = np.array([rows[f"{prefix}{number}"] for number in (1, 2, 3)]).T / moving.SPHERE
+        assert on_sphere == pytest.approx(expected, abs=0.51 / moving.SPHERE)
     framed = read_spacecraft(TEXTS[name], "craft.yaml").attitude is not None
     longitude, latitude = (rows["angle1"], rows["angle2"]) if framed else (rows["angle2"], rows["angle1"])
     for (x, y, z), along, above in zip(axis.tolist(), longitude, latitude, strict=True):
         across = math.hypot(x, y)
         height = math.atan2(z, across) if framed else math.atan2(across, z)
         assert above / 1e4 == pytest.approx(math.degrees(height), abs=6e-5)
-        if along == NONE:
+        if along == moving.NONE:
             assert across < 1e-10
         else:
             way = math.radians(along / 1e4)
@@ -240,7 +231,7 @@ def test_a_track_of_too_many_turns_is_drawn_as_dots() -> None:
     text = CALM.replace("[0, 0, 3]", "[0.1, 0, 3]") + "limits: {earliest: 3000 s, horizon: 3600 s}\n"
     made, data, rows = view(text)
     assert data["dots"]
-    assert len(rows["t"]) < MOST_ROWS + 20
+    assert len(rows["t"]) < moving.MOST_ROWS + 20
     assert len(made.data) < 160_000
 
 
@@ -262,7 +253,7 @@ def test_the_target_is_a_mark_and_a_circle_and_further_circles_are_taken_as_data
     assert data["target"] is not None
     plan = chosen(TEXTS["target"])
     star = replace(plan.spacecraft, keep=(Keep("star", np.array([0.0, 0.6, 0.8]), 0.2),))
-    assert json.loads(moving_of(replace(plan, spacecraft=star)).data)["named"] == [
+    assert json.loads(moving.moving_of(replace(plan, spacecraft=star)).data)["named"] == [
         named,
         {"name": "star", "kind": "watched", "axis": [0.0, 0.6, 0.8], "circles": [{"radius": 0.2, "kind": "keep-out"}]},
     ]
@@ -291,7 +282,7 @@ def test_sun_and_cones_of_the_file_are_on_the_globe(run: Run) -> None:
 def test_the_strip_says_where_the_required_nutation_is(degrees: float) -> None:
     body = replace(WIDE, requirement=Requirement(nutation=math.radians(degrees)))
     made = propagation.flown(body, planning.plan(body, "two-pulse").pulses, 20.0)
-    strip, (low, high) = strip_of(made, made.sampled(200, 20.0), 20.0)
+    strip, (low, high) = moving.strip_of(made, made.sampled(200, 20.0), 20.0)
     assert (low < degrees < high) == (strip.required is not None) == (degrees < 1.0)
     assert strip.outside == ("" if degrees < 1.0 else "50 deg")
 
@@ -299,8 +290,8 @@ def test_the_strip_says_where_the_required_nutation_is(degrees: float) -> None:
 def test_the_strip_has_the_times_without_firings() -> None:
     body = replace(WIDE, limits=Limits(earliest=2.0, blackout=((5.0, 7.0), (19.0, 25.0)), horizon=60.0))
     made = propagation.flown(body, Schedule(), 20.0)
-    strip, _ = strip_of(made, made.sampled(200, 20.0), 20.0)
-    ends = [2000.0 * (LEAD + (1.0 - LEAD) * time / 20.0) for time in (0.0, 2.0, 5.0, 7.0, 19.0, 20.0)]
+    strip, _ = moving.strip_of(made, made.sampled(200, 20.0), 20.0)
+    ends = [2000.0 * (moving.LEAD + (1.0 - moving.LEAD) * time / 20.0) for time in (0.0, 2.0, 5.0, 7.0, 19.0, 20.0)]
     for shown, first, last in zip(strip.closed, ends[::2], ends[1::2], strict=True):
         assert shown == pytest.approx((first, last - first), abs=0.06)
 
@@ -340,19 +331,17 @@ def test_other_bodies_have_none_and_the_view_has_the_reason(more: str, reason: s
 
 def test_schedules_without_pulses_command_blocks_and_wheels_have_none() -> None:
     plan = chosen(TEXTS["three"])
-    assert absence(plan.spacecraft, plan.pulses) == ""
-    assert absence(plan.spacecraft, Schedule()) == "no pulses"
+    assert moving.absence(plan.spacecraft, plan.pulses) == ""
+    assert moving.absence(plan.spacecraft, Schedule()) == "no pulses"
     blocks = replace(plan.pulses, blocks=(Block("T1", 1, 0.1, 0.1, 3),))
-    assert absence(plan.spacecraft, blocks) == "command blocks"
+    assert moving.absence(plan.spacecraft, blocks) == "command blocks"
     inertia = replace(plan.spacecraft.inertia, wheel=1.0)
-    assert absence(replace(plan.spacecraft, inertia=inertia), plan.pulses) == "a wheel"
+    assert moving.absence(replace(plan.spacecraft, inertia=inertia), plan.pulses) == "a wheel"
 
 
 def test_cones_roll_on_a_symmetric_body_alone() -> None:
     for name in ("example", "three"):
-        workbench = view(TEXTS[name])[0].workbench
-        assert workbench is not None
-        assert workbench.rolling == (name == "example")
+        assert present(view(TEXTS[name])[0].workbench).rolling == (name == "example")
 
 
 def test_its_data_are_the_plan_and_the_limits_of_the_file() -> None:
@@ -368,8 +357,7 @@ def test_its_data_are_the_plan_and_the_limits_of_the_file() -> None:
     assert {(entry["least"], entry["most"]) for entry in bench["pulses"]} == {(0.02, 2.0)}
     limits = {"earliest": 1.0, "horizon": 60.0, "gap": 0.2, "tick": 1e-3, "blackout": [[30.0, 31.0]], "most": None}
     assert bench["limits"] == limits
-    assert made.workbench is not None
-    assert [(key, limit) for key, _, limit in made.workbench.rows] == [
+    assert [(key, limit) for key, _, limit in present(made.workbench).rows] == [
         ("nutation", "≤ 0.5°"),
         ("momentum_shift", "≤ 0.2°"),
     ]
@@ -377,8 +365,7 @@ def test_its_data_are_the_plan_and_the_limits_of_the_file() -> None:
 
 def test_with_a_target_the_axis_error_is_bounded_and_ideal_impulses_have_no_on_time() -> None:
     made, data, _ = view(TEXTS["target"])
-    assert made.workbench is not None
-    rows = [(key, limit) for key, _, limit in made.workbench.rows]
+    rows = [(key, limit) for key, _, limit in present(made.workbench).rows]
     assert rows == [("nutation", ""), ("momentum_shift", ""), ("axis_error", "≤ 4°")]
     pulses = data["bench"]["pulses"]
     assert {(entry["on"], entry["torque"], entry["most"]) for entry in pulses} == {(0.0, None, None)}

@@ -1,38 +1,51 @@
-"""The page of `report`, without a browser: what stands on it, that nothing breaks out of it, that it needs nothing."""
-
-from __future__ import annotations
+"""The page of report, without a browser: what stands on it, its manoeuvre sheet, and what a board needs."""
 
 import base64
 import hashlib
 import math
 import re
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from rich.console import Group
 from rich.table import Table
 from rich.text import Text
-from support import places
+from support import places, reference
+from support.builders import present
 from support.cases import deep, weekly
+from support.golden import check_text
 from support.markup import Node
 from support.pages import plain_page
 from support.process import Run
-from support.shown import cells, downloaded, section, sheet, tree
+from support.shown import cells, downloaded, facts, section, sheet, tree
+from support.spinners import FILE
 
+import nutdamp
 from nutdamp.api import trade
 from nutdamp.figures import style
 from nutdamp.files.reader import example_text, read_spacecraft
+from nutdamp.flight import propagation
+from nutdamp.flight.end_state import spin_phases
 from nutdamp.montecarlo.study import Results, run, study_of
-from nutdamp.page.document import Prose, Sheet, blocks_of, number_in
+from nutdamp.page.document import Control, Prose, Sheet, blocks_of, number_in
 from nutdamp.page.report import CONDITIONS, Repeat, assumptions, block_html, page_html, report_page
+from nutdamp.physics import attitude
+from nutdamp.planning import plan as planning
 from nutdamp.planning.decision import Comparison, compare
+from nutdamp.planning.screening import CASES, Checkpoints, even, first_pulses
+from nutdamp.planning.verdict import Status
 from nutdamp.schemes.catalogue import CLASSIC
+from nutdamp.spacecraft.model import Disturbance, Goal, Requirement, Spacecraft
+from nutdamp.spacecraft.schedule import Schedule
 from nutdamp.views import guide
 from nutdamp.views.decisions import comparison_json
 from nutdamp.views.tables import Heading
-from nutdamp.views.verdict import statement
+from nutdamp.views.verdict import HEADLINES, statement
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 
@@ -205,9 +218,8 @@ def test_comparison_and_schedule_say_what_the_json_says(samples: int | None, rec
         assert (row["verdict"] == "met") is (plan["status"] == "fly")
     (marked,) = (one for one in shown.all("tr") if one.attributes.get("class") == "mark")
     assert marked.all("th")[0].text == data["recommended"] == recommended
-    assert both.recommended is not None
     fired = sheet(section(shown, "background"), "Pulses of")
-    for shot, pulse in zip(fired, both.recommended.pulses, strict=True):
+    for shot, pulse in zip(fired, present(both.recommended).pulses, strict=True):
         assert shot["channel"] == pulse.channel
         times = (float(shot["start s"]), float(shot["on-time s"]))
         assert times == pytest.approx((pulse.start, pulse.on_time), abs=1e-4)
@@ -258,9 +270,8 @@ def test_what_an_earlier_end_costs_stands_on_the_page_with_the_recommended_plan_
     numbers = [row[0].text for table in tables for row in cells(table)[1:]]
     assert numbers == [str(n) for n in range(1, 1 + sum(len(front.points) for front in fronts))]
     words = {text.text for text in part.all("text")}
-    assert both.recommended is not None
-    other = "" if both.recommended.scheme == "optimal" else " (not traded)"
-    assert {f"recommended: {both.recommended.scheme}{other}", "H ends where it was"} <= words
+    other = "" if present(both.recommended).scheme == "optimal" else " (not traded)"
+    assert {f"recommended: {present(both.recommended).scheme}{other}", "H ends where it was"} <= words
     assert len([word for word in words if word.startswith("lower bound, ")]) == 1
     assert "H may end anywhere" in part.text
     assert 'id="trade"' not in page(example_text())
@@ -278,14 +289,11 @@ dispersions: {A: {normal: SIGMA}}
 @pytest.mark.parametrize(("sigma", "good"), [deep("5 %", False), weekly("0.1 %", True)])
 def test_dispersions_enter_the_verdict(sigma: str, good: bool) -> None:
     both = compared_text(DISPERSED.replace("SIGMA", sigma), ("two-pulse",), 1000)
-    assert both.recommended is not None
-    assert both.recommended.meets_requirement
-    results = run(Results(study_of(both.spacecraft, both.recommended.pulses), 1000), threads=1)
-    distribution, made = (
-        results.distribution("nutation"),
-        (report_page if good else plain_page)(both, Repeat("", "", "")),
-    )
+    assert present(both.recommended).meets_requirement
+    results = run(Results(study_of(both.spacecraft, present(both.recommended).pulses), 1000), threads=1)
+    distribution = results.distribution("nutation")
     assert distribution is not None
+    made = (report_page if good else plain_page)(both, Repeat("", "", ""))
     assert (made.verdict, made.state) == (statement(both.verdict), "met" if good else "missed")
     (margin,) = made.margins
     assert (both.verdict.met, margin.met, margin.used[1] <= 1.0) == (good, good, good)
@@ -306,3 +314,352 @@ def test_of_several_lines_above_a_table_the_last_is_its_title() -> None:
     assert (first, last) == (Prose("a line"), Prose("below"))
     assert isinstance(sheet_, Sheet)
     assert sheet_.title == "a title"
+
+
+# --- the manoeuvre sheet: what is loaded, when to begin, when to hold, and the cases that say so
+
+
+def turning(text: str, degrees: float, azimuth: float = math.radians(82.0)) -> Spacecraft:
+    """The spacecraft of a file, with a target so many degrees away."""
+    body = read_spacecraft(text, "f.yaml", ())
+    return body.replace(goal=Goal(axis=body.direction_in_n(math.radians(degrees), azimuth)))
+
+
+def manoeuvre(body: Spacecraft, scheme: str, cases: int = 0) -> Node:
+    """The section of a page, without pictures."""
+    control = Control(document="ND-014", issue="2")
+    compared = nutdamp.compare(body, [scheme], samples=cases)
+    return section(tree(plain_page(compared, Repeat("", "f.yaml", "name: X"), control=control)), "manoeuvre")
+
+
+@cache
+def example() -> Node:
+    """The sheet of the built-in example."""
+    return manoeuvre(nutdamp.example(), "two-pulse", 3000)
+
+
+def numbers(text: str) -> list[float]:
+    """The numbers of a text."""
+    return [float(number) for number in re.findall(r"[+-]?\d+\.?\d*(?:e-?\d+)?", text)]
+
+
+@pytest.mark.deep
+def test_rows_are_the_pulses_as_they_are_loaded() -> None:
+    body, chosen = nutdamp.example(), planning.plan(nutdamp.example(), "two-pulse")
+    _, after = chosen.flight.around_pulses()
+    for row, pulse, left in zip(sheet(example(), "Fire"), chosen.pulses, np.degrees(after.nutation), strict=True):
+        assert (row["start s"], row["on-time s"]) == (f"{pulse.start:.3f}", f"{pulse.on_time:.3f}")
+        assert float(row["spin phase deg"]) == pytest.approx(math.degrees(body.spin * pulse.start) % 360.0, abs=0.06)
+        assert (row["thrusters"], row["done"]) == (pulse.channel, "☐")
+        assert float(row["nutation after deg"]) == pytest.approx(left, abs=5e-3)
+    given = facts(example(), "Document")
+    assert given["document"] == "ND-014 iss 2"
+    assert given["input file"].startswith("f.yaml, SHA-256 ")
+    assert facts(example(), "Totals")["totals"].startswith(
+        "pulses: 2; on-time 3.068 s; 14.22 g; the last ends at 7.434 s"
+    )
+    assert {row["sheet"] for row in sheet(example(), "Signatures")} == {"prepared", "checked"}
+
+
+@pytest.mark.deep
+def test_conditions_and_ranges_are_those_of_flown_cases() -> None:
+    """The same draws through the study itself: of the motion at t = 0, of the end, and of a schedule that is late."""
+    body, pulses = nutdamp.example(), planning.plan(nutdamp.example(), "two-pulse").pulses
+    study = study_of(body, pulses)
+    go = facts(example(), "GO at t = 0")
+    draws, _ = study.source().block(0)
+    cases = study.model.cases({name: draw if isinstance(draw, float) else draw[:CASES] for name, draw in draws.items()})
+    momentum = np.array([np.broadcast_to(i * w, CASES) for i, w in zip(cases.moments, cases.omega0, strict=True)])
+    nutation = np.degrees(np.arccos(momentum[2] / np.linalg.norm(momentum, axis=0)))
+    assert numbers(go["nutation"])[:2] == pytest.approx(np.quantile(nutation, [0.0015, 0.9985]), rel=5e-3)
+    spins = np.broadcast_to(cases.omega0[2], CASES) * 30.0 / math.pi
+    assert numbers(go["spin"])[:2] == pytest.approx(np.quantile(spins, [0.0015, 0.9985]), rel=1e-4)
+    early, late, *_ = numbers(go["phase window"].partition("(")[2].replace("to ", ""))
+    for shift, share in ((early, 0.997), (late, 0.997), (1.5 * early, 0.0), (1.5 * late, 0.0)):
+        moved = replace(pulses, pulses=tuple(pulse.moved(shift) for pulse in pulses))
+        fraction = present(run(Results(study_of(body, moved), CASES)).met_fraction)
+        assert (fraction >= 0.997) == (share > 0.0), shift
+
+
+def flown(body: Spacecraft, schedule: Schedule) -> NDArray[np.float64]:
+    """Residuals of the first cases, (outputs, cases)."""
+    return present(run(Results(study_of(body, schedule), CASES)).values)
+
+
+@pytest.mark.deep
+def test_limits_to_hold_are_those_of_cases_that_end_well_and_the_last_row_accepts_what_is_required() -> None:
+    """Of this body two in three cases end well, of which half are required."""
+    limits = {"nutation": "0.5 deg", "momentum_shift": "0.2 deg", "probability": 0.5}
+    body = nutdamp.example().with_(
+        requirement=limits, dispersions={"A": {"normal": "1 %"}, "thrust": {"normal": "3 %"}}
+    )
+    plan = planning.plan(body, "two-pulse")
+    nutation, shift = np.degrees(flown(body, plan.pulses)[:2])
+    well = (nutation <= 0.5) & (shift <= 0.2)
+    assert 0.5 < well.mean() < 0.8
+    after = np.degrees(flown(body, first_pulses(plan.pulses, 1))[0][well])
+    first, last = (row["hold if outside deg"] for row in sheet(manoeuvre(body, "two-pulse", 3000), "Fire"))
+    assert numbers(first) == pytest.approx([after.min(), after.max()], abs=5.1e-3)
+    assert last == "accept ≤ 0.5"
+
+
+@pytest.mark.deep
+def test_rows_of_command_blocks_are_blocks_with_counts_and_the_sun_phase() -> None:
+    body = turning(FILE, 9.0)
+    shown, fired = manoeuvre(body, "command-block"), planning.plan(body, "command-block").pulses
+    (row,) = sheet(shown, "Fire")
+    (block,) = fired.blocks
+    assert (row["block"], row["pulses"], row["first Sun pulse"]) == ("1", str(block.count), str(block.first))
+    delay, counts = numbers(row["delay s (counts)"])
+    assert (delay, counts) == (block.delay, present(body.commands).counts("delay", block.delay))
+    # Without nutation the Sun phase is the delay times the spin.
+    assert float(row["Sun phase deg"]) == pytest.approx(math.degrees(block.delay * body.spin) % 360.0, abs=0.3)
+    assert f"T{row['start UTC']}Z" in (body.utc(fired.pulses[0].loaded[0], 3) or "")
+
+
+STRICT, LOOSE = Requirement(nutation=1e-4), Requirement(nutation=0.2, probability=0.9)
+
+
+@pytest.mark.parametrize(
+    ("status", "change", "cases"),
+    [
+        (Status.FLY, {"requirement": LOOSE}, 100),
+        (Status.FLY, {"dispersions": None}, 0),
+        (Status.FLY, {"dispersions": None, "requirement": None}, 0),
+        (Status.NOT_SHOWN, {}, 100),
+        (Status.NOT_SHOWN, {"dispersions": None, "requirement": LOOSE}, 0),
+        (Status.NOT_ENOUGH, {"requirement": STRICT}, 100),
+        (Status.NO_PULSE, {"dispersions": None, "requirement": replace(LOOSE, probability=None)}, 0),
+        (Status.NOT_COMMANDABLE, None, 0),
+    ],
+)
+def test_only_a_sheet_to_fly_has_conditions_limits_to_hold_boxes_and_signatures(
+    status: Status, change: dict[str, Any] | None, cases: int
+) -> None:
+    body = turning(FILE, 3.0) if change is None else nutdamp.example().replace(**change)
+    scheme = "rhumb-line" if change is None else "none" if status is Status.NO_PULSE else "two-pulse"
+    compared = nutdamp.compare(body, [scheme], samples=cases)
+    page = tree(plain_page(compared))
+    assert compared.verdict.status is status
+    told = page.all("main")[0].text
+    assert {words for words in HEADLINES.values() if re.search(rf"\b{words}\b", told)} == {HEADLINES[status]}
+    shown, flies = section(page, "manoeuvre"), status is Status.FLY
+    captions = {caption.text for caption in shown.all("caption")}
+    heads = {head.text for head in shown.all("th")}
+    alarms = [one.text for one in shown.all("p") if one.attributes.get("class") == "alarm"]
+    assert (alarms[:1] == ["NOT FOR FLIGHT"]) is bool(status.exit_status)
+    assert any(caption.startswith("GO at t = 0") for caption in captions) is flies
+    assert ("Signatures" in captions) is ("☐" in shown.text) is flies
+    for head in ("hold if outside deg", "decide before", "done"):
+        assert (head in heads) is flies
+
+
+DATED = {"attitude": {"quaternion": [1, 0, 0, 0], "epoch": "2026-03-01T12:00:00Z", "frame": "EME2000"}}
+
+
+@pytest.mark.parametrize(("gap", "more"), [("1 s", {}), ("12 s", {}), ("12 s", DATED)])
+def test_a_row_says_when_to_decide_unless_the_coast_is_too_short(gap: str, more: dict[str, Any]) -> None:
+    first, last = sheet(manoeuvre(nutdamp.example().with_(limits={"gap": gap}, **more), "two-pulse"), "Fire")
+    assert last["decide before"] == "–"
+    decided = first["decide before"]
+    if gap == "1 s":
+        assert decided == "automatic"
+    elif more:
+        assert decided == last["start UTC"]
+    else:
+        assert float(last["start s"]) - 0.1 < numbers(decided)[0] <= float(last["start s"])
+
+
+@pytest.mark.deep
+@pytest.mark.parametrize(
+    ("settings", "shown"),
+    [({"limits": {"tick": "2.5 ms"}}, 4), ({"dispersions": {"timing": {"uniform": "20 ms"}}}, 2), ({}, 3)],
+)
+def test_times_are_no_finer_than_the_file_can_tell(settings: dict[str, object], shown: int) -> None:
+    row, *_ = sheet(manoeuvre(nutdamp.example().with_(**settings), "two-pulse"), "Fire")
+    assert {len(row[name].partition(".")[2]) for name in ("start s", "on-time s")} == {shown}
+
+
+def test_the_nutation_after_each_pulse_is_that_of_the_reference() -> None:
+    """Nutation and Sun angle after each pulse against Euler's equations by DOP853."""
+    body = turning(FILE, 3.0, 0.5)
+    plan = planning.plan(body, "rhumb-line")
+    _, after = plan.flight.around_pulses()
+    motion = reference.Motion(body.omega0, attitude.matrix(body.initial.quaternion))
+    now, moments = 0.0, np.asarray(body.inertia.moments)
+    for index, pulse in enumerate(plan.pulses):
+        (motion,) = reference.coast(body.inertia.moments, motion, np.zeros(3), np.array([pulse.start - now]))
+        (motion,) = reference.coast(body.inertia.moments, motion, present(pulse.torque), np.array([pulse.on_time]))
+        now = pulse.end
+        momentum = motion.rotation @ (moments * motion.rates)
+        assert float(after.nutation[index]) == pytest.approx(reference.angle(momentum, motion.rotation[:, 2]), abs=1e-7)
+        seen = float(attitude.angle_between(after.momentum[index], present(body.sun)))
+        assert seen == pytest.approx(reference.angle(momentum, present(body.sun)), abs=1e-7)
+
+
+@pytest.mark.deep
+def test_a_window_ends_at_half_a_turn_or_where_the_first_pulse_would_come_before_t_0() -> None:
+    body = nutdamp.example()
+    points = Checkpoints(study_of(body, planning.plan(body, "two-pulse").pulses))
+    assert points.window(1.0 + 1e-9) is None
+    assert present(points.window(0.0)) == pytest.approx((-math.pi / body.spin, math.pi / body.spin))
+    soon = replace(
+        points.study.model.schedule, pulses=tuple(pulse.moved(-0.6) for pulse in points.study.model.schedule)
+    )
+    early = present(Checkpoints(study_of(body, soon)).window(0.0))
+    assert early.least == pytest.approx(-soon.pulses[0].start)
+
+
+def test_checkpoints_are_even_and_the_first_pulses_are_those_of_the_first_blocks() -> None:
+    body = turning(FILE, 3.0, 0.5)
+    made = planning.plan(body, "command-block").pulses
+    part = first_pulses(made, 4)
+    assert [block.count for block in part.blocks] == [4]
+    assert part.pulses == made.pulses[:4]
+    assert propagation.flown(body, part).settled.spin == pytest.approx(body.spin)
+    assert (even(1, 8), even(3, 8), even(10, 12)) == ([1], [1, 2, 3], list(range(1, 11)))
+    assert (even(57, 8)[0], even(57, 8)[-1], len(even(57, 8))) == (1, 57, 8)
+
+
+# --- what a board needs: the decision, the data, thresholds, how to repeat it, who signs
+
+ACE = places.CONFIGS / "ace.yaml"
+
+
+@cache
+def compared_ace() -> Comparison:
+    return compare(nutdamp.load(ACE), ["two-pulse"], samples=0)
+
+
+@cache
+def ace(**control: str) -> Node:
+    """The page of a body with an attitude and an epoch, without pictures."""
+    repeat = Repeat("nutdamp report", "ace.yaml", ACE.read_text("utf-8"))
+    return tree(plain_page(compared_ace(), repeat, control=Control(**control)))
+
+
+@pytest.mark.deep
+def test_what_the_board_asks_for_is_on_the_page() -> None:
+    start = facts(ace(), "ACE")
+    wanted = {"width": "in steps of 30 ms, 60 ms to 0.48 s"}
+    assert wanted == {key: start[key] for key in wanted}
+    assert start["Sun sensor"].startswith("at azimuth 0 deg")
+    # With three moments the file's 0.6° is that of t = 0; pulses are measured by the largest on the arc.
+    assert ace().all("h1")[0].text == "ACE · damp 0.6° nutation"
+    assert [row["channel"] for row in sheet(ace(), "Pulses of")]
+
+
+@pytest.mark.deep
+def test_pulses_have_date_phase_and_cones() -> None:
+    body, chosen = compared_ace().spacecraft, present(compared_ace().recommended)
+    around = dict(zip(("before", "after"), chosen.flight.around_pulses(), strict=True))
+    for index, (pulse, row) in enumerate(zip(chosen.pulses, sheet(ace(), "Pulses of"), strict=True)):
+        assert f"T{row['start UTC']}Z" in (body.utc(pulse.start, 3) or "")
+        x, y, _ = attitude.matrix(chosen.flight.motion(np.array([pulse.start]))[1][0]).T @ present(body.sun)
+        assert float(row["Sun phase deg"]) == pytest.approx(-math.degrees(math.atan2(y, x)) % 360.0, abs=0.051)
+        for cone in ("nutation", "body_cone", "space_cone"):
+            for when, track in around.items():
+                shown = float(row[f"{cone.replace('_', ' ')} {when} deg"])
+                assert shown == pytest.approx(math.degrees(getattr(track, cone)[index]), rel=1e-3)
+
+
+def test_the_spin_phase_is_the_integral_of_the_spin() -> None:
+    """Against Euler's equations by DOP853, with three moments and a torque about axis 3."""
+    body = nutdamp.example().replace(disturbances=(Disturbance(0.0, 0.4),), dispersions=None)
+    times = np.array([0.0, 3.0, 11.0, 40.0])
+    phases = spin_phases(propagation.flown(body, nutdamp.plan(body, "none").pulses, 41.0), times)
+    assert phases == pytest.approx(body.spin * times + 0.5 * 0.4 / body.inertia.C * times**2, rel=1e-12)
+    uneven = nutdamp.load(ACE)
+    made = propagation.flown(uneven, nutdamp.plan(uneven, "none").pulses, 61.0)
+    grid = np.linspace(0.0, 60.0, 6001)
+    motions = reference.coast(made.moments, reference.Motion(uneven.omega0, np.eye(3)), np.zeros(3), grid[1:])
+    spins = np.array([uneven.spin, *(one.rates[2] for one in motions)])
+    assert spin_phases(made, grid[[-1]])[0] == pytest.approx(np.trapezoid(spins, grid), rel=1e-7)
+
+
+@pytest.mark.deep
+def test_the_verification_is_a_line_and_the_equations_are_those_of_the_guide() -> None:
+    verified = section(ace(), "verification")
+    assert re.search(r"DOP853( and Basilisk)? agree \(within 1e-09 rad\)", verified.all("p")[0].text)
+    checks = {row["method"]: row for row in sheet(verified, "Maximum differences")}
+    assert float(checks["DOP853, full tensor"]["Δaxis rad"].removeprefix("< ")) <= 1e-9
+    (listing,) = (one.text for one in ace().all("pre") if "M(17)" in one.text)
+    for number in ("M(1)", "M(17)", "M(18)", "M(19)"):
+        assert re.search(rf"^{re.escape(number)} ", listing, re.MULTILINE)
+    symbols = facts(ace(), "Symbols")
+    assert symbols["J_v"] == "impulse of pulse v, N m s: about axis 1, + i times that about axis 2"
+
+
+@pytest.mark.deep
+def test_configuration_control_is_written_as_given() -> None:
+    given = {"document": "ND-7", "issue": '2 "b"', "author": "M. Ö", "date": "2026-03-01"}
+    controlled = ace(title="ACE <1>", **given)
+    assert controlled.all("h1")[0].text == "ACE <1>"
+    digest = hashlib.sha256(ACE.read_bytes()).hexdigest()
+    for node, expected in ((controlled, 'ND-7 iss 2 "b" · M. Ö · 2026-03-01 · '), (ace(), "")):
+        (line,) = (one.text for one in node.all("p") if one.attributes.get("class") == "control")
+        assert line == f"{expected}input {digest[:8]}"
+    footer = r'content: "ND\2d 7\20 iss\20 2\20 \22 b\22 \2c \20 2026\2d 03\2d 01\2c \20 input\20 '
+    assert footer in controlled.all("style")[0].text
+
+
+@pytest.mark.deep
+@pytest.mark.usefixtures("plain_pages")
+def test_input_is_known_by_its_digest_and_the_date_is_that_of_the_build_where_none_is_given(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert run("init", "craft.yaml").returncode == 0
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "1772366400")
+    digest = hashlib.sha256((tmp_path / "craft.yaml").read_bytes()).hexdigest()
+    for more, said in (((), "2026-03-01"), (("--date", "1 May 2026"), "1 May 2026")):
+        asked = ("report", "craft.yaml", "--nominal", "--scheme", "two-pulse", "-o", "page.html", *more)
+        assert run(*asked).returncode == 0
+        content = (tmp_path / "page.html").read_text("utf-8")
+        assert f'<p class="control">{said} · input {digest[:8]}</p>' in content
+        assert facts(tree(content), "Versions")["input file"] == f"craft.yaml, SHA-256 {digest}"
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "yesterday")
+    check_text("page.date", run("report", "-o", "c.html", status=2).stderr)
+
+
+@pytest.mark.deep
+@pytest.mark.usefixtures("plain_pages")
+@pytest.mark.parametrize(("tolerances", "state"), [((), "met"), (("--set", "dispersions.A={normal: 1 %}"), "missed")])
+def test_the_top_of_the_page_has_the_bounds_of_the_screen(
+    run: Run, tmp_path: Path, tolerances: tuple[str, ...], state: str
+) -> None:
+    """With the tolerances of the file enough cases comply with one scheme; with A known to 1 % with none."""
+    schemes = [part for name in CLASSIC for part in ("--scheme", name)]
+    run("report", *schemes, *tolerances, "-o", "page.html")
+    lines = run("plan", *schemes, *tolerances, columns=120).stdout.splitlines()
+    page = tree((tmp_path / "page.html").read_text("utf-8"))
+    decision = section(page, "decision")
+    assert decision.attributes["class"] == state
+    assert [node.text for node in decision.all("p")[:2]] == lines[1:3]
+    rows = {row[0].text: [cell.text for cell in row[2:]] for row in cells(decision.all("table")[0])}
+    for line in (line for line in lines if line.partition("  ")[0] in rows):
+        label, limit, nominal, level, alone, margin, word = re.split(r"  +", line)
+        bounds = [f"nominal {nominal}", f"99.7 % within {level}", f"limit {limit}", f"margin {margin}"]
+        assert rows.pop(label) == [*bounds, f"{alone} keep it", word]
+    assert rows == {}
+    (chosen,) = (one.text for one in page.all("li") if one.attributes.get("class") == "mark")
+    assert chosen.startswith(lines[1].partition(": pulses")[0].split()[-1])
+
+
+@pytest.mark.weekly
+@pytest.mark.parametrize("name", ["lunar-prospector", "magnus-a03"])
+def test_the_notes_name_the_plan_that_can_be_sent_or_fired_as_it_stands(run: Run, tmp_path: Path, name: str) -> None:
+    assert run("init", "--from", name, "craft.yaml").returncode == 0
+    assert run("report", "craft.yaml", "-o", "page.html").returncode == 0
+    shown = section(tree((tmp_path / "page.html").read_text("utf-8")), "decision")
+    told = {"lunar-prospector": "FLY command-block: ", "magnus-a03": "two-pulse fires ideal impulses"}
+    assert told[name] in shown.text
+
+
+@pytest.mark.deep
+def test_a_turn_is_in_the_title() -> None:
+    """A body that is to turn to a target 10° away; within 9 s there is no plan, and the page says so."""
+    body = nutdamp.example().with_(goal={"tilt": "10 deg", "azimuth": "45 deg"}, limits={"horizon": "100 s"})
+    shown = tree(plain_page(compare(body, ["rhumb-line"], samples=0)))
+    assert shown.all("h1")[0].text == "Sounder-1 · damp 5° nutation, turn by 10°"
+    late = plain_page(compare(body.with_(limits={"horizon": "9 s"}), ["rhumb-line"]))
+    assert (late.state, late.headline[0]) == ("missed", "NO PLAN")

@@ -1,7 +1,5 @@
 """Comparisons: the rule of the recommendation on plans whose figures are given, its notes, and why none is cheaper."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from typing import Any
@@ -17,6 +15,7 @@ from support.builders import (
     cross,
     judged,
     noted,
+    present,
     recommended,
     spinner,
 )
@@ -29,7 +28,6 @@ from nutdamp.files.reader import read_spacecraft
 from nutdamp.planning import plan as planning
 from nutdamp.planning.decision import Comparison, Gain, Ground, cheapest, compare, recommend, usual
 from nutdamp.planning.notes import alternatives, comparison_warnings, reasons
-from nutdamp.planning.plan import Plan, Standing
 from nutdamp.planning.screening import FlownPlan, unflown
 from nutdamp.planning.verdict import Cases, Status
 from nutdamp.schemes import catalogue
@@ -125,7 +123,7 @@ class Given(Judged):
 
 def made(
     name: str, nutation: float, cost: float | None = None, shift: float = 0.0, end: float = 1.0, **more: Any
-) -> Plan:
+) -> planning.Plan:
     degrees, speed = more.pop("degrees", 5.0), more.pop("speed", None)
     one = judged(name, nutation, propellant=cost, shift=shift, end=end, **more)
     if degrees != 5.0:
@@ -137,7 +135,7 @@ def made(
     return INFEASIBLE if name == "?" else one
 
 
-def plans_of(given: str, text: str) -> list[Plan]:
+def plans_of(given: str, text: str) -> list[planning.Plan]:
     plans = []
     for name, *rest in (one.split() for one in text.split(";")):
         numbers = [None if one == "-" else float(one) for one in rest]
@@ -196,9 +194,9 @@ or else enough comply            | keep | idle ONLY MEETS 1       | idle 4.9 0; 
 """
 
 
-def with_shares(plans: list[Plan], text: str) -> Comparison:
+def with_shares(plans: list[planning.Plan], text: str) -> Comparison:
     """The comparison of plans that flew so many cases that the share that complies is known so closely."""
-    flown: dict[Plan, FlownPlan] = {}
+    flown: dict[planning.Plan, FlownPlan] = {}
     for plan, bounds in zip(plans, text.split(";"), strict=True):
         low, high = (float(bound) for bound in (bounds.split("-") * 2)[:2])
         flown[plan] = FlownPlan(plan, None, cases=Cases(2_048, 1, 0.997, low, low, high, final=low == high))
@@ -214,7 +212,11 @@ def test_plans_with_which_too_few_dispersed_cases_comply_miss_the_requirement() 
         compared = with_shares(plans_of(given, text), shares)
         found, cases = compared.recommendation, compared.cases[compared[best]]
         assert found.plan is compared.recommended is compared[best], what
-        assert (found.ground, found.standing, found.count) == (Ground[ground], Standing[standing], int(count)), what
+        assert (found.ground, found.standing, found.count) == (
+            Ground[ground],
+            planning.Standing[standing],
+            int(count),
+        ), what
         enough = {each: each.meets_requirement and compared.cases[each].low >= 0.997 for each in compared}
         assert {each: verdict.met for each, verdict in compared.verdicts.items()} == enough
         # Undecided where the budget of work ended too early.
@@ -273,8 +275,7 @@ def test_what_is_to_be_saved_decides_on_the_plan() -> None:
     )
     for least, best in (("propellant", "frugal"), ("time", "soon"), ("pulses", "late")):
         found = recommend(plans, least=least)
-        assert found.plan is not None
-        assert (found.plan.scheme, found.ground, found.least, found.count) == (best, Ground.COST, least, 3)
+        assert (present(found.plan).scheme, found.ground, found.least, found.count) == (best, Ground.COST, least, 3)
         compared = Comparison(plans[0].spacecraft, tuple(plans), least=least)
         assert [each.why.code for each in compared.verdict.cheaper] == ["why-nutation"] * (least != "propellant")
 
@@ -294,8 +295,7 @@ def test_where_thrusters_are_too_weak_the_plan_that_leaves_least(degrees: int) -
     text = case("nothing-damps.yaml").read_text(encoding="utf-8").replace("8 deg", f"{degrees} deg")
     compared = compare(read_spacecraft(text, "nothing-damps.yaml"), catalogue.CLASSIC)
     left = {one.scheme: one.flown.nutation for one in compared.plans if one.flown is not None}
-    assert compared.recommended is not None
-    assert compared.recommended.scheme == min(left, key=lambda name: left[name]) == "four-pulse"
+    assert present(compared.recommended).scheme == min(left, key=lambda name: left[name]) == "four-pulse"
     check_text(f"plan.weak-{degrees}", recommended("weak", compared))
 
 
@@ -318,14 +318,14 @@ ALONE, BOUND = made("cheap", 0.0, 12.0, 0.11, goal=POINTING), made("ideal", 0.0,
 BLOCK = Block("T", 1, 0.1, 0.1, 1)
 
 
-def fired(cost: float, *blocks: Block) -> Plan:
+def fired(cost: float, *blocks: Block) -> planning.Plan:
     """Real pulse widths, perhaps sent as command blocks."""
     one = made("real", 0.1, cost, 0.15, end=4.0, required=BOTH)
     wide = tuple(replace(each, on_time=0.1, torque=10.0 * each.impulse) for each in one.pulses)
     return replace(one, schedule=Schedule(wide, blocks=blocks))
 
 
-GAINS: list[tuple[Plan, tuple[Plan, ...], Gain, str | None]] = [
+GAINS: list[tuple[planning.Plan, tuple[planning.Plan, ...], Gain, str | None]] = [
     (SHIFTED, (made("still", 0.0, 13.1, 0.35),), Gain.STEADIER, "still"),
     (SHIFTED, (made("still", 0.0, 13.1, 0.37),), Gain.STEADIER, None),
     (SHIFTED, (made("still", 0.0, 13.3, 0.35),), Gain.STEADIER, None),
@@ -361,8 +361,7 @@ def test_the_cheapest_plan_that_gains_much_for_little_more_is_an_alternative() -
 
 def test_only_what_the_spacecraft_can_fire_is_recommended_unless_named_or_timed() -> None:
     """Where it takes commands: command blocks, and no pulse at all."""
-    commands = nutdamp.load(case("cbp1004.yaml")).commands
-    assert commands is not None
+    commands = present(nutdamp.load(case("cbp1004.yaml")).commands)
     given = fired(0.1), fired(0.2, BLOCK), made("none", 0.1, 0.0, pulses=0, required=BOTH)
     bodies = [replace(given[0].spacecraft, commands=one) for one in (None, commands)]
     for_free, commanded = ([replace(one, spacecraft=body) for one in given] for body in bodies)
@@ -405,8 +404,7 @@ def test_none_is_compared_and_recommended_where_no_pulse_is_needed() -> None:
 
 
 def test_the_notes_on_what_a_plan_gains_and_what_it_is_worse_in() -> None:
-    lines = []
-    for best, other in (
+    pairs = (
         (SHIFTED, made("still", 0.0, 12.8, 0.01)),
         (MANY, FEW),
         (made("many", 0.0, 0.1, 1.0, pulses=2), made("both", 0.0, 0.104, 0.01, pulses=1)),
@@ -415,9 +413,9 @@ def test_the_notes_on_what_a_plan_gains_and_what_it_is_worse_in() -> None:
         (SLOW, made("soon", 0.0, 0.1045, 0.2, 50.0)),
         (BOUND, fired(0.109)),
         (BOUND, fired(9.0, BLOCK)),
-    ):
-        lines.append(noted(alternatives(Comparison(best.spacecraft, (best, other)))))
-    check_text("plan.hints", "\n".join(lines))
+    )
+    notes = (noted(alternatives(Comparison(pair[0].spacecraft, pair))) for pair in pairs)
+    check_text("plan.hints", "\n".join(notes))
 
 
 @pytest.mark.deep
@@ -429,6 +427,6 @@ def test_optimal_keeps_a_spin_without_a_channel_for_it() -> None:
 def test_examples_have_such_alternatives(name: str, gain: Gain) -> None:
     body = nutdamp.example(name)
     found = compare(body, usual(body), timed=gain is Gain.COMMANDED)
-    assert found.recommended is not None
-    assert (found.recommended.pulses.idealised, bool(found.recommended.pulses.blocks)) == (gain is Gain.REAL, False)
+    pulses = present(found.recommended).pulses
+    assert (pulses.idealised, bool(pulses.blocks)) == (gain is Gain.REAL, False)
     assert bool(found.recommendation.alternatives[gain].pulses.blocks) is (gain is Gain.COMMANDED)

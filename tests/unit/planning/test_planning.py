@@ -1,7 +1,6 @@
-"""Plans judged: requirement, limits, and why there is none; a scheme with a bug takes no other scheme down."""
+"""Plans judged, and why there is none; their numbers; ways round cones."""
 
-from __future__ import annotations
-
+import itertools
 import math
 import re
 from collections.abc import Callable
@@ -11,33 +10,35 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from support.builders import BOTH, HALF_A_DEGREE, channel, codes, cross, judged, noted, spinner
+from scipy.integrate import simpson
+from support import reference
+from support.builders import BOTH, HALF_A_DEGREE, aimed, channel, codes, cross, events, judged, noted, present, spinner
 from support.cases import deep, weekly
 from support.golden import check_text
 
 from nutdamp.files.reader import read_spacecraft
 from nutdamp.flight import end_state
-from nutdamp.flight.end_state import seen_at
 from nutdamp.flight.propagation import by_impulses
+from nutdamp.physics import attitude
 from nutdamp.planning import plan as planning
 from nutdamp.planning.decision import Ground, compare
 from nutdamp.planning.notes import broken_limits, infeasibility, plan_notes, reasons
-from nutdamp.planning.plan import Standing, plan
+from nutdamp.planning.plan import Plan, Standing, plan
 from nutdamp.schemes import catalogue, two_pulse
-from nutdamp.schemes.catalogue import CLASSIC, OptimalOptions, SchemeOptions
 from nutdamp.spacecraft.constraints import Limit, Windows, breaches, keeps_limits
-from nutdamp.spacecraft.equipment import Channel
-from nutdamp.spacecraft.model import Limits, Requirement, Spacecraft
+from nutdamp.spacecraft.equipment import Channel, Steerable
+from nutdamp.spacecraft.model import Keep, Limits, Requirement, Spacecraft, Vector
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
+from nutdamp.units import STANDARD_GRAVITY
 
 DRIFT_ONLY = Requirement(momentum_shift=math.radians(0.2))
-KEPT = OptimalOptions(free_axis=False)
+KEPT = catalogue.OptimalOptions(free_axis=False)
 """H ends where it was, though nothing in the file asks for it."""
 
 
 def test_compare_keeps_the_order_given_and_recommends_one_of_them() -> None:
-    compared = compare(spinner(channels=cross(20.0), requirement=BOTH), CLASSIC)
-    assert [one.scheme for one in compared.plans] == list(CLASSIC)
+    compared = compare(spinner(channels=cross(20.0), requirement=BOTH), catalogue.CLASSIC)
+    assert [one.scheme for one in compared.plans] == list(catalogue.CLASSIC)
     # one-pulse and four-pulse move H by degrees: only two-pulse meets the shift required.
     assert [one.meets_requirement for one in compared.plans] == [False, True, False]
     recommended = compared.recommendation
@@ -80,9 +81,8 @@ def test_without_nutation_there_is_an_empty_schedule_and_none_is_free_motion() -
             assert (made.feasible, len(made.pulses), made.meets_requirement) == (True, 0, True)
         assert codes(plan_notes(made)) == ["no-nutation"]
     free = plan(spinner(degrees=5.0), "none")
-    assert free.flown is not None
     assert len(free.pulses) == 0
-    assert math.degrees(free.flown.nutation) == pytest.approx(5.0, rel=1e-14)
+    assert math.degrees(present(free.flown).nutation) == pytest.approx(5.0, rel=1e-14)
     body = spinner(moments=(121.2, 120.0, 80.0), channels=cross(8.0))
     check_text("plan.no-rounding", noted(plan_notes(plan(body, "one-pulse"))))
 
@@ -98,10 +98,10 @@ def test_a_scheme_with_a_bug_leaves_the_others_also_where_it_shows_only_when_the
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     body = spinner(channels=cross(20.0))
-    whole = compare(body, CLASSIC)
+    whole = compare(body, catalogue.CLASSIC)
     for error in (ZeroDivisionError, IndexError):
         monkeypatch.setattr(two_pulse, "schedule", raising(error))
-        compared = compare(body, CLASSIC)
+        compared = compare(body, catalogue.CLASSIC)
         (failed,) = compared.failed
         assert (failed.scheme, type(failed.failure)) == ("two-pulse", error)
         assert error.__name__ in infeasibility(failed)
@@ -118,7 +118,7 @@ def test_a_plan_that_would_not_lower_the_nutation_is_infeasible() -> None:
     """A push along the transverse rate, and one against it."""
     body = spinner(channels=cross(40.0), phase=0.0)
     along, against = (
-        planning.judged(body, "one-pulse", Schedule((channel_pulse(one, 0.05, 0.1),)), SchemeOptions())
+        planning.judged(body, "one-pulse", Schedule((channel_pulse(one, 0.05, 0.1),)), catalogue.SchemeOptions())
         for one in body.channels[:2]
     )
     assert (along.feasible, against.feasible) == (False, True)
@@ -139,15 +139,14 @@ SELF_DAMPING = replace(
 
 def idle(body: Spacecraft, t: float) -> float:
     """Nutation, rad, of a flight without pulses."""
-    return seen_at(by_impulses(body, Schedule(), t), t).final.nutation
+    return end_state.seen_at(by_impulses(body, Schedule(), t), t).final.nutation
 
 
 def test_a_plan_that_leaves_more_than_decay_alone_by_its_end_is_infeasible_and_says_so() -> None:
     compared = compare(replace(SELF_DAMPING, limits=Limits(horizon=180.0)), ("two-pulse",))
     (made,) = compared.plans
-    assert made.worse is not None
-    assert made.worse < 0.01 * SELF_DAMPING.nutation  # it does damp
-    assert idle(SELF_DAMPING, made.worse_at) < made.worse
+    assert present(made.worse) < 0.01 * SELF_DAMPING.nutation  # it does damp
+    assert idle(SELF_DAMPING, made.worse_at) < present(made.worse)
     check_text("plan.worse-than-decay", f"{infeasibility(made)}\n{noted(reasons(compared))}")
     assert math.degrees(idle(SELF_DAMPING, 81.91)) == pytest.approx(0.05, rel=1e-3)  # the time that the text names
     late = plan(replace(SELF_DAMPING, limits=Limits(earliest=300.0)), "one-pulse")  # the default horizon is 240 s
@@ -155,7 +154,11 @@ def test_a_plan_that_leaves_more_than_decay_alone_by_its_end_is_infeasible_and_s
 
 
 @given(
-    st.floats(5.0, 100.0), st.floats(1e-3, 0.5), st.floats(0.5, 20.0), st.sampled_from(CLASSIC), st.floats(0.0, 60.0)
+    st.floats(5.0, 100.0),
+    st.floats(1e-3, 0.5),
+    st.floats(0.5, 20.0),
+    st.sampled_from(catalogue.CLASSIC),
+    st.floats(0.0, 60.0),
 )
 @settings(max_examples=10)
 @pytest.mark.deep
@@ -225,7 +228,7 @@ def test_the_horizon_that_is_named_as_long_enough_is(
     assert named
     assert plan(replace(body, limits=Limits(horizon=float(named[1]))), "optimal", KEPT).feasible, said
     assert ("--free-axis" in said) is freed
-    assert plan(body, "optimal", OptimalOptions(free_axis=True)).feasible is freed
+    assert plan(body, "optimal", catalogue.OptimalOptions(free_axis=True)).feasible is freed
 
 
 TIGHT = Limits(horizon=20.0, earliest=1.0, gap=0.5, max_pulses=3, blackout=((6.0, 7.0),))
@@ -289,3 +292,151 @@ def test_one_slack_for_windows_and_breaches(exponent: int, off: float, which: in
     allowed = windows.allows(pulse.start, pulse.on_time, late)
     assert keeps_limits(body, (pulse,)) == allowed
     assert windows.allowed(np.array([pulse.start]), np.array([pulse.on_time]), late).tolist() == [allowed]
+
+
+# --- Δv, spin change, propellant and impulse, against the reference integrator and by hand
+
+
+def jet(name: str, position: tuple[float, float, float], force: tuple[float, float, float]) -> Channel:
+    return channel(name, *np.cross(position, force), isp=220.0, thrust=float(np.linalg.norm(force)), force=force)
+
+
+JETS = (
+    jet("T1", (0.0, 0.5, 0.8), (0.0, 10.0, 1.0)),
+    jet("T2", (0.5, 0.0, 0.8), (8.0, 2.0, 0.0)),
+    jet("T3", (0.0, -0.5, 0.8), (0.0, -10.0, -3.0)),
+)
+BODY, REVERSED = spinner(channels=JETS, mass=250.0), spinner(spin=-3.0, channels=JETS, mass=250.0)
+
+
+def flown_force(body: Spacecraft, made: Schedule) -> Vector:
+    """∫ R(t) F dt by Simpson's rule on the reference motion, from each moment that a pulse begins or ends to the next.
+
+    Pulses may overlap: forces add.
+    """
+    moments, gained = body.inertia.moments, np.zeros(3)
+    rotation = reference.frame_n(moments, body.omega0)
+    edges = sorted({edge for pulse in made for edge in (pulse.start, pulse.end)})
+    for begin, end in itertools.pairwise(edges):
+        pushing = [one for one in made if one.start < 0.5 * (begin + end) < one.end]
+        if pushing:
+            start = reference.fly(moments, body.omega0, events(made), begin, rotation)
+            times = np.linspace(0.0, end - begin, 2001)
+            torque, force = (np.sum([getattr(one, of) for one in pushing], axis=0) for of in ("torque", "force"))
+            motions = [start, *reference.coast(moments, start, torque, times[1:])]
+            gained += simpson(np.array([motion.rotation @ force for motion in motions]), x=times, axis=0)
+    return gained
+
+
+@pytest.mark.parametrize(
+    ("body", "fired"),
+    [
+        *((BODY, "one-pulse"), deep(BODY, "two-pulse"), deep(BODY, "four-pulse")),
+        *(deep(REVERSED, "one-pulse"), deep(REVERSED, "two-pulse"), (REVERSED, "four-pulse")),
+        # Stretches are cut by how fast the body turns at either end of the pulse, not as it begins.
+        (spinner(2.0, 1.0, 0.1, mass=10.0), [(channel("up", 0.0, 1.2, 1.0, force=(1.0, 0.0, 0.5)), 5.0, 10.0)]),
+        (BODY, [(JETS[0], 2.0, 1.0), (JETS[1], 2.4, 1.0)]),  # overlapping
+        (BODY, [(channel("couple", 0.0, 20.0, 0.0, force=(0.0, 0.0, 0.0)), 2.0, 1.0)]),
+    ],
+)
+def test_delta_v_is_the_force_turned_into_the_inertial_frame_over_the_mass(
+    body: Spacecraft, fired: str | list[tuple[Channel, float, float]]
+) -> None:
+    by_hand = isinstance(fired, list)
+    made = Plan(body, "", Schedule(tuple(channel_pulse(*one) for one in fired))) if by_hand else plan(body, str(fired))
+    expected = flown_force(made.spacecraft, made.pulses) / (body.mass or 0.0)
+    assert made.delta_v == pytest.approx(expected, abs=(1e-9 if by_hand else 1e-10) * float(np.linalg.norm(expected)))
+    assert replace(made, spacecraft=replace(body, mass=None)).delta_v is None
+    unknown = replace(made.pulses.pulses[0], force=None)
+    assert replace(made, schedule=Schedule((unknown, *made.pulses.pulses[1:]))).delta_v is None
+
+
+@pytest.mark.parametrize("scheme", catalogue.CLASSIC)
+def test_spin_change_and_propellant(scheme: str) -> None:
+    """By the reference integrator, by the sum of axial impulses, and by F t / (Isp g0)."""
+    made = plan(BODY, scheme)
+    end = reference.fly(BODY.inertia.moments, BODY.omega0, events(made.pulses), made.pulses.end)
+    assert made.spin_change == pytest.approx(end.rates[2] - 3.0, abs=1e-11)
+    assert made.spin_change == pytest.approx(math.fsum(one.impulse[2] for one in made.pulses) / 80.0, abs=1e-13)
+    thrust = {one.name: one.thrusters[0].thrust or 0.0 for one in JETS}
+    expected = math.fsum(thrust[pulse.channel] * pulse.on_time / (220.0 * 9.80665) for pulse in made.pulses)
+    assert made.pulses.propellant == pytest.approx(expected, rel=1e-14)
+    assert STANDARD_GRAVITY == 9.80665
+
+
+def test_propellant_of_all_thrusters_of_a_channel_and_by_lever_arms_and_one_unknown_makes_the_sum_unknown() -> None:
+    pulse = channel_pulse(Channel("both", tuple(one.thrusters[0] for one in JETS[:2])), 3.0, 2.0)
+    thrust = math.hypot(10.0, 1.0) + math.hypot(8.0, 2.0)
+    assert pulse.propellant == pytest.approx(thrust * 2.0 / (220.0 * 9.80665), rel=1e-15)
+    assert np.array_equal(pulse.impulse, 2.0 * (JETS[0].torque + JETS[1].torque))
+    assert (None if pulse.force is None else pulse.force.tolist()) == [8.0, 12.0, 1.0]
+    unknown = channel_pulse(cross(20.0)[0], 6.0, 1.0)
+    known = [Schedule(some).propellant is not None for some in ((), (pulse,), (pulse, unknown))]
+    assert known == [True, True, False]
+    made = plan(spinner(steerable=Steerable(torque=20.0, isp=220.0, lever_arm=0.8)), "two-pulse").pulses
+    assert made.propellant == pytest.approx(made.total_impulse / 0.8 / (220.0 * 9.80665), rel=1e-14)
+    assert plan(spinner(steerable=Steerable(20.0)), "two-pulse").pulses.propellant is None
+
+
+def test_impulses_and_the_end_of_a_schedule_in_the_order_of_its_centres() -> None:
+    body = spinner(degrees=5.0)
+    made = plan(body, "two-pulse").pulses
+    assert body.least_impulse == pytest.approx(80.0 * 3.0 * math.tan(math.radians(5.0)), rel=1e-15)
+    assert made.total_impulse == math.fsum(float(np.linalg.norm(one.impulse)) for one in made)
+    ordered = Schedule((channel_pulse(JETS[0], 9.0, 4.0), channel_pulse(JETS[1], 8.0, 0.5)))
+    assert ([pulse.t for pulse in ordered], ordered.end) == ([8.0, 9.0], 11.0)
+
+
+# --- ways round cones: on the sphere, and flown leg by leg by the cheapest scheme that points
+
+SUN = math.radians(3.0)
+TURNED = replace(
+    aimed(spinner(80.0, 120.0, degrees=0.2), 12.0, 30.0), steerable=Steerable(), limits=Limits(horizon=900.0)
+)
+"""A turn of 12 deg."""
+START = TURNED.momentum / np.linalg.norm(TURNED.momentum)
+
+
+def watched(direction: Vector, least: float = SUN) -> Spacecraft:
+    return replace(TURNED, keep=(Keep("Sun", direction / np.linalg.norm(direction), least=least),))
+
+
+def length(route: tuple[Vector, ...]) -> float:
+    return sum(float(attitude.angle_between(*leg)) for leg in itertools.pairwise((START, *route)))
+
+
+def test_routes_lead_to_the_target_clear_of_the_cone_the_shortest_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two legs that touch a circle of 3 deg and its margin of 0.5 deg about the middle of 12 deg, as in a plane."""
+    monkeypatch.setattr(planning, "MARGINS", planning.MARGINS[:2])
+    body = watched(START + TURNED.target_axis)
+    found = planning.routes(body)
+    assert 4 <= len(found) <= planning.ROUTES
+    for route in found:
+        assert np.allclose(route[-1], body.target_axis)
+        for one, two in itertools.pairwise((START, *route)):
+            shares = np.linspace(0.0, 1.0, 50)[:, None]
+            points = (1.0 - shares) * one + shares * two  # chords of short legs lie next to their great circles
+            assert attitude.angle_between(points, np.asarray(body.keep[0].direction)).min() > SUN
+    lengths = list(map(length, found))
+    assert np.all(np.diff(lengths) > -2e-3)
+    clear = math.degrees(SUN + planning.MARGINS[0])
+    bend = clear / math.sqrt(1.0 - (clear / 6.0) ** 2)
+    assert 1.0 < lengths[0] / math.radians(2.0 * math.hypot(6.0, bend)) < 1.03
+    assert not any(len(route) < 2 for route in found)
+    for route in planning.routes(watched(-body.target_axis)):  # without a cone in the way they are next to straight
+        assert length(route) == pytest.approx(math.radians(12.0), rel=1e-3)
+
+
+def test_a_plan_goes_round_where_the_straight_way_breaks_the_cone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The Sun stands where the axis would be half-way on its half cone."""
+    monkeypatch.setattr(planning, "MARGINS", planning.MARGINS[:1])
+    free = planning.plan(TURNED, "half-cone")
+    track = free.fly(free.end, samples=101).track
+    body = watched(track.axis[len(track.t) // 2], math.radians(1.0))
+    assert planning.judged(body, "half-cone", free.pulses, free.options).astray is not None
+    routed = planning.plan(body, "half-cone")
+    assert routed.feasible
+    (aspect,) = routed.aspects
+    assert aspect.kept
+    assert present(routed.left).aim < 1e-6
+    assert routed.total_impulse < 1.6 * free.total_impulse

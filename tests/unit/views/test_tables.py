@@ -1,25 +1,31 @@
-"""One declaration of a table gives screens, pages, CSV, JSON and arrays that agree."""
-
-from __future__ import annotations
+"""One declaration of a table gives screens, pages, CSV, JSON and arrays that agree; the default screen of plan."""
 
 import csv
 import io
 import math
+import re
+from dataclasses import replace
 from types import SimpleNamespace as Row
 
 import numpy as np
 import pytest
-from rich.console import Console
+from support.builders import spinner
 from support.cases import spread
+from support.commands import printed
+from support.golden import check_text
 from support.places import CONFIGS
 
 import nutdamp
 from nutdamp.files.schedules import BLOCKS_HEADER, EFFECTIVE, PULSES_HEADER
+from nutdamp.spacecraft.model import Requirement, Spacecraft
 from nutdamp.units import US, screen_units
-from nutdamp.views.parts import block_table, pulse_table
-from nutdamp.views.tables import REAL, TEXT, WHOLE, YES_NO, Column, DataTable, angle_of
-from nutdamp.views.text import vector
+from nutdamp.views.glance import glance
+from nutdamp.views.parts import LINES, SIZES, block_table, pulse_table
+from nutdamp.views.tables import REAL, TEXT, WHOLE, WIDTH, YES_NO, Column, DataTable, angle_of
+from nutdamp.views.text import short_angle, vector
+from nutdamp.views.verdict import HEADLINES
 
+NAMES = sorted(path.stem for path in CONFIGS.glob("*.yaml"))
 TABLE = DataTable(
     "Things",
     (
@@ -38,10 +44,7 @@ TABLE = DataTable(
 
 
 def screen(table: DataTable, first: int | None = None, width: int = 80) -> list[list[str]]:
-    console = Console(width=width, file=io.StringIO())
-    with console.capture() as captured:
-        console.print(table.screen("screen", first=first))
-    return [line.split() for line in captured.get().splitlines()]
+    return [line.split() for line in printed(table.screen("screen", first=first), width)]
 
 
 def test_a_file_has_vectors_in_three_columns_and_unknown_values_empty() -> None:
@@ -82,17 +85,14 @@ def test_of_many_rows_the_first_ones_and_the_last_are_shown_where_that_saves_roo
 
 
 def test_quantities_go_down_where_rows_go_across() -> None:
-    console = Console(width=80, file=io.StringIO())
-    with console.capture() as captured:
-        console.print(TABLE.transposed("screen"))
-    assert [line.split() for line in captured.get().splitlines()[:3]] == [
+    assert [line.split() for line in printed(TABLE.transposed("screen"))[:3]] == [
         ["one", "two", "three"],
         ["count", "1", "2", "3"],
         ["size,", "mm", "500.0", "–", "250.0"],
     ]
 
 
-@spread("name", sorted(path.stem for path in CONFIGS.glob("*.yaml")), quick=3, deep=4)
+@spread("name", NAMES, quick=3, deep=4)
 def test_files_of_pulses_and_blocks_have_the_names_that_are_read_again(name: str) -> None:
     plan = nutdamp.plan(nutdamp.load(CONFIGS / f"{name}.yaml"), "optimal")
     if not plan.feasible:
@@ -124,3 +124,86 @@ def test_a_screen_has_the_units_requested_and_files_are_si() -> None:
         assert screen(table)[1:3] == [["lbm", "ft", "lbf"], ["1.0000", "(1,", "0,", "-2)"]]
         assert [heading.unit for heading in table.headings("screen")] == ["lbm", "ft lbf"]
         assert (table.csv(), table.json()) == files
+
+
+# --- the default screen of plan: what to fire on top, in 40 lines of 80 columns
+
+
+def glance_lines(compared: nutdamp.Comparison) -> list[str]:
+    return printed(glance(compared), WIDTH)
+
+
+def compared(body: Spacecraft, *names: str) -> nutdamp.Comparison:
+    return nutdamp.compare(body, names, samples=0)
+
+
+@pytest.mark.usefixtures("plans_shared")
+@spread("name", NAMES, quick=2, deep=len(NAMES))
+def test_a_plan_is_seen_at_a_glance(name: str) -> None:
+    lines = glance_lines(compared(nutdamp.load(CONFIGS / f"{name}.yaml")))
+    assert len(lines) <= LINES
+    assert max(map(len, lines)) <= WIDTH
+    assert [line for line in lines if line.startswith((*HEADLINES.values(),))] == [lines[1]]
+    assert lines[-1].startswith("-v ")
+    assert lines[-1].endswith("nutdamp report")
+    assert not any("…" in line and "more" not in line for line in lines)
+
+
+@pytest.mark.usefixtures("plans_shared")
+def test_the_screen_of_the_example() -> None:
+    check_text("glance.example", "\n".join(glance_lines(compared(nutdamp.example()))))
+
+
+def test_a_requirement_that_is_missed_is_never_dropped() -> None:
+    weak = replace(spinner(degrees=5.0), requirement=Requirement(nutation=math.radians(1e-7), momentum_shift=1e-9))
+    lines = glance_lines(compared(weak, "one-pulse"))
+    assert lines[2].startswith("NOT met")
+    assert any(line.startswith("momentum shift") and line.endswith("NOT met") for line in lines)
+
+
+def test_of_many_pulses_the_first_ones_and_the_last_are_shown() -> None:
+    body = nutdamp.load({
+        "name": "weak", "inertia": {"A": 100, "C": 80}, "state": {"spin": 3.0, "nutation": "5 deg"},
+        "thrusters": [{"name": "T", "torque": [2.0, 0, 0], "max_on_time": "0.3 s"}], "limits": {"horizon": "200 s"},
+    })  # fmt: skip
+    plan = compared(body, "optimal")
+    count = len(plan["optimal"].pulses)
+    most, _ = SIZES[0]
+    assert count > most + 1
+    rows = glance_lines(plan)
+    start = next(index for index, line in enumerate(rows) if line.startswith("pulse"))
+    first = [row.split()[0] for row in rows[start + 1 : start + most + 3]]
+    shown = first.index("…")
+    assert first[: shown + 2] == [*map(str, range(1, shown + 1)), "…", str(count)]
+    assert f"{count - shown - 1} more" in rows[start + shown + 1]
+
+
+@pytest.mark.parametrize(
+    ("degrees", "largest", "text"),
+    [
+        (1e-4, math.inf, "0"),
+        (6e-4, math.inf, "0.0006"),
+        (1e-4, 1e-3, "0.0001"),
+        (1.23456, 90.0, "1.23"),
+        (0.0, 1.0, "0"),
+    ],
+)
+def test_zero_is_written_one_way_below_what_matters(degrees: float, largest: float, text: str) -> None:
+    assert short_angle(math.radians(degrees), math.radians(largest)) == text
+
+
+def test_a_plan_that_misses_is_no_headline_to_fly_and_digits_stand_on_their_side_of_the_limit() -> None:
+    body = nutdamp.example().with_(requirement={"nutation": "0.5 deg", "momentum_shift": "0.16836 deg"})
+    lines = glance_lines(compared(body, "four-pulse"))
+    assert lines[1].startswith("NOT ENOUGH: four-pulse")
+    (row,) = (line for line in lines if line.startswith("momentum shift"))
+    most, left = (float(text) for text in re.findall(r"([0-9.]+) deg", row)[:2])
+    assert row.endswith("NOT met")
+    assert left > most
+
+
+@pytest.mark.usefixtures("plans_shared")
+def test_what_only_timed_pulses_reach_names_the_option() -> None:
+    body = nutdamp.load(CONFIGS / "lunar-prospector.yaml")
+    plans = nutdamp.compare(body, options=nutdamp.Options(max_blocks=1), samples=0)
+    assert any("--timed" in line for line in glance_lines(plans))

@@ -1,21 +1,27 @@
-"""When a pulse may be on: earliest start, horizon, gap, blackout windows, ticks."""
-
-from __future__ import annotations
+"""When a pulse may be on, where the center of mass is, and what keeps a bound."""
 
 import cmath
 import itertools
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from support.builders import channel, fan, spinner
+from support.builders import channel, fan, judged, present, spinner
 
+import nutdamp
+from nutdamp.files.carried import later
+from nutdamp.flight.dynamics import Supply
+from nutdamp.flight.propagation import flown
+from nutdamp.montecarlo.cases import DispersedModel
 from nutdamp.spacecraft.constraints import Windows, commandable, for_pairs, free_windows, longest_on_time, rooms
 from nutdamp.spacecraft.equipment import Steerable
-from nutdamp.spacecraft.model import Limits
-from nutdamp.spacecraft.schedule import TOUCHING, channel_pulse, steerable_pulse
+from nutdamp.spacecraft.model import SLACK, Goal, Keep, Limits, Requirement
+from nutdamp.spacecraft.requirements import AIMED_SPIN, Bound, Part, cones, required, spin_tolerance, spins_at
+from nutdamp.spacecraft.schedule import TOUCHING, Schedule, channel_pulse, steerable_pulse
+from nutdamp.spacecraft.tolerances import SpinTolerance
 
 THRUSTER = channel("T", 8.0, 0.0, 0.0)
 
@@ -111,9 +117,8 @@ def test_pulses_of_a_torquer_are_put_on_ticks_with_the_impulse_of_their_on_time(
     assert (ideal.on_time, ideal.t, ideal.magnitude) == pytest.approx((0.0, 0.3, 3.0))
     exact = steerable_pulse(Steerable(20.0, 220.0, 0.8), 1.02, 0.4, on_time=0.26)
     wide = commandable(body, exact)
-    assert exact.propellant is not None
     assert (wide.start, wide.on_time, wide.magnitude) == pytest.approx((0.9, 0.3, 20.0 * 0.3))
-    assert wide.propellant == pytest.approx(exact.propellant * 0.3 / 0.26)
+    assert wide.propellant == pytest.approx(present(exact.propellant) * 0.3 / 0.26)
 
 
 def test_pulses_share_the_time_between_them_but_for_the_gap() -> None:
@@ -153,3 +158,135 @@ def test_windows_behind_the_horizon_leave_no_empty_window_at_its_end() -> None:
     body = spinner(limits=Limits(horizon=100.0, blackout=((10.0, 100.0), (105.0, 110.0))))
     assert free_windows(body) == [(0.0, 10.0)]
     assert free_windows(body, 107.0) == [(0.0, 10.0), (100.0, 105.0)]
+
+
+# --- center of mass: arms of the thrusters, its travel with the propellant, and how far it may be off
+
+TEXT = """
+name: b
+mass: 250 kg
+inertia: {A: 120, C: 80}
+state: {spin: 30 rpm, nutation: 5 deg, phase: 20 deg}
+thrusters:
+  - {name: P, position: [0.1, 0.5, 1.2], direction: [0, -1, 0], force: 10 N, isp: 220 s, max_on_time: 2 s}
+  - {name: N, position: [0.1, -0.5, 1.2], direction: [0, 1, 0], force: 10 N, isp: 220 s, max_on_time: 2 s}
+center_of_mass: [0.1 m, 0, 40 cm]
+"""
+MOVING = f"{TEXT}center_of_mass_per_kg: [0, 0, -50 mm/kg]\n"
+TENSOR = "{tensor: [[120, 2, 1], [2, 110, 0.5], [1, 0.5, 80]]}"
+
+
+def test_arms_count_from_the_center_of_mass() -> None:
+    body = nutdamp.read(TEXT)
+    assert body.channels[0].torque == pytest.approx(np.cross([0.0, 0.5, 0.8], [0.0, -10.0, 0.0]))
+    assert body.channels[1].torque == pytest.approx(np.cross([0.0, -0.5, 0.8], [0.0, 10.0, 0.0]))
+
+
+def test_a_force_through_the_center_of_mass_turns_nothing() -> None:
+    through = TEXT.replace("direction: [0, -1, 0]", "direction: [0, 0.5, 0.8]")
+    with pytest.raises(nutdamp.errors.FaultyFile, match="centre of mass"):
+        nutdamp.read(through)
+
+
+def test_an_accelerometer_counts_from_it_too() -> None:
+    loop = "loop: {sensor: {kind: accelerometer, rate: 10 Hz, position: [0.9, 0, 0.4]}, start: 1 deg, stop: 0.1 deg}\n"
+    assert present(nutdamp.read(TEXT + loop).loop).sensor.position == pytest.approx([0.8, 0.0, 0.0])
+
+
+@pytest.mark.parametrize("inertia", ["{A: 120, C: 80}", TENSOR])
+def test_it_moves_with_the_propellant_used(inertia: str) -> None:
+    """By the moment of force about where it is in the middle of the pulse."""
+    body = nutdamp.read(MOVING.replace("{A: 120, C: 80}", inertia))
+    supply, channel = Supply(body), body.channels[0]
+    supply.draw(3.0)
+    fired = supply.fire(channel_pulse(channel, 10.0, 1.0), channel)
+    used = 3.0 + 0.5 * (channel.mass_flow or 0.0)
+    center = np.array([0.1, 0.0, 0.4 - 0.05 * used])
+    expected = np.cross(np.array([0.1, 0.5, 1.2]) - center, [0.0, -10.0, 0.0])
+    assert body.inertia.axes @ present(fired.torque) == pytest.approx(expected, abs=1e-12)
+
+
+def test_plans_are_corrected_for_its_travel() -> None:
+    """Propellant of a thousandth of the isp: the arm changes by a tenth within a plan."""
+    body = nutdamp.read(MOVING.replace("isp: 220 s", "isp: 0.5 s"))
+    plan = nutdamp.plan(body, "four-pulse")
+    assert present(plan.flown).nutation < 1e-6
+    sizes = {round(float(np.linalg.norm(pulse.torque)), 6) for pulse in plan.pulses if pulse.torque is not None}
+    assert len(sizes) == len(plan.pulses)
+    fixed = flown(body, Schedule(tuple(channel_pulse(body.channels[int(pulse.channel == "N")], pulse.t, pulse.on_time)
+                                       for pulse in plan.pulses)))  # fmt: skip
+    assert fixed.residual.nutation > 1e-4
+
+
+def test_a_file_carried_on_has_it_where_it_is_then() -> None:
+    plan = nutdamp.plan(nutdamp.read(MOVING), "four-pulse")
+    used, carried = plan.propellant or 0.0, plan.carried()
+    assert used > 0.0
+    assert carried.center_of_mass == pytest.approx([0.1, 0.0, 0.4 - 0.05 * used], abs=1e-12)
+    assert later(plan.flight, plan.end).after.center_of_mass == pytest.approx([0.1, 0.0, 0.4 - 0.05 * used])
+
+
+def test_dispersed_it_moves_all_arms_alike() -> None:
+    body = nutdamp.read(TEXT + "dispersions: {center_of_mass: {normal: 2 mm}}\n")
+    plan = nutdamp.plan(body, "four-pulse")
+    model = DispersedModel(body, plan.pulses)
+    assert [entry.name for entry in model.inputs.drawn] == [f"center of mass {axis}" for axis in "xyz"]
+    off = np.array([0.01, -0.02, 0.03])
+    draws = {f"center of mass {axis}": np.array([value]) for axis, value in zip("xyz", off, strict=True)}
+    cases = model.cases(draws)
+    for pulse, impulse in zip(plan.pulses, cases.impulses, strict=True):
+        shifted = nutdamp.read(TEXT.replace("[0.1 m, 0, 40 cm]", f"[{0.1 + off[0]}, {off[1]}, {0.4 + off[2]}]"))
+        channel = next(each for each in shifted.channels if each.name == pulse.channel)
+        assert np.concatenate([np.atleast_1d(part) for part in impulse]) == pytest.approx(
+            channel.torque * pulse.on_time
+        )
+
+
+# --- bounds: what keeps them and how much of them is used, and the tolerance of a spin that is required
+
+CONE = Keep("star", np.array([1.0, 0.0, 0.0]), 0.1, 0.5)
+
+
+def test_no_more_than_all_of_a_bound_that_is_kept_is_used() -> None:
+    """Also over cases; edges of cones may be passed by rounding."""
+    inner, outer = cones(replace(spinner(), keep=(CONE,)))
+    end = Bound(Part.NUTATION, 0.2, True)
+    for bound, kept, broken in (
+        (end, (0.0, 0.1, 0.2), (0.2 + 1e-8, 3.0)),
+        (inner, (3.0, 0.1, 0.1 - 0.9 * SLACK), (0.1 - 1.1 * SLACK, 0.0)),
+        (outer, (0.0, 0.5, 0.5 + 0.9 * SLACK), (0.5 + 1.1 * SLACK, 3.0)),
+    ):
+        values = np.array([*kept, *broken])
+        expected = [True] * len(kept) + [False] * len(broken)
+        assert bound.met(values).tolist() == expected == [bool(bound.met(value)) for value in values]
+        assert (bound.used(values) <= 1.0).tolist() == expected
+        assert (bound.margin(values) >= -SLACK).tolist() == expected
+    assert (inner.part, inner.inner, outer.inner) == (Part.CONE, True, False)
+    (way,) = cones(replace(spinner(), keep=(Keep("H", None, most=0.3),)))
+    assert (way.part, way.limit) == (Part.DURING, 0.3)
+
+
+@pytest.mark.parametrize(
+    ("goal", "tolerance", "size"),
+    [
+        (3.0, None, 0.03),  # 1 % of the goal
+        (-3.0, None, 0.03),
+        (3.0, SpinTolerance(0.005), 0.015),
+        (3.0, SpinTolerance(0.1, relative=False), 0.1),
+        (0.0, None, 0.02),  # of a halt: of the spin at t = 0
+    ],
+)
+def test_a_spin_is_required_within_one_percent_of_the_goal_unless_the_file_says_otherwise(
+    goal: float, tolerance: SpinTolerance | None, size: float
+) -> None:
+    requirement = Requirement(spin=tolerance)
+    body = replace(spinner(spin=2.0, requirement=requirement), goal=Goal(spin=goal))
+    (bound,) = required(body)
+    assert (bound.part, bound.required) == (Part.SPIN, True)
+    assert bound.limit == pytest.approx(size)
+    for off, meets in ((-1.01, False), (-0.99, True), (0.0, True), (0.99, True), (1.01, False)):
+        made = judged("a", 0.0, required=requirement, goal=body.goal, spin=goal + off * size)
+        assert replace(made, spacecraft=body).meets_requirement is meets
+        near = replace(body, omega0=np.array([0.0, 0.0, goal + off * AIMED_SPIN * size]))
+        assert goal == 0.0 or spins_at(near, goal) is meets
+    assert spin_tolerance(replace(body, requirement=None), 5.0) == 0.05

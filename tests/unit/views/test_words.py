@@ -1,39 +1,41 @@
-"""Verdicts in words, and what they go by: shares of cases, severities, and whether a pulse is needed."""
+"""Verdicts in words and what they go by; each code of a note has a sentence, whose values are given."""
 
-from __future__ import annotations
-
+import ast
+import json
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from support import reference
-from support.builders import (
-    BOTH,
-    HALF_A_DEGREE,
-    POINTING,
-    aimed,
-    cross,
-    judged,
-    off_target,
-    pulse,
-    spinner,
-)
+from support.builders import BOTH, HALF_A_DEGREE, POINTING, aimed, cross, judged, off_target, present, pulse, spinner
 from support.golden import check_text
+from support.process import Run
 
 import nutdamp
+from nutdamp.common.results import Note, Value, note
 from nutdamp.planning import plan as planning
-from nutdamp.planning.notes import infeasibility
-from nutdamp.planning.plan import Plan, Standing
+from nutdamp.planning.decision import TIES, WHY, Gain
+from nutdamp.planning.notes import (
+    LEAST_CODES,
+    alternatives,
+    comparison_warnings,
+    infeasibility,
+    plan_notes,
+    reasons,
+    verdict_notes,
+)
 from nutdamp.planning.verdict import Status
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import Disturbance, Goal, Limits, Requirement
-from nutdamp.spacecraft.requirements import Bound, Part
 from nutdamp.spacecraft.schedule import Schedule
 from nutdamp.spacecraft.tolerances import SpinTolerance
 from nutdamp.views import verdict
+from nutdamp.views.guide import note_entries
+from nutdamp.views.loop import STOPS
 from nutdamp.views.parts import required
-from nutdamp.views.verdict import fired, idle, percent
+from nutdamp.views.text import NAME, NOTE, REASON, WARNING, note_json, ordered, screen_line, text
 
 FIRED = spinner(channels=cross(8.0))
 WIDE = Goal(spin=3.0)
@@ -58,13 +60,15 @@ def test_the_requirement_is_on_one_line() -> None:
     (0.99996, 0.9973, "99.996 %"), (0.9999999, 0.999999, "99.99999 %"),
 ])  # fmt: skip
 def test_a_share_is_never_rounded_to_what_it_is_not(share: float, of: float, shown: str) -> None:
-    assert percent(share, of) == shown
+    assert verdict.percent(share, of) == shown
 
 
-@pytest.mark.parametrize(("part", "unit"), [(Part.NUTATION, math.radians(1.0)), (Part.SPIN, math.pi / 30.0)])
+@pytest.mark.parametrize(
+    ("part", "unit"), [(requirements.Part.NUTATION, math.radians(1.0)), (requirements.Part.SPIN, math.pi / 30.0)]
+)
 @pytest.mark.parametrize("size", [0.5, 0.1684, 0.003491])
-def test_a_value_is_shown_on_its_side_of_its_limit(part: Part, unit: float, size: float) -> None:
-    bound = Bound(part, size * unit, True)
+def test_a_value_is_shown_on_its_side_of_its_limit(part: requirements.Part, unit: float, size: float) -> None:
+    bound = requirements.Bound(part, size * unit, True)
     for off in (0.1, 1e-3, 1e-5, 1e-6, -1e-6, -1e-4, -0.3):
         texts = verdict.value(bound, bound.limit * (1.0 + off)), verdict.limit(bound)
         shown, edge = (float(text.split()[-2]) for text in texts)
@@ -77,7 +81,7 @@ def test_pulses_at_even_distances_are_a_train() -> None:
         Schedule(tuple(pulse(t, 0.1, np.ones(3)) for t in times)) for times in ((1, 3, 5, 7, 9), (1, 3, 4, 9))
     )
     single = Schedule((*even.pulses, pulse(30.0, 0.1, np.ones(3), "U")))
-    assert [fired(made).partition(", ")[0] for made in (even, other, single)] == [
+    assert [verdict.fired(made).partition(", ")[0] for made in (even, other, single)] == [
         "train of 5", "pulses 4", "train of 5 and pulses 1",
     ]  # fmt: skip
 
@@ -87,18 +91,21 @@ TILTING = (Disturbance(0.5 + 0j),)
 
 def test_the_parts_that_are_missed_and_by_how_much() -> None:
     plan = judged("a", 0.6, shift=0.3, required=BOTH, goal=WIDE, spin=4.0)
-    assert [bound.part for bound in plan.shortfalls] == [Part.NUTATION, Part.SHIFT, Part.SPIN]
+    assert [bound.part for bound in plan.shortfalls] == [
+        requirements.Part.NUTATION,
+        requirements.Part.SHIFT,
+        requirements.Part.SPIN,
+    ]
     assert plan.severity == pytest.approx(1.0 / 0.03)
-    assert Plan(plan.spacecraft, "x", None, "why").severity == math.inf
+    assert planning.Plan(plan.spacecraft, "x", None, "why").severity == math.inf
 
 
 def test_with_a_target_the_severity_goes_by_the_distance_from_it() -> None:
     """One pulse takes the nutation out and leaves H 11.7° from its target, having shifted it by 2.1°."""
     body = aimed(replace(FIRED, requirement=Requirement(None, math.radians(1.0))), 10.0, 40.0)
     plan = planning.plan(body, "one-pulse")
-    assert plan.flown is not None
     assert plan.severity == pytest.approx(off_target(body, plan.pulses) / math.radians(1.0), rel=1e-9)
-    assert plan.flown.momentum_shift < 0.9 * plan.flown.axis_error
+    assert present(plan.flown).momentum_shift < 0.9 * present(plan.flown).axis_error
     free = replace(plan, spacecraft=replace(body, requirement=None))
     assert free.severity == pytest.approx(off_target(body, plan.pulses), rel=1e-9)
 
@@ -130,7 +137,7 @@ def test_where_no_pulse_is_needed_it_says_so() -> None:
     for degrees, limit, goal, needless in rows:
         body = replace(spinner(degrees=degrees, channels=cross(8.0), requirement=limit), goal=goal)
         assert requirements.unaided(body) is needless
-        assert (planning.plan(body, "none").standing is Standing.COMPLIES) is needless
+        assert (planning.plan(body, "none").standing is planning.Standing.COMPLIES) is needless
         assert (nutdamp.compare(body, ("none", "four-pulse")).verdict.status is Status.NO_PULSE) is needless
 
 
@@ -159,8 +166,8 @@ def test_what_dissipation_makes_of_it_counts() -> None:
     assert requirements.unaided(growing)
     assert not requirements.unaided(replace(growing, limits=Limits(horizon=21.0)))
     assert not requirements.unaided(replace(calm, dissipation=0.01))  # e-fold 2,000 times: beyond any float
-    assert "horizon of 20 s" in idle(nutdamp.compare(growing, ("none",)).verdict)
-    assert "horizon" not in idle(nutdamp.compare(calm, ("none",)).verdict)
+    assert "horizon of 20 s" in verdict.idle(nutdamp.compare(growing, ("none",)).verdict)
+    assert "horizon" not in verdict.idle(nutdamp.compare(calm, ("none",)).verdict)
     assert not requirements.unaided(replace(calm, disturbances=TILTING))
 
 
@@ -175,3 +182,100 @@ def test_changes_of_spin_count(A: float, C: float, degrees: float, horizon: floa
     body = replace(body, dissipation=30.0, goal=WIDE, limits=Limits(horizon=horizon))
     ended = reference.fly(body.inertia.moments, body.omega0, [], horizon, growth=body.growth)
     assert bool(abs(ended.rates[2] - 3.0) <= 3e-3) is kept is requirements.unaided(body)
+
+
+# --- each code that the code uses has a sentence, whose values are given
+
+SOURCE = Path(nutdamp.__file__).parent
+
+
+def calls() -> list[tuple[str, str, set[str]]]:
+    """Module, code and names of values of each call of `note` with the code written out."""
+    result = []
+    for path in sorted(SOURCE.rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "note" and node.args:
+                codes = [part.value for part in ast.walk(node.args[0]) if isinstance(part, ast.Constant)]
+                names = {keyword.arg or "" for keyword in node.keywords}
+                result += [(path.name, code, names) for code in codes if isinstance(code, str)]
+    return result
+
+
+CALLS = calls()
+
+
+def test_every_code_has_a_sentence_and_every_sentence_its_values() -> None:
+    """Notes on a plan get the scheme beside their own values."""
+    assert len(CALLS) > 60
+    for module, code, names in CALLS:
+        wanted = set(NAME.findall(note_entries()[code].sentence))
+        assert "" in names or wanted <= names | {"scheme"}, (module, code)  # "": values in a dict
+
+
+def test_every_entry_is_used_and_says_what_it_means() -> None:
+    used = {
+        *(code for _, code, _ in CALLS),
+        *(gain.value for gain in Gain),
+        *(tie.value for tie in TIES),
+        *("cone-broken-at-start", "ideal-impulses", "ideal-torquer-assumed", "ideal-torque-missing"),
+        *("least-propellant", *STOPS.values(), *WHY.values(), *LEAST_CODES.values()),
+    }
+    assert set(note_entries()) == used
+    for entry in note_entries().values():
+        assert entry.severity in (WARNING, NOTE, REASON)
+        assert entry.paragraph.endswith(".")
+
+
+@pytest.mark.parametrize(("name", "value", "shown"), [
+    ("limit_deg", 0.5, "0.5 deg"), ("at_s", 0.0123, "12.3 ms"), ("at_s", 12.5, "12.5 s"),
+    ("limit_deg", 1e-12, "< 1e-9 deg"),
+])  # fmt: skip
+def test_values_are_shown_by_the_unit_in_their_names(name: str, value: float, shown: str) -> None:
+    values: dict[str, Value] = {
+        "angle_deg": 1.0,
+        "direction": "Sun",
+        "at_s": 1.0,
+        "limit_deg": 1.0,
+        "scheme": "x",
+        name: value,
+    }
+    assert shown in text(Note("cone-broken", tuple(values.items())))
+
+
+def test_a_rate_is_no_time() -> None:
+    shown = text(note("models-differ-in-spin", difference_rad_s=1.2e-5, limit_rad_s=0.0598))
+    assert "1.2e-05 rad/s" in shown
+    assert "0.0598 rad/s" in shown
+
+
+def test_a_note_for_people_has_severity_and_code_and_for_programs_the_values_too() -> None:
+    entry = note("momentum-shift", scheme="optimal", momentum_shift_deg=0.25)
+    assert screen_line(entry).plain.startswith("note[momentum-shift]: optimal ")
+    data = note_json(entry)
+    assert (data["code"], data["severity"]) == ("momentum-shift", "note")
+    assert data["values"] == {"scheme": "optimal", "momentum_shift_deg": 0.25}
+
+
+def test_warnings_come_first_and_nothing_twice() -> None:
+    shift = note("momentum-shift", scheme="x", momentum_shift_deg=1.0)
+    assert [entry.code for entry in ordered([shift, note("try-trade"), shift])] == ["try-trade", "momentum-shift"]
+
+
+def test_the_json_of_a_plan_has_notes_as_data(run: Run) -> None:
+    content = json.loads(run("plan", "--nominal", "--set", "requirement={nutation: 1e-9 deg}", "--json", "-").stdout)
+    for entry in (*content["notes"], *(entry for plan in content["plans"] for entry in plan["notes"])):
+        assert set(entry) == {"code", "severity", "values", "text"}
+        assert entry["code"] in note_entries()
+        numbers = [value for value in entry["values"].values() if isinstance(value, float)]
+        assert all(map(math.isfinite, numbers))
+
+
+def test_notes_of_the_example_are_those_of_its_decision() -> None:
+    compared = nutdamp.compare(nutdamp.example(), samples=0)
+    assert [entry.code for entry in reasons(compared)] == ["least-propellant"]
+    assert not [*comparison_warnings(compared)]
+    assert {entry.code for plan in compared.plans for entry in plan_notes(plan)} >= {"half-turns-apart"}
+    assert {entry.code for entry in alternatives(compared)} <= {gain.value for gain in Gain}
+    assert compared.recommended is not None
+    codes = [entry.code for entry in verdict_notes(compared.verdict, compared.recommended)]
+    assert "tolerances-not-checked" in codes

@@ -1,11 +1,13 @@
-"""Messages merged into a spacecraft file, and attitude histories as telemetry: what `export` writes is read back."""
+"""Attitudes of files: by the direction of an axis and a phase, or merged from messages."""
 
-from __future__ import annotations
-
+import math
 from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from support.builders import present
 from support.process import Run
 
 import nutdamp
@@ -13,7 +15,6 @@ from nutdamp.errors import BadRequest, FaultyFile
 from nutdamp.files.ccsds.read import merged_text, read_apm, read_history
 from nutdamp.files.reader import Source
 from nutdamp.physics import attitude
-from nutdamp.spacecraft.model import Spacecraft
 
 SPACECRAFT = """
 name: Sounder  # flown twice
@@ -23,7 +24,7 @@ attitude: {quaternion: [0.9, 0.1, -0.2, 0.3], epoch: 2026-03-01T12:00:00Z, frame
 thrusters:
   - {name: P, torque: [8, 0, 0], max_on_time: 1 s}
 """
-TENSOR = SPACECRAFT.replace("{A: 120 kg m^2, C: 80 kg m^2}", "{tensor: [[120, 2, 1], [2, 110, 0.5], [1, 0.5, 80]]}")
+SKEW = SPACECRAFT.replace("{A: 120 kg m^2, C: 80 kg m^2}", "{tensor: [[120, 2, 1], [2, 110, 0.5], [1, 0.5, 80]]}")
 
 
 def exported(tmp_path: Path, text: str, form: str, until: float = 20.0) -> tuple[Path, nutdamp.Plan]:
@@ -37,36 +38,31 @@ def turned(first: np.ndarray, second: np.ndarray) -> float:
     return float(2.0 * np.linalg.norm(attitude.multiply(attitude.conjugate(first), second)[1:]))
 
 
-def quaternion(spacecraft: Spacecraft) -> np.ndarray:
-    assert spacecraft.attitude is not None
-    return spacecraft.attitude.quaternion
+def quaternion(spacecraft: nutdamp.Spacecraft) -> np.ndarray:
+    return present(spacecraft.attitude).quaternion
 
 
-@pytest.mark.parametrize("text", [SPACECRAFT, TENSOR], ids=["symmetric", "tensor"])
+@pytest.mark.parametrize("text", [SPACECRAFT, SKEW], ids=["symmetric", "tensor"])
 def test_a_history_is_read_as_it_was_written(tmp_path: Path, text: str) -> None:
     path, plan = exported(tmp_path, text, "aem")
     history = read_history(str(path))
     rates, quaternions = plan.spacecraft.inertia.in_file_axes(*plan.reaching(20.0).motion(history.times))
-    assert history.rates is not None
-    assert np.allclose(history.rates, rates, rtol=0.0, atol=1e-9)
+    assert np.allclose(present(history.rates), rates, rtol=0.0, atol=1e-9)
     assert max(turned(*pair) for pair in zip(history.quaternions, quaternions, strict=True)) < 1e-9
     assert history.times[-1] == pytest.approx(20.0, abs=1e-6)
 
 
 @pytest.mark.parametrize(("form", "at"), [("apm", None), ("aem", None), ("aem", "7s")])
-@pytest.mark.parametrize("text", [SPACECRAFT, TENSOR], ids=["symmetric", "tensor"])
+@pytest.mark.parametrize("text", [SPACECRAFT, SKEW], ids=["symmetric", "tensor"])
 def test_a_message_is_merged_into_a_file(run: Run, tmp_path: Path, text: str, form: str, at: str | None) -> None:
     """Into a file with another motion: then it moves as the one that the message is of."""
     path, plan = exported(tmp_path, text, form)
     other = text.replace("[0.2 rad/s, 5 deg/s, 30 rpm]", "[0.1 rad/s, 2 deg/s, 29 rpm]").replace("[0.9, 0.1,", "[1, 0,")
     (tmp_path / "other.yaml").write_text(other)
     more = () if at is None else ("--at", at)
-    result = run("import", path.name, "--into", "other.yaml", "-o", "merged.yaml", *more)
-    assert result.returncode == 0, result.stderr
+    run("import", path.name, "--into", "other.yaml", "-o", "merged.yaml", *more, status=0)
     merged = nutdamp.load(tmp_path / "merged.yaml")
-    assert merged.attitude is not None
-    assert merged.attitude.epoch is not None
-    since = float(merged.attitude.epoch.removesuffix("Z")[17:])
+    since = float(present(present(merged.attitude).epoch).removesuffix("Z")[17:])
     assert since >= (0.0 if at is None else 7.0)
     rates, quaternions = plan.spacecraft.inertia.in_file_axes(*plan.reaching(20.0).motion(np.array([since])))
     assert np.allclose(merged.rates, rates[0], rtol=0.0, atol=1e-9)
@@ -77,18 +73,17 @@ def test_a_message_is_merged_into_a_file(run: Run, tmp_path: Path, text: str, fo
 
 
 def test_inertia_is_merged_only_where_it_is_asked_for(run: Run, tmp_path: Path) -> None:
-    path, _ = exported(tmp_path, TENSOR, "apm")
+    path, _ = exported(tmp_path, SKEW, "apm")
     (tmp_path / "other.yaml").write_text(SPACECRAFT)
     for flag, moment in ((), 120.0), (("--inertia",), 110.0):
-        result = run("import", path.name, "--into", "other.yaml", "-o", "merged.yaml", *flag)
-        assert result.returncode == 0, result.stderr
+        run("import", path.name, "--into", "other.yaml", "-o", "merged.yaml", *flag, status=0)
         assert nutdamp.load(tmp_path / "merged.yaml").inertia.tensor[1, 1] == pytest.approx(moment)
 
 
 def test_an_attitude_is_written_as_the_message_has_it(tmp_path: Path) -> None:
     """Without the rounding of a turn to the principal axes and back."""
     path, _ = exported(tmp_path, SPACECRAFT.replace("[0.9, 0.1, -0.2, 0.3]", "[0.8, 0, 0.6, 0]"), "apm")
-    assert "quaternion: [0.8, 0, 0.6, 0]," in merged_text(Source(TENSOR, "f.yaml"), read_apm(str(path)), inertia=True)
+    assert "quaternion: [0.8, 0, 0.6, 0]," in merged_text(Source(SKEW, "f.yaml"), read_apm(str(path)), inertia=True)
 
 
 def test_a_file_without_attitude_gets_one(run: Run, tmp_path: Path) -> None:
@@ -153,3 +148,75 @@ def test_what_cannot_be_merged_is_refused(run: Run, tmp_path: Path, arguments: t
     (tmp_path / "s.yaml").write_text(SPACECRAFT)
     assert run(*arguments, "-o", "out.yaml").returncode == status
     assert not (tmp_path / "out.yaml").exists()
+
+
+# --- by the direction of the spin axis, or of the angular momentum, and a phase about it
+
+ANGLES = st.floats(-180.0, 180.0)
+DECLINATIONS = st.floats(-89.0, 89.0)
+TENSOR = "{tensor: [[120, 2, 1], [2, 110, 0.5], [1, 0.5, 80]]}"
+SYMMETRIC = "{A: 120, C: 80}"
+
+
+def body(given: str, *, spin: float = 3.0, inertia: str = SYMMETRIC, more: str = "") -> nutdamp.Spacecraft:
+    return nutdamp.read(f"name: b\ninertia: {inertia}\nomega0: [0.1, -0.2, {spin}]\nattitude: {{{given}}}\n{more}")
+
+
+def direction(right_ascension: float, declination: float) -> np.ndarray:
+    ra, dec = math.radians(right_ascension), math.radians(declination)
+    return np.array([math.cos(dec) * math.cos(ra), math.cos(dec) * math.sin(ra), math.sin(dec)])
+
+
+def angle_about(axis: np.ndarray, start: np.ndarray, end: np.ndarray) -> float:
+    """Angle about an axis from one vector to another as they are seen along it, deg."""
+    first, second = (vector - axis * (axis @ vector) for vector in (start, end))
+    return math.degrees(math.atan2(axis @ np.cross(first, second), first @ second))
+
+
+def same_angle(first: float, second: float) -> bool:
+    return abs((first - second + 180.0) % 360.0 - 180.0) < 1e-7
+
+
+@given(ANGLES, DECLINATIONS, ANGLES, st.sampled_from([3.0, -3.0]), st.sampled_from([SYMMETRIC, TENSOR]))
+def test_the_phase_counts_from_the_ascending_node_to_body_axis_1(
+    ra: float, dec: float, phase: float, spin: float, inertia: str
+) -> None:
+    spacecraft = body(f"spin_axis: [{ra} deg, {dec} deg], phase: {phase} deg", spin=spin, inertia=inertia)
+    axis = direction(ra, dec)
+    assert np.allclose(spacecraft.axis, axis, rtol=0.0, atol=1e-12)
+    first = attitude.rotate(quaternion(spacecraft), np.array([1.0, 0.0, 0.0]))
+    assert same_angle(angle_about(axis, np.cross([0.0, 0.0, 1.0], axis), first), phase)
+
+
+@given(ANGLES, DECLINATIONS, st.sampled_from([3.0, -3.0]), st.sampled_from([SYMMETRIC, TENSOR]))
+def test_it_may_be_that_of_the_angular_momentum(ra: float, dec: float, spin: float, inertia: str) -> None:
+    spacecraft = body(f"spin_axis: [{ra} deg, {dec} deg], of: momentum", spin=spin, inertia=inertia)
+    momentum = spacecraft.momentum / np.linalg.norm(spacecraft.momentum)
+    assert np.allclose(momentum, direction(ra, dec), rtol=0.0, atol=1e-12)
+
+
+@given(ANGLES, DECLINATIONS, ANGLES)
+def test_the_phase_may_count_from_the_side_of_the_sun(ra: float, dec: float, phase: float) -> None:
+    sun = (ra + 40.0, 0.5 * dec)
+    given = f"spin_axis: [{ra} deg, {dec} deg], sun_phase: {phase} deg"
+    spacecraft = body(given, more=f"sun: [{sun[0]} deg, {sun[1]} deg]")
+    first = attitude.rotate(quaternion(spacecraft), np.array([1.0, 0.0, 0.0]))
+    assert same_angle(angle_about(direction(ra, dec), direction(*sun), first), phase)
+
+
+@pytest.mark.parametrize("dec", [90.0, -90.0])
+def test_at_a_pole_the_phase_counts_from_x(dec: float) -> None:
+    spacecraft = body(f"spin_axis: [10 deg, {dec} deg], phase: 30 deg")
+    first = attitude.rotate(quaternion(spacecraft), np.array([1.0, 0.0, 0.0]))
+    assert same_angle(
+        angle_about(np.array([0.0, 0.0, math.copysign(1.0, dec)]), np.array([1.0, 0.0, 0.0]), first), 30.0
+    )
+
+
+def test_a_file_carried_on_holds_a_quaternion_instead() -> None:
+    spacecraft = body("spin_axis: [120 deg, -15 deg], phase: 20 deg, epoch: 2026-03-01T12:00:00Z")
+    carried = nutdamp.plan(spacecraft, "none").carried(10.0)
+    flight = nutdamp.plan(spacecraft, "none").fly(10.0).track
+    turned = attitude.multiply(attitude.conjugate(quaternion(carried)), flight.quaternion[-1])
+    assert np.linalg.norm(turned[1:]) < 1e-10
+    assert present(carried.attitude).epoch == "2026-03-01T12:00:10Z"

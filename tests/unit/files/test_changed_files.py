@@ -1,0 +1,423 @@
+"""Spacecraft files with other values: set beside them, carried on by a flight, estimated by a fit."""
+
+import copy
+import dataclasses
+import json
+import re
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from support.broken import BASE, THRUSTERS
+from support.builders import noted, present
+from support.cases import spread
+from support.golden import check_text, refusal
+from support.hand_made_fit import silent, told
+from support.process import Run
+
+import nutdamp
+from nutdamp.errors import BadRequest, Fault, FaultyFile
+from nutdamp.estimation.results import carried, correlations, replaced
+from nutdamp.files.carried import fitted_text, later, notes
+from nutdamp.files.editing import parse_setting
+from nutdamp.files.fields import KeyPath
+from nutdamp.files.reader import Source, example_text, read_spacecraft
+from nutdamp.files.yaml import dotted, read_tree
+from nutdamp.flight.dynamics import supplied
+from nutdamp.physics import attitude
+from nutdamp.physics.thruster import Trapezoid
+from nutdamp.spacecraft.schedule import Schedule, channel_pulse
+
+EXAMPLE = example_text()
+
+
+def with_settings(text: str, *settings: str) -> nutdamp.Spacecraft:
+    return read_spacecraft(text, "f.yaml", [parse_setting(one) for one in settings])
+
+
+def faults_of(text: str, *settings: str) -> list[Fault]:
+    try:
+        with_settings(text, *settings)
+    except FaultyFile as wrong:
+        return wrong.faults
+    return []
+
+
+def leaves(value: Any, path: KeyPath = ()) -> Iterator[tuple[KeyPath, Any]]:
+    """Every value of a file that holds no others."""
+    steps = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    for step, child in steps:
+        yield from leaves(child, (*path, step))
+    if not isinstance(value, dict | list):
+        yield path, value
+
+
+def changed(plain: Any, path: KeyPath, value: object) -> str:
+    """The file with another value at ``path``, as JSON."""
+    holder = copied = copy.deepcopy(plain)
+    for step in path[:-1]:
+        holder = holder[step]
+    holder[path[-1]] = value
+    return json.dumps(copied)
+
+
+def contents(spacecraft: nutdamp.Spacecraft) -> str:
+    return repr(dataclasses.asdict(spacecraft))
+
+
+PLAIN = read_tree(EXAMPLE, "f.yaml")[0].plain()
+LEAVES = list(leaves(PLAIN))
+
+
+@pytest.mark.deep
+@spread("value", ["rubbish", 1e9, {"x": 1}, "-1 min", True, None, [1, 2], ""], quick=1)
+def test_what_is_set_is_checked_as_the_file_is(value: object) -> None:
+    """Each value of the example replaced in turn: the same faults, whether in the file or beside it."""
+    placed: set[bool] = set()
+    for path, _ in LEAVES:
+        text, setting = changed(PLAIN, path, value), f"{dotted(path)}={json.dumps(value)}"
+        inside, beside = faults_of(text), faults_of(EXAMPLE, setting)
+        pairs = [sorted((fault.where, fault.problem) for fault in faults) for faults in (inside, beside)]
+        assert pairs[0] == pairs[1], setting
+        if beside:
+            placed.add(any(fault.file.startswith("--set ") and fault.line == 0 for fault in beside))
+        else:
+            assert contents(with_settings(EXAMPLE, setting)) == contents(read_spacecraft(text, "f.yaml"))
+    assert placed == {True}
+
+
+def test_setting_every_value_to_itself_changes_nothing() -> None:
+    chosen = [f"{dotted(path)}={json.dumps(value)}" for path, value in LEAVES]
+    assert len(chosen) > 40
+    assert contents(with_settings(EXAMPLE, *chosen)) == contents(with_settings(EXAMPLE))
+
+
+def test_entries_of_lists_sections_that_are_not_there_and_the_later_of_two_settings() -> None:
+    for key in ("thrusters[1].torque", "thrusters.T2.torque", "thrusters[T2].torque", "thrusters.'T2'.torque"):
+        craft = with_settings(THRUSTERS, f"{key}=[0, -3, 0]")
+        assert tuple(craft.channels[1].thrusters[0].torque) == (0, -3, 0)
+    craft = with_settings(BASE, "limits.blackout=[[10 s, 0.5 min], [40, 41]]", "limits.max_pulses=3", "omega0[1]=0.5")
+    assert (craft.limits.blackout, craft.limits.max_pulses) == (((10.0, 30.0), (40.0, 41.0)), 3)
+    assert tuple(craft.omega0) == (0.1, 0.5, 3.0)
+    assert with_settings(BASE, "mass=2", "mass=3 kg").mass == 3.0
+
+
+def test_values_that_aliases_share_change_only_where_they_are_set() -> None:
+    text = BASE + "thrusters:\n  - &t {name: T1, torque: &v [8, 0, 0]}\n  - {name: T2, torque: *v}\n"
+    craft = with_settings(text, "thrusters.T2.torque[0]=-1")
+    assert [channel.thrusters[0].torque[0] for channel in craft.channels] == [8.0, -1.0]
+
+
+# fmt: off
+FAULTY = (
+    "limits.horizon=-3 s", "limits.horizn=300s", "limits.earlist=300s", "thrusters.T11.torque=[1, 0, 0]",
+    "thrusters.Z.torque=[1, 0, 0]", "thrusters[3].torque=[1, 0, 0]", "omega0.x=1", "limits.blackout[0]=[1, 2]",
+    "name.x=1", "limits.blackout=[[1, 2]", "mass=", "limits.tick={a: 1, a: 2}", "name=!!python/object:os.system x",
+    f"{'x.' * 40}y=1", "mass=\x1b[31m",
+)
+NO_SETTINGS = ("", "mass", "=3", "a..b=1", ".a=1", "a[=1", "a[1=2", "a]=1", "'a=1", "a.'\\x=1", "[]=1")
+# fmt: on
+
+
+def test_a_fault_names_the_setting_as_its_place() -> None:
+    lines = list[str]()
+    for setting in FAULTY:
+        faults = faults_of(THRUSTERS + "limits: {horizon: 120 s}\n", setting)
+        assert faults
+        assert all(fault.file.startswith("--set ") and not fault.line and str(fault).isprintable() for fault in faults)
+        lines += map(str, faults)
+    lines += map(str, faults_of(THRUSTERS, "thrusters[0].name=T2"))  # a name that another entry has
+    check_text("files.settings", "\n".join(lines))
+    for text in NO_SETTINGS:
+        with pytest.raises(ValueError, match=r"is not KEY=VALUE, such as limits\.horizon=300s"):
+            parse_setting(text)
+
+
+def test_faults_of_file_and_settings_come_together_and_are_the_same() -> None:
+    (fault,) = faults_of(BASE, "state={spin: 3, nutation: 8 deg}")
+    (there,) = faults_of(BASE + "state: {spin: 3, nutation: 8 deg}\n")
+    assert (fault.where, fault.problem) == (there.where, there.problem)
+    faults = faults_of(BASE + "mass: -1 kg\n", "limits.tick=0 s", "limits.gap=-1 s")
+    places = [(fault.where, fault.file[:5]) for fault in faults]
+    assert places == [("limits.gap", "--set"), ("limits.tick", "--set"), ("mass", "f.yam")]
+
+
+CHARACTERS = st.text("aZ09_+-. []{}'\"\\=:#,\t\n\x00\x1b\x85\u2028\ud83dé漢😀", min_size=1, max_size=12)
+STEPS = st.one_of(st.integers(0, 99), CHARACTERS.filter(lambda text: text.strip() == text))
+
+
+@given(st.lists(STEPS, min_size=1, max_size=5).filter(lambda path: isinstance(path[0], str)), CHARACTERS)
+def test_a_key_as_messages_write_it_can_be_set(path: list[str | int], value: str) -> None:
+    setting = parse_setting(f"{dotted(tuple(path))}={value}")
+    assert (setting.path, setting.value) == (tuple(path), value)
+    assert setting.label.isprintable()
+
+
+KEYS = st.sampled_from([dotted(path) for path, _ in LEAVES] + ["thrusters", "limits", "goal.spin", "x.y[0]", "limits"])
+VALUES = st.one_of(st.text(max_size=12), st.text("[]{}:,&*!'\"#-1e9 .xmNd\n\t|>%@", max_size=24))
+
+
+@pytest.mark.deep
+@settings(max_examples=200)
+@given(st.lists(st.tuples(KEYS, VALUES), min_size=1, max_size=3))
+def test_whatever_is_set_is_a_spacecraft_or_faults_on_one_line_each(chosen: list[tuple[str, str]]) -> None:
+    assert all(str(fault).isprintable() for fault in faults_of(EXAMPLE, *(f"{key}={value}" for key, value in chosen)))
+
+
+def test_the_library_sets_too(tmp_path: Path) -> None:
+    file = tmp_path / "f.yaml"
+    file.write_text(THRUSTERS, encoding="utf-8")
+    values = {"limits.horizon": "300 s", "thrusters.T1.torque": (9, 0, 0), "limits.blackout": [["1 s", 2]], "mass": 50}
+    craft = nutdamp.load(file, set=values)
+    assert (craft.limits.horizon, craft.limits.blackout, craft.mass) == (300.0, ((1.0, 2.0),), 50.0)
+    assert craft.channels[0].thrusters[0].torque[0] == 9.0
+    wrong = (({"limits.tick": -1.5}, FaultyFile), ({"a=b": 1}, BadRequest), ({"mass": object}, BadRequest))
+    said = (refusal(error, nutdamp.load, file, set=setting) for setting, error in wrong)
+    check_text("files.settings-library", "\n".join(said))
+
+
+# --- carried on: it flies as the flight that it was taken from does, and keeps its comments
+
+SOUNDER = """
+name: Sounder  # flown twice
+inertia: {A: 120 kg m^2, C: 80 kg m^2}
+state: {spin: 30 rpm, nutation: 5 deg, phase: 20 deg}   # as released
+thrusters:
+  - {name: P, torque: [8, 0, 0], isp: 220 s, lever_arm: 0.8 m, max_on_time: 1 s}
+  - {name: N, torque: [-8, 0, 0], isp: 220 s, lever_arm: 0.8 m, max_on_time: 1 s}
+"""
+ATTITUDE = "attitude: {quaternion: [0.9, 0.1, -0.2, 0.3], epoch: 2026-03-01T12:00:00Z, frame: EME2000}\n"
+TENSOR = "{tensor: [[120, 2, 1], [2, 110, 0.5], [1, 0.5, 80]]}"
+TANK = (
+    "tank: {propellant: 0.5 kg, pressure: 22 bar, final_pressure: 8 bar, inertia_per_kg: {A: 3, C: 5}}\nmass: 250 kg\n"
+)
+LEAK = "disturbances: [{name: leak, torque: [5 mN m, 2 mN m, 0], rate: -1.3 rad/s}]\n"
+
+TEXTS = {
+    "symmetric": SOUNDER + ATTITUDE,
+    "tensor": SOUNDER.replace("{A: 120 kg m^2, C: 80 kg m^2}", TENSOR) + ATTITUDE,
+    "rates": SOUNDER.replace("state: {spin: 30 rpm, nutation: 5 deg, phase: 20 deg}", "omega0: [0.2, 5 deg/s, 3]")
+    + ATTITUDE,
+    "tank": SOUNDER + ATTITUDE + TANK,
+    "turning torque": SOUNDER + ATTITUDE + LEAK,
+}
+
+
+def planned(text: str) -> nutdamp.Plan:
+    return nutdamp.plan(nutdamp.read(text), "two-pulse")
+
+
+def turned(first: np.ndarray, second: np.ndarray) -> float:
+    """Angle between two attitudes, rad."""
+    return float(2.0 * np.linalg.norm(attitude.multiply(attitude.conjugate(first), second)[1:]))
+
+
+@pytest.mark.parametrize("text", TEXTS.values(), ids=TEXTS)
+def test_the_file_carried_on_flies_as_the_plan_does(text: str) -> None:
+    plan = planned(text)
+    carried = plan.carried(40.0)
+    expected, flight = plan.fly(70.0).track, nutdamp.plan(carried, "none").fly(30.0).track
+    assert np.allclose(flight.rates[-1], expected.rates[-1], rtol=0.0, atol=1e-10)
+    assert turned(flight.quaternion[-1], expected.quaternion[-1]) < 1e-9
+    assert present(carried.attitude).epoch == "2026-03-01T12:00:40Z"
+
+
+def test_tank_and_mass_are_those_left() -> None:
+    plan = planned(TEXTS["tank"])
+    used, carried = plan.propellant or 0.0, plan.carried()
+    before, after = present(plan.spacecraft.tank), present(carried.tank)
+    assert (after.propellant, carried.mass) == pytest.approx((0.5 - used, 250.0 - used))
+    assert after.pressure == pytest.approx(before.pressure_after(used))
+    # What is left acts as the rest of the same tank.
+    assert after.thrust_factor(0.1) * after.pressure == pytest.approx(before.pressure_after(used + 0.1))
+    assert carried.inertia.moments == pytest.approx((120.0 - 3.0 * used, 120.0 - 3.0 * used, 80.0 - 5.0 * used))
+
+
+def test_a_target_stays_where_it_is_in_space() -> None:
+    """Without an attitude a file knows space by the motion at t = 0, which is another one in the file carried on."""
+    plan = nutdamp.plan(nutdamp.read(SOUNDER + "goal: {tilt: 10 deg, azimuth: 45 deg}\n"), "none")
+    moved_on = later(plan.reaching(33.0), 33.0)
+    carried = plan.carried(33.0)
+    seen = [
+        attitude.rotate(attitude.conjugate(moved_on.quaternion), plan.spacecraft.target_axis),
+        attitude.rotate(attitude.conjugate(carried.initial.quaternion), carried.target_axis),
+    ]
+    assert np.allclose(seen[0], seen[1], rtol=0.0, atol=1e-10)
+
+
+def test_comments_and_units_are_kept() -> None:
+    carried = planned(SOUNDER).carried(40.0)
+    assert isinstance(carried.source, Source)
+    lines = carried.source.text.splitlines()
+    assert "name: Sounder  # flown twice" in lines
+    assert lines[3].startswith("state: {spin: 30 rpm, nutation: ")
+    assert lines[3].endswith(" deg}   # as released")
+    assert lines[4:] == SOUNDER.splitlines()[4:]
+
+
+def test_a_chain_of_files_is_one_flight() -> None:
+    body = nutdamp.read(TEXTS["symmetric"])
+    once, many = nutdamp.plan(body, "none").carried(60.0), body
+    for _ in range(6):
+        many = nutdamp.plan(many, "none").carried(10.0)
+    assert many.omega0 == pytest.approx(once.omega0, abs=1e-10)
+    assert turned(many.initial.quaternion, once.initial.quaternion) < 1e-9
+
+
+def test_what_no_file_can_hold_is_refused() -> None:
+    plan = planned(SOUNDER)
+    first = plan.pulses[0]
+    with pytest.raises(BadRequest, match="is on at"):
+        plan.carried(first.t)
+    body = nutdamp.read(SOUNDER + TANK.replace("0.5 kg", "1 g"))
+    empty = nutdamp.Plan(body, "by hand", Schedule(supplied(body, [channel_pulse(body.channels[0], 3.0, 5.0)])))
+    with pytest.raises(BadRequest, match="no propellant"):
+        empty.carried()
+    for time in (-3.0, float("nan"), float("inf")):
+        with pytest.raises(BadRequest, match="after t = 0"):
+            plan.carried(time)
+    replaced: nutdamp.Spacecraft = plan.spacecraft.replace(mass=3.0)
+    with pytest.raises(BadRequest, match="no field replaced"):
+        nutdamp.plan(replaced, "two-pulse").carried()
+
+
+@pytest.mark.parametrize(("command", "lasts"), [
+    (("plan", "--nominal", "--scheme", "two-pulse"), 3.0),
+    (("simulate", "--scheme", "two-pulse", "--until", "20s"), 20.0),
+])  # fmt: skip
+def test_commands_write_it(run: Run, tmp_path: Path, command: tuple[str, ...], lasts: float) -> None:
+    (tmp_path / "now.yaml").write_text(TEXTS["symmetric"])
+    run(*command, "now.yaml", "-o", "next.yaml", status=0)
+    carried = nutdamp.load(tmp_path / "next.yaml")
+    assert float(present(present(carried.attitude).epoch)[17:19]) >= lasts
+
+
+def test_its_moment_needs_its_name(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "now.yaml").write_text(TEXTS["symmetric"])
+    assert "-o" in run("simulate", "now.yaml", "--scheme", "none", "--at", "5s", status=2).stderr
+
+
+# --- the estimates of a fit: read back it is the body of the fit, and all else stays
+
+GYROS = ("omega_1", "omega_2", "omega_3")
+FILE = """\
+name: fitted  # its name
+inertia: {A: 120 kg m^2, C: 80}  # moments
+state:
+  spin: 30 rpm
+  nutation: 5 deg  # at t = 0
+attitude: {epoch: 2026-03-01T12:00:00Z, frame: EME2000, quaternion: [0.9, 0.1, 0.2, 0.3]}
+goal: {tilt: 20 deg, azimuth: 0.5}
+valve: {open_delay: 10 ms, close_delay: 12 ms}
+thrusters:
+  - {name: T1, position: [0, 0.5, 0.8], direction: [0, -1, 0], force: 10 N, isp: 220 s}  # pushed
+  - {name: T 2, torque: [0, 8 N m, 0], lever_arm: 1 m, isp: 220 s, valve: {open_delay: 0.02, close_delay: 0.02}}
+  - {name: T3, torque: [0, -8, 0], lever_arm: 1 m, isp: 220 s}
+tank: {propellant: 10 kg, pressure: 2e6, final_pressure: 1e6}
+limits: {horizon: 90 s, earliest: 1 s}
+loop:
+  sensor: {kind: accelerometer, rate: 10 Hz, position: [0.8 m, 0, 0], axis: [0, 0, 1]}
+  law: four-pulse
+  start: 0.5 deg
+  stop: 0.05 deg
+dispersions:
+  {A: {normal: 0.5 %}, C: {normal: 0.5 %}, thrust: {T1: {normal: 3 %}, T 2: {normal: 3 %}, T3: {normal: 2 %}}}
+"""
+# fmt: off
+EVERYTHING = {
+    "A": 121.0, "C/A": 0.7, "omega_1": 0.1, "omega_2": -0.2, "omega_3": 3.1, "attitude_1": 0.01, "attitude_2": -0.02,
+    "attitude_3": 0.3, "bias_omega_1": 1e-3, "wobble_2": 2e-3, "bias_acceleration": 0.03, "thrust T1": 0.96,
+    "thrust T 2": 1.05, "delay T1": 0.005, "delay T 2": -0.015,
+}
+# fmt: on
+SIGMAS = {"A": 0.4, "C/A": 1e-3, "omega_1": 1e-3, "thrust T1": 0.01, "attitude_1": 2e-3, "attitude_2": 2e-3}
+
+
+def test_the_file_holds_all_that_is_known_now() -> None:
+    settings = (parse_setting("thrusters.T3.torque[1]=-9"), parse_setting("mass=200 kg"))
+    body = Source(FILE, "f.yaml", settings).read()
+    fired = Schedule(tuple(channel_pulse(one, t, 0.5) for one, t in zip(body.channels, (3.0, 6.0), strict=False)))
+    record = silent(*GYROS, "axis_x", "axis_y", "axis_z", "acceleration", schedule=fired)
+    fit = told(body, record, EVERYTHING, SIGMAS)
+    known = carried(fit, 7.5)
+    text = fitted_text(fit, known)
+    now = read_spacecraft(text, "now.yaml")
+    expected = replaced(body, known)
+    assert now.inertia.moments == pytest.approx((121.0, 121.0, 84.7))
+    assert now.omega0 == pytest.approx(expected.omega0, rel=1e-9)
+    assert (now.attitude is not None, now.mass) == (True, 200.0)
+    assert abs(now.initial.quaternion @ expected.initial.quaternion) == pytest.approx(1.0, abs=1e-12)
+    assert now.target_axis == pytest.approx(body.target_axis, abs=1e-9)  # though t = 0 is another now
+    assert (present(now.attitude).epoch or "").startswith("2026-03-01T12:00:07.5")
+    thrusters = [one.thrusters[0] for one in now.channels]
+    assert [one.torque[1] for one in thrusters[1:]] == pytest.approx([8.0 * 1.05, -9.0])
+    assert thrusters[0].force == pytest.approx([0.0, -9.6, 0.0])
+    valves = [one.valve for one in thrusters]
+    assert all(isinstance(one, Trapezoid) for one in valves)
+    delays = [(one.open_delay, one.close_delay) for one in valves if isinstance(one, Trapezoid)]
+    assert np.ravel(delays) == pytest.approx([0.015, 0.017, 0.005, 0.005, 0.01, 0.012])
+    assert present(now.loop).sensor.bias == pytest.approx(0.03)
+    spread, sigmas = present(now.dispersions), dict(zip(known.names, known.sigmas, strict=True))
+    assert present(spread.A).size == pytest.approx(0.4 / 121.0, rel=1e-5)
+    sizes = [tolerance and tolerance.size for tolerance in (*spread.omega0, spread.attitude)]
+    rates = [sigmas[f"omega0_{axis}"] for axis in (1, 2, 3)]
+    assert sizes == pytest.approx([*rates, known.tilt], rel=1e-5)
+    assert {name: one.size for name, one in spread.thrust.items()} == pytest.approx(
+        {"T1": 0.01 / 0.96, "T 2": 1e-7 / 1.05, "T3": 0.02}, rel=1e-5
+    )
+    assert spread.correlation == correlations(known, body.dispersions)
+    assert re.findall("#.*", text) == re.findall("#.*", FILE)
+    units = "kg m^2", "rpm", "deg", "N", "N m", "ms"
+    assert [bool(re.search(rf"[\d.] {re.escape(unit)}\b", text)) for unit in units] == [True] * 6
+    check_text("files.fitted-notes", noted(notes(fit, known)))
+
+
+CASES: dict[str, tuple[str, Mapping[str, float], bool]] = {
+    "three moments, other axes": ("inertia: {A: 120, C: 80}\nstate: {spin: 3, nutation: 5 deg}\n", {}, True),
+    "tensor": ("inertia: {tensor: [[120, 0, 1], [0, 110, 2], [1, 2, 80]]}\nomega0: [0.1, 10 deg/s, 3]\n", {}, True),
+    "decay": ("inertia: {A: 80, C: 120}\nomega0: [0.1, 0.2, 3]\ndissipation: {time_constant: 5 min}\n", {}, False),
+    "odd": ("inertia: {A: 80, C: 120}\nomega0: [0.1, 0.2, 3]\n", {"growth": 0.002}, False),
+    "not seen": ("inertia: {A: 80, C: 120}\nomega0: [0.1, 0.2, 3]\n", {"growth": 1e-8}, False),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_bodies_of_any_kind_are_written_as_the_file_has_them(name: str) -> None:
+    """Tensors and rates where A, C and angles do not tell it; a growth that dissipation would not cause is said."""
+    text, given, unequal = CASES[name]
+    text = "name: x\n" + text
+    body = Source(text, "f.yaml").read()
+    values = {"omega_1": 0.11, "omega_3": -2.9 if "axes" in name else 3.2, **given}
+    values |= {"unequal_1": 0.05, "unequal_2": 0.02} if unequal else {"growth": -0.002, **given}
+    fit = told(body, silent(*GYROS), values, {}, unequal=unequal)
+    known = carried(fit, 4.0)
+    written = fitted_text(fit, known)
+    now = read_spacecraft(written, "now.yaml")
+    bodies = now.inertia, known.body.inertia
+    tensors = [body.axes @ np.diag(body.moments) @ body.axes.T for body in bodies]
+    assert tensors[0] == pytest.approx(tensors[1], rel=1e-9, abs=1e-8)
+    assert now.inertia.axes @ now.omega0 == pytest.approx(known.values[2:5], rel=1e-9)
+    if not unequal:
+        assert now.growth == pytest.approx(values["growth"] if name != "not seen" else 0.0)
+    shape = re.sub(r"\b\d[\d.e-]*", "#", written.partition("dispersions")[0])
+    check_text(f"files.fitted-{name.split()[0]}", shape + noted(notes(fit, known)))
+
+
+def test_thrusters_that_did_not_fire_and_delays_that_no_valve_has_are_said() -> None:
+    body = Source(FILE, "f.yaml").read()
+    fired = Schedule(tuple(channel_pulse(one, t, 0.5) for one, t in zip(body.channels, (2.0, 4.0, 6.0), strict=True)))
+    values = {"thrust T1": 0.01, "thrust T 2": -0.9, "delay T1": -0.5, "delay T3": -0.02}
+    fit = told(body, silent(*GYROS, schedule=fired), values, {})
+    known = carried(fit, 0.0)
+    check_text("files.fitted-doubts", noted(notes(fit, known)))
+    text = fitted_text(fit, known)
+    now = read_spacecraft(text, "now.yaml")
+    assert "epoch: 2026-03-01T12:00:00Z" in text  # as it was
+    assert [one.thrusters[0].torque for one in now.channels[:2]] == [
+        pytest.approx(one.thrusters[0].torque) for one in body.channels[:2]
+    ]
+    assert [one.valve for one in now.channels] == [one.valve for one in body.channels]
