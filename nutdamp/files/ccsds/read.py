@@ -385,6 +385,27 @@ def contradictions(contents: ApmContents, body: Spacecraft) -> list[str]:
     ]
 
 
+def ratio_doubts(contents: ApmContents, body: Spacecraft) -> list[str]:
+    """Doubt where spin, nutation and period of SPIN are those of another C/A than that of the ``body`` merged into."""
+    if not _by_nutation(contents) or body.spin == 0.0:
+        return []
+    assert contents.nutation is not None
+    first, second, third = contents.rates.tolist()
+    implied = math.hypot(first, second) / (abs(third) * math.tan(abs(contents.nutation)))
+    ratio = abs(body.axial / (body.inertia.A * body.spin))
+    if abs(implied - ratio) <= SAME_NUTATION * ratio:
+        return []
+    return [
+        f"spin, nutation and period of SPIN are those of C/A = {implied:.4g}, and the file has {ratio:.4g}: "
+        f"the spin and the nutation of {math.degrees(abs(contents.nutation)):.4g} deg are kept, not the period"
+    ]
+
+
+def _by_nutation(contents: ApmContents) -> bool:
+    """True where the rates are those of a nutation in SPIN, which is not zero."""
+    return bool(contents.nutation) and "ANGVEL" not in contents.lines
+
+
 def _file_text(contents: ApmContents, path: str, torquer: float | None) -> str:
     """The spacecraft file as YAML; ``torquer`` N m is the torque of a steerable torquer, or None."""
     # Texts are in double quotes, in which JSON and YAML agree.
@@ -456,6 +477,8 @@ def _schedule(manoeuvres: tuple[Manoeuvre, ...], torques: list[Vector]) -> Sched
 def merged_text(source: Source, contents: ApmContents | History, at: float = 0.0, *, inertia: bool) -> str:
     """The text of a spacecraft file with the motion of a message, of a history the record from ``at`` s on.
 
+    Of SPIN with a nutation the spin and the angle; see `ratio_doubts`.
+
     Raises BadRequest where the message has no ``inertia`` to merge, and where the file would be none for nutdamp.
     """
     given: Vector | None
@@ -471,6 +494,11 @@ def merged_text(source: Source, contents: ApmContents | History, at: float = 0.0
         after = replace(after, inertia=Inertia(*principal_axes(tensor), before.inertia.wheel))
     axes = after.inertia.axes
     after = replace(after, omega0=axes.T @ (before.rates if given is None else given))
+    if isinstance(contents, ApmContents) and _by_nutation(contents):
+        assert contents.nutation is not None
+        first, second, third = after.inertia.momentum(after.omega0).tolist()
+        share = abs(third) * math.tan(abs(contents.nutation)) / math.hypot(first, second)
+        after = replace(after, omega0=after.omega0 * (share, share, 1.0))  # the angle stays, whatever C/A the file has
     quaternion = before.initial.quaternion
     if turn is not None:
         quaternion = attitude.multiply(turn, attitude.from_matrix(axes))
