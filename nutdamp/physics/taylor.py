@@ -415,7 +415,7 @@ def _series(
     series[0] = state
     turning = [(size * cmath.exp(1j * rate * now), 1j * rate * unit) for size, rate in forcing.turning]
     light = None if falling is None else _Light(np.asarray(moments), falling, unit)
-    sink = None if forcing.growth == 0.0 else _Sink(np.asarray(moments), forcing, floor)
+    sink = None if forcing.growth == 0.0 else _Sink(np.asarray(moments), forcing, floor, light)
     for k in range(ORDER):
         # (series of the product of any two components)_k, by rows and columns, in one matrix product
         w = series[: k + 1].T @ series[k::-1, :3]
@@ -479,13 +479,15 @@ class _Sink:
 
     With q = H3/|H|² the slip is s = κq (H2, -H1, 0), and H × s is added to dH/dt in the body. ``floor`` keeps q regular
     where external torques bring H to rest: there is nothing to dissipate there. With a wheel q is
-    (bH3 + h)/(b|H|² + σh|H|), b = (C - A)/A.
+    ((C - A)H3 + Ah)/((C - A)|H|² + σAh|H|), of moments that may fall.
     """
 
-    def __init__(self, moments: Array, forcing: Forcing, floor: float) -> None:
+    def __init__(self, moments: Array, forcing: Forcing, floor: float, light: _Light | None) -> None:
         self.moments, self.growth, self.floor, self.wheel = moments, forcing.growth, floor, forcing.wheel
-        self.by_wheel, A = forcing.sense * forcing.wheel, 0.5 * (moments[0] + moments[1])
-        self.by_body = (moments[2] - A) / A if self.wheel else 1.0
+        parts = np.array([moments] if light is None else light.parts)  # series of the moments
+        self.by_wheel = 0.5 * (parts[:, 0] + parts[:, 1])
+        self.by_body = parts[:, 2] - self.by_wheel if self.wheel else np.ones(1)
+        self.sense = forcing.sense
         self.size, self.below = np.zeros((2, ORDER))  # |H| and the denominator of q
         self.momentum, self.slip = np.zeros((2, ORDER, 3))  # H and s
         self.squares, self.quotient = np.zeros((2, ORDER))  # |H|² and q
@@ -499,12 +501,16 @@ class _Sink:
         if k == 0:
             self.squares[0] += self.floor
             self.size[0] = math.sqrt(self.squares[0])
-        elif self.size[0] > 0.0:
+        elif self.wheel and self.size[0] > 0.0:
             between = self.size[1:k] @ self.size[k - 1 : 0 : -1]
             self.size[k] = 0.5 * (self.squares[k] - between) / self.size[0]
-        self.below[k] = self.by_body * self.squares[k] + self.by_wheel * self.size[k]
+        by_body, by_wheel = self.by_body[: k + 1], self.wheel * self.by_wheel[: k + 1]
+        back = slice(k, k - len(by_body) if k >= len(by_body) else None, -1)
+        self.below[k] = by_body @ self.squares[back]
+        if self.wheel:
+            self.below[k] += self.sense * (by_wheel @ self.size[back])
         if self.below[0] != 0.0:
-            above = self.by_body * momentum[k, 2] + (self.wheel if k == 0 else 0.0)
+            above = by_body @ momentum[back, 2] + (by_wheel[k] if k < len(by_wheel) else 0.0)
             before = self.below[1 : k + 1] @ self.quotient[:k][::-1]
             self.quotient[k] = (above - before) / self.below[0]
         first, second = self.growth * (self.quotient[k::-1] @ momentum[: k + 1, :2])

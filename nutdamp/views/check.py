@@ -205,7 +205,8 @@ def _notes(spacecraft: Spacecraft, verbose: bool) -> Iterator[Note]:
 
 def _spin_axis(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
     spin = capability.spin_axis(spacecraft)
-    stable = f"stable, p² = {spin.exponent:.4g} / s²" if spin.exponent < 0.0 else "a sphere, no axis is special"
+    still = "ω stands still in the body" if spacecraft.inertia.wheel else "a sphere, no axis is special"
+    stable = f"stable, p² = {spin.exponent:.4g} / s²" if spin.exponent < 0.0 else still
     by_shape = spin.kind == "minimum" and not spacecraft.inertia.wheel
     unstable = " (not under dissipation)" if by_shape or spacecraft.growth > 0.0 else ""
     yield "spin axis", f"{spin.kind} moment of inertia; {stable}{unstable}"
