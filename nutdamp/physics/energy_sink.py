@@ -66,7 +66,7 @@ class SinkEffect(NamedTuple):
 
 def damper(A: Any, C: Any, wheel: Any, size: Any, sense: float) -> tuple[Any, Any]:
     """Shares u and v of the law by |H| = ``size`` and the end ``sense`` of axis 3: (1, 0) without a wheel."""
-    if not np.any(wheel):
+    if not (wheel if isinstance(wheel, float) else np.any(wheel)):
         return 1.0, 0.0
     by_body, by_wheel = (C - A) / A * size, sense * wheel
     small = by_body + by_wheel + TINY
@@ -77,7 +77,7 @@ def course(
     growth: float, cosine: float, sine_squared: float, time: float, shares: tuple[Any, Any] = (1.0, 0.0)
 ) -> SinkEffect:
     """Effect of a sink of ``growth`` κ (1/s) after ``time`` s, from θ0 by its ``cosine`` and ``sine_squared``."""
-    if np.any(shares[1]):
+    if shares[1] != 0.0:
         return _gyrostat_course(growth * shares[0], growth * shares[1], cosine, sine_squared, time)
     exponent = growth * time
     clipped = max(-FOR_EVER, min(exponent, FOR_EVER))

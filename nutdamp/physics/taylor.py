@@ -486,7 +486,7 @@ class _Sink:
         self.moments, self.growth, self.floor, self.wheel = moments, forcing.growth, floor, forcing.wheel
         parts = np.array([moments] if light is None else light.parts)  # series of the moments
         self.by_wheel = 0.5 * (parts[:, 0] + parts[:, 1])
-        self.by_body = parts[:, 2] - self.by_wheel if self.wheel else np.ones(1)
+        self.by_body = parts[:, 2] - self.by_wheel
         self.sense = forcing.sense
         self.size, self.below = np.zeros((2, ORDER))  # |H| and the denominator of q
         self.momentum, self.slip = np.zeros((2, ORDER, 3))  # H and s
@@ -504,13 +504,13 @@ class _Sink:
         elif self.wheel and self.size[0] > 0.0:
             between = self.size[1:k] @ self.size[k - 1 : 0 : -1]
             self.size[k] = 0.5 * (self.squares[k] - between) / self.size[0]
-        by_body, by_wheel = self.by_body[: k + 1], self.wheel * self.by_wheel[: k + 1]
-        back = slice(k, k - len(by_body) if k >= len(by_body) else None, -1)
-        self.below[k] = by_body @ self.squares[back]
+        self.below[k], above = self.squares[k], momentum[k, 2]
         if self.wheel:
-            self.below[k] += self.sense * (by_wheel @ self.size[back])
-        if self.below[0] != 0.0:
+            by_body, by_wheel = self.by_body[: k + 1], self.wheel * self.by_wheel[: k + 1]
+            back = slice(k, k - len(by_body) if k >= len(by_body) else None, -1)
+            self.below[k] = by_body @ self.squares[back] + self.sense * (by_wheel @ self.size[back])
             above = by_body @ momentum[back, 2] + (by_wheel[k] if k < len(by_wheel) else 0.0)
+        if self.below[0] != 0.0:
             before = self.below[1 : k + 1] @ self.quotient[:k][::-1]
             self.quotient[k] = (above - before) / self.below[0]
         first, second = self.growth * (self.quotient[k::-1] @ momentum[: k + 1, :2])
