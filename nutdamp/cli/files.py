@@ -279,7 +279,17 @@ def import_command(job: Job, given: tuple[str, ...], into: str | None, inertia: 
     if into is None and (inertia or at is not None):
         raise click.UsageError("--inertia and --at say what to merge: name the spacecraft file with --into")
 
-    from nutdamp.files.ccsds.read import contradictions, imported, is_history, merged_text, read_apm, read_history
+    from nutdamp.files.ccsds.read import (
+        ApmContents,
+        contradictions,
+        imported,
+        is_history,
+        merged_text,
+        ratio_doubts,
+        read_apm,
+        read_history,
+    )
+    from nutdamp.files.reader import read_spacecraft
     from nutdamp.flight.propagation import flown
     from nutdamp.views.parts import pulse_table
 
@@ -291,6 +301,9 @@ def import_command(job: Job, given: tuple[str, ...], into: str | None, inertia: 
             job.remark(f"{file}: {entry}")
         merged = merged_text(FileInput(into).source(job.remark, job.doubt), message, at or 0.0, inertia=inertia)
         deliver([(output, lambda: merged)])
+        if isinstance(message, ApmContents):
+            for entry in ratio_doubts(message, read_spacecraft(merged, into)):
+                say(f"{file}: warning: {entry}")
         return
     if is_history(file):
         raise BadRequest(f"{file}: an attitude history has no inertia; --into merges it into a spacecraft file")

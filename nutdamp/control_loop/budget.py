@@ -116,6 +116,7 @@ class Map:
         self.seen = transfer(self.law, self.spin)
         self.ahead = self.watch.ahead = self.seen.step if loop.predict or loop.sensor.rate is None else 0.0
         self.turn = complex(self.law.growth, -float(self.law.rate(self.spin)))
+        self.slower = requirements.slower(spacecraft, loop.start)
         self.start, self.stop = (self.law.size(angle, self.spin) for angle in (loop.start, loop.stop))
         self.channels = {channel.name: channel for channel in spacecraft.channels}
         self.up = Odds(self.seen, self.start, self.law.growth, below=False)
@@ -366,6 +367,7 @@ class Map:
             if sizes[2] > sizes[1] * RISING > sizes[0] * RISING**2:
                 raise Infeasible(TOO_FAST)
         spans = np.array([np.subtract(cycle[-1], cycle[0])[:ADDED] for cycle in counted])
+        spans[:, 0] += self.slower * spans[:, 5]
         total = spans.sum(axis=0)
         rates = (total / total[0]).tolist()
         apart = spans[:, 1] - rates[1] * spans[:, 0]
@@ -493,7 +495,9 @@ def budget(
     if loop is None or spacecraft.growth <= 0.0:
         return Budget(spacecraft, largest, ())
     held = []
-    for done, pair in enumerate(pairs or [Thresholds(loop.start, loop.stop)], start=1):
+    asked = pairs or [Thresholds(loop.start, loop.stop)]
+    grown = [pair for pair in asked if math.isfinite(requirements.slower(spacecraft, pair.start))]
+    for done, pair in enumerate(grown, start=1):
         held.append(_held(spacecraft, replace(loop, start=pair.start, stop=pair.stop), seed))
         progress(done)
     return Budget(spacecraft, largest, tuple(held))

@@ -461,7 +461,9 @@ class Pilot:
         reach = (law.size(law.loop.start, float(seen.spin[-1])) - margin) / over
         if reach <= seen.size:
             return None
-        # tan θ grows by e^{κt}, and |ω| by no more.
+        # tan θ grows by e^{κt}, and |ω| by no more; with a wheel κ may rise with θ.
+        by_body, by_wheel = self.truth.damper
+        growth *= max(1.0, by_body * math.cos(law.loop.start) + by_wheel)
         waits = math.log(reach / seen.size) / growth if growth > 0.0 < seen.size else math.inf
         settles = law.loop.settle + max(law.period, WAVES * self.loop.sensor.low_pass)
         later = min(now + waits, self.until) - settles - law.period / GRID

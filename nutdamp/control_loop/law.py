@@ -62,7 +62,7 @@ class Law:
     def __init__(self, spacecraft: Spacecraft, loop: Loop) -> None:
         inertia = spacecraft.inertia
         if spacecraft.nutation_rate == 0.0:
-            raise Infeasible("in a sphere ω does not rotate in the body: there is no phase to fire by")
+            raise Infeasible("ω does not rotate in this body: there is no phase to fire by")
         self.spacecraft, self.loop, self.inertia = spacecraft, loop, inertia
         self.windows = Windows(spacecraft, endless=True)
         self.gauge = _gauge(inertia, spacecraft.spin)

@@ -39,6 +39,7 @@ from nutdamp.montecarlo.cases import watch_over
 from nutdamp.physics import attitude, batch, energy_sink, taylor
 from nutdamp.physics.taylor import Forcing
 from nutdamp.physics.triaxial import arc_cones
+from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.equipment import Loop
 from nutdamp.spacecraft.model import Spacecraft, SpinState, Vector
 from nutdamp.spacecraft.schedule import Pulse, Schedule
@@ -119,14 +120,13 @@ def until_default(spacecraft: Spacecraft, loop: Loop) -> float:
 
     Where the nutation grows again from what is left, a cycle longer, in which at most `REGROWN` samples are looked at.
     """
-    growth, now = spacecraft.growth, math.tan(spacecraft.nutation)
-    if growth <= 0.0:
+    if spacecraft.growth <= 0.0:
         return spacecraft.horizon
-    first = math.tan(loop.start)
-    waits = math.log(first / now) / growth if 0.0 < now < first else 0.0
+    first, waits = math.tan(loop.start), requirements.reached(spacecraft, loop.start)
     low = max(LEFT * math.tan(max(loop.stop, 0.5 * dead_band(spacecraft, loop).step)), SMALLEST * first)
     step = spacecraft.body_period / GRID if loop.sensor.rate is None else 1.0 / loop.sensor.rate
-    return waits + spacecraft.horizon + min(max(math.log(first / low), 0.0) / growth, REGROWN * step)
+    again = requirements.reached(spacecraft, loop.start, math.atan(low))
+    return (waits if math.isfinite(waits) else 0.0) + spacecraft.horizon + min(again, REGROWN * step)
 
 
 def fly(
@@ -255,7 +255,7 @@ class Fleet:
         self.noise, self.delays = np.array([(sensor.noise, sensor.delay) for sensor in sensors]).T.copy()
         moments = np.array([case.truth.inertia.moments for case in cases]).T
         wheels = np.array([case.truth.inertia.wheel for case in cases])
-        self.bodies = batch.Bodies(moments, np.zeros(3), Forcing(growth=law.growth, wheel=wheels))
+        self.bodies = batch.Bodies(moments, np.zeros(3), Forcing((), law.growth, wheels, law.spacecraft.sense))
         self.rates = np.array([case.truth.omega0 for case in cases]).T.copy()
         self.quaternion = np.zeros((4, len(cases)))
         self.quaternion[0] = 1.0
@@ -337,7 +337,7 @@ class Fleet:
         x, y, axial = self.rates[:, rows, None]
         wheel, now = forcing.wheel[rows, None], self.now[rows, None]
         omega, spin = energy_sink.rates_on_arc(
-            moments[0], moments[2], forcing.growth, x + 1j * y, axial, times - now, wheel
+            moments[0], moments[2], forcing.growth, x + 1j * y, axial, times - now, wheel, forcing.sense
         )
         shown = np.stack(felt(sensor, moments, (omega.real, omega.imag, spin)), axis=-1)
         values = shown * self.scales[rows, None] + self.biases[rows, None]
@@ -356,19 +356,22 @@ class Fleet:
             seen = Seen(times[at], decided[at], z[at], best[at], spin[at], nutation[at], fires[:, *at], size)
             yield seen if end else None
 
-    def _nutation(self, rows: Rows, growing: Vector | float = 0.0) -> Vector:
-        """θ (n,) rad of cases now, and with tan θ grown by e to the power ``growing``."""
-        h1, h2, h3 = self.bodies.some(rows).momentum(self.rates[:, rows])
-        return np.asarray(np.arctan2(np.hypot(h1, h2) * np.exp(growing), np.abs(h3)))
+    def _nutation(self, rows: Rows, since: Vector | float = 0.0) -> Vector:
+        """θ (n,) rad of cases after a coast ``since`` (n,) s from now."""
+        bodies = self.bodies.some(rows)
+        (A, _, C), (x, y, axial), (_, growth, wheel, sense) = bodies.moments, self.rates[:, rows], bodies.forcing
+        times = np.broadcast_to(since, x.shape)
+        omega, spin = energy_sink.rates_on_arc(A, C, growth, x + 1j * y, axial, times, wheel, sense)
+        return np.asarray(np.arctan2(A * np.abs(omega), np.abs(C * spin + wheel)))
 
     def _go(self, rows: Rows, times: Vector) -> None:
         """Coasts to ``times`` (n,) s."""
-        now, settled, growth = self.now[rows], self.settled[rows], self.law.growth
+        now, settled = self.now[rows], self.settled[rows]
         since = settled <= times
         if since.any():
             seen = rows[since]
             begin = np.maximum(settled, now)[since]
-            nutation = self._nutation(seen, growth * (begin - now[since]))
+            nutation = self._nutation(seen, begin - now[since])
             self.largest[seen] = np.maximum(self.largest[seen], nutation)
             self.quiet[seen] = np.where(np.isnan(self.quiet[seen]), nutation, self.quiet[seen])
         self._advance(rows, times - now, None, None)

@@ -56,6 +56,11 @@ class Body(NamedTuple):
     growth: float
 
     @property
+    def sense(self) -> float:
+        """Sign σ of H3 at the start."""
+        return math.copysign(1.0, self.inertia.axial(self.state.spin))
+
+    @property
     def closed(self) -> bool:
         """True where a coast is a closed form."""
         return self.inertia.symmetric or (self.growth == 0.0 and self.inertia.wheel == 0.0)
@@ -182,7 +187,8 @@ class Model:
         (A, _, C), since = inertia.moments, times - self.start
         if not inertia.symmetric:
             return triaxial.free_rates(inertia.moments, state.rates, since) @ inertia.axes.T
-        omega, spin = energy_sink.rates_on_arc(A, C, growth, state.omega, state.spin, since, inertia.wheel)
+        motion = state.omega, state.spin, since, inertia.wheel, body.sense
+        omega, spin = energy_sink.rates_on_arc(A, C, growth, *motion)
         return np.column_stack([omega.real, omega.imag, spin]) @ inertia.axes.T
 
     def _pulses(self) -> Schedule:
@@ -224,7 +230,7 @@ class Model:
             attitude=Attitude(attitude.multiply(state.quaternion, attitude.from_matrix(inertia.axes.T))),
         )
         acting = make_dynamics(spacecraft)
-        dynamics = _Closed(inertia.moments, acting.constant, Forcing(acting.forcing.turning, growth, inertia.wheel))
+        dynamics = _Closed(inertia.moments, acting.constant, acting.forcing._replace(growth=growth))
         pulses = tuple(
             replace(pulse, torque=None if pulse.torque is None else turn @ pulse.torque, impulse=turn @ pulse.impulse)
             for pulse in fired
@@ -241,7 +247,7 @@ def _coast(body: Body) -> Path:
     """The motion without pulses; of three moments that without dissipation and wheel."""
     inertia, state, growth = body
     if inertia.symmetric:
-        return Arc(inertia.A, inertia.C, 0.0, state, growth, inertia.wheel)
+        return Arc(inertia.A, inertia.C, 0.0, state, growth, inertia.wheel, body.sense)
     return FreeCoast(inertia.moments, 0.0, state)
 
 

@@ -13,6 +13,7 @@ from nutdamp.control_loop.sensor import Signal
 from nutdamp.figures import style
 from nutdamp.figures.overview import EDGE, TIME, firings, firings_height, title
 from nutdamp.figures.style import GREY, INK, MOMENTUM, MOTION, PULSE
+from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.equipment import GYRO
 from nutdamp.spacecraft.model import Vector
 from nutdamp.views.loop import described
@@ -142,11 +143,11 @@ def budget_figure(budget: Budget) -> Figure:
     figure = style.sheet(7.4, 4.0)
     axes = figure.subplots()
     times = np.linspace(0.0, size, ROWS)
-    free = np.degrees(np.arctan(np.exp(np.minimum(growth * times, 300.0)) * math.tan(body.nutation)))
+    free = np.degrees(requirements.idle(body, times))
     axes.plot(times / seconds, free, color=INK, label="no firing")
     for (thresholds, cycle, period, begins), (colour, line) in zip(held, LINES, strict=False):
         low, high = math.degrees(cycle.low), math.degrees(cycle.high)
-        rises = min(math.log(high / low) / growth, period) if high > low > 0.0 else period
+        rises = min(requirements.reached(body, cycle.high, cycle.low), period) if high > low > 0.0 else period
         starts = begins + period * np.arange(max(math.ceil((size - begins) / period), 0))
         drawn = np.stack([starts, starts + period - rises, starts + period], axis=1).ravel()
         name = f"{style.angle(thresholds.start)} to {style.angle(thresholds.stop)}"

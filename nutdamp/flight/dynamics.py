@@ -64,6 +64,7 @@ class Arc:
     state: SpinState
     growth: float = 0.0  # κ of `energy_sink`, 1/s
     wheel: float = 0.0  # h, N m s
+    sense: float = 1.0  # of the spin axis, for the growth
     steps: int = 0
 
     @classmethod
@@ -76,7 +77,7 @@ class Arc:
         A, C, state, since = self.A, self.C, self.state, np.asarray(times) - self.start
         motion = state.quaternion, state.omega, state.spin, since, self.wheel
         if self.growth != 0.0:
-            omega, spin, quaternion = energy_sink.arc(A, C, self.growth, *motion)
+            omega, spin, quaternion = energy_sink.arc(A, C, self.growth, *motion, self.sense)
         else:
             omega = state.omega * np.exp(-1j * ((A - C) / A * state.spin - self.wheel / A) * since)
             spin, quaternion = np.full(len(since), state.spin), attitude.arc(A, C, *motion)
@@ -87,7 +88,7 @@ class Arc:
         A, C, state, since = self.A, self.C, self.state, time - self.start
         motion = state.quaternion, state.omega, state.spin, since, self.wheel
         if self.growth != 0.0:
-            return SpinState(*energy_sink.arc(A, C, self.growth, *motion))
+            return SpinState(*energy_sink.arc(A, C, self.growth, *motion, self.sense))
         turned = cmath.exp(-1j * ((A - C) / A * state.spin - self.wheel / A) * since)
         return SpinState(state.omega * turned, state.spin, attitude.arc_end(A, C, *motion))
 
@@ -192,7 +193,8 @@ class Dynamics:
         work.spend(LEG)
         torques, slope, falling = push
         if end == start or (self.free and not torques and falling is None):
-            arc = Arc(self.moments[0], self.moments[2], start, state, self.forcing.growth, self.forcing.wheel)
+            _, growth, wheel, sense = self.forcing
+            arc = Arc(self.moments[0], self.moments[2], start, state, growth, wheel, sense)
             return arc, state if end == start else arc.end(end)
         torque = np.asarray(sum(torques, self.constant))
         long = float(np.linalg.norm(state.rates)) * (end - start) > LONG
@@ -224,7 +226,8 @@ def make_dynamics(spacecraft: Spacecraft) -> Dynamics:
     fixed = sum(disturbance.transverse for disturbance in disturbances if disturbance.rate == 0.0)
     turning = tuple((each.transverse, each.rate) for each in disturbances if each.rate != 0.0)
     axial = math.fsum(disturbance.axial for disturbance in disturbances)
-    forcing = Forcing(turning=turning, growth=spacecraft.growth, wheel=spacecraft.inertia.wheel)
+    wheel = spacecraft.inertia.wheel
+    forcing = Forcing(turning, spacecraft.growth, wheel, spacecraft.sense if wheel else 1.0)
     return Dynamics(spacecraft.inertia.moments, np.array([fixed.real, fixed.imag, axial]), forcing)
 
 

@@ -48,7 +48,7 @@ class EulerEquations:
         self._constant = self.tensor.tolist(), self.inverse.tolist()
         self.growth, self.axis = spacecraft.growth, self.axes[:, 2].tolist()
         self.wheel = (spacecraft.inertia.wheel * self.axes[:, 2]).tolist()
-        self.evaluations = 0
+        self.sense, self.evaluations = spacecraft.sense, 0
 
     def state(self, motion: SpinState) -> Vector:
         """Rates, rad/s, and quaternion in the axes of the file, (7,); (8,) with propellant used, kg: moments fall."""
@@ -115,7 +115,7 @@ class EulerEquations:
             rates, since = (first, second, third), t - start
             tensor, inverse = self._body(used)
             momentum = [part + more for part, more in zip(_times(tensor, rates), self.wheel, strict=True)]
-            drive, slip = self._sink(momentum)
+            drive, slip = self._sink(tensor, momentum)
             torque = [push + rise * since for push, rise in zip(pushed, rising, strict=True)]
             for rate, transverse, axial in disturbances:
                 turned = transverse * complex(math.cos(rate * t), math.sin(rate * t))
@@ -134,11 +134,12 @@ class EulerEquations:
 
         return derivative
 
-    def _sink(self, momentum: Numbers) -> tuple[Numbers, Numbers]:
+    def _sink(self, tensor: Matrix, momentum: Numbers) -> tuple[Numbers, Numbers]:
         """Contribution of energy dissipation to dH/dt in the body, N m, and to its turning, rad/s, axes of the file.
 
-        It turns axis 3 away from H (towards it for an oblate body) at κ sin θ cos θ: in the body H moves along the part
-        of -axis 3 square to H. Nothing inside a body can turn H in space, so the body slips against it to undo this.
+        It turns axis 3 away from H (towards it for an oblate body) at κ sin θ D(θ)/D(0), D the rate at which a nutation
+        turns in the body, dE/dθ over |H| sin θ: cos θ without a wheel. In the body H moves along the part of -axis 3
+        square to H. Nothing inside a body can turn H in space, so the body slips against it to undo this.
         """
         squared = sum(part * part for part in momentum)
         if self.growth == 0.0 or squared == 0.0:
@@ -146,7 +147,12 @@ class EulerEquations:
         size = math.sqrt(squared)
         cosine = sum(part * along for part, along in zip(momentum, self.axis, strict=True)) / size
         pairs = zip(momentum, self.axis, strict=True)
-        drive = [self.growth * cosine * (cosine * part - size * along) for part, along in pairs]
+        C = sum(part * along for part, along in zip(_times(tensor, self.axis), self.axis, strict=True))
+        wheel = self.spacecraft.inertia.wheel
+        A = 0.5 * (sum(tensor[i][i] for i in range(3)) - C)
+        turns = [size * angle * (1 / A - 1 / C) + wheel / C for angle in (cosine, self.sense)]
+        rate = self.growth * (self.sense * turns[0] / turns[1] if wheel else cosine)
+        drive = [rate * (cosine * part - size * along) for part, along in pairs]
         return drive, [part / squared for part in _cross(drive, momentum)]
 
 

@@ -91,9 +91,11 @@ class ClosedForm:
             if growth == 0.0:
                 phase = phase + plus(a * spin, times(-per_A, wheel)) * coast
             else:
-                effect, turn = _slipped(turn, (x, y, z), growth, coast)
-                phase = phase + (a * z * effect.turned - wheel * coast) / C
-                x, y, z = x * effect.transverse, y * effect.transverse, z * effect.axial
+                size = np.sqrt(x * x + y * y + z * z) + TINY
+                shares = energy_sink.damper(A, C, wheel, size, self.model.spacecraft.sense)
+                effect, turn = _slipped(turn, (x, y, z), growth, coast, shares)
+                phase = phase + (a * size * effect.travel - wheel * coast) / C
+                x, y, z = x * effect.transverse, y * effect.transverse, size * effect.along
                 spin = (z - wheel) / C
             if sheds is not None:  # half before the pulse and half after it, the rates as they are
                 x, y, A, C = _lighter(x, y, A, C, sheds[number])
@@ -154,13 +156,13 @@ def _turned_on(turn: tuple[Cases, ...] | None, momentum: Triple, time: Cases) ->
 
 
 def _slipped(
-    turn: tuple[Cases, ...], momentum: Triple, growth: float, time: Cases
+    turn: tuple[Cases, ...], momentum: Triple, growth: float, time: Cases, shares: tuple[Cases, Cases]
 ) -> tuple[energy_sink.SinkEffect, tuple[Cases, ...]]:
     """Effect of dissipation in ``time`` s, and ``turn`` with the slip against ``momentum``."""
     x, y, z = momentum
     across = x * x + y * y
     size = np.sqrt(across + z * z) + TINY
-    effect = energy_sink.courses(growth, z / size, across / (size * size), time)
+    effect = energy_sink.courses(growth, z / size, across / (size * size), time, shares)
     w, i, j = effect.cosine, effect.sine * y / size, -effect.sine * x / size
     p, a, b, c = turn
     return effect, (p * w - a * i - b * j, p * i + a * w - c * j, p * j + b * w + c * i, c * w + a * j - b * i)

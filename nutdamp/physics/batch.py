@@ -129,6 +129,11 @@ class _DampingSeries:
 
     def __init__(self, moments: Array, forcing: Forcing, acceleration: Array, rates: Array, step: Array) -> None:
         self.moments, self.growth, self.wheel = moments, forcing.growth, forcing.wheel
+        A = 0.5 * (moments[0] + moments[1])
+        self.with_wheel = bool(np.any(self.wheel))
+        self.by_body = (moments[2] - A) / A if self.with_wheel else 1.0
+        self.by_wheel = forcing.sense * forcing.wheel
+        self.size, self.below = np.zeros((2, LARGEST_ORDER, len(step)))  # |H| and the denominator of the quotient
         self.momentum, self.slip = np.zeros((2, LARGEST_ORDER, 3, len(step)))
         self.squares, self.quotient = np.zeros((2, LARGEST_ORDER, len(step)))  # |H|² and H3/|H|²
         largest = self.moments * (np.abs(rates) + np.abs(acceleration) * step)
@@ -143,8 +148,17 @@ class _DampingSeries:
         self.squares[k] = np.einsum("kcn,kcn->n", momentum[: k + 1], momentum[k::-1])
         if k == 0:
             self.squares[0] += np.where(self.squares[0] + self.floor > 0.0, self.floor, 1.0)
-        before = np.einsum("kn,kn->n", self.squares[1 : k + 1], self.quotient[:k][::-1])
-        self.quotient[k] = (momentum[k, 2] - before) / self.squares[0]
+        above, self.below[k] = momentum[k, 2], self.squares[k]
+        if self.with_wheel:
+            if k == 0:
+                self.size[0] = np.sqrt(self.squares[0])
+            else:
+                between = np.einsum("kn,kn->n", self.size[1:k], self.size[1:k][::-1])
+                self.size[k] = 0.5 * (self.squares[k] - between) / self.size[0]
+            above = self.by_body * above + (self.wheel if k == 0 else 0.0)
+            self.below[k] = self.by_body * self.squares[k] + self.by_wheel * self.size[k]
+        before = np.einsum("kn,kn->n", self.below[1 : k + 1], self.quotient[:k][::-1])
+        self.quotient[k] = (above - before) / self.below[0]
         slip[k, 0] = self.growth * np.einsum("kn,kn->n", self.quotient[k::-1], momentum[: k + 1, 1])
         slip[k, 1] = -self.growth * np.einsum("kn,kn->n", self.quotient[k::-1], momentum[: k + 1, 0])
         by_first, by_second = (np.einsum("kcn,kn->cn", momentum[: k + 1], slip[k::-1, axis]) for axis in (0, 1))
@@ -446,17 +460,17 @@ def _arc(moments: Array, forcing: Forcing, rates: Array, quaternion: Array, dura
     rates[0], rates[1] = x * cosine + y * sine, y * cosine - x * sine
     if growth == 0.0:
         return
-    spin = rates[2] + forcing.wheel / C  # dissipation acts on the whole of H3
-    moving = np.where(size > 0.0, size, 1.0)
+    moving = np.where(size > 0.0, size, 1.0)  # |H|/A
     cosine = np.where(size > 0.0, axial / moving, 1.0)
     h1, h2 = rates[0] / moving, rates[1] / moving
-    effect = energy_sink.courses(growth, cosine, h1 * h1 + h2 * h2, duration)
-    behind = (1.0 - C / A) * spin * (effect.turned - duration)
+    shares = energy_sink.damper(A, C, forcing.wheel, A * size, forcing.sense)
+    effect = energy_sink.courses(growth, cosine, h1 * h1 + h2 * h2, duration, shares)
+    behind = (A / C - 1.0) * size * (effect.travel - cosine * duration)
     quaternion[:] = attitude.product(quaternion, energy_sink.slip(effect, h1, h2, behind, cos_sin))
     cosine, sine = cos_sin(behind)
     x, y = rates[0] * effect.transverse, rates[1] * effect.transverse
     rates[0], rates[1] = x * cosine + y * sine, y * cosine - x * sine
-    rates[2] = spin * effect.axial - forcing.wheel / C
+    rates[2] = (A * size * effect.along - forcing.wheel) / C
 
 
 def _series(here: MotionStretch, duration: Array, acceleration: Array, jerk: Array | None) -> Iterator[Series]:

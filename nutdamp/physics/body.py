@@ -79,6 +79,12 @@ def body_period(A: float, C: float, spin: float, wheel: float = 0.0) -> float:
     return 2 * math.pi * A / rate if rate > 0 else math.inf
 
 
+def body_rate(A: float, C: float, spin: float, wheel: float = 0.0) -> float:
+    """Rate ν = ω3 - H3/A in rad/s, signed, at which ω turns in the body; zero where a wheel leaves but rounding."""
+    rate = (A - C) / A * spin - wheel / A
+    return 0.0 if abs(rate) <= 1e-14 * abs(wheel / A) else rate
+
+
 def inertial_rate(A: float, C: float, omega: float, spin: float) -> float:
     """Rate ω_n = |H|/A of the nutation seen inertially, rad/s: sqrt(|ω|² + (C/A)² ω3²), Magnus 1970 before (22)."""
     return math.hypot(omega, C / A * spin)

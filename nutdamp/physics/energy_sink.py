@@ -20,8 +20,15 @@ e^{κt} and N = sqrt(c² + s²E²): sin θ = sE/N, cos θ = c/N, and
 which is -asinh(e^{-κt}/tan θ0)/κ less its value at t = 0, in a form that cancels nowhere: t cos θ0 for κ -> 0, t
 for θ0 -> 0, and zero for θ0 = 90°. Either sense of spin: θ runs from 0 to 180°, and h3 carries the sign.
 
-With a wheel of momentum h, H3 = Cω3 + h takes the place of Cω3: dψ/dt = |H|(1/C - 1/A) cos θ - h/C, so that the forms
-above hold for the spin H3/C, and the body turns by -h t/C besides.
+With a wheel of momentum h, H3 = Cω3 + h takes the place of Cω3. |H| and h are kept, so that the energy changes by
+dE/dθ = |H| sin θ D, D(θ) = |H| cos θ (1/A - 1/C) + h/C: the rate at which ω turns in the body. A linear damper in the
+body takes D² sin²θ, and
+
+    dθ/dt = κ sin θ D(θ)/D(0) = κ sin θ (u cos θ + v)
+
+with D(0) at the end of axis 3 that is the spin axis, and κ the rate of small angles there. The slip is κ (u h3 + v)
+(h × e3), and dψ/dt = |H|(1/C - 1/A) cos θ - h/C. Where |u| > |v| there is an angle at which D = 0: ω stands still in
+the body, and growth ends. Losses within the wheel follow another law.
 """
 
 from __future__ import annotations
@@ -39,6 +46,9 @@ from nutdamp.physics import attitude
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
+STEPS, CLOSE = 60, 1e-9  # most Newton steps to θ at a time (usual are three), and the error that the last one squares
+STILL = 1e-12  # distance in ln tan(θ/2) from the angle with D = 0 within which it is reached
+MOST_TURNED = 10.0  # largest exponent of one of these steps: by e^10 a step that is too far can be taken back
 FOR_EVER = 300.0  # time constants after which the sink has finished: θ is then 0 or 90° to far beyond rounding
 TINY = 1e-200  # offset that keeps quotients like asinh x / x defined at zero and changes nothing elsewhere
 SMALLEST = 1e-150  # least cosine of a nutation angle that is distinguished from zero: its square is still a number
@@ -48,21 +58,38 @@ class SinkEffect(NamedTuple):
     """Effect of the sink on an arc, beside the free arc of the same body."""
 
     transverse: Any  # factor on |ω|
-    axial: Any  # factor on ω3
-    turned: Any  # s, in which the spin at the start turns the body as far as it has turned, ∫ω3 dt / ω3(0)
+    along: Any  # cos θ
+    travel: Any  # ∫cos θ dt, s
     cosine: Any  # of half the angle by which θ has grown
     sine: Any  # of that, as a multiple of sin θ0
 
 
-def course(growth: float, cosine: float, sine_squared: float, time: float) -> SinkEffect:
+def damper(A: Any, C: Any, wheel: Any, size: Any, sense: float) -> tuple[Any, Any]:
+    """Shares u and v of the law by |H| = ``size`` and the end ``sense`` of axis 3: (1, 0) without a wheel."""
+    if not (wheel if isinstance(wheel, float) else np.any(wheel)):
+        return 1.0, 0.0
+    by_body, by_wheel = (C - A) / A * size, sense * wheel
+    small = by_body + by_wheel + TINY
+    return by_body / small, sense * by_wheel / small
+
+
+def course(
+    growth: float, cosine: float, sine_squared: float, time: float, shares: tuple[Any, Any] = (1.0, 0.0)
+) -> SinkEffect:
     """Effect of a sink of ``growth`` κ (1/s) after ``time`` s, from θ0 by its ``cosine`` and ``sine_squared``."""
+    if shares[1] != 0.0:
+        return _gyrostat_course(growth * shares[0], growth * shares[1], cosine, sine_squared, time)
     exponent = growth * time
     clipped = max(-FOR_EVER, min(exponent, FOR_EVER))
     return _course(math, math.asinh, cosine, sine_squared, time, exponent, clipped)
 
 
-def courses(growth: float, cosine: Any, sine_squared: Any, times: Any) -> SinkEffect:
+def courses(
+    growth: float, cosine: Any, sine_squared: Any, times: Any, shares: tuple[Any, Any] = (1.0, 0.0)
+) -> SinkEffect:
     """`course` for arrays that broadcast, real or complex (a complex step gives derivatives)."""
+    if np.any(shares[1]):
+        return _gyrostat_course(growth * shares[0], growth * shares[1], cosine, sine_squared, times)
     exponent = growth * np.asarray(times)
     clipped = np.clip(exponent, -FOR_EVER, FOR_EVER)
     return _course(np, np.arcsinh, cosine, sine_squared, times, exponent, clipped)
@@ -78,15 +105,74 @@ def _course(module: Any, asinh: Any, cosine: Any, sine_squared: Any, time: Any, 
     swing = cosine * 2.0 * module.sinh(x) / (1.0 + size) + TINY
     return SinkEffect(
         transverse=growing / size,
-        axial=1.0 / size,
-        turned=stretched * asinh(swing) / swing + (time - moving) / size,
+        along=cosine / size,
+        travel=cosine * (stretched * asinh(swing) / swing + (time - moving) / size),
         cosine=grown,
         sine=0.5 * cosine * module.expm1(x) / (size * grown),
     )
 
 
+def _gyrostat_course(slope: Any, level: Any, cosine: Any, sine_squared: Any, time: Any) -> SinkEffect:
+    """Effect of θ' = sin θ (p cos θ + r), ``slope`` p and ``level`` r in 1/s, not both zero.
+
+    For z = ln tan(θ/2) - ln tan(θ0/2) it is z' = p cos θ + r, with which t = (z + p∫(1 - cos θ)dt)/(r + p) is closed
+    in z. Its inverse is by Newton steps in the logarithm of the distance from the angle at rest, if there is one.
+    """
+    # Seen from the end of axis 3 at which the rate is the larger, so that nothing cancels.
+    end = np.where(np.real(slope * level) < 0.0, -1.0, 1.0)
+    cosine, level = end * cosine, end * level
+    small = 0.5 * sine_squared / (1.0 + np.where(np.real(cosine) > 0.0, cosine, -cosine))
+    above = np.real(cosine) > 0.0
+    near, far = np.where(above, 1.0 - small, small), np.where(above, small, 1.0 - small)
+    first, last = level + slope, level - slope  # z' at θ = 0 and at θ = 180°
+    begin = first * near + last * far
+
+    def clock(way: Any) -> tuple[Any, Any, Any, Any]:
+        """Time until z = ``way`` z'(0), z' there over z'(0), e^{2z} and ∫(1 - cos θ)dt."""
+        double = 2.0 * begin * way + TINY
+        squared, gained = np.exp(double), 2.0 * way * np.expm1(double) / double
+        change = last * far * gained + TINY
+        falls = np.real(change) < -0.5
+        ratio = np.where(falls, (first * near + last * far * squared) / begin, 1.0 + change)
+        lag = far * gained * np.where(falls, np.log(ratio), np.log1p(change)) / change
+        return (begin * way + slope * lag) / first, ratio / (near + far * squared), squared, lag
+
+    with np.errstate(all="ignore"):  # where a logarithm is of nothing there is no such angle, or it is reached
+        rest = 0.5 * np.log(-first * near / (last * far))
+        rest = np.where(np.isfinite(rest) & (np.real(first * last) < 0.0), rest, 1.0 / STILL)
+        most = np.sign(np.real(time)) * FOR_EVER / (np.abs(begin) + 1e-20 * np.abs(first))
+        over, moves, _, _ = clock(most)
+        until = np.where((np.real(moves) > 0.0) & (np.abs(over) < np.abs(time)), over, time)
+        way = 0.0 * (begin * until)
+        for _ in range(STEPS):
+            passed, moves, _, _ = clock(way)
+            gap = rest - begin * way
+            going = (np.real(moves) > 0.0) & (np.abs(gap) > STILL)
+            late = np.where(going, until - passed, 0.0)
+            turned = begin * moves * late / np.where(going, gap, 1.0) + TINY
+            shorter = np.where(np.abs(turned) > MOST_TURNED, np.copysign(MOST_TURNED, np.real(turned)), turned)
+            step, farthest = -moves * late * np.expm1(-shorter) / turned, 1.01 * np.abs(first * late / (begin + TINY))
+            step = np.where(np.abs(step) > farthest, np.copysign(farthest, np.real(step)), step)
+            before, way = way, np.clip(way + step, -np.abs(most), np.abs(most))
+            if np.all(np.abs(way - before) <= CLOSE * np.abs(way)):
+                break
+        way = np.where(np.abs(rest - begin * way) <= STILL, rest / begin, way)
+        _, _, squared, lag = clock(way)
+        z = begin * way
+        travel = np.where(np.abs(slope * until) < 1.0, until - lag, (z - level * until) / slope)
+    grown, size = np.exp(z), near + far * squared
+    along, root = (near - far * squared) / size, np.sqrt(size)
+    return SinkEffect(
+        transverse=grown / size,
+        along=end * along,
+        travel=end * (travel + along * (time - until)),
+        cosine=(near + far * grown) / root,
+        sine=0.5 * end * np.expm1(z) / root,
+    )
+
+
 def time_to_turn(growth: float, cosine: float, sine_squared: float, turned: float) -> float:
-    """Time in s after which `SinkEffect.turned` is ``turned`` s: its inverse; infinite where it is never reached.
+    """Time in s after which ∫cos θ dt is cos θ0 times ``turned`` s, without a wheel; infinite if never.
 
     With z = κ c ``turned`` and c = |cos θ0| > 0 it is κt = z - ln(1 - (e^{2z} - 1) sin²θ0/(2c(1 + c))); flat spin turns
     no further.
@@ -99,19 +185,40 @@ def time_to_turn(growth: float, cosine: float, sine_squared: float, turned: floa
     return (z - math.log1p(-slowed)) / growth if growth != 0.0 else turned
 
 
+def time_to_angle(growth: float, begin: float, end: float, shares: tuple[float, float]) -> float:
+    """Time in s from θ = ``begin`` to ``end``, rad, both above zero, with growth κ not zero; infinite if never."""
+    by_body, by_wheel = shares
+    far, rate = math.sin(0.5 * begin) ** 2, by_body * math.cos(begin) + by_wheel
+    ratio = math.tan(0.5 * end) / math.tan(0.5 * begin)
+    gained = far * (ratio * ratio - 1.0) / (rate + TINY)
+    change = (by_wheel - by_body) * gained + TINY
+    if change <= -1.0:
+        return math.inf
+    time = (math.log(ratio) + by_body * gained * math.log1p(change) / change) / (growth * (by_body + by_wheel))
+    return time if time >= 0.0 else math.inf
+
+
 def coast(
-    A: float, C: float, growth: float, omega: complex, spin: float, time: float, wheel: float = 0.0
+    A: float,
+    C: float,
+    growth: float,
+    omega: complex,
+    spin: float,
+    time: Any,
+    wheel: float = 0.0,
+    sense: float = 1.0,
 ) -> SinkEffect:
     """`course` of a symmetric body from its rates ``omega`` = ω1 + iω2 and ``spin`` at the start, rad/s."""
-    first, second, third = _direction(A, C, omega, spin, wheel)
-    return course(growth, third, first * first + second * second, time)
+    first, second, third, size = _direction(A, C, omega, spin, wheel)
+    effect_of = courses if isinstance(time, np.ndarray) else course
+    return effect_of(growth, third, first * first + second * second, time, damper(A, C, wheel, size, sense))
 
 
 def slip(effect: SinkEffect, first: Any, second: Any, behind: Any, cos_sin: Callable[[Any], tuple[Any, Any]]) -> Any:
     """Quaternion (w, x, y, z) by which the body has slipped from its free arc; it multiplies that from the right.
 
-    ``first`` and ``second``: components of h in the body at the end of the free arc; ``behind`` = aH3/C(turned - t),
-    rad, the excess turn about axis 3.
+    ``first`` and ``second``: components of h in the body at the end of the free arc; ``behind``, rad: the
+    excess turn about axis 3, |H|(1/C - 1/A)(∫cos θ dt - t cos θ0).
     """
     x, y = effect.sine * second, -effect.sine * first
     cosine, sine = cos_sin(0.5 * behind)
@@ -119,7 +226,15 @@ def slip(effect: SinkEffect, first: Any, second: Any, behind: Any, cos_sin: Call
 
 
 def arc(
-    A: float, C: float, growth: float, quaternion: Array, omega: complex, spin: float, times: Any, wheel: float = 0.0
+    A: float,
+    C: float,
+    growth: float,
+    quaternion: Array,
+    omega: complex,
+    spin: float,
+    times: Any,
+    wheel: float = 0.0,
+    sense: float = 1.0,
 ) -> tuple[Any, Any, Array]:
     """Coast of a symmetric body, exact: ω (n,), ω3 (n,) rad/s and attitude (n, 4) at ``times`` (n,) s from its start.
 
@@ -127,12 +242,12 @@ def arc(
     At one time that is a number, by plain numbers: a tenth of the cost of arrays.
     """
     many = isinstance(times, np.ndarray)
-    module, exp, effect_of = (np, np.exp, courses) if many else (math, cmath.exp, course)
-    first, second, third = _direction(A, C, omega, spin, wheel)
-    effect = effect_of(growth, third, first * first + second * second, times)
+    module, exp = (np, np.exp) if many else (math, cmath.exp)
+    first, second, third, size = _direction(A, C, omega, spin, wheel)
+    effect = coast(A, C, growth, omega, spin, times, wheel, sense)
     offset = wheel / C
-    rate = (A - C) / A * (spin + offset)
-    free, behind = exp(-1j * (rate - offset) * times), rate * (effect.turned - times)
+    pace = (A - C) / A * size / C
+    free, behind = exp(-1j * (pace * third - offset) * times), pace * (effect.travel - third * times)
     there = complex(first, second) * free
     slipped = slip(effect, there.real, there.imag, behind, lambda angle: (module.cos(angle), module.sin(angle)))
     motion = A, C, quaternion, omega, spin, times, wheel
@@ -140,30 +255,37 @@ def arc(
         turned = attitude.multiply(attitude.arc(*motion), np.stack(slipped, axis=-1))
     else:
         turned = np.array(attitude.product(attitude.arc_end(*motion).tolist(), slipped))
-    spins = (spin + offset) * effect.axial - offset
+    spins = size * effect.along / C - offset
     return omega * free * effect.transverse * exp(-1j * behind), spins, turned
 
 
 def rates_on_arc(
-    A: Any, C: Any, growth: float, omega: Any, spin: Any, times: Array, wheel: Any = 0.0
+    A: Any,
+    C: Any,
+    growth: float,
+    omega: Any,
+    spin: Any,
+    times: Array,
+    wheel: Any = 0.0,
+    sense: float = 1.0,
 ) -> tuple[ComplexArray, Array]:
     """ω and ω3 of `arc` alone, for many bodies: ``times`` (cases, n) s from the starts of their arcs, else (cases, 1).
 
     ``omega`` and ``spin`` at the starts, rad/s, and moments, kg m², are by case; ``growth`` may be zero.
     """
     offset = wheel / C
-    rate = (A - C) / A * (spin + offset)
     if growth == 0.0:
-        return np.asarray(omega * np.exp(-1j * ((rate - offset) * times))), np.broadcast_to(spin, times.shape)
+        rate = (A - C) / A * (spin + offset) - offset
+        return np.asarray(omega * np.exp(-1j * (rate * times))), np.broadcast_to(spin, times.shape)
     across, along = A * A * (omega.real**2 + omega.imag**2), C * (spin + offset)
     size = np.sqrt(across + along * along) + TINY
-    effect = courses(growth, along / size, across / (size * size), times)
-    turned = rate * effect.turned - offset * times
-    return np.asarray(omega * np.exp(-1j * turned) * effect.transverse), (spin + offset) * effect.axial - offset
+    effect = courses(growth, along / size, across / (size * size), times, damper(A, C, wheel, size, sense))
+    turned = (A - C) / A * size / C * effect.travel - offset * times
+    return np.asarray(omega * np.exp(-1j * turned) * effect.transverse), size * effect.along / C - offset
 
 
-def _direction(A: float, C: float, omega: complex, spin: float, wheel: float) -> tuple[float, float, float]:
-    """Unit vector h of H in body axes; axis 3 for a body at rest."""
+def _direction(A: float, C: float, omega: complex, spin: float, wheel: float) -> tuple[float, float, float, float]:
+    """Unit vector of H in body axes, axis 3 for a body at rest, and |H|."""
     h1, h2, h3 = attitude.angular_momentum(A, C, omega, spin, wheel).tolist()
     size = math.hypot(h1, h2, h3)
-    return (h1 / size, h2 / size, h3 / size) if size > 0.0 else (0.0, 0.0, 1.0)
+    return (h1 / size, h2 / size, h3 / size, size) if size > 0.0 else (0.0, 0.0, 1.0, 0.0)

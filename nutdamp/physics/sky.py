@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from nutdamp.physics.attitude import angle_of_parts
 from nutdamp.physics.batch import MotionStretch, pieces
+from nutdamp.physics.energy_sink import damper
 
 OBLIQUITY = math.radians(23.43928)  # obliquity of the ecliptic at J2000.0
 ABERRATION = 20.4898 / 3600.0  # mean aberration of the Sun, deg (Meeus, 25.10)
@@ -170,8 +171,11 @@ class AxisWatch:
                 momentum = here.bodies.momentum(here.rates)
                 size = np.sqrt(np.sum(momentum * momentum, axis=0))
                 along = momentum[2] / size
-            if growth != 0.0:  # the axis leaves H at θ' = κ sin θ cos θ
-                rate = rate + growth * along * (along * seen[2] - np.sum(momentum * seen, axis=0) / size)
+                A, forcing = 0.5 * (here.bodies.moments[0] + here.bodies.moments[1]), here.bodies.forcing
+                by_body, by_wheel = damper(A, here.bodies.moments[2], forcing.wheel, size, forcing.sense)
+                pace = growth * (by_body * along + by_wheel)
+            if growth != 0.0:  # the axis leaves H at θ' = κ sin θ (u cos θ + v)
+                rate = rate + pace * (along * seen[2] - np.sum(momentum * seen, axis=0) / size)
             if number == self.momentum:  # which turns at the torque across it, over |H|
                 torque = _torque(here)
                 rate = rate + (torque[2] - np.sum(torque * seen, axis=0) * along) / size

@@ -248,6 +248,7 @@ class Forcing(NamedTuple):
     turning: tuple[tuple[complex, float], ...] = ()  # torques M e^{irt} about axis 3: M1 + iM2 in N m at t = 0, r rad/s
     growth: float = 0.0  # κ of `energy_sink`, 1/s, at which a small nutation grows; negative: decay
     wheel: Any = 0.0  # constant momentum h along axis 3 besides I3 ω3, N m s; (n,) by case in `batch`
+    sense: float = 1.0  # σ of the spin axis σ·e3, where κ holds
 
 
 NOTHING = Forcing()
@@ -414,7 +415,7 @@ def _series(
     series[0] = state
     turning = [(size * cmath.exp(1j * rate * now), 1j * rate * unit) for size, rate in forcing.turning]
     light = None if falling is None else _Light(np.asarray(moments), falling, unit)
-    sink = None if forcing.growth == 0.0 else _Sink(np.asarray(moments), forcing.growth, floor, forcing.wheel)
+    sink = None if forcing.growth == 0.0 else _Sink(np.asarray(moments), forcing, floor, light)
     for k in range(ORDER):
         # (series of the product of any two components)_k, by rows and columns, in one matrix product
         w = series[: k + 1].T @ series[k::-1, :3]
@@ -477,11 +478,17 @@ class _Sink:
     """`energy_sink` as series: torque of dissipation on H in body axes, and slip of the body.
 
     With q = H3/|H|² the slip is s = κq (H2, -H1, 0), and H × s is added to dH/dt in the body. ``floor`` keeps q regular
-    where external torques bring H to rest: there is nothing to dissipate there.
+    where external torques bring H to rest: there is nothing to dissipate there. With a wheel q is
+    ((C - A)H3 + Ah)/((C - A)|H|² + σAh|H|), of moments that may fall.
     """
 
-    def __init__(self, moments: Array, growth: float, floor: float, wheel: float) -> None:
-        self.moments, self.growth, self.floor, self.wheel = moments, growth, floor, wheel
+    def __init__(self, moments: Array, forcing: Forcing, floor: float, light: _Light | None) -> None:
+        self.moments, self.growth, self.floor, self.wheel = moments, forcing.growth, floor, forcing.wheel
+        parts = np.array([moments] if light is None else light.parts)  # series of the moments
+        self.by_wheel = 0.5 * (parts[:, 0] + parts[:, 1])
+        self.by_body = parts[:, 2] - self.by_wheel
+        self.sense = forcing.sense
+        self.size, self.below = np.zeros((2, ORDER))  # |H| and the denominator of q
         self.momentum, self.slip = np.zeros((2, ORDER, 3))  # H and s
         self.squares, self.quotient = np.zeros((2, ORDER))  # |H|² and q
 
@@ -493,10 +500,19 @@ class _Sink:
         self.squares[k] = momentum[: k + 1].ravel() @ momentum[k::-1].ravel()
         if k == 0:
             self.squares[0] += self.floor
-            self.quotient[0] = momentum[0, 2] / self.squares[0] if self.squares[0] > 0.0 else 0.0
-        elif self.squares[0] > 0.0:
-            before = self.squares[1 : k + 1] @ self.quotient[k - 1 :: -1]
-            self.quotient[k] = (momentum[k, 2] - before) / self.squares[0]
+            self.size[0] = math.sqrt(self.squares[0])
+        elif self.wheel and self.size[0] > 0.0:
+            between = self.size[1:k] @ self.size[k - 1 : 0 : -1]
+            self.size[k] = 0.5 * (self.squares[k] - between) / self.size[0]
+        self.below[k], above = self.squares[k], momentum[k, 2]
+        if self.wheel:
+            by_body, by_wheel = self.by_body[: k + 1], self.wheel * self.by_wheel[: k + 1]
+            back = slice(k, k - len(by_body) if k >= len(by_body) else None, -1)
+            self.below[k] = by_body @ self.squares[back] + self.sense * (by_wheel @ self.size[back])
+            above = by_body @ momentum[back, 2] + (by_wheel[k] if k < len(by_wheel) else 0.0)
+        if self.below[0] != 0.0:
+            before = self.below[1 : k + 1] @ self.quotient[:k][::-1]
+            self.quotient[k] = (above - before) / self.below[0]
         first, second = self.growth * (self.quotient[k::-1] @ momentum[: k + 1, :2])
         slip[k] = (second, -first, 0.0)
         products = momentum[: k + 1].T @ slip[k::-1]

@@ -167,15 +167,18 @@ def nearest_pair(spacecraft: Spacecraft) -> PairFit | None:
 class Consequence(NamedTuple):
     """Effect of one disturbance in the long run.
 
-    ``precession`` (rad/s) is the steady rate that it forces, K(14) fixed in the body, K(15) nearly fixed in space,
-    ``tilt`` (rad) the angle between H and the spin axis that goes with it, Magnus 1970 (13)/(14).
+    ``forced`` (rad/s) is the steady rate about which ω settles, K(14) fixed in the body, K(15) nearly fixed in space,
+    ``tilt`` (rad) the angle between H and the spin axis that goes with it, Magnus 1970 (13)/(14). A torque fixed in
+    space turns H by the ``precession`` M/|H| (rad/s); under any other H goes round, up to ``swing`` rad from the start.
     From rest the nutation swells to ``beat`` (rad) and back within ``beat_period`` s, (27). At resonance, (25), these
     are None and ``resonant`` holds the times (s) at which it has driven the nutation to `MARKS`. An axial
     part changes the spin at ``spin_rate`` rad/s².
     """
 
     disturbance: Disturbance
+    forced: float | None
     precession: float | None
+    swing: float | None
     tilt: float | None
     beat: float | None
     beat_period: float
@@ -194,18 +197,22 @@ def consequences(spacecraft: Spacecraft) -> Iterator[Consequence]:
     for disturbance in spacecraft.disturbances:
         torque, spin_rate = disturbance.transverse, disturbance.axial / C
         if torque == 0.0:
-            yield Consequence(disturbance, 0.0, 0.0, 0.0, math.inf, (), spin_rate)
+            yield Consequence(disturbance, 0.0, None, 0.0, 0.0, 0.0, math.inf, (), spin_rate)
             continue
         largest, period = response.beat(A, turning, torque, disturbance.rate)
         # A beat that takes longer than everything planned, several times over, is a resonance for the user.
         if period > RESONANT * spacecraft.horizon:
             marks = [mark for mark in MARKS if mark > spacecraft.nutation]
             times = [(mark, response.resonant_time(A, spacecraft.axial, omega0, torque, mark)) for mark in marks]
-            yield Consequence(disturbance, None, None, None, period, tuple(times), spin_rate)
+            yield Consequence(disturbance, None, None, None, None, None, period, tuple(times), spin_rate)
             continue
         steady = abs(response.steady_response(A, turning, torque, disturbance.rate))
+        turns = abs(spacecraft.spin + disturbance.rate)  # of the torque in space
+        precession = abs(torque) / float(np.linalg.norm(spacecraft.momentum))
+        steadily = turns * spacecraft.horizon < 1.0
+        ways = precession if steadily else None, None if steadily else 2.0 * precession / turns
         tilt, swell = (float(rigid_body.nutation_angle(A, C, rate, spin)) for rate in (steady, largest))
-        yield Consequence(disturbance, steady, tilt, swell, period, (), spin_rate)
+        yield Consequence(disturbance, steady, *ways, tilt, swell, period, (), spin_rate)
 
 
 class SpinAxis(NamedTuple):

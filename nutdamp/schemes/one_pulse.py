@@ -10,7 +10,7 @@ from nutdamp.errors import Infeasible, TooShort
 from nutdamp.physics import response
 from nutdamp.schemes.catalogue import SchemeOptions
 from nutdamp.schemes.correction import FlownBuilder
-from nutdamp.schemes.sequential import ImpulseBuilder, at_hand, no_alignment
+from nutdamp.schemes.sequential import ImpulseBuilder, at_hand, fire_components, no_alignment
 from nutdamp.spacecraft.constraints import longest_useful, usable
 from nutdamp.spacecraft.equipment import Channel, Steerable
 from nutdamp.spacecraft.model import Spacecraft
@@ -37,6 +37,11 @@ def schedule(spacecraft: Spacecraft, options: SchemeOptions) -> Schedule:  # noq
             return train.schedule()
         raise TooShort(f"no pulse of the steerable torquer fits before the horizon of {spacecraft.horizon:.4g} s")
     channels = at_hand(spacecraft, usable(spacecraft))
+    if spacecraft.nutation_rate == 0.0:  # no channel ever comes to oppose ω: those beside it take its components
+        still = ImpulseBuilder(spacecraft)
+        fire_components(still, channels)
+        if still.pulses:
+            return still.schedule()
     trains = [train for train in (_train(spacecraft, channel) for channel in channels) if train.pulses]
     if not trains:
         raise no_alignment(spacecraft, channels)

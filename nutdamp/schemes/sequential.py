@@ -8,6 +8,7 @@ a symmetric body, and put back in: the schedule is translated to the true actuat
 from __future__ import annotations
 
 import cmath
+import itertools
 import math
 from dataclasses import dataclass, replace
 
@@ -70,7 +71,7 @@ class ImpulseBuilder:
 
     def rate(self, spin: float) -> float:
         """Rate ν in rad/s at which ω turns in the body at a ``spin``."""
-        return self.a * spin - self.wheel / self.A
+        return rigid_body.body_rate(self.A, self.C, spin, self.wheel)
 
     @property
     def turning(self) -> float:
@@ -88,9 +89,11 @@ class ImpulseBuilder:
         since, drift, growth = time - self.now, self.spacecraft.spin_drift, self.spacecraft.growth
         omega, spin, angle, slower = self.omega, self.spin, self.turning * since, self.wheel / self.C
         if growth != 0.0:
-            effect = energy_sink.coast(self.A, self.C, growth, omega, spin, since, self.wheel)
-            angle = self.a * (spin + slower) * effect.turned - slower * since
-            omega, spin = omega * effect.transverse, (spin + slower) * effect.axial - slower
+            motion = omega, spin, since, self.wheel, self.spacecraft.sense
+            effect = energy_sink.coast(self.A, self.C, growth, *motion)
+            equivalent = math.hypot(spin + slower, self.A / self.C * abs(omega))  # |H|/C
+            angle = self.a * equivalent * effect.travel - slower * since
+            omega, spin = omega * effect.transverse, equivalent * effect.along - slower
         angle += 0.5 * self.a * drift * since * since
         return omega * cmath.exp(-1j * angle), spin + drift * since
 
@@ -164,7 +167,10 @@ class ImpulseBuilder:
         def alignment(ready: float) -> float:
             """Whole turns from ``first`` to the alignment at which a pulse starts at ``ready`` s or next."""
             since = ready + 0.5 * on_time - slack - self.now
-            turned = since if self._even else energy_sink.course(*self._sink(), since).turned
+            turned = since
+            if not self._even:
+                growth, cosine, square = self._sink()
+                turned = energy_sink.course(growth, cosine, square, since).travel / cosine
             return math.ceil((turned - first) / self.period)
 
         turns = alignment(self.ready)
@@ -217,6 +223,45 @@ class ImpulseBuilder:
         centre = start + 0.5 * on_time
         angle = cmath.phase(-self.omega_at(centre))
         return steerable_pulse(steerable, centre, angle, impulse=impulse, on_time=on_time)
+
+
+def fire_components(
+    builder: ImpulseBuilder, channels: list[Channel], on_time: float | None = None, *, coarse: bool = False
+) -> None:
+    """Pulses where ω does not turn in the body: the channels beside -ω share it, |cos φ| + |sin φ| for ±1, ±2."""
+    for channel, impulse in components(channels, -builder.A * builder.omega):
+        unit = impulse / abs(channel.transverse)
+        longest = channel.max_on_time if on_time is None else on_time
+        count = 1 if math.isinf(longest) else max(math.ceil(unit / longest - 1e-9), 1)
+        for _ in range(count):
+            needed = longest if coarse and not math.isinf(longest) else unit / count
+            lasts = builder.windows.on_time(needed, channel.min_on_time, channel.max_on_time)
+            start = builder.windows.earliest_start(lasts, builder.ready)
+            if builder.full or start is None:
+                return
+            pulse = channel_pulse(channel, start + 0.5 * lasts, lasts)
+            if not builder.helps(pulse):
+                break
+            builder.fire(pulse)
+
+
+def components(channels: list[Channel], target: complex) -> list[tuple[Channel, float]]:
+    """Impulses >= 0 (N m s) along channel directions that sum to ``target`` with least total; else the nearest."""
+    best: list[tuple[Channel, float]] = []
+    least = math.inf
+    for left, right in itertools.combinations(channels, 2):
+        d1, d2 = (channel.transverse / abs(channel.transverse) for channel in (left, right))
+        area = (d1.conjugate() * d2).imag
+        if abs(area) < 1e-9:
+            continue
+        first, second = (target.conjugate() * d2).imag / area, (d1.conjugate() * target).imag / area
+        if min(first, second) >= -1e-12 * abs(target) and first + second < least:
+            least = first + second
+            best = [(left, first), (right, second)]
+    if not best:
+        along = [(target * channel.transverse.conjugate()).real / abs(channel.transverse) for channel in channels]
+        best = [max(zip(channels, along, strict=True), key=lambda share: share[1])]
+    return [(channel, impulse) for channel, impulse in best if impulse > 1e-12 * abs(target)]
 
 
 FADED = 1e-6  # fraction of the nutation below which pulses have nothing to do: dissipation has removed it
@@ -272,8 +317,8 @@ def no_alignment(spacecraft: Spacecraft, channels: list[Channel]) -> Infeasible:
         off = {channel.name: abs(cmath.phase(-omega * channel.transverse.conjugate())) for channel in channels}
         nearest = min(off, key=lambda name: off[name])
         return Infeasible(
-            "in a sphere (a = 0) ω does not turn in the body, so waiting brings no channel to oppose it; "
-            f"nearest is {nearest}, {math.degrees(off[nearest]):.4g}° off. four-pulse combines channels"
+            "ω does not turn in this body, so waiting brings no channel to oppose it; "
+            f"nearest is {nearest}, {math.degrees(off[nearest]):.4g}° off"
         )
     builder = ImpulseBuilder(spacecraft, endless=True)
     pulses, ends = [], []

@@ -13,6 +13,7 @@ import itertools
 import math
 from collections.abc import Iterator
 from contextlib import suppress
+from dataclasses import replace
 
 import numpy as np
 
@@ -23,7 +24,7 @@ from nutdamp.physics import energy_sink, response
 from nutdamp.schemes import correction
 from nutdamp.schemes.catalogue import TwoPulseOptions
 from nutdamp.schemes.correction import CLOSE_IN_COST, PairCandidate, tolerable
-from nutdamp.schemes.sequential import ALIGNED, FADED, ImpulseBuilder, at_hand, bounded_by, model_of
+from nutdamp.schemes.sequential import ALIGNED, FADED, ImpulseBuilder, at_hand, bounded_by, components, model_of
 from nutdamp.spacecraft.constraints import Windows, for_pairs, keeps_limits, longest_useful
 from nutdamp.spacecraft.equipment import Channel, Steerable
 from nutdamp.spacecraft.model import Spacecraft, Vector
@@ -69,18 +70,39 @@ def _damping(spacecraft: Spacecraft, options: TwoPulseOptions) -> Schedule:
     channels = at_hand(spacecraft, for_pairs(spacecraft))
     best, broken = correction.best_of(spacecraft, _shortlist(spacecraft, channels, options))
     schedule = best or broken
+    if schedule is None and spacecraft.nutation_rate == 0.0:
+        schedule = _standing(spacecraft, channels)
     if schedule is not None:
         return schedule
     names = ", ".join(channel.name for channel in channels)
     if spacecraft.nutation_rate == 0.0:
         raise Infeasible(
-            "in a sphere (a = 0) ω does not turn in the body, and no two of the channels "
-            f"({names}) have it opposite to the middle between them; a steerable torquer or four-pulse can work"
+            f"ω does not turn in this body, and the channels ({names}) cannot oppose it, each twice, half a turn of "
+            f"the axis about H apart, within {bounded_by(spacecraft)}; a steerable torquer can work"
         )
     if _grown(spacecraft, spacecraft.limits.earliest + 0.25 * spacecraft.body_period) < FADED:
         raise Infeasible(f"dissipation takes the nutation out before the channels ({names}) come to oppose it")
     bounds = bounded_by(spacecraft)
     raise Infeasible(f"no two of the channels ({names}) bring H back and oppose the nutation within {bounds}")
+
+
+def _standing(spacecraft: Spacecraft, channels: list[Channel]) -> Schedule | None:
+    """A pair of pulses of each channel beside -ω where ω does not turn in the body: it brings H back by itself."""
+    wait, here, pulses = _halves(spacecraft).wait, spacecraft, list[Pulse]()
+    A, (first, second, spin) = spacecraft.inertia.A, spacecraft.omega0.tolist()
+    left = -A * complex(first, second)
+    for channel, impulse in components(channels, left):
+        share = impulse * channel.transverse / abs(channel.transverse)
+        here = replace(here, omega0=np.array([-share.real / A, -share.imag / A, spin]))
+        placed = _place(here, (channel, channel), wait, 0.0, literal=False)
+        if placed is None:
+            return None
+        pulses += placed.fired(spacecraft)
+        earliest = pulses[-1].over + spacecraft.limits.gap
+        here, left = replace(here, limits=replace(here.limits, earliest=earliest)), left - share
+    if not pulses or abs(left) > ALIGNED * spacecraft.least_impulse:
+        return None
+    return correction.correct(spacecraft, Schedule(tuple(pulses)), chosen=range(len(pulses)), momentum=True)
 
 
 def _steered(spacecraft: Spacecraft, torquer: Steerable, options: TwoPulseOptions) -> Schedule:
@@ -170,18 +192,17 @@ def _candidates(spacecraft: Spacecraft, one: Channel, two: Channel, literal: boo
     turn = cmath.phase(two.transverse * one.transverse.conjugate())  # arg d2 - arg d1
     # Rate of d as seen from H while half the nutation is left: ω3 at small angles, exact for the aligned pair.
     rate = turning + inertia.C / inertia.A * inertia.equivalent(spacecraft.spin) / math.cos(0.5 * spacecraft.nutation)
-    to_go = math.pi - turn
-    still = 0.1  # rad; channels that turn no further stand still in space: they close at any time, or never
-    if abs(rate) * spacecraft.horizon < still:
-        if abs(cmath.phase(cmath.rect(1.0, to_go))) > still:
-            return []
-        to_go, rate = -turn, turning  # until the second opposes ω as the first does
-    if rate == 0.0:
-        return []
-    first_wait = to_go * math.copysign(1.0, rate) % (2 * math.pi) / abs(rate)
-    count = int(max(spacecraft.horizon - first_wait, 0.0) * abs(rate) / (2 * math.pi)) + 1
-    turns = _turns(count, turn + turning * first_wait, 2 * math.pi * turning / abs(rate))
-    waits = first_wait + 2 * math.pi / abs(rate) * turns
+    to_go, waits = math.pi - turn, np.zeros(0)
+    first_wait = to_go * math.copysign(1.0, rate) % (2 * math.pi) / abs(rate) if rate != 0.0 else math.inf
+    if first_wait <= spacecraft.horizon:
+        count = int((spacecraft.horizon - first_wait) * abs(rate) / (2 * math.pi)) + 1
+        turns = _turns(count, turn + turning * first_wait, 2 * math.pi * turning / abs(rate))
+        waits = first_wait + 2 * math.pi / abs(rate) * turns
+    still = 0.1  # rad; channels that turn by less in half a nutation turn all but stand still in space
+    if abs(rate) * math.pi < still * abs(turning):  # they close whenever the second opposes ω as the first does
+        count = min(int(spacecraft.horizon / spacecraft.body_period) + 1, MANY)
+        opposed = (-turn * math.copysign(1.0, turning) % (2 * math.pi) + 2 * math.pi * np.arange(count)) / abs(turning)
+        waits = np.union1d(waits, opposed[np.abs(np.angle(np.exp(1j * (to_go - rate * opposed)))) < still])
     if literal:  # halves and wait as printed; the pair must do with the direction it finds
         wait = _halves(spacecraft, literal).wait
         count = max(int(spacecraft.horizon / wait), 1) // 2 + 1
@@ -274,5 +295,6 @@ def _grown(spacecraft: Spacecraft, time: float) -> float:
         return 1.0
     inertia, (first, second, spin) = spacecraft.inertia, spacecraft.omega0.tolist()
     omega = complex(first, second)
-    effect = energy_sink.coast(inertia.A, inertia.C, spacecraft.growth, omega, spin, time, inertia.wheel)
+    motion = omega, spin, time, inertia.wheel, spacecraft.sense
+    effect = energy_sink.coast(inertia.A, inertia.C, spacecraft.growth, *motion)
     return float(effect.transverse)

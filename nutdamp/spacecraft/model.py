@@ -20,7 +20,7 @@ from nutdamp.common import results
 from nutdamp.common.numerics import cleaned
 from nutdamp.common.time import DIGITS, Epoch
 from nutdamp.errors import BadRequest
-from nutdamp.physics import attitude
+from nutdamp.physics import attitude, energy_sink
 from nutdamp.physics import body as rigid_body
 from nutdamp.physics.body import ConeAngles
 from nutdamp.physics.thruster import Cold as Cold
@@ -159,7 +159,7 @@ class Inertia:
             from nutdamp.physics import triaxial  # few bodies need it
 
             return triaxial.body_nutation_rate(self.moments, spin, self.wheel)
-        return self.a * spin - self.wheel / self.A
+        return rigid_body.body_rate(self.A, self.C, spin, self.wheel)
 
     def nutation_slope(self, spin: float) -> float:
         """Derivative of `nutation_rate` by the spin: ``a`` where I1 = I2."""
@@ -383,12 +383,20 @@ class Spacecraft(results.Data, results.Shown):
         """Growth rate κ (1/s) of a small nutation by energy dissipation; negative where it decays.
 
         By shape it grows in a prolate body and decays in an oblate one, unless the file says what it does, as of a boom
-        that the Sun heats. A sphere has no energy to give: zero. See `physics.energy_sink`.
+        that the Sun heats. A sphere has no energy to give, nor has a body in which ω stands still for its wheel: zero.
+        See `physics.energy_sink`.
         """
-        if self.dissipation is None or (self.nutation_grows is None and self.inertia.a == 0.0):
+        still = self.nutation_rate == 0.0 and (self.nutation_grows is None or self.inertia.wheel != 0.0)
+        if self.dissipation is None or still:
             return 0.0
         grows = self.inertia.a > 0.0 if self.nutation_grows is None else self.nutation_grows
         return 1.0 / self.dissipation if grows else -1.0 / self.dissipation
+
+    @property
+    def damper(self) -> tuple[float, float]:
+        """Shares u and v of `energy_sink` at t = 0, for the angle from the spin axis."""
+        inertia, size = self.inertia, float(np.linalg.norm(self.momentum))
+        return energy_sink.damper(inertia.A, inertia.C, self.sense * inertia.wheel, size, 1.0)
 
     @property
     def spin_drift(self) -> float:

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from nutdamp.errors import BadRequest
+from nutdamp.physics import energy_sink
 from nutdamp.spacecraft.equipment import Loop
 from nutdamp.spacecraft.model import SLACK, Keep, Spacecraft
 from nutdamp.spacecraft.tolerances import SpinTolerance
@@ -197,7 +198,7 @@ def unaided(spacecraft: Spacecraft) -> bool:
     varying = spacecraft.growth != 0.0 or spacecraft.goal.spin is not None
     if spacecraft.disturbances or (varying and not spacecraft.inertia.symmetric):
         return False
-    nutation = _idle(spacecraft, spacecraft.horizon)
+    nutation = spacecraft.nutation if spacecraft.growth == 0.0 else float(idle(spacecraft, spacecraft.horizon))
     aim = 0.0 if spacecraft.goal.axis is None else spacecraft.to_turn
     # H stays, and H3 = |H| cos θ with it, so that spin and nutation are worst at one end of the time or the other.
     faster = math.cos(nutation) / math.cos(spacecraft.nutation)
@@ -214,15 +215,20 @@ def decayed(spacecraft: Spacecraft, t: float) -> float:
     """
     if spacecraft.growth >= 0.0 or spacecraft.disturbances or not spacecraft.inertia.symmetric:
         return spacecraft.nutation
-    return _idle(spacecraft, t)
+    return float(idle(spacecraft, t))
 
 
-def _idle(spacecraft: Spacecraft, t: float) -> float:
-    return math.atan(math.tan(spacecraft.nutation) * math.exp(min(spacecraft.growth * t, 700.0)))
+def idle(spacecraft: Spacecraft, t: Any) -> Any:
+    """Nutation, rad, at ``t`` s without control, a number or an array, where I1 = I2 and there is no disturbance."""
+    sine, cosine = math.sin(spacecraft.nutation), math.cos(spacecraft.nutation)
+    effect = energy_sink.courses(spacecraft.growth, cosine, sine * sine, t, spacecraft.damper)
+    return np.arctan2(sine * effect.transverse, effect.along)
 
 
 def reached(spacecraft: Spacecraft, nutation: float, now: float | None = None) -> float:
-    """Time to a nutation (rad) without firing, s: ln(tan θ/tan θ0)/κ; 0 if reached, infinite if never.
+    """Time to a nutation (rad) without firing, s; 0 if reached, infinite if never, as beyond the end of growth.
+
+    ln(tan θ/tan θ0)/κ without a wheel.
 
     Growing nutation reaches it from below, decaying nutation from above; ``now``: θ0, default that at t = 0.
     """
@@ -232,7 +238,19 @@ def reached(spacecraft: Spacecraft, nutation: float, now: float | None = None) -
         return 0.0
     if growth == 0.0 or now == 0.0 or nutation == 0.0:
         return math.inf
-    return math.log(math.tan(nutation) / math.tan(now)) / growth
+    return energy_sink.time_to_angle(growth, now, nutation, spacecraft.damper)
+
+
+def slower(spacecraft: Spacecraft, nutation: float) -> float:
+    """Time, s, by which a growing nutation comes later to an angle, rad, than at the rate of small angles.
+
+    Infinite where growth ends before; without a wheel tan θ grows at that rate to the end.
+    """
+    if spacecraft.inertia.wheel == 0.0:
+        return 0.0
+    small = 1e-6 * nutation
+    even = math.log(math.tan(nutation) / math.tan(small)) / spacecraft.growth
+    return reached(spacecraft, nutation, small) - even
 
 
 def only_nutation(spacecraft: Spacecraft) -> bool:

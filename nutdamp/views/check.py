@@ -112,7 +112,8 @@ def disturbance_table(spacecraft: Spacecraft) -> DataTable:
                kind=TEXT),
         Column("name", "", "", lambda row: row.disturbance.name or None, where="json", kind=TEXT),
         Column("", "effect", "", lambda row: "; ".join(_effects(row)), where="screen", kind=TEXT),
-        *file_columns("json", "precession_rad_s", "forced_tilt_deg=tilt", "beat_deg", "beat_period_s"),
+        *file_columns("json", "forced_rate_rad_s=forced", "precession_rad_s", "momentum_swing_deg=swing",
+                      "forced_tilt_deg=tilt", "beat_deg", "beat_period_s"),
         Column("reaches", "", "", reached, where="json"),
         *file_columns("json", "spin_rate_rad_s2=spin_rate"),
     )  # fmt: skip
@@ -124,7 +125,11 @@ def _effects(row: Consequence) -> Iterator[str]:
         reached = ", ".join(f"{degrees(mark)} after {duration(time)}" for mark, time in row.resonant)
         yield f"resonant with the nutation: drives it to {reached}"
     elif row.disturbance.transverse != 0.0:
-        yield f"forces a tilt of {degrees(row.tilt)}, precession at {quantity(row.precession, 'rad/s')}"
+        yield f"forces a tilt of {degrees(row.tilt)}, forced rate {quantity(row.forced, 'rad/s')}"
+        if row.swing is None:
+            yield f"precession of H at {quantity(row.precession, 'rad/s')}"
+        else:
+            yield f"H stays within {degrees(row.swing)}"
         yield f"from rest the nutation beats up to {degrees(row.beat)} every {duration(row.beat_period)}"
     if row.spin_rate != 0.0:
         yield f"changes the spin by {row.spin_rate:.4g} rad/s²"
@@ -200,7 +205,8 @@ def _notes(spacecraft: Spacecraft, verbose: bool) -> Iterator[Note]:
 
 def _spin_axis(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
     spin = capability.spin_axis(spacecraft)
-    stable = f"stable, p² = {spin.exponent:.4g} / s²" if spin.exponent < 0.0 else "a sphere, no axis is special"
+    still = "ω stands still in the body" if spacecraft.inertia.wheel else "a sphere, no axis is special"
+    stable = f"stable, p² = {spin.exponent:.4g} / s²" if spin.exponent < 0.0 else still
     by_shape = spin.kind == "minimum" and not spacecraft.inertia.wheel
     unstable = " (not under dissipation)" if by_shape or spacecraft.growth > 0.0 else ""
     yield "spin axis", f"{spin.kind} moment of inertia; {stable}{unstable}"

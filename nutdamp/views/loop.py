@@ -21,6 +21,7 @@ from nutdamp.control_loop.simulation import LoopRun
 from nutdamp.control_loop.stability import SURELY, Margin, dead_band, feeding, margins, too_late
 from nutdamp.planning.notes import verdict_notes
 from nutdamp.planning.verdict import Verdict
+from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.equipment import GYRO, Loop
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.views import decisions, tables
@@ -349,6 +350,9 @@ def _outlook(budget: Budget) -> Iterator[Note]:
         yield note("no-largest-nutation")
     elif until == 0.0:
         yield note("damping-due", nutation_deg=now, limit_deg=limit)
+    elif until is not None and math.isinf(until):
+        end = math.degrees(float(requirements.idle(body, 1e3 / body.growth)))
+        yield note("damping-never", nutation_deg=now, end_deg=end, limit_deg=limit)
     else:
         yield note("damping-within", until_lasting_s=until, nutation_deg=now, limit_deg=limit)
     if body.growth > 0.0 and body.loop is None:

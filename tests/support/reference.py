@@ -11,7 +11,8 @@ With energy dissipation it is H in space that is integrated, where dissipation c
 
     dH/dt = R M,      dR/dt = R [I⁻¹ RᵀH + s]×,
 
-s the turn of axis 3 away from H at κ sin θ cos θ. No torque of dissipation stands in these equations.
+s the turn of axis 3 away from H at κ sin θ cos θ; with a wheel at κ sin θ D(θ)/D(0), D dE/dθ over |H| sin θ. No torque
+of dissipation stands in these equations.
 
 A ``wheel`` adds its constant momentum h e3 to I ω, wherever H stands.
 """
@@ -184,13 +185,18 @@ def sinking(
     """`coast` of a body in which energy dissipation lets a small nutation grow at the rate ``growth`` κ, 1/s."""
     A, B, C = (float(one) for one in moments)
     x, y_, z = (float(one) for one in torque)
+    sense = math.copysign(1.0, C * float(motion.rates[2]) + wheel)
+
+    def pace(size: float, cosine: float) -> float:
+        """dE/dθ / (|H| sin θ) of E = H² sin²θ/(2A) + (H cos θ - h)²/(2C)."""
+        return size * cosine * 2.0 / (A + B) - (size * cosine - wheel) / C
 
     def slope(_: float, y: Array) -> list[float]:
         hx, hy, hz, a, b, c, d, e, f, g, h, i = y.tolist()
         size = math.sqrt(hx * hx + hy * hy + hz * hz)
         u1, u2, u3 = ((a * hx + d * hy + g * hz), (b * hx + e * hy + h * hz), (c * hx + f * hy + i * hz))
         # s = κ (u·e3) (u × e3), u the direction of H in the body.
-        sinks = growth * u3 / (size * size)
+        sinks = growth * (sense * pace(size, u3 / size) / pace(size, sense) if wheel else u3 / size) / size
         p, q, r = u1 / A + sinks * u2, u2 / B - sinks * u1, (u3 - wheel) / C
         rates = [a * x + b * y_ + c * z, d * x + e * y_ + f * z, g * x + h * y_ + i * z]
         return [*rates, *_turning([a, b, c, d, e, f, g, h, i], p, q, r)]

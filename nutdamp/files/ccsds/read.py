@@ -47,7 +47,8 @@ class Manoeuvre(NamedTuple):
 class ApmContents(NamedTuple):
     """Contents of a message, in body axes: ``quaternion`` body -> frame, scalar first; ``rates`` rad/s.
 
-    ``tensor`` kg m²; ``nutation`` rad as SPIN states it; ``lines`` where blocks begin; ``remarks`` for the reader.
+    ``tensor`` kg m²; ``nutation`` rad as SPIN states it, where its rates count; ``lines`` where blocks begin;
+    ``remarks`` for the reader.
     """
 
     name: str
@@ -179,7 +180,7 @@ class _ApmReader(MessageReader):
             if values[1] <= 0.0:
                 block.fault("NUTATION_PER", f"{values[1]:g} s is no period; expected more than 0")
                 return quaternion, rates
-            self.nutation = tilt
+            self.nutation = tilt if rates is None else None
             side = math.sin(tilt)
             momentum = np.array([side * math.cos(phase), -side * math.sin(phase), math.cos(tilt)])
             rate += 2.0 * math.pi / values[1] * momentum
@@ -385,6 +386,21 @@ def contradictions(contents: ApmContents, body: Spacecraft) -> list[str]:
     ]
 
 
+def ratio_doubts(contents: ApmContents, body: Spacecraft) -> list[str]:
+    """Doubt where spin, nutation and period of SPIN are those of another C/A than that of the ``body`` merged into."""
+    if not contents.nutation or body.spin == 0.0:
+        return []
+    first, second, third = contents.rates.tolist()
+    implied = math.hypot(first, second) / (abs(third) * math.tan(abs(contents.nutation)))
+    ratio = abs(body.axial / (body.inertia.A * body.spin))
+    if abs(implied - ratio) <= SAME_NUTATION * ratio:
+        return []
+    return [
+        f"spin, nutation and period of SPIN are those of C/A = {implied:.4g}, and the file has {ratio:.4g}: "
+        f"the spin and the nutation of {math.degrees(abs(contents.nutation)):.4g} deg are kept, not the period"
+    ]
+
+
 def _file_text(contents: ApmContents, path: str, torquer: float | None) -> str:
     """The spacecraft file as YAML; ``torquer`` N m is the torque of a steerable torquer, or None."""
     # Texts are in double quotes, in which JSON and YAML agree.
@@ -456,6 +472,8 @@ def _schedule(manoeuvres: tuple[Manoeuvre, ...], torques: list[Vector]) -> Sched
 def merged_text(source: Source, contents: ApmContents | History, at: float = 0.0, *, inertia: bool) -> str:
     """The text of a spacecraft file with the motion of a message, of a history the record from ``at`` s on.
 
+    Of SPIN with a nutation the spin and the angle; see `ratio_doubts`.
+
     Raises BadRequest where the message has no ``inertia`` to merge, and where the file would be none for nutdamp.
     """
     given: Vector | None
@@ -471,6 +489,10 @@ def merged_text(source: Source, contents: ApmContents | History, at: float = 0.0
         after = replace(after, inertia=Inertia(*principal_axes(tensor), before.inertia.wheel))
     axes = after.inertia.axes
     after = replace(after, omega0=axes.T @ (before.rates if given is None else given))
+    if isinstance(contents, ApmContents) and contents.nutation:
+        first, second, third = after.inertia.momentum(after.omega0).tolist()
+        share = abs(third) * math.tan(abs(contents.nutation)) / math.hypot(first, second)
+        after = replace(after, omega0=after.omega0 * (share, share, 1.0))  # the angle stays, whatever C/A the file has
     quaternion = before.initial.quaternion
     if turn is not None:
         quaternion = attitude.multiply(turn, attitude.from_matrix(axes))

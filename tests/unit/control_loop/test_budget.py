@@ -371,7 +371,8 @@ def test_the_picture_shows_what_is_held() -> None:
     assert free[5, 1] == pytest.approx(math.degrees(math.atan(grown)))
     assert first[:3, 1] == pytest.approx([0.05, 0.05, 0.5])
     assert first[0, 0] * hours == pytest.approx(50.0)
-    assert second[:3, 0] * hours == pytest.approx([100.0, 1100.0 - math.log(10.0) / body.growth, 1100.0])
+    ratio = math.tan(rad(0.5)) / math.tan(rad(0.05))
+    assert second[:3, 0] * hours == pytest.approx([100.0, 1100.0 - math.log(ratio) / body.growth, 1100.0])
     (alone,) = budget_figure(Budget(replace(body, loop=None), None, ())).axes
     assert len(alone.lines) == 1
 

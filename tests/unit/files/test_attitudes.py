@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from support.builders import present
+from support.places import case
 from support.process import Run
 
 import nutdamp
@@ -78,6 +79,19 @@ def test_inertia_is_merged_only_where_it_is_asked_for(run: Run, tmp_path: Path) 
     for flag, moment in ((), 120.0), (("--inertia",), 110.0):
         run("import", path.name, "--into", "other.yaml", "-o", "merged.yaml", *flag, status=0)
         assert nutdamp.load(tmp_path / "merged.yaml").inertia.tensor[1, 1] == pytest.approx(moment)
+
+
+def test_the_nutation_of_a_message_stays_whatever_the_ratio_of_the_file(run: Run, tmp_path: Path) -> None:
+    """NUTATION = 5 became 4.62 deg at exit 0; spin, nutation and period of the message are those of C/A = 1.2009."""
+    text = case("apm-into.yaml").read_text()
+    for moment, doubt in (("1300", "C/A = 1.201, and the file has 1.3:"), ("1200.9", "")):
+        (tmp_path / "other.yaml").write_text(text.replace("1300", moment))
+        result = run("import", str(case("spin-nutation.apm.txt")), "--into", "other.yaml", "-o", "merged.yaml")
+        assert (result.returncode, "warning" in result.stderr) == (0, bool(doubt))
+        assert doubt in result.stderr
+        merged = nutdamp.load(tmp_path / "merged.yaml")
+        assert math.degrees(merged.nutation) == pytest.approx(5.0, rel=1e-12)
+        assert merged.spin == pytest.approx(-math.pi / 10.0 + 2.0 * math.pi / 3.3333333 * math.cos(math.radians(5.0)))
 
 
 def test_an_attitude_is_written_as_the_message_has_it(tmp_path: Path) -> None:

@@ -16,6 +16,7 @@ from support import reference
 from support.builders import spinner
 from support.cases import spread
 from support.golden import check_text
+from support.places import case
 from support.planner import Planner
 from support.process import Run
 
@@ -24,6 +25,7 @@ from nutdamp.errors import MissingExtra
 from nutdamp.files.reader import example_text, read_spacecraft
 from nutdamp.flight import basilisk, propagation, verification
 from nutdamp.flight.basilisk import BasiliskFlight
+from nutdamp.flight.dynamics import supplied
 from nutdamp.flight.verification import (
     AGREE,
     AS_FLOWN,
@@ -327,3 +329,20 @@ def test_what_is_conserved_is_no_number_of_noughts() -> None:
         assert verified.drifting == (("|H|",) if momentum > AGREE else ())
         said.append(words.text(conservation(verified)))
     check_text("flight.conserved", "\n".join(said))
+
+
+def test_dissipation_with_a_wheel_whatever_pushes_and_falls() -> None:
+    """Wide pulses of a tank that takes moments along, an axial part among them, to both sides of θ0."""
+    thrusters = "[{name: P, torque: [90, 30, 3], JET}, {name: N, torque: [-90, 20, -8], JET}]"
+    thrusters = thrusters.replace("JET", "isp: 220, lever_arm: 1")
+    tank = "{propellant: 5 kg, pressure: 20 bar, final_pressure: 8 bar, inertia_per_kg: {A: 2 m^2, C: 1 m^2}}"
+    text = case("wheel-growth.yaml").read_text().replace("2 deg", "14 deg")
+    for sign in ("", "-"):
+        turned = text.replace("{momentum: ", f"{{momentum: {sign}").replace("{spin: ", f"{{spin: {sign}")
+        body = read_spacecraft(f"{turned}mass: 300 kg\nthrusters: {thrusters}\ntank: {tank}\n", "growth.yaml")
+        pulses = [channel_pulse(channel, t, 4.0) for channel, t in zip(body.channels, (30.0, 50.0), strict=True)]
+        schedule, times = Schedule(supplied(body, pulses)), np.array([0.0, 29.0, 40.0, 60.0, 90.0])
+        rates, quaternions = verification.integrate(body, schedule, times)
+        ours = propagation.flown(body, schedule, 90.0).motion(times)
+        assert ours[0] == pytest.approx(rates, abs=1e-10)
+        assert np.abs(np.sum(ours[1] * quaternions, axis=1)) == pytest.approx(np.ones(5), abs=1e-12)

@@ -145,17 +145,17 @@ def test_small_angles_from_spin_grow_and_from_flat_shrink_by_the_exponential() -
 def test_no_time_is_too_long(growth: float, degrees: float, time: float) -> None:
     cosine, sine = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
     course = energy_sink.course(growth, cosine, sine * sine, time)
-    assert math.hypot(cosine * course.axial, sine * course.transverse) == pytest.approx(1.0, abs=20 * EPS)
+    assert math.hypot(course.along, sine * course.transverse) == pytest.approx(1.0, abs=20 * EPS)
     # Squares of times below 1e-150 s are denormal numbers.
-    assert abs(cosine * course.turned) <= time * (1 + 20 * EPS) + 1e-150
+    assert abs(course.travel) <= time * (1 + 20 * EPS) + 1e-150
     assert math.hypot(course.cosine, sine * course.sine) == pytest.approx(1.0, abs=20 * EPS)
 
 
 def test_a_complex_step_gives_the_derivative_by_time() -> None:
     theta = math.radians(30.0)
     course = energy_sink.courses(0.02, math.cos(theta), math.sin(theta) ** 2, np.array([20.0 + 1e-30j]))
-    tilt = math.atan2(math.sin(theta) * course.transverse[0].real, math.cos(theta) * course.axial[0].real)
-    assert math.cos(theta) * course.turned[0].imag / 1e-30 == pytest.approx(math.cos(tilt), rel=1e-13)
+    tilt = math.atan2(math.sin(theta) * course.transverse[0].real, course.along[0].real)
+    assert course.travel[0].imag / 1e-30 == pytest.approx(math.cos(tilt), rel=1e-13)
     rise = math.sin(theta) * course.transverse[0].imag / 1e-30
     assert rise == pytest.approx(0.02 * math.sin(tilt) * math.cos(tilt) ** 2, rel=1e-12)
 

@@ -10,10 +10,14 @@ import pytest
 from numpy.typing import NDArray
 from support import reference
 from support.cases import spread
+from support.places import case
 
+from nutdamp.files.reader import load_spacecraft
+from nutdamp.flight.dynamics import make_dynamics
 from nutdamp.physics import attitude, batch, energy_sink, response, taylor, triaxial
 from nutdamp.physics import body as rigid_body
 from nutdamp.physics.taylor import Forcing
+from nutdamp.spacecraft import requirements
 
 Array = NDArray[np.float64]
 
@@ -59,19 +63,49 @@ def test_arcs(A: float, C: float, spin: float, wheel: float) -> None:
 def test_arcs_with_dissipation(A: float, C: float, spin: float, wheel: float) -> None:
     """Dissipation changes the whole of H3, and the wheel keeps its share of it."""
     motion, quaternion = start(A, C, spin, wheel)
+    sense = math.copysign(1.0, C * spin + wheel)
     for growth in (0.05, -0.04):
         flown = reference.sinking((A, A, C), motion, np.zeros(3), TIMES, growth, wheel)
-        omega, spins, turned = energy_sink.arc(A, C, growth, quaternion, OMEGA, spin, TIMES, wheel)
+        omega, spins, turned = energy_sink.arc(A, C, growth, quaternion, OMEGA, spin, TIMES, wheel, sense)
         assert np.column_stack([omega.real, omega.imag, spins]) == pytest.approx(
             np.array([m.rates for m in flown]), abs=1e-10
         )
         assert apart(turned, flown) < 1e-10
-        end = energy_sink.arc(A, C, growth, quaternion, OMEGA, spin, 20.0, wheel)
+        end = energy_sink.arc(A, C, growth, quaternion, OMEGA, spin, 20.0, wheel, sense)
         assert end[0] == pytest.approx(omega[-1], abs=1e-12)
         assert end[2] == pytest.approx(turned[-1], abs=1e-12)
-        rates = energy_sink.rates_on_arc(A, C, growth, OMEGA, spin, TIMES, wheel)
+        rates = energy_sink.rates_on_arc(A, C, growth, OMEGA, spin, TIMES, wheel, sense)
         assert rates[0] == pytest.approx(omega, abs=1e-12)
         assert rates[1] == pytest.approx(spins, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("time", "degrees", "spin"),
+    [(120.0, 8.372, None), (240.0, 22.237, None), (400.0, 27.431, 2.7927), (1e6, 27.606, None)],
+)
+def test_growth_ends_where_omega_stands_still_in_the_body(time: float, degrees: float, spin: float | None) -> None:
+    """By DOP853 of E(θ); with tan θ e^{κt} it was 8.72, 34.0 and 78.3 deg, and -8.63 rad/s."""
+    body = load_spacecraft(case("wheel-growth.yaml"))
+    end = make_dynamics(body).path(body.initial, 0.0, time, most=1)[1]
+    moments, rates = body.inertia.moments, end.rates
+    assert math.degrees(reference.nutation(moments, rates, 1.0, 1800.0)) == pytest.approx(degrees, abs=6e-4)
+    assert spin is None or end.spin == pytest.approx(spin, abs=1e-4)
+    assert requirements.idle(body, time) == pytest.approx(reference.nutation(moments, rates, 1.0, 1800.0), abs=1e-11)
+    if time < 1e3:
+        assert requirements.reached(body, math.radians(degrees)) == pytest.approx(time, abs=0.1)
+        assert requirements.reached(body, math.radians(28.0)) == math.inf
+
+
+def test_a_complex_step_gives_the_derivative_with_a_wheel() -> None:
+    """As dispersed cases take it, and by any share of the wheel: toward an angle at rest, and past 90 deg."""
+    for shares in ((8.8, -7.8), (0.4, 0.6), (-1.5, 2.5)):
+        theta, time = math.radians(30.0), np.array([40.0 + 1e-30j])
+        course = energy_sink.courses(0.02, math.cos(theta), math.sin(theta) ** 2, time, shares)
+        tilt = math.atan2(math.sin(theta) * course.transverse[0].real, course.along[0].real)
+        rise = 0.02 * math.sin(tilt) * (shares[0] * math.cos(tilt) + shares[1])
+        assert course.travel[0].imag / 1e-30 == pytest.approx(math.cos(tilt), rel=1e-12)
+        assert course.along[0].imag / 1e-30 == pytest.approx(-math.sin(tilt) * rise, rel=1e-9, abs=1e-12)
+        assert math.hypot(course.cosine[0].real, math.sin(theta) * course.sine[0].real) == pytest.approx(1.0, rel=1e-13)
 
 
 @gyrostats
@@ -122,7 +156,8 @@ def test_series_under_a_torque(moments: tuple[float, float, float], spin: float,
     rotation = reference.frame_n(moments, rates, wheel)
     begin, quaternion = reference.Motion(rates, rotation), attitude.from_matrix(rotation)
     for time in (0.7, 12.0):
-        forcing, span = Forcing(growth=growth, wheel=wheel), np.array([time])
+        sense, span = math.copysign(1.0, moments[2] * spin + wheel), np.array([time])
+        forcing = Forcing(growth=growth, wheel=wheel, sense=sense)
         flown = (
             reference.sinking(moments, begin, torque, span, growth, wheel)
             if growth
@@ -131,7 +166,7 @@ def test_series_under_a_torque(moments: tuple[float, float, float], spin: float,
         body, turned = taylor.integrate(moments, torque, rates, quaternion, 0.0, time, forcing)[-1].final
         assert body == pytest.approx(flown[0].rates, abs=1e-10)
         assert apart(turned[None], flown) < 1e-10
-        many = batch.Bodies(np.tile(moments, (3, 1)).T, np.zeros(3), Forcing(growth=growth, wheel=np.full(3, wheel)))
+        many = batch.Bodies(np.tile(moments, (3, 1)).T, np.zeros(3), forcing._replace(wheel=np.full(3, wheel)))
         here = batch.MotionStretch(
             many, np.zeros(3), np.tile(rates, (3, 1)).T, np.tile(quaternion, (3, 1)).T, np.tile(torque, (3, 1)).T
         )

@@ -22,7 +22,7 @@ from support.process import Run
 
 from nutdamp.common import numerics
 from nutdamp.figures import overview
-from nutdamp.files.reader import example_text, read_spacecraft
+from nutdamp.files.reader import example_text, load_spacecraft, read_spacecraft
 from nutdamp.flight import propagation
 from nutdamp.physics import attitude, response
 from nutdamp.planning import capability
@@ -126,7 +126,7 @@ def test_a_resonant_torque_drives_the_nutation_to_the_marks_when_reported() -> N
 def test_the_forced_tilt_stays_and_the_beat_swells_from_rest() -> None:
     """Flown for a beat period: from the steady rate the nutation keeps the tilt, from rest it swells to the beat."""
     A, C = CALM.inertia.A, CALM.inertia.C
-    for torque, rate, precession in (  # equations K14, K15
+    for torque, rate, forced in (  # equations K14, K15
         (0.4 - 0.3j, 0.0, 0.5 / (abs(A - C) * 3.0)),
         (0.24 + 0.1j, -3.0, 0.26 / (C * 3.0)),
         (0.3j, 0.7, None),
@@ -137,11 +137,30 @@ def test_the_forced_tilt_stays_and_the_beat_swells_from_rest() -> None:
         assert swollen.max() == pytest.approx(present(effect.beat), rel=1e-4)
         assert swollen[-1] < 1e-12
         steady = response.steady_response(A, (A - C) / A * 3.0, torque, rate)
-        assert effect.precession == pytest.approx(abs(steady), rel=1e-12)
-        assert precession is None or effect.precession == pytest.approx(precession, rel=1e-12)
+        assert effect.forced == pytest.approx(abs(steady), rel=1e-12)
+        assert forced is None or effect.forced == pytest.approx(forced, rel=1e-12)
+        if rate == -3.0:  # fixed in space: from rest H leaves at M/|H|
+            assert effect.precession == pytest.approx(forced, rel=1e-12)
+            assert effect.swing is None
+        else:
+            assert effect.precession is None
+            assert effect.swing is not None
         kept = replace(body, omega0=np.array([steady.real, steady.imag, 3.0]))
         angles = propagation.flown(kept, Schedule(), 10.0).sampled(50, 10.0).nutation
         assert np.abs(angles - present(effect.tilt)).max() < 1e-12
+
+
+def test_a_torque_fixed_in_the_body_is_no_precession() -> None:
+    """H never leaves its start by more than 0.0151 deg in 1,800 s, and ω settles about 0.007758 rad/s: not H."""
+    body = load_spacecraft(case("body-fixed-torque.yaml"))
+    (effect,) = capability.consequences(body)
+    assert effect.forced == pytest.approx(0.007758, abs=5e-7)
+    assert effect.precession is None
+    turns = propagation.flown(body, Schedule(), 1800.0).sampled(20_001, 1800.0).momentum
+    aside = np.degrees(np.linalg.norm(np.cross(turns, turns[0]), axis=1) / np.linalg.norm(turns[0]) ** 2)
+    assert effect.swing is not None
+    assert math.degrees(effect.swing) == pytest.approx(aside.max(), rel=2e-3)
+    assert math.degrees(effect.swing) == pytest.approx(0.0151, abs=5e-5)
 
 
 def test_sun_pulses_are_those_of_the_motion() -> None:
@@ -173,7 +192,7 @@ def test_check_shows_disturbances_sun_cones_and_commands(run: Run, tmp_path: Pat
     text = f"name: X\ninertia: {{A: 120, C: 80}}\nomega0: [0.1, 0, 3]\ndisturbances: {disturbances}\n"
     shown = run("check", "-", "-v", "--json", "d.json", stdin=text).stdout
     (file,) = json.loads((tmp_path / "d.json").read_text())["files"]
-    assert file["disturbances"][0]["precession_rad_s"] > 0.0
+    assert file["disturbances"][0]["forced_rate_rad_s"] > 0.0
     assert file["disturbances"][2]["reaches"][0]["nutation_deg"] == pytest.approx(10.0)
     check_text("capability.disturbances", shown)
     check_text("capability.sun", run("check", "-", "-v", "--json", "d.json", stdin=SUNNY, columns=120).stdout)
