@@ -208,6 +208,9 @@ class Dynamics:
         work.spend(PULSE + (SUNK_STEP if self.forcing.growth != 0.0 else step) * len(pieces))
         return Integrated(tuple(pieces)), SpinState.of(*pieces[-1].final)
 
+    def command(self, pulse: Pulse) -> None:
+        """Take note of a pulse before it is flown: nothing to do where paths are told its torque."""
+
     def with_moments(self, moments: Vector) -> Dynamics:
         """Copy with these principal moments (3,) kg m²."""
         first, second, third = moments.tolist()
