@@ -148,7 +148,7 @@ class ReferenceModel:
             return np.asarray(warm * volume**power * speed / STANDARD_GRAVITY)
 
         used = SOLVE(flow, (0.0, length), [begun], atol=1e-20, max_step=0.25 * length).sol
-        return lambda full: np.array([used(full)[0] - begun, warm * (1.0 + growth * used(full)[0]) ** power])
+        return lambda full: np.array([(now := used(full)[0]) - begun, warm * (1.0 + growth * now) ** power])
 
     def fly(
         self, state: Array, start: float, end: float, reach: Callable[[float], None] = lambda _: None
@@ -174,7 +174,7 @@ class ReferenceModel:
 
     def _tensor_at(self, time: float, unused: float = 0.0) -> Array:
         # Tensor in the axes of the file at a time; so many kg used at that time are still there.
-        begun = [burn for burn in self.burns if burn.shape[0, 0] < time]
+        begun = [burn for burn in self.burns if burn.shape[0, 0] < time] if self.shed.any() else []
         burnt = [burn.supply(burn.full(time))[0] if time < burn.shape[0, 3] else burn.taken for burn in begun]
         burnt += [kick.taken for kick in self.kicks if kick.shape[0, 0] <= time]
         return np.asarray(self.tensor - (sum(burnt) - unused) * self.shed)
