@@ -110,8 +110,7 @@ def verify_loop(spacecraft: Spacecraft, until: float | None = None, *, seed: int
     """
     loop = requirements.expect_loop(spacecraft)
     run = fly(spacecraft, loop, until, seed=seed)
-    model = reference_model(spacecraft, EVALUATIONS)
-    moments = spacecraft.inertia.moments
+    model, moments = reference_model(spacecraft, EVALUATIONS), spacecraft.inertia.moments
     mover = _Independent(moments, np.zeros(3), NOTHING, model=model, spacecraft=spacecraft)
     try:
         with work.steps(run.until):

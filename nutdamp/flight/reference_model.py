@@ -287,5 +287,6 @@ def _unit(vector: Array) -> Array:
     return np.asarray(vector / np.linalg.norm(vector))
 
 
-def _cross(one: Array, two: Array) -> Array:  # np.cross takes six times as long
-    return one[[1, 2, 0]] * two[[2, 0, 1]] - one[[2, 0, 1]] * two[[1, 2, 0]]
+def _cross(one: Array, two: Array) -> Array:
+    (a, b, c), (x, y, z) = one.tolist(), two.tolist()  # np.cross takes ten times as long
+    return np.array([b * z - c * y, c * x - a * z, a * y - b * x])

@@ -39,10 +39,11 @@ def reference_model(spacecraft: Spacecraft, most: int) -> ReferenceModel:
 
 def command(model: ReferenceModel, spacecraft: Spacecraft, pulse: Pulse) -> None:
     """Command a ``pulse`` to a ``model``: by channel and times, or as torque or impulse where the file has none."""
-    commanded = pulse.torque is not None or pulse.command is not None
-    fires = commanded and pulse.channel in [channel.name for channel in spacecraft.channels]
-    push = spacecraft.inertia.axes @ (pulse.impulse if pulse.torque is None else pulse.torque)
-    model.command(pulse.channel, *pulse.loaded, None if fires else push)
+    fires = pulse.channel in [channel.name for channel in spacecraft.channels] and not (
+        pulse.torque is None and pulse.command is None
+    )
+    push = pulse.impulse if pulse.torque is None else pulse.torque
+    model.command(pulse.channel, *pulse.loaded, None if fires else spacecraft.inertia.axes @ push)
 
 
 SAMPLES = 201  # even times at which two flights are compared, besides the edges of the pulses
