@@ -5,9 +5,10 @@ The plan is judged by the motion from the time at which the loop was first down 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,13 +20,18 @@ from nutdamp.errors import BadRequest, Infeasible
 from nutdamp.flight.dynamics import Dynamics, Path, Push
 from nutdamp.flight.end_state import Aspect, aspects, left_on_the_way, seen_at
 from nutdamp.flight.propagation import Flight
-from nutdamp.flight.verification import EulerEquations
+from nutdamp.flight.verification import command, reference_model
+from nutdamp.physics import attitude
 from nutdamp.physics.taylor import NOTHING
 from nutdamp.planning.plan import Plan
 from nutdamp.planning.verdict import LOOP, Verdict, judge_loop
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import Spacecraft, SpinState, Vector
 from nutdamp.spacecraft.requirements import Held, Left, Part
+from nutdamp.spacecraft.schedule import Pulse
+
+if TYPE_CHECKING:
+    from nutdamp.flight.reference_model import ReferenceModel
 
 AGREE = 1e-6  # s; firings that begin and last alike to this are the same
 EVALUATIONS = 1_000_000  # evaluations of Euler's equations by DOP853, at most: a loop flies on where a schedule is over
@@ -33,38 +39,40 @@ EVALUATIONS = 1_000_000  # evaluations of Euler's equations by DOP853, at most: 
 
 @dataclass(frozen=True, eq=False)
 class _Solved:
-    """A stretch that was integrated, by its interpolant."""
-
-    equations: EulerEquations
-    solution: Any
-    steps: int
+    # A stretch that was integrated, by its interpolant of states in the axes of the file, (7, n).
+    axes: Vector
+    solution: Callable[[Vector], Vector]
+    steps: int = 0
 
     def motion(self, times: Vector) -> tuple[Vector, Vector]:
-        """Rates (n, 3) in rad/s and quaternions (n, 4) at ``times`` (n,) s."""
-        return self.equations.motion(np.atleast_2d(self.solution(np.asarray(times, dtype=float)).T))
+        states = self.solution(np.asarray(times, dtype=float)).T
+        quaternion = np.roll(states[:, 3:] / np.linalg.norm(states[:, 3:], axis=1, keepdims=True), 1, axis=1)
+        return states[:, :3] @ self.axes, attitude.multiply(quaternion, attitude.from_matrix(self.axes))
 
 
 @dataclass(frozen=True, slots=True)
 class _Independent(Dynamics):
-    """Moves a body by DOP853 on Euler's equations with the full tensor; evaluations of these are counted, not steps."""
-
-    equations: EulerEquations = field(kw_only=True)
+    # Moves the body of a file by its reference model, which fires the pulses commanded.
+    model: ReferenceModel = field(kw_only=True)
+    spacecraft: Spacecraft = field(kw_only=True)
 
     @property
     def free(self) -> bool:
-        """Always False: no coast is known in closed form."""
-        return False
+        return False  # no coast is known in closed form
+
+    def command(self, pulse: Pulse) -> None:
+        command(self.model, self.spacecraft, pulse)
 
     def _path(self, state: SpinState, start: float, end: float, push: Push, most: int) -> tuple[Path, SpinState]:
-        del most  # of steps of a Taylor series
-        first = self.equations.state(state)  # no loop is flown with moments that fall
-        if end <= start:
-            return _Solved(self.equations, lambda times: np.outer(first, np.ones(np.size(times))), 0), state
-        torque = (np.asarray(sum(push.torques, np.zeros(3))), push.slope)
-        solution = self.equations.solved(first, start, end, [torque], dense=True)
-        work.reach(end)
-        rates, quaternion = self.equations.motion(solution.y[:, -1:].T)
-        return _Solved(self.equations, solution.sol, len(solution.t)), SpinState.of(rates[0], quaternion[0])
+        del push, most  # the model has its own
+        inertia, first = self.spacecraft.inertia, self.model.initial
+        if start > 0.0:
+            rates, quaternion = inertia.in_file_axes(state.rates, state.quaternion)
+            first = np.concatenate([rates, np.roll(quaternion, -1)])
+        # A stretch that ends where it begins is integrated a little further, to be a motion too.
+        path = _Solved(inertia.axes, self.model.fly(first, start, max(end, start + 1e-6), work.reach))
+        rates, quaternion = path.motion(np.array([end]))
+        return path, SpinState.of(rates[0], quaternion[0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,16 +104,19 @@ class LoopVerification(results.Data):
 
 
 def verify_loop(spacecraft: Spacecraft, until: float | None = None, *, seed: int = SEED) -> LoopVerification:
-    """Fly the loop of the file in closed form and by DOP853; raises Infeasible where it cannot be flown at all."""
+    """Fly the loop of the file in closed form and by its reference model.
+
+    Raises Infeasible where it cannot be flown at all, or where fields of the spacecraft were replaced.
+    """
     loop = requirements.expect_loop(spacecraft)
     run = fly(spacecraft, loop, until, seed=seed)
-    equations, inertia = EulerEquations(spacecraft, EVALUATIONS), spacecraft.inertia
-    mover = _Independent(inertia.moments, np.zeros(3), NOTHING, equations=equations)
+    model, moments = reference_model(spacecraft, EVALUATIONS), spacecraft.inertia.moments
+    mover = _Independent(moments, np.zeros(3), NOTHING, model=model, spacecraft=spacecraft)
     try:
         with work.steps(run.until):
             other = fly(spacecraft, loop, run.until, seed=seed, dynamics=mover)
     except Infeasible as reason:
-        return LoopVerification(run, None, str(reason), equations.evaluations)
+        return LoopVerification(run, None, str(reason), model.evaluations)
     pairs = tuple(
         (
             fired.pulse.loaded[0] - two.pulse.loaded[0],
@@ -114,7 +125,7 @@ def verify_loop(spacecraft: Spacecraft, until: float | None = None, *, seed: int
         )
         for fired, two in zip(run.fired, other.fired, strict=False)
     )
-    return LoopVerification(run, other, "", equations.evaluations, pairs)
+    return LoopVerification(run, other, "", model.evaluations, pairs)
 
 
 HELD = 1.05

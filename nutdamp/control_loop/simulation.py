@@ -103,6 +103,7 @@ class LoopRun:
         return there
 
     def _fire(self, pulse: Pulse, state: SpinState) -> SpinState:
+        self.dynamics.command(pulse)
         for start, end in itertools.pairwise(sorted(set(pulse.edges))):
             push = pulse.push(start, end)
             torque, slope = ([], None) if push is None else ([push[0]], push[1])

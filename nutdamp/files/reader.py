@@ -195,6 +195,7 @@ def read_spacecraft(text: str, name: str, settings: Sequence[Setting] = (), warn
         sun_sensor=_given(contents.sun_sensor, _sun_sensor, axes),
         commands=_given(contents.commands, _commands),
         loop=_given(contents.loop, _loop, axes, center),
+        document=contents,
     )
     faults = [_placed(finding, root, name) for finding in correlation_findings(spacecraft)]
     if faults:

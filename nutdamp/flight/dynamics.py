@@ -22,7 +22,7 @@ from nutdamp.spacecraft.model import BLOWDOWN, COLD, LIGHTER, TRAVEL, VALVES, In
 from nutdamp.spacecraft.schedule import Command, Pulse, Schedule, on_command
 from nutdamp.units import STANDARD_GRAVITY
 
-EVEN = 0.01  # share of its mean by which the thrust falls, at most, in each of the straight pieces of a pulse
+EVEN = 2e-4  # a pulse has the root of its fall over this of straight pieces, which so err by 1e-10 of it at most
 NODES = 6  # nodes of the quadrature in each of them
 REPEATED = 60  # iterations of the search of the on-time for an impulse, at most
 CLOSE = 1e-14  # relative tolerance of that on-time
@@ -210,6 +210,9 @@ class Dynamics:
         work.spend(PULSE + (SUNK_STEP if self.forcing.growth != 0.0 else step) * len(pieces))
         return Integrated(tuple(pieces)), SpinState.of(*pieces[-1].final)
 
+    def command(self, pulse: Pulse) -> None:
+        """Take note of a pulse before it is flown: nothing to do where paths are told its torque."""
+
     def with_moments(self, moments: Vector) -> Dynamics:
         """Copy with these principal moments (3,) kg m²."""
         first, second, third = moments.tolist()
@@ -320,9 +323,10 @@ class Supply:
     def torque(self, channel: Channel, used: float) -> Vector:
         """Torque of ``channel`` at the thrust of the file with ``used`` kg gone, (3,) N m: the center of mass moves."""
         per_kg = self.spacecraft.center_of_mass_per_kg
-        if per_kg is None or channel.force is None:
+        forces = [thruster.force for thruster in channel.thrusters if thruster.force is not None]
+        if per_kg is None or not forces:
             return channel.torque
-        return channel.torque - np.cross((used - self._begun) * per_kg, channel.force)
+        return channel.torque - np.cross((used - self._begun) * per_kg, np.sum(forces, axis=0))
 
     def on_time_for(self, channel: Channel, effective: float) -> float:
         """On-time (s) of the next pulse of ``channel`` with the impulse of ``effective`` s at the file's thrust."""
@@ -414,7 +418,7 @@ def falling(pulse: Pulse, tank: Tank, used: float, flow: float) -> Pulse:
     command = pulse.command or Command(start, on_time, (Ramp(pulse.start, pulse.end, 1.0, 1.0),), valve=False)
     gone, mean = tank.burn(used, flow, pulse.on_time)
     first, last = (float(tank.thrust_factor(used + spent) / mean) for spent in (0.0, gone))
-    pieces, ramps, moment, passed = max(1, math.ceil((first - last) / EVEN)), list[Ramp](), 0.0, 0.0
+    pieces, ramps, moment, passed = max(1, math.ceil(math.sqrt(max(first - last, 0.0) / EVEN))), list[Ramp](), 0.0, 0.0
     nodes, weights = gauss_legendre(NODES)
     for ramp in command.ramps:
         length = (ramp.end - ramp.begin) / pieces

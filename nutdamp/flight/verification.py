@@ -1,17 +1,13 @@
-"""Verification: cross-check by DOP853, conservation laws, error budget.
-
-Euler's equations by scipy's DOP853 are written independently of everything else that flies: cross products, a matrix
-for the tensor, in the axes of the file, and restarts at every edge of a pulse.
-"""
+"""Verification: cross-check by the reference model of the file, conservation laws, error budget."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
 from importlib.util import find_spec
-from typing import Any
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -23,179 +19,31 @@ from nutdamp.flight.propagation import Flight
 from nutdamp.physics import attitude, response
 from nutdamp.physics.triaxial import arc_cones
 from nutdamp.spacecraft.constraints import commandable
-from nutdamp.spacecraft.model import Spacecraft, SpinState, Vector
+from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.schedule import Pulse, Schedule
+
+if TYPE_CHECKING:
+    from nutdamp.flight.reference_model import ReferenceModel
 
 EVALUATIONS = 200_000  # evaluations of Euler's equations by DOP853, at most: a thousand turns, some 15 seconds
 
-Push = tuple[Vector, Vector | None]
-"""Torque (3,) N m, principal axes, as a stretch begins, and its slope, N m/s, None for none."""
 
-Numbers = Sequence[float]
-Matrix = Sequence[Numbers]
+def reference_model(spacecraft: Spacecraft, most: int) -> ReferenceModel:
+    """Model of the file of a ``spacecraft``, of ``most`` evaluations; raises Infeasible where it is of none."""
+    from nutdamp.flight.reference_model import ReferenceModel  # few commands need scipy
 
-
-class EulerEquations:
-    """Euler's equations of a spacecraft and its attitude; ``evaluations`` of them so far, ``most`` at most."""
-
-    def __init__(self, spacecraft: Spacecraft, most: int | None = None) -> None:
-        self.most = EVALUATIONS if most is None else most
-        self.spacecraft, self.axes = spacecraft, spacecraft.inertia.axes
-        self.tensor = self.axes @ np.diag(spacecraft.inertia.moments) @ self.axes.T
-        self.inverse: Vector = np.asarray(np.linalg.inv(self.tensor), dtype=np.float64)
-        per_kg = shed(spacecraft)
-        self.shed = None if per_kg is None else self.axes @ np.diag(per_kg) @ self.axes.T
-        self._constant = self.tensor.tolist(), self.inverse.tolist()
-        self.growth, self.axis = spacecraft.growth, self.axes[:, 2].tolist()
-        self.wheel = (spacecraft.inertia.wheel * self.axes[:, 2]).tolist()
-        self.sense, self.evaluations = spacecraft.sense, 0
-
-    def state(self, motion: SpinState) -> Vector:
-        """Rates, rad/s, and quaternion in the axes of the file, (7,); (8,) with propellant used, kg: moments fall."""
-        turned = attitude.multiply(motion.quaternion, attitude.from_matrix(self.axes.T))
-        return np.concatenate([self.axes @ motion.rates, turned, [] if self.shed is None else [0.0]])
-
-    def motion(self, states: Vector) -> tuple[Vector, Vector]:
-        """Rates (n, 3) and quaternions (n, 4) in principal axes of ``states`` (n, 7) or (n, 8)."""
-        quaternion = states[:, 3:7] / np.linalg.norm(states[:, 3:7], axis=1, keepdims=True)
-        return states[:, :3] @ self.axes, attitude.multiply(quaternion, attitude.from_matrix(self.axes))
-
-    def kicked(self, state: Vector, impulse: Vector, propellant: float = 0.0) -> Vector:
-        """State after an ``impulse`` (3,) N m s in principal axes, which uses ``propellant`` kg."""
-        _, inverse = self._body((state[7:] + 0.5 * propellant).tolist())
-        kick = np.array(inverse) @ (self.axes @ impulse)
-        return np.concatenate([state[:3] + kick, state[3:7], state[7:] + propellant])
-
-    def _body(self, used: Numbers) -> tuple[Matrix, Matrix]:
-        """Tensor and its inverse once ``used`` kg, (1,), are gone; (0,) where they stay."""
-        if self.shed is None:
-            return self._constant
-        tensor = self.tensor - used[0] * self.shed
-        return tensor.tolist(), np.linalg.inv(tensor).tolist()
-
-    def solved(
-        self,
-        state: Vector,
-        start: float,
-        end: float,
-        pushes: Iterable[Push],
-        *,
-        burn: tuple[float, float] = (0.0, 0.0),
-        dense: bool = False,
-    ) -> Any:
-        """Result of solve_ivp from ``state`` at ``start`` to ``end`` s, with interpolant where ``dense``.
-
-        ``burn``: flow of propellant at ``start``, kg/s, and its slope, kg/s². Raises Infeasible beyond ``most``.
-        """
-        from scipy.integrate import solve_ivp
-
-        derivative = self._derivative(start, tuple(pushes), burn)
-        return solve_ivp(
-            derivative, (start, end), state, method="DOP853", rtol=1e-13, atol=1e-15, dense_output=dense,
-            first_step=end - start,  # often one step does: the guess would take two, and two evaluations more
-        )  # fmt: skip
-
-    def _derivative(
-        self, start: float, pushes: tuple[Push, ...], burn: tuple[float, float]
-    ) -> Callable[[float, Vector], list[float]]:
-        constant, slope = np.zeros(3), np.zeros(3)
-        for torque, rise in pushes:
-            constant = constant + torque
-            slope = slope if rise is None else slope + rise
-        pushed, rising = ((self.axes @ part).tolist() for part in (constant, slope))
-        disturbances = [(each.rate, each.transverse, each.axial) for each in self.spacecraft.disturbances]
-        principal = self.axes.tolist()
-
-        # Plain numbers: an evaluation takes a tenth of what it takes with arrays of three.
-        def derivative(t: float, y: Vector) -> list[float]:
-            self.evaluations += 1
-            if self.evaluations > self.most:
-                raise Infeasible(f"the motion takes more than {self.most} evaluations of Euler's equations")
-            first, second, third, w, x, v, z, *used = y.tolist()
-            rates, since = (first, second, third), t - start
-            tensor, inverse = self._body(used)
-            momentum = [part + more for part, more in zip(_times(tensor, rates), self.wheel, strict=True)]
-            drive, slip = self._sink(tensor, momentum)
-            torque = [push + rise * since for push, rise in zip(pushed, rising, strict=True)]
-            for rate, transverse, axial in disturbances:
-                turned = transverse * complex(math.cos(rate * t), math.sin(rate * t))
-                acting = _times(principal, (turned.real, turned.imag, axial))
-                torque = [both + part for both, part in zip(torque, acting, strict=True)]
-            against = _cross(rates, momentum)
-            spin = _times(inverse, [torque[i] + drive[i] - against[i] for i in range(3)])
-            p, q, r = first + slip[0], second + slip[1], third + slip[2]
-            turning = (
-                0.5 * (-x * p - v * q - z * r),
-                0.5 * (w * p + v * r - z * q),
-                0.5 * (w * q + z * p - x * r),
-                0.5 * (w * r + x * q - v * p),
-            )
-            return [*spin, *turning, burn[0] + burn[1] * since] if used else [*spin, *turning]
-
-        return derivative
-
-    def _sink(self, tensor: Matrix, momentum: Numbers) -> tuple[Numbers, Numbers]:
-        """Contribution of energy dissipation to dH/dt in the body, N m, and to its turning, rad/s, axes of the file.
-
-        It turns axis 3 away from H (towards it for an oblate body) at κ sin θ D(θ)/D(0), D the rate at which a nutation
-        turns in the body, dE/dθ over |H| sin θ: cos θ without a wheel. In the body H moves along the part of -axis 3
-        square to H. Nothing inside a body can turn H in space, so the body slips against it to undo this.
-        """
-        squared = sum(part * part for part in momentum)
-        if self.growth == 0.0 or squared == 0.0:
-            return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-        size = math.sqrt(squared)
-        cosine = sum(part * along for part, along in zip(momentum, self.axis, strict=True)) / size
-        pairs = zip(momentum, self.axis, strict=True)
-        C = sum(part * along for part, along in zip(_times(tensor, self.axis), self.axis, strict=True))
-        wheel = self.spacecraft.inertia.wheel
-        A = 0.5 * (sum(tensor[i][i] for i in range(3)) - C)
-        turns = [size * angle * (1 / A - 1 / C) + wheel / C for angle in (cosine, self.sense)]
-        rate = self.growth * (self.sense * turns[0] / turns[1] if wheel else cosine)
-        drive = [rate * (cosine * part - size * along) for part, along in pairs]
-        return drive, [part / squared for part in _cross(drive, momentum)]
+    if spacecraft.document is None:
+        raise Infeasible("there is no file to fly by: change its keys by with_, not fields")
+    return ReferenceModel(spacecraft.document, spacecraft.sun, most)
 
 
-def _times(matrix: Matrix, vector: Numbers) -> Numbers:
-    """Product of a matrix (3, 3) with a vector (3,)."""
-    x, y, z = vector
-    return [row[0] * x + row[1] * y + row[2] * z for row in matrix]
-
-
-def _cross(one: Numbers, other: Numbers) -> Numbers:
-    """Cross product of vectors (3,)."""
-    a, b, c = one
-    x, y, z = other
-    return (b * z - c * y, c * x - a * z, a * y - b * x)
-
-
-def integrate(spacecraft: Spacecraft, schedule: Schedule, times: Vector) -> tuple[Vector, Vector]:
-    """Rates (n, 3), quaternions (n, 4), principal axes, at rising ``times`` (n,) s. Raises Infeasible if too long."""
-    equations = EulerEquations(spacecraft)
-    state = equations.state(spacecraft.initial)
-    edges = {0.0, float(times[-1]), *times.tolist()}
-    edges |= {edge for pulse in schedule for edge in pulse.edges}
-    knots = sorted(edge for edge in edges if edge <= times[-1])
-    rows = {}
-    for now, end in zip(knots, [*knots[1:], knots[-1]], strict=True):
-        for pulse in schedule:
-            if pulse.on_time == 0.0 and pulse.t == now:
-                state = equations.kicked(state, pulse.impulse, pulse.propellant or 0.0)
-        rows[now] = state
-        if end > now:
-            firing = [(pulse, push) for pulse in schedule if (push := pulse.push(now, end)) is not None]
-            burn = np.sum([_flow(pulse, now, end) for pulse, _ in firing], axis=0) if firing else (0.0, 0.0)
-            state = equations.solved(state, now, end, [push for _, push in firing], burn=(burn[0], burn[1])).y[:, -1]
-        work.reach(end)
-    return equations.motion(np.array([rows[time] for time in times.tolist()]))
-
-
-def _flow(pulse: Pulse, start: float, end: float) -> tuple[float, float]:
-    """Flow of propellant, kg/s, as a stretch without an edge starts, and its slope, kg/s², by the share of impulse."""
-    times = np.array([start, 0.5 * (start + end), end])
-    before, middle, after = ((pulse.propellant or 0.0) * pulse.share(times)).tolist()
-    length = end - start
-    return (4.0 * middle - 3.0 * before - after) / length, 4.0 * (before - 2.0 * middle + after) / length**2
+def command(model: ReferenceModel, spacecraft: Spacecraft, pulse: Pulse) -> None:
+    """Command a ``pulse`` to a ``model``: by channel and times, or as torque or impulse where the file has none."""
+    fires = pulse.channel in [channel.name for channel in spacecraft.channels] and not (
+        pulse.torque is None and pulse.command is None
+    )
+    push = pulse.impulse if pulse.torque is None else pulse.torque
+    model.command(pulse.channel, *pulse.loaded, None if fires else spacecraft.inertia.axes @ push)
 
 
 SAMPLES = 201  # even times at which two flights are compared, besides the edges of the pulses
@@ -218,6 +66,8 @@ class Method:
     rate: float | None = None  # over |ω|, or over |H| by the largest moment where a wheel holds the body still
     missing: str = ""  # reason why it could not be flown
     outside: bool = False  # it shares nothing with the flown motion, and so is to confirm it
+    exact: bool = False  # its rates between pulses are those of the flown motion
+    result: float = 0.0  # difference of nutation (t = 0, after pulses) and shift, rad, or relative of propellant
 
     @property
     def short(self) -> str:
@@ -226,8 +76,8 @@ class Method:
 
     @property
     def difference(self) -> float:
-        """Largest of the three, NaN where one is unknown."""
-        differences = (self.axis, self.momentum, self.rate)
+        """Largest of those that are to be none, NaN where one is unknown."""
+        differences = (self.rate,) if self.exact else (self.axis, self.momentum, self.rate, self.result)
         return float(np.max([math.nan if difference is None else difference for difference in differences]))
 
 
@@ -271,8 +121,9 @@ class Verification:
 
     @property
     def disagreeing(self) -> tuple[str, ...]:
-        """Names of methods whose motion differs from the flown one by more than `AGREE`, or is not a number."""
-        return tuple(method.short for method in self._outside if not method.difference <= AGREE)
+        """Names of methods that differ from the flown motion by more than `AGREE`, or not by a number."""
+        exact = [method for method in self.methods if method.exact]
+        return tuple(method.short for method in (*self._outside, *exact) if not method.difference <= AGREE)
 
     @property
     def drifting(self) -> tuple[str, ...]:
@@ -292,7 +143,7 @@ class Verification:
 def verify(
     spacecraft: Spacecraft, schedule: Schedule, unrounded: Schedule | None = None, *, expected: bool = False
 ) -> Verification:
-    """Fly ``schedule`` by the impulse sum, Taylor series, DOP853 and, where it is installed, Basilisk.
+    """Fly ``schedule`` by the impulse sum, Taylor series, the reference model and, where installed, Basilisk.
 
     ``unrounded``: the schedule before its commands were rounded to ticks; ``expected``: planned with the disturbances.
     """
@@ -305,8 +156,7 @@ def verify(
     ]
     with work.steps(2.0 if find_spec("Basilisk") else 1.0):  # all else takes no time beside these two
         with work.steps(end):
-            dop853 = partial(integrate, spacecraft, schedule, times)
-            methods.append(_from_outside("DOP853, full tensor", judge, lambda: (times, dop853())))
+            methods.append(_by_the_file(judge, end, times))
         methods.append(_from_outside("Basilisk", judge, lambda: basilisk.fly(spacecraft, schedule, end).motion))
     return Verification(tuple(methods), *_conserved(judge), _budget(spacecraft, schedule, unrounded, expected=expected))
 
@@ -316,7 +166,8 @@ def _closed_form(judge: Flight, end: float, times: Vector) -> Method:
     spacecraft, schedule = judge.spacecraft, judge.schedule
     arcs, inertia = propagation.by_impulses(spacecraft, schedule, end), spacecraft.inertia
     body, quaternion = arcs.motion(times)
-    if inertia.symmetric and not spacecraft.disturbances and spacecraft.growth == 0.0 and shed(spacecraft) is None:
+    exact = inertia.symmetric and not spacecraft.disturbances and spacecraft.growth == 0.0
+    if exact and shed(spacecraft) is None:
         omega, spin = response.impulse_sum(
             times,
             complex(spacecraft.omega0[0], spacecraft.omega0[1]),
@@ -331,8 +182,46 @@ def _closed_form(judge: Flight, end: float, times: Vector) -> Method:
         body = np.column_stack([omega.real, omega.imag, spin])
     outside = np.all([(times <= pulse.thrust[0]) | (times >= pulse.thrust[1]) for pulse in schedule], axis=0)
     between = np.broadcast_to(outside, times.shape)  # within a pulse the impulse has been given or not
-    left, apart = arcs.residual, _differences(judge, times, (body, quaternion), between)
-    return Method("impulse sum (17), arcs", left.nutation, left.momentum_shift, *apart)
+    left, apart = arcs.residual, _differences(judge, times, _vectors(judge, times, body, quaternion), between)
+    # While two pulses with axial torque overlap, the turn of the body within one is not that of its own torque.
+    alone = all(one.thrust[1] <= other.thrust[0] for one, other in pairwise(schedule))
+    exact = exact and shed(spacecraft) is None and (alone or not any(pulse.impulse[2] for pulse in schedule))
+    return Method("impulse sum (17), arcs", left.nutation, left.momentum_shift, *apart, exact=exact)
+
+
+def _by_the_file(judge: Flight, end: float, times: Vector) -> Method:
+    """The same commands by the reference model: motion, what is left, and propellant."""
+    name, spacecraft, schedule = "DOP853, the file alone", judge.spacecraft, judge.schedule
+    try:
+        model = reference_model(spacecraft, EVALUATIONS)
+        for pulse in sorted(schedule, key=lambda pulse: pulse.loaded[0]):
+            command(model, spacecraft, pulse)
+        path = model.fly(model.initial, 0.0, end, work.reach)
+    except Infeasible as reason:
+        return Method(name, missing=str(reason), outside=True)
+    vectors, falls = model.vectors(path(times), times), [one for one in schedule if one.command and one.command.fall]
+    # While a tank's pressure falls the flown thrust is one of straight pieces, which only in all is the same.
+    even = np.all([(times <= one.thrust[0]) | (times >= one.thrust[1]) for one in falls], axis=0)
+    ends = np.column_stack([model.initial, path(schedule.end)])
+    first, last = model.vectors(ends, np.array([-1.0, schedule.end]))[2]  # before an impulse at t = 0
+    shift = math.atan2(float(np.linalg.norm(np.cross(first, last))), float(first @ last))
+    nutation, left = model.nutation(ends[:, 1], schedule.end), judge.residual
+    after, used = judge.around_pulses()[1], schedule.propellant
+    pairs = [
+        (spacecraft.nutation, model.nutation(model.initial, -1.0)),
+        (left.nutation, nutation),
+        (left.momentum_shift, shift),
+        (model.propellant / used if used else 1.0, 1.0),
+        *((angle, model.nutation(path(t), t)) for t, angle in zip(after.t, after.nutation, strict=True)),
+    ]
+    return Method(
+        name,
+        nutation,
+        shift,
+        *_differences(judge, times, vectors, np.broadcast_to(even, times.shape)),
+        outside=True,
+        result=max(abs(one - other) for one, other in pairs),
+    )
 
 
 def _from_outside(name: str, judge: Flight, fly: Callable[[], tuple[Vector, tuple[Vector, Vector]]]) -> Method:
@@ -346,23 +235,28 @@ def _from_outside(name: str, judge: Flight, fly: Callable[[], tuple[Vector, tupl
     inertia = replace(craft.inertia, moments=judge.last_moments)
     shift = float(attitude.angle_between(craft.momentum, attitude.rotate(quaternion, inertia.momentum(rates))))
     nutation = arc_cones(inertia.moments, rates, craft.sense, inertia.wheel).nutation
-    return Method(name, nutation, shift, *_differences(judge, times, motion), outside=True)
+    return Method(name, nutation, shift, *_differences(judge, times, _vectors(judge, times, *motion)), outside=True)
+
+
+def _vectors(judge: Flight, times: Vector, rates: Vector, quaternion: Vector) -> tuple[Vector, Vector, Vector]:
+    """Rates in the axes of the file, inertial spin axis and H, (n, 3) each, of a motion of the flown spacecraft."""
+    body = judge.spacecraft
+    momentum = rates * judge.moments_at(times) + np.array([0.0, 0.0, body.inertia.wheel])
+    axis = attitude.rotate(quaternion, np.array([0.0, 0.0, body.sense]))
+    return body.inertia.in_file_axes(rates, quaternion)[0], axis, attitude.rotate(quaternion, momentum)
 
 
 def _differences(
-    judge: Flight, times: Vector, motion: tuple[Vector, Vector], rows: Any = slice(None)
+    judge: Flight, times: Vector, vectors: tuple[Vector, Vector, Vector], rows: Any = slice(None)
 ) -> tuple[float, float, float]:
-    """Largest differences of a motion from the flown one at ``times`` (n,) s over the ``rows``: see `Method`."""
-    moments, wheel = judge.moments_at(times), np.array([0.0, 0.0, judge.spacecraft.inertia.wheel])
-    still = wheel[2] and float(np.linalg.norm(judge.spacecraft.momentum)) / max(judge.moments)
-    spin_axis = np.array([0.0, 0.0, 1.0])
-    (body, turn), (other_body, other_turn) = motion, judge.motion(times)
+    """Largest differences of axis, H and rates from those flown at ``times`` (n,) s over the ``rows``: see `Method`."""
+    wheel = judge.spacecraft.inertia.wheel
+    still = wheel and float(np.linalg.norm(judge.spacecraft.momentum)) / max(judge.moments)
+    flown = _vectors(judge, times, *judge.motion(times))
+    sizes = np.maximum(np.linalg.norm(flown[0], axis=1), still)
     differences = (
-        attitude.angle_between(attitude.rotate(turn, spin_axis), attitude.rotate(other_turn, spin_axis)),
-        attitude.angle_between(
-            attitude.rotate(turn, body * moments + wheel), attitude.rotate(other_turn, other_body * moments + wheel)
-        ),
-        np.linalg.norm(body - other_body, axis=1) / np.maximum(np.linalg.norm(other_body, axis=1), still),
+        *(attitude.angle_between(one, other) for one, other in zip(vectors[1:], flown[1:], strict=True)),
+        np.linalg.norm(vectors[0] - flown[0], axis=1) / sizes,
     )
     axis, momentum, rate = (float(np.max(values[rows], initial=0.0)) for values in differences)
     return axis, momentum, rate

@@ -300,8 +300,8 @@ class Spacecraft(results.Data, results.Shown):
     which carry ``orbit``; ``sun`` (3,) is the inertial unit vector to the Sun, where it is known; ``keep`` are
     cones for the spin axis; ``commands`` is what blocks fired from the Sun pulses of ``sun_sensor`` may hold;
     ``cold`` and ``tank`` make pulses weaker than the thrusters say, None where they are not; ``loop`` damps by what
-    a sensor shows; ``built_in``: the built-in example, since no file was named; ``source`` is what it was read from,
-    None once a field is replaced.
+    a sensor shows; ``built_in``: the built-in example, since no file was named; ``document`` are the values of the
+    file, SI, by which `verify` flies on its own; ``source`` is what it was read from, None once a field is replaced.
     """
 
     name: str
@@ -330,6 +330,7 @@ class Spacecraft(results.Data, results.Shown):
     center_of_mass: Vector | None = None
     center_of_mass_per_kg: Vector | None = None
     built_in: bool = False
+    document: object = None
     source: SourceFile | None = field(default=None, init=False)
 
     def with_(self, **keys: object) -> Spacecraft:
@@ -346,9 +347,10 @@ class Spacecraft(results.Data, results.Shown):
     def replace(self, **fields: object) -> Spacecraft:
         """Spacecraft with fields replaced, in SI and principal axes: ``replace(mass=210.0)``.
 
-        Names, types and signs are checked; `with_` checks all that a file is checked for. Raises BadRequest.
+        Names, types and signs are checked; `with_` checks all that a file is checked for, and keeps the ``document``.
+        Raises BadRequest.
         """
-        changed = units.replaced(self, fields)
+        changed = units.replaced(self, {"document": None, **fields})
         for name in ("mass", "dissipation"):
             value = getattr(changed, name)
             if value is not None and value <= 0.0:

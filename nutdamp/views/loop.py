@@ -223,8 +223,8 @@ def verification_screen(verification: LoopVerification) -> RenderableType:
     run, other = verification.run, verification.other
     parts = [*opening(run.flight.spacecraft, verbose=True), Text(described(run.loop), style="bold"), Text()]
     if other is None:
-        return Group(*parts, Text(f"NOT CONFIRMED by DOP853, full tensor: {verification.missing}."))
-    result = f"DOP853 on the full tensor, {verification.evaluations:,} evaluations, fires "
+        return Group(*parts, Text(f"NOT CONFIRMED by DOP853: {verification.missing}."))
+    result = f"DOP853, the file alone, {verification.evaluations:,} evaluations, fires "
     if verification.agree:
         result += f"alike: {len(run.fired)} firings, times within {verification.worst:.1g} s ({AGREE:g} s allowed)."
     elif verification.same:

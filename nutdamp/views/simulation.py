@@ -338,6 +338,7 @@ METHODS = (
     Column("axis_difference_rad", "Δaxis", "rad", attrgetter("axis"), _difference, "json screen"),
     Column("momentum_difference_rad", "ΔH", "rad", attrgetter("momentum"), _difference, "json screen"),
     Column("rate_difference", "Δrates", "relative", attrgetter("rate"), _difference, "json screen"),
+    Column("result_difference", "", "", attrgetter("result"), where="json"),
     Column("missing", "", "", lambda row: row.missing or None, where="json", kind=TEXT),
 )
 IMPERFECTIONS = (

@@ -18,7 +18,7 @@ LONGEST, SHORTEST = 600, 80
 FLOORS = 22
 """Longest chain of imports, those within functions and for types alone too."""
 
-MOST_MODULES, MOST_OUTSIDE = 135, 112
+MOST_MODULES, MOST_OUTSIDE = 136, 112
 """Modules without the markers of packages, and of them those outside views, figures and the page."""
 
 RIDDLES = re.compile(r"(What|Whether|How|Which|That|Why|Where|When)\b")

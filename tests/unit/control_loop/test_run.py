@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from support import reference
 from support.cases import deep, spread
+from support.documents import documented
 from support.golden import check_text, refused
 from support.loops import AXIAL, FOUR, fired_by, fires, four, ideal, rad, transverse_size
 from support.process import Run as Process
@@ -25,7 +26,6 @@ from nutdamp.control_loop.simulation import LoopRun, fly
 from nutdamp.control_loop.stability import margins
 from nutdamp.errors import Infeasible
 from nutdamp.flight import propagation
-from nutdamp.flight.verification import EulerEquations
 from nutdamp.physics.thruster import Cold, Trapezoid
 from nutdamp.spacecraft.equipment import ACCELEROMETER, BANG, Loop, Sensor
 from nutdamp.spacecraft.model import Disturbance, Inertia, Limits, Spacecraft
@@ -271,7 +271,7 @@ def test_valves_and_cold_nozzles_are_fired_through(predict: bool) -> None:
     colder = fly(replace(craft, cold=Cold(0.6, 2.0)), loop, 60.0).schedule
     assert np.linalg.norm(colder.pulses[0].impulse) / colder.pulses[0].on_time == pytest.approx(0.6 * 6.0)
     assert colder.total_impulse == pytest.approx(run.schedule.total_impulse, rel=0.2)
-    assert verify_loop(craft, 5.0).agree
+    assert verify_loop(documented(craft), 5.0).agree
 
 
 SLANTED = (FOUR[0].of(torque=np.array([6.0, 0.2, 0.1])), *FOUR[1:])
@@ -299,27 +299,20 @@ CASES = {
 def test_dop853_fires_alike(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("nutdamp.flight.verification.EVALUATIONS", 1000)  # of schedules, which loops need not keep
     craft, until = CASES[name]
-    verdict = verify_loop(craft, until)
+    verdict = verify_loop(documented(craft), until)
     assert len(verdict.pairs) >= 3
     assert verdict.agree
     assert verdict.worst < 1e-7
     assert until == 40.0 or max(np.diff([each.pulse.start for each in verdict.run.fired])) > 20.0
 
 
-class Heavier(EulerEquations):
-    """The body of the file with other moments."""
-
-    def __init__(self, spacecraft: Spacecraft, most: int) -> None:
-        super().__init__(replace(spacecraft, inertia=Inertia((120.0, 120.0, 80.002))), most)
-
-
 def test_a_loop_is_not_confirmed_by_another_body_or_where_it_is_too_long(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("nutdamp.control_loop.evaluation.EulerEquations", Heavier)
-    verdict = verify_loop(CONTINUOUS, 5.0)
+    heavier = documented(replace(CONTINUOUS, inertia=Inertia((120.0, 120.0, 80.002))))
+    verdict = verify_loop(replace(CONTINUOUS, document=heavier.document), 5.0)
     assert (verdict.same, verdict.agree) == (True, False)
     assert verdict.worst > 1e-6
     monkeypatch.setattr("nutdamp.control_loop.evaluation.EVALUATIONS", 200)
-    verdict = verify_loop(CONTINUOUS, 5.0)
+    verdict = verify_loop(documented(CONTINUOUS), 5.0)
     assert (verdict.other, verdict.agree) == (None, False)
     check_text("loop.too-long-to-verify", verdict.missing)
 

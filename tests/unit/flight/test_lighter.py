@@ -13,6 +13,7 @@ from scipy.integrate import solve_ivp
 from support import reference
 from support.builders import channel, cross, noted, spinner
 from support.cases import deep, weekly
+from support.documents import documented
 from support.golden import check_text
 from support.spinners import FILE as SPINNER
 
@@ -115,7 +116,7 @@ def test_verify_confirms_it_with_and_without_dissipation(
     monkeypatch.setattr("nutdamp.flight.verification.SAMPLES", 21)
     body = replace(craft(AXIAL), dissipation=growth)
     made = fires(body, *numbers)
-    verified = verify(body, made)
+    verified = verify(documented(body), made)
     assert verified.agree, verified.methods
     kept = flown(replace(body, tank=TANK), made).residual.nutation
     assert abs(kept - flown(body, made).residual.nutation) > math.radians(1e-4)

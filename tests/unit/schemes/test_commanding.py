@@ -13,6 +13,7 @@ import pytest
 from support import reference
 from support.builders import aimed, channel, codes, cross, one_of, spinner
 from support.cases import deep, spread, weekly
+from support.documents import documented
 from support.golden import refused
 
 from nutdamp.common.results import Value
@@ -187,7 +188,7 @@ def test_cold_pulses_are_planned_for(scheme: str, valve: Valve | None) -> None:
 @pytest.mark.weekly
 def test_the_budget_says_what_valves_and_cold_pulses_cost() -> None:
     body = replace(through(SLOW, SHORT), cold=Cold(0.9, 4.0))
-    found = verify(body, made_by("optimal", body))
+    found = verify(documented(body), made_by("optimal", body))
     budget = {row.name: row.nutation for row in found.budget}
     assert found.agree
     assert budget["all: as flown"] < MICRODEGREE
