@@ -57,7 +57,7 @@ def schedule(name: str, spacecraft: Spacecraft, options: Choice = None) -> Sched
         on_plain = valve_commands.options(spacecraft, chosen)
         correct = Correction(scheme, on_plain)
         return valve_commands.planned(spacecraft, lambda body: schedule(name, body, on_plain), correct)
-    model = model_of(spacecraft, turning=chosen.equal)
+    model = model_of(spacecraft, turning=chosen.equal, three_moments=scheme.three_moments)
     try:
         whole = planned(model.body, chosen)
     except TooShort as short:

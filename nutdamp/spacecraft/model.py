@@ -185,6 +185,14 @@ class Inertia:
         rate = spin if wheel else 1.0  # without a wheel the sign is that of any spin
         return first != second and ((first - third) * rate - wheel) * ((second - third) * rate - wheel) > 0.0
 
+    def circle(self, spin: float) -> Vector:
+        """Factors (2,) of H1 and H2, the larger one 1, with which a small nutation turns on a circle."""
+        if not self._swings(spin):
+            return np.ones(2)
+        (first, second, _), axial = self.moments, self.axial(spin)
+        ratio = math.sqrt((first * spin - axial) / first / ((second * spin - axial) / second))
+        return np.array([ratio, 1.0]) / max(ratio, 1.0)
+
     def nutating(self, spin: float) -> float:
         """Transverse moment of the symmetric body whose small nutation turns as fast, kg m²: A where I1 = I2."""
         return self.A if self.symmetric else float(self.axial(spin)) / (spin - self.nutation_rate(spin))
