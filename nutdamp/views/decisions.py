@@ -219,8 +219,8 @@ PROVES = (
 )
 
 MODEL = (
-    "small angles, spin as at t = 0: for a symmetric body exact for the nutation as long as nothing changes the spin, "
-    "else of first order, as it is for the direction of H; impulses of any size at once for channels with acts_at_once, "
+    "small angles, spin as at t = 0: exact for the nutation of symmetric bodies while nothing changes the spin, of "
+    "first order for others and for the direction of H; impulses of any size at once for channels with acts_at_once, "
     "at most the full torque at a time for the others"
 )
 

@@ -95,7 +95,7 @@ def rival(body: Spacecraft, off: float) -> Rival:
         A_ub=np.concatenate([np.zeros(acts.shape[1]), np.ones(ring.shape[1])])[None],
         b_ub=[1.0],
         bounds=(0.0, 1.0),
-    )  # type: ignore[call-overload]
+    )
     if found.fun is None:
         return Rival(math.inf, None)
     shares = np.asarray(found.x)[: acts.shape[1]].reshape(count, -1)
@@ -149,8 +149,8 @@ def _flown(body: Spacecraft, off: float, burns: list[tuple[float, float, int]]) 
                 ]
             ),
             b_ub=np.append(order @ x - level, 1.0),
-            bounds=[*(zip(np.maximum(-region, -x / unit), np.full(2 * count, region))), *[(0.0, None)] * (9 + len(ring.T))],
-        )  # type: ignore[call-overload]
+            bounds=[*((max(-region, least), region) for least in -x / unit), *[(0.0, None)] * (9 + len(ring.T))],
+        )
         if moved.fun is None:
             return None
         x = x + np.asarray(moved.x)[: 2 * count] * unit

@@ -11,7 +11,7 @@ import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +24,7 @@ from nutdamp.schemes.correction import bounded_step
 from nutdamp.schemes.optimal.descent import Task
 from nutdamp.schemes.optimal.linear_program import GrowingProgram, Shares, Solution
 from nutdamp.schemes.optimal.problem import LEFT, UNMET, Problem
-from nutdamp.schemes.optimal.refinement import Influence, along, misses, small_angles
+from nutdamp.schemes.optimal.refinement import AROUND, Influence, along, misses, small_angles
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import Windows, keeps_limits
 from nutdamp.spacecraft.equipment import Channel
@@ -183,8 +183,15 @@ HALVINGS, LONGER = 10, (0.0, 0.01, 0.03, 0.08, 0.2, 0.4, 0.8)
 """Steps in which the earliest end by small angles is found, and shares added to it that are tried in turn."""
 
 
-Pieces = tuple[NDArray[np.int_], Vector]
-"""Numbers (n,) of channels that fire one after the other, -1 where none does, and for how long, s."""
+class Pieces(NamedTuple):
+    """Numbers ``which`` (n,) of channels that fire one after the other, -1 where none does, and for how long, s.
+
+    ``off`` (2,) N m s is how far from the target H is to end, where it may.
+    """
+
+    which: NDArray[np.int_]
+    times: Vector
+    off: Vector
 
 
 def earliest(problem: Problem) -> Schedule | None:
@@ -214,7 +221,7 @@ def within(problem: Problem, horizon: float) -> Schedule | None:
         pieces = None if work.exhausted() else _pieces(problem, influence, horizon)
         if pieces is None:
             return None
-        schedule = _exact(problem, *pieces)
+        schedule = _exact(problem, pieces)
         try:
             flown = problem.flown(schedule)
         except Infeasible:
@@ -222,7 +229,8 @@ def within(problem: Problem, horizon: float) -> Schedule | None:
         in_time = problem.left(flown) <= LEFT and schedule.end <= horizon
         if in_time and keeps_limits(problem.spacecraft, schedule.pulses):
             return schedule
-        influence = along(problem.flown(_burns(problem, *pieces)), problem.equations, _slot(problem))
+        burns = _burns(problem, pieces.which, pieces.times)
+        influence = along(problem.flown(burns), problem.equations, _slot(problem))
     return None
 
 
@@ -251,9 +259,15 @@ def _pieces(problem: Problem, influence: Influence, horizon: float) -> Pieces | 
     size = float(np.linalg.norm(influence.goal)) or 1.0
     whole = np.einsum("nek,ck->ecn", influence.rows(centres) * lost[:, None], torques) * (width / size)
     equations, slots = len(influence.goal), len(free)
-    program = GrowingProgram(influence.goal / size, np.ones(slots), np.ones(equations))
+    program = GrowingProgram(influence.goal / size, np.ones(slots + 1), np.ones(equations))
     slack = np.hstack([np.eye(equations), -np.eye(equations)])
     program.add(np.full(2 * equations, 1e4 * slots), slack, np.full(2 * equations, np.inf))
+    # For free in all directions of the shift; the shares add up to no more than one.
+    ring = np.zeros((equations, AROUND.shape[1] if problem.off > 0.0 else 0))
+    if problem.off > 0.0:
+        ring[2:4] = problem.off / size * AROUND
+    free_shares = Shares(np.full(ring.shape[1], slots), np.ones(ring.shape[1]))
+    program.add(np.zeros(ring.shape[1]), ring, np.ones(ring.shape[1]), free_shares)
     every = np.ones(slots * len(channels))
     cost = np.repeat(problem.costs / float(problem.costs.max()), slots)
     program.add(cost, whole.reshape(equations, -1), every, Shares(np.tile(np.arange(slots), len(channels)), every))
@@ -261,11 +275,12 @@ def _pieces(problem: Problem, influence: Influence, horizon: float) -> Pieces | 
     if optimum is None or float(optimum.x[: 2 * equations].sum()) > UNMET:
         return None
     fired = np.zeros((len(channels), count + 1))  # and one slot more, in which nothing fires
-    fired[:, free] = optimum.x[2 * equations :].reshape(len(channels), slots) * width
-    return _in_order(fired, width)
+    around, shares = np.split(optimum.x[2 * equations :], [ring.shape[1]])
+    fired[:, free] = shares.reshape(len(channels), slots) * width
+    return _in_order(fired, width, -size * (ring @ around)[2:4] if problem.off > 0.0 else np.zeros(2))
 
 
-def _in_order(times: Vector, width: float) -> Pieces | None:
+def _in_order(times: Vector, width: float, off: Vector) -> Pieces | None:
     """Burns from ``times`` (channels, slots) s: in each slot first what fired before, last what fires on after it."""
     pieces = list[tuple[int, float]]()
     for mine, following in itertools.pairwise(times.T):
@@ -280,7 +295,8 @@ def _in_order(times: Vector, width: float) -> Pieces | None:
     joined = [(number, sum(time for _, time in group)) for number, group in groups]
     if joined[-1][0] < 0:
         joined.pop()
-    return (np.array([number for number, _ in joined]), np.array([time for _, time in joined])) if joined else None
+    which, lengths = (np.array([part[at] for part in joined]) for at in (0, 1))
+    return Pieces(which, lengths, off) if joined else None
 
 
 def _burns(problem: Problem, which: NDArray[np.int_], times: Vector) -> Schedule:
@@ -291,8 +307,10 @@ def _burns(problem: Problem, which: NDArray[np.int_], times: Vector) -> Schedule
     return Schedule(tuple(channel_pulse(channel, start + 0.5 * time, time) for channel, start, time in on))
 
 
-def _exact(problem: Problem, which: NDArray[np.int_], times: Vector) -> Schedule:
-    """The schedule whose flown motion leaves nothing, by Newton's method for the lengths of its pieces."""
+def _exact(problem: Problem, pieces: Pieces) -> Schedule:
+    """The schedule whose flown motion leaves nothing but ``off``, by Newton's method for the lengths of its pieces."""
+    which, times, off = pieces
+    aside = np.array([0.0, 0.0, *off, 0.0])[problem.equations.chosen]
     body, size = problem.spacecraft, float(np.linalg.norm(problem.spacecraft.momentum))
     scale = np.full(len(times), float(times.max(initial=1e-9)))
     most = body.horizon - body.limits.earliest
@@ -303,9 +321,10 @@ def _exact(problem: Problem, which: NDArray[np.int_], times: Vector) -> Schedule
         """Misses of many times (k, n) s, (k, equations), over |H|."""
         if task is None:
             flown = (problem.flown(_burns(problem, which, times)) for times in rows)
-            return np.array([misses(flight, problem.equations) for flight in flown]) / size
+            return np.array([misses(flight, problem.equations) - aside for flight in flown]) / size
         starts = body.limits.earliest + np.cumsum(rows, axis=1) - rows
-        return task.misses(np.tile(which[firing], (len(rows), 1)), np.hstack([starts[:, firing], rows[:, firing]]), 0)
+        settings = np.hstack([starts[:, firing], rows[:, firing]])
+        return task.misses(np.tile(which[firing], (len(rows), 1)), settings, 0) - aside / size
 
     value = left(times[None])[0]
     for _ in range(NEWTON_STEPS):

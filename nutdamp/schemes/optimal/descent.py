@@ -86,8 +86,8 @@ class Task:
     def misses(self, which: Indices, x: Vector, kicks: int) -> Vector:
         """Misses of the flights of ``x`` (b, …), (b, equations), over |H|.
 
-        Pulses act as so many ``kicks`` spread over them, without disturbances, and where I1 ≠ I2 as at small angles; 0 is
-        the true motion.
+        Pulses act as so many ``kicks`` spread over them, without disturbances, with I1 ≠ I2 as at small angles; 0: the
+        true motion.
         """
         parts = [slice(begin, begin + batch.BLOCK) for begin in range(0, len(x) or 1, batch.BLOCK)]
         return np.concatenate([self._misses(which[part], x[part], kicks) for part in parts])

@@ -174,12 +174,18 @@ class Problem:
 
     def program(self, spacecraft: Spacecraft | None = None, equations: EndEquations | None = None) -> Program:
         """The linear program of small angles, with another horizon or other equations if given."""
-        body, equations = spacecraft or self.spacecraft, equations or self.equations
-        off = 0.0
-        if self.options.shift is not None and equations.shift:
-            final = body.spin if body.goal.spin is None else body.goal.spin
-            off = abs(body.inertia.axial(final)) * math.sin(min(self.options.shift, 0.5 * math.pi))
-        return Program(body, self.channels, self.costs, small_angles(body, equations), off=off)
+        body = spacecraft or self.spacecraft
+        influence = small_angles(body, equations or self.equations)
+        return Program(body, self.channels, self.costs, influence, off=self.off)
+
+    @property
+    def off(self) -> float:
+        """How far, N m s, H may end off its target."""
+        body = self.spacecraft
+        axial = float(abs(body.inertia.axial(body.spin if body.goal.spin is None else body.goal.spin)))
+        if not body.inertia.symmetric:  # what is along axis 3 swings, and is to be enough at its least
+            axial = min(axial, float(np.linalg.norm(body.momentum)) * math.cos(body.nutation))
+        return axial * math.sin(min(self.options.shift or 0.0, 0.5 * math.pi))
 
     def within(self, horizon: float) -> Spacecraft:
         """The spacecraft with another horizon."""

@@ -214,8 +214,8 @@ class _LeastCostSearch(Problem):
         looser = self.options.free_axis or self.options.shift is not None
         with work.budget("a schedule as asked", MOST_LOOSE if looser else math.inf):
             best = self.whole_or_shorter(first)
-        if self.dear(best, first.cost):
-            best = self.cheaper(best, alternatives.within(self, self.spacecraft.horizon))
+        if self.dear(best, first.cost, DEAR):
+            best = self.cheaper(best, self.cheapened(alternatives.within(self, self.spacecraft.horizon)))
         if looser and not work.exhausted() and not self.proved(best, EQUAL):
             still = self.keeping(best)
             best = still if self.astray(best) and not self.astray(still) else self.cheaper(best, still)
@@ -264,7 +264,7 @@ class _LeastCostSearch(Problem):
     def astray(self, schedule: Schedule | None) -> bool:
         """True where there is no schedule, or one that, rounded to ticks, shifts H by more than it may."""
         most = math.inf if self.options.shift is None else self.options.shift
-        return schedule is None or self.flown(schedule).residual.axis_error > most
+        return schedule is None or self.flown(schedule).residual.axis_error > most + DAMPED_ANGLE
 
     def whole_or_shorter(self, first: Solution) -> Schedule | None:
         """The cheapest found over the whole horizon; where there is none, or a dear one, over less of it too."""
@@ -358,7 +358,7 @@ class _LeastCostSearch(Problem):
 
     def task(self) -> Task:
         """Task of the descents."""
-        return Task(self.spacecraft, self.equations, self.channels, self.costs, self.program().off)
+        return Task(self.spacecraft, self.equations, self.channels, self.costs, self.off)
 
     def descended(self, known: Schedule | None) -> Schedule | None:
         """The best schedule to which very many starts, and the one ``known``, descend on the true motion."""
