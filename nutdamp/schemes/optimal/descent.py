@@ -31,6 +31,7 @@ Complex = NDArray[np.complex128]
 
 DIFFERENCE = 1e-6  # step of the difference quotients, in scaled unknowns
 FLIGHT, CASE = 0.05, 0.0003  # units of `work` of a stretch of a flight of many sequences, and of each of them
+RADIAN, CASE_RADIAN = 0.8, 0.0025  # and where it is integrated, of each radian
 
 
 class Sequences(NamedTuple):
@@ -121,6 +122,8 @@ class Task:
     def _in_turn(self, which: Indices, x: Vector, kicks: int) -> tuple[Vector, Vector]:
         """H in body axes (3, b) and quaternions (4, b) at the end, stretch by stretch."""
         count, n = which.shape
+        turned = float(np.max(x[:, n - 1] + x[:, 2 * n - 1])) * float(np.linalg.norm(self._start[1]))
+        work.spend(turned * (RADIAN + CASE_RADIAN * count))
         moments, rates, turn = (np.repeat(part[:, None], count, axis=1) for part in self._start)
         bodies = batch.Bodies(moments, *(self._coasting if kicks else self._forced))
         now = np.zeros(count)
