@@ -545,6 +545,15 @@ class Spacecraft(results.Data, results.Shown):
         return 2 * math.pi / rate if rate > 0.0 else math.inf
 
     @property
+    def motion_period(self) -> float:
+        """Period of ω in the body, s; with I1 ≠ I2 that of the motion at hand, where no wheel turns in it."""
+        if self.inertia.symmetric or self.inertia.wheel:
+            return self.body_period
+        from nutdamp.physics.triaxial import nutation_period
+
+        return nutation_period(self.inertia.moments, self.omega0)
+
+    @property
     def inertial_period(self) -> float:
         """Nutation period seen inertially, 2π A/|H|, s; with I1 ≠ I2 that of a small nutation."""
         inertia, spin = self.inertia, self.inertia.equivalent(self.spin)

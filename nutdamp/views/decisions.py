@@ -125,7 +125,7 @@ def spacecraft_json(spacecraft: Spacecraft) -> dict[str, Any]:
         "principal_axes": cleaned(inertia.axes.T).tolist(),
         "omega0_rad_s": inertia.in_file(spacecraft.omega0).tolist(),
         **values_of(spacecraft.widest, "nutation_deg", "body_cone_deg=body", "space_cone_deg=space"),
-        **values_of(spacecraft, "nutation_at_start_deg=tilt", "body_nutation_period_s=body_period"),
+        **values_of(spacecraft, "nutation_at_start_deg=tilt", "body_nutation_period_s=motion_period"),
         "inertial_nutation_period_s": spacecraft.inertial_period,
         "target_axis": cleaned(spacecraft.target_axis).tolist(),
         **values_of(spacecraft, "target_angle_deg=to_turn", "target_spin_rad_s=goal.spin"),

@@ -19,12 +19,25 @@ from numpy.typing import NDArray
 from nutdamp.common import work
 from nutdamp.errors import Infeasible
 from nutdamp.flight.end_state import left_by
-from nutdamp.schemes.catalogue import HalfConeOptions, RhumbLineOptions, SchemeOptions, TwoPulseOptions
-from nutdamp.schemes.correction import bounded_step
+from nutdamp.schemes.catalogue import (
+    FOUR_PULSE,
+    HALF_CONE,
+    ONE_PULSE,
+    RHUMB_LINE,
+    TWO_PULSE,
+    FourPulseOptions,
+    HalfConeOptions,
+    RhumbLineOptions,
+    Scheme,
+    SchemeOptions,
+    TwoPulseOptions,
+)
+from nutdamp.schemes.correction import Correction, bounded_step
 from nutdamp.schemes.optimal.descent import Task
 from nutdamp.schemes.optimal.linear_program import GrowingProgram, Shares, Solution
 from nutdamp.schemes.optimal.problem import LEFT, UNMET, Problem
 from nutdamp.schemes.optimal.refinement import AROUND, Influence, along, misses, small_angles
+from nutdamp.schemes.sequential import SymmetricModel, model_of
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import Windows, keeps_limits
 from nutdamp.spacecraft.equipment import Channel
@@ -150,28 +163,33 @@ def by_other_schemes(spacecraft: Spacecraft, *, shift: bool) -> Iterator[Schedul
 
     The later ones take longer to plan, and are rarely better.
     """
-    from nutdamp.schemes import half_cone, one_pulse, rhumb_line, two_pulse
+    from nutdamp.schemes import four_pulse, half_cone, one_pulse, rhumb_line, two_pulse
 
     # The Sun keeps the phase of trains alone.
     body = replace(spacecraft, steerable=None, goal=replace(spacecraft.goal, sun=None))
-    plans: list[tuple[Callable[[Spacecraft, Any], Schedule | Iterable[Schedule]], SchemeOptions]]
+    model = SymmetricModel(body, body, np.ones(2)) if body.inertia.symmetric else model_of(body)
+    plans: list[tuple[Scheme, Callable[[Spacecraft, Any], Schedule | Iterable[Schedule]], SchemeOptions]]
     if not shift:
-        plans = [(one_pulse.schedule, SchemeOptions())]
+        plans = [(ONE_PULSE, one_pulse.schedule, SchemeOptions())]
+        if not body.inertia.symmetric:
+            plans.append((FOUR_PULSE, lambda _, options: four_pulse.on_true_motion(body, options), FourPulseOptions()))
     elif body.goal.axis is None:
-        plans = [(two_pulse.alternatives, TwoPulseOptions())]
+        plans = [(TWO_PULSE, two_pulse.alternatives, TwoPulseOptions())]
     else:
-        plans = [(two_pulse.schedule, TwoPulseOptions())]
+        plans = [(TWO_PULSE, two_pulse.schedule, TwoPulseOptions())]
         if body.spin != 0.0:
-            plans.append((rhumb_line.schedule, RhumbLineOptions()))
-        plans += [(half_cone.schedule, HalfConeOptions(cones=cones)) for cones in (None, 12, 6, 3)]
-    for plan, options in plans:
+            plans.append((RHUMB_LINE, rhumb_line.schedule, RhumbLineOptions()))
+        plans += [(HALF_CONE, half_cone.schedule, HalfConeOptions(cones=cones)) for cones in (None, 12, 6, 3)]
+    for scheme, plan, options in plans:
         if work.exhausted():
             return
         try:
-            planned = plan(body, options)
+            planned = plan(model.body, options)
             every = [planned] if isinstance(planned, Schedule) else list(planned)
         except Infeasible:
             continue
+        if not body.inertia.symmetric:
+            every = [Correction(scheme, options)(body, model.translate(schedule)) for schedule in every]
         yield from (schedule for schedule in every if keeps_limits(spacecraft, schedule))
 
 

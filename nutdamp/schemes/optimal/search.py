@@ -285,7 +285,8 @@ class _LeastCostSearch(Problem):
     def cheapest(self, first: Solution) -> Schedule | None:
         """The cheapest schedule found, where the program's ``first`` solution is this."""
         # Infinite where the solver gave up: then there may be solutions all the same.
-        best = None if UNMET < first.unmet < math.inf else self.programmed(first)
+        misled = UNMET < first.unmet < math.inf and self.spacecraft.inertia.symmetric
+        best = None if misled else self.programmed(first)
         if not work.exhausted() and self.doubtful(best, first):
             return self.cheaper(best, self.descended(best))
         best = self.cheapened(best)
