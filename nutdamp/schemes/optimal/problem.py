@@ -174,9 +174,9 @@ class Problem:
 
     def program(self, spacecraft: Spacecraft | None = None, equations: EndEquations | None = None) -> Program:
         """The linear program of small angles, with another horizon or other equations if given."""
-        body = spacecraft or self.spacecraft
-        influence = small_angles(body, equations or self.equations)
-        return Program(body, self.channels, self.costs, influence, off=self.off)
+        body, equations = spacecraft or self.spacecraft, equations or self.equations
+        off = self.off if equations.shift else 0.0
+        return Program(body, self.channels, self.costs, small_angles(body, equations), off)
 
     @property
     def off(self) -> float:
