@@ -7,15 +7,18 @@ import math
 
 import numpy as np
 import pytest
-from support.cases import spread
+from support.cases import deep, spread
 from support.optimal import flies
 from support.places import case
+from support.reference import Push, fly, nutation
 from support.three_moments import rival, unequal_body
 
 from nutdamp.files.reader import load_spacecraft
+from nutdamp.planning.plan import plan
 from nutdamp.schemes.catalogue import OptimalOptions
 from nutdamp.schemes.optimal import bounds
 from nutdamp.schemes.optimal.search import _LeastCostSearch
+from nutdamp.views.decisions import spacecraft_json
 
 DEAR, BEATEN = 1.005, 0.995
 """Cost of a plan over that of the schedule known, at most; over the bound of small angles, at least."""
@@ -56,3 +59,35 @@ def test_a_schedule_known_is_not_missed(name: str, shift: float, least: str) -> 
         assert made.pulses.end <= max(map(sum, rows))
     else:
         assert made.pulses.cost_in("kg") <= 1.001 * np.sum(rows, axis=0)[1] * 10.0 / (220.0 * 9.80665)
+
+
+def test_a_shift_allowed_is_used_by_channels_that_fire_one_after_the_other() -> None:
+    """A symmetric body of weak thrusters: 10.47 g, where the schedule beside it takes 10.26 g."""
+    body = load_spacecraft(case("shift-symmetric-ss6.yaml"))
+    with case("shift-symmetric-ss6-meets.csv").open(encoding="utf-8") as stream:
+        known = sum(float(row["on_time_s"]) for row in csv.DictReader(stream)) * 10.0 / (220.0 * 9.80665)
+    assert flies(body, shift=math.radians(0.1)).pulses.cost_in("kg") <= 1.001 * known
+
+
+@pytest.mark.parametrize(("rate", "schemes"), [(0.5, ("four-pulse",)), deep(0.3, ("two-pulse", "four-pulse"))])
+def test_a_large_nutation_of_three_moments_is_damped_on_the_true_motion(rate: float, schemes: tuple[str, ...]) -> None:
+    """31.7° were left, and by optimal 14.1° where two-pulse left nothing; the ideal rate-gyro law takes 74.2 N m s."""
+    body = load_spacecraft(case("three-moments-large.yaml")).replace(omega0=np.array([rate, 0.0, 1.0]))
+    costs = []
+    for scheme in (*schemes, "optimal"):
+        made = plan(body, scheme)
+        pushes = [Push(pulse.start, pulse.end, pulse.impulse / pulse.on_time) for pulse in made.pulses]
+        end = fly(body.inertia.moments, body.omega0, pushes, made.pulses.end)
+        assert nutation(body.inertia.moments, end.rates, 1.0) < math.radians(1e-6)
+        costs.append(made.pulses.total_impulse)
+    assert costs[-1] <= min(costs)
+    assert costs[0] < 74.2
+
+
+def test_the_period_shown_is_that_of_the_motion_at_hand() -> None:
+    """4K/p = 42.94 s, of a small nutation 33.25 s; it is the time after which the rates are those at t = 0."""
+    body = load_spacecraft(case("three-moments-large.yaml"))
+    assert body.motion_period == pytest.approx(42.94, abs=5e-3)
+    assert spacecraft_json(body)["body_nutation_period_s"] == body.motion_period
+    again = fly(body.inertia.moments, body.omega0, [], body.motion_period)
+    assert again.rates == pytest.approx(body.omega0, abs=1e-9)
