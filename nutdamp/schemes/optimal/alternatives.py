@@ -235,8 +235,9 @@ def earliest(problem: Problem) -> Schedule | None:
 def within(problem: Problem, horizon: float) -> Schedule | None:
     """A schedule of one channel after another within ``horizon`` s that leaves nothing; None where none is found."""
     influence = small_angles(problem.spacecraft, problem.equations)
+    late = 0.0
     for _ in range(LINES):  # programs, each about the flight of the one before: at large angles small ones mislead
-        pieces = None if work.exhausted() else _pieces(problem, influence, horizon)
+        pieces = None if work.exhausted() else _pieces(problem, influence, horizon - late)
         if pieces is None:
             return None
         schedule = _exact(problem, pieces)
@@ -244,6 +245,7 @@ def within(problem: Problem, horizon: float) -> Schedule | None:
             flown = problem.flown(schedule)
         except Infeasible:
             return None
+        late += 2.0 * max(schedule.end - horizon, 0.0)
         in_time = problem.left(flown) <= LEFT and schedule.end <= horizon
         if in_time and keeps_limits(problem.spacecraft, schedule.pulses):
             return schedule

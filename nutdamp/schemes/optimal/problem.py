@@ -180,7 +180,7 @@ class Problem:
 
     @property
     def off(self) -> float:
-        """How far, N m s, H may end off its target."""
+        """Distance from its target, N m s, at which H may end."""
         body = self.spacecraft
         axial = float(abs(body.inertia.axial(body.spin if body.goal.spin is None else body.goal.spin)))
         if not body.inertia.symmetric:  # what is along axis 3 swings, and is to be enough at its least

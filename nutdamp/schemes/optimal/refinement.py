@@ -209,7 +209,7 @@ def _turned_back(flight: Flight, times: Vector) -> Vector:
         phase = slope * np.interp(times, knots, turned) + offset * times
         return np.asarray(np.exp(1j * phase + grown) * then / now)
     turned = (spacecraft.spin + 0.5 * drift * times) * times
-    for pulse in schedule:
+    for pulse in schedule if inertia.symmetric else ():  # changes of three moments are followed, see `_variations`
         if pulse.impulse[2] and pulse.on_time > 0.0:
             since, after = np.maximum(times - pulse.start, 0.0), np.maximum(times - pulse.end, 0.0)
             turned = turned + 0.5 * pulse.impulse[2] / (inertia.C * pulse.on_time) * (since**2 - after**2)
