@@ -23,7 +23,7 @@ from nutdamp.schemes.catalogue import OptimalOptions, SchemeOptions, TwoPulseOpt
 from nutdamp.schemes.optimal import alternatives, multistart
 from nutdamp.schemes.optimal.descent import Task
 from nutdamp.schemes.optimal.linear_program import Burn, Program, Solution
-from nutdamp.schemes.optimal.problem import GAIN, LEFT, UNMET, Problem, as_pulses, repaired, thinned
+from nutdamp.schemes.optimal.problem import DEARER, GAIN, LEFT, UNMET, Problem, as_pulses, repaired, thinned
 from nutdamp.schemes.optimal.refinement import MOST_GROWN, EndEquations, Refinement, along, misses
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import keeps_limits, rounded_off, shortest_on_time
@@ -337,7 +337,9 @@ class _LeastCostSearch(Problem):
             if not shorter.feasible(horizon):
                 break
             best = self.cheaper(best, shorter.settled(first.cost))
-        if self.dear(best, first.cost) and not work.exhausted():
+        # With three moments small angles mislead sooner, and no other plan is to be better.
+        share = DEARER if self.spacecraft.inertia.symmetric else SAVED
+        if self.dear(best, first.cost, share) and not work.exhausted():
             best = self.cheaper(best, self.others(first.cost))
         return best
 
