@@ -102,7 +102,8 @@ BISECTIONS, ROUNDS, PARTS = 3, 3, (0.2, 0.4, 0.6)
 """Steps in which the earliest end is found that they allow; earlier ends looked for one after the other; horizons that
 are tried in turn, as parts of the way from the earliest end that they allow to the end there is."""
 
-EARLIER, MOST_ENDS = 300.0, 900.0  # units of `work` after which no other end is looked for, and for all of them
+EARLIER, MOST_ENDS, INTEGRATED = 300.0, 900.0, 4.0
+"""Units of `work` after which no other end is looked for, and for all of them; how many more with three moments."""
 
 
 def hastened(
@@ -123,10 +124,11 @@ def hastened(
         less = schedule.end < best.end and len(schedule) <= len(best)
         return less and problem.price(schedule) <= dearest and problem.left(problem.flown(schedule)) <= left
 
-    with work.budget("an earlier end", MOST_ENDS) as spent:
+    more = 1.0 if problem.spacecraft.inertia.symmetric else INTEGRATED
+    with work.budget("an earlier end", more * MOST_ENDS) as spent:
 
         def over() -> bool:
-            return not len(best) or work.exhausted() or spent.done > EARLIER
+            return not len(best) or work.exhausted() or spent.done > more * EARLIER
 
         for _ in range(ROUNDS):
             ends = [] if over() else _earlier_ends(problem, best.end, allowed)

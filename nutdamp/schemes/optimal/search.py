@@ -338,7 +338,7 @@ class _LeastCostSearch(Problem):
                 break
             best = self.cheaper(best, shorter.settled(first.cost))
         # With three moments small angles mislead sooner, and no other plan is to be better.
-        share = DEARER if self.spacecraft.inertia.symmetric else SAVED
+        share = DEARER if self.spacecraft.inertia.symmetric else 0.5 * DEAR
         if self.dear(best, first.cost, share) and not work.exhausted():
             best = self.cheaper(best, self.others(first.cost))
         return best
