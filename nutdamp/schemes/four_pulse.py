@@ -50,11 +50,8 @@ def schedule(spacecraft: Spacecraft, options: FourPulseOptions) -> Schedule:
     return builder.schedule()
 
 
-LOOKS, SHARES = 240, 0.88 ** np.arange(40)
-"""Moments in a period at which pulses are looked at, and their lengths as shares of a full one."""
-
-LIKE, LEFT = 0.5, 1e-4
-"""Share of the largest gain of a channel from which one that gains it sooner is fired; rad left to correction."""
+LOOKS, SHARES = 240, 0.88 ** np.arange(40)  # moments in a period at which pulses are looked at, shares of a full one
+LIKE, LEFT = 0.5, 1e-4  # share of the largest gain with which an earlier pulse is fired; rad left to correction
 
 
 def on_true_motion(spacecraft: Spacecraft, options: FourPulseOptions) -> Schedule:

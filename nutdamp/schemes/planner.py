@@ -70,8 +70,8 @@ def schedule(name: str, spacecraft: Spacecraft, options: Choice = None) -> Sched
     unlike = scheme.on_true_motion and not (spacecraft.inertia.symmetric or spacecraft.disturbances)
     if not unlike or chosen.uncorrected or not (remains := left(spacecraft, made, momentum=False)) > MODELLED:
         return made
-    other = import_module(scheme.module).on_true_motion(spacecraft, chosen)
-    other = Correction(scheme, chosen)(spacecraft, other)
+    on_true = import_module(scheme.module).on_true_motion(spacecraft, chosen)
+    other = Correction(scheme, chosen)(spacecraft, on_true)
     return other if left(spacecraft, other, momentum=False) < remains else made
 
 

@@ -25,7 +25,7 @@ from nutdamp.physics import body as rigid_body
 from nutdamp.physics.body import ConeAngles
 from nutdamp.physics.thruster import Cold as Cold
 from nutdamp.physics.thruster import Tank as Tank
-from nutdamp.physics.triaxial import arc_cones
+from nutdamp.physics.triaxial import arc_cones, nutation_period
 from nutdamp.spacecraft.equipment import Channel as Channel
 from nutdamp.spacecraft.equipment import Commands as Commands
 from nutdamp.spacecraft.equipment import Loop as Loop
@@ -549,8 +549,6 @@ class Spacecraft(results.Data, results.Shown):
         """Period of ω in the body, s; with I1 ≠ I2 that of the motion at hand, where no wheel turns in it."""
         if self.inertia.symmetric or self.inertia.wheel:
             return self.body_period
-        from nutdamp.physics.triaxial import nutation_period
-
         return nutation_period(self.inertia.moments, self.omega0)
 
     @property

@@ -32,10 +32,9 @@ MOST_GROWN, KNOTS = 14.0, 400
 """Exponent of growth or decay beyond which nothing (a millionth, of pulses that a clock still resolves) is left of the
 nutation, or all is lost; even moments, besides the edges of pulses, at which ω3 is read from a flight with it."""
 
-STEPS, ORDERS, MOST_VARIED = 32, 10, 300_000
-"""Steps in a turn of small changes of a motion of three moments, terms of each one's exponential, and most of them."""
-
-VARIED = 0.004  # units of `work` of each such step
+# Steps in a turn by which small changes of a motion of three moments are followed, terms of each one's exponential, the
+# most steps, and units of `work` of each.
+STEPS, ORDERS, MOST_VARIED, VARIED = 32, 10, 300_000, 0.004
 
 
 AROUND: Vector = np.array([part(2 * math.pi / 32 * np.arange(32)) for part in (np.cos, np.sin)])
