@@ -4,8 +4,8 @@ A channel of torque direction d fires while arg ω = arg d + π (Magnus 1970, se
 change of the observed rate by each firing with the expected one.
 
 The law knows the moments of the body and its momentary spin, and sees the transverse rate ω = ω1 + iω2. With
-I1 ≠ I2 a small ω runs on an ellipse; the quantity that turns evenly is z = g1 ω1 + i g2 ω2 with gj in proportion to
-sqrt(Ij |Ij - I3|), at `Inertia.nutation_rate`: the law works on z, which is ω itself where I1 = I2.
+I1 ≠ I2 a small ω runs on an ellipse; the quantity that turns evenly is z = g1 ω1 + i g2 ω2 with gj by
+`Inertia.circle`, at `Inertia.nutation_rate`: the law works on z, which is ω itself where I1 = I2.
 """
 
 from __future__ import annotations
@@ -146,12 +146,9 @@ class Law:
 
 def _gauge(inertia: Inertia, spin: float) -> tuple[float, float]:
     """(g1, g2), such that |z| is that of a symmetric body with A and C at the widest point of the small ellipse."""
-    first, second, _ = inertia.moments
-    if first == second:
-        return 1.0, 1.0
-    weights = [math.sqrt(moment * abs(moment * spin - inertia.axial(spin))) for moment in (first, second)]
-    most = max(first / weights[0], second / weights[1]) / (0.5 * (first + second))
-    return weights[0] * most, weights[1] * most
+    circle = inertia.circle(spin)
+    first, second = (circle * inertia.moments[:2] / (inertia.A * circle.min())).tolist()
+    return first, second
 
 
 WORKS = 0.25  # fraction of the expected effect above which a firing works, and below whose negative it works backwards

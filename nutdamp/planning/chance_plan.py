@@ -166,8 +166,11 @@ MOST_BURNS, LARGEST = 8, 60_000
 """Burns that are kept, the longest: the program has very short ones besides; slots up to which a plan is sought."""
 
 
-def uncertain(body: Spacecraft, on_times: Vector, goal: Vector) -> Uncertain:
-    """First-order effect of dispersions on pulses of ``on_times`` (K,) s, per second of them, by complex steps."""
+def uncertain(body: Spacecraft, on_times: Vector, goal: Vector, stretch: Vector) -> Uncertain:
+    """First-order effect of dispersions on pulses of ``on_times`` (K,) s, per second of them, by complex steps.
+
+    The ``stretch`` (2,) of the torques of a `SymmetricModel` counts for the nutation, not for H.
+    """
     pulses = [
         channel_pulse(channel, 100.0 + 1e3 * at, on)
         for at, (channel, on) in enumerate(zip(body.channels, on_times, strict=True))
@@ -205,9 +208,12 @@ def uncertain(body: Spacecraft, on_times: Vector, goal: Vector) -> Uncertain:
     torque = (changes[:, 0] + 1j * changes[:, 1]) / on[:, None] @ mixed
     late, less = np.array([change for _, change in begun]) @ mixed, daxial / axial @ mixed
     before, to_do = np.array([start, pointed]) @ mixed, goal[:4:2] + 1j * goal[1:4:2]
-    turned = [torque + (1j * pace * late - less) * effect[:, None] for pace in (body.nutation_rate, body.spin)]
+    in_space = effect.real / stretch[0] + 1j * effect.imag / stretch[1]
+    turning = torque.real / stretch[0] + 1j * torque.imag / stretch[1]
+    each = (torque, effect, body.nutation_rate), (turning, in_space, body.spin)
+    turned = [one + (1j * pace * late - less) * whole[:, None] for one, whole, pace in each]
     return Uncertain(
-        effects=np.array([effect, effect, nominal[:, 2] / on]),
+        effects=np.array([effect, in_space, nominal[:, 2] / on]),
         changes=np.array([*turned, changes[:, 2] / on[:, None] @ mixed]),
         rates=np.array([*(np.array([dnutation, dspin]) @ mixed), np.zeros(len(drawn))]),
         start=np.array([*(before + less * to_do[:, None]), C * dspin @ mixed]),
@@ -269,7 +275,7 @@ class _MarginSearch:
         flat = replace(flat, channels=channels, dispersions=body.dispersions)
         every, goal = EndEquations(True, True), np.zeros(5)
         goal[every.chosen] = small_angles(flat, every).goal
-        dispersed = uncertain(flat, ons, goal)
+        dispersed = uncertain(flat, ons, goal, self.model.stretch)
         drift = float(np.linalg.norm(dispersed.rates, axis=1).max())
         last = max(STRAIGHT / max(drift, 1e-12), flat.limits.earliest + TURNS * flat.nutation_period)
         self.program.forbid(None, last, math.inf)

@@ -461,7 +461,7 @@ def attempt(spacecraft: Spacecraft, scheme: str, options: planner.Choice) -> Pla
     try:
         planned = plan(spacecraft, scheme, options)
         # Judged here, where a failure is that of this scheme alone, and not when the first figure is shown.
-        _ = planned.residual, planned.delta_v, planned.left_if_symmetric
+        _ = planned.residual, planned.delta_v
     except NutdampError:
         raise
     except Exception as failure:

@@ -123,19 +123,12 @@ def _bounds(plan: Plan) -> Iterator[Note]:
 
 
 def _left(plan: Plan) -> Iterator[Note]:
-    """Reasons for remaining nutation: unequal moments and equal pulses of a given length among them."""
+    """Reasons for remaining nutation, equal pulses of a given length among them."""
     body, options, left, inertia = plan.spacecraft, plan.options, plan.left, plan.spacecraft.inertia
-    nutation, symmetric = plan.flight.residual.nutation, plan.left_if_symmetric
+    nutation = plan.flight.residual.nutation
     if nutation >= TELLING and not options.uncorrected:
         allowed = body.goal.spin is not None and plan.meets_requirement
         yield note("remains-allowed", nutation_deg=math.degrees(nutation)) if allowed else remaining(plan)
-    if symmetric is not None:  # what the same pulses would leave
-        yield note(
-            "unequal-moments",
-            inequality_percent=100.0 * abs(inertia.moments[0] - inertia.moments[1]) / inertia.A,
-            nutation_deg=math.degrees(nutation),
-            symmetric_deg=math.degrees(symmetric),
-        )
     simple = inertia.symmetric and not body.disturbances and body.growth == 0.0
     if left is not None and not simple and options.equal and not options.resizable and not options.uncorrected:
         off = float(requirements.missed(body, left.nutation, left.aim))

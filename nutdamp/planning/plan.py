@@ -346,15 +346,6 @@ class Plan(results.Data, results.Tabled):
         return end_state.momentum_gained(flown) / mass
 
     @cached_property
-    def left_if_symmetric(self) -> float | None:
-        """Nutation, rad, that the same pulses would leave if I1 and I2 were their mean; None where they are equal."""
-        inertia = self.spacecraft.inertia
-        if inertia.symmetric or not self.feasible:
-            return None
-        mean = replace(self.spacecraft, inertia=replace(inertia, moments=(inertia.A, inertia.A, inertia.C)))
-        return propagation.flown(mean, self.pulses).residual.nutation
-
-    @cached_property
     def aspects(self) -> tuple[Aspect, ...]:
         """Extreme angles of the flown spin axis from each watched direction; see `end_state.aspects`."""
         return end_state.aspects(self.flight)

@@ -70,7 +70,7 @@ class Certificate:
 
     @property
     def spacecraft(self) -> Spacecraft:
-        """Symmetric body of the program."""
+        """Body of the program."""
         return self.program.spacecraft
 
     @property
@@ -104,7 +104,7 @@ def certificate(plan: Plan) -> Certificate:
     body = planning.known(plan.spacecraft, chosen)
     if body.thrust_laws:
         chosen, body = valve_commands.options(body, chosen), valve_commands.plain(body)
-    body = model_of(body).body
+    body = model_of(body, three_moments=True).body
     assert isinstance(chosen, OptimalOptions)
     try:
         problem = Problem(replace(body, limits=replace(body.limits, horizon=known.within)), chosen)

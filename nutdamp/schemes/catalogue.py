@@ -221,6 +221,8 @@ class Scheme:
     body_fixed: bool = False  # fires channels of the file only, no steerable torquer
     reads_commands: bool = False  # makes blocks of the ``commands`` of the file, and is planned where there are some
     on_true_body: bool = False  # needs no symmetric model
+    three_moments: bool = False  # plans on three moments as they are, and needs a model for lasting torques alone
+    on_true_motion: bool = False  # has such a function too, for three moments
     slow: bool = False  # may take seconds
     by_turns: bool = False  # fires at one phase of each spin turn, so that the body has to spin
     home: str = ""  # its module, where that has another name
@@ -233,9 +235,16 @@ class Scheme:
 
 ONE_PULSE = Scheme("one-pulse", classic=True)
 TWO_PULSE = Scheme("two-pulse", TwoPulseOptions, classic=True, points=True, weighs_alternatives=True)
-FOUR_PULSE = Scheme("four-pulse", FourPulseOptions, classic=True, body_fixed=True)
+FOUR_PULSE = Scheme("four-pulse", FourPulseOptions, classic=True, body_fixed=True, on_true_motion=True)
 OPTIMAL = Scheme(
-    "optimal", OptimalOptions, points=True, sets_spin=True, body_fixed=True, slow=True, home="optimal.search"
+    "optimal",
+    OptimalOptions,
+    points=True,
+    sets_spin=True,
+    body_fixed=True,
+    three_moments=True,
+    slow=True,
+    home="optimal.search",
 )
 HALF_CONE = Scheme("half-cone", HalfConeOptions, points=True, only_points=True, body_fixed=True)
 RHUMB_LINE = Scheme(

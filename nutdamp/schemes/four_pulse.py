@@ -4,13 +4,21 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
+from nutdamp.common import work
 from nutdamp.errors import Infeasible, span
+from nutdamp.flight import propagation
+from nutdamp.physics.triaxial import widest_cones
 from nutdamp.schemes.catalogue import DEFAULT_SHARE, FourPulseOptions
+from nutdamp.schemes.correction import FlownBuilder
 from nutdamp.schemes.sequential import ImpulseBuilder, at_hand, fire_components, no_alignment
-from nutdamp.spacecraft.constraints import usable
+from nutdamp.spacecraft.constraints import Windows, usable
 from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Spacecraft
-from nutdamp.spacecraft.schedule import Schedule
+from nutdamp.spacecraft.schedule import Pulse, Schedule, channel_pulse
+
+MOST_FLOWN = 200  # pulses that are laid one by one on the true motion, at most
 
 
 def schedule(spacecraft: Spacecraft, options: FourPulseOptions) -> Schedule:
@@ -22,7 +30,7 @@ def schedule(spacecraft: Spacecraft, options: FourPulseOptions) -> Schedule:
     """
     channels = at_hand(spacecraft, usable(spacecraft))
     builder = ImpulseBuilder(spacecraft)
-    on_times = {channel.name: _on_time(builder, channel, options.on_time) for channel in channels}
+    on_times = {channel.name: _on_time(builder.period, channel, options.on_time) for channel in channels}
     turns = spacecraft.nutation_rate != 0.0
     if not turns:
         fire_components(builder, channels, options.on_time, coarse=options.coarse)
@@ -41,10 +49,54 @@ def schedule(spacecraft: Spacecraft, options: FourPulseOptions) -> Schedule:
     return builder.schedule()
 
 
-def _on_time(builder: ImpulseBuilder, channel: Channel, requested: float | None) -> float:
+LOOKS, SHARES = 240, 0.88 ** np.arange(40)  # moments in a period at which pulses are looked at, shares of a full one
+LIKE, LEFT = 0.5, 1e-4  # share of the largest gain with which an earlier pulse is fired; rad left to correction
+
+
+def on_true_motion(spacecraft: Spacecraft, options: FourPulseOptions) -> Schedule:
+    """The law of ideal rate gyros for three moments, whose large nutation turns unevenly and at a rate of its own.
+
+    Each pulse is one that lowers, as an impulse, the largest nutation of the motion that follows most.
+    """
+    channels, builder = at_hand(spacecraft, usable(spacecraft)), FlownBuilder(spacecraft)
+    most = spacecraft.limits.max_pulses or MOST_FLOWN
+    while len(builder.pulses) < most and builder.here.nutation > LEFT and not work.exhausted():
+        pulse, after = _best_pulse(builder.here, channels, options.on_time), builder.fork()
+        if pulse is None:
+            break
+        after.fire([pulse])
+        if after.here.nutation >= builder.here.nutation:
+            break
+        builder = after
+    return builder.schedule()
+
+
+def _best_pulse(here: Spacecraft, channels: list[Channel], requested: float | None) -> Pulse | None:
+    """The pulse to fire next, within a period of the motion; None where none lowers the nutation."""
+    windows, earliest, period = Windows(here), here.limits.earliest, min(here.motion_period, here.horizon)
+    times = earliest + np.linspace(0.0, period, LOOKS)
+    rates = propagation.flown(here, Schedule(), float(times[-1])).motion(times)[0].T
+    moments, best = np.tile(np.array(here.inertia.moments)[:, None], LOOKS), list[tuple[float, Pulse]]()
+    for channel in channels:
+        full, tried = _on_time(period, channel, requested), list[tuple[float, float, float]]()
+        for on_time in dict.fromkeys(windows.on_time(full * share, channel.min_on_time, full) for share in SHARES):
+            after = rates + channel.torque[:, None] * on_time / moments
+            left = widest_cones(moments, after, here.sense, here.inertia.wheel)[0]
+            starts = times - 0.5 * on_time
+            left[~windows.allowed(starts, np.full(LOOKS, on_time), earliest)] = math.inf
+            at = int(np.argmin(left))
+            tried.append((float(left[at]), float(times[at]), on_time))
+        left_over, t, on_time = min(tried)
+        best.append((here.nutation - left_over, channel_pulse(channel, t, on_time)))
+    most = max(gain for gain, _ in best)
+    good = [pulse for gain, pulse in best if gain >= LIKE * most]
+    return min(good, key=lambda pulse: pulse.t) if most > 0.0 else None
+
+
+def _on_time(period: float, channel: Channel, requested: float | None) -> float:
     """Length of a full pulse of ``channel``, s."""
     if requested is None:
-        return max(min(channel.max_on_time, DEFAULT_SHARE * builder.period), channel.min_on_time)
+        return max(min(channel.max_on_time, DEFAULT_SHARE * period), channel.min_on_time)
     if not (channel.min_on_time <= requested <= channel.max_on_time and 0.0 < requested < math.inf):
         raise Infeasible(
             f"an on-time of {requested:.4g} s is outside what {channel.name} allows: "

@@ -12,11 +12,13 @@ from nutdamp.common.results import note
 from nutdamp.errors import BadRequest, Infeasible, TooShort
 from nutdamp.schemes import valve_commands
 from nutdamp.schemes.catalogue import POINTING, SCHEMES, Options, Scheme, SchemeOptions
-from nutdamp.schemes.correction import Correction
+from nutdamp.schemes.correction import Correction, left
 from nutdamp.schemes.sequential import SymmetricModel, model_of
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.schedule import Schedule
 from nutdamp.units import as_given
+
+MODELLED = 1e-6  # rad that a schedule laid on the symmetric body leaves from which one is laid on the true motion
 
 LONGER = 4.0  # multiple of the horizon, and of the default one, up to which a sufficient horizon is sought
 
@@ -57,14 +59,20 @@ def schedule(name: str, spacecraft: Spacecraft, options: Choice = None) -> Sched
         on_plain = valve_commands.options(spacecraft, chosen)
         correct = Correction(scheme, on_plain)
         return valve_commands.planned(spacecraft, lambda body: schedule(name, body, on_plain), correct)
-    model = model_of(spacecraft, turning=chosen.equal)
+    model = model_of(spacecraft, turning=chosen.equal, three_moments=scheme.three_moments)
     try:
         whole = planned(model.body, chosen)
     except TooShort as short:
         with work.budget("a longer horizon", work.CURE):
             cure = short.cure or _longer_horizon(model.body, lambda body: planned(body, chosen))
         raise TooShort(short.why, cure) from None
-    return _corrected(scheme, model, whole, chosen)
+    made = _corrected(scheme, model, whole, chosen)
+    unlike = scheme.on_true_motion and not (spacecraft.inertia.symmetric or spacecraft.disturbances)
+    if not unlike or chosen.uncorrected or not (remains := left(spacecraft, made, momentum=False)) > MODELLED:
+        return made
+    on_true = import_module(scheme.module).on_true_motion(spacecraft, chosen)
+    other = Correction(scheme, chosen)(spacecraft, on_true)
+    return other if left(spacecraft, other, momentum=False) < remains else made
 
 
 def _longer_horizon(spacecraft: Spacecraft, planned: Callable[[Spacecraft], Schedule]) -> str:

@@ -370,11 +370,13 @@ class SymmetricModel:
     @property
     def exact(self) -> bool:
         """True if the model moves as the spacecraft does, so that nothing has to be corrected."""
-        return self.spacecraft.inertia.symmetric and not self.spacecraft.disturbances and self.spacecraft.growth == 0.0
+        spacecraft = self.spacecraft
+        alike = self.body.inertia.moments == spacecraft.inertia.moments
+        return alike and not spacecraft.disturbances and spacecraft.growth == 0.0
 
     def translate(self, schedule: Schedule) -> Schedule:
         """Schedule with the true actuators."""
-        if self.spacecraft.inertia.symmetric:
+        if self.body.inertia.moments == self.spacecraft.inertia.moments:
             return schedule
         torquer, windows = self.spacecraft.torquer, Windows(self.spacecraft)
         ready, pulses = self.spacecraft.limits.earliest, list[Pulse]()
@@ -396,21 +398,21 @@ class SymmetricModel:
         return Schedule(tuple(pulses), schedule.notes, schedule.bounds)
 
 
-def model_of(spacecraft: Spacecraft, *, turning: bool = False) -> SymmetricModel:
+def model_of(spacecraft: Spacecraft, *, turning: bool = False, three_moments: bool = False) -> SymmetricModel:
     """Model of a spacecraft, whose torques change ω as the true ones do.
 
     ``turning``: they turn H so, and ω at t = 0 is as much larger or smaller on average: the circle may be of any size.
+    ``three_moments``: the model has those of the spacecraft.
     """
     undisturbed = _without_steady(spacecraft)
     inertia = spacecraft.inertia
-    if inertia.symmetric:
+    if inertia.symmetric or three_moments:
         return SymmetricModel(spacecraft, _aimed(undisturbed, spacecraft), np.ones(2))
-    first, second, C = inertia.moments
     # Its nutation has the true rate, and (s1 ω1, s2 ω2) moves on a circle (linearised Euler equations).
-    A, spin, axial = inertia.nutating(spacecraft.spin), spacecraft.spin, spacecraft.axial
-    circle = (first * (first * spin - axial) / (second * (second * spin - axial))) ** 0.25
-    scale = np.array([circle, 1.0 / circle])
-    stretch = scale * A / np.array([first, second])  # for torques and impulses
+    A, C, across = inertia.nutating(spacecraft.spin), inertia.C, np.array(inertia.moments[:2])
+    scale = inertia.circle(spacecraft.spin) * across
+    scale /= math.sqrt(scale[0] * scale[1])
+    stretch = scale * A / across  # for torques and impulses
     mean = float(np.mean(stretch))
     torquer = undisturbed.steerable
     if torquer is not None and torquer.torque is not None:  # the stretch differs by direction: near enough for a plan

@@ -25,7 +25,7 @@ from nutdamp.physics import body as rigid_body
 from nutdamp.physics.body import ConeAngles
 from nutdamp.physics.thruster import Cold as Cold
 from nutdamp.physics.thruster import Tank as Tank
-from nutdamp.physics.triaxial import arc_cones
+from nutdamp.physics.triaxial import arc_cones, nutation_period
 from nutdamp.spacecraft.equipment import Channel as Channel
 from nutdamp.spacecraft.equipment import Commands as Commands
 from nutdamp.spacecraft.equipment import Loop as Loop
@@ -184,6 +184,14 @@ class Inertia:
         (first, second, third), wheel = self.moments, self.wheel
         rate = spin if wheel else 1.0  # without a wheel the sign is that of any spin
         return first != second and ((first - third) * rate - wheel) * ((second - third) * rate - wheel) > 0.0
+
+    def circle(self, spin: float) -> Vector:
+        """Factors (2,) of H1 and H2, the larger one 1, with which a small nutation turns on a circle."""
+        if not self._swings(spin):
+            return np.ones(2)
+        (first, second, _), axial = self.moments, self.axial(spin)
+        ratio = math.sqrt((first * spin - axial) / first / ((second * spin - axial) / second))
+        return np.array([ratio, 1.0]) / max(ratio, 1.0)
 
     def nutating(self, spin: float) -> float:
         """Transverse moment of the symmetric body whose small nutation turns as fast, kg m²: A where I1 = I2."""
@@ -545,6 +553,13 @@ class Spacecraft(results.Data, results.Shown):
         """Period of a small nutation seen in the body, Magnus (12), s; infinite for a sphere."""
         rate = abs(self.nutation_rate)
         return 2 * math.pi / rate if rate > 0.0 else math.inf
+
+    @property
+    def motion_period(self) -> float:
+        """Period of ω in the body, s; with I1 ≠ I2 that of the motion at hand, where no wheel turns in it."""
+        if self.inertia.symmetric or self.inertia.wheel:
+            return self.body_period
+        return nutation_period(self.inertia.moments, self.omega0)
 
     @property
     def inertial_period(self) -> float:

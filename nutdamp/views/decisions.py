@@ -126,7 +126,7 @@ def spacecraft_json(spacecraft: Spacecraft) -> dict[str, Any]:
         "principal_axes": cleaned(inertia.axes.T).tolist(),
         "omega0_rad_s": inertia.in_file(spacecraft.omega0).tolist(),
         **values_of(spacecraft.widest, "nutation_deg", "body_cone_deg=body", "space_cone_deg=space"),
-        **values_of(spacecraft, "nutation_at_start_deg=tilt", "body_nutation_period_s=body_period"),
+        **values_of(spacecraft, "nutation_at_start_deg=tilt", "body_nutation_period_s=motion_period"),
         "inertial_nutation_period_s": spacecraft.inertial_period,
         "target_axis": cleaned(spacecraft.target_axis).tolist(),
         **values_of(spacecraft, "target_angle_deg=to_turn", "target_spin_rad_s=goal.spin"),
@@ -220,9 +220,9 @@ PROVES = (
 )
 
 MODEL = (
-    "small angles, symmetric body, spin as at t = 0: exact for the nutation as long as nothing changes the spin, of "
-    "first order for the direction of H; impulses of any size at once for channels with acts_at_once, at most the full "
-    "torque at a time for the others"
+    "small angles, spin as at t = 0: exact for the nutation of symmetric bodies while nothing changes the spin, of "
+    "first order for others and for the direction of H; impulses of any size at once for channels with acts_at_once, "
+    "at most the full torque at a time for the others"
 )
 
 NOT_COUNTED = (
@@ -234,11 +234,11 @@ NOT_COUNTED = (
 def certificate_json(certificate: Certificate) -> dict[str, Any]:
     """The file of ``plan --certificate``: all data to check a least cost by hand, in SI.
 
-    It is about the transverse impulse of a symmetric body of small angles. With E1 = e^{i α t} min(1, e^{-κ (t -
-    t_last)}) and E2 = e^{i ω t}, where α is ``nutation_rad_s``, ω is ``spin_rad_s`` and κ is ``growth_per_s``, a second
-    of a channel of the torque (m1, m2, m3) at t adds E1 (m1 + i m2) to the equations nutation, E2 (m1 + i m2) to the
-    equations shift, and m3 to the equation spin. Of each equation the file has the goal and the price y, and q(t) of a
-    channel is the sum of y times what it adds, over ``cost_per_s``.
+    It is about the transverse impulse at small angles. With E1 = e^{i α t} min(1, e^{-κ (t - t_last)}) and E2 =
+    e^{i ω t}, where α is ``nutation_rad_s``, ω is ``spin_rad_s`` and κ is ``growth_per_s``, a second of a channel of
+    the torque (m1, m2, m3) at t adds E1 (f1 m1 + i f2 m2), f being ``circle``, to the equations nutation, E2 (m1 + i
+    m2) to the equations shift, and m3 to the equation spin. Of each equation the file has the goal and the price y,
+    and q(t) of a channel is the sum of y times what it adds, over ``cost_per_s``.
     """
     body, program, prices = certificate.spacecraft, certificate.program, certificate.proof.prices.tolist()
     equations = zip(certificate.rows, program.influence.goal.tolist(), prices, strict=True)
@@ -250,7 +250,8 @@ def certificate_json(certificate: Certificate) -> dict[str, Any]:
         "proves": PROVES,
         "model": MODEL,
         "not_counted": NOT_COUNTED,
-        **values_of(body, "a=inertia.a", "spin_rad_s", "nutation_rad_s=nutation_rate", "growth_per_s=growth"),
+        "circle": body.inertia.circle(body.spin).tolist(),
+        **values_of(body, "spin_rad_s", "nutation_rad_s=nutation_rate", "growth_per_s=growth"),
         "last_s": certificate.last,
         "windows_s": [list(span) for span in certificate.windows],
         "unit": certificate.problem.unit,

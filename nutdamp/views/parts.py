@@ -403,8 +403,9 @@ def _derived(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
     now = "" if inertia.symmetric else f"{degrees(spacecraft.tilt)} at t = 0, at most "
     cones = f"body cone {degrees(motion.body)} + space cone {degrees(motion.space)}"
     yield "nutation", f"{now}{degrees(motion.nutation)} = {cones}"
-    still = math.isinf(spacecraft.body_period)
-    in_body = "none in the body, where ω does not turn" if still else f"{duration(spacecraft.body_period)} in the body"
+    period = spacecraft.motion_period
+    still = math.isinf(period)
+    in_body = "none in the body, where ω does not turn" if still else f"{duration(period)} in the body"
     yield "nutation period", f"{in_body}, {duration(spacecraft.inertial_period)} inertially"
     if spacecraft.dissipation is not None:
         yield "dissipation", _dissipation(spacecraft, spacecraft.dissipation)

@@ -11,7 +11,7 @@ import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,12 +19,25 @@ from numpy.typing import NDArray
 from nutdamp.common import work
 from nutdamp.errors import Infeasible
 from nutdamp.flight.end_state import left_by
-from nutdamp.schemes.catalogue import HalfConeOptions, RhumbLineOptions, SchemeOptions, TwoPulseOptions
-from nutdamp.schemes.correction import bounded_step
+from nutdamp.schemes.catalogue import (
+    FOUR_PULSE,
+    HALF_CONE,
+    ONE_PULSE,
+    RHUMB_LINE,
+    TWO_PULSE,
+    FourPulseOptions,
+    HalfConeOptions,
+    RhumbLineOptions,
+    Scheme,
+    SchemeOptions,
+    TwoPulseOptions,
+)
+from nutdamp.schemes.correction import Correction, bounded_step
 from nutdamp.schemes.optimal.descent import Task
 from nutdamp.schemes.optimal.linear_program import GrowingProgram, Shares, Solution
 from nutdamp.schemes.optimal.problem import LEFT, UNMET, Problem
-from nutdamp.schemes.optimal.refinement import Influence, along, misses, small_angles
+from nutdamp.schemes.optimal.refinement import AROUND, Influence, along, misses, small_angles
+from nutdamp.schemes.sequential import SymmetricModel, model_of
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import Windows, keeps_limits
 from nutdamp.spacecraft.equipment import Channel
@@ -89,7 +102,8 @@ BISECTIONS, ROUNDS, PARTS = 3, 3, (0.2, 0.4, 0.6)
 """Steps in which the earliest end is found that they allow; earlier ends looked for one after the other; horizons that
 are tried in turn, as parts of the way from the earliest end that they allow to the end there is."""
 
-EARLIER, MOST_ENDS = 300.0, 900.0  # units of `work` after which no other end is looked for, and for all of them
+EARLIER, MOST_ENDS, INTEGRATED = 300.0, 900.0, 4.0
+"""Units of `work` after which no other end is looked for, and for all of them; how many more with three moments."""
 
 
 def hastened(
@@ -110,10 +124,11 @@ def hastened(
         less = schedule.end < best.end and len(schedule) <= len(best)
         return less and problem.price(schedule) <= dearest and problem.left(problem.flown(schedule)) <= left
 
-    with work.budget("an earlier end", MOST_ENDS) as spent:
+    more = 1.0 if problem.spacecraft.inertia.symmetric else INTEGRATED
+    with work.budget("an earlier end", more * MOST_ENDS) as spent:
 
         def over() -> bool:
-            return not len(best) or work.exhausted() or spent.done > EARLIER
+            return not len(best) or work.exhausted() or spent.done > more * EARLIER
 
         for _ in range(ROUNDS):
             ends = [] if over() else _earlier_ends(problem, best.end, allowed)
@@ -150,28 +165,33 @@ def by_other_schemes(spacecraft: Spacecraft, *, shift: bool) -> Iterator[Schedul
 
     The later ones take longer to plan, and are rarely better.
     """
-    from nutdamp.schemes import half_cone, one_pulse, rhumb_line, two_pulse
+    from nutdamp.schemes import four_pulse, half_cone, one_pulse, rhumb_line, two_pulse
 
     # The Sun keeps the phase of trains alone.
     body = replace(spacecraft, steerable=None, goal=replace(spacecraft.goal, sun=None))
-    plans: list[tuple[Callable[[Spacecraft, Any], Schedule | Iterable[Schedule]], SchemeOptions]]
+    model = SymmetricModel(body, body, np.ones(2)) if body.inertia.symmetric else model_of(body)
+    plans: list[tuple[Scheme, Callable[[Spacecraft, Any], Schedule | Iterable[Schedule]], SchemeOptions]]
     if not shift:
-        plans = [(one_pulse.schedule, SchemeOptions())]
+        plans = [(ONE_PULSE, one_pulse.schedule, SchemeOptions())]
+        if not body.inertia.symmetric:
+            plans.append((FOUR_PULSE, lambda _, options: four_pulse.on_true_motion(body, options), FourPulseOptions()))
     elif body.goal.axis is None:
-        plans = [(two_pulse.alternatives, TwoPulseOptions())]
+        plans = [(TWO_PULSE, two_pulse.alternatives, TwoPulseOptions())]
     else:
-        plans = [(two_pulse.schedule, TwoPulseOptions())]
+        plans = [(TWO_PULSE, two_pulse.schedule, TwoPulseOptions())]
         if body.spin != 0.0:
-            plans.append((rhumb_line.schedule, RhumbLineOptions()))
-        plans += [(half_cone.schedule, HalfConeOptions(cones=cones)) for cones in (None, 12, 6, 3)]
-    for plan, options in plans:
+            plans.append((RHUMB_LINE, rhumb_line.schedule, RhumbLineOptions()))
+        plans += [(HALF_CONE, half_cone.schedule, HalfConeOptions(cones=cones)) for cones in (None, 12, 6, 3)]
+    for scheme, plan, options in plans:
         if work.exhausted():
             return
         try:
-            planned = plan(body, options)
+            planned = plan(model.body, options)
             every = [planned] if isinstance(planned, Schedule) else list(planned)
         except Infeasible:
             continue
+        if not body.inertia.symmetric:
+            every = [Correction(scheme, options)(body, model.translate(schedule)) for schedule in every]
         yield from (schedule for schedule in every if keeps_limits(spacecraft, schedule))
 
 
@@ -183,8 +203,15 @@ HALVINGS, LONGER = 10, (0.0, 0.01, 0.03, 0.08, 0.2, 0.4, 0.8)
 """Steps in which the earliest end by small angles is found, and shares added to it that are tried in turn."""
 
 
-Pieces = tuple[NDArray[np.int_], Vector]
-"""Numbers (n,) of channels that fire one after the other, -1 where none does, and for how long, s."""
+class Pieces(NamedTuple):
+    """Numbers ``which`` (n,) of channels that fire one after the other, -1 where none does, and for how long, s.
+
+    ``off`` (2,) N m s is how far from the target H is to end, where it may.
+    """
+
+    which: NDArray[np.int_]
+    times: Vector
+    off: Vector
 
 
 def earliest(problem: Problem) -> Schedule | None:
@@ -210,19 +237,22 @@ def earliest(problem: Problem) -> Schedule | None:
 def within(problem: Problem, horizon: float) -> Schedule | None:
     """A schedule of one channel after another within ``horizon`` s that leaves nothing; None where none is found."""
     influence = small_angles(problem.spacecraft, problem.equations)
+    late = 0.0
     for _ in range(LINES):  # programs, each about the flight of the one before: at large angles small ones mislead
-        pieces = None if work.exhausted() else _pieces(problem, influence, horizon)
+        pieces = None if work.exhausted() else _pieces(problem, influence, horizon - late)
         if pieces is None:
             return None
-        schedule = _exact(problem, *pieces)
+        schedule = _exact(problem, pieces)
         try:
             flown = problem.flown(schedule)
         except Infeasible:
             return None
+        late += 2.0 * max(schedule.end - horizon, 0.0)
         in_time = problem.left(flown) <= LEFT and schedule.end <= horizon
         if in_time and keeps_limits(problem.spacecraft, schedule.pulses):
             return schedule
-        influence = along(problem.flown(_burns(problem, *pieces)), problem.equations, _slot(problem))
+        burns = _burns(problem, pieces.which, pieces.times)
+        influence = along(problem.flown(burns), problem.equations, _slot(problem))
     return None
 
 
@@ -251,9 +281,15 @@ def _pieces(problem: Problem, influence: Influence, horizon: float) -> Pieces | 
     size = float(np.linalg.norm(influence.goal)) or 1.0
     whole = np.einsum("nek,ck->ecn", influence.rows(centres) * lost[:, None], torques) * (width / size)
     equations, slots = len(influence.goal), len(free)
-    program = GrowingProgram(influence.goal / size, np.ones(slots), np.ones(equations))
+    program = GrowingProgram(influence.goal / size, np.ones(slots + 1), np.ones(equations))
     slack = np.hstack([np.eye(equations), -np.eye(equations)])
     program.add(np.full(2 * equations, 1e4 * slots), slack, np.full(2 * equations, np.inf))
+    # For free in all directions of the shift; the shares add up to no more than one.
+    ring = np.zeros((equations, AROUND.shape[1] if problem.off > 0.0 else 0))
+    if problem.off > 0.0:
+        ring[2:4] = problem.off / size * AROUND
+    free_shares = Shares(np.full(ring.shape[1], slots), np.ones(ring.shape[1]))
+    program.add(np.zeros(ring.shape[1]), ring, np.ones(ring.shape[1]), free_shares)
     every = np.ones(slots * len(channels))
     cost = np.repeat(problem.costs / float(problem.costs.max()), slots)
     program.add(cost, whole.reshape(equations, -1), every, Shares(np.tile(np.arange(slots), len(channels)), every))
@@ -261,11 +297,12 @@ def _pieces(problem: Problem, influence: Influence, horizon: float) -> Pieces | 
     if optimum is None or float(optimum.x[: 2 * equations].sum()) > UNMET:
         return None
     fired = np.zeros((len(channels), count + 1))  # and one slot more, in which nothing fires
-    fired[:, free] = optimum.x[2 * equations :].reshape(len(channels), slots) * width
-    return _in_order(fired, width)
+    around, shares = np.split(optimum.x[2 * equations :], [ring.shape[1]])
+    fired[:, free] = shares.reshape(len(channels), slots) * width
+    return _in_order(fired, width, -size * (ring @ around)[2:4] if problem.off > 0.0 else np.zeros(2))
 
 
-def _in_order(times: Vector, width: float) -> Pieces | None:
+def _in_order(times: Vector, width: float, off: Vector) -> Pieces | None:
     """Burns from ``times`` (channels, slots) s: in each slot first what fired before, last what fires on after it."""
     pieces = list[tuple[int, float]]()
     for mine, following in itertools.pairwise(times.T):
@@ -280,7 +317,8 @@ def _in_order(times: Vector, width: float) -> Pieces | None:
     joined = [(number, sum(time for _, time in group)) for number, group in groups]
     if joined[-1][0] < 0:
         joined.pop()
-    return (np.array([number for number, _ in joined]), np.array([time for _, time in joined])) if joined else None
+    which, lengths = (np.array([part[at] for part in joined]) for at in (0, 1))
+    return Pieces(which, lengths, off) if joined else None
 
 
 def _burns(problem: Problem, which: NDArray[np.int_], times: Vector) -> Schedule:
@@ -291,8 +329,10 @@ def _burns(problem: Problem, which: NDArray[np.int_], times: Vector) -> Schedule
     return Schedule(tuple(channel_pulse(channel, start + 0.5 * time, time) for channel, start, time in on))
 
 
-def _exact(problem: Problem, which: NDArray[np.int_], times: Vector) -> Schedule:
-    """The schedule whose flown motion leaves nothing, by Newton's method for the lengths of its pieces."""
+def _exact(problem: Problem, pieces: Pieces) -> Schedule:
+    """The schedule whose flown motion leaves nothing but ``off``, by Newton's method for the lengths of its pieces."""
+    which, times, off = pieces
+    aside = np.array([0.0, 0.0, *off, 0.0])[problem.equations.chosen]
     body, size = problem.spacecraft, float(np.linalg.norm(problem.spacecraft.momentum))
     scale = np.full(len(times), float(times.max(initial=1e-9)))
     most = body.horizon - body.limits.earliest
@@ -303,9 +343,10 @@ def _exact(problem: Problem, which: NDArray[np.int_], times: Vector) -> Schedule
         """Misses of many times (k, n) s, (k, equations), over |H|."""
         if task is None:
             flown = (problem.flown(_burns(problem, which, times)) for times in rows)
-            return np.array([misses(flight, problem.equations) for flight in flown]) / size
+            return np.array([misses(flight, problem.equations) - aside for flight in flown]) / size
         starts = body.limits.earliest + np.cumsum(rows, axis=1) - rows
-        return task.misses(np.tile(which[firing], (len(rows), 1)), np.hstack([starts[:, firing], rows[:, firing]]), 0)
+        settings = np.hstack([starts[:, firing], rows[:, firing]])
+        return task.misses(np.tile(which[firing], (len(rows), 1)), settings, 0) - aside / size
 
     value = left(times[None])[0]
     for _ in range(NEWTON_STEPS):

@@ -158,7 +158,7 @@ def rigorous(
     channels = usable(spacecraft, axial=True)
     if spacecraft.disturbances or spacecraft.growth != 0.0 or any(channel.name not in prices for channel in channels):
         return None
-    if spacecraft.goal.spin is not None:
+    if spacecraft.goal.spin is not None or not spacecraft.inertia.symmetric:
         return None
     if allowed.nutation >= 0.5 * math.pi:  # the spin axis points away from H
         return None

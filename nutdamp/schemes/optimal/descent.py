@@ -20,7 +20,7 @@ from nutdamp.common import work
 from nutdamp.common.numerics import cos_sin
 from nutdamp.flight.dynamics import make_dynamics
 from nutdamp.physics import attitude, batch
-from nutdamp.schemes.optimal.refinement import AROUND, EndEquations, square_to_target
+from nutdamp.schemes.optimal.refinement import AROUND, EndEquations, Influence, small_angles, square_to_target
 from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Spacecraft, Vector
 
@@ -31,6 +31,7 @@ Complex = NDArray[np.complex128]
 
 DIFFERENCE = 1e-6  # step of the difference quotients, in scaled unknowns
 FLIGHT, CASE = 0.05, 0.0003  # units of `work` of a stretch of a flight of many sequences, and of each of them
+RADIAN, CASE_RADIAN = 0.8, 0.0025  # and where it is integrated, of each radian
 
 
 class Sequences(NamedTuple):
@@ -79,13 +80,15 @@ class Task:
         self._coasting = np.zeros(3), dynamics.forcing._replace(turning=())
         self._start = np.asarray(dynamics.moments, dtype=float), start.rates, start.quaternion
         self._decays = body.growth != 0.0
-        self._free = not dynamics.constant.any() and not dynamics.forcing.turning and not self._decays
+        self._free = dynamics.free and not self._decays
+        self._linear = None if body.inertia.symmetric else small_angles(body, equations)
         self._across = square_to_target(body)
 
     def misses(self, which: Indices, x: Vector, kicks: int) -> Vector:
         """Misses of the flights of ``x`` (b, …), (b, equations), over |H|.
 
-        Pulses act as so many ``kicks`` spread over them, without disturbances; 0 is the true motion.
+        Pulses act as so many ``kicks`` spread over them, without disturbances, with I1 ≠ I2 as at small angles; 0: the
+        true motion.
         """
         parts = [slice(begin, begin + batch.BLOCK) for begin in range(0, len(x) or 1, batch.BLOCK)]
         return np.concatenate([self._misses(which[part], x[part], kicks) for part in parts])
@@ -93,6 +96,8 @@ class Task:
     def _misses(self, which: Indices, x: Vector, kicks: int) -> Vector:
         count, n = which.shape
         work.spend(n * (max(kicks, 1) + 1) * (FLIGHT + CASE * count))
+        if kicks and self._linear is not None:
+            return self._at_small_angles(self._linear, which, x)
         flown = self._together if self._free or (kicks and not self._decays) else self._in_turn
         momentum, turn = flown(which, x, kicks)
         inertial = attitude.rotate(turn.T, momentum.T)
@@ -103,9 +108,22 @@ class Task:
         spin = momentum[2] - self.body.inertia.axial(self.spin)
         return np.asarray(np.column_stack([momentum[:2].T, shift, spin])[:, self.chosen] / self.momentum)
 
+    def _at_small_angles(self, linear: Influence, which: Indices, x: Vector) -> Vector:
+        """Misses by the equations of small angles."""
+        n = which.shape[1]
+        on = x[:, n : 2 * n]
+        rows = linear.rows((x[:, :n] + 0.5 * on).ravel()) * linear.widths(on.ravel())[:, :, None]
+        impulses = self.torques[which] * on[:, :, None]
+        left = np.einsum("bnek,bnk->be", rows.reshape(*which.shape, -1, 3), impulses) - linear.goal
+        if self.loose:
+            left[:, 2:4] -= self.off * x[:, -2:]
+        return np.asarray(left / self.momentum)
+
     def _in_turn(self, which: Indices, x: Vector, kicks: int) -> tuple[Vector, Vector]:
         """H in body axes (3, b) and quaternions (4, b) at the end, stretch by stretch."""
         count, n = which.shape
+        turned = float(np.max(x[:, n - 1] + x[:, 2 * n - 1])) * float(np.linalg.norm(self._start[1]))
+        work.spend(turned * (RADIAN + CASE_RADIAN * count))
         moments, rates, turn = (np.repeat(part[:, None], count, axis=1) for part in self._start)
         bodies = batch.Bodies(moments, *(self._coasting if kicks else self._forced))
         now = np.zeros(count)

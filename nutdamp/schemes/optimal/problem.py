@@ -138,6 +138,8 @@ def as_pulses(spacecraft: Spacecraft, burns: tuple[Burn, ...]) -> Schedule:
 
 LEFT = math.radians(1e-6)  # largest nutation and distance from the target, rad, and spin error, as a share, of a plan
 
+BEATEN = 0.005  # share by which a schedule costs less than the bound of small angles, that refutes the bound
+
 SHARPEST, DEARER = 1e-3, 0.03
 """Relative accuracy of a least time by small angles; share above its cost from which shorter ones are looked at."""
 
@@ -166,17 +168,24 @@ class Problem:
 
     @property
     def closed(self) -> bool:
-        """True where the motion between pulses is that of a symmetric body left alone."""
-        return self._dynamics.free and self.spacecraft.growth == 0.0
+        """True where nothing acts between pulses."""
+        alone = not self._dynamics.constant.any() and not self._dynamics.forcing.turning
+        return alone and self.spacecraft.growth == 0.0
 
     def program(self, spacecraft: Spacecraft | None = None, equations: EndEquations | None = None) -> Program:
         """The linear program of small angles, with another horizon or other equations if given."""
         body, equations = spacecraft or self.spacecraft, equations or self.equations
-        off = 0.0
-        if self.options.shift is not None and equations.shift:
-            final = body.spin if body.goal.spin is None else body.goal.spin
-            off = abs(body.inertia.axial(final)) * math.sin(min(self.options.shift, 0.5 * math.pi))
-        return Program(body, self.channels, self.costs, small_angles(body, equations), off=off)
+        off = self.off if equations.shift else 0.0
+        return Program(body, self.channels, self.costs, small_angles(body, equations), off)
+
+    @property
+    def off(self) -> float:
+        """Distance from its target, N m s, at which H may end."""
+        body = self.spacecraft
+        axial = float(abs(body.inertia.axial(body.spin if body.goal.spin is None else body.goal.spin)))
+        if not body.inertia.symmetric:  # what is along axis 3 swings, and is to be enough at its least
+            axial = min(axial, float(np.linalg.norm(body.momentum)) * math.cos(body.nutation))
+        return axial * math.sin(min(self.options.shift or 0.0, 0.5 * math.pi))
 
     def within(self, horizon: float) -> Spacecraft:
         """The spacecraft with another horizon."""
@@ -208,6 +217,8 @@ class Problem:
         if self.options.free_axis and not work.exhausted():
             still = self.program(equations=EndEquations(shift=True, spin=self.equations.spin))
             keeping = least(still, still.solve())
+        if first_order is not None and self.price(schedule) < first_order * (1.0 - BEATEN):
+            first_order = None  # angles are large, or it leaves what the program takes out
         lower = Bounds(first_order, self.rigorous(schedule), self.unit, program.end, keeping)
         return Schedule(schedule.pulses, schedule.notes, lower)
 

@@ -1,7 +1,8 @@
 """Equations of the end errors, refinement of a schedule on its flight, rounding to ticks.
 
-Five equations at most, all in N m s: nutation (two: the transverse momentum A ω, turned back to t = 0), momentum shift
-(two, square to the target axis) and spin (one); first those of small angles, then those along a flight.
+Five equations at most, all in N m s: nutation (two: the transverse momentum in the body, turned back to t = 0; with
+I1 ≠ I2 times the factors with which it turns on a circle), momentum shift (two, square to the target axis) and spin
+(one); first those of small angles, then those along a flight. What turns H is the torque in space, whatever I1 and I2.
 
 Refinement moves and lengthens pulses until the flown motion leaves nothing: a quasi-Newton iteration for the nearest
 solution, with the slopes of the equations, which cost no flights, corrected at each step (Broyden 1965). On ticks,
@@ -10,6 +11,7 @@ starts and on-times are stepped to and fro, two pulses at a time, by the linear 
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -18,6 +20,7 @@ from functools import lru_cache, partial
 import numpy as np
 from numpy.typing import NDArray
 
+from nutdamp.common import work
 from nutdamp.flight.propagation import Flight
 from nutdamp.physics import attitude
 from nutdamp.schemes.correction import bounded_step
@@ -28,6 +31,10 @@ from nutdamp.spacecraft.schedule import TOUCHING, Schedule, channel_pulse
 MOST_GROWN, KNOTS = 14.0, 400
 """Exponent of growth or decay beyond which nothing (a millionth, of pulses that a clock still resolves) is left of the
 nutation, or all is lost; even moments, besides the edges of pulses, at which ω3 is read from a flight with it."""
+
+# Steps in a turn by which small changes of a motion of three moments are followed, terms of each one's exponential, the
+# most steps, and units of `work` of each.
+STEPS, ORDERS, MOST_VARIED, VARIED = 32, 10, 300_000, 0.004
 
 
 AROUND: Vector = np.array([part(2 * math.pi / 32 * np.arange(32)) for part in (np.cos, np.sin)])
@@ -81,13 +88,14 @@ def small_angles(spacecraft: Spacecraft, equations: EndEquations) -> Influence:
     if np.any(shift):  # as long as the way there is on the sphere
         shift *= spacecraft.turning_impulse / np.linalg.norm(shift)
     final = spin if goal.spin is None else goal.spin
-    there = -inertia.A * spacecraft.omega0[:2] * math.exp(growth * last)
+    circle = inertia.circle(spin)
+    there = -circle * inertia.momentum(spacecraft.omega0)[:2] * math.exp(growth * last)
     every = np.array([*there, *shift, inertia.C * (final - spin)])
 
     def rows(times: Vector) -> Vector:
         turned = np.exp(1j * np.outer(times, [spacecraft.nutation_rate, spin]))
         turned[:, 0] *= np.exp(np.minimum(-growth * (times - last), 0.0))
-        return _all_rows(turned[:, 0], _complex_product(turned[:, 1]))[:, equations.chosen]
+        return _all_rows(_complex_product(turned[:, 0]) * circle, _complex_product(turned[:, 1]))[:, equations.chosen]
 
     return Influence(rows, every[equations.chosen], _turning(spacecraft)[equations.chosen])
 
@@ -114,13 +122,59 @@ def _rows(flight: Flight, equations: EndEquations, times: Vector) -> Vector:
     """Coefficients of `Influence` at the true angles of a flight."""
     across, (_, quaternions) = square_to_target(flight.spacecraft), flight.motion(times)
     columns = [attitude.rotate(quaternions, axis) @ across.T for axis in np.eye(3)]
-    return _all_rows(_turned_back(flight, times), np.stack(columns, axis=-1))[:, equations.chosen]
+    return _all_rows(_nutation_rows(flight, times), np.stack(columns, axis=-1))[:, equations.chosen]
+
+
+def _nutation_rows(flight: Flight, times: Vector) -> Vector:
+    """Effect (n, 2, …) on the nutation of one N m s about each body axis at ``times`` (n,) s of a flight."""
+    body = flight.spacecraft
+    circle = body.inertia.circle(body.spin)
+    if body.inertia.symmetric or body.growth != 0.0:
+        return _complex_product(_turned_back(flight, times)) * circle
+    knots, back, slopes = _variations(flight)
+    every = np.append(times, flight.schedule.end)
+    index = np.clip(np.searchsorted(knots, every, side="right") - 1, 0, len(knots) - 2)
+    step = float(knots[1])
+    x = ((every - knots[index]) / step)[:, None, None]
+    # By the cubic of its values and slopes at the knots beside.
+    rise = back[index + 1] - back[index]
+    first, last = step * slopes[index] - rise, rise - step * slopes[index + 1]
+    there = back[index] + x * rise + x * (1.0 - x) * ((1.0 - x) * first + x * last)
+    end = _complex_product(_turned_back(flight, every[-1:]))[0] * circle
+    return np.asarray(end @ np.linalg.inv(there[-1])[:2] @ there[:-1])
+
+
+@lru_cache(maxsize=2)
+def _variations(flight: Flight) -> tuple[Vector, Vector, Vector]:
+    """Even knots (n,) s of a flight; what leads small changes of H in the body there back to t = 0, and its slopes."""
+    body = flight.spacecraft
+    last, pace = max(body.horizon, flight.schedule.end), max(body.fastest, float(np.linalg.norm(body.omega0)))
+    knots = np.linspace(0.0, last, min(math.ceil(last * pace / (2 * math.pi) * STEPS), MOST_VARIED) + 2)
+    step = float(knots[1])
+    work.spend(VARIED * len(knots))
+
+    def jacobian(times: Vector) -> Vector:
+        rates = flight.motion(times)[0]
+        momentum = body.inertia.momentum(rates)[:, None, :]
+        turns = momentum / np.array(body.inertia.moments)[:, None] - rates[:, None, :]
+        return np.swapaxes(np.cross(turns, np.eye(3)), 1, 2)
+
+    # Magnus' series of fourth order: exact where the rates are constant.
+    early, late = (jacobian(knots[:-1] + (0.5 + side * math.sqrt(3.0) / 6.0) * step) for side in (-1.0, 1.0))
+    exponent = -step * (0.5 * (early + late) + math.sqrt(3.0) / 12.0 * step * (late @ early - early @ late))
+    steps = term = np.tile(np.eye(3), (len(exponent), 1, 1))
+    for order in range(1, ORDERS):
+        term = term @ exponent / order
+        steps = steps + term
+    back = np.array(list(itertools.accumulate(steps, np.matmul, initial=np.eye(3))))
+    return knots, back, -back @ jacobian(knots)
 
 
 def misses(flight: Flight, equations: EndEquations) -> Vector:
     """End errors of a flight, (equations,) N m s; zero where it ends as requested."""
     body, end = flight.spacecraft, flight.settled
-    nutation = body.inertia.A * end.omega * _turned_back(flight, np.array([flight.schedule.end]))[0]
+    across = body.inertia.circle(body.spin) * body.inertia.momentum(end.rates)[:2]
+    nutation = complex(*across) * _turned_back(flight, np.array([flight.schedule.end]))[0]
     final = end.spin if body.goal.spin is None else body.goal.spin
     shift = square_to_target(body) @ flight.last_momentum
     return np.array([nutation.real, nutation.imag, *shift, body.inertia.C * (end.spin - final)])[equations.chosen]
@@ -145,19 +199,20 @@ def _turned_back(flight: Flight, times: Vector) -> Vector:
     """e^{i∫ν dt}, and what dissipation adds until the end: turns ω at ``times`` (n,) s back to t = 0."""
     spacecraft, schedule = flight.spacecraft, flight.schedule
     inertia, drift = spacecraft.inertia, spacecraft.spin_drift
+    slope, offset = inertia.linear_rate(spacecraft.spin)
     if spacecraft.growth != 0.0:  # dissipation changes ω3: on coasts ω/H3, or tan θ, grows by e^{κt} exactly
         knots, spins, turned = _spins(flight, max(float(np.max(times)), flight.legs[-1].start))
         grown = np.minimum(-spacecraft.growth * (times - schedule.end), MOST_GROWN)
         least, axial = math.exp(-MOST_GROWN) * abs(spacecraft.axial), inertia.axial(spins)
         now, then = (np.maximum(np.abs(np.interp(at, knots, axial)), least) for at in (times, schedule.end))
-        phase = inertia.a * np.interp(times, knots, turned) - inertia.wheel / inertia.A * times
+        phase = slope * np.interp(times, knots, turned) + offset * times
         return np.asarray(np.exp(1j * phase + grown) * then / now)
     turned = (spacecraft.spin + 0.5 * drift * times) * times
-    for pulse in schedule:
+    for pulse in schedule if inertia.symmetric else ():  # changes of three moments are followed, see `_variations`
         if pulse.impulse[2] and pulse.on_time > 0.0:
             since, after = np.maximum(times - pulse.start, 0.0), np.maximum(times - pulse.end, 0.0)
             turned = turned + 0.5 * pulse.impulse[2] / (inertia.C * pulse.on_time) * (since**2 - after**2)
-    return np.asarray(np.exp(1j * (inertia.a * turned - inertia.wheel / inertia.A * times)))
+    return np.asarray(np.exp(1j * (slope * turned + offset * times)))
 
 
 @lru_cache(maxsize=2)
@@ -174,9 +229,9 @@ def _complex_product(factors: Vector) -> Vector:
 
 
 def _all_rows(nutation: Vector, shifts: Vector) -> Vector:
-    """All five equations, (n, 5, 3), from the turn of ω (n,) and the effect of axes on H (n, 2, …)."""
+    """All five equations, (n, 5, 3), from the effects of axes on the nutation and on H, (n, 2, …) each."""
     rows = np.zeros((len(nutation), 5, 3))
-    rows[:, :2, :2] = _complex_product(nutation)
+    rows[:, :2, : nutation.shape[2]] = nutation
     rows[:, 2:4, : shifts.shape[2]] = shifts
     rows[:, 4, 2] = 1.0
     return rows

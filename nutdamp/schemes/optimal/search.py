@@ -23,7 +23,7 @@ from nutdamp.schemes.catalogue import OptimalOptions, SchemeOptions, TwoPulseOpt
 from nutdamp.schemes.optimal import alternatives, multistart
 from nutdamp.schemes.optimal.descent import Task
 from nutdamp.schemes.optimal.linear_program import Burn, Program, Solution
-from nutdamp.schemes.optimal.problem import GAIN, LEFT, UNMET, Problem, as_pulses, repaired, thinned
+from nutdamp.schemes.optimal.problem import DEARER, GAIN, LEFT, UNMET, Problem, as_pulses, repaired, thinned
 from nutdamp.schemes.optimal.refinement import MOST_GROWN, EndEquations, Refinement, along, misses
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import keeps_limits, rounded_off, shortest_on_time
@@ -214,8 +214,8 @@ class _LeastCostSearch(Problem):
         looser = self.options.free_axis or self.options.shift is not None
         with work.budget("a schedule as asked", MOST_LOOSE if looser else math.inf):
             best = self.whole_or_shorter(first)
-        if self.dear(best, first.cost):
-            best = self.cheaper(best, alternatives.within(self, self.spacecraft.horizon))
+        if self.dear(best, first.cost, DEAR):
+            best = self.cheaper(best, self.cheapened(alternatives.within(self, self.spacecraft.horizon)))
         if looser and not work.exhausted() and not self.proved(best, EQUAL):
             still = self.keeping(best)
             best = still if self.astray(best) and not self.astray(still) else self.cheaper(best, still)
@@ -264,7 +264,7 @@ class _LeastCostSearch(Problem):
     def astray(self, schedule: Schedule | None) -> bool:
         """True where there is no schedule, or one that, rounded to ticks, shifts H by more than it may."""
         most = math.inf if self.options.shift is None else self.options.shift
-        return schedule is None or self.flown(schedule).residual.axis_error > most
+        return schedule is None or self.flown(schedule).residual.axis_error > most + DAMPED_ANGLE
 
     def whole_or_shorter(self, first: Solution) -> Schedule | None:
         """The cheapest found over the whole horizon; where there is none, or a dear one, over less of it too."""
@@ -285,7 +285,8 @@ class _LeastCostSearch(Problem):
     def cheapest(self, first: Solution) -> Schedule | None:
         """The cheapest schedule found, where the program's ``first`` solution is this."""
         # Infinite where the solver gave up: then there may be solutions all the same.
-        best = None if UNMET < first.unmet < math.inf else self.programmed(first)
+        misled = UNMET < first.unmet < math.inf and self.spacecraft.inertia.symmetric
+        best = None if misled else self.programmed(first)
         if not work.exhausted() and self.doubtful(best, first):
             return self.cheaper(best, self.descended(best))
         best = self.cheapened(best)
@@ -336,7 +337,9 @@ class _LeastCostSearch(Problem):
             if not shorter.feasible(horizon):
                 break
             best = self.cheaper(best, shorter.settled(first.cost))
-        if self.dear(best, first.cost) and not work.exhausted():
+        # With three moments small angles mislead sooner, and no other plan is to be better.
+        share = DEARER if self.spacecraft.inertia.symmetric else 0.5 * DEAR
+        if self.dear(best, first.cost, share) and not work.exhausted():
             best = self.cheaper(best, self.others(first.cost))
         return best
 
@@ -358,7 +361,7 @@ class _LeastCostSearch(Problem):
 
     def task(self) -> Task:
         """Task of the descents."""
-        return Task(self.spacecraft, self.equations, self.channels, self.costs, self.program().off)
+        return Task(self.spacecraft, self.equations, self.channels, self.costs, self.off)
 
     def descended(self, known: Schedule | None) -> Schedule | None:
         """The best schedule to which very many starts, and the one ``known``, descend on the true motion."""

@@ -34,7 +34,7 @@ from nutdamp.planning.verdict import Cases, Status, cases_of
 from nutdamp.schemes import four_pulse
 from nutdamp.schemes.catalogue import CLASSIC, Options
 from nutdamp.schemes.optimal.linear_program import ProgramColumns
-from nutdamp.spacecraft.model import Limits, Requirement, Spacecraft
+from nutdamp.spacecraft.model import Inertia, Limits, Requirement, Spacecraft
 from nutdamp.spacecraft.requirements import bounds
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
 from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
@@ -591,6 +591,14 @@ def test_the_margin_holds_in_every_direction_and_is_used_up() -> None:
         costs.append(sum(burn.impulse for burn in found.burns))
     assert costs == sorted(costs)
     assert costs[0] < 0.8 * body.least_impulse  # a quarter of the nutation may stay
+
+
+def test_with_three_moments_the_true_torque_turns_h() -> None:
+    """The one stretched to the circle of the nutation does so for the nutation alone."""
+    body = replace(a_body(), inertia=Inertia((130.0, 105.0, 80.0)))
+    chance, true = chance_plan._MarginSearch(body, body).chance, [one.transverse for one in body.channels]
+    assert chance.effects[1] == pytest.approx(np.array(true), rel=1e-12)
+    assert np.abs(chance.effects[0] / true - 1.0).min() > 0.05
 
 
 @pytest.mark.weekly

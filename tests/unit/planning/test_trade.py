@@ -270,7 +270,7 @@ BODIES: dict[str, tuple[Spacecraft, nutdamp.OptimalOptions]] = {
     "damped": (replace(OBLATE, dissipation=60.0), PLAIN),
     "I1 ≠ I2": (spinner(moments=(122.0, 118.0, 80.0), channels=WEAK, limits=BRIEF), PLAIN),
 }
-IN_CI = ("windows", "one way only", "shift", "damped")
+IN_CI = ("windows", "one way only", "shift", "damped", "I1 ≠ I2")
 
 
 def raised(c: dict[str, Any]) -> None:
@@ -294,8 +294,8 @@ def halved(*keys: str | int) -> Callable[[dict[str, Any]], None]:
 
 
 TAMPERED: list[Callable[[dict[str, Any]], None]] = [
-    halved("a"),
-    lambda c: c.update(nutation_rad_s=0.5 * c["nutation_rad_s"], a=0.5 * c["a"]),
+    halved("circle", 0),
+    halved("nutation_rad_s"),
     halved("equations", 0, "goal_Nms"),
     lambda c: c.update(bound=1.001 * c["bound"]),
     halved("channels", 0, "cost_per_s"),

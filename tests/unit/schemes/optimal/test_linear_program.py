@@ -309,13 +309,16 @@ def test_the_shortest_horizon_is_that_of_the_program(torque: float, monkeypatch:
 
 
 @pytest.mark.parametrize("spin", [2.0, -2.0])
-@pytest.mark.parametrize("dissipation", [None, 15.0])
-def test_the_equations_along_a_flight_say_what_a_short_firing_adds(spin: float, dissipation: float | None) -> None:
+@pytest.mark.parametrize(("dissipation", "first"), [(None, 100.0), (15.0, 100.0), (None, 125.0)])
+def test_the_equations_along_a_flight_say_what_a_short_firing_adds(
+    spin: float, dissipation: float | None, first: float
+) -> None:
     """Differences of flights: with a short firing more, at true angles and with the spin that dissipation changes.
 
-    Of an oblate body, whose spin the wheels of its nutation speed up while that decays.
+    Of an oblate body, whose spin the wheels of its nutation speed up while that decays; one with three moments.
     """
-    body = spinner(100.0, 150.0, spin, 25.0, channels=(channel("T", 3.0, 1.0, 0.4), *cross(4.0)))
+    jets = channel("T", 3.0, 1.0, 0.4), *cross(4.0)
+    body = spinner(100.0, 150.0, spin, 25.0, moments=(first, 100.0, 150.0), channels=jets)
     body = replace(body, dissipation=dissipation)
     last = channel_pulse(body.channels[1], 9.0, 0.5)
     influence = refinement.along(propagation.flown(body, Schedule((last,))), EndEquations(), 0.05)
