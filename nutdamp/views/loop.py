@@ -43,6 +43,7 @@ from nutdamp.views.text import (
 
 SHOWN = 40  # largest number of firings in a table of a screen
 ROUNDING = 1e-12  # share of the nutation that a firing leaves by rounding alone
+TILTED = 1e-3  # share of start below which what tilted gyros show of the spin does not matter, whatever stop
 
 
 class FiringRow(NamedTuple):
@@ -203,6 +204,8 @@ def warnings(spacecraft: Spacecraft) -> Iterator[Note]:
         yield note("start-below-pulse", start_deg=start, step_deg=step)
     if 0.5 * band.step > loop.stop > 0.0:
         yield note("stop-below-pulse", stop_deg=stop, step_deg=step)
+    if band.tilt > max(0.5 * loop.stop, TILTED * loop.start):
+        yield note("gyros-tilted", tilt_deg=math.degrees(band.tilt), stop_deg=stop)
     if band.noise > loop.start:
         yield note("start-below-noise", start_deg=start, noise_deg=noise)
     elif band.noise > loop.stop > 0.0:

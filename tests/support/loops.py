@@ -6,11 +6,13 @@ import math
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
 from support.builders import channel, spinner
 
 from nutdamp.control_loop import budget
 from nutdamp.control_loop.budget import Map
+from nutdamp.physics.attitude import matrix
 from nutdamp.spacecraft.equipment import Channel, Loop, Sensor
 from nutdamp.spacecraft.model import Spacecraft, Vector
 
@@ -58,6 +60,14 @@ def fires(sensor: Sensor | None = None, start: float = 0.3, stop: float = 0.1, *
 def ideal(**given: Any) -> Loop:
     """A loop that sees everything and fires at any nutation."""
     return replace(Loop(Sensor(), start=1e-7, stop=0.0), **given)
+
+
+def turned(*angles: float) -> Vector:
+    """Axes (3, 3) turned by three angles, rad, about the axes 1, 2, 3 in this order."""
+    axes = np.eye(3)
+    for axis, angle in enumerate(angles):
+        axes = matrix(np.array([math.cos(0.5 * angle), *(math.sin(0.5 * angle) * np.eye(3)[axis])])) @ axes
+    return axes
 
 
 def transverse_size(rates: Vector) -> float:

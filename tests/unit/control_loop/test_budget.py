@@ -13,7 +13,7 @@ from scipy.special import chndtr
 from support.builders import codes, noted, spinner
 from support.cases import deep, spread
 from support.golden import check_text, refused
-from support.loops import fired_by, fires, follow_few_cycles, four, rad
+from support.loops import fired_by, fires, follow_few_cycles, four, rad, turned
 
 import nutdamp
 from nutdamp.control_loop.budget import DAY, YEAR, Budget, Cycle, HeldNutation, Map, Thresholds, budget
@@ -168,7 +168,10 @@ def body_of(sensor: Sensor) -> Spacecraft:
     return STAGE if sensor.kind == "accelerometer" else craft()
 
 
-@pytest.mark.parametrize("sensor", [gyro(bias=0.001), gyro(low_pass=0.3), SEEN, FILTERED])
+TILTED = gyro(bias=0.001, scale=-1.1, low_pass=0.3, axes=turned(0.004, -0.003, 0.7)[:2])
+
+
+@pytest.mark.parametrize("sensor", [gyro(bias=0.001), gyro(low_pass=0.3), TILTED, SEEN, FILTERED])
 @pytest.mark.parametrize("predict", [True, False])
 def test_what_is_seen_is_what_the_estimator_makes_of_samples(sensor: Sensor, predict: bool) -> None:
     body = body_of(sensor)
