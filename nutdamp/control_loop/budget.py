@@ -7,6 +7,7 @@ few samples in which a channel may come to fire are worked out one by one. Many 
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -18,6 +19,7 @@ from numpy.typing import NDArray
 from nutdamp.common import results
 from nutdamp.control_loop.controller import SAMPLED, Watch
 from nutdamp.control_loop.law import Actuator, ComplexArray, Law
+from nutdamp.control_loop.simulation import fly
 from nutdamp.control_loop.stability import FARTHEST, Band, Odds, dead_band, expect_in_time, margins, transfer
 from nutdamp.errors import Infeasible
 from nutdamp.flight.dynamics import Supply
@@ -81,8 +83,20 @@ class Chains:
         self.cycles: list[list[Sums]] = [[] for _ in self.sums]
 
 
+class Entry(NamedTuple):
+    """State in which a chain begins: z rad/s at ``time`` s; ``active`` after a firing; ``ready`` s to fire again."""
+
+    z: complex
+    time: float
+    active: bool
+    ready: float
+
+
 CHAINS, CYCLES, SETTLING = 64, 16, 2  # cycles followed side by side, counted cycles of each, and cycles before those
-FIRINGS = 200  # firings of each, at most
+FIRINGS = 200  # firings of each, at most, and as many more as bring the nutation down from start
+MOST_FOLLOWED = 2000  # firings of each, at most, whatever start
+ALONE = 8  # factor on cycles and firings of chains that have no noise
+ENTRIES, LOOKED = 16, 1_000_000  # flights, at most, from the state of the file down to start, and samples of them all
 FEW = 4  # cycles per so many firings below which firings are counted instead
 MOST_STEPS = 100_000  # stretches in all, at most
 ROWS = 128  # largest number of samples computed one by one at a time
@@ -124,33 +138,72 @@ class Map:
         self.near = self._near()
         reach, half = SIGMAS * self.seen.sigma + abs(self.seen.offset), abs(0.5 * self.turn.imag)
         acts = [abs(actuator.kick) * abs(math.sin(half * actuator.shortest)) / half for actuator in self.law.actuators]
-        self.smallest = min(acts)
+        longest = min(abs(each.kick) * abs(math.sin(half * each.longest)) / half for each in self.law.actuators)
+        self.firings = FIRINGS + min(math.ceil(2.0 * self.start / longest), MOST_FOLLOWED)
         self.reach, self.helps = reach, (0.5 * min(acts) - reach) / abs(self.seen.direct)
         self.bound = OUTGROWN * (max(self.start, *acts) + 2.0 * reach) / abs(self.seen.direct)
         self.memory = len(self.seen.weights) if len(self.seen.weights) > 1 else 0
         self.shapes: dict[tuple[str, float], complex] = {}
 
+    def entries(self, spacecraft: Spacecraft, seed: int = 1) -> list[Entry]:
+        """States in which flights of the loop from that of the file come down to start, by the noise of each."""
+        z = complex(self.law.seen(spacecraft.initial.omega))
+        if abs(z) <= FARTHEST * self.start:
+            return []
+        now = Entry(z, 0.0, active=False, ready=spacecraft.limits.earliest)
+        if abs(z) < self.start:
+            return [now]
+        loop, entries, looked = self.law.loop, list[Entry](), 0
+        body = replace(spacecraft, limits=replace(spacecraft.limits, max_pulses=None))
+        each = 3.0 * (self.law.period + self.seen.first + loop.min_interval) + loop.sensor.delay
+        until = spacecraft.limits.earliest + each * self.firings * abs(z) / self.start
+        for number in range(ENTRIES):
+            run = fly(body, loop, until, seed=seed + number, down_to=self.start)
+            if not run.fired:
+                return [now]
+            z = complex(self.law.seen(run.flight.settled.omega))
+            if run.stop.fault or not abs(z) < self.start:
+                why = run.stop.value if run.stop.fault else TOO_FAST
+                raise Infeasible(f"the loop does not come down to start: {why}")
+            entries.append(Entry(z, run.fired[-1].pulse.thrust[1], active=True, ready=run.pilot.ready))
+            looked += run.looked_at
+            if loop.sensor.noise == 0.0 or looked * (number + 2) > LOOKED * (number + 1):
+                break
+        return entries
+
     def cycle(self, chains: int = CHAINS, cycles: int = CYCLES) -> Cycle:
-        """Limit cycle; raises Infeasible where the loop does not hold the nutation."""
+        """Limit cycle of chains in random phases; raises Infeasible where the loop does not hold the nutation."""
         at = self._begin(chains)
-        self._follow(at, SETTLING + cycles, FIRINGS)
+        self._follow(at, SETTLING + cycles, self.firings)
         return self._summed(at.firings, at.cycles)
 
-    def attractors(self, chains: int = CHAINS, *, z: complex | None = None) -> tuple[Cycle, ...]:
-        """Limit cycles that chains, or chains that fire already at ``z`` rad/s, converge to; raises as `cycle`."""
+    def attractors(self, entries: Sequence[Entry] = (), chains: int = CHAINS) -> tuple[tuple[Cycle, float], ...]:
+        """Limit cycles in which chains end, most first, with the share of each; raises as `cycle`.
+
+        They begin in the ``entries``, by turns, or in random phases at half the start threshold.
+        """
+        alike = bool(entries) and not (any(self.seen.scatter) or any(self.seen.grain))
+        chains, longer = (len(entries), ALONE) if alike else (chains, 1)
         at = self._begin(chains)
-        if z is not None:
-            self.bound = max(self.bound, 1.1 * abs(z))
-            at.z[:], at.number[:], at.active[:], at.carried[:] = z, 0, True, math.nan
-        # Until each has paused or fires on at the same size.
-        self._follow(at, 0, FIRINGS + round(abs(z or 0.0) / max(self.smallest, 1e-9 * abs(z or 1.0))))
+        for row, entry in zip(range(chains if entries else 0), itertools.cycle(entries), strict=False):
+            self._enter(at, row, entry)
+        self._follow(at, 0, self.firings)  # until each has paused, or fires on at the same size
         at = replace(at, sums=[total._replace(pulses=0.0, cycles=0.0) for total in at.sums])
-        self._follow(at, SETTLING + CYCLES, FIRINGS)
-        pausing: list[list[tuple[list[Sums], list[Sums]]]] = [[], []]
+        self._follow(at, SETTLING + longer * CYCLES, longer * self.firings)
+        ends: list[list[tuple[list[Sums], list[Sums]]]] = [[], []]
         for firings, cycles in zip(at.firings, at.cycles, strict=True):
-            pausing[not cycles].append((firings, cycles))
-        parts = sorted(pausing, key=len, reverse=True)
-        return tuple(self._summed(*zip(*part, strict=True)) for part in parts if part)
+            paused = cycles[-1].pulses if cycles else 0.0
+            later = [total for total in firings if total.pulses > paused]
+            never = 2 * len(later) >= self.firings  # it does not pause any more
+            ends[never].append((later, []) if never else (firings, cycles))
+        parts = sorted(filter(None, ends), key=len, reverse=True)
+        return tuple((self._summed(*zip(*part, strict=True)), len(part) / chains) for part in parts)
+
+    def _enter(self, at: Chains, row: int, entry: Entry) -> None:
+        """Put a chain where ``entry`` is, at its first estimate."""
+        number = math.ceil((entry.time + self.seen.first) / self.seen.step - SAMPLED)
+        at.z[row] = entry.z * np.exp(self.turn * (number * self.seen.step - entry.time))
+        at.number[row], at.active[row], at.fresh[row], at.ready[row] = number, entry.active, True, entry.ready
 
     def _follow(self, at: Chains, cycles: int, firings: int) -> None:
         """Follow every chain until it has paused more than ``cycles`` times, or fired ``firings`` times."""
@@ -235,15 +288,14 @@ class Map:
         soonest = np.where(idle, 0.0, np.where(np.isnan(due), math.inf, due).min(axis=0))
         samples = np.maximum(np.floor(soonest / self.seen.step), 0.0).astype(np.int64)
         samples[samples < self.memory] = 0
-        useless = idle & (size < self.helps)  # the smallest pulse would leave more than there is
+        useless = idle & (size < self.helps)  # the smallest pulse would leave more than there is: no pause, it waits
         samples[useless] = self._until(self.helps, size[useless])
-        self._rest(at, rows[useless])
         if self.down is not None:
             event = self.down.size(size, self.rng.exponential(size=len(rows)))
             quiet = event < size * np.exp(self.turn.real * self.seen.step * samples)
             samples[quiet] = self._until(event[quiet], size[quiet])
             at.active[rows[quiet]] = False
-            self._rest(at, rows[quiet & ~useless])
+            self._rest(at, rows[quiet])
         moved = samples > 0
         self._goes(at, rows[moved], samples[moved])
 
@@ -332,10 +384,8 @@ class Map:
         )
         at.firings[row].append(at.sums[row]._replace(largest=size))
         at.ready[row] = pulse.over + max(self.law.loop.min_interval, self.truth.limits.gap)
-        number = math.ceil((ends + self.seen.first) / self.seen.step - SAMPLED)
-        at.z[row], at.number[row] = after * np.exp(self.turn * (number * self.seen.step - ends)), number
         at.white[row], at.carried[:, row] = self._drawn(1)[0], math.nan
-        at.fresh[row] = at.active[row] = True
+        self._enter(at, row, Entry(after, ends, active=True, ready=at.ready[row]))
 
     def _shape(self, actuator: Actuator, pulse: Pulse) -> complex:
         """Factor on the effect of a pulse on z by its width, with the growth in it."""
@@ -415,7 +465,8 @@ class HeldNutation:
     thresholds: Thresholds
     begins: float  # time at which the loop first fires, s
     band: Band | None = None  # allowed by the sensor and the smallest pulse
-    cycle: Cycle | None = None  # the one that the loop falls into from the nutation of the file
+    cycle: Cycle | None = None  # the one in which most loops end that begin as the file says
+    share: float = 1.0  # of those that do
     other: Cycle | None = None  # a second one
     lasts: float | None = None  # s that the propellant in the tank is enough for; None if unknown
     noisy: bool = False  # noise above `NOISY` of start
@@ -425,9 +476,11 @@ class HeldNutation:
     def meets_requirement(self) -> bool | None:
         """True if the nutation stays within the requirement, and the tank lasts `LASTING` s.
 
-        None where neither is given, False without a limit cycle.
+        False without a limit cycle, or where it never falls quiet but should; else None where neither is given.
         """
         bounds = [bound for bound in requirements.required(self.spacecraft) if bound.part is Part.NUTATION]
+        if self.cycle is not None and self.cycle.cycles == 0.0 and self.thresholds.stop > 0.0:
+            return False
         if not bounds and self.spacecraft.tank is None:
             return None
         if self.cycle is None or (self.lasts is not None and self.lasts < LASTING):
@@ -505,47 +558,40 @@ def budget(
 
 def _held(spacecraft: Spacecraft, loop: Loop, seed: int) -> HeldNutation:
     body = replace(spacecraft, loop=loop)
-    pair = Thresholds(loop.start, loop.stop)
-    result = HeldNutation(body, pair, requirements.reached(body, loop.start))
+    band = None
+    result = HeldNutation(body, Thresholds(loop.start, loop.stop), requirements.reached(body, loop.start))
     try:
-        result = replace(result, band=dead_band(body, loop))
+        band = dead_band(body, loop)
         turned = [margin.channel for margin in margins(body, loop) if margin.turned]
         if turned:
             raise Infeasible(f"firings of {' and '.join(turned)} feed the nutation: wired backwards against the sensor")
         expect_in_time(body, loop)
         cycles = Map(body, loop, seed=seed)
-        cycle, *others = _attractors(body, loop, cycles)
-        if cycles.seen.sigma > NOISY * cycles.start:
-            result, cycle = replace(result, noisy=True), cycle._replace(doubt=max(cycle.doubt, WIDENED))
-        result = replace(result, cycle=cycle, other=others[0] if others else None)
-        return replace(result, lasts=_lasts(body, loop, seed))
+        entries = cycles.entries(body, seed)
+        ends = list(cycles.attractors(entries))
+        # There may be others where a firing can leave more than the stop threshold that no smaller pulse lowers.
+        if 0.5 * band.step > loop.stop > 0.0:
+            half = complex(cycles.law.size(0.5 * band.step, body.spin))
+            ends += [*cycles.attractors(), *cycles.attractors([Entry(half, 0.0, active=True, ready=0.0)])]
+        (cycle, share), *rest = ends
+        others = (each for each, _ in rest if abs(each.pulses - cycle.pulses) > DIFFERENT * cycle.pulses)
+        noisy = cycles.seen.sigma > NOISY * cycles.start
+        if noisy:
+            cycle = cycle._replace(doubt=max(cycle.doubt, WIDENED))
+        result = replace(result, noisy=noisy, cycle=cycle, share=share, other=next(others, None))
+        return replace(result, band=band, lasts=_lasts(body, loop, seed, entries))
     except Infeasible as reason:
-        return replace(result, why=str(reason))
+        return replace(result, band=band, why=str(reason))
 
 
-def _attractors(body: Spacecraft, loop: Loop, cycles: Map) -> list[Cycle]:
-    """Limit cycle of the loop from the nutation of the file, and others that differ from it."""
-    band, law = dead_band(body, loop), cycles.law
-    # There may be others where a firing can leave more than the stop threshold that no smaller pulse lowers.
-    if not 0.5 * band.step > loop.stop > 0.0:
-        return [cycles.cycle()]
-    now = complex(law.seen(body.initial.omega))
-    starts = [now] * (body.nutation >= loop.start) + [None, complex(law.size(0.5 * band.step, body.spin))]
-    distinct: list[Cycle] = []
-    for z in starts:
-        for cycle in cycles.attractors(z=z):
-            if all(abs(cycle.pulses - each.pulses) > DIFFERENT * each.pulses for each in distinct):
-                distinct.append(cycle)
-    return distinct
-
-
-def _lasts(body: Spacecraft, loop: Loop, seed: int) -> float | None:
+def _lasts(body: Spacecraft, loop: Loop, seed: int, entries: Sequence[Entry]) -> float | None:
     """Lifetime of the limit cycle, s: ∫ dm over the flow, as the pressure in the tank falls."""
     if body.tank is None:
         return None
     mass, total = body.tank.propellant, 0.0
     for share, weight in STAGES:
-        rate = _attractors(body, loop, Map(body, loop, used=share * mass, seed=seed))[0].propellant
+        cycles = Map(body, loop, used=share * mass, seed=seed)
+        rate = cycles.attractors(entries)[0][0].propellant
         if rate is None:
             return None
         total += weight / rate

@@ -290,16 +290,17 @@ class Course(Enum):
 class Pilot:
     """Controller of one loop, known on board to the ``law`` and true in the ``case``: from samples to firings.
 
-    ``free``: coasts are those of a symmetric body without torque from outside.
+    ``free``: coasts are those of a symmetric body without torque from outside. ``down_to`` rad/s: true |z| to which a
+    firing brings it where the flight is over, as not to be followed further.
     """
 
-    def __init__(self, law: Law, case: Case, until: float, *, free: bool) -> None:
+    def __init__(self, law: Law, case: Case, until: float, *, free: bool, down_to: float = 0.0) -> None:
         truth = case.truth
         if shed(truth) is not None:
             problem = "a loop flies with constant moments of inertia; leave this out"
             raise Unsuitable(("tank", "inertia_per_kg"), problem)
         self.law, self.truth, self.loop, self.scatter = law, truth, truth.loop or law.loop, case.scatter
-        self.until, self.free = until, free
+        self.until, self.free, self.down_to = until, free, down_to
         self.diagnosis = Diagnosis(law.period, law.growth, math.tan(float(law.nutation(1.0, truth.spin))))
         self.most = min(MOST_FIRINGS, truth.limits.max_pulses or MOST_FIRINGS)
         self.channels = {channel.name: channel for channel in truth.channels}
@@ -319,6 +320,8 @@ class Pilot:
             raise Infeasible(
                 f"more than {MOST:.2g} samples by {seen.times[0]:.6g} s; an earlier end, or a lower rate, helps"
             )
+        if self.fired and seen.size <= self.down_to:
+            return Course.OVER
         self._seen.append((seen.times, seen.best, seen.spin))
         self._latest, self._shown = len(seen.times), seen.shown
         self._found = self._decide(coast, seen)

@@ -86,7 +86,7 @@ def felt(sensor: Sensor, moments: Any, rates: Any, torque: Any = None) -> tuple[
     """
     x, y, z = rates
     if sensor.kind != ACCELEROMETER:
-        return x, y
+        return tuple(along * x + across * y + axial * z for along, across, axial in sensor.axes.tolist())
     first, second, third = moments
     m1, m2, m3 = (0.0, 0.0, 0.0) if torque is None else torque
     turned = ((second - third) * y * z + m1, (third - first) * z * x + m2, (first - second) * x * y + m3)
@@ -135,6 +135,8 @@ class Estimator:
         self.since = since + max(law.loop.settle, SETTLED * sensor.low_pass)
         self.step = 0.0 if sensor.rate is None else 1.0 / sensor.rate
         self._memory = math.exp(-self.step / sensor.low_pass) if sensor.low_pass > 0.0 else 0.0  # from sample to sample
+        # The law turns the gyros about axis 3 to the principal axes, and takes what they show of ω3 for nutation.
+        self._across = np.linalg.inv(sensor.axes[:, :2])
         self._filtered: Vector | None = None
         self._kept: tuple[Any, ...] = ()  # last samples of the coast: times, values, number of usable ones
         self._fit: tuple[Any, ...] = ()  # see `_fit`
@@ -164,7 +166,8 @@ class Estimator:
             # The law knows how far out the sensor is and the spin, which dissipation changes: by more than ω shows.
             x, y, _ = (self.sensor.position * self.sensor.axis).tolist()
             return self._fitted(times, smooth[..., 0] + (x + y) * spin * spin, spin)
-        seen = self.law.seen(smooth[..., 0] + 1j * smooth[..., 1])
+        across = smooth @ self._across.T
+        seen = self.law.seen(across[..., 0] + 1j * across[..., 1])
         return np.asarray(np.where(times >= self.since, seen, math.nan))
 
     def on_board(self, z: ComplexArray, spin: Vector) -> ComplexArray:
@@ -244,6 +247,11 @@ class Estimator:
         square = 2.0 * math.hypot(*sensor.position.tolist()) * size / abs(truth.spin)
         return FITTED * (gained + square) / seen if seen > 0.0 else math.inf
 
+    def standing(self, spin: float) -> complex:
+        """z that gyros show without nutation at a ``spin`` ω3, rad/s: by their bias, and by ω3 along tilted axes."""
+        shown = np.array(self.sensor.biases) + np.array(self.sensor.scales) * self.sensor.axes[:, 2] * spin
+        return complex(self.law.seen(complex(*(self._across @ shown))))
+
     @property
     def doubts(self) -> Doubt:
         """Uncertainties of the estimates."""
@@ -258,7 +266,7 @@ class Estimator:
         white = sensor.noise * math.sqrt(2.0) * widest
         noise = white * (lift * math.sqrt((1.0 - memory) / (1.0 + memory)))
         steps = sensor.quantisation / math.sqrt(2.0) * lift * widest
-        return Doubt(noise, white, 0.0, lift, math.hypot(*sensor.biases) * lift * widest, steps, *off)
+        return Doubt(noise, white, 0.0, lift, abs(self.standing(body.spin)) * lift, steps, *off)
 
 
 def _fit(rate: Vector, step: float, size: int) -> tuple[Vector, ComplexArray]:

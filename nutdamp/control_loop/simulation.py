@@ -58,10 +58,12 @@ class LoopRun:
     stop threshold, ``settled`` the first of them, None without; ``lost``: see `Pilot`.
     """
 
-    def __init__(self, law: Law, case: Case, until: float, dynamics: Dynamics | None = None) -> None:
+    def __init__(
+        self, law: Law, case: Case, until: float, dynamics: Dynamics | None = None, *, down_to: float = 0.0
+    ) -> None:
         own = make_dynamics(case.truth)
         # Free as the body is: so that any integrator flies the same decisions.
-        pilot = self.pilot = Pilot(law, case, until, free=own.free)
+        pilot = self.pilot = Pilot(law, case, until, free=own.free, down_to=down_to)
         self.dynamics, self.loop, self.until = dynamics or own, pilot.loop, until
         self.key, self.seed, self.case = case.key, case.key[0], case.key[1] if len(case.key) > 1 else None
         self.legs: list[Leg] = []
@@ -89,7 +91,8 @@ class LoopRun:
                 pilot.take(step, abs(complex(pilot.law.seen(begin.omega))), begin.spin)
                 state, now = self._fire(step, begin), step.thrust[1]
                 coast = Coast(pilot.law, signal, self.dynamics, state, now)
-        self._coasted(coast, state, now, max(self.until, now))
+        if not pilot.down_to:
+            self._coasted(coast, state, now, max(self.until, now))
         return state
 
     def _coasted(self, coast: Coast, state: SpinState, start: float, end: float) -> SpinState:
@@ -139,16 +142,18 @@ def fly(
     law: Law | None = None,
     scatter: Scatter | None = None,
     dynamics: Dynamics | None = None,
+    down_to: float = 0.0,
 ) -> LoopRun:
     """Fly the loop of a ``spacecraft`` to ``until`` s; ``dynamics`` flies it by another integrator.
 
+    ``down_to`` rad/s: only to the firing that brings |z| down to that, without the coast after it.
     ``law`` is that on board, where it does not know spacecraft and sensor as they are in truth, and ``scatter`` what
     its firings are off by. Raises Infeasible where no law can work, or the flight takes too many samples or firings.
     """
     end = until_default(spacecraft, loop) if until is None else until
     key = seed if isinstance(seed, tuple) else (seed,)
     case = Case(spacecraft if spacecraft.loop is loop else replace(spacecraft, loop=loop), key, scatter)
-    return LoopRun(law or Law(spacecraft, loop), case, end, dynamics)
+    return LoopRun(law or Law(spacecraft, loop), case, end, dynamics, down_to=down_to)
 
 
 def largest_since(run: LoopRun) -> tuple[float, float]:

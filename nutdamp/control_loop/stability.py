@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import cmath
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -117,6 +117,7 @@ class Band(NamedTuple):
     most: float  # in `SURELY` of the cases
     noise: float  # by the sensor
     step: float  # that the smallest pulse takes away
+    tilt: float  # that gyros show of ω3, their axes being tilted
 
 
 SURELY = 0.99  # share of the cases that keep the `Band`
@@ -128,8 +129,8 @@ def dead_band(spacecraft: Spacecraft, loop: Loop) -> Band:
     |z| is the stop threshold, bias, steps, and noise of which one of N samples exceeds σ sqrt(2 ln(N/p)) in a share p.
     Where half the smallest pulse is more, firings end there: noise counts in the size and in both parts of the firing.
     """
-    law, spin = Law(spacecraft, loop), spacecraft.spin
-    doubts = Estimator(law, loop.sensor, 0.0).doubts
+    law, spin, sensor = Law(spacecraft, loop), spacecraft.spin, loop.sensor
+    doubts = Estimator(law, sensor, 0.0).doubts
     looks = 1.0 if loop.sensor.rate is None else max(loop.sensor.rate * law.period, 1.0)
     noise = doubts.noise / math.sqrt(2.0) * math.sqrt(2.0 * math.log(looks / (1.0 - SURELY)))
     noise = (doubts.bias + doubts.steps + noise) / abs(loop.sensor.scale)
@@ -141,7 +142,9 @@ def dead_band(spacecraft: Spacecraft, loop: Loop) -> Band:
     floor = 0.5 * max(steps)
     most = stop + noise if floor <= stop else floor + 3.0 * noise
     grown = math.exp(min(max(law.growth, 0.0) * loop.sensor.delay, math.log(NEVER)))
-    angles = [float(law.nutation(size, spin)) for size in (most * grown, noise, max(steps))]
+    unbiased = Estimator(law, replace(sensor, bias=0.0, second=None), 0.0)
+    tilt = 0.0 if sensor.kind == ACCELEROMETER else abs(unbiased.standing(spin))
+    angles = [float(law.nutation(size, spin)) for size in (most * grown, noise, max(steps), tilt)]
     return Band(*angles)
 
 
@@ -221,6 +224,7 @@ def transfer(law: Law, spin: float) -> Transfer:
         weights = weights * np.exp(-1j * rate * sensor.delay) / behind
     gain = complex(weights @ np.exp(-complex(law.growth, -rate) * step * np.arange(len(weights))))
     direct, mirrored, parts = gain * sensor.scale, 0j, law.gauge
+    standing = sensor.bias + 0j if accelerometer else estimator.standing(spin)
     if accelerometer:
         shown = 0.5 * sensor.scale * spin * estimator.seen_gain
         image = complex(weights @ np.exp(-complex(law.growth, rate) * step * np.arange(len(weights))))
@@ -236,7 +240,7 @@ def transfer(law: Law, spin: float) -> Transfer:
         weights=weights,
         direct=direct,
         mirrored=mirrored,
-        offset=complex(weights.sum()) * sensor.bias * complex(*parts),
+        offset=complex(weights.sum()) * standing,
         sigma=size * math.hypot(*parts) * math.sqrt(0.5 * power),
         fresh=min(max(1.0 - lasting, 1e-6), 1.0),
         scatter=(noise * parts[0], noise * parts[1]),

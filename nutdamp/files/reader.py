@@ -395,7 +395,8 @@ def _loop(section: LoopSection, axes: Vector, center: Vector) -> Loop | None:
     given = section.sensor
     along = np.array([0.0, 0.0, 1.0] if given.axis is None else given.axis)
     position = axes.T @ (np.array(given.position or center) - center)
-    sensor = _part(Sensor, given, position=position, axis=axes.T @ (along / math.hypot(*along)))
+    about = (np.eye(3) if given.axes == "principal" else axes)[:2]
+    sensor = _part(Sensor, given, position=position, axis=axes.T @ (along / math.hypot(*along)), axes=about)
     turned = () if section.faults is None else tuple(section.faults.reversed)
     return _part(Loop, section, sensor=sensor, reversed=turned)
 

@@ -203,10 +203,16 @@ Least = Annotated[float, Reading(minimum=0)]
 
 
 class LoopSensorSection(Section):
-    """Sensor of the loop: two rate gyros about the axes 1 and 2, or an accelerometer."""
+    """Sensor of the loop: two rate gyros about axes 1 and 2, or an accelerometer."""
 
     kind: Literal["gyro", "accelerometer"] = Field(
         "gyro: ω1 and ω2; accelerometer: the acceleration at position along axis.", "gyro"
+    )
+    axes: Literal["file", "principal"] = Field(
+        "Axes about which gyros measure: those of the file, in which a tilted axis 3 shows as a rate, or the principal "
+        "ones, of gyros that are calibrated so. Default file.",
+        "principal",
+        default="file",
     )
     rate: Frequency | None = Field("Samples a second, Hz; default: a continuous signal.", "100 Hz")
     quantisation: Least = Field(

@@ -254,6 +254,8 @@ def _sensor(facts: Facts) -> Iterator[Finding]:
                 "is for kind: accelerometer; a gyro measures the same everywhere",
                 True,
             )
+    if kind == "accelerometer" and facts.has(*SENSOR, "axes"):
+        yield Finding((*SENSOR, "axes"), "is for kind: gyro; an accelerometer measures along axis", True)
     other, right = "acceleration" if kind == "gyro" else "rate", UNITS_OF.get(kind or "")
     for key in ("noise", "bias", "quantisation") if right else ():
         text = facts.text(*SENSOR, key)

@@ -131,10 +131,11 @@ def coast(A: float, momentum: Array, axes: Array, target: Array) -> tuple[Array,
     return np.arctan2(sine, cosine) % (2.0 * math.pi) / (2.0 * math.pi) * turn, turn
 
 
-def half_cone(h: float, axes: Array, target: Array, cones: int) -> tuple[Array, Array]:
-    """H (n, 3) in the first of ``cones`` half cones from ``axes`` (n, 3) to ``target`` (3,), and the further cost.
+def half_cone(h: float, axes: Array, target: Array, cones: int, more: Array | float = 0.0) -> tuple[Array, Array]:
+    """H (n, 3) in the first of ``cones`` half cones from ``axes`` (n, 3) to ``target`` (3,), and h tan δ, N m s.
 
-    Half cones of half-angle δ = β/2n lie in a row on the great circle from S to T; further jumps cost (2n - 1) h tan δ.
+    Half cones of half-angle δ = β/2n lie in a row on the great circle from S to T: n - 1 further jumps are 2h tan δ,
+    the last h tan δ. H is ``more`` (n,) rad further ahead than δ.
     """
     angle = np.arctan2(np.linalg.norm(np.cross(axes, target), axis=-1), axes @ target)
     half = angle / (2 * cones)
@@ -142,7 +143,7 @@ def half_cone(h: float, axes: Array, target: Array, cones: int) -> tuple[Array, 
     size = np.linalg.norm(sideways, axis=-1, keepdims=True)
     with np.errstate(divide="ignore", invalid="ignore"):
         sideways = np.where(size > 0.0, sideways / size, square_to(target))
-    return h * (axes + np.tan(half)[:, None] * sideways), (2 * cones - 1) * h * np.tan(half)
+    return h * (axes + np.tan(half + more)[:, None] * sideways), h * np.tan(half)
 
 
 def half_cones_impulse(h: float, angle: float, cones: int) -> float:

@@ -160,16 +160,24 @@ def _costs(
     best, chosen = np.full(len(push), np.inf), np.zeros(len(push))
     sizes = np.unique(np.minimum(nominal * SHARES, 0.999 * reach))
     on_times = precession.on_times_to_turn(sizes, abs(channel.transverse), here.spin)
+    strongest = max(abs(each.transverse) for each in usable(here))
+    widest = 0.999 * precession.reach(strongest, here.spin, math.inf)
+
+    def spent(jumps: Vector) -> Vector:
+        """Impulse (n,) N m s of later ``jumps`` (n,), with their widths as that of the first."""
+        return strongest * precession.on_times_to_turn(np.minimum(jumps, widest), strongest, here.spin)
+
     for size, on_time in zip(sizes.tolist(), on_times.tolist(), strict=True):
         if not channel.min_on_time <= on_time <= channel.max_on_time:
             continue
         momentum = here.momentum + size * push
         half_angle = np.arccos(np.minimum(h / np.linalg.norm(momentum, axis=1), 1.0))
         rest = np.abs(attitude.angle_between(momentum, here.target_axis) - half_angle) / (2 * (cones - 1))
-        costs = abs(channel.transverse) * on_time + h * (np.tan(half_angle) + 2 * (cones - 1) * np.tan(rest))
+        ahead, last = h * np.tan(half_angle), h * np.tan(rest)
+        costs = abs(channel.transverse) * on_time + spent(ahead + last) + (cones - 2) * spent(2.0 * last) + spent(last)
         # Cones may differ by so much for a channel to be in phase, but the last must not have too much to do.
         costs[(np.abs(half_angle - equal) > UNEQUAL * equal) | (rest > LAGGING * equal)] = np.inf
-        costs[(h * (np.tan(half_angle) + np.tan(rest)) > 1.02 * reach)] = np.inf
+        costs[ahead + last > 1.02 * reach] = np.inf
         better = costs < best
         best[better], chosen[better] = costs[better], on_time
     return best, chosen

@@ -49,6 +49,7 @@ ON_CONE = 1e-3  # share of its natural size below which the first jump counts as
 BESIDE = 0.05  # distance beside the target, over the angles at hand, of a search that finds nothing on it
 
 SPIN_SAMPLES = 256  # moments looked at in each turn of the spin axis, before the best is made exact
+BACKWARD = 4  # steps in which a pulse and the place to which it sets back the spin axis are made to agree
 COMPASS_STEPS = 2000  # steps of that search, at most
 EQUAL = 1e-9  # costs that differ by less, relatively, are equal: then the earlier end wins
 
@@ -77,6 +78,14 @@ class SteerablePair:
         """Impulse (n,) N m s that ``jumps`` (n,) of H take: more where the pulse is wide."""
         torque = self.torquer.torque
         return jumps if torque is None else torque * self.on_times(jumps)
+
+    def set_back(self, jumps: Vector) -> Vector:
+        """Angle (n,) rad by which pulses that turn H by ``jumps`` (n,) set the spin axis back.
+
+        A wide pulse acts more on ω than it turns H, by sinc(ντ/2) over sinc(ω3τ/2): seen from its centre.
+        """
+        half = 0.5 * self.spacecraft.nutation_rate * self.on_times(jumps)
+        return np.asarray((self.spent(jumps) * np.sinc(half / math.pi) - jumps) / self.h)
 
     def pulses(self, jumps: list[tuple[float, Vector]]) -> tuple[Pulse, ...]:
         """Pulses that bring H to the given vectors (3,) N m s at the given moments, in order."""
@@ -107,11 +116,16 @@ class SteerablePair:
         """First pulse of ``cones`` half cones in a row, at the time from which all of them cost least."""
 
         def cost(times: Vector) -> tuple[Vector, Vector]:
-            middle, rest = precession.half_cone(self.h, self.axes(times), self.target, cones)
-            jumps = np.linalg.norm(middle - self.momentum, axis=-1)
+            axes, more = self.axes(times), np.zeros(len(times))
+            for _ in range(BACKWARD):
+                middle, last = precession.half_cone(self.h, axes, self.target, cones, more)
+                jumps = np.linalg.norm(middle - self.momentum, axis=-1)
+                back = self.set_back(jumps)
+                more = (back + (cones - 1) * self.set_back(2.0 * last)) / (2 * cones) - back
             on_times = self.on_times(jumps)
             allowed = self.windows.allowed(times - 0.5 * on_times, on_times, self.spacecraft.limits.earliest)
-            return np.where(allowed, self.spent(jumps) + rest, np.inf), middle
+            spent = self.spent(jumps) + (cones - 1) * self.spent(2.0 * last) + self.spent(last)
+            return np.where(allowed & ~np.isnan(spent), spent, np.inf), middle
 
         times = self.moments()
         costs, _ = cost(times)

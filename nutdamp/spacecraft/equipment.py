@@ -104,9 +104,10 @@ class Sensor:
 
     ``bias``, ``noise`` and the steps of ``quantisation`` are rad/s of a gyro, m/s² of an accelerometer, which is at
     ``position`` (3,) m from the centre of mass and measures along the unit vector ``axis`` (3,), both in principal
-    axes. ``rate`` Hz is that of its samples, None is a continuous signal; ``delay`` s until a sample can be used;
-    ``low_pass`` s the time constant of a first-order filter over the samples, 0 is none. ``second`` is what the gyro
-    about axis 2 has as scale and bias, where that differs.
+    axes; the gyros measure about the rows of ``axes`` (2, 3), unit vectors in those. ``rate`` Hz is that of its
+    samples, None is a continuous signal; ``delay`` s until a sample can be used; ``low_pass`` s the time constant of a
+    first-order filter over the samples, 0 is none. ``second`` is what the second gyro has as scale and bias, where that
+    differs.
     """
 
     kind: str = GYRO
@@ -119,6 +120,7 @@ class Sensor:
     low_pass: float = 0.0
     position: Vector = field(default_factory=lambda: np.zeros(3))
     axis: Vector = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
+    axes: Vector = field(default_factory=lambda: np.eye(3)[:2])
     second: tuple[float, float] | None = None
 
     @property

@@ -44,6 +44,7 @@ from nutdamp.views.text import (
 
 SHOWN = 40  # largest number of firings in a table of a screen
 ROUNDING = 1e-12  # share of the nutation that a firing leaves by rounding alone
+TILTED = 1e-3  # share of start below which what tilted gyros show of the spin does not matter, whatever stop
 
 
 class FiringRow(NamedTuple):
@@ -204,6 +205,8 @@ def warnings(spacecraft: Spacecraft) -> Iterator[Note]:
         yield note("start-below-pulse", start_deg=start, step_deg=step)
     if 0.5 * band.step > loop.stop > 0.0:
         yield note("stop-below-pulse", stop_deg=stop, step_deg=step)
+    if band.tilt > max(0.5 * loop.stop, TILTED * loop.start):
+        yield note("gyros-tilted", tilt_deg=math.degrees(band.tilt), stop_deg=stop)
     if band.noise > loop.start:
         yield note("start-below-noise", start_deg=start, noise_deg=noise)
     elif band.noise > loop.stop > 0.0:
@@ -407,16 +410,14 @@ def _row_warnings(row: HeldNutation, budget: Budget) -> Iterator[Note]:
         yield from warnings(replace(body, loop=replace(loop, start=row.thresholds.start, stop=row.thresholds.stop)))
     if row.cycle is not None and row.cycle.cycles == 0.0:
         yield note("never-quiet", start_deg=start, stop_deg=stop)
-        if loop.sensor.noise == 0.0 and loop.stop > 0.0:
-            yield note("pulses-to-a-factor-of-two", start_deg=start, stop_deg=stop)
     if row.noisy:
         yield note("start-noisy", start_deg=start, noise_share=100.0 * NOISY, known_share=100.0 * WIDENED)
     if row.other is not None and row.cycle is not None:
         words = ("never falls quiet", "falls quiet between firings")
         held, other = (words[cycle.cycles > 0.0] for cycle in (row.cycle, row.other))
         used = None if row.other.propellant is None else row.other.propellant * YEAR
-        yield note("two-limit-cycles", held=held, other=other, pulses=f"{row.other.pulses * DAY:.4g}",
-                   propellant=quantity(used, "kg"), start_deg=start, stop_deg=stop)  # fmt: skip
+        yield note("two-limit-cycles", held=held, held_percent=100.0 * row.share, other=other, start_deg=start,
+                   stop_deg=stop, pulses=f"{row.other.pulses * DAY:.4g}", propellant=quantity(used, "kg"))  # fmt: skip
 
 
 def budget_csv(budget: Budget) -> str:

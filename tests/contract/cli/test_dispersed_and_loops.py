@@ -154,7 +154,7 @@ def test_where_nutation_grows_the_default_end_comes_after_a_cycle(run: Run, file
 def test_start_below_the_smallest_pulse_is_warned_of(run: Run, file: str) -> None:
     shown = words(run("loop", file, *settings("loop.start=0.02deg", "loop.stop=0.001deg"), "--until", "5s").stdout)
     assert "warning[start-below-pulse]: loop.start, 0.02 deg, is below 0.02728 deg" in shown
-    assert "noise, bias and steps of the sensor" in shown
+    assert "noise, bias, tilt and steps of the sensor" in shown
 
 
 @pytest.mark.deep

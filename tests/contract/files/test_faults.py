@@ -287,6 +287,7 @@ ACCELEROMETER = {"kind": "accelerometer", "rate": "100 Hz", "position": "[1 m, 0
 
 SENSELESS = {
     "sensor.kind": "star; 1",
+    "sensor.axes": "body",
     "sensor.rate": "0; -1; .nan; 100 m; 0.5 Hz",
     "sensor.quantisation": "-1e-3; .inf; 1 m/s^2",
     "sensor.noise": "-1 deg/s; .nan; 1 m/s^2",
@@ -307,6 +308,7 @@ SENSELESS = {
     "faults.reversed": "[X]; +M1; [+M1, +M1]",
 }
 OF_ACCELEROMETER = {
+    "sensor.axes": "principal",
     "sensor.quantisation": "1 deg/s",
     "sensor.noise": "-1; 1 deg/s",
     "sensor.position": "[0, 0, 0]; [1, 0]",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import cmath
 import math
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,10 +14,11 @@ from scipy.special import chndtr
 from support.builders import codes, noted, spinner
 from support.cases import deep, spread
 from support.golden import check_text, refused
-from support.loops import fired_by, fires, follow_few_cycles, four, rad
+from support.loops import fired_by, fires, follow_few_cycles, four, rad, turned
 
 import nutdamp
 from nutdamp.control_loop.budget import DAY, YEAR, Budget, Cycle, HeldNutation, Map, Thresholds, budget
+from nutdamp.control_loop.evaluation import loop_of
 from nutdamp.control_loop.law import Ending, Law
 from nutdamp.control_loop.sensor import Estimator, Signal
 from nutdamp.control_loop.simulation import fly
@@ -24,6 +26,7 @@ from nutdamp.control_loop.stability import Odds, Transfer, exceeds, transfer
 from nutdamp.errors import BadRequest, Infeasible
 from nutdamp.figures.signals import budget_figure
 from nutdamp.physics.thruster import Cold, Tank, Trapezoid
+from nutdamp.planning.verdict import Status
 from nutdamp.spacecraft.equipment import BANG, ONE_PULSE, Channel, Loop, Sensor
 from nutdamp.spacecraft.model import Limits, Requirement, Spacecraft
 from nutdamp.spacecraft.requirements import reached
@@ -152,6 +155,37 @@ def test_of_two_limit_cycles_the_budget_is_of_the_one_that_the_loop_falls_into(d
         assert held.other.pulses < 0.01 * held.cycle.pulses
 
 
+CASES = Path(__file__).parents[2] / "cases"
+
+
+@pytest.mark.deep
+@pytest.mark.parametrize(("name", "pulses"), [("budget-bistable", 3340.0), ("budget-never-quiet", 2151.0)])
+def test_a_budget_is_of_the_state_in_which_the_loop_of_the_file_ends(
+    monkeypatch: pytest.MonkeyPatch, name: str, pulses: float
+) -> None:
+    """Never quiet, though loops at less nutation fall quiet: pulses a day of loops flown for 60,000 s and 40,000 s."""
+    follow_few_cycles(monkeypatch)
+    made = nutdamp.budget(nutdamp.load(CASES / f"{name}.yaml"))
+    (held,) = made.held
+    assert held.cycle is not None
+    assert held.other is not None
+    assert (held.cycle.cycles, held.other.cycles > 0.0, held.share) == (0.0, True, 1.0)
+    assert held.cycle.pulses * DAY == pytest.approx(pulses, rel=0.05)
+    assert made.status is Status.NOT_ENOUGH
+    assert loop_of(made.spacecraft, 2000.0).verdict.status is Status.NOT_ENOUGH
+
+
+@pytest.mark.deep
+def test_chains_that_change_over_are_told_by_their_share() -> None:
+    """Most fall quiet; one firing in a hundred leaves what no pulse lowers, and they never do again."""
+    body = nutdamp.load(CASES / "budget-bistable.yaml")
+    assert body.loop is not None
+    (quiet, most), (never, least) = Map(body, body.loop).attractors()
+    assert (quiet.cycles > 0.0, never.cycles) == (True, 0.0)
+    assert most + least == 1.0
+    assert 0.02 < least < 0.25
+
+
 @pytest.mark.deep
 def test_dissipation_slows_the_spin_as_in_flight() -> None:
     body, made = craft(), loop(Sensor(delay=0.05), 5.0, 1.0, predict=False)
@@ -168,7 +202,10 @@ def body_of(sensor: Sensor) -> Spacecraft:
     return STAGE if sensor.kind == "accelerometer" else craft()
 
 
-@pytest.mark.parametrize("sensor", [gyro(bias=0.001), gyro(low_pass=0.3), SEEN, FILTERED])
+TILTED = gyro(bias=0.001, scale=-1.1, low_pass=0.3, axes=turned(0.004, -0.003, 0.7)[:2])
+
+
+@pytest.mark.parametrize("sensor", [gyro(bias=0.001), gyro(low_pass=0.3), TILTED, SEEN, FILTERED])
 @pytest.mark.parametrize("predict", [True, False])
 def test_what_is_seen_is_what_the_estimator_makes_of_samples(sensor: Sensor, predict: bool) -> None:
     body = body_of(sensor)

@@ -12,7 +12,7 @@ from support import reference
 from support.builders import channel, spinner
 from support.cases import deep, spread
 from support.golden import refused
-from support.loops import fired_by, fires, four, transverse_size
+from support.loops import fired_by, fires, four, transverse_size, turned
 
 from nutdamp.control_loop.controller import Watch
 from nutdamp.control_loop.law import ComplexArray, Firing, Law
@@ -182,6 +182,21 @@ def test_steps_scale_and_bias() -> None:
     shown = signal.shown(np.array([[0.1, -0.2, 3.0]]))
     assert shown[0] == pytest.approx([-0.15 + 0.013, 0.3 + 0.013])
     assert signal.sampled(np.array([0]), shown)[0] == pytest.approx([-0.14, 0.32])
+
+
+def test_gyros_measure_about_axes_of_the_file() -> None:
+    """What they show of ω3 is no nutation; turned about axis 3 alone they show what those of principal axes do."""
+    axes, rates = turned(0.02, -0.03, 0.5), np.array([[0.1, -0.2, 3.0], [0.0, 0.0, -2.0]])
+    assert Signal(body(), Sensor(axes=axes[:2]), (1,)).shown(rates) == pytest.approx((rates @ axes.T)[:, :2])
+    for craft in (body(), body((120.0, 95.0, 80.0))):
+        of_principal, turned_alone, tilted = (
+            estimates(craft, Sensor(rate=50.0, axes=each[:2])) for each in (np.eye(3), turned(0.0, 0.0, 0.5), axes)
+        )
+        assert turned_alone[1] == pytest.approx(of_principal[1], abs=1e-14)
+        first, second = Law(craft, Loop(Sensor(), start=0.01)).gauge
+        standing = tilted[1] - of_principal[1]
+        size = np.hypot(standing.real / first, standing.imag / second)
+        assert size == pytest.approx(3.0 * math.tan(math.acos(axes[2, 2])), rel=1e-4)
 
 
 def estimates(

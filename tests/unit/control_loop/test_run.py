@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 from support import reference
+from support.builders import codes
 from support.cases import deep, spread
 from support.documents import documented
 from support.golden import check_text, refused
@@ -29,6 +30,7 @@ from nutdamp.flight import propagation
 from nutdamp.physics.thruster import Cold, Trapezoid
 from nutdamp.spacecraft.equipment import ACCELEROMETER, BANG, Loop, Sensor
 from nutdamp.spacecraft.model import Disturbance, Inertia, Limits, Spacecraft
+from nutdamp.views.loop import warnings
 
 CRAFTS = {
     "prolate": nutdamp.example("magnus-a03"),
@@ -54,6 +56,21 @@ def test_a_continuous_gyro_and_prediction_give_the_four_pulse_schedule(name: str
     for mine, other in zip(run.flight.around_pulses(), around, strict=True):
         assert np.degrees(mine.nutation) == pytest.approx(np.degrees(other.nutation), abs=1e-9)
         assert mine.momentum == pytest.approx(other.momentum, abs=1e-9)
+
+
+TILTED = Path(__file__).parents[2] / "cases" / "loop-tilted-axes.yaml"
+
+
+@pytest.mark.parametrize(("axes", "fired", "left", "warned"), [("file", 0, 0.5, True), ("principal", 2, 0.0, False)])
+def test_a_tilted_axis_3_shows_as_nutation_to_gyros_about_axes_of_the_file(
+    axes: str, fired: int, left: float, warned: bool
+) -> None:
+    """0.7 kg m² of I13 turn 0.055 rad/s of ω3 into ω1, three times what there is of nutation."""
+    given = nutdamp.load(TILTED, set={"loop.sensor.axes": axes})
+    run = loop_of(given)
+    assert len(run.pulses) == fired
+    assert np.degrees(run.largest[0]) == pytest.approx(left, abs=1e-4)
+    assert ("gyros-tilted" in codes(warnings(given))) is warned
 
 
 def brute(craft: Spacecraft, predict: bool, until: float) -> list[tuple[float, float, str]]:

@@ -101,6 +101,31 @@ def test_more_cones_cost_less_down_to_the_floor_and_as_many_are_taken_as_are_wor
         assert cones == 1 or taken <= 0.99 * fewer
 
 
+@spread(
+    ("A", "C", "spin", "torque", "tilt", "cones"),
+    [
+        (100.0, 150.0, -1.0, 18.0, 60.0, (6, 8, 12, 20)),  # of half-cone-many.yaml: 8 cones take 85.3 g, 12 take 82.8 g
+        (100.0, 150.0, -1.0, 36.0, 60.0, (4, 6, 10, 20)),
+        (120.0, 80.0, 3.0, 60.0, 40.0, (5, 9)),
+        (100.0, 100.0, 2.0, 50.0, 100.0, (10, 14)),
+    ],
+    quick=1,
+    deep=3,
+)
+def test_cones_of_a_torquer_near_its_reach_are_alike(
+    A: float, C: float, spin: float, torque: float, tilt: float, cones: tuple[int, ...]
+) -> None:
+    """2J of the first, the last, and of each half between, J = 2M/ω asin(ωh tan δ/2M): no more than equal ones."""
+    h, rate, taken = C * abs(spin), 0.5 * abs(spin), []
+    body = aimed(spinner(A, C, spin, 0.0, steerable=Steerable(torque), limits=Limits(horizon=2000.0)), tilt, 40.0)
+    for number in cones:
+        jump = h * math.tan(math.radians(tilt) / (2 * number))
+        one, two = (torque / rate * math.asin(rate * turn / torque) for turn in (jump, 2.0 * jump))
+        taken.append(acquired(body, "half-cone", cones=number, by_reference=False).total_impulse)
+        assert 0.98 < taken[-1] / (2.0 * one + (number - 1) * two) < 1.005
+    assert taken == sorted(taken, reverse=True)
+
+
 @spread("degrees", [1.0, 5.0, 20.0], quick=1)
 @spread(("tilt", "azimuth"), [(10.0, 45.0), (60.0, -120.0)], quick=1)
 def test_cones_take_a_nutation_along(degrees: float, tilt: float, azimuth: float) -> None:
