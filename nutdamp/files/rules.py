@@ -531,9 +531,9 @@ def _sun(facts: Facts) -> Iterator[Finding]:
         if facts.text(*path) == "sun" and not facts.has("sun"):
             yield Finding(path, f"needs sun{SUN}")
     sun, axis = _to_sun(facts), facts.vector("angle", 2, "attitude", "spin_axis")
-    if sun is None and facts.text("sun") == "epoch" and facts.has("attitude"):
-        if facts.text("attitude", "epoch") is None:
-            yield Finding(("sun",), f"epoch needs attitude.epoch, the date of t = 0; or give {SKY}")
+    undated = facts.has("attitude") and not facts.has("attitude", "epoch")
+    if sun is None and facts.text("sun") == "epoch" and undated:
+        yield Finding(("sun",), f"epoch needs attitude.epoch, the date of t = 0; or give {SKY}")
     if sun is not None and axis is not None and facts.has("attitude", "sun_phase"):
         angle = float(attitude.angle_between(attitude.on_sphere(*axis.tolist()), sun))
         if min(angle, math.pi - angle) < ALONG:

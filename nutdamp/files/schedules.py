@@ -151,7 +151,7 @@ def _against_commands(row: Row, block: Block, spacecraft: Spacecraft) -> None:
         return
     longest = math.floor(commands.delay_max / commands.delay_step * (1.0 + COUNTS)) * commands.delay_step
     nearest_delay = min(round(block.delay / commands.delay_step) * commands.delay_step, longest)
-    nearest_width = float(commands.widths[np.abs(commands.widths - block.width).argmin()])
+    nearest_width = commands.nearest_width(block.width)
     allowed = ", ".join(map(str, commands.every))
     off = [
         (column, f"{given:.6g} s", f"{near:.6g} s is the nearest")

@@ -108,6 +108,7 @@ def schedule(spacecraft: Spacecraft, options: CommandBlockOptions) -> Schedule:
         in_legs = (note("blocks-in-legs"), *missed * (not requirements.complies(chosen.rank[1])))
         chosen = chosen._replace(schedule=replace(chosen.schedule, notes=in_legs))
     notes, steps = chosen.schedule.notes, np.array([commands.delay_step, *commands.widths]) / (tick or 1.0)
+    steps = np.append(steps, (commands.width_step or 0.0) / (tick or 1.0))
     if tick is not None and np.abs(steps - np.rint(steps)).max() > OFF_TICK:
         notes = (*notes, note("tick-not-kept", tick_s=tick, delay_step_s=commands.delay_step))
     return replace(chosen.schedule, notes=notes)
