@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.common import results
+from nutdamp.common import results, work
 from nutdamp.control_loop.controller import SAMPLED, Watch
 from nutdamp.control_loop.law import Actuator, ComplexArray, Law
 from nutdamp.control_loop.stability import FARTHEST, Band, Odds, dead_band, expect_in_time, margins, transfer
@@ -84,6 +84,7 @@ class Chains:
 CHAINS, CYCLES, SETTLING = 64, 16, 2  # cycles followed side by side, counted cycles of each, and cycles before those
 FIRINGS = 200  # firings of each, at most
 FEW = 4  # cycles per so many firings below which firings are counted instead
+STEP = 0.1  # units of work of a stretch of sixteen chains
 MOST_STEPS = 100_000  # stretches in all, at most
 ROWS = 128  # largest number of samples computed one by one at a time
 EARLY, LATE = 0.003, 3.0  # probabilities of the start threshold between which samples are examined one by one
@@ -155,13 +156,16 @@ class Map:
         """Follow every chain until it has paused more than ``cycles`` times, or fired ``firings`` times."""
         going = np.ones(len(at.z), dtype=bool)
         for _ in range(MOST_STEPS):
+            work.spend(STEP * (1.0 + len(going) / 16.0))
+            if work.exhausted():
+                break
             self._wake(at, np.flatnonzero(going & ~at.active))
             self._skip(at, np.flatnonzero(going & at.active & ~at.fresh))
             self._look(at, np.flatnonzero(going))
             going = np.array([total.cycles <= cycles and total.pulses < firings for total in at.sums])
             if not going.any():
                 return
-        raise Infeasible(f"the limit cycle is not reached within {MOST_STEPS} coasts")
+        raise Infeasible("the limit cycle is not reached within the budget of work")
 
     def _near(self) -> float | None:
         """Size of z from which on every sample is examined; None where the chances of the samples add up."""
@@ -494,7 +498,8 @@ def budget(
         return Budget(spacecraft, largest, ())
     held = []
     for done, pair in enumerate(pairs or [Thresholds(loop.start, loop.stop)], start=1):
-        held.append(_held(spacecraft, replace(loop, start=pair.start, stop=pair.stop), seed))
+        with work.budget("the limit cycle", work.CYCLES), work.steps(1 + len(STAGES)):
+            held.append(_held(spacecraft, replace(loop, start=pair.start, stop=pair.stop), seed))
         progress(done)
     return Budget(spacecraft, largest, tuple(held))
 
@@ -516,6 +521,9 @@ def _held(spacecraft: Spacecraft, loop: Loop, seed: int) -> HeldNutation:
         result = replace(result, cycle=cycle, other=others[0] if others else None)
         return replace(result, lasts=_lasts(body, loop, seed))
     except Infeasible as reason:
+        rate = None if result.cycle is None else result.cycle.propellant
+        if work.exhausted() and body.tank is not None and rate:
+            return replace(result, lasts=body.tank.propellant / rate)  # as if the pressure stayed
         return replace(result, why=str(reason))
 
 
@@ -540,7 +548,8 @@ def _lasts(body: Spacecraft, loop: Loop, seed: int) -> float | None:
     if body.tank is None:
         return None
     mass, total = body.tank.propellant, 0.0
-    for share, weight in STAGES:
+    for done, (share, weight) in enumerate(STAGES, start=1):
+        work.reach(done)
         rate = _attractors(body, loop, Map(body, loop, used=share * mass, seed=seed))[0].propellant
         if rate is None:
             return None
