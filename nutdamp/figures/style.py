@@ -113,9 +113,29 @@ def styled() -> Iterator[None]:
     from matplotlib import style
 
     with style.context(["default", _SETTINGS]), warnings.catch_warnings():
-        # A name in another script is drawn as boxes, one that is too long leaves no room: no reader can mend that.
+        # A name that is long leaves no room, and one may have no glyphs in SVG: no reader can mend that.
         warnings.simplefilter("ignore", UserWarning)
         yield
+
+
+OTHER_SCRIPTS = ("Noto Sans CJK JP", "WenQuanYi Zen Hei", "Unifont", "Noto Emoji", "Arial Unicode MS", "MS Gothic")
+"""Fonts that draw what `DejaVu Sans` does not, where they are installed."""
+
+
+def legible(figure: Figure) -> None:
+    """Draw texts of a figure with the fonts that are installed, and "?" for characters that none of them has."""
+    from matplotlib import font_manager
+    from matplotlib.text import Text
+
+    files = {entry.name: entry.fname for entry in font_manager.fontManager.ttflist}
+    names = [name for name in ("DejaVu Sans", *OTHER_SCRIPTS) if name in files]
+    fonts = [font_manager.get_font(files[name]) for name in names]
+    for text in figure.findobj(Text):
+        shown = text.get_text()
+        if not shown.isascii():
+            known = (sign == "\n" or any(font.get_char_index(ord(sign)) for font in fonts) for sign in shown)
+            text.set(text="".join(sign if drawn else "?" for sign, drawn in zip(shown, known, strict=True)))
+            text.set(fontfamily=names)
 
 
 PHONE = 3.7  # width of a figure for narrow screens, inches: its smallest text is 10 px high where 360 px show it

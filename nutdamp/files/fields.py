@@ -69,6 +69,8 @@ class Length(Rule):
             return None
         if len(entries) < self.least == 1:
             raise ValueError("empty; expected an entry")
+        if isinstance(entries, str) and self.most is not None and len(entries) > self.most:
+            raise ValueError(f"{len(entries)} characters long; expected at most {self.most}")
         if long or len(entries) < self.least:
             count = f"{self.least} to {self.most}" if self.most != self.least else f"{self.least}"
             count = f"at least {self.least}" if self.most is None else count
@@ -279,4 +281,5 @@ PositiveTime = Annotated[float, Quantity("time", exclusiveMinimum=0)]
 THREE = Length(3, 3)
 Position = Annotated[list[Annotated[float, Quantity("length")]], THREE]
 Direction = Annotated[list[Annotated[float, Quantity("number")]], THREE]
-Name = Annotated[str, Length(1)]
+LONGEST_NAME = 80  # characters: a line of a screen
+Name = Annotated[str, Length(1, LONGEST_NAME)]

@@ -35,7 +35,7 @@ from support.shown import (
 
 import nutdamp.api  # noqa: F401 - figures of flights are declared there
 from nutdamp.figures import geometry, overview, sphere, style
-from nutdamp.figures.image import Scene, Timing
+from nutdamp.figures.image import Scene, Timing, rendered
 from nutdamp.flight import propagation
 from nutdamp.physics.attitude import angle_between
 from nutdamp.planning import plan as planning
@@ -376,3 +376,13 @@ def test_the_globe_shows_where_the_axis_the_sun_and_the_cones_are() -> None:
 def on_globe(places: Vector) -> Vector:
     """Unit vectors (n, 3) of places (n, 2) in front, towards the viewer."""
     return np.concatenate([places, np.sqrt(1.0 - np.sum(places**2, axis=-1, keepdims=True))], axis=-1)
+
+
+def test_characters_without_a_glyph_are_question_marks_and_nothing_is_said(capfd: pytest.CaptureFixture[str]) -> None:
+    """U+E000 is in no font; the Greek is in the one that comes with matplotlib."""
+    figure = style.sheet(2.0, 1.0)
+    title = figure.suptitle("ω\ue000 x")
+    for kind, text in (("svg", "ω\ue000 x"), ("png", "ω? x")):
+        assert rendered(figure, f"a.{kind}")
+        assert title.get_text() == text
+    assert capfd.readouterr().err == ""

@@ -266,7 +266,7 @@ def spent(*_: object) -> float:
 
 def test_a_search_for_cycles_ends_with_its_budget_of_work(monkeypatch: pytest.MonkeyPatch) -> None:
     """Without a cycle nothing is known; with one the lifetime is that of its flow."""
-    body = craft(tank=Tank(2.0, 22e5, 6e5), loop=loop(gyro()))
+    body = replace(craft(loop=loop(gyro())), tank=Tank(2.0, 22e5, 6e5, 1.0))
     monkeypatch.setattr("nutdamp.common.work.CYCLES", 0.5)
     assert budget(body).held[0].cycle is None
     check_text("budget.work-spent", budget(body).held[0].why)

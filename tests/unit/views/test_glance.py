@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import math
 import re
+from contextlib import nullcontext
 from dataclasses import replace
 
 import pytest
@@ -18,7 +19,7 @@ import nutdamp
 from nutdamp.planning.decision import Comparison
 from nutdamp.spacecraft.model import Requirement, Spacecraft
 from nutdamp.views.glance import glance
-from nutdamp.views.parts import LINES, SIZES
+from nutdamp.views.parts import FEWEST, LINES, SIZES, WIDE
 from nutdamp.views.tables import WIDTH
 from nutdamp.views.text import short_angle
 from nutdamp.views.verdict import HEADLINES
@@ -47,6 +48,18 @@ def test_a_plan_is_seen_at_a_glance(name: str) -> None:
     assert lines[-1].startswith("-v ")
     assert lines[-1].endswith("nutdamp report")
     assert not any("…" in line and "more" not in line for line in lines)
+
+
+@pytest.mark.deep
+@pytest.mark.parametrize("name", ["plan-25-lines", "plan-30-lines"])
+def test_a_plan_of_many_bounds_and_warnings_fits_a_terminal(name: str) -> None:
+    """Where no cell is broken; of 80 columns it takes more."""
+    console = Console(width=WIDE, file=io.StringIO(), markup=False, emoji=False, highlight=False)
+    with pytest.warns(UserWarning, match="is read as") if "25" in name else nullcontext():
+        body = nutdamp.load(places.case(f"{name}.yaml"))
+    compared = nutdamp.compare(body)
+    assert len(console.render_lines(glance(compared))) <= FEWEST
+    assert len(screen(compared)) <= LINES
 
 
 @pytest.mark.usefixtures("plans_shared")
