@@ -90,7 +90,8 @@ class Facts:
         """Paths of a pattern such as ``thrusters.*.force``; its last step need not be there."""
         paths: list[KeyPath] = [()]
         for step in pattern.split("."):
-            deeper = [self.below(*path) if step == "*" else [(*path, step)] for path in paths]
+            key = int(step) if step.isdigit() else step
+            deeper = [self.below(*path) if step == "*" else [(*path, key)] for path in paths]
             paths = [path for each in deeper for path in each]
         return paths
 
