@@ -345,11 +345,10 @@ def _expect_seen(fitted: Fit) -> None:
     sigma = 1.0 / math.sqrt(float(way @ np.linalg.pinv(across, hermitian=True) @ way))
     if size < SEEN * sigma:
         expect_explained(fitted)
-        unseen = f"the transverse rate is {math.degrees(size):.3g} deg/s, within the noise"
-        if SEEN * sigma < abs(fitted.model.spacecraft.spin):  # else the record says nothing of it
-            unseen = f"{unseen}, which hides {math.degrees(SEEN * sigma):.3g} deg/s"
-        cure = "a longer record, less noise or a larger nutation (a probe pulse) helps"
-        raise Infeasible(f"no nutation is seen: {unseen}; {cure}")
+        raise Infeasible(
+            f"no nutation is seen: the transverse rate is {math.degrees(size):.3g} deg/s, within the noise; "
+            "a longer record, less noise or a larger nutation (a probe pulse) helps"
+        )
 
 
 def _best(model: Model) -> Vector:

@@ -124,18 +124,14 @@ OTHER_SCRIPTS = ("Noto Sans CJK JP", "WenQuanYi Zen Hei", "Unifont", "Noto Emoji
 
 def legible(figure: Figure) -> None:
     """Draw texts of a figure with the fonts that are installed, and "?" for characters that none of them has."""
-    from matplotlib import font_manager
-    from matplotlib.text import Text
+    from matplotlib import font_manager, text
 
     files = {entry.name: entry.fname for entry in font_manager.fontManager.ttflist}
     names = [name for name in ("DejaVu Sans", *OTHER_SCRIPTS) if name in files]
-    fonts = [font_manager.get_font(files[name]) for name in names]
-    for text in figure.findobj(Text):
-        shown = text.get_text()
-        if not shown.isascii():
-            known = (sign == "\n" or any(font.get_char_index(ord(sign)) for font in fonts) for sign in shown)
-            text.set(text="".join(sign if drawn else "?" for sign, drawn in zip(shown, known, strict=True)))
-            text.set(fontfamily=names)
+    drawn = {ord("\n")}.union(*(font_manager.get_font(files[name]).get_charmap() for name in names))
+    for each in figure.findobj(text.Text):
+        shown = "".join(sign if ord(sign) in drawn else "?" for sign in each.get_text())
+        each.set(text=shown, fontfamily=names)
 
 
 PHONE = 3.7  # width of a figure for narrow screens, inches: its smallest text is 10 px high where 360 px show it

@@ -191,7 +191,11 @@ def _read(annotation: Any, value: Any, problems: Problems, path: KeyPath) -> Any
         problems.append((path, _mismatch(value, _WORDS[plain]) + quoted))
         return None
     if isinstance(value, dict):
-        return {key: _read(parts[1], entry, problems, (*path, key)) for key, entry in value.items()}
+        key_type, entry_type = parts
+        return {
+            _read(key_type, key, problems, (*path, key)): _read(entry_type, entry, problems, (*path, key))
+            for key, entry in value.items()
+        }
     if plain is list:
         return [_read(parts[0], entry, problems, (*path, index)) for index, entry in enumerate(value)]
     if plain is tuple:

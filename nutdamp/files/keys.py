@@ -11,7 +11,6 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from nutdamp.common.time import Epoch
 from nutdamp.files.fields import (
-    LONGEST_NAME,
     RIGHT_ANGLE,
     THREE,
     AcuteAngle,
@@ -87,17 +86,6 @@ class _ShareOrRate(Rule):
     def schema(self, inner: Callable[[], dict[str, Any]]) -> dict[str, Any]:
         number, rate = self.rate.schema(inner)["anyOf"]
         return {"anyOf": [number, rate, self.share.schema(inner)["anyOf"][1]]}
-
-
-class _Names(Rule):
-    """Annotation of a mapping whose keys are names."""
-
-    def read(self, value: Any, inner: Callable[[Any], Any]) -> Any:
-        entries = inner(value)
-        longest = max(map(len, entries or ()), default=0)
-        if longest > LONGEST_NAME:
-            raise ValueError(f"a name has {longest} characters; expected at most {LONGEST_NAME}")
-        return entries
 
 
 class _DateAndTime(Rule):
@@ -513,7 +501,7 @@ class SpacecraftFile(Section):
         [{"name": "T2", "torque": [0, "-8 N m", 0], "isp": "220 s", "lever_arm": "0.8 m"}],
         default=[],
     )
-    channels: Annotated[dict[str, Annotated[list[Name], Length(1)]], Length(1), _Names()] | None = Field(
+    channels: Annotated[dict[Name, Annotated[list[Name], Length(1)]], Length(1)] | None = Field(
         "Names of thrusters that fire together; without it each thruster is a channel of its own.",
         {"+M1": ["T1", "T2"]},
     )

@@ -352,9 +352,8 @@ class BlockSearch:
         """Numbers of pulses up to the horizon."""
         most = int((self.body.horizon - float(np.min(state.sun_pulse))) / (every * self.model.turn)) + 1
         most = max(min(most, self.allowed), 0)
-        if most <= SOME_COUNTS:
-            return np.arange(1, most + 1)
-        return np.unique(np.rint(np.geomspace(1, most, SOME_COUNTS)).astype(np.int64))
+        few = most <= SOME_COUNTS
+        return np.arange(1, most + 1) if few else np.unique(np.geomspace(1, most, SOME_COUNTS).round().astype(int))
 
     def _single(self) -> list[BlockSequence]:
         """The best single blocks at the delays that serve best, without those that surely end worse by `_short_by`."""

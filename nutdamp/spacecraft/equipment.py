@@ -60,10 +60,9 @@ class Commands:
     width_step: float | None = None
 
     def some_widths(self, least: float, most: float, count: int) -> Vector:
-        """At most ``count`` widths from ``least`` to ``most`` s, evenly spread over all that can be commanded."""
+        """Widths from ``least`` to ``most`` s that can be commanded; of those in steps ``count``, evenly spread."""
         if self.width_step is None:
-            within = self.widths[(self.widths >= least) & (self.widths <= most)]
-            return np.asarray(within[np.unique(np.linspace(0, len(within) - 1, min(len(within), count)).astype(int))])
+            return np.asarray(self.widths[(self.widths >= least) & (self.widths <= most)])
         first, last = self.widths.tolist()
         low = math.ceil((max(least, first) - first) / self.width_step * (1.0 - 1e-12))
         high = math.floor((min(most, last) - first) / self.width_step * (1.0 + 1e-12))
@@ -72,10 +71,9 @@ class Commands:
 
     def nearest_width(self, width: float) -> float:
         """The nearest to a ``width``, s, that can be commanded."""
-        if self.width_step is None:
-            return float(self.widths[np.abs(self.widths - width).argmin()])
-        first, last = map(float, self.widths)
-        return min(first + max(round((width - first) / self.width_step), 0) * self.width_step, last)
+        step = self.width_step or 0.0
+        near = np.append(self.widths, self.some_widths(width - step, width + step, 3))
+        return float(near[np.abs(near - width).argmin()])
 
     def counts(self, name: str, time: float) -> int:
         """Steps of a ``delay`` or ``width``, s; in a list of widths the number of the nearest entry, 1 the shortest."""
