@@ -100,8 +100,10 @@ def doubts(root: Node) -> Iterator[Finding]:
     for path in (path for pattern in ISP.split() for path in facts.matching(pattern)):
         isp = _bare(facts, path)
         if isp is not None and isp > EXHAUST:
-            exhaust = f"an exhaust velocity in m/s would be {isp / STANDARD_GRAVITY:.4g} s"
-            yield Finding(path, f"{isp} is read as {isp} s; {exhaust}; write {isp} s if that is meant")
+            yield Finding(
+                path,
+                f"{isp} is read as {isp} s; if m/s is meant write {isp / STANDARD_GRAVITY:.4g} s, else {isp} s",
+            )
     start, largest = facts.number("angle", "loop", "start"), facts.number("angle", "requirement", "nutation")
     if start is not None and largest is not None and start > largest:
         degrees = f"{math.degrees(start):g} deg is above requirement.nutation, {math.degrees(largest):g} deg"

@@ -352,8 +352,9 @@ class BlockSearch:
         """Numbers of pulses up to the horizon."""
         most = int((self.body.horizon - float(np.min(state.sun_pulse))) / (every * self.model.turn)) + 1
         most = max(min(most, self.allowed), 0)
-        few = most <= SOME_COUNTS
-        return np.arange(1, most + 1) if few else np.unique(np.geomspace(1, most, SOME_COUNTS).round().astype(int))
+        if most > SOME_COUNTS:
+            return np.unique(np.geomspace(1, most, SOME_COUNTS).round().astype(int))
+        return np.arange(1, most + 1)
 
     def _single(self) -> list[BlockSequence]:
         """The best single blocks at the delays that serve best, without those that surely end worse by `_short_by`."""

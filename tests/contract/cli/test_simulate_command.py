@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 
 import pytest
+from support import places
 from support.commands import EXACT, SCHEDULE, result, rows, written
 from support.golden import check_text
 from support.process import Run
@@ -50,6 +51,30 @@ def test_a_written_schedule_flies_as_it_was_planned(run: Run) -> None:
             assert flight[kind] == pytest.approx(planned[kind], abs=1e-11)
     pulses = run("plan", "--scheme", "two-pulse", "--csv", "-", "-q").stdout
     assert result(run, "simulate --schedule -", stdin=pulses)["flown"] == flight["flown"]
+
+
+@pytest.mark.parametrize(
+    ("keys", "scheme", "status", "grows"),
+    [
+        ("upper-stage.yaml --set limits.tick=20ms", "one-pulse", 0, True),
+        ("communications-spinner.yaml --set limits.max_pulses=3", "four-pulse", 4, False),
+    ],
+)
+def test_a_written_schedule_is_judged_as_the_plan_wherever_the_simulation_ends(
+    run: Run, keys: str, scheme: str, status: int, grows: bool
+) -> None:
+    """The motion after the last pulse changes; what is said of its end is marked as that."""
+    file = f"{places.CONFIGS}/{keys}"
+    planned = result(run, f"plan {file} --nominal --scheme {scheme} --csv own.csv", status=status)
+    for until in ("", "--until 300s"):
+        flight = result(run, f"simulate {file} --schedule own.csv {until}", status=status)
+        assert flight["judged_s"] == pytest.approx(planned["plans"][0]["end_s"], abs=1e-9)
+        ways = zip(planned["decision"]["requirement"], flight["decision"]["requirement"], strict=True)
+        for before, after in ways:
+            assert after["nominal_deg"] == pytest.approx(before["nominal_deg"], abs=1e-9)
+            assert after["part"] == before["part"]
+    screen = run("simulate", *file.split(), "--schedule", "own.csv", "--until", "300s").stdout
+    assert ("note[judged-at-end]" in screen) is grows
 
 
 def test_schedules_by_hand_may_be_short_and_settings_are_doubted(run: Run, tmp_path: Path) -> None:
