@@ -93,7 +93,7 @@ class _DateAndTime(Rule):
         text = inner(value)
         if text is not None:
             if not re.fullmatch(_EPOCH, text):
-                raise ValueError(f"{shown(text)} is no epoch; expected ISO 8601 with date and time: {_EXAMPLE}")
+                raise ValueError(f"{shown(text)} is no epoch; expected ISO 8601: 2026-03-01T12:00:00Z")
             Epoch.parse(text)  # raises for a day that is none, and for one without UTC or beyond four digits
         return text
 
@@ -101,7 +101,6 @@ class _DateAndTime(Rule):
         return {**inner(), "pattern": f"^{_EPOCH}$"}
 
 
-_EXAMPLE = "2026-03-01T12:00:00Z"
 _EPOCH = r"[0-9]{4}-[0-9]{2}-[0-9]{2}T[0-9]{2}:[0-9]{2}(:[0-9]{2}(\.[0-9]+)?)?(Z|[+-][0-9]{2}:[0-9]{2})?"
 
 Mass = Annotated[float, Quantity("mass", exclusiveMinimum=0)]

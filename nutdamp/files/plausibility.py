@@ -28,7 +28,7 @@ EXHAUST = 500.0  # s; no chemical thruster has more, and data sheets also give t
 STRONG = 2.0  # times the thrust of a warm nozzle; none gives as much when it is cold
 
 
-class Band(NamedTuple):
+class UsualRange(NamedTuple):
     """Numbers that probably lack the unit ``meant``: below ``low``, and from ``high`` to what is refused with a hint.
 
     ``paths``: patterns of keys; an end of the band may depend on the file and the number.
@@ -68,20 +68,21 @@ def _orbit(key: str, kind: str, least: float) -> Callable[[Facts, float], float]
 
 
 BANDS = (
-    Band("state.phase goal.azimuth goal.right_ascension", "angle", "deg", -2.0 * math.pi, 2.0 * math.pi),
-    Band("requirement.momentum_shift state.nutation", "angle", "deg", -math.inf, LOOSE, 0.5 * math.pi),
-    Band("requirement.nutation", "angle", "deg", -math.inf, lambda facts, _: min(LOOSE, _nutation(facts)),
+    UsualRange("state.phase goal.azimuth goal.right_ascension", "angle", "deg", -2.0 * math.pi, 2.0 * math.pi),
+    UsualRange("requirement.momentum_shift state.nutation", "angle", "deg", -math.inf, LOOSE, 0.5 * math.pi),
+    UsualRange("requirement.nutation", "angle", "deg", -math.inf, lambda facts, _: min(LOOSE, _nutation(facts)),
          0.5 * math.pi),
-    Band("state.spin goal.spin", "rate", "rpm", lambda facts, value: -_fastest(facts, value), _fastest),
-    Band("omega0.*", "rate", "deg/s", lambda facts, value: -_fastest(facts, value), _fastest),
-    Band("orbit.position.*", "length", "km", _orbit("position", "length", NEAR), math.inf),
-    Band("orbit.velocity.*", "speed", "km/s", _orbit("velocity", "speed", SLOW), math.inf),
-    Band("thrusters.*.position.* thrusters.*.lever_arm steerable.lever_arm", "length", "mm", -FAR, FAR),
-    Band("thrusters.*.min_on_time", "time", "ms", -math.inf, _turns(1.0)),
-    Band("thrusters.*.max_on_time", "time", "ms", -math.inf, _turns(LASTING)),
-    Band(" ".join(f"valve.{key} thrusters.*.valve.{key}" for key in VALVE_TIMES), "time", "ms", -math.inf, SLUGGISH),
-    Band("thrusters.*.impulse_bit.*.0 thrusters.*.impulse_bit.*.2", "time", "ms", -math.inf, SLUGGISH),
-    Band("tank.pressure tank.final_pressure tank.isp.*.0", "pressure", "bar", -math.inf, 0.0, THIN),
+    UsualRange("state.spin goal.spin", "rate", "rpm", lambda facts, value: -_fastest(facts, value), _fastest),
+    UsualRange("omega0.*", "rate", "deg/s", lambda facts, value: -_fastest(facts, value), _fastest),
+    UsualRange("orbit.position.*", "length", "km", _orbit("position", "length", NEAR), math.inf),
+    UsualRange("orbit.velocity.*", "speed", "km/s", _orbit("velocity", "speed", SLOW), math.inf),
+    UsualRange("thrusters.*.position.* thrusters.*.lever_arm steerable.lever_arm", "length", "mm", -FAR, FAR),
+    UsualRange("thrusters.*.min_on_time", "time", "ms", -math.inf, _turns(1.0)),
+    UsualRange("thrusters.*.max_on_time", "time", "ms", -math.inf, _turns(LASTING)),
+    UsualRange(" ".join(f"valve.{key} thrusters.*.valve.{key}" for key in VALVE_TIMES), "time", "ms",
+               -math.inf, SLUGGISH),
+    UsualRange("thrusters.*.impulse_bit.*.0 thrusters.*.impulse_bit.*.2", "time", "ms", -math.inf, SLUGGISH),
+    UsualRange("tank.pressure tank.final_pressure tank.isp.*.0", "pressure", "bar", -math.inf, 0.0, THIN),
 )  # fmt: skip
 ISP = "thrusters.*.isp steerable.isp tank.isp.*.1"
 

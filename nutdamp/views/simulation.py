@@ -82,8 +82,12 @@ def _notes(simulation: Simulation) -> Iterator[Note]:
         yield note("track-cut", until_s=extremes.until, begun=begun, pulses=pulses)
     judged = simulation.plan.flight.residual.nutation
     if begun == pulses > 0 and abs(simulation.flown.residual.nutation - judged) > TELLING:
-        end = simulation.plan.pulses.end
-        yield note("judged-at-end", judged_s=end, nutation_deg=math.degrees(judged), until_s=extremes.until)
+        yield note(
+            "judged-at-end",
+            judged_s=simulation.plan.pulses.end,
+            nutation_deg=math.degrees(judged),
+            until_s=extremes.until,
+        )
     yield from model_warnings(simulation.impulses, simulation.flown)
     yield from verdict_notes(simulation.verdict, simulation.plan)
     (near, near_at), (far, far_at) = extremes.nearest, extremes.farthest
