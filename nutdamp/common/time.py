@@ -72,10 +72,13 @@ class Epoch:
         within = 61 if system == "UTC" and minutes == 1439 and day in LEAP_DAYS else 60
         if hour > 23 or minute > 59 or second >= within:
             raise ValueError(f"{text!r} is no epoch: expected a time of day from 00:00:00 to 23:59:59.999…")
-        if day < FIRST_DAY:
-            raise ValueError(f"{text!r} is before 1972, when the UTC second had another length")
+        if day > datetime.date.max.toordinal():
+            raise ValueError(f"{text!r} is after the year 9999 in UTC")
         elapsed = 86400 * (day - FIRST_DAY) + 60 * minutes + second
-        return cls(elapsed + _leaps_before(day) if system == "UTC" else _of_uniform(elapsed, system))
+        elapsed = Fraction(elapsed + _leaps_before(day)) if system == "UTC" else _of_uniform(elapsed, system)
+        if elapsed < 0:
+            raise ValueError(f"{text!r} is before 1972, when the UTC second had another length")
+        return cls(elapsed)
 
     def plus(self, seconds: float | Fraction) -> Epoch:
         """Epoch ``seconds`` SI seconds later; exact for the number as it is stored."""

@@ -20,6 +20,8 @@ CURE = 1_000.0  # units for the search of a limit that would make a scheme feasi
 CASES, SAMPLES = 20_000.0, 20_000  # units for the dispersed cases of one comparison by so many, the default number
 MORE_CASES = 5_000.0  # units for cases beyond that number, where they leave it undecided whether enough comply
 FRONTS = 30_000.0  # units for all points of `trade` but those that `plan` finds
+LOOP = 20_000.0  # units for the flight of one closed loop
+CYCLES = 30_000.0  # units for the limit cycles of one pair of thresholds, and the lifetime of the tank
 FIT, FITTED = 4_500.0, 600  # units that a fit may spend on a record of so many rows; in proportion if more
 
 

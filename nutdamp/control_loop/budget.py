@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.common import results
+from nutdamp.common import results, work
 from nutdamp.control_loop.controller import SAMPLED, Watch
 from nutdamp.control_loop.law import Actuator, ComplexArray, Law
 from nutdamp.control_loop.simulation import fly
@@ -98,6 +98,7 @@ MOST_FOLLOWED = 2000  # firings of each, at most, whatever start
 ALONE = 8  # factor on cycles and firings of chains that have no noise
 ENTRIES, LOOKED = 16, 1_000_000  # flights, at most, from the state of the file down to start, and samples of them all
 FEW = 4  # cycles per so many firings below which firings are counted instead
+STEP = 0.1  # units of work of a stretch of sixteen chains
 MOST_STEPS = 100_000  # stretches in all, at most
 ROWS = 128  # largest number of samples computed one by one at a time
 EARLY, LATE = 0.003, 3.0  # probabilities of the start threshold between which samples are examined one by one
@@ -209,13 +210,16 @@ class Map:
         """Follow every chain until it has paused more than ``cycles`` times, or fired ``firings`` times."""
         going = np.ones(len(at.z), dtype=bool)
         for _ in range(MOST_STEPS):
+            work.spend(STEP * (1.0 + len(going) / 16.0))
+            if work.exhausted():
+                break
             self._wake(at, np.flatnonzero(going & ~at.active))
             self._skip(at, np.flatnonzero(going & at.active & ~at.fresh))
             self._look(at, np.flatnonzero(going))
             going = np.array([total.cycles <= cycles and total.pulses < firings for total in at.sums])
             if not going.any():
                 return
-        raise Infeasible(f"the limit cycle is not reached within {MOST_STEPS} coasts")
+        raise Infeasible("the limit cycle is not reached within the budget of work")
 
     def _near(self) -> float | None:
         """Size of z from which on every sample is examined; None where the chances of the samples add up."""
@@ -551,7 +555,8 @@ def budget(
     asked = pairs or [Thresholds(loop.start, loop.stop)]
     grown = [pair for pair in asked if math.isfinite(requirements.slower(spacecraft, pair.start))]
     for done, pair in enumerate(grown, start=1):
-        held.append(_held(spacecraft, replace(loop, start=pair.start, stop=pair.stop), seed))
+        with work.budget("the limit cycle", work.CYCLES), work.steps(1 + len(STAGES)):
+            held.append(_held(spacecraft, replace(loop, start=pair.start, stop=pair.stop), seed))
         progress(done)
     return Budget(spacecraft, largest, tuple(held))
 
@@ -581,6 +586,9 @@ def _held(spacecraft: Spacecraft, loop: Loop, seed: int) -> HeldNutation:
         result = replace(result, noisy=noisy, cycle=cycle, share=share, other=next(others, None))
         return replace(result, band=band, lasts=_lasts(body, loop, seed, entries))
     except Infeasible as reason:
+        rate = None if result.cycle is None else result.cycle.propellant
+        if work.exhausted() and body.tank is not None and rate:
+            return replace(result, band=band, lasts=body.tank.propellant / rate)  # as if the pressure stayed
         return replace(result, band=band, why=str(reason))
 
 
@@ -589,7 +597,8 @@ def _lasts(body: Spacecraft, loop: Loop, seed: int, entries: Sequence[Entry]) ->
     if body.tank is None:
         return None
     mass, total = body.tank.propellant, 0.0
-    for share, weight in STAGES:
+    for done, (share, weight) in enumerate(STAGES, start=1):
+        work.reach(done)
         cycles = Map(body, loop, used=share * mass, seed=seed)
         rate = cycles.attractors(entries)[0][0].propellant
         if rate is None:

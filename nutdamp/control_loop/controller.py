@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from nutdamp.common import work
 from nutdamp.control_loop.law import Actuator, ComplexArray, Diagnosis, Ending, Firing, Glimpse, Law
 from nutdamp.control_loop.sensor import Estimator, Signal
 from nutdamp.errors import Infeasible, Unsuitable
@@ -24,7 +25,8 @@ from nutdamp.spacecraft.tolerances import Tolerance
 
 GRID = 64  # moments per nutation period at which a continuous signal is examined for a firing in between
 LONGEST = 1024  # moments looked at together, at most
-MOST = 20_000_000  # moments looked at in a flight, at most: two days of 100 Hz
+LOOKED = 2e-3  # units of work of a moment looked at
+MOST = round(work.LOOP / LOOKED)  # moments looked at in a flight, at most: a day of 100 Hz
 SAMPLED = 1e-6  # part of a sampling interval by which a sample at the end of a pulse may come before it: rounding
 REFINED = 60  # steps, at most, in which the moment of a firing is found between two of the `GRID`
 
@@ -229,6 +231,7 @@ class Coast(Watch):
         return Decided(row, now, now, actuator, firing)
 
 
+EARLIER = "an earlier end, or a lower rate, helps"
 MOST_FIRINGS = 10_000  # largest number of firings of one flight
 NO_NOISE = 8.0  # sigmas that noise does not reach: a chance of 1e-15 a sample
 WAVES = 40.0  # time constants of the low-pass filter after which it has forgotten its start
@@ -312,14 +315,16 @@ class Pilot:
         self._found: Decided | None = None
         self._pending: tuple[Pulse, Firing, Glimpse] | None = None
         self._seen: list[tuple[Vector, ComplexArray, Vector]] = []
+        looks = until * (self.loop.sensor.rate or GRID / law.period)
+        if looks > MOST and not (free and self._reach(truth.spin) > 0.0):  # it never rests
+            raise Infeasible(f"{looks:.2g} samples by {until:.6g} s, {MOST:.2g} at most: {EARLIER}")
 
     def step(self, coast: Watch, seen: Seen) -> Pulse | float | Course:
         """Action after a stretch of a coast: a pulse; a time, s, until which nothing is to be seen; or `Course`."""
         self.looked_at += len(seen.times)
-        if self.looked_at > MOST:
-            raise Infeasible(
-                f"more than {MOST:.2g} samples by {seen.times[0]:.6g} s; an earlier end, or a lower rate, helps"
-            )
+        work.spend(LOOKED * len(seen.times))
+        if self.looked_at > MOST or work.exhausted():
+            raise Infeasible(f"{self.looked_at:.2g} samples by {seen.times[0]:.6g} s: {EARLIER}")
         if self.fired and seen.size <= self.down_to:
             return Course.OVER
         self._seen.append((seen.times, seen.best, seen.spin))
@@ -460,8 +465,7 @@ class Pilot:
         law = self.law
         if not self.free:
             return None
-        now, growth, (margin, over) = float(seen.times[-1]), self.truth.growth, self._margins
-        reach = (law.size(law.loop.start, float(seen.spin[-1])) - margin) / over
+        now, growth, reach = float(seen.times[-1]), self.truth.growth, self._reach(float(seen.spin[-1]))
         if reach <= seen.size:
             return None
         # tan θ grows by e^{κt}, and |ω| by no more; with a wheel κ may rise with θ.
@@ -471,6 +475,11 @@ class Pilot:
         settles = law.loop.settle + max(law.period, WAVES * self.loop.sensor.low_pass)
         later = min(now + waits, self.until) - settles - law.period / GRID
         return later if later > now + law.period else None
+
+    def _reach(self, spin: float) -> float:
+        """Largest |z|, rad/s, at which the sensor surely shows less than the start threshold."""
+        margin, over = self._margins
+        return (self.law.size(self.law.loop.start, spin) - margin) / over
 
     @cached_property
     def _margins(self) -> tuple[float, float]:

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from nutdamp.common import work
 from nutdamp.control_loop.controller import (
     GRID,
     LONGEST,
@@ -153,7 +154,8 @@ def fly(
     end = until_default(spacecraft, loop) if until is None else until
     key = seed if isinstance(seed, tuple) else (seed,)
     case = Case(spacecraft if spacecraft.loop is loop else replace(spacecraft, loop=loop), key, scatter)
-    return LoopRun(law or Law(spacecraft, loop), case, end, dynamics, down_to=down_to)
+    with work.budget("the loop", work.LOOP):
+        return LoopRun(law or Law(spacecraft, loop), case, end, dynamics, down_to=down_to)
 
 
 def largest_since(run: LoopRun) -> tuple[float, float]:

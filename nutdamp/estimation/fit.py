@@ -345,10 +345,9 @@ def _expect_seen(fitted: Fit) -> None:
     sigma = 1.0 / math.sqrt(float(way @ np.linalg.pinv(across, hermitian=True) @ way))
     if size < SEEN * sigma:
         expect_explained(fitted)
-        least = math.degrees(SEEN * sigma)
         raise Infeasible(
-            f"no nutation is seen: the transverse rate of {math.degrees(size):.3g} deg/s is below {least:.3g} deg/s, "
-            "which the noise allows for; a longer record, less noise or a larger nutation (a probe pulse) helps"
+            f"no nutation is seen: the transverse rate is {math.degrees(size):.3g} deg/s, within the noise; "
+            "a longer record, less noise or a larger nutation (a probe pulse) helps"
         )
 
 

@@ -58,6 +58,8 @@ def rendered(figure: Figure, path: str) -> bytes:
     """The figure as the content of a file, vector or not by the ending of ``path``; raises BadRequest for others."""
     kind = ending(path)
     stream = io.BytesIO()
+    if kind != "svg":  # in which text stays text, drawn with the fonts of who reads it
+        style.legible(figure)
     figure.savefig(stream, format=kind, metadata=_METADATA[kind])
     return stream.getvalue()
 

@@ -113,9 +113,25 @@ def styled() -> Iterator[None]:
     from matplotlib import style
 
     with style.context(["default", _SETTINGS]), warnings.catch_warnings():
-        # A name in another script is drawn as boxes, one that is too long leaves no room: no reader can mend that.
+        # A name that is long leaves no room, and one may have no glyphs in SVG: no reader can mend that.
         warnings.simplefilter("ignore", UserWarning)
         yield
+
+
+OTHER_SCRIPTS = ("Noto Sans CJK JP", "WenQuanYi Zen Hei", "Unifont", "Noto Emoji", "Arial Unicode MS", "MS Gothic")
+"""Fonts that draw what `DejaVu Sans` does not, where they are installed."""
+
+
+def legible(figure: Figure) -> None:
+    """Draw texts of a figure with the fonts that are installed, and "?" for characters that none of them has."""
+    from matplotlib import font_manager, text
+
+    files = {entry.name: entry.fname for entry in font_manager.fontManager.ttflist}
+    names = [name for name in ("DejaVu Sans", *OTHER_SCRIPTS) if name in files]
+    drawn = {ord("\n")}.union(*(font_manager.get_font(files[name]).get_charmap() for name in names))
+    for each in figure.findobj(text.Text):
+        shown = "".join(sign if ord(sign) in drawn else "?" for sign in each.get_text())
+        each.set(text=shown, fontfamily=names)
 
 
 PHONE = 3.7  # width of a figure for narrow screens, inches: its smallest text is 10 px high where 360 px show it

@@ -345,8 +345,11 @@ def rate_edits(tree: Node, later: Later) -> Edits:
 
 
 def epoch_after(epoch: str, time: float) -> str:
-    """Epoch in UTC ``time`` s after another."""
-    whole, _, part = Epoch.parse(epoch).plus(time).text.partition(".")
+    """Epoch in UTC ``time`` s after another; raises BadRequest past the year 9999."""
+    try:
+        whole, _, part = Epoch.parse(epoch).plus(time).text.partition(".")
+    except ValueError:
+        raise BadRequest(f"attitude.epoch: {time:.4g} s after it the year 9999 is over") from None
     return f"{whole}.{part}".rstrip("0").rstrip(".") + "Z"
 
 

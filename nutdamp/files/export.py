@@ -127,10 +127,7 @@ def reference(spacecraft: Spacecraft) -> Reference:
     if given.frame not in FRAMES:
         problem = f"{given.frame!r} is no frame that the format knows; expected one of {', '.join(FRAMES)}"
         raise Unsuitable(("attitude", "frame"), problem)
-    try:
-        return Reference(Epoch.parse(given.epoch), given.frame)
-    except ValueError as wrong:
-        raise Unsuitable(("attitude", "epoch"), str(wrong)) from None
+    return Reference(Epoch.parse(given.epoch), given.frame)
 
 
 def interpolated(flown: Flight, until: float) -> Iterator[AttitudeSegment]:

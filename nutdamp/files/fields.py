@@ -69,6 +69,8 @@ class Length(Rule):
             return None
         if len(entries) < self.least == 1:
             raise ValueError("empty; expected an entry")
+        if isinstance(entries, str) and self.most is not None and len(entries) > self.most:
+            raise ValueError(f"{len(entries)} characters long; expected at most {self.most}")
         if long or len(entries) < self.least:
             count = f"{self.least} to {self.most}" if self.most != self.least else f"{self.least}"
             count = f"at least {self.least}" if self.most is None else count
@@ -189,7 +191,11 @@ def _read(annotation: Any, value: Any, problems: Problems, path: KeyPath) -> Any
         problems.append((path, _mismatch(value, _WORDS[plain]) + quoted))
         return None
     if isinstance(value, dict):
-        return {key: _read(parts[1], entry, problems, (*path, key)) for key, entry in value.items()}
+        key_type, entry_type = parts
+        return {
+            _read(key_type, key, problems, (*path, key)): _read(entry_type, entry, problems, (*path, key))
+            for key, entry in value.items()
+        }
     if plain is list:
         return [_read(parts[0], entry, problems, (*path, index)) for index, entry in enumerate(value)]
     if plain is tuple:
@@ -279,4 +285,5 @@ PositiveTime = Annotated[float, Quantity("time", exclusiveMinimum=0)]
 THREE = Length(3, 3)
 Position = Annotated[list[Annotated[float, Quantity("length")]], THREE]
 Direction = Annotated[list[Annotated[float, Quantity("number")]], THREE]
-Name = Annotated[str, Length(1)]
+LONGEST_NAME = 80  # characters: a line of a screen
+Name = Annotated[str, Length(1, LONGEST_NAME)]

@@ -5,11 +5,11 @@ Constraints between several keys are in `rules`.
 
 from __future__ import annotations
 
-import datetime
 import re
 from collections.abc import Callable
 from typing import Annotated, Any, ClassVar, Literal
 
+from nutdamp.common.time import Epoch
 from nutdamp.files.fields import (
     RIGHT_ANGLE,
     THREE,
@@ -91,14 +91,10 @@ class _ShareOrRate(Rule):
 class _DateAndTime(Rule):
     def read(self, value: Any, inner: Callable[[Any], Any]) -> Any:
         text = inner(value)
-        try:
-            if text is not None:
-                if not re.fullmatch(_EPOCH, text):
-                    raise ValueError
-                datetime.datetime.fromisoformat(text)
-        except ValueError:
-            example = "2026-03-01T12:00:00Z"
-            raise ValueError(f"{shown(text)} is no epoch; expected ISO 8601 with date and time: {example}") from None
+        if text is not None:
+            if not re.fullmatch(_EPOCH, text):
+                raise ValueError(f"{shown(text)} is no epoch; expected ISO 8601: 2026-03-01T12:00:00Z")
+            Epoch.parse(text)  # raises for a day that is none, and for one without UTC or beyond four digits
         return text
 
     def schema(self, inner: Callable[[], dict[str, Any]]) -> dict[str, Any]:
@@ -128,7 +124,7 @@ Quaternion = Annotated[list[Annotated[float, Quantity("number")]], Length(4, 4)]
 InTheSky = Annotated[list[Angle], Length(2, 2)]
 Apart = Annotated[float, Quantity("angle", minimum=0, maximum=2 * RIGHT_ANGLE)]
 Window = Annotated[list[Time], Length(2, 2)]
-Epoch = Annotated[str, _DateAndTime()]
+DateAndTime = Annotated[str, _DateAndTime()]
 Count = Annotated[int, Within(1, 1_000_000)]
 
 
@@ -320,7 +316,9 @@ class AttitudeSection(Section):
     of: Literal["axis", "momentum"] | None = Field(
         "Vector that spin_axis and phase are of: the spin axis itself (default), or the angular momentum.", "momentum"
     )
-    epoch: Epoch | None = Field("Date and time of t = 0, ISO 8601; without a zone it is UTC.", "2026-03-01T12:00:00Z")
+    epoch: DateAndTime | None = Field(
+        "Date and time of t = 0, ISO 8601, from 1972 to 9999; without a zone it is UTC.", "2026-03-01T12:00:00Z"
+    )
     frame: Literal["EME2000", "J2000", "GCRF"] | None = Field("Inertial frame of the attitude.", "EME2000")
 
 
@@ -502,7 +500,7 @@ class SpacecraftFile(Section):
         [{"name": "T2", "torque": [0, "-8 N m", 0], "isp": "220 s", "lever_arm": "0.8 m"}],
         default=[],
     )
-    channels: Annotated[dict[str, Annotated[list[Name], Length(1)]], Length(1)] | None = Field(
+    channels: Annotated[dict[Name, Annotated[list[Name], Length(1)]], Length(1)] | None = Field(
         "Names of thrusters that fire together; without it each thruster is a channel of its own.",
         {"+M1": ["T1", "T2"]},
     )

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
 
 from nutdamp.files.fields import KeyPath
 from nutdamp.files.rules import Facts, Finding, inertia_of, spin_of
 from nutdamp.files.study_keys import VALVE_TIMES
 from nutdamp.files.yaml import Node
 from nutdamp.physics.body import momentary
-from nutdamp.units import KINDS
+from nutdamp.units import KINDS, STANDARD_GRAVITY
 
 FAR = 50.0  # m; few spacecraft reach further from their centre of mass, and many a drawing counts in mm
 
@@ -18,21 +19,92 @@ NEAR, SLOW = 1e6, 50.0
 """m, m/s; no orbit about a planet is as near to its centre or as slow, and most tables count in km."""
 
 FAST = 100.0  # rad/s; no spacecraft spins faster
-FAST_AND_WHOLE = 20.0  # rad/s; from here on (191 rpm) a whole number is more likely one of rpm
+FAST_AND_WHOLE = 12.0  # rad/s; above (115 rpm) a whole number is more likely one of rpm
 LOOSE = 0.1  # rad; few requirements on an angle are looser than this 5.7 deg, and many a file counts in deg
 LASTING = 50.0  # spin turns; no pulse against a nutation lasts longer
 SLUGGISH = 1.0  # s; few valves take so long, and many a data sheet counts in ms
 THIN = 1e3  # Pa; no tank feeds thrusters with less, and most data sheets count in bar
+EXHAUST = 500.0  # s; no chemical thruster has more, and data sheets also give the exhaust velocity in m/s
 STRONG = 2.0  # times the thrust of a warm nozzle; none gives as much when it is cold
+
+
+class UsualRange(NamedTuple):
+    """Numbers that probably lack the unit ``meant``: below ``low``, and from ``high`` to what is refused with a hint.
+
+    ``paths``: patterns of keys; an end of the band may depend on the file and the number.
+    """
+
+    paths: str
+    kind: str
+    meant: str
+    low: float | Callable[[Facts, float], float]
+    high: float | Callable[[Facts, float], float]
+    refused: float = math.inf
+
+
+def _fastest(_: Facts, value: float) -> float:
+    return FAST if value % 1 else FAST_AND_WHOLE
+
+
+def _turns(count: float) -> Callable[[Facts, float], float]:
+    """So many spin turns, s: a torque cancels itself within one."""
+
+    def lasts(facts: Facts, _: float) -> float:
+        spin = spin_of(facts)
+        return count * 2.0 * math.pi / abs(spin) if spin else math.inf
+
+    return lasts
+
+
+def _orbit(key: str, kind: str, least: float) -> Callable[[Facts, float], float]:
+    """The end that doubts the largest component of a vector shorter than ``least``."""
+
+    def low(facts: Facts, value: float) -> float:
+        vector = facts.vector(kind, 3, "orbit", key)
+        short = vector is not None and 0.0 < math.hypot(*vector) < least and abs(value) == abs(vector).max()
+        return math.inf if short else -math.inf
+
+    return low
+
+
+BANDS = (
+    UsualRange("state.phase goal.azimuth goal.right_ascension", "angle", "deg", -2.0 * math.pi, 2.0 * math.pi),
+    UsualRange("requirement.momentum_shift state.nutation", "angle", "deg", -math.inf, LOOSE, 0.5 * math.pi),
+    UsualRange("requirement.nutation", "angle", "deg", -math.inf, lambda facts, _: min(LOOSE, _nutation(facts)),
+         0.5 * math.pi),
+    UsualRange("state.spin goal.spin", "rate", "rpm", lambda facts, value: -_fastest(facts, value), _fastest),
+    UsualRange("omega0.*", "rate", "deg/s", lambda facts, value: -_fastest(facts, value), _fastest),
+    UsualRange("orbit.position.*", "length", "km", _orbit("position", "length", NEAR), math.inf),
+    UsualRange("orbit.velocity.*", "speed", "km/s", _orbit("velocity", "speed", SLOW), math.inf),
+    UsualRange("thrusters.*.position.* thrusters.*.lever_arm steerable.lever_arm", "length", "mm", -FAR, FAR),
+    UsualRange("thrusters.*.min_on_time", "time", "ms", -math.inf, _turns(1.0)),
+    UsualRange("thrusters.*.max_on_time", "time", "ms", -math.inf, _turns(LASTING)),
+    UsualRange(" ".join(f"valve.{key} thrusters.*.valve.{key}" for key in VALVE_TIMES), "time", "ms",
+               -math.inf, SLUGGISH),
+    UsualRange("thrusters.*.impulse_bit.*.0 thrusters.*.impulse_bit.*.2", "time", "ms", -math.inf, SLUGGISH),
+    UsualRange("tank.pressure tank.final_pressure tank.isp.*.0", "pressure", "bar", -math.inf, 0.0, THIN),
+)  # fmt: skip
+ISP = "thrusters.*.isp steerable.isp tank.isp.*.1"
 
 
 def doubts(root: Node) -> Iterator[Finding]:
     """Numbers beyond any plausible value in SI."""
     facts = Facts(root)
-    for path, kind, meant, low, high, most in _bands(facts):
-        value = _bare(facts, path)
-        if value is not None and (value < low or high < value < most):
-            yield Finding(path, reading(value, kind, meant))
+    for band in BANDS:
+        for path in (path for pattern in band.paths.split() for path in facts.matching(pattern)):
+            value = _bare(facts, path)
+            if value is None:
+                continue
+            low, high = (end(facts, value) if callable(end) else end for end in (band.low, band.high))
+            if value < low or high < value < band.refused:
+                yield Finding(path, reading(value, band.kind, band.meant))
+    for path in (path for pattern in ISP.split() for path in facts.matching(pattern)):
+        isp = _bare(facts, path)
+        if isp is not None and isp > EXHAUST:
+            yield Finding(
+                path,
+                f"{isp} is read as {isp} s; if m/s is meant write {isp / STANDARD_GRAVITY:.4g} s, else {isp} s",
+            )
     start, largest = facts.number("angle", "loop", "start"), facts.number("angle", "requirement", "nutation")
     if start is not None and largest is not None and start > largest:
         degrees = f"{math.degrees(start):g} deg is above requirement.nutation, {math.degrees(largest):g} deg"
@@ -56,41 +128,6 @@ def _bare(facts: Facts, path: KeyPath) -> float | None:
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
         return None
     return value
-
-
-def _bands(facts: Facts) -> Iterator[tuple[KeyPath, str, str, float, float, float]]:
-    """Paths, kinds and units that may be meant of numbers doubtful below the first and between the other two bounds."""
-    # Other angles are refused where they are too large, with a hint: so are these from a right angle on.
-    path: KeyPath
-    for path in (("state", "phase"), ("goal", "azimuth"), ("goal", "right_ascension")):
-        yield path, "angle", "deg", -2.0 * math.pi, 2.0 * math.pi, math.inf
-    for path in (("requirement", "nutation"), ("requirement", "momentum_shift"), ("state", "nutation")):
-        usual = min(LOOSE, _nutation(facts)) if path == ("requirement", "nutation") else LOOSE
-        yield path, "angle", "deg", -math.inf, usual, 0.5 * math.pi
-    for path in (("state", "spin"), ("goal", "spin"), *facts.below("omega0")):
-        fastest = FAST if (_bare(facts, path) or 0.0) % 1 else FAST_AND_WHOLE
-        yield path, "rate", "deg/s" if path[0] == "omega0" else "rpm", -fastest, fastest, math.inf
-    for key, kind, least, meant in (("position", "length", NEAR, "km"), ("velocity", "speed", SLOW, "km/s")):
-        given = facts.vector(kind, 3, "orbit", key)
-        if given is not None and 0.0 < math.hypot(*given) < least:
-            yield ("orbit", key, int(abs(given).argmax())), kind, meant, math.inf, math.inf, math.inf
-    thrusters = facts.below("thrusters")
-    positions = [position for path in thrusters for position in facts.below(*path, "position")]
-    for path in (*positions, *((*path, "lever_arm") for path in (*thrusters, ("steerable",)))):
-        yield path, "length", "mm", -FAR, FAR, math.inf
-    spin = spin_of(facts)
-    turn = 2.0 * math.pi / abs(spin) if spin else math.inf
-    for path in thrusters:  # a torque cancels itself within a turn
-        yield (*path, "min_on_time"), "time", "ms", -math.inf, turn, math.inf
-        yield (*path, "max_on_time"), "time", "ms", -math.inf, LASTING * turn, math.inf
-    times: list[KeyPath] = [(*path, "valve", key) for path in ((), *thrusters) for key in VALVE_TIMES]
-    for path in thrusters:
-        times += [(*row, column) for row in facts.below(*path, "impulse_bit") for column in (0, 2)]
-    for path in times:
-        yield path, "time", "ms", -math.inf, SLUGGISH, math.inf
-    pressures = [(*row, 0) for row in facts.below("tank", "isp")]
-    for path in (("tank", "pressure"), ("tank", "final_pressure"), *pressures):
-        yield path, "pressure", "bar", -math.inf, 0.0, THIN
 
 
 def _nutation(facts: Facts) -> float:

@@ -386,7 +386,7 @@ def _commands(section: keys.CommandsSection) -> Commands:
         widths = np.unique(given)
     else:
         step = given.step
-        widths = given.min + step * np.arange(math.floor((given.max - given.min) / step * (1.0 + 1e-12)) + 1)
+        widths = given.min + step * np.array([0, math.floor((given.max - given.min) / step * (1.0 + 1e-12))])
     every = tuple(sorted(set(section.every)))
     return Commands(section.delay_step, section.delay_max, widths, section.max_count, every, step)
 

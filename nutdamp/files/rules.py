@@ -90,7 +90,8 @@ class Facts:
         """Paths of a pattern such as ``thrusters.*.force``; its last step need not be there."""
         paths: list[KeyPath] = [()]
         for step in pattern.split("."):
-            deeper = [self.below(*path) if step == "*" else [(*path, step)] for path in paths]
+            key = int(step) if step.isdigit() else step
+            deeper = [self.below(*path) if step == "*" else [(*path, key)] for path in paths]
             paths = [path for each in deeper for path in each]
         return paths
 
@@ -531,13 +532,9 @@ def _sun(facts: Facts) -> Iterator[Finding]:
         if facts.text(*path) == "sun" and not facts.has("sun"):
             yield Finding(path, f"needs sun{SUN}")
     sun, axis = _to_sun(facts), facts.vector("angle", 2, "attitude", "spin_axis")
-    if sun is None and facts.text("sun") == "epoch" and facts.has("attitude"):
-        epoch, cure = facts.text("attitude", "epoch"), f"give {SKY}"
-        problem = f"the Sun is computed for epochs from 1972 on, not for {epoch}; {cure}"
-        yield Finding(
-            ("sun",),
-            problem if epoch else f"epoch needs attitude.epoch, the date of t = 0; or {cure}",
-        )
+    undated = facts.has("attitude") and not facts.has("attitude", "epoch")
+    if sun is None and facts.text("sun") == "epoch" and undated:
+        yield Finding(("sun",), f"epoch needs attitude.epoch, the date of t = 0; or give {SKY}")
     if sun is not None and axis is not None and facts.has("attitude", "sun_phase"):
         angle = float(attitude.angle_between(attitude.on_sphere(*axis.tolist()), sun))
         if min(angle, math.pi - angle) < ALONG:

@@ -392,9 +392,14 @@ def _fly_alike(
 
 
 def _fly_each(bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses, watch: Observer | None) -> None:
-    """Fly cases with different orders of edges, in place."""
+    """Fly cases with different orders of edges, in place.
+
+    Those that coast from one edge to the next go on in closed form: with times widely dispersed one coast may be long
+    where another case has a pulse on, whose steps it would take.
+    """
     edges = pulses.edges
     order = np.argsort(edges, axis=0, kind="stable")
+    on = np.cumsum(1 - 2 * (order % 2), axis=0)  # pulses that are on behind each edge
     edges, of_each = np.take_along_axis(edges, order, axis=0), order[:, None, :]
     turns, kicks = (np.take_along_axis(jump, of_each, axis=0) for jump in pulses.jumps)
     slopes, slope, half = pulses.slopes, None, None
@@ -403,7 +408,14 @@ def _fly_each(bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses, w
     bends = None if slopes is None else np.take_along_axis(_edgewise(slopes, -slopes), of_each, axis=0)
     now, torque = np.zeros(rates.shape[1]), np.zeros_like(rates)
     for number, (edge, turn, kick) in enumerate(zip(edges, turns, kicks, strict=True)):
-        advance(MotionStretch(bodies, now, rates, quaternion, torque, slope), edge - now, watch)
+        here = MotionStretch(bodies, now, rates, quaternion, torque, slope)
+        coasts = on[number - 1] == 0 if number else np.ones(len(now), dtype=bool)
+        for cases in (np.flatnonzero(coasts), np.flatnonzero(~coasts)) if bodies.free else (np.arange(len(now)),):
+            part = here.some(cases)
+            if bodies.free and len(cases) and coasts[cases[0]]:
+                part = part._replace(torque=None, slope=None)
+            advance(part, (edge - now)[cases], watch and watch.some(cases))
+            rates[:, cases], quaternion[:, cases] = part.rates, part.quaternion
         torque = torque + turn if slope is None else torque + slope * (edge - now) + turn
         now = edge
         if bends is not None:

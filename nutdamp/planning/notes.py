@@ -300,9 +300,9 @@ def comparison_warnings(compared: Comparison, *, tabulated: bool = False) -> Ite
     yield from _missed(chosen, compared, tabulated=tabulated)
     broken = [aspect for aspect in chosen.aspects if not aspect.kept]
     yield from (broken_cone(aspect).of(chosen.scheme) for aspect in broken if not tabulated)
-    if broken:
-        keeping = [plan.scheme for plan in compared.plans if plan.feasible and plan.kept]
-        yield note("plans-keep-cones", schemes=", ".join(keeping) or "none")
+    keeping = [plan.scheme for plan in compared.plans if plan.feasible and plan.kept]
+    if broken and keeping:
+        yield note("plans-keep-cones", schemes=", ".join(keeping))
     for aspect in at_start(compared.spacecraft):
         if not aspect.kept:
             yield Note("cone-broken-at-start", tuple(item for item in broken_cone(aspect).items if item[0] != "at_s"))

@@ -36,6 +36,8 @@ GENTLE = 10  # multiple of `FLOWN`: sequences among which those with the smalles
 # blocks after one wait up to which all are looked at, and the cheapest of them behind which others are
 ALL_BLOCKS = 400
 ALL_FIRSTS = 300
+SOME_COUNTS = 256  # numbers of pulses that are looked at, where a block may have more
+FEW_DELAYS = 16  # delays, up to which each is looked at
 AROUND = (0, 1)  # steps of the delay that are looked at, from the one below the best delay
 MOST_WIDTHS = 24  # widths that are looked at for a second and a third block, where more can be commanded
 # share of a spin turn by which blocks in closed form keep away from blackout windows: nutation moves Sun pulses
@@ -204,11 +206,12 @@ class BlockSearch:
         self._every = [every for every in commands.every if every * turn >= limits.gap + float(commands.widths[0])]
         self._kinds = list(itertools.product(channels, self._every))
         last_delay = math.floor(min(commands.delay_max, turn) / step * (1.0 + 1e-12))
-        self._delays = np.asarray(np.arange(last_delay + 1) * step, dtype=np.float64)  # all that can be commanded
-        self._few_delays = len(self._delays) <= 16
+        self._last_delay, self._few_delays = last_delay, last_delay < FEW_DELAYS
+        few = min(last_delay + 1, FEW_DELAYS)
+        self._delays = np.asarray(np.arange(few) * step, dtype=np.float64)  # all that can be commanded, where few
         widths = sum(len(commandable_widths(commands, channel)) for channel in channels)
         # So few blocks after one wait that all are looked at.
-        self.small = self._few_delays and widths * len(self._delays) * self.allowed <= ALL_BLOCKS
+        self.small = self._few_delays and widths * few * self.allowed <= ALL_BLOCKS
 
     def best(self, most: int) -> list[BlockSequence]:
         """The best few sequences of up to ``most`` blocks, those that are flown."""
@@ -348,7 +351,10 @@ class BlockSearch:
     def _counts(self, state: BlockState, every: int) -> NDArray[np.int64]:
         """Numbers of pulses up to the horizon."""
         most = int((self.body.horizon - float(np.min(state.sun_pulse))) / (every * self.model.turn)) + 1
-        return np.arange(1, max(min(most, self.allowed), 0) + 1)
+        most = max(min(most, self.allowed), 0)
+        if most > SOME_COUNTS:
+            return np.unique(np.geomspace(1, most, SOME_COUNTS).round().astype(int))
+        return np.arange(1, most + 1)
 
     def _single(self) -> list[BlockSequence]:
         """The best single blocks at the delays that serve best, without those that surely end worse by `_short_by`."""
@@ -375,9 +381,10 @@ class BlockSearch:
         Of the spin where it is to change; with a target of the length of the rhumb line, of which a block ends no
         nearer than a third of the difference; else of the nutation, lowered by the sum of their kicks at most.
         """
+        widths, counts = commandable_widths(self.commands, channel)[:, None], self._counts(state, every)
+        work.spend(LOOKED * widths.size * counts.size * np.size(state.phasor))
         if self._damps:
             return self._undamped(state, channel, every)
-        widths, counts = commandable_widths(self.commands, channel)[:, None], self._counts(state, every)
         if self.body.goal.spin is not None:
             gained = channel.axial * acts(channel, widths).on_time * counts / self.model.inertia.C
             lacks = np.abs(self.body.goal.spin - state.spin - gained) / self._most[Part.SPIN]
@@ -498,7 +505,7 @@ class BlockSearch:
     def commanded(self, delay: Array) -> Array:
         """The nearest delay that can be commanded, of those within a spin turn."""
         step = self.commands.delay_step
-        counts = np.clip(np.rint(delay / step), 0, len(self._delays) - 1)
+        counts = np.clip(np.rint(delay / step), 0, self._last_delay)
         return np.asarray((counts + 0.0) * step)  # 0, not -0
 
     def doubted(self) -> None:
@@ -531,7 +538,9 @@ class BlockSearch:
         channel, number = self._named[last.channel], _following(before.blocks)
         every = commandable_widths(self.commands, channel)
         at = int(np.argmin(np.abs(every - last.width)))
-        widths = np.union1d(evenly(every, MOST_WIDTHS), every[max(at - 3, 0) : at + 4])
+        near = every[max(at - 3, 0)] - 1e-12, every[min(at + 3, len(every) - 1)] + 1e-12
+        closer = commandable_widths(self.commands, channel, *near, count=MOST_WIDTHS)
+        widths = np.union1d(evenly(every, MOST_WIDTHS), closer)
         as_long = np.rint(last.count * acts(channel, np.array([last.width])).on_time / acts(channel, widths).on_time)
         waits = np.arange(-1, 2) + (last.first - number)
         waits = waits[waits >= (self.pause if before.blocks else self.earliest)]

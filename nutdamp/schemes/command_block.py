@@ -107,7 +107,8 @@ def schedule(spacecraft: Spacecraft, options: CommandBlockOptions) -> Schedule:
         missed = [*used_up(spacecraft, chosen.schedule)] or [note("finer-commands")]
         in_legs = (note("blocks-in-legs"), *missed * (not requirements.complies(chosen.rank[1])))
         chosen = chosen._replace(schedule=replace(chosen.schedule, notes=in_legs))
-    notes, steps = chosen.schedule.notes, np.array([commands.delay_step, *commands.widths]) / (tick or 1.0)
+    steps = np.array([commands.delay_step, *commands.widths, commands.width_step or 0.0]) / (tick or 1.0)
+    notes = chosen.schedule.notes
     if tick is not None and np.abs(steps - np.rint(steps)).max() > OFF_TICK:
         notes = (*notes, note("tick-not-kept", tick_s=tick, delay_step_s=commands.delay_step))
     return replace(chosen.schedule, notes=notes)

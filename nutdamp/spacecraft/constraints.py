@@ -151,10 +151,15 @@ def usable(spacecraft: Spacecraft, *, axial: bool = False) -> list[Channel]:
     ]
 
 
-def commandable_widths(commands: Commands, channel: Channel) -> Vector:
-    """Widths (n,) s that a command block of a channel may have: those that give thrust."""
-    widths = commands.widths
-    widths = widths[(widths >= channel.min_on_time - 1e-12) & (widths <= channel.max_on_time + 1e-12)]
+SOME_WIDTHS = 500  # of a range in finer steps so many, evenly spread: then neighbours of the best
+
+
+def commandable_widths(
+    commands: Commands, channel: Channel, least: float = 0.0, most: float = math.inf, count: int = SOME_WIDTHS
+) -> Vector:
+    """Widths (n,) s from ``least`` to ``most`` that a command block of a channel may have: those that give thrust."""
+    least, most = max(least, channel.min_on_time - 1e-12), min(most, channel.max_on_time + 1e-12)
+    widths = commands.some_widths(least, most, count)
     if channel.valve is None:
         return widths
     return widths[[effective_on_time(channel, width) > 0.0 for width in widths.tolist()]]
@@ -228,7 +233,7 @@ def misfits(commands: Commands | None, block: Block) -> list[tuple[str, str, str
         return []
     longest = math.floor(commands.delay_max / commands.delay_step * (1.0 + OFF_TICK)) * commands.delay_step
     nearest_delay = min(round(block.delay / commands.delay_step) * commands.delay_step, longest)
-    nearest_width = float(commands.widths[np.abs(commands.widths - block.width).argmin()])
+    nearest_width = commands.nearest_width(block.width)
     off = [
         (column, f"{value:.6g} s", f"{near:.6g} s is the nearest")
         for column, value, near, slack in (

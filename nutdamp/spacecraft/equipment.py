@@ -18,6 +18,8 @@ from nutdamp.units import STANDARD_GRAVITY
 if TYPE_CHECKING:
     from nutdamp.physics.thruster import Valve
 
+Vector = NDArray[np.float64]
+
 
 @dataclass(frozen=True, slots=True)
 class SunSensor:
@@ -46,14 +48,32 @@ class SunSensor:
 class Commands:
     """Possible command blocks: delays 0, ``delay_step``, … up to ``delay_max`` s, ``widths`` (n,) s, at most
     ``max_count`` pulses, one in ``every`` so many spins.
+
+    With a ``width_step`` the widths are the shortest and the longest of all in such steps, which no array lists.
     """
 
     delay_step: float
     delay_max: float
-    widths: NDArray[np.float64]
+    widths: Vector
     max_count: int
     every: tuple[int, ...]
     width_step: float | None = None
+
+    def some_widths(self, least: float, most: float, count: int) -> Vector:
+        """Widths from ``least`` to ``most`` s that can be commanded; of those in steps ``count``, evenly spread."""
+        if self.width_step is None:
+            return np.asarray(self.widths[(self.widths >= least) & (self.widths <= most)])
+        first, last = self.widths.tolist()
+        low = math.ceil((max(least, first) - first) / self.width_step * (1.0 - 1e-12))
+        high = math.floor((min(most, last) - first) / self.width_step * (1.0 + 1e-12))
+        steps = np.unique(np.rint(np.linspace(low, high, max(min(high - low + 1, count), 0))))
+        return np.asarray(first + self.width_step * steps)
+
+    def nearest_width(self, width: float) -> float:
+        """The nearest to a ``width``, s, that can be commanded."""
+        step = self.width_step or 0.0
+        near = np.append(self.widths, self.some_widths(width - step, width + step, 3))
+        return float(near[np.abs(near - width).argmin()])
 
     def counts(self, name: str, time: float) -> int:
         """Steps of a ``delay`` or ``width``, s; in a list of widths the number of the nearest entry, 1 the shortest."""
@@ -88,8 +108,6 @@ class Block:
         """Numbers of the Sun pulses that fire it."""
         return range(self.first, self.first + self.count * self.every, self.every)
 
-
-Vector = NDArray[np.float64]
 
 GYRO, ACCELEROMETER = "gyro", "accelerometer"
 """Kinds of sensor: rate gyros about the body axes 1 and 2, or one accelerometer."""

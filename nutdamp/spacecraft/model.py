@@ -494,7 +494,7 @@ class Spacecraft(results.Data, results.Shown):
     def utc(self, time: float, digits: int = DIGITS) -> str | None:
         """Date and time in UTC ``time`` s after the epoch, rounded to ``digits`` of a second.
 
-        None without an epoch, before 1972 and after the year 9999.
+        None without an epoch and after the year 9999.
         """
         if self.attitude is None or self.attitude.epoch is None:
             return None

@@ -176,6 +176,8 @@ def check_screen(spacecraft: Spacecraft, *, verbose: bool = True) -> RenderableT
 def _notes(spacecraft: Spacecraft, verbose: bool) -> Iterator[Note]:
     """Notes on a valid file; ``verbose``: disturbances stand in a table."""
     clock, dispersions = capability.sun_clock(spacecraft), spacecraft.dispersions
+    if spacecraft.utc(0.0) is not None and spacecraft.utc(spacecraft.horizon) is None:
+        yield note("dates-end", horizon_s=spacecraft.horizon)
     if clock is not None and clock.refusal:
         yield note("no-sun-pulse", why=clock.refusal)
     for names, reason in without_effect(() if dispersions is None else reachable(spacecraft)[1]):

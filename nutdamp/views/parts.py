@@ -238,6 +238,7 @@ def shown_rows(table: DataTable, blocks: tuple[Block, ...]) -> DataTable:
 
 
 LINES = 40  # lines of a default screen
+WIDE, FEWEST = 160, 24  # columns where no cell is broken, and lines of the smallest screen there
 NOTES = 3  # notes on it, at most, besides warnings
 SIZES = ((14, NOTES), (8, NOTES), (4, NOTES), (1, 0))  # rows before the last one, and notes: the first that fits
 
@@ -275,8 +276,19 @@ def summary(
         last = Text(f"-v all values{hidden} · {steps}", style="dim")
         return Group(*head, *warnings, *body, *[Text()] * bool(body), *others[:count], last)
 
-    sizes = (screen(*size) for size in SIZES)
-    return next((shown for shown in sizes if lines_of(shown) <= LINES), screen(*SIZES[-1]))
+    for size in SIZES[:-1]:
+        if lines_of(shown := screen(*size)) <= LINES:
+            return shown
+    shown = screen(*SIZES[-1])
+    return shown if lines_of(shown, width=WIDE) <= FEWEST else Group(*_dense(shown))
+
+
+def _dense(part: RenderableType) -> Iterator[RenderableType]:
+    """Parts of a group without the blank lines between them."""
+    if isinstance(part, Group):
+        yield from (inner for each in part.renderables for inner in _dense(each))
+    elif not isinstance(part, Text) or part.plain:
+        yield part
 
 
 def blocks_screen(flown: Flight, velocity: Vector | None) -> RenderableType:

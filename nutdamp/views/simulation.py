@@ -26,7 +26,7 @@ from nutdamp.flight.propagation import IMPULSE_SUM, REAL_WIDTHS, Flight
 from nutdamp.flight.verification import AGREE, AS_FLOWN, IDEAL, WITHOUT, Conservation, Verification
 from nutdamp.physics.attitude import full_turn
 from nutdamp.planning.decision import Simulation
-from nutdamp.planning.notes import model_warnings, verdict_notes
+from nutdamp.planning.notes import TELLING, model_warnings, verdict_notes
 from nutdamp.planning.plan import Plan
 from nutdamp.planning.verdict import Light
 from nutdamp.spacecraft.model import Spacecraft, Vector
@@ -80,6 +80,14 @@ def _notes(simulation: Simulation) -> Iterator[Note]:
     extremes, begun, pulses = simulation.extremes, len(simulation.shown.schedule), len(simulation.plan.pulses)
     if begun < pulses:
         yield note("track-cut", until_s=extremes.until, begun=begun, pulses=pulses)
+    judged = simulation.plan.flight.residual.nutation
+    if begun == pulses > 0 and abs(simulation.flown.residual.nutation - judged) > TELLING:
+        yield note(
+            "judged-at-end",
+            judged_s=simulation.plan.pulses.end,
+            nutation_deg=math.degrees(judged),
+            until_s=extremes.until,
+        )
     yield from model_warnings(simulation.impulses, simulation.flown)
     yield from verdict_notes(simulation.verdict, simulation.plan)
     (near, near_at), (far, far_at) = extremes.nearest, extremes.farthest
@@ -135,6 +143,7 @@ def simulation_json(simulation: Simulation) -> dict[str, Any]:
         **decisions.aspects_json(aspects(flight, extremes.until)),
         "decision": decisions.decision_json(simulation.verdict),
         "until_s": extremes.until,
+        "judged_s": simulation.plan.pulses.end or None,
         "axis_track": {
             "frame": "N" if attitude is None else attitude.frame,
             "farthest_from_momentum_deg": math.degrees(extremes.farthest[0]),

@@ -31,9 +31,9 @@ WORD = re.compile(r"(?:[<≤≥✗] )?\S+(?: %(?!\S))?")  # pattern of the words
 WIDTH = 80  # columns of a default screen
 
 
-def lines_of(*parts: RenderableType) -> int:
-    """Lines that parts take on a screen of `WIDTH` columns."""
-    console = Console(width=WIDTH, file=StringIO(), markup=False, emoji=False, highlight=False)
+def lines_of(*parts: RenderableType, width: int = WIDTH) -> int:
+    """Lines that parts take on a screen of ``width`` columns."""
+    console = Console(width=width, file=StringIO(), markup=False, emoji=False, highlight=False)
     return sum(len(console.render_lines(part)) for part in parts)
 
 

@@ -38,7 +38,7 @@ from support.shown import (
 )
 
 from nutdamp.figures import geometry, overview, sphere, style
-from nutdamp.figures.image import Scene, Timing
+from nutdamp.figures.image import Scene, Timing, rendered
 from nutdamp.files.reader import load_spacecraft
 from nutdamp.flight import propagation
 from nutdamp.physics.attitude import angle_between
@@ -571,3 +571,13 @@ def test_no_text_is_cut_in_the_pictures_of_the_configs(path: Path) -> None:
 def test_words_and_swatches_can_be_seen_on_white_and_in_the_dark(name: str, case: str) -> None:
     check_colours(drawn(name, case))
     assert all(contrast(style.GREY, paper) > 3.0 for paper, _ in pages())
+
+
+def test_characters_without_a_glyph_are_question_marks_and_nothing_is_said(capfd: pytest.CaptureFixture[str]) -> None:
+    """U+E000 is in no font; the Greek is in the one that comes with matplotlib."""
+    figure = style.sheet(2.0, 1.0)
+    title = figure.suptitle("ω\ue000 x")
+    for kind, text in (("svg", "ω\ue000 x"), ("png", "ω? x")):
+        assert rendered(figure, f"a.{kind}")
+        assert title.get_text() == text
+    assert capfd.readouterr().err == ""

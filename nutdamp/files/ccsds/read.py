@@ -21,6 +21,7 @@ from nutdamp.errors import BadRequest, Fault, FaultyFile, printable
 from nutdamp.files.ccsds import message
 from nutdamp.files.ccsds.message import QUATERNION_ANGVEL, Checked, Keyword, MessageBlock, MessageReader
 from nutdamp.files.editing import Edits, Later, attitude_edits, carry_text, epoch_after, inertia_edits, rate_edits
+from nutdamp.files.fields import LONGEST_NAME
 from nutdamp.files.reader import Source, read_spacecraft
 from nutdamp.files.yaml import Node, read_bytes
 from nutdamp.physics import attitude
@@ -106,8 +107,8 @@ class _ApmReader(MessageReader):
             self.remarks.append("the message gives no attitude: frame and epoch are left out")
         object_id = outside.text("OBJECT_ID")
         return ApmContents(
-            name=outside.text("OBJECT_NAME") or "UNKNOWN",
-            object_id=None if object_id == "UNKNOWN" else object_id,
+            name=(outside.text("OBJECT_NAME") or "UNKNOWN")[:LONGEST_NAME],
+            object_id=None if object_id in (None, "UNKNOWN") else object_id[:LONGEST_NAME],
             epoch=epoch,
             frame=self.frame,
             quaternion=quaternion,
@@ -305,7 +306,7 @@ class _HistoryReader(MessageReader):
 
     def take(self, metadata: MessageBlock, records: MessageBlock) -> None:
         block = Checked(self, metadata, message.AEM_METADATA)
-        self.name = block.text("OBJECT_NAME") or self.name
+        self.name = (block.text("OBJECT_NAME") or self.name)[:LONGEST_NAME]
         self.take_system(block)
         forward, kind = self.endpoints(block), block.text("ATTITUDE_TYPE")
         if kind is not None and kind not in COLUMNS:

@@ -361,10 +361,9 @@ def test_epochs_that_messages_cannot_hold_are_refused_with_their_place(run: Run,
     commands.append("export late.yaml --format aem-spin --scheme two-pulse --set attitude.epoch=9999-12-31T23:59:59Z")
     aem = "--format aem --scheme two-pulse"
     commands += [f"export old.yaml {aem}", f"export old.yaml {aem} --set attitude.epoch=1961-03-01T12:00:00Z"]
+    commands += ["check old.yaml", "plan late.yaml --scheme two-pulse -o later.yaml --at 1s"]
     said = refusals(run, tmp_path, commands)
-    check_text(
-        "cli.export.epochs", f"{said}\n" + run("export", "-", *aem.split(), stdin=DATED.replace("2026", "1960")).stderr
-    )
+    check_text("cli.export.epochs", said + "\n" + call(run, "check late.yaml -q").stdout)
     assert result(run, "plan late.yaml --scheme two-pulse")["plans"][0]["pulses"][1]["utc"] is None
     assert call(run, "plan late.yaml --scheme two-pulse").returncode == 0
     far = run("plan", "-", "--scheme", "one-pulse", stdin=DATED + "limits: {horizon: 1e15, earliest: 9e14}\n")

@@ -352,6 +352,30 @@ def test_a_written_schedule_flies_as_it_was_planned(run: Run) -> None:
     assert result(run, "simulate --schedule -", stdin=pulses)["flown"] == flight["flown"]
 
 
+@pytest.mark.parametrize(
+    ("keys", "scheme", "status", "grows"),
+    [
+        ("upper-stage.yaml --set limits.tick=20ms", "one-pulse", 0, True),
+        ("communications-spinner.yaml --set limits.max_pulses=3", "four-pulse", 4, False),
+    ],
+)
+def test_a_written_schedule_is_judged_as_the_plan_wherever_the_simulation_ends(
+    run: Run, keys: str, scheme: str, status: int, grows: bool
+) -> None:
+    """The motion after the last pulse changes; what is said of its end is marked as that."""
+    file = f"{places.CONFIGS}/{keys}"
+    planned = result(run, f"plan {file} --nominal --scheme {scheme} --csv own.csv", status=status)
+    for until in ("", "--until 300s"):
+        flight = result(run, f"simulate {file} --schedule own.csv {until}", status=status)
+        assert flight["judged_s"] == pytest.approx(planned["plans"][0]["end_s"], abs=1e-9)
+        ways = zip(planned["decision"]["requirement"], flight["decision"]["requirement"], strict=True)
+        for before, after in ways:
+            assert after["nominal_deg"] == pytest.approx(before["nominal_deg"], abs=1e-9)
+            assert after["part"] == before["part"]
+    screen = run("simulate", *file.split(), "--schedule", "own.csv", "--until", "300s").stdout
+    assert ("note[judged-at-end]" in screen) is grows
+
+
 def test_schedules_by_hand_may_be_short_and_settings_are_doubted(run: Run, tmp_path: Path) -> None:
     written(tmp_path, own_csv=SCHEDULE.replace(",channel", "").replace("1,0,steerable,4", "1,0,-5") + "2,0.5,0,4,0\n")
     first, second = result(run, "simulate --schedule own.csv", status=4)["pulses"]

@@ -170,6 +170,9 @@ def doubts_of(lines: str) -> list[Fault]:
 
 DOUBTED = (
     "state: {spin: 30, nutation: 0.1}",
+    "state: {spin: 15, nutation: 0.1}",
+    THRUSTER.format(0.3, "0, isp: 2200"),
+    "steerable: {torque: 3, isp: 2200, lever_arm: 1}",
     "state: {spin: -101.5, nutation: 0.1}",
     "state: {spin: 3, nutation: 0.1, phase: 40}",
     "omega0: [0.1, 0, 180]",
@@ -202,7 +205,9 @@ UNDOUBTED = (
     "state: {spin: 30 rad/s, nutation: 0.1, phase: 40 rad}",
     "state: {spin: 300 rpm, nutation: 89 deg, phase: 400 deg}",
     "state: {spin: 27.4, nutation: 0.1, phase: 6.2}",
-    "state: {spin: 19, nutation: 0.1, phase: -6.2}",
+    "state: {spin: -12, nutation: 0.1, phase: -6.2}",
+    THRUSTER.format(0.3, "0, isp: 2200 s"),
+    THRUSTER.format(0.3, "0, isp: 460"),
     THRUSTER.format("300 m", "20 s"),
     THRUSTER.format(49, 2.0),
     "goal: {tilt: 2.0, azimuth: 5, spin: 12}",

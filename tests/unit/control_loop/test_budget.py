@@ -17,6 +17,7 @@ from support.golden import check_text, refused
 from support.loops import fired_by, fires, follow_few_cycles, four, rad, turned
 
 import nutdamp
+from nutdamp.common import work
 from nutdamp.control_loop.budget import DAY, YEAR, Budget, Cycle, HeldNutation, Map, Thresholds, budget
 from nutdamp.control_loop.evaluation import loop_of
 from nutdamp.control_loop.law import Ending, Law
@@ -293,6 +294,25 @@ def test_a_tank_lasts_as_long_as_its_propellant() -> None:
     assert falling.lasts == pytest.approx(held.lasts, rel=0.6)
     assert falling.lasts != pytest.approx(held.lasts, rel=0.01)
     assert Map(steady, loop(gyro()), used=1.0).cycle().pulses == Map(steady, loop(gyro())).cycle().pulses
+
+
+def spent(*_: object) -> float:
+    work.spend(work.CYCLES)
+    raise Infeasible("spent")
+
+
+def test_a_search_for_cycles_ends_with_its_budget_of_work(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without a cycle nothing is known; with one the lifetime is that of its flow."""
+    body = replace(craft(loop=loop(gyro())), tank=Tank(2.0, 22e5, 6e5, 1.0))
+    monkeypatch.setattr("nutdamp.common.work.CYCLES", 0.5)
+    assert budget(body).held[0].cycle is None
+    check_text("budget.work-spent", budget(body).held[0].why)
+    monkeypatch.undo()
+    follow_few_cycles(monkeypatch)
+    monkeypatch.setattr("nutdamp.control_loop.budget._lasts", spent)
+    held = budget(body).held[0]
+    assert held.cycle is not None
+    assert held.lasts == pytest.approx(2.0 / (held.cycle.propellant or math.nan))
 
 
 @pytest.mark.weekly

@@ -252,6 +252,9 @@ def test_samples_are_few_while_the_nutation_cannot_show_and_never_too_many(monke
     monkeypatch.setattr("nutdamp.control_loop.controller.MOST", 100_000)
     with refused(Infeasible, "loop.too-many-samples"):
         fly(GROWING, fires(Sensor(rate=1e6, noise=rad(0.25)), 80.0), 1e4)
+    monkeypatch.setattr("nutdamp.control_loop.controller.Coast.look", None)  # refused before a sample is looked at
+    with refused(Infeasible, "loop.samples-known"):
+        fly(GROWING, fires(Sensor(rate=100.0, noise=rad(3.0)), 0.5), 1e15)
 
 
 def check_flown_again(craft: Spacecraft, run: LoopRun) -> None:

@@ -21,7 +21,6 @@ from support.single_case import flown_outputs, realised, timed
 from support.spinners import commanded, flown_by_reference
 
 import nutdamp
-from nutdamp import load
 from nutdamp.common.numerics import cos_sin
 from nutdamp.files.schedules import read_plan
 from nutdamp.flight import propagation
@@ -31,14 +30,14 @@ from nutdamp.montecarlo.propagated import ClosedForm, RealWidths, nodes_for
 from nutdamp.montecarlo.statistics import OUTPUTS, first_order, measure, vectors
 from nutdamp.montecarlo.study import Results, Study, run, study_of
 from nutdamp.montecarlo.study import run as fly_all
-from nutdamp.physics import attitude
+from nutdamp.physics import attitude, batch
 from nutdamp.physics.thruster import Cold, Tank, Trapezoid
 from nutdamp.planning import decision, robust
 from nutdamp.planning import plan as planning
 from nutdamp.schemes.block_model import fired
 from nutdamp.spacecraft.equipment import Block, Steerable, SunSensor
 from nutdamp.spacecraft.model import Disturbance, Inertia, Keep, Requirement, Spacecraft
-from nutdamp.spacecraft.schedule import Schedule, steerable_pulse
+from nutdamp.spacecraft.schedule import Schedule, channel_pulse, steerable_pulse
 from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
 
 CASES = 40
@@ -176,6 +175,26 @@ def test_through_real_widths_each_case_is_the_flight_of_its_own_spacecraft(name:
     for case in range(0, CASES, 6):
         one = dispersed.one_of(draws, case)
         assert flown[:, case] == pytest.approx(flown_outputs(model, one), abs=1e-10, nan_ok=True)
+
+
+def test_a_case_that_coasts_while_others_fire_takes_no_steps(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Shifts of 100 s change the order of pulses of 0.4 s: only these are integrated, some radians each."""
+    body = nutdamp.load(places.case("slow-timing.yaml"))
+    pulses = [channel_pulse(body.channels[number], 1.0 + number, 0.4) for number in range(3)]
+    model, spans = DispersedModel(body, Schedule(tuple(pulses))), list[float]()
+    monkeypatch.setattr(batch, "_expect_short", spans.append)
+    draws = dispersed.first_cases(Study(model), CASES)
+    flown = outputs(RealWidths, model, draws)
+    assert max(spans) < 5.0
+    for case in range(0, CASES, 6):
+        assert flown[:, case] == pytest.approx(flown_outputs(model, dispersed.one_of(draws, case)), abs=1e-10)
+
+
+def test_the_price_of_cases_that_are_integrated_grows_with_their_coasts() -> None:
+    bodies = [replace(THREE["three moments"].spacecraft, dispersions=Dispersions(timing=dispersed.normal(late)))
+              for late in (1e-3, 100.0)]  # fmt: skip
+    soon, late = (RealWidths(DispersedModel(body, PROLATE.schedule)).effort for body in bodies)
+    assert late > 10.0 * soon
 
 
 BLOCKS = {
@@ -436,7 +455,7 @@ def test_the_csv_has_the_angles_of_each_case(run: Run, tmp_path: Path) -> None:
 @pytest.mark.weekly
 def test_a_robust_plan_keeps_the_cone_in_most_cases(tmp_path: Path) -> None:
     (tmp_path / "keeper.yaml").write_text(FILE)
-    body: Spacecraft = load(tmp_path / "keeper.yaml")
+    body: Spacecraft = nutdamp.load(tmp_path / "keeper.yaml")
     names = "rhumb-line", "half-cone"
     compared, counted = (decision.compare(body, names, samples=samples) for samples in (0, 1000))
     assert [one.recommended and one.recommended.scheme for one in (compared, counted)] == list(names)

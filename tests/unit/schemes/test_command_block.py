@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from support import places, reference
-from support.builders import aimed, channel, codes, cross, noted, one_of, spinner
+from support.builders import aimed, channel, codes, cross, noted, one_of, present, spinner
 from support.cases import deep, spread, weekly
 from support.golden import check_text
 from support.spinners import FILE, commanded, flown_by_reference, some_body
@@ -31,7 +31,7 @@ from nutdamp.schemes.block_search import FLOWN, BlockFlights, BlockSearch, Block
 from nutdamp.schemes.catalogue import Options
 from nutdamp.schemes.command_block import scope_note
 from nutdamp.spacecraft import requirements
-from nutdamp.spacecraft.constraints import usable
+from nutdamp.spacecraft.constraints import commandable_widths, usable
 from nutdamp.spacecraft.equipment import Block, Commands, SunSensor
 from nutdamp.spacecraft.model import Disturbance, Keep, Limits, Requirement, Spacecraft
 
@@ -351,3 +351,18 @@ def test_blocks_that_miss_say_what_would_help(key: str, most: tuple[float, float
     assert plan.meets_requirement == (not key) == (not cures)
     if key:
         check_text(f"blocks.cure-{key}", noted(cures))
+
+
+@pytest.mark.parametrize("step", ["10 ms", "1e-9 s", "1e-13 s"])
+def test_fine_steps_are_never_listed_and_neighbours_of_the_best_are_looked_at(step: str) -> None:
+    """10 ms from 100 to 500 ms: 41 widths, all of them; else some that lie on the grid, with both ends."""
+    body = read_spacecraft(FILE.replace("width: {step: 10 ms", f"width: {{step: {step}"), "f.yaml")
+    assert body.commands is not None
+    widths = commandable_widths(body.commands, body.channels[0])
+    assert (widths[0], widths[-1]) == (0.1, pytest.approx(0.5, rel=1e-12))
+    assert len(widths) == (41 if step == "10 ms" else 500)
+    steps = (widths - 0.1) / present(body.commands.width_step)
+    assert np.abs(steps - np.rint(steps)).max() <= 1e-12 * steps[-1]
+    close = commandable_widths(body.commands, body.channels[0], 0.3 - 1e-12, 0.31 + 1e-12, count=7)
+    assert len(close) == (2 if step == "10 ms" else 7)
+    assert body.commands.nearest_width(0.3049) == pytest.approx(0.3 if step == "10 ms" else 0.3049, rel=1e-9)

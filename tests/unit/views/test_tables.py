@@ -4,6 +4,7 @@ import csv
 import io
 import math
 import re
+from contextlib import nullcontext
 from dataclasses import replace
 from types import SimpleNamespace as Row
 
@@ -13,14 +14,14 @@ from support.builders import spinner
 from support.cases import spread
 from support.commands import printed
 from support.golden import check_text
-from support.places import CONFIGS
+from support.places import CONFIGS, case
 
 import nutdamp
 from nutdamp.files.schedules import BLOCKS_HEADER, EFFECTIVE, PULSES_HEADER
 from nutdamp.spacecraft.model import Requirement, Spacecraft
 from nutdamp.units import US, screen_units
 from nutdamp.views.glance import glance
-from nutdamp.views.parts import LINES, SIZES, block_table, pulse_table
+from nutdamp.views.parts import FEWEST, LINES, SIZES, WIDE, block_table, pulse_table
 from nutdamp.views.tables import REAL, TEXT, WHOLE, WIDTH, YES_NO, Column, DataTable, angle_of
 from nutdamp.views.text import short_angle, vector
 from nutdamp.views.verdict import HEADLINES
@@ -147,6 +148,17 @@ def test_a_plan_is_seen_at_a_glance(name: str) -> None:
     assert lines[-1].startswith("-v ")
     assert lines[-1].endswith("nutdamp report")
     assert not any("…" in line and "more" not in line for line in lines)
+
+
+@pytest.mark.deep
+@pytest.mark.parametrize("name", ["plan-25-lines", "plan-30-lines"])
+def test_a_plan_of_many_bounds_and_warnings_fits_a_terminal(name: str) -> None:
+    """Where no cell is broken; of 80 columns it takes more."""
+    with pytest.warns(UserWarning, match="is read as") if "25" in name else nullcontext():
+        body = nutdamp.load(case(f"{name}.yaml"))
+    compared = nutdamp.compare(body)
+    assert len(printed(glance(compared), WIDE)) <= FEWEST
+    assert len(printed(glance(compared), WIDTH)) <= LINES
 
 
 @pytest.mark.usefixtures("plans_shared")
