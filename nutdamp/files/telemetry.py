@@ -21,6 +21,7 @@ from nutdamp.estimation.parameters import (
     AXIS,
     DIRECTION,
     GYROS,
+    KIND,
     QUATERNION,
     SEEN,
     SUN_ASPECT,
@@ -28,6 +29,7 @@ from nutdamp.estimation.parameters import (
     Record,
     of_quaternions,
 )
+from nutdamp.estimation.search import absurd
 from nutdamp.files.ccsds.read import History, is_history, read_history
 from nutdamp.files.tabular import HEADER as TRACK
 from nutdamp.files.tabular import Table
@@ -75,6 +77,7 @@ MEANT: dict[str, Sequence[str]] = {
 }
 """Beginnings of names of columns that are meant to be measured, and the columns that there are of the kind."""
 
+SPARSE = 0.2  # part of a signal below which samples that are no motion are left out
 SAME = 0.03  # part by which a ratio of rates may differ from that of two units
 
 
@@ -102,6 +105,11 @@ def _read_samples(path: str | Path, spacecraft: Spacecraft, schedule: Schedule) 
     _expect_whole(table, columns, spacecraft)
     table.check()
     signals = _signals(table, columns, spacecraft)
+    for name in sorted(KIND.keys() & signals.keys()):
+        out = absurd(spacecraft, name, signals[name])
+        if 0.0 < out.mean() < SPARSE:
+            signals[name][out] = math.nan
+            table.warned.append(f"{path}: {name}: {out.sum()} samples that no motion shows are left out")
     _expect_unit(table, signals, spacecraft.spin)
     seen, step = _sun_column(table, times, columns.get(SUN_PULSE))
     table.check()
