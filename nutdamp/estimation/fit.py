@@ -33,6 +33,7 @@ from nutdamp.estimation.parameters import (
     quantisation,
 )
 from nutdamp.estimation.search import (
+    BROKEN,
     NORMAL_MAD,
     ROUNDING,
     Fit,
@@ -53,8 +54,7 @@ from nutdamp.estimation.search import (
 from nutdamp.physics import body as rigid_body
 from nutdamp.spacecraft.model import Spacecraft
 
-STUCK = 0.2  # part of the samples of a sensor that are alike in a row where it is stuck
-FEWEST = 20  # number of them, at least
+FEWEST = 20  # number of samples that are alike in a row where a sensor is stuck, at least
 COARSE = 10  # a record that has so few different values is one of coarse steps
 OFTEN = 1.5  # radians of spin between two samples up to which a direction is seen to go round
 
@@ -73,12 +73,14 @@ def expect_alive(model: Model) -> tuple[str, ...]:
     steady = {*GYROS} == constant == {*shown} and moves <= spins and bool(spins)
     faults = []
     for name, (times, values) in shown.items():
-        begins, ends, alike, different = _run(times, values)
+        edges = np.concatenate([[0], np.flatnonzero(np.diff(values, axis=0).any(axis=1)) + 1, [len(values)]])
+        at, alike = int(np.argmax(np.diff(edges))), int(np.diff(edges).max())
+        begins, ends = times[edges[at]], times[edges[at + 1] - 1]
         # That gyro 3 does not change all along is as it should be.
-        off = not steady and name not in spins if name in constant else different > COARSE
-        if name in KIND and np.mean(absurd(model.spacecraft, name, values)) > STUCK:
+        off = not steady and name not in spins if name in constant else len(np.unique(values, axis=0)) > COARSE
+        if name in KIND and np.mean(absurd(model.spacecraft, name, values)) > BROKEN:
             faults.append(f"{name} shows {np.abs(values).max():.3g} {KIND[name].unit}, which no motion is")
-        elif off and alike >= max(min(FEWEST, len(values)), STUCK * len(values)):
+        elif off and alike >= max(min(FEWEST, len(values)), BROKEN * len(values)):
             faults.append(f"{name} does not change from {begins:.4g} s to {ends:.4g} s ({alike} samples)")
     if faults:
         shows = {name for name in model.signals if KIND[name].nutation}
@@ -101,14 +103,6 @@ def _sensors(model: Model) -> Iterator[tuple[str, Vector, Vector]]:
             yield f"the elevation of {name}", times, values[:, 2:3].round(12)
         elif name != SUN_PULSE:
             yield name, times, values
-
-
-def _run(times: Vector, values: Vector) -> tuple[float, float, int, int]:
-    """First and last time (s) and number of the most samples of a signal in a row that are alike; how many differ."""
-    edges = np.concatenate([[0], np.flatnonzero(np.diff(values, axis=0).any(axis=1)) + 1, [len(values)]])
-    at = int(np.argmax(np.diff(edges)))
-    first, last = edges[at], edges[at + 1] - 1
-    return float(times[first]), float(times[last]), int(last - first + 1), len(np.unique(values, axis=0))
 
 
 def expect_enough(model: Model) -> None:
@@ -135,7 +129,6 @@ def expect_enough(model: Model) -> None:
         )
 
 
-MOST_LEFT_OUT = 20.0  # percent of a signal that may be outliers
 FAR = 2.0  # times the noise of neighbouring samples from which on residuals are no noise
 PART = 1e-3  # part of what varies in a signal that they have then at least: records without noise show smaller ones
 WINDOWS = (4, 8, 16, 32, 64)  # samples in a row among which those left out are counted
@@ -154,9 +147,11 @@ def expect_explained(fitted: Fit) -> None:
     """
     model = fitted.model
     for index, signal in enumerate(model.signals):
-        out = 100.0 * float(np.mean(~fitted.used[model.signal == index]))
-        if out > MOST_LEFT_OUT:
-            raise Infeasible(f"the motion fitted does not explain {signal}: {out:.0f} % of it would be left out")
+        out = float(np.mean(~fitted.used[model.signal == index]))
+        if out > BROKEN:
+            raise Infeasible(
+                f"the motion fitted does not explain {signal}: {100.0 * out:.0f} % of it would be left out"
+            )
     burst = left_out_together(fitted)
     if burst is not None:
         signal, begins, ends, count = burst
@@ -284,7 +279,6 @@ PARTS = (0.5, 0.25, 0.1, 0.04)  # parts of the record that it then begins with
 SEEN = 4.5  # standard deviations of |ω| from which on there is a nutation
 UNEQUAL = 5.0  # sigmas from which on the transverse moments count as different, or such a body as dissipating
 LARGE = 0.42  # noise of a signal, in its steps, below which these are large: they make 0.29 of it alone
-PASSES = 3  # times that errors by steps are found, of a motion that is less off each time
 LOST = 1e-7  # least singular value of derivatives of length 1 from which on they are independent
 UNEQUAL_BY = ("unequal_1", "unequal_2")  # the parameters of unequal transverse moments
 
@@ -358,7 +352,7 @@ def _with_steps(fitted: Fit) -> Fit:
     found = ((at, model.signal == at, quantisation(model.measured[model.signal == at])) for at in loud)
     steps = [(at, rows, step) for at, rows, step in found if fitted.noise[at] < LARGE * step]
     weights = fitted.jacobian[used] / fitted.noise[model.signal[used], None] ** 2
-    for _ in range(PASSES if steps else 0):
+    for _ in range(3 if steps else 0):  # of a motion that is less off each time
         shown, errors = model.predicted(named_of(model, fitted.values - off)), np.zeros(len(used))
         for _, rows, step in steps:
             away = (shown[rows] - model.measured[rows][0]) / step

@@ -368,8 +368,10 @@ def refused(fitted: Fit) -> bool:
 TURNED = {AXIS[1]: "axis_y, or of the right ascension,", AXIS[2]: "axis_z, or of the declination,",
           SEEN[1]: "the azimuth of crossing", SEEN[2]: "the elevation of crossing"}  # fmt: skip
 UNITS = ((180.0 / math.pi, "57.3, rad for deg"), (30.0 / math.pi, "9.55, rad/s for rpm"), (6.0, "6, rpm for deg/s"))
-FASTER = 5.0  # times the transverse rate of the file from which on units are doubted
-SAME = 1.3  # times at which the rate is that of the file
+FASTER, SAME = (
+    5.0,
+    1.3,
+)  # times the file's transverse rate from which on units are doubted, up to which it is the file's
 ALIKE = 2.0  # times the distance of the nearest motion from the file up to which others count as well
 NEAR = 0.35  # part of C/A and of the spin by which the start of a fit may be off the file to be followed
 
@@ -404,14 +406,17 @@ def _near(fitted: Fit, most: float) -> bool:
 def _causes(spacecraft: Spacecraft, record: Record, most: float = FASTER) -> tuple[str, ...]:
     """Mistakes by which a motion and a body near to the file explain a record, the nearest first."""
     explained = []
-    with work.budget("causes", work.FIT):
+    of_file = {RATIO: spacecraft.inertia.C / spacecraft.inertia.A, "omega_3": spacecraft.spin}
+    with work.budget("causes", 0.5 * work.FIT):
         for words, changes in _mistakes():
             if not record.has(*changes) or work.exhausted():
                 continue
             changed = {name: factor * record.signals[source] for name, (source, factor) in changes.items()}
             mended = replace(record, signals={**record.signals, **changed})
             try:
-                fitted = fit(spacecraft, mended) if _begins_near(spacecraft, mended) else None
+                begin = next(initial_guess.starts(Model(spacecraft, mended)))
+                near = all(abs(begin.get(name, file) - file) <= NEAR * abs(file) for name, file in of_file.items())
+                fitted = fit(spacecraft, mended) if near else None
             except (Infeasible, np.linalg.LinAlgError):
                 continue
             if fitted is not None and fitted.finished and _near(fitted, most) and _shows(fitted, changes):
@@ -438,14 +443,6 @@ def _mistakes() -> Iterator[tuple[str, Mapping[str, tuple[str, float]]]]:
             which = ", ".join(names)
             yield f"{which} too large ({words})", {name: (name, 1.0 / factor) for name in names}
             yield f"{which} too small ({words})", {name: (name, factor) for name in names}
-
-
-def _begins_near(spacecraft: Spacecraft, record: Record) -> bool:
-    """True where the spectrum of a record gives a C/A and a spin that may be those of the file."""
-    model = Model(spacecraft, record)
-    ratio, begin = spacecraft.inertia.C / spacecraft.inertia.A, next(initial_guess.starts(model))
-    near = abs(begin[RATIO] - ratio) < NEAR * ratio
-    return near and abs(begin.get("omega_3", spacecraft.spin) - spacecraft.spin) <= NEAR * abs(spacecraft.spin)
 
 
 LATE = 0.1  # delay of a channel up to which it is that of a valve, s

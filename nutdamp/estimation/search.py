@@ -29,6 +29,7 @@ from nutdamp.estimation.parameters import KIND, SUN_PULSE, Matrix, Vector, quant
 from nutdamp.spacecraft.model import Spacecraft
 
 NORMAL_MAD = 1.4826  # standard deviation of normal numbers over their median magnitude
+BROKEN = 0.2  # part of the samples of a sensor that are alike, no motion or left out where it is broken
 ABSURD = 1e3  # times the usual size of a signal from which on a sample is no motion
 ROUNDING = 1e-7  # noise that a signal has at least, as a share of its largest value: no telemetry has more digits
 EVALUATIONS = 60  # trials of one of the last least-squares searches, at most

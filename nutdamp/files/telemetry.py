@@ -29,7 +29,7 @@ from nutdamp.estimation.parameters import (
     Record,
     of_quaternions,
 )
-from nutdamp.estimation.search import absurd
+from nutdamp.estimation.search import BROKEN, absurd
 from nutdamp.files.ccsds.read import History, is_history, read_history
 from nutdamp.files.tabular import HEADER as TRACK
 from nutdamp.files.tabular import Table
@@ -77,7 +77,6 @@ MEANT: dict[str, Sequence[str]] = {
 }
 """Beginnings of names of columns that are meant to be measured, and the columns that there are of the kind."""
 
-SPARSE = 0.2  # part of a signal below which samples that are no motion are left out
 SAME = 0.03  # part by which a ratio of rates may differ from that of two units
 
 
@@ -107,7 +106,7 @@ def _read_samples(path: str | Path, spacecraft: Spacecraft, schedule: Schedule) 
     signals = _signals(table, columns, spacecraft)
     for name in sorted(KIND.keys() & signals.keys()):
         out = absurd(spacecraft, name, signals[name])
-        if 0.0 < out.mean() < SPARSE:
+        if 0.0 < out.mean() <= BROKEN:
             signals[name][out] = math.nan
             table.warned.append(f"{path}: {name}: {out.sum()} samples that no motion shows are left out")
     _expect_unit(table, signals, spacecraft.spin)

@@ -105,13 +105,21 @@ FAULTS: dict[str, Fault] = {
 }
 """The first ten are for CI."""
 
-NO_RECORD_TELLS = {"signs"}
+
+def untellable(number: int, fault: str) -> bool:
+    """True where no record tells the fault: of two transverse signals both signs; of a lone one its sign and size."""
+    return False
 
 
 def record_of(folder: Path, number: int) -> Telemetry:
     """Telemetry of a number, of the kind whose turn it is."""
     kinds = (*KINDS, *CROSSED)
     return telemetry(folder, 7000 + number, kinds[number % len(kinds)])
+
+
+def _apart(name: str, difference: float) -> float:
+    """A difference of two estimates; turns about the axis count without whole ones."""
+    return math.remainder(difference, 2.0 * math.pi) if name == "attitude_3" else difference
 
 
 def outcome(folder: Path, number: int, fault: str) -> tuple[str, float, str]:
@@ -136,7 +144,7 @@ def outcome(folder: Path, number: int, fault: str) -> tuple[str, float, str]:
     if refused(fitted):
         return "refused", 0.0, ", ".join(fitted.causes)
     off = {
-        each.name: abs(fitted.named[each.name] - told.truth[each.name]) / sigma
+        each.name: abs(_apart(each.name, fitted.named[each.name] - told.truth[each.name])) / sigma
         for each, sigma in zip(fitted.model.parameters, fitted.sigmas, strict=True)
         if each.name in told.truth and not each.name.startswith(SENSORS)
     }
