@@ -300,6 +300,7 @@ LABELS = {
     "bias": ("bias of {}", "deg/s", 1.0 / DEG),
     "misalignment": ("gyros tilted about {}", "deg", 1.0 / DEG),
     "wobble": ("axis tilted about {}", "deg", 1.0 / DEG),
+    "attitude": ("attitude about {}", "deg", 1.0 / DEG),
     "thrust": ("thrust factor of {}", "", 1.0),
     "delay": ("delay of {}", "ms", 1e3),
 }
@@ -308,7 +309,8 @@ LABELS = {
 def _of_others(fitted: Fit) -> Iterator[Estimate]:
     for parameter in fitted.model.parameters:
         kind, _, which = parameter.name.partition(" " if " " in parameter.name else "_")
-        if kind not in LABELS:
+        # An attitude without tolerance is told by the data alone.
+        if kind not in LABELS or (kind == "attitude" and math.isinf(parameter.prior)):
             continue
         label, unit, factor = LABELS[kind]
         if which == "acceleration":
