@@ -250,8 +250,9 @@ def _of_motion(fitted: Fit, time: float) -> Iterator[Estimate]:
         ("phase", "phase arg(ω1 + iω2)", "deg", phase, None),
     )
     for (key, label, unit, known, prior), (value, sigma) in zip(rows, _each(fitted, motion), strict=True):
-        shown = sigma if key != "phase" or (model.record.shows_turn and not fitted.constant) else math.inf
-        yield Estimate(key, label, unit, 1.0 / DEG, value, shown, known, prior)
+        shown = sigma if key != "phase" or model.record.shows_turn else math.inf
+        if key != "phase" or not fitted.constant:  # without nutation there is none
+            yield Estimate(key, label, unit, 1.0 / DEG, value, shown, known, prior)
 
 
 def _sigma_of(tolerance: Tolerance | None, nominal: float) -> float | None:

@@ -192,6 +192,14 @@ def test_what_coarse_steps_do_to_an_estimate_is_in_its_sigma(run: Run, tmp_path:
     assert results(tmp_path)["kept"] == ["bias_omega_3"]
 
 
+def test_what_a_steady_spin_does_not_tell_is_as_the_file_has_it(run: Run, tmp_path: Path) -> None:
+    assert run("fit", str(case("fit-steady-spin.csv")), str(case("fit-tiny.yaml")), "--json", "f.json").returncode == 0
+    rows = estimates(tmp_path)
+    assert (rows["nutation"]["value"], rows["spin"]["value"]) == (0.0, pytest.approx(math.degrees(3.0)))
+    assert rows.keys().isdisjoint({"phase", "C/A"})
+    assert results(tmp_path)["kept"] == ["bias_omega_1", "bias_omega_2", "bias_omega_3"]
+
+
 def test_what_is_far_from_the_file_is_written_where_that_is_accepted(run: Run, tmp_path: Path) -> None:
     """Both values are said; a column that was swapped makes C/A another one, and so does what it leads to."""
     files = str(case("fit-gyro-swap12.csv")), str(case("fit-sc.yaml"))
