@@ -56,6 +56,7 @@ from nutdamp.spacecraft.model import Spacecraft
 
 FEWEST = 20  # number of samples that are alike in a row where a sensor is stuck, at least
 COARSE = 10  # a record that has so few different values is one of coarse steps
+NOTHING = 1e-12  # times the usual size of a signal below which it shows 0
 OFTEN = 1.5  # radians of spin between two samples up to which a direction is seen to go round
 
 
@@ -102,7 +103,8 @@ def _sensors(model: Model) -> Iterator[tuple[str, Vector, Vector]]:
         if name == CROSSING:
             yield f"the elevation of {name}", times, values[:, 2:3].round(12)
         elif name != SUN_PULSE:
-            yield name, times, values
+            least = NOTHING * usual(model.spacecraft, KIND[name].unit)
+            yield name, times, np.where(np.abs(values) > least, values, 0.0)
 
 
 def expect_enough(model: Model) -> None:

@@ -456,24 +456,6 @@ def doubts(fitted: Fit) -> Iterator[Note]:
     model = fitted.model
     if not fitted.finished:
         yield note("fit-cut")
-    yield from _of_file(fitted)
-    if fitted.constant:
-        yield note("signal-constant", signals=", ".join(fitted.constant))
-    if fitted.coarse:
-        yield note("fit-coarse", signals=", ".join(fitted.coarse))
-    if initial_guess.too_slow(model, fitted.values):
-        yield note("fit-sampled-below", every_s=initial_guess.interval(model))
-    if model.unequal and model.spacecraft.inertia.symmetric:
-        apart = 200.0 * math.hypot(fitted.named["unequal_1"], fitted.named["unequal_2"])
-        yield note("fit-unequal-moments", apart_percent=apart)
-    if not model.record.shows_turn:
-        yield note("fit-phase-of-file", signals=", ".join(model.signals))
-    yield from _of_residuals(fitted)
-    yield from _of_schedule(fitted)
-
-
-def _of_file(fitted: Fit) -> Iterator[Note]:
-    """Differences from the file, with both values, and their causes."""
     if far := far_from_file(fitted):
         pairs = ((row, row.factor * row.value, row.factor * (row.file or 0.0), off) for row, off in far)
         texts = (
@@ -487,6 +469,23 @@ def _of_file(fitted: Fit) -> Iterator[Note]:
         yield note("fit-cause", causes=" or ".join(fitted.causes))
     if refused(fitted):
         yield note("fit-refused")
+    if fitted.constant:
+        yield note("signal-constant", signals=", ".join(fitted.constant))
+    if fitted.coarse:
+        yield note("fit-coarse", signals=", ".join(fitted.coarse))
+    if initial_guess.too_slow(model, fitted.values):
+        yield note("fit-sampled-below", every_s=initial_guess.interval(model))
+    if model.unequal and model.spacecraft.inertia.symmetric:
+        apart = 200.0 * math.hypot(fitted.named["unequal_1"], fitted.named["unequal_2"])
+        yield note("fit-unequal-moments", apart_percent=apart)
+    if not model.record.shows_turn:
+        yield note("fit-phase-of-file", signals=", ".join(model.signals))
+    yield from _of_residuals(fitted)
+    record = model.record
+    outside = len(record.schedule) - len(record.fired)
+    if outside:
+        span = {"start_s": record.start, "end_s": record.end}
+        yield note("fit-pulses-outside", outside=outside, pulses=len(record.schedule), **span)
 
 
 def _of_residuals(fitted: Fit) -> Iterator[Note]:
@@ -500,15 +499,6 @@ def _of_residuals(fitted: Fit) -> Iterator[Note]:
         yield note("fit-steps-beside-schedule" if fired else "fit-steps", signals=signals, at_s=time)
     else:
         yield note("fit-not-white", signals=signals)
-
-
-def _of_schedule(fitted: Fit) -> Iterator[Note]:
-    """Differences between the schedule and the firings in the record."""
-    record = fitted.model.record
-    outside = len(record.schedule) - len(record.fired)
-    if outside:
-        span = {"start_s": record.start, "end_s": record.end}
-        yield note("fit-pulses-outside", outside=outside, pulses=len(record.schedule), **span)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

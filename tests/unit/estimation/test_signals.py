@@ -406,6 +406,7 @@ def test_signals_of_zeros_are_sensors_that_are_off() -> None:
     axis = dict(zip(AXIS, np.tile([[0.6], [0.0], [0.8]], 240), strict=True))
     for signals, named in (
         (dict.fromkeys(GYROS, zeros), GYROS),
+        (dict(noisy(times, 1e-290 * np.ones((240, 3))).signals) | {GYROS[2]: 1e-300 * times}, GYROS[2:]),
         (dict.fromkeys(GYROS[:2], zeros), GYROS[:2]),
         (axis, ["axis"]),
         (axis | {GYROS[2]: zeros + 3.0}, ["axis"]),
