@@ -529,8 +529,7 @@ def fit(
     >>> nutdamp.fit("flight.csv", body, ignored=print).spacecraft().name
     'Sounder-1'
     """
-    from nutdamp.estimation.fit import fit as fitted
-    from nutdamp.estimation.results import Fitted, doubts
+    from nutdamp.estimation.results import Fitted, compared, doubts
     from nutdamp.files.schedules import read_pulses
     from nutdamp.files.telemetry import read_telemetry
     from nutdamp.planning.plan import Plan
@@ -545,7 +544,7 @@ def fit(
     record, remarks = read_telemetry(name, body, times, fired)
     for remark in (*odd, *remarks):
         (ignored or warn)(remark)
-    estimate = fitted(body, record)
+    estimate = compared(body, record)
     for entry in doubts(estimate) if ignored is None else ():
         warn(text(entry))
     return Fitted(estimate, tuple(remarks))

@@ -40,6 +40,7 @@ from nutdamp.cli.options import (
 from nutdamp.cli.plan import flown_options, fronts_of, plan_or_read
 from nutdamp.cli.screen import say
 from nutdamp.common.work import SAMPLES
+from nutdamp.errors import printable
 from nutdamp.schemes.catalogue import LEAST, OPTIMAL
 from nutdamp.units import LARGEST_SEED, shifts, thresholds, tilt
 
@@ -209,10 +210,11 @@ def budget_command(job: Job, pairs: tuple[Angles, ...], largest: float | None, s
 @click.option("--sun-pulses", type=FILE, help="Times of Sun pulses, a CSV file: t_s or utc, and any sun_aspect_deg.")
 @click.option("--at", type=UnitType("time"), default=0.0, help="Show and write the motion at this time; default 0 s.")
 @click.option("-o", "--output", type=OUTPUT, help="Write the spacecraft file with the estimates in it.")
+@click.option("--accept", is_flag=True, help="Accept an estimate that is far from the file: -o writes it.")
 @click.option("--json", type=OUTPUT, help="Write estimates, covariance and signals.")
 @click.option("--plot", type=OUTPUT, help="Draw data, fit and residuals (.png, .svg, .pdf; needs extra plot).")
 @screen_options
-def fit_command(job: Job, telemetry: str, sun_pulses: str | None, at: float, verbose: bool) -> None:
+def fit_command(job: Job, telemetry: str, sun_pulses: str | None, at: float, accept: bool, verbose: bool) -> None:
     """Estimate motion, C/A, dissipation and sensor errors from telemetry, and thrust factors from pulses fired in it.
 
     TELEMETRY.csv has t_s or utc, and any of omega_1_rad_s, omega_2_rad_s, omega_3_rad_s (or _deg_s), axis_ra_deg and
@@ -226,13 +228,14 @@ def fit_command(job: Job, telemetry: str, sun_pulses: str | None, at: float, ver
       nutdamp fit flight.csv -o now.yaml --at 90s
       nutdamp plan now.yaml
 
-    Exit status 3 where nothing can be estimated, several nutation rates fit equally well, or residuals are no noise,
-    as with a pulse that --schedule does not have. SPACECRAFT and FILE are as for `nutdamp plan`.
+    Exit status 3 where nothing can be estimated, several nutation rates fit equally well, residuals are no noise, as
+    with a pulse that --schedule does not have, or the estimate is far from the file: then -o needs --accept.
+    SPACECRAFT and FILE are as for `nutdamp plan`.
     """
     body = job.begin()
 
     from nutdamp.api import fit
-    from nutdamp.estimation.results import carried
+    from nutdamp.estimation.results import carried, refused
     from nutdamp.files.carried import notes
     from nutdamp.views.fit import fit_screen
 
@@ -240,7 +243,12 @@ def fit_command(job: Job, telemetry: str, sun_pulses: str | None, at: float, ver
         fitted = fit(telemetry, body, schedule=job.flown.schedule, sun_pulses=sun_pulses, ignored=job.doubt)
     job.note(notes(fitted.core, carried(fitted.core, at)))
     files: Files = {"output": partial(fitted.text, at), "json": partial(fitted.to_dict, at)}
+    doubtful, output = bool(refused(fitted.core)) and not accept, job.written["output"]
+    if doubtful and output is not None:
+        del files["output"]
+        say(f"{printable(output)} was not written: the estimate is far from the file (--accept writes it)")
     job.deliver(fitted, partial(fit_screen, fitted.core, at, verbose=verbose), more=files)
+    leave(infeasible=doubtful)
 
 
 FIGURES = ("overview", "cases", "momentum")  # figures that ``--plot`` draws

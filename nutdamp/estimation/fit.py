@@ -8,7 +8,7 @@ sigmas would mean nothing.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -19,13 +19,29 @@ from nutdamp.errors import Infeasible
 from nutdamp.estimation import initial_guess
 from nutdamp.estimation.initial_guess import once_a_turn, starts
 from nutdamp.estimation.model import Model
-from nutdamp.estimation.parameters import BODY, GYROS, KIND, RATIO, SPACE, SUN_PULSE, Matrix, Record, Vector
+from nutdamp.estimation.parameters import (
+    BODY,
+    CROSSING,
+    GYROS,
+    KIND,
+    RATIO,
+    SPACE,
+    SUN_PULSE,
+    Matrix,
+    Record,
+    Vector,
+    quantisation,
+)
 from nutdamp.estimation.search import (
+    BROKEN,
     NORMAL_MAD,
+    ROUNDING,
     Fit,
+    absurd,
     covariance_of,
     jacobian,
     least,
+    named_of,
     plain,
     residuals,
     robust,
@@ -33,49 +49,62 @@ from nutdamp.estimation.search import (
     search,
     share_left,
     units_of,
+    usual,
 )
 from nutdamp.physics import body as rigid_body
 from nutdamp.spacecraft.model import Spacecraft
 
-STUCK = 0.2  # part of the samples of a sensor that are alike in a row where it is stuck
-FEWEST = 20  # number of them, at least
+FEWEST = 20  # number of samples that are alike in a row where a sensor is stuck, at least
 COARSE = 10  # a record that has so few different values is one of coarse steps
+NOTHING = 1e-12  # times the usual size of a signal below which it shows 0
+OFTEN = 1.5  # radians of spin between two samples up to which a direction is seen to go round
 
 
-def expect_alive(model: Model) -> None:
-    """Raise Infeasible for a sensor that does not change, all along while another one shows a nutation, or for long.
+def expect_alive(model: Model) -> tuple[str, ...]:
+    """The signals of a body that spins steadily, and do not change; none where a signal shows a nutation.
 
-    So it does for gyros that show no motion at all, not even the spin.
+    Raises Infeasible for sensors that are dead or stuck, all along or for long, and for samples that are no motion.
     """
-    gyros = np.isin(np.array(model.signals)[model.signal], GYROS)
     held = model.spacecraft.inertia.wheel != 0.0  # by a wheel a body may stand still
-    if GYROS[2] in model.signals and not held and not model.measured[gyros].any():
-        raise Infeasible("the gyros show 0 all along: they are off; leave their columns out")
-    shows = [index for index, name in enumerate(model.signals) if KIND[name].nutation]
-    varying = [index for index in shows if _run(model, index)[3] > 1]
-    for index, signal in enumerate(model.signals):
-        if signal == SUN_PULSE:
-            continue
-        begins, ends, alike, different = _run(model, index)
-        if alike < max(FEWEST, STUCK * len(model.samples[index])):
-            continue
+    shown = {name: (times, values) for name, times, values in _sensors(model)}
+    constant = {name for name, (_, values) in shown.items() if (values == values[0]).all()}
+    moves = {name for name, (_, values) in shown.items() if values.any()}
+    spins = {GYROS[2]} if held else {GYROS[2]} & moves
+    # Gyros without noise show a spin so; everything else that does not change is a sensor that is off.
+    steady = {*GYROS} == constant == {*shown} and moves <= spins and bool(spins)
+    faults = []
+    for name, (times, values) in shown.items():
+        edges = np.concatenate([[0], np.flatnonzero(np.diff(values, axis=0).any(axis=1)) + 1, [len(values)]])
+        at, alike = int(np.argmax(np.diff(edges))), int(np.diff(edges).max())
+        begins, ends = times[edges[at]], times[edges[at + 1] - 1]
         # That gyro 3 does not change all along is as it should be.
-        dead = different == 1 and signal != GYROS[2] and bool(set(varying) - {index})
-        if dead or different > COARSE:
-            while_others = " while others show a nutation" if dead else ""
-            raise Infeasible(
-                f"{signal} does not change from {begins:.4g} s to {ends:.4g} s ({alike} samples){while_others}: "
-                "the sensor is dead or stuck; leave its column out, or end the record before"
-            )
+        off = not steady and name not in spins if name in constant else len(np.unique(values, axis=0)) > COARSE
+        if name in KIND and np.mean(absurd(model.spacecraft, name, values)) > BROKEN:
+            faults.append(f"{name} shows {np.abs(values).max():.3g} {KIND[name].unit}, which no motion is")
+        elif off and alike >= max(min(FEWEST, len(values)), BROKEN * len(values)):
+            faults.append(f"{name} does not change from {begins:.4g} s to {ends:.4g} s ({alike} samples)")
+    if faults:
+        shows = {name for name in model.signals if KIND[name].nutation}
+        others = " while others show a nutation" if constant & shows and shows - constant else ""
+        cure = "the sensor is dead or stuck; leave its column out, or end the record before"
+        raise Infeasible(f"{'; '.join(faults)}{others}: {cure}")
+    return GYROS if steady else ()
 
 
-def _run(model: Model, index: int) -> tuple[float, float, int, int]:
-    """First and last time (s) and number of the most samples of a signal in a row that are alike; how many differ."""
-    values, times = model.samples[index], model.times[model.signal == index]
-    edges = np.concatenate([[0], np.flatnonzero(np.diff(values, axis=0).any(axis=1)) + 1, [len(values)]])
-    at = int(np.argmax(np.diff(edges)))
-    first, last = edges[at], edges[at + 1] - 1
-    return float(times[first]), float(times[last]), int(last - first + 1), len(np.unique(values, axis=0))
+def _sensors(model: Model) -> Iterator[tuple[str, Vector, Vector]]:
+    """Names of what changes while a body moves, times (n,) s and values (n, k) of each; of directions the angles."""
+    for index, name in enumerate(model.signals):
+        values = model.samples[index]
+        times = model.times[model.signal == index][: len(values)]
+        # A slit sees a direction at one azimuth, once a turn; what sees it more often sees it go round.
+        often = len(times) > 1 and float(np.median(np.diff(times))) * abs(model.spacecraft.spin) < OFTEN
+        if name == CROSSING and often:
+            yield f"the azimuth of {name}", times, np.arctan2(values[:, 1], values[:, 0]).round(12)[:, None]
+        if name == CROSSING:
+            yield f"the elevation of {name}", times, values[:, 2:3].round(12)
+        elif name != SUN_PULSE:
+            least = NOTHING * usual(model.spacecraft, KIND[name].unit)
+            yield name, times, np.where(np.abs(values) > least, values, 0.0)
 
 
 def expect_enough(model: Model) -> None:
@@ -119,6 +148,12 @@ def expect_explained(fitted: Fit) -> None:
     So it does where samples are left out that follow each other: outliers come one by one, motion does not.
     """
     model = fitted.model
+    for index, signal in enumerate(model.signals):
+        out = float(np.mean(~fitted.used[model.signal == index]))
+        if out > BROKEN:
+            raise Infeasible(
+                f"the motion fitted does not explain {signal}: {100.0 * out:.0f} % of it would be left out"
+            )
     burst = left_out_together(fitted)
     if burst is not None:
         signal, begins, ends, count = burst
@@ -245,6 +280,8 @@ UNLIKELY = 4.0  # sigmas of the file by which a parameter may be off before the 
 PARTS = (0.5, 0.25, 0.1, 0.04)  # parts of the record that it then begins with
 SEEN = 4.5  # standard deviations of |ω| from which on there is a nutation
 UNEQUAL = 5.0  # sigmas from which on the transverse moments count as different, or such a body as dissipating
+LARGE = 0.42  # noise of a signal, in its steps, below which these are large: they make 0.29 of it alone
+LOST = 1e-7  # least singular value of derivatives of length 1 from which on they are independent
 UNEQUAL_BY = ("unequal_1", "unequal_2")  # the parameters of unequal transverse moments
 
 
@@ -254,9 +291,10 @@ def fit(spacecraft: Spacecraft, record: Record) -> Fit:
     Raises Infeasible where that is nothing, BadRequest where the file does not describe what a signal needs.
     """
     with work.budget("fit", work.FIT * max(1.0, len(record.times) / work.FITTED)) as spent:
-        best = _fitted(spacecraft, record)
+        best = _with_steps(_fitted(spacecraft, record))
     try:
         expect_explained(best)
+        expect_told(best)
     except Infeasible as error:
         if not spent.exhausted:
             raise
@@ -270,7 +308,8 @@ def _fitted(spacecraft: Spacecraft, record: Record) -> Fit:
     # Three moments and dissipation together take an integration: only where both are seen.
     model = Model(spacecraft, record, growing=spacecraft.inertia.symmetric)
     expect_enough(model)
-    expect_alive(model)
+    if constant := expect_alive(model):
+        return _steady(Model(spacecraft, record, growing=False), constant)
     fitted = _settled(model, _best(model))
     _expect_seen(fitted)
     fitted = initial_guess.likeliest(
@@ -290,6 +329,49 @@ def _fitted(spacecraft: Spacecraft, record: Record) -> Fit:
         return _grown_a_little(unequal, grown)
     begin[of_moments] = _begun(unequal, three)[of_moments]
     return _settled(three, begin)
+
+
+def _steady(model: Model, constant: tuple[str, ...]) -> Fit:
+    """The fit of gyros that show the spin alone, without noise: what no motion tells is exactly as the file has it."""
+    shown = {name: float(model.samples[model.signals.index(name)][0, 0]) for name in GYROS}
+    values = np.array([shown.get(each.name, each.file) for each in model.parameters])
+    noise = np.maximum(least(model), ROUNDING * usual(model.spacecraft, "rad/s"))
+    slopes, used = jacobian(model, values, range(len(values))), np.ones(len(model.measured), dtype=bool)
+    scaled = slopes / noise[model.signal, None]
+    told = np.concatenate([scaled, model.prior[0]]).any(axis=0)
+    covariance = np.where(np.outer(told, told), covariance_of(model, scaled), 0.0)
+    return Fit(model, values, covariance, noise, used, residuals(model, values), slopes, constant=constant)
+
+
+def _with_steps(fitted: Fit) -> Fit:
+    """The fit with what steps that are large beside the noise do to it in its covariance, and their signals named.
+
+    Between such steps errors are no noise, which averages out, but follow from the motion: least squares of what steps
+    make of the prediction is off by δ, and δ δᵀ adds to P. The motion that they were made of is that without δ.
+    """
+    model, used, off = fitted.model, fitted.used, np.zeros(len(fitted.values))
+    loud = [at for at, name in enumerate(model.signals) if not KIND[name].off]
+    found = ((at, model.signal == at, quantisation(model.measured[model.signal == at])) for at in loud)
+    steps = [(at, rows, step) for at, rows, step in found if fitted.noise[at] < LARGE * step]
+    weights = fitted.jacobian[used] / fitted.noise[model.signal[used], None] ** 2
+    for _ in range(3 if steps else 0):  # of a motion that is less off each time
+        shown, errors = model.predicted(named_of(model, fitted.values - off)), np.zeros(len(used))
+        for _, rows, step in steps:
+            away = (shown[rows] - model.measured[rows][0]) / step
+            errors[rows] = step * (np.rint(away) - away)
+        off = fitted.covariance @ (weights.T @ errors[used])
+    covariance, coarse = fitted.covariance + np.outer(off, off), tuple(model.signals[at] for at, _, _ in steps)
+    return replace(fitted, covariance=covariance, coarse=coarse)
+
+
+def expect_told(fitted: Fit) -> None:
+    """Raise Infeasible where neither the data nor the file tell a parameter, or several only together."""
+    free = [at for at, each in enumerate(fitted.model.parameters) if math.isinf(each.prior)]
+    told = fitted.jacobian[fitted.used][:, free] / fitted.noise[fitted.model.signal[fitted.used], None]
+    sizes = np.linalg.norm(told, axis=0)
+    if not fitted.constant and (not sizes.all() or np.linalg.svd(told / sizes, compute_uv=False)[-1] < LOST):
+        names = ", ".join(fitted.model.parameters[at].name for at in free)
+        raise Infeasible(f"the record does not tell all of {names}: a sensor is dead, or more signals are needed")
 
 
 def _shows_growth(narrow: Fit, wider: Model) -> bool:

@@ -6,21 +6,37 @@ The checks name what makes a fit doubtful though its sigmas are small. `Fitted` 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from itertools import combinations
 from os import PathLike
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from nutdamp.common import results
-from nutdamp.common.numerics import finite
+from nutdamp.common import results, work
+from nutdamp.common.numerics import RPM, finite
 from nutdamp.common.results import Note, note
+from nutdamp.errors import Infeasible
 from nutdamp.estimation import initial_guess
-from nutdamp.estimation.fit import step
-from nutdamp.estimation.model import OF_SENSORS, Body
-from nutdamp.estimation.parameters import EXACT, RATIO, Matrix, Values, Vector, in_moments, prior_of, thrust_prior
-from nutdamp.estimation.search import KEPT, Fit
+from nutdamp.estimation.fit import expect_alive, expect_enough, fit, step
+from nutdamp.estimation.model import OF_SENSORS, Body, Model
+from nutdamp.estimation.parameters import (
+    ACCELERATION,
+    AXIS,
+    EXACT,
+    GYROS,
+    RATIO,
+    SEEN,
+    Matrix,
+    Record,
+    Values,
+    Vector,
+    in_moments,
+    prior_of,
+    thrust_prior,
+)
+from nutdamp.estimation.search import Fit, unmoved
 from nutdamp.physics import attitude
 from nutdamp.physics.triaxial import arc_cones
 from nutdamp.spacecraft.model import Spacecraft, SpinState
@@ -33,7 +49,6 @@ DEG = math.pi / 180.0
 UNTOLD, SHARED, TOLD = "file", "both", "data"  # sources of an estimate: the file's tolerances, both, or the data
 
 FROM_DATA = 0.5  # share of its prior that a sigma is below where the data tell a value
-FROM_FILE = KEPT  # share above which they do not
 CORRELATED = 1e-3  # correlations below are left out of files
 DIGITS = 9  # decimals of correlations in files
 LEAST_THRUST = 0.05  # thrust factor down to which a channel did not fire: it is not calibrated by that
@@ -62,7 +77,8 @@ class Estimate(NamedTuple):
             return UNTOLD
         if self.prior is None or self.sigma <= FROM_DATA * self.prior:
             return TOLD
-        return UNTOLD if self.sigma > FROM_FILE * self.prior else SHARED
+        assert self.file is not None
+        return UNTOLD if unmoved(self.value - self.file, self.sigma, self.prior) else SHARED
 
     @property
     def change(self) -> float | None:
@@ -235,7 +251,8 @@ def _of_motion(fitted: Fit, time: float) -> Iterator[Estimate]:
     )
     for (key, label, unit, known, prior), (value, sigma) in zip(rows, _each(fitted, motion), strict=True):
         shown = sigma if key != "phase" or model.record.shows_turn else math.inf
-        yield Estimate(key, label, unit, 1.0 / DEG, value, shown, known, prior)
+        if key != "phase" or not fitted.constant:  # without nutation there is none
+            yield Estimate(key, label, unit, 1.0 / DEG, value, shown, known, prior)
 
 
 def _sigma_of(tolerance: Tolerance | None, nominal: float) -> float | None:
@@ -284,6 +301,7 @@ LABELS = {
     "bias": ("bias of {}", "deg/s", 1.0 / DEG),
     "misalignment": ("gyros tilted about {}", "deg", 1.0 / DEG),
     "wobble": ("axis tilted about {}", "deg", 1.0 / DEG),
+    "attitude": ("attitude about {}", "deg", 1.0 / DEG),
     "thrust": ("thrust factor of {}", "", 1.0),
     "delay": ("delay of {}", "ms", 1e3),
 }
@@ -292,7 +310,8 @@ LABELS = {
 def _of_others(fitted: Fit) -> Iterator[Estimate]:
     for parameter in fitted.model.parameters:
         kind, _, which = parameter.name.partition(" " if " " in parameter.name else "_")
-        if kind not in LABELS:
+        # An attitude without tolerance is told by the data alone.
+        if kind not in LABELS or (kind == "attitude" and math.isinf(parameter.prior)):
             continue
         label, unit, factor = LABELS[kind]
         if which == "acceleration":
@@ -311,14 +330,125 @@ def _at(fitted: Fit, name: str) -> tuple[float, float]:
 
 def correlated(fitted: Fit) -> tuple[tuple[str, str, float], ...]:
     """Pairs of parameters that are known together much better than apart, and their correlations."""
-    matrix = fitted.covariance / np.outer(fitted.sigmas, fitted.sigmas)
+    scale = np.where(fitted.sigmas > 0.0, fitted.sigmas, 1.0)
+    matrix = fitted.covariance / np.outer(scale, scale)
     names = [parameter.name for parameter in fitted.model.parameters]
     pairs = [(names[i], names[j], float(matrix[i, j])) for i in range(len(names)) for j in range(i)]
     return tuple(sorted((pair for pair in pairs if abs(pair[2]) > WORTH_NAMING), key=lambda pair: -abs(pair[2])))
 
 
-LATE = 0.1  # delay of a channel from which on the times of the schedule are doubted, s: valves are faster
-SURE = 3.0  # standard deviations from which on a doubt is said
+FAR, REFUSED = 3.0, 5.0  # sigmas of the file by which a constant is off that is said, and that is not accepted
+UNSAID = 0.1  # tolerance of C/A, of unequal moments and of thrust where the file gives none
+OTHER_SPIN = 0.01  # part by which a spin is off that is said
+
+
+def far_from_file(fitted: Fit, least: float = FAR) -> list[tuple[Estimate, float]]:
+    """The constants that are farther off than ``least`` sigmas of the file, with their own, and by how many."""
+    far = []
+    for row in (*_of_body(fitted), *_of_others(fitted)):
+        file, usual = row.file or 0.0, row.key.startswith((RATIO, "unequal", "thrust"))
+        unsaid = UNSAID * (file if row.key == RATIO else 1.0) if usual else math.inf
+        off = (row.value - file) / math.hypot(row.prior or unsaid, row.sigma)
+        if row.key != "a" and abs(off) > least:
+            far.append((row, off))
+    return far
+
+
+def spin_off(fitted: Fit) -> tuple[float, float] | None:
+    """The spin at the start of the record and that of the file, rad/s, where they differ."""
+    row, file = next(_of_motion(fitted, fitted.model.start)), fitted.model.spacecraft.spin
+    least = min(FAR * row.prior if row.prior else math.inf, OTHER_SPIN * abs(file) or math.inf)
+    return (row.value, file) if abs(row.value - file) > max(least, FAR * row.sigma) else None
+
+
+def refused(fitted: Fit) -> bool:
+    """True where an estimate is not accepted: constants are much too far from the file, or columns are wrong."""
+    # A bias belongs to the sensor, and what the file says of it is usual, not of this one.
+    far = any(not row.key.startswith("bias") for row, _ in far_from_file(fitted, REFUSED))
+    return far or bool(fitted.causes)
+
+
+TURNED = {AXIS[1]: "axis_y, or of the right ascension,", AXIS[2]: "axis_z, or of the declination,",
+          SEEN[1]: "the azimuth of crossing", SEEN[2]: "the elevation of crossing"}  # fmt: skip
+UNITS = ((180.0 / math.pi, "57.3, rad for deg"), (30.0 / math.pi, "9.55, rad/s for rpm"), (6.0, "6, rpm for deg/s"))
+FASTER, SAME = (
+    5.0,
+    1.3,
+)  # times the file's transverse rate from which on units are doubted, up to which it is the file's
+ALIKE = 2.0  # times the distance of the nearest motion from the file up to which others count as well
+NEAR = 0.35  # part of C/A and of the spin by which the start of a fit may be off the file to be followed
+
+
+def compared(spacecraft: Spacecraft, record: Record) -> Fit:
+    """The `fit` of a record; where it is far from the file, with what done to its columns would bring it back.
+
+    Raises as `fit` does, with that in its words.
+    """
+    model = Model(spacecraft, record)
+    expect_enough(model)
+    expect_alive(model)  # nothing done to the columns makes up for a sensor that is dead
+    try:
+        fitted = fit(spacecraft, record)
+    except Infeasible as error:
+        if causes := _causes(spacecraft, record):
+            raise Infeasible(f"{error}; {' or '.join(causes)} would explain the record") from None
+        raise
+    if _near(fitted, FASTER):
+        return fitted
+    # A nutation that is many times that of the file may be true: only a unit that leads to the file's explains it.
+    return replace(fitted, causes=_causes(spacecraft, record, SAME if _near(fitted, math.inf) else FASTER))
+
+
+def _near(fitted: Fit, most: float) -> bool:
+    """True where constants and spin are those of the file, and the transverse rate at ``most`` so many times."""
+    size = math.hypot(fitted.named["omega_1"], fitted.named["omega_2"])
+    slow = size < most * float(np.linalg.norm(fitted.model.reference.rates[:2])) or math.isinf(most)
+    return slow and not far_from_file(fitted) and spin_off(fitted) is None
+
+
+def _causes(spacecraft: Spacecraft, record: Record, most: float = FASTER) -> tuple[str, ...]:
+    """Mistakes by which a motion and a body near to the file explain a record, the nearest first."""
+    explained = []
+    of_file = {RATIO: spacecraft.inertia.C / spacecraft.inertia.A, "omega_3": spacecraft.spin}
+    with work.budget("causes", 0.5 * work.FIT):
+        for words, changes in _mistakes():
+            if not record.has(*changes) or work.exhausted():
+                continue
+            changed = {name: factor * record.signals[source] for name, (source, factor) in changes.items()}
+            mended = replace(record, signals={**record.signals, **changed})
+            try:
+                begin = next(initial_guess.starts(Model(spacecraft, mended)))
+                near = all(abs(begin.get(name, file) - file) <= NEAR * abs(file) for name, file in of_file.items())
+                fitted = fit(spacecraft, mended) if near else None
+            except (Infeasible, np.linalg.LinAlgError):
+                continue
+            if fitted is not None and fitted.finished and _near(fitted, most) and _shows(fitted, changes):
+                off = fitted.model.reference.rates[:2] - [fitted.named["omega_1"], fitted.named["omega_2"]]
+                explained.append((float(np.linalg.norm(off)), words))
+    return tuple(words for off, words in sorted(explained) if off < ALIKE * min(explained)[0])
+
+
+def _shows(fitted: Fit, names: Iterable[str]) -> bool:
+    """True where motion explains the signals of these names, and not noise."""
+    model, loud = fitted.model, [each for each in (*GYROS[:2], ACCELERATION) if each in names]
+    rows = ((model.signals.index(each), model.record.signals[each]) for each in loud)
+    return all(fitted.noise[at] < 0.5 * np.nanstd(samples) for at, samples in rows)
+
+
+def _mistakes() -> Iterator[tuple[str, Mapping[str, tuple[str, float]]]]:
+    """Mistakes that columns commonly have, in words, and their cures: signals by others, times a factor."""
+    for first, second in (*combinations(GYROS, 2), *combinations(AXIS, 2)):
+        yield f"{first} and {second} swapped", {first: (second, 1.0), second: (first, 1.0)}
+    for name in (*GYROS, ACCELERATION, *AXIS, *SEEN[1:]):
+        yield f"the sign of {TURNED.get(name, name)} turned", {name: (name, -1.0)}
+    for names in (GYROS, GYROS[:2], *((name,) for name in (*GYROS, ACCELERATION))):
+        for factor, words in UNITS:
+            which = ", ".join(names)
+            yield f"{which} too large ({words})", {name: (name, 1.0 / factor) for name in names}
+            yield f"{which} too small ({words})", {name: (name, factor) for name in names}
+
+
+LATE = 0.1  # delay of a channel up to which it is that of a valve, s
 
 
 def doubts(fitted: Fit) -> Iterator[Note]:
@@ -326,17 +456,36 @@ def doubts(fitted: Fit) -> Iterator[Note]:
     model = fitted.model
     if not fitted.finished:
         yield note("fit-cut")
+    if far := far_from_file(fitted):
+        pairs = ((row, row.factor * row.value, row.factor * (row.file or 0.0), off) for row, off in far)
+        texts = (
+            f"{row.label} {value:.6g} for {f'{file:.6g} {row.unit}'.strip()} ({off:+.1f})"
+            for row, value, file, off in pairs
+        )
+        yield note("fit-far", estimates=", ".join(texts))
+    if (spins := spin_off(fitted)) is not None:
+        yield note("fit-spin", spin_rpm=RPM * spins[0], file_rpm=RPM * spins[1])
+    if fitted.causes:
+        yield note("fit-cause", causes=" or ".join(fitted.causes))
+    if refused(fitted):
+        yield note("fit-refused")
+    if fitted.constant:
+        yield note("signal-constant", signals=", ".join(fitted.constant))
+    if fitted.coarse:
+        yield note("fit-coarse", signals=", ".join(fitted.coarse))
     if initial_guess.too_slow(model, fitted.values):
         yield note("fit-sampled-below", every_s=initial_guess.interval(model))
-    if fitted.named.get("omega_3", model.spacecraft.spin) * model.spacecraft.spin < 0.0:
-        yield note("fit-other-sense")
     if model.unequal and model.spacecraft.inertia.symmetric:
         apart = 200.0 * math.hypot(fitted.named["unequal_1"], fitted.named["unequal_2"])
         yield note("fit-unequal-moments", apart_percent=apart)
     if not model.record.shows_turn:
         yield note("fit-phase-of-file", signals=", ".join(model.signals))
     yield from _of_residuals(fitted)
-    yield from _of_schedule(fitted)
+    record = model.record
+    outside = len(record.schedule) - len(record.fired)
+    if outside:
+        span = {"start_s": record.start, "end_s": record.end}
+        yield note("fit-pulses-outside", outside=outside, pulses=len(record.schedule), **span)
 
 
 def _of_residuals(fitted: Fit) -> Iterator[Note]:
@@ -350,21 +499,6 @@ def _of_residuals(fitted: Fit) -> Iterator[Note]:
         yield note("fit-steps-beside-schedule" if fired else "fit-steps", signals=signals, at_s=time)
     else:
         yield note("fit-not-white", signals=signals)
-
-
-def _of_schedule(fitted: Fit) -> Iterator[Note]:
-    """Differences between the schedule and the firings in the record."""
-    record = fitted.model.record
-    outside = len(record.schedule) - len(record.fired)
-    if outside:
-        span = {"start_s": record.start, "end_s": record.end}
-        yield note("fit-pulses-outside", outside=outside, pulses=len(record.schedule), **span)
-    for parameter, value, sigma in zip(fitted.model.parameters, fitted.values, fitted.sigmas, strict=True):
-        kind, _, channel = parameter.name.partition(" ")
-        if kind == "delay" and abs(value) > max(LATE, SURE * sigma):
-            yield note("fit-late" if value < 0.0 else "fit-early", channel=channel, by_s=float(abs(value)))
-        if kind == "thrust" and value < -SURE * sigma:
-            yield note("fit-reversed", channel=channel, thrust_percent=100.0 * float(value))
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -26,8 +26,11 @@ from nutdamp.common.numerics import chi_square_tail
 from nutdamp.errors import Infeasible
 from nutdamp.estimation.model import Model
 from nutdamp.estimation.parameters import KIND, SUN_PULSE, Matrix, Vector, quantisation
+from nutdamp.spacecraft.model import Spacecraft
 
 NORMAL_MAD = 1.4826  # standard deviation of normal numbers over their median magnitude
+BROKEN = 0.2  # part of the samples of a sensor that are alike, no motion or left out where it is broken
+ABSURD = 1e3  # times the usual size of a signal from which on a sample is no motion
 ROUNDING = 1e-7  # noise that a signal has at least, as a share of its largest value: no telemetry has more digits
 EVALUATIONS = 60  # trials of one of the last least-squares searches, at most
 TRIAL = 40  # trials of one from a start, at most, which may lead nowhere
@@ -38,11 +41,11 @@ STEP = 1e-10  # relative change of it, and of the values, from which on a search
 def least(model: Model) -> Vector:
     """Noise that each signal has at least: that of its steps, and rounding."""
     # A signal of zeros has no digits, but its prediction is rounded, as rates and angles are.
-    turned = _usual(model, "rad/s") * model.record.length
+    turned = usual(model.spacecraft, "rad/s") * model.record.length
     rounding, sigmas = float(np.finfo(float).eps) * (1.0 + turned), []
     for index, name in enumerate(model.signals):
         kind, values = KIND[name], model.measured[model.signal == index]
-        step, size = 0.0, _usual(model, kind.unit)
+        step, size = 0.0, usual(model.spacecraft, kind.unit)
         largest = size if kind.off else float(np.abs(values).max())
         if name == SUN_PULSE:
             step = model.record.sun_step
@@ -52,15 +55,20 @@ def least(model: Model) -> Vector:
     return np.array(sigmas)
 
 
-def _usual(model: Model, unit: str) -> float:
+def usual(spacecraft: Spacecraft, unit: str) -> float:
     """Size of the motion in the ``unit`` of a signal: a radian, H3/C, what 1 m off the axis feels.
 
     Of times that in which the body spins by a radian.
     """
     if unit == "s":
-        return 1.0 / abs(model.spacecraft.spin)
-    pace = abs(model.spacecraft.axial) / model.spacecraft.inertia.C
+        return 1.0 / abs(spacecraft.spin)
+    pace = abs(spacecraft.axial) / spacecraft.inertia.C
     return {"rad": 1.0, "rad/s": pace, "m/s²": pace * pace}[unit]
+
+
+def absurd(spacecraft: Spacecraft, name: str, values: Vector) -> NDArray[np.bool_]:
+    """True for samples of a signal that are no motion, however fast; of directions none."""
+    return np.asarray(np.abs(values) > ABSURD * max(usual(spacecraft, KIND[name].unit), 1.0)) & (not KIND[name].off)
 
 
 def robust(model: Model, left: Vector) -> Vector:
@@ -99,9 +107,9 @@ def scales_of(model: Model) -> Vector:
     for index, name in enumerate(model.signals):
         kind, values = KIND[name], model.measured[model.signal == index]
         spread = NORMAL_MAD * float(np.median(np.abs(values - np.median(values))))
-        varies = spread > ROUNDING * _usual(model, kind.unit)
-        usual = kind.spread * (_usual(model, "s") if kind.unit == "s" else 1.0)
-        scales.append(0.1 * spread if varies else usual)
+        varies = spread > ROUNDING * usual(model.spacecraft, kind.unit)
+        before = kind.spread * (usual(model.spacecraft, "s") if kind.unit == "s" else 1.0)
+        scales.append(0.1 * spread if varies else before)
     return np.array(scales)
 
 
@@ -135,8 +143,8 @@ def jacobian(model: Model, values: Vector, which: Iterable[int], *, one_sided: b
 
 def units_of(model: Model) -> Vector:
     """Sizes in which the parameters are searched: their priors, or what is usual."""
-    usual = {"rad/s": 1e-2 * model.spacecraft.fastest, "1/s": 0.1 / max(model.record.length, 1e-9)}
-    sizes = (each.prior if math.isfinite(each.prior) else usual.get(each.unit, 1e-2) for each in model.parameters)
+    of_unit = {"rad/s": 1e-2 * model.spacecraft.fastest, "1/s": 0.1 / max(model.record.length, 1e-9)}
+    sizes = (each.prior if math.isfinite(each.prior) else of_unit.get(each.unit, 1e-2) for each in model.parameters)
     return np.array(list(sizes))
 
 
@@ -199,6 +207,12 @@ CURVED = 7.0
 
 GROWS = 3.0  # standard deviations of κ from which on it shows
 KEPT = 0.9  # share of its prior above which a parameter's sigma is where the data do not tell it
+MOVED = 0.1  # share of its prior from which on a parameter has moved from the file
+
+
+def unmoved(change: float, sigma: float, prior: float) -> bool:
+    """True where the data do not tell a value, and do not move it."""
+    return sigma > KEPT * prior and abs(change) <= MOVED * prior
 
 
 @dataclass(frozen=True, eq=False)
@@ -213,6 +227,9 @@ class Fit:
     residuals: Vector  # (m,) measured less predicted
     jacobian: Matrix  # (m, p)
     finished: bool = True  # unless the search ended with its budget of work
+    constant: tuple[str, ...] = ()  # signals of a steady spin, which do not change
+    coarse: tuple[str, ...] = ()  # signals with steps that are large beside their noise
+    causes: tuple[str, ...] = ()  # what would bring an estimate that is far from the file back to it
 
     @property
     def named(self) -> dict[str, float]:
@@ -242,7 +259,7 @@ class Fit:
         squares by J turns them into the shift s across it that the curve takes there. It is off by s t² at t sigmas:
         of P + `CURVED` Σ s sᵀ the 95 % ellipsoid holds 95 % of a normal t, for any length of s.
         """
-        scale = self.sigmas
+        scale = np.where(self.sigmas > 0.0, self.sigmas, 1.0)
         sizes, turned = np.linalg.eigh(self.covariance / np.outer(scale, scale))
         noise = self.noise[self.model.signal[self.used]]
         slopes = self.jacobian[self.used] / noise[:, None]
@@ -261,21 +278,9 @@ class Fit:
 
     @cached_property
     def kept(self) -> tuple[str, ...]:
-        """Parameters that the data do not tell: they stay as the file has them."""
-        pairs = zip(self.model.parameters, self.sigmas, strict=True)
-        return tuple(parameter.name for parameter, sigma in pairs if sigma > KEPT * parameter.prior)
-
-    @cached_property
-    def information(self) -> Vector:
-        """Singular values of J/s in units of the priors, the rest being fitted, falling; below 1 priors say more."""
-        priors = np.array([parameter.prior for parameter in self.model.parameters])
-        with_prior = np.isfinite(priors)
-        scaled = self.jacobian[self.used] / self.noise[self.model.signal[self.used], None]
-        free, held = scaled[:, ~with_prior], scaled[:, with_prior] * priors[with_prior]
-        if free.shape[1]:
-            basis, _ = np.linalg.qr(free / np.maximum(np.linalg.norm(free, axis=0), 1e-300))
-            held = held - basis @ (basis.T @ held)
-        return np.asarray(np.linalg.svd(held, compute_uv=False))
+        """Parameters that the data do not tell, and that stay as the file has them."""
+        rows = zip(self.model.parameters, self.values, self.sigmas, strict=True)
+        return tuple(each.name for each, value, sigma in rows if unmoved(value - each.file, sigma, each.prior))
 
     @cached_property
     def resolved(self) -> NDArray[np.bool_]:

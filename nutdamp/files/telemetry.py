@@ -21,6 +21,7 @@ from nutdamp.estimation.parameters import (
     AXIS,
     DIRECTION,
     GYROS,
+    KIND,
     QUATERNION,
     SEEN,
     SUN_ASPECT,
@@ -28,6 +29,7 @@ from nutdamp.estimation.parameters import (
     Record,
     of_quaternions,
 )
+from nutdamp.estimation.search import BROKEN, absurd
 from nutdamp.files.ccsds.read import History, is_history, read_history
 from nutdamp.files.tabular import HEADER as TRACK
 from nutdamp.files.tabular import Table
@@ -102,6 +104,11 @@ def _read_samples(path: str | Path, spacecraft: Spacecraft, schedule: Schedule) 
     _expect_whole(table, columns, spacecraft)
     table.check()
     signals = _signals(table, columns, spacecraft)
+    for name in sorted(KIND.keys() & signals.keys()):
+        out = absurd(spacecraft, name, signals[name])
+        if 0.0 < out.mean() <= BROKEN:
+            signals[name][out] = math.nan
+            table.warned.append(f"{path}: {name}: {out.sum()} samples that no motion shows are left out")
     _expect_unit(table, signals, spacecraft.spin)
     seen, step = _sun_column(table, times, columns.get(SUN_PULSE))
     table.check()

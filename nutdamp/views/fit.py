@@ -20,7 +20,6 @@ from nutdamp.views.parts import opening, summary
 from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, to_figures, values_of
 from nutdamp.views.text import note_json
 
-FAR = 4.0  # sigmas of the file from which on a change is remarked upon
 NOTHING = 1e-3  # sigmas below which a value, or a change, is zero
 MOST_PAIRS = 6  # largest number of correlations named
 
@@ -142,10 +141,6 @@ def told(fit: Fit, rows: Sequence[Estimate]) -> Iterator[Note]:
     tied += [f"{first} and {second} {value:+.3f}" for first, second, value in correlated(fit)[:MOST_PAIRS]]
     if tied:
         yield note("correlated-inputs", inputs=", ".join(tied))
-    changes = [(row.label, row.change) for row in rows if row.change is not None]
-    far = [f"{label} ({_changed(change)})" for label, change in changes if abs(change) > FAR]
-    if far:
-        yield note("fit-far", estimates=", ".join(far))
     if fit.model.unequal and fit.model.spacecraft.inertia.symmetric:
         yield note("fit-one-moment")
 
@@ -166,7 +161,6 @@ def fit_json(fit: Fit, at_time: Carried, warnings: Sequence[str] = ()) -> dict[s
         "time_s": at_time.time,
         "estimates": DataTable("Estimates", ESTIMATES, estimates(fit, at_time.time)).json(),
         "kept": list(fit.kept),
-        "information": fit.information.tolist(),
         "parameters": [parameter.name for parameter in model.parameters],
         **values_of(fit, "values_SI=values", "covariance_SI=region"),
         "dispersed": {

@@ -105,10 +105,10 @@ def _any_file(draw: np.random.Generator, seed: int) -> tuple[nutdamp.Spacecraft,
     ), prolate
 
 
-def telemetry(folder: Path, seed: int) -> Telemetry:
-    """The record of number ``seed``, of the kind whose turn it is, through a CSV file in ``folder``."""
+def telemetry(folder: Path, seed: int, kind: tuple[str, ...] | None = None) -> Telemetry:
+    """The record of number ``seed``, of a kind or that whose turn it is, through a CSV file in ``folder``."""
     draw = np.random.default_rng([17, seed])
-    kind = KINDS[seed % len(KINDS)]
+    kind = kind or KINDS[seed % len(KINDS)]
     body, prolate = file_of(draw, seed)
     A, C = 120.0 * (1.0 + 0.005 * draw.normal()), body.inertia.C * (1.0 + 0.005 * draw.normal())
     rates = body.omega0 + math.radians(0.3) * draw.normal(size=3)
@@ -262,6 +262,19 @@ def _columns(
                 "axis_dec_deg": np.degrees(np.arcsin(axis[:, 2])),
             }
         )
+    if "star" in kind or "sun" in kind:
+        assert body.sun is not None
+        to = np.array([-0.6, 0.64, 0.48]) if "star" in kind else body.sun
+        x, y, z = np.array([one.rotation.T @ to for one in motions]).T
+        made["crossing_azimuth_deg"] = np.degrees(np.arctan2(y, x) + noise * draw.normal(size=len(x)))
+        made["crossing_elevation_deg"] = np.degrees(np.arcsin(z) + noise * draw.normal(size=len(x)))
+        if "star" in kind:
+            made["crossing_ra_deg"] = np.full(len(x), math.degrees(math.atan2(to[1], to[0])))
+            made["crossing_dec_deg"] = np.full(len(x), math.degrees(math.asin(to[2])))
+    if "quaternion" in kind:
+        about = Rotation.from_rotvec(noise * draw.normal(size=(len(motions), 3)))
+        x, y, z, w = (Rotation.from_matrix([one.rotation for one in motions]) * about).as_quat().T
+        made |= {"q_w": w, "q_x": x, "q_y": y, "q_z": z}
     if "sun_column" in kind:
         seen = flight.sun(body, float(times[-1]))
         made["sun_pulse"] = np.zeros(len(times))
