@@ -105,14 +105,10 @@ EARLY, LATE = 0.003, 3.0  # probabilities of the start threshold between which s
 LONGEST_LOOKED = 10_000  # largest number of samples examined one by one
 SIGMAS = 5.0  # reach of noise, sigmas, in which a channel may come to fire
 OUTGROWN = 4.0  # multiple of the expected dead band at which a loop does not hold the nutation
-
-# Mean by which a random walk first passes a level, 0.58 steps, in sigmas of noise of which all is new: √2 times.
-OVERSHOOT = 0.82
-
+OVERSHOOT = 0.82  # by which a random walk first passes a level, 0.58 steps, in sigmas of new noise: √2 times
 RISING = 1.1  # growth of the nutation from the first of many firings to the middle, and on, where it is not held
-
+SPENT = "the limit cycle is not reached within the budget of work"
 TOO_FAST = "the nutation grows faster than the firings damp it"
-
 REFINED = 4  # steps in which the moment of a firing is found on a continuous signal
 
 
@@ -219,7 +215,7 @@ class Map:
             going = np.array([total.cycles <= cycles and total.pulses < firings for total in at.sums])
             if not going.any():
                 return
-        raise Infeasible("the limit cycle is not reached within the budget of work")
+        raise Infeasible(SPENT)
 
     def _near(self) -> float | None:
         """Size of z from which on every sample is examined; None where the chances of the samples add up."""
@@ -442,13 +438,10 @@ class Map:
 DAY = 86400.0
 YEAR = 365.25 * DAY  # s
 LASTING = YEAR  # s that a tank must last: the time for which propellant is budgeted
-
 # Noise of estimates (one sigma), over the start threshold, above which the map underestimates firings, and the share by
 # which their number is then known at best: flown loops fire up to a fifth more at 0.2 of start.
 NOISY, WIDENED = 0.1, 0.2
-
 DIFFERENT = 0.3  # relative difference of pulses by which one limit cycle differs from another
-
 # Shares of the propellant used at which a rate of use is worked out, with the weights of Simpson's rule: so many, as
 # the rate is uneven; how well the last pulse of a cycle fits differs with the thrust.
 STAGES = tuple((part / 8.0, weight / 24.0) for part, weight in enumerate((1, 4, 2, 4, 2, 4, 2, 4, 1)))
@@ -589,7 +582,7 @@ def _held(spacecraft: Spacecraft, loop: Loop, seed: int) -> HeldNutation:
         rate = None if result.cycle is None else result.cycle.propellant
         if work.exhausted() and body.tank is not None and rate:
             return replace(result, band=band, lasts=body.tank.propellant / rate)  # as if the pressure stayed
-        return replace(result, band=band, why=str(reason))
+        return replace(result, band=band, why=SPENT if work.exhausted() else str(reason))
 
 
 def _lasts(body: Spacecraft, loop: Loop, seed: int, entries: Sequence[Entry]) -> float | None:

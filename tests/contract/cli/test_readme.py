@@ -98,7 +98,7 @@ def test_what_the_readme_shows_of_files_is_what_is_there() -> None:
     for page in PAGES:
         for shown in re.findall(r"```yaml\n(.+?)```", TEXTS[page], re.DOTALL):
             assert read_spacecraft(shown, page.name).name == "Sounder-1"
-    assert f"- {__version__}: " in TEXTS[guide.FOLDER / "changes.md"]
+    assert f"## {__version__}\n" in TEXTS[guide.FOLDER / "changes.md"]
 
 
 def test_every_snippet_of_python_is_an_example_that_runs() -> None:

@@ -66,7 +66,7 @@ def changed(plain: Any, path: KeyPath, value: object) -> str:
 
 
 def contents(spacecraft: nutdamp.Spacecraft) -> str:
-    return repr(dataclasses.asdict(spacecraft))
+    return repr(dataclasses.asdict(dataclasses.replace(spacecraft, document=None)))
 
 
 PLAIN = read_tree(EXAMPLE, "f.yaml")[0].plain()
