@@ -407,7 +407,7 @@ def _derived(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
     if not inertia.symmetric:
         unit, factor = screen_unit("kg m²")
         first, second, _ = factor * np.asarray(inertia.moments)
-        yield "", f"I1 = {first:.6g}, I2 = {second:.6g} {unit}; planned on the equivalent symmetric body"
+        yield "", f"I1 = {first:.6g}, I2 = {second:.6g} {unit}; schemes but optimal plan on their mean"
     if inertia.wheel:
         whole = f"H3 = C ω3 + h = {quantity(spacecraft.axial, 'N m s')}"
         yield "wheel", f"h = {quantity(inertia.wheel, 'N m s')} along axis 3: {whole}"
