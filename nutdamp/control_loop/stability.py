@@ -22,7 +22,7 @@ from nutdamp.control_loop.law import Actuator, ComplexArray, Law
 from nutdamp.control_loop.sensor import HARMONIC, Estimator, lag
 from nutdamp.errors import Infeasible
 from nutdamp.spacecraft.constraints import effective_on_time, shortest_on_time
-from nutdamp.spacecraft.equipment import ACCELEROMETER, Loop, Sensor
+from nutdamp.spacecraft.equipment import ACCELEROMETER, Loop
 from nutdamp.spacecraft.model import Spacecraft, Vector
 
 HALVINGS = 60  # steps in which the largest lateness that still damps is found
@@ -93,22 +93,16 @@ def _margin(law: Law, actuator: Actuator, theta: float, spin: float) -> Margin:
     if firing is not None and not loop.predict:
         sampling = 0.0 if loop.sensor.rate is None else 1.0 / loop.sensor.rate
         late = abs(lag(law, loop.sensor, spin)) + rate * (firing.lead + sampling)
-    most = _most_late(pull, growth)
+    most = -math.inf  # largest ε in [0, π] with which the firing damps, if any
+    if abs(1.0 - pull) * growth < 1.0:
+        most, high = 0.0, math.pi
+        for _ in range(HALVINGS):
+            middle = 0.5 * (most + high)
+            damps = abs(1.0 - pull * cmath.exp(1j * middle)) * growth < 1.0
+            most, high = (middle, high) if damps else (most, middle)
     turned = (loop.sensor.scale < 0.0) != (actuator.channel.name in loop.reversed)
     gain = abs(1.0 - pull * cmath.exp(1j * late))
     return Margin(actuator.channel.name, theta, late, most, gain, growth, (most - late) / rate, turned)
-
-
-def _most_late(pull: float, growth: float) -> float:
-    """Largest ε in [0, π] with which a firing that takes ``pull`` (of |z|) off damps; -inf where none does."""
-    if abs(1.0 - pull) * growth >= 1.0:
-        return -math.inf
-    low, high = 0.0, math.pi
-    for _ in range(HALVINGS):
-        middle = 0.5 * (low + high)
-        damps = abs(1.0 - pull * cmath.exp(1j * middle)) * growth < 1.0
-        low, high = (middle, high) if damps else (low, middle)
-    return low
 
 
 class Band(NamedTuple):
@@ -214,9 +208,18 @@ def transfer(law: Law, spin: float) -> Transfer:
     if accelerometer and law.loop.predict and sensor.low_pass == 0.0:
         every = max(estimator.window // ENOUGH, 1)  # as good as all, each with so much less noise
     step = every * estimator.step or law.period / GRID
-    smooth, weights = _smoothing(sensor, step), np.ones(1, dtype=complex)
-    if accelerometer:
-        weights = _fitted(law, spin, step, round(estimator.window / every))
+    smooth = weights = np.ones(1, dtype=complex)
+    if sensor.low_pass != 0.0:  # newest sample first, as all weights
+        count = min(math.ceil(FORGOTTEN * sensor.low_pass / step), LONGEST_RESPONSE)
+        memory = math.exp(-step / sensor.low_pass)
+        smooth = np.asarray((1.0 - memory) * memory ** np.arange(count), dtype=complex)
+    if accelerometer:  # a sine is fitted to the samples, over its gain for z
+        count = round(estimator.window / every)
+        angle = -rate * step * np.arange(count)
+        orders = (1, 2) if count >= HARMONIC else (1,)
+        waves = [wave(order * angle) for order in orders for wave in (np.cos, np.sin)]
+        rows = np.linalg.pinv(np.column_stack([np.ones(count), *waves]))
+        weights = np.asarray((rows[1] + 1j * rows[2]) / (np.conj(estimator.seen_gain) * spin))
     first = estimator.since + (len(weights) - 1) * step
     weights = np.convolve(weights, smooth)[:LONGEST_RESPONSE]
     if law.loop.predict:
@@ -249,24 +252,6 @@ def transfer(law: Law, spin: float) -> Transfer:
     )
 
 
-def _smoothing(sensor: Sensor, step: float) -> ComplexArray:
-    """Weights of the low-pass filter, newest sample first."""
-    if sensor.low_pass == 0.0:
-        return np.ones(1, dtype=complex)
-    count = min(math.ceil(FORGOTTEN * sensor.low_pass / step), LONGEST_RESPONSE)
-    memory = math.exp(-step / sensor.low_pass)
-    return np.asarray((1.0 - memory) * memory ** np.arange(count), dtype=complex)
-
-
-def _fitted(law: Law, spin: float, step: float, size: int) -> ComplexArray:
-    """Weights of the sine fitted to ``size`` samples of an accelerometer, over its gain for z."""
-    angle = -float(law.rate(spin)) * step * np.arange(size)
-    orders = (1, 2) if size >= HARMONIC else (1,)
-    waves = [wave(order * angle) for order in orders for wave in (np.cos, np.sin)]
-    rows = np.linalg.pinv(np.column_stack([np.ones(size), *waves]))
-    return np.asarray((rows[1] + 1j * rows[2]) / (np.conj(Estimator(law, law.loop.sensor, 0.0).seen_gain) * spin))
-
-
 FINE = 1500  # sizes of z at which the probability of an event is computed, far off and again near the threshold
 FARTHEST = 1e-12  # share of a threshold below which a nutation is none
 REACH = 12.0  # sigmas of noise within which sizes lie closer together
@@ -293,7 +278,15 @@ class Odds:
         sizes = np.abs(shown[:, None] * turns + seen.offset)
         chance = exceeds(limit / sigma, sizes / sigma)
         chance = 1.0 - chance if below else chance
-        chance = (chance * _clustered(seen.fresh, np.abs(limit - sizes) / sigma)).mean(axis=1)
+        if seen.fresh <= 0.5:
+            # The share of the samples beyond the limit that are the first of a cluster of such: x²/2 ν(x), where x is
+            # the distance in sigmas, times sqrt(2 fresh), as of a random walk with drift, and
+            # ν(x) = (2/x) (Φ(x/2) - 1/2) / (x/2 Φ(x/2) + φ(x/2)) (Siegmund and Yakir 2007).
+            half = 0.5 * np.maximum(np.abs(limit - sizes) / sigma, 1.0) * math.sqrt(2.0 * seen.fresh)
+            within = _normal(half)
+            density = np.exp(-0.5 * half * half) / math.sqrt(2.0 * math.pi)
+            chance = chance * (2.0 * half * (within - 0.5) / (half * within + density))
+        chance = chance.mean(axis=1)
         expected = -np.log1p(-np.minimum(chance, 1.0 - 1e-15)) / (growth * seen.step)
         self.sizes = np.log(shown / gain)
         pieces = 0.5 * (expected[1:] + expected[:-1]) * np.diff(self.sizes)
@@ -304,19 +297,6 @@ class Odds:
         reached = np.interp(np.log(now), self.sizes, self.sum) + drawn
         sizes = np.maximum(np.exp(np.interp(reached, self.sum, self.sizes)), now)
         return np.where(reached > self.sum[-1], math.inf, sizes)
-
-
-def _clustered(fresh: float, apart: Vector) -> Any:
-    """Share of the samples beyond a threshold, ``apart`` sigmas off, that are the first of a cluster of such.
-
-    Where ``fresh`` is the share of noise that is new in each sample: x²/2 ν(x), x = apart sqrt(2 fresh), as of a random
-    walk with drift, ν(x) = (2/x) (Φ(x/2) - 1/2) / (x/2 Φ(x/2) + φ(x/2)) (Siegmund and Yakir 2007).
-    """
-    if fresh > 0.5:
-        return 1.0
-    half = 0.5 * np.maximum(apart, 1.0) * math.sqrt(2.0 * fresh)
-    below = _normal(half)
-    return 2.0 * half * (below - 0.5) / (half * below + np.exp(-0.5 * half * half) / math.sqrt(2.0 * math.pi))
 
 
 def _normal(values: Vector) -> Vector:
