@@ -294,8 +294,8 @@ def trade(
     body = _expected(spacecraft)
     count, shifts = units.count("points", points), units.shifts(allow)
     options = OptimalOptions(least=units.one_of("least", least, LEAST[:2]), with_disturbances=with_disturbances)
-    with work.steps(count * len({*shifts}), hook=progress) as task:
-        return tradeoff.trade(body, options, count=count, shifts=shifts, nominal=nominal, progress=task.reach)
+    with work.steps(count * len({*shifts}), hook=progress):
+        return tradeoff.trade(body, options, count=count, shifts=shifts, nominal=nominal)
 
 
 def disperse(
@@ -470,8 +470,8 @@ def budget(
         units.tilt(largest)
     if rows:
         expect_loop(body)
-    with work.steps(max(len(rows), 1), hook=progress) as task:
-        return holding.budget(body, rows, largest, seed=units.seed(seed), progress=task.reach)
+    with work.steps(max(len(rows), 1), hook=progress):
+        return holding.budget(body, rows, largest, seed=units.seed(seed))
 
 
 def export(

@@ -106,13 +106,21 @@ def verify_command(job: Job, looped: bool, verbose: bool) -> None:
     if looped and any(job.flown):
         raise click.UsageError("name what to verify: one of --scheme, --schedule, --blocks and --loop")
     job.begin()
-    if looped:
-        _verify_loop(job)
-        return
 
-    from nutdamp.api import verify
+    from nutdamp.api import verify, verify_loop
     from nutdamp.views.simulation import verification_brief
 
+    if looped:
+        with job.working("verifying"):
+            comparison = verify_loop(job.spacecraft)
+        job.deliver(comparison)
+        if comparison.missing:
+            say(f"nutdamp: DOP853 did not fly the loop to its end, so it is not confirmed: {comparison.missing}")
+            leave(infeasible=True)
+        if not comparison.agree:
+            say("nutdamp: the loop and the same by DOP853 do not agree; please report this")
+        leave(failed=not comparison.agree)
+        return
     plan = plan_or_read(job)
     with job.working("verifying"):
         verified = verify(plan)
@@ -126,20 +134,6 @@ def verify_command(job: Job, looped: bool, verbose: bool) -> None:
     for quantity in core.drifting:
         say(f"nutdamp: {quantity} is not constant on coasts, where nothing changes it; please report this")
     leave(failed=bool(core.disagreeing or core.drifting), infeasible=not core.checks)
-
-
-def _verify_loop(job: Job) -> None:
-    from nutdamp.api import verify_loop
-
-    with job.working("verifying"):
-        comparison = verify_loop(job.spacecraft)
-    job.deliver(comparison)
-    if comparison.missing:
-        say(f"nutdamp: DOP853 did not fly the loop to its end, so it is not confirmed: {comparison.missing}")
-        leave(infeasible=True)
-    if not comparison.agree:
-        say("nutdamp: the loop and the same by DOP853 do not agree; please report this")
-        leave(failed=True)
 
 
 @click.command("init")

@@ -42,7 +42,11 @@ class Terminated(BaseException):
 
 def run(group: click.Group) -> None:
     """Run ``group`` on the arguments of the process and leave with its exit status."""
-    _open_streams()
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:  # without streams (`>&-`)
+            setattr(sys, name, Path(os.devnull).open("w", encoding="utf-8"))  # noqa: SIM115 - until the end
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="replace")  # what the encoding lacks becomes ?
     if signal.getsignal(signal.SIGTERM) == signal.SIG_DFL:
         signal.signal(signal.SIGTERM, _terminate)
     try:
@@ -117,15 +121,6 @@ def stoppable() -> Iterator[Interruption]:
 def _terminate(number: int, frame: FrameType | None) -> None:  # noqa: ARG001 - signature of handlers
     signal.signal(signal.SIGTERM, signal.SIG_IGN)  # a second one would interrupt the clearing up
     raise Terminated
-
-
-def _open_streams() -> None:
-    """See that everything can be printed: to nowhere without streams (`>&-`), else ? for what an encoding lacks."""
-    for name in ("stdout", "stderr"):
-        if getattr(sys, name) is None:
-            setattr(sys, name, Path(os.devnull).open("w", encoding="utf-8"))  # noqa: SIM115 - until the end
-    if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(errors="replace")
 
 
 def _silence_stdout() -> None:

@@ -25,7 +25,7 @@ from nutdamp.cli.main import leave
 from nutdamp.cli.options import END, FILE, OUTPUT, Command, NameType, expect_read, goal_options, scheme_options
 from nutdamp.cli.screen import say, show_failures
 from nutdamp.errors import BadRequest, Infeasible, listed, printable
-from nutdamp.schemes.catalogue import NAMES, PLANNED, SchemeOptions
+from nutdamp.schemes.catalogue import NAMES, OPTIMAL, PLANNED, SchemeOptions
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -35,7 +35,6 @@ if TYPE_CHECKING:
     from nutdamp.planning.plan import Plan
     from nutdamp.planning.robust import RobustComparison
     from nutdamp.planning.tradeoff import Trade
-    from nutdamp.spacecraft.model import Spacecraft
 
 
 scheme_option = partial(click.option, "--scheme", metavar="SCHEME")  # a line does not hold all the names
@@ -94,7 +93,8 @@ def plan_or_read(job: Job, *, judged: bool = False) -> Plan:
     ``judged``: a verdict names the cones that are broken.
     """
     from nutdamp import api
-    from nutdamp.planning.notes import infeasibility, plan_notes
+    from nutdamp.planning.notes import comparison_warnings, infeasibility, plan_notes, reasons
+    from nutdamp.views.text import joined
 
     scheme, schedule, blocks = job.flown
     if schedule is not None:
@@ -107,7 +107,15 @@ def plan_or_read(job: Job, *, judged: bool = False) -> Plan:
     if blocks is not None:
         return _fired(job, blocks)
     if scheme is None:
-        plan = _recommended(job, judged=judged)
+        compared = compared_with(job, ())
+        recommended = compared.recommended
+        show_failures(compared)
+        if recommended is not None:
+            job.remark(f"using recommended plan: {recommended.scheme}")
+        job.note(comparison_warnings(compared, tabulated=judged))
+        if recommended is None:
+            raise Infeasible(f"{joined(reasons(compared))}; `nutdamp plan` says more")
+        plan = recommended
     else:
         expect_read((scheme,), job.options, job.spacecraft, job.doubt)
         with job.working("planning"):
@@ -115,22 +123,6 @@ def plan_or_read(job: Job, *, judged: bool = False) -> Plan:
     if not plan.feasible:
         raise Infeasible(f"{plan.scheme} is infeasible: {infeasibility(plan)}")
     job.note(plan_notes(plan, cones=scheme is not None and not judged))
-    return plan
-
-
-def _recommended(job: Job, *, judged: bool) -> Plan:
-    """The plan that is recommended, its warnings beside a verdict or not; raises Infeasible where there is none."""
-    from nutdamp.planning.notes import comparison_warnings, reasons
-    from nutdamp.views.text import joined
-
-    compared = compared_with(job, ())
-    plan = compared.recommended
-    show_failures(compared)
-    if plan is not None:
-        job.remark(f"using recommended plan: {plan.scheme}")
-    job.note(comparison_warnings(compared, tabulated=judged))
-    if plan is None:
-        raise Infeasible(f"{joined(reasons(compared))}; `nutdamp plan` says more")
     return plan
 
 
@@ -181,6 +173,7 @@ def plan_command(
     if robust and nominal:
         raise click.UsageError("--robust goes by dispersed cases, which --nominal leaves out: name one of them")
 
+    from nutdamp.planning.decision import usual
     from nutdamp.planning.notes import comparison_warnings
     from nutdamp.spacecraft.tolerances import expect_dispersions
     from nutdamp.views.glance import scheme_table
@@ -189,7 +182,10 @@ def plan_command(
     if robust:
         expect_dispersions(body.dispersions)
     if certificate is not None:
-        _expect_certified(names, body)
+        if OPTIMAL.name not in (names or usual(body)):
+            raise BadRequest(f"a certificate is of {OPTIMAL.name}, which is not planned: name it with --scheme")
+        if not body.channels:
+            raise BadRequest(f"a certificate is of {OPTIMAL.name}, which fires channels, and the spacecraft has none")
     compared = compared_with(job, names, 0 if nominal else None, timed=timed)
     dispersed = robust_of(job, compared) if robust else None
     shown = compared if dispersed is None else dispersed.joined
@@ -225,17 +221,6 @@ def _blocks_file(job: Job, compared: Comparison, chosen: Plan | None) -> Files:
     return {"blocks": lambda: block_table(source.flight).csv()}
 
 
-def _expect_certified(names: Sequence[str], body: Spacecraft) -> None:
-    """Raise BadRequest where the scheme that certificates belong to is not to be planned, or cannot."""
-    from nutdamp.planning.decision import usual
-    from nutdamp.schemes.catalogue import OPTIMAL
-
-    if OPTIMAL.name not in (names or usual(body)):
-        raise BadRequest(f"a certificate is of {OPTIMAL.name}, which is not planned: name it with --scheme")
-    if not body.channels:
-        raise BadRequest(f"a certificate is of {OPTIMAL.name}, which fires channels, and the spacecraft has none")
-
-
 def _certified(
     job: Job, compared: Comparison, chosen: Plan | None, path: str | None
 ) -> tuple[Files, list[CannotWrite]]:
@@ -244,7 +229,6 @@ def _certified(
         return {}, []
     from nutdamp.errors import CannotWrite
     from nutdamp.planning.tradeoff import certificate
-    from nutdamp.schemes.catalogue import OPTIMAL
     from nutdamp.views.decisions import certificate_json
 
     try:

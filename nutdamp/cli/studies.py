@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -40,7 +40,7 @@ from nutdamp.cli.options import (
 from nutdamp.cli.plan import flown_options, fronts_of, plan_or_read
 from nutdamp.cli.screen import say
 from nutdamp.common.work import SAMPLES
-from nutdamp.errors import printable
+from nutdamp.errors import CannotWrite, printable
 from nutdamp.schemes.catalogue import LEAST, OPTIMAL
 from nutdamp.units import LARGEST_SEED, shifts, thresholds, tilt
 
@@ -48,10 +48,8 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
 
     from nutdamp.control_loop.dispersion import LoopDispersion
-    from nutdamp.errors import CannotWrite
     from nutdamp.planning.plan import Plan
     from nutdamp.planning.screening import Dispersion
-    from nutdamp.planning.tradeoff import Front
 
 
 @click.command("trade", cls=SessionCommand)
@@ -87,9 +85,10 @@ def trade_command(
     in both. Exit status 4 where none of the schedules may be flown, by their verdicts, and 3 where there is none.
     SPACECRAFT and FILE are as for `nutdamp plan`.
     """
+    from nutdamp.files.tabular import make_folder
     from nutdamp.planning.notes import CUT
     from nutdamp.planning.tradeoff import numbered
-    from nutdamp.views.trade import schedule_paths, trade_brief
+    from nutdamp.views.trade import schedule_files, schedule_paths, trade_brief
 
     allowed = allow or (0.0, math.inf)
     for shift in allow:
@@ -101,7 +100,15 @@ def trade_command(
     for index, _, point in numbered(traded.fronts):
         if point.plan.cut:
             job.doubt(f"point {index}: {CUT}")
-    files, unsaved = ([], []) if schedules is None else _schedules(traded.fronts, schedules)
+    files: list[Output] = []
+    unsaved: list[CannotWrite] = []
+    if schedules is not None:
+        try:
+            make_folder(schedules)
+            named = schedule_files(traded.fronts, schedules)
+            files = [(path, partial(str, text)) for path, text in named]
+        except CannotWrite as wrong:
+            unsaved = [wrong]
     brief = [] if verbose else [partial(trade_brief, traded.spacecraft, traded.fronts)]
     job.deliver(traded, *brief, files=files, unsaved=unsaved)
     judged = [point.verdict.status for _, _, point in numbered(traded.fronts)]
@@ -109,19 +116,6 @@ def trade_command(
     if not judged and traded.recommended is not None and traded.recommended.verdict.idle:
         best = traded.recommended.verdict.status
     leave(best, infeasible=best is None)
-
-
-def _schedules(fronts: Sequence[Front], folder: str) -> tuple[list[Output], list[CannotWrite]]:
-    """A file of each schedule, or the error where the folder cannot be made."""
-    from nutdamp.errors import CannotWrite
-    from nutdamp.files.tabular import make_folder
-    from nutdamp.views.trade import schedule_files
-
-    try:
-        make_folder(folder)
-    except CannotWrite as wrong:
-        return [], [wrong]
-    return [(path, partial(str, text)) for path, text in schedule_files(fronts, folder)], []
 
 
 @click.command("loop", cls=SessionCommand)

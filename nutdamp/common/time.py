@@ -59,7 +59,13 @@ class Epoch:
         if match is None:
             raise ValueError(f"{text!r} is no epoch; expected the form 2026-03-01T12:00:00.000")
         try:
-            day = _day(match)
+            if match["day_of_year"] is None:
+                day = datetime.date(int(match["year"]), int(match["month"]), int(match["day"])).toordinal()
+            else:
+                first = datetime.date(int(match["year"]), 1, 1)
+                day = first.toordinal() + int(match["day_of_year"]) - 1
+                if not first.toordinal() <= day <= datetime.date(first.year, 12, 31).toordinal():
+                    raise ValueError("that year has no such day")
         except ValueError as reason:
             raise ValueError(f"{text!r} is no epoch: {reason}") from None
         hour, minute = int(match["hour"]), int(match["minute"])
@@ -75,7 +81,12 @@ class Epoch:
         if day > datetime.date.max.toordinal():
             raise ValueError(f"{text!r} is after the year 9999 in UTC")
         elapsed = 86400 * (day - FIRST_DAY) + 60 * minutes + second
-        elapsed = Fraction(elapsed + _leaps_before(day)) if system == "UTC" else _of_uniform(elapsed, system)
+        elapsed += _leaps_before(day) if system == "UTC" else -UNIFORM[system]
+        if system == "TDB":  # Kaplan 2005, USNO Circular 179, (2.6): to 10 µs
+            centuries = float(elapsed - _J2000) / 86400.0 / 36525.0
+            ahead = 0.001657 * math.sin(628.3076 * centuries + 6.2401)
+            ahead += 0.000022 * math.sin(575.3385 * centuries + 4.2970)
+            elapsed -= Fraction(round(ahead * 1e6), 1_000_000)
         if elapsed < 0:
             raise ValueError(f"{text!r} is before 1972, when the UTC second had another length")
         return cls(elapsed)
@@ -104,40 +115,16 @@ class Epoch:
         Rounding carries over to the next minute or day. Raises ValueError after the year 9999, where no such text can
         be written.
         """
-        day, second, part = self._calendar(digits)
-        if day > datetime.date.max.toordinal():
-            raise ValueError("the date lies after the year 9999")
-        date = datetime.date.fromordinal(day).isoformat()
-        clock = min(second // 60, 1439)
-        return f"{date}T{clock // 60:02d}:{clock % 60:02d}:{second - 60 * clock:02d}.{part:0{digits}d}"
-
-    def _calendar(self, digits: int) -> tuple[int, int, int]:
-        """Day (ordinal), whole second of the day, and the rest in units of the last of ``digits`` digits."""
         whole, part = divmod(round(self.elapsed * 10**digits), 10**digits)
         day = FIRST_DAY + whole // 86400
         while 86400 * (day - FIRST_DAY) + _leaps_before(day) > whole:  # the days before were longer
             day -= 1
-        return day, whole - 86400 * (day - FIRST_DAY) - _leaps_before(day), part
-
-
-def _of_uniform(shown: Fraction, system: str) -> Fraction:
-    """Seconds since 1972-01-01T00:00:00 UTC for a ``shown`` clock reading of a ``system`` without leap seconds."""
-    elapsed = shown - UNIFORM[system]
-    if system == "TDB":  # Kaplan 2005, USNO Circular 179, (2.6): to 10 µs
-        centuries = float(elapsed - _J2000) / 86400.0 / 36525.0
-        ahead = 0.001657 * math.sin(628.3076 * centuries + 6.2401) + 0.000022 * math.sin(575.3385 * centuries + 4.2970)
-        elapsed -= Fraction(round(ahead * 1e6), 1_000_000)
-    return elapsed
-
-
-def _day(match: re.Match[str]) -> int:
-    if match["day_of_year"] is None:
-        return datetime.date(int(match["year"]), int(match["month"]), int(match["day"])).toordinal()
-    first = datetime.date(int(match["year"]), 1, 1)
-    day = first.toordinal() + int(match["day_of_year"]) - 1
-    if not first.toordinal() <= day <= datetime.date(first.year, 12, 31).toordinal():
-        raise ValueError("that year has no such day")
-    return day
+        if day > datetime.date.max.toordinal():
+            raise ValueError("the date lies after the year 9999")
+        date = datetime.date.fromordinal(day).isoformat()
+        second = whole - 86400 * (day - FIRST_DAY) - _leaps_before(day)
+        clock = min(second // 60, 1439)
+        return f"{date}T{clock // 60:02d}:{clock % 60:02d}:{second - 60 * clock:02d}.{part:0{digits}d}"
 
 
 def _leaps_before(day: int) -> int:

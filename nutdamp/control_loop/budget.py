@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -530,12 +530,11 @@ def budget(
     largest: float | None = None,
     *,
     seed: int = 1,
-    progress: Callable[[int], None] = lambda _: None,
 ) -> Budget:
     """Budget of a ``spacecraft`` with dissipation, for ``pairs`` of thresholds, default those of its loop.
 
     ``largest`` rad: θ_max, default the nutation required. Nothing is held where the nutation does not grow, or the file
-    has no loop. ``progress`` is called with the number of pairs done.
+    has no loop. The pairs are the steps of the task.
     """
     requirements.expect_dissipation(spacecraft)
     required = spacecraft.requirement
@@ -550,7 +549,7 @@ def budget(
     for done, pair in enumerate(grown, start=1):
         with work.budget("the limit cycle", work.CYCLES), work.steps(1 + len(STAGES)):
             held.append(_held(spacecraft, replace(loop, start=pair.start, stop=pair.stop), seed))
-        progress(done)
+        work.reach(done)
     return Budget(spacecraft, largest, tuple(held))
 
 

@@ -25,7 +25,7 @@ from nutdamp.schemes.catalogue import DEFAULT_SHARE
 from nutdamp.schemes.sequential import at_hand
 from nutdamp.spacecraft.constraints import Windows, effective_on_time, effective_on_times, longest_useful, usable
 from nutdamp.spacecraft.equipment import BANG, ONE_PULSE, Channel, Loop
-from nutdamp.spacecraft.model import Inertia, Spacecraft, Vector
+from nutdamp.spacecraft.model import Spacecraft, Vector
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -65,7 +65,10 @@ class Law:
             raise Infeasible("ω does not rotate in this body: there is no phase to fire by")
         self.spacecraft, self.loop, self.inertia = spacecraft, loop, inertia
         self.windows = Windows(spacecraft, endless=True)
-        self.gauge = _gauge(inertia, spacecraft.spin)
+        # |z| is that of a symmetric body with A and C at the widest point of the small ellipse.
+        circle = inertia.circle(spacecraft.spin)
+        first, second = (circle * inertia.moments[:2] / (inertia.A * circle.min())).tolist()
+        self.gauge: tuple[float, float] = (first, second)
         self.slope, self._offset = inertia.linear_rate(spacecraft.spin)
         self.period, self.growth = spacecraft.body_period, spacecraft.growth
         self.actuators = tuple(map(self._actuator, at_hand(spacecraft, usable(spacecraft))))
@@ -142,13 +145,6 @@ class Law:
         if self.loop.predict:
             wait = wait - (0.5 * on_time if actuator.leads is None else np.interp(on_time, *actuator.leads))
         return np.where((acts > 0.0) & (acts < 2.0 * size), wait, math.nan)
-
-
-def _gauge(inertia: Inertia, spin: float) -> tuple[float, float]:
-    """(g1, g2), such that |z| is that of a symmetric body with A and C at the widest point of the small ellipse."""
-    circle = inertia.circle(spin)
-    first, second = (circle * inertia.moments[:2] / (inertia.A * circle.min())).tolist()
-    return first, second
 
 
 WORKS = 0.25  # fraction of the expected effect above which a firing works, and below whose negative it works backwards

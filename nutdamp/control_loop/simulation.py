@@ -68,18 +68,7 @@ class LoopRun:
         self.dynamics, self.loop, self.until = dynamics or own, pilot.loop, until
         self.key, self.seed, self.case = case.key, case.key[0], case.key[1] if len(case.key) > 1 else None
         self.legs: list[Leg] = []
-        last = self._fly(Signal(case.truth, self.loop.sensor, case.key))
-        self.fired, self.quiet = tuple(pilot.fired), tuple(pilot.quiet)
-        self.settled = self.quiet[0] if self.quiet else None
-        self.stop, self.channel = pilot.ending[0], pilot.ending[1] or None
-        self.lost, self.looked_at = pilot.lost, pilot.looked_at
-        self.schedule = Schedule(tuple(firing.pulse for firing in self.fired))
-        legs, spans = tuple(self.legs), tuple(pulse.thrust for pulse in self.schedule)
-        self.flight = Flight(case.truth, self.schedule, legs, last, self.dynamics.moments, spans, until=until)
-
-    def _fly(self, signal: Signal) -> SpinState:
-        """Coast and fire until the end, or until something is wrong; returns the state after the last firing."""
-        pilot, state, now = self.pilot, self.pilot.truth.initial, 0.0
+        state, now, signal = pilot.truth.initial, 0.0, Signal(case.truth, self.loop.sensor, case.key)
         coast = Coast(pilot.law, signal, self.dynamics, state, now)
         while (seen := coast.look(self.until, active=pilot.active)) is not None:
             step = pilot.step(coast, seen)
@@ -94,7 +83,13 @@ class LoopRun:
                 coast = Coast(pilot.law, signal, self.dynamics, state, now)
         if not pilot.down_to:
             self._coasted(coast, state, now, max(self.until, now))
-        return state
+        self.fired, self.quiet = tuple(pilot.fired), tuple(pilot.quiet)
+        self.settled = self.quiet[0] if self.quiet else None
+        self.stop, self.channel = pilot.ending[0], pilot.ending[1] or None
+        self.lost, self.looked_at = pilot.lost, pilot.looked_at
+        self.schedule = Schedule(tuple(firing.pulse for firing in self.fired))
+        legs, spans = tuple(self.legs), tuple(pulse.thrust for pulse in self.schedule)
+        self.flight = Flight(case.truth, self.schedule, legs, state, self.dynamics.moments, spans, until=until)
 
     def _coasted(self, coast: Coast, state: SpinState, start: float, end: float) -> SpinState:
         """Motion at the ``end`` of a coast that began as ``state``; where it was integrated to be seen, as it was."""

@@ -208,12 +208,52 @@ def _fitted_edits(tree: Node, fit: Fit, carried: Carried) -> Edits:
         yield Edit(("dissipation", "time_constant"), 1.0 / abs(growth), "time")
         if tree.get("dissipation", "nutation") is not None or not _grows_so(carried, growth):
             yield Edit(("dissipation", "nutation"), "grows" if growth > 0.0 else "decays")
-    yield from _thrusts(tree, carried)
-    for channel, late in _delays(fit):
-        yield from _valve(tree, channel, late)
+    for name, path in _thrusters(tree).items():
+        parts = [((*path, "force"), "force"), *(((*path, "torque", axis), "torque") for axis in range(3))]
+        for place, kind in parts if name in carried.factors else ():
+            part = tree.get(*place)
+            if part is not None:
+                yield Edit(place, parse(part.value, kind) * carried.factors[name][0], kind)
+    for thruster, late in _delays(fit):
+        # Delays so much longer; a thruster with the valve of the whole file gets its own.
+        path = (*_thrusters(tree)[thruster], "valve")
+        own = tree.get(*path)
+        known = own or tree.get("valve") or Node(None, Place())
+        values = {str(key): str(node.value) for key, node in known.children()}
+        for key in ("open_delay", "close_delay"):
+            old = known.get(key)
+            time = late if old is None else parse(old.value, "time") + late
+            values[key] = as_before(old, time, "time")
+            if own is not None:
+                yield Edit((*path, key), values[key])
+        if own is None:
+            yield Edit(path, "{" + ", ".join(f"{key}: {value}" for key, value in values.items()) + "}")
     if (bias := large.get(f"bias_{ACCELERATION}")) is not None:
         yield Edit(("loop", "sensor", "bias"), bias, "acceleration")
-    yield from _dispersions(fit, carried)
+    sigmas = dict(zip(carried.names, carried.sigmas.tolist(), strict=True))
+    estimates = dict(zip(carried.names, carried.values.tolist(), strict=True))
+    for key in ("A", "C"):
+        if sigmas[key] > 0.0:
+            yield Edit(("dispersions", key), f"{{normal: {100.0 * sigmas[key] / estimates[key]:.6g} %}}")
+    rates = ", ".join(f"{{normal: {math.degrees(sigmas[f'omega0_{axis}']):.6g} deg/s}}" for axis in (1, 2, 3))
+    yield Edit(("dispersions", "omega0"), f"[{rates}]")
+    if WHEEL in sigmas:
+        yield Edit(("dispersions", "wheel_momentum"), f"{{normal: {sigmas[WHEEL]:.6g} N m s}}")
+    factors, tolerances = carried.factors, fit.model.spacecraft.dispersions
+    if factors:
+        thrust = {} if tolerances is None else tolerances.thrust
+        listed = [(name, size.kind, size.size) for name, size in thrust.items() if name not in factors]
+        listed += [(name, "normal", sigma / factor) for name, (factor, sigma) in factors.items()]
+        sizes = (f"{key_text(name)}: {{{kind}: {100.0 * size:.6g} %}}" for name, kind, size in listed)
+        yield Edit(("dispersions", "thrust"), "{" + ", ".join(sizes) + "}")
+    if carried.tilt is not None:
+        yield Edit(("dispersions", "attitude"), f"{{normal: {math.degrees(carried.tilt):.6g} deg}}")
+    pairs = correlations(carried, tolerances)
+    if pairs:
+        rows = ", ".join(
+            f"[{key_text(first)}, {key_text(second)}, {value:.{DIGITS}f}]" for first, second, value in pairs
+        )
+        yield Edit(("dispersions", "correlation"), f"[{rows}]")
 
 
 def _grows_so(carried: Carried, growth: float) -> bool:
@@ -222,47 +262,10 @@ def _grows_so(carried: Carried, growth: float) -> bool:
     return not carried.body.inertia.wheel and (0.5 * (first + second) - third) * growth > 0.0
 
 
-def _thrusts(tree: Node, carried: Carried) -> Edits:
-    factors = carried.factors
-    for name, path in _thrusters(tree).items():
-        parts = [((*path, "force"), "force"), *(((*path, "torque", axis), "torque") for axis in range(3))]
-        for place, kind in parts if name in factors else ():
-            part = tree.get(*place)
-            if part is not None:
-                yield Edit(place, parse(part.value, kind) * factors[name][0], kind)
-
-
 def _thrusters(tree: Node) -> dict[str, KeyPath]:
     entries = tree.get("thrusters") or Node(None, Place())
     nodes = {index: entry.get("name") for index, entry in entries.children()}
     return {str(name.value): ("thrusters", index) for index, name in nodes.items() if name is not None}
-
-
-def _dispersions(fit: Fit, carried: Carried) -> Edits:
-    sigmas = dict(zip(carried.names, carried.sigmas.tolist(), strict=True))
-    values = dict(zip(carried.names, carried.values.tolist(), strict=True))
-    for key in ("A", "C"):
-        if sigmas[key] > 0.0:
-            yield Edit(("dispersions", key), f"{{normal: {100.0 * sigmas[key] / values[key]:.6g} %}}")
-    rates = ", ".join(f"{{normal: {math.degrees(sigmas[f'omega0_{axis}']):.6g} deg/s}}" for axis in (1, 2, 3))
-    yield Edit(("dispersions", "omega0"), f"[{rates}]")
-    if WHEEL in sigmas:
-        yield Edit(("dispersions", "wheel_momentum"), f"{{normal: {sigmas[WHEEL]:.6g} N m s}}")
-    factors, given = carried.factors, fit.model.spacecraft.dispersions
-    if factors:
-        before = {} if given is None else given.thrust
-        parts = [(name, size.kind, size.size) for name, size in before.items() if name not in factors]
-        parts += [(name, "normal", sigma / factor) for name, (factor, sigma) in factors.items()]
-        sizes = (f"{key_text(name)}: {{{kind}: {100.0 * size:.6g} %}}" for name, kind, size in parts)
-        yield Edit(("dispersions", "thrust"), "{" + ", ".join(sizes) + "}")
-    if carried.tilt is not None:
-        yield Edit(("dispersions", "attitude"), f"{{normal: {math.degrees(carried.tilt):.6g} deg}}")
-    pairs = correlations(carried, given)
-    if pairs:
-        rows = ", ".join(
-            f"[{key_text(first)}, {key_text(second)}, {value:.{DIGITS}f}]" for first, second, value in pairs
-        )
-        yield Edit(("dispersions", "correlation"), f"[{rows}]")
 
 
 def _delays(fit: Fit) -> Iterator[tuple[str, float]]:
@@ -274,19 +277,3 @@ def _delays(fit: Fit) -> Iterator[tuple[str, float]]:
             continue
         if abs(late) <= LATE and min(known.open_delay, known.close_delay) + late >= 0.0:
             yield channel.thrusters[0].name, late
-
-
-def _valve(tree: Node, name: str, late: float) -> Edits:
-    """The delays of the valve of a thruster, ``late`` s longer; one with the valve of the whole file gets its own."""
-    path = (*_thrusters(tree)[name], "valve")
-    own = tree.get(*path)
-    known = own or tree.get("valve") or Node(None, Place())
-    values = {str(key): str(node.value) for key, node in known.children()}
-    for key in ("open_delay", "close_delay"):
-        before = known.get(key)
-        time = late if before is None else parse(before.value, "time") + late
-        values[key] = as_before(before, time, "time")
-        if own is not None:
-            yield Edit((*path, key), values[key])
-    if own is None:
-        yield Edit(path, "{" + ", ".join(f"{key}: {value}" for key, value in values.items()) + "}")

@@ -305,7 +305,15 @@ def motion_edits(tree: Node, later: Later) -> Edits:
     yield from inertia_edits(tree, later)
     yield from rate_edits(tree, later)
     yield from attitude_edits(tree, later)
-    yield from _goal(tree, later)
+    # Tilt and azimuth count from the motion at t = 0, which is another one now.
+    target = later.before.goal.axis
+    if target is None or tree.get("goal", "tilt") is None:
+        return
+    in_body = attitude.rotate(attitude.conjugate(later.quaternion), target)
+    to_n = replace(later.after, attitude=None).initial.quaternion
+    x, y, z = attitude.rotate(to_n, in_body).tolist()
+    yield Edit(("goal", "tilt"), math.atan2(math.hypot(x, y), z), "angle")
+    yield Edit(("goal", "azimuth"), math.atan2(y, x), "angle")
 
 
 def inertia_edits(tree: Node, later: Later) -> Edits:
@@ -367,18 +375,6 @@ def attitude_edits(tree: Node, later: Later) -> Edits:
     for key in ("epoch", "frame"):
         if (value := keys[key]) is not None and (old is None or value != getattr(old, key)):
             yield Edit(("attitude", key), value)
-
-
-def _goal(tree: Node, later: Later) -> Edits:
-    """Tilt and azimuth count from the motion at t = 0, which is another one now."""
-    target = later.before.goal.axis
-    if target is None or tree.get("goal", "tilt") is None:
-        return
-    in_body = attitude.rotate(attitude.conjugate(later.quaternion), target)
-    to_n = replace(later.after, attitude=None).initial.quaternion
-    x, y, z = attitude.rotate(to_n, in_body).tolist()
-    yield Edit(("goal", "tilt"), math.atan2(math.hypot(x, y), z), "angle")
-    yield Edit(("goal", "azimuth"), math.atan2(y, x), "angle")
 
 
 def carry_text(text: str, name: str, settings: Sequence[Setting], edits: Callable[[Node], Edits]) -> str:

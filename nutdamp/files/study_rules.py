@@ -14,7 +14,7 @@ from nutdamp.files.study_keys import BY_THRUSTER, QUANTITIES, by_name, size_of
 from nutdamp.files.thruster_rules import instead, on_times_of, thrusts
 from nutdamp.files.yaml import Node
 from nutdamp.montecarlo.inputs import grouped, positive_definite, reachable
-from nutdamp.spacecraft.model import Inertia, Spacecraft
+from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.schedule import STEERABLE
 from nutdamp.spacecraft.tolerances import KINDS, READING
 from nutdamp.units import shown
@@ -24,16 +24,59 @@ LARGEST_SIGMA, LARGEST_OFFSET = 0.5, 1.0
 or of a right angle: beyond the first one draw in forty would turn its sign, beyond the second any."""
 
 
+EXAMPLES = {
+    "inertia": "2 %",
+    "mass": "1 %",
+    "pressure": "2 %",
+    "rate": "0.1 deg/s",
+    "force": "3 %",
+    "ratio": "1 %",
+    "angle": "0.5 deg",
+    "length": "5 mm",
+    READING: "0.01 deg/s",
+}
+
+
 def dispersion_findings(root: Node) -> Iterator[Finding]:
     """Faults of the dispersions, and of the share of cases that is to comply."""
     facts, asked = Facts(root), ("nutation", "momentum_shift", "spin")
     if facts.has("requirement", "probability") and not any(facts.has("requirement", key) for key in asked):
         problem = "given alone; name what must be met with it: nutation, momentum_shift or spin"
         yield Finding(("requirement", "probability"), problem, True)
-    if facts.has("dispersions"):
-        yield from _thruster_names(facts)
-        yield from _distributions(facts)
-        yield from _of_sensor(facts)
+    if not facts.has("dispersions"):
+        return
+    known = list(thrusts(facts))
+    for key in BY_THRUSTER:
+        path: KeyPath = ("dispersions", key)
+        for *_, name in (entry for entry in _each(facts, key) if entry != path):
+            if name not in known:
+                problem = f"no thruster is called {shown(name)}; {instead(str(name), known)}"
+                yield Finding((*path, name), problem, True)
+    for path in filter(lambda path: facts.is_mapping(*path), _entries(facts)):
+        nodes = dict(facts.children(*path))
+        given = [str(key) for key in nodes if key in KINDS]
+        if not given:
+            size = EXAMPLES.get(QUANTITIES[str(path[1])], "5 ms")
+            yield Finding(path, f"names no distribution; give {{normal: {size}}}, or uniform, triangular, bias")
+        for key in given[1:]:
+            yield Finding((*path, key), f"given together with {given[0]}; keep one of the two", True)
+        for key in given:
+            fault = _size_fault(facts, path, key, nodes[key].plain())
+            if fault is not None:
+                yield Finding((*path, key), fault)
+    kind = facts.text("loop", "sensor", "kind")
+    wrong, right = ("rate", "m/s^2") if kind == "accelerometer" else ("acceleration", "rad/s, deg/s or rpm")
+    for key in ("sensor_bias", "sensor_scale", "sensor_noise", "sensor_delay"):
+        path = ("dispersions", key)
+        if facts.has(*path) and not facts.has("loop"):
+            yield Finding(path, "is of the sensor of a loop, and the file has no loop; leave this out", True)
+        for distribution in KINDS if key == "sensor_bias" and kind is not None else ():
+            text = facts.text(*path, distribution)
+            if text is not None and facts.number(wrong, *path, distribution) is not None:
+                yield Finding(
+                    (*path, distribution),
+                    f"{shown(text)} is not in the unit of the sensor: {right}",
+                )
 
 
 def _each(facts: Facts, key: str) -> list[KeyPath]:
@@ -54,42 +97,6 @@ def _entries(facts: Facts) -> Iterator[KeyPath]:
             yield from facts.below(*path)
         elif facts.has(*path):
             yield path
-
-
-def _thruster_names(facts: Facts) -> Iterator[Finding]:
-    known = list(thrusts(facts))
-    for key in BY_THRUSTER:
-        path: KeyPath = ("dispersions", key)
-        for *_, name in (entry for entry in _each(facts, key) if entry != path):
-            if name not in known:
-                problem = f"no thruster is called {shown(name)}; {instead(str(name), known)}"
-                yield Finding((*path, name), problem, True)
-
-
-def _distributions(facts: Facts) -> Iterator[Finding]:
-    for path in filter(lambda path: facts.is_mapping(*path), _entries(facts)):
-        nodes = dict(facts.children(*path))
-        given = [str(key) for key in nodes if key in KINDS]
-        if not given:
-            yield Finding(path, f"names no distribution; give {_example(QUANTITIES[str(path[1])])}")
-        for key in given[1:]:
-            yield Finding((*path, key), f"given together with {given[0]}; keep one of the two", True)
-        for key in given:
-            problem = _size_fault(facts, path, key, nodes[key].plain())
-            if problem is not None:
-                yield Finding((*path, key), problem)
-
-
-def _example(kind: str) -> str:
-    sizes = {
-        "inertia": "2 %",
-        "mass": "1 %",
-        "pressure": "2 %",
-        "rate": "0.1 deg/s",
-        "force": "3 %",
-    }
-    sizes |= {"ratio": "1 %", "angle": "0.5 deg", "length": "5 mm", READING: "0.01 deg/s"}
-    return f"{{normal: {sizes.get(kind, '5 ms')}}}, or uniform, triangular, bias"
 
 
 def _size_fault(facts: Facts, path: KeyPath, key: str, value: object) -> str | None:
@@ -121,22 +128,6 @@ def _size_fault(facts: Facts, path: KeyPath, key: str, value: object) -> str | N
 
 def _percent(share: float, relative: bool) -> str:
     return f"{100 * share:g} %" if relative else f"{90 * share:g} deg"
-
-
-def _of_sensor(facts: Facts) -> Iterator[Finding]:
-    kind = facts.text("loop", "sensor", "kind")
-    wrong, right = ("rate", "m/s^2") if kind == "accelerometer" else ("acceleration", "rad/s, deg/s or rpm")
-    for key in ("sensor_bias", "sensor_scale", "sensor_noise", "sensor_delay"):
-        path: KeyPath = ("dispersions", key)
-        if facts.has(*path) and not facts.has("loop"):
-            yield Finding(path, "is of the sensor of a loop, and the file has no loop; leave this out", True)
-        for distribution in KINDS if key == "sensor_bias" and kind is not None else ():
-            text = facts.text(*path, distribution)
-            if text is not None and facts.number(wrong, *path, distribution) is not None:
-                yield Finding(
-                    (*path, distribution),
-                    f"{shown(text)} is not in the unit of the sensor: {right}",
-                )
 
 
 def correlation_findings(spacecraft: Spacecraft) -> Iterator[Finding]:
@@ -199,7 +190,28 @@ def loop_findings(root: Node) -> Iterator[Finding]:
             True,
         )
     yield from _channels(facts)
-    yield from _sensor(facts)
+    kind = facts.text(*SENSOR, "kind")
+    needed = {
+        "rate": "samples, of which a sine is made",
+        "position": "where it is, from the centre of mass",
+    }
+    for key, what in needed.items():
+        if kind == "accelerometer" and not facts.has(*SENSOR, key):
+            yield Finding((*SENSOR, key), f"missing; an accelerometer needs {key}: {what}")
+    for key in ("position", "axis"):
+        if kind == "gyro" and facts.has(*SENSOR, key):
+            yield Finding(
+                (*SENSOR, key),
+                "is for kind: accelerometer; a gyro measures the same everywhere",
+                True,
+            )
+    if kind == "accelerometer" and facts.has(*SENSOR, "axes"):
+        yield Finding((*SENSOR, "axes"), "is for kind: gyro; an accelerometer measures along axis", True)
+    other, right = "acceleration" if kind == "gyro" else "rate", UNITS_OF.get(kind or "")
+    for key in ("noise", "bias", "quantisation") if right else ():
+        text = facts.text(*SENSOR, key)
+        if text is not None and facts.number(other, *SENSOR, key) is not None:
+            yield Finding((*SENSOR, key), f"{shown(text)} is not in a unit of {right}")
     inertia, spin = inertia_of(facts), spin_of(facts)
     if inertia is None or spin is None:
         return
@@ -209,8 +221,21 @@ def loop_findings(root: Node) -> Iterator[Finding]:
         problem = f"{rate:g} Hz is below four times the nutation frequency"
         cure = f"expected at least {least:.4g} Hz, or alias: true beside start"
         yield Finding((*SENSOR, "rate"), f"{problem}; {cure}")
-    if facts.text(*SENSOR, "kind") == "accelerometer":
-        yield from _accelerometer(facts, inertia)
+    if kind != "accelerometer":
+        return
+    from nutdamp.control_loop.sensor import is_blind
+
+    if inertia.wheel != 0.0:
+        yield Finding((*SENSOR, "kind"), "accelerometer: with a wheel only gyros are modelled; expected gyro")
+        return
+    position = facts.vector("length", 3, *SENSOR, "position")
+    axis = facts.vector("number", 3, *SENSOR, "axis") if facts.has(*SENSOR, "axis") else np.array([0.0, 0.0, 1.0])
+    if position is None or axis is None or not axis.any():
+        return
+    turn = inertia.axes.T
+    if is_blind(inertia.moments, turn @ position, turn @ axis / math.hypot(*axis)):
+        problem = "blind: here it shows nothing of the nutation"
+        yield Finding((*SENSOR, "position"), f"{problem}; move it off axis 3, or turn its axis")
 
 
 def _channels(facts: Facts) -> Iterator[Finding]:
@@ -236,45 +261,3 @@ def _channels(facts: Facts) -> Iterator[Finding]:
         if turned is not None and turned not in channels:
             problem = f"no channel is called {shown(turned)}"
             yield Finding(path, f"{problem}; {instead(turned, list(channels))}")
-
-
-def _sensor(facts: Facts) -> Iterator[Finding]:
-    kind = facts.text(*SENSOR, "kind")
-    needed = {
-        "rate": "samples, of which a sine is made",
-        "position": "where it is, from the centre of mass",
-    }
-    for key, what in needed.items():
-        if kind == "accelerometer" and not facts.has(*SENSOR, key):
-            yield Finding((*SENSOR, key), f"missing; an accelerometer needs {key}: {what}")
-    for key in ("position", "axis"):
-        if kind == "gyro" and facts.has(*SENSOR, key):
-            yield Finding(
-                (*SENSOR, key),
-                "is for kind: accelerometer; a gyro measures the same everywhere",
-                True,
-            )
-    if kind == "accelerometer" and facts.has(*SENSOR, "axes"):
-        yield Finding((*SENSOR, "axes"), "is for kind: gyro; an accelerometer measures along axis", True)
-    other, right = "acceleration" if kind == "gyro" else "rate", UNITS_OF.get(kind or "")
-    for key in ("noise", "bias", "quantisation") if right else ():
-        text = facts.text(*SENSOR, key)
-        if text is not None and facts.number(other, *SENSOR, key) is not None:
-            yield Finding((*SENSOR, key), f"{shown(text)} is not in a unit of {right}")
-
-
-def _accelerometer(facts: Facts, inertia: Inertia) -> Iterator[Finding]:
-    """Faults of where an accelerometer is, or of a body on which none is modelled."""
-    from nutdamp.control_loop.sensor import is_blind
-
-    if inertia.wheel != 0.0:
-        yield Finding((*SENSOR, "kind"), "accelerometer: with a wheel only gyros are modelled; expected gyro")
-        return
-    position = facts.vector("length", 3, *SENSOR, "position")
-    axis = facts.vector("number", 3, *SENSOR, "axis") if facts.has(*SENSOR, "axis") else np.array([0.0, 0.0, 1.0])
-    if position is None or axis is None or not axis.any():
-        return
-    turn = inertia.axes.T
-    if is_blind(inertia.moments, turn @ position, turn @ axis / math.hypot(*axis)):
-        problem = "blind: here it shows nothing of the nutation"
-        yield Finding((*SENSOR, "position"), f"{problem}; move it off axis 3, or turn its axis")

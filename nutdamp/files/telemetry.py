@@ -94,99 +94,23 @@ def read_telemetry(
         return record, warnings
     if len(record.sun_pulses):
         warnings.append(f"{path}: the column {SUN_PULSE} is ignored: the times are those of {sun_pulses}")
-    return _with_pulses(record, *_read_sun_pulses(sun_pulses, spacecraft)), warnings
+    table = Table(sun_pulses, (*TIMES, ASPECTS), "Sun pulses")
+    _expect_time(table)
+    table.expect()
+    pulses, columns = _samples(table, spacecraft)
+    table.check()
+    record = replace(record, sun_pulses=pulses, sun_step=0.0)
+    if ASPECTS not in columns or not np.isfinite(columns[ASPECTS]).any():
+        return record, warnings
+    times = np.union1d(record.times, pulses)  # with the Sun aspect angles at the pulses among the samples
+    signals = {name: _spread(times, record.times, values) for name, values in record.signals.items()}
+    at_pulses = _spread(times, pulses, np.radians(columns[ASPECTS]))
+    signals[SUN_ASPECT] = np.where(np.isfinite(at_pulses), at_pulses, signals.get(SUN_ASPECT, math.nan))
+    return replace(record, times=times, signals=signals), warnings
 
 
 def _read_samples(path: str | Path, spacecraft: Spacecraft, schedule: Schedule) -> tuple[Record, list[str]]:
     table = Table(path, (*TIMES, *MEASURED, *TRACK), "samples")
-    _expect_columns(table)
-    times, columns = _samples(table, spacecraft)
-    _expect_whole(table, columns, spacecraft)
-    table.check()
-    signals = _signals(table, columns, spacecraft)
-    for name in sorted(KIND.keys() & signals.keys()):
-        out = absurd(spacecraft, name, signals[name])
-        if 0.0 < out.mean() <= BROKEN:
-            signals[name][out] = math.nan
-            table.warned.append(f"{path}: {name}: {out.sum()} samples that no motion shows are left out")
-    _expect_unit(table, signals, spacecraft.spin)
-    seen, step = _sun_column(table, times, columns.get(SUN_PULSE))
-    table.check()
-    return Record(times, signals, seen, step, schedule), table.warned
-
-
-def _with_pulses(record: Record, pulses: Vector, aspects: Vector | None) -> Record:
-    """The record with Sun pulses, and Sun aspect angles (k,) at them among its samples."""
-    record = replace(record, sun_pulses=pulses, sun_step=0.0)
-    if aspects is None or not np.isfinite(aspects).any():
-        return record
-    times = np.union1d(record.times, pulses)
-    signals = {name: _spread(times, record.times, values) for name, values in record.signals.items()}
-    at_pulses = _spread(times, pulses, aspects)
-    signals[SUN_ASPECT] = np.where(np.isfinite(at_pulses), at_pulses, signals.get(SUN_ASPECT, math.nan))
-    return replace(record, times=times, signals=signals)
-
-
-def _spread(times: Vector, those: Vector, values: Vector) -> Vector:
-    """Values at some of the ``times`` (n,), NaN at the others."""
-    spread = np.full(len(times), math.nan)
-    spread[np.searchsorted(times, those)] = values
-    return spread
-
-
-def _read_sun_pulses(path: str | Path, spacecraft: Spacecraft) -> tuple[Vector, Vector | None]:
-    """Times (k,) s of Sun pulses in a CSV file, and the Sun aspect angles (k,) rad if it has that column."""
-    table = Table(path, (*TIMES, ASPECTS), "Sun pulses")
-    _expect_time(table)
-    table.expect()
-    times, columns = _samples(table, spacecraft)
-    table.check()
-    return times, np.radians(columns[ASPECTS]) if columns else None
-
-
-def _samples(table: Table, spacecraft: Spacecraft) -> tuple[Vector, dict[str, Vector]]:
-    """Times of the rows (n,) s, and the columns (n,) of measurements, NaN where they are empty."""
-    times, columns = _times(table, spacecraft), {}
-    for name in (name for name in MEASURED if name in table.known and name in table.header):
-        numbers = (row.number(name) if row[name].lower() not in ("", "nan") else None for row in table.rows)
-        columns[name] = np.array([math.nan if number is None else number for number in numbers])
-    for name, (least, most) in LIMITS.items():
-        if name not in columns:
-            continue
-        wrong = (columns[name] < least) | (columns[name] > most)
-        _fault_first(table, wrong, name, f"expected an angle of {least:g} to {most:g} deg")
-    return times, columns
-
-
-def _fault_first(table: Table, wrong: NDArray[np.bool_], name: str, problem: str) -> None:
-    """A fault in a column for the first of the rows (n,) that are ``wrong``."""
-    if wrong.any():
-        table.rows[int(wrong.argmax())].fault(name, problem)
-
-
-def _expect_whole(table: Table, columns: Mapping[str, Vector], spacecraft: Spacecraft) -> None:
-    """A fault for the first row that has a part of a direction or of a quaternion; for a direction that is not said."""
-    there = {name: np.isfinite(values) for name, values in columns.items()}
-    for group in (CROSSED, TOWARDS, QUATERNION):
-        if group[0] in columns:
-            parts = np.array([there[name] for name in group])
-            wrong = np.asarray(parts.any(axis=0) & ~parts.all(axis=0))
-            _fault_first(table, wrong, group[0], f"expected all of {', '.join(group)}, or none")
-    if CROSSED[0] in columns and spacecraft.sun is None:
-        wrong = there[CROSSED[0]] & ~there.get(TOWARDS[0], np.zeros(len(table.rows), dtype=bool))
-        problem = "no direction: that of the Sun needs the key sun in the spacecraft file"
-        _fault_first(table, wrong, TOWARDS[0], problem)
-
-
-def _expect_time(table: Table) -> None:
-    there = {*TIMES} & {*table.header}
-    if not there:
-        table.fault(1, TIMES[0], f"the column is missing (or {TIMES[1]}){table.misspelt(TIMES[0])}")
-    if len(there) == 2:
-        table.fault(1, TIMES[1], f"two columns of times: expected {TIMES[0]} or {TIMES[1]}")
-
-
-def _expect_columns(table: Table) -> None:
     _expect_time(table)
     header = table.header
     for name in header:
@@ -208,10 +132,39 @@ def _expect_columns(table: Table) -> None:
     if set(ANGLES) & set(header) and set(AXIS) & set(header):
         table.fault(1, ANGLES[0], f"the axis is given twice, also as {', '.join(AXIS)}; remove one of them")
     table.expect()
+    times, columns = _samples(table, spacecraft)
+    there = {name: np.isfinite(values) for name, values in columns.items()}
+    for group in (CROSSED, TOWARDS, QUATERNION):
+        if group[0] in columns:
+            parts = np.array([there[name] for name in group])
+            wrong = np.asarray(parts.any(axis=0) & ~parts.all(axis=0))
+            _fault_first(table, wrong, group[0], f"expected all of {', '.join(group)}, or none")
+    if CROSSED[0] in columns and spacecraft.sun is None:
+        wrong = there[CROSSED[0]] & ~there.get(TOWARDS[0], np.zeros(len(table.rows), dtype=bool))
+        problem = "no direction: that of the Sun needs the key sun in the spacecraft file"
+        _fault_first(table, wrong, TOWARDS[0], problem)
+    table.check()
+    signals = _signals(table, columns, spacecraft)
+    for name in sorted(KIND.keys() & signals.keys()):
+        out = absurd(spacecraft, name, signals[name])
+        if 0.0 < out.mean() <= BROKEN:
+            signals[name][out] = math.nan
+            table.warned.append(f"{path}: {name}: {out.sum()} samples that no motion shows are left out")
+    _expect_unit(table, signals, spacecraft.spin)
+    seen, step = _sun_column(table, times, columns.get(SUN_PULSE))
+    table.check()
+    return Record(times, signals, seen, step, schedule), table.warned
 
 
-def _times(table: Table, spacecraft: Spacecraft) -> Vector:
-    """Times of the rows, s from t = 0 of the spacecraft file; raises FaultyFile where they do not rise."""
+def _spread(times: Vector, those: Vector, values: Vector) -> Vector:
+    """Values at some of the ``times`` (n,), NaN at the others."""
+    spread = np.full(len(times), math.nan)
+    spread[np.searchsorted(times, those)] = values
+    return spread
+
+
+def _samples(table: Table, spacecraft: Spacecraft) -> tuple[Vector, dict[str, Vector]]:
+    """Times of the rows (n,) s, and the columns (n,) of measurements, NaN where they are empty."""
     table.check()
     if not table.rows:
         table.fault(1, "", "no rows of samples below the names of the columns")
@@ -221,19 +174,42 @@ def _times(table: Table, spacecraft: Spacecraft) -> Vector:
         table.fault(1, column, "the spacecraft file has no attitude.epoch to count from; expected the column t_s")
     table.check()
     epoch = Epoch.parse(given) if column == TIMES[1] and given is not None else None
-    times: list[float] = []
+    moments: list[float] = []
     for row in table.rows:
         try:
             time = row.number(column) if epoch is None else Epoch.parse(row[column]).since(epoch)
-        except ValueError as wrong:
-            row.fault(column, str(wrong))
+        except ValueError as reason:
+            row.fault(column, str(reason))
             continue
-        if time is not None and times and time <= times[-1]:
-            text = f"{row[column]} does not rise: the sample before is at {times[-1]:.9g} s"
+        if time is not None and moments and time <= moments[-1]:
+            text = f"{row[column]} does not rise: the sample before is at {moments[-1]:.9g} s"
             row.fault(column, text + (JUMPS if TRACK[-1] in table.header else ""))
-        times += [] if time is None else [time]
+        moments += [] if time is None else [time]
     table.check()
-    return np.array(times)
+    columns = {}
+    for name in (name for name in MEASURED if name in table.known and name in table.header):
+        numbers = (row.number(name) if row[name].lower() not in ("", "nan") else None for row in table.rows)
+        columns[name] = np.array([math.nan if number is None else number for number in numbers])
+    for name, (least, most) in LIMITS.items():
+        if name not in columns:
+            continue
+        wrong = (columns[name] < least) | (columns[name] > most)
+        _fault_first(table, wrong, name, f"expected an angle of {least:g} to {most:g} deg")
+    return np.array(moments), columns
+
+
+def _fault_first(table: Table, wrong: NDArray[np.bool_], name: str, problem: str) -> None:
+    """A fault in a column for the first of the rows (n,) that are ``wrong``."""
+    if wrong.any():
+        table.rows[int(wrong.argmax())].fault(name, problem)
+
+
+def _expect_time(table: Table) -> None:
+    there = {*TIMES} & {*table.header}
+    if not there:
+        table.fault(1, TIMES[0], f"the column is missing (or {TIMES[1]}){table.misspelt(TIMES[0])}")
+    if len(there) == 2:
+        table.fault(1, TIMES[1], f"two columns of times: expected {TIMES[0]} or {TIMES[1]}")
 
 
 def _signals(table: Table, columns: Mapping[str, Vector], spacecraft: Spacecraft) -> dict[str, Vector]:

@@ -78,12 +78,6 @@ def thrust_findings(root: Node) -> Iterator[Finding]:
         if torque is not None and norm(torque[0]) <= CANCELLED * torque[1]:
             cure = "the force passes through the centre of mass; move or turn the thruster"
             yield Finding((*path, "position"), f"no torque: {cure}")
-    yield from _channels(facts)
-    yield from _propellant(facts)
-    yield from _emptied(facts)
-
-
-def _channels(facts: Facts) -> Iterator[Finding]:
     paths = {facts.text(*path, "name"): path for path in facts.below("thrusters")}
     names = [name for name in paths if name is not None]
     for path in facts.below("channels"):
@@ -91,23 +85,15 @@ def _channels(facts: Facts) -> Iterator[Finding]:
         for entry in facts.below(*path):
             name = facts.text(*entry)
             if name in paths:
-                valves.append(_valve(facts, paths[name]))
+                nodes = [facts.root.get(*paths[name], key) for key in ("valve", "impulse_bit")]
+                valves.append([None if node is None else node.plain() for node in nodes])
             elif name is not None:
                 yield Finding(entry, f"no thruster is called {shown(name)}; {instead(name, names)}")
         # A channel has one valve, so that thrusters with another one would not fire as planned.
         if any(valve != valves[0] for valve in valves):
             problem = "its thrusters do not have the same valve or impulse_bit"
             yield Finding(path, f"{problem}; write them alike, or use channels of their own")
-
-
-def _valve(facts: Facts, path: KeyPath) -> list[object]:
-    """Valve and table of a thruster as they are written; None for what is not."""
-    nodes = [facts.root.get(*path, key) for key in ("valve", "impulse_bit")]
-    return [None if node is None else node.plain() for node in nodes]
-
-
-def _propellant(facts: Facts) -> Iterator[Finding]:
-    """Missing keys without which a tank, or a table of impulses, is of no use."""
+    # A tank, or a table of impulses, is of no use without these.
     problem, forces = "missing; tank needs to know the propellant that is used", thrusts(facts)
     for path in facts.below("thrusters"):
         thrust = forces.get(facts.text(*path, "name") or "", 0.0)
@@ -118,11 +104,8 @@ def _propellant(facts: Facts) -> Iterator[Finding]:
             yield Finding((*path, "lever_arm"), f"{problem}, and so the thrust")
         if facts.has(*path, "impulse_bit") and unknown:
             yield Finding((*path, "impulse_bit"), "needs the thrust; give lever_arm", True)
-
-
-def _emptied(facts: Facts) -> Iterator[Finding]:
-    """Moments of inertia that no body can have once all propellant is used."""
-    path: KeyPath = ("tank", "inertia_per_kg")
+    # Once all propellant is used, the moments must be those of a body.
+    path = ("tank", "inertia_per_kg")
     propellant, principal = facts.number("mass", "tank", "propellant"), principal_of(facts)
     rows = facts.vector("shed", 3, *path)
     transverse, axial = (facts.number("shed", *path, key) for key in "AC")

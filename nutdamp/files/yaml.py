@@ -227,7 +227,12 @@ class _Builder:
         try:
             event: yaml.Event = self.events.get_event()  # type: ignore[no-untyped-call]
         except yaml.MarkedYAMLError as error:
-            raise self.fatal(*_syntax_fault(error)) from None
+            # Own words for the frequent slips, PyYAML's for the rest.
+            problem = " ".join(str(error.problem).split())
+            slips = (slip for slip in _SYNTAX if re.search(slip[0], problem))
+            _, cure, at_beginning = next(slips, ("", problem, False))
+            place = _at(error.context_mark if at_beginning else error.problem_mark)
+            raise self.fatal(place, f"not YAML: {cure}") from None
         except (ValueError, OverflowError):  # such as "\UFFFFFFFF", which is no character
             place = Place(self.events.line + 1, self.events.column + 1)
             raise self.fatal(place, "not YAML: a number here is out of range") from None
@@ -392,13 +397,6 @@ _SYNTAX = (
     (r"cannot start any token", "a text that begins with a reserved character; put it in quotes", False),
     (r"undefined tag handle", "an unknown tag; leave it out", False),
 )
-
-
-def _syntax_fault(error: yaml.MarkedYAMLError) -> tuple[Place, str]:
-    """Place and wording of a syntax error: own words for the frequent slips, PyYAML's for the rest."""
-    problem = " ".join(str(error.problem).split())
-    _, cure, at_beginning = next((slip for slip in _SYNTAX if re.search(slip[0], problem)), ("", problem, False))
-    return _at(error.context_mark if at_beginning else error.problem_mark), f"not YAML: {cure}"
 
 
 def _at(mark: Any) -> Place:

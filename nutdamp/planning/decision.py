@@ -16,11 +16,11 @@ from nutdamp.errors import NutdampError
 from nutdamp.flight import propagation
 from nutdamp.flight.end_state import seen_at
 from nutdamp.flight.propagation import Extremes, Flight, Track, extremes
-from nutdamp.planning.plan import Plan, Standing, judge, plan, reaches_spin, spinning
+from nutdamp.planning.plan import Plan, Standing, judge, plan, reaches_spin, spinning, unflown
 from nutdamp.planning.verdict import Cases, Cheaper, Line, Verdict, no_plan
 from nutdamp.schemes import catalogue, planner
 from nutdamp.spacecraft import requirements
-from nutdamp.spacecraft.model import Spacecraft, required_share
+from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.requirements import DAMPED_ANGLE, NEGLIGIBLE, SAME_COST, Part, missed, required
 
 if TYPE_CHECKING:
@@ -297,9 +297,8 @@ class Comparison(results.Data, results.Tabled):
         """Dispersed cases of each feasible plan, from none to all where they have not flown; empty if not to decide."""
         if self.flown is None or not requirements.judged(self.spacecraft):
             return {}
-        unknown = Cases(0, 0, required_share(self.spacecraft.requirement), 0.0, final=False)
         feasible = (plan for plan in self.plans if plan.feasible)
-        return {plan: self.flown[plan].cases if plan in self.flown else unknown for plan in feasible}
+        return {plan: self.flown[plan].cases if plan in self.flown else unflown(plan) for plan in feasible}
 
     @cached_property
     def verdicts(self) -> Mapping[Plan, Verdict]:
@@ -322,7 +321,7 @@ class Comparison(results.Data, results.Tabled):
     def _cheaper(self, chosen: Plan) -> Iterator[Cheaper]:
         """Compared plans that take less of what is saved, with the reason why they are not recommended."""
         feasible = [plan for plan in self.plans if plan.feasible]
-        unit = "kg" if by_propellant(feasible) else "N m s"
+        unit = _unit(feasible)
         most = spent(chosen, self.least, unit) * (1.0 - SAME_COST)
         for other in feasible:
             why = self.shortcoming(other)

@@ -10,7 +10,7 @@ from nutdamp.common.results import Note, Value, note
 from nutdamp.flight import end_state
 from nutdamp.flight.end_state import Aspect, at_start
 from nutdamp.flight.propagation import Flight
-from nutdamp.planning.decision import TIES, Comparison, Gain, Ground, Recommendation
+from nutdamp.planning.decision import TIES, Comparison, Gain, Ground
 from nutdamp.planning.plan import Plan, Standing
 from nutdamp.planning.verdict import Verdict
 from nutdamp.schemes import catalogue
@@ -214,7 +214,17 @@ def verdict_notes(verdict: Verdict, plan: Plan, *, looped: bool = False) -> Iter
     if len(plan.pulses):
         if verdict.required and requirements.unaided(body):
             yield note("pulses-unneeded", scheme=plan.scheme)
-        yield from _growing(flight, verdict)
+        # Nutation that grows keeps the requirement for a time after the last pulse.
+        values = (line.value for line in verdict.lines if line.bound.part is Part.NUTATION)
+        left = next(values, flight.final.nutation)
+        again = requirements.to_required(flight.spacecraft, left, growing=True)
+        if again and left > TELLING:
+            after = flight.schedule.end if flight.until is None else flight.until
+            figures_ = {"after_s": after, "left_deg": math.degrees(left), "limit_deg": limit, "lasting_s": again}
+            if verdict.cases is None:
+                yield note("grows-again", **figures_)
+            else:
+                yield note("grows-again-in-cases", share=f"{100.0 * verdict.cases.probability:.10g}", **figures_)
     limited = body.goal.axis is not None or _limit_of(body, Part.SHIFT) is not None
     if not limited and final.momentum_shift > TURNED:
         yield note("momentum-shift", scheme=plan.scheme, momentum_shift_deg=math.degrees(final.momentum_shift))
@@ -274,21 +284,6 @@ def _limit_of(body: Spacecraft, part: Part) -> float | None:
     return None if most is None else math.degrees(most)
 
 
-def _growing(flight: Flight, verdict: Verdict) -> Iterator[Note]:
-    """Time for which nutation that grows keeps the requirement after the last pulse."""
-    body, cases = flight.spacecraft, verdict.cases
-    left = next((line.value for line in verdict.lines if line.bound.part is Part.NUTATION), flight.final.nutation)
-    again = requirements.to_required(body, left, growing=True)
-    if again and left > TELLING:
-        after = flight.schedule.end if flight.until is None else flight.until
-        limit = _limit_of(body, Part.NUTATION)
-        values = {"after_s": after, "left_deg": math.degrees(left), "limit_deg": limit, "lasting_s": again}
-        if cases is None:
-            yield note("grows-again", **values)
-        else:
-            yield note("grows-again-in-cases", share=f"{100.0 * cases.probability:.10g}", **values)
-
-
 def comparison_warnings(compared: Comparison, *, tabulated: bool = False) -> Iterator[Note]:
     """Requirements that the recommended plan misses, the causes, and cones that the axis breaks.
 
@@ -316,7 +311,7 @@ def comparison_warnings(compared: Comparison, *, tabulated: bool = False) -> Ite
 
 
 def _missed(chosen: Plan, compared: Comparison, *, tabulated: bool) -> Iterator[Note]:
-    """Requirements that the recommended plan misses, and the causes."""
+    """Requirements that the recommended plan misses, and the causes, the best cure first."""
     if compared.recommendation.standing is Standing.COMPLIES:
         return
     cases = compared.verdicts[chosen].cases
@@ -343,14 +338,9 @@ def _missed(chosen: Plan, compared: Comparison, *, tabulated: bool) -> Iterator[
             part=bound.label,
             limit_deg=math.degrees(bound.limit),
         )
-    yield from _obstacles(chosen, compared)
-
-
-def _obstacles(plan: Plan, compared: Comparison) -> Iterator[Note]:
-    """Causes that prevent a smaller residual; the best cure first."""
-    body = plan.spacecraft
-    parts = {bound.part for bound in plan.shortfalls}
-    if body.disturbances and not plan.options.with_disturbances:
+    body = chosen.spacecraft
+    parts = {bound.part for bound in chosen.shortfalls}
+    if body.disturbances and not chosen.options.with_disturbances:
         aware = compared.with_disturbances
         if aware is None:
             yield note("unplanned-disturbances")
@@ -358,22 +348,22 @@ def _obstacles(plan: Plan, compared: Comparison) -> Iterator[Note]:
             yield note("disturbances-helped", scheme=aware.scheme)
         else:
             yield note("disturbances-not-helped")
-    if Part.NUTATION in parts and (cause := remaining(plan)).code != "remains-unplanned":
-        reached = [limit for limits in hindrances(plan) for limit in limits]
-        short = plan.pulses.total_impulse < body.least_impulse and cause.code != "remains-max-pulses"
+    if Part.NUTATION in parts and (cause := remaining(chosen)).code != "remains-unplanned":
+        reached = [limit for limits in hindrances(chosen) for limit in limits]
+        short = chosen.pulses.total_impulse < body.least_impulse and cause.code != "remains-max-pulses"
         if reached and short:
             yield note(
                 "pulses-at-limits",
-                given_Nms=plan.pulses.total_impulse,
+                given_Nms=chosen.pulses.total_impulse,
                 needed_Nms=body.least_impulse,
-                end_s=plan.pulses.end,
+                end_s=chosen.pulses.end,
                 horizon_s=body.horizon,
                 limits=", ".join(reached),
             )
         else:
-            yield cause.of(plan.scheme)
-    if Part.DISTANCE in parts and plan.scheme not in (*catalogue.POINTING, *catalogue.COMMANDED):
-        yield note("scheme-does-not-turn", scheme=plan.scheme, schemes=", ".join(catalogue.POINTING))
+            yield cause.of(chosen.scheme)
+    if Part.DISTANCE in parts and chosen.scheme not in (*catalogue.POINTING, *catalogue.COMMANDED):
+        yield note("scheme-does-not-turn", scheme=chosen.scheme, schemes=", ".join(catalogue.POINTING))
     if parts != {Part.SPIN} and any(channel.damps for channel in body.channels):
         if OPTIMAL.name not in {plan.scheme for plan in compared.plans}:
             yield note("optimal-not-compared")
@@ -412,10 +402,6 @@ LEAST_CODES = {"impulse": "least-impulse", "time": "least-time", "pulses": "leas
 """Codes of the notes on the plan that takes least of what is saved, but propellant."""
 
 
-def _by_cost(recommendation: Recommendation) -> str:
-    return "least-propellant" if recommendation.by_propellant else "least-impulse"
-
-
 def reasons(compared: Comparison) -> Iterator[Note]:
     """Reason for the recommended plan, or for none."""
     recommendation, body = compared.recommendation, compared.spacecraft
@@ -447,7 +433,8 @@ def reasons(compared: Comparison) -> Iterator[Note]:
     elif not requirements.required(body):
         yield note("damps-at-least", count=count)
     else:
-        yield note(LEAST_CODES.get(recommendation.least, _by_cost(recommendation)), count=count)
+        usual = "least-propellant" if recommendation.by_propellant else "least-impulse"
+        yield note(LEAST_CODES.get(recommendation.least, usual), count=count)
     if ground in TIES:
         yield note(ground.value)
 

@@ -30,7 +30,7 @@ from nutdamp.schemes import catalogue, planner, valve_commands
 from nutdamp.schemes.valve_commands import Legs
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import Breach, breaches, keeps_limits, misfits
-from nutdamp.spacecraft.model import Keep, Spacecraft, Vector
+from nutdamp.spacecraft.model import Keep, Spacecraft, Vector, required_share
 from nutdamp.spacecraft.requirements import Bound, Held, Left
 from nutdamp.spacecraft.schedule import Schedule
 
@@ -62,7 +62,17 @@ def schedules(spacecraft: Spacecraft, scheme: str, options: catalogue.SchemeOpti
         if work.exhausted():
             return
         try:
-            whole = _over(body, scheme, options, route)
+            legs, goal = Legs(body), body.goal
+            for number, point in enumerate(route, start=1):  # each leg has its share of the horizon
+                here = legs.here
+                to_go = _length((here.momentum, point, *route[number:]))
+                share = _length((here.momentum, point)) / to_go if to_go > 0.0 else 1.0
+                spin = goal.spin if number == len(route) else None
+                limits = replace(here.limits, horizon=share * here.horizon)
+                leg = replace(here, goal=replace(goal, axis=point, spin=spin), limits=limits)
+                legs.fire(planner.schedule(scheme, leg, options))
+            names = ", ".join(keep.name for keep in spacecraft.keep)
+            whole = legs.schedule(note("goes-round", points=len(route) - 1, directions=names))
             yield whole if as_it_is else planner.as_commands(scheme, spacecraft, whole, options)
         except Infeasible:
             continue
@@ -121,21 +131,6 @@ def _clear(corners: Route, keeps: Sequence[Keep], margin: float) -> bool:
         if min(room[0], room[-1]) < 0.0 or room.min() < min(margin, room[0], room[-1]):
             return False
     return True
-
-
-def _over(spacecraft: Spacecraft, scheme: str, options: catalogue.SchemeOptions, route: Route) -> Schedule:
-    """Schedule over a ``route``, each leg with its share of the horizon; raises Infeasible with the reason."""
-    legs, goal = Legs(spacecraft), spacecraft.goal
-    for number, point in enumerate(route, start=1):
-        here = legs.here
-        to_go = _length((here.momentum, point, *route[number:]))
-        share = _length((here.momentum, point)) / to_go if to_go > 0.0 else 1.0
-        spin = goal.spin if number == len(route) else None
-        limits = replace(here.limits, horizon=share * here.horizon)
-        leg = replace(here, goal=replace(goal, axis=point, spin=spin), limits=limits)
-        legs.fire(planner.schedule(scheme, leg, options))
-    names = ", ".join(keep.name for keep in spacecraft.keep)
-    return legs.schedule(note("goes-round", points=len(route) - 1, directions=names))
 
 
 NO_NUTATION, ROUNDING = 1e-12, 1e-11
@@ -505,3 +500,8 @@ def unrounded(plan_: Plan) -> Schedule | None:
     if body.limits.tick is None or plan_.from_file or plan_.scheme not in catalogue.SCHEMES:
         return None
     return plan(replace(body, limits=replace(body.limits, tick=None)), plan_.scheme, plan_.options).schedule
+
+
+def unflown(plan: Plan) -> Cases:
+    """Cases of a plan that have not flown: of all any share may comply."""
+    return Cases(0, 0, required_share(plan.spacecraft.requirement), 0.0, final=False)

@@ -32,11 +32,10 @@ from nutdamp.montecarlo.study import (
     next_stage,
     study_of,
 )
-from nutdamp.planning.plan import Plan, judge
+from nutdamp.planning.plan import Plan, judge, unflown
 from nutdamp.planning.verdict import Cases, Verdict, cases_of
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.equipment import Block
-from nutdamp.spacecraft.model import required_share
 from nutdamp.spacecraft.schedule import Schedule
 
 
@@ -140,8 +139,10 @@ def fly_compared(
         if candidate is None:
             break
         if candidate.final and candidate.cases.enough is not True:
-            rivals = [each for each in flown.values() if each.plan in eligible]
-            candidate = _likelier(rivals, candidate) or candidate
+            worth = (candidate.cases.complying or 0.0) + LIKELIER
+            others = [each for each in flown.values() if each.plan in eligible and not each.final]
+            rivals = [each for each in others if each.cases.high >= worth]
+            candidate = max(rivals, key=lambda each: each.cases.high, default=candidate)
         if candidate.final:
             break
         try:
@@ -149,18 +150,6 @@ def fly_compared(
         except Infeasible:
             del flown[candidate.plan]
     return flown
-
-
-def unflown(plan: Plan) -> Cases:
-    """Cases of a plan that have not flown: of all any share may comply."""
-    return Cases(0, 0, required_share(plan.spacecraft.requirement), 0.0, final=False)
-
-
-def _likelier(flown: Sequence[FlownPlan], best: FlownPlan) -> FlownPlan | None:
-    """Plan with which more cases may comply than with the ``best``, too few; None without one."""
-    worth = (best.cases.complying or 0.0) + LIKELIER
-    others = [each for each in flown if not each.final and each.cases.high >= worth]
-    return max(others, key=lambda each: each.cases.high, default=None)
 
 
 CASES = 2 * STRIDE  # dispersed cases that are flown for each range: the first ones of the study

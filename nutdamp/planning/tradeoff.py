@@ -179,15 +179,13 @@ def fronts(
     count: int,
     shifts: Sequence[float],
     nominal: bool = False,
-    progress: Callable[[int], None] = lambda _: None,
 ) -> tuple[Front, ...]:
     """Fronts for each of the ``shifts`` (rad, infinite for any), of at most ``count`` searches each.
 
     What is traded is propellant, with ``options.least`` of impulse that (then pulses do not tell their propellant).
     A schedule counts for every front whose shift it keeps; that of the whole horizon is what
     `plan` finds. Where optimal finds none, those of the other schemes count that comply but for
-    where H ends. ``nominal``: see `Point`. ``progress``: called with how many of the
-    count × len(shifts) searches are done.
+    where H ends. ``nominal``: see `Point`. The count × len(shifts) searches are the steps of the task.
     """
     if options.least == "impulse":
         # The search for the fastest saves time, and counts in kg whatever it can: one unit for all points.
@@ -204,7 +202,7 @@ def fronts(
         with work.budget("a point", work.left() / share):
             planned = plan(body, OPTIMAL.name, chosen)
         done += 1
-        progress(done)
+        work.reach(done)
         return planned
 
     for number, shift in enumerate(ordered, start=1):
@@ -213,7 +211,7 @@ def fronts(
         # The very search of `plan`, with its budget: one question, one answer.
         whole = plan(spacecraft, OPTIMAL.name, allowing)
         done += 1
-        progress(done)
+        work.reach(done)
         if whole.schedule is None or whole.schedule.bounds is None:
             why[shift] = infeasibility(whole) or "there is nothing to do"
         else:
@@ -222,7 +220,12 @@ def fronts(
                 entries += [(shift, *entry) for entry in _sooner(whole, allowing, count, search)]
             unspent -= spent.done
         done = count * number
-    others = _others(spacecraft, options) if why else []
+    others: list[Plan] = []
+    if why:
+        names = [name for name in usual(spacecraft) if name != OPTIMAL.name]
+        compared = compare(spacecraft, names, Options(with_disturbances=options.with_disturbances), samples=0)
+        ends = {Part.SHIFT, Part.DISTANCE}
+        others = [plan for plan in compared if len(plan.pulses) and {bound.part for bound in plan.shortfalls} <= ends]
     plans = [*(plan for _, plan, _ in entries), *others]
     counted = [plan.pulses.bounds for plan in plans if plan.pulses.bounds is not None]
     in_kg = options.least != "impulse" and by_propellant(plans) and all(known.unit == "kg" for known in counted)
@@ -245,14 +248,6 @@ def _fronts(
         kept = undominated(points or [point for point in others if point.off <= shift + LEFT], kept)
         by_others = all(point.plan.scheme != OPTIMAL.name for point in kept)
         yield Front(shift, kept, why.get(shift) if by_others else None)
-
-
-def _others(spacecraft: Spacecraft, options: OptimalOptions) -> list[Plan]:
-    """Plans of the other usual schemes that comply but for the end of H."""
-    names = [name for name in usual(spacecraft) if name != OPTIMAL.name]
-    plans = compare(spacecraft, names, Options(with_disturbances=options.with_disturbances), samples=0)
-    ends = {Part.SHIFT, Part.DISTANCE}
-    return [plan for plan in plans if len(plan.pulses) and {bound.part for bound in plan.shortfalls} <= ends]
 
 
 def _sooner(
@@ -320,10 +315,9 @@ def trade(
     count: int,
     shifts: Sequence[float],
     nominal: bool = False,
-    progress: Callable[[int], None] = lambda _: None,
 ) -> Trade:
     """Trade of the `fronts`, with the plan that a comparison of the usual schemes recommends."""
-    traded = fronts(spacecraft, options, count=count, shifts=shifts, nominal=nominal, progress=progress)
+    traded = fronts(spacecraft, options, count=count, shifts=shifts, nominal=nominal)
     usual_options = Options(least=options.least, with_disturbances=options.with_disturbances)
     compared = compare(spacecraft, options=usual_options, samples=0 if nominal else None)
     return Trade(spacecraft, traded, compared.recommended)

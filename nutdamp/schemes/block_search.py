@@ -317,8 +317,15 @@ class BlockSearch:
             shape = np.broadcast_shapes((len(before), 1, 1, 1), *map(np.shape, (*trial, left.nutation)))
             self.looked += math.prod(shape)
             work.spend(LOOKED * math.prod(shape))
-            parts, rows = (self._severity(state, channel, trial, after, left), after.cost), shape[0] * shape[1]
-            severity, cost = (np.broadcast_to(part, shape).reshape(rows, shape[2] * shape[3]) for part in parts)
+            share = self.flights.share(left)  # largest one of a bound; infinite for blocks that may not be
+            over = np.asarray(after.sun_pulse) > self.body.horizon + self.model.turn
+            over = over | self._dark(state, channel, trial, after)
+            if self.body.goal.axis is not None:  # H has gone round the Sun the longer way to the target, or once more
+                over = over | (np.abs(after.longitude - state.longitude - self.model.ahead(state)) > math.pi)
+            over = over if self.body.tank is None else over | (after.used > self.body.tank.propellant)
+            share = np.where(over | np.isnan(share) | (after.cost >= self.most), np.inf, share)
+            table = shape[0] * shape[1], shape[2] * shape[3]
+            severity, cost = (np.broadcast_to(part, shape).reshape(table) for part in (share, after.cost))
             doubted = np.where(severity <= DOUBTFUL, cost, np.inf)
             keys = (
                 (_in_order(severity, cost), few),
@@ -337,16 +344,6 @@ class BlockSearch:
                 blocks = (*before[parent].blocks, Block(channel.name, *block))
                 sequences.append(BlockSequence(blocks, (failed, spent, end), severe))
         return sequences
-
-    def _severity(self, state: BlockState, channel: Channel, trial: Trial, after: BlockState, left: Left) -> Array:
-        """Largest share of a bound, infinite for blocks that may not be."""
-        severity = self.flights.share(left)
-        over = np.asarray(after.sun_pulse) > self.body.horizon + self.model.turn
-        over = over | self._dark(state, channel, trial, after)
-        if self.body.goal.axis is not None:  # H has gone round the Sun the longer way to the target, or once more
-            over = over | (np.abs(after.longitude - state.longitude - self.model.ahead(state)) > math.pi)
-        over = over if self.body.tank is None else over | (after.used > self.body.tank.propellant)
-        return np.asarray(np.where(over | np.isnan(severity) | (after.cost >= self.most), np.inf, severity))
 
     def _counts(self, state: BlockState, every: int) -> NDArray[np.int64]:
         """Numbers of pulses up to the horizon."""

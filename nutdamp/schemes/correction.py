@@ -335,8 +335,29 @@ class FlownBuilder:
                 raise Infeasible("the flight of the pulses for that was not finished")
             self._before.append((self.now, self.here))
             timed = pulse.moved(base)
-            self.here, steps = _after(self.here, timed.moved(-self.now))
-            self.steps += steps
+            here, pulse_ = self.here, timed.moved(-self.now)
+            flown = propagation.flown(here, Schedule((pulse_,)))
+            settled, since, limits = flown.settled, pulse_.over, here.limits
+            to_principal = attitude.from_matrix(here.inertia.axes.T)
+            given = here.attitude or Attitude(settled.quaternion)
+            self.here = replace(
+                here,
+                inertia=lightened(here, pulse_.propellant or 0.0),
+                omega0=settled.rates,
+                attitude=replace(given, quaternion=attitude.multiply(settled.quaternion, to_principal), epoch=None),
+                disturbances=tuple(
+                    replace(disturbance, transverse=disturbance.transverse * cmath.exp(1j * disturbance.rate * since))
+                    for disturbance in here.disturbances
+                ),
+                limits=replace(
+                    limits,
+                    horizon=here.horizon - since,
+                    earliest=limits.gap,
+                    max_pulses=None if limits.max_pulses is None else limits.max_pulses - 1,
+                    blackout=tuple((begins - since, ends - since) for begins, ends in limits.blackout if ends > since),
+                ),
+            )
+            self.steps += flown.steps
             self.pulses.append(timed)
             self.now = timed.over
 
@@ -360,29 +381,3 @@ def tolerable(spacecraft: Spacecraft) -> float:
     """Largest residual, rad, at which the target counts as reached: more where commands have ticks."""
     share = LEFT_OVER if spacecraft.limits.tick is None else LEFT_OVER_BY_TICKS
     return max(share * (spacecraft.nutation + spacecraft.to_turn), ROUNDING)
-
-
-def _after(spacecraft: Spacecraft, pulse: Pulse) -> tuple[Spacecraft, int]:
-    """Spacecraft at the end of ``pulse``, with its time counted from there; and the steps taken."""
-    flown = propagation.flown(spacecraft, Schedule((pulse,)))
-    settled, since, limits = flown.settled, pulse.over, spacecraft.limits
-    to_principal = attitude.from_matrix(spacecraft.inertia.axes.T)
-    given = spacecraft.attitude or Attitude(settled.quaternion)
-    after = replace(
-        spacecraft,
-        inertia=lightened(spacecraft, pulse.propellant or 0.0),
-        omega0=settled.rates,
-        attitude=replace(given, quaternion=attitude.multiply(settled.quaternion, to_principal), epoch=None),
-        disturbances=tuple(
-            replace(disturbance, transverse=disturbance.transverse * cmath.exp(1j * disturbance.rate * since))
-            for disturbance in spacecraft.disturbances
-        ),
-        limits=replace(
-            limits,
-            horizon=spacecraft.horizon - since,
-            earliest=limits.gap,
-            max_pulses=None if limits.max_pulses is None else limits.max_pulses - 1,
-            blackout=tuple((begins - since, ends - since) for begins, ends in limits.blackout if ends > since),
-        ),
-    )
-    return after, flown.steps

@@ -77,7 +77,22 @@ class Train:
         if torquer is not None:
             self.torque = math.inf if torquer.torque is None else torquer.torque
         else:
-            self.channels = _spread(usable(here), options.per_turn)
+            # Of directions as different as can be, the one that costs least for its torque first.
+            channels, count = usable(here), options.per_turn
+            if not channels:
+                raise Infeasible("once the nutation is taken out no time is left for the turn")
+            self.channels = [min(channels, key=lambda channel: (channel.price, -abs(channel.transverse)))]
+            while len(self.channels) < count:
+                off = [
+                    min(abs(cmath.phase(each.transverse * other.transverse.conjugate())) for other in self.channels)
+                    for each in channels
+                ]
+                if max(off) < 0.2:
+                    raise Infeasible(
+                        f"{count} pulses a spin turn need {count} channels of different directions, for each passes "
+                        f"the phase once a turn; there are {len(self.channels)}"
+                    )
+                self.channels.append(channels[off.index(max(off))])
             self.torque = math.fsum(abs(channel.transverse) for channel in self.channels) / len(self.channels)
             self.shortest = max(channel.min_on_time for channel in self.channels)
             self.longest = min(channel.max_on_time for channel in self.channels)
@@ -306,25 +321,6 @@ def _in_body(here: Spacecraft, direction: Vector, t: float) -> complex:
     _, quaternions = Arc.of(here.inertia, here.initial).motion(np.array([t]))
     body = attitude.matrix(quaternions[0]).T @ direction
     return complex(body[0], body[1])
-
-
-def _spread(channels: list[Channel], count: int) -> list[Channel]:
-    """``count`` channels of directions as different as can be, the one that costs least for its torque first."""
-    if not channels:
-        raise Infeasible("once the nutation is taken out no time is left for the turn")
-    chosen = [min(channels, key=lambda channel: (channel.price, -abs(channel.transverse)))]
-    while len(chosen) < count:
-        off = [
-            min(abs(cmath.phase(channel.transverse * other.transverse.conjugate())) for other in chosen)
-            for channel in channels
-        ]
-        if max(off) < 0.2:
-            raise Infeasible(
-                f"{count} pulses a spin turn need {count} channels of different directions, for each passes the "
-                f"phase once a turn; there are {len(chosen)}"
-            )
-        chosen.append(channels[off.index(max(off))])
-    return chosen
 
 
 def _ratio(whole: float, part: float) -> float:

@@ -180,7 +180,14 @@ class ImpulseBuilder:
             if math.isinf(centre):  # dissipation stops the spin before
                 return None
             if self.spacecraft.disturbances or self.spacecraft.growth != 0.0:
-                centre = self._opposed_near(channel, centre, on_time)
+                # ω does not turn evenly: the pulse opposes it by Newton steps.
+                for _ in range(20):
+                    pulse = channel_pulse(channel, centre, on_time)
+                    off = rigid_body.phase_to_oppose(self.omega_at(centre), self.acts(pulse))
+                    _, spin = self._coast(centre)
+                    centre += off / (self.rate(spin) or self.turning)
+                    if abs(off) < ALIGNED:
+                        break
             start = centre - 0.5 * on_time
             if windows.limits.tick is not None:
                 start = windows.nearest_tick(start)
@@ -192,16 +199,6 @@ class ImpulseBuilder:
             # Rounded to a tick before the actuators are ready, opposed earlier by a disturbance, or blacked out.
             turns = max(turns + 1, alignment(self.ready if free is None else free))
         return None
-
-    def _opposed_near(self, channel: Channel, centre: float, on_time: float) -> float:
-        """Time near ``centre`` at which ω opposes the pulse where it does not turn evenly, by Newton steps."""
-        for _ in range(20):
-            turn = rigid_body.phase_to_oppose(self.omega_at(centre), self.acts(channel_pulse(channel, centre, on_time)))
-            _, spin = self._coast(centre)
-            centre += turn / (self.rate(spin) or self.turning)
-            if abs(turn) < ALIGNED:
-                break
-        return centre
 
     def steer(self, steerable: Steerable, impulse: float) -> Pulse | None:
         """Earliest pulse of a steerable torquer that acts against ω like ``impulse`` N m s; None if none can."""

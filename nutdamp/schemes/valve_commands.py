@@ -8,7 +8,7 @@ and blowdown included; further effects of the shape of the thrust are corrected 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -163,25 +163,18 @@ def as_commands(
         if supply.shortage is not None:
             raise Infeasible(supply.shortage)
     fired = [pulse for pulse, command in zip(schedule, commands, strict=True) if command.magnitude > 0.0]
-    notes = _weakened(spacecraft, list(zip(fired, corrected, strict=True)), firing, correct)
-    return replace(firing, notes=(*firing.notes, *notes))
-
-
-def _weakened(
-    spacecraft: Spacecraft, pairs: list[tuple[Pulse, Pulse]], firing: Schedule, correct: Correction
-) -> Iterator[Note]:
-    """Note on weakening by falling pressure and cold nozzles; ``pairs`` of pulses and their commands."""
-    if correct.options.equal and pairs:
-        last = pairs[-1][0].on_time
-        alike = [command.loaded[1] for pulse, command in pairs if pulse.on_time == last and command.magnitude > 0.0]
+    notes, tank = list(firing.notes), spacecraft.tank
+    if correct.options.equal and fired:
+        pairs = [pair for pair in zip(fired, corrected, strict=True) if pair[0].on_time == fired[-1].on_time]
+        alike = [command.loaded[1] for _, command in pairs if command.magnitude > 0.0]
         shortest, longest = min(alike, default=0.0), max(alike, default=0.0)
         if f"{shortest:.4g}" != f"{longest:.4g}":
-            yield note("unequal-commands", shortest_s=shortest, longest_s=longest)
-    tank = spacecraft.tank
+            notes.append(note("unequal-commands", shortest_s=shortest, longest_s=longest))
     if tank is not None and firing.pulses:
         full, left = 1e-5 * tank.pressure, 1e-5 * tank.pressure_after(firing.propellant or 0.0)
         if f"{full:.4g}" != f"{left:.4g}":
-            yield note("pressure-falls", full_bar=full, left_bar=left)
+            notes.append(note("pressure-falls", full_bar=full, left_bar=left))
+    return replace(firing, notes=tuple(notes))
 
 
 def _firing(schedule: Schedule) -> Schedule:

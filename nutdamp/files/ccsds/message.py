@@ -336,23 +336,21 @@ class Checked:
                     self.fault(name, f"comes after {last}; the order of the standard is {', '.join(order)}")
                 else:
                     last = name
-                self._form(entry, known[name])
+                unit = known[name].unit
+                if not entry.value:
+                    self.fault(name, "empty; expected a value")
+                elif unit is not None and not _NUMBER.fullmatch(entry.value):
+                    self.fault(name, f"{entry.value[:40]!r} is not a number")
+                elif unit is not None and not abs(float(entry.value)) <= LARGEST:
+                    self.fault(name, f"{entry.value[:40]} is beyond anything physical")
+                elif unit is not None:
+                    self._numbers[name] = float(entry.value)
+                if entry.unit and entry.unit != unit:
+                    expected = f"[{unit}]" if unit else "no unit"
+                    self.fault(name, f"expected {expected}, got [{entry.unit}]")
         for keyword in keywords:
             if keyword.required and keyword.name not in self.entries:
                 self.fault(keyword.name, f"missing{f' in this {block.name} block' if block.name else ''}")
-
-    def _form(self, entry: MessageEntry, keyword: Keyword) -> None:
-        if not entry.value:
-            self.fault(keyword.name, "empty; expected a value")
-        elif keyword.unit is not None and not _NUMBER.fullmatch(entry.value):
-            self.fault(keyword.name, f"{entry.value[:40]!r} is not a number")
-        elif keyword.unit is not None and not abs(float(entry.value)) <= LARGEST:
-            self.fault(keyword.name, f"{entry.value[:40]} is beyond anything physical")
-        elif keyword.unit is not None:
-            self._numbers[keyword.name] = float(entry.value)
-        if entry.unit and entry.unit != keyword.unit:
-            expected = f"[{keyword.unit}]" if keyword.unit else "no unit"
-            self.fault(keyword.name, f"expected {expected}, got [{entry.unit}]")
 
     def fault(self, keyword: str, problem: str) -> None:
         """Something wrong with a keyword, or, where it is missing, with the block."""
@@ -419,22 +417,9 @@ class MessageReader:
         if data.lstrip(BEFORE).startswith(b"<"):
             cure = "write the message in keyword = value notation (KVN)"
             raise FaultyFile([Fault(path, 1, 1, "", f"XML is not read; {cure}")])
-        self.outside, *self.blocks = self._parsed(utf8_text(data, path))
-        first = next(iter(self.outside.entries), None)
-        if first is None or not VERSIONS.fullmatch(first.keyword):
-            self.fault(1, "", f"not an {keyword.split('_')[1]}: its first line is {keyword} = {VERSION}")
-            raise FaultyFile(self.faults)
-        if first.keyword != keyword:
-            raise FaultyFile([Fault(path, first.line, 1, first.keyword, f"another message; expected {keyword}")])
-        if first.value != VERSION:
-            problem = f"version {first.value!r} is not read, its keywords are others; expected version {VERSION}"
-            raise FaultyFile([Fault(path, first.line, 1, keyword, problem)])
-
-    def _parsed(self, text: str) -> list[MessageBlock]:
-        """The blocks of a text, first what is in no block; keeps the faults of notation."""
         begun: list[tuple[str, int, list[MessageEntry]]] = [("", 1, [])]
         within: str | None = None
-        for line, raw in enumerate(_LINE_END.split(text), start=1):
+        for line, raw in enumerate(_LINE_END.split(utf8_text(data, path)), start=1):
             content = raw.strip()
             if not content or content.split(maxsplit=1)[0] == "COMMENT":
                 continue
@@ -456,7 +441,17 @@ class MessageReader:
                 self.fault(line, "", f"{content[:40]!r} is no KEYWORD = value")
         if within is not None:
             self.fault(begun[-1][1], f"{within}_START", f"{within}_STOP is missing")
-        return [MessageBlock(word, tuple(entries), line=line) for word, line, entries in begun]
+        blocks = [MessageBlock(word, tuple(entries), line=line) for word, line, entries in begun]
+        self.outside, *self.blocks = blocks  # first what is in no block
+        first = next(iter(self.outside.entries), None)
+        if first is None or not VERSIONS.fullmatch(first.keyword):
+            self.fault(1, "", f"not an {keyword.split('_')[1]}: its first line is {keyword} = {VERSION}")
+            raise FaultyFile(self.faults)
+        if first.keyword != keyword:
+            raise FaultyFile([Fault(path, first.line, 1, first.keyword, f"another message; expected {keyword}")])
+        if first.value != VERSION:
+            problem = f"version {first.value!r} is not read, its keywords are others; expected version {VERSION}"
+            raise FaultyFile([Fault(path, first.line, 1, keyword, problem)])
 
     def fault(self, line: int, where: str, problem: str) -> None:
         """Keep a fault of the message."""

@@ -364,9 +364,37 @@ def imported(contents: ApmContents, path: str) -> tuple[str, Spacecraft, Schedul
     sizes = [float(np.linalg.norm(torque)) for torque in torques]
     transverse = all(abs(torque[2]) <= ALIKE * size for torque, size in zip(torques, sizes, strict=True))
     alike = sizes and transverse and max(sizes) - min(sizes) <= ALIKE * max(sizes)
-    text = _file_text(contents, path, sizes[0] if alike else None)
+    # Texts are in double quotes, in which JSON and YAML agree.
+    lines = [
+        f"# From the attitude parameter message {printable(path)}; numbers as given there.",
+        "# An APM knows no thruster layout, no mass, no requirement and no limits: add them.",
+        f"name: {json.dumps(contents.name, ensure_ascii=False)}",
+    ]
+    if contents.object_id is not None:
+        lines.append(f"object_id: {json.dumps(contents.object_id, ensure_ascii=False)}")
+    rates = ", ".join(f"{math.degrees(rate)!r} deg/s" for rate in contents.rates.tolist())
+    lines += [*_inertia(contents.tensor), f"omega0: [{rates}]"]
+    if contents.quaternion is not None:
+        lines += [
+            "attitude:",
+            f"  epoch: {contents.epoch.text.rstrip('0').rstrip('.')}Z",
+            f"  frame: {contents.frame}",
+            f"  quaternion: {contents.quaternion.tolist()}   # body -> frame, scalar first",
+        ]
+    lines += _actuators(contents.manoeuvres, sizes[0] if alike else None)
+    text = "\n".join(lines) + "\n"
+    # Pulses of the steerable torquer; one that overlaps another has a name of its own.
+    pulses: list[Pulse] = []
+    free = 0.0
+    for number, (manoeuvre, torque) in enumerate(zip(contents.manoeuvres, torques, strict=True), start=1):
+        start, lasts, used = manoeuvre.start, manoeuvre.duration, manoeuvre.mass
+        alone = start >= free - 1e-9
+        spent = None if used is None else -used
+        channel = STEERABLE if alone else f"MAN{number}"
+        pulses.append(Pulse(start + 0.5 * lasts, lasts, channel, torque * lasts, torque, propellant=spent))
+        free = max(free, start + lasts) if alone else free
     try:
-        return text, read_spacecraft(text, path), _schedule(contents.manoeuvres, torques)
+        return text, read_spacecraft(text, path), Schedule(tuple(pulses))
     except FaultyFile as wrong:  # its faults are those of the message
         faults = []
         for fault in wrong.faults:
@@ -402,30 +430,6 @@ def ratio_doubts(contents: ApmContents, body: Spacecraft) -> list[str]:
     ]
 
 
-def _file_text(contents: ApmContents, path: str, torquer: float | None) -> str:
-    """The spacecraft file as YAML; ``torquer`` N m is the torque of a steerable torquer, or None."""
-    # Texts are in double quotes, in which JSON and YAML agree.
-    lines = [
-        f"# From the attitude parameter message {printable(path)}; numbers as given there.",
-        "# An APM knows no thruster layout, no mass, no requirement and no limits: add them.",
-        f"name: {json.dumps(contents.name, ensure_ascii=False)}",
-    ]
-    if contents.object_id is not None:
-        lines.append(f"object_id: {json.dumps(contents.object_id, ensure_ascii=False)}")
-    assert contents.tensor is not None
-    rates = ", ".join(f"{math.degrees(rate)!r} deg/s" for rate in contents.rates.tolist())
-    lines += [*_inertia(contents.tensor), f"omega0: [{rates}]"]
-    if contents.quaternion is not None:
-        lines += [
-            "attitude:",
-            f"  epoch: {contents.epoch.text.rstrip('0').rstrip('.')}Z",
-            f"  frame: {contents.frame}",
-            f"  quaternion: {contents.quaternion.tolist()}   # body -> frame, scalar first",
-        ]
-    lines += _actuators(contents.manoeuvres, torquer)
-    return "\n".join(lines) + "\n"
-
-
 def _inertia(tensor: Vector) -> list[str]:
     first, second, third = np.diag(tensor).tolist()
     if first == second and not (tensor - np.diag(np.diag(tensor))).any():
@@ -454,20 +458,6 @@ def _actuators(manoeuvres: tuple[Manoeuvre, ...], torquer: float | None) -> list
             for number, torque in enumerate(distinct, start=1)
         ),
     ]
-
-
-def _schedule(manoeuvres: tuple[Manoeuvre, ...], torques: list[Vector]) -> Schedule:
-    """The manoeuvres as pulses of the steerable torquer; one that overlaps another has a name of its own."""
-    pulses: list[Pulse] = []
-    free = 0.0
-    for number, (manoeuvre, torque) in enumerate(zip(manoeuvres, torques, strict=True), start=1):
-        start, lasts, used = manoeuvre.start, manoeuvre.duration, manoeuvre.mass
-        alone = start >= free - 1e-9
-        spent = None if used is None else -used
-        channel = STEERABLE if alone else f"MAN{number}"
-        pulses.append(Pulse(start + 0.5 * lasts, lasts, channel, torque * lasts, torque, propellant=spent))
-        free = max(free, start + lasts) if alone else free
-    return Schedule(tuple(pulses))
 
 
 def merged_text(source: Source, contents: ApmContents | History, at: float = 0.0, *, inertia: bool) -> str:

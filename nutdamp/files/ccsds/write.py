@@ -25,7 +25,7 @@ from nutdamp.flight.propagation import Flight
 from nutdamp.physics import attitude
 from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft.model import Inertia, Spacecraft, Vector
-from nutdamp.spacecraft.schedule import Pulse, Schedule
+from nutdamp.spacecraft.schedule import Schedule
 
 AXIS = 1e-12  # tilt in rad up to which the symmetry axis counts as the third axis of the file
 
@@ -134,9 +134,21 @@ def _manoeuvres(name: str, plan: Plan, reference: Reference) -> Iterator[message
         timing = (reference.epoch.plus(max(pulse.start, 0.0)).text, pulse.on_time)
         mass = None if pulse.propellant is None else -pulse.propellant
         if name == "MAN":
-            values = [*timing, BODY_FRAME, *_torque(plan, pulse, place), mass]
+            if pulse.torque is None or pulse.on_time == 0.0:
+                cure = "give the torquer a torque (steerable: {torque: 20 N m}) and plan again"
+                impulse = f"pulse {place} is an ideal impulse without a duration"
+                raise BadRequest(f"{impulse}, which an APM cannot hold; {cure}")
+            values = [*timing, BODY_FRAME, *plan.spacecraft.inertia.in_file(pulse.torque), mass]
         else:
-            values = [*timing, mass, reference.frame, *(KILO * _velocity_change(plan, pulse, place))]
+            if pulse.force is None:
+                change = f"the velocity change by pulse {place} ({pulse.channel})"
+                raise BadRequest(f"{change} is not known; give the thrusters position, direction and force")
+            if pulse.propellant is None:
+                used = f"the propellant of pulse {place} ({pulse.channel})"
+                raise BadRequest(f"{used} is not known, which an OPM needs; give the thrusters isp")
+            assert plan.spacecraft.mass is not None
+            gained = momentum_gained(replace(plan.flight, schedule=Schedule((pulse,))))  # inertial
+            values = [*timing, mass, reference.frame, *(KILO * cleaned(gained / plan.spacecraft.mass))]
         comments = [f"pulse {place}: {pulse.channel}"]
         if pulse.through_valve:
             start, on_time = pulse.loaded
@@ -144,26 +156,6 @@ def _manoeuvres(name: str, plan: Plan, reference: Reference) -> Iterator[message
             thrust = f"{pulse.on_time:.9g} s at the torque given."
             comments.append(f"Start and duration below are those of the thrust: {thrust}")
         yield _block(name, values, *comments)
-
-
-def _torque(plan: Plan, pulse: Pulse, place: int) -> Vector:
-    if pulse.torque is None or pulse.on_time == 0.0:
-        cure = "give the torquer a torque (steerable: {torque: 20 N m}) and plan again"
-        raise BadRequest(f"pulse {place} is an ideal impulse without a duration, which an APM cannot hold; {cure}")
-    return plan.spacecraft.inertia.in_file(pulse.torque)
-
-
-def _velocity_change(plan: Plan, pulse: Pulse, place: int) -> Vector:
-    """Inertial velocity change (3,) m/s by the force, which turns with the body."""
-    if pulse.force is None:
-        cure = "give the thrusters position, direction and force"
-        raise BadRequest(f"the velocity change by pulse {place} ({pulse.channel}) is not known; {cure}")
-    if pulse.propellant is None:
-        cure = "give the thrusters isp"
-        raise BadRequest(f"the propellant of pulse {place} ({pulse.channel}) is not known, which an OPM needs; {cure}")
-    mass = plan.spacecraft.mass
-    assert mass is not None
-    return cleaned(momentum_gained(replace(plan.flight, schedule=Schedule((pulse,)))) / mass)
 
 
 def aem(

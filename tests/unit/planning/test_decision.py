@@ -28,7 +28,7 @@ from nutdamp.files.reader import read_spacecraft
 from nutdamp.planning import plan as planning
 from nutdamp.planning.decision import Comparison, Gain, Ground, cheapest, compare, recommend, usual
 from nutdamp.planning.notes import alternatives, comparison_warnings, reasons
-from nutdamp.planning.screening import FlownPlan, unflown
+from nutdamp.planning.screening import FlownPlan
 from nutdamp.planning.verdict import Cases, Status
 from nutdamp.schemes import catalogue
 from nutdamp.spacecraft.equipment import Block
@@ -257,7 +257,7 @@ def test_why_a_plan_that_costs_less_is_not_recommended() -> None:
     cheap, dear = plans_of("half", "cheap 0.4 0.1; dear 0.4 0.2")
     flown = FlownPlan(dear, None, cases=Cases(2_048, 1, 0.997, 1.0, 0.998, 1.0))
     unknown = Comparison(cheap.spacecraft, (cheap, dear), {dear: flown})
-    assert unknown.cases[cheap] == unflown(cheap)
+    assert unknown.cases[cheap] == planning.unflown(cheap)
     commands = nutdamp.load(case("cbp1004.yaml")).commands
     timed, block = (
         replace(each, spacecraft=replace(each.spacecraft, commands=commands))

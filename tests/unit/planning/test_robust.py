@@ -425,7 +425,7 @@ def test_plans_compared_fly_as_many_cases_as_decide(
     assert compared.recommended is plans[chosen]
     assert compared.verdict.status is status
     assert flown[plans[chosen]].final
-    assert compared.cases == {plan: flown[plan].cases if plan in flown else screening.unflown(plan) for plan in plans}
+    assert compared.cases == {plan: flown[plan].cases if plan in flown else planning.unflown(plan) for plan in plans}
 
 
 def test_a_plan_that_may_not_be_chosen_flies_until_its_verdict_is_known(staged: dict[float, Told]) -> None:

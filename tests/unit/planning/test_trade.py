@@ -82,9 +82,8 @@ def test_each_front_has_what_any_search_found_that_keeps_its_shift_and_none_beat
         return next(results)
 
     monkeypatch.setattr(tradeoff, "plan", search)
-    made = tradeoff.fronts(
-        BODY, nutdamp.OptimalOptions(), count=4, shifts=(math.inf, 0.0, math.inf), progress=done.append
-    )
+    with work.steps(8, hook=lambda count, _: done.append(count)):
+        made = tradeoff.fronts(BODY, nutdamp.OptimalOptions(), count=4, shifts=(math.inf, 0.0, math.inf))
     assert [front.shift for front in made] == [0.0, math.inf]
     # The fastest of the free front keeps H too; what saves less than a thousandth is no point.
     assert figures(made[0].points) == [(8.0, 2.5), (16.0, 2.0), (30.0, 1.0)]
