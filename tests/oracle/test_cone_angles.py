@@ -1,7 +1,5 @@
 """Nutation angle = body cone + space cone, everywhere and with I1 ≠ I2 too, against Euler's equations by DOP853."""
 
-from __future__ import annotations
-
 import json
 import math
 from dataclasses import replace

@@ -2,8 +2,6 @@
 of this moment and as golden/make_golden.py kept it.
 """
 
-from __future__ import annotations
-
 import cmath
 import itertools
 import json

@@ -1,7 +1,5 @@
 """The figures of Magnus 1970 as numbers: pole curve of the four-pulse scheme (5), axis tracks (6)-(8)."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """The scheme optimal on random layouts of strong thrusters, against an independent search of many starts."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

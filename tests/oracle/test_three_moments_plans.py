@@ -1,7 +1,5 @@
 """The scheme optimal on bodies with I1 ≠ I2, against linear programs and flights of `support.three_moments`."""
 
-from __future__ import annotations
-
 import csv
 import math
 

@@ -1,7 +1,5 @@
 """Plans of bodies with a wheel, end to end: what each scheme plans, flown by the reference integrator."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """All commands, the page, its sheet and the library give one verdict on a plan: status, share and bounds."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """How near the spin axis comes to directions in space, against the reference integrator; and plans that keep cones."""
 
-from __future__ import annotations
-
 import json
 import math
 import re
@@ -12,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from support import reference
-from support.builders import aimed, codes, cross, events, noted, pulse, spinner
+from support.builders import aimed, codes, cross, events, noted, present, pulse, spinner
 from support.cases import spread, weekly
 from support.flights import axis_path
 from support.golden import check_text
@@ -152,8 +150,7 @@ def test_a_cone_on_the_way_is_gone_round(scheme: str) -> None:
     assert "from Sun" in infeasibility(straight)
     routed = planning.plan(body, scheme)
     assert routed.feasible, infeasibility(routed)
-    assert routed.left is not None
-    assert routed.left.aim < 1e-6
+    assert present(routed.left).aim < 1e-6
     assert routed.aspects[0].kept
     check_kept(routed)
     assert "goes-round" in codes(plan_notes(routed))
@@ -290,8 +287,7 @@ def test_no_dispersed_case_complies_where_a_cone_is_broken() -> None:
     text = BROKEN.replace("normal: 5 %", "normal: 1 %")
     compared = nutdamp.compare(read_spacecraft(text, "broken.yaml"), ("one-pulse",), samples=100)
     verdict = compared.verdict
-    assert verdict.cases is not None
-    assert (verdict.status, verdict.cases.complying) == (Status.NOT_ENOUGH, 0.0)
+    assert (verdict.status, present(verdict.cases).complying) == (Status.NOT_ENOUGH, 0.0)
     assert [(line.bound.part, line.bound.inner, line.share, line.met) for line in verdict.lines] == [
         (Part.NUTATION, False, 1.0, True),
         (Part.CONE, True, 0.0, False),

@@ -1,7 +1,5 @@
 """A tank in blowdown: thrust that falls during a pulse, against DOP853 with the propellant used as a state."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from itertools import pairwise
@@ -10,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
-from support.builders import cross, spinner
+from support.builders import cross, present, spinner
 from support.cases import deep, spread
 from support.dispersed import normal
 
@@ -45,8 +43,7 @@ def carrier(tank: Tank, spin: float = 3.0, moments: tuple[float, float, float] =
 
 def by_reference(body: Spacecraft, starts: list[tuple[str, float, float]], until: float) -> tuple[Array, Array, float]:
     """Rates, the matrix body -> inertial and the propellant used, kg, after rectangles of commands."""
-    tank, moments = body.tank, np.array(body.inertia.moments)
-    assert tank is not None
+    tank, moments = present(body.tank), np.array(body.inertia.moments)
     channels = {one.name: one for one in body.channels}
 
     def slope(t: float, y: Array, firing: list[str]) -> Array:
@@ -164,10 +161,9 @@ def test_valves_open_and_close_while_the_pressure_falls() -> None:
     body = carrier(SMALL)
     body = replace(body, channels=tuple(one.of(valve=valve) for one in body.channels))
     (pulse,) = supplied(body, [on_command(body.channels[0], 1.0, 2.0)])
-    assert pulse.command is not None
-    assert pulse.command.valve
+    assert present(pulse.command).valve
     given = moment = 0.0
-    for ramp in pulse.command.ramps:
+    for ramp in present(pulse.command).ramps:
         length, even, lean = ramp.end - ramp.begin, 0.5 * (ramp.first + ramp.last), 0.5 * (ramp.last - ramp.first)
         given += even * length
         moment += 0.5 * (ramp.begin + ramp.end) * even * length + lean * length**2 / 6.0
@@ -176,9 +172,7 @@ def test_valves_open_and_close_while_the_pressure_falls() -> None:
     plain = on_command(body.channels[0], 1.0, 2.0)
     assert pulse.t < plain.t
     assert pulse.on_time == plain.on_time
-    assert planning.plan(body, "two-pulse").flown is not None
-    left = planning.plan(body, "two-pulse").flown
-    assert left is not None
+    left = present(present(planning.plan(body, "two-pulse").flown))
     assert math.degrees(left.nutation) < 1e-6
 
 

@@ -1,7 +1,5 @@
 """Flights of trial schedules: flown anew from the first pulse that has changed, and the same to the last bit."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -18,8 +16,6 @@ from nutdamp.errors import Infeasible
 from nutdamp.files.reader import load_spacecraft
 from nutdamp.flight import dynamics as motion
 from nutdamp.flight import propagation
-from nutdamp.flight.dynamics import Dynamics, make_dynamics
-from nutdamp.flight.propagation import Flight
 from nutdamp.physics import taylor
 from nutdamp.planning import plan as planning
 from nutdamp.spacecraft.model import Spacecraft
@@ -28,7 +24,7 @@ from nutdamp.spacecraft.schedule import Schedule
 THREE = spinner(moments=(100.0, 120.0, 80.0))
 
 
-def bits(flown: Flight) -> list[bytes]:
+def bits(flown: propagation.Flight) -> list[bytes]:
     """All that a flight gives: legs, motion along them and how it ends."""
     legs = [repr((one.start, one.end, one.completed, one.jump, one.completed_at_end)).encode() for one in flown.legs]
     motion, settled = flown.motion(np.linspace(0.0, flown.legs[-1].end, 50)), flown.settled
@@ -49,7 +45,7 @@ def train(count: int, moved: int | None = None) -> Schedule:
 )
 def test_what_is_remembered_changes_no_bit(body: Spacecraft, constant: float, every: list[Schedule]) -> None:
     body = replace(body, dissipation=constant) if constant else body
-    remembering = make_dynamics(body).remembering()
+    remembering = motion.make_dynamics(body).remembering()
     mixed = [Schedule((*one.pulses, *other.pulses)) for one in every for other in every]
     for made in (*every, *mixed, *every):
         assert bits(propagation.flown(body, made, dynamics=remembering)) == bits(propagation.flown(body, made))
@@ -57,7 +53,7 @@ def test_what_is_remembered_changes_no_bit(body: Spacecraft, constant: float, ev
 
 @pytest.mark.parametrize("moved", [0, 3, 7])
 def test_a_trial_costs_what_comes_after_the_pulse_that_has_changed(moved: int) -> None:
-    remembering = make_dynamics(THREE).remembering()
+    remembering = motion.make_dynamics(THREE).remembering()
     propagation.flown(THREE, train(8), dynamics=remembering)
     with work.budget("trial", 1e9) as trial:
         flown = propagation.flown(THREE, train(8, moved), dynamics=remembering)
@@ -71,7 +67,7 @@ def test_a_trial_costs_what_comes_after_the_pulse_that_has_changed(moved: int) -
 
 
 def test_a_flight_that_is_remembered_keeps_its_limit_of_steps() -> None:
-    remembering = make_dynamics(THREE).remembering()
+    remembering = motion.make_dynamics(THREE).remembering()
     torque = [np.array([0.0, 0.0, 0.1])]
     path, _ = remembering.path(THREE.initial, 0.0, 50.0, torque, most=1000)
     assert remembering.path(THREE.initial, 0.0, 50.0, torque, most=path.steps)[0] is path
@@ -82,7 +78,7 @@ def test_a_flight_that_is_remembered_keeps_its_limit_of_steps() -> None:
 @given(triaxial_spinners())
 def test_a_long_coast_in_closed_form_is_that_of_taylor_series(body: Spacecraft) -> None:
     end = 3.0 * motion.LONG / float(np.linalg.norm(body.omega0))
-    path, after = make_dynamics(body).path(body.initial, 0.0, end, most=1000)
+    path, after = motion.make_dynamics(body).path(body.initial, 0.0, end, most=1000)
     pieces = taylor.integrate(body.inertia.moments, np.zeros(3), body.omega0, body.initial.quaternion, 0.0, end)
     rates, quaternion = pieces[-1].final
     assert path.steps == 0
@@ -93,7 +89,7 @@ def test_a_long_coast_in_closed_form_is_that_of_taylor_series(body: Spacecraft) 
 def test_legs_are_forgotten_before_they_are_too_many(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(motion, "REMEMBERED", 3)
     body = spinner()
-    remembering = make_dynamics(body).remembering()
+    remembering = motion.make_dynamics(body).remembering()
     for made in (train(2), train(2, 1), train(2, 0)):
         assert bits(propagation.flown(body, made, dynamics=remembering)) == bits(propagation.flown(body, made))
     assert 0 < len(remembering.known or ()) <= 3
@@ -104,7 +100,7 @@ def test_plans_are_the_same_for_much_less_work(name: str, monkeypatch: pytest.Mo
     body = load_spacecraft(CASES / f"{name}.yaml")
     with work.budget("remembered", 1e9) as remembered:
         made = planning.plan(body, "two-pulse").pulses
-    monkeypatch.setattr(Dynamics, "remembering", lambda one: one)
+    monkeypatch.setattr(motion.Dynamics, "remembering", lambda one: one)
     with work.budget("whole", 1e9) as whole:
         same = planning.plan(body, "two-pulse").pulses
     assert [(one.t, one.on_time) for one in made] == [(one.t, one.on_time) for one in same]

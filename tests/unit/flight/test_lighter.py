@@ -1,7 +1,5 @@
 """Moments of inertia that fall with the propellant used: against Euler's equations with I(t) written out."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Callable
@@ -11,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from support import reference
-from support.builders import channel, cross, noted, spinner
+from support.builders import channel, cross, noted, present, spinner
 from support.cases import deep, weekly
 from support.documents import documented
 from support.golden import check_text
@@ -62,8 +60,7 @@ def fires(body: Spacecraft, *numbers: int, on_time: float = 0.05) -> Schedule:
 
 def independent(body: Spacecraft, made: Schedule, until: float = math.inf) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Rates (3,), rotation (3, 3), moments (3,) at ``until`` s or the last pulse's end, from commands and pressure."""
-    assert body.tank is not None
-    start, per_kg = np.asarray(body.inertia.moments), np.asarray(body.tank.inertia_per_kg)
+    start, per_kg = np.asarray(body.inertia.moments), np.asarray(present(body.tank).inertia_per_kg)
     channels, swells = {one.name: one for one in body.channels}, []
     for pulse in sorted(made, key=lambda one: one.loaded[0]):
         one = channels[pulse.channel]
@@ -139,8 +136,7 @@ def missed_by_cases(body: Spacecraft, made: Schedule) -> float:
 def test_what_is_left_out_is_of_second_order(missed: Callable[[Spacecraft, Schedule], float]) -> None:
     """Pulses of half the length: each errs by a quarter of what whole ones do, or less."""
     body = craft(AXIAL, None, axial=0.0)
-    assert body.tank is not None
-    body = replace(body, tank=replace(body.tank, final_pressure=body.tank.pressure))  # rectangles
+    body = replace(body, tank=replace(present(body.tank), final_pressure=present(body.tank).pressure))  # rectangles
     long, short = (missed(body, fires(body, 0, on_time=on_time)) for on_time in (0.05, 0.025))
     assert long > 1e-9
     assert short < 0.3 * long
@@ -161,8 +157,7 @@ def test_a_further_leg_begins_where_the_one_before_ends(shed: Shed) -> None:
 def test_plans_leave_nothing_and_without_falling_moments_they_would(scheme: str) -> None:
     body = craft((3000.0, 3000.0, 1500.0))
     plan = planning.plan(body, scheme)
-    assert plan.flown is not None
-    assert plan.flown.nutation < math.radians(1e-6)
+    assert present(plan.flown).nutation < math.radians(1e-6)
     rates, _, moments = independent(body, plan.pulses)
     assert reference.nutation(moments.tolist(), rates, 1.0) < math.radians(1e-6)
     kept = planning.plan(replace(body, tank=TANK), scheme).pulses
@@ -185,8 +180,7 @@ def of_file(shed: str, more: str = "") -> Spacecraft:
 
 def test_what_a_file_says_of_it() -> None:
     three = of_file("[0.4 kg m^2/kg, 0.3 m^2, 0.2]")
-    assert three.tank is not None
-    assert three.tank.inertia_per_kg == (0.4, 0.3, 0.2)
+    assert present(three.tank).inertia_per_kg == (0.4, 0.3, 0.2)
     assert lightened(three, 0.5).moments == pytest.approx((119.8, 119.85, 79.9))
     # Without it, or with nothing shed, all is the same to the last bit.
     without, zero = of_file(""), of_file("{A: 0, C: 0}")
@@ -213,9 +207,8 @@ def test_what_a_file_says_of_it() -> None:
 def test_what_cannot_have_falling_moments_says_so() -> None:
     loop = "loop: {sensor: {kind: gyro, rate: 100 Hz}, law: four-pulse, start: 0.3 deg, stop: 0.1 deg}\n"
     body = of_file("{A: 1, C: 1}", loop)
-    assert body.loop is not None
     with pytest.raises(Unsuitable, match="inertia_per_kg"):
-        fly(body, body.loop)
+        fly(body, present(body.loop))
     blocks = read_spacecraft(SPINNER, "f.yaml")
     lighter = replace(blocks, tank=Tank(10.0, 22e5, 16e5, 1.0, inertia_per_kg=(0.3, 0.3, 0.2)))
     within = Requirement(nutation=1e-9)
@@ -238,8 +231,7 @@ def test_without_blowdown_the_tank_is_empty_sooner(per_kg: Shed | None) -> None:
     steady = replace(body, tank=Tank(1.0, 22e5, 22e5, 0.0, inertia_per_kg=per_kg))
     whole, part = divmod(0.1, full)
     last, share = wide[int(whole)], part / full
-    assert last.torque is not None
-    weak = replace(last, impulse=share * last.impulse, torque=share * last.torque, propellant=part)
+    weak = replace(last, impulse=share * last.impulse, torque=share * present(last.torque), propellant=part)
     expected = flown(steady, Schedule((*wide[: int(whole)], weak))).residual
     assert (row.nutation, row.momentum_shift) == pytest.approx((expected.nutation, expected.momentum_shift), rel=1e-6)
 

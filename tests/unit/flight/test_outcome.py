@@ -1,7 +1,5 @@
 """What has become of a body by a given time, and what is said where two models of a flight are apart."""
 
-from __future__ import annotations
-
 import csv
 import itertools
 import json
@@ -13,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support import reference
-from support.builders import aimed, cross, events, spinner
+from support.builders import aimed, cross, events, present, spinner
 from support.cases import spread
 from support.golden import check_text
 from support.planner import Planner
@@ -101,8 +99,7 @@ NUTATION = re.compile(r"^nutation +([<0-9.e -]+) deg +([<0-9.e -]+) deg$", re.MU
 
 def nutations(screen: str) -> list[str]:
     """By the impulse sum and through real widths, as a screen shows them."""
-    shown = NUTATION.search(screen)
-    assert shown is not None
+    shown = present(NUTATION.search(screen))
     return list(shown.groups())
 
 

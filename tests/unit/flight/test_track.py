@@ -1,7 +1,5 @@
 """The motion as arrays: rows round each pulse, tracks in pieces and as CSV, and how far the spin axis strays."""
 
-from __future__ import annotations
-
 import csv
 import io
 import math
@@ -22,7 +20,6 @@ from support.process import Run
 from nutdamp.common.numerics import SAME_ANGLE
 from nutdamp.files.tabular import HEADER, number, track_array, write_track
 from nutdamp.flight import propagation
-from nutdamp.flight.propagation import Flight, Track
 from nutdamp.physics import attitude
 from nutdamp.physics import body as rigid_body
 from nutdamp.spacecraft.model import Attitude
@@ -40,17 +37,17 @@ WIDE = Schedule(
 UNTIL, FEW = 40.0, 7
 
 
-def some_flight() -> Flight:
+def some_flight() -> propagation.Flight:
     """A flight with coasts and wide pulses, the first of them at once."""
     push = channel("T", 4.0, 1.0, 0.5)
     made = Schedule(tuple(channel_pulse(push, t, on_time) for t, on_time in ((0.25, 0.5), (4.0, 0.7), (20.0, 3.0))))
     return propagation.flown(spinner(degrees=12.0, channels=(push,)), made, UNTIL)
 
 
-def cut(whole: Track, edges: Iterable[int]) -> list[Track]:
+def cut(whole: propagation.Track, edges: Iterable[int]) -> list[propagation.Track]:
     """The rows between ``edges``, as tracks of their own."""
     return [
-        Track(**{one.name: getattr(whole, one.name)[begin:end] for one in fields(Track)})
+        propagation.Track(**{one.name: getattr(whole, one.name)[begin:end] for one in fields(propagation.Track)})
         for begin, end in pairwise([0, *edges, len(whole.t)])
         if end > begin
     ]
@@ -132,11 +129,11 @@ def test_cone_angles_are_those_of_the_rates_axis_and_momentum_those_of_the_attit
         assert h == pytest.approx(expected, rel=1e-14, abs=1e-12)
 
 
-def pointing(axes: np.ndarray) -> Track:
+def pointing(axes: np.ndarray) -> propagation.Track:
     """Rows whose spin axis is ``axes`` (n, 3), at whole seconds; H at the start along z."""
     nothing, up = np.zeros(len(axes)), np.tile([0.0, 0.0, 2.0], (len(axes), 1))
     t, pulses = np.arange(float(len(axes))), np.zeros(len(axes), dtype=np.int64)
-    return Track(t, up, np.zeros((len(axes), 4)), axes, up, nothing, nothing, nothing, pulses)
+    return propagation.Track(t, up, np.zeros((len(axes), 4)), axes, up, nothing, nothing, nothing, pulses)
 
 
 TILTS = [(0, 80), (90, 70), (180, 60), (270, 85)]
@@ -206,7 +203,7 @@ def test_the_pieces_of_a_track_are_its_rows(samples: int, monkeypatch: pytest.Mo
     pieces = list(made.pieces(samples, UNTIL))
     assert len(pieces) >= len(whole.t) // (2 * FEW)
     assert max(len(piece.t) for piece in pieces) <= 2 * FEW + 4
-    for one in fields(Track):
+    for one in fields(propagation.Track):
         joined = np.concatenate([getattr(piece, one.name) for piece in pieces])
         assert joined == pytest.approx(getattr(whole, one.name), rel=1e-14, abs=1e-13)
 

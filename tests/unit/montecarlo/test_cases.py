@@ -552,8 +552,8 @@ def test_a_study_spreads_as_its_valves_do() -> None:
     body = craft("close_delay: {a: {normal: 1 ms}}")
     made = fires(body, commands(body, 0.05)[:1])
     spread = run(Results(study_of(body, made, seed=3), 4000)).distribution("nutation")
-    early, late = (nutation(RealWidths, DispersedModel(body, made), {"close_delay a": one}) for one in (-0.001, 0.001))
     assert spread is not None
+    early, late = (nutation(RealWidths, DispersedModel(body, made), {"close_delay a": one}) for one in (-0.001, 0.001))
     low, high = spread.quantiles(np.array([0.1587, 0.8413]))
     assert high - low == pytest.approx(abs(late - early), rel=0.05)
 

@@ -1,7 +1,5 @@
 """Quaternions, torque-free arcs, the frame N, cone angles and periods, Magnus 1970 (12), (18)-(20), (22), by DOP853."""
 
-from __future__ import annotations
-
 import cmath
 import math
 
@@ -11,7 +9,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support import reference
 from support.cases import spread
-from support.reference import Array
 from support.spinning import EPS, about, spinners
 
 from nutdamp.physics import attitude
@@ -34,7 +31,7 @@ axes = vectors.filter(lambda v: float(np.linalg.norm(v)) > 0.1).map(lambda v: v 
 angles = st.floats(-math.pi, math.pi)
 
 
-def quaternion_of(axis: Array, angle: float) -> Array:
+def quaternion_of(axis: reference.Array, angle: float) -> reference.Array:
     return np.concatenate([[math.cos(angle / 2)], math.sin(angle / 2) * axis])
 
 
@@ -45,7 +42,9 @@ def start_of(A: float, C: float, theta: float, spin: float) -> tuple[complex, re
 
 
 @given(axes, angles, axes, angles, vectors)
-def test_quaternions_are_rodrigues_formula(axis: Array, angle: float, other: Array, by: float, vector: Array) -> None:
+def test_quaternions_are_rodrigues_formula(
+    axis: reference.Array, angle: float, other: reference.Array, by: float, vector: reference.Array
+) -> None:
     """Scalar first, body to inertial; a product turns by the right one first; `from_matrix` is the inverse."""
     left, right = quaternion_of(axis, angle), quaternion_of(other, by)
     assert attitude.rotate(left, vector) == pytest.approx(about(axis, angle) @ vector, abs=100 * EPS)

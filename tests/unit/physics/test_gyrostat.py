@@ -1,7 +1,5 @@
 """Bodies with a wheel: closed forms, series and cones against DOP853, with H3 = Cω3 + h in the place of Cω3."""
 
-from __future__ import annotations
-
 import cmath
 import math
 
@@ -16,7 +14,6 @@ from nutdamp.files.reader import load_spacecraft
 from nutdamp.flight.dynamics import make_dynamics
 from nutdamp.physics import attitude, batch, energy_sink, response, taylor, triaxial
 from nutdamp.physics import body as rigid_body
-from nutdamp.physics.taylor import Forcing
 from nutdamp.spacecraft import requirements
 
 Array = NDArray[np.float64]
@@ -157,7 +154,7 @@ def test_series_under_a_torque(moments: tuple[float, float, float], spin: float,
     begin, quaternion = reference.Motion(rates, rotation), attitude.from_matrix(rotation)
     for time in (0.7, 12.0):
         sense, span = math.copysign(1.0, moments[2] * spin + wheel), np.array([time])
-        forcing = Forcing(growth=growth, wheel=wheel, sense=sense)
+        forcing = taylor.Forcing(growth=growth, wheel=wheel, sense=sense)
         flown = (
             reference.sinking(moments, begin, torque, span, growth, wheel)
             if growth
@@ -197,7 +194,7 @@ def test_widest_cones_of_many_bodies_are_those_that_they_reach(seed: int) -> Non
     sense = math.copysign(1.0, moments[2] * rates[2] + wheel)
     series = taylor.integrate(
         (moments[0], moments[1], moments[2]), np.zeros(3), rates, np.array([1.0, 0, 0, 0]), 0.0, 60.0,
-        Forcing(wheel=wheel),
+        taylor.Forcing(wheel=wheel),
     )  # fmt: skip
     body = np.concatenate([piece.at(np.linspace(piece.start, piece.start + piece.duration, 60))[0] for piece in series])
     momentum = body * moments + [0.0, 0.0, wheel]
@@ -219,7 +216,7 @@ def test_stability_and_rate_of_a_small_nutation(spin: float) -> None:
             small = np.array([1e-7, 0.0, spin])
             until = min(15.0 * grows.growth_time, 300.0) if grows.squared_exponent > 0.0 else 40.0
             series = taylor.integrate(
-                moments, np.zeros(3), small, np.array([1.0, 0, 0, 0]), 0.0, until, Forcing(wheel=wheel)
+                moments, np.zeros(3), small, np.array([1.0, 0, 0, 0]), 0.0, until, taylor.Forcing(wheel=wheel)
             )
             sizes = np.abs(np.concatenate([piece.at(np.array([piece.start]))[0] for piece in series])[:, :2]).max()
             assert grows.stable is bool(sizes < 1e-5)

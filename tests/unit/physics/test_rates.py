@@ -1,7 +1,5 @@
 """The impulse sum, Magnus 1970 (17), finite pulses, and what to fire when, (21), (22), by DOP853 and quadrature."""
 
-from __future__ import annotations
-
 import cmath
 import math
 
@@ -11,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import quad
 from support import reference
-from support.builders import within
+from support.builders import present, within
 from support.cases import spread
 from support.spinning import BODIES, EPS, plain_spinners, spinners
 
@@ -111,8 +109,7 @@ def test_width_factor_of_long_pulses_and_where_the_axial_torque_vanishes() -> No
 def test_one_pulse_of_the_on_time_of_the_formula_leaves_no_omega(A: float, C: float, spin: float) -> None:
     """τ = (2/(aω3)) asin(aω3 A|ω|/(2M)), centred where ω opposes the torque (US patent 4504032)."""
     a, size, torque = (A - C) / A, 0.2, 40.0
-    on_time = response.on_time_for(A * size, torque, a * spin, 0.0, math.inf)
-    assert on_time is not None
+    on_time = present(response.on_time_for(A * size, torque, a * spin, 0.0, math.inf))
     if a:
         assert on_time == pytest.approx(2 / (a * spin) * math.asin(a * spin * A * size / (2 * torque)), rel=4 * EPS)
     # ω0 such that ω = -|ω| at the centre of the pulse along +1.
@@ -140,8 +137,7 @@ def test_limits_of_on_times() -> None:
 
 
 def assert_gives(impulse: float, torque: float, a: float, spin: float, spin_rate: float) -> None:
-    on_time = response.on_time_for(impulse, torque, a * spin, a * spin_rate, math.inf)
-    assert on_time is not None
+    on_time = present(response.on_time_for(impulse, torque, a * spin, a * spin_rate, math.inf))
     acts = torque * on_time * abs(response.width_factor(a * spin, a * spin_rate, on_time))
     assert acts == pytest.approx(impulse, rel=1e-13)
 

@@ -1,7 +1,5 @@
 """Euler's equations by series, torques fixed or turning, against DOP853, conservation laws and closed forms."""
 
-from __future__ import annotations
-
 import itertools
 import math
 
@@ -10,12 +8,10 @@ import pytest
 from support import reference
 from support.cases import spread
 from support.golden import refused
-from support.reference import Array, vector
 from support.spinning import EPS, Triple, about, driven, turning
 
 from nutdamp.errors import Infeasible
 from nutdamp.physics import attitude, batch, taylor
-from nutdamp.physics.taylor import Forcing
 
 FLOWN = 1e-11
 """rad, rad/s; what DOP853 at 1e-13 a step adds up over some tens of radians."""
@@ -35,7 +31,9 @@ CASES = {
 }
 
 
-def last(moments: Triple, torque: Array, rates: Array, begin: float, end: float) -> tuple[Array, Array]:
+def last(
+    moments: Triple, torque: reference.Array, rates: reference.Array, begin: float, end: float
+) -> tuple[reference.Array, reference.Array]:
     """Rates and quaternion at the end of a flight from `START`."""
     return taylor.integrate(moments, torque, rates, START, begin, end)[-1].final
 
@@ -46,7 +44,7 @@ def test_motion_under_fixed_and_turning_torques(moments: Triple, torque: Triple,
     """At the ends of the pieces, which join without gap or jump, and within them."""
     times, acting = np.linspace(1.3, 10.0, 11), turning(*TURNING) if turns else lambda _: (0.0, 0.0, 0.0)
     pieces = taylor.integrate(
-        moments, np.array(torque), np.array(rates), START, 1.3, 10.0, Forcing(TURNING if turns else ())
+        moments, np.array(torque), np.array(rates), START, 1.3, 10.0, taylor.Forcing(TURNING if turns else ())
     )
     assert (len(pieces) > 3, pieces[0].start) == (True, 1.3)
     assert pieces[-1].start + pieces[-1].duration == pytest.approx(10.0, rel=EPS)
@@ -67,7 +65,7 @@ def test_motion_under_fixed_and_turning_torques(moments: Triple, torque: Triple,
 
 @pytest.mark.parametrize("moments", MOMENTS)
 def test_energy_and_momentum_stay_without_torque(moments: Triple) -> None:
-    rates = vector(0.6, -0.3, 2.0)
+    rates = reference.vector(0.6, -0.3, 2.0)
     later, quaternion = last(moments, np.zeros(3), rates, 0.0, 100.0)
     # One rounding in each of about a hundred steps.
     assert reference.energy(moments, later) == pytest.approx(reference.energy(moments, rates), rel=200 * EPS)
@@ -78,7 +76,7 @@ def test_energy_and_momentum_stay_without_torque(moments: Triple) -> None:
 def test_a_spin_up_about_a_principal_axis_and_rest() -> None:
     """ω = Mt/I, angle Mt²/(2I): seven and a half turns."""
     body, still, angle = (2.0, 3.0, 4.0), np.zeros(3), 9.7**2 / 2
-    rates, quaternion = last(body, vector(0, 0, 4), still, 0.0, 9.7)
+    rates, quaternion = last(body, reference.vector(0, 0, 4), still, 0.0, 9.7)
     assert rates == pytest.approx([0, 0, 9.7], abs=100 * EPS)
     assert attitude.matrix(quaternion) == pytest.approx(about((0, 0, 1), angle), abs=1000 * EPS)
     assert np.array_equal(np.concatenate(last(body, still, still, 0.0, 1e6)), [*still, *START])
@@ -87,7 +85,7 @@ def test_a_spin_up_about_a_principal_axis_and_rest() -> None:
 @pytest.mark.parametrize(("mass", "time"), [(1e-12, 1.0), (1e12, 1.0), (1.0, 1e-9), (1.0, 1e6)])
 def test_units_do_not_matter(mass: float, time: float) -> None:
     """Rates × s, torques × s², times / s: the same path through space."""
-    torque, rates, (first, second, third) = vector(5, 2, 1), vector(1, 2, 3), BODY
+    torque, rates, (first, second, third) = reference.vector(5, 2, 1), reference.vector(1, 2, 3), BODY
     plain = last(BODY, torque, rates, 0.0, 5.0)
     moments = first * mass, second * mass, third * mass
     scaled = last(moments, torque * mass * time**2, rates * time, 0.0, 5.0 / time)
@@ -97,7 +95,7 @@ def test_units_do_not_matter(mass: float, time: float) -> None:
 
 def test_a_late_clock_that_cannot_tell_the_steps_does_not_stop_them() -> None:
     """At 1e17 s a second is less than a rounding; the motion over the 64 s is that of any other time."""
-    torque, start = vector(0.3, -0.2, 0.1), vector(0.2, 0.1, 3.0)
+    torque, start = reference.vector(0.3, -0.2, 0.1), reference.vector(0.2, 0.1, 3.0)
     late, early = (taylor.integrate((120.0, 100.0, 80.0), torque, start, START, t, t + 64.0) for t in (1e17, 0.0))
     assert len(late) == len(early)
     assert np.concatenate(late[-1].final) == pytest.approx(np.concatenate(early[-1].final), abs=1e-12)
@@ -106,20 +104,20 @@ def test_a_late_clock_that_cannot_tell_the_steps_does_not_stop_them() -> None:
 def test_what_cannot_be_integrated_is_refused() -> None:
     for torque in (math.nan, math.inf, 1e200, 1e300):
         with np.errstate(all="ignore"), pytest.raises(Infeasible, match="integrated"):
-            last((120.0, 100.0, 80.0), vector(torque, 0, 0), np.ones(3), 0.0, 1e9)
-    body, rates = (120.0, 120.0, 80.0), vector(0.1, 0.0, 3.0)
+            last((120.0, 100.0, 80.0), reference.vector(torque, 0, 0), np.ones(3), 0.0, 1e9)
+    body, rates = (120.0, 120.0, 80.0), reference.vector(0.1, 0.0, 3.0)
     with refused(Infeasible, "physics.too-many-steps"):
-        taylor.integrate(body, vector(1, 0, 0), rates, START, 0.0, 100.0, most=20)
+        taylor.integrate(body, reference.vector(1, 0, 0), rates, START, 0.0, 100.0, most=20)
     with refused(Infeasible, "physics.too-long"):
-        last(body, vector(1, 0, 0), rates, 0.0, 1e6)
+        last(body, reference.vector(1, 0, 0), rates, 0.0, 1e6)
 
 
 @pytest.mark.parametrize(
     ("forcing", "alike"),
-    [(Forcing(), (0, 1)), (Forcing(TURNING), (0, 1)), (Forcing(), (0, 2))],
+    [(taylor.Forcing(), (0, 1)), (taylor.Forcing(TURNING), (0, 1)), (taylor.Forcing(), (0, 2))],
     ids=["fixed", "turning", "symmetric about axis 2"],
 )
-def test_few_cases_fly_as_each_alone_does(forcing: Forcing, alike: tuple[int, int]) -> None:
+def test_few_cases_fly_as_each_alone_does(forcing: taylor.Forcing, alike: tuple[int, int]) -> None:
     """Bodies, motions, torques, begins and durations of their own."""
     rng, count = np.random.default_rng(12), 7
     A = 100.0 * (1.0 + 0.2 * rng.normal(size=count))

@@ -1,7 +1,5 @@
 """Many cases at once against the independent integrator, case by case; their spin axes over long arcs."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Iterable
@@ -13,13 +11,11 @@ from numpy.testing import assert_allclose, assert_array_equal
 from support import reference
 from support.cases import deep, spread
 from support.golden import refused
-from support.reference import Array, Kick, Motion, Push
 from support.spinning import Triple, driven, turning
 
 from nutdamp.common.numerics import cos_sin
 from nutdamp.errors import Infeasible
 from nutdamp.physics import attitude, batch
-from nutdamp.physics.batch import Bodies, MotionStretch, Pulses
 from nutdamp.physics.sky import AxisWatch
 from nutdamp.physics.taylor import NOTHING, Forcing
 
@@ -33,24 +29,24 @@ TENSOR = (120.0, 100.0, 80.0)
 class Case(NamedTuple):
     """The arguments of `rigid_cases.fly`."""
 
-    bodies: Bodies
-    rates: Array
-    quaternion: Array
-    pulses: Pulses
+    bodies: batch.Bodies
+    rates: reference.Array
+    quaternion: reference.Array
+    pulses: batch.Pulses
 
-    def fly(self) -> tuple[Array, Array]:
+    def fly(self) -> tuple[reference.Array, reference.Array]:
         return batch.fly(*self)
 
-    def some(self, which: Any) -> Case:
+    def some(self, which: Any) -> "Case":
         return Case(self.bodies.some(which), self.rates[:, which], self.quaternion[:, which], self.pulses.some(which))
 
-    def start(self, number: int) -> Motion:
-        return Motion(self.rates[:, number], attitude.matrix(self.quaternion[:, number]))
+    def start(self, number: int) -> reference.Motion:
+        return reference.Motion(self.rates[:, number], attitude.matrix(self.quaternion[:, number]))
 
-    def events(self, number: int) -> list[Push | Kick]:
+    def events(self, number: int) -> list[reference.Push | reference.Kick]:
         starts, impulses = self.pulses.starts[:, number], self.pulses.impulses[:, :, number]
         return [
-            Push(start, start + width, impulse / width) if width else Kick(start, impulse)
+            reference.Push(start, start + width, impulse / width) if width else reference.Kick(start, impulse)
             for start, width, impulse in zip(starts, self.pulses.on_times[:, 0], impulses, strict=True)
         ]
 
@@ -62,7 +58,7 @@ def cases(
     starts: tuple[float, ...] = (0.4, 2.9),
     on_times: tuple[float, ...] = (0.5, 0.3),
     jitter: float = 0.05,
-    constant: Array = STILL,
+    constant: reference.Array = STILL,
     forcing: Forcing = NOTHING,
 ) -> Case:
     """Dispersed cases: moments by 2 %, rates, attitude at random, torques with an axial part, edges by ``jitter`` s."""
@@ -77,10 +73,14 @@ def cases(
     torque = np.array([12.0, -9.0, 1.5])[None, :, None] * (1 + 0.1 * draw.standard_normal((len(starts), 3, count)))
     widths = np.array(on_times, dtype=float)
     impulses = torque * np.where(widths == 0.0, 0.5, widths)[:, None, None]
-    return Case(Bodies(bodies, constant, forcing), rates, quaternion, Pulses(times, widths[:, None], impulses))
+    return Case(
+        batch.Bodies(bodies, constant, forcing), rates, quaternion, batch.Pulses(times, widths[:, None], impulses)
+    )
 
 
-def assert_is(flown: tuple[Array, Array], number: int, motion: Motion, tolerance: float) -> None:
+def assert_is(
+    flown: tuple[reference.Array, reference.Array], number: int, motion: reference.Motion, tolerance: float
+) -> None:
     assert_allclose(flown[0][:, number], motion.rates, atol=tolerance, rtol=0)
     assert reference.turned(motion.rotation, attitude.matrix(flown[1][:, number])) < tolerance
 
@@ -159,16 +159,19 @@ def test_blocks_hold_what_single_cases_give_and_the_same_block_the_same_bits() -
         assert_array_equal(alone, of_many[:, half])
 
 
-def forced(case: Case, number: int) -> Motion:
+def forced(case: Case, number: int) -> reference.Motion:
     """The motion at the end, by DOP853 on the equations with all that acts."""
     forcing, motion = case.bodies.forcing, case.start(number)
-    pushes, turned = [event for event in case.events(number) if isinstance(event, Push)], turning(*forcing.turning)
+    pushes, turned = (
+        [event for event in case.events(number) if isinstance(event, reference.Push)],
+        turning(*forcing.turning),
+    )
     edges = sorted({0.0, *(edge for push in pushes for edge in (push.start, push.end))})
     for begin, end in itertools.pairwise(edges):
         on = [push.torque for push in pushes if push.start < 0.5 * (begin + end) < push.end]
         steady = np.sum([case.bodies.constant, *on], axis=0)
 
-        def torque(t: float, steady: Array = steady) -> Array:
+        def torque(t: float, steady: reference.Array = steady) -> reference.Array:
             return np.asarray(steady + turned(t))
 
         (motion,) = driven(case.bodies.moments[:, number].tolist(), motion, torque, [begin, end], forcing.growth)
@@ -187,7 +190,7 @@ def forced(case: Case, number: int) -> Motion:
     quick=1,
     ids=["constant", "turning", "growing", "all"],
 )
-def test_disturbances_and_dissipation(moments: Triple, constant: Array, forcing: Forcing) -> None:
+def test_disturbances_and_dissipation(moments: Triple, constant: reference.Array, forcing: Forcing) -> None:
     case = cases(4, moments, constant=constant, forcing=forcing)
     for number in (0, 3):
         assert_is(case.fly(), number, forced(case, number), 1e-11)
@@ -239,13 +242,15 @@ def test_few_turns_show_what_all_show(sense: float, growth: float, monkeypatch: 
     round_ = rng.uniform(0.0, 2.0 * math.pi, (2, count))
     directions = np.stack([np.sin(away) * np.cos(round_), np.sin(away) * np.sin(round_), np.cos(away)], axis=1)
     lasts = rng.uniform(20.0, 40.0, count) * 2.0 * math.pi * first / np.linalg.norm(moments * rates, axis=0)
-    here = MotionStretch(Bodies(moments, np.zeros(3), Forcing(growth=growth)), np.zeros(count), rates, upright)
+    here = batch.MotionStretch(
+        batch.Bodies(moments, np.zeros(3), Forcing(growth=growth)), np.zeros(count), rates, upright
+    )
     few, every = AxisWatch.of(directions, sense), AxisWatch.of(directions, sense)
     every._steps(here, lasts)
     steps: list[int] = []
     stepped = AxisWatch._steps
 
-    def counted(self: AxisWatch, begin: MotionStretch, duration: Array) -> None:
+    def counted(self: AxisWatch, begin: batch.MotionStretch, duration: reference.Array) -> None:
         steps.append(len(duration))
         stepped(self, begin, duration)
 

@@ -1,7 +1,5 @@
 """Torque-free motion of triaxial bodies: against two integrators, conserved quantities, limits and separatrix."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from decimal import Decimal, localcontext
@@ -15,7 +13,6 @@ from scipy.special import ellipj, ellipk
 from support import reference
 from support.cases import deep
 from support.golden import refused
-from support.reference import Array
 
 from nutdamp.physics import attitude, response, triaxial
 from nutdamp.physics import body as rigid_body
@@ -30,7 +27,7 @@ rate = st.floats(-3.0, 3.0).map(lambda x: x if abs(x) > 1e-100 else 0.0)
 turns = st.lists(rate, min_size=3, max_size=3).map(np.array)
 
 
-def forty_digits(moments: Sequence[float], rates0: Sequence[float], times: Array) -> Array:
+def forty_digits(moments: Sequence[float], rates0: Sequence[float], times: reference.Array) -> reference.Array:
     """Rates (n, 3) by Taylor series of Euler's equations in decimal numbers of 40 digits, half a radian a step."""
     track = []
     with localcontext() as context:
@@ -56,24 +53,28 @@ def forty_digits(moments: Sequence[float], rates0: Sequence[float], times: Array
     return np.array(track)
 
 
-def turned(first: Array, second: Array) -> float:
+def turned(first: reference.Array, second: reference.Array) -> float:
     """Largest angle between two tracks of unit quaternions, rad."""
     return 2 * float(np.min([np.linalg.norm(first - second, axis=1), np.linalg.norm(first + second, axis=1)], 0).max())
 
 
-def extremes(moments: Sequence[float] | Array, rates0: Sequence[float] | Array) -> tuple[float, float]:
+def extremes(
+    moments: Sequence[float] | reference.Array, rates0: Sequence[float] | reference.Array
+) -> tuple[float, float]:
     """Least and largest nutation angle."""
     sense = math.copysign(1.0, rates0[2])
     least, largest = (triaxial.arc_cones(moments, rates0, end * sense).nutation for end in (-1.0, 1.0))
     return math.pi - least, largest
 
 
-def flown(moments: Sequence[float] | Array, rates0: Sequence[float] | Array, times: Array) -> tuple[Array, Array]:
+def flown(
+    moments: Sequence[float] | reference.Array, rates0: Sequence[float] | reference.Array, times: reference.Array
+) -> tuple[reference.Array, reference.Array]:
     """Rates and attitudes by the closed form."""
     return triaxial.free_rates(moments, rates0, times), triaxial.free_attitude(moments, rates0, START, times)
 
 
-def off(first: Array, second: Array) -> float:
+def off(first: reference.Array, second: reference.Array) -> float:
     """Largest distance of two tracks of rates, as a part of |ω|."""
     return float(np.linalg.norm(first - second, axis=1).max() / np.linalg.norm(second, axis=1).max())
 
@@ -85,7 +86,9 @@ def test_jacobi_functions_are_those_of_scipy() -> None:
         assert 0.5 * math.pi / triaxial._means(1.0 - m)[1] == pytest.approx(float(ellipk(m)), rel=1e-14)
 
 
-def assert_obeys(moments: Sequence[float] | Array, rates0: Sequence[float] | Array, late: float) -> None:
+def assert_obeys(
+    moments: Sequence[float] | reference.Array, rates0: Sequence[float] | reference.Array, late: float
+) -> None:
     """From a point of the track a radian on by DOP853: so short that no separatrix magnifies its errors."""
     size = max(float(np.linalg.norm(rates0)), 1e-3)
     times = np.array([late, late + 1.0]) / size
@@ -140,13 +143,13 @@ def test_on_the_separatrix_it_ends_in_a_spin_about_the_middle_axis(rates0: list[
 
 
 @given(moments=bodies, rates0=turns, late=st.floats(0.0, 300.0))
-def test_any_motion_obeys_eulers_equations(moments: Array, rates0: Array, late: float) -> None:
+def test_any_motion_obeys_eulers_equations(moments: reference.Array, rates0: reference.Array, late: float) -> None:
     assert_obeys(moments, rates0, late)
 
 
 @settings(max_examples=80)
 @given(moments=bodies, rates0=turns)
-def test_energy_and_momentum_stay_and_the_period_is_one(moments: Array, rates0: Array) -> None:
+def test_energy_and_momentum_stay_and_the_period_is_one(moments: reference.Array, rates0: reference.Array) -> None:
     """After half of it the transverse rates have changed sign, after the whole nothing differs."""
     size = float(np.linalg.norm(rates0))
     track, attitudes = flown(moments, rates0, np.linspace(0.0, 1000.0, 41) / max(size, 1e-3))

@@ -1,14 +1,12 @@
 """Spin and turn in one row of blocks: flown by the reference, in the cheaper order, and refused with a reason."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from support import reference
-from support.builders import channel, codes
+from support.builders import channel, codes, present
 from support.cases import spread
 from support.golden import check_text
 from support.spinners import flown_by_reference, some_body
@@ -31,8 +29,7 @@ def body_of(seed: int, change: float | None = None) -> Spacecraft:
     """
     body, rng = some_body(seed), np.random.default_rng(1000 + seed)
     change = rng.uniform(0.7, 1.4) if change is None else change
-    assert body.commands is not None
-    axial = abs(body.axial) * 0.3 / (40.0 * float(body.commands.widths[-1]))
+    axial = abs(body.axial) * 0.3 / (40.0 * float(present(body.commands).widths[-1]))
     turning, across = list(body.channels), (0.0, 0.0)
     if seed % 3 == 1:
         turning = [channel(each.name, *each.torque[:2], rng.uniform(-0.05, 0.05) * each.strength) for each in turning]
@@ -63,8 +60,7 @@ def test_spin_and_turn_end_as_required_when_flown_by_the_reference(seed: int) ->
     assert [pulse.start for pulse in plan.pulses] == pytest.approx(starts, abs=1e-7)
     assert reference.nutation(moments, motion.rates, math.copysign(1.0, body.spin)) <= NUTATION + 1e-7
     assert reference.angle(reference.momentum(moments, motion), body.target_axis) <= SHIFT + 1e-7
-    assert body.goal.spin is not None
-    assert abs(motion.rates[2] - body.goal.spin) <= spin_tolerance(body, body.goal.spin) + 1e-9
+    assert abs(motion.rates[2] - present(body.goal.spin)) <= spin_tolerance(body, present(body.goal.spin)) + 1e-9
 
 
 @spread("seed", [0, 3, 6, 12, 15, 18], quick=1, deep=2)

@@ -1,7 +1,5 @@
 """Command blocks: their closed form and their Sun pulses against the flight and against an independent integrator."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from dataclasses import replace
@@ -12,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from support import reference
-from support.builders import aimed, channel, cross, spinner
+from support.builders import aimed, channel, cross, present, spinner
 from support.cases import spread
 from support.golden import refused
 from support.spinners import FILE, commanded, flown_by_reference, some_body
@@ -27,10 +25,8 @@ from nutdamp.physics import attitude, precession
 from nutdamp.physics.thruster import Cold, Tank, Trapezoid, Valve
 from nutdamp.planning import plan as planning
 from nutdamp.schemes.block_model import BlockModel, BlockState, Trial, fired, sun_clock, sun_pulses
-from nutdamp.schemes.catalogue import Options
 from nutdamp.spacecraft.constraints import commandable_widths
 from nutdamp.spacecraft.equipment import Block, Channel, SunSensor
-from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.schedule import Schedule
 
 SLOW = Trapezoid(open_delay=0.015, close_delay=0.015)
@@ -40,22 +36,22 @@ TURN = math.pi
 """s of a body at 2 rad/s."""
 
 
-def through(body: Spacecraft, valve: Valve) -> Spacecraft:
+def through(body: nutdamp.Spacecraft, valve: Valve) -> nutdamp.Spacecraft:
     """The body with that valve at every thruster."""
     return replace(body, channels=tuple(one.of(valve=valve) for one in body.channels))
 
 
-def at_rest(name: str = "lunar-prospector") -> Spacecraft:
+def at_rest(name: str = "lunar-prospector") -> nutdamp.Spacecraft:
     """An example without nutation, whose thrusters may fire from 50 ms on."""
     body = nutdamp.example(name)
     return replace(body, omega0=np.array([0.0, 0.0, body.spin]), keep=())
 
 
-def named(body: Spacecraft, name: str) -> Channel:
+def named(body: nutdamp.Spacecraft, name: str) -> Channel:
     return next(one for one in body.channels if one.name == name)
 
 
-def in_form(body: Spacecraft, *blocks: Block) -> tuple[BlockModel, BlockState]:
+def in_form(body: nutdamp.Spacecraft, *blocks: Block) -> tuple[BlockModel, BlockState]:
     model = BlockModel(body)
     state, number = model.start, 1
     for block in blocks:
@@ -64,7 +60,7 @@ def in_form(body: Spacecraft, *blocks: Block) -> tuple[BlockModel, BlockState]:
     return model, state
 
 
-def turns(body: Spacecraft, *blocks: Block) -> np.ndarray:
+def turns(body: nutdamp.Spacecraft, *blocks: Block) -> np.ndarray:
     """By how much blocks turn H, rad: in closed form, and flown."""
     model, state = in_form(body, *blocks)
     return np.array([float(model.left(state).aim), left_by(propagation.flown(body, fired(body, blocks))).aim])
@@ -191,8 +187,8 @@ def test_commands_begin_at_the_delay_after_the_sun_pulses_of_the_motion_that_the
     assert any(begins < one < ends for one in moments for begins, ends in (pulse.thrust for pulse in made))
 
 
-def one_block(body: Spacecraft) -> planning.Plan:
-    plan = planning.plan(body, "command-block", Options(max_blocks=1))
+def one_block(body: nutdamp.Spacecraft) -> planning.Plan:
+    plan = planning.plan(body, "command-block", nutdamp.Options(max_blocks=1))
     assert len(plan.pulses.blocks) == 1
     return plan
 
@@ -210,7 +206,7 @@ def test_a_valve_without_delays_changes_no_block_and_a_late_one_the_delay_alone(
     assert slow.flight.residual.nutation == pytest.approx(plain.flight.residual.nutation, abs=1e-6)
 
 
-def missed(body: Spacecraft, made: Schedule) -> float:
+def missed(body: nutdamp.Spacecraft, made: Schedule) -> float:
     """H off the target, rad, by the reference from start and on-time as loaded alone."""
     swells = list[reference.Swell]()
     for pulse in made:
@@ -234,8 +230,7 @@ def test_planned_with_valves_blocks_leave_what_the_grid_allows_and_without_them_
     thrust lacks.
     """
     body, way = aimed(at_rest(), 3.0, 40.0), math.radians(3.0)
-    assert body.commands is not None
-    body = replace(body, commands=replace(body.commands, widths=np.arange(0.046, 0.0541, 0.001)))
+    body = replace(body, commands=replace(present(body.commands), widths=np.arange(0.046, 0.0541, 0.001)))
     slow, spin = through(body, valve), abs(body.spin)
     aware, unaware = one_block(slow), one_block(body)
     (block,), step = aware.pulses.blocks, way / aware.pulses.blocks[0].count
@@ -294,10 +289,9 @@ def test_what_cannot_give_thrust_is_neither_fired_nor_planned() -> None:
     with refused(Infeasible, "blocks.tank-dry"):
         fired(dry, (Block("+M2", 1, 1.0, 0.2, 40),))
     body = commanded(spinner(channels=cross(8.0)), SUN)
-    assert body.commands is not None
-    widths = body.commands.widths
+    widths = present(body.commands).widths
     slow = through(body, Trapezoid(open_delay=float(0.5 * (widths[3] + widths[4])))).channels[0]
-    assert commandable_widths(body.commands, slow).tolist() == widths[4:].tolist()
+    assert commandable_widths(present(body.commands), slow).tolist() == widths[4:].tolist()
 
 
 def test_cold_pulses_leave_the_nutation_of_the_closed_form() -> None:
@@ -347,9 +341,8 @@ def test_what_was_fired_before_counts_in_the_search_and_in_the_flight() -> None:
     assert float(full[0]) == pytest.approx(sum(rest) / (float(np.linalg.norm(jet.torque)) * 0.3), rel=1e-9)
     assert float(used[0]) == pytest.approx(sum(one.propellant or 0.0 for one in whole), rel=1e-9)
     # 12 pulses of a body whose pressure has fallen to half: without that the form would be off by half the way.
-    assert FED.tank is not None
     block, worn = Block("T1", 1, 1.0, 0.3, 12), replace(FED, cold=Cold(0.7, 4.0, {"T1": 40}))
-    worn = replace(worn, tank=replace(FED.tank, used=0.6))
+    worn = replace(worn, tank=replace(present(FED.tank), used=0.6))
     form, flown = turns(worn, block)
     assert form == pytest.approx(flown, abs=2e-3 * FED.to_turn)
     assert abs(turns(FED, block)[0] - flown) > 0.02 * FED.to_turn

@@ -1,7 +1,5 @@
 """One pulse (21), two pulses (22) and pulses at every alignment, Magnus 1970: torquers and body-fixed thrusters."""
 
-from __future__ import annotations
-
 import cmath
 import itertools
 import math
@@ -11,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support.builders import Outcome, channel, codes, cross, fan, noted, spinner, transverse
+from support.builders import Outcome, channel, codes, cross, fan, noted, present, spinner, transverse
 from support.cases import spread
 from support.checker import violations
 from support.feasible import feasible_by, left
@@ -98,8 +96,7 @@ def test_the_horizon_that_is_named_is_long_enough(scheme: str) -> None:
     for torque, shortest in itertools.product((3.0, 30.0, 300.0), (0.0, 0.02)):
         jet = (channel("T", torque, 0.0, 0.0, min_on_time=shortest),)
         why = why_not((scheme, spinner(channels=jet, limits=Limits(horizon=0.3))))
-        named = re.search(r"would end at (\S+) s: set limits.horizon beyond that", why)
-        assert named is not None, why
+        named = present(re.search(r"would end at (\S+) s: set limits.horizon beyond that", why), why)
         feasible_by(scheme, spinner(channels=jet, limits=Limits(horizon=float(named[1]) * (1.0 + 1e-5))))
 
 
@@ -222,8 +219,7 @@ def test_two_ideal_pulses_are_exact_at_every_angle_for_the_impulse_of_the_floor(
         by_reference = degrees in (2.0, 60.0) and a in (-0.9, 0.0, 0.3)
         spacecraft = spinner(100.0, 100.0 * (1 - a), spin, degrees)  # no actuator named: an ideal steerable impulse
         plan = check_exact(spacecraft, "two-pulse", 2, by_reference=by_reference)
-        assert plan.residual is not None
-        assert max(plan.residual.nutation, plan.residual.momentum_shift) < NANODEGREE
+        assert max(present(plan.residual).nutation, present(plan.residual).momentum_shift) < NANODEGREE
         assert plan.pulses.total_impulse == pytest.approx(spacecraft.least_impulse, rel=1e-12)
 
 

@@ -1,7 +1,5 @@
 """The search for command blocks: nothing better on the whole grid, limits kept, and what is said of the best ones."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Iterator
@@ -62,8 +60,7 @@ def scanned(body: Spacecraft) -> tuple[float, float]:
 
     Of those that carry H the shorter way round the Sun.
     """
-    model, bounds, commands = BlockModel(body), requirements.bounds(body), body.commands
-    assert commands is not None
+    model, bounds, commands = BlockModel(body), requirements.bounds(body), present(body.commands)
     delays = (commands.delay_step * np.arange(round(commands.delay_max / commands.delay_step) + 1))[:, None, None]
     widths, counts = commands.widths[:, None], np.arange(1, commands.max_count + 1)
     ranks, ahead = [(math.inf, math.inf)], math.atan2(model.goal[1], model.goal[0])
@@ -92,8 +89,7 @@ def test_no_single_block_of_the_whole_grid_is_better_in_closed_form(seed: int) -
         commands=Commands(turn / 60, turn * 59 / 60, commands.widths[::8], 30, (1, 2)),
         requirement=within(0.5, 0.5 if aim else None),
     )
-    assert body.commands is not None
-    best = BlockSearch(body, body.channels, body.commands).best(1)[0]
+    best = BlockSearch(body, body.channels, present(body.commands)).best(1)[0]
     assert best.rank[:2] == pytest.approx(scanned(body), rel=1e-9)
 
 
@@ -105,12 +101,11 @@ def test_the_best_blocks_flown_by_the_reference_end_where_the_plan_says(seed: in
     assert 1 <= len(plan.pulses.blocks) <= 3
     motion, starts = flown_by_reference(body, plan.pulses.blocks)
     assert [one.start for one in plan.pulses] == pytest.approx(starts, abs=1e-7)
-    assert plan.left is not None
     momentum, near = reference.momentum(moments, motion), 1e-3 * body.to_turn
     assert reference.angle(momentum, plan.flight.final.momentum) < near
-    assert reference.angle(momentum, body.target_axis) == pytest.approx(float(plan.left.aim), abs=near)
+    assert reference.angle(momentum, body.target_axis) == pytest.approx(float(present(plan.left).aim), abs=near)
     nutation = reference.nutation(moments, motion.rates, math.copysign(1.0, body.spin))
-    assert nutation == pytest.approx(float(plan.left.nutation), abs=near)
+    assert nutation == pytest.approx(float(present(plan.left).nutation), abs=near)
 
 
 @pytest.mark.parametrize("seed", [26, 52])
@@ -143,8 +138,7 @@ def test_nutation_on_the_way_is_reckoned_with_where_blocks_would_miss(seed: int,
     That form leaves the nutation out: its best ones left up to nine times as much as others of the same search.
     """
     body = replace(some_body(seed), requirement=within(nutation, shift))
-    assert body.commands is not None
-    search = BlockSearch(body, usable(body), body.commands)
+    search = BlockSearch(body, usable(body), present(body.commands))
 
     def shares() -> Iterator[float]:
         for found in sorted(search._single(), key=lambda one: one.share)[:200]:
@@ -184,8 +178,7 @@ def test_a_looser_requirement_is_met_as_well() -> None:
     body = spinner(120.0, 180.0, 1.2, 0.5, channels=(channel("T", 5.0, 0.0, 0.0),))
     for most in (0.4, 0.51, 1.0):
         plan = planned(replace(commanded(body, np.array([1.0, -0.3, 0.1])), requirement=within(most)))
-        assert plan.left is not None
-        assert plan.left.nutation < min(math.radians(most), body.nutation)
+        assert present(plan.left).nutation < min(math.radians(most), body.nutation)
 
 
 @pytest.mark.weekly
@@ -208,14 +201,12 @@ def test_blocks_keep_out_of_blackout_windows(tight: bool) -> None:
     begins, ends = free.pulses[8].start - 1.0, free.pulses[8].start + (1.0 if tight else 21.0)
     body = a_turn(blackout=((begins, ends),), **({"horizon": free.end + 12.0} if tight else {}))
     if tight:  # with the same width there is room for two blocks alone, which come near
-        assert body.commands is not None
-        body = replace(body, commands=replace(body.commands, widths=np.array([free.blocks[0].width])))
+        body = replace(body, commands=replace(present(body.commands), widths=np.array([free.blocks[0].width])))
     plan = planned(body, met=not tight)
     assert any(pulse.end > begins and pulse.start < ends for pulse in free)
     assert not any(pulse.end > begins and pulse.start < ends for pulse in plan.pulses)
     assert len(plan.pulses.blocks) > tight
-    assert plan.left is not None
-    assert math.degrees(float(plan.left.aim)) < 1.0
+    assert math.degrees(float(present(plan.left).aim)) < 1.0
 
 
 @pytest.mark.weekly
@@ -247,8 +238,7 @@ def test_in_random_cases_blocks_never_bring_the_axis_into_a_cone(seed: int) -> N
         return
     motion, nearest, now = reference.Motion(body.omega0, attitude.matrix(body.initial.quaternion)), math.inf, 0.0
     for pulse in plan.pulses:
-        assert pulse.torque is not None
-        for torque, until in ((np.zeros(3), pulse.start), (pulse.torque, pulse.end)):
+        for torque, until in ((np.zeros(3), pulse.start), (present(pulse.torque), pulse.end)):
             path = reference.coast(body.inertia.moments, motion, torque, np.linspace(0.0, until - now, 20)[1:])
             axes = [math.copysign(1.0, body.spin) * one.rotation[:, 2] for one in path]
             nearest = min(nearest, *(reference.angle(axis, centre) for axis in axes))
@@ -261,8 +251,7 @@ NARROW = load(places.case("command-block-empty-widths.yaml"))
 
 @pytest.mark.deep
 def test_a_channel_without_a_commandable_width_is_left_out() -> None:
-    assert NARROW.commands is not None
-    commands = replace(NARROW.commands, widths=NARROW.commands.widths[::16], max_count=20)
+    commands = replace(present(NARROW.commands), widths=present(NARROW.commands).widths[::16], max_count=20)
     plan = planned(replace(NARROW, commands=commands, requirement=within(4.5)), ONE, met=False)
     assert {pulse.channel for pulse in plan.pulses} == {"T1"}
 
@@ -270,8 +259,7 @@ def test_a_channel_without_a_commandable_width_is_left_out() -> None:
 def test_where_there_are_no_blocks_the_reason_is_said() -> None:
     """Of a sensor that never sees the Sun a longer horizon would be no cure."""
     body = a_turn()
-    assert body.sun is not None
-    ends = [float(attitude.angle_between(body.sun, axis)) for axis in (body.momentum, body.target_axis)]
+    ends = [float(attitude.angle_between(present(body.sun), axis)) for axis in (body.momentum, body.target_axis)]
     sensor = SunSensor(0.4, elevation=0.5 * math.pi - ends[0], half_width=0.3 * abs(ends[1] - ends[0]))
     sensor = replace(sensor, elevation=sensor.elevation + 3.0 * sensor.half_width)
     cases = {
@@ -290,8 +278,9 @@ def test_where_there_are_no_blocks_the_reason_is_said() -> None:
 
 def test_a_delay_just_below_none_is_none_without_a_sign() -> None:
     body = a_turn()
-    assert body.commands is not None
-    delays = BlockSearch(body, body.channels, body.commands).commanded(np.array([-0.3, 0.3]) * body.commands.delay_step)
+    delays = BlockSearch(body, body.channels, present(body.commands)).commanded(
+        np.array([-0.3, 0.3]) * present(body.commands).delay_step
+    )
     assert delays.tolist() == [0.0, 0.0]
     assert not np.signbit(delays).any()
 
@@ -300,8 +289,7 @@ def test_a_delay_just_below_none_is_none_without_a_sign() -> None:
 def test_no_other_block_is_better_is_said_of_the_best_one_alone() -> None:
     """Where another was taken because it does better when flown, the note says no more than that."""
     for body in (a_turn(), replace(a_turn(), requirement=within(0.5, 0.02))):
-        assert body.commands is not None
-        search = BlockSearch(body, body.channels, body.commands)
+        search = BlockSearch(body, body.channels, present(body.commands))
         best, plan = search.best(1), planned(body, ONE, met=False)
         flights = [search.flights.flown(found) for found in best]
         assert scope_note(search, flights[0], first=True).code == "blocks-compared"
@@ -316,8 +304,7 @@ def test_ticks_are_superseded_by_the_steps_of_commands_and_a_note_says_so_where_
     assert ticked.pulses.blocks == free.pulses.blocks
     assert one_of(ticked.pulses.notes, "tick-not-kept")["tick_s"] == 0.0173
     body = a_turn(tick=0.01)
-    assert body.commands is not None
-    alike = replace(body, commands=replace(body.commands, delay_step=0.02, widths=np.array([0.2, 0.3])))
+    alike = replace(body, commands=replace(present(body.commands), delay_step=0.02, widths=np.array([0.2, 0.3])))
     assert "tick-not-kept" not in codes(planned(alike, met=False).pulses.notes)
 
 

@@ -1,7 +1,5 @@
 """Two pulses and half cones to a target axis: exact from any motion, the free numbers for least impulse."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Trains of pulses at a fixed inertial phase: what they cost, what nutation they leave, and where they fail."""
 
-from __future__ import annotations
-
 import math
 import re
 from dataclasses import replace
@@ -10,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from support import reference
-from support.builders import Outcome, aimed, channel, codes, cross, events, fan, off_target, one_of, spinner
+from support.builders import Outcome, aimed, channel, codes, cross, events, fan, off_target, one_of, present, spinner
 from support.cases import spread
 from support.feasible import feasible_by
 from support.golden import check_text
@@ -164,9 +162,7 @@ def test_pulses_that_damp_make_up_for_unequal_moments_where_the_width_is_given(
     assert {pulse.on_time for pulse in equal(plan)} == {on_time}
     assert "fixed-length" not in codes(plan_notes(plan))
     cut = replace(plan, schedule=replace(plan.pulses, pulses=plan.pulses.pulses[:-1]))
-    assert cut.flown is not None
-    assert cut.left is not None
-    off = math.degrees(max(cut.flown.nutation, cut.left.aim))
+    off = math.degrees(max(present(cut.flown).nutation, present(cut.left).aim))
     assert one_of(plan_notes(cut), "fixed-length")["off_deg"] == pytest.approx(off)
 
 
