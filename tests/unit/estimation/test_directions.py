@@ -70,8 +70,7 @@ def fly(seed: int, kind: str, length: float = 40.0) -> Flown:
     flight = [start, *reference.coast((moments[0], *moments), start, np.zeros(3), grid[1:])]
     tilt = math.radians(1.0) * draw.normal(size=2)
     true = Rotation.from_matrix([one.rotation for one in flight])
-    shown = true * Rotation.from_rotvec([*tilt, 0.0])
-    record = _record(draw, kind, body, grid, true, shown)
+    record = _record(draw, kind, body, grid, true, true * Rotation.from_rotvec([*tilt, 0.0]))
     edges = np.array([max(record.start, 1e-9), record.end])
     first, last = reference.coast((moments[0], *moments), start, np.zeros(3), edges)
     truth = {"A": moments[0], "C/A": moments[1] / moments[0], "growth": 0.0}
@@ -161,8 +160,7 @@ def test_what_flew_is_estimated_within_the_sigmas(kind: str, seed: int) -> None:
     """The attitude at the end of the record too."""
     flown = fly(seed, kind)
     fitted = fit(flown.spacecraft, flown.record)
-    apart = off(flown, fitted)
-    assert not {name: value for name, value in apart.items() if not abs(value) < 4.0}
+    assert not {name: value for name, value in off(flown, fitted).items() if not abs(value) < 4.0}
     assert fitted.sigmas[fitted.index("C/A") or 0] < 5e-4
     known = carried(fitted, flown.record.end)
     axis = Rotation.from_quat(np.roll(known.quaternion, -1)).as_matrix()[:, 2]
@@ -190,8 +188,7 @@ def test_the_attitude_about_one_direction_is_that_of_the_file() -> None:
     """Of two it is told; without a tolerance of the file, one leaves it as it is there."""
     one, three = (Model(each.spacecraft, each.record) for each in (fly(0, "one star"), fly(0, "three stars")))
     for model, finite in ((one, True), (three, False)):
-        tilt = present(model.parameter("attitude_1"))
-        assert math.isfinite(tilt.prior) == finite
+        assert math.isfinite(present(model.parameter("attitude_1")).prior) == finite
     body = one.spacecraft.replace(dispersions=None)
     assert Model(body, one.record).parameter("attitude_1") is None
 

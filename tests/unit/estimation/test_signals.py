@@ -252,8 +252,7 @@ def test_of_unequal_moments_pulses_and_disturbances_push_in_the_axes_of_the_file
     body = nutdamp.load(FILE | {"inertia": tensor, "disturbances": leak})
     pulses = Schedule(tuple(channel_pulse(one, at, 0.5) for one, at in zip(body.channels, (4.0, 9.0), strict=True)))
     times = np.linspace(0.0, 20.0, 50)
-    record = Record(times, {name: np.zeros(50) for name in GYROS}, schedule=pulses)
-    model = Model(body, record)
+    model = Model(body, Record(times, {name: np.zeros(50) for name in GYROS}, schedule=pulses))
     assert model.unequal
     rates, turned = model.motion({one.name: one.file for one in model.parameters}, times)
     there = propagation.flown(body, pulses, 20.0).motion(times)

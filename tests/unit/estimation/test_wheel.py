@@ -56,8 +56,7 @@ def test_a_coast_tells_the_moment_that_the_wheel_does_not_know(motion: tuple[str
     body = nutdamp.load({**FILE, "state": {**FILE["state"], "spin": spin}, "wheel": {"momentum": wheel}})
     true = (303.0, 303.0, 199.0)
     seen, rates = record(body, true, wheel)
-    fitted = fit(body, seen)
-    known = carried(fitted, 0.0)
+    known = carried(fit(body, seen), 0.0)
     sigmas = np.maximum(known.sigmas, 1e-12)
     assert known.values[0] == pytest.approx(true[0], abs=4.0 * sigmas[0])
     assert known.values[2:5] == pytest.approx(rates, abs=4.0 * float(sigmas[2:5].max()))
@@ -83,8 +82,7 @@ def test_a_record_without_noise_of_a_body_that_does_not_spin(rounding: float) ->
     omega = complex(body.omega0[0], body.omega0[1]) * np.exp(1j * 60.0 / 303.0 * times)
     third = rounding * np.random.default_rng(3).normal(size=len(times))
     seen = Record(times, dict(zip(GYROS, (omega.real, omega.imag, third), strict=True)))
-    known = carried(fit(body, seen), 0.0)
-    A, C, *rates = known.values[:5]
+    A, C, *rates = carried(fit(body, seen), 0.0).values[:5]
     assert rates[:2] == pytest.approx(body.omega0[:2], abs=1e-9)
     assert rates[2] - (C * rates[2] + 60.0) / A == pytest.approx(-60.0 / 303.0, abs=1e-9)
 

@@ -172,8 +172,7 @@ def test_a_change_of_spin_that_brings_the_phase_sooner_is_allowed_for() -> None:
 
 @pytest.mark.parametrize("seed", range(8))
 def test_axial_torque_lowers_the_bound_no_further_than_free_phases(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    body = layout(rng, axial=0.3)
+    body = layout(np.random.default_rng(seed), axial=0.3)
     still = replace(body, channels=tuple(channel(one.name, *one.torque[:2], 0.0) for one in body.channels))
     fixed = bounds.rigorous(still, prices(body), 1.0, bounds.Allowed(), shift=False)
     free = body.least_impulse / max(abs(one.transverse) / prices(body)[one.name] for one in body.channels)
@@ -264,8 +263,7 @@ def solved_program(body: Spacecraft) -> tuple[Program, Solution]:
 def test_any_prices_give_a_bound(seed: int) -> None:
     """Not only those of the solver, which may have stopped anywhere: the dual is checked at every time."""
     rng = np.random.default_rng(seed)
-    body = layout(rng, count=6)
-    program, solution = solved_program(body)
+    program, solution = solved_program(layout(rng, count=6))
     if solution.unmet > 1e-9:  # no solution for this layout
         return
     size = float(np.linalg.norm(solution.prices))
