@@ -1,12 +1,11 @@
 """Command blocks of small grids: none of all sequences of one or two blocks, flown, complies for less."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 
 import numpy as np
 import pytest
+from support.builders import present
 from support.cases import spread
 
 import nutdamp
@@ -16,10 +15,9 @@ from nutdamp.flight.end_state import left_by
 from nutdamp.schemes.block_model import fired, spin_turn
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.equipment import Block
-from nutdamp.spacecraft.model import Spacecraft
 
 
-def grid(seed: int) -> Spacecraft:
+def grid(seed: int) -> nutdamp.Spacecraft:
     """A spinner of two axial thrusters, three delays, two widths, and up to two pulses a block.
 
     Odd seeds are like the seed before, but spin the other way and are three times as large.
@@ -62,10 +60,9 @@ def grid(seed: int) -> Spacecraft:
     )
 
 
-def blocks_of(body: Spacecraft, first: int) -> Iterator[Block]:
+def blocks_of(body: nutdamp.Spacecraft, first: int) -> Iterator[Block]:
     """All blocks from the ``first`` Sun pulse on that end before the horizon."""
-    commands = body.commands
-    assert commands is not None
+    commands = present(body.commands)
     last = int(body.horizon / spin_turn(body)) + 1
     for channel in body.channels:
         for number in range(first, last + 1):
@@ -75,7 +72,7 @@ def blocks_of(body: Spacecraft, first: int) -> Iterator[Block]:
                         yield Block(channel.name, number, steps * commands.delay_step, width, count)
 
 
-def cheapest(body: Spacecraft, most: float) -> float:
+def cheapest(body: nutdamp.Spacecraft, most: float) -> float:
     """The least propellant, kg, below ``most`` of one or two blocks that comply; ``most`` where none does."""
     flow = {one.name: one.mass_flow or 0.0 for one in body.channels}
 
@@ -107,7 +104,6 @@ def test_no_blocks_of_a_small_grid_are_cheaper(seed: int) -> None:
     body = grid(seed)
     plan = nutdamp.plan(body, "command-block", nutdamp.Options(max_blocks=2))
     if plan.meets_requirement:
-        assert plan.propellant is not None
-        assert cheapest(body, 0.999 * plan.propellant) == pytest.approx(0.999 * plan.propellant)
+        assert cheapest(body, 0.999 * present(plan.propellant)) == pytest.approx(0.999 * present(plan.propellant))
     else:
         assert math.isinf(cheapest(body, math.inf))

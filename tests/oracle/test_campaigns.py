@@ -4,8 +4,6 @@ The figures are those of the status reports of Lunar Prospector and of the weekl
 say what of the spacecraft is published, computed from them and assumed. Nothing here is fitted but what they say.
 """
 
-from __future__ import annotations
-
 import csv
 import io
 import math
@@ -14,20 +12,17 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from support.builders import one_of
+from support.builders import one_of, present
 from support.cases import deep, spread
 from support.process import Run
 
 import nutdamp
 from nutdamp.files.reader import example_text
 from nutdamp.flight import propagation
-from nutdamp.flight.propagation import Flight
 from nutdamp.physics import attitude
 from nutdamp.planning import plan as planning
 from nutdamp.planning.notes import verdict_notes
-from nutdamp.planning.plan import judge
 from nutdamp.schemes.block_model import BlockModel, fired
-from nutdamp.schemes.catalogue import Options
 from nutdamp.spacecraft.equipment import Block
 from nutdamp.spacecraft.model import Spacecraft, Vector
 
@@ -41,7 +36,7 @@ def at_rest(name: str, rpm: float) -> Spacecraft:
     return replace(body, omega0=np.array([0.0, 0.0, rpm * math.pi / 30.0]), limits=limits, keep=())
 
 
-def flown(body: Spacecraft, *blocks: Block) -> Flight:
+def flown(body: Spacecraft, *blocks: Block) -> propagation.Flight:
     return propagation.flown(body, fired(body, blocks))
 
 
@@ -98,8 +93,7 @@ WIDTH = 0.21
 
 
 def sun_of(body: Spacecraft) -> Vector:
-    assert body.sun is not None
-    return body.sun
+    return present(body.sun)
 
 
 @spread("side", [1.0, -1.0], quick=1)
@@ -124,8 +118,7 @@ def test_campaigns_of_ace_end_as_reported(date: str, side: float) -> None:
     # As H goes about the Sun, Sun pulses come sooner or later.
     assert abs(turn.schedule.end - turn.schedule.pulses[0].start - spins) < 0.75 * model.turn
     assert 0.0 < one.took - spins < 2.0 * model.turn
-    assert turn.schedule.propellant is not None
-    difference = 3.0 * turn.schedule.propellant / (one.used * POUND) - 1.0  # three thrusters fire
+    difference = 3.0 * present(turn.schedule.propellant) / (one.used * POUND) - 1.0  # three thrusters fire
     assert -0.14 < difference < (0.01 if one.pulses > 50 else -0.02)
 
 
@@ -140,7 +133,7 @@ def test_the_spin_of_ace_rises_as_reported(date: str) -> None:
     body = replace(body, sun=body.direction_in_n(math.radians(one.sun[0]), 0.3))
     schedule = fired(body, (Block("P1", 1, 5.0, WIDTH, one.pulses),))
     plan = planning.Plan(body, "command-block", schedule)
-    values = one_of(verdict_notes(judge(plan), plan), "spin-change")
+    values = one_of(verdict_notes(planning.judge(plan), plan), "spin-change")
     before, after, cause = (values[key] for key in ("before_rpm", "after_rpm", "cause"))
     assert isinstance(before, float)
     assert isinstance(after, float)
@@ -164,10 +157,9 @@ def test_ace_is_planned_with_about_the_pulses_reported() -> None:
         for a in np.linspace(0.0, 2.0 * math.pi, 721).tolist()
     ]
     target = min(circle, key=lambda one: abs(float(attitude.angle_between(one, start)) - math.radians(14.0)))
-    commands = body.commands
-    assert commands is not None
+    commands = present(body.commands)
     body = replace(body, commands=replace(commands, widths=np.array([WIDTH])), goal=replace(body.goal, axis=target))
-    plan = planning.plan(body, "command-block", Options(max_blocks=1))
+    plan = planning.plan(body, "command-block", nutdamp.Options(max_blocks=1))
     assert plan.feasible
     (block,) = plan.pulses.blocks
     assert block.count == pytest.approx(99, abs=12)

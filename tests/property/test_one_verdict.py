@@ -1,7 +1,5 @@
 """All commands, the page, its sheet and the library give one verdict on a plan: status, share and bounds."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Iterator
@@ -104,8 +102,7 @@ def test_everything_that_judges_a_plan_says_the_same(run: Run, tmp_path: Path, t
     status, scheme = decision["status"], decision["scheme"]
     assert made.returncode == EXIT[status]
 
-    written = call(run, "report body.yaml -o page.html")
-    assert written.returncode == EXIT[status]
+    assert call(run, "report body.yaml -o page.html").returncode == EXIT[status]
     page = page_of((tmp_path / "page.html").read_text())
     assert page["status"].removesuffix(", nothing required") == HEADLINES[status]
     if status == "no-plan":
@@ -124,8 +121,7 @@ def test_everything_that_judges_a_plan_says_the_same(run: Run, tmp_path: Path, t
     export = result(run, f"export body.yaml --scheme {scheme} --format json", status=EXIT[status])
     assert judged(export["decision"]) == judged(decision)
 
-    body = nutdamp.load(tmp_path / "body.yaml")
-    known = nutdamp.plan(body, scheme).verdict
+    known = nutdamp.plan(nutdamp.load(tmp_path / "body.yaml"), scheme).verdict
     assert judged(json.loads(json.dumps(verdict_json(known)))) == judged(decision)
     assert known.status.exit_status == made.returncode
 

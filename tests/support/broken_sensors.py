@@ -1,7 +1,5 @@
 """Records with sensors that are broken: what happens to the columns of a CSV file of telemetry, and what `fit` says."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from pathlib import Path

@@ -130,9 +130,9 @@ class Outcome:
         self.spin: float = float(self.motion.rates[2])
 
 
-def present(value: T | None) -> T:
+def present(value: T | None, why: str | None = None) -> T:
     """The value, which must be there."""
-    assert value is not None
+    assert value is not None, why
     return value
 
 

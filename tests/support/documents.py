@@ -1,7 +1,5 @@
 """The file of a spacecraft that a test has built, for `verify`, which flies by the values of a file alone."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -5,8 +5,6 @@ linear Euler equations about pure spin, by the exponential of their matrix, and 
 ω3 t. Its burns are taken down on the true motion by linear programs, by fourth-order Runge-Kutta steps.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

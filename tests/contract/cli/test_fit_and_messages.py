@@ -12,7 +12,6 @@ from support import places
 from support.builders import present
 from support.commands import BUILT_IN, DATED, WIDE, call, contents, refusals, result, rows, written
 from support.golden import check_text
-from support.places import case
 from support.process import Run
 from support.synthetic import Array, motion
 
@@ -172,7 +171,7 @@ def test_rates_in_another_unit_are_a_fault_of_their_column(run: Run, tmp_path: P
 )
 def test_broken_sensors_are_named(run: Run, tmp_path: Path, record: str, body: str, status: int, said: str) -> None:
     """And nothing is written of what they show, but a JSON file."""
-    files = case(f"fit-{record}.csv"), case(f"fit-{body}.yaml")
+    files = places.case(f"fit-{record}.csv"), places.case(f"fit-{body}.yaml")
     screen = run("fit", *map(str, files), "-o", "now.yaml", "--json", "f.json")
     assert (screen.returncode, (tmp_path / "now.yaml").exists()) == (status, status == 0), screen.stderr
     notes = results(tmp_path).get("notes", [])
@@ -182,14 +181,15 @@ def test_broken_sensors_are_named(run: Run, tmp_path: Path, record: str, body: s
 
 def test_what_coarse_steps_do_to_an_estimate_is_in_its_sigma(run: Run, tmp_path: Path) -> None:
     """The same record without steps has a nutation of 4.602 deg; with them it was 7 sigma off."""
-    run("fit", str(case("fit-gyro-quant.csv")), str(case("fit-sc.yaml")), "--json", "f.json")
+    run("fit", str(places.case("fit-gyro-quant.csv")), str(places.case("fit-sc.yaml")), "--json", "f.json")
     nutation = estimates(tmp_path)["nutation"]
     assert abs(nutation["value"] - 4.602) < 3.0 * nutation["sigma"] < 0.6
     assert results(tmp_path)["kept"] == ["bias_omega_3"]
 
 
 def test_what_a_steady_spin_does_not_tell_is_as_the_file_has_it(run: Run, tmp_path: Path) -> None:
-    assert run("fit", str(case("fit-steady-spin.csv")), str(case("fit-tiny.yaml")), "--json", "f.json").returncode == 0
+    files = str(places.case("fit-steady-spin.csv")), str(places.case("fit-tiny.yaml"))
+    assert run("fit", *files, "--json", "f.json").returncode == 0
     rows = estimates(tmp_path)
     assert (rows["nutation"]["value"], rows["spin"]["value"]) == (0.0, pytest.approx(math.degrees(3.0)))
     assert rows.keys().isdisjoint({"phase", "C/A"})
@@ -198,7 +198,7 @@ def test_what_a_steady_spin_does_not_tell_is_as_the_file_has_it(run: Run, tmp_pa
 
 def test_what_is_far_from_the_file_is_written_where_that_is_accepted(run: Run, tmp_path: Path) -> None:
     """Both values are said; a column that was swapped makes C/A another one, and so does what it leads to."""
-    files = str(case("fit-gyro-swap12.csv")), str(case("fit-sc.yaml"))
+    files = str(places.case("fit-gyro-swap12.csv")), str(places.case("fit-sc.yaml"))
     assert run("fit", *files, "--accept", "-o", "now.yaml", "--json", "f.json").returncode == 0
     far = next(note for note in results(tmp_path)["notes"] if note["code"] == "fit-far")
     assert far["values"]["estimates"].startswith("C/A 1.32833 for 0.666667 (+3")

@@ -1,7 +1,5 @@
 """The budget of a loop: against long closed-loop flights, against what limits say, and what it refuses."""
 
-from __future__ import annotations
-
 import cmath
 import math
 from dataclasses import replace
@@ -11,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.special import chndtr
-from support.builders import codes, noted, spinner
+from support.builders import codes, noted, present, spinner
 from support.cases import deep, spread
 from support.golden import check_text, refused
 from support.loops import fired_by, fires, follow_few_cycles, four, rad, turned
@@ -52,8 +50,7 @@ def loop(sensor: Sensor, start: float = 0.5, stop: float = 0.05, **given: Any) -
 
 VALVED = tuple(each.of(valve=Trapezoid(0.008, 0.012, 0.005, 0.01)) for each in thrusters())
 STAGE = nutdamp.example("upper-stage")
-assert STAGE.loop is not None
-STAGE_LOOP = STAGE.loop
+STAGE_LOOP = present(STAGE.loop)
 SEEN = replace(STAGE_LOOP.sensor, rate=10.0)
 FILTERED = replace(SEEN, low_pass=0.1)
 
@@ -146,14 +143,13 @@ def test_of_two_limit_cycles_the_budget_is_of_the_one_that_the_loop_falls_into(d
     body = craft(tau=1000.0, channels=thrusters(least=0.1), degrees=degrees, loop=made)
     (held,) = budget(body).held
     assert held.cycle is not None
-    assert held.other is not None
-    assert (held.cycle.cycles > 0.0, held.other.cycles > 0.0) == (pauses, not pauses)
+    assert (held.cycle.cycles > 0.0, present(held.other).cycles > 0.0) == (pauses, not pauses)
     run = fly(body, made, 3000.0, seed=2)
     assert bool(run.quiet) is pauses
     if not pauses:
         later = sum(each.pulse.t > 1000.0 for each in run.fired)
         assert held.cycle.pulses == pytest.approx(later / 2000.0, rel=0.02)
-        assert held.other.pulses < 0.01 * held.cycle.pulses
+        assert present(held.other).pulses < 0.01 * held.cycle.pulses
 
 
 CASES = Path(__file__).parents[2] / "cases"
@@ -168,10 +164,8 @@ def test_a_budget_is_of_the_state_in_which_the_loop_of_the_file_ends(
     follow_few_cycles(monkeypatch)
     made = nutdamp.budget(nutdamp.load(CASES / f"{name}.yaml"))
     (held,) = made.held
-    assert held.cycle is not None
-    assert held.other is not None
-    assert (held.cycle.cycles, held.other.cycles > 0.0, held.share) == (0.0, True, 1.0)
-    assert held.cycle.pulses * DAY == pytest.approx(pulses, rel=0.05)
+    assert (present(held.cycle).cycles, present(held.other).cycles > 0.0, held.share) == (0.0, True, 1.0)
+    assert present(held.cycle).pulses * DAY == pytest.approx(pulses, rel=0.05)
     assert made.status is Status.NOT_ENOUGH
     assert loop_of(made.spacecraft, 2000.0).verdict.status is Status.NOT_ENOUGH
 
@@ -180,8 +174,7 @@ def test_a_budget_is_of_the_state_in_which_the_loop_of_the_file_ends(
 def test_chains_that_change_over_are_told_by_their_share() -> None:
     """Most fall quiet; one firing in a hundred leaves what no pulse lowers, and they never do again."""
     body = nutdamp.load(CASES / "budget-bistable.yaml")
-    assert body.loop is not None
-    (quiet, most), (never, least) = Map(body, body.loop).attractors()
+    (quiet, most), (never, least) = Map(body, present(body.loop)).attractors()
     assert (quiet.cycles > 0.0, never.cycles) == (True, 0.0)
     assert most + least == 1.0
     assert 0.02 < least < 0.25
@@ -271,8 +264,7 @@ def test_when_damping_must_begin_is_that_of_the_course_example() -> None:
 
 def held_by(body: Spacecraft) -> tuple[HeldNutation, Cycle]:
     (held,) = budget(body).held
-    assert held.cycle is not None, held.why
-    return held, held.cycle
+    return held, present(held.cycle, held.why)
 
 
 def test_propellant_follows_from_impulse_and_isp(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -286,13 +278,11 @@ def test_propellant_follows_from_impulse_and_isp(monkeypatch: pytest.MonkeyPatch
 def test_a_tank_lasts_as_long_as_its_propellant() -> None:
     steady = replace(craft(loop=loop(gyro())), cold=Cold(0.5, 10.0), tank=Tank(2.0, 22e5, 8e5, 0.0))
     held, cycle = held_by(steady)
-    assert cycle.propellant is not None
-    assert held.lasts == pytest.approx(2.0 / cycle.propellant, rel=1e-9)
+    assert held.lasts == pytest.approx(2.0 / present(cycle.propellant), rel=1e-9)
     falling = held_by(replace(steady, tank=Tank(2.0, 22e5, 8e5, 1.0)))[0]
-    assert falling.lasts is not None
     # Weaker than the law believes, a pulse leaves a good part of the nutation: more pulses for the same impulse.
-    assert falling.lasts == pytest.approx(held.lasts, rel=0.6)
-    assert falling.lasts != pytest.approx(held.lasts, rel=0.01)
+    assert present(falling.lasts) == pytest.approx(held.lasts, rel=0.6)
+    assert present(falling.lasts) != pytest.approx(held.lasts, rel=0.01)
     assert Map(steady, loop(gyro()), used=1.0).cycle().pulses == Map(steady, loop(gyro())).cycle().pulses
 
 
@@ -311,15 +301,13 @@ def test_a_search_for_cycles_ends_with_its_budget_of_work(monkeypatch: pytest.Mo
     follow_few_cycles(monkeypatch)
     monkeypatch.setattr("nutdamp.control_loop.budget._lasts", spent)
     held = budget(body).held[0]
-    assert held.cycle is not None
-    assert held.lasts == pytest.approx(2.0 / (held.cycle.propellant or math.nan))
+    assert held.lasts == pytest.approx(2.0 / (present(held.cycle).propellant or math.nan))
 
 
 @pytest.mark.weekly
 def test_a_tank_whose_pressure_falls_lasts_as_long_as_a_loop_that_is_flown_until_it_is_empty() -> None:
     body = replace(craft(degrees=0.4, loop=loop(gyro())), tank=Tank(0.15, 22e5, 8e5, 1.0))
-    lasts = held_by(body)[0].lasts
-    assert lasts is not None
+    lasts = present(held_by(body)[0].lasts)
     run = fly(body, loop(gyro()), 1.2 * lasts, seed=3)
     assert (run.stop, len(run.fired) > 400) == (Ending.EMPTY, True)
     assert run.fired[-1].pulse.t - run.fired[0].pulse.t == pytest.approx(lasts, rel=0.02)
@@ -382,11 +370,9 @@ def test_the_library_gives_what_the_command_writes(monkeypatch: pytest.MonkeyPat
     follow_few_cycles(monkeypatch)
     made = nutdamp.budget(STAGE, [(rad(0.5), rad(0.1))])
     (row,) = made.to_dict()["thresholds"]
-    cycle = made.held[0].cycle
-    assert cycle is not None
-    assert cycle.propellant is not None
+    cycle = present(made.held[0].cycle)
     assert row["pulses_per_day"] == cycle.pulses * DAY
-    assert row["propellant_kg_per_year"] == cycle.propellant * YEAR
+    assert row["propellant_kg_per_year"] == present(cycle.propellant) * YEAR
     wrong: list[Any] = [[(0.1, 0.2)], [(0.1,)], "0.1", [("a", "b")]]
     given: list[dict[str, Any]] = [{"thresholds": each} for each in wrong] + [{"largest": 4.0}]
     for number, options in enumerate(given):

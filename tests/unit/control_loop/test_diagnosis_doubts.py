@@ -1,7 +1,5 @@
 """What is off in the sensor itself widens what the effect of a firing leaves open."""
 
-from __future__ import annotations
-
 import pytest
 
 from nutdamp.control_loop.law import Diagnosis, Doubt, Glimpse

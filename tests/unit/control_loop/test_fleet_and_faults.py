@@ -1,7 +1,5 @@
 """What is wired backwards is named, whatever sensor and law; loops flown together fire as each flown alone."""
 
-from __future__ import annotations
-
 import cmath
 import math
 from dataclasses import replace
@@ -9,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support.builders import spinner
+from support.builders import present, spinner
 from support.cases import deep, spread
 from support.loops import FOUR, around, fired_by, fires, rad
 
@@ -256,8 +254,7 @@ def test_loops_flown_together_fire_as_each_alone(seed: int, law: str) -> None:
     assert not expects_alone(known, craft)
     together = Fleet(known, cases, until).fly()
     for row, (case, pilot) in enumerate(zip(cases, together.pilots, strict=True)):
-        assert case.truth.loop is not None
-        run = fly(case.truth, case.truth.loop, until, seed=case.key, law=known, scatter=case.scatter)
+        run = fly(case.truth, present(case.truth.loop), until, seed=case.key, law=known, scatter=case.scatter)
         assert [each.pulse.channel for each in pilot.fired] == [each.pulse.channel for each in run.fired]
         for mine, other in zip(pilot.fired, run.fired, strict=True):
             assert mine.pulse.loaded == pytest.approx(other.pulse.loaded, abs=1e-9)

@@ -1,7 +1,5 @@
 """What the sensors show, and when the law fires by it: Magnus' sign table, closed forms, motions by DOP853."""
 
-from __future__ import annotations
-
 import cmath
 import math
 
@@ -9,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from support import reference
-from support.builders import channel, spinner
+from support.builders import channel, present, spinner
 from support.cases import deep, spread
 from support.golden import refused
 from support.loops import fired_by, fires, four, transverse_size, turned
@@ -28,9 +26,7 @@ TABLE = {"+M1": (1, 1), "-M1": (1, -1), "+M2": (0, -1), "-M2": (0, 1)}
 
 
 def first_firing(law: Law, z: complex, spin: float = 3.0) -> Firing:
-    firing = law.firing(law.actuators[0], z, spin)
-    assert firing is not None
-    return firing
+    return present(law.firing(law.actuators[0], z, spin))
 
 
 def after(moments: tuple[float, float, float], rates: Vector, torque: Vector, start: float, width: float) -> Vector:
@@ -47,8 +43,7 @@ def test_sign_table_of_magnus_and_its_mirror_image(C: float, spin: float) -> Non
     law, rate = Law(fired_by(5.0, FOUR, C=C, spin=spin), Loop(Sensor(), start=0.01)), (120.0 - C) / 120.0 * spin
     for actuator in law.actuators:
         z = 0.1 * cmath.exp(0.3j)
-        firing = law.firing(actuator, z, spin)
-        assert firing is not None
+        firing = present(law.firing(actuator, z, spin))
         then = z * cmath.exp(-1j * rate * (firing.wait + 0.5 * firing.on_time))
         change = -1j * rate * then
         zero, sign = TABLE[actuator.channel.name]
@@ -205,9 +200,8 @@ def estimates(
     """Times, estimates of z with the filter taken out, and z itself, along a coast; fed in pieces at ``cuts``."""
     law = Law(craft, Loop(sensor, start=0.01))
     signal, path = Signal(craft, sensor, (1,)), make_dynamics(craft).path(craft.initial, 0.0, 40.0, most=9999)[0]
-    assert sensor.rate is not None
-    numbers = np.arange(int(40.0 * sensor.rate))
-    times = numbers / sensor.rate
+    numbers = np.arange(int(40.0 * present(sensor.rate)))
+    times = numbers / present(sensor.rate)
     rates = path.motion(times)[0]
     estimator, values = Estimator(law, sensor, 0.0), signal.sampled(numbers, signal.shown(rates))
     pieces = [

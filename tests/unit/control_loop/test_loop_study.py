@@ -1,7 +1,5 @@
 """Dispersed loops: what is drawn, that each is what it says, and what is made of many."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import replace
@@ -10,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from support.builders import present
 from support.cases import spread
 from support.dispersed import jet, normal
 from support.golden import refused
@@ -91,8 +90,7 @@ def test_every_case_has_its_own_body_thrusters_and_sensor() -> None:
     assert pytest.approx(body.inertia.A + draws["A"]) == truth.inertia.A
     assert pytest.approx(body.inertia.C + draws["C"]) == truth.inertia.C
     assert truth.omega0 == pytest.approx(body.omega0 + [draws[f"omega0_{axis}"] for axis in (1, 2, 3)])
-    assert truth.loop is not None
-    sensor = truth.loop.sensor
+    sensor = present(truth.loop).sensor
     assert sensor.scales == pytest.approx([1.0 + draws["sensor scale 1"], 1.0 + draws["sensor scale 2"]])
     assert sensor.biases == pytest.approx([GYRO.bias + draws["sensor bias 1"], GYRO.bias + draws["sensor bias 2"]])
     assert sensor.noise == pytest.approx(GYRO.noise * (1.0 + draws["sensor noise"]))
@@ -100,8 +98,7 @@ def test_every_case_has_its_own_body_thrusters_and_sensor() -> None:
     valve = truth.channels[2].valve
     assert isinstance(valve, Trapezoid)
     assert valve.open_delay == pytest.approx(0.01 + draws["open_delay +M2"])
-    assert truth.cold is not None
-    assert truth.cold.first == pytest.approx(0.9 + draws["cold"])
+    assert present(truth.cold).first == pytest.approx(0.9 + draws["cold"])
     assert case.tilt == pytest.approx([draws["attitude x"], draws["attitude y"]])
     assert case.scatter is not None
     assert case.scatter.of(3) == case.scatter.of(3) != case.scatter.of(4)
@@ -210,10 +207,9 @@ def test_dispersed_loops_are_judged_by_their_share_and_a_single_one_by_its_own_b
     results = results_of(body, 60)
     verdict = LoopDispersion(results).verdict
     assert [verdict.status, loop_of(body, 60.0).verdict.status] == [many, one]
-    assert verdict.cases is not None
     kept = np.count_nonzero(results.of("nutation") <= verdict.lines[0].bound.limit) / 60
     assert [line.share for line in verdict.lines] == [kept]
-    assert verdict.cases.complying == (None if requirement is None else kept)
+    assert present(verdict.cases).complying == (None if requirement is None else kept)
     assert verdict.met == (None if requirement is None else many is Status.FLY)
 
 
@@ -232,9 +228,7 @@ def test_what_never_settles_is_worst_and_does_not_comply() -> None:
 
 def test_a_loop_whose_tank_is_empty_fires_no_more_and_does_not_comply() -> None:
     body = craft(dispersions=Dispersions(tank_propellant=Tolerance("uniform", 0.3, relative=True)))
-    assert body.loop is not None
-    needs = fly(body, body.loop, 30.0).schedule.propellant
-    assert needs is not None
+    needs = present(fly(body, present(body.loop), 30.0).schedule.propellant)
     results = results_of(replace(body, tank=Tank(needs, 22e5, 22e5, 0.0)), 40, 30.0)
     empty = results.stops[Ending.EMPTY]
     assert 12 < empty < 28
@@ -319,12 +313,11 @@ def test_loops_fire_alike_whether_they_look_while_nothing_can_show_or_not(
     sensor: str, alike: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     body = replace(fired_by(1.0, loop=fires(NOISY[sensor], settle=1.0)), dissipation=60.0, dispersions=STARTS)
-    assert body.loop is not None
     asleep = results_of(body, 20, 400.0)
-    looked = [fly(body, body.loop, 400.0).looked_at]
+    looked = [fly(body, present(body.loop), 400.0).looked_at]
     monkeypatch.setattr("nutdamp.control_loop.controller.Pilot._idle_until", lambda *_: None)
     awake = results_of(body, 20, 400.0)
-    looked.append(fly(body, body.loop, 400.0).looked_at)
+    looked.append(fly(body, present(body.loop), 400.0).looked_at)
     assert asleep.values == pytest.approx(awake.values, rel=alike, abs=1e-3 * alike, nan_ok=True)
     assert np.array_equal(asleep.of("firings"), awake.of("firings"))
     assert 1.5 * looked[0] < looked[1]

@@ -1,7 +1,5 @@
 """The loop flown: equal to the open-loop schedule where it sees all, to simulations by DOP853 where it samples."""
 
-from __future__ import annotations
-
 import cmath
 import itertools
 import json
@@ -13,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from support import reference
-from support.builders import codes
+from support.builders import codes, present
 from support.cases import deep, spread
 from support.documents import documented
 from support.golden import check_text, refused
@@ -244,8 +242,7 @@ def test_growing_nutation_is_kept_between_the_thresholds() -> None:
 
 
 def test_samples_are_few_while_the_nutation_cannot_show_and_never_too_many(monkeypatch: pytest.MonkeyPatch) -> None:
-    slow, loop = replace(GROWING, dissipation=20_000.0), GROWING.loop
-    assert loop is not None
+    slow, loop = replace(GROWING, dissipation=20_000.0), present(GROWING.loop)
     run = fly(slow, loop, 300_000.0)
     assert len(run.quiet) >= 3
     assert run.looked_at < 300_000.0 * 40.0 / 10.0

@@ -1,7 +1,5 @@
 """Other values of C/A that equal sampling allows, and what is said of the body, for fits that are given."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Sensors that are broken: no estimate is accepted that is far off, but where no record could tell."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

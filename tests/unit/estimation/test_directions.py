@@ -1,7 +1,5 @@
 """Directions seen from the body, and attitudes: what DOP853 flew is estimated, each within what its sigma says."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import NamedTuple
@@ -11,6 +9,7 @@ import pytest
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation, Slerp
 from support import reference
+from support.builders import present
 from support.cases import deep, weekly
 from support.golden import check_text
 from support.synthetic import Array
@@ -22,7 +21,6 @@ from nutdamp.estimation.model import Model
 from nutdamp.estimation.parameters import DIRECTION, SEEN, SUN_ASPECT, Record, of_quaternions
 from nutdamp.estimation.results import carried, doubts
 from nutdamp.estimation.search import Fit
-from nutdamp.spacecraft.model import Spacecraft
 
 FILE: dict[str, object] = {
     "name": "directions",
@@ -46,7 +44,7 @@ KINDS = ("aspect", "sun crossings", "one star", "three stars", "quaternions")
 class Flown(NamedTuple):
     """A file, the telemetry of a body that differs from it, true values of parameters, and the rotation at the end."""
 
-    spacecraft: Spacecraft
+    spacecraft: nutdamp.Spacecraft
     record: Record
     truth: Mapping[str, float]
     rotation: Array
@@ -59,9 +57,8 @@ def fly(seed: int, kind: str, length: float = 40.0) -> Flown:
     keys: dict[str, object] = {"inertia.C": C, "state.spin": float(draw.choice([-1.0, 1.0]) * draw.uniform(1.5, 4.0))}
     keys |= {"state.nutation": f"{draw.uniform(1.0, 10.0)} deg", "state.phase": f"{draw.uniform(-180, 180)} deg"}
     body = nutdamp.load(FILE, set=keys)
-    assert body.sun is not None
     begin = Rotation.random(random_state=seed)
-    while not 30.0 < math.degrees(math.acos(float(begin.as_matrix()[:, 2] @ body.sun))) < 150.0:
+    while not 30.0 < math.degrees(math.acos(float(begin.as_matrix()[:, 2] @ present(body.sun)))) < 150.0:
         begin = Rotation.random(random_state=int(draw.integers(1 << 30)))
     body = body.with_(attitude={"quaternion": scalar_first(begin).tolist()})
     moments = 120.0 * (1.0 + 0.005 * draw.normal()), C * (1.0 + 0.005 * draw.normal())
@@ -73,8 +70,7 @@ def fly(seed: int, kind: str, length: float = 40.0) -> Flown:
     flight = [start, *reference.coast((moments[0], *moments), start, np.zeros(3), grid[1:])]
     tilt = math.radians(1.0) * draw.normal(size=2)
     true = Rotation.from_matrix([one.rotation for one in flight])
-    shown = true * Rotation.from_rotvec([*tilt, 0.0])
-    record = _record(draw, kind, body, grid, true, shown)
+    record = _record(draw, kind, body, grid, true, true * Rotation.from_rotvec([*tilt, 0.0]))
     edges = np.array([max(record.start, 1e-9), record.end])
     first, last = reference.coast((moments[0], *moments), start, np.zeros(3), edges)
     truth = {"A": moments[0], "C/A": moments[1] / moments[0], "growth": 0.0}
@@ -88,7 +84,7 @@ def scalar_first(rotation: Rotation) -> Array:
     return np.roll(rotation.as_quat(), 1, axis=-1)
 
 
-def _turned(body: Spacecraft, record: Record, rotation: Array) -> dict[str, float]:
+def _turned(body: nutdamp.Spacecraft, record: Record, rotation: Array) -> dict[str, float]:
     """The true attitude, by what the file has at the start of a record: the tilt of axis 3, then the turn about it."""
     of_file = Rotation.from_quat(np.roll(Model(body, record).reference.quaternion, -1))
     apart = of_file.inv() * Rotation.from_matrix(rotation)
@@ -98,15 +94,14 @@ def _turned(body: Spacecraft, record: Record, rotation: Array) -> dict[str, floa
 
 
 def _record(
-    draw: np.random.Generator, kind: str, body: Spacecraft, grid: Array, true: Rotation, shown: Rotation
+    draw: np.random.Generator, kind: str, body: nutdamp.Spacecraft, grid: Array, true: Rotation, shown: Rotation
 ) -> Record:
     if kind == "quaternions":
         times = np.arange(0.0, grid[-1], 0.5)
         error = NOISE * draw.normal(size=(len(times), 3)) * np.array([1.0, 1.0, 5.0])
         seen = Slerp(grid, shown)(times) * Rotation.from_rotvec(error)
         return Record(times, of_quaternions(scalar_first(seen), body))
-    sun = body.sun
-    assert sun is not None
+    sun = present(body.sun)
     if kind == "aspect":
         times = passing(grid, true.inv().apply(sun), math.radians(35.0))
         x, y, z = at(grid, shown.inv().apply(sun), times).T
@@ -165,13 +160,11 @@ def test_what_flew_is_estimated_within_the_sigmas(kind: str, seed: int) -> None:
     """The attitude at the end of the record too."""
     flown = fly(seed, kind)
     fitted = fit(flown.spacecraft, flown.record)
-    apart = off(flown, fitted)
-    assert not {name: value for name, value in apart.items() if not abs(value) < 4.0}
+    assert not {name: value for name, value in off(flown, fitted).items() if not abs(value) < 4.0}
     assert fitted.sigmas[fitted.index("C/A") or 0] < 5e-4
     known = carried(fitted, flown.record.end)
     axis = Rotation.from_quat(np.roll(known.quaternion, -1)).as_matrix()[:, 2]
-    assert known.tilt is not None
-    assert reference.angle(axis, flown.rotation[:, 2]) < 4.0 * known.tilt
+    assert reference.angle(axis, flown.rotation[:, 2]) < 4.0 * present(known.tilt)
 
 
 @pytest.mark.parametrize("kind", [weekly(kind) for kind in KINDS])
@@ -195,9 +188,7 @@ def test_the_attitude_about_one_direction_is_that_of_the_file() -> None:
     """Of two it is told; without a tolerance of the file, one leaves it as it is there."""
     one, three = (Model(each.spacecraft, each.record) for each in (fly(0, "one star"), fly(0, "three stars")))
     for model, finite in ((one, True), (three, False)):
-        tilt = model.parameter("attitude_1")
-        assert tilt is not None
-        assert math.isfinite(tilt.prior) == finite
+        assert math.isfinite(present(model.parameter("attitude_1")).prior) == finite
     body = one.spacecraft.replace(dispersions=None)
     assert Model(body, one.record).parameter("attitude_1") is None
 

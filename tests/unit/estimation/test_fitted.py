@@ -1,7 +1,5 @@
 """Results of a fit: its file, its JSON, its screen."""
 
-from __future__ import annotations
-
 import io
 import math
 import re
@@ -12,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from rich.console import Console
+from support.builders import present
 from support.golden import check_text, refused
 from support.synthetic import motion
 
@@ -60,8 +59,7 @@ def test_estimates_file_and_json_are_one(fitted: Fitted, tmp_path: Path) -> None
     of_file = body.inertia.C / body.inertia.A
     assert of_file == pytest.approx(ratio.value, rel=1e-8)
     assert body.omega0 == pytest.approx(true, abs=1e-3)
-    assert body.dispersions is not None
-    assert {pair[:2]: pair[2] for pair in body.dispersions.correlation}["A", "C"] > 0.999
+    assert {pair[:2]: pair[2] for pair in present(body.dispersions).correlation}["A", "C"] > 0.999
 
 
 def test_only_a_spacecraft_of_a_file_makes_one(fitted: Fitted) -> None:
@@ -73,8 +71,7 @@ def test_only_a_spacecraft_of_a_file_makes_one(fitted: Fitted) -> None:
 
 def test_the_screen_says_how_many_periods_the_record_has(fitted: Fitted) -> None:
     values = fitted.core.named
-    periods = re.search(r"0 s to 30 s, nutation periods: (\S+)", shown(fit_screen(fitted.core, 0.0)))
-    assert periods is not None
+    periods = present(re.search(r"0 s to 30 s, nutation periods: (\S+)", shown(fit_screen(fitted.core, 0.0))))
     expected = LENGTH * (1.0 - values["C/A"]) * values["omega_3"] / (2.0 * math.pi)
     assert float(periods[1]) == pytest.approx(expected, rel=5e-3)
 

@@ -1,7 +1,5 @@
 """Regions of 95 % where the spin is that of the file: ω3 and C/A lie on the curve of one nutation rate."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Each kind of signal, and pulses fired within a record: what is estimated is what DOP853 flew; what is refused."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 
@@ -9,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 from support import reference
-from support.builders import noted, one_of
+from support.builders import noted, one_of, present
 from support.cases import deep, spread
 from support.golden import check_text
 from support.places import case
@@ -27,7 +25,6 @@ from nutdamp.estimation.search import Fit
 from nutdamp.files.telemetry import read_telemetry
 from nutdamp.flight import propagation
 from nutdamp.physics import attitude
-from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
 
 NOISE = math.radians(0.01)
@@ -72,7 +69,7 @@ def noisy(times: Array, rates: Array, seed: int = 16, names: tuple[str, ...] = G
     return Record(times, {name: shown[:, GYROS.index(name)] for name in names})
 
 
-def of_body(body: Spacecraft, times: Array) -> Record:
+def of_body(body: nutdamp.Spacecraft, times: Array) -> Record:
     """Gyros of the body with A and C."""
     return noisy(times, motion((A, A, C), body.omega0, times), 8)
 
@@ -82,7 +79,7 @@ def of_example(times: Array, C: float = 80.4, names: tuple[str, ...] = GYROS, sp
     return noisy(times, motion((120.0, 120.0, C), np.array([0.14, 0.12, spin]), times), names=names)
 
 
-def flown(times: Array, body: Spacecraft, events: tuple[reference.Push, ...] = ()) -> list[reference.Motion]:
+def flown(times: Array, body: nutdamp.Spacecraft, events: tuple[reference.Push, ...] = ()) -> list[reference.Motion]:
     """The motion of a body that differs from its file, at rising times > 0; turned about its axis by 0.3 rad."""
     rates = body.omega0 * np.array([1.2, 0.7, 1.001]) + np.array([0.01, 0.02, 0.0])
     start = reference.Motion(rates, attitude.matrix(body.initial.quaternion) @ turning(0.3))
@@ -104,7 +101,7 @@ def axes(
     return dict(zip(AXIS, (axis / np.linalg.norm(axis, axis=1, keepdims=True)).T, strict=True))
 
 
-def felt(times: Array, growth: float = 0.0, body: Spacecraft = BODY) -> Array:
+def felt(times: Array, growth: float = 0.0, body: nutdamp.Spacecraft = BODY) -> Array:
     """Acceleration along axis 3 at 0.8 m on axis 1, by differences of the rates that DOP853 flies."""
     step, arm = 1e-5, np.array([0.8, 0.0, 0.0])
     near = np.sort(np.concatenate([times - step, times + step]))
@@ -216,9 +213,8 @@ def test_gyros_and_axis_together_tell_bias_misalignment_and_wobble_apart() -> No
 @pytest.mark.deep
 def test_sun_pulses_tell_the_spin_and_so_the_bias_of_the_third_gyro() -> None:
     """The Sun passes the sensor by the rotations of DOP853 on a fine grid."""
-    assert BODY.sun is not None
     times, grid, draw = np.linspace(0.05, 100.0, 500), np.linspace(0.0, 100.0, 20_001)[1:], np.random.default_rng(4)
-    seen = np.array([one.rotation.T @ BODY.sun for one in flown(grid, BODY)])
+    seen = np.array([one.rotation.T @ present(BODY.sun) for one in flown(grid, BODY)])
     turns = -(np.unwrap(np.arctan2(seen[:, 1], seen[:, 0])) - math.radians(35.0)) / (2.0 * math.pi)
     passed = np.interp(np.arange(math.ceil(turns[0]), turns[-1]), turns, grid)
     signals = gyros(flown(times, BODY), 5, np.array([0.0, 0.0, 5e-4]))
@@ -240,8 +236,7 @@ def test_pulses_in_a_record_tell_thrust_and_delay_of_their_channels() -> None:
     fitted = fit(BODY, Record(times, gyros(flown(times, BODY, events), 5), schedule=fired))
     of_A = fitted.index("A") or 0
     for name, factor in factors.items():  # a pulse shows thrust over A, so that the factor is as uncertain as A
-        at = fitted.index(f"thrust {name}")
-        assert at is not None
+        at = present(fitted.index(f"thrust {name}"))
         apart = math.sqrt(fitted.covariance[at, at] - fitted.covariance[at, of_A] ** 2 / fitted.covariance[of_A, of_A])
         assert abs(fitted.values[at] / fitted.named["A"] * A - factor) < 4.0 * apart
         assert apart < 0.002
@@ -257,8 +252,7 @@ def test_of_unequal_moments_pulses_and_disturbances_push_in_the_axes_of_the_file
     body = nutdamp.load(FILE | {"inertia": tensor, "disturbances": leak})
     pulses = Schedule(tuple(channel_pulse(one, at, 0.5) for one, at in zip(body.channels, (4.0, 9.0), strict=True)))
     times = np.linspace(0.0, 20.0, 50)
-    record = Record(times, {name: np.zeros(50) for name in GYROS}, schedule=pulses)
-    model = Model(body, record)
+    model = Model(body, Record(times, {name: np.zeros(50) for name in GYROS}, schedule=pulses))
     assert model.unequal
     rates, turned = model.motion({one.name: one.file for one in model.parameters}, times)
     there = propagation.flown(body, pulses, 20.0).motion(times)
@@ -427,7 +421,7 @@ def test_a_small_pulse_in_the_last_fifth_that_the_axis_shows_is_told(share: floa
     assert one_of(doubts(fitted), "fit-steps")["at_s"] == pytest.approx(at, abs=2.5)
 
 
-def refusal(error: type[NutdampError], body: Spacecraft, record: Record) -> str:
+def refusal(error: type[NutdampError], body: nutdamp.Spacecraft, record: Record) -> str:
     with pytest.raises(error) as raised:
         fit(body, record)
     return str(raised.value)
@@ -457,7 +451,7 @@ def test_records_that_tell_nothing_say_what_would_help() -> None:
     ids=["all gyros", "two gyros", "none that the file allows"],
 )
 def test_nutation_rates_that_sampling_cannot_tell_apart_are_all_named(
-    body: Spacecraft, names: tuple[str, ...], request: pytest.FixtureRequest
+    body: nutdamp.Spacecraft, names: tuple[str, ...], request: pytest.FixtureRequest
 ) -> None:
     """C/A 0.775 sampled every 10 s looks like any that differs by a multiple of 0.2, as its rate does by 2π/10 s."""
     record = of_example(np.linspace(0.0, 600.0, 61), 93.0, names)

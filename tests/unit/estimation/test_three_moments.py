@@ -1,7 +1,5 @@
 """Bodies of three different moments: pulses in their records, by DOP853 and by a file of ACE."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from dataclasses import replace
@@ -10,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support import reference
-from support.builders import noted
+from support.builders import noted, present
 from support.cases import spread
 from support.golden import check_text
 from support.places import case
@@ -24,7 +22,6 @@ from nutdamp.estimation.parameters import GYROS, Record
 from nutdamp.estimation.results import doubts
 from nutdamp.estimation.search import Fit
 from nutdamp.files.telemetry import read_telemetry
-from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
 
 TENSOR = [[110.0, 2.0, 0.0], [2.0, 126.0, 0.0], [0.0, 0.0, 170.0]]
@@ -42,13 +39,13 @@ LATE = (0.02, -0.01)
 """By how much two channels are late, s."""
 
 
-def pulses(body: Spacecraft, *fired: tuple[float, float]) -> Schedule:
+def pulses(body: nutdamp.Spacecraft, *fired: tuple[float, float]) -> Schedule:
     """One pulse of each channel in turn, by their start and on-time, s."""
     pairs = zip(body.channels, fired, strict=False)
     return Schedule(tuple(channel_pulse(one, start, on_time) for one, (start, on_time) in pairs))
 
 
-def flown(tensor: Array, rates: Array, fired: Schedule, body: Spacecraft, times: Array) -> Array:
+def flown(tensor: Array, rates: Array, fired: Schedule, body: nutdamp.Spacecraft, times: Array) -> Array:
     """Rates (n, 3) in the axes of the file, by DOP853 in the principal axes that an eigensolver gives."""
     moments, axes = np.linalg.eigh(tensor)
     axes = axes * np.array([1.0, 1.0, np.linalg.det(axes)])
@@ -81,9 +78,7 @@ def test_a_pulse_pushes_where_its_thruster_is_mounted_whatever_the_principal_axe
 
 def calibrated(fitted: Fit, channel: str) -> tuple[float, float, float, float]:
     """Thrust factor and delay (s) of a channel, and their sigmas."""
-    thrust, delay = fitted.index(f"thrust {channel}"), fitted.index(f"delay {channel}")
-    assert thrust is not None
-    assert delay is not None
+    thrust, delay = present(fitted.index(f"thrust {channel}")), present(fitted.index(f"delay {channel}"))
     values, sigmas = fitted.values, fitted.sigmas
     return float(values[thrust]), float(values[delay]), float(sigmas[thrust]), float(sigmas[delay])
 

@@ -1,7 +1,5 @@
 """Large nutations, seen by the axis alone: it goes round a cone, which no small motion about a mean axis is."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Fits of bodies with a wheel: coasts and firings of DOP853, each estimate within what its sigma says."""
 
-from __future__ import annotations
-
 import io
 import math
 from typing import Any
@@ -10,6 +8,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 from support import reference
+from support.builders import present
 from support.cases import spread
 
 import nutdamp
@@ -57,8 +56,7 @@ def test_a_coast_tells_the_moment_that_the_wheel_does_not_know(motion: tuple[str
     body = nutdamp.load({**FILE, "state": {**FILE["state"], "spin": spin}, "wheel": {"momentum": wheel}})
     true = (303.0, 303.0, 199.0)
     seen, rates = record(body, true, wheel)
-    fitted = fit(body, seen)
-    known = carried(fitted, 0.0)
+    known = carried(fit(body, seen), 0.0)
     sigmas = np.maximum(known.sigmas, 1e-12)
     assert known.values[0] == pytest.approx(true[0], abs=4.0 * sigmas[0])
     assert known.values[2:5] == pytest.approx(rates, abs=4.0 * float(sigmas[2:5].max()))
@@ -84,8 +82,7 @@ def test_a_record_without_noise_of_a_body_that_does_not_spin(rounding: float) ->
     omega = complex(body.omega0[0], body.omega0[1]) * np.exp(1j * 60.0 / 303.0 * times)
     third = rounding * np.random.default_rng(3).normal(size=len(times))
     seen = Record(times, dict(zip(GYROS, (omega.real, omega.imag, third), strict=True)))
-    known = carried(fit(body, seen), 0.0)
-    A, C, *rates = known.values[:5]
+    A, C, *rates = carried(fit(body, seen), 0.0).values[:5]
     assert rates[:2] == pytest.approx(body.omega0[:2], abs=1e-9)
     assert rates[2] - (C * rates[2] + 60.0) / A == pytest.approx(-60.0 / 303.0, abs=1e-9)
 
@@ -102,15 +99,13 @@ dispersions: {A: {normal: 0.05 %}, C: {normal: 0.05 %}, wheel_momentum: {normal:
     body = nutdamp.read(text)
     seen, _ = record(body, (300.0, 300.0, 200.0), 61.5)
     fitted = fit(body, seen)
-    at = fitted.index("wheel")
-    assert at is not None
+    at = present(fitted.index("wheel"))
     assert fitted.values[at] == pytest.approx(61.5, abs=4.0 * fitted.sigmas[at])
     assert fitted.sigmas[at] < 0.1
     written = nutdamp.read(fitted_text(fitted, carried(fitted, 0.0)))
     assert written.inertia.wheel == pytest.approx(float(fitted.values[at]), rel=1e-9)
     assert written.dispersions is not None
-    assert written.dispersions.wheel_momentum is not None
-    assert written.dispersions.wheel_momentum.size == pytest.approx(float(fitted.sigmas[at]), rel=1e-5)
+    assert present(written.dispersions.wheel_momentum).size == pytest.approx(float(fitted.sigmas[at]), rel=1e-5)
 
 
 @pytest.mark.deep
@@ -130,8 +125,7 @@ def test_three_moments_and_dissipation() -> None:
     sinking = nutdamp.load({**FILE, "dissipation": {"time_constant": 500, "nutation": "grows"}})
     seen, _ = record(sinking, (300.0, 300.0, 200.0), 60.0, growth=1.0 / 400.0)
     fitted = fit(sinking, seen)
-    at = fitted.index("growth")
-    assert at is not None
+    at = present(fitted.index("growth"))
     assert fitted.values[at] == pytest.approx(1.0 / 400.0, abs=4.0 * fitted.sigmas[at])
 
 

@@ -1,8 +1,8 @@
-"""A tank in blowdown: thrust that falls during a pulse, against DOP853 with the propellant used as a state."""
+"""A tank in blowdown, thrust that falls during a pulse; moments of inertia that fall with the propellant: by DOP853."""
 
-from __future__ import annotations
-
+import itertools
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
 
@@ -10,18 +10,31 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
-from support.builders import cross, spinner
-from support.cases import deep, spread
+from support import reference
+from support.builders import channel, cross, noted, present, spinner
+from support.cases import deep, spread, weekly
 from support.dispersed import normal
+from support.documents import documented
+from support.golden import check_text
+from support.spinners import FILE as SPINNER
 
-from nutdamp.flight.dynamics import Supply, supplied
-from nutdamp.flight.propagation import flown
+from nutdamp.control_loop.simulation import fly
+from nutdamp.errors import FaultyFile, Unsuitable
+from nutdamp.files.reader import read_spacecraft
+from nutdamp.flight.dynamics import Supply, lightened, supplied
+from nutdamp.flight.propagation import by_impulses, flown
+from nutdamp.flight.verification import verify
+from nutdamp.montecarlo.cases import DispersedModel
+from nutdamp.montecarlo.propagated import RealWidths
 from nutdamp.montecarlo.study import study_of
 from nutdamp.physics.thruster import Cold, Tank, Trapezoid
 from nutdamp.planning import plan as planning
-from nutdamp.spacecraft.model import Spacecraft
-from nutdamp.spacecraft.schedule import Schedule, on_command
-from nutdamp.spacecraft.tolerances import Dispersions
+from nutdamp.schemes import command_block
+from nutdamp.schemes.catalogue import CommandBlockOptions
+from nutdamp.schemes.valve_commands import Legs
+from nutdamp.spacecraft.model import Requirement, Spacecraft
+from nutdamp.spacecraft.schedule import Schedule, channel_pulse, on_command
+from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
 from nutdamp.units import STANDARD_GRAVITY
 
 Array = NDArray[np.float64]
@@ -45,8 +58,7 @@ def carrier(tank: Tank, spin: float = 3.0, moments: tuple[float, float, float] =
 
 def by_reference(body: Spacecraft, starts: list[tuple[str, float, float]], until: float) -> tuple[Array, Array, float]:
     """Rates, the matrix body -> inertial and the propellant used, kg, after rectangles of commands."""
-    tank, moments = body.tank, np.array(body.inertia.moments)
-    assert tank is not None
+    tank, moments = present(body.tank), np.array(body.inertia.moments)
     channels = {one.name: one for one in body.channels}
 
     def slope(t: float, y: Array, firing: list[str]) -> Array:
@@ -164,10 +176,9 @@ def test_valves_open_and_close_while_the_pressure_falls() -> None:
     body = carrier(SMALL)
     body = replace(body, channels=tuple(one.of(valve=valve) for one in body.channels))
     (pulse,) = supplied(body, [on_command(body.channels[0], 1.0, 2.0)])
-    assert pulse.command is not None
-    assert pulse.command.valve
+    assert present(pulse.command).valve
     given = moment = 0.0
-    for ramp in pulse.command.ramps:
+    for ramp in present(pulse.command).ramps:
         length, even, lean = ramp.end - ramp.begin, 0.5 * (ramp.first + ramp.last), 0.5 * (ramp.last - ramp.first)
         given += even * length
         moment += 0.5 * (ramp.begin + ramp.end) * even * length + lean * length**2 / 6.0
@@ -176,10 +187,7 @@ def test_valves_open_and_close_while_the_pressure_falls() -> None:
     plain = on_command(body.channels[0], 1.0, 2.0)
     assert pulse.t < plain.t
     assert pulse.on_time == plain.on_time
-    assert planning.plan(body, "two-pulse").flown is not None
-    left = planning.plan(body, "two-pulse").flown
-    assert left is not None
-    assert math.degrees(left.nutation) < 1e-6
+    assert math.degrees(present(present(planning.plan(body, "two-pulse").flown)).nutation) < 1e-6
 
 
 def test_cases_without_deviations_are_the_flight_itself() -> None:
@@ -206,3 +214,220 @@ def test_cases_of_another_valve_fall_as_well() -> None:
     name = f"open_delay {made.pulses.pulses[0].channel}"
     assert name in {entry.name for entry in study.model.inputs.drawn}
     assert study.outputs_of({name: 0.0})[0] == pytest.approx(0.0, abs=math.radians(0.01))
+
+
+# --- moments of inertia that fall with the propellant used: against Euler's equations with I(t) written out
+
+Shed = tuple[float, float, float]
+
+SLOW = Trapezoid(0.015, 0.012, 0.005, 0.010)
+TANK = Tank(0.002, 22e5, 16e5, 1.0)
+"""Small enough that a few pulses use half of it."""
+
+AXIAL, THREE = (6000.0, 6000.0, 3500.0), (6000.0, 5000.0, 3500.0)
+"""m²; with a gram used the moments fall by some 5 %, far more than of any spacecraft."""
+
+
+def craft(shed: Shed | None, valve: Trapezoid | None = SLOW, axial: float = 0.3) -> Spacecraft:
+    channels = [
+        channel(f"C{at}", *one.torque[:2], axial, min_on_time=0.005, max_on_time=0.06, isp=220.0, thrust=10.0)
+        for at, one in enumerate(cross(8.0))
+    ]
+    body = spinner(spin=math.pi, degrees=0.4, channels=tuple(one.of(valve=valve) for one in channels))
+    return replace(body, tank=replace(TANK, inertia_per_kg=shed), limits=replace(body.limits, horizon=200.0))
+
+
+def fires(body: Spacecraft, *numbers: int, on_time: float = 0.05) -> Schedule:
+    """Commands of the channels with these numbers, one every 1.3 s."""
+    commands = (on_command(body.channels[one], 0.7 + 1.3 * at, on_time) for at, one in enumerate(numbers))
+    return Schedule(supplied(body, list(commands)))
+
+
+def independent(body: Spacecraft, made: Schedule, until: float = math.inf) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Rates (3,), rotation (3, 3), moments (3,) at ``until`` s or the last pulse's end, from commands and pressure."""
+    start, per_kg = np.asarray(body.inertia.moments), np.asarray(present(body.tank).inertia_per_kg)
+    channels, swells = {one.name: one for one in body.channels}, []
+    for pulse in sorted(made, key=lambda one: one.loaded[0]):
+        one = channels[pulse.channel]
+        slow = dict(zip(("opening", "closing", "rise", "fall"), (0.015, 0.012, 0.005, 0.010), strict=True))
+        times = slow if isinstance(one.valve, Trapezoid) else dict.fromkeys(slow, 0.0)
+        swells += reference.through_valve(*pulse.loaded, one.torque, **times)
+
+    def slope(t: float, y: np.ndarray, firing: list[reference.Swell]) -> np.ndarray:
+        moments, rotation, w = start - y[12] * per_kg, y[3:12].reshape(3, 3), y[:3]
+        level = 1.0 / (1.0 + (22.0 / 16.0 - 1.0) * y[12] / 0.002)
+        torque = level * sum((one.at(t) for one in firing), np.zeros(3))
+        thrust = level * sum(float(np.linalg.norm(one.at(t))) for one in firing) / math.hypot(8.0, 0.3)
+        flow = thrust * 10.0 / (220.0 * 9.80665)
+        spins = np.array([[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]])
+        return np.concatenate([(torque - spins @ (moments * w)) / moments, (rotation @ spins).ravel(), [flow]])
+
+    y = np.concatenate([body.omega0, reference.frame_n(body.inertia.moments, body.omega0).ravel(), [0.0]])
+    until = min(until, made.end)
+    edges = sorted({0.0, until, *(edge for one in swells for edge in one[:2] if edge < until)})
+    for now, end in itertools.pairwise(edges):
+        firing = [one for one in swells if one.start <= 0.5 * (now + end) <= one.end]
+        y = solve_ivp(slope, (now, end), y, "DOP853", rtol=1e-13, atol=1e-15, args=(firing,)).y[:, -1]
+    return y[:3], y[3:12].reshape(3, 3), start - y[12] * per_kg
+
+
+@pytest.mark.parametrize(("shed", "valve"), [(AXIAL, None), (THREE, SLOW), deep(AXIAL, SLOW), deep(THREE, None)])
+def test_the_flight_is_that_of_eulers_equations_with_falling_moments(shed: Shed, valve: Trapezoid | None) -> None:
+    body = craft(shed, valve)
+    made = fires(body, 0, 2, 1, 3, 0)
+    rates, rotation, moments = independent(body, made)
+    by_flight, momentum = flown(body, made), rotation @ (moments * rates)
+    assert moments[0] < 0.98 * 120.0
+    assert by_flight.last_moments == pytest.approx(moments, rel=1e-12)
+    assert by_flight.settled.rates == pytest.approx(rates, abs=1e-12)
+    # Straight pieces of falling thrust err by a little more than the integration.
+    assert by_flight.final.momentum == pytest.approx(momentum / np.linalg.norm(momentum), abs=1e-11)
+    assert by_flight.sampled(50, made.end).momentum[-1] == pytest.approx(momentum, abs=1e-9)
+    # The impulse sum takes each pulse at its centre: what it leaves out is of second order.
+    summed, amid = by_impulses(body, made), made.pulses[2].t
+    assert summed.motion(np.array([made.end]))[0][0] == pytest.approx(rates, abs=2e-6)
+    assert by_flight.moments_at(np.array([amid]))[0] == pytest.approx(independent(body, made, amid)[2], rel=1e-6)
+    before, after = (independent(body, made, one)[2] for one in (amid - 0.3, amid + 0.3))
+    assert summed.moments_at(np.array([amid - 1e-6, amid])) == pytest.approx(np.array([before, after]), rel=1e-9)
+
+
+@pytest.mark.parametrize(("growth", "numbers"), [(None, (0, 2)), deep(40.0, (0, 1, 2, 3))])
+def test_verify_confirms_it_with_and_without_dissipation(
+    growth: float | None, numbers: tuple[int, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("nutdamp.flight.verification.SAMPLES", 21)
+    body = replace(craft(AXIAL), dissipation=growth)
+    made = fires(body, *numbers)
+    verified = verify(documented(body), made)
+    assert verified.agree, verified.methods
+    kept = flown(replace(body, tank=TANK), made).residual.nutation
+    assert abs(kept - flown(body, made).residual.nutation) > math.radians(1e-4)
+    assert any(row.name == "without falling moments" for row in verified.budget)
+
+
+def missed_by_impulses(body: Spacecraft, made: Schedule) -> float:
+    ends = (one.motion(np.array([made.end]))[0][0] for one in (by_impulses(body, made), flown(body, made)))
+    return float(np.abs(np.subtract(*ends)).max())
+
+
+def missed_by_cases(body: Spacecraft, made: Schedule) -> float:
+    """They take half off as a pulse begins and half as it ends."""
+    model, here = DispersedModel(body, made), flown(body, made)
+    x, y, _ = RealWidths(model)(model.cases({"timing pulse 1": np.zeros(1)})).momentum
+    return abs(float(np.hypot(x, y)[0]) - math.hypot(*(here.settled.rates * np.asarray(here.last_moments))[:2]))
+
+
+@pytest.mark.parametrize("missed", [missed_by_impulses, missed_by_cases])
+def test_what_is_left_out_is_of_second_order(missed: Callable[[Spacecraft, Schedule], float]) -> None:
+    """Pulses of half the length: each errs by a quarter of what whole ones do, or less."""
+    body = craft(AXIAL, None, axial=0.0)
+    body = replace(body, tank=replace(present(body.tank), final_pressure=present(body.tank).pressure))  # rectangles
+    long, short = (missed(body, fires(body, 0, on_time=on_time)) for on_time in (0.05, 0.025))
+    assert long > 1e-9
+    assert short < 0.3 * long
+
+
+@pytest.mark.parametrize("shed", [AXIAL, deep(THREE)])
+def test_a_further_leg_begins_where_the_one_before_ends(shed: Shed) -> None:
+    body, legs = craft(shed), Legs(craft(shed))
+    made = fires(body, 0, 2, 1, 3, 0)
+    legs.fire(made)
+    flight = flown(body, made)
+    assert legs.here.inertia.moments == pytest.approx(flight.last_moments, rel=1e-12)
+    assert legs.here.omega0 == pytest.approx(flight.settled.rates, abs=1e-12)
+    assert legs.here.momentum == pytest.approx(flight.last_momentum, rel=1e-12, abs=1e-9)
+
+
+@pytest.mark.parametrize("scheme", ["one-pulse", deep("four-pulse"), weekly("optimal")])
+def test_plans_leave_nothing_and_without_falling_moments_they_would(scheme: str) -> None:
+    body = craft((3000.0, 3000.0, 1500.0))
+    plan = planning.plan(body, scheme)
+    assert present(plan.flown).nutation < math.radians(1e-6)
+    rates, _, moments = independent(body, plan.pulses)
+    assert reference.nutation(moments.tolist(), rates, 1.0) < math.radians(1e-6)
+    kept = planning.plan(replace(body, tank=TANK), scheme).pulses
+    assert flown(body, kept).residual.nutation > math.radians(1e-3)
+
+
+FILE = """\
+name: Sat
+inertia: {A: 120, C: 80}
+state: {spin: 30 rpm, nutation: 0.4 deg}
+thrusters:
+  - {name: a, torque: [8, 0, 0], lever_arm: 0.8, isp: 220, max_on_time: 50 ms}
+  - {name: b, torque: [-8, 0, 0], lever_arm: 0.8, isp: 220, max_on_time: 50 ms}
+tank: {propellant: 2 kg, pressure: 22 bar, final_pressure: 16 bar"""
+
+
+def of_file(shed: str, more: str = "") -> Spacecraft:
+    return read_spacecraft(f"{FILE}{shed and ', inertia_per_kg: '}{shed}}}\n{more}", "sat.yaml")
+
+
+def test_what_a_file_says_of_it() -> None:
+    three = of_file("[0.4 kg m^2/kg, 0.3 m^2, 0.2]")
+    assert present(three.tank).inertia_per_kg == (0.4, 0.3, 0.2)
+    assert lightened(three, 0.5).moments == pytest.approx((119.8, 119.85, 79.9))
+    # Without it, or with nothing shed, all is the same to the last bit.
+    without, zero = of_file(""), of_file("{A: 0, C: 0}")
+    plans = [[repr(one) for one in planning.plan(body, "four-pulse").pulses] for body in (without, zero)]
+    assert plans[0] == plans[1]
+    assert lightened(without, 0.001) is without.inertia
+    faults = []
+    for shed in (
+        "{A: 60, C: 10}",
+        "{A: 50 kg m^2/kg, C: 1}",
+        "[10, 0, 70 m^2]",
+        "{A: -1, C: 1}",
+        "[1, 1]",
+        "{A: 1}",
+        "3",
+    ):
+        with pytest.raises(FaultyFile) as caught:
+            of_file(shed)
+        (fault,) = caught.value.faults
+        faults.append(f"{fault.where}: {fault.problem}")
+    check_text("flight.impossible-shedding", "\n".join(faults))
+
+
+def test_what_cannot_have_falling_moments_says_so() -> None:
+    loop = "loop: {sensor: {kind: gyro, rate: 100 Hz}, law: four-pulse, start: 0.3 deg, stop: 0.1 deg}\n"
+    body = of_file("{A: 1, C: 1}", loop)
+    with pytest.raises(Unsuitable, match="inertia_per_kg"):
+        fly(body, present(body.loop))
+    blocks = read_spacecraft(SPINNER, "f.yaml")
+    lighter = replace(blocks, tank=Tank(10.0, 22e5, 16e5, 1.0, inertia_per_kg=(0.3, 0.3, 0.2)))
+    within = Requirement(nutation=1e-9)
+    nutating = np.array([0.01, 0.0, blocks.spin])
+    bodies = [replace(body, omega0=nutating, requirement=within) for body in (blocks, lighter)]
+    cures = [command_block.schedule(body, CommandBlockOptions(max_blocks=1)).notes[1:] for body in bodies]
+    check_text("flight.cures-of-blocks", "\n".join(map(noted, cures)))
+
+
+@pytest.mark.parametrize("per_kg", [weekly((900.0, 900.0, 600.0)), weekly(None)])
+def test_without_blowdown_the_tank_is_empty_sooner(per_kg: Shed | None) -> None:
+    """At full pressure the commands take more than there is; what comes after that does not fire."""
+    jets = tuple(channel(name, *torque, thrust=10.0, isp=220.0) for name, *torque in (("a", 8, 0, 0), ("b", 0, 8, 0)))
+    body = replace(spinner(degrees=2.0, channels=jets), tank=Tank(0.1, 22e5, 8e5, 1.0, inertia_per_kg=per_kg))
+    wide = [channel_pulse(jets[at % 2], 5.0 * at + 5.0, 1.0) for at in range(40)]
+    full = wide[0].propellant or math.nan
+    made = Schedule(supplied(body, wide[:32]))
+    assert 0.085 < (made.propellant or 0.0) < 0.1 < 32 * full
+    (row,) = (one for one in verify(body, made).budget if one.name == "without blowdown")
+    steady = replace(body, tank=Tank(1.0, 22e5, 22e5, 0.0, inertia_per_kg=per_kg))
+    whole, part = divmod(0.1, full)
+    last, share = wide[int(whole)], part / full
+    weak = replace(last, impulse=share * last.impulse, torque=share * present(last.torque), propellant=part)
+    expected = flown(steady, Schedule((*wide[: int(whole)], weak))).residual
+    assert (row.nutation, row.momentum_shift) == pytest.approx((expected.nutation, expected.momentum_shift), rel=1e-6)
+
+
+def test_how_far_cases_of_falling_moments_err_is_said() -> None:
+    """A study says nothing where they err by less than what is shown."""
+    for shed, said in ((None, False), ((1.0, 1.0, 0.5), False), (AXIAL, True)):
+        body = replace(craft(shed), dispersions=Dispersions(A=Tolerance("normal", 0.01, relative=True)))
+        jets = tuple(one.of(valve=None, max_on_time=2.0) for one in body.channels)
+        body = replace(body, channels=jets, tank=replace(TANK, inertia_per_kg=shed, propellant=0.02))
+        made = Schedule(supplied(body, [on_command(one, 0.7 + 3.0 * at, 1.2) for at, one in enumerate(jets)]))
+        error = study_of(body, made).lightening_error
+        assert ("in the nominal one that errs by " in error) == said
+        assert said == bool(error)

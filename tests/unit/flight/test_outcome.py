@@ -1,6 +1,4 @@
-"""What has become of a body by a given time, and what is said where two models of a flight are apart."""
-
-from __future__ import annotations
+"""What has become of a body by a given time; how near its axis comes to directions in space, plans that keep cones."""
 
 import csv
 import itertools
@@ -12,22 +10,31 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from support import reference
-from support.builders import aimed, cross, events, spinner
-from support.cases import spread
+from support.builders import aimed, codes, cross, events, noted, present, pulse, spinner
+from support.cases import spread, weekly
+from support.flights import axis_path
 from support.golden import check_text
 from support.planner import Planner
 from support.process import Run
+from support.spinners import commanded
 
 import nutdamp
 from nutdamp.figures.overview import title
+from nutdamp.files.reader import read_spacecraft
 from nutdamp.flight import propagation
-from nutdamp.flight.end_state import ANGLE, deviations, seen_at, tolerated
+from nutdamp.flight.end_state import ANGLE, aspects, deviations, seen_at, tolerated
+from nutdamp.flight.propagation import by_impulses, flown
+from nutdamp.physics import attitude
 from nutdamp.planning import plan as planning
+from nutdamp.planning.notes import infeasibility, plan_notes, reasons
+from nutdamp.planning.verdict import Status
 from nutdamp.spacecraft.equipment import Steerable
-from nutdamp.spacecraft.model import Disturbance, Goal, Limits, Requirement
+from nutdamp.spacecraft.model import Disturbance, Goal, Keep, Limits, Requirement, Spacecraft
 from nutdamp.spacecraft.requirements import Part
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
+from nutdamp.views.verdict import statement
 
 BODY = spinner(channels=cross(8.0, max_on_time=0.75), limits=Limits(horizon=60.0))
 FLIES = (propagation.flown, propagation.by_impulses)
@@ -101,9 +108,7 @@ NUTATION = re.compile(r"^nutation +([<0-9.e -]+) deg +([<0-9.e -]+) deg$", re.MU
 
 def nutations(screen: str) -> list[str]:
     """By the impulse sum and through real widths, as a screen shows them."""
-    shown = NUTATION.search(screen)
-    assert shown is not None
-    return list(shown.groups())
+    return list(present(NUTATION.search(screen)).groups())
 
 
 CHANGES = ("", "dissipation={time_constant: 50 s}", "disturbances=[{torque: [0, 0, 0.4 N m]}]")
@@ -172,3 +177,282 @@ def test_widths_are_named_where_any_pulse_has_one() -> None:
     for schedules in ([both], [kicks, both], [Schedule((wide,)), kicks]):
         assert propagation.model_name(schedules) == propagation.REAL_WIDTHS
     assert propagation.model_name([kicks, Schedule()]) == propagation.IDEAL_IMPULSES
+
+
+# --- how near the spin axis comes to directions in space, against the reference integrator; plans that keep cones
+
+Array = NDArray[np.float64]
+
+
+def unit(vector: Array) -> Array:
+    return np.asarray(vector / np.linalg.norm(vector))
+
+
+@pytest.mark.parametrize("shape", [(120.0, 80.0), (80.0, 120.0), (100.0, 100.0), (80.0, 160.0)])
+def test_in_free_motion_the_axis_stays_within_its_cone_about_H(shape: tuple[float, float]) -> None:
+    """Seen from a direction β away from H: from |β - θ| to β + θ, since by default it goes round once."""
+    for spin in (3.0, -3.0):
+        body = spinner(*shape, spin=spin, degrees=7.0)
+        for beta in (0.0, 3.0, 7.0, 50.0, 120.0, 180.0):
+            keep = Keep("beacon", body.direction_in_n(math.radians(beta), 0.4))
+            (seen,) = aspects(flown(replace(body, keep=(keep,)), Schedule()))
+            ends = abs(beta - 7.0), min(beta + 7.0, 353.0 - beta)
+            assert np.degrees([seen.least, seen.largest]) == pytest.approx(ends, abs=1e-6)
+    assert aspects(flown(spinner(), Schedule())) == ()  # nothing is watched unless the file says so
+
+
+@spread("moments", [(120.0, 120.0, 80.0), (90.0, 90.0, 140.0), (120.0, 100.0, 70.0)], quick=1, deep=2)
+def test_with_pulses_they_are_those_of_the_reference_integrator(moments: tuple[float, float, float]) -> None:
+    rng = np.random.default_rng(5)
+    for sense in (-1.0, 1.0):
+        body = spinner(moments=moments, spin=2.0 * sense, degrees=rng.uniform(1.0, 12.0))
+        body = replace(body, keep=tuple(Keep(name, unit(rng.normal(size=3))) for name in ("one", "two")))
+        pushes = (pulse(4.0 * k + 2.0, rng.uniform(0.1, 2.0), rng.normal(size=3) * 6.0) for k in range(3))
+        made, start = Schedule(tuple(pushes)), attitude.matrix(body.initial.quaternion)
+        path = axis_path(body, made, 14.0, 400)
+        for seen in aspects(flown(body, made), 14.0):
+            apart = attitude.angle_between(path, np.asarray(seen.keep.direction))
+            assert (seen.least, seen.largest) == pytest.approx((apart.min(), apart.max()), abs=1e-4)
+            assert seen.least < apart.min() + 1e-6  # the reference is asked at other moments
+            assert seen.largest > apart.max() - 1e-6
+            for at, way in ((seen.least_at, 1.0), (seen.largest_at, -1.0)):  # none about it is nearer or farther
+                about = flown(body, made, 14.0).axis(np.clip(at + np.linspace(-0.1, 0.1, 20_001), 0.0, 14.0))
+                best = np.min(way * attitude.angle_between(about, np.asarray(seen.keep.direction)))
+                assert way * best == pytest.approx(seen.least if way > 0.0 else seen.largest, abs=math.radians(1e-6))
+            there = reference.fly(moments, body.omega0, events(made), seen.least_at, start)
+            angle = reference.angle(sense * there.rotation[:, 2], np.asarray(seen.keep.direction))
+            assert angle == pytest.approx(seen.least, abs=1e-6)
+
+
+@spread("moments", [(120.0, 120.0, 80.0), (90.0, 90.0, 140.0), (120.0, 100.0, 70.0)], quick=1, deep=2)
+def test_the_nutation_on_the_way_is_that_of_the_reference_integrator(moments: tuple[float, float, float]) -> None:
+    rng = np.random.default_rng(6)
+    for sense in (-1.0, 1.0):
+        body = spinner(moments=moments, spin=2.0 * sense, degrees=rng.uniform(1.0, 12.0))
+        body = replace(body, keep=(Keep("H", None, 0.0, 0.1),))
+        made = Schedule(tuple(pulse(4.0 * k + 2.0, rng.uniform(0.1, 2.0), rng.normal(size=3) * 6.0) for k in range(3)))
+        (seen,) = aspects(flown(body, made), 14.0)
+        start, pushes = attitude.matrix(body.initial.quaternion), events(made)
+        there = [reference.fly(moments, body.omega0, pushes, at, start) for at in np.linspace(0.0, 14.0, 150)]
+        angles = [reference.nutation(moments, motion.rates, sense) for motion in there]
+        assert seen.least < min(angles) + 1e-7
+        assert seen.largest > max(angles) - 1e-7
+        assert (seen.least, seen.largest) == pytest.approx((min(angles), max(angles)), abs=2e-3)
+        for at, value in ((seen.least_at, seen.least), (seen.largest_at, seen.largest)):
+            motion = reference.fly(moments, body.omega0, pushes, at, start)
+            assert reference.nutation(moments, motion.rates, sense) == pytest.approx(value, abs=1e-7)
+
+
+def test_schemes_that_point_keep_a_bound_of_the_nutation_on_the_way(run: Run, tmp_path: Path) -> None:
+    """One half-cone leans the spin axis by half of the turn; within the bound it takes more of them."""
+    text = """name: b
+inertia: {A: 80, C: 120}
+omega0: [0, 0, 3]
+attitude: {quaternion: [1, 0, 0, 0]}
+goal: {right_ascension: 0, declination: 70 deg}
+steerable: {}
+limits: {horizon: 900 s}
+requirement: {nutation: 2 deg, nutation_during: %s}
+"""
+    plans = {}
+    for bound in ("30 deg", "5.5 deg", "2 deg"):
+        (tmp_path / "b.yaml").write_text(text % bound)
+        result = run("plan", "b.yaml", "--json", "-", "--nominal", "--scheme", "half-cone")
+        (plans[bound],) = json.loads(result.stdout)["plans"]
+    pulses = [len(plan["pulses"]) for plan in plans.values()]
+    assert pulses == sorted(pulses)
+    assert pulses[0] < pulses[-1]
+    for bound, plan in plans.items():
+        (about_momentum,) = plan["aspects"]
+        assert about_momentum["kept"]
+        assert about_momentum["largest_deg"] <= float(bound.split()[0])
+
+
+def test_a_jump_of_the_rates_is_no_peak() -> None:
+    """Under ideal impulses the axis turns a corner, where a parabola through three rows would miss."""
+    body = spinner(degrees=2.0)
+    body = replace(body, keep=(Keep("beacon", body.direction_in_n(0.3, 1.0)),))
+    made = Schedule((pulse(1.0, 0.0, np.array([30.0, 5.0, 0.0])),))
+    (seen,) = aspects(by_impulses(body, made), 5.0)
+    for model in (by_impulses(body, made, 5.0), flown(body, made, 5.0)):
+        apart = attitude.angle_between(model.sampled(20_001, 5.0).axis, np.asarray(seen.keep.direction))
+        assert (seen.least, seen.largest) == pytest.approx((apart.min(), apart.max()), abs=1e-6)
+
+
+def watching(body: Spacecraft, *keeps: Keep) -> Spacecraft:
+    return replace(body, keep=keeps, limits=Limits(horizon=900.0))
+
+
+def between(body: Spacecraft, share: float) -> Array:
+    """A direction on the great circle from H to the target."""
+    return unit((1.0 - share) * unit(body.momentum) + share * body.target_axis)
+
+
+TURNING = aimed(spinner(80.0, 120.0, degrees=0.2, channels=cross(8.0, max_on_time=0.3)), 12.0, 30.0)
+
+
+@pytest.mark.parametrize("scheme", [weekly("rhumb-line"), weekly("optimal")])
+def test_a_cone_on_the_way_is_gone_round(scheme: str) -> None:
+    """12 deg straight; round a cone of 3 deg about its middle 13.4 deg, by one dog-leg."""
+    free = planning.plan(watching(TURNING), scheme)
+    body = watching(TURNING, Keep("Sun", between(TURNING, 0.5), least=math.radians(3.0)))
+    straight = planning.judged(body, scheme, free.pulses, free.options)
+    assert straight.astray is not None  # what is planned without the cone breaks it
+    assert "from Sun" in infeasibility(straight)
+    routed = planning.plan(body, scheme)
+    assert routed.feasible, infeasibility(routed)
+    assert present(routed.left).aim < 1e-6
+    assert routed.aspects[0].kept
+    check_kept(routed)
+    assert "goes-round" in codes(plan_notes(routed))
+    assert 1.0 < routed.total_impulse / free.total_impulse < 1.3
+
+
+@pytest.mark.deep
+def test_the_axis_may_be_held_within_a_cone() -> None:
+    keep = Keep("Earth", between(TURNING, 0.5), most=math.radians(8.0))
+    plan = planning.plan(watching(TURNING, keep), "rhumb-line")
+    assert plan.feasible
+    assert plan.aspects[0].largest < math.radians(8.0)
+
+
+def test_a_target_within_a_cone_is_refused_and_damping_into_one_warned_of() -> None:
+    body = watching(TURNING, Keep("Sun", TURNING.target_axis, least=math.radians(1.0)))
+    refused = planning.plan(body, "rhumb-line")
+    assert not refused.feasible
+    body = spinner(channels=cross(8.0))
+    body = replace(body, keep=(Keep("Sun", body.direction_in_n(0.05, 0.0), least=0.1),))
+    damped = planning.plan(body, "four-pulse")
+    assert damped.feasible
+    broken = [entry for entry in plan_notes(damped) if entry.code == "cone-broken"]
+    check_text("flight.cone-broken", f"{infeasibility(refused)}\n{noted(broken)}")
+
+
+def check_kept(plan: planning.Plan) -> None:
+    """That the axis comes into no cone by the reference integrator, half a turn after the plan included."""
+    path = axis_path(plan.spacecraft, plan.pulses, plan.end + plan.spacecraft.inertial_period)
+    for keep in plan.spacecraft.keep:
+        assert attitude.angle_between(path, np.asarray(keep.direction)).min() >= keep.least - 1e-6
+
+
+def some_case(seed: int, *, near: bool = False) -> Spacecraft:
+    """A spinner that is to turn by 5 to 60 deg past one or two cones near its way.
+
+    ``near``: by 2 to 12 deg past one, with strong channels.
+    """
+    rng = np.random.default_rng(seed)
+    A, spin = 10 ** rng.uniform(1, 3), rng.choice([-1.0, 1.0]) * rng.uniform(0.5, 4.0)
+    C = A * rng.choice([rng.uniform(0.3, 0.8), rng.uniform(1.2, 1.8)])
+    turn, torque = rng.uniform(2.0, 12.0) if near else rng.uniform(5.0, 60.0), C * spin**2
+    torque *= 1.0 if near else rng.uniform(0.02, 0.2)
+    channels, degrees = cross(torque, max_on_time=0.3 / abs(spin)), 0.2 if near else rng.uniform(0.0, 1.0)
+    body = spinner(A, C, spin, degrees, rng.uniform(0.0, 6.0), channels=channels)
+    body = aimed(body, turn, rng.uniform(0.0, 360.0))
+    aside = np.cross(between(body, 0.0), body.target_axis) / math.sin(math.radians(turn))
+    keeps = []
+    for number in range(1 if near else rng.integers(1, 3)):
+        off = math.radians(turn) * rng.uniform(-0.4, 0.4)
+        centre = unit(between(body, rng.uniform(0.2, 0.8)) + off * aside)
+        clear = min(float(attitude.angle_between(centre, end)) for end in (between(body, 0.0), body.target_axis))
+        keeps.append(Keep(f"cone {number}", centre, least=clear * rng.uniform(0.2, 0.8)))
+    return replace(body, keep=tuple(keeps), limits=Limits(horizon=(600.0 if near else 2000.0) / abs(spin)))
+
+
+@pytest.mark.parametrize(
+    ("scheme", "seeds"),
+    [
+        *(weekly("rhumb-line", range(first, first + 10)) for first in range(0, 160, 10)),
+        *(weekly(scheme, range(first, first + 2)) for first in range(0, 20, 2) for scheme in ("half-cone", "optimal")),
+        weekly("command-block", range(1)),
+    ],
+    ids=str,
+)
+def test_in_random_cases_the_axis_never_enters_a_cone(scheme: str, seeds: range) -> None:
+    """200 cases, nutation on the way included; where no way round is found there is no plan."""
+    planned = 0
+    for seed in seeds:
+        body = some_case(seed, near=scheme in ("half-cone", "optimal"))
+        if scheme == "command-block":  # the Sun in view, well off the spin axis
+            aside = unit(np.cross(body.axis, np.random.default_rng(1000).normal(size=3)))
+            body = commanded(body, aside + 0.2 * body.axis)
+        plan = planning.plan(body, scheme)
+        planned += plan.feasible
+        if plan.feasible:
+            check_kept(plan)
+    assert scheme in ("half-cone", "optimal") or planned >= 0.7 * len(seeds)
+
+
+WATCHING = """
+name: Spinner
+inertia: {A: 80 kg m^2, C: 120 kg m^2}
+state: {spin: 30 rpm, nutation: 0.2 deg}
+attitude: {epoch: 2026-03-20T12:00:00Z, frame: EME2000, quaternion: [1, 0, 0, 0]}
+thrusters: [{name: T1, torque: [8, 0, 0], isp: 220 s, lever_arm: 1 m, max_on_time: 300 ms}]
+limits: {horizon: 600 s}
+sun: epoch
+keep: [{name: pole star, direction: [10 deg, 86 deg], min: 2 deg}]
+"""
+
+
+@pytest.mark.weekly
+def test_screens_and_json_show_how_near_the_axis_comes(run: Run, tmp_path: Path) -> None:
+    options = ("--target", "10deg,80deg", "--scheme", "rhumb-line", "--json", "plan.json")
+    shown = run("plan", "-v", "-", *options, stdin=WATCHING)
+    assert shown.returncode == 0, shown.stderr
+    for text in ("axis from pole star", "(at least 2 deg)", "axis from Sun"):
+        assert text in " ".join(shown.stdout.split())
+    (plan,) = json.loads((tmp_path / "plan.json").read_text(encoding="utf-8"))["plans"]
+    star, sun = plan["aspects"]
+    assert star["kept"]
+    assert star["least_deg"] >= 2.0
+    assert sun["least_deg"] > 60.0  # at the equinox the Sun is square to the pole
+
+
+BROKEN = """
+name: Breaker
+inertia: {A: 120 kg m^2, C: 180 kg m^2}
+state: {spin: 30 rpm, nutation: 3 deg, phase: 20 deg}
+attitude: {epoch: 2026-03-20T12:00:00Z, frame: EME2000, quaternion: [1, 0, 0, 0]}
+thrusters:
+  - {name: T1, torque: [8, 0, 0], isp: 220 s, lever_arm: 1 m, max_on_time: 400 ms}
+  - {name: T2, torque: [-8, 0, 0], isp: 220 s, lever_arm: 1 m, max_on_time: 400 ms}
+requirement: {nutation: 0.5 deg}
+keep: [{name: Star, direction: [0 deg, 86 deg], min: 4 deg, max: 60 deg}]
+dispersions: {thrust: {normal: 5 %}}
+"""
+
+
+def test_no_screen_calls_the_requirement_met_where_a_cone_is_broken(run: Run) -> None:
+    for scheme in ("one-pulse", "four-pulse"):
+        shown = run("plan", "-v", "-", "--nominal", "--scheme", scheme, stdin=BROKEN)
+        assert shown.returncode == 4
+        rows = [line.split() for line in shown.stdout.splitlines()]
+        assert [row[-2:] == ["NOT", "met"] for row in rows if row[-1:] == ["met"]] == [False, True, False]
+        assert any(row[:7] == ["axis", "from", "Star", "≥", "4", "deg", "✗"] for row in rows)
+        assert any(row[:6] == ["axis", "from", "Star", "≤", "60", "deg"] and "✗" not in row for row in rows)
+    assert "axis from Star" in run("simulate", "-", "--scheme", "none", "--until", "5s", stdin=BROKEN).stdout
+
+
+def test_no_dispersed_case_complies_where_a_cone_is_broken() -> None:
+    """Though each meets what is required of the end: that the plan does is then not said."""
+    text = BROKEN.replace("normal: 5 %", "normal: 1 %")
+    compared = nutdamp.compare(read_spacecraft(text, "broken.yaml"), ("one-pulse",), samples=100)
+    verdict = compared.verdict
+    assert (verdict.status, present(verdict.cases).complying) == (Status.NOT_ENOUGH, 0.0)
+    assert [(line.bound.part, line.bound.inner, line.share, line.met) for line in verdict.lines] == [
+        (Part.NUTATION, False, 1.0, True),
+        (Part.CONE, True, 0.0, False),
+        (Part.CONE, False, 1.0, True),
+    ]
+    assert "as-requested" in codes(reasons(compared))
+    assert "axis comes to 0.14" in statement(verdict)
+
+
+@pytest.mark.deep
+def test_disperse_shows_one_angle_of_the_nominal_case_and_no_warning_of_numpy(run: Run) -> None:
+    """Thrust alone is dispersed: derivatives are of the pulses, and not of body or rates."""
+    shown = run("disperse", "-", "--scheme", "one-pulse", "--samples", "2", "-v", stdin=BROKEN)
+    text = " ".join(shown.stdout.split())
+    assert "ComplexWarning" not in shown.stderr
+    least, largest = re.findall(r"axis from Star ✗ (\S+) deg at \S+ s to (\S+) deg", text)[0]
+    assert f"{least} deg to {largest} deg in the nominal one." in text

@@ -1,7 +1,5 @@
 """Faults planted in the planner's physics: `verify` reports each, since it flies by the file alone."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any

@@ -1,13 +1,11 @@
 """The motion as arrays: rows round each pulse, tracks in pieces and as CSV, and how far the spin axis strays."""
 
-from __future__ import annotations
-
 import csv
 import io
 import math
 import tracemalloc
 from collections.abc import Iterable
-from dataclasses import fields
+from dataclasses import fields, replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -17,15 +15,22 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support import reference
 from support.builders import channel, pulse, spinner
+from support.cases import deep
+from support.places import CASES
 from support.process import Run
+from support.strategies import schedules, symmetric_spinners, triaxial_spinners
 
+from nutdamp.common import work
 from nutdamp.common.numerics import SAME_ANGLE
+from nutdamp.errors import Infeasible
+from nutdamp.files.reader import load_spacecraft
 from nutdamp.files.tabular import HEADER, number, track_array, write_track
+from nutdamp.flight import dynamics as motion
 from nutdamp.flight import propagation
-from nutdamp.flight.propagation import Flight, Track
-from nutdamp.physics import attitude
+from nutdamp.physics import attitude, taylor
 from nutdamp.physics import body as rigid_body
-from nutdamp.spacecraft.model import Attitude
+from nutdamp.planning import plan as planning
+from nutdamp.spacecraft.model import Attitude, Spacecraft
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
 
 EPS = float(np.finfo(float).eps)
@@ -40,17 +45,17 @@ WIDE = Schedule(
 UNTIL, FEW = 40.0, 7
 
 
-def some_flight() -> Flight:
+def some_flight() -> propagation.Flight:
     """A flight with coasts and wide pulses, the first of them at once."""
     push = channel("T", 4.0, 1.0, 0.5)
     made = Schedule(tuple(channel_pulse(push, t, on_time) for t, on_time in ((0.25, 0.5), (4.0, 0.7), (20.0, 3.0))))
     return propagation.flown(spinner(degrees=12.0, channels=(push,)), made, UNTIL)
 
 
-def cut(whole: Track, edges: Iterable[int]) -> list[Track]:
+def cut(whole: propagation.Track, edges: Iterable[int]) -> list[propagation.Track]:
     """The rows between ``edges``, as tracks of their own."""
     return [
-        Track(**{one.name: getattr(whole, one.name)[begin:end] for one in fields(Track)})
+        propagation.Track(**{one.name: getattr(whole, one.name)[begin:end] for one in fields(propagation.Track)})
         for begin, end in pairwise([0, *edges, len(whole.t)])
         if end > begin
     ]
@@ -132,11 +137,11 @@ def test_cone_angles_are_those_of_the_rates_axis_and_momentum_those_of_the_attit
         assert h == pytest.approx(expected, rel=1e-14, abs=1e-12)
 
 
-def pointing(axes: np.ndarray) -> Track:
+def pointing(axes: np.ndarray) -> propagation.Track:
     """Rows whose spin axis is ``axes`` (n, 3), at whole seconds; H at the start along z."""
     nothing, up = np.zeros(len(axes)), np.tile([0.0, 0.0, 2.0], (len(axes), 1))
     t, pulses = np.arange(float(len(axes))), np.zeros(len(axes), dtype=np.int64)
-    return Track(t, up, np.zeros((len(axes), 4)), axes, up, nothing, nothing, nothing, pulses)
+    return propagation.Track(t, up, np.zeros((len(axes), 4)), axes, up, nothing, nothing, nothing, pulses)
 
 
 TILTS = [(0, 80), (90, 70), (180, 60), (270, 85)]
@@ -206,7 +211,7 @@ def test_the_pieces_of_a_track_are_its_rows(samples: int, monkeypatch: pytest.Mo
     pieces = list(made.pieces(samples, UNTIL))
     assert len(pieces) >= len(whole.t) // (2 * FEW)
     assert max(len(piece.t) for piece in pieces) <= 2 * FEW + 4
-    for one in fields(Track):
+    for one in fields(propagation.Track):
         joined = np.concatenate([getattr(piece, one.name) for piece in pieces])
         assert joined == pytest.approx(getattr(whole, one.name), rel=1e-14, abs=1e-13)
 
@@ -263,3 +268,91 @@ def test_the_command_writes_every_row(run: Run, tmp_path: Path) -> None:
     assert len(times) == 45_004
     assert times == sorted(times)
     assert "45004 rows" in ended.stdout
+
+
+# --- flights of trial schedules: flown anew from the first pulse that has changed, and the same to the last bit
+
+THREE = spinner(moments=(100.0, 120.0, 80.0))
+
+
+def bits(flown: propagation.Flight) -> list[bytes]:
+    """All that a flight gives: legs, motion along them and how it ends."""
+    legs = [repr((one.start, one.end, one.completed, one.jump, one.completed_at_end)).encode() for one in flown.legs]
+    motion, settled = flown.motion(np.linspace(0.0, flown.legs[-1].end, 50)), flown.settled
+    return [*legs, *(part.tobytes() for part in (*motion, settled.rates, settled.quaternion))]
+
+
+def train(count: int, moved: int | None = None) -> Schedule:
+    """So many pulses, one every 4 s; the one with the number ``moved`` comes later and is longer."""
+    pulses = [(4.0 * n + 1.0, 0.5) if n != moved else (4.0 * n + 1.2, 0.7) for n in range(count)]
+    return Schedule(tuple(pulse(t, on, on * np.array([3.0, -2.0, 0.5])) for t, on in pulses))
+
+
+@pytest.mark.deep
+@given(
+    st.one_of(symmetric_spinners(), triaxial_spinners()),
+    st.sampled_from([0.0, 200.0]),
+    st.lists(st.one_of(schedules(), schedules(ideal=True)), min_size=2, max_size=3),
+)
+def test_what_is_remembered_changes_no_bit(body: Spacecraft, constant: float, every: list[Schedule]) -> None:
+    body = replace(body, dissipation=constant) if constant else body
+    remembering = motion.make_dynamics(body).remembering()
+    mixed = [Schedule((*one.pulses, *other.pulses)) for one in every for other in every]
+    for made in (*every, *mixed, *every):
+        assert bits(propagation.flown(body, made, dynamics=remembering)) == bits(propagation.flown(body, made))
+
+
+@pytest.mark.parametrize("moved", [0, 3, 7])
+def test_a_trial_costs_what_comes_after_the_pulse_that_has_changed(moved: int) -> None:
+    remembering = motion.make_dynamics(THREE).remembering()
+    propagation.flown(THREE, train(8), dynamics=remembering)
+    with work.budget("trial", 1e9) as trial:
+        flown = propagation.flown(THREE, train(8, moved), dynamics=remembering)
+    assert bits(flown) == bits(propagation.flown(THREE, train(8, moved)))
+    changed = [leg for leg in flown.legs if leg.end > 4.0 * moved + 0.75]  # a leg for each coast, pulse, and the end
+    assert len(changed) == 2 * (8 - moved) + 1
+    integrated = [leg for leg in changed if leg.end > leg.start]
+    steps = sum(leg.path.steps for leg in integrated)
+    expected = len(changed) * motion.LEG + len(integrated) * motion.PULSE + steps * motion.STEP
+    assert trial.done == pytest.approx(expected)
+
+
+def test_a_flight_that_is_remembered_keeps_its_limit_of_steps() -> None:
+    remembering = motion.make_dynamics(THREE).remembering()
+    torque = [np.array([0.0, 0.0, 0.1])]
+    path, _ = remembering.path(THREE.initial, 0.0, 50.0, torque, most=1000)
+    assert remembering.path(THREE.initial, 0.0, 50.0, torque, most=path.steps)[0] is path
+    with pytest.raises(Infeasible):
+        remembering.path(THREE.initial, 0.0, 50.0, torque, most=path.steps - 1)
+
+
+@given(triaxial_spinners())
+def test_a_long_coast_in_closed_form_is_that_of_taylor_series(body: Spacecraft) -> None:
+    end = 3.0 * motion.LONG / float(np.linalg.norm(body.omega0))
+    path, after = motion.make_dynamics(body).path(body.initial, 0.0, end, most=1000)
+    pieces = taylor.integrate(body.inertia.moments, np.zeros(3), body.omega0, body.initial.quaternion, 0.0, end)
+    rates, quaternion = pieces[-1].final
+    assert path.steps == 0
+    assert np.allclose(after.rates, rates, rtol=0.0, atol=1e-10 * np.linalg.norm(rates))
+    assert np.allclose(after.quaternion, quaternion, rtol=0.0, atol=1e-10)
+
+
+def test_legs_are_forgotten_before_they_are_too_many(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(motion, "REMEMBERED", 3)
+    body = spinner()
+    remembering = motion.make_dynamics(body).remembering()
+    for made in (train(2), train(2, 1), train(2, 0)):
+        assert bits(propagation.flown(body, made, dynamics=remembering)) == bits(propagation.flown(body, made))
+    assert 0 < len(remembering.known or ()) <= 3
+
+
+@pytest.mark.parametrize("name", [deep("geo-dissipation"), deep("tensor-microsat")])
+def test_plans_are_the_same_for_much_less_work(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    body = load_spacecraft(CASES / f"{name}.yaml")
+    with work.budget("remembered", 1e9) as remembered:
+        made = planning.plan(body, "two-pulse").pulses
+    monkeypatch.setattr(motion.Dynamics, "remembering", lambda one: one)
+    with work.budget("whole", 1e9) as whole:
+        same = planning.plan(body, "two-pulse").pulses
+    assert [(one.t, one.on_time) for one in made] == [(one.t, one.on_time) for one in same]
+    assert 0.0 < remembered.done < 0.75 * whole.done

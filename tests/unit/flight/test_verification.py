@@ -1,7 +1,5 @@
 """``verify``: independent flights agree, differences are seen, the error budget names what costs."""
 
-from __future__ import annotations
-
 import json
 import math
 import re
@@ -13,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from support import reference
-from support.builders import spinner
+from support.builders import present, spinner
 from support.cases import spread
 from support.documents import documented
 from support.golden import check_text
@@ -25,7 +23,6 @@ from nutdamp.cli.main import group
 from nutdamp.errors import MissingExtra
 from nutdamp.files.reader import Source, example_text, read_spacecraft
 from nutdamp.flight import basilisk, propagation, verification
-from nutdamp.flight.basilisk import BasiliskFlight
 from nutdamp.flight.dynamics import supplied
 from nutdamp.flight.reference_model import ReferenceModel
 from nutdamp.flight.verification import (
@@ -92,8 +89,7 @@ def test_in_the_axes_of_the_file_too_and_the_budget_names_each_imperfection(plan
     verified = verify(TILTED, plan.pulses, planning.unrounded(plan))
     assert confirmed(verified, 1e-11)
     check_text("flight.error-budget", "\n".join(left_in(verified)))
-    assert plan.flown is not None
-    assert left_in(verified)[AS_FLOWN] == plan.flown.nutation
+    assert left_in(verified)[AS_FLOWN] == present(plan.flown).nutation
 
 
 def test_a_flight_of_another_body_does_not_agree(planned: Planner) -> None:
@@ -117,10 +113,10 @@ def test_basilisk_has_its_say_in_the_verdict(
 ) -> None:
     """A stand-in for Basilisk that flies another body is named and turns the verdict."""
 
-    def of(body: Spacecraft) -> Callable[[Spacecraft, Schedule, float], BasiliskFlight]:
-        def fly(_: Spacecraft, made: Schedule, until: float) -> BasiliskFlight:
+    def of(body: Spacecraft) -> Callable[[Spacecraft, Schedule, float], basilisk.BasiliskFlight]:
+        def fly(_: Spacecraft, made: Schedule, until: float) -> basilisk.BasiliskFlight:
             times = np.unique([*np.linspace(0.0, until, 50), *(pulse.end for pulse in made)])
-            return BasiliskFlight(times, *propagation.flown(body, made, until).motion(times), 0.01)
+            return basilisk.BasiliskFlight(times, *propagation.flown(body, made, until).motion(times), 0.01)
 
         return fly
 
@@ -331,7 +327,7 @@ def test_a_motion_too_long_to_be_confirmed_is_not_called_confirmed(
 ) -> None:
     """DOP853 had no end: it ran for as long as the motion did."""
 
-    def missing(*_: object) -> BasiliskFlight:
+    def missing(*_: object) -> basilisk.BasiliskFlight:
         raise MissingExtra("verify", "a flight by Basilisk")
 
     monkeypatch.setattr("nutdamp.flight.verification.EVALUATIONS", 50)

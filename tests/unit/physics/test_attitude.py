@@ -1,6 +1,4 @@
-"""Quaternions, torque-free arcs, the frame N, cone angles and periods, Magnus 1970 (12), (18)-(20), (22), by DOP853."""
-
-from __future__ import annotations
+"""Rotation, cones, the impulse sum, finite pulses, Magnus 1970 (12) and (17)-(22), by DOP853 and quadrature."""
 
 import cmath
 import math
@@ -9,18 +7,19 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.integrate import quad
 from support import reference
+from support.builders import present, within
 from support.cases import spread
-from support.reference import Array
-from support.spinning import EPS, about, spinners
+from support.spinning import BODIES, EPS, about, plain_spinners, spinners
 
-from nutdamp.physics import attitude
+from nutdamp.physics import attitude, response
 from nutdamp.physics import body as rigid_body
 
 FLOWN = 1e-11
 """rad; what DOP853 at 1e-13 a step adds up over some tens of radians."""
 
-BODIES = {
+SHAPES = {
     "prolate": (120.0, 80.0),
     "oblate": (80.0, 120.0),
     "sphere": (100.0, 100.0),
@@ -34,7 +33,7 @@ axes = vectors.filter(lambda v: float(np.linalg.norm(v)) > 0.1).map(lambda v: v 
 angles = st.floats(-math.pi, math.pi)
 
 
-def quaternion_of(axis: Array, angle: float) -> Array:
+def quaternion_of(axis: reference.Array, angle: float) -> reference.Array:
     return np.concatenate([[math.cos(angle / 2)], math.sin(angle / 2) * axis])
 
 
@@ -45,7 +44,9 @@ def start_of(A: float, C: float, theta: float, spin: float) -> tuple[complex, re
 
 
 @given(axes, angles, axes, angles, vectors)
-def test_quaternions_are_rodrigues_formula(axis: Array, angle: float, other: Array, by: float, vector: Array) -> None:
+def test_quaternions_are_rodrigues_formula(
+    axis: reference.Array, angle: float, other: reference.Array, by: float, vector: reference.Array
+) -> None:
     """Scalar first, body to inertial; a product turns by the right one first; `from_matrix` is the inverse."""
     left, right = quaternion_of(axis, angle), quaternion_of(other, by)
     assert attitude.rotate(left, vector) == pytest.approx(about(axis, angle) @ vector, abs=100 * EPS)
@@ -88,7 +89,7 @@ def test_angle_between_keeps_small_angles_whole_and_those_near_a_half_turn() -> 
 
 @spread("spin", [2.0, -2.0], quick=1)
 @spread("theta", [0.0, 1e-9, math.radians(10), math.radians(60), math.radians(89)], quick=2, deep=3)
-@pytest.mark.parametrize(("A", "C"), BODIES.values(), ids=BODIES)
+@pytest.mark.parametrize(("A", "C"), SHAPES.values(), ids=SHAPES)
 def test_arc_is_the_motion_of_the_integrated_body(A: float, C: float, theta: float, spin: float) -> None:
     """An arc begun where another ended is the rest of it, and the end of an arc is its last row."""
     omega, start = start_of(A, C, theta, spin)
@@ -201,3 +202,293 @@ def test_magnus_22_the_spin_axis_is_opposite_after_half_an_inertial_period(A: fl
     x, y, z = sense * start.rotation[:, 2]
     assert sense * opposite.rotation[:, 2] == pytest.approx([-x, -y, z], abs=1e-11)
     assert sense * back.rotation[:, 2] == pytest.approx([x, y, z], abs=1e-11)
+
+
+# --- the impulse sum, Magnus 1970 (17), finite pulses, and what to fire when, (21), (22), by DOP853 and quadrature
+
+"""rad/s, and half of it in rad; what DOP853 at 1e-13 a step adds up over the flights here, at rates of a few rad/s."""
+
+
+def summed(A: float, C: float, start: reference.Array, kicks: list[reference.Kick], *until: float) -> reference.Array:
+    """Rates (n, 3) by the impulse sum."""
+    impulses = np.array([kick.impulse for kick in kicks]).reshape(-1, 3)
+    fired, across = np.array([kick.t for kick in kicks]), impulses[:, 0] + 1j * impulses[:, 1]
+    omega, spin = response.impulse_sum(
+        np.array(until), complex(start[0], start[1]), float(start[2]), A, C, fired, across, impulses[:, 2]
+    )
+    return np.column_stack([omega.real, omega.imag, spin])
+
+
+@spinners
+def test_magnus_17_is_the_motion(A: float, C: float, spin: float) -> None:
+    """Transverse impulses; axial ones too, by which ω3 goes from 3 over 1, 0 and -2 to -4 rad/s (or mirrored)."""
+    start = reference.vector(0.9, -0.4, spin)
+    across = [reference.Kick(t, reference.vector(40 - 20 * t, 15 * t, 0)) for t in (0.0, 0.7, 2.5, 2.9)]
+    steps = [(0.5, -2), (1.5, -1), (2.2, -2), (4.0, -2)]
+    axial = [reference.Kick(t, reference.vector(10 * t, -5, math.copysign(C, spin) * step)) for t, step in steps]
+    for kicks, ends in ((across, spin), (axial, -4 * math.copysign(1, spin))):
+        (found,) = summed(A, C, start, kicks, 4.5)
+        assert found == pytest.approx(reference.fly((A, A, C), start, kicks, 4.5).rates, abs=FLOWN)
+        assert found[2] == pytest.approx(ends, rel=2 * EPS)
+
+
+def test_magnus_17_steps_at_the_moment_of_an_impulse_and_turns_at_minus_a_omega3() -> None:
+    times = np.linspace(0.0, 20.0, 7)
+    free = summed(120.0, 80.0, reference.vector(0.3, 0.4, -2), [], *times)
+    assert free[:, 0] + 1j * free[:, 1] == pytest.approx((0.3 + 0.4j) * np.exp(2j * times / 3), abs=20 * EPS)
+    assert np.array_equal(free[:, 2], np.full(7, -2.0))
+    kick = reference.Kick(1.0, reference.vector(100, 0, 25))
+    before_and_after = summed(50.0, 50.0, reference.vector(0, 0, 1), [kick], math.nextafter(1.0, 0.0), 1.0)
+    assert np.array_equal(before_and_after, [[0, 0, 1.0], [2.0, 0, 1.5]])
+
+
+@spread(("on_time", "spin_rate"), [(1e-3, 0), (0.4, 0), (9, 0), (4, 0.006), (4, -0.05), (4, 0.75), (4, -1.5)], quick=3)
+@spinners
+def test_a_pulse_acts_as_its_impulse_times_the_width_factor_at_its_centre(
+    A: float, C: float, spin: float, on_time: float, spin_rate: float
+) -> None:
+    """M τ sinc(aω3τ/2) at any width and angle; with axial torque half the width is turned at the new spin."""
+    start, torque = reference.vector(0.3, -0.2, spin), reference.vector(6.0, 9.0, C * spin_rate)
+    factor = response.width_factor((A - C) / A * spin, (A - C) / A * spin_rate, on_time)
+    if not spin_rate:
+        half = 0.5 * (A - C) / A * spin * on_time
+        assert factor == pytest.approx(math.sin(half) / half if half else 1.0, abs=2 * EPS)
+    pushed = factor * complex(torque[0], torque[1]) * on_time
+    kick = reference.Kick(1.0 + 0.5 * on_time, reference.vector(pushed.real, pushed.imag, torque[2] * on_time))
+    end = 1.0 + on_time
+    flown = reference.fly((A, A, C), start, [reference.Push(1.0, end, torque)], end)
+    assert summed(A, C, start, [kick], end)[0] == pytest.approx(flown.rates, abs=FLOWN)
+
+
+@given(st.floats(-1.0, 1.0), st.floats(-10.0, 10.0), st.floats(-5.0, 5.0), st.floats(1e-3, 5.0))
+def test_width_factor_by_quadrature(a: float, spin: float, spin_rate: float, on_time: float) -> None:
+    """F = (1/τ) ∫ exp(i a (spin s + spin_rate (s + τ/2)²/2)) ds over |s| <= τ/2, of which width only loses."""
+    half = 0.5 * on_time
+
+    def phase(s: float) -> float:
+        return a * (spin * s + 0.5 * spin_rate * (s + half) ** 2)
+
+    real, imaginary = (
+        quad(lambda s, part=part: part(phase(s)), -half, half, epsabs=1e-13, epsrel=1e-13, limit=500)[0] / on_time
+        for part in (math.cos, math.sin)
+    )
+    factor = response.width_factor(a * spin, a * spin_rate, on_time)
+    assert factor == pytest.approx(complex(real, imaginary), abs=1e-12)
+    assert abs(factor) <= 1.0 + 1e-13
+
+
+def test_width_factor_of_long_pulses_and_where_the_axial_torque_vanishes() -> None:
+    """Over some hundred panels, against Simpson's rule on a fine grid."""
+    a, spin, on_time = 0.7, 3.0, 90.0
+    s = np.linspace(-0.5 * on_time, 0.5 * on_time, 400_001)
+    weights = np.array([1.0, *([4.0, 2.0] * 199_999), 4.0, 1.0]) / (3.0 * 400_000)
+    for spin_rate in (0.05, -0.2):
+        values = np.exp(1j * a * (spin * s + 0.5 * spin_rate * (s + 0.5 * on_time) ** 2))
+        assert response.width_factor(a * spin, a * spin_rate, on_time) == pytest.approx(
+            complex(weights @ values), abs=1e-12
+        )
+    plain = response.width_factor(1.5, 0.0, 1.5)
+    assert response.width_factor(1.5, 1e-14, 1.5) == pytest.approx(plain, abs=1e-13)
+
+
+# --- on-time of one pulse --------------------------------------------------------------------------------------------
+
+
+@spinners
+def test_one_pulse_of_the_on_time_of_the_formula_leaves_no_omega(A: float, C: float, spin: float) -> None:
+    """τ = (2/(aω3)) asin(aω3 A|ω|/(2M)), centred where ω opposes the torque (US patent 4504032)."""
+    a, size, torque = (A - C) / A, 0.2, 40.0
+    on_time = present(response.on_time_for(A * size, torque, a * spin, 0.0, math.inf))
+    if a:
+        assert on_time == pytest.approx(2 / (a * spin) * math.asin(a * spin * A * size / (2 * torque)), rel=4 * EPS)
+    # ω0 such that ω = -|ω| at the centre of the pulse along +1.
+    omega0 = -size * cmath.exp(0.5j * a * spin * on_time)
+    push = reference.Push(0.0, on_time, reference.vector(torque, 0, 0))
+    end = reference.fly((A, A, C), reference.vector(omega0.real, omega0.imag, spin), [push], on_time)
+    assert np.abs(end.rates[:2]).max() < FLOWN
+
+
+def test_limits_of_on_times() -> None:
+    """One pulse does at most 2M/|aω3| = 6 N m s, in half a period; none is longer than allowed; nothing takes none.
+
+    For a to zero it is impulse over torque, and asin x / x = 1 + x²/6 …: nothing cancels.
+    """
+    for a in (1e-3, -1e-6, 1e-9, -1e-12, 1e-300, 0.0):
+        on_time, x = response.on_time_for(12.0, 4.0, a * 2.0, 0.0, math.inf), 0.5 * a * 2.0 * 3.0
+        assert on_time == pytest.approx(3.0 * (1 + x * x / 6), rel=max(x**4, 4 * EPS))
+    most = (3.0, -1.0, 0.0, math.inf)
+    assert response.on_time_for(6.0 * (1 - 1e-12), *most) == pytest.approx(math.pi, rel=1e-5)
+    assert response.on_time_for(6.0 * (1 + 1e-12), *most) is None
+    for spin_rate, longest, on_time in ((0.0, 10.0, 10.0), (0.0, 9.999, None), (0.1, 9.999, None)):
+        assert response.on_time_for(10.0, 1.0, 0.0, 0.0 * spin_rate, longest) == on_time
+    for spin_rate in (0.0, 0.2):
+        assert response.on_time_for(0.0, 5.0, 0.3, 0.3 * spin_rate, math.inf) == 0.0
+
+
+def assert_gives(impulse: float, torque: float, a: float, spin: float, spin_rate: float) -> None:
+    on_time = present(response.on_time_for(impulse, torque, a * spin, a * spin_rate, math.inf))
+    acts = torque * on_time * abs(response.width_factor(a * spin, a * spin_rate, on_time))
+    assert acts == pytest.approx(impulse, rel=1e-13)
+
+
+@given(
+    st.floats(-0.95, 0.95).filter(lambda a: abs(a) > 0.01),
+    st.sampled_from([-3.0, -0.7, 0.7, 3.0]),
+    st.floats(-0.1, 0.1),
+    st.floats(0.01, 0.95),
+)
+def test_on_time_with_axial_torque_gives_the_impulse_requested(
+    a: float, spin: float, share: float, part: float
+) -> None:
+    """While the spin changes by less than a third: found, and exact to rounding."""
+    rate = abs(a * spin)
+    assert_gives(part * 0.9 * 2 * 5.0 / rate, 5.0, a, spin, share * abs(spin) * rate / math.pi * 3)
+
+
+def test_on_time_where_the_curve_bends() -> None:
+    """Spin through zero within the pulse; less reached after half a period than before (the first crossing counts)."""
+    assert_gives(2.665260255191444, 1.0, 0.847171258807392, -0.8766341758481142, 0.47537038364894224)
+    assert_gives(21.796764904268404, 2.947761893524505, 0.21068867019307735, -0.5783760751564644, 0.208649381851118)
+
+
+def test_on_time_of_a_near_sphere_with_axial_torque_takes_no_time_to_find() -> None:
+    """The search begins with the pulse without axial torque, not with one of 10⁹ turns of the body."""
+    with within(100_000):
+        on_time = response.on_time_for(10.0, 5.0, 3e-9, 1e-11, math.inf)
+    assert on_time == pytest.approx(2.0, rel=1e-12)
+
+
+@given(
+    *(st.sampled_from([0.0, 1e-320, 1e-300, 1e-30, 1.0, 1e30, 1e300]) for _ in range(3)),
+    st.sampled_from([-1.0, -1e-9, 0.0, 1e-15, 0.3, 0.99]),
+    st.sampled_from([1e-300, 1.0, -3.0, 1e30]),
+    st.sampled_from([0.0, 1e-300, 0.1, -5.0, 1e10]),
+)
+def test_the_search_for_an_on_time_ends(
+    impulse: float, torque: float, longest: float, a: float, spin: float, spin_rate: float
+) -> None:
+    """Also where the on-time without axial torque is too small for a number: it was then stretched for ever."""
+    with within(3_000_000):
+        on_time = response.on_time_for(impulse, torque or 1.0, a * spin, a * spin_rate, longest or math.inf)
+    assert on_time is None or 0.0 <= on_time <= (longest or math.inf)
+
+
+# --- what to fire, and when ------------------------------------------------------------------------------------------
+
+every_angle = spread("degrees", [1e-6, 2.0, 10.0, 30.0, 60.0, 85.0], quick=2, deep=4)
+
+
+def after(
+    A: float, C: float, spin: float, omega0: complex, *kicks: tuple[float, complex]
+) -> tuple[float, float, complex]:
+    """Nutation angle, shift of H (rad) and ω (rad/s) just after the last of the impulses (s, N m s)."""
+    moments, rates = (A, A, C), reference.vector(omega0.real, omega0.imag, spin)
+    fired = [reference.Kick(t, reference.vector(J.real, J.imag, 0)) for t, J in kicks]
+    rotation = reference.frame_n(moments, rates)
+    end = reference.fly(moments, rates, fired, kicks[-1][0], rotation)
+    before = reference.momentum(moments, reference.Motion(rates, rotation))
+    nutation = reference.nutation(moments, end.rates, math.copysign(1, spin))
+    return nutation, reference.angle(before, reference.momentum(moments, end)), complex(end.rates[0], end.rates[1])
+
+
+def after_two(
+    A: float, C: float, spin: float, omega: complex, first: float, second: float, wait: float
+) -> tuple[float, float]:
+    """Nutation and shift of H, rad, after two impulses against ω, which turns at -aω3 in between."""
+    left = omega * (1 - first / (A * abs(omega))) * cmath.exp(-1j * (A - C) / A * spin * wait)
+    kicks = (0.0, -first * omega / abs(omega)), (wait, -second * left / abs(left))
+    return after(A, C, spin, omega, *kicks)[:2]
+
+
+@every_angle
+@spinners
+def test_magnus_21_and_22_made_exact(A: float, C: float, spin: float, degrees: float) -> None:
+    """One impulse against ω takes out all and moves H by θ; two leave H where it was, for not a gram more."""
+    theta = math.radians(degrees)
+    size = rigid_body.transverse_rate(A, C, theta, spin)
+    omega = cmath.rect(size, 0.7)
+    nutation, shift, _ = after(A, C, spin, omega, (0.0, -A * omega))
+    assert nutation < 2 * EPS * max(1.0, math.tan(theta))  # the rounding of A|ω|, as an angle
+    assert shift == pytest.approx(theta, abs=8 * EPS)
+    halves = rigid_body.half_pulses(A, C, size, spin)
+    assert halves.first + halves.second == pytest.approx(A * size, rel=2 * EPS)
+    assert min(halves) > 0.0
+    assert max(after_two(A, C, spin, omega, *halves)) < 2 * FLOWN
+
+
+@pytest.mark.parametrize("half_turns", [3, 9])
+@pytest.mark.parametrize(("A", "C"), BODIES[:2])
+def test_the_second_pulse_may_come_any_odd_number_of_half_turns_later(A: float, C: float, half_turns: int) -> None:
+    size = rigid_body.transverse_rate(A, C, math.radians(25), -2.0)
+    first, second, wait = rigid_body.half_pulses(A, C, size, -2.0)
+    assert max(after_two(A, C, -2.0, size + 0j, first, second, half_turns * wait)) < 2 * FLOWN
+
+
+@pytest.mark.parametrize(("A", "C", "spin"), [(120.0, 80.0, 3.0), (80.0, 120.0, -3.0), (100.0, 190.0, 3.0)])
+@pytest.mark.parametrize(
+    ("degrees", "before", "after_first", "approximation"),
+    [(2.0, 0.0016, 0.0006, 0.0008), (10.0, 0.19, 0.077, 0.098), (30.0, 5.1, 2.2, 2.9)],
+)
+def test_magnus_22_as_printed_displaces_h_by_the_figures_of_the_physics_sheet(
+    A: float, C: float, spin: float, degrees: float, before: float, after_first: float, approximation: float
+) -> None:
+    """Equal halves, with Δt from the ω before or after the first, or πA/(Cω3): to the last digit, for every body."""
+    size = rigid_body.transverse_rate(A, C, math.radians(degrees), spin)
+    printed = rigid_body.half_pulses_as_printed(A, C, size, spin)
+    assert printed.first == printed.second == 0.5 * A * size
+    halfway, small = math.pi / math.hypot(0.5 * size, C / A * spin), math.pi * A / (C * abs(spin))
+    for wait, figure in ((printed.wait, before), (halfway, after_first), (small, approximation)):
+        nutation, shift = after_two(A, C, spin, complex(size), printed.first, printed.second, wait)
+        assert nutation < 2 * FLOWN
+        last_digit = 0.5 * 10.0 ** -len(str(figure).partition(".")[2])
+        assert math.degrees(shift) == pytest.approx(figure, abs=last_digit)
+
+
+@every_angle
+@spinners
+def test_two_actuators_at_the_mounting_angle_give_both_pulses(A: float, C: float, spin: float, degrees: float) -> None:
+    """The second actuator stands along ω, either way, as the axis has gone half a turn; at small angles -σπA/C."""
+    size = rigid_body.transverse_rate(A, C, math.radians(degrees), spin)
+    halves, angle = rigid_body.half_pulses(A, C, size, spin), rigid_body.mounting_angle(A, C, size, spin)
+    assert 0.0 <= angle < math.pi
+    _, _, omega = after(A, C, spin, complex(size), (0.0, complex(-halves.first)), (halves.wait, 0j))
+    assert abs((omega * cmath.exp(-1j * angle)).imag) < 2 * FLOWN * max(size, 1.0)
+    if degrees < 1e-3:
+        assert cmath.exp(2j * angle) == pytest.approx(cmath.exp(-2j * math.copysign(math.pi, spin) * A / C), abs=1e-11)
+
+
+TABLE = {+1: ("omega2", +1), -1: ("omega2", -1), +2: ("omega1", -1), -2: ("omega1", +1)}
+"""Magnus 1970 before fig. 5: thruster -> the component that passes zero, and the sign of its rate of change."""
+
+
+def moment(A: float, C: float, spin: float, thruster: int, mirrored: bool) -> complex:
+    """ω of size 1/5 at the moment at which the table fires a thruster, by the rates of change of Euler's equations."""
+    passing, sign = TABLE[thruster]
+    rate = (A - C) / A * spin
+    for omega in (0.2 + 0j, -0.2 + 0j, 0.2j, -0.2j):
+        slope = {"omega1": rate * omega.imag, "omega2": -rate * omega.real}[passing]
+        zero = {"omega1": omega.real, "omega2": omega.imag}[passing]
+        if zero == 0.0 and slope * sign * (-1 if mirrored else 1) > 0:
+            return omega
+    raise AssertionError("the table names no moment")
+
+
+@pytest.mark.parametrize("thruster", TABLE)
+@plain_spinners
+def test_sign_table_of_magnus(A: float, C: float, spin: float, thruster: int) -> None:
+    """The rule "ω against the torque" is the table for aω3 > 0, else its mirror image; the other one pumps."""
+    direction = complex(math.copysign(1, thruster)) * (1 if abs(thruster) == 1 else 1j)
+    damps, pumps = (moment(A, C, spin, thruster, wrong == ((A - C) * spin > 0)) for wrong in (False, True))
+    for omega, phase, change in ((damps, 0.0, -3.0 / A), (pumps, math.pi, 3.0 / A)):
+        assert abs(rigid_body.phase_to_oppose(omega, direction)) == phase
+        _, _, left = after(A, C, spin, omega, (0.0, 3.0 * direction))
+        assert abs(left) == pytest.approx(abs(omega) + change, rel=4 * EPS)
+
+
+@pytest.mark.parametrize("phase", [0.0, 0.4, -1.7, 3.0])
+@pytest.mark.parametrize("torque", [5.0 + 0j, -2.0 + 1j, 0.3j])
+def test_phase_to_oppose_is_the_turn_left_to_the_opposite_of_the_torque(phase: float, torque: complex) -> None:
+    """ω turns at -aω3: after the time phase/(aω3) it stands against the torque."""
+    omega = cmath.rect(0.3, phase)
+    then = omega * cmath.exp(-1j * rigid_body.phase_to_oppose(omega, torque))
+    assert then / abs(then) == pytest.approx(-torque / abs(torque), abs=8 * EPS)

@@ -1,7 +1,5 @@
 """The energy sink: its closed form against DOP853 on angles and on the attitude, its limits, its two forms."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 
@@ -11,12 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support import reference
 from support.cases import deep, spread
-from support.reference import Array, Motion, vector
 from support.spinning import EPS, Triple
 
 from nutdamp.physics import attitude, energy_sink, taylor
 
-QUATERNION = vector(0.5, -0.1, 0.7, 0.5)  # of length 1
+QUATERNION = reference.vector(0.5, -0.1, 0.7, 0.5)  # of length 1
 START = attitude.matrix(QUATERNION)
 
 
@@ -29,7 +26,7 @@ class Body(NamedTuple):
     omega: complex
     spin: float
 
-    def arc(self, *times: float) -> tuple[Array, Array]:
+    def arc(self, *times: float) -> tuple[reference.Array, reference.Array]:
         """Rates (n, 3) and rotations (n, 3, 3) by the closed form."""
         omega, spin, turned = energy_sink.arc(
             self.A, self.C, self.growth, QUATERNION, self.omega, self.spin, np.array(times)
@@ -41,8 +38,8 @@ class Body(NamedTuple):
         return self.A, self.A, self.C
 
     @property
-    def start(self) -> Motion:
-        return Motion(vector(self.omega.real, self.omega.imag, self.spin), START)
+    def start(self) -> reference.Motion:
+        return reference.Motion(reference.vector(self.omega.real, self.omega.imag, self.spin), START)
 
 
 def body(A: float, C: float, spin: float, degrees: float, tau: float, phase: float = 0.7) -> Body:
@@ -175,10 +172,14 @@ def test_a_complex_step_gives_the_derivative_by_time() -> None:
 )
 def test_powered_arcs_agree_with_dop853(moments: Triple, spin: float, torque: Triple) -> None:
     """And those without torque with the closed form, which has two equal moments."""
-    rates0, growth = vector(0.5, -0.3, spin), math.copysign(0.05, moments[0] - 100)
-    pieces = taylor.integrate(moments, vector(*torque), rates0, QUATERNION, 0.0, 6.0, taylor.Forcing(growth=growth))
+    rates0, growth = reference.vector(0.5, -0.3, spin), math.copysign(0.05, moments[0] - 100)
+    pieces = taylor.integrate(
+        moments, reference.vector(*torque), rates0, QUATERNION, 0.0, 6.0, taylor.Forcing(growth=growth)
+    )
     rates, turned = pieces[-1].final
-    (expected,) = reference.sinking(moments, Motion(rates0, START), vector(*torque), np.array([6.0]), growth)
+    (expected,) = reference.sinking(
+        moments, reference.Motion(rates0, START), reference.vector(*torque), np.array([6.0]), growth
+    )
     assert rates == pytest.approx(expected.rates, abs=2e-12)
     assert reference.turned(expected.rotation, attitude.matrix(turned)) < 2e-12
     if moments[0] == moments[1] and not any(torque):
@@ -190,7 +191,7 @@ def test_powered_arcs_agree_with_dop853(moments: Triple, spin: float, torque: Tr
 @pytest.mark.parametrize(("moments", "growth"), [((120.0, 100.0, 80.0), 1 / 15), deep((80.0, 90.0, 130.0), -1 / 15)])
 def test_three_moments_lose_energy_and_end_about_the_largest(moments: Triple, growth: float) -> None:
     """Also beyond the separatrix: about axis 1 (prolate) or axis 3 (oblate) in the end; H stays in space."""
-    rates, turned, energies = vector(0.4, 0.3, 2.0), QUATERNION, []
+    rates, turned, energies = reference.vector(0.4, 0.3, 2.0), QUATERNION, []
     h = attitude.rotate(turned, rates * moments)
     for start in np.arange(0.0, 200.0, 10.0).tolist():
         pieces = taylor.integrate(
@@ -206,7 +207,7 @@ def test_three_moments_lose_energy_and_end_about_the_largest(moments: Triple, gr
 @pytest.mark.parametrize("aside", [0.0, 1e-12, 1e-6])
 def test_a_torque_through_rest_takes_few_steps(aside: float) -> None:
     """H passes zero, or nearly: the direction of H turns about at once there, and the series must not stop."""
-    torque, rates, forcing = vector(aside, 0, -8), vector(0, 0, 1), taylor.Forcing(growth=0.05)
+    torque, rates, forcing = reference.vector(aside, 0, -8), reference.vector(0, 0, 1), taylor.Forcing(growth=0.05)
     pieces = taylor.integrate((120.0, 120.0, 80.0), torque, rates, QUATERNION, 0.0, 20.0, forcing)
     assert len(pieces) < 200
     assert pieces[-1].final[0][2] == pytest.approx(-1.0, abs=1e-9)

@@ -1,7 +1,5 @@
 """Lasting torques, Magnus 1970 (8)-(14), (23)-(27), Kreisel K(14), K(15), against DOP853 on Euler's equations."""
 
-from __future__ import annotations
-
 import cmath
 import itertools
 import math

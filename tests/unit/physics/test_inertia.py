@@ -1,7 +1,5 @@
 """Inertia: the ratio a, shapes, principal axes of a tensor, and whether a spin about one of them is stable."""
 
-from __future__ import annotations
-
 import itertools
 import math
 

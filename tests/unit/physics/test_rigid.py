@@ -1,21 +1,23 @@
 """Euler's equations by series, torques fixed or turning, against DOP853, conservation laws and closed forms."""
 
-from __future__ import annotations
-
 import itertools
 import math
+from collections.abc import Iterable
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 from support import reference
-from support.cases import spread
+from support.cases import deep, spread
 from support.golden import refused
-from support.reference import Array, vector
 from support.spinning import EPS, Triple, about, driven, turning
 
+from nutdamp.common.numerics import cos_sin
 from nutdamp.errors import Infeasible
 from nutdamp.physics import attitude, batch, taylor
-from nutdamp.physics.taylor import Forcing
+from nutdamp.physics.sky import AxisWatch
+from nutdamp.physics.taylor import NOTHING, Forcing
 
 FLOWN = 1e-11
 """rad, rad/s; what DOP853 at 1e-13 a step adds up over some tens of radians."""
@@ -35,7 +37,9 @@ CASES = {
 }
 
 
-def last(moments: Triple, torque: Array, rates: Array, begin: float, end: float) -> tuple[Array, Array]:
+def last(
+    moments: Triple, torque: reference.Array, rates: reference.Array, begin: float, end: float
+) -> tuple[reference.Array, reference.Array]:
     """Rates and quaternion at the end of a flight from `START`."""
     return taylor.integrate(moments, torque, rates, START, begin, end)[-1].final
 
@@ -46,7 +50,7 @@ def test_motion_under_fixed_and_turning_torques(moments: Triple, torque: Triple,
     """At the ends of the pieces, which join without gap or jump, and within them."""
     times, acting = np.linspace(1.3, 10.0, 11), turning(*TURNING) if turns else lambda _: (0.0, 0.0, 0.0)
     pieces = taylor.integrate(
-        moments, np.array(torque), np.array(rates), START, 1.3, 10.0, Forcing(TURNING if turns else ())
+        moments, np.array(torque), np.array(rates), START, 1.3, 10.0, taylor.Forcing(TURNING if turns else ())
     )
     assert (len(pieces) > 3, pieces[0].start) == (True, 1.3)
     assert pieces[-1].start + pieces[-1].duration == pytest.approx(10.0, rel=EPS)
@@ -67,7 +71,7 @@ def test_motion_under_fixed_and_turning_torques(moments: Triple, torque: Triple,
 
 @pytest.mark.parametrize("moments", MOMENTS)
 def test_energy_and_momentum_stay_without_torque(moments: Triple) -> None:
-    rates = vector(0.6, -0.3, 2.0)
+    rates = reference.vector(0.6, -0.3, 2.0)
     later, quaternion = last(moments, np.zeros(3), rates, 0.0, 100.0)
     # One rounding in each of about a hundred steps.
     assert reference.energy(moments, later) == pytest.approx(reference.energy(moments, rates), rel=200 * EPS)
@@ -78,7 +82,7 @@ def test_energy_and_momentum_stay_without_torque(moments: Triple) -> None:
 def test_a_spin_up_about_a_principal_axis_and_rest() -> None:
     """ω = Mt/I, angle Mt²/(2I): seven and a half turns."""
     body, still, angle = (2.0, 3.0, 4.0), np.zeros(3), 9.7**2 / 2
-    rates, quaternion = last(body, vector(0, 0, 4), still, 0.0, 9.7)
+    rates, quaternion = last(body, reference.vector(0, 0, 4), still, 0.0, 9.7)
     assert rates == pytest.approx([0, 0, 9.7], abs=100 * EPS)
     assert attitude.matrix(quaternion) == pytest.approx(about((0, 0, 1), angle), abs=1000 * EPS)
     assert np.array_equal(np.concatenate(last(body, still, still, 0.0, 1e6)), [*still, *START])
@@ -87,7 +91,7 @@ def test_a_spin_up_about_a_principal_axis_and_rest() -> None:
 @pytest.mark.parametrize(("mass", "time"), [(1e-12, 1.0), (1e12, 1.0), (1.0, 1e-9), (1.0, 1e6)])
 def test_units_do_not_matter(mass: float, time: float) -> None:
     """Rates × s, torques × s², times / s: the same path through space."""
-    torque, rates, (first, second, third) = vector(5, 2, 1), vector(1, 2, 3), BODY
+    torque, rates, (first, second, third) = reference.vector(5, 2, 1), reference.vector(1, 2, 3), BODY
     plain = last(BODY, torque, rates, 0.0, 5.0)
     moments = first * mass, second * mass, third * mass
     scaled = last(moments, torque * mass * time**2, rates * time, 0.0, 5.0 / time)
@@ -97,7 +101,7 @@ def test_units_do_not_matter(mass: float, time: float) -> None:
 
 def test_a_late_clock_that_cannot_tell_the_steps_does_not_stop_them() -> None:
     """At 1e17 s a second is less than a rounding; the motion over the 64 s is that of any other time."""
-    torque, start = vector(0.3, -0.2, 0.1), vector(0.2, 0.1, 3.0)
+    torque, start = reference.vector(0.3, -0.2, 0.1), reference.vector(0.2, 0.1, 3.0)
     late, early = (taylor.integrate((120.0, 100.0, 80.0), torque, start, START, t, t + 64.0) for t in (1e17, 0.0))
     assert len(late) == len(early)
     assert np.concatenate(late[-1].final) == pytest.approx(np.concatenate(early[-1].final), abs=1e-12)
@@ -106,20 +110,20 @@ def test_a_late_clock_that_cannot_tell_the_steps_does_not_stop_them() -> None:
 def test_what_cannot_be_integrated_is_refused() -> None:
     for torque in (math.nan, math.inf, 1e200, 1e300):
         with np.errstate(all="ignore"), pytest.raises(Infeasible, match="integrated"):
-            last((120.0, 100.0, 80.0), vector(torque, 0, 0), np.ones(3), 0.0, 1e9)
-    body, rates = (120.0, 120.0, 80.0), vector(0.1, 0.0, 3.0)
+            last((120.0, 100.0, 80.0), reference.vector(torque, 0, 0), np.ones(3), 0.0, 1e9)
+    body, rates = (120.0, 120.0, 80.0), reference.vector(0.1, 0.0, 3.0)
     with refused(Infeasible, "physics.too-many-steps"):
-        taylor.integrate(body, vector(1, 0, 0), rates, START, 0.0, 100.0, most=20)
+        taylor.integrate(body, reference.vector(1, 0, 0), rates, START, 0.0, 100.0, most=20)
     with refused(Infeasible, "physics.too-long"):
-        last(body, vector(1, 0, 0), rates, 0.0, 1e6)
+        last(body, reference.vector(1, 0, 0), rates, 0.0, 1e6)
 
 
 @pytest.mark.parametrize(
     ("forcing", "alike"),
-    [(Forcing(), (0, 1)), (Forcing(TURNING), (0, 1)), (Forcing(), (0, 2))],
+    [(taylor.Forcing(), (0, 1)), (taylor.Forcing(TURNING), (0, 1)), (taylor.Forcing(), (0, 2))],
     ids=["fixed", "turning", "symmetric about axis 2"],
 )
-def test_few_cases_fly_as_each_alone_does(forcing: Forcing, alike: tuple[int, int]) -> None:
+def test_few_cases_fly_as_each_alone_does(forcing: taylor.Forcing, alike: tuple[int, int]) -> None:
     """Bodies, motions, torques, begins and durations of their own."""
     rng, count = np.random.default_rng(12), 7
     A = 100.0 * (1.0 + 0.2 * rng.normal(size=count))
@@ -154,3 +158,246 @@ def test_steps_are_halved_where_the_torque_changes_faster_than_promised() -> Non
     turn = taylor.whole(np.concatenate([one.turn.sum(axis=0) for one in steps], axis=1))
     angle = 0.5 * abs(0.3 + 0.1j) * 40.0**2  # about one axis: the turn is that of the angle
     assert turn[0, 0] == pytest.approx(math.cos(0.5 * angle), abs=1e-11)
+
+
+# --- many cases at once against the independent integrator, case by case; their spin axes over long arcs
+
+STILL = np.zeros(3)
+
+SYMMETRIC = (120.0, 120.0, 80.0)
+OBLATE = (80.0, 80.0, 130.0)
+TENSOR = (120.0, 100.0, 80.0)
+
+
+class Case(NamedTuple):
+    """The arguments of `rigid_cases.fly`."""
+
+    bodies: batch.Bodies
+    rates: reference.Array
+    quaternion: reference.Array
+    pulses: batch.Pulses
+
+    def fly(self) -> tuple[reference.Array, reference.Array]:
+        return batch.fly(*self)
+
+    def some(self, which: Any) -> "Case":
+        return Case(self.bodies.some(which), self.rates[:, which], self.quaternion[:, which], self.pulses.some(which))
+
+    def start(self, number: int) -> reference.Motion:
+        return reference.Motion(self.rates[:, number], attitude.matrix(self.quaternion[:, number]))
+
+    def events(self, number: int) -> list[reference.Push | reference.Kick]:
+        starts, impulses = self.pulses.starts[:, number], self.pulses.impulses[:, :, number]
+        return [
+            reference.Push(start, start + width, impulse / width) if width else reference.Kick(start, impulse)
+            for start, width, impulse in zip(starts, self.pulses.on_times[:, 0], impulses, strict=True)
+        ]
+
+
+def cases(
+    count: int,
+    moments: Triple = SYMMETRIC,
+    spin: float = 3.0,
+    starts: tuple[float, ...] = (0.4, 2.9),
+    on_times: tuple[float, ...] = (0.5, 0.3),
+    jitter: float = 0.05,
+    constant: reference.Array = STILL,
+    forcing: Forcing = NOTHING,
+) -> Case:
+    """Dispersed cases: moments by 2 %, rates, attitude at random, torques with an axial part, edges by ``jitter`` s."""
+    draw = np.random.default_rng(7)
+    bodies = np.array(moments)[:, None] * (1 + 0.02 * draw.standard_normal((3, count)))
+    if moments[0] == moments[1]:
+        bodies[1] = bodies[0]
+    rates = np.array([0.3, 0.2, spin])[:, None] + 0.01 * draw.standard_normal((3, count))
+    quaternion = draw.standard_normal((4, count))
+    quaternion /= np.linalg.norm(quaternion, axis=0)
+    times = np.maximum(np.array(starts)[:, None] + jitter * draw.uniform(-1, 1, (len(starts), count)), 0.0)
+    torque = np.array([12.0, -9.0, 1.5])[None, :, None] * (1 + 0.1 * draw.standard_normal((len(starts), 3, count)))
+    widths = np.array(on_times, dtype=float)
+    impulses = torque * np.where(widths == 0.0, 0.5, widths)[:, None, None]
+    return Case(
+        batch.Bodies(bodies, constant, forcing), rates, quaternion, batch.Pulses(times, widths[:, None], impulses)
+    )
+
+
+def assert_is(
+    flown: tuple[reference.Array, reference.Array], number: int, motion: reference.Motion, tolerance: float
+) -> None:
+    assert_allclose(flown[0][:, number], motion.rates, atol=tolerance, rtol=0)
+    assert reference.turned(motion.rotation, attitude.matrix(flown[1][:, number])) < tolerance
+
+
+def assert_flown_alike(case: Case, numbers: Iterable[int], tolerance: float = 2e-12) -> None:
+    flown = case.fly()
+    assert_allclose(np.linalg.norm(flown[1], axis=0), 1.0, atol=1e-15)
+    for number in numbers:
+        until = float((case.pulses.starts[:, number] + case.pulses.on_times[:, 0]).max())
+        moments, start = case.bodies.moments[:, number].tolist(), case.start(number)
+        growth = case.bodies.forcing.growth
+        motion = reference.fly(moments, start.rates, case.events(number), until, start.rotation, growth)
+        assert_is(flown, number, motion, tolerance)
+
+
+MIXED = {"starts": (0.0, 0.9, 1.0, 1.8), "on_times": (0.0, 0.4, 0.0, 0.0)}
+
+
+@pytest.mark.parametrize(
+    ("options", "numbers", "tolerance"),
+    [
+        *[
+            ({"count": 6, "moments": moments, "spin": spin}, (0, 5), 2e-12)
+            for moments in (SYMMETRIC, OBLATE, TENSOR, (100.0, 100.0, 100.0))
+            for spin in (3.0, -3.0)
+        ],
+        # Longer than a turn and far apart.
+        ({"count": 2, "starts": (0.0, 25.0), "on_times": (4.0, 6.0)}, (1,), 1e-11),
+        deep({"count": 2, "moments": TENSOR, "starts": (0.0, 25.0), "on_times": (4.0, 6.0)}, (1,), 1e-11),
+        # Overlapping; ideal impulses among pulses, also at the beginning.
+        ({"count": 5, "starts": (0.5, 0.8, 2.0), "on_times": (0.6, 0.2, 0.4)}, (0, 4), 2e-12),
+        ({"count": 5, **MIXED, "jitter": 0.0}, (0, 4), 2e-12),
+        ({"count": 8, **MIXED, "jitter": 0.2}, (0, 4, 7), 2e-12),
+    ],
+)
+def test_pulses_are_flown_as_by_the_reference(
+    options: dict[str, Any], numbers: tuple[int, ...], tolerance: float
+) -> None:
+    assert_flown_alike(cases(**options), numbers, tolerance)
+
+
+def test_pulses_that_change_their_order_in_some_cases() -> None:
+    case = cases(30, starts=(0.5, 1.05, 1.1), on_times=(0.5, 0.2, 0.4), jitter=0.12)
+    assert len({tuple(column) for column in np.argsort(case.pulses.edges, axis=0).T}) > 3
+    assert_flown_alike(case, range(0, 30, 6))
+
+
+def test_the_spin_may_stop_and_turn_round() -> None:
+    case = cases(4, spin=0.2, starts=(0.3,), on_times=(3.0,))
+    case.pulses.impulses[:, 2] = -60.0  # from 0.2 rad/s to about -0.55
+    assert_flown_alike(case, (0, 3))
+    assert np.all(case.fly()[0][2] < -0.3)
+
+
+def test_no_pulses_and_no_time_and_what_is_given_stays() -> None:
+    case = cases(3, starts=(), on_times=())
+    for flown, start in zip(case.fly(), (case.rates, case.quaternion), strict=True):
+        assert_array_equal(flown, start)
+    case, same = cases(5), cases(5)
+    case.fly()
+    assert_array_equal(case.rates, same.rates)
+    assert_array_equal(case.quaternion, same.quaternion)
+    assert_array_equal(case.pulses.starts, same.pulses.starts)
+    assert_array_equal(case.pulses.impulses, same.pulses.impulses)
+
+
+def test_blocks_hold_what_single_cases_give_and_the_same_block_the_same_bits() -> None:
+    case = cases(batch.BLOCK + 3, on_times=(0.5, 0.0))
+    flown = case.fly()
+    for number in (0, batch.BLOCK - 1, batch.BLOCK, batch.BLOCK + 2):
+        for alone, of_many in zip(case.some([number]).fly(), flown, strict=True):
+            assert_allclose(alone[:, 0], of_many[:, number], atol=1e-14)
+    case, half = cases(2 * batch.BLOCK), slice(batch.BLOCK, None)
+    for alone, of_many in zip(case.some(half).fly(), case.fly(), strict=True):
+        assert_array_equal(alone, of_many[:, half])
+
+
+def forced(case: Case, number: int) -> reference.Motion:
+    """The motion at the end, by DOP853 on the equations with all that acts."""
+    forcing, motion = case.bodies.forcing, case.start(number)
+    pushes, turned = (
+        [event for event in case.events(number) if isinstance(event, reference.Push)],
+        turning(*forcing.turning),
+    )
+    edges = sorted({0.0, *(edge for push in pushes for edge in (push.start, push.end))})
+    for begin, end in itertools.pairwise(edges):
+        on = [push.torque for push in pushes if push.start < 0.5 * (begin + end) < push.end]
+        steady = np.sum([case.bodies.constant, *on], axis=0)
+
+        def torque(t: float, steady: reference.Array = steady) -> reference.Array:
+            return np.asarray(steady + turned(t))
+
+        (motion,) = driven(case.bodies.moments[:, number].tolist(), motion, torque, [begin, end], forcing.growth)
+    return motion
+
+
+@spread("moments", [SYMMETRIC, TENSOR], quick=1)
+@spread(
+    ("constant", "forcing"),
+    [
+        (np.array([0.5, -0.3, 0.2]), NOTHING),
+        (STILL, Forcing(turning=((0.4 + 0.1j, -3.0), (0.2j, 7.0)))),
+        (STILL, Forcing(growth=1 / 20)),
+        (np.array([0.1, 0.0, -0.2]), Forcing(turning=((0.3j, 1.0),), growth=-1 / 30)),
+    ],
+    quick=1,
+    ids=["constant", "turning", "growing", "all"],
+)
+def test_disturbances_and_dissipation(moments: Triple, constant: reference.Array, forcing: Forcing) -> None:
+    case = cases(4, moments, constant=constant, forcing=forcing)
+    for number in (0, 3):
+        assert_is(case.fly(), number, forced(case, number), 1e-11)
+
+
+@pytest.mark.deep
+@spread("moments", [SYMMETRIC, OBLATE], quick=1)
+def test_coasts_under_dissipation_end_in_flat_or_in_pure_spin(moments: Triple) -> None:
+    growth = math.copysign(1 / 40, moments[0] - moments[2])
+    case = cases(6, moments, starts=(0.5, 200.0), on_times=(0.5, 0.0), forcing=Forcing(growth=growth))
+    case.rates[:2, 0] = 3.0  # far out already
+    case.pulses.impulses[1] *= 1e-3
+    assert_flown_alike(case, (0, 3), 1e-10)
+    momentum = case.fly()[0] * case.bodies.moments
+    tilt = np.degrees(np.arctan2(np.hypot(momentum[0], momentum[1]), momentum[2]))
+    assert np.all((tilt > 80.0) & (tilt < 90.0) if growth > 0.0 else tilt < 1.0)
+
+
+def test_a_long_free_coast_is_exact_and_motions_too_long_to_integrate_are_refused() -> None:
+    case = cases(4, starts=(1e4,), on_times=(0.0,), jitter=0.0)
+    case.pulses.impulses[:] = 0.0
+    rates, quaternion = case.fly()
+    for number in range(4):
+        A, _, C = case.bodies.moments[:, number].tolist()
+        first, second, spin = case.rates[:, number].tolist()
+        (after,) = attitude.arc(A, C, case.quaternion[:, number], complex(first, second), spin, np.array([1e4]))
+        assert reference.turned(attitude.matrix(after), attitude.matrix(quaternion[:, number])) < 1e-10
+        assert math.hypot(*rates[:2, number]) == pytest.approx(math.hypot(first, second), rel=1e-13)
+    with refused(Infeasible, "physics.cases-too-long"):
+        cases(2, TENSOR, starts=(2e5,), on_times=(1.0,)).fly()
+
+
+def test_cosine_and_sine_by_the_half_angle() -> None:
+    angles = np.concatenate([np.linspace(-400.0, 400.0, 2001), [0.0, 1e-300, math.pi, math.pi / 2, 1e-9]])
+    assert_allclose(cos_sin(angles), (np.cos(angles), np.sin(angles)), atol=1e-15)
+
+
+@pytest.mark.weekly
+@pytest.mark.parametrize(("sense", "growth"), [(1.0, 3e-3), (-1.0, 3e-3), (1.0, -6e-3)])
+def test_few_turns_show_what_all_show(sense: float, growth: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Arcs of some 20 to 40 turns with dissipation, directions near the spin axis and away from it."""
+    rng, count = np.random.default_rng(5), 60
+    first = rng.uniform(80.0, 120.0, count)
+    moments = np.array([first, first, first * rng.uniform(0.5, 1.6, count)])
+    tilt = rng.uniform(0.02, 0.1, count)
+    rates = np.array([np.sin(tilt), 0.3 * np.sin(tilt), sense * np.cos(tilt)]) * rng.uniform(1.0, 2.0, count)
+    upright = np.repeat([[1.0], [0.0], [0.0], [0.0]], count, axis=1)
+    away = np.array([rng.uniform(0.0, 0.3, count), rng.uniform(math.pi - 0.3, math.pi, count)])
+    round_ = rng.uniform(0.0, 2.0 * math.pi, (2, count))
+    directions = np.stack([np.sin(away) * np.cos(round_), np.sin(away) * np.sin(round_), np.cos(away)], axis=1)
+    lasts = rng.uniform(20.0, 40.0, count) * 2.0 * math.pi * first / np.linalg.norm(moments * rates, axis=0)
+    here = batch.MotionStretch(
+        batch.Bodies(moments, np.zeros(3), Forcing(growth=growth)), np.zeros(count), rates, upright
+    )
+    few, every = AxisWatch.of(directions, sense), AxisWatch.of(directions, sense)
+    every._steps(here, lasts)
+    steps: list[int] = []
+    stepped = AxisWatch._steps
+
+    def counted(self: AxisWatch, begin: batch.MotionStretch, duration: reference.Array) -> None:
+        steps.append(len(duration))
+        stepped(self, begin, duration)
+
+    monkeypatch.setattr(AxisWatch, "_steps", counted)
+    few.motion(here, lasts)
+    assert few.angles == pytest.approx(every.angles, abs=3e-5)
+    assert steps[0] < count // 2  # followed all the way
+    assert steps[1:] == [count - steps[0]] * 2

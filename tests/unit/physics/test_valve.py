@@ -1,7 +1,5 @@
 """Valves and tanks: impulse and centroid against the thrust itself, commands there and back, and what they do to ω."""
 
-from __future__ import annotations
-
 import cmath
 import math
 import random

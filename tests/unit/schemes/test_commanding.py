@@ -1,7 +1,5 @@
 """Plans through valves: what is commanded, flown by an integrator that knows nothing but the level of the thrust."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Iterable
@@ -11,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from support import reference
-from support.builders import aimed, channel, codes, cross, one_of, spinner
+from support.builders import aimed, channel, codes, cross, one_of, present, spinner
 from support.cases import deep, spread, weekly
 from support.documents import documented
 from support.golden import refused
@@ -73,10 +71,9 @@ def levels(made: Schedule, body: Spacecraft) -> Iterable[reference.Swell]:
     for pulse in made:
         valve = valves[pulse.channel]
         assert isinstance(valve, Trapezoid)
-        assert pulse.torque is not None
         times: dict[str, Any] = {"opening": valve.open_delay, "closing": valve.close_delay}
         ramps: dict[str, Any] = {"rise": valve.rise_time, "fall": valve.fall_time}
-        yield from reference.through_valve(pulse.loaded[0], pulse.loaded[1], pulse.torque, **times, **ramps)
+        yield from reference.through_valve(pulse.loaded[0], pulse.loaded[1], present(pulse.torque), **times, **ramps)
 
 
 def left(made: Schedule, body: Spacecraft) -> float:
@@ -90,8 +87,7 @@ def left(made: Schedule, body: Spacecraft) -> float:
 
 def made_by(scheme: str, body: Spacecraft, *, most: float = MICRODEGREE) -> Schedule:
     plan = planning.plan(body, scheme.partition(",")[0])
-    assert plan.flown is not None, infeasibility(plan)
-    assert plan.flown.nutation < most
+    assert present(plan.flown, infeasibility(plan)).nutation < most
     assert list(breaches(body, plan.pulses)) == []
     return plan.pulses
 
@@ -133,8 +129,7 @@ def test_commands_are_those_of_the_valve_and_effective_ones_of_the_impulse(valve
         (start, on_time), given = pulse.loaded, valve.thrust(pulse.loaded[1])
         assert (pulse.on_time, pulse.t) == pytest.approx((given.on_time, start + given.centroid), rel=1e-12)
         assert 0.005 <= on_time <= 0.05
-        assert pulse.torque is not None
-        assert pulse.impulse == pytest.approx(pulse.torque * pulse.on_time)
+        assert pulse.impulse == pytest.approx(present(pulse.torque) * pulse.on_time)
 
 
 @spread("scheme", ["one-pulse", "four-pulse", "optimal"], quick=1)
@@ -229,9 +224,8 @@ def test_a_train_of_requested_length_closes_on_a_body_of_three_moments(
     limits = Limits(horizon=200.0)
     body = spinner(spin=math.pi, degrees=degrees, moments=moments, channels=SHORT.channels, limits=limits)
     plan = planning.plan(aimed(body, 1.0, 40.0), "rhumb-line", RhumbLineOptions(on_time=on_time))
-    assert plan.flown is not None, infeasibility(plan)
     allowed = MICRODEGREE if degrees == 0.0 else math.radians(0.005)  # of 1 degree to turn, where nutation is left
-    assert max(plan.flown.nutation, plan.flown.axis_error) < allowed
+    assert max(present(plan.flown, infeasibility(plan)).nutation, present(plan.flown).axis_error) < allowed
     assert [pulse.on_time for pulse in plan.pulses.pulses[-15:]] == pytest.approx([on_time] * 15)  # the train
 
 

@@ -1,14 +1,12 @@
 """Bounds that no schedule may go below: against independent linear programs, and against what all schemes plan."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.optimize import linprog, minimize
-from support.builders import aimed, channel, cross, noted, one_of, spinner
+from support.builders import aimed, channel, cross, noted, one_of, present, spinner
 from support.cases import deep, spread, weekly
 from support.golden import check_text
 from support.places import case
@@ -20,7 +18,6 @@ from nutdamp.planning.notes import plan_notes
 from nutdamp.planning.plan import plan
 from nutdamp.schemes.catalogue import OptimalOptions
 from nutdamp.schemes.optimal import bounds
-from nutdamp.schemes.optimal.bounds import Allowed
 from nutdamp.schemes.optimal.linear_program import Program, Solution
 from nutdamp.schemes.optimal.search import _LeastCostSearch
 from nutdamp.spacecraft.constraints import free_windows
@@ -28,20 +25,20 @@ from nutdamp.spacecraft.model import Disturbance, Goal, Limits, Spacecraft, Vect
 from nutdamp.spacecraft.schedule import Bounds, Schedule, channel_pulse
 
 TIGHT = 1e-9
-NOTHING = Allowed()
+NOTHING = bounds.Allowed()
 
 
 def prices(spacecraft: Spacecraft) -> dict[str, float]:
     return {one.name: float(np.linalg.norm(one.torque)) for one in spacecraft.channels}
 
 
-def proved(spacecraft: Spacecraft, left: Allowed = NOTHING, *, shift: bool = False, cost: float = math.inf) -> float:
+def proved(
+    spacecraft: Spacecraft, left: bounds.Allowed = NOTHING, *, shift: bool = False, cost: float = math.inf
+) -> float:
     """The bound; ``cost`` is that of a schedule known, which counts where torques are axial."""
     if not math.isfinite(cost):
         cost = 1e3 * (spacecraft.least_impulse + spacecraft.turning_impulse)
-    found = bounds.rigorous(spacecraft, prices(spacecraft), cost, left, shift=shift)
-    assert found is not None
-    return found
+    return present(bounds.rigorous(spacecraft, prices(spacecraft), cost, left, shift=shift))
 
 
 def grid_optimum(
@@ -120,7 +117,7 @@ def test_no_plan_of_any_scheme_is_below_its_bound_for_what_it_leaves(first: int,
             if made.flown is None:
                 continue
             feasible += 1
-            cost, left = made.pulses.total_impulse, Allowed(made.flown.nutation, made.flown.axis_error)
+            cost, left = made.pulses.total_impulse, bounds.Allowed(made.flown.nutation, made.flown.axis_error)
             for shift in (False, body.goal.axis is not None):
                 assert cost >= proved(body, left, shift=shift, cost=cost) * (1.0 - TIGHT), (seed, made.scheme)
     assert feasible > last - first
@@ -130,10 +127,8 @@ def test_no_plan_of_any_scheme_is_below_its_bound_for_what_it_leaves(first: int,
 def test_one_pulse_attains_the_bound_of_the_file_where_it_was_above() -> None:
     """The primal cost on the grid of the column generation was 208.84693 N m s, one pulse takes 208.84384."""
     body = load_spacecraft(case("bound-grid.yaml"))
-    cost, best = plan(body, "one-pulse").pulses.total_impulse, plan(body, "optimal").pulses.bounds
-    assert best is not None
-    assert best.rigorous is not None
-    assert cost * (1.0 - 1e-6) <= best.rigorous <= cost
+    cost, best = plan(body, "one-pulse").pulses.total_impulse, present(plan(body, "optimal").pulses.bounds)
+    assert cost * (1.0 - 1e-6) <= present(best.rigorous) <= cost
 
 
 def test_a_bound_is_never_told_rounded_up_and_none_of_nothing() -> None:
@@ -166,18 +161,20 @@ def test_a_change_of_spin_that_brings_the_phase_sooner_is_allowed_for() -> None:
     assert made.end <= body.horizon
     cost, left = made.total_impulse, propagation.flown(body, made).residual.nutation
     assert left < 1e-7
-    assert body.least_impulse * (1.0 - 1e-6) <= proved(body, Allowed(left), cost=cost) <= cost * (1.0 + TIGHT)
+    assert body.least_impulse * (1.0 - 1e-6) <= proved(body, bounds.Allowed(left), cost=cost) <= cost * (1.0 + TIGHT)
     fixed, with_plenty = replace(body, channels=(push,)), replace(body, limits=Limits(horizon=60.0))
-    assert bounds.rigorous(fixed, prices(fixed), cost, Allowed(left), shift=False) in (None, pytest.approx(math.inf))
+    assert bounds.rigorous(fixed, prices(fixed), cost, bounds.Allowed(left), shift=False) in (
+        None,
+        pytest.approx(math.inf),
+    )
     assert proved(with_plenty, cost=cost) == pytest.approx(body.least_impulse, rel=1e-9)
 
 
 @pytest.mark.parametrize("seed", range(8))
 def test_axial_torque_lowers_the_bound_no_further_than_free_phases(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    body = layout(rng, axial=0.3)
+    body = layout(np.random.default_rng(seed), axial=0.3)
     still = replace(body, channels=tuple(channel(one.name, *one.torque[:2], 0.0) for one in body.channels))
-    fixed = bounds.rigorous(still, prices(body), 1.0, Allowed(), shift=False)
+    fixed = bounds.rigorous(still, prices(body), 1.0, bounds.Allowed(), shift=False)
     free = body.least_impulse / max(abs(one.transverse) / prices(body)[one.name] for one in body.channels)
     for share in (0.0, 1.0, 100.0):
         if fixed is None:  # there is no solution for this layout
@@ -232,7 +229,7 @@ def test_ticks_count_what_they_leave() -> None:
     assert made.flown is not None
     assert made.flown.nutation > 1e-6
     cost, less = made.pulses.total_impulse, body.inertia.C * body.spin * math.tan(made.flown.nutation)
-    bound = proved(body, Allowed(made.flown.nutation), cost=cost)
+    bound = proved(body, bounds.Allowed(made.flown.nutation), cost=cost)
     assert bound <= cost
     assert proved(body, cost=cost) - bound == pytest.approx(less, rel=1e-6)
 
@@ -266,8 +263,7 @@ def solved_program(body: Spacecraft) -> tuple[Program, Solution]:
 def test_any_prices_give_a_bound(seed: int) -> None:
     """Not only those of the solver, which may have stopped anywhere: the dual is checked at every time."""
     rng = np.random.default_rng(seed)
-    body = layout(rng, count=6)
-    program, solution = solved_program(body)
+    program, solution = solved_program(layout(rng, count=6))
     if solution.unmet > 1e-9:  # no solution for this layout
         return
     size = float(np.linalg.norm(solution.prices))
@@ -280,10 +276,8 @@ def test_any_prices_give_a_bound(seed: int) -> None:
 def test_dissipation_is_in_the_first_order_bound() -> None:
     """An oblate body damps itself while it waits; 39.68 g was the least of a body without dissipation."""
     made = plan(load_spacecraft(case("oblate-dissipation.yaml")), "optimal")
-    assert made.flown is not None
-    assert made.flown.nutation < math.radians(1e-6)
-    assert made.pulses.bounds is not None
-    assert made.pulses.bounds.first_order == pytest.approx(made.pulses.cost_in("kg"), rel=0.01)
+    assert present(made.flown).nutation < math.radians(1e-6)
+    assert present(made.pulses.bounds).first_order == pytest.approx(made.pulses.cost_in("kg"), rel=0.01)
     assert made.pulses.cost_in("kg") < 0.03251
 
 
@@ -299,7 +293,7 @@ def test_very_many_alignments_do_not_loosen_the_first_order_bound() -> None:
 @pytest.mark.parametrize(("degrees", "known"), [(80.0, True), (100.0, False)])
 def test_nothing_is_known_of_schedules_that_turn_the_spin_axis_over(degrees: float, known: bool) -> None:
     body = spinner(channels=cross(8.0), limits=Limits(horizon=60.0))
-    found = bounds.rigorous(body, prices(body), 100.0, Allowed(nutation=math.radians(degrees)), shift=True)
+    found = bounds.rigorous(body, prices(body), 100.0, bounds.Allowed(nutation=math.radians(degrees)), shift=True)
     assert (found is not None) is known
 
 

@@ -1,7 +1,5 @@
 """Firing without a pause, one channel after another: the earliest end, and short horizons."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Flights of many sequences at once: all stretches together are what they are in turn."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from support.builders import channel, cross, spinner

@@ -1,7 +1,5 @@
 """The linear program: its equations, its solver, what it can reach, and what it says where it cannot."""
 
-from __future__ import annotations
-
 import math
 import re
 import subprocess
@@ -12,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 import scipy.optimize
-from support.builders import channel, cross, spinner
+from support.builders import channel, cross, present, spinner
 from support.cases import deep
 from support.golden import check_text
 from support.optimal import flies
@@ -25,9 +23,7 @@ from nutdamp.planning.notes import infeasibility
 from nutdamp.planning.plan import plan
 from nutdamp.schemes.catalogue import OptimalOptions
 from nutdamp.schemes.optimal import linear_program, refinement
-from nutdamp.schemes.optimal.linear_program import GrowingProgram, Optimum, Program
 from nutdamp.schemes.optimal.problem import Problem, thinned
-from nutdamp.schemes.optimal.refinement import EndEquations
 from nutdamp.spacecraft.model import Goal, Limits, Vector
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
 
@@ -39,15 +35,15 @@ class Failing:
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch, fails: Callable[[int, str], bool]) -> None:
         self.calls, self.failed = 0, 0
-        plain = GrowingProgram._solved
+        plain = linear_program.GrowingProgram._solved
 
-        def tried(program: GrowingProgram, method: str, presolve: bool) -> Optimum | None:
+        def tried(program: linear_program.GrowingProgram, method: str, presolve: bool) -> linear_program.Optimum | None:
             self.calls += 1
             failed = fails(self.calls, method)
             self.failed += failed
             return None if failed else plain(program, method, presolve)
 
-        monkeypatch.setattr(GrowingProgram, "_solved", tried)
+        monkeypatch.setattr(linear_program.GrowingProgram, "_solved", tried)
 
 
 @pytest.mark.deep
@@ -102,9 +98,9 @@ class Small:
     below: Vector
     limits: Vector
 
-    def grown(self, *parts: int, level: float = 1.0, step: Vector | float = 0.0) -> GrowingProgram:
+    def grown(self, *parts: int, level: float = 1.0, step: Vector | float = 0.0) -> linear_program.GrowingProgram:
         """With the columns added in ``parts``, solved after each but the last."""
-        program = GrowingProgram(self.right + step, self.limits, np.full(3, level))
+        program = linear_program.GrowingProgram(self.right + step, self.limits, np.full(3, level))
         for count, part in enumerate(np.split(np.arange(12), parts)):
             if count:
                 program.optimum()
@@ -118,13 +114,11 @@ def small(seed: int) -> Small:
     return Small(rng.uniform(1.0, 2.0, 12), equal, equal @ rng.uniform(0.1, 0.4, 12), below, rng.uniform(2.0, 3.0, 2))
 
 
-def solved(program: GrowingProgram) -> Optimum:
-    found = program.optimum()
-    assert found is not None
-    return found
+def solved(program: linear_program.GrowingProgram) -> linear_program.Optimum:
+    return present(program.optimum())
 
 
-def check_same(found: Optimum, other: Optimum) -> None:
+def check_same(found: linear_program.Optimum, other: linear_program.Optimum) -> None:
     assert other.x == pytest.approx(found.x, abs=1e-7)
     assert other.prices == pytest.approx(found.prices, rel=1e-6)
 
@@ -160,7 +154,7 @@ def test_many_unknowns_begin_with_interior_points(monkeypatch: pytest.MonkeyPatc
         return False
 
     Failing(monkeypatch, never)
-    optima = list[Optimum]()
+    optima = list[linear_program.Optimum]()
     for large in (12, 11):
         monkeypatch.setattr(linear_program, "LARGE", large)
         optima.append(solved(small(3).grown()))
@@ -191,7 +185,7 @@ def test_the_basis_is_kept() -> None:
 
 def test_no_way_of_solving_is_no_optimum() -> None:
     """x ≥ 0 cannot be -1."""
-    program = GrowingProgram(-np.ones(1), np.zeros(0), np.ones(1))
+    program = linear_program.GrowingProgram(-np.ones(1), np.zeros(0), np.ones(1))
     program.add(np.ones(1), np.ones((1, 1)), np.ones(1))
     assert program.optimum() is None
 
@@ -257,7 +251,7 @@ def test_a_far_target_with_weak_thrusters_is_not_called_out_of_reach(monkeypatch
         assert (unmet_by_all_slots(Problem(longer, OptimalOptions()).program()) < 1e-7) == feasible
 
 
-def unmet_by_all_slots(program: Program) -> float:
+def unmet_by_all_slots(program: linear_program.Program) -> float:
     """What all slots together cannot supply, by one program of least slack over every one of them."""
     size = float(np.linalg.norm(program.influence.goal))
     most = np.repeat([program.width * one.strength / size for one in program.channels], len(program.centres))
@@ -268,8 +262,7 @@ def unmet_by_all_slots(program: Program) -> float:
     bounds = [*((0.0, one) for one in most), *((0.0, None),) * (2 * count)]
     goal = program.influence.goal / size
     found = scipy.optimize.linprog(cost, A_eq=np.hstack([matrix, slack]), b_eq=goal, bounds=bounds)
-    assert found.fun is not None
-    return float(found.fun)
+    return float(present(found.fun))
 
 
 @pytest.mark.parametrize("rows", [2, 4, 5])
@@ -283,8 +276,7 @@ def test_goals_within_and_beyond_reach_are_told_apart(seed: int, rows: int) -> N
     # The largest s with most @ x = s goal, 0 <= x <= 1.
     equal, bounds = np.hstack([most, -goal[:, None]]), [(0, 1)] * 300 + [(0, None)]
     found = scipy.optimize.linprog([*np.zeros(300), -1.0], A_eq=equal, b_eq=np.zeros(rows), bounds=bounds)
-    assert found.x is not None
-    size = float(found.x[-1])
+    size = float(present(found.x)[-1])
     assert size > 0.01
     told = [linear_program.supplies(most / size, share * goal) for share in (0.3, 0.99, 0.9999, 1.0001, 1.01, 3.0)]
     assert [one is not False for one in told] == [True] * 3 + [False] * 3
@@ -321,11 +313,11 @@ def test_the_equations_along_a_flight_say_what_a_short_firing_adds(
     body = spinner(100.0, 150.0, spin, 25.0, moments=(first, 100.0, 150.0), channels=jets)
     body = replace(body, dissipation=dissipation)
     last = channel_pulse(body.channels[1], 9.0, 0.5)
-    influence = refinement.along(propagation.flown(body, Schedule((last,))), EndEquations(), 0.05)
+    influence = refinement.along(propagation.flown(body, Schedule((last,))), refinement.EndEquations(), 0.05)
     for at in (2.0, 6.0):
         added = channel_pulse(body.channels[0], at, 1e-3)
         without, more = (
-            refinement.misses(propagation.flown(body, Schedule(made)), EndEquations(shift=False))
+            refinement.misses(propagation.flown(body, Schedule(made)), refinement.EndEquations(shift=False))
             for made in ((last,), (added, last))
         )
         expected = np.hypot(*(influence.rows(np.array([at]))[0] @ added.impulse)[:2])

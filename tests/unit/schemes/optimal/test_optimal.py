@@ -1,7 +1,5 @@
 """The scheme optimal: optima of small angles, and schedules that fly at that cost, whatever the goal and the limits."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Any
@@ -10,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 from support import reference
-from support.builders import Outcome, channel, cross, noted, spinner
+from support.builders import Outcome, channel, cross, noted, present, spinner
 from support.cases import deep, spread, weekly
 from support.golden import check_text
 from support.optimal import as_found, flies, random_layout
@@ -79,8 +77,7 @@ def test_flown_schedules_leave_nothing_at_that_cost(row: tuple[Any, ...]) -> Non
     *parts, share = row
     made = flies(ideal(*parts))
     assert made.pulses.total_impulse / ideal(*parts).least_impulse == pytest.approx(share, rel=0.01)
-    bounds = made.pulses.bounds
-    assert bounds is not None
+    bounds = present(made.pulses.bounds)
     assert (bounds.rigorous or math.inf) <= (bounds.first_order or 0.0) * (1 + 1e-6)
 
 
@@ -259,6 +256,5 @@ def test_with_three_moments_impulse_is_that_of_the_true_thrusters() -> None:
     ratios = []
     for channels in (body.channels, tuple(one.of(isp=220.0, thrust=8.0) for one in body.channels)):
         made = flies(replace(body, channels=channels)).pulses
-        assert made.bounds is not None
-        ratios.append(made.cost_in(made.bounds.unit) / (made.bounds.first_order or 0.0))
+        ratios.append(made.cost_in(present(made.bounds).unit) / (present(made.bounds).first_order or 0.0))
     assert ratios[0] == pytest.approx(ratios[1], rel=1e-9)

@@ -1,7 +1,5 @@
 """What optimal tries beside its linear program: other horizons, ends and schemes, short horizons, divided pulses."""
 
-from __future__ import annotations
-
 import csv
 import itertools
 import math
@@ -11,12 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 from support import places
-from support.builders import Outcome, aimed, channel, cross, fan, pulse, spinner
+from support.builders import Outcome, aimed, channel, cross, fan, present, pulse, spinner
 from support.cases import deep, spread, weekly
 from support.checker import violations
 from support.golden import check_text
 from support.optimal import as_found, flies, random_layout
-from support.places import CASES, case
 
 import nutdamp
 from nutdamp.common import work
@@ -29,7 +26,6 @@ from nutdamp.schemes.catalogue import SCHEMES, OptimalOptions, Options, SchemeOp
 from nutdamp.schemes.optimal import alternatives, multistart, problem
 from nutdamp.schemes.optimal.descent import Descent, Task
 from nutdamp.schemes.optimal.linear_program import Burn
-from nutdamp.schemes.optimal.problem import DEARER, Problem
 from nutdamp.schemes.optimal.refinement import EndEquations
 from nutdamp.schemes.optimal.search import HALVINGS, _LeastCostSearch
 from nutdamp.schemes.sequential import at_hand, bounded_by
@@ -40,7 +36,7 @@ from nutdamp.spacecraft.schedule import Schedule, channel_pulse
 BODY = spinner(channels=cross(8.0), limits=Limits(horizon=400.0))
 """400 s are 128 inertial nutation periods, so that the horizon can be halved six times."""
 
-NOTHING_DAMPS = case("nothing-damps.yaml").read_text(encoding="utf-8")
+NOTHING_DAMPS = places.case("nothing-damps.yaml").read_text(encoding="utf-8")
 PLAIN = OptimalOptions()
 
 
@@ -69,8 +65,7 @@ def test_other_horizons_and_schemes_are_tried_where_the_program_leads_nowhere_or
     first = search.program().solve()
     for known in ({400.0: dearer(pair, 2.0)}, {}):
         tried = settle(monkeypatch, known)
-        made = search.programmed(first)
-        assert made is not None
+        made = present(search.programmed(first))
         assert search.price(made) <= search.price(pair) * (1.0 + 1e-9)  # another scheme was the start
     halves = int(math.log2(400.0 / BODY.inertial_period))
     assert tried == [400.0 * 0.5**turn for turn in range(halves + 1)]
@@ -80,7 +75,7 @@ def test_other_horizons_and_schemes_are_tried_where_the_program_leads_nowhere_or
     tried = settle(monkeypatch, dear)
     assert search.programmed(first) is dear[50.0]
     assert tried == [400.0, 200.0, 100.0, 50.0]
-    cheap = dearer(pair, (1.0 + 0.5 * DEARER) * first.cost / search.price(pair))
+    cheap = dearer(pair, (1.0 + 0.5 * problem.DEARER) * first.cost / search.price(pair))
     tried = settle(monkeypatch, {400.0: dearer(cheap, 2.0), 200.0: cheap})
     assert search.programmed(first) is cheap
     assert tried == [400.0, 200.0]
@@ -92,7 +87,7 @@ def test_ticks_are_among_the_limits_named_where_the_file_sets_them(tick: float |
     brief = replace(body, channels=cross(8.0, min_on_time=500.0))
     with pytest.raises(Infeasible) as none:
         at_hand(brief, [])
-    for said in (bounded_by(body), Problem(body, PLAIN).not_found(), str(none.value)):
+    for said in (bounded_by(body), problem.Problem(body, PLAIN).not_found(), str(none.value)):
         assert ("tick" in said) is named
 
 
@@ -107,19 +102,17 @@ def test_an_earlier_end_costs_and_leaves_as_much_and_takes_no_more_pulses(name: 
         made = plan(body, "optimal")
     with as_found(), work.budget("without", 1e9) as without:
         before = plan(body, "optimal")
-    assert made.flown is not None
-    assert before.flown is not None
     assert made.end <= min(latest, 0.8 * before.end) if name else made.end == before.end
     assert name or spent.done - without.done < 6.0
     assert len(made) <= len(before)
     assert made.pulses.cost <= before.pulses.cost * (1.0 + SAME_COST)
-    assert made.flown.nutation <= before.flown.nutation + DAMPED_ANGLE
+    assert present(made.flown).nutation <= present(before.flown).nutation + DAMPED_ANGLE
 
 
 @pytest.mark.weekly
 def test_a_far_target_costs_no_more_than_a_train_that_the_user_finds() -> None:
     """19.1 N m s, where rhumb-line --per-turn 2 --on-time 7ms takes 18.0; C|ω3|β is 17.92."""
-    body = aimed(load_spacecraft(case("optimal-far-target.yaml")), 120.0, 87.29)
+    body = aimed(load_spacecraft(places.case("optimal-far-target.yaml")), 120.0, 87.29)
     train = plan(body, "rhumb-line", Options(per_turn=2, on_time=7e-3))
     assert flies(body).pulses.total_impulse <= 1.002 * train.pulses.total_impulse
 
@@ -156,7 +149,7 @@ def test_several_short_pulses_in_each_half_turn_damp(degrees: int, changed: str,
 @pytest.mark.parametrize(("longest", "gap", "shortest"), [(0.3, 0.0, 0.0), (0.21, 0.1, 0.0), (0.5, 0.02, 0.13)])
 def test_no_slots_are_left_that_join_to_more_than_a_pulse_may_last(longest: float, gap: float, shortest: float) -> None:
     body = spinner(channels=cross(8.0, min_on_time=shortest, max_on_time=longest), limits=Limits(horizon=30.0, gap=gap))
-    program = Problem(body, PLAIN).program()
+    program = problem.Problem(body, PLAIN).program()
     long = tuple(Burn(body.channels[1], t, on) for t, on in ((2.0, 1.1), (5.3, 0.7), (17.0, 2.0)))
     assert problem._divide(program, (*long, Burn(body.channels[0], 9.0, 0.9 * longest)))
     assert not program.forbidden[[0, 2, 3]].any()  # nothing is too long there
@@ -172,10 +165,8 @@ def test_no_slots_are_left_that_join_to_more_than_a_pulse_may_last(longest: floa
 def test_a_schedule_is_taken_down_on_the_true_motion_and_leaves_nothing() -> None:
     body = random_layout(153)
     search = _LeastCostSearch(body, PLAIN)
-    before = search.programmed(search.program().solve())
-    assert before is not None
-    after = search.cheapened(before)
-    assert after is not None
+    before = present(search.programmed(search.program().solve()))
+    after = present(search.cheapened(before))
     assert search.price(after) < search.price(before) * (1.0 - 1e-4)
     assert [one.channel for one in after] == [one.channel for one in before]
     assert math.degrees(search.left(search.flown(after))) < 1e-9
@@ -212,12 +203,12 @@ def test_what_is_not_to_be_had_is_said() -> None:
     At 25 deg channels cannot do it at all: divided pulses are no way round the program. And one of 1 µs at most is left
     out beside one without a limit; alone, its limit is named.
     """
-    made = plan(load_spacecraft(case("optimal-tick.yaml")), "optimal")
+    made = plan(load_spacecraft(places.case("optimal-tick.yaml")), "optimal")
     assert made.schedule is None
     check_text("plan.gap-forbids", infeasibility(made))
     far = read_spacecraft(NOTHING_DAMPS.replace("8 deg", "25 deg"), "nothing-damps.yaml")
     check_text("plan.no-pulses-can", infeasibility(plan(replace(far, limits=Limits(max_pulses=20)), "optimal")))
-    body = load_spacecraft(case("optimal-longer-than-inf.yaml"))
+    body = load_spacecraft(places.case("optimal-longer-than-inf.yaml"))
     made = plan(body, "optimal")
     assert {pulse.channel for pulse in made.pulses} == {"T1"}
     assert made.pulses.bounds is not None
@@ -239,7 +230,7 @@ def task_of(spacecraft: Spacecraft, equations: EndEquations | None = None) -> Ta
 
 
 @pytest.mark.deep
-@spread("name", sorted(path.stem for path in CASES.glob("optimal-beaten-*.csv")), quick=1, deep=0)
+@spread("name", sorted(path.stem for path in places.CASES.glob("optimal-beaten-*.csv")), quick=1, deep=0)
 def test_no_schedule_found_without_it_is_cheaper(name: str) -> None:
     check_not_beaten(name, 1.001)
 
@@ -251,16 +242,18 @@ def test_pulses_of_two_channels_may_stand_side_by_side() -> None:
 
 def check_not_beaten(name: str, most: float, **options: Any) -> None:
     """By the schedule beside the file."""
-    with case(f"{name}.csv").open(encoding="utf-8") as stream:
+    with places.case(f"{name}.csv").open(encoding="utf-8") as stream:
         impulses = [[float(row[f"impulse_{axis}_Nms"]) for axis in (1, 2, 3)] for row in csv.DictReader(stream)]
     known = math.fsum(math.hypot(*impulse) for impulse in impulses)
-    assert flies(load_spacecraft(case(f"{name}.yaml")), left=EXACT, **options).pulses.total_impulse <= most * known
+    assert (
+        flies(load_spacecraft(places.case(f"{name}.yaml")), left=EXACT, **options).pulses.total_impulse <= most * known
+    )
 
 
 @pytest.mark.deep
 @spread("rpm", [31.0, 31.5, 32.0], quick=1, deep=0)
 def test_two_spin_jets_that_one_burn_does_not_suffice_for(rpm: float) -> None:
-    body = load_spacecraft(case("spin-up.yaml"))
+    body = load_spacecraft(places.case("spin-up.yaml"))
     flies(replace(body, goal=Goal(spin=rpm * math.pi / 30.0)), left=EXACT, dearest=1.01)
 
 
