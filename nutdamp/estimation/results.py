@@ -371,10 +371,8 @@ def refused(fitted: Fit) -> bool:
 TURNED = {AXIS[1]: "axis_y, or of the right ascension,", AXIS[2]: "axis_z, or of the declination,",
           SEEN[1]: "the azimuth of crossing", SEEN[2]: "the elevation of crossing"}  # fmt: skip
 UNITS = ((180.0 / math.pi, "57.3, rad for deg"), (30.0 / math.pi, "9.55, rad/s for rpm"), (6.0, "6, rpm for deg/s"))
-FASTER, SAME = (
-    5.0,
-    1.3,
-)  # times the file's transverse rate from which on units are doubted, up to which it is the file's
+FASTER = 5.0  # times the file's transverse rate from which on units are doubted
+SAME = 1.3  # times it up to which a motion is the file's
 ALIKE = 2.0  # times the distance of the nearest motion from the file up to which others count as well
 NEAR = 0.35  # part of C/A and of the spin by which the start of a fit may be off the file to be followed
 
