@@ -362,10 +362,13 @@ def spin_off(fitted: Fit) -> tuple[float, float] | None:
 
 
 def refused(fitted: Fit) -> bool:
-    """True where an estimate is not accepted: constants are much too far from the file, or columns are wrong."""
+    """True where an estimate is not accepted: constants much too far from the file, H turned, or wrong columns."""
     # A bias belongs to the sensor, and what the file says of it is usual, not of this one.
     far = any(not row.key.startswith("bias") for row, _ in far_from_file(fitted, REFUSED))
-    return far or bool(fitted.causes)
+    model = fitted.model
+    # Of a mirrored record the mirrored motion is as likely, with H the other way.
+    turned = model.body(fitted.named).sense != model.spacecraft.sense
+    return far or turned or bool(fitted.causes)
 
 
 TURNED = {AXIS[1]: "axis_y, or of the right ascension,", AXIS[2]: "axis_z, or of the declination,",

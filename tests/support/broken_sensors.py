@@ -108,7 +108,7 @@ FAULTS: dict[str, Fault] = {
 
 ALONE = (("omega_1",), ("acceleration",))
 UNTELLABLE: dict[str, tuple[tuple[str, ...], ...]] = {
-    "signs": (*KINDS, *CROSSED),
+    "signs": KINDS,
     "sign_one": ALONE,
     "sign_last": (*ALONE, ("acceleration", "omega_3")),
     "x57": (*ALONE, ("omega_12",)),

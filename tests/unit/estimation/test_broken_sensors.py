@@ -39,8 +39,18 @@ def test_other_kinds_of_broken_sensors_lead_to_no_wrong_estimate(tmp_path: Path,
     expect_sound(tmp_path, number, fault)
 
 
-@pytest.mark.parametrize(("fault", "number"), [("sign_last", 13), deep("sign_last", 14), deep("sign_last", 30)])
-def test_a_direction_opposite_to_the_true_one_is_not_taken_for_it(tmp_path: Path, fault: str, number: int) -> None:
+@pytest.mark.parametrize(
+    ("fault", "number"),
+    [
+        ("sign_last", 13),
+        deep("sign_last", 14),
+        deep("sign_last", 30),
+        deep("signs", 15),
+        deep("signs", 16),
+        ("signs", 31),
+    ],
+)
+def test_no_opposite_direction_and_no_mirrored_motion_is_accepted(tmp_path: Path, fault: str, number: int) -> None:
     assert outcome(tmp_path, number, fault)[0] == "refused"
 
 
