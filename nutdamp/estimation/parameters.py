@@ -243,10 +243,13 @@ def _sun_late(seen: Sighting) -> Vector:
 
 
 def _off(measured: Vector, there: Vector) -> Vector:
-    """Components (2n,) of unit vectors across measured ones, (n, 3) each."""
+    """Components (2n,) of unit vectors across measured ones, (n, 3) each; of opposite ones they add up to 2."""
     first = np.cross(measured, np.eye(3)[np.argmin(np.abs(measured), axis=1)])
     first /= np.linalg.norm(first, axis=1, keepdims=True)
-    return np.concatenate([np.sum(across * there, axis=1) for across in (first, np.cross(measured, first))])
+    off = np.array([np.sum(across * there, axis=1) for across in (first, np.cross(measured, first))])
+    # Beyond 90 deg what is across falls again, and would be nothing for the opposite direction.
+    sizes, behind = np.hypot(*off), np.sum(measured * there, axis=1) < 0.0
+    return np.concatenate(off * np.where(behind, 2.0 / np.maximum(sizes, TINY) - 1.0, 1.0))
 
 
 def wrapped(angles: Vector) -> Vector:

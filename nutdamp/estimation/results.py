@@ -362,19 +362,20 @@ def spin_off(fitted: Fit) -> tuple[float, float] | None:
 
 
 def refused(fitted: Fit) -> bool:
-    """True where an estimate is not accepted: constants are much too far from the file, or columns are wrong."""
+    """True where an estimate is not accepted: constants much too far from the file, H turned, or wrong columns."""
     # A bias belongs to the sensor, and what the file says of it is usual, not of this one.
     far = any(not row.key.startswith("bias") for row, _ in far_from_file(fitted, REFUSED))
-    return far or bool(fitted.causes)
+    model = fitted.model
+    # Of a mirrored record the mirrored motion is as likely, with H the other way.
+    turned = model.body(fitted.named).sense != model.spacecraft.sense
+    return far or turned or bool(fitted.causes)
 
 
 TURNED = {AXIS[1]: "axis_y, or of the right ascension,", AXIS[2]: "axis_z, or of the declination,",
           SEEN[1]: "the azimuth of crossing", SEEN[2]: "the elevation of crossing"}  # fmt: skip
 UNITS = ((180.0 / math.pi, "57.3, rad for deg"), (30.0 / math.pi, "9.55, rad/s for rpm"), (6.0, "6, rpm for deg/s"))
-FASTER, SAME = (
-    5.0,
-    1.3,
-)  # times the file's transverse rate from which on units are doubted, up to which it is the file's
+FASTER = 5.0  # times the file's transverse rate from which on units are doubted
+SAME = 1.3  # times it up to which a motion is the file's
 ALIKE = 2.0  # times the distance of the nearest motion from the file up to which others count as well
 NEAR = 0.35  # part of C/A and of the spin by which the start of a fit may be off the file to be followed
 

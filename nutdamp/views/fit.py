@@ -11,7 +11,7 @@ from rich.text import Text
 
 from nutdamp.common.results import Note, note
 from nutdamp.estimation.parameters import KIND, in_moments, untold
-from nutdamp.estimation.results import UNTOLD, Carried, Estimate, carried, correlated, doubts, estimates
+from nutdamp.estimation.results import CORRELATED, UNTOLD, Carried, Estimate, carried, correlated, doubts, estimates
 from nutdamp.estimation.search import Fit
 from nutdamp.files.carried import notes
 from nutdamp.units import screen_unit
@@ -136,8 +136,8 @@ def told(fit: Fit, rows: Sequence[Estimate]) -> Iterator[Note]:
     kept = [estimate.label for estimate in rows if estimate.source == UNTOLD]
     if kept:
         yield note("fit-kept", estimates=", ".join(kept))
-    known = carried(fit, fit.model.start)  # A and C are correlated where both are estimated
-    tied = [f"A and C {float(known.correlation[0, 1]):+.4f}"] if known.sigmas[0] > 0.0 else []
+    both = float(carried(fit, fit.model.start).correlation[0, 1])
+    tied = [f"A and C {both:+.4f}"] if abs(both) > CORRELATED else []
     tied += [f"{first} and {second} {value:+.3f}" for first, second, value in correlated(fit)[:MOST_PAIRS]]
     if tied:
         yield note("correlated-inputs", inputs=", ".join(tied))

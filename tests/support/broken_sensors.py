@@ -106,16 +106,16 @@ FAULTS: dict[str, Fault] = {
 
 ALONE = (("omega_1",), ("acceleration",))
 UNTELLABLE: dict[str, tuple[tuple[str, ...], ...]] = {
-    "signs": (*KINDS, *CROSSED),
+    "signs": KINDS,
     "sign_one": ALONE,
-    "sign_last": (*ALONE, ("acceleration", "omega_3"), *CROSSED[:3]),
+    "sign_last": (*ALONE, ("acceleration", "omega_3")),
     "x57": (*ALONE, ("omega_12",)),
     "rpm": (*ALONE, ("omega_12",)),
 }
 """Kinds of records that do not tell a fault.
 
-A body turned by 180 deg about its axis moves alike: both transverse signs, that of a lone transverse signal, that
-of the elevation of a star. Without the spin beside them transverse signals of another size are another nutation.
+A body turned by 180 deg about its axis moves alike: both transverse signs, or that of a lone transverse signal.
+Without the spin beside them transverse signals of another size are another nutation.
 """
 
 

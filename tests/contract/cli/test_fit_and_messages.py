@@ -194,6 +194,8 @@ def test_what_a_steady_spin_does_not_tell_is_as_the_file_has_it(run: Run, tmp_pa
     assert (rows["nutation"]["value"], rows["spin"]["value"]) == (0.0, pytest.approx(math.degrees(3.0)))
     assert rows.keys().isdisjoint({"phase", "C/A"})
     assert results(tmp_path)["kept"] == ["bias_omega_1", "bias_omega_2", "bias_omega_3"]
+    run("fit", str(case("fit-steady-spin.csv")), str(case("fit-sc.yaml")), "--json", "f.json")
+    assert not any("A and C +0.0000" in note["text"] for note in results(tmp_path)["notes"])
 
 
 def test_what_is_far_from_the_file_is_written_where_that_is_accepted(run: Run, tmp_path: Path) -> None:

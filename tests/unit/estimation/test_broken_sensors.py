@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support.broken_sensors import FAULTS, outcome, untellable
-from support.cases import spread, weekly
+from support.cases import deep, spread, weekly
 from support.synthetic import gyro_case
 
 from nutdamp.errors import Infeasible
@@ -35,6 +35,21 @@ def test_ten_kinds_of_broken_sensors_lead_to_no_wrong_estimate(tmp_path: Path, f
 )
 def test_other_kinds_of_broken_sensors_lead_to_no_wrong_estimate(tmp_path: Path, fault: str, number: int) -> None:
     expect_sound(tmp_path, number, fault)
+
+
+@pytest.mark.parametrize(
+    ("fault", "number"),
+    [
+        ("sign_last", 13),
+        deep("sign_last", 14),
+        deep("sign_last", 30),
+        deep("signs", 15),
+        deep("signs", 16),
+        ("signs", 31),
+    ],
+)
+def test_no_opposite_direction_and_no_mirrored_motion_is_accepted(tmp_path: Path, fault: str, number: int) -> None:
+    assert outcome(tmp_path, number, fault)[0] == "refused"
 
 
 def test_what_neither_data_nor_file_tell_is_named() -> None:
