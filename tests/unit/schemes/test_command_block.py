@@ -18,6 +18,7 @@ from support.golden import check_text
 from support.spinners import FILE, commanded, flown_by_reference, some_body
 
 from nutdamp import load
+from nutdamp.common import work
 from nutdamp.errors import Infeasible
 from nutdamp.files.reader import read_spacecraft
 from nutdamp.flight import propagation
@@ -27,7 +28,7 @@ from nutdamp.planning import plan as planning
 from nutdamp.planning.decision import usual
 from nutdamp.planning.notes import infeasibility
 from nutdamp.schemes.block_model import BlockModel, Trial, fired
-from nutdamp.schemes.block_search import FLOWN, BlockFlights, BlockSearch, BlockSequence, FlownSequence
+from nutdamp.schemes.block_search import FLOWN, LONGEST, BlockFlights, BlockSearch, BlockSequence, FlownSequence
 from nutdamp.schemes.catalogue import Options
 from nutdamp.schemes.command_block import scope_note
 from nutdamp.spacecraft import requirements
@@ -328,6 +329,7 @@ CURES = (
     "longer-horizon",
     "more-pulses",
     "larger-count",
+    "longest-block",
     "finer-commands",
 )
 COARSE = read_spacecraft(
@@ -366,3 +368,14 @@ def test_fine_steps_are_never_listed_and_neighbours_of_the_best_are_looked_at(st
     close = commandable_widths(body.commands, body.channels[0], 0.3 - 1e-12, 0.31 + 1e-12, count=7)
     assert len(close) == (2 if step == "10 ms" else 7)
     assert body.commands.nearest_width(0.3049) == pytest.approx(0.3 if step == "10 ms" else 0.3049, rel=1e-9)
+
+
+def test_blocks_too_long_to_be_fired_end_with_the_budget_of_work() -> None:
+    """One of a million pulses in 1e7 s: neither the closed form lists them nor a flight fires them all."""
+    body = a_turn(horizon=1e7)
+    assert body.commands is not None
+    body = replace(body, commands=replace(body.commands, max_count=1_000_000))
+    search = BlockSearch(body, body.channels, present(body.commands))
+    assert search.allowed == LONGEST
+    with work.budget("blocks", 10.0), pytest.raises(Infeasible, match="budget of work is spent"):
+        fired(body, [Block("T", 1, 0.0, 0.1, 1_000_000)])
