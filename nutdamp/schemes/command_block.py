@@ -143,6 +143,8 @@ def _searched(spacecraft: Spacecraft, most: int | None) -> FlownSequence:
     outside = " outside the blackout windows" if spacecraft.limits.blackout else ""
     why = f"no block that can be commanded ends within the horizon{outside}; a longer limits.horizon may help"
     best = search.best(most or BLOCKS)
+    if not best and work.exhausted():
+        why = "the budget of work is spent before a block is found"
     for round_ in range(4):  # the best ones, and three searches near the best flights so far
         if round_ > 0 and search.flights.complies:
             break

@@ -29,12 +29,12 @@ from nutdamp.planning.decision import usual
 from nutdamp.planning.notes import infeasibility
 from nutdamp.schemes.block_model import BlockModel, Trial, fired
 from nutdamp.schemes.block_search import FLOWN, LONGEST, BlockFlights, BlockSearch, BlockSequence, FlownSequence
-from nutdamp.schemes.catalogue import Options
-from nutdamp.schemes.command_block import scope_note
+from nutdamp.schemes.catalogue import CommandBlockOptions, Options
+from nutdamp.schemes.command_block import schedule, scope_note
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import commandable_widths, usable
 from nutdamp.spacecraft.equipment import Block, Commands, SunSensor
-from nutdamp.spacecraft.model import Disturbance, Keep, Limits, Requirement, Spacecraft
+from nutdamp.spacecraft.model import Disturbance, Goal, Keep, Limits, Requirement, Spacecraft
 
 ONE = Options(max_blocks=1)
 
@@ -379,3 +379,8 @@ def test_blocks_too_long_to_be_fired_end_with_the_budget_of_work() -> None:
     assert search.allowed == LONGEST
     with work.budget("blocks", 10.0), pytest.raises(Infeasible, match="budget of work is spent"):
         fired(body, [Block("T", 1, 0.0, 0.1, 1_000_000)])
+    slow = replace(spinner(120.0, 165.0, 1.2, 0.0, channels=(channel("S", 0.0, 0.0, -0.1),)), goal=Goal(spin=0.6))
+    with work.budget("blocks", 0.0), pytest.raises(Infeasible, match="budget of work is spent"):
+        schedule(
+            replace(commanded(slow, np.array([1.0, -0.3, 0.1])), limits=Limits(horizon=1e7)), CommandBlockOptions()
+        )
