@@ -410,9 +410,10 @@ def _fly_each(bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses, w
     for number, (edge, turn, kick) in enumerate(zip(edges, turns, kicks, strict=True)):
         here = MotionStretch(bodies, now, rates, quaternion, torque, slope)
         coasts = on[number - 1] == 0 if number else np.ones(len(now), dtype=bool)
-        for cases in (np.flatnonzero(coasts), np.flatnonzero(~coasts)) if bodies.free else (np.arange(len(now)),):
+        groups = (np.flatnonzero(coasts), np.flatnonzero(~coasts)) if bodies.free else (np.arange(len(now)),)
+        for cases in filter(len, groups):
             part = here.some(cases)
-            if bodies.free and len(cases) and coasts[cases[0]]:
+            if bodies.free and coasts[cases[0]]:
                 part = part._replace(torque=None, slope=None)
             advance(part, (edge - now)[cases], watch and watch.some(cases))
             rates[:, cases], quaternion[:, cases] = part.rates, part.quaternion

@@ -37,10 +37,13 @@ ITERATIONS = 60  # steps by which the moment of a Sun pulse is found in a flight
 EXACT = 1e-13  # tolerance of the time of a Sun pulse, in spin turns
 
 BLIND = 32  # spin turns in a row without a Sun pulse, after which none is waited for
+ALWAYS = 500  # Sun pulses that flights of blocks may take whatever work is spent
 NEVER = np.iinfo(np.int64).max  # number of a Sun pulse that is not waited for
 
 FIRED, INTEGRATED = 1.0, 40.0
 """Units of `work` of a pulse that is fired, and of the motion of all flights to the next where it is integrated."""
+
+KEPT = 4_000_000  # entries of tables of the supply that are kept
 
 
 def spin_turn(spacecraft: Spacecraft) -> float:
@@ -116,6 +119,11 @@ class SunPulses:
     def fail(self, flight: int, reason: Infeasible) -> None:
         """End a flight."""
         self.failures[flight], self._due[flight] = reason, NEVER
+
+    def end(self, reason: Infeasible) -> None:
+        """End all flights that wait for a Sun pulse."""
+        for flight in np.flatnonzero(self._due < NEVER).tolist():
+            self.fail(flight, reason)
 
     def __iter__(self) -> Iterator[tuple[MotionStretch, list[int]]]:
         clock, sensor, count = self.clock, self._sensor, np.zeros(len(self._due), dtype=np.int64)
@@ -218,6 +226,8 @@ def fire_all(
         for flight, pulse in given.items():
             pulses[flight].append(pulse.moved(float(starts[flight])))
         over[list(given)] = clock.over[list(given)]
+        if len(sun_pulses.seen) > ALWAYS and work.exhausted():
+            sun_pulses.end(Infeasible("the budget of work is spent before its last pulse"))
     for flight, supply in enumerate(supplies):
         if sun_pulses.failures[flight] is None and supply.shortage is not None:
             sun_pulses.fail(flight, Infeasible(supply.shortage))
@@ -356,6 +366,8 @@ class BlockModel:
         fired, used, most = int(state.fired.get(channel.name, 0)), float(state.used), int(np.max(count))
         key = (channel.name, fired, used, most, on_times.tobytes())
         if key not in self._tables:
+            if sum(full.size for full, _ in self._tables.values()) > KEPT:
+                self._tables.clear()
             self._tables[key] = Supply(self.body, Counter({channel.name: fired}), used).train(channel, on_times, most)
         at = index.reshape(np.shape(width)), np.asarray(count) - 1
         full, spent = self._tables[key]

@@ -36,6 +36,7 @@ GENTLE = 10  # multiple of `FLOWN`: sequences among which those with the smalles
 # blocks after one wait up to which all are looked at, and the cheapest of them behind which others are
 ALL_BLOCKS = 400
 ALL_FIRSTS = 300
+LONGEST = 5000  # pulses of a block, at most: more would take the whole budget of work to fire
 SOME_COUNTS = 256  # numbers of pulses that are looked at, where a block may have more
 FEW_DELAYS = 16  # delays, up to which each is looked at
 AROUND = (0, 1)  # steps of the delay that are looked at, from the one below the best delay
@@ -196,7 +197,7 @@ class BlockSearch:
         self._states: dict[Blocks, BlockState] = {(): self.model.start}
         self.doubtful: list[BlockSequence] = []  # those that may comply in a flight, the cheapest first
         limits, turn, step = spacecraft.limits, self.model.turn, commands.delay_step
-        self.allowed = commands.max_count if limits.max_pulses is None else min(commands.max_count, limits.max_pulses)
+        self.allowed = min(commands.max_count, LONGEST, limits.max_pulses or LONGEST)
         self.pause = math.ceil(limits.gap / turn)
         self.dark = Windows(spacecraft).dark
         self.earliest = max(math.ceil((limits.earliest - self.model.start.sun_pulse) / turn), 0)
@@ -440,7 +441,7 @@ class BlockSearch:
                 first = start.sun_pulse + float(delay) + float(acts(channel, width).over)
                 fits = (self.dark[0][:WINDOWS] - first) / (every * self.model.turn) - self.earliest / every
                 counts = np.rint([*shares * float(way) / step, *np.floor(fits), *np.floor(fits) + 1.0])
-                counts = np.unique(counts.clip(1, self.commands.max_count).astype(int))
+                counts = np.unique(counts.clip(1, self.allowed).astype(int))
                 rows = np.meshgrid(self._waits(start, self.earliest, 1), counts)
                 wait, count = (row.reshape(-1, 1, 1) for row in rows)
                 sequences += self.behind([START], start, [(channel, Trial(wait, delay, width, count, every))], 1)

@@ -19,7 +19,7 @@ from nutdamp.errors import Infeasible
 from nutdamp.flight import propagation
 from nutdamp.flight.end_state import left_by
 from nutdamp.schemes.block_model import BlockModel, acts, spin_turn
-from nutdamp.schemes.block_search import BLOCKS, FLOWN, BlockFlights, BlockSearch, BlockSequence, FlownSequence
+from nutdamp.schemes.block_search import BLOCKS, FLOWN, LONGEST, BlockFlights, BlockSearch, BlockSequence, FlownSequence
 from nutdamp.schemes.catalogue import CommandBlockOptions
 from nutdamp.schemes.sequential import NO_AXIAL, at_hand
 from nutdamp.schemes.valve_commands import Legs
@@ -84,6 +84,8 @@ def used_up(body: Spacecraft, schedule: Schedule) -> Iterator[Note]:
         yield note("more-pulses", pulses=limits.max_pulses)
     if any(block.count == commands.max_count for block in schedule.blocks):
         yield note("larger-count", count=commands.max_count)
+    elif any(block.count >= LONGEST for block in schedule.blocks):
+        yield note("longest-block", count=LONGEST)
 
 
 def schedule(spacecraft: Spacecraft, options: CommandBlockOptions) -> Schedule:
@@ -141,6 +143,8 @@ def _searched(spacecraft: Spacecraft, most: int | None) -> FlownSequence:
     outside = " outside the blackout windows" if spacecraft.limits.blackout else ""
     why = f"no block that can be commanded ends within the horizon{outside}; a longer limits.horizon may help"
     best = search.best(most or BLOCKS)
+    if not best and work.exhausted():
+        why = "the budget of work is spent before a block is found"
     for round_ in range(4):  # the best ones, and three searches near the best flights so far
         if round_ > 0 and search.flights.complies:
             break

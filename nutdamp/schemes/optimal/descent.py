@@ -90,8 +90,9 @@ class Task:
         Pulses act as so many ``kicks`` spread over them, without disturbances, with I1 ≠ I2 as at small angles; 0: the
         true motion.
         """
-        parts = [slice(begin, begin + batch.BLOCK) for begin in range(0, len(x) or 1, batch.BLOCK)]
-        return np.concatenate([self._misses(which[part], x[part], kicks) for part in parts])
+        parts = [slice(begin, begin + batch.BLOCK) for begin in range(0, len(x), batch.BLOCK)]
+        flown = [self._misses(which[part], x[part], kicks) for part in parts]
+        return np.concatenate([np.zeros((0, len(self.chosen))), *flown])
 
     def _misses(self, which: Indices, x: Vector, kicks: int) -> Vector:
         count, n = which.shape

@@ -194,7 +194,7 @@ def test_what_a_steady_spin_does_not_tell_is_as_the_file_has_it(run: Run, tmp_pa
     assert (rows["nutation"]["value"], rows["spin"]["value"]) == (0.0, pytest.approx(math.degrees(3.0)))
     assert rows.keys().isdisjoint({"phase", "C/A"})
     assert results(tmp_path)["kept"] == ["bias_omega_1", "bias_omega_2", "bias_omega_3"]
-    run("fit", str(case("fit-steady-spin.csv")), str(case("fit-sc.yaml")), "--json", "f.json")
+    run("fit", str(places.case("fit-steady-spin.csv")), str(places.case("fit-sc.yaml")), "--json", "f.json")
     assert not any("A and C +0.0000" in note["text"] for note in results(tmp_path)["notes"])
 
 

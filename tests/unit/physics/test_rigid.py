@@ -401,3 +401,15 @@ def test_few_turns_show_what_all_show(sense: float, growth: float, monkeypatch: 
     assert few.angles == pytest.approx(every.angles, abs=3e-5)
     assert steps[0] < count // 2  # followed all the way
     assert steps[1:] == [count - steps[0]] * 2
+
+
+def test_cases_with_pulses_in_different_orders_are_watched_as_each_alone() -> None:
+    case = cases(6, jitter=2.0)
+    directions = np.repeat(np.array([[[0.0], [0.6], [0.8]]]), 6, axis=2)
+    together = AxisWatch.of(directions, 1.0)
+    batch.fly(*case, together)
+    assert len({tuple(order) for order in np.argsort(case.pulses.edges, axis=0).T.tolist()}) > 1
+    for number in range(6):
+        alone = AxisWatch.of(directions[:, :, [number]], 1.0)
+        batch.fly(*case.some([number]), alone)
+        assert together.angles[..., [number]] == pytest.approx(alone.angles, abs=1e-5)

@@ -19,6 +19,7 @@ from support.spinners import FILE, commanded, flown_by_reference, some_body
 
 import nutdamp
 from nutdamp import load
+from nutdamp.common import work
 from nutdamp.errors import Infeasible
 from nutdamp.files.reader import read_spacecraft
 from nutdamp.flight import propagation
@@ -30,9 +31,9 @@ from nutdamp.planning import plan as planning
 from nutdamp.planning.decision import usual
 from nutdamp.planning.notes import infeasibility
 from nutdamp.schemes.block_model import BlockModel, BlockState, Trial, fired, sun_clock, sun_pulses
-from nutdamp.schemes.block_search import BLOCKS, FLOWN, BlockFlights, BlockSearch, BlockSequence, FlownSequence
-from nutdamp.schemes.catalogue import Options
-from nutdamp.schemes.command_block import LEGS, scope_note
+from nutdamp.schemes.block_search import BLOCKS, FLOWN, LONGEST, BlockFlights, BlockSearch, BlockSequence, FlownSequence
+from nutdamp.schemes.catalogue import CommandBlockOptions, Options
+from nutdamp.schemes.command_block import LEGS, schedule, scope_note
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import commandable_widths, usable
 from nutdamp.spacecraft.equipment import Block, Channel, Commands, SunSensor
@@ -322,6 +323,7 @@ CURES = (
     "longer-horizon",
     "more-pulses",
     "larger-count",
+    "longest-block",
     "finer-commands",
 )
 COARSE = read_spacecraft(
@@ -360,6 +362,22 @@ def test_fine_steps_are_never_listed_and_neighbours_of_the_best_are_looked_at(st
     close = commandable_widths(body.commands, body.channels[0], 0.3 - 1e-12, 0.31 + 1e-12, count=7)
     assert len(close) == (2 if step == "10 ms" else 7)
     assert body.commands.nearest_width(0.3049) == pytest.approx(0.3 if step == "10 ms" else 0.3049, rel=1e-9)
+
+
+def test_blocks_too_long_to_be_fired_end_with_the_budget_of_work() -> None:
+    """One of a million pulses in 1e7 s: neither the closed form lists them nor a flight fires them all."""
+    body = a_turn(horizon=1e7)
+    assert body.commands is not None
+    body = replace(body, commands=replace(body.commands, max_count=1_000_000))
+    search = BlockSearch(body, body.channels, present(body.commands))
+    assert search.allowed == LONGEST
+    with work.budget("blocks", 10.0), pytest.raises(Infeasible, match="budget of work is spent"):
+        fired(body, [Block("T", 1, 0.0, 0.1, 1_000_000)])
+    slow = replace(spinner(120.0, 165.0, 1.2, 0.0, channels=(channel("S", 0.0, 0.0, -0.1),)), goal=Goal(spin=0.6))
+    with work.budget("blocks", 0.0), pytest.raises(Infeasible, match="budget of work is spent"):
+        schedule(
+            replace(commanded(slow, np.array([1.0, -0.3, 0.1])), limits=Limits(horizon=1e7)), CommandBlockOptions()
+        )
 
 
 # --- closed form and Sun pulses against the flight and against an independent integrator

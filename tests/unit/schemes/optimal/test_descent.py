@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from support.builders import channel, cross, spinner
+from support.three_moments import unequal_body
 
 from nutdamp.physics import attitude
 from nutdamp.schemes.optimal.descent import Task
@@ -25,4 +26,6 @@ def test_all_stretches_at_once_are_those_in_turn(channels: tuple[Channel, ...], 
     assert np.abs(momentum - expected).max() < 1e-13 * size
     there, here = (attitude.rotate(q.T, h.T) for q, h in ((turn, momentum), (turned, expected)))
     assert np.abs(there - here).max() < 1e-13 * size
-    assert task.misses(which[:0], x[:0], kicks).shape == (0, len(EndEquations().chosen))
+    unequal = Task(unequal_body(1)[0], EndEquations(), channels, np.ones(len(channels)))
+    for each in (task, unequal):
+        assert each.misses(which[:0], x[:0], kicks).shape == (0, len(EndEquations().chosen))
