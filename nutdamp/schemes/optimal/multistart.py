@@ -38,6 +38,8 @@ WIDE, MOST_KICKS = 0.25, 24  # rad of the faster turn from which a pulse is firs
 CLOSE, MOVES, FEWEST_MOVES = 1e-5, 30, 3
 """Barrier for a schedule that is nearly the cheapest nearby; steps of its descent, over its pulses; the fewest."""
 
+APART = 1e-2  # barrier for one that has lost its way from there
+
 
 class Moments(NamedTuple):
     """Pulses still without order: channels ``which``, centres ``t`` and on-times ``on`` in s, (b, n) each."""
@@ -87,9 +89,13 @@ def schedules(task: Task, known: Iterable[Schedule] = ()) -> list[Schedule]:
 def cheapened(task: Task, schedule: Schedule) -> Schedule | None:
     """A schedule of the same channels after a few steps down on the true motion; None where there is none."""
     sequences, x = laid_out(task, _together([_moments_of(task, schedule)]), bounded=True)
-    steps = max(MOVES // len(schedule), FEWEST_MOVES)
-    lowered = _lowered(Descent(task, sequences, x, kicks=0, barrier=CLOSE), steps) if len(x) else []
-    return _schedule(task, lowered[0]) if lowered else None
+    ways = [(CLOSE, max(MOVES // len(schedule), FEWEST_MOVES))]
+    if len(schedule) <= _pulses(task, 2 * SPARE):  # pulses that touched lie apart now, and miss too much for few steps
+        ways.append((APART, MOVES))
+    for barrier, steps in ways if len(x) else ():
+        if lowered := _lowered(Descent(task, sequences, x, kicks=0, barrier=barrier), steps):
+            return _schedule(task, lowered[0])
+    return None
 
 
 def _pulses(task: Task, spare: int) -> int:
