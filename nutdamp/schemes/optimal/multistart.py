@@ -38,7 +38,8 @@ WIDE, MOST_KICKS = 0.25, 24  # rad of the faster turn from which a pulse is firs
 CLOSE, MOVES, FEWEST_MOVES = 1e-5, 30, 3
 """Barrier for a schedule that is nearly the cheapest nearby; steps of its descent, over its pulses; the fewest."""
 
-APART = 1e-2  # barrier for one that has lost its way from there
+APART, INSIDE = 1e-2, 0.98
+"""Barrier for one that has lost its way from there; share of the way off the target that H may end, to begin with."""
 
 
 class Moments(NamedTuple):
@@ -144,6 +145,9 @@ def laid_out(task: Task, moments: Moments, *, bounded: bool = False) -> tuple[Se
         close = start[:, pulse]
     sequences = Sequences(which, begins, ends, least, longest)
     x = np.hstack([start, on, np.zeros((len(t), task.loose))])
+    if bounded and task.loose:  # H begins as far off its target as they leave it
+        off = task.misses(which, x, 0)[:, 2:4] * task.momentum / task.off
+        x[:, -2:] = off * (INSIDE / np.maximum(np.hypot(*off.T), INSIDE))[:, None]
     rows, levels = task.bounds(sequences)
     fits = np.all(x @ rows.T > levels, axis=1)
     return sequences.of(fits), x[fits]
