@@ -9,6 +9,7 @@ tank one after the other, and during a pulse the center of mass is where half of
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from functools import partial
 from itertools import pairwise
@@ -17,7 +18,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.integrate import OdeSolution, solve_ivp
+from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from nutdamp.errors import Infeasible
@@ -58,8 +59,8 @@ class ReferenceModel:
         self.tensor = 0.5 * (tensor + tensor.T)
         values, vectors = np.linalg.eigh(self.tensor)
         spaces = [vectors[:, np.abs(values - value) <= EQUAL * values.max()] for value in values]
-        third = self.third = _nearest(spaces, Z, np.zeros(3))
-        first = _nearest(spaces, X, third)
+        third = self.third = _nearest(spaces, Z, np.eye(3))
+        first = _nearest(spaces, X, np.eye(3) - np.outer(third, third))
         self.axes = np.column_stack([first, _cross(third, first), third])
         self.wheel = third * (document.wheel.momentum if document.wheel else 0.0)
         self.rates = np.array(document.omega0, dtype=float) if document.omega0 else self._rates(document.state)
@@ -93,9 +94,9 @@ class ReferenceModel:
         right_ascension, declination = given.spin_axis
         along = Rotation.from_euler("ZY", [right_ascension, -declination]).apply(X)
         side: Any = np.cross(Z, along) if given.sun_phase is None else sun
-        turn = Rotation.from_rotvec((given.sun_phase or given.phase or 0.0) * along)
+        phase = Rotation.from_rotvec((given.sun_phase or given.phase or 0.0) * along)
         body = _triad(upright if given.of == "momentum" else self.axis, X)
-        return turn * _triad(along, X if np.linalg.norm(side) < EQUAL else side) * body.inv()
+        return phase * _triad(along, X if np.linalg.norm(side) < EQUAL else side) * body.inv()
 
     def command(self, channel: str, start: float, on_time: float, vector: Array | None = None) -> None:
         """Fire a ``channel``, behind those before, for ``on_time`` s from ``start`` s on.
@@ -152,7 +153,7 @@ class ReferenceModel:
 
     def fly(
         self, state: Array, start: float, end: float, reach: Callable[[float], None] = lambda _: None
-    ) -> OdeSolution:
+    ) -> Callable[[Any], Array]:
         """Motion from a ``state`` at ``start`` to ``end`` s: at times (n,) states (7, n), just after jumps.
 
         A state is the rates (3) and the quaternion, scalar last (4). ``reach`` is told the time. Raises Infeasible
@@ -170,7 +171,9 @@ class ReferenceModel:
             times, pieces = [*times, *solution.sol.ts[1:]], [*pieces, *solution.sol.interpolants]
             state = solution.y[:, -1]
             reach(then)
-        return OdeSolution(times, pieces, alt_segment=True)
+        # The piece that begins last up to a time; the first before, the last after all.
+        at = np.vectorize(lambda time: pieces[bisect_right(times[:-1], time, 1) - 1](time), signature="()->(n)")
+        return lambda moments: at(moments).T
 
     def _tensor_at(self, time: float, unused: float = 0.0) -> Array:
         # Tensor in the axes of the file at a time; so many kg used at that time are still there.
@@ -242,17 +245,15 @@ class ReferenceModel:
             b, a = 2.0 * (spin - axial / other) / apart, (1.0 / other - 1.0 / third) / apart
             square = b * b - 4.0 * a * part**2
             if square >= 0.0 and min(a, b) < 0.0:  # it falls to zero
-                root = math.sqrt(square)
-                falls.append(2.0 * part**2 / (root - b) if b < 0.0 else -0.5 * (b + root) / a)
+                falls.append(2.0 * part**2 / (square**0.5 - b) if b < 0.0 else -0.5 * (b + square**0.5) / a)
         fall = min(falls, default=0.0)
         across = one**2 + two**2 + fall * (2.0 * axial - fall)
         return math.atan2(math.sqrt(max(across, 0.0)), axial - fall)
 
 
-def _nearest(spaces: Sequence[Array], direction: Array, without: Array) -> Array:
-    # Unit vector nearest to a direction among the spaces of equal moments, square to one taken.
-    nears = (space @ (space.T @ direction) for space in spaces)
-    return _unit(max((near - (near @ without) * without for near in nears), key=lambda near: float(near @ near)))
+def _nearest(spaces: Sequence[Array], direction: Array, across: Array) -> Array:
+    # Unit vector nearest to a direction among the spaces of equal moments, projected by a matrix.
+    return _unit(max((across @ space @ (space.T @ direction) for space in spaces), key=np.linalg.norm))
 
 
 def _response(thruster: Any, every: Any, on_time: float) -> Array:

@@ -82,7 +82,9 @@ def check(body: Spacecraft, scheme: str, options: Options | None = None, most: i
         change, rounding = math.fsum(one.impulse[2] for one in plan.pulses), 1e-9 * abs(body.spin) * body.inertia.C
         assert plan.spin_change * body.inertia.C == pytest.approx(change, abs=rounding + sum(slips))
     if body.goal.axis is None:
-        assert len(plan.pulses) == 2 if scheme == "two-pulse" else len(plan.pulses) > 0
+        # Where ω stands still in the body, each of two channels beside it fires a pair.
+        pairs = {2} if body.nutation_rate != 0.0 else {2, 4}
+        assert len(plan.pulses) in pairs if scheme == "two-pulse" else len(plan.pulses) > 0
         assert left.nutation < body.nutation
         assert plan.spin_change is not None
         return plan

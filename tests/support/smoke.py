@@ -49,7 +49,7 @@ init
 init; 1
 init --list
 init --from ace ace.yaml
-plan ace.yaml --scheme one-pulse
+plan ace.yaml --scheme one-pulse; 4
 check
 check smoke.yaml --json check.json
 check broken.yaml; 2
@@ -72,7 +72,7 @@ plan smoke.yaml --scheme two-pulse --set limits.horizon=1ms; 3
 simulate smoke.yaml --scheme two-pulse --csv track.csv --json track.json --plot motion.svg --figure motion
 simulate smoke.yaml --schedule pulses.csv --flown
 simulate smoke.yaml --scheme none --until 10s --plot free.pdf
-trade --points 1 --csv trade.csv --json trade.json --plot trade.png --schedules folder
+trade --points 1 --csv trade.csv --json trade.json --plot trade.png --schedules folder; 4
 disperse smoke.yaml --schedule pulses.csv --samples 200 --csv c.csv --json d.json --plot d.png --figure cases
 disperse smoke.yaml --scheme two-pulse --case 7 --json case.json
 verify smoke.yaml --scheme two-pulse --json verify.json
@@ -82,7 +82,7 @@ loop smoke.yaml --set loop.sensor.scale=-100% --json reversed.json; 3
 loop ace.yaml; 2
 loop smoke.yaml --set limits.horizon=15s --case 2 --json dispersed.json
 disperse smoke.yaml --loop --set disturbances=[] --until 20s --samples 10 --csv loops.csv --json l.json --plot l.png
-disperse smoke.yaml --loop --until 5s --samples 2
+disperse smoke.yaml --loop --until 5s --samples 2; 4
 budget smoke.yaml --set dissipation.time_constant=300s --csv budget.csv --json budget.json --plot budget.png
 budget smoke.yaml; 2
 simulate smoke.yaml --scheme none --until 60s --samples 301 --csv telemetry.csv
