@@ -383,8 +383,7 @@ class LoopDispersion(Dispersed):
         nutation, aim, spin = (float(np.ravel(part)[0]) for part in (left.nutation, left.aim, left.spin))
         alone = Left(nutation, aim, spin, None if left.angles is None else left.angles[:, :, 0])
         lost = math.isinf(severity[0])
-        held = study.band.judging(requirements.held(body, alone), study.law.loop.start)
-        return judge_loop(body, held, cases, self.core, lost=lost)
+        return judge_loop(body, requirements.held(body, alone), cases, self.core, lost=lost)
 
 
 def run(

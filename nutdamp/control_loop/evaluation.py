@@ -27,7 +27,7 @@ from nutdamp.planning.plan import Plan
 from nutdamp.planning.verdict import LOOP, Verdict, judge_loop
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import Spacecraft, SpinState, Vector
-from nutdamp.spacecraft.requirements import Held, Left
+from nutdamp.spacecraft.requirements import Held, Left, Part
 from nutdamp.spacecraft.schedule import Pulse
 
 if TYPE_CHECKING:
@@ -128,6 +128,12 @@ def verify_loop(spacecraft: Spacecraft, until: float | None = None, *, seed: int
     return LoopVerification(run, other, "", model.evaluations, pairs)
 
 
+HELD = 1.05
+"""Nutation, over the start threshold, that a loop may let stand without a requirement: it grows while the loop waits
+for the phase of its firing, by a twentieth where a time constant is ten nutation periods (upper-stage: 0.1 %).
+"""
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class LoopPlan(Plan):
     """Pulses fired by a loop in a ``flown_run``, with its flight; ``known`` is the spacecraft as the law knows it.
@@ -167,7 +173,14 @@ class LoopPlan(Plan):
     @property
     def held(self) -> tuple[Held, ...]:
         """Residual beside each bound; without a requirement the nutation is judged by the thresholds of the loop."""
-        return self.band.judging(super().held, self.flown_run.loop.start)
+        limit = max(self.band.most, HELD * self.flown_run.loop.start + self.band.noise)
+        lines = super().held
+        return tuple(
+            line
+            if line.bound.required or line.bound.part is not Part.NUTATION
+            else Held(line.bound._replace(limit=limit), line.left)
+            for line in lines
+        )
 
     @property
     def meets_requirement(self) -> bool | None:

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -25,7 +24,6 @@ from nutdamp.errors import Infeasible
 from nutdamp.spacecraft.constraints import effective_on_time, shortest_on_time
 from nutdamp.spacecraft.equipment import ACCELEROMETER, Loop, Sensor
 from nutdamp.spacecraft.model import Spacecraft, Vector
-from nutdamp.spacecraft.requirements import Held, Part
 
 HALVINGS = 60  # steps in which the largest lateness that still damps is found
 NEVER = 1e3  # growth e^{κT} from which on further growth does not matter
@@ -113,12 +111,6 @@ def _most_late(pull: float, growth: float) -> float:
     return low
 
 
-HELD = 1.05
-"""Nutation, over the start threshold, that a loop may let stand without a requirement: it grows while the loop waits
-for the phase of its firing, by a twentieth where a time constant is ten nutation periods (upper-stage: 0.1 %).
-"""
-
-
 class Band(NamedTuple):
     """Nutation, rad, left by a loop as it settles."""
 
@@ -126,16 +118,6 @@ class Band(NamedTuple):
     noise: float  # by the sensor
     step: float  # that the smallest pulse takes away
     tilt: float  # that gyros show of ω3, their axes being tilted
-
-    def judging(self, held: Sequence[Held], start: float) -> tuple[Held, ...]:
-        """Residual beside each bound: nutation that no requirement limits is limited by the ``start`` of the loop."""
-        limit = max(self.most, HELD * start + self.noise)
-        return tuple(
-            line
-            if line.bound.required or line.bound.part is not Part.NUTATION
-            else Held(line.bound._replace(limit=limit), line.left)
-            for line in held
-        )
 
 
 SURELY = 0.99  # share of the cases that keep the `Band`
