@@ -37,7 +37,9 @@ from nutdamp.spacecraft.model import Spacecraft, required_share
 
 # later starts that are tried, in nutation periods as seen in the body (inertial ones for a sphere)
 LATER = (0.25, 0.5, 0.75, 1.0, 2.0)
-WITHIN = (1.5, 2.0)  # ends by which the scheme optimal is to be done with least cost, over the earliest one
+# Ends by which the scheme optimal is to be done with least cost, over the earliest one; the first for spin-up.yaml, of
+# which 99.98 % of the cases comply with H kept, and at most 98.4 % with the others.
+WITHIN = (1.35, 1.5, 2.0)
 
 ROBUST = "robust"  # name of the robust plan beside those of schemes
 FRESH = 211  # seed of cases that nothing was chosen by

@@ -296,8 +296,8 @@ def test_a_page_of_a_schedule_judges_that_flight_alone(run: Run, tmp_path: Path)
     assert run("report", "--schedule", "p.csv").returncode == 0
     assert "99.995 % of cases comply (99.7 % required)" in verdict_of(tmp_path, "met")
     broken = ("--nominal", "--schedule", "p.csv", "--set", "limits.horizon=2 s")
-    assert run("report", *broken).returncode == 0  # the requirement is met, but a limit is not
-    assert "ends after the horizon of 2 s" in verdict_of(tmp_path, "caution")
+    assert run("report", *broken).returncode == 4  # the requirement is met, but a limit is not
+    assert "ends after the horizon of 2 s" in verdict_of(tmp_path, "missed")
 
 
 @pytest.mark.deep

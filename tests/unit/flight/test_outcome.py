@@ -155,18 +155,18 @@ def test_what_a_screen_says_of_the_end(run: Run) -> None:
 
 @pytest.mark.deep
 def test_where_the_models_end_apart_is_shown_for_each_and_warned_of(run: Run, tmp_path: Path) -> None:
-    """The target is met through real widths; the impulse sum ends 2 deg from it."""
+    """The target is met through real widths; the impulse sum ends nearly 2 deg from it."""
     options = ("simulate", "--scheme", "half-cone", "--target", "10deg,45deg")
     screen = run(*options, "--json", "flight.json").stdout
     table = {line[:22].strip(): line[22:].split() for line in screen.splitlines()}
-    assert table["spin axis: tilt"] == ["11.9392", "deg", "10.0000", "deg"]
-    assert table["spin axis: azimuth"] == ["49.0449", "deg", "45.0000", "deg"]
+    assert table["spin axis: tilt"] == ["11.7469", "deg", "10.0000", "deg"]
+    assert table["spin axis: azimuth"] == ["48.9566", "deg", "45.0000", "deg"]
     for text in (" ".join(screen.split()), run(*options, "--json", "-").stderr):
-        assert "warning[models-differ]: impulse sum (17) and flown motion differ by 2.085 deg of" in text
+        assert "warning[models-differ]: impulse sum (17) and flown motion differ by 1.899 deg of" in text
     data = json.loads((tmp_path / "flight.json").read_text())
     assert data["differ"] == ["axis_error"]
     assert data["final"]["axis"]["tilt_deg"] == pytest.approx(10.0, abs=1e-6)
-    assert data["final_by_impulses"]["axis"]["tilt_deg"] == pytest.approx(11.94, abs=0.01)
+    assert data["final_by_impulses"]["axis"]["tilt_deg"] == pytest.approx(11.75, abs=0.01)
     assert "models-differ" not in run("simulate", "--scheme", "none").stdout
 
 
