@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 import threading
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -251,7 +252,7 @@ class Study(DrawnCases):
 
 
 @dataclass(eq=False)
-class Counted:
+class Counted(ABC):
     """Results of a study so far: the cases from 0 to ``done`` of the ``requested``, of which ``met`` comply.
 
     ``kept``: those that keep each of the ``bounds`` at the end and on the way, required or not.
@@ -326,13 +327,13 @@ class Counted:
             return None
         return float(spread.quantiles(np.array([1.0 - share if bound.inner else share]))[0])
 
+    @abstractmethod
     def spread(self, bound: Bound) -> Distribution | None:
         """Distribution of the value of a bound's part."""
-        raise NotImplementedError
 
+    @abstractmethod
     def contributions(self, bound: Bound) -> dict[str, float]:
         """Share of each tolerance of the file in the variance of the value of a bound's part."""
-        raise NotImplementedError
 
 
 @dataclass(eq=False)
