@@ -15,7 +15,7 @@ import re
 import sys
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, Any
 
@@ -74,14 +74,16 @@ def check_place(path: str) -> Path:
     if path == STDOUT:
         return Path(path)
     try:
-        target = Path(path).resolve()
+        target = Path(os.path.realpath(path))
         if target.is_dir():
             raise CannotWrite(path, "it is a directory")
+        with suppress(FileNotFoundError, NotADirectoryError):
+            target.stat()  # raises OSError for links in a circle and for names too long, where exists() is only false
         if not target.parent.is_dir():
             raise CannotWrite(path, f"{target.parent} is no directory")
         if not os.access(target if target.exists() else target.parent, os.W_OK):
             raise CannotWrite(path, "permission denied")
-    except (OSError, RuntimeError, ValueError) as reason:  # RuntimeError: links in a circle; ValueError: a zero byte
+    except (OSError, ValueError) as reason:  # ValueError: a zero byte
         raise CannotWrite(path, _reason(reason)) from reason
     return target
 
