@@ -183,10 +183,10 @@ def aspects(flown: Flight, until: float | None = None) -> tuple[Aspect, ...]:
         flown = fly(body, flown.schedule, end)
     symmetric = body.inertia.symmetric  # else the axis wobbles on its way round H as the body turns, too
     period = body.inertial_period if symmetric else min(body.inertial_period, body.body_period)
-    pieces = list(flown.pieces(max(int(ROWS * end / period), ROWS), end))
-    times = np.concatenate([piece.t for piece in pieces])
-    axis = np.concatenate([piece.axis for piece in pieces])
-    momentum = np.concatenate([piece.momentum for piece in pieces])
+    pieces = flown.pieces(max(int(ROWS * end / period), ROWS), end)
+    rows = [(piece.t, piece.axis, piece.momentum) for piece in pieces]  # the other columns are let go
+    times, axis, momentum = (np.concatenate(column) for column in zip(*rows, strict=True))
+    del rows
     momentum /= np.linalg.norm(momentum, axis=-1, keepdims=True)
     observed = []
     for keep in body.watched:
@@ -196,10 +196,13 @@ def aspects(flown: Flight, until: float | None = None) -> tuple[Aspect, ...]:
             _closer(flown, keep, way, _peaks(times, way * nearness), period / ROWS, end)
             for way in (1.0, -1.0)  # farthest from a direction is nearest to the opposite one
         ]
-        rows = [int(np.argmax(nearness)), int(np.argmin(nearness))]  # before a jump, or at a kink of the angle from H
-        looked = np.concatenate([*tops, times[rows]])
-        angles = attitude.angle_between(*_axis_and_direction(flown, keep, looked[: -len(rows)]))
-        angles = np.concatenate([angles, attitude.angle_between(axis[rows], towards[rows])])
+        extremes = [
+            int(np.argmax(nearness)),
+            int(np.argmin(nearness)),
+        ]  # before a jump, or at a kink of the angle from H
+        looked = np.concatenate([*tops, times[extremes]])
+        angles = attitude.angle_between(*_axis_and_direction(flown, keep, looked[: -len(extremes)]))
+        angles = np.concatenate([angles, attitude.angle_between(axis[extremes], towards[extremes])])
         near, far = int(np.argmin(angles)), int(np.argmax(angles))
         observed.append(Aspect(keep, float(angles[near]), float(looked[near]), float(angles[far]), float(looked[far])))
     return tuple(observed)

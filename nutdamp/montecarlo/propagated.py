@@ -341,13 +341,14 @@ class RealWidths:
 
     @cached_property
     def effort(self) -> float:
-        """Units of work of a case: its pulses, and where coasts are no arcs, its steps and looks at cones."""
+        """Units of work of a case: its pulses, and steps and looks at cones in them and in coasts that are no arcs."""
         moments, rates = np.array(self._dynamics.moments)[:, None], self.model.spacecraft.initial.rates
         arcs = self._bodies(moments, 0.0).free
         # Cases are flown together, from one edge to the next as long as the longest coast takes.
         late = max((FAR * row.sigma for row in self.model.inputs.drawn if row.name.startswith("timing")), default=0.0)
         lasts = self.model.schedule.end + late * len(self.model.schedule)
-        turned = 0.0 if arcs else float(np.linalg.norm(rates)) * lasts
+        in_steps = min(float(np.sum(self.model.on_times)), lasts) if arcs else lasts
+        turned = float(np.linalg.norm(rates)) * in_steps
         looks = turned * sky.ROWS / sky.CIRCLE if self.model.spacecraft.keep else 0.0
         stepping = STEPPED * turned / batch.STRIDE + LOOKED * looks
         return CASE * (1.0 + len(self.model.schedule)) + stepping
