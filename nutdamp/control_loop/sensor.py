@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.control_loop.law import ComplexArray, Doubt, Law, known_to
+from nutdamp.errors import Infeasible
 from nutdamp.spacecraft.equipment import ACCELEROMETER, Sensor
 from nutdamp.spacecraft.model import Spacecraft, Vector
 
@@ -124,6 +125,10 @@ def stepped(sensor: Sensor, values: Vector) -> Vector:
     return values if sensor.quantisation == 0.0 else np.rint(values / sensor.quantisation) * sensor.quantisation
 
 
+WINDOW = 1_000_000
+"""Samples over which an accelerometer's sine may be fitted: its weights and a window of values take 0.1 GB."""
+
+
 class Estimator:
     """From samples to z, the rate that the `Law` works on, along a coast from ``since`` s on, (cases, 1) for many.
 
@@ -160,7 +165,10 @@ class Estimator:
         return self.since + (self.law.period if self.sensor.kind == ACCELEROMETER else 0.0)
 
     def feed(self, times: Vector, values: Vector, spin: Vector) -> ComplexArray:
-        """z at the ``times`` (s) of further samples ``values``, at a ``spin`` ω3, filtered; NaN where none yet."""
+        """z at the ``times`` (s) of further samples ``values``, at a ``spin`` ω3, filtered; NaN where none yet.
+
+        Raises Infeasible for an accelerometer with more than `WINDOW` samples in a nutation period.
+        """
         smooth = self._low_pass(values)
         if self.sensor.kind == ACCELEROMETER:
             # The law knows how far out the sensor is and the spin, which dissipation changes: by more than ω shows.
@@ -211,6 +219,11 @@ class Estimator:
         """
         if not times.shape[-1]:
             return np.empty(times.shape, dtype=complex)
+        if self.window > WINDOW:
+            raise Infeasible(
+                f"an accelerometer's sine is fitted over a nutation period, {self.window:.2g} samples at this rate: "
+                f"{WINDOW:.0e} at most; a lower loop.sensor.rate helps"
+            )
         self._fit = self._fit or _fit(np.asarray(self.law.rate(spin[..., :1])), self.step, self.window)
         (rate, weights), fresh, size = self._fit, times.shape[-1], self.window
         used = np.cumsum(times >= self.since, axis=-1)

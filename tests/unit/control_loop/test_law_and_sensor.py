@@ -248,6 +248,11 @@ def test_estimates_do_not_depend_on_the_pieces_in_which_samples_come() -> None:
         assert np.allclose(whole, parts, rtol=1e-9, atol=1e-12, equal_nan=True)
 
 
+def test_an_accelerometer_with_too_many_samples_in_a_period_is_refused_before_they_are_held() -> None:
+    with pytest.raises(Infeasible, match="lower loop"):
+        estimates(body(), Sensor(ACCELEROMETER, 1e6, position=SIDE))
+
+
 @pytest.mark.parametrize("spin", [3.0, -3.0])
 def test_low_pass_filter_is_the_recursion_and_its_lag_is_known(spin: float) -> None:
     craft, sensor = body(spin=spin), Sensor(rate=20.0, low_pass=0.4, delay=0.05)
