@@ -1,7 +1,8 @@
 """Nutation-damping planner for spinning spacecraft.
 
-One stream runs through the package: spacecraft file -> Spacecraft -> scheme -> Schedule -> flight -> report.
-As a library it is these few names, of which `nutdamp.api` tells more; each is loaded on first use.
+One stream runs through the package: spacecraft file -> Spacecraft -> scheme -> Schedule -> flight
+-> report. As a library it is these few names, of which `nutdamp.api` tells more; each is loaded on
+first use.
 """
 
 from typing import TYPE_CHECKING, Any
@@ -110,7 +111,9 @@ __all__ = ["__version__", "errors", *(name for names in _HOMES.values() for name
 if not TYPE_CHECKING:  # or else a type checker would believe in any name
 
     def __getattr__(name: str) -> Any:
-        """Load a public name when it is first requested: the command line, too, begins here, and must begin fast."""
+        """Load a public name when it is first requested: the command line, too, begins here, and
+        must begin fast.
+        """
         if name not in __all__:
             raise AttributeError(f"module 'nutdamp' has no attribute {name!r}")
         from importlib import import_module

@@ -4,7 +4,9 @@ import sys
 
 
 def main() -> None:
-    """Entry point of the command; ends quietly where it is interrupted before there is anything to interrupt."""
+    """Entry point of the command; ends quietly where it is interrupted before there is anything to
+    interrupt.
+    """
     try:
         from nutdamp.cli.main import main as run
 

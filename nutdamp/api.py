@@ -1,4 +1,5 @@
-"""nutdamp as a library: a function a command, which the command line calls too, so that both give the same numbers.
+"""nutdamp as a library: a function a command, which the command line calls too, so that both give
+the same numbers.
 
     import nutdamp
 
@@ -7,9 +8,9 @@
     flight = plan.fly()
     flight.to_csv("track.csv")
 
-Attributes are SI and radians, vectors in principal axes unless stated to be in the axes of the spacecraft file; arrays
-with named fields carry the names and units of the CSV files. A wrong argument raises BadRequest, as all errors of the
-package a NutdampError.
+Attributes are SI and radians, vectors in principal axes unless stated to be in the axes of the
+spacecraft file; arrays with named fields carry the names and units of the CSV files. A wrong
+argument raises BadRequest, as all errors of the package a NutdampError.
 """
 
 from __future__ import annotations
@@ -43,7 +44,9 @@ if TYPE_CHECKING:
 
 PathName = str | PathLike[str]
 
-Progress = Callable[[int, int], None]  # called now and then with the number of steps done, and that of all
+Progress = Callable[
+    [int, int], None
+]  # called now and then with the number of steps done, and that of all
 
 results.register("nutdamp.page.results")
 
@@ -60,13 +63,15 @@ def load(
     path
         Name of the file, or a dict: numbers in SI, texts with a unit.
     set
-        Keys of the file to change, as ``--set`` does: ``{"limits.horizon": "300 s", "thrusters.T1.force": 12.0}``.
+        Keys of the file to change, as ``--set`` does: ``{"limits.horizon": "300 s",
+        "thrusters.T1.force": 12.0}``.
 
     Raises CannotRead, or FaultyFile with everything wrong: in a dict, lines count in its JSON.
 
     Examples
     --------
-    >>> nutdamp.load({"name": "Top", "inertia": {"A": 120, "C": "80 kg m^2"}, "omega0": [0.1, 0, 3]})
+    >>> top = {"name": "Top", "inertia": {"A": 120, "C": "80 kg m^2"}, "omega0": [0.1, 0, 3]}
+    >>> nutdamp.load(top)
     <Spacecraft Top: prolate, a = 0.3333, nutation 2.862 deg>
     """
     from nutdamp.files.reader import source_of
@@ -75,7 +80,8 @@ def load(
 
 
 def read(text: str, name: str = "text") -> Spacecraft:
-    """Read the spacecraft in the ``text`` of a file; raises FaultyFile, whose faults call the file ``name``.
+    """Read the spacecraft in the ``text`` of a file; raises FaultyFile, whose faults call the file
+    ``name``.
 
     Examples
     --------
@@ -89,7 +95,8 @@ def read(text: str, name: str = "text") -> Spacecraft:
 
 
 def example(name: str = "example") -> Spacecraft:
-    """Load the built-in example, or the one of that ``name`` among those of ``nutdamp init --list``.
+    """Load the built-in example, or the one of that ``name`` among those of ``nutdamp init
+    --list``.
 
     Examples
     --------
@@ -103,11 +110,13 @@ def example(name: str = "example") -> Spacecraft:
 
 
 def check(path: PathName | Mapping[str, object]) -> CheckedFile:
-    """Check a spacecraft file, as ``nutdamp check`` does; raises CannotRead, and FaultyFile with everything wrong.
+    """Check a spacecraft file, as ``nutdamp check`` does; raises CannotRead, and FaultyFile with
+    everything wrong.
 
     Examples
     --------
-    >>> nutdamp.check({"name": "Top", "inertia": {"A": 120, "C": 80}, "omega0": [0, 0, 3]}).to_dict()["valid"]
+    >>> top = {"name": "Top", "inertia": {"A": 120, "C": 80}, "omega0": [0, 0, 3]}
+    >>> nutdamp.check(top).to_dict()["valid"]
     True
     """
     from nutdamp.files.reader import source_of
@@ -119,20 +128,27 @@ def check(path: PathName | Mapping[str, object]) -> CheckedFile:
 def _expected(spacecraft: Spacecraft) -> Spacecraft:
     from nutdamp.spacecraft.model import Spacecraft
 
-    return units.instance("spacecraft", spacecraft, Spacecraft, "a Spacecraft, as nutdamp.load gives it")
+    return units.instance(
+        "spacecraft", spacecraft, Spacecraft, "a Spacecraft, as nutdamp.load gives it"
+    )
 
 
-def plan(spacecraft: Spacecraft, scheme: str | None = None, options: Choice = None, **chosen: Any) -> Plan:
-    """Plan one scheme, or the recommended one, and judge it by flying it; an infeasible plan says why.
+def plan(
+    spacecraft: Spacecraft, scheme: str | None = None, options: Choice = None, **chosen: Any
+) -> Plan:
+    """Plan one scheme, or the recommended one, and judge it by flying it; an infeasible plan says
+    why.
 
     Parameters
     ----------
     spacecraft
         Of `load`, `read` or `example`.
     scheme
-        Name of a scheme; without it that which `compare` recommends. Raises Infeasible where there is none.
+        Name of a scheme; without it that which `compare` recommends. Raises Infeasible where there
+        is none.
     options, chosen
-        `Options` of several schemes or those of one, or their fields by keyword, in SI: ``on_time=0.2`` (s).
+        `Options` of several schemes or those of one, or their fields by keyword, in SI:
+        ``on_time=0.2`` (s).
 
     Examples
     --------
@@ -143,7 +159,8 @@ def plan(spacecraft: Spacecraft, scheme: str | None = None, options: Choice = No
     """
     from nutdamp.planning import plan as planning
 
-    body, named = _expected(spacecraft), None if scheme is None else expect_names([scheme])[0]
+    body = _expected(spacecraft)
+    named = None if scheme is None else expect_names([scheme])[0]
     settled = expect_options(options, chosen, named)
     if named is not None:
         return planning.plan(body, named, settled)
@@ -167,36 +184,47 @@ def compare(
     Parameters
     ----------
     names
-        Schemes, default the classic three and optimal, or those that point where the file has a target axis.
+        Schemes, default the classic three and optimal, or those that point where the file has a
+        target axis.
     options, chosen
         As of `plan`; each scheme takes those that it has.
     samples, timed
-        Dispersed cases of each plan where the file has dispersions, 0 to judge nominal values alone; recommend pulses
+        Dispersed cases of each plan where the file has dispersions, 0 to judge nominal values
+        alone; recommend pulses
         that no command block can fire, too.
 
     Examples
     --------
-    >>> nutdamp.compare(nutdamp.example(), ["two-pulse", "four-pulse"], samples=0).recommended.scheme
+    >>> compared = nutdamp.compare(nutdamp.example(), ["two-pulse", "four-pulse"], samples=0)
+    >>> compared.recommended.scheme
     'four-pulse'
     """
     from nutdamp.planning import decision
 
-    body, schemes = _expected(spacecraft), expect_names(names)
+    body = _expected(spacecraft)
+    schemes = expect_names(names)
     count = samples if samples in (None, 0) else units.count("samples", samples)
-    return decision.compare(body, schemes, expect_options(options, chosen), samples=count, timed=timed)
+    return decision.compare(
+        body, schemes, expect_options(options, chosen), samples=count, timed=timed
+    )
 
 
 def robust(
-    compared: Comparison, options: Options | None = None, *, progress: Progress = lambda _done, _all: None
+    compared: Comparison,
+    options: Options | None = None,
+    *,
+    progress: Progress = lambda _done, _all: None,
 ) -> RobustComparison:
-    """Search the cheapest plan with which enough dispersed cases comply, as ``nutdamp plan --robust`` does.
+    """Search the cheapest plan with which enough dispersed cases comply, as ``nutdamp plan
+    --robust`` does.
 
     Raises BadRequest where the spacecraft file has no dispersions.
 
     Parameters
     ----------
     compared
-        The comparison of `compare`: its plans are among the candidates. ``options``: those that it was made with.
+        The comparison of `compare`: its plans are among the candidates. ``options``: those that it
+        was made with.
     progress
         Called with the number of attempts made, and that of all.
 
@@ -209,16 +237,21 @@ def robust(
     from nutdamp.planning.decision import Comparison
     from nutdamp.spacecraft.tolerances import expect_dispersions
 
-    expect_dispersions(units.instance("compared", compared, Comparison, "a Comparison").spacecraft.dispersions)
+    expect_dispersions(
+        units.instance("compared", compared, Comparison, "a Comparison").spacecraft.dispersions
+    )
     trials = search.variations_of(compared, options)
-    with work.steps(1.5 * len(trials), hook=lambda done, _: progress(done, len(trials))) as task:  # a third: flights
+    with work.steps(
+        1.5 * len(trials), hook=lambda done, _: progress(done, len(trials))
+    ) as task:  # a third: flights
         return search.compare(compared, trials, task.reach)
 
 
 def load_schedule(path: PathName, spacecraft: Spacecraft) -> Plan:
     """Load the pulses of a CSV file as ``plan --csv`` writes it, as a plan of that name.
 
-    Warns where columns contradict each other or a limit is broken. Raises CannotRead, or FaultyFile.
+    Warns where columns contradict each other or a limit is broken. Raises CannotRead, or
+    FaultyFile.
 
     Examples
     --------
@@ -234,8 +267,11 @@ def load_schedule(path: PathName, spacecraft: Spacecraft) -> Plan:
     return schedule
 
 
-def simulate(plan: Plan, until: float | None = None, *, flown: bool = False, samples: int = 1000) -> Simulation:
-    """Propagate a plan by the impulse sum (17) and through its real widths, as ``nutdamp simulate`` does.
+def simulate(
+    plan: Plan, until: float | None = None, *, flown: bool = False, samples: int = 1000
+) -> Simulation:
+    """Propagate a plan by the impulse sum (17) and through its real widths, as ``nutdamp simulate``
+    does.
 
     Parameters
     ----------
@@ -292,8 +328,11 @@ def trade(
     from nutdamp.planning import tradeoff
 
     body = _expected(spacecraft)
-    count, shifts = units.count("points", points), units.shifts(allow)
-    options = OptimalOptions(least=units.one_of("least", least, LEAST[:2]), with_disturbances=with_disturbances)
+    count = units.count("points", points)
+    shifts = units.shifts(allow)
+    options = OptimalOptions(
+        least=units.one_of("least", least, LEAST[:2]), with_disturbances=with_disturbances
+    )
     with work.steps(count * len({*shifts}), hook=progress):
         return tradeoff.trade(body, options, count=count, shifts=shifts, nominal=nominal)
 
@@ -309,19 +348,22 @@ def disperse(
     progress: Progress = lambda _done, _all: None,
     stopped: Callable[[], bool] = lambda: False,
 ) -> Dispersion:
-    """Fly the schedule of a plan through its real widths in dispersed cases, as ``nutdamp disperse`` does.
+    """Fly the schedule of a plan through its real widths in dispersed cases, as ``nutdamp
+    disperse`` does.
 
     Parameters
     ----------
     samples, seed
-        Number of cases, default as many as show the share required, 20,000 or more; and the seed of their draws: a
+        Number of cases, default as many as show the share required, 20,000 or more; and the seed of
+        their draws: a
         whole number from 0 to 2**64 - 1.
     threads
         Default: the processors there are.
     csv
         File of the inputs and outputs of each case, written as they are flown.
     remark, progress, stopped
-        Called with notes on the model; with the number of cases flown, and that of all; to end early. A stop before
+        Called with notes on the model; with the number of cases flown, and that of all; to end
+        early. A stop before
         the first case raises KeyboardInterrupt.
 
     Examples
@@ -342,7 +384,9 @@ def disperse(
         rows.check_room(units.path("csv", csv), study, count or work.SAMPLES)
 
     def fly(collect: Callable[..., None] | None) -> Results:
-        run = functools.partial(dispersion.run, threads=threads or dispersion.threads_here(), stopped=stopped)
+        run = functools.partial(
+            dispersion.run, threads=threads or dispersion.threads_here(), stopped=stopped
+        )
         with work.steps(count or work.SAMPLES, hook=progress) as task:
             stage = functools.partial(run, watch=task.reach, collect=collect)
             return dispersion.flown_in_stages(study, count, fly=stage, stopped=stopped)
@@ -362,9 +406,11 @@ def disperse_loop(
     progress: Progress = lambda _done, _all: None,
     stopped: Callable[[], bool] = lambda: False,
 ) -> LoopDispersion:
-    """Fly the closed loop of the file in dispersed cases to ``until`` s, as ``nutdamp disperse --loop`` does.
+    """Fly the closed loop of the file in dispersed cases to ``until`` s, as ``nutdamp disperse
+    --loop`` does.
 
-    ``samples``: default what shows the share required. Others: see `disperse`. Raises Infeasible where it cannot damp.
+    ``samples``: default what shows the share required. Others: see `disperse`. Raises Infeasible
+    where it cannot damp.
 
     >>> nutdamp.disperse_loop(nutdamp.example("upper-stage"), 20, until=60.0)
     <LoopDispersion: 20 of 20 cases comply>
@@ -389,7 +435,9 @@ def disperse_loop(
     return dispersion.LoopDispersion(*streamed(csv, study, LoopCasesWriter, fly))
 
 
-def loop(spacecraft: Spacecraft, until: float | None = None, *, seed: int = 1, case: int | None = None) -> LoopPlan:
+def loop(
+    spacecraft: Spacecraft, until: float | None = None, *, seed: int = 1, case: int | None = None
+) -> LoopPlan:
     """Fly the closed loop of the file, as ``nutdamp loop`` does.
 
     Parameters
@@ -397,7 +445,8 @@ def loop(spacecraft: Spacecraft, until: float | None = None, *, seed: int = 1, c
     until
         End, s, default the horizon after the nutation is at ``start``.
     seed, case
-        Of the noise of the sensor; number (from 1) of a dispersed case of `disperse_loop` with that seed.
+        Of the noise of the sensor; number (from 1) of a dispersed case of `disperse_loop` with that
+        seed.
 
     Examples
     --------
@@ -428,7 +477,8 @@ def verify(plan: Plan) -> Verified:
 
 
 def verify_loop(spacecraft: Spacecraft, until: float | None = None) -> LoopVerification:
-    """Fly the closed loop of the file in closed form and by DOP853 to ``until`` s, as ``nutdamp verify --loop`` does.
+    """Fly the closed loop of the file in closed form and by DOP853 to ``until`` s, as ``nutdamp
+    verify --loop`` does.
 
     Examples
     --------
@@ -437,7 +487,9 @@ def verify_loop(spacecraft: Spacecraft, until: float | None = None) -> LoopVerif
     """
     from nutdamp.control_loop import evaluation
 
-    return evaluation.verify_loop(_expected(spacecraft), None if until is None else units.end_of_flight(until))
+    return evaluation.verify_loop(
+        _expected(spacecraft), None if until is None else units.end_of_flight(until)
+    )
 
 
 def budget(
@@ -453,7 +505,8 @@ def budget(
     Parameters
     ----------
     thresholds, largest
-        Pairs (start, stop), rad, default those of the loop; nutation by which damping must begin, default as required.
+        Pairs (start, stop), rad, default those of the loop; nutation by which damping must begin,
+        default as required.
     seed, progress
         Of the noise of the sensor; called with the number of pairs done, and that of all.
 
@@ -465,7 +518,8 @@ def budget(
     from nutdamp.control_loop import budget as holding
     from nutdamp.spacecraft.requirements import expect_loop
 
-    body, rows = _expected(spacecraft), [holding.Thresholds(*pair) for pair in units.thresholds(thresholds)]
+    body = _expected(spacecraft)
+    rows = [holding.Thresholds(*pair) for pair in units.thresholds(thresholds)]
     if largest is not None:
         units.tilt(largest)
     if rows:
@@ -489,7 +543,8 @@ def export(
     format, path
         Name of the format and of the file.
     until, xml
-        End of a history or spin table, s; CCSDS messages as XML, default where the name ends in .xml.
+        End of a history or spin table, s; CCSDS messages as XML, default where the name ends in
+        .xml.
 
     Examples
     --------
@@ -499,7 +554,8 @@ def export(
     from nutdamp.planning.plan import feasible
     from nutdamp.views.exchange import FORMATS, export_text
 
-    form, name = units.one_of("format", format, tuple(FORMATS)), units.path("path", path)
+    form = units.one_of("format", format, tuple(FORMATS))
+    name = units.path("path", path)
     end = None if until is None else units.end_of_flight(until)
     notation = FORMATS[form].message and name.lower().endswith(".xml") if xml is None else xml
     write_whole(name, export_text(feasible(plan), form, xml=notation, until=end))
@@ -518,9 +574,11 @@ def fit(
     Parameters
     ----------
     telemetry, sun_pulses, schedule
-        Names of the CSV files, and of that of the pulses fired during the record, or a plan of `load_schedule`.
+        Names of the CSV files, and of that of the pulses fired during the record, or a plan of
+        `load_schedule`.
     ignored
-        Called with columns that are ignored, in place of Python warnings of them and of doubts about the estimates.
+        Called with columns that are ignored, in place of Python warnings of them and of doubts
+        about the estimates.
 
     Examples
     --------
@@ -535,11 +593,15 @@ def fit(
     from nutdamp.planning.plan import Plan
     from nutdamp.views.text import text
 
-    body, name, odd = _expected(spacecraft), units.path("telemetry", telemetry), list[str]()
+    body = _expected(spacecraft)
+    name = units.path("telemetry", telemetry)
+    odd = list[str]()
     if schedule is None or isinstance(schedule, Plan):
         fired = None if schedule is None else schedule.pulses
     else:
-        fired, odd = read_pulses(units.path("schedule", schedule, "a Plan or the name of a file"), body)
+        fired, odd = read_pulses(
+            units.path("schedule", schedule, "a Plan or the name of a file"), body
+        )
     times = None if sun_pulses is None else units.path("sun_pulses", sun_pulses)
     record, remarks = read_telemetry(name, body, times, fired)
     for remark in (*odd, *remarks):
@@ -560,7 +622,8 @@ def report(
     points: int | None = None,
     **control: str,
 ) -> Report:
-    """Compare the schemes named, and write the page of ``nutdamp report``; raises MissingExtra without the extra plot.
+    """Compare the schemes named, and write the page of ``nutdamp report``; raises MissingExtra
+    without the extra plot.
 
     Parameters
     ----------
@@ -583,7 +646,8 @@ def report(
     from nutdamp.page.report import called, expect_html, made_of
     from nutdamp.spacecraft.model import Spacecraft
 
-    name, kept = units.path("output", output), controlled(**control)
+    name = units.path("output", output)
+    kept = controlled(**control)
     expect_html(name)
     body = spacecraft if isinstance(spacecraft, Spacecraft) else load(spacecraft)
     samples = disperse if disperse in (None, 0) else units.count("disperse", disperse)

@@ -1,4 +1,6 @@
-"""Exceptions, and faults with their place, as data; the command line turns them into messages and exit statuses."""
+"""Exceptions, and faults with their place, as data; the command line turns them into messages and
+exit statuses.
+"""
 
 from __future__ import annotations
 
@@ -10,9 +12,11 @@ from typing import NamedTuple
 
 
 class NutdampError(Exception):
-    """Root of all errors that a user can cause and cure; anything else is a bug and keeps its traceback.
+    """Root of all errors that a user can cause and cure; anything else is a bug and keeps its
+    traceback.
 
-    The arguments of the constructor are in ``args``, so that an error can be pickled and passed between processes.
+    The arguments of the constructor are in ``args``, so that an error can be pickled and passed
+    between processes.
     """
 
 
@@ -20,7 +24,10 @@ def printable(text: str) -> str:
     """A text such as the name of a file, with unprintable and control characters escaped."""
     if text.isprintable():
         return text
-    return "".join(char if char.isprintable() else char.encode("unicode_escape").decode("ascii") for char in text)
+    return "".join(
+        char if char.isprintable() else char.encode("unicode_escape").decode("ascii")
+        for char in text
+    )
 
 
 def nearest(word: str, known: Iterable[str]) -> str | None:
@@ -46,11 +53,17 @@ class Fault(NamedTuple):
     problem: str
 
     def __str__(self) -> str:
-        return f"{self.place}: {self.where}: {self.problem}" if self.where else f"{self.place}: {self.problem}"
+        return (
+            f"{self.place}: {self.where}: {self.problem}"
+            if self.where
+            else f"{self.place}: {self.problem}"
+        )
 
     @property
     def place(self) -> str:
-        """``FILE:LINE:COLUMN``; without a line it is a file as a whole, or a setting such as ``--set KEY=VALUE``."""
+        """``FILE:LINE:COLUMN``; without a line it is a file as a whole, or a setting such as
+        ``--set KEY=VALUE``.
+        """
         file = printable(self.file)
         return f"{file}:{self.line}:{self.column}" if self.line else file
 
@@ -87,7 +100,8 @@ class BadRequest(NutdampError):
 
 
 class Unsuitable(BadRequest):
-    """A value of the spacecraft file that does not suit the request, and else is none of its faults.
+    """A value of the spacecraft file that does not suit the request, and else is none of its
+    faults.
 
     ``where`` is the path of keys to it, such as ``("attitude", "epoch")``.
     """
@@ -101,7 +115,9 @@ class Unsuitable(BadRequest):
 
 
 class SenselessOption(BadRequest):
-    """An option of a scheme whose value makes no sense: its ``name``, the value as ``shown``, and the ``problem``."""
+    """An option of a scheme whose value makes no sense: its ``name``, the value as ``shown``, and
+    the ``problem``.
+    """
 
     def __init__(self, name: str, shown: str, problem: str) -> None:
         super().__init__(name, shown, problem)
@@ -156,7 +172,9 @@ class Infeasible(NutdampError):
 
 
 class TooShort(Infeasible):
-    """A scheme that a longer horizon would make feasible: ``why``, and a ``cure`` that names the horizon, if known."""
+    """A scheme that a longer horizon would make feasible: ``why``, and a ``cure`` that names the
+    horizon, if known.
+    """
 
     def __init__(self, why: str, cure: str = "") -> None:
         self.why, self.cure = why, cure
@@ -173,12 +191,18 @@ def listed(words: Sequence[str], last: str = "and") -> str:
 
 def span(least: float, most: float, unit: str) -> str:
     """``0.2 s to 5 s``, or ``at least 0.2 s`` where there is no ``most``."""
-    return f"at least {least:.4g} {unit}" if math.isinf(most) else f"{least:.4g} {unit} to {most:.4g} {unit}"
+    return (
+        f"at least {least:.4g} {unit}"
+        if math.isinf(most)
+        else f"{least:.4g} {unit} to {most:.4g} {unit}"
+    )
 
 
 def warn(text: str) -> None:
     """Python warning at the line that called the library."""
-    level, frame = 1, sys._getframe()
+    level = 1
+    frame = sys._getframe()
     while frame.f_back is not None and str(frame.f_globals.get("__name__")).startswith("nutdamp."):
-        level, frame = level + 1, frame.f_back
+        level = level + 1
+        frame = frame.f_back
     warnings.warn(text, stacklevel=level)

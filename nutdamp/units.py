@@ -1,8 +1,8 @@
 """Quantities: units, parsing and ranges; checks of the arguments of Python users.
 
-A quantity is a number, which is SI, or a text with a unit of the table `KINDS`. Any other unit is refused, and the
-message names those allowed: revolutions are left out on purpose, and Hz is for sampling rates alone, since nobody can
-tell whether they count turns or radians.
+A quantity is a number, which is SI, or a text with a unit of the table `KINDS`. Any other unit is
+refused, and the message names those allowed: revolutions are left out on purpose, and Hz is for
+sampling rates alone, since nobody can tell whether they count turns or radians.
 """
 
 from __future__ import annotations
@@ -49,32 +49,52 @@ class Kind:
 
 
 POUND, FOOT, STANDARD_GRAVITY = 0.45359237, 0.3048, 9.80665
-"""International pound, kg, and foot, m (yard and pound agreement of 1959); gravity, m/s² (3rd CGPM, 1901)."""
+"""International pound, kg, and foot, m (yard and pound agreement of 1959); gravity, m/s² (3rd CGPM,
+1901).
+"""
 
 POUND_FORCE = POUND * STANDARD_GRAVITY
 """N."""
 
 KINDS: dict[str, Kind] = {
     "mass": Kind("a mass", {"kg": 1.0, "g": 1e-3, "lbm": POUND, "slug": POUND_FORCE / FOOT}),
-    "length": Kind("a length", {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "km": 1e3, "ft": FOOT, "in": FOOT / 12.0}),
+    "length": Kind(
+        "a length", {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "km": 1e3, "ft": FOOT, "in": FOOT / 12.0}
+    ),
     "time": Kind("a time", {"s": 1.0, "ms": 1e-3, "min": 60.0, "hours": 3600.0}),
     "force": Kind("a force", {"N": 1.0, "mN": 1e-3, "lbf": POUND_FORCE}),
     "torque": Kind(
-        "a torque", {"N m": 1.0, "mN m": 1e-3, "ft lbf": POUND_FORCE * FOOT, "in lbf": POUND_FORCE * FOOT / 12.0}
+        "a torque",
+        {
+            "N m": 1.0,
+            "mN m": 1e-3,
+            "ft lbf": POUND_FORCE * FOOT,
+            "in lbf": POUND_FORCE * FOOT / 12.0,
+        },
     ),
     "inertia": Kind(
-        "a moment of inertia", {"kg m^2": 1.0, "slug ft^2": POUND_FORCE * FOOT, "lbm in^2": POUND * (FOOT / 12.0) ** 2}
+        "a moment of inertia",
+        {"kg m^2": 1.0, "slug ft^2": POUND_FORCE * FOOT, "lbm in^2": POUND * (FOOT / 12.0) ** 2},
     ),
     "momentum": Kind(
         "an angular momentum",
-        {"N m s": 1.0, "kg m^2/s": 1.0, "ft lbf s": POUND_FORCE * FOOT, "in lbf s": POUND_FORCE * FOOT / 12.0},
+        {
+            "N m s": 1.0,
+            "kg m^2/s": 1.0,
+            "ft lbf s": POUND_FORCE * FOOT,
+            "in lbf s": POUND_FORCE * FOOT / 12.0,
+        },
     ),
     "shed": Kind("a moment of inertia for each kg", {"kg m^2/kg": 1.0, "m^2": 1.0}),
     "travel": Kind("a length for each kg", {"m/kg": 1.0, "mm/kg": 1e-3}),
     "angle": Kind("an angle", {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180.0}),
-    "rate": Kind("an angular rate", {"rad/s": 1.0, "deg/s": math.pi / 180.0, "rpm": math.pi / 30.0}),
+    "rate": Kind(
+        "an angular rate", {"rad/s": 1.0, "deg/s": math.pi / 180.0, "rpm": math.pi / 30.0}
+    ),
     "speed": Kind("a speed", {"m/s": 1.0, "km/s": 1e3, "ft/s": FOOT}),
-    "pressure": Kind("a pressure", {"Pa": 1.0, "bar": 1e5, "psi": POUND_FORCE / (FOOT / 12.0) ** 2}),
+    "pressure": Kind(
+        "a pressure", {"Pa": 1.0, "bar": 1e5, "psi": POUND_FORCE / (FOOT / 12.0) ** 2}
+    ),
     "impulse": Kind("an impulse", {"N s": 1.0, "lbf s": POUND_FORCE}),
     "acceleration": Kind("an acceleration", {"m/s^2": 1.0, "mm/s^2": 1e-3, "ft/s^2": FOOT}),
     "frequency": Kind("a sampling rate", {"Hz": 1.0}),
@@ -84,12 +104,16 @@ KINDS: dict[str, Kind] = {
 """The kinds of quantity by name; ``number`` has no unit, such as the parts of a quaternion."""
 
 LARGEST = 1e15
-"""Largest magnitude in SI: nothing physical is larger, and results of larger values could overflow."""
+"""Largest magnitude in SI: nothing physical is larger,
+and results of larger values could overflow.
+"""
 
 LARGEST_SEED = 2**64 - 1
 """Largest seed of random numbers."""
 
-_QUANTITY = re.compile(r"\s*([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)\s*(.*?)\s*", re.DOTALL)
+_QUANTITY = re.compile(
+    r"\s*([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)\s*(.*?)\s*", re.DOTALL
+)
 _TURNS = re.compile(r"k?hz|rev.*|r/(s|min)|cps|turns?.*", re.IGNORECASE)
 
 _WORDS = {"deg": "(deg(rees?)?|°)", "s": "s(ec)?", "hours": "hours?", "rpm": "[rR][pP][mM]"}
@@ -114,15 +138,16 @@ _UNITS = [
 def parse(value: object, kind: str, *, bare: bool = False) -> float:
     """SI value of a quantity: a number, or a text with a unit of ``kind``.
 
-    ``bare`` accepts a text that is only a number, as command lines give it; in a file that is a slip.
-    Raises ValueError, with a message on the fault and the values allowed; also for NaN, infinite and
-    unphysically large values.
+    ``bare`` accepts a text that is only a number, as command lines give it; in a file that is a
+    slip. Raises ValueError, with a message on the fault and the values allowed; also for NaN,
+    infinite and unphysically large values.
     """
     expected = KINDS[kind]
     if isinstance(value, str):
         number, factor = _split(value, kind, bare)
     elif isinstance(value, int | float) and not isinstance(value, bool):
-        number, factor = value, 1.0
+        number = value
+        factor = 1.0
     else:
         raise ValueError(f"expected {expected.noun} ({expected.expected}), got {shown(value)}")
     try:
@@ -132,7 +157,8 @@ def parse(value: object, kind: str, *, bare: bool = False) -> float:
     if not math.isfinite(result):
         raise ValueError(f"{shown(value)} is not a finite number")
     if abs(result) > LARGEST:
-        raise ValueError(f"{shown(value)} is beyond anything physical; at most {LARGEST:g} {expected.si}".rstrip())
+        largest = f"{LARGEST:g} {expected.si}".rstrip()
+        raise ValueError(f"{shown(value)} is beyond anything physical; at most {largest}")
     return result
 
 
@@ -145,26 +171,38 @@ def _split(text: str, kind: str, bare: bool) -> tuple[float, float]:
         comma = re.match(r"\s*[-+]?[0-9]+,[0-9]+\s*($|[^0-9.,\s])", text)
         point = f"; write {shown(text.replace(',', '.', 1))}, with a decimal point" if comma else ""
         raise ValueError(f"{shown(text)} is not {expected.noun}: {expected.expected}{point}")
-    number, unit = float(match[1]), re.sub(r"\s+", " ", match[2])
+    number = float(match[1])
+    unit = re.sub(r"\s+", " ", match[2])
     if not unit and bare:
         return number, 1.0
     if not expected.factors:
         raise ValueError(f"{shown(text)} is not {expected.noun}: {expected.expected}")
     if not unit:
-        raise ValueError(f"{shown(text)} has no unit; add {expected.units}, or leave the quotes out")
-    known = next(((name, factor) for spelling, name, factor in _UNITS if spelling.fullmatch(unit)), None)
+        raise ValueError(
+            f"{shown(text)} has no unit; add {expected.units}, or leave the quotes out"
+        )
+    known = next(
+        ((name, factor) for spelling, name, factor in _UNITS if spelling.fullmatch(unit)), None
+    )
     if known is None or (known[0] == "frequency" and kind != "frequency"):
         noun = expected.noun.partition(" ")[2]
         turns = kind in ("rate", "angle") and _TURNS.fullmatch(unit)
         hint = f" ({match[2]} hides a factor 2π)" if turns else ""
-        raise ValueError(f"{shown(text)}: {shown(match[2])} is not a unit of {noun}; use {expected.units}{hint}")
+        raise ValueError(
+            f"{shown(text)}: {shown(match[2])} is not a unit of {noun}; use {expected.units}{hint}"
+        )
     if known[0] != kind:
-        raise ValueError(f"{shown(text)} is {KINDS[known[0]].noun}; expected {expected.noun}: {expected.expected}")
+        raise ValueError(
+            f"{shown(text)} is {KINDS[known[0]].noun}; expected {expected.noun}: "
+            f"{expected.expected}"
+        )
     return number, known[1]
 
 
 def pattern(kind: str) -> str:
-    """Regular expression (ECMA 262 and Python) of the texts that `parse` takes for ``kind``; for JSON Schema."""
+    """Regular expression (ECMA 262 and Python) of the texts that `parse` takes for ``kind``; for
+    JSON Schema.
+    """
     units = "|".join(map(_spellings, KINDS[kind].factors))
     return rf"^\s*[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?\s*({units})\s*$"
 
@@ -172,8 +210,16 @@ def pattern(kind: str) -> str:
 SI, US = "si", "us"
 """Systems of units of screens; files are SI."""
 
-_US_UNITS = {"N m": "ft lbf", "kg m²": "slug ft²", "kg": "lbm", "g": "lbm", "N": "lbf", "mm": "in", "m": "ft",
-             "bar": "psi"}  # fmt: skip
+_US_UNITS = {
+    "N m": "ft lbf",
+    "kg m²": "slug ft²",
+    "kg": "lbm",
+    "g": "lbm",
+    "N": "lbf",
+    "mm": "in",
+    "m": "ft",
+    "bar": "psi",
+}
 """Units of screens, and the US customary ones in their place."""
 
 _CUSTOMARY = re.compile(rf"({'|'.join(_US_UNITS)})(?= s$|/|$)")
@@ -193,11 +239,17 @@ def screen_units(system: str) -> Iterator[None]:
 
 
 def screen_unit(unit: str, scale: float = 1.0) -> tuple[str, float]:
-    """The unit of screens for a unit of SI, and ``scale``, a factor to the latter, as one to the former."""
+    """The unit of screens for a unit of SI, and ``scale``, a factor to the latter, as one to the
+    former.
+    """
     replaced = _CUSTOMARY.match(unit) if _system.get() == US else None
     if replaced is None:
         return unit, scale
-    factors = {name.replace("^2", "²"): factor for kind in KINDS.values() for name, factor in kind.factors.items()}
+    factors = {
+        name.replace("^2", "²"): factor
+        for kind in KINDS.values()
+        for name, factor in kind.factors.items()
+    }
     customary = _US_UNITS[replaced[0]]
     return customary + unit[replaced.end() :], scale * factors[replaced[0]] / factors[customary]
 
@@ -244,7 +296,9 @@ def changes(value: Any) -> Mapping[str, object]:
         return {}
     if isinstance(value, Mapping) and all(isinstance(key, str) for key in value):
         return value
-    raise BadRequest(f"set: expected a mapping such as {{'limits.horizon': '300 s'}}, got {as_given(value)}")
+    raise BadRequest(
+        f"set: expected a mapping such as {{'limits.horizon': '300 s'}}, got {as_given(value)}"
+    )
 
 
 def end_of_flight(value: Any) -> float:
@@ -265,7 +319,9 @@ def tilt(value: Any, name: str = "largest") -> float:
     """An angle in rad between 0 and a right angle; raises BadRequest."""
     if is_number(value) and 0.0 < value < 0.5 * math.pi:
         return float(value)
-    raise BadRequest(f"{name} = {as_given(value)}: expected an angle in rad between 0 and a right angle")
+    raise BadRequest(
+        f"{name} = {as_given(value)}: expected an angle in rad between 0 and a right angle"
+    )
 
 
 def count(name: str, value: Any, least: int = 1) -> int:
@@ -280,7 +336,9 @@ def shifts(value: Any) -> tuple[float, ...]:
     angles = tuple(value) if isinstance(value, Iterable) and not isinstance(value, str) else ()
     if angles and all((is_number(angle) or angle == math.inf) and angle >= 0.0 for angle in angles):
         return tuple(map(float, angles))
-    raise BadRequest(f"allow = {as_given(value)}: expected angles of at least 0, in rad, such as (0.0, math.inf)")
+    raise BadRequest(
+        f"allow = {as_given(value)}: expected angles of at least 0, in rad, such as (0.0, math.inf)"
+    )
 
 
 def thresholds(value: Any) -> tuple[tuple[float, float], ...]:
@@ -288,8 +346,15 @@ def thresholds(value: Any) -> tuple[tuple[float, float], ...]:
     pairs = tuple(value) if isinstance(value, Iterable) else (value,)
     for pair in pairs:
         angles = tuple(pair) if isinstance(pair, Sequence) and not isinstance(pair, str) else ()
-        if not (len(angles) == 2 and all(map(is_number, angles)) and 0.0 <= angles[1] < angles[0] < 0.5 * math.pi):
-            what = "pairs of angles in rad below a right angle, the second smaller, such as [(0.01, 0.002)]"
+        if not (
+            len(angles) == 2
+            and all(map(is_number, angles))
+            and 0.0 <= angles[1] < angles[0] < 0.5 * math.pi
+        ):
+            what = (
+                "pairs of angles in rad below a right angle, the second smaller, "
+                "such as [(0.01, 0.002)]"
+            )
             raise BadRequest(f"thresholds: expected {what}, got {as_given(pair)}")
     return tuple((float(start), float(stop)) for start, stop in pairs)
 
@@ -315,7 +380,11 @@ def as_given(value: object) -> str:
     """A value as a message names it: short ones in full, others by their type."""
     text = repr(value) if isinstance(value, str | Real | None) else ""
     kind = type(value)
-    return text if 0 < len(text) <= 60 else f"a {kind.__module__}.{kind.__qualname__}".replace("builtins.", "")
+    return (
+        text
+        if 0 < len(text) <= 60
+        else f"a {kind.__module__}.{kind.__qualname__}".replace("builtins.", "")
+    )
 
 
 def replaced(value: Record, fields: Mapping[str, object]) -> Record:
@@ -354,11 +423,15 @@ def _meaning(kind: Any) -> tuple[str, Callable[[Any], bool]]:
         held = parts[0]
         return (
             f"a tuple of {held.__name__}",
-            lambda value: isinstance(value, tuple) and all(isinstance(entry, held) for entry in value),
+            lambda value: (
+                isinstance(value, tuple) and all(isinstance(entry, held) for entry in value)
+            ),
         )
     if kind is float:
         return "a number", is_number
-    return {str: "a text", type(None): "None"}.get(kind, f"a {kind.__name__}"), lambda value: isinstance(value, kind)
+    return {str: "a text", type(None): "None"}.get(
+        kind, f"a {kind.__name__}"
+    ), lambda value: isinstance(value, kind)
 
 
 def _is_vector(value: Any) -> bool:

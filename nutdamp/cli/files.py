@@ -1,4 +1,6 @@
-"""Commands on files: ``check``, ``init``, ``schema``, ``explain``, ``export``, ``import``, ``report``, ``verify``."""
+"""Commands on files: ``check``, ``init``, ``schema``, ``explain``, ``export``, ``import``,
+``report``, ``verify``.
+"""
 
 from __future__ import annotations
 
@@ -32,7 +34,14 @@ from nutdamp.cli.options import (
     NameType,
     goal_options,
 )
-from nutdamp.cli.plan import compared_with, flown_options, fronts_of, plan_or_read, robust_of, scheme_option
+from nutdamp.cli.plan import (
+    compared_with,
+    flown_options,
+    fronts_of,
+    plan_or_read,
+    robust_of,
+    scheme_option,
+)
 from nutdamp.cli.screen import console, look_of_screen, say, show, show_failures
 from nutdamp.common.work import SAMPLES
 from nutdamp.errors import BadRequest, nearest, printable
@@ -50,9 +59,15 @@ if TYPE_CHECKING:
 @click.option("--json", type=OUTPUT, help="Write derived quantities and faults.")
 @screen_options
 def check_command(
-    files: tuple[str, ...], settings: tuple[Setting, ...], json: str | None, verbose: bool, quiet: bool
+    files: tuple[str, ...],
+    settings: tuple[Setting, ...],
+    json: str | None,
+    verbose: bool,
+    quiet: bool,
 ) -> None:
-    """Check spacecraft files: all faults of all files, derived quantities, channel torques, smallest steps."""
+    """Check spacecraft files: all faults of all files, derived quantities, channel torques,
+    smallest steps.
+    """
     from nutdamp.errors import CannotRead, CannotWrite, FaultyFile
     from nutdamp.views.check import check_json, check_screen, checked, failed_json
 
@@ -94,17 +109,25 @@ def check_command(
 @spacecraft_argument
 @flown_options("Verify")
 @goal_options
-@click.option("--loop", "looped", is_flag=True, help="Verify the closed loop of the file: each firing, by DOP853.")
+@click.option(
+    "--loop",
+    "looped",
+    is_flag=True,
+    help="Verify the closed loop of the file: each firing, by DOP853.",
+)
 @click.option("--json", type=OUTPUT, help="Write methods, differences and error budget.")
 @screen_options
 def verify_command(job: Job, looped: bool, verbose: bool) -> None:
-    """Fly a schedule by impulse sum, Taylor series, DOP853 and Basilisk (where installed), side by side.
+    """Fly a schedule by impulse sum, Taylor series, DOP853 and Basilisk (where installed), side by
+    side.
 
-    Shows the largest differences and what is conserved, with -v what each imperfection alone leaves. Motions too long
-    for DOP853 and Basilisk are not confirmed: exit status 3.
+    Shows the largest differences and what is conserved, with -v what each imperfection alone
+    leaves. Motions too long for DOP853 and Basilisk are not confirmed: exit status 3.
     """
     if looped and any(job.flown):
-        raise click.UsageError("name what to verify: one of --scheme, --schedule, --blocks and --loop")
+        raise click.UsageError(
+            "name what to verify: one of --scheme, --schedule, --blocks and --loop"
+        )
     job.begin()
 
     from nutdamp.api import verify, verify_loop
@@ -115,7 +138,10 @@ def verify_command(job: Job, looped: bool, verbose: bool) -> None:
             comparison = verify_loop(job.spacecraft)
         job.deliver(comparison)
         if comparison.missing:
-            say(f"nutdamp: DOP853 did not fly the loop to its end, so it is not confirmed: {comparison.missing}")
+            say(
+                "nutdamp: DOP853 did not fly the loop to its end, so it is not confirmed: "
+                f"{comparison.missing}"
+            )
             leave(infeasible=True)
         if not comparison.agree:
             say("nutdamp: the loop and the same by DOP853 do not agree; please report this")
@@ -130,23 +156,31 @@ def verify_command(job: Job, looped: bool, verbose: bool) -> None:
         others = " and ".join(core.disagreeing)
         say(f"nutdamp: the flown motion and {others} do not agree; please report this")
     elif not core.checks:
-        say("nutdamp: no independent integration was flown to the end, so the flown motion is not confirmed")
+        say(
+            "nutdamp: no independent integration was flown to the end, "
+            "so the flown motion is not confirmed"
+        )
     for quantity in core.drifting:
-        say(f"nutdamp: {quantity} is not constant on coasts, where nothing changes it; please report this")
+        say(
+            f"nutdamp: {quantity} is not constant on coasts, where nothing changes it; "
+            "please report this"
+        )
     leave(failed=bool(core.disagreeing or core.drifting), infeasible=not core.checks)
 
 
 @click.command("init")
 @click.argument("file", type=FILE, default=DEFAULT_FILE, metavar="[FILE]")
 @click.option("--from", "name", metavar="NAME", help="One of the examples of --list instead.")
-@click.option("--list", "listed", is_flag=True, help="List the examples that there are, and write nothing.")
+@click.option(
+    "--list", "listed", is_flag=True, help="List the examples that there are, and write nothing."
+)
 @click.option("--force", is_flag=True, help="Replace an existing file.")
 @quiet_option
 def init_command(file: str, name: str | None, listed: bool, force: bool, quiet: bool) -> None:
     """Write a commented spacecraft file (default spacecraft.yaml); a FILE of - is standard output.
 
-    It is the built-in example, in which every key is described, or with --from one of the spacecraft that ship with
-    nutdamp, each with the sources of its figures.
+    It is the built-in example, in which every key is described, or with --from one of the
+    spacecraft that ship with nutdamp, each with the sources of its figures.
     """
     from nutdamp.errors import CannotWrite
     from nutdamp.files.reader import BUILT_IN, example_names, example_subject, example_text
@@ -159,7 +193,11 @@ def init_command(file: str, name: str | None, listed: bool, force: bool, quiet: 
         return
     if name and name not in example_names():
         close = nearest(name, example_names())
-        cure = f"did you mean {close!r}?" if close else "`nutdamp init --list` lists those that there are"
+        cure = (
+            f"did you mean {close!r}?"
+            if close
+            else "`nutdamp init --list` lists those that there are"
+        )
         raise click.BadParameter(f"there is no example {name!r}; {cure}", param_hint="'--from'")
     text = example_text(name or BUILT_IN)
     if file != STDOUT and check_place(file).exists() and not force:
@@ -170,7 +208,9 @@ def init_command(file: str, name: str | None, listed: bool, force: bool, quiet: 
 
 
 @click.command("schema")
-@click.option("-o", "--output", type=OUTPUT, default="-", help="Where to write it; default standard output.")
+@click.option(
+    "-o", "--output", type=OUTPUT, default="-", help="Where to write it; default standard output."
+)
 def schema_command(output: str) -> None:
     """Print the JSON Schema of the spacecraft file, for editors that complete and check YAML."""
     from nutdamp.files.reader import json_schema
@@ -182,15 +222,20 @@ def schema_command(output: str) -> None:
 @click.command("explain")
 @click.argument("topic", nargs=-1, metavar="[TOPIC]")
 def explain_command(topic: tuple[str, ...]) -> None:
-    """Explain a page of the guide, a scheme, an equation, a heading of a table, or a key of the spacecraft file.
+    """Explain a page of the guide, a scheme, an equation, a heading of a table, or a key of the
+    spacecraft file.
 
-    TOPIC is a page or a scheme; a number such as 17, K7 or 24.4, or `equations` for all; a word such as `tilt`, `H`
-    or `on_time_s`; `file.thrusters`. Without it the pages are listed. On a terminal long pages go through a pager.
+    TOPIC is a page or a scheme; a number such as 17, K7 or 24.4, or `equations` for all; a word
+    such as `tilt`, `H` or `on_time_s`; `file.thrusters`. Without it the pages are listed. On a
+    terminal long pages go through a pager.
     """
     from nutdamp.views import explain
 
-    requested, shown = " ".join(topic).strip(), console()
-    screen = explain.topic_screen(explain.explained(requested)) if requested else explain.topics_screen()
+    requested = " ".join(topic).strip()
+    shown = console()
+    screen = (
+        explain.topic_screen(explain.explained(requested)) if requested else explain.topics_screen()
+    )
     if shown.is_terminal and on_keyboard():
         with shown.capture() as captured:
             shown.print(screen)
@@ -214,19 +259,28 @@ def on_keyboard() -> bool:
     required=True,
     help=f"{'; '.join(f'{row.name}: {row.summary}' for row in FORMATS.values())}.",
 )
-@click.option("--xml", is_flag=True, help="CCSDS: XML instead of keyword = value; also where FILE ends in .xml.")
+@click.option(
+    "--xml",
+    is_flag=True,
+    help="CCSDS: XML instead of keyword = value; also where FILE ends in .xml.",
+)
 @flown_options("Export")
 @goal_options
 @click.option(
-    "--until", type=END, help="Histories, spin-table: end; default last pulse + one inertial period, or last pulse."
+    "--until",
+    type=END,
+    help="Histories, spin-table: end; default last pulse + one inertial period, or last pulse.",
 )
-@click.option("-o", "--output", type=OUTPUT, default="-", help="Where to write it; default standard output.")
+@click.option(
+    "-o", "--output", type=OUTPUT, default="-", help="Where to write it; default standard output."
+)
 @quiet_option
 def export_command(job: Job, form: str, xml: bool, until: float | None) -> None:
     """Write a schedule in a format that other tools read.
 
-    The CCSDS messages and stk need attitude.epoch and attitude.frame in the spacecraft file; opm also mass, and orbit
-    for its state. Vectors are in the axes of that file, those of opm in attitude.frame.
+    The CCSDS messages and stk need attitude.epoch and attitude.frame in the spacecraft file; opm
+    also mass, and orbit for its state. Vectors are in the axes of that file, those of opm in
+    attitude.frame.
     """
     from nutdamp.api import export
     from nutdamp.views.verdict import stated
@@ -251,27 +305,43 @@ def export_command(job: Job, form: str, xml: bool, until: float | None) -> None:
 
 @click.command("import", cls=SessionCommand)
 @click.argument("given", nargs=-1, required=True, type=FILE, metavar="[apm] FILE")
-@click.option("-o", "--output", type=OUTPUT, default="-", help="Spacecraft file to write; default standard output.")
+@click.option(
+    "-o",
+    "--output",
+    type=OUTPUT,
+    default="-",
+    help="Spacecraft file to write; default standard output.",
+)
 @click.option("--into", type=FILE, help="Spacecraft file into which the message is merged.")
 @click.option("--inertia", is_flag=True, help="Merge the moments of inertia too.")
 @click.option("--at", type=END, help="Record of an AEM, after its first; default the first.")
-@click.option("--schedule", type=OUTPUT, help="Write the manoeuvres as a schedule for `simulate --schedule`.")
+@click.option(
+    "--schedule", type=OUTPUT, help="Write the manoeuvres as a schedule for `simulate --schedule`."
+)
 @quiet_option
-def import_command(job: Job, given: tuple[str, ...], into: str | None, inertia: bool, at: float | None) -> None:
-    """Make a spacecraft file from a CCSDS attitude parameter message (APM, version 2, KVN), or merge one into a file.
+def import_command(
+    job: Job, given: tuple[str, ...], into: str | None, inertia: bool, at: float | None
+) -> None:
+    """Make a spacecraft file from a CCSDS attitude parameter message (APM, version 2, KVN), or
+    merge one into a file.
 
-    With --into the attitude, epoch and rates of an APM, or of a record of an attitude history (AEM), replace those of a
-    spacecraft file; all else stays. Without it the message needs an inertia block and the motion: angular velocity or
-    spin. It knows no thrusters; where all its manoeuvres are transverse and of one torque, the file gets a steerable
-    torquer of that torque. FILE may be - for standard input.
+    With --into the attitude, epoch and rates of an APM, or of a record of an attitude history
+    (AEM), replace those of a spacecraft file; all else stays. Without it the message needs an
+    inertia block and the motion: angular velocity or spin. It knows no thrusters; where all its
+    manoeuvres are transverse and of one torque, the file gets a steerable torquer of that torque.
+    FILE may be - for standard input.
     """
     *form, file = given
     if form not in ([], ["apm"]):
-        raise click.UsageError(f"expected one FILE, an attitude parameter message; got {' '.join(given)}")
+        raise click.UsageError(
+            f"expected one FILE, an attitude parameter message; got {' '.join(given)}"
+        )
     output, schedule = job.written["output"], job.written["schedule"]
     expect_outputs(file, into, output=output, schedule=schedule)
     if into is None and (inertia or at is not None):
-        raise click.UsageError("--inertia and --at say what to merge: name the spacecraft file with --into")
+        raise click.UsageError(
+            "--inertia and --at say what to merge: name the spacecraft file with --into"
+        )
 
     from nutdamp.files.ccsds.read import (
         ApmContents,
@@ -289,18 +359,24 @@ def import_command(job: Job, given: tuple[str, ...], into: str | None, inertia: 
 
     if into is not None:
         if schedule is not None:
-            raise click.UsageError("--schedule writes the manoeuvres of a message that makes a spacecraft file")
+            raise click.UsageError(
+                "--schedule writes the manoeuvres of a message that makes a spacecraft file"
+            )
         message = read_history(file) if is_history(file) else read_apm(file)
         for entry in message.remarks:
             job.remark(f"{file}: {entry}")
-        merged = merged_text(FileInput(into).source(job.remark, job.doubt), message, at or 0.0, inertia=inertia)
+        merged = merged_text(
+            FileInput(into).source(job.remark, job.doubt), message, at or 0.0, inertia=inertia
+        )
         deliver([(output, lambda: merged)])
         if isinstance(message, ApmContents):
             for entry in ratio_doubts(message, read_spacecraft(merged, into)):
                 say(f"{file}: warning: {entry}")
         return
     if is_history(file):
-        raise BadRequest(f"{file}: an attitude history has no inertia; --into merges it into a spacecraft file")
+        raise BadRequest(
+            f"{file}: an attitude history has no inertia; --into merges it into a spacecraft file"
+        )
     contents = read_apm(file)
     text, body, pulses = imported(contents, file)
     deliver([(output, lambda: text), (schedule, lambda: pulse_table(flown(body, pulses)).csv())])
@@ -328,14 +404,20 @@ CONTROLLED = "Configuration control"  # their heading
 def control_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """The options of `CONTROL`."""
     for name, what in reversed(CONTROL):
-        command = click.option(f"--{name}", cls=Grouped, group=CONTROLLED, metavar="TEXT", help=what)(command)
+        command = click.option(
+            f"--{name}", cls=Grouped, group=CONTROLLED, metavar="TEXT", help=what
+        )(command)
     return command
 
 
 @click.command("report", cls=SessionCommand)
 @spacecraft_argument
-@scheme_option("names", multiple=True, type=NameType(PLANNED), help="Compare this one only; repeatable.")
-@click.option("--schedule", type=FILE, help="Report the pulses of a CSV file, as `plan --csv` writes it.")
+@scheme_option(
+    "names", multiple=True, type=NameType(PLANNED), help="Compare this one only; repeatable."
+)
+@click.option(
+    "--schedule", type=FILE, help="Report the pulses of a CSV file, as `plan --csv` writes it."
+)
 @click.option("--blocks", type=FILE, help="Report what the command blocks of a CSV file fire.")
 @click.option("--robust", is_flag=True, help="Compare the plan of `plan --robust` as well.")
 @goal_options
@@ -353,7 +435,10 @@ def control_options(command: Callable[..., Any]) -> Callable[..., Any]:
     is_flag=False,
     flag_value=SAMPLES,
     metavar="[N]",
-    help=f"Number of dispersed cases; {SAMPLES} where no number follows, and where something is required.",
+    help=(
+        f"Number of dispersed cases; {SAMPLES} where no number follows, "
+        "and where something is required."
+    ),
 )
 @click.option("--nominal", is_flag=True, help="Judge nominal values alone: fly no dispersed cases.")
 @click.option(
@@ -362,7 +447,10 @@ def control_options(command: Callable[..., Any]) -> Callable[..., Any]:
     is_flag=False,
     flag_value=POINTS,
     metavar="[POINTS]",
-    help=f"Show what an earlier end costs, as `nutdamp trade` does; {POINTS} points where no number follows.",
+    help=(
+        "Show what an earlier end costs, as `nutdamp trade` does; "
+        f"{POINTS} points where no number follows."
+    ),
 )
 @control_options
 @quiet_option
@@ -377,8 +465,8 @@ def report_command(
 ) -> None:
     """Write a report: decision, motion, dispersion, schemes, verification, manoeuvre sheet, input.
 
-    SPACECRAFT is a YAML file; without it spacecraft.yaml in this folder, else the built-in example. A FILE of - is
-    standard output. Needs the extra plot.
+    SPACECRAFT is a YAML file; without it spacecraft.yaml in this folder, else the built-in example.
+    A FILE of - is standard output. Needs the extra plot.
     """
     from nutdamp.page.document import controlled
     from nutdamp.page.report import expect_html, made_of
@@ -388,7 +476,9 @@ def report_command(
     job.flown = job.flown._replace(scheme=names[0] if names else None)
     read = job.flown.schedule or job.flown.blocks
     if job.flown.count(None) < 2 or (read and robust):
-        raise click.UsageError("a report is of the schemes compared, of --schedule, or of --blocks: name one of them")
+        raise click.UsageError(
+            "a report is of the schemes compared, of --schedule, or of --blocks: name one of them"
+        )
     body = job.begin()
 
     from nutdamp.page.report import repeated
@@ -399,12 +489,22 @@ def report_command(
     if disperse is not None or robust:
         expect_dispersions(body.dispersions)
         if nominal:
-            raise click.UsageError("--disperse and --robust fly dispersed cases, which --nominal leaves out")
+            raise click.UsageError(
+                "--disperse and --robust fly dispersed cases, which --nominal leaves out"
+            )
     samples = 0 if nominal else disperse
-    compared = compare_plans((plan_or_read(job),), samples=samples) if read else compared_with(job, names, samples)
+    compared = (
+        compare_plans((plan_or_read(job),), samples=samples)
+        if read
+        else compared_with(job, names, samples)
+    )
     if robust:
         compared = robust_of(job, compared).joined
-    fronts = () if trade is None else fronts_of(job, trade, (0.0, math.inf), LEAST[0], nominal=nominal).fronts
+    fronts = (
+        ()
+        if trade is None
+        else fronts_of(job, trade, (0.0, math.inf), LEAST[0], nominal=nominal).fronts
+    )
     with job.working("writing the page"):
         repeat = repeated(shlex.join(["nutdamp", *sys.argv[1:]]), job.source, job.aim.words)
         report = made_of(compared, repeat, kept, fronts)

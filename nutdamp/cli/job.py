@@ -62,19 +62,29 @@ def _quiet(ctx: click.Context, _: click.Parameter, value: bool) -> bool:
     return value
 
 
-quiet_option = click.option("-q", "--quiet", is_flag=True, callback=_quiet, help="Hide progress, notes and next steps.")
+quiet_option = click.option(
+    "-q", "--quiet", is_flag=True, callback=_quiet, help="Hide progress, notes and next steps."
+)
 
 
 def screen_options(command: Command) -> Command:
     """``--units``, ``--verbose`` and ``--quiet``."""
-    units = click.option("--units", type=NameType((SI, US)), default=SI, expose_value=False, callback=_units,
-                         help="Units of the screen, default si; files are SI.")  # fmt: skip
+    units = click.option(
+        "--units",
+        type=NameType((SI, US)),
+        default=SI,
+        expose_value=False,
+        callback=_units,
+        help="Units of the screen, default si; files are SI.",
+    )
     verbose = click.option("-v", "--verbose", is_flag=True, help="Show all values and notes.")
     return units(verbose(quiet_option(command)))
 
 
 class FileInput(NamedTuple):
-    """The spacecraft that a command line names: the ``path`` of a file, and the changes of ``--set``."""
+    """The spacecraft that a command line names: the ``path`` of a file, and the changes of
+    ``--set``.
+    """
 
     path: str | None
     settings: tuple[Setting, ...] = ()
@@ -85,7 +95,9 @@ class FileInput(NamedTuple):
         return DEFAULT_FILE if self.path is None and Path(DEFAULT_FILE).exists() else self.path
 
     def source(self, remark: Callable[[str], None], doubt: Callable[[str], None]) -> Source:
-        """The text of the file, else of the built-in example, which is a ``doubt``, and its name."""
+        """The text of the file, else of the built-in example, which is a ``doubt``,
+        and its name.
+        """
         from nutdamp.files.reader import Source, example_text
         from nutdamp.files.yaml import read_text
 
@@ -98,7 +110,9 @@ class FileInput(NamedTuple):
         return Source(example_text(), "example.yaml", self.settings, built_in=True)
 
 
-def _settings(ctx: click.Context, param: click.Parameter, texts: tuple[str, ...]) -> tuple[Setting, ...]:
+def _settings(
+    ctx: click.Context, param: click.Parameter, texts: tuple[str, ...]
+) -> tuple[Setting, ...]:
     if not texts:
         return ()
     from nutdamp.files.editing import parse_setting
@@ -110,26 +124,36 @@ def _settings(ctx: click.Context, param: click.Parameter, texts: tuple[str, ...]
 
 
 _CHANGE = "Change a key, e.g. limits.gap=1s; repeatable."
-set_option = click.option("--set", "settings", multiple=True, metavar="KEY=VALUE", callback=_settings, help=_CHANGE)
+set_option = click.option(
+    "--set", "settings", multiple=True, metavar="KEY=VALUE", callback=_settings, help=_CHANGE
+)
 
 
 def spacecraft_argument(command: Command) -> Command:
     """The spacecraft file and ``--set``, of a `SessionCommand`."""
-    return click.argument("spacecraft", required=False, type=FILE, metavar="[SPACECRAFT]")(set_option(command))
+    return click.argument("spacecraft", required=False, type=FILE, metavar="[SPACECRAFT]")(
+        set_option(command)
+    )
 
 
 def placed(wrong: Unsuitable, given: FileInput) -> NutdampError:
-    """The error as a fault with the place of the value in the spacecraft file, where it comes from one."""
+    """The error as a fault with the place of the value in the spacecraft file, where it comes from
+    one.
+    """
     if given.path == "-" or any(wrong.where[:1] == setting.path[:1] for setting in given.settings):
         return wrong
     from nutdamp.files.yaml import dotted, read_tree
 
     source = given.source(lambda _: None, lambda _: None)
     place = read_tree(source.text, source.name)[0].place_of(wrong.where)
-    return FaultyFile([Fault(source.name, place.line, place.column, dotted(wrong.where), wrong.problem)])
+    return FaultyFile(
+        [Fault(source.name, place.line, place.column, dotted(wrong.where), wrong.problem)]
+    )
 
 
-def defaulted(name: str, kind: click.ParamType[Any], default: object, text: str, **more: Any) -> Callable[..., Any]:
+def defaulted(
+    name: str, kind: click.ParamType[Any], default: object, text: str, **more: Any
+) -> Callable[..., Any]:
     """An option whose default is on the help page, where ``text`` is its line."""
     return click.option(name, type=kind, default=default, show_default=True, help=text, **more)
 
@@ -137,14 +161,18 @@ def defaulted(name: str, kind: click.ParamType[Any], default: object, text: str,
 def carry_options(when: str) -> Callable[[Command], Command]:
     """``-o FILE --at TIME``: the spacecraft file carried on, by default to ``when``."""
     which = click.option("--at", type=END, help=f"Its t = 0; default {when}.")
-    where = click.option("-o", "--output", type=OUTPUT, help="Write the spacecraft file carried on.")
+    where = click.option(
+        "-o", "--output", type=OUTPUT, help="Write the spacecraft file carried on."
+    )
     return lambda command: where(which(command))
 
 
 def plot_options(names: tuple[str, ...]) -> Callable[[Command], Command]:
     """``--plot FILE`` and the choice of the picture among ``names``, the default first."""
     which = defaulted("--figure", NameType(names), names[0], "What --plot draws.")
-    where = click.option("--plot", type=OutputName(), help="Draw it (.png, .svg, .pdf; needs extra plot).")
+    where = click.option(
+        "--plot", type=OutputName(), help="Draw it (.png, .svg, .pdf; needs extra plot)."
+    )
     return lambda command: where(which(command))
 
 
@@ -154,7 +182,8 @@ STANDARD = "-"  # file name that means standard input or standard output
 def expect_outputs(*read: str | None, **written: str | Sequence[str] | None) -> bool:
     """True where an output file is standard output, so that nothing else may go there.
 
-    A usage error where an output, by its option, is a file ``read`` or another output, under whatever name.
+    A usage error where an output, by its option, is a file ``read`` or another output, under
+    whatever name.
     """
     outputs = [
         (f"--{option}", path)
@@ -175,7 +204,9 @@ def expect_outputs(*read: str | None, **written: str | Sequence[str] | None) -> 
 
 
 def _identity(path: str, standard: int) -> Hashable:
-    """Identity of a file, None for a terminal, /dev/null and the like; ``standard``: the descriptor of ``-``."""
+    """Identity of a file, None for a terminal, /dev/null and the like; ``standard``: the descriptor
+    of ``-``.
+    """
     try:
         status = os.fstat(standard) if path == STANDARD else Path(path).stat()
     except OSError:
@@ -192,12 +223,19 @@ Files = dict[str, Callable[[], Content]]
 Output = tuple[str | None, Callable[[], Content]]
 """Path of a file to write, if one is requested, and the function of its content."""
 
-UNDER_WAY = "nutdamp.cli.job"  # key of the JSON file and the spacecraft of the job that has begun, in the context
-KINDS = (("csv", "csv"), ("json", "data"), ("plot", "figure"))  # options of files, and the views that they hold
+# key of the JSON file and the spacecraft of the job that has begun, in the context
+UNDER_WAY = "nutdamp.cli.job"
+KINDS = (
+    ("csv", "csv"),
+    ("json", "data"),
+    ("plot", "figure"),
+)  # options of files, and the views that they hold
 
 
 class FlownChoice(NamedTuple):
-    """Source of the pulses that a command flies: a scheme, a schedule file, a file of blocks, else what is best."""
+    """Source of the pulses that a command flies: a scheme, a schedule file, a file of blocks, else
+    what is best.
+    """
 
     scheme: str | None = None
     schedule: str | None = None
@@ -206,9 +244,11 @@ class FlownChoice(NamedTuple):
 
 @dataclass
 class Job:
-    """Request of a command line, and from `begin` on the ``spacecraft``, its ``source``, and ``silent``: no screens.
+    """Request of a command line, and from `begin` on the ``spacecraft``, its ``source``, and
+    ``silent``: no screens.
 
-    ``read``, ``written``: files; ``figure``: the picture of ``plot``, None for the only one; ``usual``: its default.
+    ``read``, ``written``: files; ``figure``: the picture of ``plot``, None for the only one;
+    ``usual``: its default.
     """
 
     given: FileInput
@@ -225,11 +265,14 @@ class Job:
     silent: bool = field(init=False)
 
     def begin(self, folder: Iterable[str] = ()) -> Spacecraft:
-        """Check the files of the command line, those that go to a ``folder`` too, and load its spacecraft.
+        """Check the files of the command line, those that go to a ``folder`` too, and load its
+        spacecraft.
 
         Raises as `expect_outputs` and `Source.read` do, and where the picture cannot be made.
         """
-        self.silent = expect_outputs(self.given.read, *self.read, **self.written, schedules=[*folder])
+        self.silent = expect_outputs(
+            self.given.read, *self.read, **self.written, schedules=[*folder]
+        )
         if (plot := self.written.get("plot")) is not None:
             from nutdamp.figures import image
 
@@ -238,7 +281,11 @@ class Job:
             raise click.UsageError("--figure says what --plot draws: name a file with --plot")
         self.source = self.given.source(self.remark, self.doubt)
         body = self.source.read(lambda doubt: say(doubt.as_warning))
-        self.spacecraft = self.aim.applied(body, self.doubt) if any(given is not None for given in self.aim) else body
+        self.spacecraft = (
+            self.aim.applied(body, self.doubt)
+            if any(given is not None for given in self.aim)
+            else body
+        )
         from nutdamp.files.tabular import check_place
 
         for path in filter(None, self.written.values()):
@@ -271,11 +318,15 @@ class Job:
         return working(what, quiet=self.quiet)
 
     def carried(self, plan: Plan | None, at: float | None, usual: float | None = None) -> Files:
-        """The file of ``-o``: the spacecraft ``at`` a time, s, of a plan (else ``usual``, else its own); BadRequest."""
+        """The file of ``-o``: the spacecraft ``at`` a time, s, of a plan (else ``usual``, else its
+        own); BadRequest.
+        """
         path = self.written["output"]
         if path is None:
             if at is not None:
-                raise click.UsageError("--at is the moment of the file that -o writes: name one with -o")
+                raise click.UsageError(
+                    "--at is the moment of the file that -o writes: name one with -o"
+                )
             return {}
         if plan is None or not plan.feasible:
             say(f"{printable(path)} was not written: no plan is feasible")
@@ -296,9 +347,11 @@ class Job:
         unsaved: Sequence[CannotWrite | None] = (),
         **shown: Any,
     ) -> None:
-        """Write the files that are requested of a result, and show it, unless a file goes to standard output.
+        """Write the files that are requested of a result, and show it, unless a file goes to
+        standard output.
 
-        What ``more`` and ``screens`` lack the views of the result make, with the options ``shown``; see `deliver`.
+        What ``more`` and ``screens`` lack the views of the result make, with the options ``shown``;
+        see `deliver`.
         """
         from nutdamp.common import results
 
@@ -306,7 +359,9 @@ class Job:
         for option, what in KINDS:
             if option not in contents and results.has(result, what):
                 names = [self.figure] if what == "figure" and self.figure is not None else []
-                contents[option] = partial(results.view, result, what, *names, **shown if what == "data" else {})
+                contents[option] = partial(
+                    results.view, result, what, *names, **shown if what == "data" else {}
+                )
         outputs = [(self.written.get(option), make) for option, make in contents.items()]
         usual = screens or (partial(results.view, result, "screen", **shown),)
         failures = [wrong for wrong in unsaved if wrong is not None]
@@ -317,9 +372,19 @@ def job_of(command: click.Command, parameters: dict[str, Any]) -> Job:
     """The job of a command line; the ``parameters`` that belong to it are taken from them."""
     types = {each.name: each.type for each in command.params if each.name in parameters}
     given = FileInput(parameters.pop("spacecraft", None), parameters.pop("settings", ()))
-    written = {name: parameters.pop(name) for name, kind in types.items() if isinstance(kind, OutputName) and name}
-    inputs = tuple(parameters[name] for name, kind in types.items() if type(kind) is FileName and name in parameters)
-    read = tuple(path for paths in inputs for path in (paths if isinstance(paths, tuple) else (paths,)))
+    written = {
+        name: parameters.pop(name)
+        for name, kind in types.items()
+        if isinstance(kind, OutputName) and name
+    }
+    inputs = tuple(
+        parameters[name]
+        for name, kind in types.items()
+        if type(kind) is FileName and name in parameters
+    )
+    read = tuple(
+        path for paths in inputs for path in (paths if isinstance(paths, tuple) else (paths,))
+    )
     flown = FlownChoice(*(parameters.pop(name, None) for name in FlownChoice._fields))
     options = options_in(command, parameters)
     aim = Aim(**{name: parameters.pop(name) for name in Aim._fields if name in parameters})
@@ -329,7 +394,9 @@ def job_of(command: click.Command, parameters: dict[str, Any]) -> Job:
 
 
 def write_infeasible(context: click.Context, reason: Exception) -> None:
-    """Write the JSON file of the job that has begun, if any: nothing is feasible, and the reason."""
+    """Write the JSON file of the job that has begun, if any: nothing is feasible,
+    and the reason.
+    """
     if UNDER_WAY not in context.meta:
         return
     from nutdamp.views.decisions import heading
@@ -339,11 +406,14 @@ def write_infeasible(context: click.Context, reason: Exception) -> None:
 
 
 def deliver(
-    outputs: Sequence[Output], *screens: Callable[[], RenderableType], unsaved: Sequence[CannotWrite] = ()
+    outputs: Sequence[Output],
+    *screens: Callable[[], RenderableType],
+    unsaved: Sequence[CannotWrite] = (),
 ) -> None:
     """Write the files requested, and show results on standard output.
 
-    A file that cannot be saved keeps nothing back: CannotWrite comes at the end, also for those ``unsaved`` already.
+    A file that cannot be saved keeps nothing back: CannotWrite comes at the end, also for those
+    ``unsaved`` already.
     """
     failures = list(unsaved)
     # All content is made before any file is written, so that a failure leaves no file behind.
@@ -380,10 +450,14 @@ def _file_of(content: Content, path: str) -> str | bytes | Callable[[IO[bytes]],
 
 
 class SessionCommand(click.Command):
-    """A command whose help page has headings; the parameters that commands share are gathered into ``job``."""
+    """A command whose help page has headings; the parameters that commands share are gathered into
+    ``job``.
+    """
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Run the command; an unsuitable value of the spacecraft file is a fault with its place there."""
+        """Run the command; an unsuitable value of the spacecraft file is a fault with its place
+        there.
+        """
         ctx.params = {"job": (job := job_of(self, ctx.params)), **ctx.params}
         try:
             return super().invoke(ctx)
@@ -403,17 +477,27 @@ class SessionCommand(click.Command):
                     formatter.write_dl(records, col_max=WIDEST if groups[GOAL] else 30)
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Parse as click does; the error for an option of a scheme that is not taken here says where to give it."""
+        """Parse as click does; the error for an option of a scheme that is not taken here says
+        where to give it.
+        """
         try:
             return super().parse_args(ctx, args)
         except click.NoSuchOption as wrong:
             name = wrong.option_name.removeprefix("--").replace("-", "_")
-            readers = SUNLIT if name == "sun" else [each for each in SCHEMES if name in names_of(SCHEMES[each].options)]
+            readers = (
+                SUNLIT
+                if name == "sun"
+                else [each for each in SCHEMES if name in names_of(SCHEMES[each].options)]
+            )
             if not readers or all(parameter.name != "target" for parameter in self.params):
                 raise
             if name == "sun":
                 raise click.UsageError(NO_SUN, ctx) from None
-            message = f"{wrong.option_name} is for {' and '.join(readers)}, an option of `nutdamp plan`"
+            message = (
+                f"{wrong.option_name} is for {' and '.join(readers)}, an option of `nutdamp plan`"
+            )
             if any(parameter.name == "schedule" for parameter in self.params):
-                message += ": save its pulses with --csv FILE, and name them here with --schedule FILE"
+                message += (
+                    ": save its pulses with --csv FILE, and name them here with --schedule FILE"
+                )
             raise click.UsageError(message, ctx) from None

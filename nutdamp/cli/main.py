@@ -1,4 +1,5 @@
-"""The ``nutdamp`` command: its subcommands, loaded when used, and errors as messages and exit statuses.
+"""The ``nutdamp`` command: its subcommands, loaded when used, and errors as messages and exit
+statuses.
 
 No other module turns errors into exit statuses; a bug keeps its traceback.
 """
@@ -57,7 +58,9 @@ def run(group: click.Group) -> None:
     except click.ClickException as wrong:
         message = io.StringIO()
         wrong.show(file=message)
-        say(message.getvalue().expandtabs(2).rstrip("\n"))  # a tab would be shown as a control character
+        say(
+            message.getvalue().expandtabs(2).rstrip("\n")
+        )  # a tab would be shown as a control character
         status = BAD_INPUT
     except (click.Abort, KeyboardInterrupt):
         say("interrupted")
@@ -66,11 +69,13 @@ def run(group: click.Group) -> None:
         say("terminated")
         status = TERMINATED
     except BrokenPipeError:
-        # The reader of our output has left (`| head`): nothing more to say, and nothing to flush at exit.
+        # The reader of our output has left (`| head`): nothing more to say, and nothing to flush at
+        # exit.
         _silence_stdout()
         status = UNREADABLE
     except OSError as wrong:
-        # Files name themselves and become CannotRead or CannotWrite; an error without a name is of standard output.
+        # Files name themselves and become CannotRead or CannotWrite; an error without a name is of
+        # standard output.
         if wrong.filename is not None:
             raise
         _silence_stdout()
@@ -82,7 +87,9 @@ def run(group: click.Group) -> None:
 
 
 def leave(judged: Status | None = None, *, failed: bool = False, infeasible: bool = False) -> None:
-    """End with the exit status of the first that holds: a bug or disagreement, no result, a verdict that says so."""
+    """End with the exit status of the first that holds: a bug or disagreement, no result, a verdict
+    that says so.
+    """
     status = 0 if judged is None else judged.exit_status
     if failed or infeasible or status:
         sys.exit(INTERNAL if failed else INFEASIBLE if infeasible else status)
@@ -100,7 +107,9 @@ class Interruption:
 
 @contextmanager
 def stoppable() -> Iterator[Interruption]:
-    """An `Interruption` set by Ctrl-C or SIGTERM, so that a run ends in order; a second Ctrl-C interrupts at once."""
+    """An `Interruption` set by Ctrl-C or SIGTERM, so that a run ends in order; a second Ctrl-C
+    interrupts at once.
+    """
     stop = Interruption()
 
     def ask(number: int, _: FrameType | None) -> None:
@@ -124,12 +133,16 @@ def _terminate(number: int, frame: FrameType | None) -> None:  # noqa: ARG001 - 
 
 
 def _silence_stdout() -> None:
-    """Discard text still buffered for standard output, so that Python does not stumble over it at exit."""
+    """Discard text still buffered for standard output, so that Python does not stumble over it at
+    exit.
+    """
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def tell(wrong: Exception) -> None:
-    """Print an error on standard error; faults of a file begin with its name, all others with that of the program."""
+    """Print an error on standard error; faults of a file begin with its name, all others with that
+    of the program.
+    """
     from nutdamp.errors import FaultyFile
 
     say(str(wrong) if isinstance(wrong, FaultyFile) else f"nutdamp: {wrong}")
@@ -147,7 +160,8 @@ def _explain(wrong: Exception) -> int:
     return BAD_INPUT if isinstance(wrong, BadRequest | FaultyFile) else UNREADABLE
 
 
-COMMANDS = {  # the subcommands in the order of a first use, with their modules and their lines on the help page
+# the subcommands in the order of a first use, with their modules and their lines on the help page
+COMMANDS = {
     "plan": ("plan", "Plan pulse schedules that damp the nutation, and compare them."),
     "simulate": ("plan", "Propagate a scheme or a schedule; cone angles and axis track."),
     "trade": ("studies", "Trade finish time against propellant."),
@@ -168,7 +182,9 @@ COMMANDS = {  # the subcommands in the order of a first use, with their modules 
 
 
 class _CommandGroup(click.Group):
-    """Group whose subcommands are loaded from their modules when they are used, and listed in their order."""
+    """Group whose subcommands are loaded from their modules when they are used, and listed in their
+    order.
+    """
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002 - signature of click
         return list(COMMANDS)
@@ -180,15 +196,21 @@ class _CommandGroup(click.Group):
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        """The command that a command line names; a usage error suggests the nearest name to a misspelt one."""
+        """The command that a command line names; a usage error suggests the nearest name to a
+        misspelt one.
+        """
         name = args[0]
         if name not in COMMANDS and not name.startswith("-"):
             close = nearest(name, COMMANDS)
-            ctx.fail(f"there is no command {name!r}" + (f"; did you mean {close!r}?" if close else ""))
+            ctx.fail(
+                f"there is no command {name!r}" + (f"; did you mean {close!r}?" if close else "")
+            )
         return super().resolve_command(ctx, args)
 
     def invoke(self, ctx: click.Context) -> object:
-        """Run the command; where nothing requested is feasible, its JSON file says so all the same."""
+        """Run the command; where nothing requested is feasible,
+        its JSON file says so all the same.
+        """
         try:
             return super().invoke(ctx)
         except Infeasible as reason:
@@ -209,26 +231,29 @@ class _CommandGroup(click.Group):
     cls=_CommandGroup,
     context_settings={"help_option_names": ["-h", "--help"]},
     epilog=(
-        "Exit status: 0 done; 1 could not read or write; 2 bad command line or bad file; 3 no plan is feasible; 4 the "
-        "plan is not shown to meet the requirement, or cannot be commanded; 130 interrupted; 143 terminated."
+        "Exit status: 0 done; 1 could not read or write; 2 bad command line or bad file; "
+        "3 no plan is feasible; 4 the "
+        "plan is not shown to meet the requirement, or cannot be commanded; 130 interrupted; "
+        "143 terminated."
     ),
 )
 @click.version_option(__version__, prog_name="nutdamp")
 def group() -> None:
     """Plan which thruster of a nutating spinner to fire, when and for how long.
 
-    Begin with `nutdamp plan`: it plans the built-in example. `nutdamp init` writes a commented spacecraft file to
-    start from.
+    Begin with `nutdamp plan`: it plans the built-in example. `nutdamp init` writes a commented
+    spacecraft file to start from.
     """
 
 
-RARELY = 100_000  # new objects between two searches for cycles: loading modules makes many, and little garbage
+# new objects between two searches for cycles: loading modules makes many, and little garbage
+RARELY = 100_000
 
 
 def main() -> None:
     """Entry point: run the command line and leave with its exit status."""
     gc.set_threshold(RARELY)
-    # Read when numpy is loaded. Matrices are small here, so that threads within their products cost more than they
-    # save; dispersed cases have threads of their own.
+    # Read when numpy is loaded. Matrices are small here, so that threads within their products cost
+    # more than they save; dispersed cases have threads of their own.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     run(group)

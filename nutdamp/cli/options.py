@@ -1,7 +1,7 @@
 """Options and kinds of parameters: the goal, the options of schemes, files, quantities, directions.
 
-Every command that plans takes the goal; `plan` alone takes the options of each scheme. Those are made from the fields
-of the scheme's options, and stand under a heading per scheme on the help page.
+Every command that plans takes the goal; `plan` alone takes the options of each scheme. Those are
+made from the fields of the scheme's options, and stand under a heading per scheme on the help page.
 """
 
 from __future__ import annotations
@@ -27,7 +27,9 @@ if TYPE_CHECKING:
 else:
 
     class ParamType(click.ParamType):
-        """`click.ParamType`, which takes the type of its values in brackets from click 8.4 on only."""
+        """`click.ParamType`, which takes the type of its values in
+        brackets from click 8.4 on only.
+        """
 
         def __class_getitem__(cls, _: object) -> type[ParamType]:
             return cls
@@ -84,15 +86,23 @@ FOLDER = click.Path(readable=False)
 
 
 class UnitType(ParamType[float]):
-    """A number in SI or a text with a unit, as in a spacecraft file, that passes a ``check``, or one of ``words``."""
+    """A number in SI or a text with a unit, as in a spacecraft file, that passes a ``check``, or
+    one of ``words``.
+    """
 
     def __init__(
-        self, kind: str, check: Callable[[float], object] = float, problem: str = "", **words: float | str
+        self,
+        kind: str,
+        check: Callable[[float], object] = float,
+        problem: str = "",
+        **words: float | str,
     ) -> None:
         self.name = kind
         self.kind, self.check, self.problem, self.words = kind, check, problem, words
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float:
         """The SI value, or that of a word; a usage error for anything else."""
         if value in self.words:
             return self.words[value]  # type: ignore[return-value]
@@ -124,9 +134,13 @@ class Angles(NamedTuple):
 
     @property
     def readings(self) -> tuple[str, ...]:
-        """Readings of the numbers without unit that are more likely degrees: whole ones, and more than a turn."""
+        """Readings of the numbers without unit that are more likely degrees: whole ones, and more
+        than a turn.
+        """
         bare = [angle for angle in self if isinstance(angle, Bare)]
-        doubtful = [angle for angle in bare if angle and (angle.is_integer() or abs(angle) > 2.0 * math.pi)]
+        doubtful = [
+            angle for angle in bare if angle and (angle.is_integer() or abs(angle) > 2.0 * math.pi)
+        ]
         return tuple(reading_of(angle, "angle", "deg") for angle in doubtful)
 
 
@@ -138,7 +152,9 @@ class Direction(ParamType[Angles]):
     def __init__(self, check: Callable[[list[Angles]], object] = len, problem: str = "") -> None:
         self.check, self.problem = check, problem
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Angles:
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> Angles:
         """Both in rad; a usage error for anything else."""
         if isinstance(value, Angles):
             return value
@@ -165,14 +181,17 @@ class Count(ParamType[int]):
         except ValueError:
             number = 0.0
         if not (1.0 <= number <= 1e12 and number.is_integer()):
-            self.fail(f"{value} is not a number of cases: 1 or more, such as 100000 or 1e6", param, ctx)
+            self.fail(
+                f"{value} is not a number of cases: 1 or more, such as 100000 or 1e6", param, ctx
+            )
         return int(number)
 
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
 GOAL = "Goal and motion"  # heading of the options of the goal
-FASTEST = 100.0  # rad/s; no spacecraft spins faster: a larger number without unit is more likely one of rpm
+# rad/s; no spacecraft spins faster: a larger number without unit is more likely one of rpm
+FASTEST = 100.0
 WIDEST = 26  # characters of an option that its help comes beside; below a longer one
 SHARED = names_of(SchemeOptions)  # options of every scheme
 NO_SUN = f"--sun is for {' and '.join(SUNLIT)}, which is not planned here"
@@ -187,7 +206,9 @@ class Grouped(click.Option):
 
 
 def goal_options(command: Command, *, several: bool = True) -> Command:
-    """The goal, and the options of every scheme; ``several``: any may be planned, and one with a bug is passed over."""
+    """The goal, and the options of every scheme; ``several``: any may be planned, and one with a
+    bug is passed over.
+    """
     option = functools.partial(click.option, cls=Grouped, group=GOAL)
     angles = functools.partial(option, type=Direction(), metavar="ANGLE,ANGLE")
     command = debug_option(command) if several else command
@@ -195,9 +216,13 @@ def goal_options(command: Command, *, several: bool = True) -> Command:
     command = option("--with-disturbances", is_flag=True, help=disturbed)(command)
     if several:
         command = angles("--sun", help="The Sun, as --target; rhumb-line keeps its phase.")(command)
-    rate, spin = UnitType("rate", keep="keep"), "Final spin rate, such as 30rpm; optimal can set it."
+    rate = UnitType("rate", keep="keep")
+    spin = "Final spin rate, such as 30rpm; optimal can set it."
     command = option("--spin", type=rate, metavar="RATE|keep", help=spin)(command)
-    end = "End of the spin axis: RA,DEC where the file has an attitude, else tilt from H,azimuth: 10deg,45deg."
+    end = (
+        "End of the spin axis: RA,DEC where the file has an attitude, else tilt from H,azimuth: "
+        "10deg,45deg."
+    )
     return angles("--target", help=end)(command)
 
 
@@ -207,30 +232,49 @@ def scheme_options(command: Command) -> Command:
         kind: OptionKind = field.metadata["kind"]
         settings: dict[str, Any] = {"is_flag": True}
         if not kind.flag:
-            value = NameType(kind.names) if kind.names else UnitType(kind.unit) if kind.unit else click.IntRange(1)
+            value = (
+                NameType(kind.names)
+                if kind.names
+                else UnitType(kind.unit)
+                if kind.unit
+                else click.IntRange(1)
+            )
             metavar = None if kind.names or kind.unit else "N"
             settings = {"type": value, "default": field.default, "metavar": metavar}
             settings["show_default"] = field.default is not None
-        group, text = f"Scheme {' and '.join(schemes)}", field.metadata["help"]
-        option = click.option(f"--{name.replace('_', '-')}", cls=Grouped, group=group, help=text, **settings)
+        group = f"Scheme {' and '.join(schemes)}"
+        text = field.metadata["help"]
+        option = click.option(
+            f"--{name.replace('_', '-')}", cls=Grouped, group=group, help=text, **settings
+        )
         command = option(command)
     return command
 
 
 def options_in(command: click.Command, parameters: dict[str, Any]) -> Options:
-    """Options of the schemes among ``parameters``, from which they are taken; a usage error for a senseless one."""
+    """Options of the schemes among ``parameters``, from which they are taken; a usage error for a
+    senseless one.
+    """
     known = {*SHARED, *_fields()}
-    names = [each.name for each in command.params if isinstance(each, Grouped) and each.name in known]
+    names = [
+        each.name for each in command.params if isinstance(each, Grouped) and each.name in known
+    ]
     taken = {name: parameters.pop(name) for name in names if name is not None}
     try:
-        return Options(**{name: value for name, value in taken.items() if value is not False})  # flags not given
+        return Options(
+            **{name: value for name, value in taken.items() if value is not False}
+        )  # flags not given
     except SenselessOption as wrong:
         hint = f"--{wrong.name.replace('_', '-')}"
-        raise click.BadParameter(wrong.problem, click.get_current_context(), param_hint=hint) from None
+        raise click.BadParameter(
+            wrong.problem, click.get_current_context(), param_hint=hint
+        ) from None
 
 
 def _fields() -> dict[str, tuple[dataclasses.Field[Any], list[str]]]:
-    """Each option that not all schemes have, by its name: its field, and the schemes that have it."""
+    """Each option that not all schemes have, by its name: its field,
+    and the schemes that have it.
+    """
     varying: dict[str, tuple[dataclasses.Field[Any], list[str]]] = {}
     for scheme in SCHEMES.values():
         for field in dataclasses.fields(scheme.options):
@@ -240,9 +284,11 @@ def _fields() -> dict[str, tuple[dataclasses.Field[Any], list[str]]]:
 
 
 class Aim(NamedTuple):
-    """A goal as the command line gives it, in place of the one in the file; ``spin``: rad/s, or ``keep``.
+    """A goal as the command line gives it, in place of the one in the file; ``spin``: rad/s, or
+    ``keep``.
 
-    Angles are right ascension and declination where the file has an attitude, else tilt and azimuth in the frame N.
+    Angles are right ascension and declination where the file has an attitude, else tilt and azimuth
+    in the frame N.
     """
 
     target: Angles | None = None
@@ -251,7 +297,9 @@ class Aim(NamedTuple):
 
     @property
     def words(self) -> tuple[str, ...]:
-        """Options that give target and spin to any command; ``--sun`` only goes with a scheme that reads it."""
+        """Options that give target and spin to any command; ``--sun`` only goes with a scheme that
+        reads it.
+        """
         words = []
         if self.target is not None:
             words.append(f"--target={self.target.first!r}rad,{self.target.second!r}rad")
@@ -260,7 +308,9 @@ class Aim(NamedTuple):
         return tuple(words)
 
     def applied(self, spacecraft: Spacecraft, doubt: Callable[[str], None]) -> Spacecraft:
-        """The spacecraft with this goal; a usage error where it cannot be one, a doubt where it is hardly meant."""
+        """The spacecraft with this goal; a usage error where it cannot be one, a doubt where it is
+        hardly meant.
+        """
         goal = spacecraft.goal
         if self.target is not None:
             goal = dataclasses.replace(goal, axis=_direction(spacecraft, self.target, "--target"))
@@ -287,12 +337,18 @@ def _direction(spacecraft: Spacecraft, angles: Angles, option: str) -> Vector:
     in_sky = spacecraft.attitude is not None
     if abs(angles.second) <= 0.5 * math.pi if in_sky else 0.0 <= angles.first < math.pi:
         return on_sphere(*angles) if in_sky else spacecraft.direction_in_n(*angles)
-    problem = "expected a " + ("declination of -90 deg to 90 deg" if in_sky else "tilt of at least 0 and below 180 deg")
+    problem = "expected a " + (
+        "declination of -90 deg to 90 deg" if in_sky else "tilt of at least 0 and below 180 deg"
+    )
     raise click.BadParameter("; ".join((problem, *angles.readings)), param_hint=option)
 
 
-def expect_read(names: Sequence[str], options: Options, body: Spacecraft, doubt: Callable[[str], None]) -> None:
-    """Warn of options that none of the schemes ``names`` reads; a usage error where that is the goal itself."""
+def expect_read(
+    names: Sequence[str], options: Options, body: Spacecraft, doubt: Callable[[str], None]
+) -> None:
+    """Warn of options that none of the schemes ``names`` reads; a usage error where that is the
+    goal itself.
+    """
     planned = [SCHEMES[name] for name in names]
     unread = [*options.without_effect([scheme.options for scheme in planned])] if planned else []
     if len(planned) > 1 and "least" in unread:  # it chooses among them, whether they read it or not
@@ -305,6 +361,11 @@ def expect_read(names: Sequence[str], options: Options, body: Spacecraft, doubt:
         if len(without) == len(planned):
             raise click.UsageError(NO_SUN)
         if without:
-            doubt(f"--sun is read by {' and '.join(SUNLIT)} alone: {', '.join(without)} plan without it")
+            doubt(
+                f"--sun is read by {' and '.join(SUNLIT)} alone: {', '.join(without)} plan without "
+                "it"
+            )
     if planned and body.goal.axis is None and all(scheme.only_points for scheme in planned):
-        raise click.UsageError(f"no target of the spin axis for {' and '.join(names)}: --target, or goal in the file")
+        raise click.UsageError(
+            f"no target of the spin axis for {' and '.join(names)}: --target, or goal in the file"
+        )

@@ -1,4 +1,6 @@
-"""``nutdamp plan``, ``simulate`` and ``animate``; and the pulses a command flies: of a scheme, a file, or blocks."""
+"""``nutdamp plan``, ``simulate`` and ``animate``; and the pulses a command flies: of a scheme, a
+file, or blocks.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +24,16 @@ from nutdamp.cli.job import (
     spacecraft_argument,
 )
 from nutdamp.cli.main import leave
-from nutdamp.cli.options import END, FILE, OUTPUT, Command, NameType, expect_read, goal_options, scheme_options
+from nutdamp.cli.options import (
+    END,
+    FILE,
+    OUTPUT,
+    Command,
+    NameType,
+    expect_read,
+    goal_options,
+    scheme_options,
+)
 from nutdamp.cli.screen import say, show_failures
 from nutdamp.errors import BadRequest, Infeasible, listed, printable
 from nutdamp.schemes.catalogue import NAMES, OPTIMAL, PLANNED, SchemeOptions
@@ -37,17 +48,27 @@ if TYPE_CHECKING:
     from nutdamp.planning.tradeoff import Trade
 
 
-scheme_option = partial(click.option, "--scheme", metavar="SCHEME")  # a line does not hold all the names
+scheme_option = partial(
+    click.option, "--scheme", metavar="SCHEME"
+)  # a line does not hold all the names
 
 
 def flown_options(verb: str, scheme: str | None = None) -> Callable[[Command], Command]:
-    """``--scheme`` (its help may be given), ``--schedule`` and ``--blocks``, one alone, of pulses to ``verb``."""
+    """``--scheme`` (its help may be given), ``--schedule`` and ``--blocks``, one alone, of pulses
+    to ``verb``.
+    """
     default = f"{verb} this scheme with default options; without it the recommended one."
 
     def alone(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
-        named = [name for name in ("scheme", "schedule", "blocks") if name != param.name and ctx.params.get(name)]
+        named = [
+            name
+            for name in ("scheme", "schedule", "blocks")
+            if name != param.name and ctx.params.get(name)
+        ]
         if value is not None and named:
-            raise click.UsageError(f"name what to {verb.lower()}: one of --scheme, --schedule and --blocks")
+            raise click.UsageError(
+                f"name what to {verb.lower()}: one of --scheme, --schedule and --blocks"
+            )
         return value
 
     def decorate(command: Command) -> Command:
@@ -60,12 +81,18 @@ def flown_options(verb: str, scheme: str | None = None) -> Callable[[Command], C
     return decorate
 
 
-def compared_with(job: Job, names: Sequence[str], samples: int | None = None, *, timed: bool = False) -> Comparison:
-    """Comparison of the schemes named, else the usual ones; a remark names the options that none of them reads."""
+def compared_with(
+    job: Job, names: Sequence[str], samples: int | None = None, *, timed: bool = False
+) -> Comparison:
+    """Comparison of the schemes named, else the usual ones; a remark names the options that none of
+    them reads.
+    """
     from nutdamp.api import compare
     from nutdamp.planning.decision import usual
 
-    expect_read(tuple(dict.fromkeys(names)) or usual(job.spacecraft), job.options, job.spacecraft, job.doubt)
+    expect_read(
+        tuple(dict.fromkeys(names)) or usual(job.spacecraft), job.options, job.spacecraft, job.doubt
+    )
     with job.working("planning"):
         return compare(job.spacecraft, names, job.options, samples=samples, timed=timed)
 
@@ -78,13 +105,17 @@ def robust_of(job: Job, compared: Comparison) -> RobustComparison:
         return robust(compared, job.options)
 
 
-def fronts_of(job: Job, points: int, shifts: Sequence[float], least: str, *, nominal: bool = False) -> Trade:
+def fronts_of(
+    job: Job, points: int, shifts: Sequence[float], least: str, *, nominal: bool = False
+) -> Trade:
     """The fronts of time against cost."""
     from nutdamp.api import trade
 
     known = job.options.with_disturbances
     with job.working("searching"):
-        return trade(job.spacecraft, points, shifts, least, with_disturbances=known, nominal=nominal)
+        return trade(
+            job.spacecraft, points, shifts, least, with_disturbances=known, nominal=nominal
+        )
 
 
 def plan_or_read(job: Job, *, judged: bool = False) -> Plan:
@@ -127,7 +158,9 @@ def plan_or_read(job: Job, *, judged: bool = False) -> Plan:
 
 
 def _fired(job: Job, path: str) -> Plan:
-    """The pulses that the command blocks of a file fire, as a plan; raises Infeasible where there is no Sun pulse."""
+    """The pulses that the command blocks of a file fire, as a plan; raises Infeasible where there
+    is no Sun pulse.
+    """
     from nutdamp.files.schedules import read_blocks
     from nutdamp.planning.notes import broken_limits
     from nutdamp.planning.plan import Plan
@@ -137,12 +170,16 @@ def _fired(job: Job, path: str) -> Plan:
     blocks, warnings = read_blocks(path, body)
     pulses = fired(body, blocks)
     job.doubt(*warnings, *broken_limits(body, pulses))
-    return Plan(body, printable(path), pulses, options=job.options.of(SchemeOptions), from_file=True)
+    return Plan(
+        body, printable(path), pulses, options=job.options.of(SchemeOptions), from_file=True
+    )
 
 
 @click.command("plan", cls=SessionCommand)
 @spacecraft_argument
-@scheme_option("names", multiple=True, type=NameType(PLANNED), help=f"Repeatable: {listed(PLANNED, 'or')}.")
+@scheme_option(
+    "names", multiple=True, type=NameType(PLANNED), help=f"Repeatable: {listed(PLANNED, 'or')}."
+)
 @scheme_options
 @goal_options
 @click.option("--robust", is_flag=True, help="Cheapest plan with which enough cases comply.")
@@ -157,21 +194,31 @@ def _fired(job: Job, path: str) -> Plan:
 @plot_options(FIGURES)
 @screen_options
 def plan_command(
-    job: Job, names: tuple[str, ...], robust: bool, nominal: bool, timed: bool, at: float | None, verbose: bool
+    job: Job,
+    names: tuple[str, ...],
+    robust: bool,
+    nominal: bool,
+    timed: bool,
+    at: float | None,
+    verbose: bool,
 ) -> None:
     """Plan pulse schedules that damp the nutation, and compare them.
 
-    SPACECRAFT is a YAML file, or - for standard input; default spacecraft.yaml here, else the built-in example.
-    A FILE of - is standard output.
+    SPACECRAFT is a YAML file, or - for standard input; default spacecraft.yaml here, else the
+    built-in example. A FILE of - is standard output.
     """
-    csv, blocks, certificate, plot = (job.written[name] for name in ("csv", "blocks", "certificate", "plot"))
+    csv, blocks, certificate, plot = (
+        job.written[name] for name in ("csv", "blocks", "certificate", "plot")
+    )
     for option, path in (("csv", csv), ("plot", plot)):
         if path is not None and len(set(names)) > 1:
             cure = "name one --scheme, or none for the recommended one"
             raise click.UsageError(f"--{option} writes one schedule: {cure}")
     body = job.begin()
     if robust and nominal:
-        raise click.UsageError("--robust goes by dispersed cases, which --nominal leaves out: name one of them")
+        raise click.UsageError(
+            "--robust goes by dispersed cases, which --nominal leaves out: name one of them"
+        )
 
     from nutdamp.planning.decision import usual
     from nutdamp.planning.notes import comparison_warnings
@@ -183,9 +230,14 @@ def plan_command(
         expect_dispersions(body.dispersions)
     if certificate is not None:
         if OPTIMAL.name not in (names or usual(body)):
-            raise BadRequest(f"a certificate is of {OPTIMAL.name}, which is not planned: name it with --scheme")
+            raise BadRequest(
+                f"a certificate is of {OPTIMAL.name}, which is not planned: name it with --scheme"
+            )
         if not body.channels:
-            raise BadRequest(f"a certificate is of {OPTIMAL.name}, which fires channels, and the spacecraft has none")
+            raise BadRequest(
+                f"a certificate is of {OPTIMAL.name}, which fires channels, "
+                "and the spacecraft has none"
+            )
     compared = compared_with(job, names, 0 if nominal else None, timed=timed)
     dispersed = robust_of(job, compared) if robust else None
     shown = compared if dispersed is None else dispersed.joined
@@ -207,12 +259,17 @@ def plan_command(
 
 
 def _blocks_file(job: Job, compared: Comparison, chosen: Plan | None) -> Files:
-    """The file of command blocks, of the plan to fly or another; raises BadRequest where plans have none."""
+    """The file of command blocks, of the plan to fly or another; raises BadRequest where plans have
+    none.
+    """
     plans: list[Plan] = [plan for plan in (chosen, *compared) if plan is not None and plan.feasible]
     source = next((plan for plan in plans if plan.pulses.blocks), None)
     if source is None:
         if plans:
-            raise BadRequest("--blocks: no plan is made of command blocks; run --scheme command-block for the reason")
+            raise BadRequest(
+                "--blocks: no plan is made of command blocks; run --scheme command-block for the "
+                "reason"
+            )
         return {}
     if source is not chosen:
         job.doubt(f"writing the blocks of {source.scheme}, which is not the recommended plan")
@@ -236,35 +293,53 @@ def _certified(
     except BadRequest as reason:
         return {}, [CannotWrite(path, f"there is no certificate: {reason}")]
     if proof.plan is not chosen:
-        job.doubt(f"the certificate is of {proof.plan.scheme} for nominal values, which is not the recommended plan")
+        job.doubt(
+            f"the certificate is of {proof.plan.scheme} for nominal values, "
+            "which is not the recommended plan"
+        )
     return {"certificate": partial(certificate_json, proof)}, []
 
 
-def _screen(compared: Comparison, dispersed: RobustComparison | None, verbose: bool) -> RenderableType:
+def _screen(
+    compared: Comparison, dispersed: RobustComparison | None, verbose: bool
+) -> RenderableType:
     from nutdamp.views.glance import comparison_screen, glance
 
     if dispersed is None:
         return comparison_screen(compared) if verbose else glance(compared)
     from nutdamp.views.robust import robust_notes, robust_screen
 
-    return robust_screen(dispersed) if verbose else glance(dispersed.joined, robust_notes(dispersed))
+    return (
+        robust_screen(dispersed) if verbose else glance(dispersed.joined, robust_notes(dispersed))
+    )
 
 
 @click.command("animate", cls=SessionCommand)
 @spacecraft_argument
 @flown_options("Show")
 @goal_options
-@click.option("-o", "--output", type=OUTPUT, required=True, help="The film: .gif, or .mp4 where ffmpeg is installed.")
+@click.option(
+    "-o",
+    "--output",
+    type=OUTPUT,
+    required=True,
+    help="The film: .gif, or .mp4 where ffmpeg is installed.",
+)
 @click.option("--until", type=END, help="End of the motion; default soon after the last pulse.")
-@click.option("--seconds", type=click.FloatRange(0.2, 600.0), help="Length of the film; default 6 s to 30 s.")
+@click.option(
+    "--seconds", type=click.FloatRange(0.2, 600.0), help="Length of the film; default 6 s to 30 s."
+)
 @defaulted("--fps", click.IntRange(1, 50), 20, "Frames a second.")
 @defaulted("--width", click.IntRange(320, 3840), 800, "Width in pixels; height 0.6 of it.")
 @quiet_option
-def animate_command(job: Job, until: float | None, seconds: float | None, fps: int, width: int) -> None:
-    """Film the body cone rolling on the space cone through the pulses, flown with their real widths.
+def animate_command(
+    job: Job, until: float | None, seconds: float | None, fps: int, width: int
+) -> None:
+    """Film the body cone rolling on the space cone through the pulses, flown with their real
+    widths.
 
-    SPACECRAFT is a YAML file; without it spacecraft.yaml in this folder, else the built-in example. A FILE of - is
-    standard output, as GIF.
+    SPACECRAFT is a YAML file; without it spacecraft.yaml in this folder, else the built-in example.
+    A FILE of - is standard output, as GIF.
     """
     from nutdamp.figures import image
 
@@ -279,7 +354,8 @@ def animate_command(job: Job, until: float | None, seconds: float | None, fps: i
     timed = image.timing(body, end, fps, seconds)
     if not timed.smooth:
         job.remark(
-            f"only {timed.frames / timed.turns:.1f} frames show a nutation turn, which may seem to run backwards: "
+            f"only {timed.frames / timed.turns:.1f} frames show a nutation turn, "
+            "which may seem to run backwards: "
             f"--seconds {timed.turns * image.SMOOTH / fps:.0f} would show it, or an earlier --until"
         )
     flight = plan.reaching(end)
@@ -292,24 +368,40 @@ def animate_command(job: Job, until: float | None, seconds: float | None, fps: i
 @click.command("simulate", cls=SessionCommand)
 @spacecraft_argument
 @flown_options(
-    "Propagate", "Plan this scheme with default options and propagate it, not the recommended one; none is free motion."
+    "Propagate",
+    (
+        "Plan this scheme with default options and propagate it, not the recommended one; "
+        "none is free motion."
+    ),
 )
 @goal_options
-@click.option("--flown", "real", is_flag=True, help="Propagate real pulse widths instead of the impulse sum (17).")
-@click.option("--until", type=END, help="End, of which the outcome is shown; default last pulse + one inertial period.")
+@click.option(
+    "--flown",
+    "real",
+    is_flag=True,
+    help="Propagate real pulse widths instead of the impulse sum (17).",
+)
+@click.option(
+    "--until",
+    type=END,
+    help="End, of which the outcome is shown; default last pulse + one inertial period.",
+)
 @defaulted("--samples", click.IntRange(2, 10_000_000), 1000, "Rows of the track.")
 @click.option("--csv", type=OUTPUT, help="Write the track.")
 @click.option("--json", type=OUTPUT, help="Write pulses, how both models end, and extremes.")
 @carry_options("the end")
 @plot_options(FIGURES)
 @screen_options
-def simulate_command(job: Job, real: bool, until: float | None, samples: int, at: float | None, verbose: bool) -> None:
-    """Propagate a schedule; show cone angles around each pulse, how it ends by both models, and the axis track.
+def simulate_command(
+    job: Job, real: bool, until: float | None, samples: int, at: float | None, verbose: bool
+) -> None:
+    """Propagate a schedule; show cone angles around each pulse, how it ends by both models, and the
+    axis track.
 
-    The verdict is on the whole schedule, in dispersed cases where the file has them; of free motion on its end. Exit
-    status 4 where it is not FLY or NO PULSE. SPACECRAFT is a YAML file, or - for standard input; without it
-    spacecraft.yaml in this folder, else the built-in example. A FILE of - is standard output, for --schedule standard
-    input.
+    The verdict is on the whole schedule, in dispersed cases where the file has them; of free motion
+    on its end. Exit status 4 where it is not FLY or NO PULSE. SPACECRAFT is a YAML file, or - for
+    standard input; without it spacecraft.yaml in this folder, else the built-in example. A FILE of
+    - is standard output, for --schedule standard input.
     """
     job.begin()
     plan = plan_or_read(job, judged=not job.silent)

@@ -1,7 +1,8 @@
-"""Output to the terminal: results on standard output, messages and progress on standard error, no control characters.
+"""Output to the terminal: results on standard output, messages and progress on standard error, no
+control characters.
 
-Names of files, channels or units come from elsewhere; on a terminal their control characters could clear the screen,
-change its title or pass for output of this program.
+Names of files, channels or units come from elsewhere; on a terminal their control characters could
+clear the screen, change its title or pass for output of this program.
 """
 
 from __future__ import annotations
@@ -42,8 +43,11 @@ def say(text: str) -> None:
 
 
 def show(renderable: RenderableType) -> None:
-    """Print a result on standard output; in a file or a pipe without the blanks that fill up lines."""
-    shown, renderable = console(), _Visible(renderable)
+    """Print a result on standard output;
+    in a file or a pipe without the blanks that fill up lines.
+    """
+    shown = console()
+    renderable = _Visible(renderable)
     if shown.is_terminal:
         shown.print(renderable)
         return
@@ -53,13 +57,16 @@ def show(renderable: RenderableType) -> None:
 
 
 def console() -> Console:
-    """Standard output as rich sees it, at least `NARROWEST` wide; names such as [red] or :rocket: stay as they are."""
+    """Standard output as rich sees it, at least `NARROWEST` wide; names such as [red] or :rocket:
+    stay as they are.
+    """
     import os
     import shutil
 
     from rich.console import Console
 
-    requested, width = os.environ.get("COLUMNS", ""), None
+    requested = os.environ.get("COLUMNS", "")
+    width = None
     if requested.isdigit() and int(requested) < NARROWEST:
         width = max(shutil.get_terminal_size().columns, NARROWEST)
     return Console(highlight=False, markup=False, emoji=False, soft_wrap=False, width=width)
@@ -86,7 +93,9 @@ QUIET = "nutdamp.quiet"  # key of ``--quiet`` in the context of a command line
 
 @contextmanager
 def look_of_screen() -> Iterator[None]:
-    """Context of texts for people: in the units of ``--units``, without notes where ``--quiet`` says so."""
+    """Context of texts for people: in the units of ``--units``, without notes where ``--quiet``
+    says so.
+    """
     from nutdamp.views.text import quietly
 
     context = click.get_current_context(silent=True)
@@ -103,12 +112,18 @@ def _debugging(ctx: click.Context, _: click.Parameter, value: bool) -> None:
 
 
 debug_option = click.option(
-    "--debug", is_flag=True, expose_value=False, callback=_debugging, help="Show the traceback of an internal error."
+    "--debug",
+    is_flag=True,
+    expose_value=False,
+    callback=_debugging,
+    help="Show the traceback of an internal error.",
 )
 
 
 def show_failures(compared: Comparison) -> bool:
-    """Name on standard error the schemes that have a bug, with ``--debug`` their tracebacks; return True if any has."""
+    """Name on standard error the schemes that have a bug, with ``--debug`` their tracebacks; return
+    True if any has.
+    """
     for plan in compared.failed:
         if click.get_current_context().meta.get(DEBUG):
             import traceback
@@ -124,7 +139,9 @@ BELIEVED = 0.1  # share of the steps that have to be done before a time left is 
 
 @contextmanager
 def working(what: str, *, quiet: bool = False) -> Iterator[None]:
-    """Show ``what`` is under way: on a terminal only, after `PATIENCE`, and it leaves nothing behind."""
+    """Show ``what`` is under way: on a terminal only, after `PATIENCE`, and it leaves nothing
+    behind.
+    """
     if quiet or not sys.stderr.isatty():
         yield
         return
@@ -154,9 +171,11 @@ def working(what: str, *, quiet: bool = False) -> Iterator[None]:
 
 @dataclass
 class _Progress:
-    """Text of ``what`` has gone on since it ``began``, s: share of the steps done, time left, and the search that runs.
+    """Text of ``what`` has gone on since it ``began``, s: share of the steps done, time left, and
+    the search that runs.
 
-    The time left goes by the last step, ``share`` at ``moment``, from `BELIEVED` on; none where a step takes longer.
+    The time left goes by the last step, ``share`` at ``moment``, from `BELIEVED` on; none where a
+    step takes longer.
     """
 
     what: str
@@ -172,7 +191,8 @@ class _Progress:
             return text
         now = clock()
         if task.share != self.share:
-            self.share, self.moment = task.share, now
+            self.share = task.share
+            self.moment = now
         text = f"{text}, {math.floor(100.0 * self.share)} % done"
         if not BELIEVED <= self.share < 1.0:
             return text

@@ -56,19 +56,29 @@ if TYPE_CHECKING:
 @spacecraft_argument
 @click.option(
     "--allow",
-    type=UnitType("angle", lambda shift: shifts([shift]), "expected an angle of at least 0, or any", any=math.inf),
+    type=UnitType(
+        "angle",
+        lambda shift: shifts([shift]),
+        "expected an angle of at least 0, or any",
+        any=math.inf,
+    ),
     multiple=True,
     metavar="ANGLE|any",
     help="How far from its target H may end; repeatable, a front for each. Default: 0 deg and any.",
 )
 @defaulted("--points", click.IntRange(1, 1000), 10, "Horizons tried per front.")
 @defaulted(
-    "--least", NameType(LEAST[:2]), LEAST[0], "What is traded against time; impulse where propellant is unknown."
+    "--least",
+    NameType(LEAST[:2]),
+    LEAST[0],
+    "What is traded against time; impulse where propellant is unknown.",
 )
 @partial(goal_options, several=False)
 @click.option("--csv", type=OUTPUT, help="Write the points.")
 @click.option("--json", type=OUTPUT, help="Write the points with their pulses.")
-@click.option("--plot", type=OUTPUT, help="Draw the fronts (.png, .svg, .pdf; needs the extra plot).")
+@click.option(
+    "--plot", type=OUTPUT, help="Draw the fronts (.png, .svg, .pdf; needs the extra plot)."
+)
 @click.option(
     "--schedules",
     type=FOLDER,
@@ -77,13 +87,19 @@ if TYPE_CHECKING:
 )
 @screen_options
 def trade_command(
-    job: Job, allow: tuple[float, ...], points: int, least: str, schedules: str | None, verbose: bool
+    job: Job,
+    allow: tuple[float, ...],
+    points: int,
+    least: str,
+    schedules: str | None,
+    verbose: bool,
 ) -> None:
-    """Trade time against propellant: the cheapest schedules found for ends from the earliest to the horizon.
+    """Trade time against propellant: the cheapest schedules found for ends from the earliest to the
+    horizon.
 
-    Each front is of the scheme optimal (of the others where that finds none) and holds no schedule that another beats
-    in both. Exit status 4 where none of the schedules may be flown, by their verdicts, and 3 where there is none.
-    SPACECRAFT and FILE are as for `nutdamp plan`.
+    Each front is of the scheme optimal (of the others where that finds none) and holds no schedule
+    that another beats in both. Exit status 4 where none of the schedules may be flown, by their
+    verdicts, and 3 where there is none. SPACECRAFT and FILE are as for `nutdamp plan`.
     """
     from nutdamp.files.tabular import make_folder
     from nutdamp.planning.notes import CUT
@@ -112,7 +128,9 @@ def trade_command(
     brief = [] if verbose else [partial(trade_brief, traded.spacecraft, traded.fronts)]
     job.deliver(traded, *brief, files=files, unsaved=unsaved)
     judged = [point.verdict.status for _, _, point in numbered(traded.fronts)]
-    best = next((status for status in judged if not status.exit_status), judged[0] if judged else None)
+    best = next(
+        (status for status in judged if not status.exit_status), judged[0] if judged else None
+    )
     if not judged and traded.recommended is not None and traded.recommended.verdict.idle:
         best = traded.recommended.verdict.status
     leave(best, infeasible=best is None)
@@ -122,21 +140,37 @@ def trade_command(
 @spacecraft_argument
 @click.option("--until", type=END, help="End; default: the horizon after the nutation is at start.")
 @defaulted("--seed", click.IntRange(0, LARGEST_SEED), 1, "Of the noise of the sensor.")
-@click.option("--case", type=Count(), help="Fly this dispersed case, as `disperse --loop` does with that seed.")
+@click.option(
+    "--case",
+    type=Count(),
+    help="Fly this dispersed case, as `disperse --loop` does with that seed.",
+)
 @defaulted("--samples", click.IntRange(2, 10_000_000), 1000, "Rows of the track.")
 @click.option("--csv", type=OUTPUT, help="Write the pulses, as `plan --csv` does.")
 @click.option("--track", type=OUTPUT, help="Write the track, as `simulate --csv` does.")
 @click.option("--json", type=OUTPUT, help="Write firings, dead band, margins.")
 @carry_options("end of the run")
-@click.option("--plot", type=OUTPUT, help="Draw signal, nutation and firings (.png, .svg, .pdf; needs extra plot).")
+@click.option(
+    "--plot",
+    type=OUTPUT,
+    help="Draw signal, nutation and firings (.png, .svg, .pdf; needs extra plot).",
+)
 @screen_options
 def loop_command(
-    job: Job, until: float | None, seed: int, case: int | None, samples: int, at: float | None, verbose: bool
+    job: Job,
+    until: float | None,
+    seed: int,
+    case: int | None,
+    samples: int,
+    at: float | None,
+    verbose: bool,
 ) -> None:
-    """Fly the closed loop of the file: fire from what its gyro or accelerometer shows, and see where it ends.
+    """Fly the closed loop of the file: fire from what its gyro or accelerometer shows, and see
+    where it ends.
 
-    A channel wired backwards, a reversed sensor and firings that come too late are found and named by the first
-    firings that can be judged: exit status 3. SPACECRAFT and FILE are as for `nutdamp plan`.
+    A channel wired backwards, a reversed sensor and firings that come too late are found and named
+    by the first firings that can be judged: exit status 3. SPACECRAFT and FILE are as for `nutdamp
+    plan`.
     """
     body = job.begin()
 
@@ -152,7 +186,9 @@ def loop_command(
         job.note(warnings(body))
     pieces = partial(run.flight.pieces, samples, run.until)
     track: Files = {"track": lambda: partial(write_track, pieces(), run.flight.spacecraft.inertia)}
-    job.deliver(plan, partial(loop_screen, plan, verbose=verbose), more=track | job.carried(plan, at))
+    job.deliver(
+        plan, partial(loop_screen, plan, verbose=verbose), more=track | job.carried(plan, at)
+    )
     if run.stop.fault:
         say(f"nutdamp: {text(stopped(run))}")
     leave(plan.verdict.status)
@@ -163,10 +199,15 @@ def loop_command(
 @click.option(
     "--thresholds",
     "pairs",
-    type=Direction(thresholds, "expected START above STOP, both below 90 deg, such as 0.5deg,0.1deg"),
+    type=Direction(
+        thresholds, "expected START above STOP, both below 90 deg, such as 0.5deg,0.1deg"
+    ),
     multiple=True,
     metavar="START,STOP",
-    help="Fire from START to STOP, such as 0.5deg,0.1deg; repeatable. Default: start and stop of loop.",
+    help=(
+        "Fire from START to STOP, such as 0.5deg,0.1deg; repeatable. Default: "
+        "start and stop of loop."
+    ),
 )
 @click.option(
     "--largest",
@@ -178,11 +219,15 @@ def loop_command(
 @click.option("--json", type=OUTPUT, help="Write the same, and how the nutation grows.")
 @click.option("--plot", type=OUTPUT, help="Draw it (.png, .svg, .pdf; needs extra plot).")
 @screen_options
-def budget_command(job: Job, pairs: tuple[Angles, ...], largest: float | None, seed: int, verbose: bool) -> None:
-    """Budget a mission: pulses a day and propellant a year that hold the nutation against energy dissipation.
+def budget_command(
+    job: Job, pairs: tuple[Angles, ...], largest: float | None, seed: int, verbose: bool
+) -> None:
+    """Budget a mission: pulses a day and propellant a year that hold the nutation against energy
+    dissipation.
 
-    The limit cycle of the loop in the file, from event to event in closed form; and how long until damping must begin.
-    A body whose nutation decays needs none. SPACECRAFT and FILE are as for `nutdamp plan`.
+    The limit cycle of the loop in the file, from event to event in closed form; and how long until
+    damping must begin. A body whose nutation decays needs none. SPACECRAFT and FILE are as for
+    `nutdamp plan`.
     """
     body = job.begin()
     for reading in (text for pair in pairs for text in pair.readings):
@@ -200,31 +245,57 @@ def budget_command(job: Job, pairs: tuple[Angles, ...], largest: float | None, s
 @click.command("fit", cls=SessionCommand)
 @click.argument("telemetry", type=FILE, metavar="TELEMETRY.csv")
 @spacecraft_argument
-@click.option("--schedule", type=FILE, help="Pulses fired during the record, a CSV file as `plan --csv` writes it.")
-@click.option("--sun-pulses", type=FILE, help="Times of Sun pulses, a CSV file: t_s or utc, and any sun_aspect_deg.")
-@click.option("--at", type=UnitType("time"), default=0.0, help="Show and write the motion at this time; default 0 s.")
-@click.option("-o", "--output", type=OUTPUT, help="Write the spacecraft file with the estimates in it.")
-@click.option("--accept", is_flag=True, help="Accept an estimate that is far from the file: -o writes it.")
+@click.option(
+    "--schedule",
+    type=FILE,
+    help="Pulses fired during the record, a CSV file as `plan --csv` writes it.",
+)
+@click.option(
+    "--sun-pulses",
+    type=FILE,
+    help="Times of Sun pulses, a CSV file: t_s or utc, and any sun_aspect_deg.",
+)
+@click.option(
+    "--at",
+    type=UnitType("time"),
+    default=0.0,
+    help="Show and write the motion at this time; default 0 s.",
+)
+@click.option(
+    "-o", "--output", type=OUTPUT, help="Write the spacecraft file with the estimates in it."
+)
+@click.option(
+    "--accept", is_flag=True, help="Accept an estimate that is far from the file: -o writes it."
+)
 @click.option("--json", type=OUTPUT, help="Write estimates, covariance and signals.")
-@click.option("--plot", type=OUTPUT, help="Draw data, fit and residuals (.png, .svg, .pdf; needs extra plot).")
+@click.option(
+    "--plot", type=OUTPUT, help="Draw data, fit and residuals (.png, .svg, .pdf; needs extra plot)."
+)
 @screen_options
-def fit_command(job: Job, telemetry: str, sun_pulses: str | None, at: float, accept: bool, verbose: bool) -> None:
-    """Estimate motion, C/A, dissipation and sensor errors from telemetry, and thrust factors from pulses fired in it.
+def fit_command(
+    job: Job, telemetry: str, sun_pulses: str | None, at: float, accept: bool, verbose: bool
+) -> None:
+    """Estimate motion, C/A, dissipation and sensor errors from telemetry, and thrust factors from
+    pulses fired in it.
 
-    TELEMETRY.csv has t_s or utc, and any of omega_1_rad_s, omega_2_rad_s, omega_3_rad_s (or _deg_s), axis_ra_deg and
+    TELEMETRY.csv has t_s or utc, and any of omega_1_rad_s, omega_2_rad_s, omega_3_rad_s (or
+    _deg_s), axis_ra_deg and
     axis_dec_deg, axis_x, axis_y and axis_z, q_w to q_z, acceleration_m_s2, crossing_azimuth_deg and
-    crossing_elevation_deg of crossing_ra_deg and crossing_dec_deg (of the Sun where they are empty), sun_aspect_deg,
+    crossing_elevation_deg of crossing_ra_deg and crossing_dec_deg (of the Sun where they are
+    empty), sun_aspect_deg,
     sun_pulse (0 or 1); empty cells are missing samples.
-    Least squares on the closed forms of the coast; what the data do not tell stays at the tolerances of the file.
-    -o writes the file with its comments kept: motion at --at, moments, and as dispersions how well all is known.
+    Least squares on the closed forms of the coast; what the data do not tell stays at the
+    tolerances of the file.
+    -o writes the file with its comments kept: motion at --at, moments, and as dispersions how well
+      all is known.
 
     \b
       nutdamp fit flight.csv -o now.yaml --at 90s
       nutdamp plan now.yaml
 
-    Exit status 3 where nothing can be estimated, several nutation rates fit equally well, residuals are no noise, as
-    with a pulse that --schedule does not have, or the estimate is far from the file: then -o needs --accept.
-    SPACECRAFT and FILE are as for `nutdamp plan`.
+    Exit status 3 where nothing can be estimated, several nutation rates fit equally well, residuals
+    are no noise, as with a pulse that --schedule does not have, or the estimate is far from the
+    file: then -o needs --accept. SPACECRAFT and FILE are as for `nutdamp plan`.
     """
     body = job.begin()
 
@@ -234,13 +305,19 @@ def fit_command(job: Job, telemetry: str, sun_pulses: str | None, at: float, acc
     from nutdamp.views.fit import fit_screen
 
     with job.working("fitting"):
-        fitted = fit(telemetry, body, schedule=job.flown.schedule, sun_pulses=sun_pulses, ignored=job.doubt)
+        fitted = fit(
+            telemetry, body, schedule=job.flown.schedule, sun_pulses=sun_pulses, ignored=job.doubt
+        )
     job.note(notes(fitted.core, carried(fitted.core, at)))
     files: Files = {"output": partial(fitted.text, at), "json": partial(fitted.to_dict, at)}
-    doubtful, output = bool(refused(fitted.core)) and not accept, job.written["output"]
+    doubtful = bool(refused(fitted.core)) and not accept
+    output = job.written["output"]
     if doubtful and output is not None:
         del files["output"]
-        say(f"{printable(output)} was not written: the estimate is far from the file (--accept writes it)")
+        say(
+            f"{printable(output)} was not written: the estimate is far from the file (--accept "
+            "writes it)"
+        )
     job.deliver(fitted, partial(fit_screen, fitted.core, at, verbose=verbose), more=files)
     leave(infeasible=doubtful)
 
@@ -260,12 +337,23 @@ FIGURES = ("overview", "cases", "momentum")  # figures that ``--plot`` draws
 )
 @defaulted("--seed", click.IntRange(0, LARGEST_SEED), 1, "Same seed, same draws, always.")
 @click.option("--threads", type=click.IntRange(1, 1024), help="Default: the processors there are.")
-@click.option("--loop", "looped", is_flag=True, help="Disperse the closed loop of the file: body, valves and sensor.")
-@click.option("--until", type=END, help="End of --loop; default: the horizon after the nutation is at start.")
+@click.option(
+    "--loop",
+    "looped",
+    is_flag=True,
+    help="Disperse the closed loop of the file: body, valves and sensor.",
+)
+@click.option(
+    "--until", type=END, help="End of --loop; default: the horizon after the nutation is at start."
+)
 @click.option("--case", type=Count(), help="Show this one case alone, with all its inputs.")
 @defaulted("--worst", click.IntRange(0, 1000), 5, "Worst cases with -v.", metavar="N")
-@click.option("--csv", type=OUTPUT, help="Write inputs and outcome of every case, with angles to cones.")
-@click.option("--json", type=OUTPUT, help="Write percentiles, requirement, tolerance budget, worst cases.")
+@click.option(
+    "--csv", type=OUTPUT, help="Write inputs and outcome of every case, with angles to cones."
+)
+@click.option(
+    "--json", type=OUTPUT, help="Write percentiles, requirement, tolerance budget, worst cases."
+)
 @plot_options(FIGURES)
 @screen_options
 def disperse_command(
@@ -281,17 +369,24 @@ def disperse_command(
 ) -> None:
     """Fly one schedule, or the closed loop, in many cases, dispersed as the spacecraft file says.
 
-    Shows the verdict, each bound with the share of cases that keep it, percentiles of what is left, and which tolerance
-    counts; with -v the tolerance budget and the worst cases. Exit status 4 where these cases do not show that enough
-    comply. Ctrl-C ends the run and shows what is done. SPACECRAFT and FILE are as for `nutdamp plan`.
+    Shows the verdict, each bound with the share of cases that keep it, percentiles of what is left,
+    and which tolerance counts; with -v the tolerance budget and the worst cases. Exit status 4
+    where these cases do not show that enough comply. Ctrl-C ends the run and shows what is done.
+    SPACECRAFT and FILE are as for `nutdamp plan`.
     """
     if case is not None and (job.written["csv"] or job.written["plot"]):
         raise click.UsageError("--case shows a single case: --csv and --plot are for a study")
     if until is not None and not looped:
         raise click.UsageError("--until is for --loop")
-    others = {**job.flown._asdict(), "threads": threads, "figure": job.figure != FIGURES[0]} if looped else {}
+    others = (
+        {**job.flown._asdict(), "threads": threads, "figure": job.figure != FIGURES[0]}
+        if looped
+        else {}
+    )
     for name in (name for name, value in others.items() if value):
-        raise click.UsageError(f"--loop flies the loop of the file, all in one way: leave --{name} out")
+        raise click.UsageError(
+            f"--loop flies the loop of the file, all in one way: leave --{name} out"
+        )
     body = job.begin()
 
     from nutdamp import api
@@ -344,7 +439,8 @@ def deliver_case(job: Job, plan: Plan | None, case: int, *, seed: int, until: fl
         study = study_of(plan.spacecraft, plan.pulses, seed=seed)
         if study.lightening_error:
             job.remark(study.lightening_error)
-        draws, scheme = study.draws_of(case), plan.scheme
+        draws = study.draws_of(case)
+        scheme = plan.scheme
         data = lambda: {"scheme": scheme, "seed": seed, **case_json(study, case, draws)}  # noqa: E731
         screen = partial(case_screen, study, case, draws, scheme=scheme)
     job.deliver(None, screen, more={"json": data})

@@ -1,4 +1,6 @@
-"""Numerics: quadrature, zeros, tails of χ², rounding of bounds, and removal of rounding noise from shown numbers."""
+"""Numerics: quadrature, zeros, tails of χ², rounding of bounds, and removal of rounding noise from
+shown numbers.
+"""
 
 from __future__ import annotations
 
@@ -12,8 +14,10 @@ from numpy.typing import ArrayLike, NDArray
 
 RPM = 30.0 / math.pi  # turns a minute of one rad/s
 MISSING = "–"  # text of a number that is not known
-NOISE = 1e-13  # part of the largest component below which another component of a vector counts as rounding
-SAME_ANGLE = 1e-11  # rad; angles closer than this count as equal, and a direction this near a pole has no longitude
+# part of the largest component below which another component of a vector counts as rounding
+NOISE = 1e-13
+# rad; angles closer than this count as equal, and a direction this near a pole has no longitude
+SAME_ANGLE = 1e-11
 
 
 @functools.cache
@@ -64,7 +68,9 @@ def cos_sin(angle: Any) -> tuple[Any, Any]:
 
 
 def rising_zero(excess: Callable[[float], float], low: float, high: float) -> float:
-    """Rising zero of ``excess`` between ``low`` and ``high``: false position that halves a stale end."""
+    """Rising zero of ``excess`` between ``low`` and ``high``: false position that halves a stale
+    end.
+    """
     below, above = excess(low), excess(high)
     for _ in range(100):
         if above == 0.0 or high - low <= 2e-16 * high:
@@ -74,15 +80,23 @@ def rising_zero(excess: Callable[[float], float], low: float, high: float) -> fl
             middle = 0.5 * (low + high)
         value = excess(middle)
         if value < 0.0:
-            low, below, above = middle, value, 0.5 * above
+            low = middle
+            below = value
+            above = 0.5 * above
         else:
-            high, above, below = middle, value, 0.5 * below
+            high = middle
+            above = value
+            below = 0.5 * below
     return high
 
 
 def chi_square_tail(count: int, value: float) -> float:
-    """Probability that the sum of ``count`` squares of standard normal numbers exceeds a ``value`` above 0."""
+    """Probability that the sum of ``count`` squares of standard normal numbers exceeds a ``value``
+    above 0.
+    """
     half = max(0.5 * value, 1e-300)
     powers = [0.5 * (count % 2) + index for index in range(count // 2)]
-    series = math.fsum(math.exp(power * math.log(half) - half - math.lgamma(power + 1.0)) for power in powers)
+    series = math.fsum(
+        math.exp(power * math.log(half) - half - math.lgamma(power + 1.0)) for power in powers
+    )
     return series + (math.erfc(math.sqrt(half)) if count % 2 else 0.0)

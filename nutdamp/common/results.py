@@ -1,7 +1,8 @@
-"""Public interface of results (to_dict, to_csv, figure ...), whose functions `nutdamp.api` registers.
+"""Public interface of results (to_dict, to_csv, figure ...), whose functions `nutdamp.api`
+registers.
 
-A `Plan` thus writes itself as CSV although its module knows no files. The functions are there as soon as a public name
-of `nutdamp` is used; without them these methods raise TypeError.
+A `Plan` thus writes itself as CSV although its module knows no files. The functions are there as
+soon as a public name of `nutdamp` is used; without them these methods raise TypeError.
 """
 
 from __future__ import annotations
@@ -22,15 +23,21 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
 
-Table = NDArray[np.void]  # structured array: one row per pulse or sample, fields named as the columns of the CSV files
+Table = NDArray[
+    np.void
+]  # structured array: one row per pulse or sample, fields named as the columns of the CSV files
 _home: list[str] = []  # module that has the table of `view`
 
 
-Value = str | int | float | None  # a value of a note; its name ends in the unit: ``_deg``, ``_s``, ``_Nms`` …
+Value = (
+    str | int | float | None
+)  # a value of a note; its name ends in the unit: ``_deg``, ``_s``, ``_Nms`` …
 
 
 class Note(NamedTuple):
-    """A statement about a result: the code of a sentence in ``guide/notes.md``, and the values that it names."""
+    """A statement about a result: the code of a sentence in ``guide/notes.md``, and the values that
+    it names.
+    """
 
     code: str
     items: tuple[tuple[str, Value], ...] = ()
@@ -42,7 +49,9 @@ class Note(NamedTuple):
 
     def of(self, scheme: str) -> Note:
         """The note with the scheme that it is about."""
-        return Note(self.code, (("scheme", scheme), *(item for item in self.items if item[0] != "scheme")))
+        return Note(
+            self.code, (("scheme", scheme), *(item for item in self.items if item[0] != "scheme"))
+        )
 
 
 def note(code: str, **values: Value) -> Note:
@@ -51,10 +60,12 @@ def note(code: str, **values: Value) -> Note:
 
 
 def register(module: str) -> None:
-    """Take the functions of `view` from the table ``VIEWS`` of a module, which is loaded when it is needed first.
+    """Take the functions of `view` from the table ``VIEWS`` of a module, which is loaded when it is
+    needed first.
 
-    Its keys are the class of a result and a subject (``Trade.csv``). Its values are ``module:function`` of the package,
-    which takes the result, or ``module:function name key=name``, which takes these attributes of it.
+    Its keys are the class of a result and a subject (``Trade.csv``). Its values are
+    ``module:function`` of the package, which takes the result, or ``module:function name
+    key=name``, which takes these attributes of it.
     """
     _home[:] = [module]
 
@@ -66,7 +77,9 @@ def _entry(result: object, what: str) -> str | None:
 
 
 def view(result: object, what: str, *arguments: Any, **options: Any) -> Any:
-    """Value of the function for a result and a subject; TypeError where its class and its bases have none."""
+    """Value of the function for a result and a subject; TypeError where its class and its bases
+    have none.
+    """
     entry = _entry(result, what)
     if entry is None:
         raise TypeError(f"expected a result with {what}, got a {type(result).__qualname__}")
@@ -99,7 +112,9 @@ class Data:
     """Mixin of results that are written as JSON."""
 
     def to_dict(self) -> dict[str, Any]:
-        """Contents of the file that the command of this result writes with ``--json``, or the part that holds it."""
+        """Contents of the file that the command of this result writes with ``--json``, or the part
+        that holds it.
+        """
         return finite(view(self, "data"))
 
 
@@ -107,7 +122,8 @@ class Drawn:
     """Mixin of results that are drawn."""
 
     def figure(self, name: str | None = None) -> Figure:
-        """Matplotlib figure that the command of this result draws with ``--plot``, by its name if it has several.
+        """Matplotlib figure that the command of this result draws with ``--plot``, by its name if
+        it has several.
 
         Of plans and flights that is ``overview`` (the default) or ``motion``.
         Raises BadRequest for other names, MissingExtra without matplotlib, Infeasible for a plan
@@ -121,7 +137,8 @@ class Written(Drawn):
     """Mixin of results that are written as CSV, too."""
 
     def to_csv(self, path: str | PathLike[str]) -> None:
-        """Write the rows as the command of this result does with ``--csv`` (a comparison: ``--table``).
+        """Write the rows as the command of this result does with ``--csv`` (a comparison:
+        ``--table``).
 
         Raises CannotWrite, and Infeasible for a plan without a schedule.
         """

@@ -11,17 +11,53 @@ from fractions import Fraction
 LEAP_DAYS = tuple(
     datetime.date(year, *((6, 30) if half == 1 else (12, 31))).toordinal()
     for year, half in (
-        *((1972, 1), (1972, 2), (1973, 2), (1974, 2), (1975, 2), (1976, 2), (1977, 2), (1978, 2), (1979, 2)),
-        *((1981, 1), (1982, 1), (1983, 1), (1985, 1), (1987, 2), (1989, 2), (1990, 2), (1992, 1), (1993, 1)),
-        *((1994, 1), (1995, 2), (1997, 1), (1998, 2), (2005, 2), (2008, 2), (2012, 1), (2015, 1), (2016, 2)),
+        *(
+            (1972, 1),
+            (1972, 2),
+            (1973, 2),
+            (1974, 2),
+            (1975, 2),
+            (1976, 2),
+            (1977, 2),
+            (1978, 2),
+            (1979, 2),
+        ),
+        *(
+            (1981, 1),
+            (1982, 1),
+            (1983, 1),
+            (1985, 1),
+            (1987, 2),
+            (1989, 2),
+            (1990, 2),
+            (1992, 1),
+            (1993, 1),
+        ),
+        *(
+            (1994, 1),
+            (1995, 2),
+            (1997, 1),
+            (1998, 2),
+            (2005, 2),
+            (2008, 2),
+            (2012, 1),
+            (2015, 1),
+            (2016, 2),
+        ),
     )
 )
-"""Ordinals of the days that ended with 23:59:60 (IERS, Bulletin C); none has been announced since 2016."""
+"""Ordinals of the days that ended with 23:59:60 (IERS, Bulletin C); none has been announced since
+2016.
+"""
 
 FIRST_DAY = datetime.date(1972, 1, 1).toordinal()
-"""Ordinal of the first day of UTC with whole leap seconds; before it the UTC second had another length."""
+"""Ordinal of the first day of UTC with whole leap seconds; before it the UTC second had another
+length.
+"""
 
-DIGITS = 9  # digits of a second in texts: at 60 rpm a body turns by less than 1e-6 deg in a nanosecond
+DIGITS = (
+    9  # digits of a second in texts: at 60 rpm a body turns by less than 1e-6 deg in a nanosecond
+)
 
 _J2000 = Fraction(883_655_957_816, 1000)
 """Seconds from 1972-01-01T00:00:00 UTC, which was 00:00:42.184 TT, to 2000-01-01T12:00:00 TT."""
@@ -39,7 +75,9 @@ UNIFORM = {
     "TT": Fraction(42_184, 1000),
     "TDB": Fraction(42_184, 1000),
 }
-"""Time systems without leap seconds, and their clock reading, s, at 1972-01-01T00:00:00 UTC; GPS extrapolated."""
+"""Time systems without leap seconds, and their clock reading, s, at 1972-01-01T00:00:00 UTC; GPS
+extrapolated.
+"""
 
 
 @dataclass(frozen=True, order=True, slots=True)
@@ -50,17 +88,20 @@ class Epoch:
 
     @classmethod
     def parse(cls, text: str, system: str = "UTC") -> Epoch:
-        """Epoch of an ISO 8601 date and time, with month and day or day of the year; UTC without a zone.
+        """Epoch of an ISO 8601 date and time, with month and day or day of the year; UTC without a
+        zone.
 
-        ``system``: UTC, or a time without leap seconds and zones, one of `UNIFORM`. Raises ValueError, which says what
-        is wrong.
+        ``system``: UTC, or a time without leap seconds and zones, one of `UNIFORM`. Raises
+        ValueError, which says what is wrong.
         """
         match = _TIME.fullmatch(text)
         if match is None:
             raise ValueError(f"{text!r} is no epoch; expected the form 2026-03-01T12:00:00.000")
         try:
             if match["day_of_year"] is None:
-                day = datetime.date(int(match["year"]), int(match["month"]), int(match["day"])).toordinal()
+                day = datetime.date(
+                    int(match["year"]), int(match["month"]), int(match["day"])
+                ).toordinal()
             else:
                 first = datetime.date(int(match["year"]), 1, 1)
                 day = first.toordinal() + int(match["day_of_year"]) - 1
@@ -72,12 +113,15 @@ class Epoch:
         second = Fraction(match["second"] or "0")
         east = 60 * int(match["zone_hour"] or "0") + int(match["zone_minute"] or "0")
         minutes = 60 * hour + minute - (-east if match["sign"] == "-" else east)
-        day, minutes = day + minutes // 1440, minutes % 1440
+        day = day + minutes // 1440
+        minutes = minutes % 1440
         if system != "UTC" and (match["sign"] or text.endswith("Z")):
             raise ValueError(f"{text!r} has a zone, and {system} has none")
         within = 61 if system == "UTC" and minutes == 1439 and day in LEAP_DAYS else 60
         if hour > 23 or minute > 59 or second >= within:
-            raise ValueError(f"{text!r} is no epoch: expected a time of day from 00:00:00 to 23:59:59.999…")
+            raise ValueError(
+                f"{text!r} is no epoch: expected a time of day from 00:00:00 to 23:59:59.999…"
+            )
         if day > datetime.date.max.toordinal():
             raise ValueError(f"{text!r} is after the year 9999 in UTC")
         elapsed = 86400 * (day - FIRST_DAY) + 60 * minutes + second
@@ -110,10 +154,11 @@ class Epoch:
         return self.rounded(DIGITS)
 
     def rounded(self, digits: int) -> str:
-        """ISO 8601 text with ``digits`` digits of a second: ``2026-03-01T12:00:00.000``; 60 within a leap second.
+        """ISO 8601 text with ``digits`` digits of a second: ``2026-03-01T12:00:00.000``; 60 within
+        a leap second.
 
-        Rounding carries over to the next minute or day. Raises ValueError after the year 9999, where no such text can
-        be written.
+        Rounding carries over to the next minute or day. Raises ValueError after the year 9999,
+        where no such text can be written.
         """
         whole, part = divmod(round(self.elapsed * 10**digits), 10**digits)
         day = FIRST_DAY + whole // 86400
@@ -124,7 +169,9 @@ class Epoch:
         date = datetime.date.fromordinal(day).isoformat()
         second = whole - 86400 * (day - FIRST_DAY) - _leaps_before(day)
         clock = min(second // 60, 1439)
-        return f"{date}T{clock // 60:02d}:{clock % 60:02d}:{second - 60 * clock:02d}.{part:0{digits}d}"
+        return (
+            f"{date}T{clock // 60:02d}:{clock % 60:02d}:{second - 60 * clock:02d}.{part:0{digits}d}"
+        )
 
 
 def _leaps_before(day: int) -> int:

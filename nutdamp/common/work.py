@@ -1,8 +1,10 @@
-"""Computation budgets, machine-independent bounds on searches; and progress, in steps done of steps expected.
+"""Computation budgets, machine-independent bounds on searches; and progress, in steps done of steps
+expected.
 
-One unit of a budget is somewhat less than a millisecond of a core of 2020. Flights, linear programs and descents
-`spend` units by counts that do not depend on the clock; searches test whether the open budget is `exhausted` and end
-with the best solution so far. A budget is no measure of progress, since a search may end long before it is spent.
+One unit of a budget is somewhat less than a millisecond of a core of 2020. Flights, linear programs
+and descents `spend` units by counts that do not depend on the clock; searches test whether the open
+budget is `exhausted` and end with the best solution so far. A budget is no measure of progress,
+since a search may end long before it is spent.
 """
 
 from __future__ import annotations
@@ -15,14 +17,24 @@ from dataclasses import dataclass
 from typing import Any
 
 SCHEME = 9_000.0  # units for the search of one scheme
-COMMAND = 20_000.0  # units for all searches of one comparison: two that take all of theirs leave some to others
+# units for all searches of one comparison: two that take all of theirs leave some to others
+COMMAND = 20_000.0
 CURE = 1_000.0  # units for the search of a limit that would make a scheme feasible
-CASES, SAMPLES = 20_000.0, 20_000  # units for the dispersed cases of one comparison by so many, the default number
-MORE_CASES = 5_000.0  # units for cases beyond that number, where they leave it undecided whether enough comply
+CASES, SAMPLES = (
+    20_000.0,
+    20_000,
+)  # units for the dispersed cases of one comparison by so many, the default number
+# units for cases beyond that number, where they leave it undecided whether enough comply
+MORE_CASES = 5_000.0
 FRONTS = 30_000.0  # units for all points of `trade` but those that `plan` finds
 LOOP = 20_000.0  # units for the flight of one closed loop
-CYCLES = 30_000.0  # units for the limit cycles of one pair of thresholds, and the lifetime of the tank
-FIT, FITTED = 4_500.0, 600  # units that a fit may spend on a record of so many rows; in proportion if more
+CYCLES = (
+    30_000.0  # units for the limit cycles of one pair of thresholds, and the lifetime of the tank
+)
+FIT, FITTED = (
+    4_500.0,
+    600,
+)  # units that a fit may spend on a record of so many rows; in proportion if more
 
 
 @dataclass(eq=False)
@@ -42,7 +54,8 @@ class WorkBudget:
 
 @dataclass(eq=False)
 class StepCount:
-    """Steps ``done`` of those ``expected``, and the ``inner`` task under way; this one is ``size`` steps of its own.
+    """Steps ``done`` of those ``expected``, and the ``inner`` task under way; this one is ``size``
+    steps of its own.
 
     ``hook`` is called with both numbers.
     """
@@ -81,7 +94,11 @@ _watch: ContextVar[Monitor | None] = ContextVar("watch", default=None)
 def budget(what: str, most: float) -> Iterator[WorkBudget]:
     """Open a budget of ``most`` units, but no more than is left of the enclosing one."""
     around, watch = _budget.get(), _watch.get()
-    inner = WorkBudget(what, most if around is None else min(most, max(around.most - around.done, 0.0)), around=around)
+    inner = WorkBudget(
+        what,
+        most if around is None else min(most, max(around.most - around.done, 0.0)),
+        around=around,
+    )
     token = _budget.set(inner)
     if watch is not None:
         watch.budget = inner
@@ -115,9 +132,14 @@ def exhausted() -> bool:
 
 @contextmanager
 def steps(
-    expected: float, size: float = 1.0, *, hook: Callable[[Any, Any], object] = lambda _done, _all: None
+    expected: float,
+    size: float = 1.0,
+    *,
+    hook: Callable[[Any, Any], object] = lambda _done, _all: None,
 ) -> Iterator[StepCount]:
-    """Count the steps of a task, which is ``size`` steps of the task around it; ``hook``: see `StepCount`."""
+    """Count the steps of a task, which is ``size`` steps of the task around it; ``hook``: see
+    `StepCount`.
+    """
     around, watch = _steps.get(), _watch.get()
     task = StepCount(expected, size, hook)
     token = _steps.set(task)
@@ -130,7 +152,8 @@ def steps(
     finally:
         _steps.reset(token)
         if around is not None:
-            around.inner, around.done = None, around.done + size
+            around.inner = None
+            around.done = around.done + size
 
 
 def reach(done: float) -> None:

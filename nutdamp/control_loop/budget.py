@@ -1,8 +1,10 @@
-"""Propellant and pulses a year that hold the nutation against energy dissipation, and how long the tank lasts.
+"""Propellant and pulses a year that hold the nutation against energy dissipation, and how long the
+tank lasts.
 
-They are those of the limit cycle of the loop from event to event: between two, z grows as e^{(κ - iω)t}, so that the
-time from one size to another is ln(s1/s0)/κ; noise decides in which sample a threshold is first reached, and only the
-few samples in which a channel may come to fire are worked out one by one. Many cycles are followed side by side.
+They are those of the limit cycle of the loop from event to event: between two, z grows as e^{(κ -
+iω)t}, so that the time from one size to another is ln(s1/s0)/κ; noise decides in which sample a
+threshold is first reached, and only the few samples in which a channel may come to fire are worked
+out one by one. Many cycles are followed side by side.
 """
 
 from __future__ import annotations
@@ -20,7 +22,15 @@ from nutdamp.common import results, work
 from nutdamp.control_loop.controller import SAMPLED, Watch
 from nutdamp.control_loop.law import Actuator, ComplexArray, Law
 from nutdamp.control_loop.simulation import fly
-from nutdamp.control_loop.stability import FARTHEST, Band, Odds, dead_band, expect_in_time, margins, transfer
+from nutdamp.control_loop.stability import (
+    FARTHEST,
+    Band,
+    Odds,
+    dead_band,
+    expect_in_time,
+    margins,
+    transfer,
+)
 from nutdamp.errors import Infeasible
 from nutdamp.flight.dynamics import Supply
 from nutdamp.physics.thruster import Ramp, shape_factor
@@ -67,7 +77,9 @@ ADDED = 6  # columns of `Sums` of which differences count
 
 @dataclass(eq=False)
 class Chains:
-    """State of each chain: z at the sample ``number``; ``fresh``: at the first estimate after a firing."""
+    """State of each chain: z at the sample ``number``; ``fresh``: at the first estimate after a
+    firing.
+    """
 
     z: ComplexArray
     number: Rows
@@ -84,7 +96,9 @@ class Chains:
 
 
 class Entry(NamedTuple):
-    """State in which a chain begins: z rad/s at ``time`` s; ``active`` after a firing; ``ready`` s to fire again."""
+    """State in which a chain begins: z rad/s at ``time`` s; ``active`` after a firing; ``ready`` s
+    to fire again.
+    """
 
     z: complex
     time: float
@@ -92,50 +106,81 @@ class Entry(NamedTuple):
     ready: float
 
 
-CHAINS, CYCLES, SETTLING = 64, 16, 2  # cycles followed side by side, counted cycles of each, and cycles before those
+CHAINS, CYCLES, SETTLING = (
+    64,
+    16,
+    2,
+)  # cycles followed side by side, counted cycles of each, and cycles before those
 FIRINGS = 200  # firings of each, at most, and as many more as bring the nutation down from start
 MOST_FOLLOWED = 2000  # firings of each, at most, whatever start
 ALONE = 8  # factor on cycles and firings of chains that have no noise
-ENTRIES, LOOKED = 16, 1_000_000  # flights, at most, from the state of the file down to start, and samples of them all
+ENTRIES, LOOKED = (
+    16,
+    1_000_000,
+)  # flights, at most, from the state of the file down to start, and samples of them all
 FEW = 4  # cycles per so many firings below which firings are counted instead
 STEP = 0.1  # units of work of a stretch of sixteen chains
 MOST_STEPS = 100_000  # stretches in all, at most
 ROWS = 128  # largest number of samples computed one by one at a time
-EARLY, LATE = 0.003, 3.0  # probabilities of the start threshold between which samples are examined one by one
+EARLY, LATE = (
+    0.003,
+    3.0,
+)  # probabilities of the start threshold between which samples are examined one by one
 LONGEST_LOOKED = 10_000  # largest number of samples examined one by one
 SIGMAS = 5.0  # reach of noise, sigmas, in which a channel may come to fire
 OUTGROWN = 4.0  # multiple of the expected dead band at which a loop does not hold the nutation
-OVERSHOOT = 0.82  # by which a random walk first passes a level, 0.58 steps, in sigmas of new noise: √2 times
-RISING = 1.1  # growth of the nutation from the first of many firings to the middle, and on, where it is not held
+# by which a random walk first passes a level, 0.58 steps, in sigmas of new noise: √2 times
+OVERSHOOT = 0.82
+# growth of the nutation from the first of many firings to the middle, and on, where it is not held
+RISING = 1.1
 SPENT = "the limit cycle is not reached within the budget of work"
 TOO_FAST = "the nutation grows faster than the firings damp it"
 REFINED = 4  # steps in which the moment of a firing is found on a continuous signal
 
 
 class Map:
-    """From event to event of the ``loop`` of a ``spacecraft`` with growing nutation, ``used`` kg of propellant gone.
+    """From event to event of the ``loop`` of a ``spacecraft`` with growing nutation, ``used`` kg of
+    propellant gone.
 
-    Raises Infeasible where no law can work. Blackout windows, and nozzles that are cold at first, are left out.
+    Raises Infeasible where no law can work. Blackout windows, and nozzles that are cold at first,
+    are left out.
     """
 
-    def __init__(self, spacecraft: Spacecraft, loop: Loop, *, used: float = 0.0, seed: int = 1) -> None:
+    def __init__(
+        self, spacecraft: Spacecraft, loop: Loop, *, used: float = 0.0, seed: int = 1
+    ) -> None:
         limits = replace(spacecraft.limits, blackout=(), earliest=0.0)
         tank = spacecraft.tank and spacecraft.tank.doubled  # so that none runs empty amid a cycle
-        self.truth, self.used = replace(spacecraft, cold=None, tank=tank, limits=limits), used
-        self.law, self.spin = Law(self.truth, loop), spacecraft.spin
+        self.truth = replace(spacecraft, cold=None, tank=tank, limits=limits)
+        self.used = used
+        self.law = Law(self.truth, loop)
+        self.spin = spacecraft.spin
         self.watch, self.rng = Watch(self.law, 0.0), np.random.default_rng(seed)
         self.seen = transfer(self.law, self.spin)
-        self.ahead = self.watch.ahead = self.seen.step if loop.predict or loop.sensor.rate is None else 0.0
+        self.ahead = self.watch.ahead = (
+            self.seen.step if loop.predict or loop.sensor.rate is None else 0.0
+        )
         self.turn = complex(self.law.growth, -float(self.law.rate(self.spin)))
         self.slower = requirements.slower(spacecraft, loop.start)
-        self.start, self.stop = (self.law.size(angle, self.spin) for angle in (loop.start, loop.stop))
+        self.start, self.stop = (
+            self.law.size(angle, self.spin) for angle in (loop.start, loop.stop)
+        )
         self.channels = {channel.name: channel for channel in spacecraft.channels}
         self.up = Odds(self.seen, self.start, self.law.growth, below=False)
-        self.down = Odds(self.seen, self.stop, self.law.growth, below=True) if self.stop > 0.0 else None
+        self.down = (
+            Odds(self.seen, self.stop, self.law.growth, below=True) if self.stop > 0.0 else None
+        )
         self.near = self._near()
-        reach, half = SIGMAS * self.seen.sigma + abs(self.seen.offset), abs(0.5 * self.turn.imag)
-        acts = [abs(actuator.kick) * abs(math.sin(half * actuator.shortest)) / half for actuator in self.law.actuators]
-        longest = min(abs(each.kick) * abs(math.sin(half * each.longest)) / half for each in self.law.actuators)
+        reach = SIGMAS * self.seen.sigma + abs(self.seen.offset)
+        half = abs(0.5 * self.turn.imag)
+        acts = [
+            abs(actuator.kick) * abs(math.sin(half * actuator.shortest)) / half
+            for actuator in self.law.actuators
+        ]
+        longest = min(
+            abs(each.kick) * abs(math.sin(half * each.longest)) / half
+            for each in self.law.actuators
+        )
         self.firings = FIRINGS + min(math.ceil(2.0 * self.start / longest), MOST_FOLLOWED)
         self.reach, self.helps = reach, (0.5 * min(acts) - reach) / abs(self.seen.direct)
         self.bound = OUTGROWN * (max(self.start, *acts) + 2.0 * reach) / abs(self.seen.direct)
@@ -143,14 +188,18 @@ class Map:
         self.shapes: dict[tuple[str, float], complex] = {}
 
     def entries(self, spacecraft: Spacecraft, seed: int = 1) -> list[Entry]:
-        """States in which flights of the loop from that of the file come down to start, by the noise of each."""
+        """States in which flights of the loop from that of the file come down to start, by the
+        noise of each.
+        """
         z = complex(self.law.seen(spacecraft.initial.omega))
         if abs(z) <= FARTHEST * self.start:
             return []
         now = Entry(z, 0.0, active=False, ready=spacecraft.limits.earliest)
         if abs(z) < self.start:
             return [now]
-        loop, entries, looked = self.law.loop, list[Entry](), 0
+        loop = self.law.loop
+        entries = list[Entry]()
+        looked = 0
         body = replace(spacecraft, limits=replace(spacecraft.limits, max_pulses=None))
         each = 3.0 * (self.law.period + self.seen.first + loop.min_interval) + loop.sensor.delay
         until = spacecraft.limits.earliest + each * self.firings * abs(z) / self.start
@@ -162,19 +211,25 @@ class Map:
             if run.stop.fault or not abs(z) < self.start:
                 why = run.stop.value if run.stop.fault else TOO_FAST
                 raise Infeasible(f"the loop does not come down to start: {why}")
-            entries.append(Entry(z, run.fired[-1].pulse.thrust[1], active=True, ready=run.pilot.ready))
+            entries.append(
+                Entry(z, run.fired[-1].pulse.thrust[1], active=True, ready=run.pilot.ready)
+            )
             looked += run.looked_at
             if loop.sensor.noise == 0.0 or looked * (number + 2) > LOOKED * (number + 1):
                 break
         return entries
 
     def cycle(self, chains: int = CHAINS, cycles: int = CYCLES) -> Cycle:
-        """Limit cycle of chains in random phases; raises Infeasible where the loop does not hold the nutation."""
+        """Limit cycle of chains in random phases; raises Infeasible where the loop does not hold
+        the nutation.
+        """
         at = self._begin(chains)
         self._follow(at, SETTLING + cycles, self.firings)
         return self._summed(at.firings, at.cycles)
 
-    def attractors(self, entries: Sequence[Entry] = (), chains: int = CHAINS) -> tuple[tuple[Cycle, float], ...]:
+    def attractors(
+        self, entries: Sequence[Entry] = (), chains: int = CHAINS
+    ) -> tuple[tuple[Cycle, float], ...]:
         """Limit cycles in which chains end, most first, with the share of each; raises as `cycle`.
 
         They begin in the ``entries``, by turns, or in random phases at half the start threshold.
@@ -182,7 +237,9 @@ class Map:
         alike = bool(entries) and not (any(self.seen.scatter) or any(self.seen.grain))
         chains, longer = (len(entries), ALONE) if alike else (chains, 1)
         at = self._begin(chains)
-        for row, entry in zip(range(chains if entries else 0), itertools.cycle(entries), strict=False):
+        for row, entry in zip(
+            range(chains if entries else 0), itertools.cycle(entries), strict=False
+        ):
             self._enter(at, row, entry)
         self._follow(at, 0, self.firings)  # until each has paused, or fires on at the same size
         at = replace(at, sums=[total._replace(pulses=0.0, cycles=0.0) for total in at.sums])
@@ -200,10 +257,17 @@ class Map:
         """Put a chain where ``entry`` is, at its first estimate."""
         number = math.ceil((entry.time + self.seen.first) / self.seen.step - SAMPLED)
         at.z[row] = entry.z * np.exp(self.turn * (number * self.seen.step - entry.time))
-        at.number[row], at.active[row], at.fresh[row], at.ready[row] = number, entry.active, True, entry.ready
+        at.number[row], at.active[row], at.fresh[row], at.ready[row] = (
+            number,
+            entry.active,
+            True,
+            entry.ready,
+        )
 
     def _follow(self, at: Chains, cycles: int, firings: int) -> None:
-        """Follow every chain until it has paused more than ``cycles`` times, or fired ``firings`` times."""
+        """Follow every chain until it has paused more than ``cycles`` times, or fired ``firings``
+        times.
+        """
         going = np.ones(len(at.z), dtype=bool)
         for _ in range(MOST_STEPS):
             work.spend(STEP * (1.0 + len(going) / 16.0))
@@ -212,29 +276,47 @@ class Map:
             self._wake(at, np.flatnonzero(going & ~at.active))
             self._skip(at, np.flatnonzero(going & at.active & ~at.fresh))
             self._look(at, np.flatnonzero(going))
-            going = np.array([total.cycles <= cycles and total.pulses < firings for total in at.sums])
+            going = np.array(
+                [total.cycles <= cycles and total.pulses < firings for total in at.sums]
+            )
             if not going.any():
                 return
         raise Infeasible(SPENT)
 
     def _near(self) -> float | None:
-        """Size of z from which on every sample is examined; None where the chances of the samples add up."""
-        seen = self.seen  # chances add up where the noise of each sample is new, or z grows little while it lasts
+        """Size of z from which on every sample is examined; None where the chances of the samples
+        add up.
+        """
+        seen = (
+            self.seen
+        )  # chances add up where the noise of each sample is new, or z grows little while it lasts
         if not any(seen.grain) and (seen.fresh > 0.5 or seen.sigma == 0.0):
             return None
         # No more likely than if each sample had a chance of its own.
         bound = Odds(seen._replace(fresh=1.0), self.start, self.law.growth, below=False)
         first, last = (
-            float(odds.size(1e-3 * self.start, chance)) for odds, chance in ((bound, EARLY), (self.up, LATE))
+            float(odds.size(1e-3 * self.start, chance))
+            for odds, chance in ((bound, EARLY), (self.up, LATE))
         )
-        return first if math.log(last / first) / (self.turn.real * seen.step) < LONGEST_LOOKED else None
+        return (
+            first
+            if math.log(last / first) / (self.turn.real * seen.step) < LONGEST_LOOKED
+            else None
+        )
 
     def _begin(self, count: int) -> Chains:
         """Coasts at half the start threshold, in random phases."""
-        z = 0.5 * self.start / abs(self.seen.direct) * np.exp(1j * self.rng.uniform(0.0, 2.0 * math.pi, count))
+        z = (
+            0.5
+            * self.start
+            / abs(self.seen.direct)
+            * np.exp(1j * self.rng.uniform(0.0, 2.0 * math.pi, count))
+        )
         number = self.rng.integers(1, 2 + round(self.law.period / self.seen.step), count)
-        quiet, waits = np.zeros(count, dtype=bool), np.full((len(self.law.actuators), count), math.nan)
-        white, sums = self._drawn(count), [Sums()] * count
+        quiet = np.zeros(count, dtype=bool)
+        waits = np.full((len(self.law.actuators), count), math.nan)
+        white = self._drawn(count)
+        sums = [Sums()] * count
         return Chains(z, number, quiet, quiet.copy(), np.zeros(count), waits, white, sums)
 
     def _drawn(self, rows: int) -> ComplexArray:
@@ -248,7 +330,9 @@ class Map:
         at.z[rows] *= np.exp(self.turn * self.seen.step * samples)
         at.number[rows] += samples
         at.white[rows] = self._drawn(len(rows))
-        at.carried[:, rows] = self._waits(self.seen.mean(at.z[rows] * np.exp(-self.turn * self.seen.step)))
+        at.carried[:, rows] = self._waits(
+            self.seen.mean(at.z[rows] * np.exp(-self.turn * self.seen.step))
+        )
 
     def _until(self, size: Vector | float, now: Vector) -> Rows:
         """Samples until |z| has grown from ``now`` to ``size``."""
@@ -256,15 +340,21 @@ class Map:
         return np.asarray(np.ceil(samples - SAMPLED), dtype=np.int64)
 
     def _wake(self, at: Chains, rows: Rows) -> None:
-        """From pauses to the sample that first shows the start threshold, or to where each is looked at."""
+        """From pauses to the sample that first shows the start threshold, or to where each is
+        looked at.
+        """
         now = np.abs(at.z[rows])
         if (now <= FARTHEST * self.start).any():
-            raise Infeasible("a firing leaves nothing that could grow: sensor and valves have no errors")
+            raise Infeasible(
+                "a firing leaves nothing that could grow: sensor and valves have no errors"
+            )
         if self.near is not None:
             far = now < self.near
             self._goes(at, rows[far], self._until(self.near, now[far]))
             return
-        self._goes(at, rows, self._until(self.up.size(now, self.rng.exponential(size=len(rows))), now))
+        self._goes(
+            at, rows, self._until(self.up.size(now, self.rng.exponential(size=len(rows))), now)
+        )
         at.active[rows] = True
         if not any(self.seen.scatter):
             return
@@ -275,20 +365,31 @@ class Map:
                 more = short + self.rng.exponential() * min(
                     1.0 / max(short, 1.0), OVERSHOOT * math.sqrt(self.seen.fresh)
                 )
-                at.white[row] += self.seen.change(at.white[row], mean / abs(mean), more * self.seen.sigma)
+                at.white[row] += self.seen.change(
+                    at.white[row], mean / abs(mean), more * self.seen.sigma
+                )
 
     def _skip(self, at: Chains, rows: Rows) -> None:
-        """Over the samples in which no channel can come to fire: to the first that may, or to a pause."""
-        size, mean = np.abs(at.z[rows]), self.seen.mean(at.z[rows])
+        """Over the samples in which no channel can come to fire: to the first that may, or to a
+        pause.
+        """
+        size = np.abs(at.z[rows])
+        mean = self.seen.mean(at.z[rows])
         waits = self._waits(mean)
         share = np.minimum(self.reach / np.maximum(np.abs(mean), self.reach + 1e-300), 1.0)
         slack = 3.0 * self.seen.step + 0.25 * share * self.law.period
-        due = np.where(waits < self.ahead - slack, waits + self.law.period, waits) - self.ahead - slack
+        due = (
+            np.where(waits < self.ahead - slack, waits + self.law.period, waits)
+            - self.ahead
+            - slack
+        )
         idle = np.isnan(due).all(axis=0)
         soonest = np.where(idle, 0.0, np.where(np.isnan(due), math.inf, due).min(axis=0))
         samples = np.maximum(np.floor(soonest / self.seen.step), 0.0).astype(np.int64)
         samples[samples < self.memory] = 0
-        useless = idle & (size < self.helps)  # the smallest pulse would leave more than there is: no pause, it waits
+        useless = idle & (
+            size < self.helps
+        )  # the smallest pulse would leave more than there is: no pause, it waits
         samples[useless] = self._until(self.helps, size[useless])
         if self.down is not None:
             event = self.down.size(size, self.rng.exponential(size=len(rows)))
@@ -303,10 +404,16 @@ class Map:
         """Examine the next samples one by one, up to the first event of each."""
         step = self.seen.step
         count = min(max(math.ceil(0.5 * self.law.period / step), 4), ROWS)
-        white = np.concatenate([at.white[rows], self.seen.drawn(self.rng, len(rows), count)], axis=1)
+        white = np.concatenate(
+            [at.white[rows], self.seen.drawn(self.rng, len(rows), count)], axis=1
+        )
         course = np.exp(self.turn * step * np.arange(count))
-        seen = self.seen.stepped(self.seen.mean(at.z[rows][:, None] * course) + self.seen.noise(white))
-        awake = np.logical_or.accumulate((np.abs(seen) >= self.start) | at.active[rows, None], axis=1)
+        seen = self.seen.stepped(
+            self.seen.mean(at.z[rows][:, None] * course) + self.seen.noise(white)
+        )
+        awake = np.logical_or.accumulate(
+            (np.abs(seen) >= self.start) | at.active[rows, None], axis=1
+        )
         waits = np.full((len(at.carried), *seen.shape), math.nan)
         some = awake[:, -1]
         waits[:, some] = self._waits(seen[some])
@@ -322,20 +429,27 @@ class Map:
         resting = rows[passes & (firsts < count)]
         at.active[resting] = False
         self._rest(at, resting)
-        places, going = np.flatnonzero(passes), rows[passes]
+        places = np.flatnonzero(passes)
+        going = rows[passes]
         passed = np.minimum(firsts[places] + 1, count)
         at.z[going] *= np.exp(self.turn * step * passed)
         at.number[going] += passed
-        at.white[going] = white[places[:, None], passed[:, None] + np.arange(white.shape[1] - count)]
+        at.white[going] = white[
+            places[:, None], passed[:, None] + np.arange(white.shape[1] - count)
+        ]
         at.carried[:, going], at.fresh[going] = waits[:, places, passed - 1], False
 
     def _fires(self, at: Chains, row: int, seen: ComplexArray, fires: NDArray[np.bool_]) -> bool:
         """First firing at one of the moments at which a channel triggers, if any."""
         for moment in np.flatnonzero(fires.any(axis=0)).tolist():
             time = (int(at.number[row]) + moment) * self.seen.step
-            actuators = (self.law.actuators[index] for index in np.flatnonzero(fires[:, moment]).tolist())
+            actuators = (
+                self.law.actuators[index] for index in np.flatnonzero(fires[:, moment]).tolist()
+            )
             firings = [
-                firing for each in actuators if (firing := self._firing(each, complex(seen[moment]), time)) is not None
+                firing
+                for each in actuators
+                if (firing := self._firing(each, complex(seen[moment]), time)) is not None
             ]
             if not firings:
                 continue
@@ -345,39 +459,59 @@ class Map:
                 return True
         return False
 
-    def _firing(self, actuator: Actuator, seen: complex, time: float) -> tuple[float, float, Pulse, Actuator] | None:
+    def _firing(
+        self, actuator: Actuator, seen: complex, time: float
+    ) -> tuple[float, float, Pulse, Actuator] | None:
         """Start, length and pulse of a firing decided on z ``seen`` at ``time`` s."""
-        now, law = time + self.law.loop.sensor.delay, self.law
-        more = REFINED if law.loop.sensor.rate is None else 0  # a continuous signal shows the moment itself
+        now = time + self.law.loop.sensor.delay
+        law = self.law
+        more = (
+            REFINED if law.loop.sensor.rate is None else 0
+        )  # a continuous signal shows the moment itself
         while (firing := law.firing(actuator, seen, self.spin)) is not None and more > 0:
-            now, seen, more = now + firing.wait, seen * complex(np.exp(self.turn * firing.wait)), more - 1
+            now = now + firing.wait
+            seen = seen * complex(np.exp(self.turn * firing.wait))
+            more = more - 1
         if firing is None:
             return None
         begins = now + (max(firing.wait, 0.0) if law.loop.predict else 0.0)
         start = law.windows.nearest_tick(begins)
         start = law.windows.tick_after(begins) if start < now else start
-        pulse = channel_pulse(self.channels[actuator.channel.name], start + firing.lead, firing.on_time)
-        return start, firing.lasts, pulse if pulse.command is None else commandable(self.truth, pulse), actuator
+        pulse = channel_pulse(
+            self.channels[actuator.channel.name], start + firing.lead, firing.on_time
+        )
+        return (
+            start,
+            firing.lasts,
+            pulse if pulse.command is None else commandable(self.truth, pulse),
+            actuator,
+        )
 
     def _fire(self, at: Chains, row: int, pulse: Pulse, actuator: Actuator) -> None:
         """Propagate through a pulse, and on to the first estimate after it."""
         given = Supply(self.truth, used=self.used).fire(pulse, actuator.channel)
         level = given.magnitude / pulse.magnitude
         (begins, ends), time = pulse.thrust, int(at.number[row]) * self.seen.step
-        before, sums = complex(at.z[row]), at.sums[row]
+        before = complex(at.z[row])
+        sums = at.sums[row]
         size = abs(before) * math.exp(self.turn.real * (begins - time))
         if size > self.bound:
             raise Infeasible(TOO_FAST)
         acts = actuator.kick * level * pulse.on_time * self._shape(actuator, pulse)
-        after = (before * np.exp(self.turn * (pulse.t - time)) + acts) * np.exp(self.turn * (ends - pulse.t))
+        after = (before * np.exp(self.turn * (pulse.t - time)) + acts) * np.exp(
+            self.turn * (ends - pulse.t)
+        )
         # Dissipation takes spin as |z| grows at the same H: cos θ goes with ω3.
-        grown, least = (math.cos(float(self.law.nutation(angle, self.spin))) for angle in (size, sums.last))
+        grown, least = (
+            math.cos(float(self.law.nutation(angle, self.spin))) for angle in (size, sums.last)
+        )
         slowed = float(self.law.inertia.equivalent(self.spin)) * (1.0 - grown / least)
         at.sums[row] = sums._replace(
             time=pulse.t,
             pulses=sums.pulses + 1.0,
             impulse=sums.impulse + given.magnitude,
-            propellant=sums.propellant + (math.nan if given.propellant is None else given.propellant),
+            propellant=sums.propellant
+            + (math.nan if given.propellant is None else given.propellant),
             spin=sums.spin + (actuator.spin_rate * level * pulse.on_time - slowed),
             largest=max(sums.largest, size),
             last=abs(after),
@@ -391,9 +525,16 @@ class Map:
         """Factor on the effect of a pulse on z by its width, with the growth in it."""
         key = (pulse.channel, round(pulse.on_time, 9))
         if key not in self.shapes:
-            ramps = (Ramp(pulse.start, pulse.end, 1.0, 1.0),) if pulse.command is None else pulse.command.ramps
-            moved = [ramp._replace(begin=ramp.begin - pulse.t, end=ramp.end - pulse.t) for ramp in ramps]
-            rate, slope = float(self.law.rate(self.spin)), self.law.slope * actuator.spin_rate
+            ramps = (
+                (Ramp(pulse.start, pulse.end, 1.0, 1.0),)
+                if pulse.command is None
+                else pulse.command.ramps
+            )
+            moved = [
+                ramp._replace(begin=ramp.begin - pulse.t, end=ramp.end - pulse.t) for ramp in ramps
+            ]
+            rate = float(self.law.rate(self.spin))
+            slope = self.law.slope * actuator.spin_rate
             self.shapes[key] = shape_factor(rate, slope, moved, 0.0, self.law.growth)
         return self.shapes[key]
 
@@ -412,7 +553,9 @@ class Map:
             counted = [cycle[SETTLING:] for cycle in cycles]
         else:
             counted = [firing[len(firing) // 4 :] for firing in firings]
-            places = [[part[place].largest for place in (0, len(part) // 2, -1)] for part in counted]
+            places = [
+                [part[place].largest for place in (0, len(part) // 2, -1)] for part in counted
+            ]
             sizes = np.array(places).mean(axis=0)
             if sizes[2] > sizes[1] * RISING > sizes[0] * RISING**2:
                 raise Infeasible(TOO_FAST)
@@ -421,7 +564,9 @@ class Map:
         total = spans.sum(axis=0)
         rates = (total / total[0]).tolist()
         apart = spans[:, 1] - rates[1] * spans[:, 0]
-        angles = self.law.nutation(np.concatenate([np.array(cycle[1:])[:, ADDED:] for cycle in counted]), self.spin)
+        angles = self.law.nutation(
+            np.concatenate([np.array(cycle[1:])[:, ADDED:] for cycle in counted]), self.spin
+        )
         return Cycle(
             pulses=rates[1],
             cycles=rates[5],
@@ -438,13 +583,17 @@ class Map:
 DAY = 86400.0
 YEAR = 365.25 * DAY  # s
 LASTING = YEAR  # s that a tank must last: the time for which propellant is budgeted
-# Noise of estimates (one sigma), over the start threshold, above which the map underestimates firings, and the share by
-# which their number is then known at best: flown loops fire up to a fifth more at 0.2 of start.
+# Noise of estimates (one sigma), over the start threshold, above which the map underestimates
+# firings, and the share by which their number is then known at best: flown loops fire up to a fifth
+# more at 0.2 of start.
 NOISY, WIDENED = 0.1, 0.2
 DIFFERENT = 0.3  # relative difference of pulses by which one limit cycle differs from another
-# Shares of the propellant used at which a rate of use is worked out, with the weights of Simpson's rule: so many, as
-# the rate is uneven; how well the last pulse of a cycle fits differs with the thrust.
-STAGES = tuple((part / 8.0, weight / 24.0) for part, weight in enumerate((1, 4, 2, 4, 2, 4, 2, 4, 1)))
+# Shares of the propellant used at which a rate of use is worked out, with the weights of Simpson's
+# rule: so many, as the rate is uneven; how well the last pulse of a cycle fits differs with the
+# thrust.
+STAGES = tuple(
+    (part / 8.0, weight / 24.0) for part, weight in enumerate((1, 4, 2, 4, 2, 4, 2, 4, 1))
+)
 
 
 class Thresholds(NamedTuple):
@@ -456,7 +605,9 @@ class Thresholds(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class HeldNutation:
-    """Nutation held between ``thresholds``: the limit ``cycle`` at the present spin; ``why`` there is none."""
+    """Nutation held between ``thresholds``: the limit ``cycle`` at the present spin; ``why`` there
+    is none.
+    """
 
     spacecraft: Spacecraft
     thresholds: Thresholds
@@ -473,9 +624,12 @@ class HeldNutation:
     def meets_requirement(self) -> bool | None:
         """True if the nutation stays within the requirement, and the tank lasts `LASTING` s.
 
-        False without a limit cycle, or where it never falls quiet but should; else None where neither is given.
+        False without a limit cycle, or where it never falls quiet but should; else None where
+        neither is given.
         """
-        bounds = [bound for bound in requirements.required(self.spacecraft) if bound.part is Part.NUTATION]
+        bounds = [
+            bound for bound in requirements.required(self.spacecraft) if bound.part is Part.NUTATION
+        ]
         if self.cycle is not None and self.cycle.cycles == 0.0 and self.thresholds.stop > 0.0:
             return False
         if not bounds and self.spacecraft.tank is None:
@@ -486,14 +640,18 @@ class HeldNutation:
 
     @property
     def slows(self) -> float | None:
-        """Relative change of the spin in a year of the cycle, at the present rate; signed. None without spin."""
+        """Relative change of the spin in a year of the cycle, at the present rate; signed. None
+        without spin.
+        """
         spin = self.spacecraft.spin
         return None if self.cycle is None or spin == 0.0 else self.cycle.spin_rate * YEAR / spin
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Budget(results.Data, results.Written):
-    """Growth of nutation in a ``spacecraft``, and the cost of holding it, for each pair of thresholds in ``held``."""
+    """Growth of nutation in a ``spacecraft``, and the cost of holding it, for each pair of
+    thresholds in ``held``.
+    """
 
     spacecraft: Spacecraft
     largest: float | None  # θ_max, rad; None where none is named
@@ -514,7 +672,9 @@ class Budget(results.Data, results.Written):
 
     @property
     def meets_requirement(self) -> bool | None:
-        """True if some pair of thresholds meets the requirement; None where nothing is required of a loop."""
+        """True if some pair of thresholds meets the requirement; None where nothing is required of
+        a loop.
+        """
         meets = [pair.meets_requirement for pair in self.held]
         return None if not meets or None in meets else any(meets)
 
@@ -531,10 +691,11 @@ def budget(
     *,
     seed: int = 1,
 ) -> Budget:
-    """Budget of a ``spacecraft`` with dissipation, for ``pairs`` of thresholds, default those of its loop.
+    """Budget of a ``spacecraft`` with dissipation, for ``pairs`` of thresholds, default those of
+    its loop.
 
-    ``largest`` rad: θ_max, default the nutation required. Nothing is held where the nutation does not grow, or the file
-    has no loop. The pairs are the steps of the task.
+    ``largest`` rad: θ_max, default the nutation required. Nothing is held where the nutation does
+    not grow, or the file has no loop. The pairs are the steps of the task.
     """
     requirements.expect_dissipation(spacecraft)
     required = spacecraft.requirement
@@ -556,22 +717,33 @@ def budget(
 def _held(spacecraft: Spacecraft, loop: Loop, seed: int) -> HeldNutation:
     body = replace(spacecraft, loop=loop)
     band = None
-    result = HeldNutation(body, Thresholds(loop.start, loop.stop), requirements.reached(body, loop.start))
+    result = HeldNutation(
+        body, Thresholds(loop.start, loop.stop), requirements.reached(body, loop.start)
+    )
     try:
         band = dead_band(body, loop)
         turned = [margin.channel for margin in margins(body, loop) if margin.turned]
         if turned:
-            raise Infeasible(f"firings of {' and '.join(turned)} feed the nutation: wired backwards against the sensor")
+            raise Infeasible(
+                f"firings of {' and '.join(turned)} feed the nutation: "
+                "wired backwards against the sensor"
+            )
         expect_in_time(body, loop)
         cycles = Map(body, loop, seed=seed)
         entries = cycles.entries(body, seed)
         ends = list(cycles.attractors(entries))
-        # There may be others where a firing can leave more than the stop threshold that no smaller pulse lowers.
+        # There may be others where a firing can leave more than the stop threshold that no smaller
+        # pulse lowers.
         if 0.5 * band.step > loop.stop > 0.0:
             half = complex(cycles.law.size(0.5 * band.step, body.spin))
-            ends += [*cycles.attractors(), *cycles.attractors([Entry(half, 0.0, active=True, ready=0.0)])]
+            ends += [
+                *cycles.attractors(),
+                *cycles.attractors([Entry(half, 0.0, active=True, ready=0.0)]),
+            ]
         (cycle, share), *rest = ends
-        others = (each for each, _ in rest if abs(each.pulses - cycle.pulses) > DIFFERENT * cycle.pulses)
+        others = (
+            each for each, _ in rest if abs(each.pulses - cycle.pulses) > DIFFERENT * cycle.pulses
+        )
         noisy = cycles.seen.sigma > NOISY * cycles.start
         if noisy:
             cycle = cycle._replace(doubt=max(cycle.doubt, WIDENED))
@@ -580,7 +752,9 @@ def _held(spacecraft: Spacecraft, loop: Loop, seed: int) -> HeldNutation:
     except Infeasible as reason:
         rate = None if result.cycle is None else result.cycle.propellant
         if work.exhausted() and body.tank is not None and rate:
-            return replace(result, band=band, lasts=body.tank.propellant / rate)  # as if the pressure stayed
+            return replace(
+                result, band=band, lasts=body.tank.propellant / rate
+            )  # as if the pressure stayed
         return replace(result, band=band, why=SPENT if work.exhausted() else str(reason))
 
 
@@ -588,7 +762,8 @@ def _lasts(body: Spacecraft, loop: Loop, seed: int, entries: Sequence[Entry]) ->
     """Lifetime of the limit cycle, s: ∫ dm over the flow, as the pressure in the tank falls."""
     if body.tank is None:
         return None
-    mass, total = body.tank.propellant, 0.0
+    mass = body.tank.propellant
+    total = 0.0
     for done, (share, weight) in enumerate(STAGES, start=1):
         work.reach(done)
         cycles = Map(body, loop, used=share * mass, seed=seed)

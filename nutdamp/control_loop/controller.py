@@ -23,11 +23,13 @@ from nutdamp.spacecraft.model import Spacecraft, SpinState, Vector
 from nutdamp.spacecraft.schedule import Pulse, channel_pulse, on_command
 from nutdamp.spacecraft.tolerances import Tolerance
 
-GRID = 64  # moments per nutation period at which a continuous signal is examined for a firing in between
+# moments per nutation period at which a continuous signal is examined for a firing in between
+GRID = 64
 LONGEST = 1024  # moments looked at together, at most
 LOOKED = 2e-3  # units of work of a moment looked at
 MOST = round(work.LOOP / LOOKED)  # moments looked at in a flight, at most: a day of 100 Hz
-SAMPLED = 1e-6  # part of a sampling interval by which a sample at the end of a pulse may come before it: rounding
+# part of a sampling interval by which a sample at the end of a pulse may come before it: rounding
+SAMPLED = 1e-6
 REFINED = 60  # steps, at most, in which the moment of a firing is found between two of the `GRID`
 
 
@@ -55,10 +57,13 @@ class Decided(NamedTuple):
 
 
 class Watch:
-    """Evaluation of samples of coasts from ``since`` s on, (cases, 1) for many; ``reach``: how many come together."""
+    """Evaluation of samples of coasts from ``since`` s on, (cases, 1) for many; ``reach``: how many
+    come together.
+    """
 
     def __init__(self, law: Law, since: Any) -> None:
-        self.law, self.sensor = law, law.loop.sensor
+        self.law = law
+        self.sensor = law.loop.sensor
         self.estimator = Estimator(law, self.sensor, since)
         step = self.estimator.step or law.period / GRID
         self.reach = min(max(round(0.5 * law.period / step), 2), LONGEST)
@@ -74,9 +79,12 @@ class Watch:
     def judged(
         self, times: Vector, values: Vector, spin: Vector, active: NDArray[np.bool_]
     ) -> tuple[ComplexArray, ComplexArray, Vector, NDArray[np.bool_]]:
-        """Estimates: z on board, best z, nutation, and triggers (channels, ..., n) where the loop is or gets active."""
+        """Estimates: z on board, best z, nutation, and triggers (channels, ..., n) where the loop
+        is or gets active.
+        """
         raw = self.estimator.feed(times, values, spin)
-        z, best = self.estimator.on_board(raw, spin), self.estimator.best(raw, spin)
+        z = self.estimator.on_board(raw, spin)
+        best = self.estimator.best(raw, spin)
         shown = self.law.nutation(np.abs(z), spin)
         fires = np.zeros((len(self.law.actuators), *times.shape), dtype=bool)
         awake = active | np.any(shown >= self.law.loop.start, axis=-1)
@@ -88,7 +96,9 @@ class Watch:
         else:
             self._waits = self.waits(z[..., -1:], spin[..., -1:])
             if np.any(awake):
-                waits = np.concatenate([before[:, awake], self.waits(z[awake], spin[awake])], axis=-1)
+                waits = np.concatenate(
+                    [before[:, awake], self.waits(z[awake], spin[awake])], axis=-1
+                )
                 fires[:, awake] = self.triggered(waits)
         return z, best, shown, fires
 
@@ -105,15 +115,25 @@ class Watch:
         firing = self.law.firing(actuator, complex(seen.z[row]), float(seen.spin[row]))
         if firing is None:
             return None
-        return Decided(row, now, now + (max(firing.wait, 0.0) if self.law.loop.predict else 0.0), actuator, firing)
+        return Decided(
+            row,
+            now,
+            now + (max(firing.wait, 0.0) if self.law.loop.predict else 0.0),
+            actuator,
+            firing,
+        )
 
     def waits(self, z: ComplexArray, spin: Vector) -> Vector:
         """`Law.waits` of all channels, (channels, ..., n)."""
         return np.array([self.law.waits(actuator, z, spin) for actuator in self.law.actuators])
 
     def triggered(self, waits: Vector) -> NDArray[np.bool_]:
-        """True where a channel comes to fire at a moment after the first: its wait falls below ``ahead``."""
-        before, now, ahead = waits[..., :-1], waits[..., 1:], self.ahead
+        """True where a channel comes to fire at a moment after the first: its wait falls below
+        ``ahead``.
+        """
+        before = waits[..., :-1]
+        now = waits[..., 1:]
+        ahead = self.ahead
         falls = (now < ahead) & (before >= ahead) & (before - now < 0.5 * self.law.period)
         slack = 1e-12 * self.law.period
         begins = np.isnan(before) & (now >= -slack) & (now < max(ahead, slack))
@@ -139,9 +159,13 @@ class Joined:
 
 
 class Coast(Watch):
-    """Motion of one body from ``state`` at ``since`` s on without firing, and its samples; ``parts``: as integrated."""
+    """Motion of one body from ``state`` at ``since`` s on without firing, and its samples;
+    ``parts``: as integrated.
+    """
 
-    def __init__(self, law: Law, signal: Signal, dynamics: Dynamics, state: SpinState, since: float) -> None:
+    def __init__(
+        self, law: Law, signal: Signal, dynamics: Dynamics, state: SpinState, since: float
+    ) -> None:
         super().__init__(law, since)
         self.signal, self.dynamics = signal, dynamics
         self.path: Path | None = None
@@ -151,15 +175,20 @@ class Coast(Watch):
         self._number = 0 if self.sensor.rate is None else int(self.first(np.float64(since)))
 
     def look(self, until: float, *, active: bool) -> Seen | None:
-        """Next moments of the coast; None where all have been seen, up to a decision at ``until`` s."""
-        begins, end = self._until, until - self.signal.sensor.delay
+        """Next moments of the coast; None where all have been seen, up to a decision at ``until``
+        s.
+        """
+        begins = self._until
+        end = until - self.signal.sensor.delay
         numbers: NDArray[np.int64] | None = None
         if self.sensor.rate is None:
             end = min(begins + self.reach * self.law.period / GRID, end)
             if end <= begins:
                 return None
             count = max(math.ceil((end - begins) / self.law.period * GRID), 2)
-            times: Vector = np.asarray(np.linspace(begins, end, count + 1)[self.path is not None :], dtype=np.float64)
+            times: Vector = np.asarray(
+                np.linspace(begins, end, count + 1)[self.path is not None :], dtype=np.float64
+            )
         else:
             last = min(self._number + self.reach - 1, math.floor(end * self.sensor.rate + SAMPLED))
             if last < self._number:
@@ -189,7 +218,9 @@ class Coast(Watch):
     def _motion(self, times: Vector) -> tuple[Vector, Vector]:
         """Rates (n, 3) rad/s and quaternions (n, 4) at ``times`` (n,) s that the path reaches."""
         begins, path = self.parts[-1]
-        return (path if self.dynamics.free or times[0] >= begins else Joined(self.parts)).motion(times)
+        return (path if self.dynamics.free or times[0] >= begins else Joined(self.parts)).motion(
+            times
+        )
 
     def at(self, time: float) -> SpinState:
         """State at ``time`` s, which has been seen or lies within a nutation period after that."""
@@ -207,11 +238,16 @@ class Coast(Watch):
         return coast
 
     def firing(self, seen: Seen, row: int, actuator: Actuator) -> Decided | None:
-        """As of any `Watch`; by a continuous signal at the end of its wait, which falls by 1 s a second (Newton)."""
+        """As of any `Watch`; by a continuous signal at the end of its wait, which falls by 1 s a
+        second (Newton).
+        """
         if self.sensor.rate is not None:
             return super().firing(seen, row, actuator)
-        now, step, delay = float(seen.now[row]), self.law.period / GRID, self.signal.sensor.delay
-        low, high = max(now - 2.0 * step, self.estimator.since + delay), now + step
+        now = float(seen.now[row])
+        step = self.law.period / GRID
+        delay = self.signal.sensor.delay
+        low = max(now - 2.0 * step, self.estimator.since + delay)
+        high = now + step
         firing = None
         for _ in range(REFINED):
             time = np.array([now - delay])
@@ -235,11 +271,15 @@ EARLIER = "an earlier end, or a lower rate, helps"
 MOST_FIRINGS = 10_000  # largest number of firings of one flight
 NO_NOISE = 8.0  # sigmas that noise does not reach: a chance of 1e-15 a sample
 WAVES = 40.0  # time constants of the low-pass filter after which it has forgotten its start
-TAG = 1  # ends the key of the random numbers of a firing: those of the noise are keyed by block alone
+TAG = (
+    1  # ends the key of the random numbers of a firing: those of the noise are keyed by block alone
+)
 
 
 class Fired(NamedTuple):
-    """Firing: the ``pulse`` as it acts, time of the decision (s), nutation (rad) observed then, and true at start."""
+    """Firing: the ``pulse`` as it acts, time of the decision (s), nutation (rad) observed then, and
+    true at start.
+    """
 
     pulse: Pulse
     decided: float
@@ -249,7 +289,9 @@ class Fired(NamedTuple):
 
 @dataclass(frozen=True)
 class Scatter:
-    """Errors of single firings of a case, drawn by the ``key`` of the case; ``late`` s is common to all."""
+    """Errors of single firings of a case, drawn by the ``key`` of the case; ``late`` s is common to
+    all.
+    """
 
     key: tuple[int, ...]
     thrust: Tolerance | None
@@ -270,7 +312,12 @@ def _drawn(random: np.random.Generator, tolerance: Tolerance | None) -> float:
         return 0.0
     first, second = random.random(2)
     normal = float(random.standard_normal())
-    unit = {"normal": normal, "uniform": 2.0 * first - 1.0, "triangular": first + second - 1.0, "bias": 1.0}
+    unit = {
+        "normal": normal,
+        "uniform": 2.0 * first - 1.0,
+        "triangular": first + second - 1.0,
+        "bias": 1.0,
+    }
     return tolerance.size * float(unit[tolerance.kind])
 
 
@@ -280,7 +327,10 @@ class Case(NamedTuple):
     truth: Spacecraft
     key: tuple[int, ...]  # seed of the noise, and number of a dispersed case, from 1
     scatter: Scatter | None = None
-    tilt: tuple[float, float] = (0.0, 0.0)  # rad, of the attitude at t = 0 about the body axes 1 and 2
+    tilt: tuple[float, float] = (
+        0.0,
+        0.0,
+    )  # rad, of the attitude at t = 0 about the body axes 1 and 2
 
 
 class Course(Enum):
@@ -291,27 +341,36 @@ class Course(Enum):
 
 
 class Pilot:
-    """Controller of one loop, known on board to the ``law`` and true in the ``case``: from samples to firings.
+    """Controller of one loop, known on board to the ``law`` and true in the ``case``: from samples
+    to firings.
 
-    ``free``: coasts are those of a symmetric body without torque from outside. ``down_to`` rad/s: true |z| to which a
-    firing brings it where the flight is over, as not to be followed further.
+    ``free``: coasts are those of a symmetric body without torque from outside. ``down_to`` rad/s:
+    true |z| to which a firing brings it where the flight is over, as not to be followed further.
     """
 
-    def __init__(self, law: Law, case: Case, until: float, *, free: bool, down_to: float = 0.0) -> None:
+    def __init__(
+        self, law: Law, case: Case, until: float, *, free: bool, down_to: float = 0.0
+    ) -> None:
         truth = case.truth
         if shed(truth) is not None:
             problem = "a loop flies with constant moments of inertia; leave this out"
             raise Unsuitable(("tank", "inertia_per_kg"), problem)
-        self.law, self.truth, self.loop, self.scatter = law, truth, truth.loop or law.loop, case.scatter
+        self.law = law
+        self.truth = truth
+        self.loop = truth.loop or law.loop
+        self.scatter = case.scatter
         self.until, self.free, self.down_to = until, free, down_to
-        self.diagnosis = Diagnosis(law.period, law.growth, math.tan(float(law.nutation(1.0, truth.spin))))
+        self.diagnosis = Diagnosis(
+            law.period, law.growth, math.tan(float(law.nutation(1.0, truth.spin)))
+        )
         self.most = min(MOST_FIRINGS, truth.limits.max_pulses or MOST_FIRINGS)
         self.channels = {channel.name: channel for channel in truth.channels}
         self.supply = Supply(truth)
         self.fired: list[Fired] = []
         self.quiet: list[float] = []
         self.active, self.looked_at = False, 0
-        self.ready, self.ending = truth.limits.earliest, (Ending.END, "")
+        self.ready = truth.limits.earliest
+        self.ending = (Ending.END, "")
         self._found: Decided | None = None
         self._pending: tuple[Pulse, Firing, Glimpse] | None = None
         self._seen: list[tuple[Vector, ComplexArray, Vector]] = []
@@ -320,7 +379,9 @@ class Pilot:
             raise Infeasible(f"{looks:.2g} samples by {until:.6g} s, {MOST:.2g} at most: {EARLIER}")
 
     def step(self, coast: Watch, seen: Seen) -> Pulse | float | Course:
-        """Action after a stretch of a coast: a pulse; a time, s, until which nothing is to be seen; or `Course`."""
+        """Action after a stretch of a coast: a pulse; a time, s, until which nothing is to be seen;
+        or `Course`.
+        """
         self.looked_at += len(seen.times)
         work.spend(LOOKED * len(seen.times))
         if self.looked_at > MOST or work.exhausted():
@@ -328,7 +389,8 @@ class Pilot:
         if self.fired and seen.size <= self.down_to:
             return Course.OVER
         self._seen.append((seen.times, seen.best, seen.spin))
-        self._latest, self._shown = len(seen.times), seen.shown
+        self._latest = len(seen.times)
+        self._shown = seen.shown
         self._found = self._decide(coast, seen)
         if self.ending[0].fault:
             return Course.OVER
@@ -338,7 +400,9 @@ class Pilot:
             edge = seen.times[-1] - self.law.period
             if seen.times[0] <= edge:
                 row = int(np.searchsorted(seen.times, edge))
-                self._seen = [(seen.times[row:].copy(), seen.best[row:].copy(), seen.spin[row:].copy())]
+                self._seen = [
+                    (seen.times[row:].copy(), seen.best[row:].copy(), seen.spin[row:].copy())
+                ]
             else:
                 self._seen = self._seen[-3:]  # the last period is among them
         later = None if self.active or self._pending is not None else self._idle_until(seen)
@@ -349,12 +413,19 @@ class Pilot:
 
     @property
     def lost(self) -> bool:
-        """True if the loop fails whatever it leaves: stopped, or fires and was never down to stop."""
-        return self.ending[0] is not Ending.END or (self.active and not self.quiet and self.law.loop.stop > 0.0)
+        """True if the loop fails whatever it leaves: stopped,
+        or fires and was never down to stop.
+        """
+        return self.ending[0] is not Ending.END or (
+            self.active and not self.quiet and self.law.loop.stop > 0.0
+        )
 
     def _pulse(self, decision: Decided) -> Pulse | None:
-        """True response of the channel to its command; None where not allowed, or not before the end."""
-        known, channel = decision.actuator.channel, self.channels[decision.actuator.channel.name]
+        """True response of the channel to its command; None where not allowed, or not before the
+        end.
+        """
+        known = decision.actuator.channel
+        channel = self.channels[decision.actuator.channel.name]
         pulse = channel_pulse(known, decision.start + decision.firing.lead, decision.firing.on_time)
         if known.valve is not None:
             pulse = commandable(self.law.spacecraft, pulse)
@@ -367,7 +438,9 @@ class Pilot:
         if len(self.fired) == self.most:
             self.ending = Ending.FULL, ""
             if self.most == MOST_FIRINGS:
-                raise Infeasible(f"more than {MOST_FIRINGS} firings by {pulse.start:.6g} s; an earlier end helps")
+                raise Infeasible(
+                    f"more than {MOST_FIRINGS} firings by {pulse.start:.6g} s; an earlier end helps"
+                )
             return None
         pulse = self.supply.fire(pulse, channel)
         if self.supply.shortage is not None:
@@ -387,9 +460,13 @@ class Pilot:
         self.ready = pulse.over + max(self.law.loop.min_interval, self.truth.limits.gap)
 
     def _glimpse(self, centre: float, row: int, *, last: bool) -> Glimpse | None:
-        """Samples of this coast up to a ``row`` of the last stretch: of the ``last`` period, or of the first."""
+        """Samples of this coast up to a ``row`` of the last stretch: of the ``last`` period, or of
+        the first.
+        """
         times, best, spin = (
-            self._seen[0] if len(self._seen) == 1 else map(np.concatenate, zip(*self._seen, strict=True))
+            self._seen[0]
+            if len(self._seen) == 1
+            else map(np.concatenate, zip(*self._seen, strict=True))
         )
         count = len(times) - self._latest + row + 1
         times, best, spin = times[:count], best[:count], spin[:count]
@@ -403,18 +480,25 @@ class Pilot:
         return Glimpse.of(times[near], best[near], rate, centre)
 
     def _decide(self, coast: Watch, seen: Seen) -> Decided | None:
-        """First firing among the moments of a stretch; thresholds and firings are judged in their order."""
-        shown, fires, count, row = seen.shown, seen.fires, len(seen.times), 0
+        """First firing among the moments of a stretch; thresholds and firings are judged in their
+        order.
+        """
+        shown = seen.shown
+        fires = seen.fires
+        count = len(seen.times)
+        row = 0
         while row < count:
             if not self.active:
                 begins = _first(np.asarray(shown >= self.law.loop.start), row)
                 if begins is None:
                     break
-                self.active, row = True, begins
+                self.active = True
+                row = begins
             downs = _first(np.asarray(shown <= self.law.loop.stop), row)
             fire = _first(np.asarray(fires.any(axis=0)), row)
             if downs is not None and (fire is None or downs <= fire):
-                self.active, row = False, downs + 1
+                self.active = False
+                row = downs + 1
                 self.diagnosis.first = None
                 self.quiet.append(float(seen.now[downs]))
                 continue
@@ -427,45 +511,68 @@ class Pilot:
                 return decision
             row = fire + 1
         last = self.until - self.loop.sensor.delay - coast.estimator.step
-        enough = min(float(coast.estimator.first) + self.law.period, last)  # of the coast, to judge a firing by it
+        enough = min(
+            float(coast.estimator.first) + self.law.period, last
+        )  # of the coast, to judge a firing by it
         if self._pending is None or seen.times[-1] >= enough:
             self._faulty(coast, seen, count - 1)
         return None
 
     def _faulty(self, coast: Watch, seen: Seen, row: int) -> bool:
-        """Judge the last firing by the samples since, up to a ``row``; True if the loop has to stop."""
+        """Judge the last firing by the samples since, up to a ``row``; True if the loop has to
+        stop.
+        """
         if self._pending is not None:
             pulse, firing, before = self._pending
             after = self._glimpse(pulse.t, row, last=False)
             if after is not None:
                 self._pending = None
                 now = max(float(seen.now[row]), self.ready)
-                verdict = self.diagnosis.judge(pulse.channel, now, before, after, firing.acts, coast.estimator.doubts)
+                verdict = self.diagnosis.judge(
+                    pulse.channel, now, before, after, firing.acts, coast.estimator.doubts
+                )
                 if verdict is not None:
                     self.ending = verdict
-        suspect, overdue = self.diagnosis.suspect, bool(seen.now[row] > self.diagnosis.deadline)
+        suspect = self.diagnosis.suspect
+        overdue = bool(seen.now[row] > self.diagnosis.deadline)
         if overdue and suspect is not None and self._pending is None and not self.ending[0].fault:
-            self.ending = Ending.UNCLEAR, suspect  # no other channel has fired in time to tell which it is
+            self.ending = (
+                Ending.UNCLEAR,
+                suspect,
+            )  # no other channel has fired in time to tell which it is
         return self.ending[0].fault
 
     def _allowed(self, coast: Watch, seen: Seen, row: int, channels: list[int]) -> Decided | None:
         """Firing at a row, on a tick, if the limits allow it."""
         actuators = [self.law.actuators[index] for index in channels]
-        fired = [coast.firing(seen, row, each) for each in actuators if each.channel.name != self.diagnosis.suspect]
+        fired = [
+            coast.firing(seen, row, each)
+            for each in actuators
+            if each.channel.name != self.diagnosis.suspect
+        ]
         decided = [decision for decision in fired if decision is not None]
         if not decided:
             return None
-        decision, windows = min(decided, key=lambda candidate: candidate.start), self.law.windows
+        decision = min(decided, key=lambda candidate: candidate.start)
+        windows = self.law.windows
         start = windows.nearest_tick(decision.start)
         start = windows.tick_after(decision.start) if start < decision.now else start
-        return decision._replace(start=start) if windows.allows(start, decision.firing.lasts, self.ready) else None
+        return (
+            decision._replace(start=start)
+            if windows.allows(start, decision.firing.lasts, self.ready)
+            else None
+        )
 
     def _idle_until(self, seen: Seen) -> float | None:
-        """Earliest time at which the sensor can show the start threshold, less the look-ahead; None where soon."""
+        """Earliest time at which the sensor can show the start threshold, less the look-ahead; None
+        where soon.
+        """
         law = self.law
         if not self.free:
             return None
-        now, growth, reach = float(seen.times[-1]), self.truth.growth, self._reach(float(seen.spin[-1]))
+        now = float(seen.times[-1])
+        growth = self.truth.growth
+        reach = self._reach(float(seen.spin[-1]))
         if reach <= seen.size:
             return None
         # tan θ grows by e^{κt}, and |ω| by no more; with a wheel κ may rise with θ.
@@ -486,8 +593,11 @@ class Pilot:
         """Largest overestimate of |z| by the sensor: rad/s, and a factor."""
         law, sensor = self.law, self.loop.sensor
         estimator = Estimator(law, sensor, 0.0)
-        over, doubts = estimator.overestimate(self.truth, law.size(law.loop.start, self.truth.spin)), estimator.doubts
-        return doubts.bias + doubts.steps + NO_NOISE * doubts.noise, over * max(map(abs, sensor.scales))
+        over = estimator.overestimate(self.truth, law.size(law.loop.start, self.truth.spin))
+        doubts = estimator.doubts
+        return doubts.bias + doubts.steps + NO_NOISE * doubts.noise, over * max(
+            map(abs, sensor.scales)
+        )
 
 
 def _first(mask: NDArray[np.bool_], row: int) -> int | None:

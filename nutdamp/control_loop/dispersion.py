@@ -1,7 +1,8 @@
 """Dispersed loops: settling, end states, propellant and worst cases of many dispersed closed loops.
 
-The law on board knows the spacecraft file alone. Body, thrusters, valves and sensor of a case are drawn as for a
-schedule, by the same names from the same streams; of the sensor bias and scale of each gyro, noise and delay.
+The law on board knows the spacecraft file alone. Body, thrusters, valves and sensor of a case are
+drawn as for a schedule, by the same names from the same streams; of the sensor bias and scale of
+each gyro, noise and delay.
 """
 
 from __future__ import annotations
@@ -19,11 +20,25 @@ from numpy.typing import NDArray
 
 from nutdamp.control_loop.controller import Case, Scatter
 from nutdamp.control_loop.law import Ending, Law
-from nutdamp.control_loop.simulation import Fleet, FlownLoops, expects_alone, fly_alone, until_default
+from nutdamp.control_loop.simulation import (
+    Fleet,
+    FlownLoops,
+    expects_alone,
+    fly_alone,
+    until_default,
+)
 from nutdamp.control_loop.stability import Band, dead_band, expect_in_time
 from nutdamp.errors import BadRequest
 from nutdamp.montecarlo.cases import DispersedModel, cold_of, rotated, tank_of, triple
-from nutdamp.montecarlo.inputs import BLOCK, BY_VALVE, Draws, Inputs, independent, some_of, with_sensor
+from nutdamp.montecarlo.inputs import (
+    BLOCK,
+    BY_VALVE,
+    Draws,
+    Inputs,
+    independent,
+    some_of,
+    with_sensor,
+)
 from nutdamp.montecarlo.propagated import carried
 from nutdamp.montecarlo.statistics import Exact, cases_to_show, correlated_shares
 from nutdamp.montecarlo.study import Counted, Dispersed, DrawnCases, by_tolerance
@@ -40,20 +55,33 @@ OF_FIRINGS = ("thrust_per_pulse", "timing")  # tolerances that each firing draws
 
 
 class LoopModel(DispersedModel):
-    """Spacecraft as known to its ``law`` on board, ready to be dispersed; ``of_firings``: inputs drawn per firing."""
+    """Spacecraft as known to its ``law`` on board, ready to be dispersed; ``of_firings``: inputs
+    drawn per firing.
+    """
 
     def __init__(self, law: Law) -> None:
-        pulses = [channel_pulse(actuator.channel, 0.0, actuator.shortest or 1.0) for actuator in law.actuators]
+        pulses = [
+            channel_pulse(actuator.channel, 0.0, actuator.shortest or 1.0)
+            for actuator in law.actuators
+        ]
         super().__init__(law.spacecraft, Schedule(tuple(pulses)))
-        self.law, drawn = law, self.inputs.drawn
+        self.law = law
+        drawn = self.inputs.drawn
         kept = tuple(entry for entry in drawn if entry.tolerance not in OF_FIRINGS)
-        self.inputs = with_sensor(self.spacecraft, Inputs(kept, self.inputs.unused), "the loop does not fire")
+        self.inputs = with_sensor(
+            self.spacecraft, Inputs(kept, self.inputs.unused), "the loop does not fire"
+        )
         each = {entry.tolerance: entry for entry in drawn if entry.tolerance in OF_FIRINGS}
         self.of_firings = tuple(entry._replace(name=name) for name, entry in each.items())
 
     def loops(self, draws: Draws, numbers: NDArray[np.intp], seed: int) -> list[Case]:
-        """Cases of a study with these ``numbers``, from 0, and their ``draws``, (n,) or one for all."""
-        body, loop, given, count = self.spacecraft, self.law.loop, self.spacecraft.dispersions, len(numbers)
+        """Cases of a study with these ``numbers``, from 0, and their ``draws``, (n,) or one for
+        all.
+        """
+        body = self.spacecraft
+        loop = self.law.loop
+        given = self.spacecraft.dispersions
+        count = len(numbers)
         draws = _at_pressure(body, draws)
 
         def rows(*parts: Any) -> Vector:
@@ -80,7 +108,9 @@ class LoopModel(DispersedModel):
                 inertia=Inertia(triple(moments[row]), body.inertia.axes, wheels[row]),
                 omega0=rates[row],
                 attitude=None if attitudes is None else Attitude(attitudes[row]),
-                channels=self._channels(draw, {name: torque[row] for name, torque in torques.items()}),
+                channels=self._channels(
+                    draw, {name: torque[row] for name, torque in torques.items()}
+                ),
                 loop=replace(loop, sensor=_sensor(loop.sensor, draw)),
                 cold=cold_of(body, draw),
                 tank=tank_of(body, draw),
@@ -90,10 +120,16 @@ class LoopModel(DispersedModel):
         return cases
 
     def _attitudes(self, tilts: Vector) -> Vector:
-        """Attitudes (n, 4) of the file's axes, where that of the principal axes is turned by ``tilts`` (n, 2) rad."""
-        body, angles = self.spacecraft, np.hypot(*tilts.T)
+        """Attitudes (n, 4) of the file's axes, where that of the principal axes is turned by
+        ``tilts`` (n, 2) rad.
+        """
+        body = self.spacecraft
+        angles = np.hypot(*tilts.T)
         turns = np.zeros((len(tilts), 4))
-        turns[:, 0], turns[:, 1:3] = np.cos(0.5 * angles), (0.5 * np.sinc(0.5 * angles / math.pi))[:, None] * tilts
+        turns[:, 0], turns[:, 1:3] = (
+            np.cos(0.5 * angles),
+            (0.5 * np.sinc(0.5 * angles / math.pi))[:, None] * tilts,
+        )
         turned = attitude.multiply(body.initial.quaternion, turns)
         return attitude.multiply(turned, attitude.from_matrix(body.inertia.axes.T))
 
@@ -115,12 +151,19 @@ class LoopModel(DispersedModel):
                 force = None if thruster.force is None else factor * thruster.force
                 thrust = None if thruster.thrust is None else factor * thruster.thrust
                 torque = torques[thruster.name]
-                thrusters.append(replace(thruster, torque=torque, valve=valve, force=force, thrust=thrust))
+                thrusters.append(
+                    replace(thruster, torque=torque, valve=valve, force=force, thrust=thrust)
+                )
             channels.append(replace(channel, thrusters=tuple(thrusters)))
         return tuple(channels)
 
 
-OF_THRUSTERS = ("thrust", "direction", "position", *BY_VALVE)  # first words of the inputs that make a thruster another
+OF_THRUSTERS = (
+    "thrust",
+    "direction",
+    "position",
+    *BY_VALVE,
+)  # first words of the inputs that make a thruster another
 
 
 def _at_pressure(body: Spacecraft, draws: Draws) -> Draws:
@@ -129,25 +172,35 @@ def _at_pressure(body: Spacecraft, draws: Draws) -> Draws:
     if body.tank is None or tank is None or not {"tank pressure", "tank exponent"} & set(draws):
         return draws
     higher = (tank.pressure / body.tank.pressure) ** tank.exponent
-    names = {f"thrust {thruster.name}" for channel in body.channels for thruster in channel.thrusters}
+    names = {
+        f"thrust {thruster.name}" for channel in body.channels for thruster in channel.thrusters
+    }
     return {**draws, **{name: (1.0 + draws.get(name, 0.0)) * higher - 1.0 for name in names}}
 
 
 def _valve(channel: Channel, draw: dict[str, float]) -> Any:
-    """Valve of a channel: all of its thrusters open with the mean of their delays, none below zero."""
+    """Valve of a channel: all of its thrusters open with the mean of their delays,
+    none below zero.
+    """
     valve = channel.valve
     if valve is None:
         return None
 
     def off(key: str) -> float:
-        return float(np.mean([draw.get(f"{key} {thruster.name}", 0.0) for thruster in channel.thrusters]))
+        return float(
+            np.mean([draw.get(f"{key} {thruster.name}", 0.0) for thruster in channel.thrusters])
+        )
 
     from nutdamp.physics.thruster import Measured  # few spacecraft have any
 
     if isinstance(valve, Measured):
         factor = 1.0 + off("impulse_bit")
-        return Measured(tuple((command, factor * given, centroid) for command, given, centroid in valve.rows))
-    return replace(valve, **{key: max(getattr(valve, key) + off(key), 0.0) for key in BY_VALVE[:-1]})
+        return Measured(
+            tuple((command, factor * given, centroid) for command, given, centroid in valve.rows)
+        )
+    return replace(
+        valve, **{key: max(getattr(valve, key) + off(key), 0.0) for key in BY_VALVE[:-1]}
+    )
 
 
 def _sensor(sensor: Sensor, draw: dict[str, float]) -> Sensor:
@@ -166,17 +219,31 @@ def _sensor(sensor: Sensor, draw: dict[str, float]) -> Sensor:
 
 Array = NDArray[np.float64]
 
-OUTPUTS = ("settled", "quiet", "nutation", "momentum_shift", "axis_error", "spin_change", "propellant", "firings")
-"""Outputs of a case: first settling (s), nutation then and largest since (rad), by what H has turned and
-is off its target at the end (rad), by how much the spin has changed (rad/s), propellant (kg), firings.
+OUTPUTS = (
+    "settled",
+    "quiet",
+    "nutation",
+    "momentum_shift",
+    "axis_error",
+    "spin_change",
+    "propellant",
+    "firings",
+)
+"""Outputs of a case: first settling (s), nutation then and largest since (rad), by what H has
+turned and is off its target at the end (rad), by how much the spin has changed (rad/s), propellant
+(kg), firings.
 
-What is not known is not a number: the first two of a loop that never falls quiet, or that never sees its start."""
+What is not known is not a number: the first two of a loop that never falls quiet, or that never
+sees its start.
+"""
 
 PORTION = 512  # cases that are flown together
 CASES = (2_000, 20_000)  # least and largest number of cases flown where nothing else is said
 
 MORE = 1.6
-"""Factor on the fewest cases that show a share by which one of them may fail: 5.6 over 3.7, as Poisson's limits are."""
+"""Factor on the fewest cases that show a share by which one of them may fail: 5.6 over 3.7, as
+Poisson's limits are.
+"""
 
 MOST_SAMPLES = 20_000_000_000  # largest number of samples of a study, by those of its nominal case
 ALONE = 20  # cost factor of a sample where cases fly alone
@@ -184,12 +251,19 @@ FEW = 100  # least number of settled cases for sensitivities
 
 
 class LoopStudy(DrawnCases):
-    """Loop flown to ``until`` s in dispersed cases; ``alone`` is why they fly one by one, empty where together."""
+    """Loop flown to ``until`` s in dispersed cases; ``alone`` is why they fly one by one, empty
+    where together.
+    """
 
     model: LoopModel
 
     def __init__(self, spacecraft: Spacecraft, loop: Loop, until: float, seed: int) -> None:
-        self.spacecraft, self.until, self.seed, self.law = spacecraft, until, seed, Law(spacecraft, loop)
+        self.spacecraft, self.until, self.seed, self.law = (
+            spacecraft,
+            until,
+            seed,
+            Law(spacecraft, loop),
+        )
         self.model, self.alone = LoopModel(self.law), expects_alone(self.law, spacecraft)
 
     @cached_property
@@ -213,7 +287,9 @@ class LoopStudy(DrawnCases):
 
     @property
     def nominal_aspects(self) -> Array:
-        """Least and largest angle (m, 2) rad from the spin axis to the direction of each cone, of that flight."""
+        """Least and largest angle (m, 2) rad from the spin axis to the direction of each cone, of
+        that flight.
+        """
         return self._nominal_flown.aspects[:, :, 0]
 
     @cached_property
@@ -222,12 +298,16 @@ class LoopStudy(DrawnCases):
 
     @property
     def enough(self) -> int:
-        """Cases flown where nothing else is said: a share required is shown even where one of them fails."""
+        """Cases flown where nothing else is said: a share required is shown even where one of them
+        fails.
+        """
         shown = cases_to_show(required_share(self.spacecraft.requirement))
         return min(max(math.ceil(MORE * shown), CASES[0]), CASES[1])
 
     def expect_affordable(self, samples: int) -> int:
-        """Number of samples of so many cases, by the nominal one; raises BadRequest where there are too many."""
+        """Number of samples of so many cases, by the nominal one; raises BadRequest where there are
+        too many.
+        """
         looked = self._nominal_flown.pilots[0].looked_at
         price = looked * (ALONE if self.alone else 1)
         if price * samples > MOST_SAMPLES:
@@ -239,11 +319,17 @@ class LoopStudy(DrawnCases):
         return looked * samples
 
     def price_alone(self, samples: int) -> str:
-        """Time of so many cases one by one, in words, by that of the nominal one on this machine."""
+        """Time of so many cases one by one, in words,
+        by that of the nominal one on this machine.
+        """
         begin = time.perf_counter()
         self.fly([Case(self.spacecraft, (self.seed,))])
         seconds = samples * (time.perf_counter() - begin)
-        return f"about {math.ceil(seconds)} s" if seconds < 120.0 else f"about {seconds / 60.0:.0f} min"
+        return (
+            f"about {math.ceil(seconds)} s"
+            if seconds < 120.0
+            else f"about {seconds / 60.0:.0f} min"
+        )
 
     def fly(self, cases: list[Case], watch: Callable[[int], None] = lambda _: None) -> FlownLoops:
         """Fly the loops of ``cases``."""
@@ -252,7 +338,9 @@ class LoopStudy(DrawnCases):
         return Fleet(self.law, cases, self.until).fly(watch)
 
     def measured(self, flown: FlownLoops) -> tuple[Array, Left, Array]:
-        """Outputs (8, n) of loops, their residuals, and their severity (n,): infinite where a loop is `lost`."""
+        """Outputs (8, n) of loops, their residuals, and their severity (n,): infinite where a loop
+        is `lost`.
+        """
         cases, pilots, body = flown.cases, flown.pilots, self.spacecraft
         before = np.array([case.truth.omega0 for case in cases]).T
         start, end = triple(flown.momentum(before)), triple(flown.momentum(flown.rates))
@@ -262,7 +350,9 @@ class LoopStudy(DrawnCases):
         out[0] = [pilot.quiet[0] if pilot.quiet else math.nan for pilot in pilots]
         out[1], out[2] = flown.quiet, flown.largest
         out[3] = attitude.angle_of_parts(start, triple(np.array(momentum)))
-        out[4] = attitude.angle_of_parts(triple(self.model.target.tolist()), rotated(momentum, (tilts[0], tilts[1])))
+        out[4] = attitude.angle_of_parts(
+            triple(self.model.target.tolist()), rotated(momentum, (tilts[0], tilts[1]))
+        )
         out[5] = flown.rates[2] - before[2]
         used = [[firing.pulse.propellant for firing in pilot.fired] for pilot in pilots]
         out[6] = [math.fsum(math.nan if kg is None else kg for kg in pulses) for pulses in used]
@@ -274,19 +364,24 @@ class LoopStudy(DrawnCases):
 
 
 def loop_study(spacecraft: Spacecraft, until: float | None = None, *, seed: int = 1) -> LoopStudy:
-    """Study of a loop; raises BadRequest without loop or dispersions, Infeasible as `evaluation.loop_of` does."""
+    """Study of a loop; raises BadRequest without loop or dispersions, Infeasible as
+    `evaluation.loop_of` does.
+    """
     loop = requirements.expect_loop(spacecraft)
     expect_dispersions(spacecraft.dispersions)
     expect_in_time(spacecraft, loop)
-    return LoopStudy(spacecraft, loop, until_default(spacecraft, loop) if until is None else until, seed)
+    return LoopStudy(
+        spacecraft, loop, until_default(spacecraft, loop) if until is None else until, seed
+    )
 
 
 @dataclass(eq=False)
 class LoopResults(Counted):
     """Results of a study of a loop; cases that comply settle too.
 
-    ``values`` are the outputs (8, requested), ``lost`` (done,) the cases that see no end, or were stopped; ``stops`` is
-    why loops were flown no further. ``angles`` (m, 2, requested) rad: least and largest to the direction of each cone.
+    ``values`` are the outputs (8, requested), ``lost`` (done,) the cases that see no end, or were
+    stopped; ``stops`` is why loops were flown no further. ``angles`` (m, 2, requested) rad: least
+    and largest to the direction of each cone.
     """
 
     study: LoopStudy
@@ -324,11 +419,17 @@ class LoopResults(Counted):
         return int(np.count_nonzero(self.of("quiet") <= self.study.band.most))
 
     def spread(self, bound: Bound) -> Exact | None:
-        """Distribution of the value of a bound's part, of the cases that settle; None where none does."""
+        """Distribution of the value of a bound's part, of the cases that settle; None where none
+        does.
+        """
         return None if self.lost.all() else Exact(self._values(bound)[~self.lost])
 
-    def take(self, values: Array, left: Left, severity: Array, angles: Array, stops: list[Ending]) -> None:
-        """Count further cases: `LoopStudy.measured`, ``angles`` (m, 2, n), and why they were flown no further."""
+    def take(
+        self, values: Array, left: Left, severity: Array, angles: Array, stops: list[Ending]
+    ) -> None:
+        """Count further cases: `LoopStudy.measured`, ``angles`` (m, 2, n), and why they were flown
+        no further.
+        """
         rows = slice(self.done, self.done + values.shape[1])
         self.values[:, rows], self.angles[:, :, rows] = values, angles
         goal = self.study.spacecraft.goal.spin
@@ -338,24 +439,32 @@ class LoopResults(Counted):
         self.count(severity, left, ~np.isinf(severity))
 
     def shares(self, output: str) -> dict[str, float]:
-        """Share of each input in the variance of an output over the cases that settle: its squared correlation.
+        """Share of each input in the variance of an output over the cases that settle: its squared
+        correlation.
 
-        What chance adds to that over few cases is taken off; empty where they are too few, or nothing varies. Of
-        inputs that are correlated each has what it adds to those before it.
+        What chance adds to that over few cases is taken off; empty where they are too few, or
+        nothing varies. Of inputs that are correlated each has what it adds to those before it.
         """
         return self._shares(self.values[OUTPUTS.index(output), : self.done])
 
     def _shares(self, values: Array) -> dict[str, float]:
-        rows, model = np.flatnonzero(~self.lost & ~np.isnan(values)), self.study.model
+        rows = np.flatnonzero(~self.lost & ~np.isnan(values))
+        model = self.study.model
         if len(rows) < FEW:
             return {}
         inputs = [entry for entry in model.inputs.drawn if entry.sigma > 0.0]
         draws = self.study.draws_of_all(np.arange(self.done))
-        drawn = independent({entry.name: np.asarray(draws[entry.name]) for entry in inputs}, inputs, model.groups)
-        return correlated_shares({entry.name: drawn[entry.name][rows] for entry in inputs}, values[rows])
+        drawn = independent(
+            {entry.name: np.asarray(draws[entry.name]) for entry in inputs}, inputs, model.groups
+        )
+        return correlated_shares(
+            {entry.name: drawn[entry.name][rows] for entry in inputs}, values[rows]
+        )
 
     def contributions(self, bound: Bound) -> dict[str, float]:
-        """Share of each tolerance in the variance of the value of a bound's part over the cases that settle."""
+        """Share of each tolerance in the variance of the value of a bound's part over the cases
+        that settle.
+        """
         model = self.study.model
         return by_tolerance(model.inputs.drawn, model.groups, self._shares(self._values(bound)))
 
@@ -377,10 +486,14 @@ class LoopDispersion(Dispersed):
 
     @cached_property
     def verdict(self) -> Verdict:
-        """Judgement of the loop by these cases, and by nominal values with the noise of the seed."""
+        """Judgement of the loop by these cases,
+        and by nominal values with the noise of the seed.
+        """
         study, body = self.core.study, self.core.study.spacecraft
         cases, (_, left, severity) = cases_of(self.core), study.nominal_measured
-        nutation, aim, spin = (float(np.ravel(part)[0]) for part in (left.nutation, left.aim, left.spin))
+        nutation, aim, spin = (
+            float(np.ravel(part)[0]) for part in (left.nutation, left.aim, left.spin)
+        )
         alone = Left(nutation, aim, spin, None if left.angles is None else left.angles[:, :, 0])
         lost = math.isinf(severity[0])
         return judge_loop(body, requirements.held(body, alone), cases, self.core, lost=lost)
@@ -395,11 +508,13 @@ def run(
 ) -> LoopResults:
     """Fly the cases that ``results`` is to have, a portion after the other; returns ``results``.
 
-    ``watch`` is called with how many are done, ``collect`` with the portions in order: number (from 0) of the first
-    case, outputs (8, n), why they end, and angles (m, 2, n) rad. Where ``stopped``, the portions done are kept.
+    ``watch`` is called with how many are done, ``collect`` with the portions in order: number (from
+    0) of the first case, outputs (8, n), why they end, and angles (m, 2, n) rad. Where ``stopped``,
+    the portions done are kept.
     """
     study = results.study
-    source, block = study.source(), -1
+    source = study.source()
+    block = -1
     draws: Draws = {}
     while results.done < results.requested and not stopped():
         first = results.done

@@ -1,6 +1,7 @@
 """Evaluation of a closed loop: as a plan, and against DOP853 firing by firing.
 
-The plan is judged by the motion from the time at which the loop was first down to its stop threshold.
+The plan is judged by the motion from the time at which the loop was first down to its stop
+threshold.
 """
 
 from __future__ import annotations
@@ -34,7 +35,8 @@ if TYPE_CHECKING:
     from nutdamp.flight.reference_model import ReferenceModel
 
 AGREE = 1e-6  # s; firings that begin and last alike to this are the same
-EVALUATIONS = 1_000_000  # evaluations of Euler's equations by DOP853, at most: a loop flies on where a schedule is over
+# evaluations of Euler's equations by DOP853, at most: a loop flies on where a schedule is over
+EVALUATIONS = 1_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,8 +48,12 @@ class _Solved:
 
     def motion(self, times: Vector) -> tuple[Vector, Vector]:
         states = self.solution(np.asarray(times, dtype=float)).T
-        quaternion = np.roll(states[:, 3:] / np.linalg.norm(states[:, 3:], axis=1, keepdims=True), 1, axis=1)
-        return states[:, :3] @ self.axes, attitude.multiply(quaternion, attitude.from_matrix(self.axes))
+        quaternion = np.roll(
+            states[:, 3:] / np.linalg.norm(states[:, 3:], axis=1, keepdims=True), 1, axis=1
+        )
+        return states[:, :3] @ self.axes, attitude.multiply(
+            quaternion, attitude.from_matrix(self.axes)
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,14 +69,18 @@ class _Independent(Dynamics):
     def command(self, pulse: Pulse) -> None:
         command(self.model, self.spacecraft, pulse)
 
-    def _path(self, state: SpinState, start: float, end: float, push: Push, most: int) -> tuple[Path, SpinState]:
+    def _path(
+        self, state: SpinState, start: float, end: float, push: Push, most: int
+    ) -> tuple[Path, SpinState]:
         del push, most  # the model has its own
         inertia, first = self.spacecraft.inertia, self.model.initial
         if start > 0.0:
             rates, quaternion = inertia.in_file_axes(state.rates, state.quaternion)
             first = np.concatenate([rates, np.roll(quaternion, -1)])
         # A stretch that ends where it begins is integrated a little further, to be a motion too.
-        path = _Solved(inertia.axes, self.model.fly(first, start, max(end, start + 1e-6), work.reach))
+        path = _Solved(
+            inertia.axes, self.model.fly(first, start, max(end, start + 1e-6), work.reach)
+        )
         rates, quaternion = path.motion(np.array([end]))
         return path, SpinState.of(rates[0], quaternion[0])
 
@@ -89,7 +99,11 @@ class LoopVerification(results.Data):
     @property
     def same(self) -> bool:
         """True if the same channels fire in the same order."""
-        names = [[firing.pulse.channel for firing in run.fired] for run in (self.run, self.other) if run is not None]
+        names = [
+            [firing.pulse.channel for firing in run.fired]
+            for run in (self.run, self.other)
+            if run is not None
+        ]
         return len(names) == 2 and names[0] == names[1]
 
     @property
@@ -100,17 +114,26 @@ class LoopVerification(results.Data):
     @property
     def agree(self) -> bool:
         """True if DOP853 confirms every firing to `AGREE`, and the reason for the end."""
-        return self.same and self.worst <= AGREE and self.other is not None and self.other.stop is self.run.stop
+        return (
+            self.same
+            and self.worst <= AGREE
+            and self.other is not None
+            and self.other.stop is self.run.stop
+        )
 
 
-def verify_loop(spacecraft: Spacecraft, until: float | None = None, *, seed: int = SEED) -> LoopVerification:
+def verify_loop(
+    spacecraft: Spacecraft, until: float | None = None, *, seed: int = SEED
+) -> LoopVerification:
     """Fly the loop of the file in closed form and by its reference model.
 
-    Raises Infeasible where it cannot be flown at all, or where fields of the spacecraft were replaced.
+    Raises Infeasible where it cannot be flown at all, or where fields of the spacecraft were
+    replaced.
     """
     loop = requirements.expect_loop(spacecraft)
     run = fly(spacecraft, loop, until, seed=seed)
-    model, moments = reference_model(spacecraft, EVALUATIONS), spacecraft.inertia.moments
+    model = reference_model(spacecraft, EVALUATIONS)
+    moments = spacecraft.inertia.moments
     mover = _Independent(moments, np.zeros(3), NOTHING, model=model, spacecraft=spacecraft)
     try:
         with work.steps(run.until):
@@ -129,16 +152,19 @@ def verify_loop(spacecraft: Spacecraft, until: float | None = None, *, seed: int
 
 
 HELD = 1.05
-"""Nutation, over the start threshold, that a loop may let stand without a requirement: it grows while the loop waits
-for the phase of its firing, by a twentieth where a time constant is ten nutation periods (upper-stage: 0.1 %).
+"""Nutation, over the start threshold, that a loop may let stand without a requirement: it grows
+while the loop waits for the phase of its firing, by a twentieth where a time constant is ten
+nutation periods (upper-stage: 0.1 %).
 """
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LoopPlan(Plan):
-    """Pulses fired by a loop in a ``flown_run``, with its flight; ``known`` is the spacecraft as the law knows it.
+    """Pulses fired by a loop in a ``flown_run``, with its flight; ``known`` is the spacecraft as
+    the law knows it.
 
-    With growing nutation the same pulses fired again without looking would not do the same: errors of rounding grow.
+    With growing nutation the same pulses fired again without looking would not do the same: errors
+    of rounding grow.
     """
 
     flown_run: LoopRun = field(kw_only=True)
@@ -157,22 +183,30 @@ class LoopPlan(Plan):
     def reaching(self, time: float) -> Flight:
         """Flight of the run; raises BadRequest where it ends before ``time`` s."""
         if time > self.flown_run.until:
-            raise BadRequest(f"the loop is flown to {self.flown_run.until:.6g} s: expected a time up to that")
+            raise BadRequest(
+                f"the loop is flown to {self.flown_run.until:.6g} s: expected a time up to that"
+            )
         return self.flown_run.flight
 
     @cached_property
     def largest(self) -> tuple[float, float]:
-        """Largest nutation since the loop first settled, rad, and its time, s; at the end where it never did."""
+        """Largest nutation since the loop first settled, rad, and its time, s; at the end where it
+        never did.
+        """
         return largest_since(self.flown_run)
 
     @property
     def left(self) -> Left:
-        """Largest nutation since the loop first settled; direction of H and spin at the end, angles to cones."""
+        """Largest nutation since the loop first settled; direction of H and spin at the end, angles
+        to cones.
+        """
         return left_on_the_way(self.flight, self.aspects)._replace(nutation=self.largest[0])
 
     @property
     def held(self) -> tuple[Held, ...]:
-        """Residual beside each bound; without a requirement the nutation is judged by the thresholds of the loop."""
+        """Residual beside each bound; without a requirement the nutation is judged by the
+        thresholds of the loop.
+        """
         limit = max(self.band.most, HELD * self.flown_run.loop.start + self.band.noise)
         lines = super().held
         return tuple(
@@ -190,7 +224,9 @@ class LoopPlan(Plan):
 
     @cached_property
     def verdict(self) -> Verdict:
-        """Judgement of this run: by its bounds, and by whether the loop was stopped or never falls quiet."""
+        """Judgement of this run: by its bounds, and by whether the loop was stopped or never falls
+        quiet.
+        """
         run = self.flown_run
         return judge_loop(
             self.spacecraft,
@@ -220,18 +256,23 @@ class LoopPlan(Plan):
 def loop_of(
     spacecraft: Spacecraft, until: float | None = None, *, seed: int = SEED, case: int | None = None
 ) -> LoopPlan:
-    """Loop of the file flown to ``until`` s with the noise of ``seed``; as dispersed in a ``case`` of it, from 0.
+    """Loop of the file flown to ``until`` s with the noise of ``seed``; as dispersed in a ``case``
+    of it, from 0.
 
-    Raises Infeasible where no law can work, and where its firings would feed the nutation by how late they come.
+    Raises Infeasible where no law can work, and where its firings would feed the nutation by how
+    late they come.
     """
     loop = requirements.expect_loop(spacecraft)
     expect_in_time(spacecraft, loop)
-    flown, law = Case(spacecraft, (seed,)), None
+    flown = Case(spacecraft, (seed,))
+    law = None
     if case is not None:
         from nutdamp.control_loop.dispersion import loop_study  # most flights are none of a study
 
         study = loop_study(spacecraft, until, seed=seed)
-        flown, law, until = study.case(case), study.law, study.until
+        flown = study.case(case)
+        law = study.law
+        until = study.until
     truth = flown.truth
     run = fly(truth, truth.loop or loop, until, seed=flown.key, law=law, scatter=flown.scatter)
     return LoopPlan(truth, LOOP, run.schedule, from_file=True, flown_run=run, known=spacecraft)

@@ -1,11 +1,12 @@
 """Firing law and fault detection.
 
-A channel of torque direction d fires while arg ω = arg d + π (Magnus 1970, section 4). The diagnosis compares the
-change of the observed rate by each firing with the expected one.
+A channel of torque direction d fires while arg ω = arg d + π (Magnus 1970, section 4). The
+diagnosis compares the change of the observed rate by each firing with the expected one.
 
-The law knows the moments of the body and its momentary spin, and sees the transverse rate ω = ω1 + iω2. With
-I1 ≠ I2 a small ω runs on an ellipse; the quantity that turns evenly is z = g1 ω1 + i g2 ω2 with gj by
-`Inertia.circle`, at `Inertia.nutation_rate`: the law works on z, which is ω itself where I1 = I2.
+The law knows the moments of the body and its momentary spin, and sees the transverse rate ω = ω1 +
+iω2. With I1 ≠ I2 a small ω runs on an ellipse; the quantity that turns evenly is z = g1 ω1 + i g2
+ω2 with gj by `Inertia.circle`, at `Inertia.nutation_rate`: the law works on z, which is ω itself
+where I1 = I2.
 """
 
 from __future__ import annotations
@@ -23,7 +24,13 @@ from nutdamp.physics import body as rigid_body
 from nutdamp.physics import response
 from nutdamp.schemes.catalogue import DEFAULT_SHARE
 from nutdamp.schemes.sequential import at_hand
-from nutdamp.spacecraft.constraints import Windows, effective_on_time, effective_on_times, longest_useful, usable
+from nutdamp.spacecraft.constraints import (
+    Windows,
+    effective_on_time,
+    effective_on_times,
+    longest_useful,
+    usable,
+)
 from nutdamp.spacecraft.equipment import BANG, ONE_PULSE, Channel, Loop
 from nutdamp.spacecraft.model import Spacecraft, Vector
 
@@ -53,11 +60,15 @@ class Actuator:
     spin_rate: float  # rad/s²: change of ω3
     shortest: float  # s: least effective on-time
     longest: float
-    leads: tuple[Array, Array] | None = None  # with a valve, s: on-times (n,) between, and leads to their centres
+    leads: tuple[Array, Array] | None = (
+        None  # with a valve, s: on-times (n,) between, and leads to their centres
+    )
 
 
 class Law:
-    """Law of a ``spacecraft`` as known on board, and of its `Loop`; raises Infeasible where none can work."""
+    """Law of a ``spacecraft`` as known on board, and of its `Loop`; raises Infeasible where none
+    can work.
+    """
 
     def __init__(self, spacecraft: Spacecraft, loop: Loop) -> None:
         inertia = spacecraft.inertia
@@ -85,11 +96,19 @@ class Law:
             longest = effective_on_time(channel, self.loop.on_time)
         if self.loop.law == BANG:
             shortest = longest
-        leads, valve = None, channel.valve
+        leads = None
+        valve = channel.valve
         if valve is not None:
             on_times = np.linspace(shortest, longest, LEADS)
-            leads = on_times, np.array([valve.thrust(valve.on_time_for(each)).centroid for each in on_times.tolist()])
-        return Actuator(channel, complex(self.seen(kick)), channel.axial / third, shortest, longest, leads)
+            leads = (
+                on_times,
+                np.array(
+                    [valve.thrust(valve.on_time_for(each)).centroid for each in on_times.tolist()]
+                ),
+            )
+        return Actuator(
+            channel, complex(self.seen(kick)), channel.axial / third, shortest, longest, leads
+        )
 
     def seen(self, omega: Any) -> Any:
         """z of ω, numbers or arrays."""
@@ -102,7 +121,9 @@ class Law:
 
     def nutation(self, size: Any, spin: Any) -> Array:
         """Nutation angle θ, rad, by |z| and ω3: tan θ = A|ω|/|H3|, Magnus 1970 (19)."""
-        return np.asarray(np.arctan2(self.inertia.A * np.asarray(size), np.abs(self.inertia.axial(spin))))
+        return np.asarray(
+            np.arctan2(self.inertia.A * np.asarray(size), np.abs(self.inertia.axial(spin)))
+        )
 
     def size(self, nutation: float, spin: float) -> float:
         """|z|, rad/s, of a nutation angle (rad)."""
@@ -110,7 +131,8 @@ class Law:
 
     def firing(self, actuator: Actuator, z: complex, spin: float) -> Firing | None:
         """Next firing of a channel against ``z`` now; None where it would not help."""
-        rate, slope = float(self.rate(spin)), self.slope * actuator.spin_rate
+        rate = float(self.rate(spin))
+        slope = self.slope * actuator.spin_rate
         needed = response.on_time_for(abs(z), abs(actuator.kick), rate, slope, actuator.longest)
         on_time = actuator.longest if needed is None else max(needed, actuator.shortest)
         if actuator.channel.valve is None:
@@ -119,7 +141,8 @@ class Law:
         else:
             loaded = actuator.channel.valve.on_time_for(on_time)
             thrust = actuator.channel.valve.thrust(loaded)
-            lead, lasts = thrust.centroid, max(loaded, thrust.ramps[-1].end)
+            lead = thrust.centroid
+            lasts = max(loaded, thrust.ramps[-1].end)
         factor = response.width_factor(rate, slope, on_time)
         acts = actuator.kick * on_time * factor
         if not 0.0 < abs(acts) < 2.0 * abs(z):
@@ -128,11 +151,15 @@ class Law:
         return Firing(wait - lead if self.loop.predict else wait, on_time, lead, lasts, acts)
 
     def waits(self, actuator: Actuator, z: ComplexArray, spin: Array) -> Array:
-        """`Firing.wait` of one channel for many moments (n,); not a number where a firing would not help.
+        """`Firing.wait` of one channel for many moments (n,); not a number where a firing would not
+        help.
 
-        To first order in the torque about axis 3, to the `LEADS` of its valve and between ticks; `firing` is exact.
+        To first order in the torque about axis 3, to the `LEADS` of its valve and between ticks;
+        `firing` is exact.
         """
-        rate, size, push = self.rate(spin), np.abs(z), abs(actuator.kick)
+        rate = self.rate(spin)
+        size = np.abs(z)
+        push = abs(actuator.kick)
         half = np.abs(0.5 * rate)
         sine = half * size / push
         needed = np.where(sine > 1.0, math.inf, np.arcsin(np.minimum(sine, 1.0)) / half)
@@ -140,18 +167,27 @@ class Law:
         acts = push * np.abs(np.sin(half * on_time)) / half
         direction = actuator.kick * np.where(np.sin(half * on_time) < 0.0, -1.0, 1.0)
         if actuator.spin_rate != 0.0:
-            direction = direction * np.exp(1j * self.slope * actuator.spin_rate * on_time * on_time / 6.0)
+            direction = direction * np.exp(
+                1j * self.slope * actuator.spin_rate * on_time * on_time / 6.0
+            )
         wait = np.angle(-z * np.conj(direction)) / rate
         if self.loop.predict:
-            wait = wait - (0.5 * on_time if actuator.leads is None else np.interp(on_time, *actuator.leads))
+            wait = wait - (
+                0.5 * on_time if actuator.leads is None else np.interp(on_time, *actuator.leads)
+            )
         return np.where((acts > 0.0) & (acts < 2.0 * size), wait, math.nan)
 
 
-WORKS = 0.25  # fraction of the expected effect above which a firing works, and below whose negative it works backwards
+# fraction of the expected effect above which a firing works, and below whose negative it works
+# backwards
+WORKS = 0.25
 SIGMAS = 5.0  # sigmas of noise within which a firing is not judged
 WHICH = 3.0  # sigmas to tell a channel from the sensor, where it is known that one works backwards
-FED = 0.5  # growth of the nutation under fire, as a share of its first size, from which firings feed it
-PHASED = 1e-3  # phase uncertainty of z (rad) from which on sizes tell more of the effect of a firing
+# growth of the nutation under fire, as a share of its first size, from which firings feed it
+FED = 0.5
+PHASED = (
+    1e-3  # phase uncertainty of z (rad) from which on sizes tell more of the effect of a firing
+)
 LOST = 1.0  # phase uncertainty of a firing (rad) from which on its expected effect is unknown
 LARGE = 100.0  # exponent of growth beyond which further growth does not matter
 STEPPED = math.sqrt(3.0)  # largest error of a quantised value over its root mean square
@@ -173,7 +209,9 @@ class Ending(Enum):
 
     @property
     def fault(self) -> bool:
-        """True if the loop was stopped before it could feed the nutation, or has nothing left to fire."""
+        """True if the loop was stopped before it could feed the nutation, or has nothing left to
+        fire.
+        """
         return self not in (Ending.END, Ending.FULL)
 
 
@@ -191,13 +229,17 @@ class Doubt(NamedTuple):
 
     def of(self, seen: Glimpse) -> float:
         """One sigma of the estimate from the samples ``seen`` on a coast, for a known bias."""
-        mixed = self.white * math.sqrt((1.0 + abs(seen.leak) ** 2 * (self.lift**2 - 1.0)) / seen.samples)
+        mixed = self.white * math.sqrt(
+            (1.0 + abs(seen.leak) ** 2 * (self.lift**2 - 1.0)) / seen.samples
+        )
         return math.hypot(max(min(mixed, self.noise), self.least), self.steps / STEPPED)
 
 
 @dataclass(slots=True)
 class Glimpse:
-    """Rates z of one coast, carried to the centre of a firing by the nutation, with a bias b: least squares."""
+    """Rates z of one coast, carried to the centre of a firing by the nutation, with a bias b: least
+    squares.
+    """
 
     z: complex  # z = ``z`` - b ``leak``
     samples: int
@@ -208,12 +250,23 @@ class Glimpse:
 
     @classmethod
     def of(cls, times: Vector, best: ComplexArray, rate: complex, centre: float) -> Glimpse:
-        """Glimpse of estimates ``best`` (n,) at ``times`` (n,) s; ``rate`` is complex where the nutation grows."""
+        """Glimpse of estimates ``best`` (n,) at ``times`` (n,) s; ``rate`` is complex where the
+        nutation grows.
+        """
         course = np.exp(-1j * rate * (times - centre))  # of z = 1 at the centre
-        power, total, count = float((abs(course) ** 2).sum()), complex(course.sum()), len(times)
+        power = float((abs(course) ** 2).sum())
+        total = complex(course.sum())
+        count = len(times)
         z = complex(np.vdot(course, best)) / power
         rest, information = complex(best.sum()) - z * total, count - abs(total) ** 2 / power
-        return cls(z, count, total.conjugate() / power, rest, information, abs(float(times.mean()) - centre))
+        return cls(
+            z,
+            count,
+            total.conjugate() / power,
+            rest,
+            information,
+            abs(float(times.mean()) - centre),
+        )
 
 
 class RateChange(NamedTuple):
@@ -226,20 +279,33 @@ class RateChange(NamedTuple):
 
     @classmethod
     def of(cls, before: Glimpse, after: Glimpse, doubt: Doubt) -> RateChange:
-        """Change between two coasts of the same bias, which is estimated too where its limits are wider."""
-        sigma, unlike = math.hypot(doubt.of(before), doubt.of(after)), abs(after.leak - before.leak)
-        information, bias, open_ = before.information + after.information, 0j, doubt.bias
+        """Change between two coasts of the same bias, which is estimated too where its limits are
+        wider.
+        """
+        sigma = math.hypot(doubt.of(before), doubt.of(after))
+        unlike = abs(after.leak - before.leak)
+        information = before.information + after.information
+        bias = 0j
+        open_ = doubt.bias
         if doubt.bias > 0.0 and information > ALIKE * (before.samples + after.samples):
             noise = doubt.white * doubt.lift / math.sqrt(information)
-            bends = math.pi * doubt.turn * max(abs(before.z), abs(after.z))  # by turning from the middle to the ends
+            bends = (
+                math.pi * doubt.turn * max(abs(before.z), abs(after.z))
+            )  # by turning from the middle to the ends
             if max(noise, bends) < doubt.bias:
-                bias, open_, sigma = (before.rest + after.rest) / information, bends, math.hypot(sigma, unlike * noise)
-        return cls(before.z - bias * before.leak, after.z - bias * after.leak, sigma, unlike * open_)
+                bias = (before.rest + after.rest) / information
+                open_ = bends
+                sigma = math.hypot(sigma, unlike * noise)
+        return cls(
+            before.z - bias * before.leak, after.z - bias * after.leak, sigma, unlike * open_
+        )
 
 
 @dataclass(slots=True)
 class Effect:
-    """Effect of the firings of one channel, as a factor on the expected one: least squares over them."""
+    """Effect of the firings of one channel, as a factor on the expected one: least squares over
+    them.
+    """
 
     did: complex = 0.0
     wanted: float = 0.0
@@ -247,12 +313,14 @@ class Effect:
     bound: float = 0.0
 
     def add(self, change: RateChange, expected: complex, phase: float) -> None:
-        """A firing that was to add ``expected`` and made a ``change``, in which z may be off by a ``phase`` (rad).
+        """A firing that was to add ``expected`` and made a ``change``, in which z may be off by a
+        ``phase`` (rad).
 
-        Where that matters, and the firing was to change the size, by sizes alone: |z| after it lies between |z + e| of
-        a firing that works and |z - e| of one that works backwards.
+        Where that matters, and the firing was to change the size, by sizes alone: |z| after it lies
+        between |z + e| of a firing that works and |z - e| of one that works backwards.
         """
-        wanted, did = abs(expected), (change.after - change.before) * expected.conjugate()
+        wanted = abs(expected)
+        did = (change.after - change.before) * expected.conjugate()
         bound = change.bound + phase * abs(change.before)
         if phase > PHASED and abs(change.before) >= 0.5 * wanted:
             works, feeds = abs(change.before + expected), abs(change.before - expected)
@@ -270,18 +338,29 @@ class Effect:
 
     def open(self, sigmas: float = SIGMAS) -> float:
         """Uncertainty of the factor by noise, and by errors common to all firings."""
-        return (sigmas * math.sqrt(self.noise) + self.bound) / self.wanted if self.wanted > 0.0 else math.inf
+        return (
+            (sigmas * math.sqrt(self.noise) + self.bound) / self.wanted
+            if self.wanted > 0.0
+            else math.inf
+        )
 
     def sure(self, sense: float, sigmas: float = SIGMAS) -> bool:
-        """True if the firings surely have the expected effect (``sense`` 1), or the opposite one (-1)."""
-        return sense * self.factor.real >= WORKS and sense * self.factor.real - self.open(sigmas) > -WORKS
+        """True if the firings surely have the expected effect (``sense`` 1), or the opposite one
+        (-1).
+        """
+        return (
+            sense * self.factor.real >= WORKS
+            and sense * self.factor.real - self.open(sigmas) > -WORKS
+        )
 
 
 @dataclass(slots=True)
 class Diagnosis:
-    """Judges firing after firing. One that works backwards makes its channel ``suspect``, until ``deadline`` s.
+    """Judges firing after firing. One that works backwards makes its channel ``suspect``, until
+    ``deadline`` s.
 
-    Another channel that works backwards too shows that it is the sensor, one that works that it is the channel.
+    Another channel that works backwards too shows that it is the sensor, one that works that it is
+    the channel.
     """
 
     period: float
@@ -290,49 +369,82 @@ class Diagnosis:
     effects: dict[str, Effect] = field(default_factory=dict)
     suspect: str | None = None
     deadline: float = math.inf
-    first: tuple[float, float] | None = None  # |z| (rad/s) as first fired at since the loop was quiet, and time (s)
+    first: tuple[float, float] | None = (
+        None  # |z| (rad/s) as first fired at since the loop was quiet, and time (s)
+    )
 
     def judge(
-        self, channel: str, now: float, before: Glimpse, after: Glimpse, expected: complex, doubt: Doubt
+        self,
+        channel: str,
+        now: float,
+        before: Glimpse,
+        after: Glimpse,
+        expected: complex,
+        doubt: Doubt,
     ) -> tuple[Ending, str] | None:
-        """Reason to stop after a firing that was to add ``expected``, and the channel to name; another from ``now``."""
-        change, effect = RateChange.of(before, after, doubt), self.effects.setdefault(channel, Effect())
-        size, turns = max(abs(change.before), abs(change.after)), 2.0 * math.pi / self.period
-        falls = abs(self.growth) * (before.apart + after.apart) * (self.slope * size) ** 2  # of the spin, as cos θ
-        half = math.pi * doubt.turn  # by which z may have turned from the middle of a period to its ends
+        """Reason to stop after a firing that was to add ``expected``, and the channel to name;
+        another from ``now``.
+        """
+        change = RateChange.of(before, after, doubt)
+        effect = self.effects.setdefault(channel, Effect())
+        size = max(abs(change.before), abs(change.after))
+        turns = 2.0 * math.pi / self.period
+        falls = (
+            abs(self.growth) * (before.apart + after.apart) * (self.slope * size) ** 2
+        )  # of the spin, as cos θ
+        half = (
+            math.pi * doubt.turn
+        )  # by which z may have turned from the middle of a period to its ends
         share = falls + doubt.scale + 0.5 * half * half
         if doubt.turn * before.apart * turns < LOST:
             unsure = change._replace(bound=change.bound + share * size)
-            effect.add(unsure, expected, turns * (before.apart + after.apart) * (0.5 * falls + doubt.turn))
+            effect.add(
+                unsure, expected, turns * (before.apart + after.apart) * (0.5 * falls + doubt.turn)
+            )
         cause = self._cause(channel, now, change, expected, doubt)
         return cause or self._fed(channel, now, change, doubt)
 
     def _cause(
         self, channel: str, now: float, change: RateChange, expected: complex, doubt: Doubt
     ) -> tuple[Ending, str] | None:
-        """Fault shown by the effects of firings, with the channel to name; None where there is none or not yet."""
+        """Fault shown by the effects of firings, with the channel to name; None where there is none
+        or not yet.
+        """
         effect = self.effects[channel]
         if self.suspect is None and effect.sure(-1.0):
-            self.suspect, self.deadline = channel, now + self.period
+            self.suspect = channel
+            self.deadline = now + self.period
         if self.suspect is not None:
             others = [effect for name, effect in self.effects.items() if name != self.suspect]
             if any(other.sure(-1.0, WHICH) for other in others):
                 return Ending.SENSOR, channel
-            return (Ending.CHANNEL, self.suspect) if any(other.sure(1.0, WHICH) for other in others) else None
+            return (
+                (Ending.CHANNEL, self.suspect)
+                if any(other.sure(1.0, WHICH) for other in others)
+                else None
+            )
         if effect.open() >= WORKS:
             return None
         if abs(effect.factor) < WORKS:
             return Ending.IDLE, channel
         size = abs(change.before)
-        lowers = size - abs(size - abs(expected)) > 0.5 * abs(expected)  # by a firing that comes at its moment
+        lowers = size - abs(size - abs(expected)) > 0.5 * abs(
+            expected
+        )  # by a firing that comes at its moment
         grown = abs(change.after) - size
-        seen_wrong = SIGMAS * doubt.noise + doubt.steps + doubt.bias  # the law fired at what it saw, not at what was
+        seen_wrong = (
+            SIGMAS * doubt.noise + doubt.steps + doubt.bias
+        )  # the law fired at what it saw, not at what was
         if lowers and grown > SIGMAS * change.sigma + change.bound + 2.0 * seen_wrong + 1e-9 * size:
             return Ending.FEEDS, channel
         return None
 
-    def _fed(self, channel: str, now: float, change: RateChange, doubt: Doubt) -> tuple[Ending, str] | None:
-        """Ending and channel where the nutation has grown under fire by more than observation errors explain."""
+    def _fed(
+        self, channel: str, now: float, change: RateChange, doubt: Doubt
+    ) -> tuple[Ending, str] | None:
+        """Ending and channel where the nutation has grown under fire by more than observation
+        errors explain.
+        """
         if self.first is None:
             self.first = abs(change.before), now
             return None
@@ -355,8 +467,12 @@ def known_to(spacecraft: Spacecraft) -> tuple[float, float]:
         (given.wheel_momentum, inertia.wheel, inertia.wheel),
     )
     changes = [
-        0.0 if off is None else off.size * (momentum if off.relative else momentum / (nominal or 1.0))
+        0.0
+        if off is None
+        else off.size * (momentum if off.relative else momentum / (nominal or 1.0))
         for off, nominal, momentum in parts
     ]
     scale = 0.0 if given.sensor_scale is None else given.sensor_scale.size
-    return 2.0 * math.hypot(*changes) / (inertia.A * abs(spacecraft.nutation_rate)), 2.0 * abs(scale)
+    return 2.0 * math.hypot(*changes) / (inertia.A * abs(spacecraft.nutation_rate)), 2.0 * abs(
+        scale
+    )

@@ -1,11 +1,12 @@
 """Stability of the loop channel by channel, and first passage of its thresholds.
 
-A firing that comes ε late against z leaves |z - J e^{iε}|: its gain is that over |z|, below 1 while cos ε > J/(2|z|).
-Meanwhile energy dissipation lets the nutation grow by e^{κT} in a period T: the loop damps where the product is below
-1.
+A firing that comes ε late against z leaves |z - J e^{iε}|: its gain is that over |z|, below 1 while
+cos ε > J/(2|z|). Meanwhile energy dissipation lets the nutation grow by e^{κT} in a period T: the
+loop damps where the product is below 1.
 
-On a coast z runs as e^{(κ - iω)t}, ω the rate at which it turns back in the body. An estimate is Σ h_j s_{k-j} of the
-samples s, which shows z times T = Σ h_j e^{-(κ - iω)jΔ}, a constant offset, and of white noise w the sum Σ h_j w_{k-j}.
+On a coast z runs as e^{(κ - iω)t}, ω the rate at which it turns back in the body. An estimate is Σ
+h_j s_{k-j} of the samples s, which shows z times T = Σ h_j e^{-(κ - iω)jΔ}, a constant offset, and
+of white noise w the sum Σ h_j w_{k-j}.
 """
 
 from __future__ import annotations
@@ -39,7 +40,8 @@ class Margin:
     latest: float  # delay up to which it damps, rad
     gain: float  # share of the nutation that the largest delay leaves
     growth: float  # factor of a period
-    delay: float  # s by which it may come later still; negative: too late, minus infinity: no firing damps
+    # s by which it may come later still; negative: too late, minus infinity: no firing damps
+    delay: float
     turned: bool  # sensor or channel, not both, reversed in the file: not counted in these figures
 
     @property
@@ -48,15 +50,21 @@ class Margin:
         return self.gain * self.growth < 1.0
 
 
-def margins(spacecraft: Spacecraft, loop: Loop, nutation: float | None = None) -> tuple[Margin, ...]:
-    """Margin of each channel at a ``nutation`` (rad), default the start threshold; raises Infeasible as `Law`."""
+def margins(
+    spacecraft: Spacecraft, loop: Loop, nutation: float | None = None
+) -> tuple[Margin, ...]:
+    """Margin of each channel at a ``nutation`` (rad), default the start threshold; raises
+    Infeasible as `Law`.
+    """
     law = Law(spacecraft, loop)
     theta = loop.start if nutation is None else nutation
     return tuple(_margin(law, actuator, theta, spacecraft.spin) for actuator in law.actuators)
 
 
 def feeding(spacecraft: Spacecraft, loop: Loop) -> Margin | None:
-    """Channel that does not damp, at the start threshold or, if larger, at the nutation at t = 0."""
+    """Channel that does not damp, at the start threshold or, if larger,
+    at the nutation at t = 0.
+    """
     angles = [loop.start, spacecraft.nutation] if spacecraft.nutation > loop.start else [loop.start]
     all_margins = (margin for theta in angles for margin in margins(spacecraft, loop, theta))
     return next((margin for margin in all_margins if not margin.damps), None)
@@ -72,19 +80,24 @@ def expect_in_time(spacecraft: Spacecraft, loop: Loop) -> None:
 def too_late(margin: Margin) -> str:
     """Message on a channel of a loop that does not damp."""
     late, latest, theta = np.degrees([margin.late, margin.latest, margin.nutation])
-    what = f"a firing of {margin.channel} leaves {100.0 * margin.gain:.4g} % of a nutation of {theta:.4g} deg"
+    what = (
+        f"a firing of {margin.channel} leaves {100.0 * margin.gain:.4g} % of a nutation of "
+        f"{theta:.4g} deg"
+    )
     if margin.growth > 1.0:
         what += f", which grows by {100.0 * (margin.growth - 1.0):.3g} % in a period"
     if margin.delay == -np.inf:
         return f"the loop does not damp: {what}; raise start, or allow other on-times"
     return (
-        f"the loop does not damp: {what}: it comes up to {late:.4g} deg late, and damps up to {latest:.4g} deg; "
+        f"the loop does not damp: {what}: it comes up to {late:.4g} deg late, "
+        f"and damps up to {latest:.4g} deg; "
         f"shorten the delays by {-margin.delay:.4g} s, or set predict: true"
     )
 
 
 def _margin(law: Law, actuator: Actuator, theta: float, spin: float) -> Margin:
-    loop, rate = law.loop, abs(float(law.rate(spin)))
+    loop = law.loop
+    rate = abs(float(law.rate(spin)))
     size = law.size(theta, spin)
     firing = law.firing(actuator, complex(abs(loop.sensor.scale) * size), spin)
     growth = min(math.exp(min(law.growth * law.period, math.log(NEVER))), NEVER)
@@ -96,14 +109,19 @@ def _margin(law: Law, actuator: Actuator, theta: float, spin: float) -> Margin:
     most = _most_late(pull, growth)
     turned = (loop.sensor.scale < 0.0) != (actuator.channel.name in loop.reversed)
     gain = abs(1.0 - pull * cmath.exp(1j * late))
-    return Margin(actuator.channel.name, theta, late, most, gain, growth, (most - late) / rate, turned)
+    return Margin(
+        actuator.channel.name, theta, late, most, gain, growth, (most - late) / rate, turned
+    )
 
 
 def _most_late(pull: float, growth: float) -> float:
-    """Largest ε in [0, π] with which a firing that takes ``pull`` (of |z|) off damps; -inf where none does."""
+    """Largest ε in [0, π] with which a firing that takes ``pull`` (of |z|) off damps; -inf where
+    none does.
+    """
     if abs(1.0 - pull) * growth >= 1.0:
         return -math.inf
-    low, high = 0.0, math.pi
+    low = 0.0
+    high = math.pi
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
         damps = abs(1.0 - pull * cmath.exp(1j * middle)) * growth < 1.0
@@ -126,10 +144,13 @@ SURELY = 0.99  # share of the cases that keep the `Band`
 def dead_band(spacecraft: Spacecraft, loop: Loop) -> Band:
     """Nutation that is left as the loop settles; raises Infeasible as `Law`.
 
-    |z| is the stop threshold, bias, steps, and noise of which one of N samples exceeds σ sqrt(2 ln(N/p)) in a share p.
-    Where half the smallest pulse is more, firings end there: noise counts in the size and in both parts of the firing.
+    |z| is the stop threshold, bias, steps, and noise of which one of N samples exceeds
+    σ sqrt(2 ln(N/p)) in a share p. Where half the smallest pulse is more, firings end there: noise
+    counts in the size and in both parts of the firing.
     """
-    law, spin, sensor = Law(spacecraft, loop), spacecraft.spin, loop.sensor
+    law = Law(spacecraft, loop)
+    spin = spacecraft.spin
+    sensor = loop.sensor
     doubts = Estimator(law, sensor, 0.0).doubts
     looks = 1.0 if loop.sensor.rate is None else max(loop.sensor.rate * law.period, 1.0)
     noise = doubts.noise / math.sqrt(2.0) * math.sqrt(2.0 * math.log(looks / (1.0 - SURELY)))
@@ -149,12 +170,15 @@ def dead_band(spacecraft: Spacecraft, loop: Loop) -> Band:
 
 
 FORGOTTEN = 12.0  # time constants of the low-pass filter after which a sample counts no more
-ENOUGH = 64  # samples of a nutation period that an accelerometer is followed by, at most about twice as many
+# samples of a nutation period that an accelerometer is followed by, at most about twice as many
+ENOUGH = 64
 LONGEST_RESPONSE = 4096  # samples that count, at most
 
 
 class Transfer(NamedTuple):
-    """An estimate of z by samples: it shows ``direct`` z + ``mirrored`` conj(z) + ``offset``, and noise."""
+    """An estimate of z by samples: it shows ``direct`` z + ``mirrored`` conj(z) + ``offset``, and
+    noise.
+    """
 
     step: float  # s from sample to sample
     weights: ComplexArray  # h (n,), the newest sample first
@@ -163,7 +187,9 @@ class Transfer(NamedTuple):
     offset: complex
     sigma: float  # of the noise in each direction, rad/s
     fresh: float  # share of it that is new in each sample, in the frame that turns with z
-    scatter: tuple[float, float]  # sigma of a sample by parts (real, imaginary), imaginary zero for an accelerometer
+    scatter: tuple[
+        float, float
+    ]  # sigma of a sample by parts (real, imaginary), imaginary zero for an accelerometer
     grain: tuple[float, float]  # steps of a gyro by these
     first: float  # s after a pulse: the first estimate
 
@@ -172,7 +198,9 @@ class Transfer(NamedTuple):
         return self.direct * z + self.mirrored * np.conj(z) + self.offset
 
     def noise(self, white: ComplexArray) -> ComplexArray:
-        """Noise of the estimates (m, k) by that of the samples (m, n + k), of which the oldest is older than needed."""
+        """Noise of the estimates (m, k) by that of the samples (m, n + k), of which the oldest is
+        older than needed.
+        """
         count = len(self.weights)
         if count == 1:
             return np.asarray(self.weights[0] * white[:, :-1])
@@ -193,28 +221,36 @@ class Transfer(NamedTuple):
             return seen
         raw, (first, second) = seen / self.weights[0], self.grain
         return np.asarray(
-            self.weights[0] * (np.rint(raw.real / first) * first + 1j * np.rint(raw.imag / second) * second)
+            self.weights[0]
+            * (np.rint(raw.real / first) * first + 1j * np.rint(raw.imag / second) * second)
         )
 
     def change(self, white: ComplexArray, towards: complex, level: float) -> ComplexArray:
-        """Most likely change of the noise that makes the newest estimate ``level`` rad/s in a direction."""
+        """Most likely change of the noise that makes the newest estimate ``level`` rad/s in a
+        direction.
+        """
         newest = self.weights[::-1]
         pull = newest.conj() * towards
         real, other = (part * part for part in self.scatter)
         missing = level - (complex(newest @ white) * towards.conjugate()).real
         along = real * pull.real + 1j * other * pull.imag
-        return np.asarray(missing / float((along.real * pull.real + along.imag * pull.imag).sum()) * along)
+        return np.asarray(
+            missing / float((along.real * pull.real + along.imag * pull.imag).sum()) * along
+        )
 
 
 def transfer(law: Law, spin: float) -> Transfer:
     """Transfer of the estimates of a law at a spin of ``spin`` rad/s."""
-    sensor, rate = law.loop.sensor, float(law.rate(spin))
-    estimator, accelerometer = Estimator(law, sensor, 0.0), sensor.kind == ACCELEROMETER
+    sensor = law.loop.sensor
+    rate = float(law.rate(spin))
+    estimator = Estimator(law, sensor, 0.0)
+    accelerometer = sensor.kind == ACCELEROMETER
     every = 1
     if accelerometer and law.loop.predict and sensor.low_pass == 0.0:
         every = max(estimator.window // ENOUGH, 1)  # as good as all, each with so much less noise
     step = every * estimator.step or law.period / GRID
-    smooth, weights = _smoothing(sensor, step), np.ones(1, dtype=complex)
+    smooth = _smoothing(sensor, step)
+    weights = np.ones(1, dtype=complex)
     if accelerometer:
         weights = _fitted(law, spin, step, round(estimator.window / every))
     first = estimator.since + (len(weights) - 1) * step
@@ -223,16 +259,27 @@ def transfer(law: Law, spin: float) -> Transfer:
         behind = complex(smooth @ np.exp(1j * rate * step * np.arange(len(smooth))))
         weights = weights * np.exp(-1j * rate * sensor.delay) / behind
     gain = complex(weights @ np.exp(-complex(law.growth, -rate) * step * np.arange(len(weights))))
-    direct, mirrored, parts = gain * sensor.scale, 0j, law.gauge
+    direct = gain * sensor.scale
+    mirrored = 0j
+    parts = law.gauge
     standing = sensor.bias + 0j if accelerometer else estimator.standing(spin)
     if accelerometer:
         shown = 0.5 * sensor.scale * spin * estimator.seen_gain
-        image = complex(weights @ np.exp(-complex(law.growth, rate) * step * np.arange(len(weights))))
-        direct, mirrored, parts = gain * shown.conjugate(), image * shown, (1.0, 0.0)
-    noise, grain = (0.0, 0.0) if sensor.rate is None else (sensor.noise / math.sqrt(every), sensor.quantisation)
+        image = complex(
+            weights @ np.exp(-complex(law.growth, rate) * step * np.arange(len(weights)))
+        )
+        direct = gain * shown.conjugate()
+        mirrored = image * shown
+        parts = (1.0, 0.0)
+    noise, grain = (
+        (0.0, 0.0)
+        if sensor.rate is None
+        else (sensor.noise / math.sqrt(every), sensor.quantisation)
+    )
     size = math.hypot(noise, grain / math.sqrt(12.0 * every))
     if accelerometer or len(weights) > 1:
-        noise, grain = size, 0.0
+        noise = size
+        grain = 0.0
     power = float((abs(weights) ** 2).sum())
     lasting = complex(np.vdot(weights[:-1], weights[1:]) * np.exp(1j * rate * step)).real / power
     return Transfer(
@@ -264,21 +311,28 @@ def _fitted(law: Law, spin: float, step: float, size: int) -> ComplexArray:
     orders = (1, 2) if size >= HARMONIC else (1,)
     waves = [wave(order * angle) for order in orders for wave in (np.cos, np.sin)]
     rows = np.linalg.pinv(np.column_stack([np.ones(size), *waves]))
-    return np.asarray((rows[1] + 1j * rows[2]) / (np.conj(Estimator(law, law.loop.sensor, 0.0).seen_gain) * spin))
+    return np.asarray(
+        (rows[1] + 1j * rows[2]) / (np.conj(Estimator(law, law.loop.sensor, 0.0).seen_gain) * spin)
+    )
 
 
-FINE = 1500  # sizes of z at which the probability of an event is computed, far off and again near the threshold
+# sizes of z at which the probability of an event is computed, far off and again near the threshold
+FINE = 1500
 FARTHEST = 1e-12  # share of a threshold below which a nutation is none
 REACH = 12.0  # sigmas of noise within which sizes lie closer together
 PHASES = 16  # directions of z against the bias over which a chance is averaged
 CURVED = 12.0  # sigmas within which a size is so small that noise across it counts
-DEGREES = 240  # terms of the mixture of Rice's distribution: of numbers with a mean of 72 none is larger
+DEGREES = (
+    240  # terms of the mixture of Rice's distribution: of numbers with a mean of 72 none is larger
+)
 
 
 class Odds:
-    """First passage: an estimate of at least ``limit`` rad/s, or at most (``below``), while z grows by ``growth`` 1/s.
+    """First passage: an estimate of at least ``limit`` rad/s, or at most (``below``), while z grows
+    by ``growth`` 1/s.
 
-    The chances of the samples add up along a coast: an event is where the sum has come to an exponential number.
+    The chances of the samples add up along a coast: an event is where the sum has come to an
+    exponential number.
     """
 
     def __init__(self, seen: Transfer, limit: float, growth: float, *, below: bool) -> None:
@@ -300,23 +354,32 @@ class Odds:
         self.sum = np.concatenate([[0.0], np.cumsum(pieces)])
 
     def size(self, now: Any, drawn: Any) -> Any:
-        """Size |z| (rad/s) at the event, from ``now`` on, by exponential numbers; infinite where it does not come."""
+        """Size |z| (rad/s) at the event, from ``now`` on, by exponential numbers; infinite where it
+        does not come.
+        """
         reached = np.interp(np.log(now), self.sizes, self.sum) + drawn
         sizes = np.maximum(np.exp(np.interp(reached, self.sum, self.sizes)), now)
         return np.where(reached > self.sum[-1], math.inf, sizes)
 
 
 def _clustered(fresh: float, apart: Vector) -> Any:
-    """Share of the samples beyond a threshold, ``apart`` sigmas off, that are the first of a cluster of such.
+    """Share of the samples beyond a threshold, ``apart`` sigmas off, that are the first of a
+    cluster of such.
 
-    Where ``fresh`` is the share of noise that is new in each sample: x²/2 ν(x), x = apart sqrt(2 fresh), as of a random
-    walk with drift, ν(x) = (2/x) (Φ(x/2) - 1/2) / (x/2 Φ(x/2) + φ(x/2)) (Siegmund and Yakir 2007).
+    Where ``fresh`` is the share of noise that is new in each sample: x²/2 ν(x), x = apart sqrt(2
+    fresh), as of a random walk with drift, ν(x) = (2/x) (Φ(x/2) - 1/2) / (x/2 Φ(x/2) + φ(x/2))
+    (Siegmund and Yakir 2007).
     """
     if fresh > 0.5:
         return 1.0
     half = 0.5 * np.maximum(apart, 1.0) * math.sqrt(2.0 * fresh)
     below = _normal(half)
-    return 2.0 * half * (below - 0.5) / (half * below + np.exp(-0.5 * half * half) / math.sqrt(2.0 * math.pi))
+    return (
+        2.0
+        * half
+        * (below - 0.5)
+        / (half * below + np.exp(-0.5 * half * half) / math.sqrt(2.0 * math.pi))
+    )
 
 
 def _normal(values: Vector) -> Vector:
@@ -326,17 +389,21 @@ def _normal(values: Vector) -> Vector:
 
 
 def exceeds(limit: float, shown: Vector) -> Vector:
-    """Probability of |``shown`` + n| >= ``limit`` with n normal, one sigma in each direction (Rice).
+    """Probability of |``shown`` + n| >= ``limit`` with n normal, one sigma in each direction
+    (Rice).
 
     |shown + n|² is χ² of 2 + 2k degrees of freedom, k by Poisson with the mean shown²/2.
     """
-    chances, near = _normal(shown - limit), shown < CURVED
+    chances = _normal(shown - limit)
+    near = shown < CURVED
     if limit < 3.0 * CURVED and near.any():
         mean, half = 0.5 * shown[near] ** 2, 0.5 * limit * limit
         share, more = np.exp(-mean), math.exp(-half)
-        total, tail = share * more, more
+        total = share * more
+        tail = more
         for number in range(1, DEGREES):
-            share, more = share * (mean / number), more * half / number
+            share = share * (mean / number)
+            more = more * half / number
             tail += more
             total += share * tail
         chances[near] = total

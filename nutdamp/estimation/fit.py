@@ -1,8 +1,9 @@
-"""Estimates of a spacecraft from telemetry: robust least squares, outliers left out, the model as wide as shown.
+"""Estimates of a spacecraft from telemetry: robust least squares, outliers left out, the model as
+wide as shown.
 
-Outliers are found under a loss that grows linearly beyond a few sigma and left out of the last fits. Residuals far
-larger than the noise that their second differences show are motion that the model does not have, such as a pulse: their
-sigmas would mean nothing.
+Outliers are found under a loss that grows linearly beyond a few sigma and left out of the last
+fits. Residuals far larger than the noise that their second differences show are motion that the
+model does not have, such as a pulse: their sigmas would mean nothing.
 """
 
 from __future__ import annotations
@@ -61,28 +62,41 @@ OFTEN = 1.5  # radians of spin between two samples up to which a direction is se
 
 
 def expect_alive(model: Model) -> tuple[str, ...]:
-    """The signals of a body that spins steadily, and do not change; none where a signal shows a nutation.
+    """The signals of a body that spins steadily, and do not change; none where a signal shows a
+    nutation.
 
-    Raises Infeasible for sensors that are dead or stuck, all along or for long, and for samples that are no motion.
+    Raises Infeasible for sensors that are dead or stuck, all along or for long, and for samples
+    that are no motion.
     """
     held = model.spacecraft.inertia.wheel != 0.0  # by a wheel a body may stand still
     shown = {name: (times, values) for name, times, values in _sensors(model)}
     constant = {name for name, (_, values) in shown.items() if (values == values[0]).all()}
     moves = {name for name, (_, values) in shown.items() if values.any()}
     spins = {GYROS[2]} if held else {GYROS[2]} & moves
-    # Gyros without noise show a spin so; everything else that does not change is a sensor that is off.
+    # Gyros without noise show a spin so; everything else that does not change is a sensor that is
+    # off.
     steady = {*GYROS} == constant == {*shown} and moves <= spins and bool(spins)
     faults = []
     for name, (times, values) in shown.items():
-        edges = np.concatenate([[0], np.flatnonzero(np.diff(values, axis=0).any(axis=1)) + 1, [len(values)]])
+        edges = np.concatenate(
+            [[0], np.flatnonzero(np.diff(values, axis=0).any(axis=1)) + 1, [len(values)]]
+        )
         at, alike = int(np.argmax(np.diff(edges))), int(np.diff(edges).max())
         begins, ends = times[edges[at]], times[edges[at + 1] - 1]
         # That gyro 3 does not change all along is as it should be.
-        off = not steady and name not in spins if name in constant else len(np.unique(values, axis=0)) > COARSE
+        off = (
+            not steady and name not in spins
+            if name in constant
+            else len(np.unique(values, axis=0)) > COARSE
+        )
         if name in KIND and np.mean(absurd(model.spacecraft, name, values)) > BROKEN:
-            faults.append(f"{name} shows {np.abs(values).max():.3g} {KIND[name].unit}, which no motion is")
+            faults.append(
+                f"{name} shows {np.abs(values).max():.3g} {KIND[name].unit}, which no motion is"
+            )
         elif off and alike >= max(min(FEWEST, len(values)), BROKEN * len(values)):
-            faults.append(f"{name} does not change from {begins:.4g} s to {ends:.4g} s ({alike} samples)")
+            faults.append(
+                f"{name} does not change from {begins:.4g} s to {ends:.4g} s ({alike} samples)"
+            )
     if faults:
         shows = {name for name in model.signals if KIND[name].nutation}
         others = " while others show a nutation" if constant & shows and shows - constant else ""
@@ -92,14 +106,23 @@ def expect_alive(model: Model) -> tuple[str, ...]:
 
 
 def _sensors(model: Model) -> Iterator[tuple[str, Vector, Vector]]:
-    """Names of what changes while a body moves, times (n,) s and values (n, k) of each; of directions the angles."""
+    """Names of what changes while a body moves, times (n,) s and values (n, k) of each; of
+    directions the angles.
+    """
     for index, name in enumerate(model.signals):
         values = model.samples[index]
         times = model.times[model.signal == index][: len(values)]
-        # A slit sees a direction at one azimuth, once a turn; what sees it more often sees it go round.
-        often = len(times) > 1 and float(np.median(np.diff(times))) * abs(model.spacecraft.spin) < OFTEN
+        # A slit sees a direction at one azimuth, once a turn; what sees it more often sees it go
+        # round.
+        often = (
+            len(times) > 1 and float(np.median(np.diff(times))) * abs(model.spacecraft.spin) < OFTEN
+        )
         if name == CROSSING and often:
-            yield f"the azimuth of {name}", times, np.arctan2(values[:, 1], values[:, 0]).round(12)[:, None]
+            yield (
+                f"the azimuth of {name}",
+                times,
+                np.arctan2(values[:, 1], values[:, 0]).round(12)[:, None],
+            )
         if name == CROSSING:
             yield f"the elevation of {name}", times, values[:, 2:3].round(12)
         elif name != SUN_PULSE:
@@ -111,13 +134,17 @@ def expect_enough(model: Model) -> None:
     """Raise Infeasible for a record that cannot tell as much as is estimated."""
     if not any(KIND[name].nutation for name in model.signals):
         raise Infeasible(
-            f"no nutation is seen in {' and '.join(model.signals)} alone{once_a_turn(model.record)}; omega_1 or "
-            "omega_2, the axis, an acceleration, Sun aspect angles or crossings beside them would show it"
+            f"no nutation is seen in {' and '.join(model.signals)} "
+            f"alone{once_a_turn(model.record)}; omega_1 or "
+            "omega_2, the axis, an acceleration, Sun aspect angles or crossings beside them would "
+            "show it"
         )
-    rows, free = len(np.unique(model.times)), sum(math.isinf(parameter.prior) for parameter in model.parameters)
+    rows = len(np.unique(model.times))
+    free = sum(math.isinf(parameter.prior) for parameter in model.parameters)
     if len(model.measured) <= free + 2:
         raise Infeasible(
-            f"the samples (rows: {rows}, values: {len(model.measured)}) cannot tell {free} unknowns; a longer record, "
+            f"the samples (rows: {rows}, values: {len(model.measured)}) cannot tell {free} "
+            "unknowns; a longer record, "
             "or more samples, helps"
         )
     body, length = model.spacecraft, model.record.length
@@ -126,39 +153,48 @@ def expect_enough(model: Model) -> None:
         period = body.inertial_period
     if length < 0.5 * period:
         raise Infeasible(
-            f"the record is too short: {length:.3g} s are {length / period:.2g} of a nutation period ({period:.3g} s); "
+            f"the record is too short: {length:.3g} s are {length / period:.2g} of a nutation "
+            f"period ({period:.3g} s); "
             f"at least one period, {period:.3g} s, is needed"
         )
 
 
 FAR = 2.0  # times the noise of neighbouring samples from which on residuals are no noise
-PART = 1e-3  # part of what varies in a signal that they have then at least: records without noise show smaller ones
+# part of what varies in a signal that they have then at least: records without noise show smaller
+# ones
+PART = 1e-3
 WINDOWS = (4, 8, 16, 32, 64)  # samples in a row among which those left out are counted
 CHANCE = 1e-6  # probability by which they may be scattered so unevenly
 FEWEST_JUDGED = 20  # samples of a signal that are judged at least
 SPLITS = 120  # times at which a step is looked for
 SAMPLES = 2000  # samples of a signal used for that, at most
 STEP = 0.7  # part of residuals that are no noise which a step leaves, at most, to count as shown
-SHOWN = 50.0  # decrease of the sum of squares, in units of the noise, by which it shows in those that are nearly noise
+# decrease of the sum of squares, in units of the noise, by which it shows in those that are nearly
+# noise
+SHOWN = 50.0
 
 
 def expect_explained(fitted: Fit) -> None:
-    """Raise Infeasible where a fit leaves more than noise, with the time of a step in the motion if there is one.
+    """Raise Infeasible where a fit leaves more than noise, with the time of a step in the motion if
+    there is one.
 
-    So it does where samples are left out that follow each other: outliers come one by one, motion does not.
+    So it does where samples are left out that follow each other: outliers come one by one, motion
+    does not.
     """
     model = fitted.model
     for index, signal in enumerate(model.signals):
         out = float(np.mean(~fitted.used[model.signal == index]))
         if out > BROKEN:
             raise Infeasible(
-                f"the motion fitted does not explain {signal}: {100.0 * out:.0f} % of it would be left out"
+                f"the motion fitted does not explain {signal}: {100.0 * out:.0f} % of it would be "
+                "left out"
             )
     burst = left_out_together(fitted)
     if burst is not None:
         signal, begins, ends, count = burst
         raise Infeasible(
-            f"from {begins:.4g} s to {ends:.4g} s the motion fitted does not explain {signal}: {count} samples would "
+            f"from {begins:.4g} s to {ends:.4g} s the motion fitted does not explain {signal}: "
+            f"{count} samples would "
             f"have to be left out, which is motion and no outlier; {_cure(fitted)}"
         )
     left = [index for index in range(len(model.signals)) if _more_than_noise(fitted, index)]
@@ -166,7 +202,10 @@ def expect_explained(fitted: Fit) -> None:
         return
     signals = ", ".join(model.signals[index] for index in left)
     more = max(fitted.noise[index] / _noise(fitted, index) for index in left)
-    says = f"the motion fitted does not explain {signals}: residuals are {more:.2g} times the noise between samples"
+    says = (
+        f"the motion fitted does not explain {signals}: residuals are {more:.2g} times the "
+        "noise between samples"
+    )
     time = step(fitted, left)
     where = "" if time is None else f", with a step at about {time:.4g} s"
     raise Infeasible(f"{says}{where}; {_cure(fitted)}")
@@ -174,17 +213,24 @@ def expect_explained(fitted: Fit) -> None:
 
 def _cure(fitted: Fit) -> str:
     fired = fitted.model.record.fired
-    what = "check the channels and times of the schedule" if fired else "give the pulses fired in it with --schedule"
+    what = (
+        "check the channels and times of the schedule"
+        if fired
+        else "give the pulses fired in it with --schedule"
+    )
     return f"{what}; a record of the coast before or after needs none"
 
 
 def left_out_together(fitted: Fit) -> tuple[str, float, float, int] | None:
-    """Signal, first and last time (s), and number of samples that were left out though they follow each other.
+    """Signal, first and last time (s), and number of samples that were left out though they follow
+    each other.
 
-    None where those left out lie as scattered as chance has it: of any `WINDOWS` samples in a row no more than by the
-    share left out elsewhere (binomial tail, `CHANCE` for all windows).
+    None where those left out lie as scattered as chance has it: of any `WINDOWS` samples in a row
+    no more than by the share left out elsewhere (binomial tail, `CHANCE` for all windows).
     """
-    model, least, burst = fitted.model, CHANCE, None
+    model = fitted.model
+    least = CHANCE
+    burst = None
     for index, signal in enumerate(model.signals):
         rows = np.flatnonzero(model.signal == index)
         rows = rows[np.argsort(model.times[rows], kind="stable")]
@@ -195,8 +241,12 @@ def left_out_together(fitted: Fit) -> tuple[str, float, float, int] | None:
             # The more, the less likely: elsewhere are fewer then.
             at = int(np.argmax(counts))
             elsewhere = max(float(sums[-1] - counts[at]), 1.0) / (len(rows) - width)
-            share, most = min(elsewhere, 1.0), int(counts[at])
-            tail = (math.comb(width, n) * share**n * (1.0 - share) ** (width - n) for n in range(most, width + 1))
+            share = min(elsewhere, 1.0)
+            most = int(counts[at])
+            tail = (
+                math.comb(width, n) * share**n * (1.0 - share) ** (width - n)
+                for n in range(most, width + 1)
+            )
             chance = len(rows) * math.fsum(tail)
             if counts[at] > 0 and chance < least:
                 least = chance
@@ -206,7 +256,9 @@ def left_out_together(fitted: Fit) -> tuple[str, float, float, int] | None:
 
 
 def _noise(fitted: Fit, signal: int) -> float:
-    """Noise s of a signal by its second differences, whose standard deviation is √6 s; at least that of its steps."""
+    """Noise s of a signal by its second differences, whose standard deviation is √6 s; at least
+    that of its steps.
+    """
     second = np.diff(fitted.residuals[fitted.model.signal == signal], 2)
     noise = NORMAL_MAD * float(np.median(np.abs(second))) / math.sqrt(6.0)
     return max(noise, float(least(fitted.model)[signal]))
@@ -223,19 +275,28 @@ def _more_than_noise(fitted: Fit, signal: int) -> bool:
 
 
 def step(fitted: Fit, signals: Sequence[int], *, small: bool = False) -> float | None:
-    """Time at which the nutation steps, s: where a jump of its sine and cosine leaves the least of the residuals.
+    """Time at which the nutation steps, s: where a jump of its sine and cosine leaves the least of
+    the residuals.
 
     None where no step shows; ``small``: one that may hide in noise.
     """
     model = fitted.model
-    chosen = [index for index in signals if model.signals[index] == GYROS[2] or KIND[model.signals[index]].nutation]
+    chosen = [
+        index
+        for index in signals
+        if model.signals[index] == GYROS[2] or KIND[model.signals[index]].nutation
+    ]
     splits = np.linspace(model.record.start, model.record.end, SPLITS + 2)[1:-1]
-    total, left = 0.0, np.zeros(len(splits))
+    total = 0.0
+    left = np.zeros(len(splits))
     for index in chosen:
-        rows, rate = np.flatnonzero(model.signal == index), _rate(fitted, index)
+        rows = np.flatnonzero(model.signal == index)
+        rate = _rate(fitted, index)
         # Of directions what is off in two ways across them.
         for part in np.array_split(rows, KIND[model.signals[index]].parts):
-            without, with_step = _with_step(fitted, part[fitted.used[part] | (not small)], rate, splits)
+            without, with_step = _with_step(
+                fitted, part[fitted.used[part] | (not small)], rate, splits
+            )
             total, left = total + without, left + with_step
     best = int(np.argmin(left))
     shows = total - left[best] > SHOWN if small else left[best] < STEP**2 * total
@@ -247,20 +308,30 @@ def _rate(fitted: Fit, signal: int) -> float:
     model, named = fitted.model, fitted.named
     if KIND[model.signals[signal]].nutation != SPACE:
         return initial_guess.nutation_rate(model, fitted.values)
-    axial = initial_guess.axial_rate(model, named[RATIO], named.get("omega_3", model.spacecraft.spin))
+    axial = initial_guess.axial_rate(
+        model, named[RATIO], named.get("omega_3", model.spacecraft.spin)
+    )
     return math.hypot(axial, named["omega_1"], named["omega_2"])
 
 
-def _with_step(fitted: Fit, rows: NDArray[np.intp], rate: float, splits: Vector) -> tuple[float, Vector]:
-    """Sums of squares that waves of one rate leave of residuals: without a step, and with one at each of some times."""
+def _with_step(
+    fitted: Fit, rows: NDArray[np.intp], rate: float, splits: Vector
+) -> tuple[float, Vector]:
+    """Sums of squares that waves of one rate leave of residuals: without a step, and with one at
+    each of some times.
+    """
     model = fitted.model
     rows = rows[:: max(-(-len(rows) // SAMPLES), 1)]
-    times, values = model.times[rows], fitted.residuals[rows] / fitted.noise[model.signal[rows]]
+    times = model.times[rows]
+    values = fitted.residuals[rows] / fitted.noise[model.signal[rows]]
     turn = rate * (times - model.record.start)
     wave = np.column_stack([np.cos(turn), np.sin(turn), np.ones(len(rows))])
     # Waves that grow linearly stand for what a rate that is off does, with or without a step.
     smooth = np.column_stack([wave, wave * (times - times.mean())[:, None] / model.record.length])
-    with_step = [_remains(np.column_stack([smooth, wave * (times > split)[:, None]]), values) for split in splits]
+    with_step = [
+        _remains(np.column_stack([smooth, wave * (times > split)[:, None]]), values)
+        for split in splits
+    ]
     return _remains(smooth, values), np.array(with_step)
 
 
@@ -270,17 +341,25 @@ def _remains(columns: Vector, values: Vector) -> float:
     return float(np.sum((values - columns @ solved) ** 2))
 
 
-OUTLIER = 5.0  # standard deviations beyond which a sample is left out: of 60,000 normal ones not one, on average 0.03
+# standard deviations beyond which a sample is left out: of 60,000 normal ones not one, on average
+# 0.03
+OUTLIER = 5.0
 ROUNDS = 8  # fits in which noise and outliers are found anew, at most
 STILL = 1e-3  # relative change of the noise from which on they are
 ADJUSTED = 3  # rounds in which the noise is corrected for what the fit takes of it
-POOR = 0.3  # share of a signal's own size that residuals may have before a fit begins again with a part of the record
+# share of a signal's own size that residuals may have before a fit begins again with a part of the
+# record
+POOR = 0.3
 STARTS = 3  # starts that are searched from at most
-UNLIKELY = 4.0  # sigmas of the file by which a parameter may be off before the starts are searched in shorter steps
+# sigmas of the file by which a parameter may be off before the starts are searched in shorter steps
+UNLIKELY = 4.0
 PARTS = (0.5, 0.25, 0.1, 0.04)  # parts of the record that it then begins with
 SEEN = 4.5  # standard deviations of |ω| from which on there is a nutation
-UNEQUAL = 5.0  # sigmas from which on the transverse moments count as different, or such a body as dissipating
-LARGE = 0.42  # noise of a signal, in its steps, below which these are large: they make 0.29 of it alone
+# sigmas from which on the transverse moments count as different, or such a body as dissipating
+UNEQUAL = 5.0
+LARGE = (
+    0.42  # noise of a signal, in its steps, below which these are large: they make 0.29 of it alone
+)
 LOST = 1e-7  # least singular value of derivatives of length 1 from which on they are independent
 UNEQUAL_BY = ("unequal_1", "unequal_2")  # the parameters of unequal transverse moments
 
@@ -288,7 +367,8 @@ UNEQUAL_BY = ("unequal_1", "unequal_2")  # the parameters of unequal transverse 
 def fit(spacecraft: Spacecraft, record: Record) -> Fit:
     """Estimate what a record tells of a spacecraft.
 
-    Raises Infeasible where that is nothing, BadRequest where the file does not describe what a signal needs.
+    Raises Infeasible where that is nothing, BadRequest where the file does not describe what a
+    signal needs.
     """
     with work.budget("fit", work.FIT * max(1.0, len(record.times) / work.FITTED)) as spent:
         best = _with_steps(_fitted(spacecraft, record))
@@ -299,7 +379,8 @@ def fit(spacecraft: Spacecraft, record: Record) -> Fit:
         if not spent.exhausted:
             raise
         raise Infeasible(
-            f"{error}; or the search, which ended with its budget of work, has not come to it: fewer samples may help"
+            f"{error}; or the search, which ended with its budget of work, has not come to it: "
+            "fewer samples may help"
         ) from None
     return replace(best, finished=not spent.exhausted)
 
@@ -313,13 +394,21 @@ def _fitted(spacecraft: Spacecraft, record: Record) -> Fit:
     fitted = _settled(model, _best(model))
     _expect_seen(fitted)
     fitted = initial_guess.likeliest(
-        [fitted, *(_settled(model, values) for values in initial_guess.neighbours(model, fitted.values))]
+        [
+            fitted,
+            *(_settled(model, values) for values in initial_guess.neighbours(model, fitted.values)),
+        ]
     )
     if model.unequal:
         grown = Model(spacecraft, record)
-        return _widened(fitted, grown, ("growth",)) if _shows_growth(fitted, grown) else _grown_a_little(fitted, grown)
+        return (
+            _widened(fitted, grown, ("growth",))
+            if _shows_growth(fitted, grown)
+            else _grown_a_little(fitted, grown)
+        )
     three = Model(spacecraft, record, unequal=True, growing=fitted.grows)
-    begin, of_moments = _begun(fitted, three), _places(three, UNEQUAL_BY)
+    begin = _begun(fitted, three)
+    of_moments = _places(three, UNEQUAL_BY)
     if not _shown(fitted, three, begin, of_moments):
         return fitted
     # What unequal moments do may look like growth of equal ones, which then is none.
@@ -332,63 +421,90 @@ def _fitted(spacecraft: Spacecraft, record: Record) -> Fit:
 
 
 def _steady(model: Model, constant: tuple[str, ...]) -> Fit:
-    """The fit of gyros that show the spin alone, without noise: what no motion tells is exactly as the file has it."""
+    """The fit of gyros that show the spin alone, without noise: what no motion tells is exactly as
+    the file has it.
+    """
     shown = {name: float(model.samples[model.signals.index(name)][0, 0]) for name in GYROS}
     values = np.array([shown.get(each.name, each.file) for each in model.parameters])
     noise = np.maximum(least(model), ROUNDING * usual(model.spacecraft, "rad/s"))
-    slopes, used = jacobian(model, values, range(len(values))), np.ones(len(model.measured), dtype=bool)
+    slopes = jacobian(model, values, range(len(values)))
+    used = np.ones(len(model.measured), dtype=bool)
     scaled = slopes / noise[model.signal, None]
     told = np.concatenate([scaled, model.prior[0]]).any(axis=0)
     covariance = np.where(np.outer(told, told), covariance_of(model, scaled), 0.0)
-    return Fit(model, values, covariance, noise, used, residuals(model, values), slopes, constant=constant)
+    return Fit(
+        model, values, covariance, noise, used, residuals(model, values), slopes, constant=constant
+    )
 
 
 def _with_steps(fitted: Fit) -> Fit:
-    """The fit with what steps that are large beside the noise do to it in its covariance, and their signals named.
+    """The fit with what steps that are large beside the noise do to it in its covariance, and their
+    signals named.
 
-    Between such steps errors are no noise, which averages out, but follow from the motion: least squares of what steps
-    make of the prediction is off by δ, and δ δᵀ adds to P. The motion that they were made of is that without δ.
+    Between such steps errors are no noise, which averages out, but follow from the motion: least
+    squares of what steps make of the prediction is off by δ, and δ δᵀ adds to P. The motion that
+    they were made of is that without δ.
     """
-    model, used, off = fitted.model, fitted.used, np.zeros(len(fitted.values))
+    model = fitted.model
+    used = fitted.used
+    off = np.zeros(len(fitted.values))
     loud = [at for at, name in enumerate(model.signals) if not KIND[name].off]
-    found = ((at, model.signal == at, quantisation(model.measured[model.signal == at])) for at in loud)
+    found = (
+        (at, model.signal == at, quantisation(model.measured[model.signal == at])) for at in loud
+    )
     steps = [(at, rows, step) for at, rows, step in found if fitted.noise[at] < LARGE * step]
     weights = fitted.jacobian[used] / fitted.noise[model.signal[used], None] ** 2
     for _ in range(3 if steps else 0):  # of a motion that is less off each time
-        shown, errors = model.predicted(named_of(model, fitted.values - off)), np.zeros(len(used))
+        shown = model.predicted(named_of(model, fitted.values - off))
+        errors = np.zeros(len(used))
         for _, rows, step in steps:
             away = (shown[rows] - model.measured[rows][0]) / step
             errors[rows] = step * (np.rint(away) - away)
         off = fitted.covariance @ (weights.T @ errors[used])
-    covariance, coarse = fitted.covariance + np.outer(off, off), tuple(model.signals[at] for at, _, _ in steps)
+    covariance = fitted.covariance + np.outer(off, off)
+    coarse = tuple(model.signals[at] for at, _, _ in steps)
     return replace(fitted, covariance=covariance, coarse=coarse)
 
 
 def expect_told(fitted: Fit) -> None:
-    """Raise Infeasible where neither the data nor the file tell a parameter, or several only together."""
+    """Raise Infeasible where neither the data nor the file tell a parameter, or several only
+    together.
+    """
     free = [at for at, each in enumerate(fitted.model.parameters) if math.isinf(each.prior)]
-    told = fitted.jacobian[fitted.used][:, free] / fitted.noise[fitted.model.signal[fitted.used], None]
+    told = (
+        fitted.jacobian[fitted.used][:, free] / fitted.noise[fitted.model.signal[fitted.used], None]
+    )
     sizes = np.linalg.norm(told, axis=0)
-    if not fitted.constant and (not sizes.all() or np.linalg.svd(told / sizes, compute_uv=False)[-1] < LOST):
+    if not fitted.constant and (
+        not sizes.all() or np.linalg.svd(told / sizes, compute_uv=False)[-1] < LOST
+    ):
         names = ", ".join(fitted.model.parameters[at].name for at in free)
-        raise Infeasible(f"the record does not tell all of {names}: a sensor is dead, or more signals are needed")
+        raise Infeasible(
+            f"the record does not tell all of {names}: a sensor is dead, or more signals are needed"
+        )
 
 
 def _shows_growth(narrow: Fit, wider: Model) -> bool:
-    """True where the residuals of a fit of three moments show the dissipation of a ``wider`` model."""
+    """True where the residuals of a fit of three moments show the
+    dissipation of a ``wider`` model.
+    """
     which = _places(wider, ("growth",))
     return bool(which) and _shown(narrow, wider, _begun(narrow, wider), which)
 
 
 def _grown_a_little(narrow: Fit, wider: Model) -> Fit:
-    """A fit of three moments with dissipation that does not show, by one step of least squares: it is linear then.
+    """A fit of three moments with dissipation that does not show, by one step of least squares: it
+    is linear then.
 
-    Left out it would be taken as exactly known, and what is known together with it off by more than its sigma.
+    Left out it would be taken as exactly known, and what is known together with it off by more than
+    its sigma.
     """
     which = _places(wider, ("growth",))
     if not which:
         return narrow
-    at, used, units = _begun(narrow, wider), narrow.used, units_of(wider)
+    at = _begun(narrow, wider)
+    used = narrow.used
+    units = units_of(wider)
     slopes = np.insert(narrow.jacobian, which[0], jacobian(wider, at, which)[:, 0], axis=1)
     weights = 1.0 / narrow.noise[narrow.model.signal[used]]
     rows, nominal = wider.prior
@@ -399,7 +515,9 @@ def _grown_a_little(narrow: Fit, wider: Model) -> Fit:
 
 
 def _begun(narrow: Fit, wider: Model) -> Vector:
-    """The values of a fit for another model, (p,): of parameters that it lacks those of the file."""
+    """The values of a fit for another model, (p,):
+    of parameters that it lacks those of the file.
+    """
     begin = {each.name: each.file for each in wider.parameters} | narrow.named
     return np.array([begin[each.name] for each in wider.parameters])
 
@@ -410,7 +528,8 @@ def _places(model: Model, names: Sequence[str]) -> list[int]:
 
 def _widened(narrow: Fit, wider: Model, more: Sequence[str]) -> Fit:
     """The fit of a model with ``more`` parameters, from where a narrower one ended."""
-    values, units = _begun(narrow, wider), units_of(wider)
+    values = _begun(narrow, wider)
+    units = units_of(wider)
     for index in _places(wider, more):
         # Away from nothing, where the principal axes are any.
         values[index] = max(abs(values[index]), 1e-3 * units[index])
@@ -428,7 +547,8 @@ def _expect_seen(fitted: Fit) -> None:
     if size < SEEN * sigma:
         expect_explained(fitted)
         raise Infeasible(
-            f"no nutation is seen: the transverse rate is {math.degrees(size):.3g} deg/s, within the noise; "
+            f"no nutation is seen: the transverse rate is {math.degrees(size):.3g} deg/s, "
+            "within the noise; "
             "a longer record, less noise or a larger nutation (a probe pulse) helps"
         )
 
@@ -452,11 +572,16 @@ def _best(model: Model) -> Vector:
 
 
 def _try(model: Model, begins: Sequence[dict[str, float]]) -> tuple[Vector, float]:
-    """Values from the start of least cost; where these are poor, the best from the three starts of least cost."""
-    scales, every = scales_of(model), np.ones(len(model.measured), dtype=bool)
+    """Values from the start of least cost; where these are poor, the best from the three starts of
+    least cost.
+    """
+    scales = scales_of(model)
+    every = np.ones(len(model.measured), dtype=bool)
     vectors = [np.array([begin[each.name] for each in model.parameters]) for begin in begins]
     if len(vectors) > 1:
-        costs = [float(np.abs(residuals(model, begin) / scales[model.signal]).sum()) for begin in vectors]
+        costs = [
+            float(np.abs(residuals(model, begin) / scales[model.signal]).sum()) for begin in vectors
+        ]
         vectors = [vectors[index] for index in np.argsort(costs)[:STARTS]]
     ends = []
     for begin in vectors:
@@ -465,9 +590,13 @@ def _try(model: Model, begins: Sequence[dict[str, float]]) -> tuple[Vector, floa
             break
     values, cost = min(ends, key=lambda end: end[1])
     rows, nominal = model.prior
-    # Where the file hardly allows for the values, the search may have left the valley in which it began.
+    # Where the file hardly allows for the values, the search may have left the valley in which it
+    # began.
     if np.any(np.abs(rows @ values - nominal) > UNLIKELY):
-        ends = [(values, cost), *(search(model, begin, scales, every, robust=True) for begin in vectors[:STARTS])]
+        ends = [
+            (values, cost),
+            *(search(model, begin, scales, every, robust=True) for begin in vectors[:STARTS]),
+        ]
     return min(ends, key=lambda end: end[1])
 
 
@@ -479,7 +608,8 @@ def _settled(model: Model, values: Vector) -> Fit:
     values, _ = search(model, values, noise, every, robust=True)
     used = every
     for _ in range(ROUNDS):
-        before, left = (noise, used), residuals(model, values)
+        before = (noise, used)
+        left = residuals(model, values)
         noise = np.maximum(robust(model, left), floor)
         used = np.abs(left) < OUTLIER * noise[model.signal]
         noise = np.maximum(plain(model, left, used), floor)
@@ -490,22 +620,33 @@ def _settled(model: Model, values: Vector) -> Fit:
     return _as_noisy(model, values, noise, used, slopes)
 
 
-def _as_noisy(model: Model, values: Vector, noise: Vector, used: NDArray[np.bool_], slopes: Matrix) -> Fit:
+def _as_noisy(
+    model: Model, values: Vector, noise: Vector, used: NDArray[np.bool_], slopes: Matrix
+) -> Fit:
     """The fit at some values, its noise corrected for what the fit takes of it."""
-    left, floor = residuals(model, values), least(model)
+    left = residuals(model, values)
+    floor = least(model)
     for _ in range(ADJUSTED):
         scaled = slopes[used] / noise[model.signal[used], None]
         covariance = covariance_of(model, scaled)
-        noise = np.maximum(plain(model, left, used, np.sum((scaled @ covariance) * scaled, axis=1)), floor)
+        noise = np.maximum(
+            plain(model, left, used, np.sum((scaled @ covariance) * scaled, axis=1)), floor
+        )
     return Fit(model, values, covariance, noise, used, left, slopes)
 
 
 def _shown(fitted: Fit, wider: Model, at: Vector, which: Sequence[int]) -> bool:
-    """True where the residuals show parameters of a wider model: a score test, one step of least squares by them."""
-    model, count = fitted.model, len(which)
+    """True where the residuals show parameters of a wider model: a score test, one step of least
+    squares by them.
+    """
+    model = fitted.model
+    count = len(which)
     weights = 1.0 / fitted.noise[model.signal[fitted.used]]
-    slopes = jacobian(wider, at, which)[fitted.used] * weights[:, None] * units_of(wider)[list(which)]
-    units, rows = units_of(model), len(model.prior[0])
+    slopes = (
+        jacobian(wider, at, which)[fitted.used] * weights[:, None] * units_of(wider)[list(which)]
+    )
+    units = units_of(model)
+    rows = len(model.prior[0])
     known = fitted.jacobian[fitted.used] * weights[:, None] * units
     bound = np.concatenate([model.prior[0] * units, np.zeros((rows, count))], axis=1)
     stacked = np.concatenate([np.concatenate([known, slopes], axis=1), bound])

@@ -1,10 +1,13 @@
-"""Start of a fit: rate and size of the nutation from the spectrum of one signal, the rest by linear least squares.
+"""Start of a fit: rate and size of the nutation from the spectrum of one signal, the rest by linear
+least squares.
 
-A symmetric body's ω = ω1 + iω2 turns in the body at -aω3, its axis in space about H at |H|/A: so the peak of a
-spectrum gives C/A. Where signals come too seldom for a spectrum, each C/A that the file allows is tried.
+A symmetric body's ω = ω1 + iω2 turns in the body at -aω3, its axis in space about H at |H|/A: so
+the peak of a spectrum gives C/A. Where signals come too seldom for a spectrum, each C/A that the
+file allows is tried.
 
-Aliases: seen every T s, a rate looks like any other that differs by a multiple of 2π/T. C/A is known but for multiples
-of 2π/(|ω3| T), and one transverse signal alone does not show the sense of the rate either.
+Aliases: seen every T s, a rate looks like any other that differs by a multiple of 2π/T. C/A is
+known but for multiples of 2π/(|ω3| T), and one transverse signal alone does not show the sense of
+the rate either.
 """
 
 from __future__ import annotations
@@ -40,10 +43,14 @@ from nutdamp.physics import attitude
 FINER = 8  # frequencies of a spectrum for each of its samples
 LONGEST_SPECTRUM = 1 << 16  # samples of a spectrum at most; of longer records the first
 SMALL = 1e-3  # share of the spin that trial transverse rates have: the motion is linear there
-STILL = 1e-3  # share of |H|/A up to which a spin counts as none, and trial rates are a share of that
-OTHER = 0.05  # part by which a spin by Sun pulses may differ from that of the file before both are tried
+STILL = (
+    1e-3  # share of |H|/A up to which a spin counts as none, and trial rates are a share of that
+)
+# part by which a spin by Sun pulses may differ from that of the file before both are tried
+OTHER = 0.05
 MOST_TURNED = 2.1  # C/A at most, and a little more: 2 for a thin disc
-NARROW = 0.966  # cosine of a nutation angle, 15 deg, from which on noise may decide in which plane a cone is
+# cosine of a nutation angle, 15 deg, from which on noise may decide in which plane a cone is
+NARROW = 0.966
 FLAT = 0.1  # cosine of the nutation angle from which on its rate is sought
 TURNS = 8  # starting values of the angle by which the body is turned about its axis
 TRIED = 60  # values of C/A tried at most where no spectrum shows the nutation
@@ -51,10 +58,14 @@ SLIP = 1.5  # phase, rad, by which the nutation of two of them differs at the en
 
 
 def starts(model: Model, share: float = 1.0) -> Iterator[dict[str, float]]:
-    """Values to begin with: from the first ``share`` of the record, as the file has them otherwise."""
-    spin, record = _spin(model), model.record
+    """Values to begin with: from the first ``share`` of the record,
+    as the file has them otherwise.
+    """
+    spin = _spin(model)
+    record = model.record
     yield from _starts(model, share, spin)
-    # The Sun does not go round a sensor once a turn where it is near the axis: then the file knows better.
+    # The Sun does not go round a sensor once a turn where it is near the axis: then the file knows
+    # better.
     by_pulses = len(record.sun_pulses) > 1 and not record.has(GYROS[2]) and _around(model) is None
     if by_pulses and abs(spin / model.spacecraft.spin - 1.0) > OTHER:
         yield from _starts(model, share, model.spacecraft.spin)
@@ -64,7 +75,8 @@ def _starts(model: Model, share: float, spin: float) -> Iterator[dict[str, float
     of_file = {each.name: each.file for each in model.parameters}
     cone = _cone(model, share)
     if cone is not None and model.record.shows_spin and not model.record.has(GYROS[2]):
-        # A direction goes round a sensor once a turn of the body about its axis and of the axis about H.
+        # A direction goes round a sensor once a turn of the body about its axis and of the axis
+        # about H.
         spin -= model.spacecraft.sense * cone.rate * (1.0 - cone.cosine)
     if "omega_3" in of_file:
         of_file["omega_3"] = spin
@@ -78,7 +90,9 @@ def _starts(model: Model, share: float, spin: float) -> Iterator[dict[str, float
         _, low, high = _range(model)
         count = math.ceil((high - low) * abs(spin) * model.record.length / SLIP) + 1
         ratios = np.linspace(low, high, min(count, TRIED))
-    angles = [2.0 * math.pi * turn / TURNS for turn in range(TURNS)] if "attitude_3" in of_file else []
+    angles = (
+        [2.0 * math.pi * turn / TURNS for turn in range(TURNS)] if "attitude_3" in of_file else []
+    )
     if (around := _around(model)) is not None:
         angles = [around[1]]
     for turned in [{"attitude_3": angle} for angle in angles] or [{}]:
@@ -96,13 +110,19 @@ def _starts(model: Model, share: float, spin: float) -> Iterator[dict[str, float
 
 def _seldom(model: Model) -> bool:
     """True where only signals that come too seldom for a spectrum show a nutation."""
-    return not any(KIND[name].nutation for name in model.signals if name == "axis" or KIND[name].nutation == BODY)
+    return not any(
+        KIND[name].nutation
+        for name in model.signals
+        if name == "axis" or KIND[name].nutation == BODY
+    )
 
 
 def _around(model: Model) -> tuple[float, float] | None:
-    """Rate (rad/s) at which known directions go round the body, and the turn of the body at the start, rad.
+    """Rate (rad/s) at which known directions go round the body, and the turn of the body at the
+    start, rad.
 
-    By the azimuths of those that crossed, or of one across the axis that quaternions turn; None without any.
+    By the azimuths of those that crossed, or of one across the axis that quaternions turn; None
+    without any.
     """
     record, reference = model.record, model.reference.quaternion
     of_file = attitude.from_matrix(model.spacecraft.inertia.axes)
@@ -113,7 +133,9 @@ def _around(model: Model) -> tuple[float, float] | None:
         times, rows = record.samples(QUATERNION)
         if not len(times):
             return None
-        there = np.broadcast_to(attitude.rotate(reference, np.array([1.0, 0.0, 0.0])), (len(times), 3))
+        there = np.broadcast_to(
+            attitude.rotate(reference, np.array([1.0, 0.0, 0.0])), (len(times), 3)
+        )
         shown = attitude.rotate(attitude.conjugate(rows), there)
     shown = attitude.rotate(attitude.conjugate(of_file), shown)
     before = attitude.rotate(attitude.conjugate(reference), there)
@@ -143,9 +165,11 @@ def _spin(model: Model) -> float:
 
 
 def spin_of(pulses: Vector, step: float = 0.0) -> tuple[float, float]:
-    """Mean rate of the turns between two Sun pulses or more, at rising times (k,) s, and its sigma, rad/s.
+    """Mean rate of the turns between two Sun pulses or more, at rising times (k,) s, and its sigma,
+    rad/s.
 
-    That of a straight line through the times, by what they are off it, or by their ``step`` (s, full width).
+    That of a straight line through the times, by what they are off it, or by their ``step`` (s,
+    full width).
     """
     gaps = np.diff(pulses)
     turns = np.concatenate([[0.0], np.cumsum(np.rint(gaps / gaps.min()))])
@@ -163,7 +187,10 @@ def once_a_turn(record: Record) -> str:
     if len(record.sun_pulses) < 3:
         return ""
     spin, sigma = np.degrees(spin_of(record.sun_pulses, record.sun_step))
-    return f": Sun pulses come once a spin turn and tell the spin, {spin:.7g} deg/s, with a sigma of {sigma:.2g} deg/s"
+    return (
+        f": Sun pulses come once a spin turn and tell the spin, {spin:.7g} deg/s, "
+        f"with a sigma of {sigma:.2g} deg/s"
+    )
 
 
 def _peak(model: Model, spin: float, share: float) -> float | None:
@@ -172,7 +199,8 @@ def _peak(model: Model, spin: float, share: float) -> float | None:
     expected = body.inertia.nutation_rate(spin)
     most = abs(spin) if body.inertia.wheel == 0.0 else max(abs(spin), 2.0 * abs(expected))
     count = _count(record, share)
-    times, signals = record.times[:count], {name: values[:count] for name, values in record.signals.items()}
+    times = record.times[:count]
+    signals = {name: values[:count] for name, values in record.signals.items()}
     if record.has(*GYROS[:2]):
         return _strongest(times, signals[GYROS[0]], signals[GYROS[1]], -expected, most, -1.0)
     for name in (*GYROS[:2], ACCELERATION):
@@ -184,7 +212,9 @@ def _peak(model: Model, spin: float, share: float) -> float | None:
 
 
 class _Cone(NamedTuple):
-    """The axis goes round ``momentum``, a unit vector, at ``rate`` rad/s from ``begin``, a unit vector at the start."""
+    """The axis goes round ``momentum``, a unit vector, at ``rate`` rad/s from ``begin``, a unit
+    vector at the start.
+    """
 
     momentum: Vector
     rate: float
@@ -206,7 +236,9 @@ def _count(record: Record, share: float) -> int:
 
 
 def _cone(model: Model, share: float) -> _Cone | None:
-    """The cone that the axis describes in space, of any angle; None where no axis is measured or shows none."""
+    """The cone that the axis describes in space, of any angle; None where no axis is measured or
+    shows none.
+    """
     record, body = model.record, model.spacecraft
     if not record.has(*AXIS):
         return None
@@ -237,7 +269,9 @@ def _cone(model: Model, share: float) -> _Cone | None:
 
 
 def _on_cone(model: Model, values: Values, spin: float, cone: _Cone) -> dict[str, float]:
-    """Values by which the axis describes a cone: ω is that of the axis about H, besides what is along the axis."""
+    """Values by which the axis describes a cone: ω is that of the axis about H, besides what is
+    along the axis.
+    """
     moments = _moments(model, spin - model.spacecraft.sense * cone.rate * cone.cosine, spin)
     values = {**values, **moments, **_towards(model, cone.begin)}
     across = cone.rate * (cone.momentum - cone.cosine * cone.begin)
@@ -248,11 +282,14 @@ def _on_cone(model: Model, values: Values, spin: float, cone: _Cone) -> dict[str
 def _strongest(
     times: Vector, real: Vector, imaginary: Vector | None, expected: float, most: float, sign: float
 ) -> float | None:
-    """Rate (rad/s, times ``sign``) at the peak of a spectrum, nearest to ``expected`` of those that look alike."""
+    """Rate (rad/s, times ``sign``) at the peak of a spectrum, nearest to ``expected`` of those that
+    look alike.
+    """
     there = np.isfinite(real) if imaginary is None else np.isfinite(real) & np.isfinite(imaginary)
     if there.sum() < 4:
         return None
-    at, values = times[there], real[there] + (0j if imaginary is None else 1j * imaginary[there])
+    at = times[there]
+    values = real[there] + (0j if imaginary is None else 1j * imaginary[there])
     step = float(np.median(np.diff(at)))
     count = min(math.ceil((at[-1] - at[0]) / step) + 1, LONGEST_SPECTRUM)
     place = np.rint((at - at[0]) / step).astype(int)
@@ -269,35 +306,48 @@ def _strongest(
     around = 2.0 * math.pi / step
     if imaginary is None:
         power = np.where(rates > 0.0, power, 0.0)
-        rates, expected = np.abs(rates), abs(expected)
+        rates = np.abs(rates)
+        expected = abs(expected)
     else:
         rates = rates + around * np.rint((expected - rates) / around) * (most > 0.5 * around)
-    power = np.where((np.abs(rates) <= 1.02 * most) & (np.abs(rates) > 0.25 * 2.0 * math.pi / (count * step)), power, 0)
+    power = np.where(
+        (np.abs(rates) <= 1.02 * most) & (np.abs(rates) > 0.25 * 2.0 * math.pi / (count * step)),
+        power,
+        0,
+    )
     if not power.any():
         return None
     return sign * float(rates[int(np.argmax(power))])
 
 
 def _moments(model: Model, rate: float, spin: float) -> dict[str, float]:
-    """A and C that give a body rate, each moved as far as the file's tolerances share it; nothing if impossible."""
+    """A and C that give a body rate, each moved as far as the file's tolerances share it; nothing
+    if impossible.
+    """
     inertia = model.spacecraft.inertia
     if inertia.wheel == 0.0:
         wanted = inertia.C / inertia.A - (rate - inertia.nutation_rate(spin)) / spin
     else:  # of the A at which ω3 - H3/A is the rate
         wanted = inertia.C * (spin - rate) / float(inertia.axial(spin))
     wanted = min(max(wanted, 0.01), 1.999)
-    A, ratio = model.parameter("A"), model.parameters[_range(model)[0]]
+    A = model.parameter("A")
+    ratio = model.parameters[_range(model)[0]]
     if A is None:
         return {RATIO: wanted}
-    # Moments that are known together would be moved by many times what the ratio is: a start need not be.
+    # Moments that are known together would be moved by many times what the ratio is: a start need
+    # not be.
     part = min((A.prior / A.file) ** 2 / (ratio.prior / ratio.file) ** 2, 1.0)
     return {"A": A.file * (ratio.file / wanted) ** part, RATIO: wanted}
 
 
 def _towards(model: Model, axis: Vector) -> dict[str, float]:
-    """The attitude turned the shortest way so that the spin axis is along an ``axis`` (3,), of any length."""
+    """The attitude turned the shortest way so that the spin axis is along an ``axis`` (3,), of any
+    length.
+    """
     sense = model.spacecraft.sense
-    wanted = sense * attitude.rotate(attitude.conjugate(model.reference.quaternion), axis / np.linalg.norm(axis))
+    wanted = sense * attitude.rotate(
+        attitude.conjugate(model.reference.quaternion), axis / np.linalg.norm(axis)
+    )
     across = np.cross([0.0, 0.0, 1.0], wanted)
     size = float(np.linalg.norm(across))
     angle = math.atan2(size, wanted[2])
@@ -307,23 +357,38 @@ def _towards(model: Model, axis: Vector) -> dict[str, float]:
 
 def _linear(model: Model, values: dict[str, float]) -> dict[str, float]:
     """The transverse rates, offsets and tilts by linear least squares, everything else as it is."""
-    offsets = ("bias", "attitude") if {CROSSING, "turn"} & set(model.signals) else ("bias", "attitude_1", "attitude_2")
+    offsets = (
+        ("bias", "attitude")
+        if {CROSSING, "turn"} & set(model.signals)
+        else ("bias", "attitude_1", "attitude_2")
+    )
     names = ["omega_1", "omega_2", *(name for name in values if name.startswith(offsets))]
     base = values | {"omega_1": 0.0, "omega_2": 0.0}
-    still = STILL * 2.0 * math.pi / model.spacecraft.inertial_period  # a wheel may hold a body that does not spin
+    still = (
+        STILL * 2.0 * math.pi / model.spacecraft.inertial_period
+    )  # a wheel may hold a body that does not spin
     pace = max(abs(values.get("omega_3", model.spacecraft.spin)), still)
     steps = dict.fromkeys(names[:2], SMALL * pace)
     steps |= dict.fromkeys(names[2:], SMALL)
     at_rest = model.predicted(base)
-    columns = [(model.predicted(base | {name: base[name] + steps[name]}) - at_rest) / steps[name] for name in names]
+    columns = [
+        (model.predicted(base | {name: base[name] + steps[name]}) - at_rest) / steps[name]
+        for name in names
+    ]
     weights = 0.1 / scales_of(model)[model.signal]
     # Of one direction the attitude is not told about it.
-    known = {each.name: 1.0 / each.prior for each in model.parameters if each.name.startswith("attitude")}
+    known = {
+        each.name: 1.0 / each.prior for each in model.parameters if each.name.startswith("attitude")
+    }
     held = np.array([known.get(name, 0.0) for name in names])
     matrix = np.concatenate([np.column_stack(columns) * weights[:, None], np.diag(held)])
-    target = np.concatenate([(model.measured - at_rest) * weights, -held * [base[name] for name in names]])
+    target = np.concatenate(
+        [(model.measured - at_rest) * weights, -held * [base[name] for name in names]]
+    )
     solved = np.linalg.lstsq(matrix, target, rcond=1e-10)[0]
-    return values | {name: base[name] + float(part) for name, part in zip(names, solved, strict=True)}
+    return values | {
+        name: base[name] + float(part) for name, part in zip(names, solved, strict=True)
+    }
 
 
 WITHIN = 3.0  # sigmas of the file within which another C/A is considered
@@ -333,7 +398,9 @@ POSSIBLE = (0.01, 1.999)  # range of C/A of a symmetric body
 
 
 def neighbours(model: Model, values: Vector) -> list[Vector]:
-    """Values of the parameters with the other C/A that equal sampling allows within the tolerances of the file."""
+    """Values of the parameters with the other C/A that equal sampling allows within the tolerances
+    of the file.
+    """
     at, low, high = _range(model)
     of_file = model.parameters[at]
     # Without a tolerance all that are possible, if the nutation found is itself sampled too slowly.
@@ -350,13 +417,18 @@ def neighbours(model: Model, values: Vector) -> list[Vector]:
         nearest = round((of_file.file - begin) / step)
         turns = range(nearest - MOST_ALIASES, nearest + MOST_ALIASES + 1)
         ratios += [begin + k * step for k in turns if k != 0 or not itself]
-    possible = sorted((ratio for ratio in ratios if low < ratio < high), key=lambda ratio: abs(ratio - of_file.file))
+    possible = sorted(
+        (ratio for ratio in ratios if low < ratio < high),
+        key=lambda ratio: abs(ratio - of_file.file),
+    )
     every = np.arange(len(values))
     return [np.where(every == at, ratio, values) for ratio in possible[:MOST_ALIASES]]
 
 
 def likeliest(fits: Sequence[Fit]) -> Fit:
-    """The one of some fits of one record that data and tolerances leave; raises Infeasible where that is several."""
+    """The one of some fits of one record that data and tolerances leave; raises Infeasible where
+    that is several.
+    """
     model = fits[0].model
     at, low, high = _range(model)
     counts = np.bincount(model.signal)
@@ -371,8 +443,10 @@ def likeliest(fits: Sequence[Fit]) -> Fit:
     left = [fitted for fitted in alike if low < fitted.values[at] < high]
     if not left and too_slow(model, alike[0].values):
         raise Infeasible(
-            f"with a sample every {interval(model):.4g} s several nutation rates fit equally well, and none of their "
-            "C/A is as near to the file as its tolerances allow; check A and C in the file (are the times in seconds?)"
+            f"with a sample every {interval(model):.4g} s several nutation rates fit equally well, "
+            "and none of their "
+            "C/A is as near to the file as its tolerances allow; "
+            "check A and C in the file (are the times in seconds?)"
         )
     left = left or alike[:1]
     if len(left) == 1:
@@ -380,9 +454,12 @@ def likeliest(fits: Sequence[Fit]) -> Fit:
     ratios = sorted(float(fitted.values[at]) for fitted in left)
     fastest = max(abs(nutation_rate(model, fitted.values)) for fitted in left)
     raise Infeasible(
-        f"with a sample every {interval(model):.4g} s several nutation rates fit equally well: C/A may be "
-        f"{', '.join(f'{ratio:.4f}' for ratio in ratios)}; samples less than {math.pi / fastest:.3g} s apart or at "
-        "uneven intervals, or smaller tolerances of A and C in the file, help (are the times in seconds?)"
+        f"with a sample every {interval(model):.4g} s several nutation rates fit equally well: "
+        "C/A may be "
+        f"{', '.join(f'{ratio:.4f}' for ratio in ratios)}; "
+        f"samples less than {math.pi / fastest:.3g} s apart or at "
+        "uneven intervals, or smaller tolerances of A and C in the file, "
+        "help (are the times in seconds?)"
     )
 
 
@@ -392,7 +469,9 @@ def too_slow(model: Model, values: Vector) -> bool:
 
 
 def nutation_rate(model: Model, values: Vector) -> float:
-    """Rate at which the signals show the nutation, rad/s: in the body, or in space where only the axis is seen."""
+    """Rate at which the signals show the nutation, rad/s: in the body, or in space where only the
+    axis is seen.
+    """
     named = named_of(model, values)
     spin = named.get("omega_3", model.spacecraft.spin)
     axial = axial_rate(model, named[RATIO], spin)
@@ -406,10 +485,16 @@ def axial_rate(model: Model, ratio: float, spin: float) -> float:
 
 
 def interval(model: Model) -> float:
-    """Usual time between the samples of the signal that is sampled fastest of those that show the nutation, s."""
+    """Usual time between the samples of the signal that is sampled fastest of those that show the
+    nutation, s.
+    """
     shown = [index for index, name in enumerate(model.signals) if KIND[name].nutation]
-    steps = [np.diff(model.times[model.signal == index][: len(model.samples[index])]) for index in shown]
-    return min((float(np.median(gaps)) for gaps in steps if len(gaps)), default=model.record.interval)
+    steps = [
+        np.diff(model.times[model.signal == index][: len(model.samples[index])]) for index in shown
+    ]
+    return min(
+        (float(np.median(gaps)) for gaps in steps if len(gaps)), default=model.record.interval
+    )
 
 
 def _range(model: Model) -> tuple[int, float, float]:

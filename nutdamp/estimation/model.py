@@ -1,7 +1,8 @@
-"""Prediction of telemetry from parameters: closed forms for coasts, the flight where pulses were fired.
+"""Prediction of telemetry from parameters: closed forms for coasts, the flight where pulses were
+fired.
 
-Transverse moments that differ are A[[1 + e1, e2], [e2, 1 - e1]] about the axes 1 and 2 of the file's principal axes:
-regular at e = 0, where principal axes are any.
+Transverse moments that differ are A[[1 + e1, e2], [e2, 1 - e1]] about the axes 1 and 2 of the
+file's principal axes: regular at e = 0, where principal axes are any.
 """
 
 from __future__ import annotations
@@ -45,11 +46,17 @@ PREDICTION = 0.1  # units of `work` of a prediction, besides steps
 SHOWN = 2e-4  # of each of its samples
 SAMPLE = 1e-3  # of each time of a motion that is new
 POLHODE = 0.8  # units of a coast of three moments between pulses
-OF_SENSORS = ("bias", "misalignment", "wobble")  # first words of parameters that leave the motion as it is
+OF_SENSORS = (
+    "bias",
+    "misalignment",
+    "wobble",
+)  # first words of parameters that leave the motion as it is
 
 
 class Body(NamedTuple):
-    """The body that parameters describe: its ``state`` at the start of the record in its own principal axes."""
+    """The body that parameters describe: its ``state`` at the start of the record in its own
+    principal axes.
+    """
 
     inertia: Inertia
     state: SpinState
@@ -69,22 +76,32 @@ class Body(NamedTuple):
 class Model:
     """Predictor of a record of a spacecraft.
 
-    ``measured`` (m,) are the samples that there are, signal by signal, or zero where what is off is compared;
-    ``signals`` their names and ``signal`` (m,) which of them each is; ``times`` (m,) s when; ``samples`` (n, k) of each
-    signal as they came. Raises BadRequest where the spacecraft file lacks what a signal needs.
+    ``measured`` (m,) are the samples that there are, signal by signal, or zero where what is off is
+    compared; ``signals`` their names and ``signal`` (m,) which of them each is; ``times`` (m,) s
+    when; ``samples`` (n, k) of each signal as they came. Raises BadRequest where the spacecraft
+    file lacks what a signal needs.
     """
 
     def __init__(
-        self, spacecraft: Spacecraft, record: Record, *, unequal: bool | None = None, growing: bool = True
+        self,
+        spacecraft: Spacecraft,
+        record: Record,
+        *,
+        unequal: bool | None = None,
+        growing: bool = True,
     ) -> None:
-        """``unequal``: with I1 ≠ I2, as the file has it where that is not said; ``growing``: κ is estimated."""
+        """``unequal``: with I1 ≠ I2, as the file has it where that is not said; ``growing``: κ is
+        estimated.
+        """
         _expect_described(spacecraft, record)
         self.spacecraft, self.record = spacecraft, record
         self.unequal = not spacecraft.inertia.symmetric if unequal is None else unequal
         self.start = record.start
         self._at: dict[tuple[float, ...], tuple[Body, SpinState]] = {}
         self._last: tuple[tuple[tuple[str, float], ...], tuple[Vector, Vector]] | None = None
-        self.parameters = tuple(parameters(spacecraft, record, unequal=self.unequal, growing=growing))
+        self.parameters = tuple(
+            parameters(spacecraft, record, unequal=self.unequal, growing=growing)
+        )
         self.prior = prior(spacecraft, self.parameters)
         self.pulses = self._pulses()
         kinds = record.kinds
@@ -93,7 +110,9 @@ class Model:
         self.signals = tuple(kind.name for kind in kinds)
         rows = [kind.samples(record) for kind in kinds]
         self.samples = [samples for _, samples in rows]
-        self.times = np.concatenate([np.tile(times, kind.parts) for kind, (times, _) in zip(kinds, rows, strict=True)])
+        self.times = np.concatenate(
+            [np.tile(times, kind.parts) for kind, (times, _) in zip(kinds, rows, strict=True)]
+        )
         compared = [
             np.zeros(kind.parts * len(samples)) if kind.off else samples[:, 0]
             for kind, samples in zip(kinds, self.samples, strict=True)
@@ -103,14 +122,20 @@ class Model:
         # Rows of the motion at all times that show each sample of a signal.
         self._instants, back = np.unique(self.times, return_inverse=True)
         firsts = np.searchsorted(self.signal, np.arange(len(rows)))
-        self._rows = [back[first : first + len(samples)] for first, samples in zip(firsts, self.samples, strict=True)]
+        self._rows = [
+            back[first : first + len(samples)]
+            for first, samples in zip(firsts, self.samples, strict=True)
+        ]
 
     @cached_property
     def reference(self) -> SpinState:
         """The motion at the start of the record as the file has it."""
         spacecraft = self.spacecraft
-        # As if the record began at t = 0; a file's disturbances are too small to turn it much before.
-        return _state(_coast(Body(spacecraft.inertia, spacecraft.initial, spacecraft.growth)), self.start)
+        # As if the record began at t = 0; a file's disturbances are too small to turn it much
+        # before.
+        return _state(
+            _coast(Body(spacecraft.inertia, spacecraft.initial, spacecraft.growth)), self.start
+        )
 
     def parameter(self, name: str) -> Parameter | None:
         """The one of that name, if it is estimated."""
@@ -118,38 +143,62 @@ class Model:
 
     def turned(self, values: Values) -> Vector:
         """Attitude (4,) of the file's principal axes at the start of the record."""
-        # The axis is tilted first, then the body turned about it, by any angle: no turn makes the tilts singular.
+        # The axis is tilted first, then the body turned about it, by any angle: no turn makes the
+        # tilts singular.
         turn = turned(np.array([0.0, 0.0, values.get("attitude_3", 0.0)]))
-        return attitude.multiply(self.reference.quaternion, attitude.multiply(tilted(values, "attitude"), turn))
+        return attitude.multiply(
+            self.reference.quaternion, attitude.multiply(tilted(values, "attitude"), turn)
+        )
 
     def body(self, values: Values) -> Body:
         """The body that parameters describe."""
         of_file, spacecraft = self.spacecraft.inertia, self.spacecraft
         A, C = in_moments(spacecraft, values)
-        rates = np.array([values["omega_1"], values["omega_2"], values.get("omega_3", spacecraft.omega0[2])])
+        rates = np.array(
+            [values["omega_1"], values["omega_2"], values.get("omega_3", spacecraft.omega0[2])]
+        )
         quaternion = self.turned(values)
         e1, e2 = values.get("unequal_1", 0.0), values.get("unequal_2", 0.0)
         size = math.hypot(e1, e2)
         if not (A > 0.0 and C > 0.0 and size < 1.0):
             raise Infeasible("no body has such moments of inertia")
-        moments, axes = (A, A, C), of_file.axes
+        moments = (A, A, C)
+        axes = of_file.axes
         if size > 0.0:
             half = 0.5 * math.atan2(e2, e1)
-            about = np.array([[math.cos(half), -math.sin(half), 0.0], [math.sin(half), math.cos(half), 0.0], [0, 0, 1]])
-            moments, axes, rates = (A * (1.0 + size), A * (1.0 - size), C), axes @ about, about.T @ rates
-            quaternion = attitude.multiply(quaternion, np.array([math.cos(0.5 * half), 0, 0, math.sin(0.5 * half)]))
+            about = np.array(
+                [
+                    [math.cos(half), -math.sin(half), 0.0],
+                    [math.sin(half), math.cos(half), 0.0],
+                    [0, 0, 1],
+                ]
+            )
+            moments = (A * (1.0 + size), A * (1.0 - size), C)
+            axes = axes @ about
+            rates = about.T @ rates
+            quaternion = attitude.multiply(
+                quaternion, np.array([math.cos(0.5 * half), 0, 0, math.sin(0.5 * half)])
+            )
         state = SpinState.of(rates, quaternion)
         inertia = Inertia(moments, axes, values.get("wheel", of_file.wheel))
         return Body(inertia, state, values.get("growth", spacecraft.growth))
 
     def motion(self, values: Values, times: Vector) -> tuple[Vector, Vector]:
-        """Rates (n, 3) rad/s and quaternions (n, 4) of the file's axes at rising ``times`` (n,) s."""
+        """Rates (n, 3) rad/s and quaternions (n, 4) of the file's axes at rising ``times`` (n,)
+        s.
+        """
         body = self.body(values)
-        rates, quaternion = self._path(body, self._fired(values), float(times[-1])).motion(times - self.start)
-        return rates @ body.inertia.axes.T, attitude.multiply(quaternion, attitude.from_matrix(body.inertia.axes.T))
+        rates, quaternion = self._path(body, self._fired(values), float(times[-1])).motion(
+            times - self.start
+        )
+        return rates @ body.inertia.axes.T, attitude.multiply(
+            quaternion, attitude.from_matrix(body.inertia.axes.T)
+        )
 
     def at(self, values: Values, time: float) -> tuple[Body, SpinState]:
-        """The body, and its motion at ``time`` s in its own principal axes; before the record it coasts."""
+        """The body, and its motion at ``time`` s in its own principal axes; before the record it
+        coasts.
+        """
         key = (time, *values.values())
         if key not in self._at:
             body = self.body(values)
@@ -164,19 +213,28 @@ class Model:
         (A, C), e1, parts = in_moments(self.spacecraft, values), values.get("unequal_1", 0.0), []
         moments = A * (1.0 + e1), A * (1.0 - e1), C
         for name, samples, rows in zip(self.signals, self.samples, self._rows, strict=True):
-            seen = Sighting(self.spacecraft, values, moments, samples, rates[rows], quaternion[rows])
+            seen = Sighting(
+                self.spacecraft, values, moments, samples, rates[rows], quaternion[rows]
+            )
             parts.append(KIND[name].predicted(seen))
         return np.concatenate(parts)
 
     def _remembered(self, values: Values) -> tuple[Vector, Vector]:
         """The motion at all times; once for values that differ in what only the sensors are off."""
-        key = tuple((name, value) for name, value in values.items() if not name.startswith(OF_SENSORS))
+        key = tuple(
+            (name, value) for name, value in values.items() if not name.startswith(OF_SENSORS)
+        )
         if self._last is None or self._last[0] != key:
             times = self._instants
             work.spend(SAMPLE * len(times))
             shows_attitude = any(KIND[name].attitude for name in self.signals)
             bare = np.empty((len(times), 0))
-            self._last = key, self.motion(values, times) if shows_attitude else (self._rates(values, times), bare)
+            self._last = (
+                key,
+                self.motion(values, times)
+                if shows_attitude
+                else (self._rates(values, times), bare),
+            )
         return self._last[1]
 
     def _rates(self, values: Values, times: Vector) -> Vector:
@@ -196,7 +254,9 @@ class Model:
         pulses = [pulse for pulse in self.record.schedule if pulse.over > self.start]
         for pulse in pulses:
             if pulse.thrust[0] < self.start:
-                raise BadRequest(f"the pulse at {pulse.t:g} s is on as the record begins, at {self.start:g} s")
+                raise BadRequest(
+                    f"the pulse at {pulse.t:g} s is on as the record begins, at {self.start:g} s"
+                )
         return Schedule(tuple(pulse.moved(-self.start) for pulse in pulses))
 
     def _fired(self, values: Values) -> Schedule:
@@ -210,29 +270,43 @@ class Model:
         return Schedule(tuple(pulses))
 
     def _path(self, body: Body, fired: Schedule, until: float) -> Path | Flight:
-        """The motion from the start of the record, from which its times count, to ``until`` s from t = 0."""
+        """The motion from the start of the record, from which its times count, to ``until`` s from
+        t = 0.
+        """
         if not fired.pulses and not self.spacecraft.disturbances and body.closed:
             return _coast(body)
         if until < self.start:
             raise Infeasible(
-                f"the motion at {until:g} s, before the record begins at {self.start:g} s, needs an integration "
+                f"the motion at {until:g} s, before the record begins at {self.start:g} s, "
+                "needs an integration "
                 "backwards: name a later --at"
             )
         inertia, state, growth = body
-        turn = inertia.axes.T @ self.spacecraft.inertia.axes  # from the principal axes of the file to those of the body
+        turn = (
+            inertia.axes.T @ self.spacecraft.inertia.axes
+        )  # from the principal axes of the file to those of the body
         about = complex(turn[0, 0], turn[1, 0])  # both have axis 3
-        disturbances = (replace(each, transverse=about * each.transverse) for each in self.spacecraft.disturbances)
+        disturbances = (
+            replace(each, transverse=about * each.transverse)
+            for each in self.spacecraft.disturbances
+        )
         spacecraft = replace(
             self.spacecraft,
             inertia=inertia,
             disturbances=tuple(disturbances),
             omega0=state.rates,
-            attitude=Attitude(attitude.multiply(state.quaternion, attitude.from_matrix(inertia.axes.T))),
+            attitude=Attitude(
+                attitude.multiply(state.quaternion, attitude.from_matrix(inertia.axes.T))
+            ),
         )
         acting = make_dynamics(spacecraft)
         dynamics = _Closed(inertia.moments, acting.constant, acting.forcing._replace(growth=growth))
         pulses = tuple(
-            replace(pulse, torque=None if pulse.torque is None else turn @ pulse.torque, impulse=turn @ pulse.impulse)
+            replace(
+                pulse,
+                torque=None if pulse.torque is None else turn @ pulse.torque,
+                impulse=turn @ pulse.impulse,
+            )
             for pulse in fired
         )
         return flown(spacecraft, Schedule(pulses), until - self.start, dynamics=dynamics)
@@ -252,10 +326,19 @@ def _coast(body: Body) -> Path:
 
 
 class _Closed(Dynamics):
-    """Dynamics whose coasts are closed forms for three different moments too, where nothing acts on them."""
+    """Dynamics whose coasts are closed forms for three different moments too, where nothing acts on
+    them.
+    """
 
-    def _path(self, state: SpinState, start: float, end: float, push: Push, most: int) -> tuple[Path, SpinState]:
-        acts = bool(push.torques) or push.falling is not None or self.constant.any() or self.forcing != Forcing()
+    def _path(
+        self, state: SpinState, start: float, end: float, push: Push, most: int
+    ) -> tuple[Path, SpinState]:
+        acts = (
+            bool(push.torques)
+            or push.falling is not None
+            or self.constant.any()
+            or self.forcing != Forcing()
+        )
         if acts or end == start or self.moments[0] == self.moments[1]:
             return super()._path(state, start, end, push, most)
         work.spend(POLHODE)
@@ -268,15 +351,23 @@ def _expect_described(spacecraft: Spacecraft, record: Record) -> None:
     if record.has(ACCELERATION):
         loop = spacecraft.loop
         if loop is None or loop.sensor.kind != ACCELEROMETER:
-            problem = "expected kind: accelerometer with its position, for the column acceleration_m_s2"
+            problem = (
+                "expected kind: accelerometer with its position, for the column acceleration_m_s2"
+            )
             raise Unsuitable(("loop", "sensor"), problem)
         if spacecraft.inertia.wheel != 0.0:
-            raise Unsuitable(("wheel",), "with a wheel no accelerometer is modelled: leave acceleration_m_s2 out")
+            raise Unsuitable(
+                ("wheel",), "with a wheel no accelerometer is modelled: leave acceleration_m_s2 out"
+            )
         if is_blind(spacecraft.inertia.moments, loop.sensor.position, loop.sensor.axis):
-            raise Unsuitable(("loop", "sensor"), "the accelerometer shows nothing of a nutation where it is")
+            raise Unsuitable(
+                ("loop", "sensor"), "the accelerometer shows nothing of a nutation where it is"
+            )
     if len(record.sun_pulses) and (spacecraft.sun is None or spacecraft.sun_sensor is None):
         key = "sun" if spacecraft.sun is None else "sun_sensor"
-        raise Unsuitable((key,), f"expected the key {key}: Sun pulses are timed by attitude, sun and sun_sensor")
+        raise Unsuitable(
+            (key,), f"expected the key {key}: Sun pulses are timed by attitude, sun and sun_sensor"
+        )
     if record.has(SUN_ASPECT) and spacecraft.sun is None:
         raise Unsuitable(("sun",), f"expected the key sun, for the columns of {SUN_ASPECT}")
     if record.has(DIRECTION[0]) and spacecraft.attitude is None:

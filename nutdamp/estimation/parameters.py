@@ -1,8 +1,9 @@
-"""Telemetry records, the kinds of signals in them (a row of `KINDS` each), and the parameters that are fitted to them.
+"""Telemetry records, the kinds of signals in them (a row of `KINDS` each), and the parameters that
+are fitted to them.
 
-A row predicts the samples of its kind from the motion and from what its sensor is off; derivatives, noise and
-statistics follow from it. Angles on the sphere are compared by what is off across the direction that was measured. A
-parameter has its value in the file and the tolerance there.
+A row predicts the samples of its kind from the motion and from what its sensor is off; derivatives,
+noise and statistics follow from it. Angles on the sphere are compared by what is off across the
+direction that was measured. A parameter has its value in the file and the tolerance there.
 """
 
 from __future__ import annotations
@@ -37,7 +38,10 @@ DIRECTION = ("crossing_x", "crossing_y", "crossing_z")
 ACCELERATION, SUN_ASPECT, CROSSING = "acceleration", "sun_aspect", "crossing"
 SUN_PULSE = "sun_pulse"
 
-BODY, SPACE = "body", "space"  # a signal shows the nutation at its rate in the body, or at that of the axis about H
+BODY, SPACE = (
+    "body",
+    "space",
+)  # a signal shows the nutation at its rate in the body, or at that of the axis about H
 
 APART = math.sin(math.radians(1.0))  # sine of the angle from which on two directions are two
 STEPS = 4000  # values of a signal from which its steps are found, at most
@@ -46,12 +50,14 @@ MULTIPLES = 0.9  # share of their differences that are multiples of a step
 
 @dataclass(frozen=True, eq=False)
 class Record:
-    """Telemetry: ``signals`` by name, (n,) each, at rising ``times`` (n,) s from t = 0; NaN where there is no sample.
+    """Telemetry: ``signals`` by name, (n,) each, at rising ``times`` (n,) s from t = 0; NaN where
+    there is no sample.
 
-    Body rates (rad/s) are in the axes of the file, ``axis_x`` to ``axis_z`` the inertial unit vector along the spin
-    axis, ``q_w`` to ``q_z`` the attitude of the axes of the file, ``acceleration`` is m/s². ``crossing_1`` to ``_3``
-    are the unit vector in the body to what is in the inertial direction ``crossing_x`` to ``_z``; ``sun_aspect`` (rad)
-    is the angle of the Sun from body axis 3. Times of ``sun_pulses`` (k,) s are known to within ``sun_step`` s (full
+    Body rates (rad/s) are in the axes of the file, ``axis_x`` to ``axis_z`` the inertial unit
+    vector along the spin axis, ``q_w`` to ``q_z`` the attitude of the axes of the file,
+    ``acceleration`` is m/s². ``crossing_1`` to ``_3`` are the unit vector in the body to what is in
+    the inertial direction ``crossing_x`` to ``_z``; ``sun_aspect`` (rad) is the angle of the Sun
+    from body axis 3. Times of ``sun_pulses`` (k,) s are known to within ``sun_step`` s (full
     width). ``schedule`` was fired meanwhile.
     """
 
@@ -85,7 +91,11 @@ class Record:
     @property
     def fired(self) -> tuple[Pulse, ...]:
         """The pulses of the schedule whose thrust falls in the record, wholly or in part."""
-        return tuple(pulse for pulse in self.schedule if pulse.over > self.start and pulse.thrust[0] < self.end)
+        return tuple(
+            pulse
+            for pulse in self.schedule
+            if pulse.over > self.start and pulse.thrust[0] < self.end
+        )
 
     def has(self, *names: str) -> bool:
         """True where all of these signals are there."""
@@ -116,25 +126,35 @@ class Record:
 
 
 def of_quaternions(quaternions: Vector, spacecraft: Spacecraft) -> dict[str, Vector]:
-    """Signals of measured attitudes (n, 4), NaN where there are none: spin axis and turn, which differ in noise."""
+    """Signals of measured attitudes (n, 4), NaN where there are none: spin axis and turn, which
+    differ in noise.
+    """
     up = spacecraft.sense * spacecraft.inertia.axes[:, 2]
     axis = attitude.rotate(quaternions, up)
     return dict(zip((*AXIS, *QUATERNION), np.column_stack([axis, quaternions]).T, strict=True))
 
 
 def quantisation(values: Vector) -> float:
-    """Step of which the differences of the values (n,) are multiples, but for some; 0 where there is none."""
+    """Step of which the differences of the values (n,) are multiples, but for some; 0 where there
+    is none.
+    """
     distinct = np.unique(values[np.isfinite(values)][:STEPS])
     gaps = np.diff(distinct)
     gaps = gaps[gaps > 1e-9 * np.abs(distinct).max(initial=0.0)]
     if not len(gaps):
         return 0.0
     multiples = gaps / gaps.min()
-    return float(gaps.min()) if np.mean(np.abs(multiples - np.rint(multiples)) < 1e-2) > MULTIPLES else 0.0
+    return (
+        float(gaps.min())
+        if np.mean(np.abs(multiples - np.rint(multiples)) < 1e-2) > MULTIPLES
+        else 0.0
+    )
 
 
 class Sighting(NamedTuple):
-    """The motion at the samples (n, k) of one signal, in the axes of the file: rates (n, 3), quaternion (n, 4)."""
+    """The motion at the samples (n, k) of one signal, in the axes of the file: rates (n, 3),
+    quaternion (n, 4).
+    """
 
     spacecraft: Spacecraft
     values: Values
@@ -150,8 +170,12 @@ class Sighting(NamedTuple):
 
     @property
     def principal(self) -> Vector:
-        """Attitude (n, 4) of the principal axes of the file, tilted as attitude sensors see them."""
-        return attitude.multiply(self.quaternion, attitude.multiply(self.axes, tilted(self.values, "wobble")))
+        """Attitude (n, 4) of the principal axes of the file,
+        tilted as attitude sensors see them.
+        """
+        return attitude.multiply(
+            self.quaternion, attitude.multiply(self.axes, tilted(self.values, "wobble"))
+        )
 
     def in_body(self, direction: Vector) -> Vector:
         """Inertial directions in the axes of the file, tilted so too, (n, 3)."""
@@ -161,7 +185,9 @@ class Sighting(NamedTuple):
 
 @dataclass(frozen=True)
 class SignalKind:
-    """Measurement model: ``predicted`` samples of the signals ``columns`` of a record, in ``unit``."""
+    """Measurement model: ``predicted`` samples of the signals ``columns`` of a record,
+    in ``unit``.
+    """
 
     name: str
     columns: tuple[str, ...]
@@ -184,7 +210,9 @@ class SignalKind:
 
 
 def _gyro(index: int, seen: Sighting) -> Vector:
-    """Rate about one axis of gyros that are turned by a rotation vector across axis 3: ω seen in their axes."""
+    """Rate about one axis of gyros that are turned by a rotation vector across axis 3: ω seen in
+    their axes.
+    """
     along = attitude.rotate(tilted(seen.values, "misalignment"), np.eye(3)[index])
     return np.asarray(seen.rates @ along + seen.values.get(f"bias_{GYROS[index]}", 0.0))
 
@@ -192,13 +220,15 @@ def _gyro(index: int, seen: Sighting) -> Vector:
 def _felt(seen: Sighting) -> Vector:
     """Acceleration at the accelerometer, m/s².
 
-    Dissipation counts as the torque that changes H in the body alike: of a body whose axis e turns at κ cos θ (t × e)
-    besides, t along H, dH/dt = κ cos θ (cos θ H - |H| e).
+    Dissipation counts as the torque that changes H in the body alike: of a body whose axis e turns
+    at κ cos θ (t × e) besides, t along H, dH/dt = κ cos θ (cos θ H - |H| e).
     """
-    spacecraft, moments = seen.spacecraft, np.array(seen.moments)
+    spacecraft = seen.spacecraft
+    moments = np.array(seen.moments)
     assert spacecraft.loop is not None
     rates = seen.rates @ spacecraft.inertia.axes
-    momentum, growth = moments * rates, seen.values.get("growth", spacecraft.growth)
+    momentum = moments * rates
+    growth = seen.values.get("growth", spacecraft.growth)
     size = np.linalg.norm(momentum, axis=1, keepdims=True)
     cosine = momentum[:, 2:] / size
     sinking = growth * cosine * (cosine * momentum - size * np.array([0.0, 0.0, 1.0]))
@@ -238,17 +268,24 @@ def _sun_late(seen: Sighting) -> Vector:
     assert body.sun is not None
     of_body = attitude.multiply(seen.quaternion, seen.axes)
     sun = np.broadcast_to(body.sun[:, None], (3, len(seen.rates)))
-    ahead, rate = sky.ahead((seen.rates @ body.inertia.axes).T, of_body.T, sun, sensor.azimuth, body.sense)
+    ahead, rate = sky.ahead(
+        (seen.rates @ body.inertia.axes).T, of_body.T, sun, sensor.azimuth, body.sense
+    )
     return np.asarray(wrapped(ahead) / np.where(rate > 0.0, rate, abs(body.spin)))
 
 
 def _off(measured: Vector, there: Vector) -> Vector:
-    """Components (2n,) of unit vectors across measured ones, (n, 3) each; of opposite ones they add up to 2."""
+    """Components (2n,) of unit vectors across measured ones, (n, 3) each; of opposite ones they add
+    up to 2.
+    """
     first = np.cross(measured, np.eye(3)[np.argmin(np.abs(measured), axis=1)])
     first /= np.linalg.norm(first, axis=1, keepdims=True)
-    off = np.array([np.sum(across * there, axis=1) for across in (first, np.cross(measured, first))])
+    off = np.array(
+        [np.sum(across * there, axis=1) for across in (first, np.cross(measured, first))]
+    )
     # Beyond 90 deg what is across falls again, and would be nothing for the opposite direction.
-    sizes, behind = np.hypot(*off), np.sum(measured * there, axis=1) < 0.0
+    sizes = np.hypot(*off)
+    behind = np.sum(measured * there, axis=1) < 0.0
     return np.concatenate(off * np.where(behind, 2.0 / np.maximum(sizes, TINY) - 1.0, 1.0))
 
 
@@ -265,7 +302,9 @@ def turned(angles: Vector) -> Vector:
 
 
 def tilted(values: Values, kind: str) -> Vector:
-    """Quaternion of the turn by the rotation vector across axis 3 that two parameters of a kind make."""
+    """Quaternion of the turn by the rotation vector across axis 3 that two parameters of a kind
+    make.
+    """
     return turned(np.array([values.get(f"{kind}_1", 0.0), values.get(f"{kind}_2", 0.0), 0.0]))
 
 
@@ -274,23 +313,64 @@ KINDS = (
     SignalKind(GYROS[1], GYROS[1:2], "rad/s", partial(_gyro, 1), BODY, turn=True),
     SignalKind(GYROS[2], GYROS[2:], "rad/s", partial(_gyro, 2), spin=True),
     SignalKind(ACCELERATION, (ACCELERATION,), "m/s²", _felt, BODY, turn=True),
-    SignalKind("axis", AXIS, "rad", _axis_off, SPACE, parts=2, off=True, attitude=True, wobble=True, spread=1e-3),
-    SignalKind("turn", QUATERNION, "rad", _turn_off, off=True, turn=True, spin=True, attitude=True, wobble=True,
-               spread=1e-3),
-    SignalKind(CROSSING, (*SEEN, *DIRECTION), "rad", _crossing_off, SPACE, parts=2, off=True, turn=True, spin=True,
-               attitude=True, wobble=True, spread=1e-3),
+    SignalKind(
+        "axis",
+        AXIS,
+        "rad",
+        _axis_off,
+        SPACE,
+        parts=2,
+        off=True,
+        attitude=True,
+        wobble=True,
+        spread=1e-3,
+    ),
+    SignalKind(
+        "turn",
+        QUATERNION,
+        "rad",
+        _turn_off,
+        off=True,
+        turn=True,
+        spin=True,
+        attitude=True,
+        wobble=True,
+        spread=1e-3,
+    ),
+    SignalKind(
+        CROSSING,
+        (*SEEN, *DIRECTION),
+        "rad",
+        _crossing_off,
+        SPACE,
+        parts=2,
+        off=True,
+        turn=True,
+        spin=True,
+        attitude=True,
+        wobble=True,
+        spread=1e-3,
+    ),
     SignalKind(SUN_ASPECT, (SUN_ASPECT,), "rad", _sun_aspect, SPACE, attitude=True, wobble=True),
-    SignalKind(SUN_PULSE, (), "s", _sun_late, off=True, turn=True, spin=True, attitude=True, spread=0.01),
-)  # fmt: skip
+    SignalKind(
+        SUN_PULSE, (), "s", _sun_late, off=True, turn=True, spin=True, attitude=True, spread=0.01
+    ),
+)
 """Measurement models, in the order of a fit."""
 
 KIND = {kind.name: kind for kind in KINDS}  # measurement models by name
 
 
 RATIO = "C/A"  # name of the parameter that a coast fixes
-BIAS = math.radians(0.02)  # one sigma of the bias of a gyro, rad/s, where the file has no dispersions.sensor_bias
-TILT = math.radians(1.0)  # one sigma of each tilt of gyros and attitude sensors from the principal axes, rad
-THRUST = 0.5  # standard deviation of a thrust factor in a fit at least: a valve that stays shut must not pass for noise
+BIAS = math.radians(
+    0.02
+)  # one sigma of the bias of a gyro, rad/s, where the file has no dispersions.sensor_bias
+TILT = math.radians(
+    1.0
+)  # one sigma of each tilt of gyros and attitude sensors from the principal axes, rad
+# standard deviation of a thrust factor in a fit at least: a valve that stays shut must not pass for
+# noise
+THRUST = 0.5
 DELAY = 0.05  # standard deviation of what a channel's thrust is late, s
 TINY = 1e-7  # step of derivatives, rad, or as a share of a value
 
@@ -312,10 +392,12 @@ def _pair(name: str, sigma: float) -> Iterator[Parameter]:
 
 
 def moments(spacecraft: Spacecraft) -> Iterator[Parameter]:
-    """A and the ratio C/A, as far as the file lets them differ from its values; the ratio in any case.
+    """A and the ratio C/A, as far as the file lets them differ from its values; the ratio in any
+    case.
 
-    Its prior is that of A and C together; with A they are correlated, see `prior`. What has no tolerance is fixed: A
-    where neither has one. The ratio and not C, because what telemetry fixes best is then linear in the parameters.
+    Its prior is that of A and C together; with A they are correlated, see `prior`. What has no
+    tolerance is fixed: A where neither has one. The ratio and not C, because what telemetry fixes
+    best is then linear in the parameters.
     """
     (A, of_A), (C, of_C), together = _of_moments(spacecraft)
     ratio = C / A
@@ -329,7 +411,8 @@ def moments(spacecraft: Spacecraft) -> Iterator[Parameter]:
 def in_moments(spacecraft: Spacecraft, values: Mapping[str, float]) -> tuple[float, float]:
     """A and C (kg m²) of the ``values`` of parameters."""
     (A, of_A), (C, of_C), _ = _of_moments(spacecraft)
-    # Of a body with a wheel it is A that C/A changes where neither has a tolerance: despun, C does not matter.
+    # Of a body with a wheel it is A that C/A changes where neither has a tolerance: despun, C does
+    # not matter.
     if of_C == 0.0 and (of_A > 0.0 or spacecraft.inertia.wheel != 0.0):
         return C / values[RATIO], C
     A = values.get("A", A)
@@ -337,7 +420,9 @@ def in_moments(spacecraft: Spacecraft, values: Mapping[str, float]) -> tuple[flo
 
 
 def prior(spacecraft: Spacecraft, chosen: Sequence[Parameter]) -> tuple[Matrix, Vector]:
-    """Rows (k, p) of what the file says of the parameters, over its sigmas, and their values (k,)."""
+    """Rows (k, p) of what the file says of the parameters, over its sigmas,
+    and their values (k,).
+    """
     rows, values = [], []
     names = [parameter.name for parameter in chosen]
     for index, parameter in enumerate(chosen):
@@ -348,7 +433,10 @@ def prior(spacecraft: Spacecraft, chosen: Sequence[Parameter]) -> tuple[Matrix, 
             # What of C = A·(C/A), to first order, A does not tell.
             (A, of_A), (C, of_C), both = _of_moments(spacecraft)
             left = of_C * math.sqrt(1.0 - both * both)
-            row[index], row[names.index("A")] = A / left, (parameter.file - both * of_C / of_A) / left
+            row[index], row[names.index("A")] = (
+                A / left,
+                (parameter.file - both * of_C / of_A) / left,
+            )
             value = (2.0 * C - both * of_C / of_A * A) / left
         if row.any():
             rows.append(row)
@@ -361,34 +449,49 @@ EXACT = Dispersions()  # the dispersions of a file that has none
 
 def _of_moments(spacecraft: Spacecraft) -> tuple[tuple[float, float], tuple[float, float], float]:
     """Means and standard deviations of A and C by the file, kg m², and their correlation."""
-    given, inertia = spacecraft.dispersions or EXACT, spacecraft.inertia
-    together = (value for first, second, value in given.correlation if {first, second} == {"A", "C"})
+    given = spacecraft.dispersions or EXACT
+    inertia = spacecraft.inertia
+    together = (
+        value for first, second, value in given.correlation if {first, second} == {"A", "C"}
+    )
     return prior_of(given.A, inertia.A), prior_of(given.C, inertia.C), next(together, 0.0)
 
 
-def parameters(spacecraft: Spacecraft, record: Record, *, unequal: bool, growing: bool) -> Iterator[Parameter]:
-    """The parameters of a record, motion at its start first; ``unequal``: I1 ≠ I2, ``growing``: with dissipation."""
-    given, spin, step = spacecraft.dispersions or EXACT, float(spacecraft.omega0[2]), TINY * spacecraft.fastest
+def parameters(
+    spacecraft: Spacecraft, record: Record, *, unequal: bool, growing: bool
+) -> Iterator[Parameter]:
+    """The parameters of a record, motion at its start first; ``unequal``: I1 ≠ I2, ``growing``:
+    with dissipation.
+    """
+    given = spacecraft.dispersions or EXACT
+    spin = float(spacecraft.omega0[2])
+    step = TINY * spacecraft.fastest
     yield from moments(spacecraft)
     if given.wheel_momentum is not None and spacecraft.inertia.wheel != 0.0:
         wheel, sigma = prior_of(given.wheel_momentum, spacecraft.inertia.wheel)
         yield Parameter("wheel", "N m s", wheel, sigma, TINY * abs(wheel))
     for number in (1, 2):
-        yield Parameter(f"omega_{number}", "rad/s", float(spacecraft.omega0[number - 1]), math.inf, step)
+        yield Parameter(
+            f"omega_{number}", "rad/s", float(spacecraft.omega0[number - 1]), math.inf, step
+        )
     if record.shows_spin:
         yield Parameter("omega_3", "rad/s", spin, math.inf, step)
     elif given.omega0[2] is not None:
         mean, sigma = prior_of(given.omega0[2], spin)
         yield Parameter("omega_3", "rad/s", mean, sigma, step)
     if growing and (spacecraft.inertia.a != 0.0 or spacecraft.inertia.wheel != 0.0):
-        yield Parameter("growth", "1/s", spacecraft.growth, math.inf, 1e-5 / max(record.length, 1e-3))
+        yield Parameter(
+            "growth", "1/s", spacecraft.growth, math.inf, 1e-5 / max(record.length, 1e-3)
+        )
     if any(kind.attitude for kind in record.kinds):
         yield from _attitude(spacecraft, record)
     yield from _gyros(spacecraft, record)
     if any(kind.wobble for kind in record.kinds):
         yield from _pair("wobble", TILT)
     if record.has(ACCELERATION):
-        yield Parameter("bias_acceleration", KIND[ACCELERATION].unit, 0.0, math.inf, 1e-6 * spin * spin)
+        yield Parameter(
+            "bias_acceleration", KIND[ACCELERATION].unit, 0.0, math.inf, 1e-6 * spin * spin
+        )
     if unequal:
         first, second, _ = spacecraft.inertia.moments
         yield Parameter("unequal_1", "", (first - second) / (first + second), math.inf, 1e-6)
@@ -400,8 +503,11 @@ def parameters(spacecraft: Spacecraft, record: Record, *, unequal: bool, growing
 
 
 def _attitude(spacecraft: Spacecraft, record: Record) -> Iterator[Parameter]:
-    """Turns of the attitude at the start about body axes; the last shows only beside what turns with the body."""
-    # A record of the axis tells the attitude, or of two directions: of one it may be turned about it.
+    """Turns of the attitude at the start about body axes; the last shows only beside what turns
+    with the body.
+    """
+    # A record of the axis tells the attitude, or of two directions: of one it may be turned about
+    # it.
     ways = record.samples(DIRECTION)[1]
     if record.has(SUN_ASPECT) and spacecraft.sun is not None:
         ways = np.vstack([ways, spacecraft.sun])
@@ -409,9 +515,14 @@ def _attitude(spacecraft: Spacecraft, record: Record) -> Iterator[Parameter]:
     sigma = math.inf
     if not (apart or record.has("axis_x")):
         sigma = prior_of((spacecraft.dispersions or EXACT).attitude, 0.0)[1]
-        # The file has the attitude at t = 0: where on its cone the axis is as the record begins is less sure.
+        # The file has the attitude at t = 0: where on its cone the axis is as the record begins is
+        # less sure.
         turn = min(2.0 * math.pi / spacecraft.inertial_period * abs(record.start), math.pi)
-        sigma = math.hypot(sigma, 2.0 * math.sin(0.5 * turn) * spacecraft.nutation) if sigma > 0.0 else 0.0
+        sigma = (
+            math.hypot(sigma, 2.0 * math.sin(0.5 * turn) * spacecraft.nutation)
+            if sigma > 0.0
+            else 0.0
+        )
     if sigma > 0.0:
         yield from _pair("attitude", sigma)
     if record.shows_turn:
@@ -421,9 +532,12 @@ def _attitude(spacecraft: Spacecraft, record: Record) -> Iterator[Parameter]:
 def _gyros(spacecraft: Spacecraft, record: Record) -> Iterator[Parameter]:
     """Biases; misalignment only beside gyro 3, for else it looks like a bias of gyros 1 and 2."""
     loop, given = spacecraft.loop, (spacecraft.dispersions or EXACT).sensor_bias
-    mean, sigma = 0.0, BIAS
+    mean = 0.0
+    sigma = BIAS
     if loop is not None and loop.sensor.kind == GYRO:
-        mean, sigma = (loop.sensor.bias, BIAS) if given is None else prior_of(given, loop.sensor.bias)
+        mean, sigma = (
+            (loop.sensor.bias, BIAS) if given is None else prior_of(given, loop.sensor.bias)
+        )
     aligned = record.has(GYROS[2])
     for name in GYROS:
         if record.has(name):
@@ -435,7 +549,9 @@ def _gyros(spacecraft: Spacecraft, record: Record) -> Iterator[Parameter]:
 
 
 def thrust_prior(spacecraft: Spacecraft, name: str) -> tuple[float, float]:
-    """Thrust factor of a channel by the file, and its standard deviation; that is infinite without a tolerance."""
+    """Thrust factor of a channel by the file, and its standard deviation; that is infinite without
+    a tolerance.
+    """
     given = (spacecraft.dispersions or EXACT).thrust
     channel = next((channel for channel in spacecraft.channels if channel.name == name), None)
     if channel is None:

@@ -1,6 +1,8 @@
-"""Estimates of a fit with their standard deviations, the spacecraft at an epoch, and checks of consistency.
+"""Estimates of a fit with their standard deviations, the spacecraft at an epoch, and checks of
+consistency.
 
-The checks name what makes a fit doubtful though its sigmas are small. `Fitted` is the result in the library.
+The checks name what makes a fit doubtful though its sigmas are small. `Fitted` is the result in the
+library.
 """
 
 from __future__ import annotations
@@ -46,17 +48,24 @@ WHEEL = "wheel momentum"  # input of a wheel that is estimated
 
 DEG = math.pi / 180.0
 
-UNTOLD, SHARED, TOLD = "file", "both", "data"  # sources of an estimate: the file's tolerances, both, or the data
+UNTOLD, SHARED, TOLD = (
+    "file",
+    "both",
+    "data",
+)  # sources of an estimate: the file's tolerances, both, or the data
 
 FROM_DATA = 0.5  # share of its prior that a sigma is below where the data tell a value
 CORRELATED = 1e-3  # correlations below are left out of files
 DIGITS = 9  # decimals of correlations in files
-LEAST_THRUST = 0.05  # thrust factor down to which a channel did not fire: it is not calibrated by that
+LEAST_THRUST = (
+    0.05  # thrust factor down to which a channel did not fire: it is not calibrated by that
+)
 WORTH_NAMING = 0.9  # correlation from which on it is named
 
 
 class Estimate(NamedTuple):
-    """A ``value`` with its ``sigma`` (infinite where the data do not tell it), shown times ``factor`` in ``unit``.
+    """A ``value`` with its ``sigma`` (infinite where the data do not tell it), shown times
+    ``factor`` in ``unit``.
 
     ``file`` and its sigma ``prior`` are None where the file says nothing.
     """
@@ -83,14 +92,18 @@ class Estimate(NamedTuple):
     @property
     def change(self) -> float | None:
         """Difference of the value from that of the file, in the file's sigmas."""
-        return None if self.file is None or not self.prior else (self.value - self.file) / self.prior
+        return (
+            None if self.file is None or not self.prior else (self.value - self.file) / self.prior
+        )
 
 
 @dataclass(frozen=True, eq=False)
 class Carried:
-    """The spacecraft at ``time`` s: ``values`` (k,) and ``covariance`` (k, k) of the inputs ``names`` of dispersions.
+    """The spacecraft at ``time`` s: ``values`` (k,) and ``covariance`` (k, k) of the inputs
+    ``names`` of dispersions.
 
-    They are A, C (kg m²), omega0_1 … omega0_3 (rad/s, axes of the file) and ``thrust`` of thrusters (factors).
+    They are A, C (kg m²), omega0_1 … omega0_3 (rad/s, axes of the file) and ``thrust`` of thrusters
+    (factors).
     """
 
     time: float
@@ -99,7 +112,9 @@ class Carried:
     covariance: Matrix
     body: Body
     state: SpinState  # in its own principal axes
-    tilt: float | None  # one sigma of the axis about each of two axes across it, rad; None if not estimated
+    tilt: (
+        float | None
+    )  # one sigma of the axis about each of two axes across it, rad; None if not estimated
 
     @property
     def sigmas(self) -> Vector:
@@ -111,13 +126,17 @@ class Carried:
         """Thrust factors and their sigmas by thruster."""
         rows = zip(self.names, self.values.tolist(), self.sigmas.tolist(), strict=True)
         return {
-            name.removeprefix("thrust "): (value, sigma) for name, value, sigma in rows if name.startswith("thrust ")
+            name.removeprefix("thrust "): (value, sigma)
+            for name, value, sigma in rows
+            if name.startswith("thrust ")
         }
 
     @property
     def quaternion(self) -> Vector:
         """Attitude of the file's axes, (4,), scalar first."""
-        return attitude.multiply(self.state.quaternion, attitude.from_matrix(self.body.inertia.axes.T))
+        return attitude.multiply(
+            self.state.quaternion, attitude.from_matrix(self.body.inertia.axes.T)
+        )
 
     @property
     def correlation(self) -> Matrix:
@@ -138,17 +157,27 @@ def carried(fitted: Fit, time: float) -> Carried:
             value, sigma = _at(fitted, parameter.name)
             # It fired, and the data tell its thrust better than the file.
             if value > LEAST_THRUST and sigma < thrust_prior(model.spacecraft, name)[1]:
-                factors |= {f"thrust {member.name}": parameter.name for member in channels[name].thrusters}
+                factors |= {
+                    f"thrust {member.name}": parameter.name for member in channels[name].thrusters
+                }
     more = ({WHEEL: "wheel"} if fitted.index("wheel") is not None else {}) | factors
     names = ("A", "C", "omega0_1", "omega0_2", "omega0_3", *more)
 
     def inputs(values: Values) -> Vector:
         body, state = model.at(values, time)
         rates = body.inertia.axes @ state.rates
-        return np.array([*in_moments(model.spacecraft, values), *rates, *(values[name] for name in more.values())])
+        return np.array(
+            [
+                *in_moments(model.spacecraft, values),
+                *rates,
+                *(values[name] for name in more.values()),
+            ]
+        )
 
     def axis(values: Values) -> Vector:
-        return attitude.rotate(model.at(values, time)[1].quaternion, np.array([0.0, 0.0, model.spacecraft.sense]))
+        return attitude.rotate(
+            model.at(values, time)[1].quaternion, np.array([0.0, 0.0, model.spacecraft.sense])
+        )
 
     tilt = None
     if fitted.index("attitude_1") is not None:
@@ -164,49 +193,72 @@ def moving(fitted: Fit, time: float) -> tuple[Body, SpinState]:
         # Rates say nothing of where the body points: at t = 0 it is as the file has it.
         first, at_first = model.at(fitted.named, 0.0)
         spacecraft = model.spacecraft
-        of_file = attitude.multiply(spacecraft.initial.quaternion, attitude.from_matrix(spacecraft.inertia.axes.T))
-        back = attitude.conjugate(attitude.multiply(at_first.quaternion, attitude.from_matrix(first.inertia.axes.T)))
-        state = replace(state, quaternion=attitude.multiply(attitude.multiply(of_file, back), state.quaternion))
+        of_file = attitude.multiply(
+            spacecraft.initial.quaternion, attitude.from_matrix(spacecraft.inertia.axes.T)
+        )
+        back = attitude.conjugate(
+            attitude.multiply(at_first.quaternion, attitude.from_matrix(first.inertia.axes.T))
+        )
+        state = replace(
+            state, quaternion=attitude.multiply(attitude.multiply(of_file, back), state.quaternion)
+        )
     return body, state
 
 
 def replaced(spacecraft: Spacecraft, known: Carried) -> Spacecraft:
-    """The ``spacecraft`` of the file with moments, motion and attitude of the estimate, and nothing else of it."""
+    """The ``spacecraft`` of the file with moments, motion and attitude of the estimate, and nothing
+    else of it.
+    """
     return replace(
         spacecraft,
         inertia=known.body.inertia,
         omega0=known.state.rates,
-        attitude=None if spacecraft.attitude is None else replace(spacecraft.attitude, quaternion=known.quaternion),
+        attitude=None
+        if spacecraft.attitude is None
+        else replace(spacecraft.attitude, quaternion=known.quaternion),
     )
 
 
 def correlations(known: Carried, given: Dispersions | None) -> tuple[tuple[str, str, float], ...]:
-    """Correlations by pairs of inputs, rounded as in files, positive definite; those ``given`` of others stay."""
+    """Correlations by pairs of inputs, rounded as in files, positive definite; those ``given`` of
+    others stay.
+    """
     matrix = known.correlation
     there = [index for index, sigma in enumerate(known.sigmas) if sigma > 0.0]
-    rounded = np.round(np.where(np.abs(matrix) < CORRELATED, 0.0, matrix), DIGITS)[np.ix_(there, there)]
+    rounded = np.round(np.where(np.abs(matrix) < CORRELATED, 0.0, matrix), DIGITS)[
+        np.ix_(there, there)
+    ]
     apart = rounded - np.diag(np.diag(rounded))
     possible = np.eye(len(there))
     for shrunk in (0.0, *(10.0**power for power in range(-DIGITS, 0))):
-        # What is rounded may be impossible by a hair: then all correlations are taken a hair smaller.
+        # What is rounded may be impossible by a hair: then all correlations are taken a hair
+        # smaller.
         possible = np.eye(len(there)) + np.round(apart * (1.0 - shrunk), DIGITS)
         if np.linalg.eigvalsh(possible)[0] > 0.5 * 10.0**-DIGITS:
             break
     names = [known.names[index] for index in there]
-    pairs = [(names[i], names[j], float(possible[i, j])) for i in range(len(names)) for j in range(i + 1, len(names))]
+    pairs = [
+        (names[i], names[j], float(possible[i, j]))
+        for i in range(len(names))
+        for j in range(i + 1, len(names))
+    ]
     others = () if given is None else given.correlation
     kept = [pair for pair in others if pair[0] not in known.names and pair[1] not in known.names]
     return (*(pair for pair in pairs if pair[2] != 0.0), *kept)
 
 
 def _told(fitted: Fit, function: Callable[[Values], Vector]) -> tuple[Vector, Matrix]:
-    """Values (k,) that a function makes of body and motion, and their covariance (k, k), by central differences."""
+    """Values (k,) that a function makes of body and motion, and their covariance (k, k), by central
+    differences.
+    """
     columns: list[Vector] = []
     for name, _, _, _, size in fitted.model.parameters:
         if name.startswith(OF_SENSORS):
             columns.append(np.zeros_like(columns[0]))  # the motion comes first of the parameters
             continue
-        above, below = (function(fitted.named | {name: fitted.named[name] + way}) for way in (size, -size))
+        above, below = (
+            function(fitted.named | {name: fitted.named[name] + way}) for way in (size, -size)
+        )
         columns.append((above - below) / (2.0 * size))
     slopes = np.column_stack(columns)
     return function(fitted.named), np.asarray(slopes @ fitted.covariance @ slopes.T)
@@ -249,7 +301,9 @@ def _of_motion(fitted: Fit, time: float) -> Iterator[Estimate]:
         ("omega", "transverse rate |ω|", "deg/s", abs(omega), None),
         ("phase", "phase arg(ω1 + iω2)", "deg", phase, None),
     )
-    for (key, label, unit, known, prior), (value, sigma) in zip(rows, _each(fitted, motion), strict=True):
+    for (key, label, unit, known, prior), (value, sigma) in zip(
+        rows, _each(fitted, motion), strict=True
+    ):
         shown = sigma if key != "phase" or model.record.shows_turn else math.inf
         if key != "phase" or not fitted.constant:  # without nutation there is none
             yield Estimate(key, label, unit, 1.0 / DEG, value, shown, known, prior)
@@ -281,17 +335,33 @@ def _of_body(fitted: Fit) -> Iterator[Estimate]:
         ("A", "A", "kg m²", inertia.A, of_A),
         ("C", "C", "kg m²", inertia.C, of_C),
     )
-    for (key, label, unit, file, prior), (value, sigma) in zip(rows, _each(fitted, body), strict=True):
+    for (key, label, unit, file, prior), (value, sigma) in zip(
+        rows, _each(fitted, body), strict=True
+    ):
         if sigma > 0.0:
             yield Estimate(key, label, unit, 1.0, value, sigma, file, prior)
     if fitted.model.record.shows_turn and not fitted.model.record.shows_spin:
         # Told much better than C/A and ω3, where the file alone tells ω3.
         file = inertia.nutation_rate(spacecraft.spin)
-        yield Estimate("rate", "nutation rate in the body", "deg/s", 1.0 / DEG, *_each(fitted, rate)[0], file, None)
+        yield Estimate(
+            "rate",
+            "nutation rate in the body",
+            "deg/s",
+            1.0 / DEG,
+            *_each(fitted, rate)[0],
+            file,
+            None,
+        )
     if fitted.index("wheel") is not None:
         known = prior_of(given.wheel_momentum, inertia.wheel)[1]
-        yield Estimate("wheel", "wheel momentum h", "N m s", 1.0, *_at(fitted, "wheel"), inertia.wheel, known)
-    others = (("growth", "growth 1/τ", "1/s"), ("unequal_1", "(I1 - I2)/(I1 + I2)", ""), ("unequal_2", "I12/A", ""))
+        yield Estimate(
+            "wheel", "wheel momentum h", "N m s", 1.0, *_at(fitted, "wheel"), inertia.wheel, known
+        )
+    others = (
+        ("growth", "growth 1/τ", "1/s"),
+        ("unequal_1", "(I1 - I2)/(I1 + I2)", ""),
+        ("unequal_2", "I12/A", ""),
+    )
     for key, label, unit in others:
         if (parameter := fitted.model.parameter(key)) is not None:
             yield Estimate(key, label, unit, 1.0, *_at(fitted, key), parameter.file, None)
@@ -317,9 +387,13 @@ def _of_others(fitted: Fit) -> Iterator[Estimate]:
         if which == "acceleration":
             unit, factor = "m/s²", 1.0
         value, sigma = _at(fitted, parameter.name)
-        known = thrust_prior(fitted.model.spacecraft, which)[1] if kind == "thrust" else parameter.prior
+        known = (
+            thrust_prior(fitted.model.spacecraft, which)[1] if kind == "thrust" else parameter.prior
+        )
         prior = known if math.isfinite(known) else None
-        yield Estimate(parameter.name, label.format(which), unit, factor, value, sigma, parameter.file, prior)
+        yield Estimate(
+            parameter.name, label.format(which), unit, factor, value, sigma, parameter.file, prior
+        )
 
 
 def _at(fitted: Fit, name: str) -> tuple[float, float]:
@@ -329,24 +403,36 @@ def _at(fitted: Fit, name: str) -> tuple[float, float]:
 
 
 def correlated(fitted: Fit) -> tuple[tuple[str, str, float], ...]:
-    """Pairs of parameters that are known together much better than apart, and their correlations."""
+    """Pairs of parameters that are known together much better than apart,
+    and their correlations.
+    """
     scale = np.where(fitted.sigmas > 0.0, fitted.sigmas, 1.0)
     matrix = fitted.covariance / np.outer(scale, scale)
     names = [parameter.name for parameter in fitted.model.parameters]
     pairs = [(names[i], names[j], float(matrix[i, j])) for i in range(len(names)) for j in range(i)]
-    return tuple(sorted((pair for pair in pairs if abs(pair[2]) > WORTH_NAMING), key=lambda pair: -abs(pair[2])))
+    return tuple(
+        sorted(
+            (pair for pair in pairs if abs(pair[2]) > WORTH_NAMING), key=lambda pair: -abs(pair[2])
+        )
+    )
 
 
-FAR, REFUSED = 3.0, 5.0  # sigmas of the file by which a constant is off that is said, and that is not accepted
+FAR, REFUSED = (
+    3.0,
+    5.0,
+)  # sigmas of the file by which a constant is off that is said, and that is not accepted
 UNSAID = 0.1  # tolerance of C/A, of unequal moments and of thrust where the file gives none
 OTHER_SPIN = 0.01  # part by which a spin is off that is said
 
 
 def far_from_file(fitted: Fit, least: float = FAR) -> list[tuple[Estimate, float]]:
-    """The constants that are farther off than ``least`` sigmas of the file, with their own, and by how many."""
+    """The constants that are farther off than ``least`` sigmas of the file, with their own, and by
+    how many.
+    """
     far = []
     for row in (*_of_body(fitted), *_of_others(fitted)):
-        file, usual = row.file or 0.0, row.key.startswith((RATIO, "unequal", "thrust"))
+        file = row.file or 0.0
+        usual = row.key.startswith((RATIO, "unequal", "thrust"))
         unsaid = UNSAID * (file if row.key == RATIO else 1.0) if usual else math.inf
         off = (row.value - file) / math.hypot(row.prior or unsaid, row.sigma)
         if row.key != "a" and abs(off) > least:
@@ -356,13 +442,16 @@ def far_from_file(fitted: Fit, least: float = FAR) -> list[tuple[Estimate, float
 
 def spin_off(fitted: Fit) -> tuple[float, float] | None:
     """The spin at the start of the record and that of the file, rad/s, where they differ."""
-    row, file = next(_of_motion(fitted, fitted.model.start)), fitted.model.spacecraft.spin
+    row = next(_of_motion(fitted, fitted.model.start))
+    file = fitted.model.spacecraft.spin
     least = min(FAR * row.prior if row.prior else math.inf, OTHER_SPIN * abs(file) or math.inf)
     return (row.value, file) if abs(row.value - file) > max(least, FAR * row.sigma) else None
 
 
 def refused(fitted: Fit) -> bool:
-    """True where an estimate is not accepted: constants much too far from the file, H turned, or wrong columns."""
+    """True where an estimate is not accepted: constants much too far from the file, H turned, or
+    wrong columns.
+    """
     # A bias belongs to the sensor, and what the file says of it is usual, not of this one.
     far = any(not row.key.startswith("bias") for row, _ in far_from_file(fitted, REFUSED))
     model = fitted.model
@@ -373,15 +462,23 @@ def refused(fitted: Fit) -> bool:
 
 TURNED = {AXIS[1]: "axis_y, or of the right ascension,", AXIS[2]: "axis_z, or of the declination,",
           SEEN[1]: "the azimuth of crossing", SEEN[2]: "the elevation of crossing"}  # fmt: skip
-UNITS = ((180.0 / math.pi, "57.3, rad for deg"), (30.0 / math.pi, "9.55, rad/s for rpm"), (6.0, "6, rpm for deg/s"))
+UNITS = (
+    (180.0 / math.pi, "57.3, rad for deg"),
+    (30.0 / math.pi, "9.55, rad/s for rpm"),
+    (6.0, "6, rpm for deg/s"),
+)
 FASTER = 5.0  # times the file's transverse rate from which on units are doubted
 SAME = 1.3  # times it up to which a motion is the file's
-ALIKE = 2.0  # times the distance of the nearest motion from the file up to which others count as well
-NEAR = 0.35  # part of C/A and of the spin by which the start of a fit may be off the file to be followed
+ALIKE = (
+    2.0  # times the distance of the nearest motion from the file up to which others count as well
+)
+# part of C/A and of the spin by which the start of a fit may be off the file to be followed
+NEAR = 0.35
 
 
 def compared(spacecraft: Spacecraft, record: Record) -> Fit:
-    """The `fit` of a record; where it is far from the file, with what done to its columns would bring it back.
+    """The `fit` of a record; where it is far from the file, with what done to its columns would
+    bring it back.
 
     Raises as `fit` does, with that in its words.
     """
@@ -396,48 +493,71 @@ def compared(spacecraft: Spacecraft, record: Record) -> Fit:
         raise
     if _near(fitted, FASTER):
         return fitted
-    # A nutation that is many times that of the file may be true: only a unit that leads to the file's explains it.
-    return replace(fitted, causes=_causes(spacecraft, record, SAME if _near(fitted, math.inf) else FASTER))
+    # A nutation that is many times that of the file may be true: only a unit that leads to the
+    # file's explains it.
+    return replace(
+        fitted, causes=_causes(spacecraft, record, SAME if _near(fitted, math.inf) else FASTER)
+    )
 
 
 def _near(fitted: Fit, most: float) -> bool:
-    """True where constants and spin are those of the file, and the transverse rate at ``most`` so many times."""
+    """True where constants and spin are those of the file, and the transverse rate at ``most`` so
+    many times.
+    """
     size = math.hypot(fitted.named["omega_1"], fitted.named["omega_2"])
     slow = size < most * float(np.linalg.norm(fitted.model.reference.rates[:2])) or math.isinf(most)
     return slow and not far_from_file(fitted) and spin_off(fitted) is None
 
 
 def _causes(spacecraft: Spacecraft, record: Record, most: float = FASTER) -> tuple[str, ...]:
-    """Mistakes by which a motion and a body near to the file explain a record, the nearest first."""
+    """Mistakes by which a motion and a body near to the file explain a record,
+    the nearest first.
+    """
     explained = []
     of_file = {RATIO: spacecraft.inertia.C / spacecraft.inertia.A, "omega_3": spacecraft.spin}
     with work.budget("causes", 0.5 * work.FIT):
         for words, changes in _mistakes():
             if not record.has(*changes) or work.exhausted():
                 continue
-            changed = {name: factor * record.signals[source] for name, (source, factor) in changes.items()}
+            changed = {
+                name: factor * record.signals[source] for name, (source, factor) in changes.items()
+            }
             mended = replace(record, signals={**record.signals, **changed})
             try:
                 begin = next(initial_guess.starts(Model(spacecraft, mended)))
-                near = all(abs(begin.get(name, file) - file) <= NEAR * abs(file) for name, file in of_file.items())
+                near = all(
+                    abs(begin.get(name, file) - file) <= NEAR * abs(file)
+                    for name, file in of_file.items()
+                )
                 fitted = fit(spacecraft, mended) if near else None
             except (Infeasible, np.linalg.LinAlgError):
                 continue
-            if fitted is not None and fitted.finished and _near(fitted, most) and _shows(fitted, changes):
-                off = fitted.model.reference.rates[:2] - [fitted.named["omega_1"], fitted.named["omega_2"]]
+            if (
+                fitted is not None
+                and fitted.finished
+                and _near(fitted, most)
+                and _shows(fitted, changes)
+            ):
+                off = fitted.model.reference.rates[:2] - [
+                    fitted.named["omega_1"],
+                    fitted.named["omega_2"],
+                ]
                 explained.append((float(np.linalg.norm(off)), words))
     return tuple(words for off, words in sorted(explained) if off < ALIKE * min(explained)[0])
 
 
 def _shows(fitted: Fit, names: Iterable[str]) -> bool:
     """True where motion explains the signals of these names, and not noise."""
-    model, loud = fitted.model, [each for each in (*GYROS[:2], ACCELERATION) if each in names]
+    model = fitted.model
+    loud = [each for each in (*GYROS[:2], ACCELERATION) if each in names]
     rows = ((model.signals.index(each), model.record.signals[each]) for each in loud)
     return all(fitted.noise[at] < 0.5 * np.nanstd(samples) for at, samples in rows)
 
 
 def _mistakes() -> Iterator[tuple[str, Mapping[str, tuple[str, float]]]]:
-    """Mistakes that columns commonly have, in words, and their cures: signals by others, times a factor."""
+    """Mistakes that columns commonly have, in words, and their cures: signals by others, times a
+    factor.
+    """
     for first, second in (*combinations(GYROS, 2), *combinations(AXIS, 2)):
         yield f"{first} and {second} swapped", {first: (second, 1.0), second: (first, 1.0)}
     for name in (*GYROS, ACCELERATION, *AXIS, *SEEN[1:]):
@@ -453,12 +573,16 @@ LATE = 0.1  # delay of a channel up to which it is that of a valve, s
 
 
 def doubts(fitted: Fit) -> Iterator[Note]:
-    """Notes on a fit: what it rests on besides the data, and where record, schedule and file disagree."""
+    """Notes on a fit: what it rests on besides the data, and where record, schedule and file
+    disagree.
+    """
     model = fitted.model
     if not fitted.finished:
         yield note("fit-cut")
     if far := far_from_file(fitted):
-        pairs = ((row, row.factor * row.value, row.factor * (row.file or 0.0), off) for row, off in far)
+        pairs = (
+            (row, row.factor * row.value, row.factor * (row.file or 0.0), off) for row, off in far
+        )
         texts = (
             f"{row.label} {value:.6g} for {f'{file:.6g} {row.unit}'.strip()} ({off:+.1f})"
             for row, value, file, off in pairs
@@ -491,20 +615,27 @@ def doubts(fitted: Fit) -> Iterator[Note]:
 
 def _of_residuals(fitted: Fit) -> Iterator[Note]:
     """Possible cause of residuals that are not white, and the cure."""
-    left = [index for index in range(len(fitted.model.signals)) if fitted.resolved[index] and not fitted.white(index)]
+    left = [
+        index
+        for index in range(len(fitted.model.signals))
+        if fitted.resolved[index] and not fitted.white(index)
+    ]
     if not left:
         return
     signals = ", ".join(fitted.model.signals[index] for index in left)
     if (time := step(fitted, left, small=True)) is not None:
         fired = fitted.model.record.fired
-        yield note("fit-steps-beside-schedule" if fired else "fit-steps", signals=signals, at_s=time)
+        yield note(
+            "fit-steps-beside-schedule" if fired else "fit-steps", signals=signals, at_s=time
+        )
     else:
         yield note("fit-not-white", signals=signals)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Fitted(results.Data, results.Drawn):
-    """Spacecraft estimated from telemetry; ``core`` holds parameters, covariance, noise and residuals.
+    """Spacecraft estimated from telemetry; ``core`` holds parameters, covariance, noise and
+    residuals.
 
     ``warnings`` are those of reading the record.
     """

@@ -1,11 +1,13 @@
-"""Least squares of a record by the parameters of a model: residuals, derivatives, the search, the noise.
+"""Least squares of a record by the parameters of a model: residuals, derivatives, the search, the
+noise.
 
-With noise of one sigma s on each sample, residuals r = measured - predicted, and the tolerances of the file as priors,
+With noise of one sigma s on each sample, residuals r = measured - predicted, and the tolerances of
+the file as priors,
 
     minimise  Σ (r/s)² + Σ ((x - x_file)/prior)²,      P = (Jᵀ S⁻² J + prior⁻²)⁻¹,
 
-J the derivatives of the prediction at the minimum: P is then the Cramér-Rao bound, which least squares attains for
-normal noise as far as the motion is linear over the errors.
+J the derivatives of the prediction at the minimum: P is then the Cramér-Rao bound, which least
+squares attains for normal noise as far as the motion is linear over the errors.
 """
 
 from __future__ import annotations
@@ -29,9 +31,12 @@ from nutdamp.estimation.parameters import KIND, SUN_PULSE, Matrix, Vector, quant
 from nutdamp.spacecraft.model import Spacecraft
 
 NORMAL_MAD = 1.4826  # standard deviation of normal numbers over their median magnitude
-BROKEN = 0.2  # part of the samples of a sensor that are alike, no motion or left out where it is broken
+BROKEN = (
+    0.2  # part of the samples of a sensor that are alike, no motion or left out where it is broken
+)
 ABSURD = 1e3  # times the usual size of a signal from which on a sample is no motion
-ROUNDING = 1e-7  # noise that a signal has at least, as a share of its largest value: no telemetry has more digits
+# noise that a signal has at least, as a share of its largest value: no telemetry has more digits
+ROUNDING = 1e-7
 EVALUATIONS = 60  # trials of one of the last least-squares searches, at most
 TRIAL = 40  # trials of one from a start, at most, which may lead nowhere
 GRADIENT = 1e-8  # slope of a cost that is least
@@ -42,10 +47,12 @@ def least(model: Model) -> Vector:
     """Noise that each signal has at least: that of its steps, and rounding."""
     # A signal of zeros has no digits, but its prediction is rounded, as rates and angles are.
     turned = usual(model.spacecraft, "rad/s") * model.record.length
-    rounding, sigmas = float(np.finfo(float).eps) * (1.0 + turned), []
+    rounding = float(np.finfo(float).eps) * (1.0 + turned)
+    sigmas = []
     for index, name in enumerate(model.signals):
         kind, values = KIND[name], model.measured[model.signal == index]
-        step, size = 0.0, usual(model.spacecraft, kind.unit)
+        step = 0.0
+        size = usual(model.spacecraft, kind.unit)
         largest = size if kind.off else float(np.abs(values).max())
         if name == SUN_PULSE:
             step = model.record.sun_step
@@ -68,7 +75,9 @@ def usual(spacecraft: Spacecraft, unit: str) -> float:
 
 def absurd(spacecraft: Spacecraft, name: str, values: Vector) -> NDArray[np.bool_]:
     """True for samples of a signal that are no motion, however fast; of directions none."""
-    return np.asarray(np.abs(values) > ABSURD * max(usual(spacecraft, KIND[name].unit), 1.0)) & (not KIND[name].off)
+    return np.asarray(np.abs(values) > ABSURD * max(usual(spacecraft, KIND[name].unit), 1.0)) & (
+        not KIND[name].off
+    )
 
 
 def robust(model: Model, left: Vector) -> Vector:
@@ -77,12 +86,17 @@ def robust(model: Model, left: Vector) -> Vector:
     return NORMAL_MAD * np.array(sizes)
 
 
-def plain(model: Model, left: Vector, used: NDArray[np.bool_], leverage: Vector | None = None) -> Vector:
-    """One sigma of each signal by its samples that are no outliers; ``leverage`` is what the fit takes of each.
+def plain(
+    model: Model, left: Vector, used: NDArray[np.bool_], leverage: Vector | None = None
+) -> Vector:
+    """One sigma of each signal by its samples that are no outliers; ``leverage`` is what the fit
+    takes of each.
 
-    Of n samples with leverages that add up to p the variance is Σr²/(n - p - 2), the mean of its posterior.
+    Of n samples with leverages that add up to p the variance is Σr²/(n - p - 2), the mean of its
+    posterior.
     """
-    sigmas, signal = [], model.signal[used]
+    sigmas = []
+    signal = model.signal[used]
     for index in range(len(model.signals)):
         rows = signal == index
         spent = 0.0 if leverage is None else float(leverage[rows].sum()) + 2.0
@@ -93,7 +107,10 @@ def plain(model: Model, left: Vector, used: NDArray[np.bool_], leverage: Vector 
 
 def named_of(model: Model, values: Iterable[float]) -> dict[str, float]:
     """The values (p,) by the names of their parameters."""
-    return {parameter.name: float(value) for parameter, value in zip(model.parameters, values, strict=True)}
+    return {
+        parameter.name: float(value)
+        for parameter, value in zip(model.parameters, values, strict=True)
+    }
 
 
 def residuals(model: Model, values: Vector) -> Vector:
@@ -102,7 +119,9 @@ def residuals(model: Model, values: Vector) -> Vector:
 
 
 def scales_of(model: Model) -> Vector:
-    """Sizes that residuals of each signal are compared with before its noise is known: a tenth of what varies."""
+    """Sizes that residuals of each signal are compared with before its noise is known: a tenth of
+    what varies.
+    """
     scales = []
     for index, name in enumerate(model.signals):
         kind, values = KIND[name], model.measured[model.signal == index]
@@ -125,10 +144,14 @@ def share_left(model: Model, values: Vector) -> float:
     return min(shares, default=0.0)
 
 
-def jacobian(model: Model, values: Vector, which: Iterable[int], *, one_sided: bool = False) -> Matrix:
-    """Derivatives (m, k) of the prediction by the parameters at some positions, by central differences.
+def jacobian(
+    model: Model, values: Vector, which: Iterable[int], *, one_sided: bool = False
+) -> Matrix:
+    """Derivatives (m, k) of the prediction by the parameters at some positions, by central
+    differences.
 
-    ``one_sided`` ones take half as long, and err by a part of about the step, 1e-7: good enough for a search.
+    ``one_sided`` ones take half as long, and err by a part of about the step, 1e-7: good enough for
+    a search.
     """
     columns = []
     here = model.predicted(named_of(model, values)) if one_sided else None
@@ -143,19 +166,36 @@ def jacobian(model: Model, values: Vector, which: Iterable[int], *, one_sided: b
 
 def units_of(model: Model) -> Vector:
     """Sizes in which the parameters are searched: their priors, or what is usual."""
-    of_unit = {"rad/s": 1e-2 * model.spacecraft.fastest, "1/s": 0.1 / max(model.record.length, 1e-9)}
-    sizes = (each.prior if math.isfinite(each.prior) else of_unit.get(each.unit, 1e-2) for each in model.parameters)
+    of_unit = {
+        "rad/s": 1e-2 * model.spacecraft.fastest,
+        "1/s": 0.1 / max(model.record.length, 1e-9),
+    }
+    sizes = (
+        each.prior if math.isfinite(each.prior) else of_unit.get(each.unit, 1e-2)
+        for each in model.parameters
+    )
     return np.array(list(sizes))
 
 
 def search(
-    model: Model, values: Vector, noise: Vector, rows: NDArray[np.bool_], *, robust: bool, near: bool = True
+    model: Model,
+    values: Vector,
+    noise: Vector,
+    rows: NDArray[np.bool_],
+    *,
+    robust: bool,
+    near: bool = True,
 ) -> tuple[Vector, float]:
-    """Values of the least cost over some of the samples, or reached with the budget of work, and that cost."""
-    units, weights = units_of(model), 1.0 / noise[model.signal[rows]]
-    bound, nominal = model.prior[0] * units, model.prior[1]
+    """Values of the least cost over some of the samples, or reached with the budget of work, and
+    that cost.
+    """
+    units = units_of(model)
+    weights = 1.0 / noise[model.signal[rows]]
+    bound = model.prior[0] * units
+    nominal = model.prior[1]
 
-    best, place = math.inf, values / units
+    best = math.inf
+    place = values / units
 
     def errors(scaled: Vector) -> Vector:
         nonlocal best, place
@@ -166,7 +206,8 @@ def search(
         every = np.concatenate([left, bound @ scaled - nominal])
         cost = float(np.sum(np.sqrt(1.0 + every * every) - 1.0 if robust else 0.5 * every * every))
         if cost < best:
-            best, place = cost, scaled.copy()
+            best = cost
+            place = scaled.copy()
         return every
 
     def derivatives(scaled: Vector) -> Matrix:
@@ -182,7 +223,15 @@ def search(
     if np.isfinite(errors(place)).all():
         with suppress(_SpentError):
             least_squares(
-                errors, place, derivatives, loss=loss, x_scale=scale, ftol=STEP, xtol=STEP, gtol=GRADIENT, max_nfev=most
+                errors,
+                place,
+                derivatives,
+                loss=loss,
+                x_scale=scale,
+                ftol=STEP,
+                xtol=STEP,
+                gtol=GRADIENT,
+                max_nfev=most,
             )
     return place * units, best
 
@@ -192,7 +241,9 @@ class _SpentError(Exception):
 
 
 def covariance_of(model: Model, scaled: Matrix) -> Matrix:
-    """P of the derivatives over the noise; what neither data nor priors tell is infinite, here very large."""
+    """P of the derivatives over the noise; what neither data nor priors tell is infinite, here very
+    large.
+    """
     units = units_of(model)
     stacked = np.concatenate([scaled, model.prior[0]]) * units
     _, sizes, turned = np.linalg.svd(stacked, full_matrices=False)
@@ -201,8 +252,8 @@ def covariance_of(model: Model, scaled: Matrix) -> Matrix:
     return np.asarray(covariance * np.outer(units, units))
 
 
-# By which the square of a shift across a curved region counts: (t², s t²) is then in the ellipsoid in 95 % of cases,
-# for 2 to 10 parameters, whether s is small or large.
+# By which the square of a shift across a curved region counts: (t², s t²) is then in the ellipsoid
+# in 95 % of cases, for 2 to 10 parameters, whether s is small or large.
 CURVED = 7.0
 
 GROWS = 3.0  # standard deviations of κ from which on it shows
@@ -229,7 +280,9 @@ class Fit:
     finished: bool = True  # unless the search ended with its budget of work
     constant: tuple[str, ...] = ()  # signals of a steady spin, which do not change
     coarse: tuple[str, ...] = ()  # signals with steps that are large beside their noise
-    causes: tuple[str, ...] = ()  # what would bring an estimate that is far from the file back to it
+    causes: tuple[
+        str, ...
+    ] = ()  # what would bring an estimate that is far from the file back to it
 
     @property
     def named(self) -> dict[str, float]:
@@ -243,44 +296,60 @@ class Fit:
 
     def index(self, name: str) -> int | None:
         """Position of a parameter; None where it is not estimated."""
-        return next((at for at, parameter in enumerate(self.model.parameters) if parameter.name == name), None)
+        return next(
+            (at for at, parameter in enumerate(self.model.parameters) if parameter.name == name),
+            None,
+        )
 
     @property
     def grows(self) -> bool:
-        """True where κ is estimated and shows: then a body of three moments is taken to dissipate."""
+        """True where κ is estimated and shows:
+        then a body of three moments is taken to dissipate.
+        """
         at = self.index("growth")
         return at is not None and bool(abs(self.values[at]) > GROWS * self.sigmas[at])
 
     @cached_property
     def region(self) -> Matrix:
-        """The covariance (p, p) whose ellipsoids hold the true values as often as they say, though regions are curved.
+        """The covariance (p, p) whose ellipsoids hold the true values as often as they say, though
+        regions are curved.
 
-        A direction of the covariance, followed for one sigma both ways, leaves residuals that do not cancel: least
-        squares by J turns them into the shift s across it that the curve takes there. It is off by s t² at t sigmas:
-        of P + `CURVED` Σ s sᵀ the 95 % ellipsoid holds 95 % of a normal t, for any length of s.
+        A direction of the covariance, followed for one sigma both ways, leaves residuals that do
+        not cancel: least squares by J turns them into the shift s across it that the curve takes
+        there. It is off by s t² at t sigmas: of P + `CURVED` Σ s sᵀ the 95 % ellipsoid holds 95 %
+        of a normal t, for any length of s.
         """
         scale = np.where(self.sigmas > 0.0, self.sigmas, 1.0)
         sizes, turned = np.linalg.eigh(self.covariance / np.outer(scale, scale))
         noise = self.noise[self.model.signal[self.used]]
         slopes = self.jacobian[self.used] / noise[:, None]
-        here, shifts = self.model.predicted(self.named), []
+        here = self.model.predicted(self.named)
+        shifts = []
         for direction in (scale[:, None] * turned * np.sqrt(np.maximum(sizes, 0.0))).T:
             both_ways = (self.values + direction, self.values - direction)
             try:
                 with np.errstate(all="ignore"):
-                    ends = [self.model.predicted(named_of(self.model, values)) for values in both_ways]
+                    ends = [
+                        self.model.predicted(named_of(self.model, values)) for values in both_ways
+                    ]
             except Infeasible:  # of what nothing is known one sigma may be no body at all
                 continue
             bent = (0.5 * (ends[0] + ends[1]) - here)[self.used] / noise
             shifts.append(self.covariance @ (slopes.T @ bent))
-        across = np.array([shift for shift in shifts if np.isfinite(shift).all()]).reshape(-1, len(scale))
+        across = np.array([shift for shift in shifts if np.isfinite(shift).all()]).reshape(
+            -1, len(scale)
+        )
         return np.asarray(self.covariance + CURVED * across.T @ across)
 
     @cached_property
     def kept(self) -> tuple[str, ...]:
         """Parameters that the data do not tell, and that stay as the file has them."""
         rows = zip(self.model.parameters, self.values, self.sigmas, strict=True)
-        return tuple(each.name for each, value, sigma in rows if unmoved(value - each.file, sigma, each.prior))
+        return tuple(
+            each.name
+            for each, value, sigma in rows
+            if unmoved(value - each.file, sigma, each.prior)
+        )
 
     @cached_property
     def resolved(self) -> NDArray[np.bool_]:
@@ -288,15 +357,29 @@ class Fit:
         return np.asarray(self.noise > least(self.model) * (1.0 + 1e-9))
 
     def whiteness(self, signal: int, lags: int = 40) -> Vector:
-        """Autocorrelations of the residuals of a signal, from lag 1 on; of white ones 95 % are below 1.96/√n."""
+        """Autocorrelations of the residuals of a signal, from lag 1 on; of white ones 95 % are
+        below 1.96/√n.
+        """
         rows = self.used & (self.model.signal == signal)
         left = self.residuals[rows] - self.residuals[rows].mean()
         total = float(left @ left) or 1.0
-        return np.array([float(left[lag:] @ left[:-lag]) / total for lag in range(1, min(lags, len(left) - 1) + 1)])
+        return np.array(
+            [
+                float(left[lag:] @ left[:-lag]) / total
+                for lag in range(1, min(lags, len(left) - 1) + 1)
+            ]
+        )
 
     def white(self, signal: int) -> bool:
-        """True where the autocorrelations are as small as those of white noise (Ljung-Box, 1 in 1000)."""
+        """True where the autocorrelations are as small as those of white noise (Ljung-Box, 1 in
+        1000).
+        """
         count = int((self.used & (self.model.signal == signal)).sum())
         correlations = self.whiteness(signal, 20)
         lags = np.arange(1, len(correlations) + 1)
-        return chi_square_tail(len(lags), float(count * (count + 2) * np.sum(correlations**2 / (count - lags)))) > 0.001
+        return (
+            chi_square_tail(
+                len(lags), float(count * (count + 2) * np.sum(correlations**2 / (count - lags)))
+            )
+            > 0.001
+        )

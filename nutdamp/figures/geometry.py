@@ -1,4 +1,6 @@
-"""Geometry of the pictures of a flight: directions as angles, rolling cones, stretches of the track. No matplotlib."""
+"""Geometry of the pictures of a flight: directions as angles, rolling cones, stretches of the
+track. No matplotlib.
+"""
 
 from __future__ import annotations
 
@@ -16,33 +18,44 @@ from nutdamp.spacecraft.schedule import Schedule
 Item = TypeVar("Item")
 
 ROWS_A_TURN = 60  # rows in a nutation period from which a polygon looks like the curve
-MOST_ROWS = 30_000  # largest number of rows of a picture; a longer track is drawn as far as they reach
+MOST_ROWS = (
+    30_000  # largest number of rows of a picture; a longer track is drawn as far as they reach
+)
 RIM = 121  # points around the rim of a cone
 LEAST = 1e-9  # degrees or deg/s below which a motion is drawn as a point
 
 INSET_FROM, INSET_BELOW = 1e-4, 0.15
 """Shares of the width of the axis track between which the path of H is shown enlarged beside it."""
 
-CLOSE = 1.0 / 125.0  # part of the time shown below which firings cannot be distinguished: 4 points on a sheet
+CLOSE = (
+    1.0 / 125.0
+)  # part of the time shown below which firings cannot be distinguished: 4 points on a sheet
 MANY = 3  # least number of firings drawn as one
 
 NO_CONE = 1e-10  # half-angle in rad below which a cone is not distinguished from its axis
 
 
 def shown_until(spacecraft: Spacecraft, schedule: Schedule) -> float:
-    """End of the time axis of pictures and films, s: the motion after the last pulse is seen, and fills no sheet.
+    """End of the time axis of pictures and films, s: the motion after the last pulse is seen, and
+    fills no sheet.
 
-    One inertial nutation period after the last pulse, but no more than a quarter of the time until then, or of a period
-    as seen in the body where that is more. Without pulses, the inertial period.
+    One inertial nutation period after the last pulse, but no more than a quarter of the time until
+    then, or of a period as seen in the body where that is more. Without pulses, the inertial
+    period.
     """
     if not len(schedule):
         return spacecraft.inertial_period
-    return schedule.end + min(spacecraft.inertial_period, 0.25 * max(schedule.end, spacecraft.body_period))
+    return schedule.end + min(
+        spacecraft.inertial_period, 0.25 * max(schedule.end, spacecraft.body_period)
+    )
 
 
 def drawn(flight: Flight, track: Track) -> Track:
-    """``track`` in as many rows as its curves need; a shorter one from t = 0 where these are more than `MOST_ROWS`."""
-    until, step = float(track.t[-1]), quickest(flight) / ROWS_A_TURN
+    """``track`` in as many rows as its curves need; a shorter one from t = 0 where these are more
+    than `MOST_ROWS`.
+    """
+    until = float(track.t[-1])
+    step = quickest(flight) / ROWS_A_TURN
     if until / step <= len(track.t):
         return track
     reach = min(until, max(MOST_ROWS * step, flight.schedule.end))
@@ -63,7 +76,9 @@ def channels_fired(flight: Flight) -> list[str]:
 
 
 class TrackPiece(NamedTuple):
-    """Rows ``first`` to ``last`` of a track, both included; ``pulse`` is the number of the one that fires, from 0."""
+    """Rows ``first`` to ``last`` of a track, both included; ``pulse`` is the number of the one that
+    fires, from 0.
+    """
 
     first: int
     last: int
@@ -72,7 +87,8 @@ class TrackPiece(NamedTuple):
 
 def stretches(flight: Flight, track: Track) -> Iterator[TrackPiece]:
     """The track cut where pulses begin and end, in order; an impulse is a stretch of two rows."""
-    now, last = 0, len(track.t) - 1
+    now = 0
+    last = len(track.t) - 1
     for number, (begins, ends) in enumerate(flight.spans):
         if begins > track.t[last]:
             break
@@ -87,7 +103,9 @@ def stretches(flight: Flight, track: Track) -> Iterator[TrackPiece]:
 
 
 class FiredBlock(NamedTuple):
-    """Pulses ``first`` to ``last``, numbered from 1, from ``begins`` to ``ends`` s; ``on`` s of it something fires."""
+    """Pulses ``first`` to ``last``, numbered from 1, from ``begins`` to ``ends`` s; ``on`` s of it
+    something fires.
+    """
 
     first: int
     last: int
@@ -105,31 +123,44 @@ class FiredBlock(NamedTuple):
 
 
 def blocks(flight: Flight, until: float, channel: str | None = None) -> list[FiredBlock]:
-    """The firings of a channel, or of all, up to ``until`` s; `MANY` or more that begin `CLOSE` together are one."""
+    """The firings of a channel, or of all, up to ``until`` s; `MANY` or more that begin `CLOSE`
+    together are one.
+    """
     firings = [
         (number, pulse)
         for number, pulse in enumerate(flight.schedule, start=1)
         if pulse.start <= until and channel in (None, pulse.channel)
     ]
     fired = []
-    for part in runs(firings, lambda one, next_: next_[1].start - one[1].start < CLOSE * until, MANY):
-        ends, on = max(pulse.end for _, pulse in part), sum(pulse.on_time for _, pulse in part)
+    for part in runs(
+        firings, lambda one, next_: next_[1].start - one[1].start < CLOSE * until, MANY
+    ):
+        ends = max(pulse.end for _, pulse in part)
+        on = sum(pulse.on_time for _, pulse in part)
         fired.append(FiredBlock(part[0][0], part[-1][0], len(part), part[0][1].start, ends, on))
     return fired
 
 
 def runs(items: Sequence[Item], near: Callable[[Item, Item], bool], least: int) -> list[list[Item]]:
-    """Items together where each is ``near`` the one before and there are ``least`` of them; all others alone."""
+    """Items together where each is ``near`` the one before and there are ``least`` of them; all
+    others alone.
+    """
     groups: list[list[Item]] = []
     for item in items:
         if not groups or not near(groups[-1][-1], item):
             groups.append([])
         groups[-1].append(item)
-    return [part for group in groups for part in ([group] if len(group) >= least else [[alone] for alone in group])]
+    return [
+        part
+        for group in groups
+        for part in ([group] if len(group) >= least else [[alone] for alone in group])
+    ]
 
 
 def sky_plane(flight: Flight, momentum: Vector) -> Vector:
-    """Rows: two directions square to ``momentum``, and its own. In a celestial frame east and north, in N its x, y."""
+    """Rows: two directions square to ``momentum``, and its own. In a celestial frame east and
+    north, in N its x, y.
+    """
     up = momentum / np.linalg.norm(momentum)
     x = np.array([1.0, 0.0, 0.0])
     first = x if flight.spacecraft.attitude is None else np.cross([0.0, 0.0, 1.0], up)
@@ -141,17 +172,30 @@ def sky_plane(flight: Flight, momentum: Vector) -> Vector:
 
 
 def sky_names(flight: Flight, centre: str = "H(0)") -> tuple[str, str, str]:
-    """Names of the two angles of `on_sky` in a view centred on ``centre``, and the sense of the view."""
+    """Names of the two angles of `on_sky` in a view centred on ``centre``, and the sense of the
+    view.
+    """
     if flight.spacecraft.attitude is None:
-        return "towards inertial x, °", "towards inertial y, °", "H towards you, inertial x to the right"
+        return (
+            "towards inertial x, °",
+            "towards inertial y, °",
+            "H towards you, inertial x to the right",
+        )
     return f"east of {centre}, °", f"north of {centre}, °", "H towards you, east to the right"
 
 
 def on_sky(plane: Vector, directions: Vector) -> Vector:
-    """Directions (n, 3) as angles from H(0) in degrees, true to scale along every radius (azimuthal equidistant)."""
+    """Directions (n, 3) as angles from H(0) in degrees, true to scale along every radius (azimuthal
+    equidistant).
+    """
     local = directions @ plane.T
     across = np.hypot(local[:, 0], local[:, 1])
-    scale = np.divide(np.degrees(np.arctan2(across, local[:, 2])), across, out=np.zeros_like(across), where=across > 0)
+    scale = np.divide(
+        np.degrees(np.arctan2(across, local[:, 2])),
+        across,
+        out=np.zeros_like(across),
+        where=across > 0,
+    )
     return np.asarray(local[:, :2] * scale[:, None], dtype=np.float64)
 
 
@@ -161,7 +205,9 @@ def pole_path(track: Track) -> Vector:
 
 
 def pole_note(flight: Flight) -> str:
-    """Words behind the names of the axes of the pole curve; empty where they are those of the file."""
+    """Words behind the names of the axes of the pole curve;
+    empty where they are those of the file.
+    """
     body = flight.spacecraft
     return ", principal axes" * (not body.inertia.aligned) + ", spin about −3" * (body.spin < 0.0)
 
@@ -174,7 +220,11 @@ def sky_paths(flight: Flight, track: Track) -> tuple[Vector, Vector]:
 
 def aimed(flight: Flight) -> Vector:
     """(n, 3): the target axis, or none."""
-    return np.empty((0, 3)) if flight.spacecraft.goal.axis is None else flight.spacecraft.goal.axis[None]
+    return (
+        np.empty((0, 3))
+        if flight.spacecraft.goal.axis is None
+        else flight.spacecraft.goal.axis[None]
+    )
 
 
 def sky_target(flight: Flight, track: Track) -> Vector:
@@ -183,15 +233,21 @@ def sky_target(flight: Flight, track: Track) -> Vector:
 
 
 def momentum_inset(flight: Flight, track: Track) -> Vector | None:
-    """(n, 2): the path of H and the target as angles in degrees, where the axis track is too wide for it; else None."""
+    """(n, 2): the path of H and the target as angles in degrees, where the axis track is too wide
+    for it; else None.
+    """
     path, momentum = sky_paths(flight, track)
     small = np.vstack([momentum, sky_target(flight, track)])
-    share = float(np.ptp(small, axis=0).max()) / max(float(np.ptp(np.vstack([path, small]), axis=0).max()), LEAST)
+    share = float(np.ptp(small, axis=0).max()) / max(
+        float(np.ptp(np.vstack([path, small]), axis=0).max()), LEAST
+    )
     return small if len(flight.schedule) and INSET_FROM < share < INSET_BELOW else None
 
 
 def once(points: Vector) -> Vector:
-    """A path (n, 2), broken by NaN where it goes straight back: dashes drawn both ways would fill each other's gaps."""
+    """A path (n, 2), broken by NaN where it goes straight back: dashes drawn both ways would fill
+    each other's gaps.
+    """
     grain = 1e-6 * max(float(np.ptp(points, axis=0).max()), 1e-9)
     places = [tuple(place) for place in np.round(points / grain).astype(np.int64).tolist()]
     drawn: set[tuple[tuple[int, ...], tuple[int, ...]]] = set()
@@ -204,15 +260,20 @@ def once(points: Vector) -> Vector:
 
 
 def room(points: Vector, margin: float, *, centre: bool = False) -> tuple[Vector, float]:
-    """Middle (2,) and half the side of a square with room for ``points`` (n, 2); ``centre``: zero in the middle."""
-    low, high = points.min(axis=0), points.max(axis=0)
+    """Middle (2,) and half the side of a square with room for ``points`` (n, 2); ``centre``: zero
+    in the middle.
+    """
+    low = points.min(axis=0)
+    high = points.max(axis=0)
     middle = np.zeros(2) if centre else 0.5 * (low + high)
     half = (1.0 + margin) * float(np.abs(points - middle).max())
     return middle, half if half > LEAST else 1.0
 
 
 def hull(points: Vector) -> Vector:
-    """Corners (m, 2) of the convex hull of ``points`` (n, 2), counterclockwise (Andrew's monotone chain)."""
+    """Corners (m, 2) of the convex hull of ``points`` (n, 2), counterclockwise (Andrew's monotone
+    chain).
+    """
     ordered = sorted(set(map(tuple, points.tolist())))
     if len(ordered) < 3:
         return np.array(ordered).reshape(-1, 2)
@@ -231,20 +292,25 @@ def hull(points: Vector) -> Vector:
 
 
 def ticks(low: float, high: float, most: int) -> list[float]:
-    """At most ``most`` round numbers from ``low`` to ``high``, a step of 1, 2 or 5 times a power of ten apart."""
+    """At most ``most`` round numbers from ``low`` to ``high``, a step of 1, 2 or 5 times a power of
+    ten apart.
+    """
     rough = (high - low) / max(most, 1)
     decade = 10.0 ** math.floor(math.log10(rough))
-    step = next(unit * decade for unit in (1.0, 2.0, 5.0, 10.0, 20.0) if unit * decade >= rough * (1 - 1e-9))
-    first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
+    step = next(
+        unit * decade for unit in (1.0, 2.0, 5.0, 10.0, 20.0) if unit * decade >= rough * (1 - 1e-9)
+    )
+    first = math.ceil(low / step - 1e-9)
+    last = math.floor(high / step + 1e-9)
     return [count * step + 0.0 for count in range(first, last + 1)]
 
 
 class DrawnCones(NamedTuple):
     """Body cone and space cone at one moment, as unit vectors in the inertial frame.
 
-    (3,) each: spin axis, H and ω. ``body`` and ``space`` (n, 3) are the rims of the cones, which touch along
-    ``rotation``; empty where there is no cone. ``swept`` (m, 3) is the circle that the space cone fills: its rim, and
-    where I1 ≠ I2 the one about a rim that never closes.
+    (3,) each: spin axis, H and ω. ``body`` and ``space`` (n, 3) are the rims of the cones, which
+    touch along ``rotation``; empty where there is no cone. ``swept`` (m, 3) is the circle that the
+    space cone fills: its rim, and where I1 ≠ I2 the one about a rim that never closes.
     """
 
     axis: Vector
@@ -256,12 +322,14 @@ class DrawnCones(NamedTuple):
 
 
 def cones(flight: Flight, rates: Vector, quaternion: Vector) -> DrawnCones:
-    """The cones that would roll on each other if the torque ended now: rates (3,) rad/s, quaternion (4,).
+    """The cones that would roll on each other if the torque ended now: rates (3,) rad/s, quaternion
+    (4,).
 
-    Polhode and herpolhode of the free motion: circles for a symmetric body (Magnus 1970 fig. 4). Without rims where
-    they do not close, and for a body with a wheel and three moments.
+    Polhode and herpolhode of the free motion: circles for a symmetric body (Magnus 1970 fig. 4).
+    Without rims where they do not close, and for a body with a wheel and three moments.
     """
-    moments, wheel = np.asarray(flight.moments), flight.spacecraft.inertia.wheel
+    moments = np.asarray(flight.moments)
+    wheel = flight.spacecraft.inertia.wheel
     axis = attitude.rotate(quaternion, np.array([0.0, 0.0, flight.spacecraft.sense]))
     turning = attitude.rotate(quaternion, rates)
     momentum = attitude.rotate(quaternion, moments * rates + np.array([0.0, 0.0, wheel]))
@@ -278,27 +346,45 @@ def cones(flight: Flight, rates: Vector, quaternion: Vector) -> DrawnCones:
     polhode = triaxial.free_rates(flight.moments, rates, times)
     turns = triaxial.free_attitude(flight.moments, rates, quaternion, times)
     size = np.linalg.norm(polhode, axis=1, keepdims=True)
-    body, space = attitude.rotate(quaternion, polhode / size), attitude.rotate(turns, polhode / size)
-    return DrawnCones(axis, direction, rotation, body, space, around(direction, space[np.argmin(space @ direction)]))
+    body, space = (
+        attitude.rotate(quaternion, polhode / size),
+        attitude.rotate(turns, polhode / size),
+    )
+    return DrawnCones(
+        axis,
+        direction,
+        rotation,
+        body,
+        space,
+        around(direction, space[np.argmin(space @ direction)]),
+    )
 
 
 def body_mark(rolling: DrawnCones, quaternion: Vector) -> Vector:
-    """The point (3,) of the body cone's rim over body axis 1, which shows the turn of the body. NaN without a rim."""
+    """The point (3,) of the body cone's rim over body axis 1, which shows the turn of the body. NaN
+    without a rim.
+    """
     if not len(rolling.body):
         return np.full(3, np.nan)
     in_body = attitude.rotate(attitude.conjugate(quaternion), rolling.body)
     azimuth = np.arctan2(in_body[:, 1], in_body[:, 0])
     order = np.argsort(azimuth)
-    return np.array([np.interp(0.0, azimuth[order], rolling.body[order, part]) for part in range(3)])
+    return np.array(
+        [np.interp(0.0, azimuth[order], rolling.body[order, part]) for part in range(3)]
+    )
 
 
 def around(axis: Vector, start: Vector) -> Vector:
-    """Unit vectors (RIM, 3) on the circle that ``start`` describes about ``axis``, both unit; none on the axis."""
+    """Unit vectors (RIM, 3) on the circle that ``start`` describes about ``axis``, both unit; none
+    on the axis.
+    """
     square = start - axis * (axis @ start)
     if np.linalg.norm(square) < NO_CONE:
         return np.empty((0, 3))
     cosine, sine = circle().T[..., None]
-    return np.asarray(axis * (axis @ start) + cosine * square + sine * np.cross(axis, square), dtype=np.float64)
+    return np.asarray(
+        axis * (axis @ start) + cosine * square + sine * np.cross(axis, square), dtype=np.float64
+    )
 
 
 def circle(count: int = RIM) -> Vector:
@@ -310,4 +396,6 @@ def circle(count: int = RIM) -> Vector:
 def closed(spacecraft: Spacecraft, until: float) -> list[tuple[float, float]]:
     """Begin and end, s, of the times to ``until`` s in which no pulse may be on."""
     windows = [(0.0, spacecraft.limits.earliest), *spacecraft.limits.blackout]
-    return [(begins, min(ends, until)) for begins, ends in windows if begins < until and ends > begins]
+    return [
+        (begins, min(ends, until)) for begins, ends in windows if begins < until and ends > begins
+    ]

@@ -42,20 +42,25 @@ SPACES = 'xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999
 
 
 def ending(path: str, option: str = "--plot", formats: Sequence[str] = FORMATS) -> str:
-    """The format of a picture by the ending of its file, the first of ``formats`` for standard output.
+    """The format of a picture by the ending of its file, the first of ``formats`` for standard
+    output.
 
     Raises BadRequest for other endings, MissingExtra without matplotlib.
     """
     suffix = formats[0] if path == "-" else Path(path).suffix.lstrip(".").lower()
     if suffix not in formats:
-        raise BadRequest(f"{option} {path}: the ending says the format; use one of .{', .'.join(formats)}")
+        raise BadRequest(
+            f"{option} {path}: the ending says the format; use one of .{', .'.join(formats)}"
+        )
     style.require()
     return suffix
 
 
 @style.styled()
 def rendered(figure: Figure, path: str) -> bytes:
-    """The figure as the content of a file, vector or not by the ending of ``path``; raises BadRequest for others."""
+    """The figure as the content of a file, vector or not by the ending of ``path``; raises
+    BadRequest for others.
+    """
     kind = ending(path)
     stream = io.BytesIO()
     if kind != "svg":  # in which text stays text, drawn with the fonts of who reads it
@@ -68,11 +73,13 @@ def rendered(figure: Figure, path: str) -> bytes:
 def svg(figure: Figure, *, titled: bool = True) -> str:
     """The figure as an inline ``<svg>`` element, as wide as its container, on no background.
 
-    Text and frames take the colour of the text around it, so that it suits light and dark pages. Its ids begin with a
-    digest of its content: several may be in one page. Not ``titled``: without the line above it, which is text of the
-    page.
+    Text and frames take the colour of the text around it, so that it suits light and dark pages.
+    Its ids begin with a digest of its content: several may be in one page. Not ``titled``: without
+    the line above it, which is text of the page.
     """
-    width, height, top = POINTS * figure.get_figwidth(), POINTS * figure.get_figheight(), 0.0
+    width = POINTS * figure.get_figwidth()
+    height = POINTS * figure.get_figheight()
+    top = 0.0
     title = figure._suptitle  # type: ignore[attr-defined]  # there is no other way to it
     if title is not None and not titled:
         if (engine := figure.get_layout_engine()) is not None:
@@ -84,12 +91,18 @@ def svg(figure: Figure, *, titled: bool = True) -> str:
     figure.savefig(stream, format="svg", transparent=True, metadata=_METADATA["page"])
     # Before are the size, which the page decides, and styles that would hold for the whole page.
     content = (
-        stream.getvalue().partition("</defs>")[2].replace(INK, "currentColor").replace(PAPER, "var(--paper, #fff)")
+        stream.getvalue()
+        .partition("</defs>")[2]
+        .replace(INK, "currentColor")
+        .replace(PAPER, "var(--paper, #fff)")
     )
     mark = "n" + hashlib.sha256(content.encode()).hexdigest()[:8] + "-"
     content = re.sub(r'(\bid="|url\(#|href="#)', rf"\g<1>{mark}", content)
     frame = f"0 {top:.1f} {width:.1f} {height - top:.1f}"
-    return f'<svg {SPACES} viewBox="{frame}" width="100%" role="img" style="stroke-linejoin: round">{content}'
+    return (
+        f'<svg {SPACES} viewBox="{frame}" width="100%" role="img" style="stroke-linejoin: '
+        f'round">{content}'
+    )
 
 
 FILMS = ("gif", "mp4")
@@ -100,10 +113,14 @@ LEVELS = (np.arange(256) // 8 * 255 // 31).astype(np.uint8)
 """Shades of a GIF: far enough apart that Pillow finds each in a palette, and white stays white."""
 
 SMOOTH = 12.0
-"""Frames in a nutation turn from which the eye follows it; with fewer than half of them it may see it backwards."""
+"""Frames in a nutation turn from which the eye follows it; with fewer than half of them it may see
+it backwards.
+"""
 
 SHORTEST, LONGEST = 6.0, 30.0  # seconds of a film whose length is not given
-MARKED = math.radians(60.0)  # turn of the body from frame to frame up to which a mark on it shows how it rolls
+MARKED = math.radians(
+    60.0
+)  # turn of the body from frame to frame up to which a mark on it shows how it rolls
 FRAMED = 300  # frames by whose cones the scales are laid out, evenly over the film
 HELD = 0.4  # seconds of film that a firing stays announced, however short it is
 
@@ -111,11 +128,14 @@ HELD = 0.4  # seconds of film that a firing stays announced, however short it is
 def film_format(path: str) -> str:
     """The format of a film by the ending of its file, gif for standard output.
 
-    Raises BadRequest for others, MissingExtra without matplotlib, CannotWrite for mp4 without ffmpeg.
+    Raises BadRequest for others, MissingExtra without matplotlib, CannotWrite for mp4 without
+    ffmpeg.
     """
     kind = ending(path, "--output", FILMS)
     if kind == "mp4" and shutil.which("ffmpeg") is None:
-        raise CannotWrite(path, "mp4 is made by ffmpeg, which is not installed; install it, or name a .gif")
+        raise CannotWrite(
+            path, "mp4 is made by ffmpeg, which is not installed; install it, or name a .gif"
+        )
     return kind
 
 
@@ -144,7 +164,9 @@ class Timing(NamedTuple):
 
 
 def timing(spacecraft: Spacecraft, until: float, fps: int, seconds: float | None) -> Timing:
-    """Frames for ``until`` s of motion; without ``seconds`` as many as the nutation needs to be followed."""
+    """Frames for ``until`` s of motion; without ``seconds`` as many as the nutation needs to be
+    followed.
+    """
     turns = float(until / spacecraft.inertial_period)
     if seconds is None:
         seconds = min(max(turns * SMOOTH / fps, SHORTEST), LONGEST)
@@ -153,7 +175,9 @@ def timing(spacecraft: Spacecraft, until: float, fps: int, seconds: float | None
 
 @style.styled()
 def film(stream: IO[bytes], flight: Flight, timed: Timing, path: str, width: int = 800) -> None:
-    """Write the film of ``width`` pixels to ``stream``, in the `film_format` of ``path``; raises as that does."""
+    """Write the film of ``width`` pixels to ``stream``, in the `film_format` of ``path``; raises as
+    that does.
+    """
     kind = film_format(path)
     scene = Scene(flight, timed, width)
     with work.steps(timed.frames):
@@ -175,14 +199,23 @@ def _gif(stream: IO[bytes], scene: Scene, timed: Timing) -> None:
 
     each = frames()
     # Time in milliseconds; GIF counts in hundredths of a second.
-    next(each).save(stream, "GIF", save_all=True, append_images=each, duration=10 * round(100 / timed.fps), loop=0)
+    next(each).save(
+        stream,
+        "GIF",
+        save_all=True,
+        append_images=each,
+        duration=10 * round(100 / timed.fps),
+        loop=0,
+    )
 
 
 def _mp4(stream: IO[bytes], scene: Scene, timed: Timing) -> None:
     """Write H.264 as browsers play it."""
     from matplotlib.animation import FFMpegWriter
 
-    writer = FFMpegWriter(fps=timed.fps, codec="h264", extra_args=["-pix_fmt", "yuv420p", "-movflags", "+faststart"])
+    writer = FFMpegWriter(
+        fps=timed.fps, codec="h264", extra_args=["-pix_fmt", "yuv420p", "-movflags", "+faststart"]
+    )
     with tempfile.TemporaryDirectory() as folder:
         target = Path(folder) / "film.mp4"
         try:
@@ -221,9 +254,15 @@ class Scene:
         grid = figure.add_gridspec(2, 2, height_ratios=[5, 1.5])
         self.space, self.sky = figure.add_subplot(grid[0, 0]), figure.add_subplot(grid[0, 1])
         self.strip = figure.add_subplot(grid[1, :])
-        some = np.unique(np.linspace(0, self.timed.frames - 1, min(self.timed.frames, FRAMED)).round().astype(int))
+        some = np.unique(
+            np.linspace(0, self.timed.frames - 1, min(self.timed.frames, FRAMED))
+            .round()
+            .astype(int)
+        )
         cones = (self.cones(number) for number in some.tolist())
-        rims = np.vstack([part for at in cones for part in (at.body, at.space, at.axis[None], at.rotation[None])])
+        rims = np.vstack(
+            [part for at in cones for part in (at.body, at.space, at.axis[None], at.rotation[None])]
+        )
         sphere.draw_ground(self.space, self.looked, self.path)
         sphere.frame(self.space, self.looked, np.vstack([rims, self.path.axis]))
         self.space.set_title(f"Cones{self.looked.scale}")
@@ -250,7 +289,8 @@ class Scene:
         """Frame ``number``, from 0."""
         for artist in self._changing:
             artist.remove()
-        now, cones = float(self.timed.times[number]), self.cones(number)
+        now = float(self.timed.times[number])
+        cones = self.cones(number)
         kept = {artist for axes in self.figure.axes for artist in axes.get_children()}
         done = self.path.t <= now
         sphere.draw_cones(self.space, self.looked, cones)
@@ -260,7 +300,9 @@ class Scene:
             mark = geometry.body_mark(cones, self.quaternions[number])[None]
             self.space.plot(*self.looked.seen(mark)[0].T, "D", color=MOTION, markersize=4)
             self.sky.plot(*geometry.on_sky(self.plane, mark).T, "D", color=MOTION, markersize=4)
-        self.sky.plot(*geometry.on_sky(self.plane, self.path.axis[done]).T, color=MOTION, linewidth=0.9)
+        self.sky.plot(
+            *geometry.on_sky(self.plane, self.path.axis[done]).T, color=MOTION, linewidth=0.9
+        )
         self.strip.axvline(now, color=INK, linewidth=1.2)
         drawn = (artist for axes in self.figure.axes for artist in axes.get_children())
         self._changing = [artist for artist in drawn if artist not in kept]

@@ -37,17 +37,26 @@ ACROSS = 1e-9  # transverse over axial torque below which it has no direction to
 NUMBERED = 17  # largest number of firings of a path that are numbered, and have arrowheads
 
 CROWD, NEAR = 3, 0.05
-"""Firings in a row that have one label, at least, each nearer to the one before than this part of the path's width."""
+"""Firings in a row that have one label, at least, each nearer to the one before than this part of
+the path's width.
+"""
 
-MANY, SPARSE = 12, 40  # numbers of firings above which lines and arrowheads are small, and up to which each has a dot
+MANY, SPARSE = (
+    12,
+    40,
+)  # numbers of firings above which lines and arrowheads are small, and up to which each has a dot
 
-ROOM, INSET = 1.8, (0.675, 0.17, 0.315, 0.66)
-"""Width of the axis track with an inset over that without, and the box of the inset as shares of the panel."""
+ROOM = 1.8
+INSET = (0.675, 0.17, 0.315, 0.66)
+"""Width of the axis track with an inset over that without, and the box of the inset as shares of
+the panel.
+"""
 
 
 @style.styled()
 def flight_figure(name: str, flight: Flight, track: Track, judged: Verdict | None = None) -> Figure:
-    """The figure ``overview`` or ``motion``, with the verdict on its plan; raises KeyError for others.
+    """The figure ``overview`` or ``motion``, with the verdict on its plan; raises KeyError for
+    others.
 
     Where the rows of ``track`` are too few for a smooth curve, a finer one is drawn.
     Raises MissingExtra without matplotlib.
@@ -56,45 +65,66 @@ def flight_figure(name: str, flight: Flight, track: Track, judged: Verdict | Non
 
 
 @style.styled()
-def history_figure(flight: Flight, track: Track, judged: Verdict | None = None, *, narrow: bool = False) -> Figure:
+def history_figure(
+    flight: Flight, track: Track, judged: Verdict | None = None, *, narrow: bool = False
+) -> Figure:
     """Nutation, firings and rates over time, as on the report; ``narrow``: for a phone."""
     return _finished(partial(history, narrow=narrow), flight, track, judged)
 
 
-def _finished(draw: Callable[[Flight, Track], Figure], flight: Flight, track: Track, judged: Verdict | None) -> Figure:
+def _finished(
+    draw: Callable[[Flight, Track], Figure], flight: Flight, track: Track, judged: Verdict | None
+) -> Figure:
     """A figure of as many rows as it needs, with its heading and its labels in place."""
     seen = geometry.drawn(flight, track)
     figure = draw(flight, seen)
     until, end = float(seen.t[-1]), float(track.t[-1])
     part = f"; drawn: the first {until:.4g} s of {end:.4g} s" if until < 0.99 * end else ""
-    style.heading(figure, flight.spacecraft, title(flight) + part, None if judged is None else stated(judged))
+    style.heading(
+        figure, flight.spacecraft, title(flight) + part, None if judged is None else stated(judged)
+    )
     style.settle(figure)
     return figure
 
 
 def title(flight: Flight) -> str:
     """Heading of every sheet after the spacecraft's name: scheme, model and result."""
-    left, count, body = flight.residual, len(flight.schedule), flight.spacecraft
-    how = " ".join(filter(None, (flight.scheme, f"by {model_name([flight.schedule], flight.model)}")))
-    fired = f"firings: {count} until {style.number(flight.schedule.end)} s" if count else "no firing"
+    left = flight.residual
+    count = len(flight.schedule)
+    body = flight.spacecraft
+    how = " ".join(
+        filter(None, (flight.scheme, f"by {model_name([flight.schedule], flight.model)}"))
+    )
+    fired = (
+        f"firings: {count} until {style.number(flight.schedule.end)} s" if count else "no firing"
+    )
     swings = "" if body.inertia.symmetric else "at most "  # between two angles, H standing still
-    goal, turn = body.goal.axis, ""
+    goal = body.goal.axis
+    turn = ""
     if goal is not None:
         angles = zip(angle_names(body), angle_texts(body, goal), strict=True)
-        target = ", ".join(f"{name} {text.removesuffix(' deg').rstrip('0').rstrip('.')}°" for name, text in angles)
+        target = ", ".join(
+            f"{name} {text.removesuffix(' deg').rstrip('0').rstrip('.')}°" for name, text in angles
+        )
         turn = f"H turned {style.angle(body.to_turn)} to the target, {target}\n"
     result = f"nutation {swings}{style.angle(body.nutation)} → {style.angle(left.nutation)}"
-    return f"{how}, {fired}\n{turn}{result}, {requirements.aim(body).label} {style.angle(left.axis_error)}"
+    return (
+        f"{how}, {fired}\n{turn}{result}, {requirements.aim(body).label} "
+        f"{style.angle(left.axis_error)}"
+    )
 
 
 def overview(flight: Flight, track: Track) -> Figure:
     """Motion, and the globe where it has something to show, above history."""
     sizes = [*_courses(flight, track).values()]
     ratios = [1.0, ROOM if geometry.momentum_inset(flight, track) is not None else 1.0]
-    width, tall, globe = 9.6, TALL, sphere.has_globe(flight, track)
+    width = 9.6
+    tall = TALL
+    globe = sphere.has_globe(flight, track)
     if globe:
         ratios.append(1.0)
-        width, tall = BROAD, BROAD / sum(ratios)
+        width = BROAD
+        tall = BROAD / sum(ratios)
     figure = style.sheet(width, tall + 1.6 + sum(sizes))
     shape: dict[str, Any] = {"height_ratios": [tall, *sizes], "width_ratios": ratios}
     grid = figure.add_gridspec(1 + len(sizes), len(ratios), **shape)
@@ -107,7 +137,9 @@ def overview(flight: Flight, track: Track) -> Figure:
 
 
 def motion(flight: Flight, track: Track) -> Figure:
-    """Pole curve in the 1-2 plane of the body beside the axis track in space (Magnus 1970 fig. 5-8)."""
+    """Pole curve in the 1-2 plane of the body beside the axis track in space (Magnus 1970 fig.
+    5-8).
+    """
     wide = geometry.momentum_inset(flight, track) is not None
     figure = style.sheet(9.6 if wide else 7.4, 4.1)
     pole, sky = figure.subplots(1, 2, width_ratios=[1.0, ROOM if wide else 1.0])
@@ -117,7 +149,9 @@ def motion(flight: Flight, track: Track) -> Figure:
 
 
 def _pole_curve(axes: Axes, flight: Flight, track: Track) -> None:
-    """Path of the rotation vector in the 1-2 plane of the body (Magnus 1970 fig. 5), firings and channels marked."""
+    """Path of the rotation vector in the 1-2 plane of the body (Magnus 1970 fig. 5), firings and
+    channels marked.
+    """
     rates = geometry.pole_path(track)
     _path(axes, flight, track, rates)
     arrows = _directions(axes, flight, float(np.abs(rates).max()))
@@ -127,9 +161,12 @@ def _pole_curve(axes: Axes, flight: Flight, track: Track) -> None:
 
 
 def _axis_track(axes: Axes, flight: Flight, track: Track) -> None:
-    """Path of the spin axis about the first H, as angles, and of H, in an inset if small (Magnus 1970 fig. 6-8)."""
+    """Path of the spin axis about the first H, as angles, and of H, in an inset if small (Magnus
+    1970 fig. 6-8).
+    """
     path, momentum = geometry.sky_paths(flight, track)
-    target, small = geometry.sky_target(flight, track), geometry.momentum_inset(flight, track)
+    target = geometry.sky_target(flight, track)
+    small = geometry.momentum_inset(flight, track)
     _path(axes, flight, track, path)
     places = _momentum(axes, flight, track, momentum, float(np.ptp(path, axis=0).max()))
     style.target(axes, target)
@@ -149,7 +186,9 @@ def _axis_track(axes: Axes, flight: Flight, track: Track) -> None:
         style.square(inset, small, margin=0.25)
         inset.locator_params(nbins=3)
         inset.tick_params(labelsize=style.SMALL)
-        much = min(INSET[2] * ROOM, INSET[3]) * float(np.ptp(axes.get_ylim()) / np.ptp(inset.get_ylim()))
+        much = min(INSET[2] * ROOM, INSET[3]) * float(
+            np.ptp(axes.get_ylim()) / np.ptp(inset.get_ylim())
+        )
         inset.set_title(f"H after each firing (× {much:.2g})", **style.NOTE)
         axes.indicate_inset_zoom(inset, edgecolor=GREY, linewidth=THIN, alpha=1.0)
     x, y, sense = geometry.sky_names(flight)
@@ -157,7 +196,9 @@ def _axis_track(axes: Axes, flight: Flight, track: Track) -> None:
 
 
 def _momentum(axes: Axes, flight: Flight, track: Track, momentum: Vector, width: float) -> Vector:
-    """The path of H, (n, 2) degrees, with its places at first and after each firing, which are returned."""
+    """The path of H, (n, 2) degrees, with its places at first and after each firing, which are
+    returned.
+    """
     axes.plot(*geometry.once(momentum).T, label="path of H", **style.PATH_OF_H)
     stations = [momentum[:1]]
     numbered = style.thinned(len(flight.schedule), NUMBERED)
@@ -168,19 +209,33 @@ def _momentum(axes: Axes, flight: Flight, track: Track, momentum: Vector, width:
             if stretch.pulse in numbered and np.hypot(*(moved[-1] - moved[0])) > 0.08 * width:
                 style.head(axes, moved, _halfway(moved), MOMENTUM)
     places = np.vstack(stations)
-    marked = [row for row in range(len(places)) if len(places) <= SPARSE or row == 0 or row - 1 in numbered]
-    look: dict[str, Any] = {"color": MOMENTUM, "markersize": 8, "markeredgewidth": 1.4, "zorder": 1.9}  # under firings
+    marked = [
+        row
+        for row in range(len(places))
+        if len(places) <= SPARSE or row == 0 or row - 1 in numbered
+    ]
+    look: dict[str, Any] = {
+        "color": MOMENTUM,
+        "markersize": 8,
+        "markeredgewidth": 1.4,
+        "zorder": 1.9,
+    }  # under firings
     axes.plot(*places[marked].T, "+", label="H", **look)
     return places
 
 
 def _path(axes: Axes, flight: Flight, track: Track, points: Vector) -> None:
-    """A path (n, 2) with its beginning, its sense, and its firings: numbered where there is room."""
+    """A path (n, 2) with its beginning, its sense, and its firings:
+    numbered where there is room.
+    """
     coasts: list[Vector] = []
     firings: list[Vector] = []
     width = float(np.ptp(points, axis=0).max())
     numbered = style.thinned(len(flight.schedule), NUMBERED)
-    thin = min(style.thickness(points), THIN if len(flight.schedule) > MANY else style.LINE) / style.LINE
+    thin = (
+        min(style.thickness(points), THIN if len(flight.schedule) > MANY else style.LINE)
+        / style.LINE
+    )
     size = 9.0 if thin == 1.0 else 5.5
     axes.axhline(0.0, color=GREY, linewidth=0.5)
     axes.axvline(0.0, color=GREY, linewidth=0.5)
@@ -197,27 +252,52 @@ def _path(axes: Axes, flight: Flight, track: Track, points: Vector) -> None:
     refined = [_refined(rows) for rows in firings]
     # First and last number of those in one place, beside the middle one.
     for group in together([rows[len(rows) // 2] for rows in refined], width):
-        first, last, middle = group[0] + 1, group[-1] + 1, refined[group[len(group) // 2]]
-        text = f"{'firing ' * (first == 1)}{first}" + (f"\N{EN DASH}{last}" if first != last else "")
+        first = group[0] + 1
+        last = group[-1] + 1
+        middle = refined[group[len(group) // 2]]
+        text = f"{'firing ' * (first == 1)}{first}" + (
+            f"\N{EN DASH}{last}" if first != last else ""
+        )
         style.add(axes, text, middle[len(middle) // 2], FIRED)
     axes.plot(*style.joined(coasts).T, color=MOTION, linewidth=thin * style.LINE, label="path")
     if firings:
-        axes.plot(*style.joined(firings).T, color=PULSE, linewidth=max(2.2 * thin, style.LINE), label="firing")
-        begins = [rows[0] for number, rows in enumerate(firings) if len(firings) <= SPARSE or number in numbered]
+        axes.plot(
+            *style.joined(firings).T,
+            color=PULSE,
+            linewidth=max(2.2 * thin, style.LINE),
+            label="firing",
+        )
+        begins = [
+            rows[0]
+            for number, rows in enumerate(firings)
+            if len(firings) <= SPARSE or number in numbered
+        ]
         axes.plot(*np.array(begins).T, ".", color=PULSE, markersize=5 if thin == 1.0 else 3)
     axes.plot(*points[0], "o", color=MOTION, markersize=4.5)
-    axes.plot(*points[-1], "o", color=MOTION, markersize=5.5, markerfacecolor="none", markeredgewidth=1.2, label="end")
+    axes.plot(
+        *points[-1],
+        "o",
+        color=MOTION,
+        markersize=5.5,
+        markerfacecolor="none",
+        markeredgewidth=1.2,
+        label="end",
+    )
     style.add(axes, "t = 0", points[0], INK, role="vital")
     if firings:
         style.add(axes, "end", points[-1], INK)
 
 
 def together(places: Sequence[Vector], width: float) -> list[list[int]]:
-    """The firings to be numbered, from 0: `CROWD` or more in a row, each near the one before, have one label."""
+    """The firings to be numbered, from 0: `CROWD` or more in a row, each near the one before, have
+    one label.
+    """
     numbered = style.thinned(len(places), NUMBERED)
     if len(numbered) < len(places):
         return [[number] for number in numbered]
-    return geometry.runs(numbered, lambda a, b: bool(np.hypot(*(places[b] - places[a])) < NEAR * width), CROWD)
+    return geometry.runs(
+        numbered, lambda a, b: bool(np.hypot(*(places[b] - places[a])) < NEAR * width), CROWD
+    )
 
 
 def _refined(rows: Vector) -> Vector:
@@ -265,24 +345,35 @@ def shown(plan: Plan) -> tuple[Flight, Track]:
 
 
 def until(flight: Flight) -> float:
-    """End of the time axis of a flight, s: that of the flight where it was named, else `geometry.shown_until`."""
+    """End of the time axis of a flight, s: that of the flight where it was named, else
+    `geometry.shown_until`.
+    """
     usual = flight.schedule.end + flight.spacecraft.inertial_period
-    return flight.shown_to if flight.shown_to != usual else geometry.shown_until(flight.spacecraft, flight.schedule)
+    return (
+        flight.shown_to
+        if flight.shown_to != usual
+        else geometry.shown_until(flight.spacecraft, flight.schedule)
+    )
 
 
 TIME = "time, s"  # label of time axes
-DECADES = 4.0  # largest number of decades of the nutation on a log axis, unless the requirement lies lower
+# largest number of decades of the nutation on a log axis, unless the requirement lies lower
+DECADES = 4.0
 EDGE = 0.012  # room before t = 0, as a part of the time shown, so that events at t = 0 are seen
 
 FULL, PALE = 0.9, 0.35
-"""Share of a bar that several firings must fill to be drawn as one, and how dense it is drawn where they do not."""
+"""Share of a bar that several firings must fill to be drawn as one, and how dense it is drawn where
+they do not.
+"""
 
 BAR = 0.46  # height of a bar; the distance between two rows is 1
 CHANGES = 1e-3  # share of the largest ω3 from which on its change is drawn
 
 
 def _courses(flight: Flight, track: Track) -> dict[Callable[[Axes, Flight, Track], None], float]:
-    """The panels over time and the height of each, inches: nutation, firings, ω1 and ω2, and ω3 where it changes."""
+    """The panels over time and the height of each, inches: nutation, firings, ω1 and ω2, and ω3
+    where it changes.
+    """
     spin = track.rates[:, 2]
     courses: dict[Callable[[Axes, Flight, Track], None], float] = {nutation_history: 1.9}
     for height in firings_height(flight):
@@ -294,7 +385,9 @@ def _courses(flight: Flight, track: Track) -> dict[Callable[[Axes, Flight, Track
 
 
 def firings_height(flight: Flight) -> list[float]:
-    """Inches of the panel of `firings`, for each row a bar, its number, and room; empty where nothing fires."""
+    """Inches of the panel of `firings`, for each row a bar, its number, and room; empty where
+    nothing fires.
+    """
     rows = len(geometry.channels_fired(flight))
     return [0.3 + 0.36 * rows] * bool(rows)
 
@@ -308,7 +401,9 @@ def history(flight: Flight, track: Track, *, narrow: bool = False) -> Figure:
     return figure
 
 
-def _draw_courses(figure: Figure, cells: Sequence[SubplotSpec], flight: Flight, track: Track) -> None:
+def _draw_courses(
+    figure: Figure, cells: Sequence[SubplotSpec], flight: Flight, track: Track
+) -> None:
     """The panels over time in ``cells`` of a figure, from above, with their legend."""
     panels: list[Axes] = []
     for cell, draw in zip(cells, _courses(flight, track), strict=True):
@@ -321,9 +416,13 @@ def _draw_courses(figure: Figure, cells: Sequence[SubplotSpec], flight: Flight, 
 
 def nutation_history(axes: Axes, flight: Flight, track: Track) -> None:
     """Nutation θ on a log axis with the band that is required, and its last value."""
-    angles, limit = np.degrees(track.nutation), style.limit_of(flight.spacecraft, Part.NUTATION)
-    most, bound = max(float(angles.max()), geometry.LEAST), math.inf if limit is None else limit
-    low = max(0.5 * min(float(angles.min()), bound, 0.1 * most), min(most * 10.0**-DECADES, 0.1 * bound))
+    angles = np.degrees(track.nutation)
+    limit = style.limit_of(flight.spacecraft, Part.NUTATION)
+    most = max(float(angles.max()), geometry.LEAST)
+    bound = math.inf if limit is None else limit
+    low = max(
+        0.5 * min(float(angles.min()), bound, 0.1 * most), min(most * 10.0**-DECADES, 0.1 * bound)
+    )
     if limit is not None:
         axes.axhspan(0.0, limit, facecolor=GREY, alpha=0.16, linewidth=0.0, zorder=0.4)
         axes.axhline(limit, **style.LIMIT)
@@ -338,7 +437,9 @@ def _rate_history(axes: Axes, flight: Flight, track: Track) -> None:
     rates = np.degrees(track.rates)
     width = style.thickness(rates, float(track.t[-1]) / flight.spacecraft.body_period / 2.5)
     axes.plot(track.t, rates[:, 0], color=MOTION, linewidth=width, label="ω1")
-    axes.plot(track.t, rates[:, 1], color=INK, linewidth=0.8 * width, linestyle=(0, (4, 1.5)), label="ω2")
+    axes.plot(
+        track.t, rates[:, 1], color=INK, linewidth=0.8 * width, linestyle=(0, (4, 1.5)), label="ω2"
+    )
     half = 1.12 * max(float(np.abs(rates[:, :2]).max()), geometry.LEAST)
     axes.set_ylim(-half, half)
     _bands(axes, flight, track)
@@ -360,13 +461,20 @@ def _bands(axes: Axes, flight: Flight, track: Track) -> None:
     """Time axis, and bands of the firings."""
     until = float(track.t[-1])
     axes.set_xlim(-EDGE * until, until)
-    look: dict[str, Any] = {"facecolor": (PULSE, 0.25), "edgecolor": PULSE, "linewidth": 0.6, "zorder": 0.5}
+    look: dict[str, Any] = {
+        "facecolor": (PULSE, 0.25),
+        "edgecolor": PULSE,
+        "linewidth": 0.6,
+        "zorder": 0.5,
+    }
     for number, block in enumerate(geometry.blocks(flight, until)):
         axes.axvspan(block.begins, block.ends, label=None if number else "firing", **look)
 
 
 def firings(axes: Axes, flight: Flight, until: float) -> None:
-    """A bar for each firing, in the row of its channel; times when nothing may fire are hatched, beside the labels."""
+    """A bar for each firing, in the row of its channel; times when nothing may fire are hatched,
+    beside the labels.
+    """
     names = geometry.channels_fired(flight)
     rows = {name: len(names) - 1 - index for index, name in enumerate(names)}
     axes.set_xlim(-EDGE * until, until)
@@ -374,29 +482,45 @@ def firings(axes: Axes, flight: Flight, until: float) -> None:
     for begins, ends in geometry.closed(flight.spacecraft, until):
         for row in rows.values():
             axes.broken_barh(
-                [(begins, ends - begins)], (row - 0.5 * BAR, BAR), facecolor="none", edgecolor=GREY, hatch="////",
-                linewidth=0.0, label="must not fire",
-            )  # fmt: skip
-    bars = ((block, row) for name, row in rows.items() for block in geometry.blocks(flight, until, name))
+                [(begins, ends - begins)],
+                (row - 0.5 * BAR, BAR),
+                facecolor="none",
+                edgecolor=GREY,
+                hatch="////",
+                linewidth=0.0,
+                label="must not fire",
+            )
+    bars = (
+        (block, row) for name, row in rows.items() for block in geometry.blocks(flight, until, name)
+    )
     for block, row in sorted(bars):
         _bar(axes, flight, block, row)
     axes.set_yticks(list(rows.values()), list(rows))
     axes.grid(axis="x")
-    notes = ["effective on-times, not the commands"] * any(pulse.through_valve for pulse in flight.schedule)
+    notes = ["effective on-times, not the commands"] * any(
+        pulse.through_valve for pulse in flight.schedule
+    )
     if any(pulse.channel == STEERABLE for pulse in flight.schedule):
         notes.append("angles: torque from body axis +1")
     axes.set_title("; ".join(notes), loc="right", **style.NOTE)
 
 
 def _bar(axes: Axes, flight: Flight, block: geometry.FiredBlock, row: int) -> None:
-    """The bar of a firing, or of several that cannot be distinguished: paler where they do not fill it."""
+    """The bar of a firing, or of several that cannot be distinguished: paler where they do not fill
+    it.
+    """
     size = block.ends - block.begins
     dense = block.many == 1 or block.on > FULL * size
     axes.broken_barh(
-        [(block.begins, size)], (row - 0.5 * BAR, BAR), facecolor=PULSE if dense else (PULSE, PALE), edgecolor=PULSE,
-        linewidth=0.8, label=None if dense else "firings too close to be distinguished",
-    )  # fmt: skip
-    how, pulse = f"{style.number(block.on)} s", flight.schedule.pulses[block.first - 1]
+        [(block.begins, size)],
+        (row - 0.5 * BAR, BAR),
+        facecolor=PULSE if dense else (PULSE, PALE),
+        edgecolor=PULSE,
+        linewidth=0.8,
+        label=None if dense else "firings too close to be distinguished",
+    )
+    how = f"{style.number(block.on)} s"
+    pulse = flight.schedule.pulses[block.first - 1]
     if block.many == 1:
         how = how if pulse.on_time else f"{style.number(pulse.magnitude)} N m s"
         if pulse.channel == STEERABLE:

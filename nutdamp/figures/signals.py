@@ -1,4 +1,6 @@
-"""Pictures of signals: one run of ``loop``, the nutation that ``budget`` holds, and residuals of a ``fit``."""
+"""Pictures of signals: one run of ``loop``, the nutation that ``budget`` holds, and residuals of a
+``fit``.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +32,9 @@ BLOCK = 4096  # samples evaluated together
 DECADES = 5.0  # largest number of decades of the nutation on its log axis
 
 FIRST, EARLY, TURNS = 4, 0.2, 4.0
-"""Firings in this share of the run, and periods of the nutation, that the enlarged first seconds hold."""
+"""Firings in this share of the run, and periods of the nutation, that the enlarged first seconds
+hold.
+"""
 
 SHORT = 0.5  # share of the run from which on its first seconds are not drawn a second time
 
@@ -44,8 +48,11 @@ ROWS = 600
 
 @style.styled()
 def loop_figure(plan: LoopPlan) -> Figure:
-    """Signal of the sensor, nutation with thresholds, and firings: the whole run, and beside it its first seconds."""
-    run, first = plan.flown_run, first_seconds(plan)
+    """Signal of the sensor, nutation with thresholds, and firings: the whole run, and beside it its
+    first seconds.
+    """
+    run = plan.flown_run
+    first = first_seconds(plan)
     spans = [run.until, *[first] * (first < SHORT * run.until)]
     heights = [1.8, 1.8, *firings_height(run.flight)]
     figure = style.sheet(7.4 if len(spans) == 1 else 10.4, 1.8 + sum(heights))
@@ -70,7 +77,9 @@ def loop_figure(plan: LoopPlan) -> Figure:
 def first_seconds(plan: LoopPlan) -> float:
     """End of the first seconds of a run, s: some firings, and some periods of the nutation."""
     run = plan.flown_run
-    ends = [firing.pulse.end for firing in run.fired[:FIRST] if firing.pulse.end < EARLY * run.until]
+    ends = [
+        firing.pulse.end for firing in run.fired[:FIRST] if firing.pulse.end < EARLY * run.until
+    ]
     return min(run.until, max(1.2 * max(ends, default=0.0), TURNS * plan.spacecraft.body_period))
 
 
@@ -82,7 +91,9 @@ def _signal(axes: Axes, plan: LoopPlan, until: float) -> None:
     else:
         times, values = _samples(plan, sensor.rate, until)
     scale = 180.0 / math.pi if sensor.kind == GYRO else 1.0
-    names = ("ω1 as sampled", "ω2 as sampled") if sensor.kind == GYRO else ("acceleration as sampled",)
+    names = (
+        ("ω1 as sampled", "ω2 as sampled") if sensor.kind == GYRO else ("acceleration as sampled",)
+    )
     for column, (name, colour) in enumerate(zip(names, (MOTION, INK), strict=False)):
         axes.plot(times, scale * values[:, column], ".", markersize=1.6, color=colour, label=name)
     axes.set_ylabel("signal, °/s" if sensor.kind == GYRO else "signal, m/s²")
@@ -90,11 +101,15 @@ def _signal(axes: Axes, plan: LoopPlan, until: float) -> None:
 
 
 def _samples(plan: LoopPlan, rate: float, until: float) -> tuple[Vector, Vector]:
-    """Some of the samples, evenly, with the noise that the loop saw; those within firings are left out."""
+    """Some of the samples, evenly, with the noise that the loop saw; those within firings are left
+    out.
+    """
     run = plan.flown_run
     count = math.floor(until * rate) + 1
     shown_at = np.arange(0, count, max(math.ceil(count / SAMPLES), 1))
-    signal, times, values = Signal(plan.spacecraft, run.loop.sensor, run.key), [], []
+    signal = Signal(plan.spacecraft, run.loop.sensor, run.key)
+    times = []
+    values = []
     for block in range(0, count, BLOCK):
         numbers = shown_at[(shown_at >= block) & (shown_at < block + BLOCK)]
         if len(numbers):
@@ -116,7 +131,11 @@ def _nutation(axes: Axes, plan: LoopPlan, until: float) -> None:
     most = max(float(angles.max()), start)
     low = max(0.5 * min(float(angles.min()), stop or start), most * 10.0**-DECADES)
     axes.plot(track.t, np.maximum(angles, 0.1 * low), color=MOTION, label="nutation θ")
-    seen = [(firing.pulse.t, max(math.degrees(firing.seen), low)) for firing in run.fired if firing.pulse.t <= until]
+    seen = [
+        (firing.pulse.t, max(math.degrees(firing.seen), low))
+        for firing in run.fired
+        if firing.pulse.t <= until
+    ]
     if seen:
         axes.plot(*np.transpose(seen), "x", color=PULSE, markersize=4, label="θ seen at a firing")
     axes.axhline(start, color=GREY, linewidth=0.9, linestyle="--", label="start")
@@ -129,9 +148,15 @@ def _nutation(axes: Axes, plan: LoopPlan, until: float) -> None:
 def budget_figure(budget: Budget) -> Figure:
     """Nutation over time: without firing, and the sawtooth of each limit cycle by its means."""
     body, growth, until = budget.spacecraft, budget.spacecraft.growth, budget.until_largest
-    # Cycles, or pulses of a loop that never pauses; with no nutation from the first that could grow at once.
+    # Cycles, or pulses of a loop that never pauses; with no nutation from the first that could grow
+    # at once.
     held = [
-        (row.thresholds, cycle, 1.0 / (cycle.cycles or cycle.pulses), row.begins if math.isfinite(row.begins) else 0.0)
+        (
+            row.thresholds,
+            cycle,
+            1.0 / (cycle.cycles or cycle.pulses),
+            row.begins if math.isfinite(row.begins) else 0.0,
+        )
         for row in budget.held
         if (cycle := row.cycle) is not None
     ]
@@ -139,7 +164,9 @@ def budget_figure(budget: Budget) -> Figure:
     if until is not None and math.isfinite(until):
         size = max(size, 1.2 * until)
     size = size or 3.0 / max(abs(growth), 1e-300)
-    unit, seconds = ("days", DAY) if size > 2.0 * DAY else ("hours", 3600.0) if size > 7200.0 else ("s", 1.0)
+    unit, seconds = (
+        ("days", DAY) if size > 2.0 * DAY else ("hours", 3600.0) if size > 7200.0 else ("s", 1.0)
+    )
     figure = style.sheet(7.4, 4.0)
     axes = figure.subplots()
     times = np.linspace(0.0, size, ROWS)
@@ -147,7 +174,11 @@ def budget_figure(budget: Budget) -> Figure:
     axes.plot(times / seconds, free, color=INK, label="no firing")
     for (thresholds, cycle, period, begins), (colour, line) in zip(held, LINES, strict=False):
         low, high = math.degrees(cycle.low), math.degrees(cycle.high)
-        rises = min(requirements.reached(body, cycle.high, cycle.low), period) if high > low > 0.0 else period
+        rises = (
+            min(requirements.reached(body, cycle.high, cycle.low), period)
+            if high > low > 0.0
+            else period
+        )
         starts = begins + period * np.arange(max(math.ceil((size - begins) / period), 0))
         drawn = np.stack([starts, starts + period - rises, starts + period], axis=1).ravel()
         name = f"{style.angle(thresholds.start)} to {style.angle(thresholds.stop)}"
@@ -166,12 +197,18 @@ def budget_figure(budget: Budget) -> Figure:
     return figure
 
 
-SPREAD = 6.0  # standard deviations to either side that residuals are drawn to; outliers beyond are marked at the edge
+# standard deviations to either side that residuals are drawn to; outliers beyond are marked at the
+# edge
+SPREAD = 6.0
 
 ROUNDING = 1e-3
-"""Share of the noise taken for the digits below which all residuals are rounding: of real noise some are above it."""
+"""Share of the noise taken for the digits below which all residuals are rounding: of real noise
+some are above it.
+"""
 
-LOOKS = tuple((colour, line) for line in ("-", (0, (4, 1.5)), ":") for colour in (MOTION, INK, MOMENTUM, GREY))
+LOOKS = tuple(
+    (colour, line) for line in ("-", (0, (4, 1.5)), ":") for colour in (MOTION, INK, MOMENTUM, GREY)
+)
 """Colour and line of the signals in turn."""
 
 FARTHEST = 6.0  # pulls beyond are drawn at the edge
@@ -179,7 +216,9 @@ FARTHEST = 6.0  # pulls beyond are drawn at the edge
 
 @style.styled()
 def fit_figure(fit: Fit) -> Figure:
-    """Residuals of the signals below each other; beside them autocorrelations, and pulls of the parameters."""
+    """Residuals of the signals below each other; beside them autocorrelations, and pulls of the
+    parameters.
+    """
     from nutdamp.estimation.results import estimates
 
     signals = fit.model.signals
@@ -196,7 +235,9 @@ def fit_figure(fit: Fit) -> Figure:
     style.legend(figure, [*left, white])
     shape = "symmetric" if fit.model.body(fit.named).inertia.symmetric else "triaxial"
     count = int(np.count_nonzero(fit.used))
-    style.heading(figure, fit.model.spacecraft, f"fit of a free rigid body, {shape}, to {count:,} samples")
+    style.heading(
+        figure, fit.model.spacecraft, f"fit of a free rigid body, {shape}, to {count:,} samples"
+    )
     return figure
 
 
@@ -206,20 +247,31 @@ def _residuals(axes: Axes, fit: Fit, index: int) -> None:
 
     unit, factor = in_shown(fit.model.signals[index])
     unit = unit.replace("deg", "°")
-    rows, noise = fit.model.signal == index, float(fit.noise[index])
+    rows = fit.model.signal == index
+    noise = float(fit.noise[index])
     axes.set_ylabel(f"{fit.model.signals[index]}, {unit}")
     if _rounding(fit, index):
         axes.text(0.5, 0.5, "only rounding", transform=axes.transAxes, ha="center", va="center")
         axes.set_yticks([])
         return
     limit = factor * SPREAD * noise
-    left, kept = np.clip(factor * fit.residuals[rows], -limit, limit), fit.used[rows]
+    left = np.clip(factor * fit.residuals[rows], -limit, limit)
+    kept = fit.used[rows]
     times = fit.model.times[rows]
-    axes.plot(times[kept], left[kept], color=LOOKS[index % len(LOOKS)][0], linestyle="", marker=".", markersize=2.0)
+    axes.plot(
+        times[kept],
+        left[kept],
+        color=LOOKS[index % len(LOOKS)][0],
+        linestyle="",
+        marker=".",
+        markersize=2.0,
+    )
     if not kept.all():
         axes.plot(times[~kept], left[~kept], color=INK, linestyle="", marker="x", label="left out")
     for side in (-3.0, 3.0):
-        axes.axhline(side * factor * noise, color=GREY, linewidth=0.9, linestyle="--", label="3 sigma")
+        axes.axhline(
+            side * factor * noise, color=GREY, linewidth=0.9, linestyle="--", label="3 sigma"
+        )
     axes.set_ylim(-1.08 * limit, 1.08 * limit)
     axes.grid()
 
@@ -244,7 +296,14 @@ def _autocorrelation(axes: Axes, fit: Fit) -> None:
     if not bands:
         style.words(axes, "too few samples, or only rounding")
         return
-    axes.axhspan(-max(bands), max(bands), facecolor=GREY, alpha=0.25, linewidth=0.0, label="95 % of white noise")
+    axes.axhspan(
+        -max(bands),
+        max(bands),
+        facecolor=GREY,
+        alpha=0.25,
+        linewidth=0.0,
+        label="95 % of white noise",
+    )
     most = max(float(np.abs(line.get_ydata()).max()) for line in axes.lines)
     size = min(1.0, 1.15 * max(most, 2.0 * max(bands)))
     axes.set(xlabel="lag, samples", ylim=(-size, size))
@@ -252,7 +311,9 @@ def _autocorrelation(axes: Axes, fit: Fit) -> None:
 
 
 def _pulls(axes: Axes, rows: list[Estimate]) -> None:
-    """Value less that of the file, with one sigma after the fit, both over the sigma of the file."""
+    """Value less that of the file, with one sigma after the fit,
+    both over the sigma of the file.
+    """
     axes.set_title("Pulls: change from the file")
     if not rows:
         style.words(axes, "the file has no tolerances of what is fitted")
@@ -262,7 +323,13 @@ def _pulls(axes: Axes, rows: list[Estimate]) -> None:
     sigmas = [min(row.sigma / (row.prior or 1.0), FARTHEST) for row in rows]
     axes.axvspan(-1.0, 1.0, facecolor=GREY, alpha=0.25, linewidth=0.0)
     axes.axvline(0.0, color=GREY, linewidth=0.8)
-    look: dict[str, Any] = {"fmt": "o", "color": MOTION, "markersize": 4, "elinewidth": 1.2, "capsize": 2.0}
+    look: dict[str, Any] = {
+        "fmt": "o",
+        "color": MOTION,
+        "markersize": 4,
+        "elinewidth": 1.2,
+        "capsize": 2.0,
+    }
     axes.errorbar(changes, places, xerr=sigmas, **look)
     reach = max(2.0, 1.1 * float((np.abs(changes) + sigmas).max()))
     axes.set(xlabel="sigmas of the file", xlim=(-reach, reach), ylim=(0.6 - len(rows), 0.6))

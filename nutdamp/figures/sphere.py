@@ -19,16 +19,22 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-ELEVATION = math.radians(28.0)  # direction from which the sphere is seen: above the plane square to H(0)
+ELEVATION = math.radians(
+    28.0
+)  # direction from which the sphere is seen: above the plane square to H(0)
 STEEPEST = math.radians(65.0)  # elevation of the globe where all that it shows is near H(0)
-ASIDE = math.radians(65.0)  # the spin axis leans to the right at t = 0, this far round from the viewer
+ASIDE = math.radians(
+    65.0
+)  # the spin axis leans to the right at t = 0, this far round from the viewer
 MOVES = math.radians(2.0)  # motion of the spin axis below which it is a point on the globe
 
 WIDE, DRAWN = math.radians(14.0), math.radians(28.0)
 """Below the first angle from H(0) everything is magnified, to the second one at most."""
 
 SPACE, BODY = 0.28, 0.15  # opacity of the cones: distinguished in grey print too
-RIM = 0.7  # width of rims and edges of cones, points: thinner than the path of the spin axis, which shares their colour
+# width of rims and edges of cones, points: thinner than the path of the spin axis, which shares
+# their colour
+RIM = 0.7
 
 DIRECTIONS = (("+", MOMENTUM, "H"), ("o", INK, "ω"), ("s", MOTION, "spin axis"))
 """Marks in the plane picture, colours and names of the three directions that lie in one plane."""
@@ -37,9 +43,11 @@ STEPS = (1.0, 2.0, 3.0, 5.0)
 
 
 class View(NamedTuple):
-    """Orthographic view of directions: ``plane`` rows are two directions square to H(0) and its own.
+    """Orthographic view of directions: ``plane`` rows are two directions square to H(0) and its
+    own.
 
-    ``magnified`` stretches directions square to H(0): straight lines, tangents and coplanar lines remain so.
+    ``magnified`` stretches directions square to H(0): straight lines, tangents and coplanar lines
+    remain so.
     """
 
     plane: Vector
@@ -54,9 +62,15 @@ class View(NamedTuple):
 
     def seen(self, directions: Vector) -> tuple[Vector, Vector]:
         """Places on paper (n, 2), and heights towards the viewer (n,)."""
-        local = np.atleast_2d(directions) @ self.plane.T * np.array([self.magnified, self.magnified, 1.0])
-        sine, cosine = math.sin(self.azimuth), math.cos(self.azimuth)
-        level, rise = math.cos(self.elevation), math.sin(self.elevation)
+        local = (
+            np.atleast_2d(directions)
+            @ self.plane.T
+            * np.array([self.magnified, self.magnified, 1.0])
+        )
+        sine = math.sin(self.azimuth)
+        cosine = math.cos(self.azimuth)
+        level = math.cos(self.elevation)
+        rise = math.sin(self.elevation)
         right, near = np.array([-sine, cosine, 0.0]), np.array([level * cosine, level * sine, rise])
         places = np.column_stack([local @ right, local @ np.cross(near, right)])
         return places, np.asarray(local @ near, dtype=np.float64)
@@ -95,7 +109,8 @@ def has_globe(flight: Flight, track: Track) -> bool:
 
 def draw_globe(axes: Axes, flight: Flight, track: Track) -> None:
     """Path of the spin axis on the sphere, with target, Sun and cones to keep on its front."""
-    cones, plane = directed(flight), geometry.sky_plane(flight, track.momentum[0])
+    cones = directed(flight)
+    plane = geometry.sky_plane(flight, track.momentum[0])
     directions = [direction for _, direction in cones]
     shown = np.vstack([track.axis[:1], geometry.aimed(flight), *directions])
     across, aside, along = (plane @ shown.sum(axis=0)).tolist()
@@ -107,7 +122,9 @@ def draw_globe(axes: Axes, flight: Flight, track: Track) -> None:
         rows = slice(stretch.first, stretch.last + 1)
         if stretch.pulse is None:
             draw_line(axes, looked, track.axis[rows], MOTION, thin)
-        elif np.any(np.ptp(track.axis[rows], axis=0) > geometry.NO_CONE):  # an impulse does not move it
+        elif np.any(
+            np.ptp(track.axis[rows], axis=0) > geometry.NO_CONE
+        ):  # an impulse does not move it
             draw_line(axes, looked, track.axis[rows], PULSE, 1.8 * thin)
     style.target(axes, looked.seen(geometry.aimed(flight))[0], "_target")
     (start,), _ = looked.seen(track.axis[0])
@@ -121,7 +138,9 @@ def draw_globe(axes: Axes, flight: Flight, track: Track) -> None:
     axes.set_title("Spin axis on the globe\nrings 30°, 60°, 90° from H(0)")
 
 
-def _draw_keep(axes: Axes, looked: View, cone: Keep, direction: Vector) -> Iterator[tuple[str, Vector]]:
+def _draw_keep(
+    axes: Axes, looked: View, cone: Keep, direction: Vector
+) -> Iterator[tuple[str, Vector]]:
     """The ``direction`` of a cone, and the circles between which the spin axis is to stay.
 
     Yields the label of each, and its place (2,).
@@ -150,7 +169,9 @@ def draw_ground(axes: Axes, looked: View, track: Track) -> None:
         for height in (0.0, 0.5, math.sqrt(0.75)):
             ring = np.insert(math.sqrt(1.0 - height * height) * circle, 2, height, axis=1)
             draw_line(axes, looked, ring @ looked.plane, FAINT, 0.6, back=False)
-    momentum, _ = looked.seen(track.momentum / np.linalg.norm(track.momentum, axis=1, keepdims=True))
+    momentum, _ = looked.seen(
+        track.momentum / np.linalg.norm(track.momentum, axis=1, keepdims=True)
+    )
     axes.plot(*geometry.once(momentum).T, **style.PATH_OF_H)
 
 
@@ -179,21 +200,33 @@ def _directions(rolling: DrawnCones) -> Vector:
 
 def _rims(rolling: DrawnCones) -> list[tuple[Vector, Vector, str, float]]:
     """Rim, circle about it, colour and density of the cones that there are."""
-    both = (rolling.space, rolling.swept, MOMENTUM, SPACE), (rolling.body, rolling.body, MOTION, BODY)
+    both = (
+        (rolling.space, rolling.swept, MOMENTUM, SPACE),
+        (rolling.body, rolling.body, MOTION, BODY),
+    )
     return [cone for cone in both if len(cone[0])]
 
 
-def draw_line(axes: Axes, looked: View, directions: Vector, colour: str, width: float, *, back: bool = True) -> None:
+def draw_line(
+    axes: Axes, looked: View, directions: Vector, colour: str, width: float, *, back: bool = True
+) -> None:
     """A line on the sphere: where it runs behind it, dotted, or not at all."""
     points, height = looked.seen(directions)
     front = height >= 0.0 if looked.magnified == 1.0 else np.ones(len(height), dtype=bool)
     axes.plot(*np.where(front[:, None], points, np.nan).T, color=colour, linewidth=width)
     if back and not front.all():
-        axes.plot(*np.where(front[:, None], np.nan, points).T, color=colour, linewidth=0.7 * width, linestyle=":")
+        axes.plot(
+            *np.where(front[:, None], np.nan, points).T,
+            color=colour,
+            linewidth=0.7 * width,
+            linestyle=":",
+        )
 
 
 def frame(axes: Axes, looked: View, directions: Vector) -> None:
-    """Equal scales, and room for the centre and all ``directions`` (n, 3); no ticks: it has no scale to read."""
+    """Equal scales, and room for the centre and all ``directions`` (n, 3); no ticks: it has no
+    scale to read.
+    """
     unit = directions / np.linalg.norm(directions, axis=1, keepdims=True)
     points = np.vstack([[[0.0, 0.0]], looked.seen(unit)[0]])
     if looked.magnified == 1.0:
@@ -213,4 +246,6 @@ def draw_circles(axes: Axes, plane: Vector, rolling: DrawnCones) -> None:
     places = geometry.on_sky(plane, _directions(rolling))
     axes.plot(*places.T, color=GREY, linewidth=0.8, label="plane of H, ω and spin axis")
     for place, (mark, colour, _) in zip(places, DIRECTIONS, strict=True):
-        axes.plot(*place, mark, color=colour, markersize=8 if mark == "+" else 4.5, markeredgewidth=1.4)
+        axes.plot(
+            *place, mark, color=colour, markersize=8 if mark == "+" else 4.5, markeredgewidth=1.4
+        )

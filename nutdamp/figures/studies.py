@@ -35,7 +35,10 @@ if TYPE_CHECKING:
     from nutdamp.planning.screening import Dispersion
 
 
-TAIL, KNEE = 2.0, 0.999  # the axis is logarithmic where the largest value is more than TAIL times the quantile KNEE
+TAIL, KNEE = (
+    2.0,
+    0.999,
+)  # the axis is logarithmic where the largest value is more than TAIL times the quantile KNEE
 DECADES = 6.0  # largest number of decades of that axis
 STEPS = 400  # steps of the curve of the cases within a value, besides the last ones
 ALIKE = 1e-9  # relative difference up to which the values of all cases are one, but for rounding
@@ -44,7 +47,9 @@ NOTHING, NEXT_TO_NOTHING = 1e-6, "1e-6°"
 """Degrees below which all cases together are not worth a picture, and their text."""
 
 FAR = 4.0
-"""A requirement is drawn where it is at most so many times the largest value: beyond, it would leave a panel empty."""
+"""A requirement is drawn where it is at most so many times the largest value: beyond, it would
+leave a panel empty.
+"""
 
 DOTS = 2_000  # largest number of cases shown as dots: more would only make the picture heavy
 DENSE = 0.8  # opacity of a dot: fainter ones are not seen
@@ -62,13 +67,16 @@ def dispersion_figure(flown: Dispersion, name: str = "overview") -> Figure:
 
 
 def loop_cases_figure(flown: LoopDispersion) -> Figure:
-    """Largest nutation after the loop falls quiet, and how far H has moved, of dispersed cases of a loop."""
+    """Largest nutation after the loop falls quiet, and how far H has moved, of dispersed cases of a
+    loop.
+    """
     return _figure(flown.core, flown.verdict, "cases", "closed loop by real pulse widths")
 
 
 @style.styled()
 def _figure(results: Results | LoopResults, judged: Verdict, name: str, how: str) -> Figure:
-    panels, body = PANELS[name], results.study.model.spacecraft
+    panels = PANELS[name]
+    body = results.study.model.spacecraft
     figure = style.sheet((4.1, 7.4, 10.8)[panels - 1], 4.4 if panels != 2 else 3.9)
     axes = list(figure.subplots(1, panels, squeeze=False)[0])
     if name != "momentum":
@@ -82,9 +90,11 @@ def _figure(results: Results | LoopResults, judged: Verdict, name: str, how: str
 
 def _cases(panels: list[Axes], results: Results | LoopResults, judged: Verdict) -> None:
     """Share of the cases within each value of nutation and momentum shift."""
-    body, lines = results.study.model.spacecraft, {line.bound.part: line for line in judged.required}
+    body = results.study.model.spacecraft
+    lines = {line.bound.part: line for line in judged.required}
     for axes, part in zip(panels, (Part.NUTATION, requirements.aim(body)), strict=True):
-        distribution, limit = results.distribution(part.value), style.limit_of(body, part)
+        distribution = results.distribution(part.value)
+        limit = style.limit_of(body, part)
         nutation = "nutation left" if isinstance(results, Results) else "largest nutation"
         name = nutation if part is Part.NUTATION else part.label
         required = "" if limit is None else f", required {style.number(limit)}°"
@@ -95,7 +105,11 @@ def _cases(panels: list[Axes], results: Results | LoopResults, judged: Verdict) 
             continue
         reached = math.degrees(float(distribution.quantiles(np.array([results.probability]))[0]))
         share = exact_percent(results.probability)
-        shown = limit if limit is not None and limit <= FAR * math.degrees(distribution.maximum) else None
+        shown = (
+            limit
+            if limit is not None and limit <= FAR * math.degrees(distribution.maximum)
+            else None
+        )
         draw_distribution(axes, distribution, f"{name}, °", shown)
         axes.axvline(reached, color=GREY, linewidth=0.8, linestyle=":")
         axes.plot(reached, 100.0 * results.probability, "o", color=INK, markersize=4)
@@ -112,12 +126,16 @@ def _alike(distribution: Distribution) -> str | None:
     return f"{style.number(most)}°" if most - least <= ALIKE * most else None
 
 
-def draw_distribution(axes: Axes, distribution: Distribution, name: str, limit: float | None) -> None:
+def draw_distribution(
+    axes: Axes, distribution: Distribution, name: str, limit: float | None
+) -> None:
     """Curve of the cases within a value: on a log axis where few lie far beyond the others."""
     high = distribution.maximum
     shares = np.append(np.linspace(0.0, 0.99, STEPS), 1.0 - np.geomspace(0.01, 1e-6, STEPS))
     values = np.degrees(np.append(distribution.quantiles(shares), high))
-    axes.plot(values, 100.0 * np.append(shares, 1.0), color=MOTION, linewidth=1.6, label="cases within")
+    axes.plot(
+        values, 100.0 * np.append(shares, 1.0), color=MOTION, linewidth=1.6, label="cases within"
+    )
     if high > TAIL * float(distribution.quantiles(np.array([KNEE]))[0]):
         axes.set_xscale("log")
         style.log_axis(axes.xaxis)
@@ -133,40 +151,56 @@ def draw_distribution(axes: Axes, distribution: Distribution, name: str, limit: 
 
 
 def momentum_cases(results: Results) -> Vector:
-    """(n, 2): final H of the first cases as angles in degrees, from the target or from its initial direction.
+    """(n, 2): final H of the first cases as angles in degrees, from the target or from its initial
+    direction.
 
-    Directions are those of `geometry.sky_plane`; the distance from zero is the error or the momentum shift.
+    Directions are those of `geometry.sky_plane`; the distance from zero is the error or the
+    momentum shift.
     """
     model = results.study.model
-    vectors = results.early[VECTORS[requirements.aim(model.spacecraft).value], : min(results.done, EARLY)].T
+    vectors = results.early[
+        VECTORS[requirements.aim(model.spacecraft).value], : min(results.done, EARLY)
+    ].T
     turn = model.spacecraft.initial.quaternion
     plane = geometry.sky_plane(results.study.nominal, attitude.rotate(turn, model.target))
     across = (attitude.rotate(turn, vectors) @ plane.T)[:, :2]
     size = np.linalg.norm(across, axis=1)
     angle = np.degrees(2.0 * np.arcsin(np.clip(0.5 * np.linalg.norm(vectors, axis=1), 0.0, 1.0)))
-    return np.asarray(across * np.divide(angle, size, out=np.zeros_like(angle), where=size > 0.0)[:, None])
+    return np.asarray(
+        across * np.divide(angle, size, out=np.zeros_like(angle), where=size > 0.0)[:, None]
+    )
 
 
 def ellipse(points: Vector, share: float) -> Vector:
-    """(m, 2): the ellipse about the mean of ``points`` (n, 2), of their covariance, that holds ``share`` of them."""
+    """(m, 2): the ellipse about the mean of ``points`` (n, 2), of their covariance, that holds
+    ``share`` of them.
+    """
     middle = points.mean(axis=0)
     variances, vectors = np.linalg.eigh((points - middle).T @ (points - middle) / len(points))
     sizes = np.sqrt(np.maximum(variances, 0.0))
     along = (points - middle) @ vectors
     away = np.hypot(*np.divide(along, sizes, out=np.zeros_like(along), where=sizes > 0.0).T)
-    return np.asarray(middle + geometry.circle() * sizes * float(np.quantile(away, share)) @ vectors.T)
+    return np.asarray(
+        middle + geometry.circle() * sizes * float(np.quantile(away, share)) @ vectors.T
+    )
 
 
 def _momentum(axes: Axes, results: Results) -> None:
-    """Final direction of H in each case, seen from outside, with the ellipse that holds as many as must comply."""
+    """Final direction of H in each case, seen from outside, with the ellipse that holds as many as
+    must comply.
+    """
     from matplotlib.patches import PathPatch
     from matplotlib.path import Path
 
     body = results.study.model.spacecraft
     aim = requirements.aim(body)
-    points, limit = momentum_cases(results), style.limit_of(body, aim)
-    # A case has an H(0) of its own: the momentum shift is counted from there, so that it is the centre in each.
-    centre, about = ("H(0)", "the H(0) of each case") if aim is Part.SHIFT else ("the target", "the target")
+    points = momentum_cases(results)
+    limit = style.limit_of(body, aim)
+    # A case has an H(0) of its own: the momentum shift is counted from there, so that it is the
+    # centre in each.
+    centre, about = (
+        ("H(0)", "the H(0) of each case") if aim is Part.SHIFT else ("the target", "the target")
+    )
     x, y, sense = geometry.sky_names(results.study.nominal, centre)
     widest = float(np.hypot(*points.T).max())
     if widest < NOTHING:
@@ -174,15 +208,22 @@ def _momentum(axes: Axes, results: Results) -> None:
         style.words(axes, f"all {results.done:,} cases:\nwithin {NEXT_TO_NOTHING} of {centre}")
         return
     around = ellipse(points, results.probability)
-    # One path for all dots, as short in a file as can be: strokes of next to no length with round caps.
+    # One path for all dots, as short in a file as can be: strokes of next to no length with round
+    # caps.
     few = points[:DOTS]
     short = np.array([1e-3 * float(np.ptp(few, axis=0).max()), 0.0])
-    dots = Path(np.stack([few, few + short], axis=1).reshape(-1, 2), [Path.MOVETO, Path.LINETO] * len(few))
+    dots = Path(
+        np.stack([few, few + short], axis=1).reshape(-1, 2), [Path.MOVETO, Path.LINETO] * len(few)
+    )
     dots.should_simplify = False
     # Above the ellipse: where all cases lie on a line, it would hide them.
     look: dict[str, Any] = {"linewidth": 1.6, "capstyle": "round", "alpha": DENSE, "zorder": 2.5}
     axes.add_patch(PathPatch(dots, edgecolor=MOTION, facecolor="none", **look))
-    some = f"{len(few):,} of the {results.done:,} cases" if len(few) < results.done else f"the {results.done:,} cases"
+    some = (
+        f"{len(few):,} of the {results.done:,} cases"
+        if len(few) < results.done
+        else f"the {results.done:,} cases"
+    )
     axes.plot([], [], ".", color=MOTION, alpha=DENSE, label=some)
     held = f"holds {exact_percent(results.probability)} of the cases"
     axes.plot(*around.T, color=MOMENTUM, linewidth=1.5, label=held)
@@ -192,14 +233,32 @@ def _momentum(axes: Axes, results: Results) -> None:
         axes.plot(*shown[-1].T, **style.LIMIT)
     style.square(axes, np.vstack(shown), margin=0.08)
     if all(low < 0.0 < high for low, high in (axes.get_xlim(), axes.get_ylim())):
-        mark: dict[str, Any] = {"marker": "+", "color": INK, "markersize": 9, "linestyle": "", "zorder": 3}
-        axes.plot(0.0, 0.0, label=centre.removeprefix("the "), **(mark if aim is Part.SHIFT else style.TARGET))
-    axes.locator_params(nbins=4)  # of shifts of thousandths of a degree more labels would run into each other
+        mark: dict[str, Any] = {
+            "marker": "+",
+            "color": INK,
+            "markersize": 9,
+            "linestyle": "",
+            "zorder": 3,
+        }
+        axes.plot(
+            0.0,
+            0.0,
+            label=centre.removeprefix("the "),
+            **(mark if aim is Part.SHIFT else style.TARGET),
+        )
+    axes.locator_params(
+        nbins=4
+    )  # of shifts of thousandths of a degree more labels would run into each other
     axes.set(xlabel=x, ylabel=y)
     axes.set_title(f"Where H ends, about {about}\n{sense}", **TITLE)
 
 
-LOOKS = ((MOTION, "o", "-"), (MOMENTUM, "^", (0, (5, 1.5, 1, 1.5))), (INK, "s", (0, (5, 1.5))), (GREY, "v", ":"))
+LOOKS = (
+    (MOTION, "o", "-"),
+    (MOMENTUM, "^", (0, (5, 1.5, 1, 1.5))),
+    (INK, "s", (0, (5, 1.5))),
+    (GREY, "v", ":"),
+)
 """Colour, mark and line of the fronts in turn."""
 
 SAME_ENDS = (0.02, 0.002)  # relative differences in end and in cost of points that are drawn as one
@@ -208,22 +267,42 @@ FEWEST = 3  # ticks of a decade's 1, 2 and 5 below which the axis of time has ot
 
 
 REACH = 1.4
-"""End of the axis of time over the last end of a schedule: to there its cost holds, as far as the horizon reaches."""
+"""End of the axis of time over the last end of a schedule: to there its cost holds, as far as the
+horizon reaches.
+"""
 
-CROSS: dict[str, Any] = {"color": MISSED, "markersize": 9, "markeredgewidth": 1.4, "linestyle": "", "zorder": 3.8}
+CROSS: dict[str, Any] = {
+    "color": MISSED,
+    "markersize": 9,
+    "markeredgewidth": 1.4,
+    "linestyle": "",
+    "zorder": 3.8,
+}
 """Look of an x over the mark of a plan that does not meet the requirement."""
 
-CHOSEN: dict[str, Any] = {"color": INK, "markersize": 11, "markerfacecolor": "none", "linestyle": "", "zorder": 4}
+CHOSEN: dict[str, Any] = {
+    "color": INK,
+    "markersize": 11,
+    "markerfacecolor": "none",
+    "linestyle": "",
+    "zorder": 4,
+}
 """Look of the mark of the recommended plan."""
 
 
 @style.styled()
 def trade_figure(
-    spacecraft: Spacecraft, fronts: Sequence[Front], chosen: Plan | None = None, *, narrow: bool = False
+    spacecraft: Spacecraft,
+    fronts: Sequence[Front],
+    chosen: Plan | None = None,
+    *,
+    narrow: bool = False,
 ) -> Figure:
-    """End of the last firing against propellant (impulse where that is unknown), numbered as in the table.
+    """End of the last firing against propellant (impulse where that is unknown), numbered as in the
+    table.
 
-    ``chosen``: a plan to be marked among them. Fronts without points are named, with reasons. ``narrow``: for phones.
+    ``chosen``: a plan to be marked among them. Fronts without points are named, with reasons.
+    ``narrow``: for phones.
     """
     from matplotlib.ticker import LogLocator, MaxNLocator
 
@@ -231,8 +310,12 @@ def trade_figure(
     figure = style.sheet(width, 4.8)
     points = [point for _, _, point in numbered(fronts)]
     how = model_name(point.plan.pulses for point in points)
-    style.heading(figure, spacecraft, f"finish time against cost, {', '.join(schemes_of(fronts))} by {how}")
-    reasons = "\n".join(fill(text(entry), int(WIDTH * width)) for entry in missing(spacecraft, fronts))
+    style.heading(
+        figure, spacecraft, f"finish time against cost, {', '.join(schemes_of(fronts))} by {how}"
+    )
+    reasons = "\n".join(
+        fill(text(entry), int(WIDTH * width)) for entry in missing(spacecraft, fronts)
+    )
     if not points:
         figure.text(0.5, 0.5, reasons, ha="center", va="center", linespacing=1.6)
         return figure
@@ -261,7 +344,13 @@ def trade_figure(
     axes.set(xlabel="end of the last firing, s", ylabel=unit)
     if log:  # ticks at 1, 2 and 5 of each decade, or evenly spaced within part of one
         low, high = axes.get_xlim()
-        few = sum(low <= value <= high for value in LogLocator(subs=(1.0, 2.0, 5.0)).tick_values(low, high)) < FEWEST
+        few = (
+            sum(
+                low <= value <= high
+                for value in LogLocator(subs=(1.0, 2.0, 5.0)).tick_values(low, high)
+            )
+            < FEWEST
+        )
         axes.xaxis.set_major_locator(MaxNLocator(6) if few else LogLocator(subs=(1.0, 2.0, 5.0)))
         style.log_axis(axes.xaxis)
     axes.grid(True, which="both")
@@ -270,11 +359,20 @@ def trade_figure(
     return figure
 
 
-def _draw_fronts(axes: Axes, spacecraft: Spacecraft, fronts: Sequence[Front], scale: float, reach: float) -> None:
-    """Step lines to ``reach`` s, with their names, and numbered marks; a schedule of two fronts has one mark."""
+def _draw_fronts(
+    axes: Axes, spacecraft: Spacecraft, fronts: Sequence[Front], scale: float, reach: float
+) -> None:
+    """Step lines to ``reach`` s, with their names, and numbered marks; a schedule of two fronts has
+    one mark.
+    """
     shown: list[tuple[float, float, list[int]]] = []
-    points = [(index, owner, point.plan.pulses.end, scale * point.cost) for index, owner, point in numbered(fronts)]
-    for front, (colour, mark, line) in zip(fronts, LOOKS * math.ceil(len(fronts) / len(LOOKS)), strict=False):
+    points = [
+        (index, owner, point.plan.pulses.end, scale * point.cost)
+        for index, owner, point in numbered(fronts)
+    ]
+    for front, (colour, mark, line) in zip(
+        fronts, LOOKS * math.ceil(len(fronts) / len(LOOKS)), strict=False
+    ):
         if not front.points:
             continue
         own = [(index, end, cost) for index, owner, end, cost in points if owner is front]
@@ -287,12 +385,19 @@ def _draw_fronts(axes: Axes, spacecraft: Spacecraft, fronts: Sequence[Front], sc
         axes.plot([], [], color=colour, linestyle=line, marker=mark, markersize=5, label=name)
         for index, end, cost in own:
             near = (place for place in shown if math.isclose(end, place[0], rel_tol=SAME_ENDS[0]))
-            same = next((place for place in near if math.isclose(cost, place[1], rel_tol=SAME_ENDS[1])), None)
+            same = next(
+                (place for place in near if math.isclose(cost, place[1], rel_tol=SAME_ENDS[1])),
+                None,
+            )
             if same is None:
                 shown.append((end, cost, [index]))
             else:
                 same[2].append(index)
-    failing = [(point.plan.pulses.end, scale * point.cost) for _, _, point in numbered(fronts) if fails(point)]
+    failing = [
+        (point.plan.pulses.end, scale * point.cost)
+        for _, _, point in numbered(fronts)
+        if fails(point)
+    ]
     if failing:
         axes.plot(*np.transpose(failing), "x", label=FAILS, **CROSS)
     for end, cost, numbers in shown:

@@ -27,12 +27,17 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.text import Annotation
 
-# Okabe & Ito's palette for colour-blind readers (jfly.uni-koeln.de/color); line styles differ too, for grey print.
+# Okabe & Ito's palette for colour-blind readers (jfly.uni-koeln.de/color); line styles differ too,
+# for grey print.
 MOTION, PULSE, MOMENTUM = "#0072B2", "#D55E00", "#009E73"
-"""Spin axis, body cone and other motion of the spacecraft; firings; angular momentum and space cone."""
+"""Spin axis, body cone and other motion of the spacecraft; firings; angular momentum and space
+cone.
+"""
 
 FIRED, TURNED = "#B34700", "#007a58"
-"""Words about firings and about H: dark enough to be read on white (5.3:1, WCAG 2.1 requires 4.5:1)."""
+"""Words about firings and about H: dark enough to be read on white (5.3:1, WCAG 2.1 requires
+4.5:1).
+"""
 
 MISSED, UNCHECKED = "#b00020", "#8a5a00"
 """A verdict that says not to fly, and nothing else; one by nominal values alone."""
@@ -44,13 +49,28 @@ LIGHTS = {Light.GREEN: INK, Light.AMBER: UNCHECKED, Light.RED: MISSED}
 """Colours of the title of a picture by its verdict."""
 
 TARGET: dict[str, Any] = {
-    "marker": "*", "color": INK, "markersize": 13.0, "markerfacecolor": "none", "linestyle": "", "zorder": 4
-}  # fmt: skip
+    "marker": "*",
+    "color": INK,
+    "markersize": 13.0,
+    "markerfacecolor": "none",
+    "linestyle": "",
+    "zorder": 4,
+}
 """Mark of the target axis: larger than the marks of ends of paths there, and over them."""
 
-PATH_OF_H: dict[str, Any] = {"color": MOMENTUM, "linewidth": 1.0, "linestyle": (0, (3, 1.5))}  # look of the path of H
+PATH_OF_H: dict[str, Any] = {
+    "color": MOMENTUM,
+    "linewidth": 1.0,
+    "linestyle": (0, (3, 1.5)),
+}  # look of the path of H
 
-LIMIT: dict[str, Any] = {"color": GREY, "linewidth": 1.3, "linestyle": (0, (6, 2)), "label": "required", "zorder": 1.5}
+LIMIT: dict[str, Any] = {
+    "color": GREY,
+    "linewidth": 1.3,
+    "linestyle": (0, (6, 2)),
+    "label": "required",
+    "zorder": 1.5,
+}
 """Look of a bound of the requirement."""
 
 PAPER = "#fefefe"
@@ -63,12 +83,14 @@ FIGURES = 3  # significant figures of the numbers in a picture
 
 _SETTINGS: dict[str, Any] = {
     "font.family": "sans-serif",
-    # The first comes with matplotlib and has the Greek letters; in SVG the others of its width stand in for it.
+    # The first comes with matplotlib and has the Greek letters; in SVG the others of its width
+    # stand in for it.
     "font.sans-serif": ["DejaVu Sans", "Bitstream Vera Sans", "Verdana"],
     "font.size": 8.5,
     "axes.titlesize": 9.5,
     "axes.titleweight": "bold",
-    "axes.titley": 1.0,  # else matplotlib measures all tick labels of a panel once more for each title
+    # else matplotlib measures all tick labels of a panel once more for each title
+    "axes.titley": 1.0,
     "axes.labelsize": 8.5,
     "axes.linewidth": 0.6,
     "axes.edgecolor": INK,
@@ -108,22 +130,34 @@ def require() -> None:
 
 @contextmanager
 def styled() -> Iterator[None]:
-    """Draw in this style, whatever the settings of the user's matplotlib; raises MissingExtra without one."""
+    """Draw in this style, whatever the settings of the user's matplotlib; raises MissingExtra
+    without one.
+    """
     require()
     from matplotlib import style
 
     with style.context(["default", _SETTINGS]), warnings.catch_warnings():
-        # A name that is long leaves no room, and one may have no glyphs in SVG: no reader can mend that.
+        # A name that is long leaves no room, and one may have no glyphs in SVG: no reader can mend
+        # that.
         warnings.simplefilter("ignore", UserWarning)
         yield
 
 
-OTHER_SCRIPTS = ("Noto Sans CJK JP", "WenQuanYi Zen Hei", "Unifont", "Noto Emoji", "Arial Unicode MS", "MS Gothic")
+OTHER_SCRIPTS = (
+    "Noto Sans CJK JP",
+    "WenQuanYi Zen Hei",
+    "Unifont",
+    "Noto Emoji",
+    "Arial Unicode MS",
+    "MS Gothic",
+)
 """Fonts that draw what `DejaVu Sans` does not, where they are installed."""
 
 
 def legible(figure: Figure) -> None:
-    """Draw texts of a figure with the fonts that are installed, and "?" for characters that none of them has."""
+    """Draw texts of a figure with the fonts that are installed, and "?" for characters that none of
+    them has.
+    """
     from matplotlib import font_manager, text
 
     files = {entry.name: entry.fname for entry in font_manager.fontManager.ttflist}
@@ -134,7 +168,8 @@ def legible(figure: Figure) -> None:
         each.set(text=shown, fontfamily=names)
 
 
-PHONE = 3.7  # width of a figure for narrow screens, inches: its smallest text is 10 px high where 360 px show it
+# width of a figure for narrow screens, inches: its smallest text is 10 px high where 360 px show it
+PHONE = 3.7
 
 
 def sheet(width: float, height: float) -> Figure:
@@ -148,7 +183,14 @@ def sheet(width: float, height: float) -> Figure:
 
 def head(axes: Axes, path: Vector, row: int, colour: str, size: float = 9.0) -> None:
     """An arrowhead at a row of a ``path`` (n, 2) that shows its sense; none at the first one."""
-    look = {"arrowstyle": "-|>", "color": colour, "linewidth": 0, "mutation_scale": size, "shrinkA": 0, "shrinkB": 0}
+    look = {
+        "arrowstyle": "-|>",
+        "color": colour,
+        "linewidth": 0,
+        "mutation_scale": size,
+        "shrinkA": 0,
+        "shrinkB": 0,
+    }
     if 0 < row < len(path) and np.any(path[row] != path[row - 1]):
         (x0, y0), (x1, y1) = path[row - 1].tolist(), path[row].tolist()
         axes.annotate("", (x1, y1), (x0, y0), annotation_clip=False, arrowprops=look)
@@ -160,7 +202,9 @@ def words(axes: Axes, text: str) -> None:
     axes.set(xticks=[], yticks=[])
 
 
-def square(axes: Axes, points: Vector, *, margin: float, centre: bool = False) -> tuple[Vector, float]:
+def square(
+    axes: Axes, points: Vector, *, margin: float, centre: bool = False
+) -> tuple[Vector, float]:
     """Equal scales on both axes, and `room` for all ``points`` (n, 2), which is returned."""
     middle, half = room(points, margin, centre=centre)
     axes.set_xlim(middle[0] - half, middle[0] + half)
@@ -174,7 +218,8 @@ def square(axes: Axes, points: Vector, *, margin: float, centre: bool = False) -
 def thickness(path: Vector, turns: float | None = None) -> float:
     """Width of the line of a ``path`` (n, 2), points: thinner where many turns lie side by side.
 
-    ``turns``: how many; by default as many as a circle of the size of the path would make of its length.
+    ``turns``: how many; by default as many as a circle of the size of the path would make of its
+    length.
     """
     if turns is None:
         length = float(np.hypot(*np.diff(path, axis=0).T).sum())
@@ -190,10 +235,16 @@ def joined(pieces: Sequence[Vector]) -> Vector:
 
 
 def thinned(count: int, most: int = 24) -> list[int]:
-    """Indices of ``count`` things to be numbered: the first, the last, and between them those of round numbers."""
+    """Indices of ``count`` things to be numbered: the first, the last, and between them those of
+    round numbers.
+    """
     steps = (many * 10**power for power in range(10) for many in (1, 2, 5))
     step = next(step for step in steps if count <= step * (most - 1))
-    return [n - 1 for n in range(1, count + 1) if n in (1, count) or (n % step == 0 and 2 * (count - n) >= step)]
+    return [
+        n - 1
+        for n in range(1, count + 1)
+        if n in (1, count) or (n % step == 0 and 2 * (count - n) >= step)
+    ]
 
 
 def log_axis(axis: Axis) -> None:
@@ -224,18 +275,26 @@ def angle(radians: float) -> str:
 
 def limit_of(spacecraft: Spacecraft, part: Part) -> float | None:
     """The bound that the file requires of an angle, deg; None without one."""
-    return next((math.degrees(bound.limit) for bound in required(spacecraft) if bound.part is part), None)
+    return next(
+        (math.degrees(bound.limit) for bound in required(spacecraft) if bound.part is part), None
+    )
 
 
 LETTERS = 11.0  # bold letters of a heading that fit in an inch
 LONGEST_NAME = 40  # characters of a name that fit above a picture
 
 
-def heading(figure: Figure, spacecraft: Spacecraft, text: str, verdict: tuple[str, Light] | None = None) -> None:
-    """The lines above a picture, broken by its width: the name of the spacecraft, ``text``, a verdict in colour."""
-    whole, colour = f"{short(spacecraft.name)}: {text}", INK
+def heading(
+    figure: Figure, spacecraft: Spacecraft, text: str, verdict: tuple[str, Light] | None = None
+) -> None:
+    """The lines above a picture, broken by its width: the name of the spacecraft, ``text``, a
+    verdict in colour.
+    """
+    whole = f"{short(spacecraft.name)}: {text}"
+    colour = INK
     if verdict is not None:
-        whole, colour = f"{whole}\n{verdict[0]}", LIGHTS[verdict[1]]
+        whole = f"{whole}\n{verdict[0]}"
+        colour = LIGHTS[verdict[1]]
     lines = (fill(line, int(LETTERS * figure.get_figwidth())) for line in whole.split("\n"))
     figure.suptitle("\n".join(lines), color=colour)
     figure.set_label(whole)  # for pages, which break it by their own width
@@ -248,32 +307,46 @@ def short(name: str) -> str:
 
 
 def legend(figure: Figure, axes: Sequence[Axes], columns: int = 8) -> None:
-    """One legend under all panels, each name once, where no curve can run into it, in as many columns as fit."""
+    """One legend under all panels, each name once, where no curve can run into it, in as many
+    columns as fit.
+    """
     handles: dict[str, Artist] = {}
     for panel in axes:
         for handle, name in zip(*panel.get_legend_handles_labels(), strict=True):
             handles.setdefault(name, handle)
     if handles:
-        room, across = 72.0 * figure.get_figwidth() + GAP, HANDLE + LETTER * max(map(len, handles)) + GAP
+        room, across = (
+            72.0 * figure.get_figwidth() + GAP,
+            HANDLE + LETTER * max(map(len, handles)) + GAP,
+        )
         many = min(columns, len(handles), max(int(room / across), 1))
         drawn = figure.legend(
-            list(handles.values()), list(handles), loc="outside lower center", ncols=many, handlelength=2.2,
-            borderpad=0.2, columnspacing=1.4,
-        )  # fmt: skip
+            list(handles.values()),
+            list(handles),
+            loc="outside lower center",
+            ncols=many,
+            handlelength=2.2,
+            borderpad=0.2,
+            columnspacing=1.4,
+        )
         for mark in drawn.get_lines():
             mark.set_markersize(max(mark.get_markersize(), DOT))
 
 
 DOT = 4.0  # points that a mark of a legend measures at least, where a curve has smaller ones
 LETTER = 4.6  # points that a letter of a legend takes, about
-HANDLE, GAP = 25.0, 11.0  # points to the left of the text in a legend, its line or mark, and between columns
+HANDLE, GAP = (
+    25.0,
+    11.0,
+)  # points to the left of the text in a legend, its line or mark, and between columns
 
 
 def add(axes: Axes, text: str, place: Vector, colour: str, *, role: str = "label") -> None:
-    """A label beside a point, which `settle` lays into the quadrant of the point that has room for it.
+    """A label beside a point, which `settle` lays into the quadrant of the point that has room for
+    it.
 
-    A ``label`` may be left out, a ``vital`` one never; a ``bar`` is above the bar of a firing, and ends before its
-    colon where not all of them have room.
+    A ``label`` may be left out, a ``vital`` one never; a ``bar`` is above the bar of a firing, and
+    ends before its colon where not all of them have room.
     """
     at = (float(place[0]), float(place[1]))
     look: dict[str, Any] = {"color": colour, "fontsize": SMALL, "annotation_clip": False}
@@ -282,20 +355,30 @@ def add(axes: Axes, text: str, place: Vector, colour: str, *, role: str = "label
 
 
 def target(axes: Axes, places: Vector, name: str = "target") -> None:
-    """The star of the target (n, 2) with its label, and the ``name`` in the legend; none where there is none."""
+    """The star of the target (n, 2) with its label, and the ``name`` in the legend; none where
+    there is none.
+    """
     if len(places):
         axes.plot(*places.T, label=name, **TARGET)
         add(axes, "target", places[0], INK, role="vital")
 
 
-QUADRANTS = [(x * away, y * away) for away in (3.5, 7.0, 12.0) for x, y in ((1, 1), (1, -1), (-1, 1), (-1, -1))]
+QUADRANTS = [
+    (x * away, y * away)
+    for away in (3.5, 7.0, 12.0)
+    for x, y in ((1, 1), (1, -1), (-1, 1), (-1, -1))
+]
 """Offsets from a point to the nearest corner of its label, points."""
 
 ABOVE = [(0.0, 2.0), (0.1, 2.0), (-0.1, 2.0)]
-"""Offsets of the label of a bar: its middle, its begin or its end is above the middle of the bar."""
+"""Offsets of the label of a bar: its middle,
+its begin or its end is above the middle of the bar.
+"""
 
 OFFSETS = {"_vital": QUADRANTS, "_label": QUADRANTS[:8], "_bar": ABOVE}
-"""Offsets of labels by their role, in the order in which they are laid: numbers stay near their points."""
+"""Offsets of labels by their role, in the order in which they are laid: numbers stay near their
+points.
+"""
 
 PASSES = 3  # passes of the layout before the last one: panels of equal scales need them
 NO_ROOM, ON_MARK = 1000.0, 10.0
@@ -309,8 +392,12 @@ def panels(figure: Figure) -> list[Axes]:
 
 
 def settle(figure: Figure) -> None:
-    """Lay out the panels, and each label where it covers least; take out those for which there is no room."""
-    for axes in panels(figure):  # drawn later outside this style, as many ticks fit between labels of the same size
+    """Lay out the panels, and each label where it covers least; take out those for which there is
+    no room.
+    """
+    for axes in panels(
+        figure
+    ):  # drawn later outside this style, as many ticks fit between labels of the same size
         axes.tick_params(labelsize=TICK_SIZE)
         # They lie within the panel and its ticks.
         axes.spines[["left", "right", "top"]].set_in_layout(False)
@@ -321,7 +408,9 @@ def settle(figure: Figure) -> None:
     figure.draw_without_rendering()
     figure.set_layout_engine(None)  # labels are put where panels are now
     for axes in panels(figure):
-        notes: list[Any] = [note for role in OFFSETS for note in axes.texts if note.get_label() == role]
+        notes: list[Any] = [
+            note for role in OFFSETS for note in axes.texts if note.get_label() == role
+        ]
         bars = [note for note in notes if note.get_label() == "_bar"]
         if notes and not _lay(axes, notes) and bars:
             for note in bars:
@@ -330,10 +419,13 @@ def settle(figure: Figure) -> None:
 
 
 def _lay(axes: Axes, notes: Sequence[Annotation]) -> bool:
-    """Lay the labels of a panel, each where it covers least of what is there; True if all have room."""
+    """Lay the labels of a panel, each where it covers least of what is there; True if all have
+    room.
+    """
     from matplotlib.transforms import Bbox
 
-    window, point = axes.get_window_extent(), axes.figure.dpi / 72.0
+    window = axes.get_window_extent()
+    point = axes.figure.dpi / 72.0
     lines = [(line, line.get_path().transformed(line.get_transform())) for line in axes.lines]
     curves = [path for line, path in lines if line.get_linestyle() != "None"]
     marks = [
@@ -346,11 +438,17 @@ def _lay(axes: Axes, notes: Sequence[Annotation]) -> bool:
 
     def cost(note: Annotation, offset: tuple[float, float]) -> float:
         across = "left" if offset[0] > 0.0 else "right" if offset[0] < 0.0 else "center"
-        note.set(position=offset, ha=across, va="bottom" if offset[1] > 0.0 else "top", visible=True)
+        note.set(
+            position=offset, ha=across, va="bottom" if offset[1] > 0.0 else "top", visible=True
+        )
         box = note.get_window_extent().padded(point)
         outside = not (window.contains(*box.min) and window.contains(*box.max))
         crossed = sum(path.intersects_bbox(box, filled=False) for path in curves)
-        return NO_ROOM * (outside + box.count_overlaps(taken)) + ON_MARK * box.count_overlaps(marks) + crossed
+        return (
+            NO_ROOM * (outside + box.count_overlaps(taken))
+            + ON_MARK * box.count_overlaps(marks)
+            + crossed
+        )
 
     for note in notes:
         role = str(note.get_label())

@@ -1,7 +1,9 @@
-"""Spacecraft files that flights and fits of telemetry lead to: the same file, with a later state as its t = 0.
+"""Spacecraft files that flights and fits of telemetry lead to: the same file, with a later state as
+its t = 0.
 
-Attitude, rates, epoch, moments, mass and the propellant and pressure of the tank are as they are then; a fit adds its
-estimates and how well they are known. What no key of the file follows is noted.
+Attitude, rates, epoch, moments, mass and the propellant and pressure of the tank are as they are
+then; a fit adds its estimates and how well they are known. What no key of the file follows is
+noted.
 """
 
 from __future__ import annotations
@@ -16,7 +18,15 @@ import numpy as np
 from nutdamp.common.results import Note, note
 from nutdamp.errors import BadRequest
 from nutdamp.estimation.parameters import ACCELERATION
-from nutdamp.estimation.results import DIGITS, LATE, LEAST_THRUST, WHEEL, Carried, correlations, replaced
+from nutdamp.estimation.results import (
+    DIGITS,
+    LATE,
+    LEAST_THRUST,
+    WHEEL,
+    Carried,
+    correlations,
+    replaced,
+)
 from nutdamp.estimation.search import Fit
 from nutdamp.files.editing import (
     Edit,
@@ -43,11 +53,16 @@ from nutdamp.units import parse
 
 
 def later(flight: Flight, time: float) -> Later:
-    """The spacecraft of a ``flight`` at ``time`` s; BadRequest while a pulse is on, or where no propellant is left."""
+    """The spacecraft of a ``flight`` at ``time`` s; BadRequest while a pulse is on, or where no
+    propellant is left.
+    """
     before = flight.spacecraft
     for count, (begins, ends) in enumerate(flight.spans, start=1):
         if begins + touching(time) < time < ends - touching(time):
-            raise BadRequest(f"pulse {count} is on at {time:.6g} s: expected a time before {begins:.6g} s or after")
+            raise BadRequest(
+                f"pulse {count} is on at {time:.6g} s: expected a time before {begins:.6g} s or "
+                "after"
+            )
     moment = np.array([time])
     rates, quaternions = flight.motion(moment)
     moments = np.broadcast_to(flight.moments_at(moment), (1, 3))[0].tolist()
@@ -56,14 +71,22 @@ def later(flight: Flight, time: float) -> Later:
     if tank is not None:
         left = tank.propellant - tank.used - used
         if left <= 0.0:
-            raise BadRequest(f"no propellant is left in the tank at {time:.6g} s: no file can hold that")
-        tank = replace(tank, propellant=left, pressure=tank.pressure_after(tank.used + used), used=0.0)
+            raise BadRequest(
+                f"no propellant is left in the tank at {time:.6g} s: no file can hold that"
+            )
+        tank = replace(
+            tank, propellant=left, pressure=tank.pressure_after(tank.used + used), used=0.0
+        )
     if turned is not None:
         of_file = attitude.multiply(quaternions[0], attitude.from_matrix(inertia.axes.T))
-        turned = replace(turned, quaternion=of_file, epoch=turned.epoch and epoch_after(turned.epoch, time))
+        turned = replace(
+            turned, quaternion=of_file, epoch=turned.epoch and epoch_after(turned.epoch, time)
+        )
     center, per_kg = before.center_of_mass, before.center_of_mass_per_kg
     if per_kg is not None and used != 0.0:
-        center = np.asarray((np.zeros(3) if center is None else center) + used * (inertia.axes @ per_kg))
+        center = np.asarray(
+            (np.zeros(3) if center is None else center) + used * (inertia.axes @ per_kg)
+        )
     after = replace(
         before,
         inertia=replace(inertia, moments=tuple(moments)),
@@ -73,7 +96,8 @@ def later(flight: Flight, time: float) -> Later:
         mass=None if before.mass is None else before.mass - used,
         tank=tank,
         disturbances=tuple(
-            replace(each, transverse=each.transverse * cmath.exp(1j * each.rate * time)) for each in before.disturbances
+            replace(each, transverse=each.transverse * cmath.exp(1j * each.rate * time))
+            for each in before.disturbances
         ),
     )
     return Later(before, after, quaternions[0])
@@ -81,18 +105,25 @@ def later(flight: Flight, time: float) -> Later:
 
 def _expected(source: object, what: str) -> Source:
     if not isinstance(source, Source):
-        raise BadRequest(f"{what}: expected a spacecraft from nutdamp.load, read or example, with no field replaced")
+        raise BadRequest(
+            f"{what}: expected a spacecraft from nutdamp.load, read or example, "
+            "with no field replaced"
+        )
     return source
 
 
 def carried_text(flight: Flight, time: float, source: object) -> str:
-    """The text of the file that a ``flight`` was planned from, ``source``, with the state at ``time`` s.
+    """The text of the file that a ``flight`` was planned from, ``source``, with the state at
+    ``time`` s.
 
-    Raises BadRequest as `later` does, for values that an alias stands for, and where no file was read.
+    Raises BadRequest as `later` does, for values that an alias stands for, and where no file was
+    read.
     """
     given = _expected(source, "carried")
     of_file = given.read(lambda _: None)
-    moved_on = later(replace(flight, spacecraft=replace(flight.spacecraft, goal=of_file.goal)), time)
+    moved_on = later(
+        replace(flight, spacecraft=replace(flight.spacecraft, goal=of_file.goal)), time
+    )
     return carry_text(*given[:3], lambda tree: _edits(tree, moved_on))
 
 
@@ -123,7 +154,9 @@ def _limits_anew(spacecraft: Spacecraft, time: float) -> Iterator[Note]:
 def _edits(tree: Node, moved_on: Later) -> Edits:
     before, after = moved_on.before, moved_on.after
     same = after.inertia.moments == before.inertia.moments
-    yield from (edit for edit in motion_edits(tree, moved_on) if not (same and edit.path[0] == "inertia"))
+    yield from (
+        edit for edit in motion_edits(tree, moved_on) if not (same and edit.path[0] == "inertia")
+    )
     if after.mass is not None and after.mass != before.mass:
         yield Edit(("mass",), after.mass, "mass")
     if after.center_of_mass is not None and before.center_of_mass is not None:
@@ -131,11 +164,17 @@ def _edits(tree: Node, moved_on: Later) -> Edits:
             yield Edit(("center_of_mass", axis), float(after.center_of_mass[axis]), "length")
     elif after.center_of_mass is not None:
         yield Edit(("center_of_mass",), flow_list(after.center_of_mass))
-    if after.tank is not None and before.tank is not None and after.tank.propellant != before.tank.propellant:
+    if (
+        after.tank is not None
+        and before.tank is not None
+        and after.tank.propellant != before.tank.propellant
+    ):
         yield Edit(("tank", "propellant"), float(after.tank.propellant), "mass")
         yield Edit(("tank", "pressure"), float(after.tank.pressure), "pressure")
     for index, (old, new) in enumerate(zip(before.disturbances, after.disturbances, strict=True)):
-        torque = before.inertia.in_file(np.array([new.transverse.real, new.transverse.imag, 0.0])).tolist()
+        torque = before.inertia.in_file(
+            np.array([new.transverse.real, new.transverse.imag, 0.0])
+        ).tolist()
         for axis in range(2) if old.rate != 0.0 else ():
             yield Edit(("disturbances", index, "torque", axis), torque[axis], "torque")
 
@@ -147,7 +186,9 @@ UNWRITTEN = {
     "misalignment": ("tilt of the gyros about {}", "deg"),
     "wobble": ("tilt of the axis about {}", "deg"),
 }
-"""Estimates of sensors that have no key in the file: the bias of a loop is one for both of its gyros."""
+"""Estimates of sensors that have no key in the file: the bias of a loop is one for both of its
+gyros.
+"""
 
 
 def fitted_text(fit: Fit, carried: Carried) -> str:
@@ -166,11 +207,13 @@ def fitted_spacecraft(_: object, text: str) -> Spacecraft:
 
 def notes(fit: Fit, carried: Carried) -> Iterator[Note]:
     """Estimates that the file cannot hold, and entries that still count from the old t = 0."""
-    body, large = fit.model.spacecraft, _seen(fit)
+    body = fit.model.spacecraft
+    large = _seen(fit)
     growth = large.get("growth")
     if growth is not None and not (carried.body.inertia.wheel or _grows_so(carried, growth)):
         yield note("fit-growth", growth=f"{growth:+.3g} 1/s")
-    written, unwritten = dict(_delays(fit)), []
+    written = dict(_delays(fit))
+    unwritten = []
     for name, value in large.items():
         kind, _, channel = name.partition(" ")
         if kind == "delay" and channel not in written:
@@ -184,8 +227,13 @@ def notes(fit: Fit, carried: Carried) -> Iterator[Note]:
     for parameter, factor in zip(fit.model.parameters, fit.values.tolist(), strict=True):
         kind, _, channel = parameter.name.partition(" ")
         if kind == "thrust" and factor <= LEAST_THRUST:
-            silent, given = factor > -LEAST_THRUST, 100.0 * factor
-            yield note("fit-no-thrust" if silent else "fit-thrust-reversed", channel=channel, thrust_percent=given)
+            silent = factor > -LEAST_THRUST
+            given = 100.0 * factor
+            yield note(
+                "fit-no-thrust" if silent else "fit-thrust-reversed",
+                channel=channel,
+                thrust_percent=given,
+            )
     if carried.time != 0.0:
         yield from _limits_anew(body, carried.time)
     if body.tank is not None and len(fit.model.record.schedule):
@@ -199,17 +247,29 @@ def _seen(fit: Fit) -> dict[str, float]:
 
 
 def _fitted_edits(tree: Node, fit: Fit, carried: Carried) -> Edits:
-    before, large = fit.model.spacecraft, _seen(fit)
-    after, given = replaced(before, carried), before.attitude
-    if given is not None and given.epoch is not None and after.attitude is not None and carried.time != 0.0:
-        after = replace(after, attitude=replace(after.attitude, epoch=epoch_after(given.epoch, carried.time)))
+    before = fit.model.spacecraft
+    large = _seen(fit)
+    after = replaced(before, carried)
+    given = before.attitude
+    if (
+        given is not None
+        and given.epoch is not None
+        and after.attitude is not None
+        and carried.time != 0.0
+    ):
+        after = replace(
+            after, attitude=replace(after.attitude, epoch=epoch_after(given.epoch, carried.time))
+        )
     yield from motion_edits(tree, Later(before, after, carried.state.quaternion))
     if (growth := large.get("growth")) is not None:
         yield Edit(("dissipation", "time_constant"), 1.0 / abs(growth), "time")
         if tree.get("dissipation", "nutation") is not None or not _grows_so(carried, growth):
             yield Edit(("dissipation", "nutation"), "grows" if growth > 0.0 else "decays")
     for name, path in _thrusters(tree).items():
-        parts = [((*path, "force"), "force"), *(((*path, "torque", axis), "torque") for axis in range(3))]
+        parts = [
+            ((*path, "force"), "force"),
+            *(((*path, "torque", axis), "torque") for axis in range(3)),
+        ]
         for place, kind in parts if name in carried.factors else ():
             part = tree.get(*place)
             if part is not None:
@@ -227,37 +287,50 @@ def _fitted_edits(tree: Node, fit: Fit, carried: Carried) -> Edits:
             if own is not None:
                 yield Edit((*path, key), values[key])
         if own is None:
-            yield Edit(path, "{" + ", ".join(f"{key}: {value}" for key, value in values.items()) + "}")
+            yield Edit(
+                path, "{" + ", ".join(f"{key}: {value}" for key, value in values.items()) + "}"
+            )
     if (bias := large.get(f"bias_{ACCELERATION}")) is not None:
         yield Edit(("loop", "sensor", "bias"), bias, "acceleration")
     sigmas = dict(zip(carried.names, carried.sigmas.tolist(), strict=True))
     estimates = dict(zip(carried.names, carried.values.tolist(), strict=True))
     for key in ("A", "C"):
         if sigmas[key] > 0.0:
-            yield Edit(("dispersions", key), f"{{normal: {100.0 * sigmas[key] / estimates[key]:.6g} %}}")
-    rates = ", ".join(f"{{normal: {math.degrees(sigmas[f'omega0_{axis}']):.6g} deg/s}}" for axis in (1, 2, 3))
+            yield Edit(
+                ("dispersions", key), f"{{normal: {100.0 * sigmas[key] / estimates[key]:.6g} %}}"
+            )
+    rates = ", ".join(
+        f"{{normal: {math.degrees(sigmas[f'omega0_{axis}']):.6g} deg/s}}" for axis in (1, 2, 3)
+    )
     yield Edit(("dispersions", "omega0"), f"[{rates}]")
     if WHEEL in sigmas:
         yield Edit(("dispersions", "wheel_momentum"), f"{{normal: {sigmas[WHEEL]:.6g} N m s}}")
     factors, tolerances = carried.factors, fit.model.spacecraft.dispersions
     if factors:
         thrust = {} if tolerances is None else tolerances.thrust
-        listed = [(name, size.kind, size.size) for name, size in thrust.items() if name not in factors]
+        listed = [
+            (name, size.kind, size.size) for name, size in thrust.items() if name not in factors
+        ]
         listed += [(name, "normal", sigma / factor) for name, (factor, sigma) in factors.items()]
-        sizes = (f"{key_text(name)}: {{{kind}: {100.0 * size:.6g} %}}" for name, kind, size in listed)
+        sizes = (
+            f"{key_text(name)}: {{{kind}: {100.0 * size:.6g} %}}" for name, kind, size in listed
+        )
         yield Edit(("dispersions", "thrust"), "{" + ", ".join(sizes) + "}")
     if carried.tilt is not None:
         yield Edit(("dispersions", "attitude"), f"{{normal: {math.degrees(carried.tilt):.6g} deg}}")
     pairs = correlations(carried, tolerances)
     if pairs:
         rows = ", ".join(
-            f"[{key_text(first)}, {key_text(second)}, {value:.{DIGITS}f}]" for first, second, value in pairs
+            f"[{key_text(first)}, {key_text(second)}, {value:.{DIGITS}f}]"
+            for first, second, value in pairs
         )
         yield Edit(("dispersions", "correlation"), f"[{rows}]")
 
 
 def _grows_so(carried: Carried, growth: float) -> bool:
-    """True where dissipation lets the nutation of such a body grow (or decay) at this rate; with a wheel not known."""
+    """True where dissipation lets the nutation of such a body grow (or decay) at this rate; with a
+    wheel not known.
+    """
     first, second, third = carried.body.inertia.moments
     return not carried.body.inertia.wheel and (0.5 * (first + second) - third) * growth > 0.0
 
@@ -265,14 +338,19 @@ def _grows_so(carried: Carried, growth: float) -> bool:
 def _thrusters(tree: Node) -> dict[str, KeyPath]:
     entries = tree.get("thrusters") or Node(None, Place())
     nodes = {index: entry.get("name") for index, entry in entries.children()}
-    return {str(name.value): ("thrusters", index) for index, name in nodes.items() if name is not None}
+    return {
+        str(name.value): ("thrusters", index) for index, name in nodes.items() if name is not None
+    }
 
 
 def _delays(fit: Fit) -> Iterator[tuple[str, float]]:
-    """Channels whose thrust is later than by the file, s, as far as a valve of their own can have such delays."""
+    """Channels whose thrust is later than by the file, s, as far as a valve of their own can have
+    such delays.
+    """
     large = _seen(fit)
     for channel in fit.model.spacecraft.channels:
-        late, known = large.get(f"delay {channel.name}"), channel.thrusters[0].valve or Trapezoid()
+        late = large.get(f"delay {channel.name}")
+        known = channel.thrusters[0].valve or Trapezoid()
         if late is None or len(channel.thrusters) > 1 or not isinstance(known, Trapezoid):
             continue
         if abs(late) <= LATE and min(known.open_delay, known.close_delay) + late >= 0.0:

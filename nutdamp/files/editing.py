@@ -1,9 +1,10 @@
-"""Values of a spacecraft file replaced: keys set beside it, such as ``limits.horizon=300s``, and values in its text.
+"""Values of a spacecraft file replaced: keys set beside it, such as ``limits.horizon=300s``, and
+values in its text.
 
-A key set beside the file changes its tree before anything in it is checked, so that settings are checked exactly as the
-file is. In the text, comments, the order of the keys and units stay as they were; it must have been read by
-`yaml.read_tree`, and so is neither a bomb nor of other than core values. `motion_edits` are the values of a later
-moment, by which a file is carried on.
+A key set beside the file changes its tree before anything in it is checked, so that settings are
+checked exactly as the file is. In the text, comments, the order of the keys and units stay as they
+were; it must have been read by `yaml.read_tree`, and so is neither a bomb nor of other than core
+values. `motion_edits` are the values of a later moment, by which a file is carried on.
 """
 
 from __future__ import annotations
@@ -30,11 +31,15 @@ from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.units import KINDS, parse, shown
 
 _QUOTED = r"""'(?:[^'\\]|\\.)*'|"(?:[^"\\]|\\.)*\""""
-_STEP = re.compile(rf"\.?(?P<word>[^.\[\]='\"]+|{_QUOTED})|\[(?P<entry>[0-9]{{1,6}}|[^.\[\]='\"]+|{_QUOTED})\]")
+_STEP = re.compile(
+    rf"\.?(?P<word>[^.\[\]='\"]+|{_QUOTED})|\[(?P<entry>[0-9]{{1,6}}|[^.\[\]='\"]+|{_QUOTED})\]"
+)
 
 
 class Setting(NamedTuple):
-    """A key and its new value (a text is YAML), given in a ``call``; entries of lists go by position or ``name``."""
+    """A key and its new value (a text is YAML), given in a ``call``; entries of lists go by
+    position or ``name``.
+    """
 
     call: str
     path: KeyPath
@@ -48,7 +53,9 @@ class Setting(NamedTuple):
         return f"{self.call} {dotted(self.path)}={brief}"
 
     def node(self) -> tuple[Node, list[Fault]]:
-        """The value as part of a tree, and its faults; raises `FaultyFile` for a text that is not YAML."""
+        """The value as part of a tree, and its faults; raises `FaultyFile` for a text that is not
+        YAML.
+        """
         place = Place(setting=self.label)
         if not isinstance(self.value, str):
             return _of_python(self.value, place), []
@@ -59,31 +66,43 @@ class Setting(NamedTuple):
 
 
 def parse_setting(text: str) -> Setting:
-    """The setting in ``KEY=VALUE``, as command lines give it; raises ValueError with the form expected."""
+    """The setting in ``KEY=VALUE``, as command lines give it; raises ValueError with the form
+    expected.
+    """
     path, end = _parse_path(text)
     if not path or text[end : end + 1] != "=":
-        raise ValueError(f"{shown(text)} is not KEY=VALUE, such as limits.horizon=300s or thrusters.T1.force=12N")
+        raise ValueError(
+            f"{shown(text)} is not KEY=VALUE, such as limits.horizon=300s or thrusters.T1.force=12N"
+        )
     return Setting("--set", path, text[end + 1 :])
 
 
 def settings_of(values: Mapping[str, object]) -> tuple[Setting, ...]:
-    """The settings in a mapping of keys, such as ``limits.horizon``, to values; raises BadRequest."""
+    """The settings in a mapping of keys, such as ``limits.horizon``, to values;
+    raises BadRequest.
+    """
     settings = []
     for key, value in values.items():
         path, end = _parse_path(key)
         if not path or end < len(key):
-            raise BadRequest(f"{shown(key)} is not a key of a spacecraft file, such as limits.horizon")
+            raise BadRequest(
+                f"{shown(key)} is not a key of a spacecraft file, such as limits.horizon"
+            )
         settings.append(Setting("set", path, value))
     return tuple(settings)
 
 
 def settings_within(values: Mapping[str, object], behind: KeyPath = ()) -> Iterator[Setting]:
-    """The settings in nested mappings at ``behind``, key by key, so that others stay; raises BadRequest."""
+    """The settings in nested mappings at ``behind``, key by key, so that others stay; raises
+    BadRequest.
+    """
     if len(behind) >= MAX_DEPTH:
         raise BadRequest(f"with_: nested more than {MAX_DEPTH} levels deep")
     for key, value in values.items():
         if not isinstance(key, str):
-            raise BadRequest(f"with_ {dotted(behind)}: expected the name of a key, got {shown(key)}")
+            raise BadRequest(
+                f"with_ {dotted(behind)}: expected the name of a key, got {shown(key)}"
+            )
         path = (*behind, key)
         if isinstance(value, Mapping):
             yield from settings_within(value, path)
@@ -98,7 +117,9 @@ def text_of(values: Mapping[str, object], name: str) -> str:
 
 
 def overlay(root: Node, settings: Iterable[Setting]) -> tuple[Node, list[Fault]]:
-    """The tree with the settings in it, one after the other, and the faults of impossible settings."""
+    """The tree with the settings in it, one after the other,
+    and the faults of impossible settings.
+    """
     faults: list[Fault] = []
     for setting in settings:
         place = Place(setting=setting.label)
@@ -112,7 +133,9 @@ def overlay(root: Node, settings: Iterable[Setting]) -> tuple[Node, list[Fault]]
         except _NoPlaceError as wrong:
             problems = [place.fault("", "", str(wrong))]
         # Lines and columns within a setting would be taken for those of the file.
-        faults += [Fault(setting.label, 0, 0, dotted(setting.path), fault.problem) for fault in problems]
+        faults += [
+            Fault(setting.label, 0, 0, dotted(setting.path), fault.problem) for fault in problems
+        ]
     return root, faults
 
 
@@ -140,11 +163,14 @@ def _parse_path(text: str) -> tuple[KeyPath, int]:
 
 
 def _put(node: Node, path: KeyPath, behind: KeyPath, value: Node, place: Place) -> Node:
-    """``node``, at ``behind``, with ``value`` at ``path`` below it; copied, since aliases may share it."""
+    """``node``, at ``behind``, with ``value`` at ``path`` below it; copied, since aliases may share
+    it.
+    """
     if not path:
         return value
     step, rest = path[0], path[1:]
-    held, at = {} if node.value is None else node.value, f"at {dotted(behind) or 'the root'}"
+    held = {} if node.value is None else node.value
+    at = f"at {dotted(behind) or 'the root'}"
     if isinstance(held, dict):
         if isinstance(step, int):
             raise _NoPlaceError(f"there is no list {at}; give all of it, as [value, …]")
@@ -164,16 +190,24 @@ def _entry(entries: list[Node], step: str | int, behind: KeyPath) -> int:
         if step < len(entries):
             return step
         last = len(entries) - 1
-        raise _NoPlaceError(f"{dotted(behind)} has " + (f"entries 0 to {last} only" if entries else "no entries"))
+        raise _NoPlaceError(
+            f"{dotted(behind)} has " + (f"entries 0 to {last} only" if entries else "no entries")
+        )
     nodes = [entry.get("name") for entry in entries]
     names = [node.value if node is not None else None for node in nodes]
     if step in names:
         return names.index(step)
     known = [name for name in names if isinstance(name, str)]
     if not known:
-        raise _NoPlaceError(f"expected a position, such as {dotted((*behind, 0))}: the entries have no names")
+        raise _NoPlaceError(
+            f"expected a position, such as {dotted((*behind, 0))}: the entries have no names"
+        )
     close = nearest(step, known) if isinstance(step, str) else None
-    cure = f"did you mean {shown(close)}?" if close else f"there are {', '.join(map(shown, known[:8]))}"
+    cure = (
+        f"did you mean {shown(close)}?"
+        if close
+        else f"there are {', '.join(map(shown, known[:8]))}"
+    )
     raise _NoPlaceError(f"no entry of {dotted(behind)} has the name {shown(step)}; {cure}")
 
 
@@ -192,14 +226,20 @@ def _of_python(value: object, place: Place, depth: int = 0) -> Node:
         return Node(below, place, dict.fromkeys(below, place))
     if isinstance(value, Iterable):
         return Node([_of_python(child, place, depth + 1) for child in value], place)
-    raise BadRequest(f"{place}: expected a number, a text, a list or a mapping, got {type(value).__name__}")
+    raise BadRequest(
+        f"{place}: expected a number, a text, a list or a mapping, got {type(value).__name__}"
+    )
 
 
-def edited(text: str, values: Mapping[KeyPath, str], renamed: Mapping[str, str] | None = None) -> str:
-    """The text with ``values``, each a flow value by its path, and keys of the first level ``renamed``.
+def edited(
+    text: str, values: Mapping[KeyPath, str], renamed: Mapping[str, str] | None = None
+) -> str:
+    """The text with ``values``, each a flow value by its path, and keys of the first level
+    ``renamed``.
 
-    A key that is not there is added, at the end of the mapping it belongs to, which must be there but for the first
-    level. Raises BadRequest for an alias, and for what has one: a change would show in the other place too.
+    A key that is not there is added, at the end of the mapping it belongs to, which must be there
+    but for the first level. Raises BadRequest for an alias, and for what has one: a change would
+    show in the other place too.
     """
     for path, value in values.items():
         text = _with(text, path, value)
@@ -216,12 +256,15 @@ def _with(text: str, path: KeyPath, value: str) -> str:
         key, node = _find(held, step)
         if node is None:
             return _added(text, held, path[depth:], value)
-        where, begins = dotted(path[: depth + 1]), node.start_mark.index
+        where = dotted(path[: depth + 1])
+        begins = node.start_mark.index
         if key is not None and begins < key.end_mark.index:
             raise BadRequest(f"{where} is an alias: write its value out, for it to be changed")
         anchor = re.match(r"&(\S+)", text[begins:])
         if anchor and f"*{anchor[1]}" in text:
-            raise BadRequest(f"{where} has the alias *{anchor[1]}: write that out, for it to be changed")
+            raise BadRequest(
+                f"{where} has the alias *{anchor[1]}: write that out, for it to be changed"
+            )
         held = node
     return text[: held.start_mark.index] + value + text[_end(held) :]
 
@@ -253,7 +296,9 @@ def _root(text: str) -> yaml.MappingNode:
 def _find(parent: yaml.Node, step: str | int) -> tuple[yaml.Node | None, yaml.Node | None]:
     """The key, of a mapping, and the value at a step; None where there is none."""
     if isinstance(parent, yaml.MappingNode):
-        return next(((name, value) for name, value in parent.value if name.value == step), (None, None))
+        return next(
+            ((name, value) for name, value in parent.value if name.value == step), (None, None)
+        )
     if isinstance(parent, yaml.SequenceNode) and isinstance(step, int) and step < len(parent.value):
         return None, parent.value[step]
     return None, None
@@ -272,14 +317,20 @@ def _end(node: yaml.Node) -> int:
 def key_text(step: str | int) -> str:
     """A key as a mapping has it, in quotes unless it is plain words."""
     word = str(step)
-    return word if re.fullmatch(r"[+-]?[A-Za-z_][\w+-]*( [\w+-]+)*", word) else "'" + word.replace("'", "''") + "'"
+    return (
+        word
+        if re.fullmatch(r"[+-]?[A-Za-z_][\w+-]*( [\w+-]+)*", word)
+        else "'" + word.replace("'", "''") + "'"
+    )
 
 
 NOISE = 1e-13  # nutation, rad, that is rounding
 
 
 class Edit(NamedTuple):
-    """A value at a path: its text, or a number of a ``kind`` of quantity, in SI, for the unit that the file has."""
+    """A value at a path: its text, or a number of a ``kind`` of quantity, in SI, for the unit that
+    the file has.
+    """
 
     path: KeyPath
     value: str | float
@@ -341,7 +392,9 @@ def rate_edits(tree: Node, later: Later) -> Edits:
             yield Edit(("omega0", index), rate, "rate")
     elif inertia.symmetric and inertia.aligned:
         first, second, spin = later.after.omega0.tolist()
-        angle = rigid_body.nutation_angle(inertia.A, inertia.C, math.hypot(first, second), inertia.equivalent(spin))
+        angle = rigid_body.nutation_angle(
+            inertia.A, inertia.C, math.hypot(first, second), inertia.equivalent(spin)
+        )
         phase = math.atan2(second, first)
         if angle < NOISE:
             angle = phase = 0.0
@@ -368,8 +421,13 @@ def attitude_edits(tree: Node, later: Later) -> Edits:
         return
     parts = flow_list(given.quaternion)
     keys = {"quaternion": parts, "epoch": given.epoch, "frame": given.frame}
-    if tree.get("attitude", "quaternion") is None:  # none, or another form, which holds a direction alone
-        yield Edit(("attitude",), "{" + ", ".join(f"{key}: {value}" for key, value in keys.items() if value) + "}")
+    if (
+        tree.get("attitude", "quaternion") is None
+    ):  # none, or another form, which holds a direction alone
+        yield Edit(
+            ("attitude",),
+            "{" + ", ".join(f"{key}: {value}" for key, value in keys.items() if value) + "}",
+        )
         return
     yield Edit(("attitude", "quaternion"), parts)
     for key in ("epoch", "frame"):
@@ -377,11 +435,16 @@ def attitude_edits(tree: Node, later: Later) -> Edits:
             yield Edit(("attitude", key), value)
 
 
-def carry_text(text: str, name: str, settings: Sequence[Setting], edits: Callable[[Node], Edits]) -> str:
-    """The text of a file ``name`` with ``settings`` and the ``edits`` of its tree; raises BadRequest for aliases."""
+def carry_text(
+    text: str, name: str, settings: Sequence[Setting], edits: Callable[[Node], Edits]
+) -> str:
+    """The text of a file ``name`` with ``settings`` and the ``edits`` of its tree; raises
+    BadRequest for aliases.
+    """
     text = text.removeprefix("\ufeff")
     for setting in settings:
-        tree, value = read_tree(text, name)[0], setting.value
+        tree = read_tree(text, name)[0]
+        value = setting.value
         if not isinstance(value, str):
             value = json.dumps(setting.node()[0].plain(), ensure_ascii=False)
         positions: KeyPath = ()  # of entries of lists, which may be named instead
@@ -399,7 +462,9 @@ def carry_text(text: str, name: str, settings: Sequence[Setting], edits: Callabl
 
 
 def as_before(node: Node | None, value: float, kind: str) -> str:
-    """A value in SI as text in the unit that the file has for it; a new one in SI, angles in deg."""
+    """A value in SI as text in the unit that the file has for it; a new one in SI,
+    angles in deg.
+    """
     before = None if node is None else node.value
     if before is not None and not isinstance(before, str):
         return number(value)

@@ -1,4 +1,5 @@
-"""Exchange formats (attitude file of the Systems Tool Kit, script for Basilisk, epochs and frames), and samples as CSV.
+"""Exchange formats (attitude file of the Systems Tool Kit, script for Basilisk, epochs and frames),
+and samples as CSV.
 
 The samples of a dispersion study are streamed as they are flown.
 """
@@ -37,12 +38,22 @@ def basilisk_script(plan: Plan) -> str:
     """The text of the script; raises BadRequest for dissipation, a wheel, or moments that fall."""
     body = plan.spacecraft
     if body.dissipation is not None:
-        raise BadRequest("a Basilisk script flies a rigid body: leave dissipation out of the spacecraft file")
+        raise BadRequest(
+            "a Basilisk script flies a rigid body: leave dissipation out of the spacecraft file"
+        )
     if body.inertia.wheel != 0.0:
-        raise BadRequest("a Basilisk script flies one rigid body: it has no wheel, and the spacecraft file has one")
+        raise BadRequest(
+            "a Basilisk script flies one rigid body: it has no wheel, "
+            "and the spacecraft file has one"
+        )
     if shed(body) is not None:
-        problem = "a Basilisk script flies constant moments of inertia: leave tank.inertia_per_kg out of the spacecraft"
-        raise BadRequest(f"{problem} file, and plan without it, if the moments may count as constant")
+        problem = (
+            "a Basilisk script flies constant moments of inertia: "
+            "leave tank.inertia_per_kg out of the spacecraft"
+        )
+        raise BadRequest(
+            f"{problem} file, and plan without it, if the moments may count as constant"
+        )
     rates, quaternion = body.inertia.in_file_axes(body.initial.rates, body.initial.quaternion)
     about = f"{plan.scheme} schedule for {body.name}, status {plan.verdict.status.value}"
     title = " ".join(about.split()).replace("\\", "/").replace('"', "'")
@@ -60,7 +71,9 @@ def basilisk_script(plan: Plan) -> str:
 
 
 def _steps(plan: Plan, body: Spacecraft) -> Iterable[str]:
-    """Rows of the schedule: channel, duration, torque; an ideal impulse lasts no time and gives its impulse."""
+    """Rows of the schedule: channel, duration, torque; an ideal impulse lasts no time and gives its
+    impulse.
+    """
     pulses, axes = plan.pulses, body.inertia.axes
     longest = default_step(body, pulses, pulses.end)
     edges = sorted({0.0, pulses.end, *(edge for pulse in pulses for edge in pulse.edges)})
@@ -71,7 +84,10 @@ def _steps(plan: Plan, body: Spacecraft) -> Iterable[str]:
         firing = [pulse.channel for pulse in pulses if pulse.push(now, end) is not None]
         if end > now:
             for duration, torque in stretches(body, pulses, now, end, longest):
-                yield f"({' + '.join(firing) or 'coast'!r}, {float(duration)!r}, {_vector(axes @ torque)})"
+                yield (
+                    f"({' + '.join(firing) or 'coast'!r}, {float(duration)!r}, "
+                    f"{_vector(axes @ torque)})"
+                )
 
 
 def _vector(vector: Iterable[float] | Vector) -> str:
@@ -79,7 +95,11 @@ def _vector(vector: Iterable[float] | Vector) -> str:
 
 
 FRAMES = ("EME2000", "J2000", "GCRF")  # inertial frames that the formats have a name for
-AXES = {"EME2000": "J2000", "J2000": "J2000", "GCRF": "ICRF"}  # their names in the format of the Systems Tool Kit
+AXES = {
+    "EME2000": "J2000",
+    "J2000": "J2000",
+    "GCRF": "ICRF",
+}  # their names in the format of the Systems Tool Kit
 
 EXAMPLE = {
     "epoch": "2026-03-01T12:00:00Z           # of t = 0, UTC",
@@ -88,12 +108,16 @@ EXAMPLE = {
 }
 
 TURN = math.radians(6.0)
-"""rad; the body turns by no more between two records. Interpolation with the rates then errs by less than 1e-5 deg, and
-even a plain turn from one attitude to the next by less than 0.01 deg at 5 deg of nutation."""
+"""rad; the body turns by no more between two records. Interpolation with the rates then errs by
+less than 1e-5 deg, and even a plain turn from one attitude to the next by less than 0.01 deg at 5
+deg of nutation.
+"""
 
 LEAST_RECORDS = 4  # records of a stretch, however short: enough for interpolation of degree 3
 MOST_RECORDS = 1_000_000  # more make no file that anyone reads
-NANOSECONDS = 1e9  # nanoseconds in a second; to divide by them gives the number nearest to the decimal one
+NANOSECONDS = (
+    1e9  # nanoseconds in a second; to divide by them gives the number nearest to the decimal one
+)
 
 
 class Reference(NamedTuple):
@@ -104,9 +128,11 @@ class Reference(NamedTuple):
 
 
 class AttitudeSegment(NamedTuple):
-    """Motion without jumps, in the axes of the file, ``completed`` pulses of which are over when it begins.
+    """Motion without jumps, in the axes of the file, ``completed`` pulses of which are over when it
+    begins.
 
-    ``t`` (n,) s, whole nanoseconds; ``rates`` (n, 3) rad/s; ``quaternion`` (n, 4) body -> frame, scalar first.
+    ``t`` (n,) s, whole nanoseconds; ``rates`` (n, 3) rad/s; ``quaternion`` (n, 4) body -> frame,
+    scalar first.
     """
 
     t: Vector
@@ -116,24 +142,33 @@ class AttitudeSegment(NamedTuple):
 
 
 def reference(spacecraft: Spacecraft) -> Reference:
-    """Epoch and frame of the file; raises BadRequest with the lines to add, or for those that no format knows."""
+    """Epoch and frame of the file; raises BadRequest with the lines to add, or for those that no
+    format knows.
+    """
     given = spacecraft.attitude
     if given is None or given.epoch is None or given.frame is None:
         missing = [key for key in EXAMPLE if given is None or getattr(given, key) is None]
         names = " and ".join(f"attitude.{key}" for key in missing if key != "quaternion")
         lines = "\n".join(f"  {key}: {EXAMPLE[key]}" for key in missing)
         cure = f"add{'' if given is None else ' there'}\nattitude:\n{lines}"
-        raise BadRequest(f"this format needs {names}, which the spacecraft file does not give; {cure}")
+        raise BadRequest(
+            f"this format needs {names}, which the spacecraft file does not give; {cure}"
+        )
     if given.frame not in FRAMES:
-        problem = f"{given.frame!r} is no frame that the format knows; expected one of {', '.join(FRAMES)}"
+        problem = (
+            f"{given.frame!r} is no frame that the format knows; "
+            f"expected one of {', '.join(FRAMES)}"
+        )
         raise Unsuitable(("attitude", "frame"), problem)
     return Reference(Epoch.parse(given.epoch), given.frame)
 
 
 def interpolated(flown: Flight, until: float) -> Iterator[AttitudeSegment]:
-    """The motion from 0 to ``until`` s between the edges of pulses, close enough to be interpolated.
+    """The motion from 0 to ``until`` s between the edges of pulses, close enough to be
+    interpolated.
 
-    Stretches too short for nanoseconds are left out. Raises BadRequest for more records than `MOST_RECORDS`.
+    Stretches too short for nanoseconds are left out. Raises BadRequest for more records than
+    `MOST_RECORDS`.
     """
     legs = [leg for leg in flown.legs if leg.start < until]
     counts = []
@@ -169,12 +204,16 @@ def stk_attitude(flown: Flight, until: float, reference: Reference, about: str =
     last: tuple[float, list[float]] | None = None
     for stretch in interpolated(flown, until):
         rates = np.degrees(stretch.rates).tolist()
-        for t, (scalar, *vector), rate in zip(stretch.t.tolist(), stretch.quaternion.tolist(), rates, strict=True):
+        for t, (scalar, *vector), rate in zip(
+            stretch.t.tolist(), stretch.quaternion.tolist(), rates, strict=True
+        ):
             if last is not None and t <= last[0]:
                 if np.allclose(rate, last[1], rtol=0.0, atol=1e-9 * np.linalg.norm(rate)):
                     continue
                 t = last[0] + 1.0 / NANOSECONDS
-            rows.append(" ".join([f"{t:.9f}", *(f"{part:.16e}" for part in (*vector, scalar, *rate))]))
+            rows.append(
+                " ".join([f"{t:.9f}", *(f"{part:.16e}" for part in (*vector, scalar, *rate))])
+            )
             last = t, rate
     date, _, clock = reference.epoch.text.partition("T")
     day = datetime.date.fromisoformat(date)
@@ -197,7 +236,13 @@ def stk_attitude(flown: Flight, until: float, reference: Reference, about: str =
 
 SUFFIXES = {"kg m²": "kgm2", "rad/s": "rad_s", "m/s²": "m_s2", "rad": "deg", "": "factor"}
 """Endings of headings for units; those not in it are written as they are."""
-OUTPUT_COLUMNS = ("nutation_deg", "momentum_shift_deg", "axis_error_deg", "spin_change_rad_s", "propellant_kg")
+OUTPUT_COLUMNS = (
+    "nutation_deg",
+    "momentum_shift_deg",
+    "axis_error_deg",
+    "spin_change_rad_s",
+    "propellant_kg",
+)
 """Columns of `OUTPUTS`, in their order."""
 
 SHORTEST = 12  # bytes that a number takes at least, on average, with its comma
@@ -215,12 +260,20 @@ def column(entry: DispersedInput) -> str:
 
 
 class SamplesWriter:
-    """Writer of one row a case: number from 1, true inputs, outputs, angles to cones, spin error; angles in degrees."""
+    """Writer of one row a case: number from 1, true inputs, outputs, angles to cones, spin error;
+    angles in degrees.
+    """
 
     def __init__(self, stream: IO[bytes], study: Study) -> None:
-        self._stream, self._study, self._inputs = stream, study, study.model.inputs.drawn
+        self._stream = stream
+        self._study = study
+        self._inputs = study.model.inputs.drawn
         body = study.model.spacecraft
-        self._outputs = [*OUTPUT_COLUMNS, *cone_columns(body), *["spin_error_rad_s"] * (body.goal.spin is not None)]
+        self._outputs = [
+            *OUTPUT_COLUMNS,
+            *cone_columns(body),
+            *["spin_error_rad_s"] * (body.goal.spin is not None),
+        ]
         header = ["case", *(column(entry) for entry in self._inputs), *self._outputs]
         stream.write(csv_text(header, []).encode())
         stream.flush()  # a full disk is better reported before the first case is flown
@@ -230,7 +283,8 @@ class SamplesWriter:
         for begin in range(0, values.shape[1], BLOCK):  # texts of all would take much memory
             part = values[:, begin : begin + BLOCK]
             cases = np.arange(first + begin, first + begin + part.shape[1])
-            draws, columns = self._study.draws_of_all(cases), [list(map(str, (cases + 1).tolist()))]
+            draws = self._study.draws_of_all(cases)
+            columns = [list(map(str, (cases + 1).tolist()))]
             for entry in self._inputs:
                 truth = np.broadcast_to(entry.nominal + draws[entry.name], len(cases))
                 columns.append(_texts(np.degrees(truth) if entry.unit == "rad" else truth))
@@ -249,7 +303,11 @@ def check_room(path: str, study: Study, samples: int) -> None:
     """Raise CannotWrite where a disk cannot hold so many rows."""
     if path == STDOUT or (Path(path).exists() and not Path(path).is_file()):
         return
-    needed = samples * SHORTEST * (len(study.model.inputs.drawn) + len(OUTPUTS) + 2 * len(study.model.spacecraft.keep))
+    needed = (
+        samples
+        * SHORTEST
+        * (len(study.model.inputs.drawn) + len(OUTPUTS) + 2 * len(study.model.spacecraft.keep))
+    )
     try:
         free = shutil.disk_usage(Path(path).resolve().parent).free
     except OSError:
@@ -276,8 +334,8 @@ def streamed(
 ) -> tuple[Flown, CannotWrite | None]:
     """Fly cases of a ``study``, and write them with a ``writer`` to a file, if one is named.
 
-    Returns what ``fly`` does, and the error if they are not all saved. Raises CannotWrite where no case has flown yet,
-    KeyboardInterrupt where the flight ended before the first.
+    Returns what ``fly`` does, and the error if they are not all saved. Raises CannotWrite where no
+    case has flown yet, KeyboardInterrupt where the flight ended before the first.
     """
     results: list[Flown] = []
 

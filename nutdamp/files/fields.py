@@ -1,8 +1,10 @@
-r"""Sections of a file declared as classes: units, ranges, defaults; read with all faults at once, and as JSON Schema.
+r"""Sections of a file declared as classes: units, ranges, defaults; read with all faults at once,
+and as JSON Schema.
 
-A key is an annotated attribute, ``mass: Mass | None = Field("Mass, kg.", "250 kg")``. Types are those of YAML and
-JSON values, lists, tuples and mappings of them, sections, and any of them `Annotated` with `Rule`\ s. Kinds of values
-in a spacecraft file follow: quantities with units and bounds, directions, lists, names, dates, counts.
+A key is an annotated attribute, ``mass: Mass | None = Field("Mass, kg.", "250 kg")``. Types are
+those of YAML and JSON values, lists, tuples and mappings of them, sections, and any of them
+`Annotated` with `Rule`\ s. Kinds of values in a spacecraft file follow: quantities with units and
+bounds, directions, lists, names, dates, counts.
 """
 
 from __future__ import annotations
@@ -13,7 +15,17 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from types import NoneType, UnionType
-from typing import Annotated, Any, ClassVar, Literal, Self, Union, get_args, get_origin, get_type_hints
+from typing import (
+    Annotated,
+    Any,
+    ClassVar,
+    Literal,
+    Self,
+    Union,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
 
 from nutdamp.errors import listed, nearest
 from nutdamp.units import KINDS, parse, pattern, shown
@@ -39,7 +51,9 @@ class Key:
 
 
 def Field(description: str, *examples: Any, default: Any = REQUIRED) -> Any:
-    """A key of a `Section`; its type is the annotation, and one that may be None is so by default."""
+    """A key of a `Section`; its type is the annotation,
+    and one that may be None is so by default.
+    """
     return Key(None, default, description, list(examples))
 
 
@@ -47,7 +61,9 @@ class Rule:
     """Rule that an annotation adds to a type."""
 
     def read(self, value: Any, inner: Callable[[Any], Any]) -> Any:
-        """The meaning of ``value``, which ``inner`` reads by the type. Raises ValueError with the problem."""
+        """The meaning of ``value``, which ``inner`` reads by the type. Raises ValueError with the
+        problem.
+        """
         return inner(value)
 
     def schema(self, inner: Callable[[], dict[str, Any]]) -> dict[str, Any]:
@@ -64,7 +80,9 @@ class Length(Rule):
     def read(self, value: Any, inner: Callable[[Any], Any]) -> Any:
         """The value as the type reads it; raises ValueError for another length."""
         long = isinstance(value, list) and self.most is not None and len(value) > self.most
-        entries = value if long else inner(value)  # entries too many are one fault, whatever they are
+        entries = (
+            value if long else inner(value)
+        )  # entries too many are one fault, whatever they are
         if entries is None:  # not of the type
             return None
         if len(entries) < self.least == 1:
@@ -81,7 +99,11 @@ class Length(Rule):
         """Schema with the keywords of the length."""
         keywords = inner()
         of = {"array": "Items", "object": "Properties", "string": "Length"}[keywords["type"]]
-        return {**keywords, f"min{of}": self.least, **({} if self.most is None else {f"max{of}": self.most})}
+        return {
+            **keywords,
+            f"min{of}": self.least,
+            **({} if self.most is None else {f"max{of}": self.most}),
+        }
 
 
 class Within(Rule):
@@ -124,12 +146,16 @@ class Section:
         for name, key in vars(cls).items():
             if isinstance(key, Key):
                 optional = key.default is REQUIRED and NoneType in get_args(types[name])
-                keys[name] = replace(key, type=types[name], default=None if optional else key.default)
+                keys[name] = replace(
+                    key, type=types[name], default=None if optional else key.default
+                )
         return keys
 
     @classmethod
     def read(cls, value: Any, problems: Problems, path: KeyPath = ()) -> Self | None:
-        """The section in ``value``; ``problems`` get its own, but for unknown keys and empty values."""
+        """The section in ``value``; ``problems`` get its own, but for unknown keys and empty
+        values.
+        """
         if not isinstance(value, dict):
             problems.append((path, _mismatch(value, cls.written)))
             return None
@@ -141,7 +167,9 @@ class Section:
                 values[name] = key.default
                 if key.default is REQUIRED and name not in value:
                     what = key.description
-                    problems.append(((*path, name), f"missing; {what[:1].lower()}{what[1:].rstrip('.')}"))
+                    problems.append(
+                        ((*path, name), f"missing; {what[:1].lower()}{what[1:].rstrip('.')}")
+                    )
         return cls(values)
 
 
@@ -164,7 +192,8 @@ def _read(annotation: Any, value: Any, problems: Problems, path: KeyPath) -> Any
     """The meaning of a value of this type; problems are added to ``problems``."""
     if value is None or annotation is Any:
         return value
-    origin, parts = get_origin(annotation), get_args(annotation)
+    origin = get_origin(annotation)
+    parts = get_args(annotation)
     if origin is Annotated:
         return _ruled(parts[0], parts[1:], value, problems, path)
     if origin in (Union, UnionType):
@@ -173,7 +202,10 @@ def _read(annotation: Any, value: Any, problems: Problems, path: KeyPath) -> Any
             problems.append((path, _mismatch(value, expected)))
             return None
         # A section is meant by a mapping, the other type by all else.
-        meant = next((kind for kind in kinds if isinstance(value, dict) == (section_of(kind) is kind)), kinds[0])
+        meant = next(
+            (kind for kind in kinds if isinstance(value, dict) == (section_of(kind) is kind)),
+            kinds[0],
+        )
         return _read(meant, value, problems, path)
     if origin is Literal:
         if value in parts:
@@ -186,32 +218,45 @@ def _read(annotation: Any, value: Any, problems: Problems, path: KeyPath) -> Any
     if section is annotation:
         return section.read(value, problems, path)
     plain: Any = origin or annotation
-    if not isinstance(value, list if plain is tuple else plain) or (plain is int and isinstance(value, bool)):
+    if not isinstance(value, list if plain is tuple else plain) or (
+        plain is int and isinstance(value, bool)
+    ):
         quoted = "; put it in quotes" if plain is str and not isinstance(value, dict | list) else ""
         problems.append((path, _mismatch(value, _WORDS[plain]) + quoted))
         return None
     if isinstance(value, dict):
         key_type, entry_type = parts
         return {
-            _read(key_type, key, problems, (*path, key)): _read(entry_type, entry, problems, (*path, key))
+            _read(key_type, key, problems, (*path, key)): _read(
+                entry_type, entry, problems, (*path, key)
+            )
             for key, entry in value.items()
         }
     if plain is list:
-        return [_read(parts[0], entry, problems, (*path, index)) for index, entry in enumerate(value)]
+        return [
+            _read(parts[0], entry, problems, (*path, index)) for index, entry in enumerate(value)
+        ]
     if plain is tuple:
         if len(parts) != len(value):
             problems.append((path, f"expected {len(parts)} entries, got {len(value)}"))
             return None
-        return [_read(parts[index], entry, problems, (*path, index)) for index, entry in enumerate(value)]
+        return [
+            _read(parts[index], entry, problems, (*path, index))
+            for index, entry in enumerate(value)
+        ]
     return value
 
 
-def _ruled(annotation: Any, rules: tuple[Rule, ...], value: Any, problems: Problems, path: KeyPath) -> Any:
+def _ruled(
+    annotation: Any, rules: tuple[Rule, ...], value: Any, problems: Problems, path: KeyPath
+) -> Any:
     """The meaning of a value by the rules about its type, the last of which is the outermost."""
     if not rules:
         return _read(annotation, value, problems, path)
     try:
-        return rules[-1].read(value, lambda inner: _ruled(annotation, rules[:-1], inner, problems, path))
+        return rules[-1].read(
+            value, lambda inner: _ruled(annotation, rules[:-1], inner, problems, path)
+        )
     except ValueError as wrong:
         problems.append((path, str(wrong)))
         return None
@@ -220,12 +265,16 @@ def _ruled(annotation: Any, rules: tuple[Rule, ...], value: Any, problems: Probl
 def _either(parts: list[Any]) -> str:
     """Words for what a union of a list and a mapping expects; empty for another union."""
     kinds = [get_args(part)[0] if get_origin(part) is Annotated else part for part in parts]
-    if {"dict" if section_of(kind) is kind else get_origin(kind) for kind in kinds} == {"dict", list}:
+    if {"dict" if section_of(kind) is kind else get_origin(kind) for kind in kinds} == {
+        "dict",
+        list,
+    }:
         return f"{_WORDS[list]} or {_WORDS[dict]}"
     return ""
 
 
-SMALLEST = 1e-15  # smaller values that must be above zero count as zero, in SI: a division by them could overflow
+# smaller values that must be above zero count as zero, in SI: a division by them could overflow
+SMALLEST = 1e-15
 
 _BOUNDS = {
     "minimum": (operator.ge, "of at least"),
@@ -237,7 +286,9 @@ RIGHT_ANGLE = parse("90 deg", "angle")
 
 
 class Quantity(Rule):
-    """Annotation of a field that holds a quantity of ``kind``; the bounds are keywords of JSON Schema, in SI."""
+    """Annotation of a field that holds a quantity of ``kind``; the bounds are keywords of JSON
+    Schema, in SI.
+    """
 
     def __init__(self, kind: str, **bounds: float) -> None:
         self.kind, self.bounds = kind, bounds
@@ -246,15 +297,24 @@ class Quantity(Rule):
         """SI value; raises ValueError with the values allowed."""
         result = parse(value, self.kind)
         if not self._allows(result):
-            # An angle without unit that would be in range in degrees, or a share that would be in %.
-            hints = {"angle": f" (read as radians; write {value} deg)", "ratio": f"; write {value} % if that is meant"}
-            unit, hint = "deg" if self.kind == "angle" else "%", hints.get(self.kind, "")
-            if hint and (isinstance(value, str) or not self._allows(parse(f"{value} {unit}", self.kind))):
+            # An angle without unit that would be in range in degrees, or a share that would be in
+            # %.
+            hints = {
+                "angle": f" (read as radians; write {value} deg)",
+                "ratio": f"; write {value} % if that is meant",
+            }
+            unit = "deg" if self.kind == "angle" else "%"
+            hint = hints.get(self.kind, "")
+            if hint and (
+                isinstance(value, str) or not self._allows(parse(f"{value} {unit}", self.kind))
+            ):
                 hint = ""
             raise ValueError(f"{shown(value)} is out of range; expected {self.range}{hint}")
         if result < self.bounds.get("exclusiveMinimum", -math.inf) + SMALLEST:
             least = f"in SI at least {SMALLEST:g}"
-            raise ValueError(f"{shown(value)} is too small to be real; expected {self.range}, {least}")
+            raise ValueError(
+                f"{shown(value)} is too small to be real; expected {self.range}, {least}"
+            )
         return result
 
     def _allows(self, result: float) -> bool:
@@ -265,7 +325,8 @@ class Quantity(Rule):
         """``an angle of at least 0 and below 90 deg``."""
         angle = self.kind == "angle"
         bounds = (
-            f"{_BOUNDS[name][1]} " + (f"{limit / RIGHT_ANGLE * 90:g} deg" if angle and limit else f"{limit:g}")
+            f"{_BOUNDS[name][1]} "
+            + (f"{limit / RIGHT_ANGLE * 90:g} deg" if angle and limit else f"{limit:g}")
             for name, limit in self.bounds.items()
         )
         return f"{KINDS[self.kind].noun} {' and '.join(bounds)}"

@@ -33,19 +33,25 @@ from nutdamp.units import shown
 
 
 class _AxialShorthand(Rule):
-    """Annotation of a torque vector that may be written as a single torque, its part about axis 3."""
+    """Annotation of a torque vector that may be written as a single torque,
+    its part about axis 3.
+    """
 
     single = Quantity("torque")
 
     def read(self, value: Any, inner: Callable[[Any], Any]) -> Any:
-        return inner(value) if isinstance(value, list) else [0.0, 0.0, self.single.read(value, inner)]
+        return (
+            inner(value) if isinstance(value, list) else [0.0, 0.0, self.single.read(value, inner)]
+        )
 
     def schema(self, inner: Callable[[], dict[str, Any]]) -> dict[str, Any]:
         return {"anyOf": [inner(), *self.single.schema(inner)["anyOf"]]}
 
 
 class _ListOf(Rule):
-    """Annotation of a list of lists, each ``written`` so; the error for a single list shows how to nest it."""
+    """Annotation of a list of lists, each ``written`` so; the error for a single list shows how to
+    nest it.
+    """
 
     def __init__(self, written: str) -> None:
         self.written = written
@@ -58,7 +64,9 @@ class _ListOf(Rule):
 
 
 class _OrWord(Rule):
-    """Annotation of a direction, two angles in a list, that may be written as one ``word`` instead."""
+    """Annotation of a direction, two angles in a list,
+    that may be written as one ``word`` instead.
+    """
 
     def __init__(self, word: str) -> None:
         self.word = word
@@ -67,7 +75,9 @@ class _OrWord(Rule):
         if value == self.word:
             return value
         if not isinstance(value, list):
-            raise ValueError(f"expected {self.word} or [right ascension, declination], got {shown(value)}")
+            raise ValueError(
+                f"expected {self.word} or [right ascension, declination], got {shown(value)}"
+            )
         return inner(value)
 
     def schema(self, inner: Callable[[], dict[str, Any]]) -> dict[str, Any]:
@@ -93,15 +103,21 @@ class _DateAndTime(Rule):
         text = inner(value)
         if text is not None:
             if not re.fullmatch(_EPOCH, text):
-                raise ValueError(f"{shown(text)} is no epoch; expected ISO 8601: 2026-03-01T12:00:00Z")
-            Epoch.parse(text)  # raises for a day that is none, and for one without UTC or beyond four digits
+                raise ValueError(
+                    f"{shown(text)} is no epoch; expected ISO 8601: 2026-03-01T12:00:00Z"
+                )
+            Epoch.parse(
+                text
+            )  # raises for a day that is none, and for one without UTC or beyond four digits
         return text
 
     def schema(self, inner: Callable[[], dict[str, Any]]) -> dict[str, Any]:
         return {**inner(), "pattern": f"^{_EPOCH}$"}
 
 
-_EPOCH = r"[0-9]{4}-[0-9]{2}-[0-9]{2}T[0-9]{2}:[0-9]{2}(:[0-9]{2}(\.[0-9]+)?)?(Z|[+-][0-9]{2}:[0-9]{2})?"
+_EPOCH = (
+    r"[0-9]{4}-[0-9]{2}-[0-9]{2}T[0-9]{2}:[0-9]{2}(:[0-9]{2}(\.[0-9]+)?)?(Z|[+-][0-9]{2}:[0-9]{2})?"
+)
 
 Mass = Annotated[float, Quantity("mass", exclusiveMinimum=0)]
 Moment = Annotated[float, Quantity("inertia", exclusiveMinimum=0)]
@@ -129,7 +145,9 @@ Count = Annotated[int, Within(1, 1_000_000)]
 
 
 class OrbitSection(Section):
-    """Position of the spacecraft at t = 0, at attitude.epoch and in attitude.frame; for messages to flight dynamics."""
+    """Position of the spacecraft at t = 0, at attitude.epoch and in attitude.frame; for messages to
+    flight dynamics.
+    """
 
     position: Position = Field("Position from the center, m.", ["7000 km", 0, 0])
     velocity: Velocity = Field("Velocity, m/s.", [0, "7.5 km/s", 0])
@@ -140,21 +158,32 @@ class WheelSection(Section):
     """A part that turns otherwise than the body: a momentum wheel, or a despun platform."""
 
     momentum: Annotated[float, Quantity("momentum")] = Field(
-        "Its constant angular momentum along principal axis 3, signed, N m s, beside the C ω3 of all else.", "40 N m s"
+        (
+            "Its constant angular momentum along principal axis 3, signed, N m s, "
+            "beside the C ω3 of all else."
+        ),
+        "40 N m s",
     )
 
 
 class SunSensorSection(Section):
     """A sensor that gives a pulse in each spin, when the Sun passes it."""
 
-    azimuth: Angle = Field("Azimuth in the body at which the Sun pulse comes, about axis 3 from axis 1, rad.", "35 deg")
+    azimuth: Angle = Field(
+        "Azimuth in the body at which the Sun pulse comes, about axis 3 from axis 1, rad.", "35 deg"
+    )
     elevation: Declination = Field(
-        "Middle of its view, from the plane square to axis 3 towards the spin axis, rad; default 0.",
+        (
+            "Middle of its view, from the plane square to axis 3 towards the spin axis, rad; "
+            "default 0."
+        ),
         "45 deg",
         default=0.0,
     )
     half_width: Apart = Field(
-        "How far from there it sees the Sun, rad; default 90 deg, which is always.", "45 deg", default=RIGHT_ANGLE
+        "How far from there it sees the Sun, rad; default 90 deg, which is always.",
+        "45 deg",
+        default=RIGHT_ANGLE,
     )
     jitter: Time = Field("One sigma of its pulses, s; default 0.", "0.5 ms", default=0.0)
 
@@ -187,14 +216,20 @@ class CommandsSection(Section):
 
 
 class KeepSection(Section):
-    """A cone about a direction in space which the spin axis must not enter, or must not leave, nutation included."""
+    """A cone about a direction in space which the spin axis must not enter, or must not leave,
+    nutation included.
+    """
 
     name: Name = Field("Name of the cone, for reports.", "Earth")
     direction: Annotated[InTheSky, _OrWord("sun")] = Field(
-        "Right ascension and declination in the attitude's frame, rad; or sun.", "sun", ["120 deg", "10 deg"]
+        "Right ascension and declination in the attitude's frame, rad; or sun.",
+        "sun",
+        ["120 deg", "10 deg"],
     )
     min: Apart | None = Field("Least angle to the spin axis, rad; default 0.", "4 deg")
-    max: Apart | None = Field("Largest angle between it and the spin axis, rad; default 180 deg.", "20 deg")
+    max: Apart | None = Field(
+        "Largest angle between it and the spin axis, rad; default 180 deg.", "20 deg"
+    )
 
 
 Pressure = Annotated[float, Quantity("pressure", exclusiveMinimum=0)]
@@ -209,11 +244,17 @@ ImpulseBits = Annotated[list[tuple[PositiveTime, Impulse, PositiveTime]], Length
 class ValveSection(Section):
     """A valve: from the command to the thrust, which then rises and falls evenly."""
 
-    open_delay: Time = Field("From the start of the command to the first thrust, s; default 0.", "8 ms", default=0.0)
-    close_delay: Time = Field(
-        "From the end of the command until the thrust begins to fall, s; default 0.", "12 ms", default=0.0
+    open_delay: Time = Field(
+        "From the start of the command to the first thrust, s; default 0.", "8 ms", default=0.0
     )
-    rise_time: Time = Field("From the first thrust to full thrust, s; default 0.", "5 ms", default=0.0)
+    close_delay: Time = Field(
+        "From the end of the command until the thrust begins to fall, s; default 0.",
+        "12 ms",
+        default=0.0,
+    )
+    rise_time: Time = Field(
+        "From the first thrust to full thrust, s; default 0.", "5 ms", default=0.0
+    )
     fall_time: Time = Field("From full thrust to none, s; default 0.", "10 ms", default=0.0)
     on_time_is: Literal["command", "effective"] = Field(
         "Meaning of a commanded on-time: the length of the command (default), or impulse over full "
@@ -231,7 +272,9 @@ class ShedSection(Section):
 
 
 class TankSection(Section):
-    """A tank in blowdown: the gas expands as the propellant is used, and pressure and thrust fall."""
+    """A tank in blowdown: the gas expands as the propellant is used,
+    and pressure and thrust fall.
+    """
 
     propellant: Mass = Field("Propellant in it at t = 0, kg.", "30 kg")
     pressure: Pressure = Field("Pressure at t = 0, Pa.", "22 bar")
@@ -240,12 +283,14 @@ class TankSection(Section):
         "Exponent n in thrust ~ pressure^n; default 1.", 1, default=1.0
     )
     isp: Annotated[list[tuple[Pressure, PositiveTime]], Length(2)] | None = Field(
-        "Rows of pressure, Pa, rising, and specific impulse, s, instead of that of the thrusters; it runs "
+        "Rows of pressure, Pa, rising, and specific impulse, s, instead of that of the thrusters; "
+        "it runs "
         "evenly between them, and below the first it is that of the first.",
         [["8 bar", "215 s"], ["22 bar", "228 s"]],
     )
     inertia_per_kg: Annotated[list[Shed], Length(3, 3)] | ShedSection | None = Field(
-        "What each kg that is used takes off the moments of inertia, kg m²/kg: A and C, or a list of the "
+        "What each kg that is used takes off the moments of inertia, kg m²/kg: A and C, "
+        "or a list of the "
         "three principal moments, the one about axis 3 last. Default: they stay.",
         {"A": "0.4 kg m^2/kg", "C": "0.6 kg m^2/kg"},
     )
@@ -270,10 +315,14 @@ def _needs(*keys: str, without: tuple[str, ...]) -> dict[str, Any]:
 class InertiaSection(Section):
     """Moments of inertia about the centre of mass: A and C, or the whole tensor."""
 
-    schema_extra: ClassVar = {"oneOf": [_needs("A", "C", without=("tensor",)), _needs("tensor", without=("A", "C"))]}
+    schema_extra: ClassVar = {
+        "oneOf": [_needs("A", "C", without=("tensor",)), _needs("tensor", without=("A", "C"))]
+    }
 
     A: Moment | None = Field("Transverse moment of inertia, kg m².", "120 kg m^2")
-    C: Moment | None = Field("Moment of inertia about the spin axis 3, kg m²; at most 2 A.", "80 kg m^2")
+    C: Moment | None = Field(
+        "Moment of inertia about the spin axis 3, kg m²; at most 2 A.", "80 kg m^2"
+    )
     tensor: Tensor | None = Field(
         "Inertia tensor, 3 rows of 3, kg m²; axis 3 is the principal axis nearest the file's.",
         [[120, 0.5, 0], [0.5, 118, 0], [0, 0, 80]],
@@ -285,13 +334,21 @@ class StateSection(Section):
 
     spin: Rate = Field("Spin rate about axis 3, signed, rad/s; zero only with a wheel.", "30 rpm")
     nutation: Nutation = Field(
-        "Nutation angle between angular momentum and spin axis at t = 0, rad, from 0 to below 90 deg.", "5 deg"
+        (
+            "Nutation angle between angular momentum and spin axis at t = 0, rad, "
+            "from 0 to below 90 deg."
+        ),
+        "5 deg",
     )
-    phase: Angle = Field("Direction of the transverse rate, arg(ω1 + i ω2), rad; default 0.", "20 deg", default=0.0)
+    phase: Angle = Field(
+        "Direction of the transverse rate, arg(ω1 + i ω2), rad; default 0.", "20 deg", default=0.0
+    )
 
 
 class AttitudeSection(Section):
-    """Attitude at t = 0; without it results refer to the frame with z along the angular momentum."""
+    """Attitude at t = 0; without it results refer to the frame with
+    z along the angular momentum.
+    """
 
     schema_extra: ClassVar = {
         "oneOf": [
@@ -300,26 +357,40 @@ class AttitudeSection(Section):
         ]
     }
 
-    quaternion: Quaternion | None = Field("Turn from body to frame, scalar first; normalised when read.", [1, 0, 0, 0])
+    quaternion: Quaternion | None = Field(
+        "Turn from body to frame, scalar first; normalised when read.", [1, 0, 0, 0]
+    )
     spin_axis: InTheSky | None = Field(
         "Instead of quaternion: right ascension and declination of the spin axis, rad; see phase.",
         ["120 deg", "-15 deg"],
     )
     phase: Angle | None = Field(
-        "Angle about spin_axis from its ascending node (z of the frame × spin axis; x of the frame at a pole) to body "
+        "Angle about spin_axis from its ascending node (z of the frame × spin axis; "
+        "x of the frame at a pole) to body "
         "axis 1, rad; default 0.",
         "20 deg",
     )
     sun_phase: Angle | None = Field(
-        "Instead of phase: angle about spin_axis from the side of the Sun to body axis 1, rad; needs sun.", "35 deg"
+        (
+            "Instead of phase: angle about spin_axis from the side of the Sun to body axis 1, rad; "
+            "needs sun."
+        ),
+        "35 deg",
     )
     of: Literal["axis", "momentum"] | None = Field(
-        "Vector that spin_axis and phase are of: the spin axis itself (default), or the angular momentum.", "momentum"
+        (
+            "Vector that spin_axis and phase are of: the spin axis itself (default), "
+            "or the angular momentum."
+        ),
+        "momentum",
     )
     epoch: DateAndTime | None = Field(
-        "Date and time of t = 0, ISO 8601, from 1972 to 9999; without a zone it is UTC.", "2026-03-01T12:00:00Z"
+        "Date and time of t = 0, ISO 8601, from 1972 to 9999; without a zone it is UTC.",
+        "2026-03-01T12:00:00Z",
     )
-    frame: Literal["EME2000", "J2000", "GCRF"] | None = Field("Inertial frame of the attitude.", "EME2000")
+    frame: Literal["EME2000", "J2000", "GCRF"] | None = Field(
+        "Inertial frame of the attitude.", "EME2000"
+    )
 
 
 class ThrusterSection(Section):
@@ -334,16 +405,21 @@ class ThrusterSection(Section):
 
     name: Name = Field("Name of the thruster, used by channels and in schedules.", "T1")
     position: Position | None = Field(
-        "Where the force acts, from the center of mass, or as center_of_mass is given, m.", [0, "0.5 m", "0.8 m"]
+        "Where the force acts, from the center of mass, or as center_of_mass is given, m.",
+        [0, "0.5 m", "0.8 m"],
     )
     direction: Direction | None = Field(
-        "Direction of the force on the spacecraft (against the plume), any length but zero.", [1, 0, 0]
+        "Direction of the force on the spacecraft (against the plume), any length but zero.",
+        [1, 0, 0],
     )
     force: Force | None = Field("Thrust, N.", "10 N")
     torque: Torques | None = Field(
-        "Torque about the centre of mass, N m; instead of position, direction and force.", [0, "-8 N m", 0]
+        "Torque about the centre of mass, N m; instead of position, direction and force.",
+        [0, "-8 N m", 0],
     )
-    lever_arm: Lever | None = Field("Lever arm, m, that gives the thrust of a torque, for the propellant.", "0.8 m")
+    lever_arm: Lever | None = Field(
+        "Lever arm, m, that gives the thrust of a torque, for the propellant.", "0.8 m"
+    )
     isp: PositiveTime | None = Field("Specific impulse, s, for the propellant.", "220 s")
     min_on_time: Time = Field("Shortest firing, s; default 0.", "20 ms", default=0.0)
     max_on_time: PositiveTime | None = Field("Longest firing, s; default: no limit.", "2 s")
@@ -352,7 +428,8 @@ class ThrusterSection(Section):
         {"open_delay": "8 ms", "close_delay": "12 ms"},
     )
     impulse_bit: ImpulseBits | None = Field(
-        "Instead of valve a table from tests: rows of on-time, s, impulse, N s, and its centroid after the "
+        "Instead of valve a table from tests: rows of on-time, s, impulse, N s, "
+        "and its centroid after the "
         "start of the command, s.",
         [["20 ms", "0.15 N s", "16 ms"], ["100 ms", "0.95 N s", "58 ms"]],
     )
@@ -361,7 +438,9 @@ class ThrusterSection(Section):
 class SteerableSection(Section):
     """A torquer for any transverse axis; body-fixed during one pulse."""
 
-    torque: Torque | None = Field("Torque, N m; without it ideal impulses of no duration.", "20 N m")
+    torque: Torque | None = Field(
+        "Torque, N m; without it ideal impulses of no duration.", "20 N m"
+    )
     isp: PositiveTime | None = Field("Specific impulse, s, for the propellant.", "220 s")
     lever_arm: Lever | None = Field("Lever arm, m, for the propellant.", "1 m")
 
@@ -369,17 +448,24 @@ class SteerableSection(Section):
 class RequirementSection(Section):
     """Requirement on the end of a plan."""
 
-    nutation: AcuteAngle | None = Field("Largest nutation angle, rad, above 0 and below 90 deg.", "0.5 deg")
+    nutation: AcuteAngle | None = Field(
+        "Largest nutation angle, rad, above 0 and below 90 deg.", "0.5 deg"
+    )
     momentum_shift: AcuteAngle | None = Field(
         "Largest turn of the angular momentum, rad, above 0 and below 90 deg.", "0.2 deg"
     )
     nutation_during: AcuteAngle | None = Field(
-        "Largest nutation angle on the way, rad, above 0 and below 90 deg: a cone of the spin axis about the angular "
+        "Largest nutation angle on the way, rad, above 0 and below 90 deg: "
+        "a cone of the spin axis about the angular "
         "momentum, see keep.",
         "2 deg",
     )
     spin: SpinError | None = Field(
-        "Tolerance of the spin about goal.spin, or --spin, at the end, rad/s or % of it; default 1 %.", "0.5 %"
+        (
+            "Tolerance of the spin about goal.spin, or --spin, at the end, rad/s or % of it; "
+            "default 1 %."
+        ),
+        "0.5 %",
     )
     probability: Probability | None = Field(
         "How surely dispersed flights must meet it, above 0 and below 1 (or in %).", "99.7 %"
@@ -387,30 +473,39 @@ class RequirementSection(Section):
 
 
 class GoalSection(Section):
-    """End of the motion; without it the angular momentum stays where it is, and the spin may change."""
+    """End of the motion; without it the angular momentum stays where it is, and the spin may
+    change.
+    """
 
     tilt: Tilt | None = Field(
         "Angle of the target axis from the angular momentum at t = 0, rad, below 180 deg.", "10 deg"
     )
     azimuth: Angle | None = Field(
-        "Azimuth of the target axis about the angular momentum, rad, from the side to which the spin axis "
+        "Azimuth of the target axis about the angular momentum, rad, "
+        "from the side to which the spin axis "
         "leans at t = 0.",
         "45 deg",
     )
     right_ascension: Angle | None = Field(
         "Right ascension of the target axis in the attitude's frame, rad.", "83.6 deg"
     )
-    declination: Declination | None = Field("Declination of the target axis in the attitude's frame, rad.", "22 deg")
+    declination: Declination | None = Field(
+        "Declination of the target axis in the attitude's frame, rad.", "22 deg"
+    )
     spin: Rate | None = Field("Spin rate about axis 3 at the end, rad/s, signed.", "31 rpm")
 
 
 class LimitsSection(Section):
     """Limits of every schedule."""
 
-    horizon: PositiveTime | None = Field("End of the planning time, s; default: 20 nutation periods.", "120 s")
+    horizon: PositiveTime | None = Field(
+        "End of the planning time, s; default: 20 nutation periods.", "120 s"
+    )
     earliest: Time = Field("Earliest start of a pulse, s; default 0.", "5 s", default=0.0)
     gap: Time = Field("Least time between two pulses, s; default 0.", "0.5 s", default=0.0)
-    tick: PositiveTime | None = Field("Resolution of commanded starts and on-times, s; default: none.", "1 ms")
+    tick: PositiveTime | None = Field(
+        "Resolution of commanded starts and on-times, s; default: none.", "1 ms"
+    )
     max_pulses: Count | None = Field("Largest number of pulses; default: no limit.", 8)
     blackout: Annotated[list[Window], _ListOf("[begin, end]")] = Field(
         "Windows [begin, end], s, in which no pulse may be on.", [["10 s", "20 s"]], default=[]
@@ -419,7 +514,10 @@ class LimitsSection(Section):
 
 _TURNING = [{"required": ["rate"]}, {"required": ["fixed_in"]}]
 _KINDS: list[Any] = [
-    {"properties": {"kind": {"const": "constant"}, "torque": {"type": "array"}}, "not": {"anyOf": _TURNING}},
+    {
+        "properties": {"kind": {"const": "constant"}, "torque": {"type": "array"}},
+        "not": {"anyOf": _TURNING},
+    },
     {"properties": {"kind": {"const": "rotating"}, "torque": {"type": "array"}}, "oneOf": _TURNING},
     {"properties": {"kind": {"const": "axial"}}, "required": ["kind"], "not": {"anyOf": _TURNING}},
 ]
@@ -438,12 +536,14 @@ class DisturbanceSection(Section):
         "rotating",
     )
     torque: DisturbingTorques = Field(
-        "Torque [M1, M2, M3] about the centre of mass, N m, of a rotating one at t = 0 and with M3 = 0; "
+        "Torque [M1, M2, M3] about the centre of mass, N m, of a rotating one at t = 0 and with M3 "
+        "= 0; "
         "of an axial one a single torque.",
         ["20 mN m", 0, 0],
     )
     rate: Rate | None = Field(
-        "Rate at which a rotating torque turns about axis 3, seen in the body, signed, rad/s.", "-3 rad/s"
+        "Rate at which a rotating torque turns about axis 3, seen in the body, signed, rad/s.",
+        "-3 rad/s",
     )
     fixed_in: Literal["inertial"] | None = Field(
         "inertial: a rotating torque nearly fixed in space; its rate is minus the spin.", "inertial"
@@ -462,9 +562,13 @@ class DissipationSection(Section):
 
 
 class SpacecraftFile(Section):
-    """A spinning spacecraft: its inertia, its motion at t = 0, and what it can fire. Bare numbers are SI."""
+    """A spinning spacecraft: its inertia, its motion at t = 0, and what it can fire. Bare numbers
+    are SI.
+    """
 
-    schema_extra: ClassVar = {"oneOf": [_needs("omega0", without=("state",)), _needs("state", without=("omega0",))]}
+    schema_extra: ClassVar = {
+        "oneOf": [_needs("omega0", without=("state",)), _needs("state", without=("omega0",))]
+    }
 
     name: Name = Field("Name of the spacecraft.", "Sounder-1")
     mass: Mass | None = Field("Mass, kg; without it no velocity change is worked out.", "250 kg")
@@ -472,21 +576,29 @@ class SpacecraftFile(Section):
         "Moments of inertia: A and C, or tensor, kg m².", {"A": "120 kg m^2", "C": "80 kg m^2"}
     )
     center_of_mass: Position | None = Field(
-        "Center of mass, in the frame of the positions of thrusters and sensor, m; default: they count from it.",
+        (
+            "Center of mass, in the frame of the positions of thrusters and sensor, m; default: "
+            "they count from it."
+        ),
         [0, "2 mm", "0.4 m"],
     )
     center_of_mass_per_kg: Travel | None = Field(
-        "How far each kg of propellant used moves the center of mass, m/kg; default: it stays.", [0, 0, "-1 mm/kg"]
+        "How far each kg of propellant used moves the center of mass, m/kg; default: it stays.",
+        [0, 0, "-1 mm/kg"],
     )
-    wheel: WheelSection | None = Field("A momentum wheel or a despun platform.", {"momentum": "40 N m s"})
+    wheel: WheelSection | None = Field(
+        "A momentum wheel or a despun platform.", {"momentum": "40 N m s"}
+    )
     omega0: Rates | None = Field(
         "Body rates [ω1, ω2, ω3] at t = 0, rad/s; or instead state.", [0.12, "2 deg/s", "30 rpm"]
     )
     state: StateSection | None = Field(
-        "Motion at t = 0 by spin and nutation; or instead omega0.", {"spin": "30 rpm", "nutation": "5 deg"}
+        "Motion at t = 0 by spin and nutation; or instead omega0.",
+        {"spin": "30 rpm", "nutation": "5 deg"},
     )
     attitude: AttitudeSection | None = Field(
-        "Attitude at t = 0.", {"quaternion": [1, 0, 0, 0], "epoch": "2026-03-01T12:00:00Z", "frame": "EME2000"}
+        "Attitude at t = 0.",
+        {"quaternion": [1, 0, 0, 0], "epoch": "2026-03-01T12:00:00Z", "frame": "EME2000"},
     )
     object_id: Name | None = Field(
         "International designator, such as 1998-001A, for messages to flight dynamics.", "1998-001A"
@@ -504,13 +616,16 @@ class SpacecraftFile(Section):
         "Names of thrusters that fire together; without it each thruster is a channel of its own.",
         {"+M1": ["T1", "T2"]},
     )
-    steerable: SteerableSection | None = Field("A torquer for any transverse axis.", {"torque": "20 N m"})
+    steerable: SteerableSection | None = Field(
+        "A torquer for any transverse axis.", {"torque": "20 N m"}
+    )
     valve: ValveSection | None = Field(
         "How the thrust of every thruster that does not say it itself follows a command.",
         {"open_delay": "8 ms", "close_delay": "12 ms", "rise_time": "5 ms", "fall_time": "10 ms"},
     )
     cold: ColdSection | None = Field(
-        "Cold nozzles, which make the first pulses of each channel weaker.", {"first": "90 %", "pulses": 4}
+        "Cold nozzles, which make the first pulses of each channel weaker.",
+        {"first": "90 %", "pulses": 4},
     )
     tank: TankSection | None = Field(
         "The tank in blowdown, whose pressure the thrust goes with.",
@@ -520,15 +635,23 @@ class SpacecraftFile(Section):
         "Disturbance torques.", [{"name": "leak", "torque": ["20 mN m", 0, 0]}], default=[]
     )
     dissipation: DissipationSection | None = Field(
-        "Energy dissipation; without it the body is rigid.", {"time_constant": "600 s", "nutation": "grows"}
+        "Energy dissipation; without it the body is rigid.",
+        {"time_constant": "600 s", "nutation": "grows"},
     )
-    requirement: RequirementSection | None = Field("What a plan must reach.", {"nutation": "0.5 deg"})
-    limits: LimitsSection | None = Field("Limits that every schedule respects.", {"horizon": "120 s"})
+    requirement: RequirementSection | None = Field(
+        "What a plan must reach.", {"nutation": "0.5 deg"}
+    )
+    limits: LimitsSection | None = Field(
+        "Limits that every schedule respects.", {"horizon": "120 s"}
+    )
     goal: GoalSection | None = Field(
         "Where the spin axis and the spin are to end.", {"tilt": "10 deg", "azimuth": "45 deg"}
     )
     sun: Annotated[InTheSky, _OrWord("epoch")] | None = Field(
-        "Right ascension and declination of the Sun in the attitude's frame, rad; epoch computes them.",
+        (
+            "Right ascension and declination of the Sun in the attitude's frame, rad; "
+            "epoch computes them."
+        ),
         "epoch",
         ["120 deg", "10 deg"],
     )
@@ -537,10 +660,16 @@ class SpacecraftFile(Section):
         [{"name": "Sun", "direction": "sun", "min": "4 deg", "max": "20 deg"}],
         default=[],
     )
-    sun_sensor: SunSensorSection | None = Field("The sensor whose pulse fires command blocks.", {"azimuth": "35 deg"})
+    sun_sensor: SunSensorSection | None = Field(
+        "The sensor whose pulse fires command blocks.", {"azimuth": "35 deg"}
+    )
     commands: CommandsSection | None = Field(
         "Command blocks: pulses fired by the Sun pulse.",
-        {"delay_step": "2 ms", "delay_max": "1.9 s", "width": {"step": "1 ms", "min": "20 ms", "max": "500 ms"}},
+        {
+            "delay_step": "2 ms",
+            "delay_max": "1.9 s",
+            "width": {"step": "1 ms", "min": "20 ms", "max": "500 ms"},
+        },
     )
     loop: LoopSection | None = Field(
         "A closed loop that damps by what a sensor shows.",

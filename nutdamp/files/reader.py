@@ -1,7 +1,9 @@
-"""Spacecraft files, YAML or JSON -> `Spacecraft`, in principal axes, SI and radians; all faults at once.
+"""Spacecraft files, YAML or JSON -> `Spacecraft`, in principal axes, SI and radians; all faults at
+once.
 
-Faults are those of the spelling of keys, of types and ranges, and the findings of `rules`. The JSON Schema follows from
-the same sections. Files to start from ship with the package: the built-in example, and those of ``configs/``.
+Faults are those of the spelling of keys, of types and ranges, and the findings of `rules`. The JSON
+Schema follows from the same sections. Files to start from ship with the package: the built-in
+example, and those of ``configs/``.
 """
 
 from __future__ import annotations
@@ -14,7 +16,17 @@ from functools import cache
 from os import PathLike
 from pathlib import Path
 from types import NoneType, UnionType
-from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, TypeVar, Union, get_args, get_origin
+from typing import (
+    TYPE_CHECKING,
+    Annotated,
+    Any,
+    Literal,
+    NamedTuple,
+    TypeVar,
+    Union,
+    get_args,
+    get_origin,
+)
 
 import numpy as np
 
@@ -25,7 +37,16 @@ from nutdamp.files import keys
 from nutdamp.files.editing import Setting, overlay, settings_of, settings_within, text_of
 from nutdamp.files.fields import REQUIRED, KeyPath, Problems, Rule, Section, section_of
 from nutdamp.files.plausibility import doubts
-from nutdamp.files.rules import CANCELLED, MOMENT, Finding, Vector, disturbance_kind, findings, force_vector, symmetric
+from nutdamp.files.rules import (
+    CANCELLED,
+    MOMENT,
+    Finding,
+    Vector,
+    disturbance_kind,
+    findings,
+    force_vector,
+    symmetric,
+)
 from nutdamp.files.study_keys import LoopSection, by_name, dispersions, thrust_behind
 from nutdamp.files.study_rules import correlation_findings, dispersion_findings, loop_findings
 from nutdamp.files.thruster_rules import thrust_findings
@@ -33,8 +54,26 @@ from nutdamp.files.yaml import Node, dotted, read_text, read_tree
 from nutdamp.physics import attitude, sky
 from nutdamp.physics.body import principal_axes
 from nutdamp.physics.thruster import Cold, Tank
-from nutdamp.spacecraft.equipment import Channel, Commands, Loop, Sensor, Steerable, SunSensor, Thruster
-from nutdamp.spacecraft.model import Attitude, Disturbance, Goal, Inertia, Keep, Limits, Orbit, Requirement, Spacecraft
+from nutdamp.spacecraft.equipment import (
+    Channel,
+    Commands,
+    Loop,
+    Sensor,
+    Steerable,
+    SunSensor,
+    Thruster,
+)
+from nutdamp.spacecraft.model import (
+    Attitude,
+    Disturbance,
+    Goal,
+    Inertia,
+    Keep,
+    Limits,
+    Orbit,
+    Requirement,
+    Spacecraft,
+)
 from nutdamp.units import shown
 
 if TYPE_CHECKING:
@@ -46,12 +85,16 @@ Part = TypeVar("Part")
 Warn = Callable[[Fault], None]
 """Receiver of each number that is hardly meant."""
 
-BUILT_IN = "example"  # name of the built-in example, planned where no file is named, and written by `init`
+BUILT_IN = (
+    "example"  # name of the built-in example, planned where no file is named, and written by `init`
+)
 
 
 @cache
 def _places() -> dict[str, Path]:
-    """Paths of the shipped files by name: an installed package holds ``configs``, a checkout has it beside."""
+    """Paths of the shipped files by name: an installed package holds ``configs``, a checkout has it
+    beside.
+    """
     package = Path(__file__).parents[1]
     folders = (package / "data" / "configs", package.parent / "configs")
     shipped = next((sorted(folder.glob("*.yaml")) for folder in folders if folder.is_dir()), [])
@@ -69,7 +112,9 @@ def example_text(name: str = BUILT_IN) -> str:
 
 
 def example_subject(name: str) -> str:
-    """Subject of the file of that ``name``: the comment at its beginning, up to the line that ends a sentence."""
+    """Subject of the file of that ``name``: the comment at its beginning, up to the line that ends
+    a sentence.
+    """
     sentence = re.split(r"\.$", example_text(name), maxsplit=1, flags=re.MULTILINE)[0]
     return " ".join(line.removeprefix("#").strip() for line in sentence.splitlines())
 
@@ -111,10 +156,14 @@ def _placed(finding: Finding, root: Node, name: str) -> Fault:
     return place.fault(name, dotted(path), finding.problem)
 
 
-def _spelling(node: Node, model: type[Section] | None, path: KeyPath, named: bool = False) -> Iterator[Finding]:
-    """Unknown keys and empty values below ``node``, whose keys are fields of ``model``, or (``named``) names of such.
+def _spelling(
+    node: Node, model: type[Section] | None, path: KeyPath, named: bool = False
+) -> Iterator[Finding]:
+    """Unknown keys and empty values below ``node``, whose keys are fields of ``model``, or
+    (``named``) names of such.
 
-    A misspelt key is put right in the tree, so that its value is checked too; any other unknown key is dropped.
+    A misspelt key is put right in the tree, so that its value is checked too; any other unknown key
+    is dropped.
     """
     fields = model.fields() if model else {}
     named = named and isinstance(node.value, dict) and by_name(node.value)
@@ -127,7 +176,9 @@ def _spelling(node: Node, model: type[Section] | None, path: KeyPath, named: boo
             if meant and meant not in node.value:
                 node.value[meant], node.keys[meant] = dropped, node.keys[key]
             elif "tensor" in fields and MOMENT.fullmatch(key):
-                cure = "write tensor: [[Ixx, Ixy, Ixz], [Ixy, Iyy, Iyz], [Ixz, Iyz, Izz]], or A and C"
+                cure = (
+                    "write tensor: [[Ixx, Ixy, Ixz], [Ixy, Iyy, Iyz], [Ixz, Iyz, Izz]], or A and C"
+                )
             elif key == "<<":
                 cure = "merge keys are of YAML 1.1; write the keys out"
             elif ":" in key:
@@ -136,7 +187,11 @@ def _spelling(node: Node, model: type[Section] | None, path: KeyPath, named: boo
     for step, child in node.children():
         annotation = fields[step].type if isinstance(step, str) and fields and not named else model
         if child.value is None:
-            cure = "give a value, or leave the key out" if isinstance(step, str) else "expected a value"
+            cure = (
+                "give a value, or leave the key out"
+                if isinstance(step, str)
+                else "expected a value"
+            )
             yield Finding((*path, step), f"empty; {cure}")
         below = section_of(annotation) if fields else None
         yield from _spelling(child, below, (*path, step), _holds_names(annotation))
@@ -149,26 +204,41 @@ def _holds_names(annotation: Any) -> bool:
 POLE = 1e-9  # rad from a pole of the frame, up to which a spin axis has no ascending node
 
 
-def load_spacecraft(path: str | Path, settings: Sequence[Setting] = (), warn: Warn = lambda _: None) -> Spacecraft:
-    """The spacecraft in a file; raises `CannotRead`, or `FaultyFile` with everything that is wrong in it."""
+def load_spacecraft(
+    path: str | Path, settings: Sequence[Setting] = (), warn: Warn = lambda _: None
+) -> Spacecraft:
+    """The spacecraft in a file; raises `CannotRead`, or `FaultyFile` with everything that is wrong
+    in it.
+    """
     return read_spacecraft(read_text(Path(path)), str(path), settings, warn)
 
 
-def read_spacecraft(text: str, name: str, settings: Sequence[Setting] = (), warn: Warn = lambda _: None) -> Spacecraft:
-    """The spacecraft in the text of a file ``name``, with ``settings``; raises `FaultyFile` with all faults."""
+def read_spacecraft(
+    text: str, name: str, settings: Sequence[Setting] = (), warn: Warn = lambda _: None
+) -> Spacecraft:
+    """The spacecraft in the text of a file ``name``, with ``settings``; raises `FaultyFile` with
+    all faults.
+    """
     contents, root = _contents(text, name, settings, warn)
     given = contents.inertia
     tensor = np.diag(np.array([given.A, given.A, given.C], dtype=float))
-    moments, axes = principal_axes(tensor if given.tensor is None else symmetric(np.array(given.tensor)))
+    moments, axes = principal_axes(
+        tensor if given.tensor is None else symmetric(np.array(given.tensor))
+    )
     inertia = Inertia(moments, axes, 0.0 if contents.wheel is None else contents.wheel.momentum)
     omega0 = _rates(contents, inertia)
     center = np.array(contents.center_of_mass or (0.0, 0.0, 0.0))
-    thrusters = {entry.name: _thruster(entry, axes, contents.valve, center) for entry in contents.thrusters}
+    thrusters = {
+        entry.name: _thruster(entry, axes, contents.valve, center) for entry in contents.thrusters
+    }
     channels = contents.channels or {thruster: [thruster] for thruster in thrusters}
-    steerable, sunward = _part(Steerable, contents.steerable), _sun(contents)
+    steerable = _part(Steerable, contents.steerable)
+    sunward = _sun(contents)
     torquer = steerable if thrusters else steerable or Steerable()
     asked = contents.requirement
-    asks_nothing = asked is None or all(each is None for each in (asked.nutation, asked.momentum_shift, asked.spin))
+    asks_nothing = asked is None or all(
+        each is None for each in (asked.nutation, asked.momentum_shift, asked.spin)
+    )
     loss, per_kg, limits = contents.dissipation, contents.center_of_mass_per_kg, contents.limits
     spacecraft = Spacecraft(
         name=contents.name,
@@ -178,16 +248,25 @@ def read_spacecraft(text: str, name: str, settings: Sequence[Setting] = (), warn
         center_of_mass=None if contents.center_of_mass is None else center,
         center_of_mass_per_kg=axes.T @ np.array(per_kg) if per_kg and any(per_kg) else None,
         attitude=_given(contents.attitude, _attitude, inertia, omega0, sunward),
-        channels=tuple(Channel(name, tuple(map(thrusters.__getitem__, members))) for name, members in channels.items()),
+        channels=tuple(
+            Channel(name, tuple(map(thrusters.__getitem__, members)))
+            for name, members in channels.items()
+        ),
         steerable=steerable,
         requirement=None if asks_nothing else _part(Requirement, asked),
-        limits=_part(Limits, limits, blackout=tuple(map(tuple, limits.blackout) if limits else ())) or Limits(),
-        disturbances=tuple(_disturbance(entry, inertia, float(omega0[2])) for entry in contents.disturbances),
+        limits=_part(Limits, limits, blackout=tuple(map(tuple, limits.blackout) if limits else ()))
+        or Limits(),
+        disturbances=tuple(
+            _disturbance(entry, inertia, float(omega0[2])) for entry in contents.disturbances
+        ),
         dissipation=None if loss is None else loss.time_constant,
         nutation_grows=None if loss is None or loss.nutation is None else loss.nutation == "grows",
         dispersions=dispersions(contents.dispersions, thrusters.values(), torquer),
         object_id=contents.object_id,
-        orbit=_given(contents.orbit, lambda at: Orbit(np.array(at.position), np.array(at.velocity), at.center.upper())),
+        orbit=_given(
+            contents.orbit,
+            lambda at: Orbit(np.array(at.position), np.array(at.velocity), at.center.upper()),
+        ),
         cold=_part(Cold, contents.cold),
         tank=_given(contents.tank, _tank),
         sun=sunward,
@@ -204,7 +283,8 @@ def read_spacecraft(text: str, name: str, settings: Sequence[Setting] = (), warn
 
 
 class Source(NamedTuple):
-    """Origin of a spacecraft: the text of the file, its name in messages, and the keys set beside it.
+    """Origin of a spacecraft: the text of the file, its name in messages, and the keys set beside
+    it.
 
     ``built_in``: the built-in example, since no file was named.
     """
@@ -214,14 +294,20 @@ class Source(NamedTuple):
     settings: tuple[Setting, ...] = ()
     built_in: bool = False
 
-    def read(self, doubt: Callable[[Fault], object] = lambda doubt: warn(doubt.as_warning)) -> Spacecraft:
-        """The spacecraft; ``doubt`` is called with numbers that are hardly meant. Raises FaultyFile."""
+    def read(
+        self, doubt: Callable[[Fault], object] = lambda doubt: warn(doubt.as_warning)
+    ) -> Spacecraft:
+        """The spacecraft; ``doubt`` is called with numbers that are hardly meant. Raises
+        FaultyFile.
+        """
         doubts: list[Fault] = []
         body = read_spacecraft(self.text, self.name, self.settings, doubts.append)
         object.__setattr__(body, "built_in", self.built_in)
         for each in doubts:
             doubt(each)
-        object.__setattr__(body, "source", self)  # not a field, so that `dataclasses.replace` drops it
+        object.__setattr__(
+            body, "source", self
+        )  # not a field, so that `dataclasses.replace` drops it
         return body
 
     def changed(self, keys: Mapping[str, object]) -> Spacecraft:
@@ -229,8 +315,12 @@ class Source(NamedTuple):
         return self._replace(settings=(*self.settings, *settings_within(keys))).read()
 
 
-def source_of(path: str | PathLike[str] | Mapping[str, object], changes: Mapping[str, object] | None = None) -> Source:
-    """Source of a spacecraft in a file, or a dict of its keys, with ``changes``; raises CannotRead or BadRequest."""
+def source_of(
+    path: str | PathLike[str] | Mapping[str, object], changes: Mapping[str, object] | None = None
+) -> Source:
+    """Source of a spacecraft in a file, or a dict of its keys, with ``changes``; raises CannotRead
+    or BadRequest.
+    """
     if isinstance(path, Mapping):
         return Source(text_of(path, "dict"), "dict", settings_of(units.changes(changes)))
     name = units.path("path", path, "the name of a file or a dict of its keys")
@@ -239,11 +329,15 @@ def source_of(path: str | PathLike[str] | Mapping[str, object], changes: Mapping
 
 
 def _part(kind: type[Part], section: Section | None, **others: object) -> Part | None:
-    """The object that a section describes, where given: keys have the names of fields, but for ``others``."""
+    """The object that a section describes, where given: keys have the names of fields, but for
+    ``others``.
+    """
     if section is None:
         return None
     named: tuple[Any, ...] = fields(kind)  # type: ignore[arg-type]
-    given = {field.name: getattr(section, field.name) for field in named if hasattr(section, field.name)}
+    given = {
+        field.name: getattr(section, field.name) for field in named if hasattr(section, field.name)
+    }
     return kind(**{**given, **others})
 
 
@@ -253,7 +347,8 @@ def _given(section: Section | None, make: Callable[..., Part], *others: object) 
 
 
 def _rates(contents: keys.SpacecraftFile, inertia: Inertia) -> Vector:
-    """Body rates at t = 0 in principal axes, rad/s; from a state by tan θ = |(I1ω1, I2ω2)|/|H3|, Magnus 1970 (19).
+    """Body rates at t = 0 in principal axes, rad/s; from a state by tan θ = |(I1ω1, I2ω2)|/|H3|,
+    Magnus 1970 (19).
 
     So θ is the angle between H and the spin axis at t = 0, for any I1 and I2.
     """
@@ -268,8 +363,12 @@ def _rates(contents: keys.SpacecraftFile, inertia: Inertia) -> Vector:
     return np.array([*(size * way), state.spin])
 
 
-def _thruster(entry: keys.ThrusterSection, axes: Vector, every: keys.ValveSection | None, center: Vector) -> Thruster:
-    """A thruster in principal axes, about the ``center`` of mass; ``every``: valve of those without their own."""
+def _thruster(
+    entry: keys.ThrusterSection, axes: Vector, every: keys.ValveSection | None, center: Vector
+) -> Thruster:
+    """A thruster in principal axes, about the ``center`` of mass; ``every``: valve of those without
+    their own.
+    """
     force = position = None
     if entry.torque is not None:
         torque = axes.T @ np.array(entry.torque)
@@ -278,11 +377,15 @@ def _thruster(entry: keys.ThrusterSection, axes: Vector, every: keys.ValveSectio
         assert entry.position is not None
         assert entry.direction is not None
         assert entry.force is not None
-        thrust, arm, push = entry.force, np.array(entry.position) - center, force_vector(entry.direction, entry.force)
+        thrust = entry.force
+        arm = np.array(entry.position) - center
+        push = force_vector(entry.direction, entry.force)
         torque, force, position = axes.T @ np.cross(arm, push), axes.T @ push, axes.T @ arm
-    least, most = entry.min_on_time, math.inf if entry.max_on_time is None else entry.max_on_time
+    least = entry.min_on_time
+    most = math.inf if entry.max_on_time is None else entry.max_on_time
     if entry.impulse_bit is not None:  # outside its rows nothing is known
-        least, most = max(least, entry.impulse_bit[0][0]), min(most, entry.impulse_bit[-1][0])
+        least = max(least, entry.impulse_bit[0][0])
+        most = min(most, entry.impulse_bit[-1][0])
     valve = _valve(entry, every, thrust)
     return Thruster(entry.name, torque, force, thrust, entry.isp, least, most, position, valve)
 
@@ -290,18 +393,29 @@ def _thruster(entry: keys.ThrusterSection, axes: Vector, every: keys.ValveSectio
 def _tank(section: keys.TankSection) -> Tank | None:
     isp, shed = section.isp, section.inertia_per_kg
     rows = (shed.A, shed.A, shed.C) if isinstance(shed, keys.ShedSection) else tuple(shed or ())
-    return _part(Tank, section, isp=isp and tuple(map(tuple, isp)), inertia_per_kg=rows if any(rows) else None)
+    return _part(
+        Tank,
+        section,
+        isp=isp and tuple(map(tuple, isp)),
+        inertia_per_kg=rows if any(rows) else None,
+    )
 
 
-def _valve(entry: keys.ThrusterSection, every: keys.ValveSection | None, thrust: float | None) -> Valve | None:
-    """The valve of a thruster of ``thrust`` N; None where each command gives full thrust from start to end."""
+def _valve(
+    entry: keys.ThrusterSection, every: keys.ValveSection | None, thrust: float | None
+) -> Valve | None:
+    """The valve of a thruster of ``thrust`` N; None where each command gives full thrust from start
+    to end.
+    """
     if entry.impulse_bit is None and entry.valve is None and every is None:
         return None
     from nutdamp.physics import thruster
 
     if entry.impulse_bit is not None:
         assert thrust is not None
-        return thruster.Measured(tuple((time, impulse / thrust, mean) for time, impulse, mean in entry.impulse_bit))
+        return thruster.Measured(
+            tuple((time, impulse / thrust, mean) for time, impulse, mean in entry.impulse_bit)
+        )
     section = entry.valve or every
     assert section is not None
     times = (section.open_delay, section.close_delay, section.rise_time, section.fall_time)
@@ -309,19 +423,28 @@ def _valve(entry: keys.ThrusterSection, every: keys.ValveSection | None, thrust:
 
 
 def _disturbance(entry: keys.DisturbanceSection, inertia: Inertia, spin: float) -> Disturbance:
-    """A disturbance in principal axes; one fixed in space turns at minus the ``spin``, rad/s, Magnus 1970 (27)."""
+    """A disturbance in principal axes; one fixed in space turns at minus the ``spin``, rad/s,
+    Magnus 1970 (27).
+    """
     torque = np.array(entry.torque)
     if not inertia.aligned:
         torque = inertia.axes.T @ torque
         torque[np.abs(torque) <= CANCELLED * math.hypot(*torque)] = 0.0
     rate = 0.0
-    if disturbance_kind(entry.kind, entry.rate is not None or entry.fixed_in is not None) == "rotating":
+    if (
+        disturbance_kind(entry.kind, entry.rate is not None or entry.fixed_in is not None)
+        == "rotating"
+    ):
         rate = -spin if entry.rate is None else entry.rate
     return Disturbance(complex(torque[0], torque[1]), float(torque[2]), rate, entry.name or "")
 
 
-def _attitude(section: keys.AttitudeSection, inertia: Inertia, omega0: Vector, sunward: Vector | None) -> Attitude:
-    """Attitude of the axes of the file; ``omega0`` (3,) rad/s in principal axes tells spin axis and H in the body."""
+def _attitude(
+    section: keys.AttitudeSection, inertia: Inertia, omega0: Vector, sunward: Vector | None
+) -> Attitude:
+    """Attitude of the axes of the file; ``omega0`` (3,) rad/s in principal axes tells spin axis and
+    H in the body.
+    """
     if section.quaternion is not None:
         given = np.array(section.quaternion) / math.hypot(*section.quaternion)
         return Attitude(given, section.epoch, section.frame)
@@ -331,12 +454,14 @@ def _attitude(section: keys.AttitudeSection, inertia: Inertia, omega0: Vector, s
         along = inertia.momentum(omega0)
     body_axis = inertia.axes @ (along / np.linalg.norm(along))
     axis = attitude.on_sphere(*section.spin_axis)
-    side, phase = np.cross([0.0, 0.0, 1.0], axis), section.phase or 0.0
+    side = np.cross([0.0, 0.0, 1.0], axis)
+    phase = section.phase or 0.0
     if np.linalg.norm(side) < POLE:
         side = np.array([1.0, 0.0, 0.0])
     if section.sun_phase is not None:
         assert sunward is not None
-        side, phase = sunward, section.sun_phase
+        side = sunward
+        phase = section.sun_phase
     quaternion = attitude.about_axis(body_axis, np.array([1.0, 0.0, 0.0]), axis, side, phase)
     return Attitude(quaternion, section.epoch, section.frame)
 
@@ -362,12 +487,16 @@ def _sun(contents: keys.SpacecraftFile) -> Vector | None:
 
 
 def _cones(contents: keys.SpacecraftFile, sunward: Vector | None) -> Iterator[Keep]:
-    """The cones of the file, and that about the angular momentum which bounds the nutation on the way."""
+    """The cones of the file, and that about the angular momentum which bounds the nutation on the
+    way.
+    """
     for entry in contents.keep:
         given: list[float] | str = entry.direction
         direction = sunward if isinstance(given, str) else attitude.on_sphere(*given)
         assert direction is not None
-        yield Keep(entry.name, direction, entry.min or 0.0, math.pi if entry.max is None else entry.max)
+        yield Keep(
+            entry.name, direction, entry.min or 0.0, math.pi if entry.max is None else entry.max
+        )
     if contents.requirement is not None and contents.requirement.nutation_during is not None:
         yield Keep("H", None, 0.0, contents.requirement.nutation_during)
 
@@ -381,12 +510,15 @@ def _sun_sensor(section: keys.SunSensorSection, axes: Vector) -> SunSensor | Non
 
 
 def _commands(section: keys.CommandsSection) -> Commands:
-    given, step = section.width, None
+    given = section.width
+    step = None
     if isinstance(given, list):
         widths = np.unique(given)
     else:
         step = given.step
-        widths = given.min + step * np.array([0, math.floor((given.max - given.min) / step * (1.0 + 1e-12))])
+        widths = given.min + step * np.array(
+            [0, math.floor((given.max - given.min) / step * (1.0 + 1e-12))]
+        )
     every = tuple(sorted(set(section.every)))
     return Commands(section.delay_step, section.delay_max, widths, section.max_count, every, step)
 
@@ -396,7 +528,9 @@ def _loop(section: LoopSection, axes: Vector, center: Vector) -> Loop | None:
     along = np.array([0.0, 0.0, 1.0] if given.axis is None else given.axis)
     position = axes.T @ (np.array(given.position or center) - center)
     about = (np.eye(3) if given.axes == "principal" else axes)[:2]
-    sensor = _part(Sensor, given, position=position, axis=axes.T @ (along / math.hypot(*along)), axes=about)
+    sensor = _part(
+        Sensor, given, position=position, axis=axes.T @ (along / math.hypot(*along)), axes=about
+    )
     turned = () if section.faults is None else tuple(section.faults.reversed)
     return _part(Loop, section, sensor=sensor, reversed=turned)
 
@@ -413,7 +547,11 @@ def section_schema(section: type[Section], parts: dict[str, Any]) -> dict[str, A
     """JSON Schema of a section; those that it refers to are added to ``parts``."""
     properties = {}
     for name, key in section.fields().items():
-        properties[name] = {**_schema(key.type, parts), "description": key.description, "examples": key.examples}
+        properties[name] = {
+            **_schema(key.type, parts),
+            "description": key.description,
+            "examples": key.examples,
+        }
         if key.default is not None and key.default is not REQUIRED:
             properties[name]["default"] = key.default
     required = [name for name, key in section.fields().items() if key.default is REQUIRED]
@@ -424,7 +562,8 @@ def section_schema(section: type[Section], parts: dict[str, Any]) -> dict[str, A
 
 
 def _schema(annotation: Any, parts: dict[str, Any]) -> dict[str, Any]:
-    origin, of = get_origin(annotation), get_args(annotation)
+    origin = get_origin(annotation)
+    of = get_args(annotation)
     if origin is Annotated:
         return _ruled_schema(of[0], of[1:], parts)
     if origin in (Union, UnionType):
@@ -444,10 +583,16 @@ def _schema(annotation: Any, parts: dict[str, Any]) -> dict[str, Any]:
         return {"type": "array", "prefixItems": entries, "minItems": len(of), "maxItems": len(of)}
     if origin is dict:
         return {"type": "object", "additionalProperties": _schema(of[1], parts)}
-    return {} if annotation is Any else {"type": {str: "string", int: "integer", bool: "boolean"}[annotation]}
+    return (
+        {}
+        if annotation is Any
+        else {"type": {str: "string", int: "integer", bool: "boolean"}[annotation]}
+    )
 
 
-def _ruled_schema(annotation: Any, rules: tuple[Rule, ...], parts: dict[str, Any]) -> dict[str, Any]:
+def _ruled_schema(
+    annotation: Any, rules: tuple[Rule, ...], parts: dict[str, Any]
+) -> dict[str, Any]:
     if not rules:
         return _schema(annotation, parts)
     return rules[-1].schema(lambda: _ruled_schema(annotation, rules[:-1], parts))
@@ -457,5 +602,7 @@ def _in_order(schema: Any, within: str = "") -> Any:
     """Keywords in the order of the alphabet, properties in that of the section."""
     if isinstance(schema, dict):
         names = schema if within in ("properties", "default") else sorted(schema)
-        return {name: _in_order(schema[name], name if within != "properties" else "") for name in names}
+        return {
+            name: _in_order(schema[name], name if within != "properties" else "") for name in names
+        }
     return [_in_order(entry, within) for entry in schema] if isinstance(schema, list) else schema

@@ -1,6 +1,7 @@
 """Constraints between the keys of a spacecraft file: the plain ones in a table; body, motion, sky.
 
-The rules read the raw tree (`Facts`) and skip unreadable values, so that they work beside any other fault.
+The rules read the raw tree (`Facts`) and skip unreadable values, so that they work beside any other
+fault.
 """
 
 from __future__ import annotations
@@ -31,7 +32,9 @@ MOMENT = re.compile(r"[IJ]_?([xyz]{1,2}|[123]{1,2})", re.IGNORECASE)  # keys for
 
 
 class Finding(NamedTuple):
-    """Something wrong at ``path``, which need not exist; ``at_key`` points at the key and not at its value."""
+    """Something wrong at ``path``, which need not exist; ``at_key`` points at the key and not at
+    its value.
+    """
 
     path: KeyPath
     problem: str
@@ -368,7 +371,9 @@ def tensor_fault(tensor: Vector) -> Finding | None:
     if skew.max() > SYMMETRIC * np.abs(tensor).max():
         column, row = map(int, np.unravel_index(np.argmax(skew), skew.shape))
         mirrored = f"{tensor[column, row]:g} at [{column}][{row}]; both must be equal"
-        return Finding((*path, row, column), f"not symmetric: {tensor[row, column]:g} here, but {mirrored}")
+        return Finding(
+            (*path, row, column), f"not symmetric: {tensor[row, column]:g} here, but {mirrored}"
+        )
     fault = moments_fault(np.asarray(np.linalg.eigvalsh(symmetric(tensor))))
     return None if fault is None else Finding(path, fault)
 
@@ -387,7 +392,9 @@ def moments_fault(moments: Vector) -> str | None:
 
 
 def principal_of(facts: Facts) -> tuple[rigid_body.Moments, Vector] | None:
-    """Principal moments, kg m², and axes, by the tensor or by A and C; None where they cannot be read."""
+    """Principal moments, kg m², and axes, by the tensor or by A and C; None where they cannot be
+    read.
+    """
     tensor = tensor_of(facts)
     if tensor is not None:
         return None if tensor_fault(tensor) else rigid_body.principal_axes(symmetric(tensor))
@@ -412,27 +419,32 @@ def wheel_of(facts: Facts) -> float:
 
 
 def _spin_axis_fault(tensor: Vector, facts: Facts) -> Finding | None:
-    """The reason why free spin about principal axis 3 is unstable, and its growth, if the spin is known."""
-    moments, spin, wheel = (
-        rigid_body.principal_axes(symmetric(tensor))[0],
-        spin_of(facts),
-        wheel_of(facts),
-    )
+    """The reason why free spin about principal axis 3 is unstable, and its growth, if the spin is
+    known.
+    """
+    moments = rigid_body.principal_axes(symmetric(tensor))[0]
+    spin = spin_of(facts)
+    wheel = wheel_of(facts)
     if wheel != 0.0:
         if spin is None or (grows := rigid_body.growth(moments, spin, wheel)).stable:
             return None
         low, high = sorted(moment * spin - moments[2] * spin for moment in moments[:2])
-        growth = f"grows e-fold in {grows.growth_time:.2g} s" if grows.squared_exponent else "is not turned back"
+        growth = (
+            f"grows e-fold in {grows.growth_time:.2g} s"
+            if grows.squared_exponent
+            else "is not turned back"
+        )
         cure = f"expected a momentum below {low:.4g} or above {high:.4g} N m s"
-        return Finding(("wheel", "momentum"), f"nutation about the spin axis {growth} with it; {cure}")
+        return Finding(
+            ("wheel", "momentum"), f"nutation about the spin axis {growth} with it; {cure}"
+        )
     named = sorted(zip(moments, ("I1", "I2", "I3"), strict=True), reverse=True)
     values = ", ".join(f"{name} = {moment:.10g}" for moment, name in named)
-    kind, growth = rigid_body.axis_class(moments), ""
+    kind = rigid_body.axis_class(moments)
+    growth = ""
     if kind == "degenerate":
-        problem, growth = (
-            f"the same principal moment as just one other axis ({values} kg m^2)",
-            " and drifts evenly",
-        )
+        problem = f"the same principal moment as just one other axis ({values} kg m^2)"
+        growth = " and drifts evenly"
     elif kind == "intermediate":
         problem = f"the middle principal moment ({values} kg m^2)"
         if spin is not None:
@@ -446,7 +458,9 @@ def _spin_axis_fault(tensor: Vector, facts: Facts) -> Finding | None:
 
 def spin_of(facts: Facts) -> float | None:
     """The rate about principal axis 3; None where it is zero without a wheel or cannot be read."""
-    spin = _spin_of_omega0(facts)[1] if facts.has("omega0") else facts.number("rate", "state", "spin")
+    spin = (
+        _spin_of_omega0(facts)[1] if facts.has("omega0") else facts.number("rate", "state", "spin")
+    )
     return spin if spin is not None and (abs(spin) >= SMALLEST or wheel_of(facts)) else None
 
 
@@ -458,7 +472,8 @@ def _motion(facts: Facts) -> Iterator[Finding]:
         if spin is not None and abs(spin) < SMALLEST and not wheel_of(facts):
             cure = "expected a rate about axis 3, or a wheel; nothing nutates without"
             yield Finding(path, f"the spin is zero; {cure}")
-    spin, inertia = spin_of(facts), inertia_of(facts)
+    spin = spin_of(facts)
+    inertia = inertia_of(facts)
     final = facts.number("rate", "goal", "spin")
     if final is not None and spin is not None and final * spin < 0.0:
         yield Finding(
@@ -467,7 +482,8 @@ def _motion(facts: Facts) -> Iterator[Finding]:
         )
     if spin is None or inertia is None or not inertia.wheel:
         return
-    axial, path = inertia.axial(spin), ("wheel", "momentum")
+    axial = inertia.axial(spin)
+    path = ("wheel", "momentum")
     if abs(axial) <= CANCELLED * abs(inertia.wheel):
         problem = f"cancels the C ω3 of the body, {inertia.C * spin:.4g} N m s"
         yield Finding(path, f"{problem}: without momentum nothing nutates")
@@ -480,8 +496,11 @@ def _motion(facts: Facts) -> Iterator[Finding]:
 
 
 def _spin_of_omega0(facts: Facts) -> tuple[KeyPath, float | None]:
-    """The rate about principal axis 3, and its path; a transverse rate that is rounding counts as zero."""
-    omega0, tensor = facts.vector("rate", 3, "omega0"), tensor_of(facts)
+    """The rate about principal axis 3, and its path; a transverse rate that is rounding counts as
+    zero.
+    """
+    omega0 = facts.vector("rate", 3, "omega0")
+    tensor = tensor_of(facts)
     if omega0 is None or (tensor is not None and tensor_fault(tensor) is not None):
         return (), None
     if tensor is None:
@@ -531,7 +550,8 @@ def _sun(facts: Facts) -> Iterator[Finding]:
     for path in facts.matching("keep.*.direction"):
         if facts.text(*path) == "sun" and not facts.has("sun"):
             yield Finding(path, f"needs sun{SUN}")
-    sun, axis = _to_sun(facts), facts.vector("angle", 2, "attitude", "spin_axis")
+    sun = _to_sun(facts)
+    axis = facts.vector("angle", 2, "attitude", "spin_axis")
     undated = facts.has("attitude") and not facts.has("attitude", "epoch")
     if sun is None and facts.text("sun") == "epoch" and undated:
         yield Finding(("sun",), f"epoch needs attitude.epoch, the date of t = 0; or give {SKY}")

@@ -51,18 +51,23 @@ BLOCKS_HEADER = (
     *("impulse_Nms", "nutation_after_deg"),
 )
 
-MOST_FIRED = 5_000  # pulses that the blocks of a file may fire: many more than any campaign, and flown within seconds
+# pulses that the blocks of a file may fire: many more than any campaign, and flown within seconds
+MOST_FIRED = 5_000
 LATEST = 100_000  # number of the last Sun pulse that may fire a block
 
 
 def read_blocks(path: str | Path, spacecraft: Spacecraft) -> tuple[tuple[Block, ...], list[str]]:
-    """The blocks in a CSV file, and warnings: commands that the file of the spacecraft does not have.
+    """The blocks in a CSV file, and warnings: commands that the file of the spacecraft does not
+    have.
 
-    delay_counts and width_counts do for delay_s and width_s where the spacecraft file has the steps; every is 1 where
-    it is left out. Raises CannotRead, and FaultyFile with every fault of the file.
+    delay_counts and width_counts do for delay_s and width_s where the spacecraft file has the
+    steps; every is 1 where it is left out. Raises CannotRead, and FaultyFile with every fault of
+    the file.
     """
     table = Table(path, BLOCKS_HEADER, "blocks")
-    times = [f"{name}_counts" if _counted(table, spacecraft, name) else f"{name}_s" for name in TIMES]
+    times = [
+        f"{name}_counts" if _counted(table, spacecraft, name) else f"{name}_s" for name in TIMES
+    ]
     table.expect("channel", "first_sun_pulse", *times, "count")
     blocks: list[Block] = []
     for row in table.rows:
@@ -71,7 +76,10 @@ def read_blocks(path: str | Path, spacecraft: Spacecraft) -> tuple[tuple[Block, 
             continue
         over = blocks[-1].sun_pulses[-1] if blocks else 0
         if block.first <= over:
-            problem = f"Sun pulse {block.first} comes before the block before is over; expected {over + 1} or later"
+            problem = (
+                f"Sun pulse {block.first} comes before the block before is over; "
+                f"expected {over + 1} or later"
+            )
             row.fault("first_sun_pulse", problem)
         for column, value, possible in misfits(spacecraft.commands, block):
             row.warn(column, f"{column} = {value} cannot be commanded, {possible}: flown as given")
@@ -87,20 +95,30 @@ TIMES = ("delay", "width")
 
 
 def _counted(table: Table, spacecraft: Spacecraft, name: str) -> bool:
-    """True where delay or width of the blocks is given by counts alone, of the commands in the spacecraft file."""
+    """True where delay or width of the blocks is given by counts alone, of the commands in the
+    spacecraft file.
+    """
     alone = f"{name}_s" not in table.header and f"{name}_counts" in table.header
     if alone and spacecraft.commands is None:
-        problem = f"the spacecraft file has no commands to count the {name} in; expected the column {name}_s"
+        problem = (
+            f"the spacecraft file has no commands to count the {name} in; "
+            f"expected the column {name}_s"
+        )
         table.fault(1, f"{name}_counts", problem)
     return alone
 
 
 def _block(row: Row, spacecraft: Spacecraft) -> Block | None:
-    faults, channels = len(row.table.faults), [channel.name for channel in spacecraft.channels]
+    faults = len(row.table.faults)
+    channels = [channel.name for channel in spacecraft.channels]
     name = row["channel"]
     if name not in channels:
         close = nearest(name, channels)
-        cure = f"did you mean {shown(close)}?" if close else f"it has {', '.join(map(shown, channels)) or 'none'}"
+        cure = (
+            f"did you mean {shown(close)}?"
+            if close
+            else f"it has {', '.join(map(shown, channels)) or 'none'}"
+        )
         row.fault("channel", f"the spacecraft file has no channel {shown(name)}; {cure}")
     delay, width = (_time(row, spacecraft, name) for name in TIMES)
     if width == 0.0:
@@ -109,23 +127,34 @@ def _block(row: Row, spacecraft: Spacecraft) -> Block | None:
             "0 s fires nothing; expected a time above 0",
         )
     numbers = [1, 1, 1]
-    for place, (column, most) in enumerate((("first_sun_pulse", LATEST), ("count", MOST_FIRED), ("every", LATEST))):
+    for place, (column, most) in enumerate(
+        (("first_sun_pulse", LATEST), ("count", MOST_FIRED), ("every", LATEST))
+    ):
         value = row.number(column) if column != "every" or row.get("every") else 1.0
         if value is not None and not (value.is_integer() and 1 <= value <= most):
             row.fault(column, f"expected a whole number from 1 to {most}, got {row[column]}")
         numbers[place] = int(value or 1)
     first, count, every = numbers
-    return None if len(row.table.faults) > faults else Block(name, first, delay or 0.0, width or 0.0, count, every)
+    return (
+        None
+        if len(row.table.faults) > faults
+        else Block(name, first, delay or 0.0, width or 0.0, count, every)
+    )
 
 
 def _time(row: Row, spacecraft: Spacecraft, name: str) -> float | None:
     """A delay or width, s: as it is given, or so many steps; None for a fault."""
-    column, commands = f"{name}_s" if f"{name}_s" in row else f"{name}_counts", spacecraft.commands
+    column = f"{name}_s" if f"{name}_s" in row else f"{name}_counts"
+    commands = spacecraft.commands
     value = row.number(column)
     if value is None:
         return None
     if value < 0.0:
-        least = " s is negative; expected a time" if column.endswith("_s") else " is negative; expected a number"
+        least = (
+            " s is negative; expected a time"
+            if column.endswith("_s")
+            else " is negative; expected a number"
+        )
         row.fault(column, f"{value:g}{least} of at least 0")
         return None
     if column.endswith("_s"):
@@ -151,7 +180,9 @@ AGREES = 1e-6  # relative difference up to which a torque is that of the torquer
 
 
 def read_pulses(path: str | Path, spacecraft: Spacecraft) -> tuple[Schedule, list[str]]:
-    """A schedule from a CSV file, and warnings; raises CannotRead, and FaultyFile with every fault of the file."""
+    """A schedule from a CSV file, and warnings; raises CannotRead, and FaultyFile with every fault
+    of the file.
+    """
     table = Table(path, (*PULSES_HEADER, *EFFECTIVE, UTC), "pulses")
     if not {*STARTS} & {*table.header}:
         missing = f"the column is missing (or {STARTS[1]}, the centre)"
@@ -180,9 +211,13 @@ def read_pulses(path: str | Path, spacecraft: Spacecraft) -> tuple[Schedule, lis
 def read_plan(
     path: str | Path, spacecraft: Spacecraft, options: SchemeOptions | None = None
 ) -> tuple[Plan, tuple[str, ...]]:
-    """A schedule file as a plan of that name, and warnings, of broken limits too; raises as `read_pulses` does."""
+    """A schedule file as a plan of that name, and warnings, of broken limits too; raises as
+    `read_pulses` does.
+    """
     pulses, warnings = read_pulses(path, spacecraft)
-    plan = Plan(spacecraft, printable(str(path)), pulses, options=options or SchemeOptions(), from_file=True)
+    plan = Plan(
+        spacecraft, printable(str(path)), pulses, options=options or SchemeOptions(), from_file=True
+    )
     return plan, (*warnings, *broken_limits(spacecraft, pulses))
 
 
@@ -256,7 +291,8 @@ def _lead(row: Row, channel: Channel, on_time: float) -> float | None:
     if channel.valve is None:
         return None
     least, most = channel.valve.known
-    named, thrust = shown(channel.name), channel.valve.thrust(on_time)
+    named = shown(channel.name)
+    thrust = channel.valve.thrust(on_time)
     if not least <= on_time <= most:
         known = f"{least:g} s to {most:g} s"
         row.fault("on_time_s", f"{on_time:g} s is outside the impulse_bit of {named}, {known}")
@@ -290,7 +326,8 @@ def _propellant(
     torque: Vector | None,
 ) -> float | None:
     """Propellant, kg, of a pulse flown as the schedule has it; a warning where it is not known."""
-    named, torquer = shown(name), spacecraft.torquer
+    named = shown(name)
+    torquer = spacecraft.torquer
     if name in channels:
         ideal = f"{named} has an on-time of 0: flown as an ideal impulse, its propellant is unknown"
         row.warn(f"ideal {name}", ideal)

@@ -1,4 +1,5 @@
-"""Keys of a spacecraft file for studies: dispersions and the closed loop, with their units and ranges.
+"""Keys of a spacecraft file for studies: dispersions and the closed loop, with their units and
+ranges.
 
 Sizes of tolerances stay as they are written here: `study_rules` finds the faults in them.
 """
@@ -37,11 +38,15 @@ RELATIVE = ("inertia", "momentum", "rate", "force", "ratio", "mass", "pressure")
 
 VALVE_TIMES = ("open_delay", "close_delay", "rise_time", "fall_time")
 
-ALL = ""  # name of all thrusters together, where the file gives one tolerance for them; no thruster has such a name
+# name of all thrusters together, where the file gives one tolerance for them; no thruster has such
+# a name
+ALL = ""
 
 
 def size_of(value: object, kind: str) -> tuple[float, bool]:
-    """The size of a tolerance of ``kind``, SI or a fraction, and True for a fraction; raises ValueError."""
+    """The size of a tolerance of ``kind``, SI or a fraction, and True for a fraction; raises
+    ValueError.
+    """
     if kind in RELATIVE and isinstance(value, str) and value.rstrip().endswith("%"):
         return parse(value, "ratio"), True
     if kind == READING:
@@ -56,7 +61,9 @@ def size_of(value: object, kind: str) -> tuple[float, bool]:
 
 
 def unit_kinds(kind: str) -> list[str]:
-    """The kinds of quantity (keys of `units.KINDS`) by which a tolerance of ``kind`` may be given."""
+    """The kinds of quantity (keys of `units.KINDS`)
+    by which a tolerance of ``kind`` may be given.
+    """
     if kind == READING:
         return ["rate", "acceleration"]
     return [kind, "ratio"] if kind in RELATIVE and kind != "ratio" else [kind]
@@ -68,13 +75,21 @@ def by_name(value: Mapping[Any, object]) -> bool:
 
 
 class ToleranceSection(Section):
-    """Tolerance of a quantity: one of normal (one sigma), uniform, triangular (half width), bias (offset)."""
+    """Tolerance of a quantity: one of normal (one sigma), uniform, triangular (half width), bias
+    (offset).
+    """
 
     written = "a tolerance, such as {normal: 2 %}"
 
-    normal: Any = Field("One sigma of a normal distribution, in its unit or in %.", "2 %", default=None)
-    uniform: Any = Field("Half the width of a uniform distribution, in its unit or in %.", "5 ms", default=None)
-    triangular: Any = Field("Half the width of a triangular distribution, in its unit or in %.", "5 %", default=None)
+    normal: Any = Field(
+        "One sigma of a normal distribution, in its unit or in %.", "2 %", default=None
+    )
+    uniform: Any = Field(
+        "Half the width of a uniform distribution, in its unit or in %.", "5 ms", default=None
+    )
+    triangular: Any = Field(
+        "Half the width of a triangular distribution, in its unit or in %.", "5 %", default=None
+    )
     bias: Any = Field("Fixed offset, signed, in its unit or in %.", "-2 ms", default=None)
 
     def tolerance(self, key: str) -> Tolerance:
@@ -85,7 +100,9 @@ class ToleranceSection(Section):
 
 
 class _Tolerance(Rule):
-    """Annotation of a tolerance of ``kind``; or of those of ``each`` axis or thruster, one of which may be for all."""
+    """Annotation of a tolerance of ``kind``; or of those of ``each`` axis or thruster, one of which
+    may be for all.
+    """
 
     def __init__(self, kind: str, each: Each = "") -> None:
         self.kind, self.each = kind, each
@@ -103,15 +120,25 @@ class _Tolerance(Rule):
         spread: dict[str, Any] = {"anyOf": [{"type": "number", "minimum": 0}, *texts]}
         single = {
             "type": "object",
-            "properties": {**dict.fromkeys(KINDS, spread), "bias": {"anyOf": [{"type": "number"}, *texts]}},
+            "properties": {
+                **dict.fromkeys(KINDS, spread),
+                "bias": {"anyOf": [{"type": "number"}, *texts]},
+            },
             "additionalProperties": False,
             "minProperties": 1,
             "maxProperties": 1,
         }
         if self.each == "axis":
-            return {"anyOf": [single, {"type": "array", "items": single, "minItems": 3, "maxItems": 3}]}
+            return {
+                "anyOf": [single, {"type": "array", "items": single, "minItems": 3, "maxItems": 3}]
+            }
         if self.each == "thruster":
-            return {"anyOf": [single, {"type": "object", "additionalProperties": single, "minProperties": 1}]}
+            return {
+                "anyOf": [
+                    single,
+                    {"type": "object", "additionalProperties": single, "minProperties": 1},
+                ]
+            }
         return single
 
 
@@ -121,15 +148,22 @@ _WRITTEN: dict[str, Any] = {
     "thruster": dict[str, ToleranceSection],
 }
 _TOLERANCES = {each.name: each.metadata for each in fields(Dispersions) if each.metadata}
-QUANTITIES = {key: declared["kind"] for key, declared in _TOLERANCES.items()}  # kinds of quantity by key
+QUANTITIES = {
+    key: declared["kind"] for key, declared in _TOLERANCES.items()
+}  # kinds of quantity by key
 BY_THRUSTER = tuple(key for key, declared in _TOLERANCES.items() if declared["each"] == "thruster")
 
 
 class DispersionsSection(Section):
-    """Tolerances: {normal: one sigma}, {uniform: half width}, {triangular: half width} or {bias: fixed offset}."""
+    """Tolerances: {normal: one sigma}, {uniform: half width}, {triangular: half width} or {bias:
+    fixed offset}.
+    """
 
-    correlation: list[tuple[str, str, Annotated[float, Quantity("ratio", minimum=-1, maximum=1)]]] = Field(
-        "Pairs of inputs that vary together, named as in disperse --json, and their correlation, -1 to 1;"
+    correlation: list[
+        tuple[str, str, Annotated[float, Quantity("ratio", minimum=-1, maximum=1)]]
+    ] = Field(
+        "Pairs of inputs that vary together, named as in disperse --json, and their correlation, "
+        "-1 to 1;"
         " of uniform and triangular ones that of the normals behind them (Gaussian copula).",
         [["A", "C", 0.99]],
         default=[],
@@ -142,14 +176,21 @@ class DispersionsSection(Section):
         keys = {}
         for key, declared in _TOLERANCES.items():
             rule = _Tolerance(declared["kind"], declared["each"])
-            keys[key] = Key(Annotated[_WRITTEN[rule.each], rule] | None, None, declared["text"], [declared["example"]])
+            keys[key] = Key(
+                Annotated[_WRITTEN[rule.each], rule] | None,
+                None,
+                declared["text"],
+                [declared["example"]],
+            )
         return keys | super().fields()
 
 
 def dispersions(
     section: DispersionsSection | None, thrusters: Iterable[Thruster], torquer: Steerable | None
 ) -> Dispersions | None:
-    """The tolerances of a checked file, those of thrusts as fractions; ``torquer``: also an ideal one."""
+    """The tolerances of a checked file, those of thrusts as fractions; ``torquer``: also an ideal
+    one.
+    """
     if section is None:
         return None
     from nutdamp.spacecraft.schedule import STEERABLE
@@ -170,7 +211,9 @@ def dispersions(
     for name, tolerance in entries.get("thrust", {}).items():
         thrust = thrusts[name]
         if not tolerance.relative and thrust is not None:
-            entries["thrust"][name] = Tolerance(tolerance.kind, tolerance.size / thrust, relative=True)
+            entries["thrust"][name] = Tolerance(
+                tolerance.kind, tolerance.size / thrust, relative=True
+            )
     return Dispersions(**entries)
 
 
@@ -180,7 +223,9 @@ def thrust_behind(torque: float | None, lever_arm: float | None) -> float | None
 
 
 class Reading(Quantity):
-    """Annotation of a quantity in the unit of the sensor: an angular rate of a gyro, else an acceleration."""
+    """Annotation of a quantity in the unit of the sensor: an angular rate of a gyro, else an
+    acceleration.
+    """
 
     def __init__(self, **bounds: float) -> None:
         super().__init__("rate", **bounds)
@@ -189,7 +234,9 @@ class Reading(Quantity):
         """SI value; raises ValueError with the values allowed."""
         result, _ = size_of(value, READING)
         if not self._allows(result):
-            raise ValueError(f"{shown(value)} is out of range; expected at least {self.bounds['minimum']:g}")
+            raise ValueError(
+                f"{shown(value)} is out of range; expected at least {self.bounds['minimum']:g}"
+            )
         return result
 
     def schema(self, inner: Callable[[], dict[str, Any]]) -> dict[str, Any]:  # noqa: ARG002
@@ -209,7 +256,8 @@ class LoopSensorSection(Section):
         "gyro: ω1 and ω2; accelerometer: the acceleration at position along axis.", "gyro"
     )
     axes: Literal["file", "principal"] = Field(
-        "Axes about which gyros measure: those of the file, in which a tilted axis 3 shows as a rate, or the principal "
+        "Axes about which gyros measure: those of the file, in which a tilted axis 3 shows as a "
+        "rate, or the principal "
         "ones, of gyros that are calibrated so. Default file.",
         "principal",
         default="file",
@@ -219,20 +267,31 @@ class LoopSensorSection(Section):
         "Step of a sample: rad/s, of an accelerometer m/s²; default 0.", "0.002 deg/s", default=0.0
     )
     noise: Least = Field(
-        "One sigma of the noise of a sample: rad/s, of an accelerometer m/s²; default 0.", "0.01 deg/s", default=0.0
+        "One sigma of the noise of a sample: rad/s, of an accelerometer m/s²; default 0.",
+        "0.01 deg/s",
+        default=0.0,
     )
     bias: Annotated[float, Reading()] = Field(
-        "What a signal shows without motion: rad/s, of an accelerometer m/s²; default 0.", "0.02 deg/s", default=0.0
+        "What a signal shows without motion: rad/s, of an accelerometer m/s²; default 0.",
+        "0.02 deg/s",
+        default=0.0,
     )
     scale: Annotated[float, Quantity("ratio")] = Field(
-        "Factor of the signal on the truth; default 100 %. -100 % is a sensor that is reversed.", "101 %", default=1.0
+        "Factor of the signal on the truth; default 100 %. -100 % is a sensor that is reversed.",
+        "101 %",
+        default=1.0,
     )
-    delay: Time = Field("Time until a sample reaches the valves, s; default 0.", "20 ms", default=0.0)
+    delay: Time = Field(
+        "Time until a sample reaches the valves, s; default 0.", "20 ms", default=0.0
+    )
     low_pass: Time = Field(
-        "Time constant of a first-order low-pass filter over the samples, s; default 0: none.", "50 ms", default=0.0
+        "Time constant of a first-order low-pass filter over the samples, s; default 0: none.",
+        "50 ms",
+        default=0.0,
     )
     position: Position | None = Field(
-        "Where an accelerometer is, from the center of mass, or as center_of_mass is given, m.", ["0.8 m", 0, 0]
+        "Where an accelerometer is, from the center of mass, or as center_of_mass is given, m.",
+        ["0.8 m", 0, 0],
     )
     axis: Direction | None = Field(
         "Along which an accelerometer measures, any length but zero; default [0, 0, 1].", [0, 0, 1]
@@ -242,35 +301,56 @@ class LoopSensorSection(Section):
 class LoopFaultsSection(Section):
     """Faults that the loop is flown with and does not know of."""
 
-    reversed: list[Name] = Field("Channels that push the other way when they are fired.", ["+M1"], default=[])
+    reversed: list[Name] = Field(
+        "Channels that push the other way when they are fired.", ["+M1"], default=[]
+    )
 
 
 class LoopSection(Section):
-    """A closed loop, for `nutdamp loop`: it fires from where the sensor shows start down to stop."""
+    """A closed loop, for `nutdamp loop`:
+    it fires from where the sensor shows start down to stop.
+    """
 
-    sensor: LoopSensorSection = Field("The sensor.", {"kind": "gyro", "rate": "100 Hz", "noise": "0.01 deg/s"})
+    sensor: LoopSensorSection = Field(
+        "The sensor.", {"kind": "gyro", "rate": "100 Hz", "noise": "0.01 deg/s"}
+    )
     law: Literal["four-pulse", "one-pulse", "bang"] = Field(
         "four-pulse: each channel that comes into line, as long as what is left requires, at most "
-        "on_time; one-pulse: the same, at most half a nutation period; bang: each for on_time. Default four-pulse.",
+        "on_time; one-pulse: the same, at most half a nutation period; bang: each for on_time. "
+        "Default four-pulse.",
         "four-pulse",
         default="four-pulse",
     )
-    start: AcuteAngle = Field("Nutation angle from which the loop fires, rad; above stop.", "0.5 deg")
-    stop: Nutation = Field("Nutation angle down to which it fires, rad; default 0.", "0.05 deg", default=0.0)
-    settle: Time = Field("Time after a firing in which samples are not used, s; default 0.", "0.2 s", default=0.0)
-    min_interval: Time = Field("Least time from firing to firing, s; default 0.", "0.5 s", default=0.0)
+    start: AcuteAngle = Field(
+        "Nutation angle from which the loop fires, rad; above stop.", "0.5 deg"
+    )
+    stop: Nutation = Field(
+        "Nutation angle down to which it fires, rad; default 0.", "0.05 deg", default=0.0
+    )
+    settle: Time = Field(
+        "Time after a firing in which samples are not used, s; default 0.", "0.2 s", default=0.0
+    )
+    min_interval: Time = Field(
+        "Least time from firing to firing, s; default 0.", "0.5 s", default=0.0
+    )
     predict: bool = Field(
-        "Whether delay, filter and half the on-time are compensated, so that firings are centred on "
+        "Whether delay, filter and half the on-time are compensated, "
+        "so that firings are centred on "
         "their moments; default true.",
         True,
         default=True,
     )
     alias: bool = Field(
-        "Whether fewer than four samples a nutation period are meant; default false.", True, default=False
+        "Whether fewer than four samples a nutation period are meant; default false.",
+        True,
+        default=False,
     )
     on_time: PositiveTime | None = Field(
-        "Pulses of bang, and the longest ones of four-pulse, s; default of four-pulse: an eighth of the "
+        "Pulses of bang, and the longest ones of four-pulse, s; default of four-pulse: "
+        "an eighth of the "
         "nutation period, within min_on_time and max_on_time.",
         "50 ms",
     )
-    faults: LoopFaultsSection | None = Field("Faults to fly with, default none.", {"reversed": ["+M1"]})
+    faults: LoopFaultsSection | None = Field(
+        "Faults to fly with, default none.", {"reversed": ["+M1"]}
+    )

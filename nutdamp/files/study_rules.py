@@ -21,7 +21,8 @@ from nutdamp.units import shown
 
 LARGEST_SIGMA, LARGEST_OFFSET = 0.5, 1.0
 """One sigma of a normal distribution, and half widths and fixed offsets of others, in % of a value
-or of a right angle: beyond the first one draw in forty would turn its sign, beyond the second any."""
+or of a right angle: beyond the first one draw in forty would turn its sign, beyond the second any.
+"""
 
 
 EXAMPLES = {
@@ -39,8 +40,11 @@ EXAMPLES = {
 
 def dispersion_findings(root: Node) -> Iterator[Finding]:
     """Faults of the dispersions, and of the share of cases that is to comply."""
-    facts, asked = Facts(root), ("nutation", "momentum_shift", "spin")
-    if facts.has("requirement", "probability") and not any(facts.has("requirement", key) for key in asked):
+    facts = Facts(root)
+    asked = ("nutation", "momentum_shift", "spin")
+    if facts.has("requirement", "probability") and not any(
+        facts.has("requirement", key) for key in asked
+    ):
         problem = "given alone; name what must be met with it: nutation, momentum_shift or spin"
         yield Finding(("requirement", "probability"), problem, True)
     if not facts.has("dispersions"):
@@ -57,19 +61,28 @@ def dispersion_findings(root: Node) -> Iterator[Finding]:
         given = [str(key) for key in nodes if key in KINDS]
         if not given:
             size = EXAMPLES.get(QUANTITIES[str(path[1])], "5 ms")
-            yield Finding(path, f"names no distribution; give {{normal: {size}}}, or uniform, triangular, bias")
+            yield Finding(
+                path,
+                f"names no distribution; give {{normal: {size}}}, or uniform, triangular, bias",
+            )
         for key in given[1:]:
-            yield Finding((*path, key), f"given together with {given[0]}; keep one of the two", True)
+            yield Finding(
+                (*path, key), f"given together with {given[0]}; keep one of the two", True
+            )
         for key in given:
             fault = _size_fault(facts, path, key, nodes[key].plain())
             if fault is not None:
                 yield Finding((*path, key), fault)
     kind = facts.text("loop", "sensor", "kind")
-    wrong, right = ("rate", "m/s^2") if kind == "accelerometer" else ("acceleration", "rad/s, deg/s or rpm")
+    wrong, right = (
+        ("rate", "m/s^2") if kind == "accelerometer" else ("acceleration", "rad/s, deg/s or rpm")
+    )
     for key in ("sensor_bias", "sensor_scale", "sensor_noise", "sensor_delay"):
         path = ("dispersions", key)
         if facts.has(*path) and not facts.has("loop"):
-            yield Finding(path, "is of the sensor of a loop, and the file has no loop; leave this out", True)
+            yield Finding(
+                path, "is of the sensor of a loop, and the file has no loop; leave this out", True
+            )
         for distribution in KINDS if key == "sensor_bias" and kind is not None else ():
             text = facts.text(*path, distribution)
             if text is not None and facts.number(wrong, *path, distribution) is not None:
@@ -109,11 +122,16 @@ def _size_fault(facts: Facts, path: KeyPath, key: str, value: object) -> str | N
         return str(wrong)
     what = {"normal": "one sigma", "bias": "an offset"}.get(key, "half a width")
     if key != "bias" and size < 0.0:
-        return f"{shown(value)} is negative; expected {what} of at least 0, or bias for a fixed offset"
+        return (
+            f"{shown(value)} is negative; expected {what} of at least 0, or bias for a fixed offset"
+        )
     for name, thrust in thrusts(facts).items() if kind == "force" and not relative else ():
         if thrust is None and path[2:] in ((), (name,)):
             unknown = f"the {STEERABLE} torquer" if name == STEERABLE else shown(name)
-            return f"{shown(value)} needs the thrust of {unknown}, which is not known; give its lever_arm, or a %"
+            return (
+                f"{shown(value)} needs the thrust of {unknown}, which is not known; "
+                "give its lever_arm, or a %"
+            )
     if not relative and kind != "angle":
         return None
     share = abs(size) if relative else abs(size) / RIGHT_ANGLE
@@ -135,7 +153,8 @@ def correlation_findings(spacecraft: Spacecraft) -> Iterator[Finding]:
     pairs = () if spacecraft.dispersions is None else spacecraft.dispersions.correlation
     if not pairs:
         return
-    path, inputs = ("dispersions", "correlation"), reachable(spacecraft)
+    path = ("dispersions", "correlation")
+    inputs = reachable(spacecraft)
     names = [*(entry.name for entry in inputs.drawn), *(entry.name for entry in inputs.unused)]
     known = [name for name in names if not name.endswith("of each pulse")]
     fixed = {entry.name for entry in inputs.drawn if entry.kind == "bias"}
@@ -206,16 +225,21 @@ def loop_findings(root: Node) -> Iterator[Finding]:
                 True,
             )
     if kind == "accelerometer" and facts.has(*SENSOR, "axes"):
-        yield Finding((*SENSOR, "axes"), "is for kind: gyro; an accelerometer measures along axis", True)
-    other, right = "acceleration" if kind == "gyro" else "rate", UNITS_OF.get(kind or "")
+        yield Finding(
+            (*SENSOR, "axes"), "is for kind: gyro; an accelerometer measures along axis", True
+        )
+    other = "acceleration" if kind == "gyro" else "rate"
+    right = UNITS_OF.get(kind or "")
     for key in ("noise", "bias", "quantisation") if right else ():
         text = facts.text(*SENSOR, key)
         if text is not None and facts.number(other, *SENSOR, key) is not None:
             yield Finding((*SENSOR, key), f"{shown(text)} is not in a unit of {right}")
-    inertia, spin = inertia_of(facts), spin_of(facts)
+    inertia = inertia_of(facts)
+    spin = spin_of(facts)
     if inertia is None or spin is None:
         return
-    rate, alias = facts.number("frequency", *SENSOR, "rate"), facts.value("loop", "alias")
+    rate = facts.number("frequency", *SENSOR, "rate")
+    alias = facts.value("loop", "alias")
     least = SAMPLES * abs(inertia.nutation_rate(spin)) / (2.0 * math.pi)
     if rate is not None and 0.0 < rate < least and alias is not True:
         problem = f"{rate:g} Hz is below four times the nutation frequency"
@@ -226,10 +250,16 @@ def loop_findings(root: Node) -> Iterator[Finding]:
     from nutdamp.control_loop.sensor import is_blind
 
     if inertia.wheel != 0.0:
-        yield Finding((*SENSOR, "kind"), "accelerometer: with a wheel only gyros are modelled; expected gyro")
+        yield Finding(
+            (*SENSOR, "kind"), "accelerometer: with a wheel only gyros are modelled; expected gyro"
+        )
         return
     position = facts.vector("length", 3, *SENSOR, "position")
-    axis = facts.vector("number", 3, *SENSOR, "axis") if facts.has(*SENSOR, "axis") else np.array([0.0, 0.0, 1.0])
+    axis = (
+        facts.vector("number", 3, *SENSOR, "axis")
+        if facts.has(*SENSOR, "axis")
+        else np.array([0.0, 0.0, 1.0])
+    )
     if position is None or axis is None or not axis.any():
         return
     turn = inertia.axes.T
@@ -249,10 +279,8 @@ def _channels(facts: Facts) -> Iterator[Finding]:
     for name, members in channels.items():
         allowed = [times[member] for member in members if member in times]
         if on_time is not None and allowed:
-            least, most = (
-                max(shortest for shortest, _ in allowed),
-                min(longest for _, longest in allowed),
-            )
+            least = max(shortest for shortest, _ in allowed)
+            most = min(longest for _, longest in allowed)
             if not least <= on_time <= most:
                 problem = f"{on_time:g} s is outside what {name} allows: {span(least, most, 's')}"
                 yield Finding(("loop", "on_time"), problem)

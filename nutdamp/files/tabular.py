@@ -1,7 +1,7 @@
 """Whole files written or none, tables in CSV files read, and the track of a flight as a table.
 
-Numbers are written so that they read back as they were. Rows are read by the names of columns, with all faults at once
-and each warning once.
+Numbers are written so that they read back as they were. Rows are read by the names of columns, with
+all faults at once and each warning once.
 """
 
 from __future__ import annotations
@@ -33,15 +33,19 @@ STDOUT = "-"  # file name that means standard output
 
 
 def write_whole(path: str, content: str | bytes | Callable[[IO[bytes]], object]) -> None:
-    """Write ``content`` to ``path``, or leave it as it was; ``-`` is standard output. Raises CannotWrite.
+    """Write ``content`` to ``path``, or leave it as it was; ``-`` is standard output. Raises
+    CannotWrite.
 
-    Long content is a function that writes to the stream. Text becomes UTF-8, what has no place there \\udcff.
+    Long content is a function that writes to the stream. Text becomes UTF-8, what has no place
+    there \\udcff.
     """
     with whole_file(path) as stream:
         if callable(content):
             content(stream)
         else:
-            stream.write(content.encode(errors="backslashreplace") if isinstance(content, str) else content)
+            stream.write(
+                content.encode(errors="backslashreplace") if isinstance(content, str) else content
+            )
 
 
 @contextmanager
@@ -70,7 +74,9 @@ def whole_file(path: str) -> Iterator[IO[bytes]]:
 
 
 def check_place(path: str) -> Path:
-    """Place of a file, behind links; checked before long work: raises CannotWrite where it cannot be written to."""
+    """Place of a file, behind links; checked before long work: raises CannotWrite where it cannot
+    be written to.
+    """
     if path == STDOUT:
         return Path(path)
     try:
@@ -78,7 +84,9 @@ def check_place(path: str) -> Path:
         if target.is_dir():
             raise CannotWrite(path, "it is a directory")
         with suppress(FileNotFoundError, NotADirectoryError):
-            target.stat()  # raises OSError for links in a circle and for names too long, where exists() is only false
+            # raises OSError for links in a circle and for names too long, where exists() is only
+            # false
+            target.stat()
         if not target.parent.is_dir():
             raise CannotWrite(path, f"{target.parent} is no directory")
         if not os.access(target if target.exists() else target.parent, os.W_OK):
@@ -121,7 +129,9 @@ def _replacing(target: Path) -> Iterator[IO[bytes]]:
 
 
 def number(value: float | None) -> str:
-    """A number with 17 significant digits at most, the shortest text that reads back the same; None is empty."""
+    """A number with 17 significant digits at most, the shortest text that reads back the same; None
+    is empty.
+    """
     return "" if value is None or not math.isfinite(value) else repr(float(value))
 
 
@@ -135,7 +145,9 @@ def csv_text(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 
 def json_text(data: dict[str, Any]) -> str:
-    """JSON with numbers that are not finite as null, characters that control a terminal escaped, newline at the end."""
+    """JSON with numbers that are not finite as null, characters that control a terminal escaped,
+    newline at the end.
+    """
     text = json.dumps(finite(data), indent=2, ensure_ascii=False, allow_nan=False)
     # Those below a blank are escaped already.
     return re.sub("[\x7f-\x9f\u2028\u2029]", lambda match: f"\\u{ord(match[0]):04x}", text) + "\n"
@@ -152,11 +164,15 @@ HEADER = (
 )
 
 
-ROW = np.dtype([(name, np.int64 if name == "pulse" else np.float64) for name in HEADER])  # one row of the track
+ROW = np.dtype(
+    [(name, np.int64 if name == "pulse" else np.float64) for name in HEADER]
+)  # one row of the track
 
 
 def track_array(track: Track, inertia: Inertia) -> NDArray[np.void]:
-    """One row a sample, fields as in `HEADER`; rates and quaternion (scalar first) in the axes of the file."""
+    """One row a sample, fields as in `HEADER`; rates and quaternion (scalar first) in the axes of
+    the file.
+    """
     turned = in_file_axes(track, inertia)
     cones = np.degrees(np.column_stack([track.nutation, track.body_cone, track.space_cone]))
     vectors = map(cleaned, (turned.rates, turned.quaternion, track.axis, track.momentum))
@@ -207,16 +223,21 @@ class Row(dict[str, str]):
         self.table.fault(self.line, column, problem)
 
     def warn(self, subject: str, text: str) -> None:
-        """Keep a warning; of several on one ``subject`` the first is given, with the number of others."""
+        """Keep a warning; of several on one ``subject`` the first is given, with the number of
+        others.
+        """
         self.table.warnings.setdefault(subject, []).append((self.line, text))
 
 
 class Table:
-    """The ``header`` of a file (names of columns) and, from `expect` on, ``rows``; raises CannotRead, FaultyFile."""
+    """The ``header`` of a file (names of columns) and, from `expect` on, ``rows``; raises
+    CannotRead, FaultyFile.
+    """
 
     def __init__(self, path: str | Path, columns: Sequence[str], what: str) -> None:
         """Table with ``columns`` that are known; ``what`` is the word for a row, for messages."""
-        self.name, self.known = str(path), columns
+        self.name = str(path)
+        self.known = columns
         self.faults: list[Fault] = []
         self.warnings: dict[str, list[tuple[int, str]]] = {}
         text = utf8_text(read_limited(self.name, MOST_BYTES), self.name)
@@ -233,11 +254,14 @@ class Table:
         elif len(rows[0][1]) == 1 and re.search(r"[;\t]", rows[0][1][0].strip()):
             self.fault(1, "", "columns are separated by commas, not by semicolons or tabs")
         self.check()
-        self.header, self._lines = [entry.strip() for entry in rows[0][1]], rows[1:]
+        self.header = [entry.strip() for entry in rows[0][1]]
+        self._lines = rows[1:]
         self.rows: list[Row] = []
 
     def expect(self, *columns: str) -> None:
-        """Read the rows; warns of unknown columns, FaultyFile for ``columns`` missing or given twice."""
+        """Read the rows; warns of unknown columns, FaultyFile for ``columns`` missing or given
+        twice.
+        """
         for column in columns:
             if column not in self.header:
                 self.fault(1, column, f"the column is missing{self.misspelt(column)}")
@@ -254,13 +278,19 @@ class Table:
                 self.fault(line, "", f"{len(cells)} values under {len(self.header)} columns")
 
     def check(self) -> None:
-        """Raise FaultyFile with the faults so far: of a column the first `MOST_FAULTS`, and how many more."""
+        """Raise FaultyFile with the faults so far: of a column the first `MOST_FAULTS`, and how
+        many more.
+        """
         kept = []
         for where in dict.fromkeys(fault.where for fault in self.faults):
             every = [fault for fault in self.faults if fault.where == where]
             kept += every[:MOST_FAULTS]
             more = every[MOST_FAULTS:]
-            kept += more if len(more) < 2 else [more[0]._replace(problem=f"and {len(more)} more such rows")]
+            kept += (
+                more
+                if len(more) < 2
+                else [more[0]._replace(problem=f"and {len(more)} more such rows")]
+            )
         if kept:
             raise FaultyFile(kept)
 

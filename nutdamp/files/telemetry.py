@@ -39,12 +39,19 @@ from nutdamp.units import KINDS, shown
 
 
 def record_of(history: History, spacecraft: Spacecraft, schedule: Schedule) -> Record:
-    """Telemetry of a history, from attitude.epoch of the file on; raises BadRequest where it has none."""
+    """Telemetry of a history, from attitude.epoch of the file on; raises BadRequest where it has
+    none.
+    """
     given = spacecraft.attitude
     if given is None or given.epoch is None:
-        raise BadRequest("the spacecraft file has no attitude.epoch to count the times of a history from")
+        raise BadRequest(
+            "the spacecraft file has no attitude.epoch to count the times of a history from"
+        )
     if history.frame is not None and given.frame not in (None, history.frame):
-        raise BadRequest(f"the history is in {history.frame}, the spacecraft file in {given.frame}: expected one frame")
+        raise BadRequest(
+            f"the history is in {history.frame}, the spacecraft file in {given.frame}: "
+            "expected one frame"
+        )
     signals = of_quaternions(history.quaternions, spacecraft)
     if history.rates is not None:
         signals |= dict(zip(GYROS, history.rates.T, strict=True))
@@ -53,17 +60,40 @@ def record_of(history: History, spacecraft: Spacecraft, schedule: Schedule) -> R
 
 
 TIMES = ("t_s", "utc")
-JUMPS = "; the track of an impulse sum has two rows at each pulse: write it by `simulate --flown --csv`"
-RATES = {f"{name}_rad_s": (name, 1.0) for name in GYROS} | {f"{name}_deg_s": (name, math.pi / 180.0) for name in GYROS}
+JUMPS = (
+    "; the track of an impulse sum has two rows at each pulse: write it by `simulate --flown --csv`"
+)
+RATES = {f"{name}_rad_s": (name, 1.0) for name in GYROS} | {
+    f"{name}_deg_s": (name, math.pi / 180.0) for name in GYROS
+}
 ANGLES = ("axis_ra_deg", "axis_dec_deg")
 CROSSED = ("crossing_azimuth_deg", "crossing_elevation_deg")
 TOWARDS = ("crossing_ra_deg", "crossing_dec_deg")
 ACCELERATIONS, ASPECTS = "acceleration_m_s2", "sun_aspect_deg"
-MEASURED = (*RATES, *ANGLES, *AXIS, *QUATERNION, ACCELERATIONS, *CROSSED, *TOWARDS, ASPECTS, SUN_PULSE)
-"""Columns of samples: crossings are of what is TOWARDS, else of the Sun; SUN_PULSE is 1 from one seen on."""
+MEASURED = (
+    *RATES,
+    *ANGLES,
+    *AXIS,
+    *QUATERNION,
+    ACCELERATIONS,
+    *CROSSED,
+    *TOWARDS,
+    ASPECTS,
+    SUN_PULSE,
+)
+"""Columns of samples: crossings are of what is TOWARDS, else of the Sun; SUN_PULSE is 1 from one
+seen on.
+"""
 
-LIMITS = {ANGLES[0]: (-360.0, 360.0), ANGLES[1]: (-90.0, 90.0), CROSSED[0]: (-360.0, 360.0), CROSSED[1]: (-90.0, 90.0),
-          TOWARDS[0]: (-360.0, 360.0), TOWARDS[1]: (-90.0, 90.0), ASPECTS: (0.0, 180.0)}  # fmt: skip
+LIMITS = {
+    ANGLES[0]: (-360.0, 360.0),
+    ANGLES[1]: (-90.0, 90.0),
+    CROSSED[0]: (-360.0, 360.0),
+    CROSSED[1]: (-90.0, 90.0),
+    TOWARDS[0]: (-360.0, 360.0),
+    TOWARDS[1]: (-90.0, 90.0),
+    ASPECTS: (0.0, 180.0),
+}
 """Least and largest angles of columns, deg."""
 
 UNIT_LENGTH = 0.01  # deviation from length one that a measured axis or quaternion may have
@@ -75,15 +105,22 @@ MEANT: dict[str, Sequence[str]] = {
     "q[_0-9]": QUATERNION,
     "axis|(ra|dec)(_|$)": [*ANGLES, *AXIS],
 }
-"""Beginnings of names of columns that are meant to be measured, and the columns that there are of the kind."""
+"""Beginnings of names of columns that are meant to be measured, and the columns that there are of
+the kind.
+"""
 
 SAME = 0.03  # part by which a ratio of rates may differ from that of two units
 
 
 def read_telemetry(
-    path: str | Path, spacecraft: Spacecraft, sun_pulses: str | Path | None = None, schedule: Schedule | None = None
+    path: str | Path,
+    spacecraft: Spacecraft,
+    sun_pulses: str | Path | None = None,
+    schedule: Schedule | None = None,
 ) -> tuple[Record, list[str]]:
-    """The record in a file, with ``sun_pulses`` of another, and warnings; raises CannotRead and FaultyFile."""
+    """The record in a file, with ``sun_pulses`` of another, and warnings; raises CannotRead and
+    FaultyFile.
+    """
     if is_history(str(path)):
         history = read_history(str(path))
         record = record_of(history, spacecraft, schedule or Schedule())
@@ -93,7 +130,9 @@ def read_telemetry(
     if sun_pulses is None:
         return record, warnings
     if len(record.sun_pulses):
-        warnings.append(f"{path}: the column {SUN_PULSE} is ignored: the times are those of {sun_pulses}")
+        warnings.append(
+            f"{path}: the column {SUN_PULSE} is ignored: the times are those of {sun_pulses}"
+        )
     table = Table(sun_pulses, (*TIMES, ASPECTS), "Sun pulses")
     _expect_time(table)
     table.expect()
@@ -102,14 +141,22 @@ def read_telemetry(
     record = replace(record, sun_pulses=pulses, sun_step=0.0)
     if ASPECTS not in columns or not np.isfinite(columns[ASPECTS]).any():
         return record, warnings
-    times = np.union1d(record.times, pulses)  # with the Sun aspect angles at the pulses among the samples
-    signals = {name: _spread(times, record.times, values) for name, values in record.signals.items()}
+    times = np.union1d(
+        record.times, pulses
+    )  # with the Sun aspect angles at the pulses among the samples
+    signals = {
+        name: _spread(times, record.times, values) for name, values in record.signals.items()
+    }
     at_pulses = _spread(times, pulses, np.radians(columns[ASPECTS]))
-    signals[SUN_ASPECT] = np.where(np.isfinite(at_pulses), at_pulses, signals.get(SUN_ASPECT, math.nan))
+    signals[SUN_ASPECT] = np.where(
+        np.isfinite(at_pulses), at_pulses, signals.get(SUN_ASPECT, math.nan)
+    )
     return replace(record, times=times, signals=signals), warnings
 
 
-def _read_samples(path: str | Path, spacecraft: Spacecraft, schedule: Schedule) -> tuple[Record, list[str]]:
+def _read_samples(
+    path: str | Path, spacecraft: Spacecraft, schedule: Schedule
+) -> tuple[Record, list[str]]:
     table = Table(path, (*TIMES, *MEASURED, *TRACK), "samples")
     _expect_time(table)
     header = table.header
@@ -122,15 +169,23 @@ def _read_samples(path: str | Path, spacecraft: Spacecraft, schedule: Schedule) 
         table.fault(1, "", f"no column of samples; expected some of {', '.join(MEASURED)}")
     for name in GYROS:
         if f"{name}_rad_s" in header and f"{name}_deg_s" in header:
-            table.fault(1, f"{name}_deg_s", f"given twice, also as {name}_rad_s; remove one of them")
+            table.fault(
+                1, f"{name}_deg_s", f"given twice, also as {name}_rad_s; remove one of them"
+            )
     for group in (ANGLES, AXIS, QUATERNION, CROSSED, TOWARDS):
         missing = [name for name in group if name not in header]
         if 0 < len(missing) < len(group):
-            table.fault(1, missing[0], f"the column is missing beside {next(name for name in group if name in header)}")
+            table.fault(
+                1,
+                missing[0],
+                f"the column is missing beside {next(name for name in group if name in header)}",
+            )
     if TOWARDS[0] in header and CROSSED[0] not in header:
         table.fault(1, CROSSED[0], f"the column is missing beside {TOWARDS[0]}")
     if set(ANGLES) & set(header) and set(AXIS) & set(header):
-        table.fault(1, ANGLES[0], f"the axis is given twice, also as {', '.join(AXIS)}; remove one of them")
+        table.fault(
+            1, ANGLES[0], f"the axis is given twice, also as {', '.join(AXIS)}; remove one of them"
+        )
     table.expect()
     times, columns = _samples(table, spacecraft)
     there = {name: np.isfinite(values) for name, values in columns.items()}
@@ -149,7 +204,9 @@ def _read_samples(path: str | Path, spacecraft: Spacecraft, schedule: Schedule) 
         out = absurd(spacecraft, name, signals[name])
         if 0.0 < out.mean() <= BROKEN:
             signals[name][out] = math.nan
-            table.warned.append(f"{path}: {name}: {out.sum()} samples that no motion shows are left out")
+            table.warned.append(
+                f"{path}: {name}: {out.sum()} samples that no motion shows are left out"
+            )
     _expect_unit(table, signals, spacecraft.spin)
     seen, step = _sun_column(table, times, columns.get(SUN_PULSE))
     table.check()
@@ -171,7 +228,11 @@ def _samples(table: Table, spacecraft: Spacecraft) -> tuple[Vector, dict[str, Ve
     column = TIMES[0] if TIMES[0] in table.header else TIMES[1]
     given = None if spacecraft.attitude is None else spacecraft.attitude.epoch
     if column == TIMES[1] and given is None:
-        table.fault(1, column, "the spacecraft file has no attitude.epoch to count from; expected the column t_s")
+        table.fault(
+            1,
+            column,
+            "the spacecraft file has no attitude.epoch to count from; expected the column t_s",
+        )
     table.check()
     epoch = Epoch.parse(given) if column == TIMES[1] and given is not None else None
     moments: list[float] = []
@@ -188,7 +249,9 @@ def _samples(table: Table, spacecraft: Spacecraft) -> tuple[Vector, dict[str, Ve
     table.check()
     columns = {}
     for name in (name for name in MEASURED if name in table.known and name in table.header):
-        numbers = (row.number(name) if row[name].lower() not in ("", "nan") else None for row in table.rows)
+        numbers = (
+            row.number(name) if row[name].lower() not in ("", "nan") else None for row in table.rows
+        )
         columns[name] = np.array([math.nan if number is None else number for number in numbers])
     for name, (least, most) in LIMITS.items():
         if name not in columns:
@@ -212,9 +275,15 @@ def _expect_time(table: Table) -> None:
         table.fault(1, TIMES[1], f"two columns of times: expected {TIMES[0]} or {TIMES[1]}")
 
 
-def _signals(table: Table, columns: Mapping[str, Vector], spacecraft: Spacecraft) -> dict[str, Vector]:
-    """Measured body rates, axis, attitude, directions and acceleration, in SI; quaternions go before the axis."""
-    signals = {RATES[name][0]: RATES[name][1] * values for name, values in columns.items() if name in RATES}
+def _signals(
+    table: Table, columns: Mapping[str, Vector], spacecraft: Spacecraft
+) -> dict[str, Vector]:
+    """Measured body rates, axis, attitude, directions and acceleration, in SI; quaternions go
+    before the axis.
+    """
+    signals = {
+        RATES[name][0]: RATES[name][1] * values for name, values in columns.items() if name in RATES
+    }
     if ACCELERATIONS in columns:
         signals[ACCELERATION] = columns[ACCELERATIONS]
     if ASPECTS in columns:
@@ -227,7 +296,11 @@ def _signals(table: Table, columns: Mapping[str, Vector], spacecraft: Spacecraft
         signals |= of_quaternions(_unit(table, columns, QUATERNION, "quaternion"), spacecraft)
     if CROSSED[0] in columns:
         seen = _towards(columns, CROSSED)
-        to = _towards(columns, TOWARDS) if TOWARDS[0] in columns else np.full((len(table.rows), 3), math.nan)
+        to = (
+            _towards(columns, TOWARDS)
+            if TOWARDS[0] in columns
+            else np.full((len(table.rows), 3), math.nan)
+        )
         if spacecraft.sun is not None:
             to = np.where(np.isfinite(to), to, spacecraft.sun)
         signals |= dict(zip((*SEEN, *DIRECTION), np.column_stack([seen, to]).T, strict=True))
@@ -235,18 +308,24 @@ def _signals(table: Table, columns: Mapping[str, Vector], spacecraft: Spacecraft
 
 
 def _towards(columns: Mapping[str, Vector], names: Sequence[str]) -> Vector:
-    """Unit vectors (n, 3) by two columns of angles: about axis 3, and up from the plane across it."""
+    """Unit vectors (n, 3) by two columns of angles: about axis 3,
+    and up from the plane across it.
+    """
     around, up = (np.radians(columns[name]) for name in names)
     across = np.cos(up)
     return np.column_stack([across * np.cos(around), across * np.sin(around), np.sin(up)])
 
 
 def _unit(table: Table, columns: Mapping[str, Vector], names: Sequence[str], what: str) -> Vector:
-    """Vectors (n, k) of length 1 by their columns; a fault for the first that has another length."""
+    """Vectors (n, k) of length 1 by their columns;
+    a fault for the first that has another length.
+    """
     vectors = np.column_stack([columns[name] for name in names])
     sizes = np.linalg.norm(vectors, axis=1)
     wrong = np.abs(sizes - 1.0) > UNIT_LENGTH
-    _fault_first(table, wrong, names[0], f"the {what} has length {sizes[wrong.argmax()]:.4g}; expected 1")
+    _fault_first(
+        table, wrong, names[0], f"the {what} has length {sizes[wrong.argmax()]:.4g}; expected 1"
+    )
     return np.asarray(vectors / sizes[:, None])
 
 
@@ -256,9 +335,14 @@ def _expect_unit(table: Table, signals: Mapping[str, Vector], spin: float) -> No
     if name not in signals or spin == 0.0:
         return
     column = next(entry for entry in table.header if RATES.get(entry, ("",))[0] == name)
-    ratio, units = abs(float(np.nanmedian(signals[name])) / spin), KINDS["rate"].factors.items()
+    ratio = abs(float(np.nanmedian(signals[name])) / spin)
+    units = KINDS["rate"].factors.items()
     own = RATES[column][1]
-    meant = [(own / size, f"are the values of this column in {unit}") for unit, size in units if size != own]
+    meant = [
+        (own / size, f"are the values of this column in {unit}")
+        for unit, size in units
+        if size != own
+    ]
     meant += [(size, f"is the spin of the file in {unit}") for unit, size in units if size != 1.0]
     words = next((words for size, words in meant if abs(ratio / size - 1.0) < SAME), None)
     if words is not None:
@@ -267,7 +351,9 @@ def _expect_unit(table: Table, signals: Mapping[str, Vector], spin: float) -> No
 
 
 def _sun_column(table: Table, times: Vector, values: Vector | None) -> tuple[Vector, float]:
-    """Times of Sun pulses (k,) s, half a sample before the rows that first show them, and the time between samples."""
+    """Times of Sun pulses (k,) s, half a sample before the rows that first show them, and the time
+    between samples.
+    """
     if values is None:
         return np.empty(0), 0.0
     for row, value in zip(table.rows, values, strict=True):

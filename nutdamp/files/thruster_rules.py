@@ -26,7 +26,9 @@ from nutdamp.units import shown
 
 
 def torque_of(facts: Facts, path: KeyPath) -> tuple[Vector, float] | None:
-    """Torque of a thruster, and the magnitude that its rounding goes by; None where it cannot be read."""
+    """Torque of a thruster, and the magnitude that its rounding goes by; None where it cannot be
+    read.
+    """
     torque = facts.vector("torque", 3, *path, "torque")
     if torque is not None:
         return torque, norm(torque)
@@ -41,7 +43,9 @@ def torque_of(facts: Facts, path: KeyPath) -> tuple[Vector, float] | None:
 
 
 def on_times_of(facts: Facts, path: KeyPath) -> tuple[float, float]:
-    """min_on_time and max_on_time in s; 0 and infinite where they are left out or cannot be read."""
+    """min_on_time and max_on_time in s;
+    0 and infinite where they are left out or cannot be read.
+    """
     most = facts.number("time", *path, "max_on_time")
     return facts.number("time", *path, "min_on_time") or 0.0, math.inf if most is None else most
 
@@ -52,7 +56,11 @@ def instead(name: str, names: list[str]) -> str:
     close = nearest(name, few)
     if close is not None:
         return f"did you mean {shown(close)}?"
-    return f"there are {', '.join(map(shown, few))}{' …' * (names != few)}" if names else "the file has none"
+    return (
+        f"there are {', '.join(map(shown, few))}{' …' * (names != few)}"
+        if names
+        else "the file has none"
+    )
 
 
 def thrusts(facts: Facts) -> dict[str, float | None]:
@@ -94,7 +102,8 @@ def thrust_findings(root: Node) -> Iterator[Finding]:
             problem = "its thrusters do not have the same valve or impulse_bit"
             yield Finding(path, f"{problem}; write them alike, or use channels of their own")
     # A tank, or a table of impulses, is of no use without these.
-    problem, forces = "missing; tank needs to know the propellant that is used", thrusts(facts)
+    problem = "missing; tank needs to know the propellant that is used"
+    forces = thrusts(facts)
     for path in facts.below("thrusters"):
         thrust = forces.get(facts.text(*path, "name") or "", 0.0)
         unknown = thrust is None and not facts.has(*path, "force")
@@ -106,7 +115,8 @@ def thrust_findings(root: Node) -> Iterator[Finding]:
             yield Finding((*path, "impulse_bit"), "needs the thrust; give lever_arm", True)
     # Once all propellant is used, the moments must be those of a body.
     path = ("tank", "inertia_per_kg")
-    propellant, principal = facts.number("mass", "tank", "propellant"), principal_of(facts)
+    propellant = facts.number("mass", "tank", "propellant")
+    principal = principal_of(facts)
     rows = facts.vector("shed", 3, *path)
     transverse, axial = (facts.number("shed", *path, key) for key in "AC")
     if rows is None and transverse is not None and axial is not None:

@@ -1,7 +1,8 @@
 """YAML text -> plain values with their positions, by the core schema of YAML 1.2.
 
-Built on the events of PyYAML, so that no tag can build an object, nothing recurses deeply and a bomb of aliases
-is refused before it unfolds. JSON is read by the same path. Every problem becomes `FaultyFile` with its place.
+Built on the events of PyYAML, so that no tag can build an object, nothing recurses deeply and a
+bomb of aliases is refused before it unfolds. JSON is read by the same path. Every problem becomes
+`FaultyFile` with its place.
 """
 
 from __future__ import annotations
@@ -28,13 +29,16 @@ STDIN = "-"  # file name that means standard input
 
 
 def read_bytes(path: str, most: int = -1) -> bytes:
-    """Contents of a file, at most ``most`` bytes of it; ``-`` is standard input. Raises CannotRead."""
+    """Contents of a file, at most ``most`` bytes of it; ``-`` is standard input.
+    Raises CannotRead.
+    """
     try:
         if path == STDIN:
             if sys.stdin is None:
                 raise CannotRead(path, "there is no standard input")
             return sys.stdin.buffer.read(most)
-        mode, problem = Path(path).stat().st_mode, "it is a device; expected a file, a pipe or -"
+        mode = Path(path).stat().st_mode
+        problem = "it is a device; expected a file, a pipe or -"
         if stat.S_ISBLK(mode) or stat.S_ISSOCK(mode):
             raise CannotRead(path, problem)
         with Path(path).open("rb") as stream:
@@ -47,7 +51,9 @@ def read_bytes(path: str, most: int = -1) -> bytes:
 
 
 def read_limited(path: str, most: int) -> bytes:
-    """Contents of a file of at most ``most`` bytes; raises CannotRead, or FaultyFile where it is larger."""
+    """Contents of a file of at most ``most`` bytes; raises CannotRead, or FaultyFile where it is
+    larger.
+    """
     data = read_bytes(path, most + 1)
     if len(data) > most:
         raise FaultyFile([Fault(path, 1, 1, "", f"larger than {most >> 20} MiB")])
@@ -55,11 +61,15 @@ def read_limited(path: str, most: int) -> bytes:
 
 
 def utf8_text(data: bytes, name: str) -> str:
-    """The text of UTF-8 bytes, without a byte order mark; raises FaultyFile, which calls the file ``name``."""
+    """The text of UTF-8 bytes, without a byte order mark; raises FaultyFile, which calls the file
+    ``name``.
+    """
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as reason:
-        raise FaultyFile([Fault(name, 1, 1, "", f"not UTF-8 text (byte {reason.start})")]) from reason
+        raise FaultyFile(
+            [Fault(name, 1, 1, "", f"not UTF-8 text (byte {reason.start})")]
+        ) from reason
 
 
 MAX_BYTES = 1 << 20
@@ -68,7 +78,9 @@ MAX_DEPTH = 32
 
 
 class Place(NamedTuple):
-    """Line and column of a value, both from 1, 0 where there are none; or the name of a ``setting`` beside the file."""
+    """Line and column of a value, both from 1, 0 where there are none; or the name of a ``setting``
+    beside the file.
+    """
 
     line: int = 0
     column: int = 0
@@ -98,7 +110,8 @@ class Node:
         """The node at ``path`` below this one; None where there is none."""
         node: Node | None = self
         for step in path:
-            value, node = (None if node is None else node.value), None
+            value = None if node is None else node.value
+            node = None
             if isinstance(value, dict) and isinstance(step, str):
                 node = value.get(step)
             elif isinstance(value, list) and isinstance(step, int) and step < len(value):
@@ -149,7 +162,9 @@ def dotted(path: KeyPath) -> str:
 
 
 def read_text(path: Path) -> str:
-    """Text of a file; raises `CannotRead`, or `FaultyFile` where it is too large, binary or not UTF-8."""
+    """Text of a file; raises `CannotRead`, or `FaultyFile` where it is too large, binary or not
+    UTF-8.
+    """
     return decode(read_bytes(str(path), MAX_BYTES + 1), str(path))
 
 
@@ -172,13 +187,19 @@ def decode(data: bytes, name: str) -> str:
     except UnicodeDecodeError as error:
         # Python counts from behind a byte order mark here.
         position = error.start + 3 * data.startswith(b"\xef\xbb\xbf")
-        raise fault(position, f"not UTF-8 (byte {position} is 0x{data[position]:02x}); save it as UTF-8") from None
+        raise fault(
+            position, f"not UTF-8 (byte {position} is 0x{data[position]:02x}); save it as UTF-8"
+        ) from None
 
 
 def read_tree(text: str, name: str) -> tuple[Node, list[Fault]]:
-    """The mapping in a YAML text, and faults that leave it readable; raises `FaultyFile` for other texts."""
+    """The mapping in a YAML text, and faults that leave it readable; raises `FaultyFile` for other
+    texts.
+    """
     builder = _Builder(text.removeprefix("\ufeff"), name)
-    root = builder.document("a spacecraft file is a mapping with name, inertia, …", "one file holds one spacecraft")
+    root = builder.document(
+        "a spacecraft file is a mapping with name, inertia, …", "one file holds one spacecraft"
+    )
     if not isinstance(root.value, dict):
         problem = f"expected a mapping with name, inertia, …, got {shown(root.plain())}"
         raise builder.fatal(root.place, problem)
@@ -200,7 +221,8 @@ class _Events(Reader, Scanner, Parser):
         Parser.__init__(self)
 
     def scan_to_next_token(self) -> None:
-        # YAML allows tabs wherever they do not indent, and JSON is often indented with them; PyYAML allows none.
+        # YAML allows tabs wherever they do not indent, and JSON is often indented with them; PyYAML
+        # allows none.
         super().scan_to_next_token()
         while self.peek() == "\t" and (self.flow_level or not self.allow_simple_key):
             self.forward()
@@ -217,7 +239,9 @@ class _Builder:
             self.events = _Events(text)
         except ReaderError as error:
             place = _place(text, error.position)
-            raise self.fatal(place, f"the character {chr(error.character)!r} is not allowed in a text") from None
+            raise self.fatal(
+                place, f"the character {chr(error.character)!r} is not allowed in a text"
+            ) from None
 
     def fatal(self, place: Place, problem: str, path: KeyPath = ()) -> FaultyFile:
         """A fault after which reading on makes no sense, together with those found so far."""
@@ -239,7 +263,9 @@ class _Builder:
         return event
 
     def document(self, needed: str, single: str) -> Node:
-        """The only document of the stream; ``needed`` and ``single`` are the cures for none and for several."""
+        """The only document of the stream; ``needed`` and ``single`` are the cures for none and for
+        several.
+        """
         self.next()
         event = self.next()
         if isinstance(event, yaml.StreamEndEvent):
@@ -285,7 +311,11 @@ class _Builder:
         node = self.anchors.get(name)
         if node is not None:
             return node
-        problem = "lies inside the value it repeats" if name in self.anchors else f"has no anchor &{name} above it"
+        problem = (
+            "lies inside the value it repeats"
+            if name in self.anchors
+            else f"has no anchor &{name} above it"
+        )
         raise self.fatal(_at(event.start_mark), f"alias {shown('*' + name)} {problem}", path)
 
     def sequence(self, event: yaml.SequenceStartEvent, path: KeyPath) -> Node:
@@ -296,7 +326,9 @@ class _Builder:
         return Node(entries, _at(event.start_mark), size=1 + sum(entry.size for entry in entries))
 
     def mapping(self, event: yaml.Event, path: KeyPath) -> Node:
-        """A mapping, up to its end event; a key that comes again is reported and its value dropped."""
+        """A mapping, up to its end event;
+        a key that comes again is reported and its value dropped.
+        """
         assert isinstance(event, yaml.MappingStartEvent)
         self.check_tag(event.tag, ("map",), _at(event.start_mark), path)
         values: dict[str, Node] = {}
@@ -315,10 +347,14 @@ class _Builder:
                 self.faults.append(place.fault(self.name, dotted((*path, text)), problem))
             else:
                 values[text], keys[text] = value, place
-        return Node(values, _at(event.start_mark), keys, 1 + sum(node.size for node in values.values()))
+        return Node(
+            values, _at(event.start_mark), keys, 1 + sum(node.size for node in values.values())
+        )
 
     def scalar(self, event: yaml.ScalarEvent, path: KeyPath) -> Scalar:
-        """Text, number, boolean or None: a plain scalar by the core schema, unless a core tag overrides it."""
+        """Text, number, boolean or None: a plain scalar by the core schema, unless a core tag
+        overrides it.
+        """
         place = _at(event.start_mark)
         text = self.characters(event.value, place, path)
         if event.tag is None:
@@ -329,8 +365,12 @@ class _Builder:
         self.check_tag(event.tag, _TAGS[type(value)], place, path)
         return float(value) if event.tag == f"{_CORE}float" and isinstance(value, int) else value
 
-    def check_tag(self, tag: str | None, allowed: tuple[str, ...], place: Place, path: KeyPath) -> None:
-        """Check a tag; raises `FaultyFile` where it does not fit the value, above all where it needs an object."""
+    def check_tag(
+        self, tag: str | None, allowed: tuple[str, ...], place: Place, path: KeyPath
+    ) -> None:
+        """Check a tag; raises `FaultyFile` where it does not fit the value, above all where it
+        needs an object.
+        """
         if tag not in (None, "!", *(f"{_CORE}{name}" for name in allowed)):
             name = str(tag).replace(_CORE, "!!")
             raise self.fatal(place, f"the tag {shown(name)} does not fit here; leave it out", path)
@@ -340,7 +380,9 @@ class _Builder:
         try:
             return text.encode("utf-16", "surrogatepass").decode("utf-16")
         except UnicodeDecodeError:
-            raise self.fatal(place, "half a surrogate pair; write the character itself", path) from None
+            raise self.fatal(
+                place, "half a surrogate pair; write the character itself", path
+            ) from None
 
 
 _CORE = "tag:yaml.org,2002:"
@@ -357,7 +399,9 @@ _WORDS: dict[str, Scalar] = {
     **dict.fromkeys(("true", "True", "TRUE"), True),
     **dict.fromkeys(("false", "False", "FALSE"), False),
     **dict.fromkeys((".nan", ".NaN", ".NAN"), math.nan),
-    **dict.fromkeys((f"{sign}{word}" for sign in ("", "+") for word in (".inf", ".Inf", ".INF")), math.inf),
+    **dict.fromkeys(
+        (f"{sign}{word}" for sign in ("", "+") for word in (".inf", ".Inf", ".INF")), math.inf
+    ),
     **dict.fromkeys(("-.inf", "-.Inf", "-.INF"), -math.inf),
 }
 _NUMBER = re.compile(
@@ -381,20 +425,32 @@ def resolve(text: str) -> Scalar:
     return int(match[kind], _BASES[kind]) if len(text) <= 300 else math.inf
 
 
-# Messages of PyYAML's scanner and parser, and their cures for a person; True where the slip lies where the
-# construct began and not where reading it failed.
+# Messages of PyYAML's scanner and parser, and their cures for a person; True where the slip lies
+# where the construct began and not where reading it failed.
 _SYNTAX = (
     (r"'\\t' that cannot start", "a tab indents here; use spaces", False),
-    (r"mapping values are not", "a second ': ' in one line, or wrong indentation; quote texts that hold ': '", False),
+    (
+        r"mapping values are not",
+        "a second ': ' in one line, or wrong indentation; quote texts that hold ': '",
+        False,
+    ),
     (r"could not find expected ':'", "no 'key: value' (a space must follow the colon)", True),
     (r"unexpected end of stream", "the quotation mark is never closed", True),
     (r"unknown escape", "unknown \\ escape; use single quotes for texts with a backslash", False),
     (r"expected <block end>", "inconsistent indentation, or text behind a closed value", False),
     (r"expected ',' or '[\]}]'", "a comma or the closing bracket is missing", False),
-    (r"sequence entries are not", "'- ' where no list can begin; put it on a line of its own", False),
+    (
+        r"sequence entries are not",
+        "'- ' where no list can begin; put it on a line of its own",
+        False,
+    ),
     (r"expected the node content", "a value is missing before this", False),
     (r"'<document start>'", "text behind the end of the file's mapping", False),
-    (r"cannot start any token", "a text that begins with a reserved character; put it in quotes", False),
+    (
+        r"cannot start any token",
+        "a text that begins with a reserved character; put it in quotes",
+        False,
+    ),
     (r"undefined tag handle", "an unknown tag; leave it out", False),
 )
 

@@ -18,11 +18,22 @@ from nutdamp.physics import attitude, energy_sink, taylor, triaxial
 from nutdamp.physics.taylor import Falling, Forcing, TaylorPiece
 from nutdamp.physics.thruster import Ramp, Tank
 from nutdamp.spacecraft.equipment import Channel
-from nutdamp.spacecraft.model import BLOWDOWN, COLD, LIGHTER, TRAVEL, VALVES, Inertia, Spacecraft, SpinState, Vector
+from nutdamp.spacecraft.model import (
+    BLOWDOWN,
+    COLD,
+    LIGHTER,
+    TRAVEL,
+    VALVES,
+    Inertia,
+    Spacecraft,
+    SpinState,
+    Vector,
+)
 from nutdamp.spacecraft.schedule import Command, Pulse, Schedule, on_command
 from nutdamp.units import STANDARD_GRAVITY
 
-EVEN = 2e-4  # a pulse has the root of its fall over this of straight pieces, which so err by 1e-10 of it at most
+# a pulse has the root of its fall over this of straight pieces, which so err by 1e-10 of it at most
+EVEN = 2e-4
 NODES = 6  # nodes of the quadrature in each of them
 REPEATED = 60  # iterations of the search of the on-time for an impulse, at most
 CLOSE = 1e-14  # relative tolerance of that on-time
@@ -44,9 +55,13 @@ class Path(Protocol):
 def joined(
     pieces: Sequence[tuple[float, Callable[[Vector], tuple[Vector, Vector]]]], times: Vector
 ) -> tuple[Vector, Vector]:
-    """Rates (n, 3) and quaternions (n, 4) at ``times`` (n,) s by ``pieces``: the start (s) of each, and its motion."""
+    """Rates (n, 3) and quaternions (n, 4) at ``times`` (n,) s by ``pieces``: the start (s) of each,
+    and its motion.
+    """
     times = np.asarray(times, dtype=float)
-    owner = np.clip(np.searchsorted([start for start, _ in pieces], times, side="right") - 1, 0, len(pieces) - 1)
+    owner = np.clip(
+        np.searchsorted([start for start, _ in pieces], times, side="right") - 1, 0, len(pieces) - 1
+    )
     rates, quaternion = np.empty((len(times), 3)), np.empty((len(times), 4))
     for index in np.flatnonzero(np.bincount(owner)).tolist():  # np.unique would load numpy.ma
         rows = owner == index
@@ -74,18 +89,25 @@ class Arc:
 
     def motion(self, times: Vector) -> tuple[Vector, Vector]:
         """Rates (n, 3) in rad/s and quaternions (n, 4) at ``times`` (n,) s."""
-        A, C, state, since = self.A, self.C, self.state, np.asarray(times) - self.start
+        A = self.A
+        C = self.C
+        state = self.state
+        since = np.asarray(times) - self.start
         motion = state.quaternion, state.omega, state.spin, since, self.wheel
         if self.growth != 0.0:
             omega, spin, quaternion = energy_sink.arc(A, C, self.growth, *motion, self.sense)
         else:
             omega = state.omega * np.exp(-1j * ((A - C) / A * state.spin - self.wheel / A) * since)
-            spin, quaternion = np.full(len(since), state.spin), attitude.arc(A, C, *motion)
+            spin = np.full(len(since), state.spin)
+            quaternion = attitude.arc(A, C, *motion)
         return np.column_stack([omega.real, omega.imag, spin]), quaternion
 
     def end(self, time: float) -> SpinState:
         """State at ``time`` s."""
-        A, C, state, since = self.A, self.C, self.state, time - self.start
+        A = self.A
+        C = self.C
+        state = self.state
+        since = time - self.start
         motion = state.quaternion, state.omega, state.spin, since, self.wheel
         if self.growth != 0.0:
             return SpinState(*energy_sink.arc(A, C, self.growth, *motion, self.sense))
@@ -95,7 +117,9 @@ class Arc:
 
 @dataclass(frozen=True, slots=True)
 class FreeCoast:
-    """Coast of a rigid body with any principal ``moments`` in closed form, from ``state`` at ``start`` s."""
+    """Coast of a rigid body with any principal ``moments`` in closed form, from ``state`` at
+    ``start`` s.
+    """
 
     moments: tuple[float, float, float]
     start: float
@@ -104,14 +128,17 @@ class FreeCoast:
 
     def motion(self, times: Vector) -> tuple[Vector, Vector]:
         """Rates (n, 3) in rad/s and quaternions (n, 4) at ``times`` (n,) s."""
-        since, rates = np.asarray(times) - self.start, self.state.rates
+        since = np.asarray(times) - self.start
+        rates = self.state.rates
         turned = triaxial.free_attitude(self.moments, rates, self.state.quaternion, since)
         return triaxial.free_rates(self.moments, rates, since), turned
 
 
 @dataclass(frozen=True, slots=True)
 class Integrated:
-    """Motion under a constant torque, or of a body with three different moments, as Taylor pieces."""
+    """Motion under a constant torque, or of a body with three different moments,
+    as Taylor pieces.
+    """
 
     pieces: tuple[TaylorPiece, ...]
 
@@ -126,9 +153,14 @@ class Integrated:
 
 
 LONG = 20.0
-"""Turn, rad, from which a free coast of a body with three moments is flown in closed form: Taylor pieces cost more."""
+"""Turn, rad, from which a free coast of a body with three moments is flown in closed form: Taylor
+pieces cost more.
+"""
 
-LEG, PULSE = 0.03, 0.4  # units of `work` of a leg of a flight, and additional ones of an integrated leg
+LEG, PULSE = (
+    0.03,
+    0.4,
+)  # units of `work` of a leg of a flight, and additional ones of an integrated leg
 
 SPUN_STEP, STEP, SUNK_STEP = 0.012, 0.2, 0.7
 """Units of a step of a symmetric body, of any other, and of one with dissipation."""
@@ -146,7 +178,9 @@ class Push(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Dynamics:
-    """Body as flown, with all torques besides the pulses; ``known``: the legs flown before, see `remembering`."""
+    """Body as flown, with all torques besides the pulses; ``known``: the legs flown before, see
+    `remembering`.
+    """
 
     moments: tuple[float, float, float]
     constant: Vector
@@ -154,13 +188,21 @@ class Dynamics:
     known: dict[bytes, tuple[Path, SpinState]] | None = None
 
     def remembering(self) -> Dynamics:
-        """Copy with a cache for trial schedules: each flies anew only from the first changed pulse."""
+        """Copy with a cache for trial schedules:
+        each flies anew only from the first changed pulse.
+        """
         return replace(self, known={})
 
     @property
     def free(self) -> bool:
-        """True if coasts are arcs of a symmetric body without external torque, known in closed form."""
-        return self.moments[0] == self.moments[1] and not self.constant.any() and not self.forcing.turning
+        """True if coasts are arcs of a symmetric body without external torque, known in closed
+        form.
+        """
+        return (
+            self.moments[0] == self.moments[1]
+            and not self.constant.any()
+            and not self.forcing.turning
+        )
 
     def path(
         self,
@@ -173,15 +215,19 @@ class Dynamics:
         most: int,
         falling: Falling | None = None,
     ) -> tuple[Path, SpinState]:
-        """Motion from ``state`` at ``start`` to ``end`` s under the sum of ``torques``, and its final state.
+        """Motion from ``state`` at ``start`` to ``end`` s under the sum of ``torques``, and its
+        final state.
 
-        With a ``slope`` (3,) N m/s the torque runs evenly from there. Raises Infeasible for more than ``most`` steps.
+        With a ``slope`` (3,) N m/s the torque runs evenly from there. Raises Infeasible for more
+        than ``most`` steps.
         """
         push = Push(torques, slope, falling)
         if self.known is None:
             return self._path(state, start, end, push, most)
         more = (*(() if slope is None else (slope,)), *(falling or ()))
-        leg = np.concatenate([self.moments, state.rates, state.quaternion, (start, end), *torques, *more]).tobytes()
+        leg = np.concatenate(
+            [self.moments, state.rates, state.quaternion, (start, end), *torques, *more]
+        ).tobytes()
         path = self.known.get(leg)
         if path is None or path[0].steps > most:
             if len(self.known) >= REMEMBERED:
@@ -189,7 +235,9 @@ class Dynamics:
             path = self.known[leg] = self._path(state, start, end, push, most)
         return path
 
-    def _path(self, state: SpinState, start: float, end: float, push: Push, most: int) -> tuple[Path, SpinState]:
+    def _path(
+        self, state: SpinState, start: float, end: float, push: Push, most: int
+    ) -> tuple[Path, SpinState]:
         work.spend(LEG)
         torques, slope, falling = push
         if end == start or (self.free and not torques and falling is None):
@@ -198,20 +246,37 @@ class Dynamics:
             return arc, state if end == start else arc.end(end)
         torque = np.asarray(sum(torques, self.constant))
         long = float(np.linalg.norm(state.rates)) * (end - start) > LONG
-        if long and falling is None and slope is None and not torque.any() and self.forcing == Forcing():
+        if (
+            long
+            and falling is None
+            and slope is None
+            and not torque.any()
+            and self.forcing == Forcing()
+        ):
             coast = FreeCoast(self.moments, start, state)
             (rates,), (quaternion,) = coast.motion(np.array([end]))
             work.spend(PULSE)
             return coast, SpinState.of(rates, quaternion)
         pieces = taylor.integrate(
-            self.moments, torque, state.rates, state.quaternion, start, end, self.forcing, most, slope, falling
+            self.moments,
+            torque,
+            state.rates,
+            state.quaternion,
+            start,
+            end,
+            self.forcing,
+            most,
+            slope,
+            falling,
         )
         step = SPUN_STEP if self.moments[0] == self.moments[1] else STEP
         work.spend(PULSE + (SUNK_STEP if self.forcing.growth != 0.0 else step) * len(pieces))
         return Integrated(tuple(pieces)), SpinState.of(*pieces[-1].final)
 
     def command(self, pulse: Pulse) -> None:
-        """Take note of a pulse before it is flown: nothing to do where paths are told its torque."""
+        """Take note of a pulse before it is flown:
+        nothing to do where paths are told its torque.
+        """
 
     def with_moments(self, moments: Vector) -> Dynamics:
         """Copy with these principal moments (3,) kg m²."""
@@ -235,14 +300,17 @@ def make_dynamics(spacecraft: Spacecraft) -> Dynamics:
 
 
 def shed(spacecraft: Spacecraft) -> Vector | None:
-    """Decrease of the principal moments per kg of propellant used, (3,) m²; None where they stay."""
+    """Decrease of the principal moments per kg of propellant used, (3,) m²;
+    None where they stay.
+    """
     per_kg = None if spacecraft.tank is None else spacecraft.tank.inertia_per_kg
     return None if per_kg is None else np.array(per_kg)
 
 
 def lightened(spacecraft: Spacecraft, used: float) -> Inertia:
     """Inertia once ``used`` kg of propellant are gone."""
-    per_kg, inertia = shed(spacecraft), spacecraft.inertia
+    per_kg = shed(spacecraft)
+    inertia = spacecraft.inertia
     if per_kg is None or used == 0.0:
         return inertia
     first, second, third = (np.asarray(inertia.moments) - used * per_kg).tolist()
@@ -252,10 +320,16 @@ def lightened(spacecraft: Spacecraft, used: float) -> Inertia:
 class Lightening:
     """Mass-property change along a flight, as the propellant of the pulses is used."""
 
-    def __init__(self, dynamics: Dynamics, spacecraft: Spacecraft, schedule: Schedule, edges: Sequence[float]) -> None:
+    def __init__(
+        self, dynamics: Dynamics, spacecraft: Spacecraft, schedule: Schedule, edges: Sequence[float]
+    ) -> None:
         self.first, self.per_kg = dynamics.moments, shed(spacecraft)
         times = np.array([*edges, *(0.5 * (start + other) for start, other in pairwise(edges))])
-        self.used = {} if self.per_kg is None else dict(zip(times.tolist(), schedule.used_by(times), strict=True))
+        self.used = (
+            {}
+            if self.per_kg is None
+            else dict(zip(times.tolist(), schedule.used_by(times), strict=True))
+        )
 
     def halfway(self, dynamics: Dynamics, time: float) -> Dynamics:
         """Body with half of the propellant gone that is used at once at ``time`` s."""
@@ -264,11 +338,16 @@ class Lightening:
         before = max((used for when, used in self.used.items() if when < time), default=0.0)
         return dynamics.with_moments(self.first - 0.5 * (before + self.used[time]) * self.per_kg)
 
-    def between(self, dynamics: Dynamics, start: float, end: float) -> tuple[Dynamics, Falling | None]:
-        """Body at ``start`` s, and the fall of its moments, quadratic in time, to ``end`` s before the next edge."""
+    def between(
+        self, dynamics: Dynamics, start: float, end: float
+    ) -> tuple[Dynamics, Falling | None]:
+        """Body at ``start`` s, and the fall of its moments, quadratic in time, to ``end`` s before
+        the next edge.
+        """
         if self.per_kg is None:
             return dynamics, None
-        before, length = self.used[start], end - start
+        before = self.used[start]
+        length = end - start
         body = dynamics.with_moments(self.first - before * self.per_kg)
         if length == 0.0 or self.used[end] == before:
             return body, None
@@ -278,9 +357,13 @@ class Lightening:
 
 
 class Supply:
-    """Pulses ``fired`` by channel, and propellant ``used`` if the tank lasts, kg: by default, those before t = 0."""
+    """Pulses ``fired`` by channel, and propellant ``used`` if the tank lasts, kg: by default, those
+    before t = 0.
+    """
 
-    def __init__(self, spacecraft: Spacecraft, fired: Counter[str] | None = None, used: Any = None) -> None:
+    def __init__(
+        self, spacecraft: Spacecraft, fired: Counter[str] | None = None, used: Any = None
+    ) -> None:
         cold, tank = spacecraft.cold, spacecraft.tank
         before: Mapping[str, int] = {} if cold is None else cold.fired
         self.spacecraft = spacecraft
@@ -291,7 +374,9 @@ class Supply:
         self._begun = self.used
 
     def behind(self, later: Spacecraft) -> Spacecraft:
-        """Spacecraft ``later``, with the moments that it then has, and all firings so far before its t = 0."""
+        """Spacecraft ``later``, with the moments that it then has, and all firings so far before
+        its t = 0.
+        """
         cold, tank = later.cold, later.tank
         return replace(
             later,
@@ -311,17 +396,28 @@ class Supply:
             share = self.draw(pulse.propellant or 0.0)
             return pulse if share == 1.0 else weakened(pulse, share)
         commanded = pulse if pulse.command is None else on_command(channel, *pulse.loaded)
-        before, flow = self.used, self.full_flow(channel)
+        before = self.used
+        flow = self.full_flow(channel)
         level, propellant = self.take(channel, commanded.on_time)
-        torque, force = self.torque(channel, 0.5 * (before + self.used)) * level, channel.force
+        torque = self.torque(channel, 0.5 * (before + self.used)) * level
+        force = channel.force
         if self.spacecraft.tank is not None and flow is not None and propellant:
-            cold = 1.0 if self.spacecraft.cold is None else self.spacecraft.cold.factor(self.fired[channel.name] - 1)
+            cold = (
+                1.0
+                if self.spacecraft.cold is None
+                else self.spacecraft.cold.factor(self.fired[channel.name] - 1)
+            )
             commanded = falling(commanded, self.spacecraft.tank, before, flow * cold)
-        impulse, force = torque * commanded.on_time, None if force is None else force * level
-        return replace(commanded, torque=torque, impulse=impulse, force=force, propellant=propellant)
+        impulse = torque * commanded.on_time
+        force = None if force is None else force * level
+        return replace(
+            commanded, torque=torque, impulse=impulse, force=force, propellant=propellant
+        )
 
     def torque(self, channel: Channel, used: float) -> Vector:
-        """Torque of ``channel`` at the thrust of the file with ``used`` kg gone, (3,) N m: the center of mass moves."""
+        """Torque of ``channel`` at the thrust of the file with ``used`` kg gone, (3,) N m: the
+        center of mass moves.
+        """
         per_kg = self.spacecraft.center_of_mass_per_kg
         forces = [thruster.force for thruster in channel.thrusters if thruster.force is not None]
         if per_kg is None or not forces:
@@ -329,22 +425,35 @@ class Supply:
         return channel.torque - np.cross((used - self._begun) * per_kg, np.sum(forces, axis=0))
 
     def on_time_for(self, channel: Channel, effective: float) -> float:
-        """On-time (s) of the next pulse of ``channel`` with the impulse of ``effective`` s at the file's thrust."""
-        cold, tank, flow = self.spacecraft.cold, self.spacecraft.tank, self.full_flow(channel)
+        """On-time (s) of the next pulse of ``channel`` with the impulse of ``effective`` s at the
+        file's thrust.
+        """
+        cold = self.spacecraft.cold
+        tank = self.spacecraft.tank
+        flow = self.full_flow(channel)
         warm = effective / (1.0 if cold is None else cold.factor(self.fired[channel.name]))
         if tank is None:
             return warm
         on_time = warm / float(tank.thrust_factor(self.used))
-        for _ in range(REPEATED if flow is not None else 0):  # each step errs by a small share of the error before
-            before, on_time = on_time, warm / float(tank.burn(self.used, flow * effective / warm, on_time)[1])
+        for _ in range(
+            REPEATED if flow is not None else 0
+        ):  # each step errs by a small share of the error before
+            before = on_time
+            on_time = warm / float(tank.burn(self.used, flow * effective / warm, on_time)[1])
             if abs(on_time - before) <= CLOSE * on_time:
                 break
         return on_time
 
     def full_flow(self, channel: Channel) -> Any:
-        """Propellant of a second of the thrust of the file, kg; times the specific impulse where the tank has it."""
+        """Propellant of a second of the thrust of the file, kg; times the specific impulse where
+        the tank has it.
+        """
         tank = self.spacecraft.tank
-        if tank is None or tank.isp is None or any(thruster.thrust is None for thruster in channel.thrusters):
+        if (
+            tank is None
+            or tank.isp is None
+            or any(thruster.thrust is None for thruster in channel.thrusters)
+        ):
             return channel.mass_flow
         if channel.mass_flow is None:
             return None
@@ -357,8 +466,12 @@ class Supply:
         return 1.0 if tank is None else tank.share(before, propellant)
 
     def take(self, channel: Channel, on_time: Any) -> tuple[Any, Any]:
-        """Fire a pulse of effective ``on_time`` s; returns its mean level, and its propellant, kg or None."""
-        flow, tank, cold = self.full_flow(channel), self.spacecraft.tank, self.spacecraft.cold
+        """Fire a pulse of effective ``on_time`` s; returns its mean level, and its propellant, kg
+        or None.
+        """
+        flow = self.full_flow(channel)
+        tank = self.spacecraft.tank
+        cold = self.spacecraft.cold
         warmth = 1.0 if cold is None else cold.factor(self.fired[channel.name])
         if flow is None or tank is None:
             level = warmth if tank is None else warmth * tank.thrust_factor(self.used)
@@ -371,19 +484,26 @@ class Supply:
         return level * share, None if propellant is None else propellant * share
 
     def train(self, channel: Channel, on_times: Vector, count: int) -> tuple[Vector, Vector]:
-        """Sums of the levels of 1 to ``count`` pulses of effective ``on_times`` (n,) s, and propellant used after them.
+        """Sums of the levels of 1 to ``count`` pulses of effective ``on_times`` (n,) s, and
+        propellant used after them.
 
         In kg; (n, count) each. None is fired.
         """
-        flow, tank, cold = self.full_flow(channel), self.spacecraft.tank, self.spacecraft.cold
+        flow = self.full_flow(channel)
+        tank = self.spacecraft.tank
+        cold = self.spacecraft.cold
         numbers = np.arange(count)
         warmth = np.ones(count) if cold is None else cold.factor(self.fired[channel.name] + numbers)
         warm = np.cumsum(warmth)
         used = np.full((len(on_times), count), float(self.used))
         if tank is None or flow is None:
             level = 1.0 if tank is None else tank.thrust_factor(self.used)
-            return level * warm + 0.0 * used, used if flow is None else used + flow * on_times[:, None] * warm
-        gone, mean = tank.burn(self.used, flow, on_times[:, None] * warm)  # what comes between pulses takes none
+            return level * warm + 0.0 * used, used if flow is None else used + flow * on_times[
+                :, None
+            ] * warm
+        gone, mean = tank.burn(
+            self.used, flow, on_times[:, None] * warm
+        )  # what comes between pulses takes none
         levels, taken = (np.diff(total, axis=1, prepend=0.0) for total in (mean * warm, gone))
         return np.cumsum(levels * tank.share(used + gone - taken, taken), axis=1), used + gone
 
@@ -404,21 +524,32 @@ class Supply:
 
 def weakened(pulse: Pulse, factor: float) -> Pulse:
     """Pulse at ``factor`` times the thrust; reversed where that is negative."""
-    torque, force = (None if vector is None else factor * vector for vector in (pulse.torque, pulse.force))
+    torque, force = (
+        None if vector is None else factor * vector for vector in (pulse.torque, pulse.force)
+    )
     used = None if pulse.propellant is None else abs(factor) * pulse.propellant
-    return replace(pulse, impulse=factor * pulse.impulse, torque=torque, force=force, propellant=used)
+    return replace(
+        pulse, impulse=factor * pulse.impulse, torque=torque, force=force, propellant=used
+    )
 
 
 def falling(pulse: Pulse, tank: Tank, used: float, flow: float) -> Pulse:
-    """Pulse whose thrust falls with the pressure of the ``tank``, of which ``used`` kg were gone at its start.
+    """Pulse whose thrust falls with the pressure of the ``tank``, of which ``used`` kg were gone at
+    its start.
 
-    ``flow`` as in `Tank.burn`. Its ramps are straight pieces, each with impulse and centroid of the thrust there.
+    ``flow`` as in `Tank.burn`. Its ramps are straight pieces, each with impulse and centroid of the
+    thrust there.
     """
     start, on_time = pulse.loaded
-    command = pulse.command or Command(start, on_time, (Ramp(pulse.start, pulse.end, 1.0, 1.0),), valve=False)
+    command = pulse.command or Command(
+        start, on_time, (Ramp(pulse.start, pulse.end, 1.0, 1.0),), valve=False
+    )
     gone, mean = tank.burn(used, flow, pulse.on_time)
     first, last = (float(tank.thrust_factor(used + spent) / mean) for spent in (0.0, gone))
-    pieces, ramps, moment, passed = max(1, math.ceil(math.sqrt(max(first - last, 0.0) / EVEN))), list[Ramp](), 0.0, 0.0
+    pieces = max(1, math.ceil(math.sqrt(max(first - last, 0.0) / EVEN)))
+    ramps = list[Ramp]()
+    moment = 0.0
+    passed = 0.0
     nodes, weights = gauss_legendre(NODES)
     for ramp in command.ramps:
         length = (ramp.end - ramp.begin) / pieces
@@ -440,7 +571,8 @@ def falling(pulse: Pulse, tank: Tank, used: float, flow: float) -> Pulse:
 
 def supplied(spacecraft: Spacecraft, pulses: Iterable[Pulse]) -> tuple[Pulse, ...]:
     """Pulses at their real strength, in the order of their commands."""
-    supply, channels = Supply(spacecraft), {channel.name: channel for channel in spacecraft.channels}
+    supply = Supply(spacecraft)
+    channels = {channel.name: channel for channel in spacecraft.channels}
     if supply.steady:
         return tuple(pulses)
     ordered = sorted(pulses, key=lambda pulse: pulse.loaded[0])
@@ -448,18 +580,27 @@ def supplied(spacecraft: Spacecraft, pulses: Iterable[Pulse]) -> tuple[Pulse, ..
 
 
 def lacking(spacecraft: Spacecraft, schedule: Schedule, law: str) -> tuple[Spacecraft, Schedule]:
-    """Body without one ``law`` of `Spacecraft.thrust_laws`, and the response to the commands of ``schedule``."""
+    """Body without one ``law`` of `Spacecraft.thrust_laws`, and the response to the commands of
+    ``schedule``.
+    """
     if law == VALVES:
-        body = replace(spacecraft, channels=tuple(channel.of(valve=None) for channel in spacecraft.channels))
+        body = replace(
+            spacecraft, channels=tuple(channel.of(valve=None) for channel in spacecraft.channels)
+        )
     elif law == LIGHTER and spacecraft.tank is not None:
         body = replace(spacecraft, tank=replace(spacecraft.tank, inertia_per_kg=None))
     elif law == TRAVEL:
         body = replace(spacecraft, center_of_mass_per_kg=None)
-    elif law == BLOWDOWN and spacecraft.tank is not None:  # once it is empty nothing fires, at full pressure too
-        body = replace(spacecraft, tank=replace(spacecraft.tank, final_pressure=spacecraft.tank.pressure))
+    elif (
+        law == BLOWDOWN and spacecraft.tank is not None
+    ):  # once it is empty nothing fires, at full pressure too
+        body = replace(
+            spacecraft, tank=replace(spacecraft.tank, final_pressure=spacecraft.tank.pressure)
+        )
     else:
         body = replace(spacecraft, cold=None)
-    known, fired = {channel.name: channel for channel in body.channels}, []
+    known = {channel.name: channel for channel in body.channels}
+    fired = []
     for pulse in schedule:
         commanded = pulse.channel in known and pulse.torque is not None
         fired.append(on_command(known[pulse.channel], *pulse.loaded) if commanded else pulse)

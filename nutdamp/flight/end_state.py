@@ -22,13 +22,19 @@ SHARE = 0.1  # tolerance of the impulse sum, as a fraction of a bound of the req
 TRIED = 8  # turns of the axis that are examined closely
 
 LEGENDRE = ((-0.8611363115940526, 0.34785484513745385), (-0.33998104358485626, 0.6521451548625461))
-"""Half of the four-point Gauss-Legendre rule on [-1, 1]: (node, weight); the other half is its mirror image."""
+"""Half of the four-point Gauss-Legendre rule on [-1, 1]: (node, weight); the other half is its
+mirror image.
+"""
 
 
 def momentum_gained(flown: Flight) -> Vector:
-    """∫ R(t) F dt over all pulses, (3,) N s, by Gauss-Legendre over stretches of at most half a radian."""
+    """∫ R(t) F dt over all pulses, (3,) N s, by Gauss-Legendre over stretches of at most half a
+    radian.
+    """
     gained = np.zeros(3)
-    nodes, weights = np.array([(sign * node, weight) for node, weight in LEGENDRE for sign in (1.0, -1.0)]).T
+    nodes, weights = np.array(
+        [(sign * node, weight) for node, weight in LEGENDRE for sign in (1.0, -1.0)]
+    ).T
     for leg in flown.legs:
         firing = [p for p in flown.schedule if p.thrust[0] <= leg.start and leg.end <= p.thrust[1]]
         if leg.end == leg.start or not any(p.force is not None and p.force.any() for p in firing):
@@ -38,13 +44,17 @@ def momentum_gained(flown: Flight) -> Vector:
         edges = np.linspace(leg.start, leg.end, math.ceil(turned / 0.5) + 1)
         middles, half = 0.5 * (edges[1:] + edges[:-1]), 0.5 * (edges[1] - edges[0])
         times = (middles[:, None] + half * nodes).ravel()
-        pushes = attitude.rotate(leg.path.motion(times)[1], _forces(firing, times)).reshape(-1, len(nodes), 3)
+        pushes = attitude.rotate(leg.path.motion(times)[1], _forces(firing, times)).reshape(
+            -1, len(nodes), 3
+        )
         gained += half * np.einsum("snc,n->c", pushes, weights)
     return gained
 
 
 def _forces(firing: Iterable[Pulse], times: Vector) -> Vector:
-    """Force (3,) N of pulses, or (n, 3) at the ``times`` (n,) s where that of one of them rises or falls."""
+    """Force (3,) N of pulses, or (n, 3) at the ``times`` (n,) s where that of one of them rises or
+    falls.
+    """
     total = np.zeros(3)
     for pulse in firing:
         if pulse.force is None:
@@ -81,7 +91,9 @@ def seen_at(flight: Flight, time: float) -> Flight:
     begun = [begins < time or begins == ends == time for begins, ends in flight.spans]
     return replace(
         flight,
-        schedule=flight.schedule if all(begun) else Schedule(tuple(compress(flight.schedule, begun))),
+        schedule=flight.schedule
+        if all(begun)
+        else Schedule(tuple(compress(flight.schedule, begun))),
         settled=SpinState.of(rates[0], quaternion[0]),
         spans=tuple((begins, min(ends, time)) for begins, ends in compress(flight.spans, begun)),
         until=time,
@@ -91,16 +103,20 @@ def seen_at(flight: Flight, time: float) -> Flight:
 def spin_phases(flight: Flight, times: Vector) -> Vector:
     """Magnus 1970 (2): α = ∫ω3 dt from t = 0 to each of the ascending ``times`` (n,) s, rad.
 
-    By Simpson's rule over stretches of at most half a radian, exact where ω3 is constant or changes linearly.
+    By Simpson's rule over stretches of at most half a radian, exact where ω3 is constant or changes
+    linearly.
     """
     last = float(times[-1]) if len(times) else 0.0
     edges = sorted({0.0, *times.tolist(), *(leg.end for leg in flight.legs if leg.end <= last)})
-    phases, phase = {0.0: 0.0}, 0.0
+    phases = {0.0: 0.0}
+    phase = 0.0
     for begin, end in pairwise(edges):
         spins = abs(flight.motion(np.array([begin, end]))[0][:, 2])
         count = 2 * math.ceil(float(spins.max()) * (end - begin) / 0.5) + 2
         spin = flight.motion(np.linspace(begin, end, count + 1)[:-1])[0][:, 2]
-        final = flight.motion(np.array([np.nextafter(end, begin)]))[0][0, 2]  # before a jump at the end
+        final = flight.motion(np.array([np.nextafter(end, begin)]))[0][
+            0, 2
+        ]  # before a jump at the end
         weights = np.ones(count)
         weights[1::2], weights[2::2] = 4.0, 2.0
         phase += (end - begin) / (3.0 * count) * float(weights @ spin + final)
@@ -121,7 +137,9 @@ def left_on_the_way(flight: Flight, observed: Sequence[Aspect]) -> Left:
 
 
 def tolerated(spacecraft: Spacecraft) -> dict[Part, float]:
-    """Tolerated difference between models, by part: `SHARE` of what is required, `ANGLE` where nothing bounds it."""
+    """Tolerated difference between models, by part: `SHARE` of what is required, `ANGLE` where
+    nothing bounds it.
+    """
     required = {bound.part: SHARE * bound.limit for bound in requirements.required(spacecraft)}
     return {Part.NUTATION: ANGLE, requirements.aim(spacecraft): ANGLE, **required}
 
@@ -131,7 +149,9 @@ def deviations(flown: Flight, other: Flight) -> tuple[Deviation, ...]:
     ends = [left_by(flight) for flight in (flown, other)]
     differences = []
     for part, most in tolerated(flown.spacecraft).items():
-        values = ({Part.NUTATION: end.nutation, Part.SPIN: end.spin}.get(part, end.aim) for end in ends)
+        values = (
+            {Part.NUTATION: end.nutation, Part.SPIN: end.spin}.get(part, end.aim) for end in ends
+        )
         first, second = values
         if abs(first - second) > most:
             differences.append(Deviation(part, abs(first - second), most))
@@ -139,14 +159,20 @@ def deviations(flown: Flight, other: Flight) -> tuple[Deviation, ...]:
 
 
 ROWS = 48
-"""Rows in each nutation period; between them the extreme is estimated by a parabola and then searched about it."""
+"""Rows in each nutation period; between them the extreme is estimated by a parabola and then
+searched about it.
+"""
 
 CLOSE, LOOKS, FINER = 3, 3, 9
-"""Extremes that are refined, rounds of refinement, points of each: a pulse on the way bends the curve."""
+"""Extremes that are refined, rounds of refinement, points of each: a pulse on the way bends the
+curve.
+"""
 
 
 class Aspect(NamedTuple):
-    """Angles ``least`` and ``largest``, rad, from the direction of ``keep`` to the spin axis, with their times (s)."""
+    """Angles ``least`` and ``largest``, rad, from the direction of ``keep`` to the spin axis, with
+    their times (s).
+    """
 
     keep: Keep
     least: float
@@ -156,9 +182,13 @@ class Aspect(NamedTuple):
 
     @property
     def broken_at(self) -> tuple[Bound, float, float] | None:
-        """First bound that is broken, the angle, rad, and its time, s; None for a cone that is kept."""
+        """First bound that is broken, the angle, rad, and its time, s; None for a cone that is
+        kept.
+        """
         for bound in requirements.edges(self.keep):
-            angle, at = (self.least, self.least_at) if bound.inner else (self.largest, self.largest_at)
+            angle, at = (
+                (self.least, self.least_at) if bound.inner else (self.largest, self.largest_at)
+            )
             if not bound.met(angle):
                 return bound, angle, at
         return None
@@ -172,25 +202,34 @@ class Aspect(NamedTuple):
 def aspects(flown: Flight, until: float | None = None) -> tuple[Aspect, ...]:
     """For each direction that the spacecraft watches, from t = 0 to ``until`` s.
 
-    Default: one inertial nutation period after the last pulse. Raises Infeasible as `propagation.flown` does.
+    Default: one inertial nutation period after the last pulse. Raises Infeasible as
+    `propagation.flown` does.
     """
     body = flown.spacecraft
     if not body.watched:
         return ()
     end = flown.schedule.end + body.inertial_period if until is None else until
     if flown.legs[-1].end < end:
-        fly = propagation.by_impulses if flown.model == propagation.IMPULSE_SUM else propagation.flown
+        fly = (
+            propagation.by_impulses if flown.model == propagation.IMPULSE_SUM else propagation.flown
+        )
         flown = fly(body, flown.schedule, end)
-    symmetric = body.inertia.symmetric  # else the axis wobbles on its way round H as the body turns, too
+    symmetric = (
+        body.inertia.symmetric
+    )  # else the axis wobbles on its way round H as the body turns, too
     period = body.inertial_period if symmetric else min(body.inertial_period, body.body_period)
     pieces = flown.pieces(max(int(ROWS * end / period), ROWS), end)
-    rows = [(piece.t, piece.axis, piece.momentum) for piece in pieces]  # the other columns are let go
+    rows = [
+        (piece.t, piece.axis, piece.momentum) for piece in pieces
+    ]  # the other columns are let go
     times, axis, momentum = (np.concatenate(column) for column in zip(*rows, strict=True))
     del rows
     momentum /= np.linalg.norm(momentum, axis=-1, keepdims=True)
     observed = []
     for keep in body.watched:
-        towards = momentum if keep.direction is None else np.broadcast_to(keep.direction, axis.shape)
+        towards = (
+            momentum if keep.direction is None else np.broadcast_to(keep.direction, axis.shape)
+        )
         nearness = np.sum(axis * towards, axis=-1)
         tops = [
             _closer(flown, keep, way, _peaks(times, way * nearness), period / ROWS, end)
@@ -204,25 +243,43 @@ def aspects(flown: Flight, until: float | None = None) -> tuple[Aspect, ...]:
         angles = attitude.angle_between(*_axis_and_direction(flown, keep, looked[: -len(extremes)]))
         angles = np.concatenate([angles, attitude.angle_between(axis[extremes], towards[extremes])])
         near, far = int(np.argmin(angles)), int(np.argmax(angles))
-        observed.append(Aspect(keep, float(angles[near]), float(looked[near]), float(angles[far]), float(looked[far])))
+        observed.append(
+            Aspect(
+                keep,
+                float(angles[near]),
+                float(looked[near]),
+                float(angles[far]),
+                float(looked[far]),
+            )
+        )
     return tuple(observed)
 
 
 def broken(spacecraft: Spacecraft, flown: Flight) -> Aspect | None:
     """First violated cone; None where there is none."""
-    return next((aspect for aspect in aspects(flown) if not aspect.kept), None) if spacecraft.keep else None
+    return (
+        next((aspect for aspect in aspects(flown) if not aspect.kept), None)
+        if spacecraft.keep
+        else None
+    )
 
 
 def at_target(spacecraft: Spacecraft) -> Aspect | None:
     """First cone violated by an axis on the target; None where there is none, or no target."""
     target = spacecraft.goal.axis
-    angles = [] if target is None else [_seen(target, target, keep, math.inf) for keep in spacecraft.keep]
+    angles = (
+        []
+        if target is None
+        else [_seen(target, target, keep, math.inf) for keep in spacecraft.keep]
+    )
     return next((aspect for aspect in angles if not aspect.kept), None)
 
 
 def at_start(spacecraft: Spacecraft) -> tuple[Aspect, ...]:
     """Angles of the watched directions from the spin axis at t = 0."""
-    return tuple(_seen(spacecraft.axis, spacecraft.momentum, keep, 0.0) for keep in spacecraft.watched)
+    return tuple(
+        _seen(spacecraft.axis, spacecraft.momentum, keep, 0.0) for keep in spacecraft.watched
+    )
 
 
 def _seen(axis: Vector, momentum: Vector, keep: Keep, time: float) -> Aspect:
@@ -232,17 +289,25 @@ def _seen(axis: Vector, momentum: Vector, keep: Keep, time: float) -> Aspect:
 
 
 def _axis_and_direction(flown: Flight, keep: Keep, times: Vector) -> tuple[Vector, Vector]:
-    """Spin axis at ``times`` (n,) s, and the direction of a cone: unit vectors (n, 3), the second perhaps (3,)."""
+    """Spin axis at ``times`` (n,) s, and the direction of a cone: unit vectors (n, 3), the second
+    perhaps (3,).
+    """
     if keep.direction is not None:
         return flown.axis(times), keep.direction
     rates, quaternion = flown.motion(times)
-    momentum = attitude.rotate(quaternion, rates * flown.moments_at(times) + (0.0, 0.0, flown.spacecraft.inertia.wheel))
+    momentum = attitude.rotate(
+        quaternion, rates * flown.moments_at(times) + (0.0, 0.0, flown.spacecraft.inertia.wheel)
+    )
     momentum /= np.linalg.norm(momentum, axis=-1, keepdims=True)
     return flown.axis(times), momentum
 
 
-def _closer(flown: Flight, keep: Keep, way: float, times: Vector, width: float, end: float) -> Vector:
-    """Moments up to ``end`` within ``width`` s of ``times`` (n,) at which the axis is nearest to ``way``·direction."""
+def _closer(
+    flown: Flight, keep: Keep, way: float, times: Vector, width: float, end: float
+) -> Vector:
+    """Moments up to ``end`` within ``width`` s of ``times`` (n,) at which the axis is nearest to
+    ``way``·direction.
+    """
 
     def apart_at(moments: Vector) -> Vector:
         """Square of the distance between axis and direction, as points of a sphere."""
@@ -250,26 +315,37 @@ def _closer(flown: Flight, keep: Keep, way: float, times: Vector, width: float, 
         return np.asarray(np.sum((axis - way * direction) ** 2, axis=-1))
 
     times = times[np.argsort(apart_at(times), kind="stable")[:CLOSE]]
-    for _ in range(LOOKS):  # each among places a quarter as far apart, with a parabola in the square of the distance
+    for _ in range(
+        LOOKS
+    ):  # each among places a quarter as far apart, with a parabola in the square of the distance
         places = np.clip(times[:, None] + width * np.linspace(-1.0, 1.0, FINER), 0.0, end)
         apart = apart_at(places.ravel()).reshape(places.shape)
         best = np.argmin(apart, axis=1, keepdims=True)
         middle = np.clip(best, 1, FINER - 2)
-        before, here, after = (np.take_along_axis(apart, middle + step, axis=1) for step in (-1, 0, 1))
-        bend, inside = before - 2.0 * here + after, best == middle
-        shift = np.divide(0.5 * (before - after), bend, out=np.zeros_like(bend), where=inside & (bend > 0.0))
+        before, here, after = (
+            np.take_along_axis(apart, middle + step, axis=1) for step in (-1, 0, 1)
+        )
+        bend = before - 2.0 * here + after
+        inside = best == middle
+        shift = np.divide(
+            0.5 * (before - after), bend, out=np.zeros_like(bend), where=inside & (bend > 0.0)
+        )
         width *= 2.0 / (FINER - 1)
         times = np.clip(np.take_along_axis(places, best, axis=1) + width * shift, 0.0, end)[:, 0]
     return times
 
 
 def _peaks(times: Vector, values: Vector) -> Vector:
-    """Times of the largest of ``values`` (n,), and of the `TRIED` highest parabolas with the top between their rows."""
+    """Times of the largest of ``values`` (n,), and of the `TRIED` highest parabolas with the top
+    between their rows.
+    """
     before, after = np.diff(times)[:-1], np.diff(times)[1:]
     with np.errstate(divide="ignore", invalid="ignore"):
         rise, fall = np.diff(values)[:-1] / before, np.diff(values)[1:] / after
         way = 0.5 * (rise * after + fall * before) / (rise - fall)
-        peaked = np.flatnonzero((before > 0.0) & (after > 0.0) & (rise > fall) & (-before < way) & (way < after))
+        peaked = np.flatnonzero(
+            (before > 0.0) & (after > 0.0) & (rise > fall) & (-before < way) & (way < after)
+        )
     before, after, rise, fall, way = (values[peaked] for values in (before, after, rise, fall, way))
     heights = values[1 + peaked] + (rise - fall) / (before + after) * way**2
     highest = np.argsort(-heights)[:TRIED]

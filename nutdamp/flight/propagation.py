@@ -1,7 +1,8 @@
-"""Propagation of schedules, by impulse sum or real pulse widths, and the track: motion over time as arrays.
+"""Propagation of schedules, by impulse sum or real pulse widths, and the track: motion over time as
+arrays.
 
-`by_impulses` is the plan's own model, the impulse sum (17) with effective impulses. `flown` is the judge: real
-widths, true moments. Both give legs that evaluate the motion at any time.
+`by_impulses` is the plan's own model, the impulse sum (17) with effective impulses. `flown` is the
+judge: real widths, true moments. Both give legs that evaluate the motion at any time.
 """
 
 from __future__ import annotations
@@ -16,7 +17,15 @@ from numpy.typing import NDArray
 
 from nutdamp.common.numerics import SAME_ANGLE
 from nutdamp.common.results import Tabled
-from nutdamp.flight.dynamics import Dynamics, Lightening, Path, joined, lightened, make_dynamics, shed
+from nutdamp.flight.dynamics import (
+    Dynamics,
+    Lightening,
+    Path,
+    joined,
+    lightened,
+    make_dynamics,
+    shed,
+)
 from nutdamp.physics import attitude, response, taylor
 from nutdamp.physics.triaxial import arc_cones, widest_cones
 from nutdamp.spacecraft.model import Inertia, Spacecraft, SpinState, Vector
@@ -25,7 +34,8 @@ from nutdamp.spacecraft.schedule import Pulse, Schedule
 Array = NDArray[np.float64]
 
 PIECE = 20_000  # rows of a track that are held at a time where many are written
-BINS = 7200  # parts of a turn by which a range of right ascension is distinguished from a whole turn: 0.05 deg
+# parts of a turn by which a range of right ascension is distinguished from a whole turn: 0.05 deg
+BINS = 7200
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,11 +56,14 @@ class Track:
 def widest(track: Track, moments: Array, sense: float, wheel: float) -> Track:
     """Track with the cone angles at the largest nutation of the free motion through each row.
 
-    ``moments`` (kg m²) are (3,), or (n, 3) where they change; ``wheel`` is h in N m s. The spin axis is ``sense``·e3.
+    ``moments`` (kg m²) are (3,), or (n, 3) where they change; ``wheel`` is h in N m s. The spin
+    axis is ``sense``·e3.
     """
     if np.array_equal(moments[..., 0], moments[..., 1]):
         return track
-    nutation, body_cone = widest_cones(np.broadcast_to(moments, track.rates.shape).T, track.rates.T, sense, wheel)
+    nutation, body_cone = widest_cones(
+        np.broadcast_to(moments, track.rates.shape).T, track.rates.T, sense, wheel
+    )
     return replace(track, nutation=nutation, body_cone=body_cone, space_cone=nutation - body_cone)
 
 
@@ -60,10 +73,16 @@ def in_file_axes(track: Track, inertia: Inertia) -> Track:
     return replace(track, rates=rates, quaternion=quaternion)
 
 
-def even_times(samples: int, until: float, start: float, end: float) -> Iterator[tuple[Array, bool, bool]]:
-    """Parts of np.linspace(0, ``until``, ``samples``) within ``start`` to ``end``, with marks of the first and last."""
+def even_times(
+    samples: int, until: float, start: float, end: float
+) -> Iterator[tuple[Array, bool, bool]]:
+    """Parts of np.linspace(0, ``until``, ``samples``) within ``start`` to ``end``, with marks of
+    the first and last.
+    """
     step = until / max(samples - 1, 1)
-    low, high = (min(max(int(time / step) + more, 0), samples) for time, more in ((start, -1), (end, 2)))
+    low, high = (
+        min(max(int(time / step) + more, 0), samples) for time, more in ((start, -1), (end, 2))
+    )
     for begin in range(low, max(high, low + 1), PIECE):
         index = np.arange(begin, min(begin + PIECE, high))
         times: Array = np.asarray(index * step, dtype=np.float64)
@@ -88,24 +107,32 @@ class Extremes:
 
 def extremes(pieces: Iterable[Track]) -> Extremes:
     """Extremes of the axis track over the rows of its pieces, at least one."""
-    rows, until, start = 0, 0.0, np.zeros(3)
-    far, near, ascension = _Record(), _Record(), _Circle()
+    rows = 0
+    until = 0.0
+    start = np.zeros(3)
+    far = _Record()
+    near = _Record()
+    ascension = _Circle()
     low, high = np.full(3, math.inf), np.full(3, -math.inf)
     for piece in pieces:
         if not len(piece.t):
             continue
         start = piece.momentum[0] if rows == 0 else start
-        rows, until = rows + len(piece.t), float(piece.t[-1])
+        rows = rows + len(piece.t)
+        until = float(piece.t[-1])
         away = attitude.angle_between(piece.axis, start)
         far.add(away, piece.t)
         near.add(-away, piece.t)
         declination = np.arctan2(piece.axis[:, 2], np.hypot(piece.axis[:, 0], piece.axis[:, 1]))
         angles = np.column_stack([np.arcsin(np.clip(piece.axis[:, :2], -1.0, 1.0)), declination])
-        low, high = np.minimum(low, angles.min(axis=0)), np.maximum(high, angles.max(axis=0))
+        low = np.minimum(low, angles.min(axis=0))
+        high = np.maximum(high, angles.max(axis=0))
         ascension.add(np.arctan2(piece.axis[:, 1], piece.axis[:, 0]))
     nearest, when = near.first
     x, y, declinations = zip(low.tolist(), high.tolist(), strict=True)
-    return Extremes(rows, until, far.first, (-nearest, when), x, y, ascension.shortest, declinations)
+    return Extremes(
+        rows, until, far.first, (-nearest, when), x, y, ascension.shortest, declinations
+    )
 
 
 class _Record:
@@ -119,7 +146,10 @@ class _Record:
         before = self.values[-1] if len(self.values) else -math.inf
         so_far = np.maximum.accumulate(np.concatenate([[before], values]))
         new = values > so_far[:-1]
-        self.values, self.times = np.append(self.values, values[new]), np.append(self.times, times[new])
+        self.values, self.times = (
+            np.append(self.values, values[new]),
+            np.append(self.times, times[new]),
+        )
         kept = self.values >= so_far[-1] - SAME_ANGLE
         self.values, self.times = self.values[kept], self.times[kept]
 
@@ -129,7 +159,9 @@ class _Record:
 
 
 class _Circle:
-    """Shortest arc that holds many angles: all but the widest gap between neighbours in different `BINS`."""
+    """Shortest arc that holds many angles: all but the widest gap between neighbours in different
+    `BINS`.
+    """
 
     def __init__(self) -> None:
         self.low, self.high = np.full(BINS, math.inf), np.full(BINS, -math.inf)
@@ -152,13 +184,19 @@ class _Circle:
 
 IMPULSE_SUM = "impulse sum (17)"
 REAL_WIDTHS = "real pulse widths"  # models of the flight of a schedule
-IDEAL_IMPULSES = "exact motion, ideal impulses"  # name of the second model for people where no pulse has a width
-PLANNED_STEPS = 30_000  # steps of integration to fly a planned schedule, at most: some 60,000 radians
+IDEAL_IMPULSES = (
+    "exact motion, ideal impulses"  # name of the second model for people where no pulse has a width
+)
+PLANNED_STEPS = (
+    30_000  # steps of integration to fly a planned schedule, at most: some 60,000 radians
+)
 
 
 def model_name(schedules: Iterable[Schedule], model: str = REAL_WIDTHS) -> str:
     """Name of the model of ``schedules`` for people; widths are named where a pulse has one."""
-    wide = model != REAL_WIDTHS or any(pulse.on_time for schedule in schedules for pulse in schedule)
+    wide = model != REAL_WIDTHS or any(
+        pulse.on_time for schedule in schedules for pulse in schedule
+    )
     return model if wide else IDEAL_IMPULSES
 
 
@@ -181,7 +219,9 @@ class Final:
     axis: Vector  # spin axis, inertial unit vector (3,)
     momentum: Vector  # direction of H, the same
     spin: float  # ω3, rad/s
-    nutation: float  # as in `Residual`, rad: the half-angle at which the axis goes round H from then on
+    nutation: (
+        float  # as in `Residual`, rad: the half-angle at which the axis goes round H from then on
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -209,7 +249,9 @@ class Flight(Tabled):
     legs: tuple[Leg, ...]  # in order
     settled: SpinState  # just after the end of the last pulse
     moments: tuple[float, float, float]  # at t = 0
-    spans: tuple[tuple[float, float], ...]  # times (s) between which each pulse acts, its centre twice for impulses
+    spans: tuple[
+        tuple[float, float], ...
+    ]  # times (s) between which each pulse acts, its centre twice for impulses
     model: str = REAL_WIDTHS
     until: float | None = None  # end of the rows it is shown by, s; None: that of its last leg
     samples: int = 1000  # even times among these, besides rows just before and after each pulse
@@ -235,7 +277,12 @@ class Flight(Tabled):
         """Final direction of spin axis and angular momentum."""
         state, momentum = self.settled, self.last_momentum
         axis = attitude.rotate(state.quaternion, np.array([0.0, 0.0, self.spacecraft.sense]))
-        return Final(axis, np.asarray(momentum / np.linalg.norm(momentum)), state.spin, self.residual.nutation)
+        return Final(
+            axis,
+            np.asarray(momentum / np.linalg.norm(momentum)),
+            state.spin,
+            self.residual.nutation,
+        )
 
     @property
     def last_momentum(self) -> Vector:
@@ -244,11 +291,15 @@ class Flight(Tabled):
         return attitude.rotate(self.settled.quaternion, inertia.momentum(self.settled.rates))
 
     def moments_at(self, times: Vector) -> Vector:
-        """Principal moments (kg m²) at ``times`` (n,) s: (3,), or (n, 3) where they fall with the propellant used."""
+        """Principal moments (kg m²) at ``times`` (n,) s: (3,), or (n, 3) where they fall with the
+        propellant used.
+        """
         per_kg = shed(self.spacecraft)
         if per_kg is None:
             return np.asarray(self.moments)
-        used = self.schedule.used_by(np.asarray(times, dtype=float), at_once=self.model == IMPULSE_SUM)
+        used = self.schedule.used_by(
+            np.asarray(times, dtype=float), at_once=self.model == IMPULSE_SUM
+        )
         return self.moments - used[:, None] * per_kg
 
     @property
@@ -278,31 +329,41 @@ class Flight(Tabled):
         return in_file_axes(self.sampled(self.samples, self.shown_to), self.spacecraft.inertia)
 
     def sampled(self, samples: int, until: float) -> Track:
-        """Motion at ``samples`` even times from 0 to ``until`` s, which it reaches, and before and after each pulse."""
+        """Motion at ``samples`` even times from 0 to ``until`` s, which it reaches, and before and
+        after each pulse.
+        """
         return self._track(self._motions(samples, until))
 
     def pieces(self, samples: int, until: float) -> Iterator[Track]:
         """Rows of `sampled` in order, about `PIECE` at a time, to bound memory."""
-        motions, count = list[Motion](), 0
+        motions = list[Motion]()
+        count = 0
         for motion in self._motions(samples, until):
             motions.append(motion)
             count += len(motion[0])
             if count >= PIECE:
                 yield self._track(motions)
-                motions, count = [], 0
+                motions = []
+                count = 0
         if motions:
             yield self._track(motions)
 
     def _track(self, motions: Iterable[Motion]) -> Track:
-        """All that follows from the motion. Cone angles are of each moment; with I1 ≠ I2 they swing: see `widest`."""
-        t, rates, quaternion, pulse = (np.concatenate(column) for column in zip(*motions, strict=True))
+        """All that follows from the motion. Cone angles are of each moment; with I1 ≠ I2 they
+        swing: see `widest`.
+        """
+        t, rates, quaternion, pulse = (
+            np.concatenate(column) for column in zip(*motions, strict=True)
+        )
         sense = self.spacecraft.sense
         momentum = rates * self.moments_at(t) + np.array([0.0, 0.0, self.spacecraft.inertia.wheel])
         nutation = np.arctan2(np.hypot(momentum[:, 0], momentum[:, 1]), sense * momentum[:, 2])
         body_cone = np.arctan2(np.hypot(rates[:, 0], rates[:, 1]), sense * rates[:, 2])
         axis = attitude.rotate(quaternion, np.array([0.0, 0.0, sense]))
         in_space = attitude.rotate(quaternion, momentum)
-        return Track(t, rates, quaternion, axis, in_space, nutation, body_cone, nutation - body_cone, pulse)
+        return Track(
+            t, rates, quaternion, axis, in_space, nutation, body_cone, nutation - body_cone, pulse
+        )
 
     def _motions(self, samples: int, until: float) -> Iterator[Motion]:
         """Rows of a track by leg, and each leg in stretches of `PIECE` even times."""
@@ -319,29 +380,38 @@ class Flight(Tabled):
                 yield times, body, quaternion, completed
 
     def around_pulses(self) -> tuple[Track, Track]:
-        """Motion just before and after each pulse, a row per pulse; cone angles as in `Residual`."""
+        """Motion just before and after each pulse, a row per pulse;
+        cone angles as in `Residual`.
+        """
         nothing = np.empty(0), np.empty((0, 3)), np.empty((0, 4)), np.empty(0, dtype=np.int64)
         before, after = [nothing], [nothing]
         starts, overs = [leg.start for leg in self.legs], [leg.end for leg in self.legs]
         for completed, span in enumerate(self.spans):
-            first, last = self.legs[bisect_left(overs, span[0])], self.legs[bisect_right(starts, span[1]) - 1]
+            first, last = (
+                self.legs[bisect_left(overs, span[0])],
+                self.legs[bisect_right(starts, span[1]) - 1],
+            )
             begins, ends = np.array([span[0]]), np.array([span[1]])
             before.append((begins, *first.path.motion(begins), np.array([completed])))
             after.append((ends, *last.path.motion(ends), np.array([completed + 1])))
         return self._widest(before), self._widest(after)
 
     def _widest(self, motions: Iterable[Motion]) -> Track:
-        track, body = self._track(motions), self.spacecraft
+        track = self._track(motions)
+        body = self.spacecraft
         return widest(track, self.moments_at(track.t), body.sense, body.inertia.wheel)
 
 
 def by_impulses(spacecraft: Spacecraft, schedule: Schedule, until: float = 0.0) -> Flight:
     """Impulse-sum solution, Magnus 1970 (17), pulse by pulse.
 
-    Each pulse acts at its centre with its effective impulse (`effective_impulses`); between them the motion is that of
-    `flown`. The last leg reaches at least to ``until`` s. Raises Infeasible as `flown` does.
+    Each pulse acts at its centre with its effective impulse (`effective_impulses`); between them
+    the motion is that of `flown`. The last leg reaches at least to ``until`` s. Raises Infeasible
+    as `flown` does.
     """
-    dynamics, state, allowed = make_dynamics(spacecraft), spacecraft.initial, _allowed(schedule, until)
+    dynamics = make_dynamics(spacecraft)
+    state = spacecraft.initial
+    allowed = _allowed(schedule, until)
     legs: list[Leg] = []
     now, used = 0.0, 0.0
     for index, pulse in enumerate(schedule):
@@ -353,55 +423,77 @@ def by_impulses(spacecraft: Spacecraft, schedule: Schedule, until: float = 0.0) 
         kick = _effective_impulse(spacecraft, inertia, pulse, state.spin)
         impulse = np.array([kick.real, kick.imag, pulse.impulse[2]])
         state = replace(dynamics, moments=inertia.moments).kicked(state, impulse)
-        now, used = pulse.t, used + taken
+        now = pulse.t
+        used = used + taken
         dynamics = replace(dynamics, moments=lightened(spacecraft, used).moments)
     last = max(until, schedule.end)
     path, _ = dynamics.path(state, now, last, most=allowed)
     legs.append(Leg(now, last, path, len(schedule), jump=True, completed_at_end=len(schedule)))
     spans = tuple((pulse.t, pulse.t) for pulse in schedule)
-    return Flight(spacecraft, schedule, tuple(legs), state, spacecraft.inertia.moments, spans, IMPULSE_SUM)
+    return Flight(
+        spacecraft, schedule, tuple(legs), state, spacecraft.inertia.moments, spans, IMPULSE_SUM
+    )
 
 
 def effective_impulses(spacecraft: Spacecraft, schedule: Schedule) -> NDArray[np.complex128]:
-    """J1 + iJ2 with which each pulse acts on ω at its centre, (k,) N m s: its impulse times `rates.width_factor`.
+    """J1 + iJ2 with which each pulse acts on ω at its centre, (k,) N m s: its impulse times
+    `rates.width_factor`.
 
     With I1 ≠ I2 by the rate of a small nutation, which turns on an ellipse: exact for small angles.
     """
     arcs = by_impulses(spacecraft, schedule).legs[:-1]  # each up to its pulse
     spins = [float(leg.path.motion(np.array([leg.end]))[0][0, 2]) for leg in arcs]
-    impulses, used = [], 0.0
+    impulses = []
+    used = 0.0
     for pulse, spin in zip(schedule, spins, strict=True):
         taken = pulse.propellant or 0.0
-        impulses.append(_effective_impulse(spacecraft, lightened(spacecraft, used + 0.5 * taken), pulse, spin))
+        impulses.append(
+            _effective_impulse(spacecraft, lightened(spacecraft, used + 0.5 * taken), pulse, spin)
+        )
         used += taken
     return np.array(impulses, dtype=complex)
 
 
-def _effective_impulse(spacecraft: Spacecraft, inertia: Inertia, pulse: Pulse, spin: float) -> complex:
-    """Effect of ``pulse`` on ω at its centre, N m s, with the ``inertia`` and ω3 (rad/s) before it."""
-    drift, impulse = spacecraft.spin_drift, complex(pulse.impulse[0], pulse.impulse[1])
+def _effective_impulse(
+    spacecraft: Spacecraft, inertia: Inertia, pulse: Pulse, spin: float
+) -> complex:
+    """Effect of ``pulse`` on ω at its centre, N m s, with the ``inertia`` and ω3 (rad/s)
+    before it.
+    """
+    drift = spacecraft.spin_drift
+    impulse = complex(pulse.impulse[0], pulse.impulse[1])
     axial_torque = 0.0 if pulse.torque is None else float(pulse.torque[2])
     slope = inertia.nutation_slope(spin)
-    change, turn, growth = slope * axial_torque / inertia.C, slope * drift, spacecraft.growth
+    change = slope * axial_torque / inertia.C
+    turn = slope * drift
+    growth = spacecraft.growth
     if pulse.command is not None and pulse.command.ramps:
         from nutdamp.physics import thruster  # few spacecraft have any
 
         rate = inertia.nutation_rate(spin - drift * (pulse.t - pulse.thrust[0]))
-        return impulse * thruster.shape_factor(rate, change, pulse.command.ramps, pulse.t, growth, turn)
+        return impulse * thruster.shape_factor(
+            rate, change, pulse.command.ramps, pulse.t, growth, turn
+        )
     rate = inertia.nutation_rate(spin - 0.5 * drift * pulse.on_time)
     return impulse * response.width_factor(rate, change, pulse.on_time, growth, turn)
 
 
 def flown(
-    spacecraft: Spacecraft, schedule: Schedule, until: float = 0.0, *, dynamics: Dynamics | None = None
+    spacecraft: Spacecraft,
+    schedule: Schedule,
+    until: float = 0.0,
+    *,
+    dynamics: Dynamics | None = None,
 ) -> Flight:
     """Euler's equations through the real pulse widths, with the true principal moments.
 
-    Coasts of symmetric bodies without disturbances are exact arcs, with dissipation too; everything else is Taylor
-    series at rounding accuracy. The last leg reaches at least to ``until`` s. ``dynamics``: those of the spacecraft,
-    where known. Raises Infeasible beyond `PLANNED_STEPS`, or `taylor.MOST_STEPS` where a later end is requested.
+    Coasts of symmetric bodies without disturbances are exact arcs, with dissipation too; everything
+    else is Taylor series at rounding accuracy. The last leg reaches at least to ``until`` s.
+    ``dynamics``: those of the spacecraft, where known. Raises Infeasible beyond `PLANNED_STEPS`, or
+    `taylor.MOST_STEPS` where a later end is requested.
     """
-    dynamics, state = dynamics or make_dynamics(spacecraft), spacecraft.initial
+    dynamics = dynamics or make_dynamics(spacecraft)
+    state = spacecraft.initial
     allowed = _allowed(schedule, until)
     pulses, over = schedule.pulses, schedule.end
     spans = tuple(pulse.thrust for pulse in pulses)
@@ -413,7 +505,8 @@ def flown(
     settled = state
     for now, end in zip(edges, [*edges[1:], last], strict=True):
         dynamics, falling = light.between(dynamics, now, end)
-        # So late, start and end of a very short pulse may be the same number: then it too acts at once.
+        # So late, start and end of a very short pulse may be the same number: then it too acts at
+        # once.
         kicks = [pulses[index].impulse for index in np.flatnonzero((starts == now) & (ends == now))]
         if kicks and now == 0.0:  # so that the motion just before the kick is there too
             path, _ = dynamics.path(state, now, now, most=allowed)
@@ -423,24 +516,38 @@ def flown(
         if now == over:
             settled = state
         on = [pulses[index] for index in np.flatnonzero((starts <= now) & (end <= ends))]
-        path, following = dynamics.path(state, now, end, *_torques(on, now, end), most=allowed, falling=falling)
+        path, following = dynamics.path(
+            state, now, end, *_torques(on, now, end), most=allowed, falling=falling
+        )
         allowed -= path.steps
         completed, at_end = (
-            int(np.count_nonzero((ends < time) | ((ends == time) & ((starts < time) | (time == now)))))
+            int(
+                np.count_nonzero(
+                    (ends < time) | ((ends == time) & ((starts < time) | (time == now)))
+                )
+            )
             for time in (now, end)
         )
-        legs.append(Leg(now, end, path, completed, jump=bool(kicks) or now == 0.0, completed_at_end=at_end))
+        legs.append(
+            Leg(now, end, path, completed, jump=bool(kicks) or now == 0.0, completed_at_end=at_end)
+        )
         state = following
     return Flight(spacecraft, schedule, tuple(legs), settled, light.first, spans)
 
 
-def _torques(pulses: Iterable[Pulse], start: float, end: float) -> tuple[list[Vector], Vector | None]:
-    """Torques (3,) N m at ``start`` of the ``pulses`` that fire until ``end`` s, and their slope, N m/s, or None."""
+def _torques(
+    pulses: Iterable[Pulse], start: float, end: float
+) -> tuple[list[Vector], Vector | None]:
+    """Torques (3,) N m at ``start`` of the ``pulses`` that fire until ``end`` s, and their slope, N
+    m/s, or None.
+    """
     pushes = [push for push in (pulse.push(start, end) for pulse in pulses) if push is not None]
     slopes = [slope for _, slope in pushes if slope is not None]
     return [torque for torque, _ in pushes], np.sum(slopes, axis=0) if slopes else None
 
 
 def _allowed(schedule: Schedule, until: float) -> int:
-    """Steps of integration that a flight may take: a plan is flown again and again, a track once."""
+    """Steps of integration that a flight may take: a plan is flown again and again,
+    a track once.
+    """
     return taylor.MOST_STEPS if until > schedule.end else PLANNED_STEPS

@@ -25,11 +25,14 @@ from nutdamp.spacecraft.schedule import Pulse, Schedule
 if TYPE_CHECKING:
     from nutdamp.flight.reference_model import ReferenceModel
 
-EVALUATIONS = 200_000  # evaluations of Euler's equations by DOP853, at most: a thousand turns, some 15 seconds
+# evaluations of Euler's equations by DOP853, at most: a thousand turns, some 15 seconds
+EVALUATIONS = 200_000
 
 
 def reference_model(spacecraft: Spacecraft, most: int) -> ReferenceModel:
-    """Model of the file of a ``spacecraft``, of ``most`` evaluations; raises Infeasible where it is of none."""
+    """Model of the file of a ``spacecraft``, of ``most`` evaluations; raises Infeasible where it is
+    of none.
+    """
     from nutdamp.flight.reference_model import ReferenceModel  # few commands need scipy
 
     if spacecraft.document is None:
@@ -38,7 +41,9 @@ def reference_model(spacecraft: Spacecraft, most: int) -> ReferenceModel:
 
 
 def command(model: ReferenceModel, spacecraft: Spacecraft, pulse: Pulse) -> None:
-    """Command a ``pulse`` to a ``model``: by channel and times, or as torque or impulse where the file has none."""
+    """Command a ``pulse`` to a ``model``: by channel and times, or as torque or impulse where the
+    file has none.
+    """
     fires = pulse.channel in [channel.name for channel in spacecraft.channels] and not (
         pulse.torque is None and pulse.command is None
     )
@@ -56,18 +61,23 @@ WITHOUT = "without "  # prefix of the rows of the budget that omit an effect inc
 
 @dataclass(frozen=True, slots=True)
 class Method:
-    """Method of flying the schedule: its residual and its largest differences from the flown motion."""
+    """Method of flying the schedule: its residual and its largest differences from the flown
+    motion.
+    """
 
     name: str
     nutation: float | None = None  # left, rad
     momentum_shift: float | None = None  # left, rad
     axis: float | None = None  # difference, rad
     momentum: float | None = None  # difference, rad
-    rate: float | None = None  # over |ω|, or over |H| by the largest moment where a wheel holds the body still
+    rate: float | None = (
+        None  # over |ω|, or over |H| by the largest moment where a wheel holds the body still
+    )
     missing: str = ""  # reason why it could not be flown
     outside: bool = False  # it shares nothing with the flown motion, and so is to confirm it
     exact: bool = False  # its rates between pulses are those of the flown motion
-    result: float = 0.0  # difference of nutation (t = 0, after pulses) and shift, rad, or relative of propellant
+    # difference of nutation (t = 0, after pulses) and shift, rad, or relative of propellant
+    result: float = 0.0
 
     @property
     def short(self) -> str:
@@ -77,13 +87,19 @@ class Method:
     @property
     def difference(self) -> float:
         """Largest of those that are to be none, NaN where one is unknown."""
-        differences = (self.rate,) if self.exact else (self.axis, self.momentum, self.rate, self.result)
-        return float(np.max([math.nan if difference is None else difference for difference in differences]))
+        differences = (
+            (self.rate,) if self.exact else (self.axis, self.momentum, self.rate, self.result)
+        )
+        return float(
+            np.max([math.nan if difference is None else difference for difference in differences])
+        )
 
 
 @dataclass(frozen=True, slots=True)
 class Imperfection:
-    """Residual (rad) with one imperfection alone, everything else ideal; or without one that plans include."""
+    """Residual (rad) with one imperfection alone, everything else ideal; or without one that plans
+    include.
+    """
 
     name: str
     nutation: float
@@ -93,7 +109,9 @@ class Imperfection:
 
 @dataclass(frozen=True, slots=True)
 class Conservation:
-    """Largest relative change of |H| or of the energy on a coast; ``changed``: legitimate cause, if any."""
+    """Largest relative change of |H| or of the energy on a coast; ``changed``: legitimate cause, if
+    any.
+    """
 
     name: str
     drift: float
@@ -121,14 +139,20 @@ class Verification:
 
     @property
     def disagreeing(self) -> tuple[str, ...]:
-        """Names of methods that differ from the flown motion by more than `AGREE`, or not by a number."""
+        """Names of methods that differ from the flown motion by more than `AGREE`, or not by a
+        number.
+        """
         exact = [method for method in self.methods if method.exact]
-        return tuple(method.short for method in (*self._outside, *exact) if not method.difference <= AGREE)
+        return tuple(
+            method.short for method in (*self._outside, *exact) if not method.difference <= AGREE
+        )
 
     @property
     def drifting(self) -> tuple[str, ...]:
         """Quantities that change on coasts without a cause."""
-        return tuple(quantity.name for quantity in (self.momentum, self.energy) if quantity.kept is False)
+        return tuple(
+            quantity.name for quantity in (self.momentum, self.energy) if quantity.kept is False
+        )
 
     @property
     def agree(self) -> bool:
@@ -141,30 +165,56 @@ class Verification:
 
 
 def verify(
-    spacecraft: Spacecraft, schedule: Schedule, unrounded: Schedule | None = None, *, expected: bool = False
+    spacecraft: Spacecraft,
+    schedule: Schedule,
+    unrounded: Schedule | None = None,
+    *,
+    expected: bool = False,
 ) -> Verification:
-    """Fly ``schedule`` by the impulse sum, Taylor series, the reference model and, where installed, Basilisk.
+    """Fly ``schedule`` by the impulse sum, Taylor series, the reference model and, where installed,
+    Basilisk.
 
-    ``unrounded``: the schedule before its commands were rounded to ticks; ``expected``: planned with the disturbances.
+    ``unrounded``: the schedule before its commands were rounded to ticks; ``expected``: planned
+    with the disturbances.
     """
     end = schedule.end + spacecraft.inertial_period
     judge = propagation.flown(spacecraft, schedule, end)
-    times = np.unique(np.concatenate([np.linspace(0.0, end, SAMPLES), [pulse.over for pulse in schedule]]))
+    times = np.unique(
+        np.concatenate([np.linspace(0.0, end, SAMPLES), [pulse.over for pulse in schedule]])
+    )
     methods = [
         _closed_form(judge, end, times),
-        Method("flown (Taylor series)", judge.residual.nutation, judge.residual.momentum_shift, 0.0, 0.0, 0.0),
+        Method(
+            "flown (Taylor series)",
+            judge.residual.nutation,
+            judge.residual.momentum_shift,
+            0.0,
+            0.0,
+            0.0,
+        ),
     ]
-    with work.steps(2.0 if find_spec("Basilisk") else 1.0):  # all else takes no time beside these two
+    with work.steps(
+        2.0 if find_spec("Basilisk") else 1.0
+    ):  # all else takes no time beside these two
         with work.steps(end):
             methods.append(_by_the_file(judge, end, times))
-        methods.append(_from_outside("Basilisk", judge, lambda: basilisk.fly(spacecraft, schedule, end).motion))
-    return Verification(tuple(methods), *_conserved(judge), _budget(spacecraft, schedule, unrounded, expected=expected))
+        methods.append(
+            _from_outside("Basilisk", judge, lambda: basilisk.fly(spacecraft, schedule, end).motion)
+        )
+    return Verification(
+        tuple(methods),
+        *_conserved(judge),
+        _budget(spacecraft, schedule, unrounded, expected=expected),
+    )
 
 
 def _closed_form(judge: Flight, end: float, times: Vector) -> Method:
-    """Exact arcs between effective impulses; where ω3 keeps between them, the rates by the sum (17) written out."""
+    """Exact arcs between effective impulses; where ω3 keeps between them, the rates by the sum (17)
+    written out.
+    """
     spacecraft, schedule = judge.spacecraft, judge.schedule
-    arcs, inertia = propagation.by_impulses(spacecraft, schedule, end), spacecraft.inertia
+    arcs = propagation.by_impulses(spacecraft, schedule, end)
+    inertia = spacecraft.inertia
     body, quaternion = arcs.motion(times)
     exact = inertia.symmetric and not spacecraft.disturbances and spacecraft.growth == 0.0
     if exact and shed(spacecraft) is None:
@@ -180,18 +230,30 @@ def _closed_form(judge: Flight, end: float, times: Vector) -> Method:
             inertia.wheel,
         )
         body = np.column_stack([omega.real, omega.imag, spin])
-    outside = np.all([(times <= pulse.thrust[0]) | (times >= pulse.thrust[1]) for pulse in schedule], axis=0)
-    between = np.broadcast_to(outside, times.shape)  # within a pulse the impulse has been given or not
-    left, apart = arcs.residual, _differences(judge, times, _vectors(judge, times, body, quaternion), between)
-    # While two pulses with axial torque overlap, the turn of the body within one is not that of its own torque.
+    outside = np.all(
+        [(times <= pulse.thrust[0]) | (times >= pulse.thrust[1]) for pulse in schedule], axis=0
+    )
+    between = np.broadcast_to(
+        outside, times.shape
+    )  # within a pulse the impulse has been given or not
+    left = arcs.residual
+    apart = _differences(judge, times, _vectors(judge, times, body, quaternion), between)
+    # While two pulses with axial torque overlap, the turn of the body within one is not that of its
+    # own torque.
     alone = all(one.thrust[1] <= other.thrust[0] for one, other in pairwise(schedule))
-    exact = exact and shed(spacecraft) is None and (alone or not any(pulse.impulse[2] for pulse in schedule))
+    exact = (
+        exact
+        and shed(spacecraft) is None
+        and (alone or not any(pulse.impulse[2] for pulse in schedule))
+    )
     return Method("impulse sum (17), arcs", left.nutation, left.momentum_shift, *apart, exact=exact)
 
 
 def _by_the_file(judge: Flight, end: float, times: Vector) -> Method:
     """The same commands by the reference model: motion, what is left, and propellant."""
-    name, spacecraft, schedule = "DOP853, the file alone", judge.spacecraft, judge.schedule
+    name = "DOP853, the file alone"
+    spacecraft = judge.spacecraft
+    schedule = judge.schedule
     try:
         model = reference_model(spacecraft, EVALUATIONS)
         for pulse in sorted(schedule, key=lambda pulse: pulse.loaded[0]):
@@ -199,20 +261,29 @@ def _by_the_file(judge: Flight, end: float, times: Vector) -> Method:
         path = model.fly(model.initial, 0.0, end, work.reach)
     except Infeasible as reason:
         return Method(name, missing=str(reason), outside=True)
-    vectors, falls = model.vectors(path(times), times), [one for one in schedule if one.command and one.command.fall]
-    # While a tank's pressure falls the flown thrust is one of straight pieces, which only in all is the same.
+    vectors = model.vectors(path(times), times)
+    falls = [one for one in schedule if one.command and one.command.fall]
+    # While a tank's pressure falls the flown thrust is one of straight pieces, which only in all is
+    # the same.
     even = np.all([(times <= one.thrust[0]) | (times >= one.thrust[1]) for one in falls], axis=0)
     ends = np.column_stack([model.initial, path(schedule.end)])
-    first, last = model.vectors(ends, np.array([-1.0, schedule.end]))[2]  # before an impulse at t = 0
+    first, last = model.vectors(ends, np.array([-1.0, schedule.end]))[
+        2
+    ]  # before an impulse at t = 0
     shift = math.atan2(float(np.linalg.norm(np.cross(first, last))), float(first @ last))
-    nutation, left = model.nutation(ends[:, 1], schedule.end), judge.residual
-    after, used = judge.around_pulses()[1], schedule.propellant
+    nutation = model.nutation(ends[:, 1], schedule.end)
+    left = judge.residual
+    after = judge.around_pulses()[1]
+    used = schedule.propellant
     pairs = [
         (spacecraft.nutation, model.nutation(model.initial, -1.0)),
         (left.nutation, nutation),
         (left.momentum_shift, shift),
         (model.propellant / used if used else 1.0, 1.0),
-        *((angle, model.nutation(path(t), t)) for t, angle in zip(after.t, after.nutation, strict=True)),
+        *(
+            (angle, model.nutation(path(t), t))
+            for t, angle in zip(after.t, after.nutation, strict=True)
+        ),
     ]
     return Method(
         name,
@@ -224,38 +295,64 @@ def _by_the_file(judge: Flight, end: float, times: Vector) -> Method:
     )
 
 
-def _from_outside(name: str, judge: Flight, fly: Callable[[], tuple[Vector, tuple[Vector, Vector]]]) -> Method:
-    """A method that gives times and motion only: its residual is read at the first time after the last pulse."""
+def _from_outside(
+    name: str, judge: Flight, fly: Callable[[], tuple[Vector, tuple[Vector, Vector]]]
+) -> Method:
+    """A method that gives times and motion only: its residual is read at the first time after the
+    last pulse.
+    """
     try:
         times, motion = fly()
     except (MissingExtra, Infeasible) as reason:
         return Method(name, missing=str(reason), outside=True)
-    last, craft = int(np.searchsorted(times, judge.schedule.end - 1e-9)), judge.spacecraft
+    last = int(np.searchsorted(times, judge.schedule.end - 1e-9))
+    craft = judge.spacecraft
     rates, quaternion = (part[last] for part in motion)
     inertia = replace(craft.inertia, moments=judge.last_moments)
-    shift = float(attitude.angle_between(craft.momentum, attitude.rotate(quaternion, inertia.momentum(rates))))
+    shift = float(
+        attitude.angle_between(craft.momentum, attitude.rotate(quaternion, inertia.momentum(rates)))
+    )
     nutation = arc_cones(inertia.moments, rates, craft.sense, inertia.wheel).nutation
-    return Method(name, nutation, shift, *_differences(judge, times, _vectors(judge, times, *motion)), outside=True)
+    return Method(
+        name,
+        nutation,
+        shift,
+        *_differences(judge, times, _vectors(judge, times, *motion)),
+        outside=True,
+    )
 
 
-def _vectors(judge: Flight, times: Vector, rates: Vector, quaternion: Vector) -> tuple[Vector, Vector, Vector]:
-    """Rates in the axes of the file, inertial spin axis and H, (n, 3) each, of a motion of the flown spacecraft."""
+def _vectors(
+    judge: Flight, times: Vector, rates: Vector, quaternion: Vector
+) -> tuple[Vector, Vector, Vector]:
+    """Rates in the axes of the file, inertial spin axis and H, (n, 3) each, of a motion of the
+    flown spacecraft.
+    """
     body = judge.spacecraft
     momentum = rates * judge.moments_at(times) + np.array([0.0, 0.0, body.inertia.wheel])
     axis = attitude.rotate(quaternion, np.array([0.0, 0.0, body.sense]))
-    return body.inertia.in_file_axes(rates, quaternion)[0], axis, attitude.rotate(quaternion, momentum)
+    return (
+        body.inertia.in_file_axes(rates, quaternion)[0],
+        axis,
+        attitude.rotate(quaternion, momentum),
+    )
 
 
 def _differences(
     judge: Flight, times: Vector, vectors: tuple[Vector, Vector, Vector], rows: Any = slice(None)
 ) -> tuple[float, float, float]:
-    """Largest differences of axis, H and rates from those flown at ``times`` (n,) s over the ``rows``: see `Method`."""
+    """Largest differences of axis, H and rates from those flown at ``times`` (n,) s over the
+    ``rows``: see `Method`.
+    """
     wheel = judge.spacecraft.inertia.wheel
     still = wheel and float(np.linalg.norm(judge.spacecraft.momentum)) / max(judge.moments)
     flown = _vectors(judge, times, *judge.motion(times))
     sizes = np.maximum(np.linalg.norm(flown[0], axis=1), still)
     differences = (
-        *(attitude.angle_between(one, other) for one, other in zip(vectors[1:], flown[1:], strict=True)),
+        *(
+            attitude.angle_between(one, other)
+            for one, other in zip(vectors[1:], flown[1:], strict=True)
+        ),
         np.linalg.norm(vectors[0] - flown[0], axis=1) / sizes,
     )
     axis, momentum, rate = (float(np.max(values[rows], initial=0.0)) for values in differences)
@@ -263,44 +360,60 @@ def _differences(
 
 
 def _conserved(flown: Flight) -> tuple[Conservation, Conservation]:
-    """|H| and energy along each coast: torques from outside change both, dissipation within the body the energy."""
+    """|H| and energy along each coast: torques from outside change both, dissipation within the
+    body the energy.
+    """
     firing = [pulse.thrust for pulse in flown.schedule]
     worst = [0.0, 0.0]
     for leg in flown.legs:
-        if leg.end == leg.start or any(start <= leg.start and leg.end <= end for start, end in firing):
+        if leg.end == leg.start or any(
+            start <= leg.start and leg.end <= end for start, end in firing
+        ):
             continue
         turning, _ = leg.path.motion(np.linspace(leg.start, leg.end, 25))
         moments = flown.moments_at(np.array([leg.start])).ravel()
-        size = np.linalg.norm(turning * moments + (0.0, 0.0, flown.spacecraft.inertia.wheel), axis=1)
+        size = np.linalg.norm(
+            turning * moments + (0.0, 0.0, flown.spacecraft.inertia.wheel), axis=1
+        )
         for index, value in enumerate((size, turning**2 @ moments)):
             whole = float(np.max(value)) or 1.0  # the energy of a despun body at rest is zero
             worst[index] = max(worst[index], float(np.ptp(value)) / whole)
     body = flown.spacecraft
-    outside, inside = ("disturbances",) * bool(body.disturbances), ("dissipation",) * (body.growth != 0.0)
-    return Conservation("|H|", worst[0], outside), Conservation("energy", worst[1], (*outside, *inside))
+    outside, inside = (
+        ("disturbances",) * bool(body.disturbances),
+        ("dissipation",) * (body.growth != 0.0),
+    )
+    return Conservation("|H|", worst[0], outside), Conservation(
+        "energy", worst[1], (*outside, *inside)
+    )
 
 
 def _budget(
     spacecraft: Spacecraft, schedule: Schedule, unrounded: Schedule | None, *, expected: bool
 ) -> tuple[Imperfection, ...]:
-    """Residual of the ideal flight, with each imperfection alone, with all, and without those that plans include.
+    """Residual of the ideal flight, with each imperfection alone, with all, and without those that
+    plans include.
 
     These are three moments, axial torques, dissipation and, ``expected``, disturbances.
     """
-    exact, inertia = schedule if unrounded is None else unrounded, spacecraft.inertia
+    exact = schedule if unrounded is None else unrounded
+    inertia = spacecraft.inertia
     ideal = spacecraft if expected else replace(spacecraft, disturbances=())
     sharp = _sharp(ideal, exact)
     rows = [(IDEAL, ideal, sharp)]
     if any(pulse.on_time for pulse in exact):
         rows.append(("pulse width", ideal, exact))
     if spacecraft.limits.tick is not None:
-        rounded = Schedule(supplied(spacecraft, (commandable(spacecraft, pulse) for pulse in exact)))
+        rounded = Schedule(
+            supplied(spacecraft, (commandable(spacecraft, pulse) for pulse in exact))
+        )
         rows.append(("command resolution", ideal, _sharp(ideal, rounded)))
     if spacecraft.disturbances and not expected:
         rows.append(("disturbances", spacecraft, sharp))
     rows.append((AS_FLOWN, spacecraft, schedule))
     if any(pulse.impulse[2] != 0.0 for pulse in exact):
-        flat, pulses = np.array([1.0, 1.0, 0.0]), []
+        flat = np.array([1.0, 1.0, 0.0])
+        pulses = []
         for pulse in exact:
             torque = None if pulse.torque is None else pulse.torque * flat
             pulses.append(replace(pulse, impulse=pulse.impulse * flat, torque=torque))
@@ -314,13 +427,18 @@ def _budget(
     if spacecraft.disturbances and expected:
         rows.append((f"{WITHOUT}disturbances", replace(ideal, disturbances=()), sharp))
     ends = [(name, propagation.flown(body, fired).residual) for name, body, fired in rows]
-    return tuple(Imperfection(name, left.nutation, left.momentum_shift, left.axis_error) for name, left in ends)
+    return tuple(
+        Imperfection(name, left.nutation, left.momentum_shift, left.axis_error)
+        for name, left in ends
+    )
 
 
 def _sharp(spacecraft: Spacecraft, schedule: Schedule) -> Schedule:
     """Every pulse as an ideal impulse at its centre, at its effective strength on ω."""
     pulses = []
-    for pulse, effective in zip(schedule, propagation.effective_impulses(spacecraft, schedule), strict=True):
+    for pulse, effective in zip(
+        schedule, propagation.effective_impulses(spacecraft, schedule), strict=True
+    ):
         impulse = np.array([effective.real, effective.imag, pulse.impulse[2]])
         pulses.append(Pulse(pulse.t, 0.0, pulse.channel, impulse, propellant=pulse.propellant))
     return Schedule(tuple(pulses))

@@ -25,7 +25,9 @@ from nutdamp.spacecraft.equipment import Thruster
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.schedule import STEERABLE, Pulse, Schedule
 
-Cases = Any  # one number for all cases, or an array (n,): real, or complex for complex-step derivatives
+Cases = (
+    Any  # one number for all cases, or an array (n,): real, or complex for complex-step derivatives
+)
 
 Triple = tuple[Cases, Cases, Cases]
 
@@ -81,7 +83,9 @@ def parts_of(vector: Vector) -> Triple:
 
 
 def tilt_axes(force: Vector) -> tuple[Vector, Vector]:
-    """Unit axes of tilt of a force: ``a`` perpendicular to it and to axis 3 (or 1), ``b`` to both."""
+    """Unit axes of tilt of a force: ``a`` perpendicular to it and to axis 3 (or 1),
+    ``b`` to both.
+    """
     along = force / np.linalg.norm(force)
     reference = np.array([0.0, 0.0, 1.0]) if abs(along[2]) < 0.9 else np.array([1.0, 0.0, 0.0])
     first = np.cross(along, reference)
@@ -102,7 +106,8 @@ def rotated(vector: Sequence[Cases], tilt: tuple[Cases, Cases]) -> Triple:
         return triple(vector)
     first, second = tilt
     cosine, ratio = tilted(first, second)
-    # Rodrigues: v cos φ + (u × v) sin φ + u (u·v)(1 - cos φ), with u = tilt/φ and (1 - cos φ)/φ² = ratio²/(1 + cos φ)
+    # Rodrigues: v cos φ + (u × v) sin φ + u (u·v)(1 - cos φ), with u = tilt/φ and (1 - cos φ)/φ² =
+    # ratio²/(1 + cos φ)
     along = (first * vector[0] + second * vector[1]) * ratio * ratio / (1.0 + cosine)
     turned = added(scaled(vector, cosine), scaled(cross((first, second, 0.0), vector), ratio))
     return added(turned, (first * along, second * along, 0.0))
@@ -118,27 +123,35 @@ def tank_of(body: Spacecraft, draws: Draws) -> Tank | None:
     if body.tank is None:
         return None
     names = ("propellant", "pressure", "final_pressure", "exponent")
-    changed = {name: plus(getattr(body.tank, name), draws.get(f"tank {name}", 0.0)) for name in names}
+    changed = {
+        name: plus(getattr(body.tank, name), draws.get(f"tank {name}", 0.0)) for name in names
+    }
     return replace(body.tank, **changed)
 
 
 def cold_of(body: Spacecraft, draws: Draws) -> Cold | None:
     """Cold nozzles of the cases."""
-    cold, first, pulses = body.cold, draws.get("cold", 0.0), draws.get("cold_pulses", 0.0)
+    cold = body.cold
+    first = draws.get("cold", 0.0)
+    pulses = draws.get("cold_pulses", 0.0)
     return cold and replace(cold, first=plus(cold.first, first), pulses=plus(cold.pulses, pulses))
 
 
 def supplied(
     body: Spacecraft, schedule: Schedule, draws: Draws, flows: Sequence[Cases]
 ) -> tuple[list[Cases], tuple[Cases, ...] | None, Cases]:
-    """Strength of each pulse of cases over the planned one, zero once the tank is empty; its propellant, kg, or None.
+    """Strength of each pulse of cases over the planned one, zero once the tank is empty; its
+    propellant, kg, or None.
 
-    ``flows``: propellant of each over that planned, at the same pressure and as warm. The last is the share of the tank
-    that all would take, above 1 where it does not last; 0 without a tank, or where it is not known what they take.
+    ``flows``: propellant of each over that planned, at the same pressure and as warm. The last is
+    the share of the tank that all would take, above 1 where it does not last; 0 without a tank, or
+    where it is not known what they take.
     """
     tank = tank_of(body, draws)
     known = all(pulse.propellant is not None for pulse in schedule)
-    taken: list[Cases] = [(pulse.propellant or 0.0) * flow for pulse, flow in zip(schedule, flows, strict=True)]
+    taken: list[Cases] = [
+        (pulse.propellant or 0.0) * flow for pulse, flow in zip(schedule, flows, strict=True)
+    ]
     levels: list[Cases] = [1.0] * len(flows)
     if tank is None and not ("cold" in draws or "cold_pulses" in draws):
         return levels, tuple(taken) if known else None, 0.0
@@ -157,12 +170,16 @@ def supplied(
             continue
         before, _ = nominal.take(channel, pulse.on_time)
         level, used = case.take(channel, pulse.on_time * flows[number] * higher)
-        levels[number], taken[number] = level * higher / (before or 1.0), 0.0 if used is None else used
+        levels[number], taken[number] = (
+            level * higher / (before or 1.0),
+            0.0 if used is None else used,
+        )
     drained = 0.0 if tank is None or not known else case.used / tank.propellant
     return levels, tuple(taken) if known else None, drained
 
 
-DISC = 1e-12  # rounding allowed, relatively, where moments touch the triangle inequality (flat disc, C = 2A)
+# rounding allowed, relatively, where moments touch the triangle inequality (flat disc, C = 2A)
+DISC = 1e-12
 
 NOT_NEGATIVE = ("thrust", *BY_VALVE, "cold", "cold_pulses", "inertia_per_kg", "sensor_delay")
 """Tolerances of quantities that are never negative: draws that make them so are repeated."""
@@ -170,7 +187,9 @@ NOT_NEGATIVE = ("thrust", *BY_VALVE, "cold", "cold_pulses", "inertia_per_kg", "s
 POSITIVE = ("sensor_scale", "sensor_noise")  # tolerances of quantities that are not zero either
 
 ROUNDING = 1e-9
-"""A pulse whose impulse differs by less, relatively, from its channel's torque times on-time is that channel's."""
+"""A pulse whose impulse differs by less, relatively, from its channel's torque times on-time is
+that channel's.
+"""
 
 
 class Thrusting(NamedTuple):
@@ -191,8 +210,12 @@ class DispersedCases:
     leads: tuple[Cases, ...]  # from the command to its start, s
     impulses: tuple[Triple, ...]  # N m s
     thrust: tuple[tuple[Thrusting, ...], ...]  # of each pulse where a valve is not as in the file
-    tilt: tuple[Cases, Cases]  # rotation vector about body axes 1 and 2 by which the attitude at t = 0 is off, rad
-    spent: tuple[Cases, ...] | None  # propellant of each pulse, kg; None where that of one is not known
+    tilt: tuple[
+        Cases, Cases
+    ]  # rotation vector about body axes 1 and 2 by which the attitude at t = 0 is off, rad
+    spent: (
+        tuple[Cases, ...] | None
+    )  # propellant of each pulse, kg; None where that of one is not known
     drained: Cases = 0.0  # as of `supplied`
     per_kg: Triple | None = None  # decrease of the moments by each kg, m²; None where they stay
     wheel: Cases = 0.0  # h, N m s
@@ -207,7 +230,8 @@ class DispersedCases:
         """Decrease of A and C by each pulse, kg m²; None where they stay."""
         if self.per_kg is None or self.spent is None:
             return None
-        across, axial = 0.5 * (self.per_kg[0] + self.per_kg[1]), self.per_kg[2]
+        across = 0.5 * (self.per_kg[0] + self.per_kg[1])
+        axial = self.per_kg[2]
         return [(kg * across, kg * axial) for kg in self.spent]
 
     @property
@@ -224,7 +248,9 @@ class DispersedCases:
 
 @dataclass(frozen=True, slots=True)
 class _Actuation:
-    """Dependence of a pulse on its actuator: on-time at its torque, and the part of the impulse of no thruster."""
+    """Dependence of a pulse on its actuator: on-time at its torque, and the part of the impulse of
+    no thruster.
+    """
 
     pulse: Pulse
     source: str | None
@@ -232,7 +258,8 @@ class _Actuation:
     remainder: Triple
 
 
-# Response to one pulse at the thrust of the file: start, width, lead, impulse and thrust of `DispersedCases`, and flow.
+# Response to one pulse at the thrust of the file: start, width, lead, impulse and thrust of
+# `DispersedCases`, and flow.
 _Fired = tuple[Cases, Cases, Cases, Triple, tuple[Thrusting, ...], Cases]
 
 
@@ -240,7 +267,11 @@ class DispersedModel:
     """Spacecraft and schedule, ready to be dispersed."""
 
     def __init__(self, spacecraft: Spacecraft, schedule: Schedule) -> None:
-        self.spacecraft, self.schedule, self.inputs = spacecraft, schedule, list_inputs(spacecraft, schedule)
+        self.spacecraft, self.schedule, self.inputs = (
+            spacecraft,
+            schedule,
+            list_inputs(spacecraft, schedule),
+        )
         self._members = {channel.name: channel.thrusters for channel in spacecraft.channels}
         if STEERABLE not in self._members and spacecraft.torquer is not None:
             self._members[STEERABLE] = ()
@@ -254,23 +285,33 @@ class DispersedModel:
 
     @cached_property
     def on_times(self) -> tuple[float, ...]:
-        """On-time of each pulse, s, the same in every case: through a valve that of a rectangle of the same spread."""
+        """On-time of each pulse, s, the same in every case: through a valve that of a rectangle of
+        the same spread.
+        """
         return tuple(
-            spread(pulse.command.ramps, pulse.t) if pulse.command and pulse.command.ramps else pulse.on_time
+            spread(pulse.command.ramps, pulse.t)
+            if pulse.command and pulse.command.ramps
+            else pulse.on_time
             for pulse in self.schedule
         )
 
     @property
     def target(self) -> Vector:
-        """Goal of H, or H at t = 0 of the estimate, as a unit vector (3,) in the estimated body axes at t = 0."""
+        """Goal of H, or H at t = 0 of the estimate, as a unit vector (3,) in the estimated body
+        axes at t = 0.
+        """
         body = self.spacecraft
         axis = body.inertia.momentum(body.omega0)
         if body.goal.axis is not None:
-            axis = attitude.rotate(attitude.conjugate(body.initial.quaternion), np.asarray(body.goal.axis))
+            axis = attitude.rotate(
+                attitude.conjugate(body.initial.quaternion), np.asarray(body.goal.axis)
+            )
         return np.asarray(axis / np.linalg.norm(axis), dtype=np.float64)
 
     def physical(self, draws: Draws) -> NDArray[np.bool_] | bool:
-        """True where a case is possible: moments of a rigid body, positive thrust, a sensor that sees something."""
+        """True where a case is possible: moments of a rigid body, positive thrust, a sensor that
+        sees something.
+        """
         moments = self._moments(draws)
         good: Any = _possible(*moments) if "A" in draws or "C" in draws else True
         for entry in self.inputs.drawn:
@@ -288,15 +329,27 @@ class DispersedModel:
     def _per_kg(self, draws: Draws) -> Triple | None:
         """Decrease of the moments per kg of propellant, m²; None where they stay."""
         per_kg = shed(self.spacecraft)
-        return None if per_kg is None else scaled(parts_of(per_kg), plus(1.0, draws.get("inertia_per_kg", 0.0)))
+        return (
+            None
+            if per_kg is None
+            else scaled(parts_of(per_kg), plus(1.0, draws.get("inertia_per_kg", 0.0)))
+        )
 
     def cases(self, draws: Draws) -> DispersedCases:
         """Cases of the ``draws`` (deviations by input name)."""
         turn = self.spacecraft.inertia.axes
         off = [draws.get(f"omega0_{axis}", 0.0) for axis in (1, 2, 3)]
-        torques = {source: self._torque(source, draws) for source in {each.source for each in self._actuations}}
-        fired = [self._fired(n, each, torques[each.source], draws) for n, each in enumerate(self._actuations)]
-        starts, widths, leads, impulses, thrusts, flows = zip(*fired, strict=True) if fired else ((),) * 6
+        torques = {
+            source: self._torque(source, draws)
+            for source in {each.source for each in self._actuations}
+        }
+        fired = [
+            self._fired(n, each, torques[each.source], draws)
+            for n, each in enumerate(self._actuations)
+        ]
+        starts, widths, leads, impulses, thrusts, flows = (
+            zip(*fired, strict=True) if fired else ((),) * 6
+        )
         levels, spent, drained = supplied(self.spacecraft, self.schedule, draws, flows)
         return DispersedCases(
             moments=self._moments(draws),
@@ -316,12 +369,19 @@ class DispersedModel:
             wheel=plus(self.spacecraft.inertia.wheel, draws.get("wheel momentum", 0.0)),
         )
 
-    def _fired(self, index: int, actuation: _Actuation, nominal: tuple[Triple, Cases, Cases], draws: Draws) -> _Fired:
+    def _fired(
+        self, index: int, actuation: _Actuation, nominal: tuple[Triple, Cases, Cases], draws: Draws
+    ) -> _Fired:
         """Response to the pulse ``index``; ``nominal`` is the `_torque` of its actuator."""
-        opened, width, number = self._opened(actuation, draws), self.on_times[index], index + 1
+        opened = self._opened(actuation, draws)
+        width = self.on_times[index]
+        number = index + 1
         late = plus(draws.get("timing offset", 0.0), draws.get(f"Sun pulse {number}", 0.0))
         shift = plus(late, draws.get(f"timing pulse {number}", 0.0))
-        pulse, start, lead, fall = actuation.pulse, actuation.pulse.start, 0.0, 0.0
+        pulse = actuation.pulse
+        start = actuation.pulse.start
+        lead = 0.0
+        fall = 0.0
         if pulse.command is not None:
             start, fall = pulse.command.start, pulse.command.fall
             lead = pulse.t - 0.5 * width - start
@@ -350,7 +410,11 @@ class DispersedModel:
         first, second, third = inertia.moments
         transverse = plus(1.0, times(draws.get("A", 0.0), 1.0 / inertia.A))
         wider = first * transverse
-        return wider, wider if first == second else second * transverse, plus(third, draws.get("C", 0.0))
+        return (
+            wider,
+            wider if first == second else second * transverse,
+            plus(third, draws.get("C", 0.0)),
+        )
 
     def _actuation(self, pulse: Pulse) -> _Actuation:
         thrusters = self._members.get(pulse.channel)
@@ -359,19 +423,29 @@ class DispersedModel:
             return _Actuation(pulse, source, pulse.on_time, parts_of(pulse.impulse))
         torque = np.sum([thruster.torque for thruster in thrusters], axis=0)
         duration = pulse.on_time or float(np.linalg.norm(pulse.impulse) / np.linalg.norm(torque))
-        if pulse.torque is not None and self.spacecraft.thrust_laws:  # weaker where it is cold or the pressure falls
+        if (
+            pulse.torque is not None and self.spacecraft.thrust_laws
+        ):  # weaker where it is cold or the pressure falls
             duration *= float(torque @ pulse.torque) / float(torque @ torque)
         remainder = pulse.impulse - duration * torque
         if np.linalg.norm(remainder) <= ROUNDING * np.linalg.norm(pulse.impulse):
-            # What is left is rounding; a single thruster takes it, so that its direction is exactly the schedule's.
+            # What is left is rounding; a single thruster takes it, so that its direction is exactly
+            # the schedule's.
             remainder = np.zeros(3)
         return _Actuation(pulse, source, duration, parts_of(remainder))
 
     def _opened(self, actuation: _Actuation, draws: Draws) -> list[tuple[Thruster, Opened]]:
-        """Thrusters of a pulse with the response of their valves, where any of these is dispersed."""
-        if actuation.pulse.command is None or actuation.source is None or not actuation.pulse.command.ramps:
+        """Thrusters of a pulse with the response of their valves,
+        where any of these is dispersed.
+        """
+        if (
+            actuation.pulse.command is None
+            or actuation.source is None
+            or not actuation.pulse.command.ramps
+        ):
             return []
-        members, on_time = self._members[actuation.source], actuation.pulse.command.on_time
+        members = self._members[actuation.source]
+        on_time = actuation.pulse.command.on_time
         if not any(f"{key} {thruster.name}" in draws for thruster in members for key in BY_VALVE):
             return []
         openings = list[tuple[Thruster, Opened]]()
@@ -386,7 +460,9 @@ class DispersedModel:
     def _torque(
         self, source: str | None, draws: Draws, longer: Mapping[str, Cases] | None = None
     ) -> tuple[Triple, Cases, Cases]:
-        """Torque of a channel (N m), the mean thrust factor of its thrusters, and that of their propellant flow."""
+        """Torque of a channel (N m), the mean thrust factor of its thrusters, and that of their
+        propellant flow.
+        """
         thrusters = self._members.get(source, ()) if source is not None else ()
         if not thrusters:
             factor = 1.0 if source is None else plus(1.0, draws.get(f"thrust {STEERABLE}", 0.0))
@@ -394,11 +470,16 @@ class DispersedModel:
         torque: Triple = (0.0, 0.0, 0.0)
         factors = [plus(1.0, draws.get(f"thrust {thruster.name}", 0.0)) for thruster in thrusters]
         if longer:
-            factors = [factor * longer.get(each.name, 1.0) for factor, each in zip(factors, thrusters, strict=True)]
+            factors = [
+                factor * longer.get(each.name, 1.0)
+                for factor, each in zip(factors, thrusters, strict=True)
+            ]
         for thruster, factor in zip(thrusters, factors, strict=True):
             torque = added(torque, scaled(self.thruster_torque(thruster, draws), factor))
         flows = [thruster.mass_flow or 1.0 for thruster in thrusters]
-        flow = sum(weight * factor for weight, factor in zip(flows, factors, strict=True)) / math.fsum(flows)
+        flow = sum(
+            weight * factor for weight, factor in zip(flows, factors, strict=True)
+        ) / math.fsum(flows)
         return torque, sum(factors) / len(factors), flow
 
     def thruster_torque(self, thruster: Thruster, draws: Draws) -> Triple:
@@ -416,7 +497,8 @@ class DispersedModel:
             cosine, ratio = tilted(*tilts)
             torque, force = scaled(torque, cosine), scaled(force, cosine)
             for axis, tilt in zip(tilt_axes(thruster.force), tilts, strict=True):
-                more, lean = parts_of(np.cross(axis, thruster.force)), times(tilt, ratio)
+                more = parts_of(np.cross(axis, thruster.force))
+                lean = times(tilt, ratio)
                 torque = added(torque, scaled(cross(parts_of(thruster.position), more), lean))
                 force = added(force, scaled(more, lean))
         if moved:
@@ -447,20 +529,39 @@ def _not_before(start: Cases) -> Cases:
 
 
 def watch_over(body: Spacecraft, tilt: tuple[Any, Any], count: int) -> AxisWatch:
-    """Observer of ``count`` cases of a ``body`` with axes off by a ``tilt``, rad, about its 1 and 2."""
+    """Observer of ``count`` cases of a ``body`` with axes off by a ``tilt``, rad, about its 1 and
+    2.
+    """
     inertial = [np.zeros(3) if cone.direction is None else cone.direction for cone in body.keep]
     directions = np.array([in_body(body, tilt, count, direction) for direction in inertial])
-    momentum = next((number for number, cone in enumerate(body.keep) if cone.direction is None), None)
+    momentum = next(
+        (number for number, cone in enumerate(body.keep) if cone.direction is None), None
+    )
     return AxisWatch.of(directions.reshape(-1, 3, count), body.sense, momentum)
 
 
-def in_body(body: Spacecraft, tilt: tuple[Any, Any], count: int, direction: Vector) -> NDArray[np.float64]:
-    """An inertial ``direction`` (3,) in the true axes of t = 0 of bodies off by a ``tilt``, (3, n)."""
+def in_body(
+    body: Spacecraft, tilt: tuple[Any, Any], count: int, direction: Vector
+) -> NDArray[np.float64]:
+    """An inertial ``direction`` (3,) in the true axes of t = 0 of bodies off by a ``tilt``, (3,
+    n).
+    """
     x, y, z = attitude.rotate(attitude.conjugate(body.initial.quaternion), direction).tolist()
-    return np.array([np.broadcast_to(part, count) for part in rotated((x, y, z), (-tilt[0], -tilt[1]))])
+    return np.array(
+        [np.broadcast_to(part, count) for part in rotated((x, y, z), (-tilt[0], -tilt[1]))]
+    )
 
 
 def number_of(cases: DispersedCases) -> int:
     """Number of cases."""
-    parts = (*cases.moments, *cases.omega0, *cases.starts, *cases.tilt, *(cases.spent or ()), *(cases.per_kg or ()))
-    return max(np.size(part) for part in (*parts, *(part for pulse in cases.impulses for part in pulse)))
+    parts = (
+        *cases.moments,
+        *cases.omega0,
+        *cases.starts,
+        *cases.tilt,
+        *(cases.spent or ()),
+        *(cases.per_kg or ()),
+    )
+    return max(
+        np.size(part) for part in (*parts, *(part for pulse in cases.impulses for part in pulse))
+    )

@@ -1,11 +1,13 @@
 """Dispersed inputs of a study: selection, correlation, random draws.
 
-Correlated inputs are a Gaussian copula: each input is a monotonic function of a standard normal number, and the
-correlation given is that of these numbers (Nelsen 2006, 5.2): of two uniform inputs theirs is (6/π) asin(ρ/2).
+Correlated inputs are a Gaussian copula: each input is a monotonic function of a standard normal
+number, and the correlation given is that of these numbers (Nelsen 2006, 5.2): of two uniform inputs
+theirs is (6/π) asin(ρ/2).
 
-Every input has a stream of its own in every block of `BLOCK` cases: the counter-based Philox generator with the seed
-and the input's name in the key, the block in the counter. So a case is the same in a study of any size and with any
-number of threads, and a tolerance that is tightened or dropped leaves all other draws as they were.
+Every input has a stream of its own in every block of `BLOCK` cases: the counter-based Philox
+generator with the seed and the input's name in the key, the block in the counter. So a case is the
+same in a study of any size and with any number of threads, and a tolerance that is tightened or
+dropped leaves all other draws as they were.
 """
 
 from __future__ import annotations
@@ -27,7 +29,12 @@ from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.schedule import STEERABLE, Schedule, channel_pulse, steerable_pulse
 from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
 
-SPREAD = {"normal": 1.0, "uniform": 1.0 / math.sqrt(3.0), "triangular": 1.0 / math.sqrt(6.0), "bias": 0.0}
+SPREAD = {
+    "normal": 1.0,
+    "uniform": 1.0 / math.sqrt(3.0),
+    "triangular": 1.0 / math.sqrt(6.0),
+    "bias": 0.0,
+}
 """Standard deviation of each kind for a size of one."""
 
 BY_VALVE = ("open_delay", "close_delay", "rise_time", "fall_time", "impulse_bit")
@@ -85,7 +92,9 @@ def list_inputs(spacecraft: Spacecraft, schedule: Schedule) -> Inputs:
 
 
 def _listed(rows: Iterable[_Row]) -> Inputs:
-    """Inputs, whose relative sizes become absolute, and unused tolerances, those too whose size is zero."""
+    """Inputs, whose relative sizes become absolute, and unused tolerances, those too whose size is
+    zero.
+    """
     drawn, unused = list[DispersedInput](), list[Unused]()
     for key, tolerance, names, nominal, unit, idle in rows:
         if tolerance is None:
@@ -103,17 +112,28 @@ def _listed(rows: Iterable[_Row]) -> Inputs:
 
 
 def reachable(spacecraft: Spacecraft) -> Inputs:
-    """Inputs of any schedule: those of one that fires each channel and the torquer; what pulses draw is there once."""
+    """Inputs of any schedule: those of one that fires each channel and the torquer; what pulses
+    draw is there once.
+    """
     pulses = [channel_pulse(channel, 0.0, 0.0) for channel in spacecraft.channels]
     if spacecraft.torquer is not None:
         pulses.append(steerable_pulse(spacecraft.torquer, 0.0, 0.0))
-    drawn, unused = with_sensor(spacecraft, list_inputs(spacecraft, Schedule(tuple(pulses))), "no channel fires")
-    once = [entry for entry in drawn if " pulse " not in entry.name or entry.name.endswith(" pulse 1")]
-    return Inputs(tuple(each._replace(name=each.name.replace(" pulse 1", " of each pulse")) for each in once), unused)
+    drawn, unused = with_sensor(
+        spacecraft, list_inputs(spacecraft, Schedule(tuple(pulses))), "no channel fires"
+    )
+    once = [
+        entry for entry in drawn if " pulse " not in entry.name or entry.name.endswith(" pulse 1")
+    ]
+    return Inputs(
+        tuple(each._replace(name=each.name.replace(" pulse 1", " of each pulse")) for each in once),
+        unused,
+    )
 
 
 def with_sensor(spacecraft: Spacecraft, fired: Inputs, idle: str) -> Inputs:
-    """Inputs of a loop by those of what is ``fired``, and of its sensor; ``idle`` in place of `SCHEDULE_IDLE`."""
+    """Inputs of a loop by those of what is ``fired``, and of its sensor; ``idle`` in place of
+    `SCHEDULE_IDLE`.
+    """
     sensor = _listed(_of_sensor(spacecraft))
     rest = (entry for entry in fired.unused if not entry.name.startswith("sensor "))
     unused = (entry._replace(reason=entry.reason.replace(SCHEDULE_IDLE, idle)) for entry in rest)
@@ -128,8 +148,16 @@ def _of_sensor(spacecraft: Spacecraft) -> Iterator[_Row]:
     sensor = loop.sensor
     axes, unit = ([""], "m/s²") if sensor.kind == ACCELEROMETER else ([" 1", " 2"], "rad/s")
     silent = "" if sensor.noise else "the sensor has no noise"
-    yield _Row("sensor_bias", requested.sensor_bias, [f"sensor bias{axis}" for axis in axes], sensor.bias, unit)
-    yield _Row("sensor_scale", requested.sensor_scale, [f"sensor scale{axis}" for axis in axes], 1.0, "")
+    yield _Row(
+        "sensor_bias",
+        requested.sensor_bias,
+        [f"sensor bias{axis}" for axis in axes],
+        sensor.bias,
+        unit,
+    )
+    yield _Row(
+        "sensor_scale", requested.sensor_scale, [f"sensor scale{axis}" for axis in axes], 1.0, ""
+    )
     yield _Row("sensor_noise", requested.sensor_noise, ["sensor noise"], 1.0, "", silent)
     yield _Row("sensor_delay", requested.sensor_delay, ["sensor delay"], sensor.delay, "s")
 
@@ -140,7 +168,9 @@ def _rows(spacecraft: Spacecraft, schedule: Schedule) -> Iterator[_Row]:
         return
     yield _Row("A", requested.A, ["A"], inertia.A, "kg m²")
     yield _Row("C", requested.C, ["C"], inertia.C, "kg m²")
-    yield _Row("wheel_momentum", requested.wheel_momentum, ["wheel momentum"], inertia.wheel, "N m s")
+    yield _Row(
+        "wheel_momentum", requested.wheel_momentum, ["wheel momentum"], inertia.wheel, "N m s"
+    )
     for at, rate in enumerate((inertia.axes @ spacecraft.omega0).tolist()):
         yield _Row("omega0", requested.omega0[at], [f"omega0_{at + 1}"], rate, "rad/s")
     members = _fired(spacecraft, schedule)
@@ -150,16 +180,32 @@ def _rows(spacecraft: Spacecraft, schedule: Schedule) -> Iterator[_Row]:
     thrusters = [thruster for thruster in members.values() if thruster is not None]
     idle = KNOWN_BY_TORQUE if members else f"{SCHEDULE_IDLE} any thruster"
     idle = "" if any(each.force is not None for each in thrusters) else idle
-    yield _Row("center_of_mass", requested.center_of_mass, [f"center of mass {a}" for a in "xyz"], 0.0, "m", idle)
+    yield _Row(
+        "center_of_mass",
+        requested.center_of_mass,
+        [f"center of mass {a}" for a in "xyz"],
+        0.0,
+        "m",
+        idle,
+    )
     yield from _feed(spacecraft, requested, "" if thrusters else "the schedule fires no thruster")
-    numbers, idle = range(1, len(schedule) + 1), "" if len(schedule) else "the schedule has no pulses"
+    numbers = range(1, len(schedule) + 1)
+    idle = "" if len(schedule) else "the schedule has no pulses"
     thrusts = [f"thrust pulse {number}" for number in numbers] or ["thrust per pulse"]
     yield _Row("thrust_per_pulse", requested.thrust_per_pulse, thrusts, 1.0, "", idle)
-    yield _Row("timing", requested.timing, [f"timing pulse {n}" for n in numbers] or ["timing"], 0.0, "s", idle)
+    yield _Row(
+        "timing",
+        requested.timing,
+        [f"timing pulse {n}" for n in numbers] or ["timing"],
+        0.0,
+        "s",
+        idle,
+    )
     yield _Row("timing_offset", requested.timing_offset, ["timing offset"], 0.0, "s", idle)
     sensor = spacecraft.sun_sensor
     if schedule.blocks and sensor is not None and sensor.jitter > 0.0:
-        jitter, names = Tolerance("normal", sensor.jitter), [f"Sun pulse {number}" for number in numbers]
+        jitter = Tolerance("normal", sensor.jitter)
+        names = [f"Sun pulse {number}" for number in numbers]
         yield _Row("sun_sensor.jitter", jitter, names, 0.0, "s")
     yield _Row("attitude", requested.attitude, ["attitude x", "attitude y"], 0.0, "rad")
     idle = "a schedule is fired whatever a sensor shows: --loop flies the loop"
@@ -179,10 +225,17 @@ def _fired(spacecraft: Spacecraft, schedule: Schedule) -> dict[str, Thruster | N
     return members
 
 
-def _of_thruster(key: str, name: str, tolerance: Tolerance, members: Mapping[str, Thruster | None]) -> _Row:
+def _of_thruster(
+    key: str, name: str, tolerance: Tolerance, members: Mapping[str, Thruster | None]
+) -> _Row:
     """Inputs of a tolerance of a thruster, its valve or the table in its place."""
-    thruster, called = members.get(name), f"{key.removeprefix('thrust_')} {name}"
-    valve, names, nominal, unit, idle = None if thruster is None else thruster.valve, [called], 0.0, "rad", ""
+    thruster = members.get(name)
+    called = f"{key.removeprefix('thrust_')} {name}"
+    valve = None if thruster is None else thruster.valve
+    names = [called]
+    nominal = 0.0
+    unit = "rad"
+    idle = ""
     if name not in members:
         idle = f"{SCHEDULE_IDLE} {'the steerable torquer' if name == STEERABLE else name}"
     elif key in ("thrust", "impulse_bit"):
@@ -190,9 +243,15 @@ def _of_thruster(key: str, name: str, tolerance: Tolerance, members: Mapping[str
         if key == "impulse_bit" and (valve is None or hasattr(valve, "open_delay")):
             idle = f"{name} has no impulse_bit"
     elif key in BY_VALVE:
-        nominal, unit, idle = getattr(valve, key, 0.0), "s", "" if hasattr(valve, key) else f"{name} has no valve"
+        nominal = getattr(valve, key, 0.0)
+        unit = "s"
+        idle = "" if hasattr(valve, key) else f"{name} has no valve"
     elif thruster is None:
-        idle = "a steerable torquer gives a pure torque, wherever it is mounted" if key == "position" else ""
+        idle = (
+            "a steerable torquer gives a pure torque, wherever it is mounted"
+            if key == "position"
+            else ""
+        )
     elif thruster.force is None or (key == "thrust_direction" and thruster.position is None):
         idle = KNOWN_BY_TORQUE
     else:
@@ -206,11 +265,25 @@ def _feed(spacecraft: Spacecraft, requested: Dispersions, idle: str) -> Iterator
     cold, tank = spacecraft.cold, spacecraft.tank
     of_cold = "the file has no cold nozzles" if cold is None else idle
     yield _Row("cold", requested.cold, ["cold"], getattr(cold, "first", 0.0), "", of_cold)
-    yield _Row("cold_pulses", requested.cold_pulses, ["cold_pulses"], getattr(cold, "pulses", 0.0), "", of_cold)
+    yield _Row(
+        "cold_pulses",
+        requested.cold_pulses,
+        ["cold_pulses"],
+        getattr(cold, "pulses", 0.0),
+        "",
+        of_cold,
+    )
     of_tank = "the file has no tank" if tank is None else idle
-    for name, unit in {"propellant": "kg", "pressure": "Pa", "final_pressure": "Pa", "exponent": ""}.items():
+    for name, unit in {
+        "propellant": "kg",
+        "pressure": "Pa",
+        "final_pressure": "Pa",
+        "exponent": "",
+    }.items():
         key = f"tank_{name}"
-        yield _Row(key, getattr(requested, key), [f"tank {name}"], getattr(tank, name, 0.0), unit, of_tank)
+        yield _Row(
+            key, getattr(requested, key), [f"tank {name}"], getattr(tank, name, 0.0), unit, of_tank
+        )
     if tank is not None and shed(spacecraft) is None:
         of_tank = "the tank has no inertia_per_kg"
     yield _Row("inertia_per_kg", requested.inertia_per_kg, ["inertia_per_kg"], 1.0, "", of_tank)
@@ -229,7 +302,9 @@ class Group(NamedTuple):
 
     @property
     def factor(self) -> Array:
-        """Cholesky factor L (m, m), lower: L times independent standard normals has this correlation."""
+        """Cholesky factor L (m, m), lower: L times independent standard normals has this
+        correlation.
+        """
         return np.asarray(np.linalg.cholesky(self.matrix))
 
     def among(self, names: Iterable[str]) -> Group:
@@ -238,9 +313,13 @@ class Group(NamedTuple):
         return Group(tuple(self.names[row] for row in rows), self.matrix[np.ix_(rows, rows)])
 
     def mixed(self, independent: Sequence[Array]) -> list[Array]:
-        """Correlated standard normals (m, n) of independent ones; each sum is taken in the same order for any n."""
+        """Correlated standard normals (m, n) of independent ones; each sum is taken in the same
+        order for any n.
+        """
         return [
-            sum((entry * independent[at] for at, entry in enumerate(row[: index + 1])), np.zeros(()))
+            sum(
+                (entry * independent[at] for at, entry in enumerate(row[: index + 1])), np.zeros(())
+            )
             for index, row in enumerate(self.factor.tolist())
         ]
 
@@ -255,11 +334,14 @@ def positive_definite(group: Group) -> bool:
 
 def grouped(pairs: Iterable[Pair]) -> tuple[Group, ...]:
     """Groups connected by ``pairs``, names in the order of their first pair."""
-    pairs, members = list(pairs), list[list[str]]()
+    pairs = list(pairs)
+    members = list[list[str]]()
     for first, second, _ in pairs:
         touched = [member for member in members if first in member or second in member]
         members = [member for member in members if member not in touched]
-        members.append(list(dict.fromkeys([*(name for member in touched for name in member), first, second])))
+        members.append(
+            list(dict.fromkeys([*(name for member in touched for name in member), first, second]))
+        )
     groups = []
     for names in members:
         matrix = np.eye(len(names))
@@ -275,7 +357,9 @@ def groups_of(pairs: Iterable[Pair]) -> tuple[Group, ...]:
     """`grouped`; raises BadRequest for groups that are not positive definite."""
     for group in (groups := grouped(pairs)):
         if not positive_definite(group):
-            raise BadRequest(f"the correlation of {', '.join(group.names)} is not positive definite")
+            raise BadRequest(
+                f"the correlation of {', '.join(group.names)} is not positive definite"
+            )
     return groups
 
 
@@ -302,13 +386,19 @@ def normal_of(entry: DispersedInput, value: Array) -> Array:
 
 
 def mixing(inputs: Sequence[DispersedInput], groups: Iterable[Group]) -> Array:
-    """M (d, d): M Mᵀ is the correlation of the values of ``inputs``; in a group, column k is what input k adds."""
-    mixed, rows = np.eye(len(inputs)), {entry.name: row for row, entry in enumerate(inputs) if entry.sigma > 0.0}
+    """M (d, d): M Mᵀ is the correlation of the values of ``inputs``; in a group, column k is what
+    input k adds.
+    """
+    mixed = np.eye(len(inputs))
+    rows = {entry.name: row for row, entry in enumerate(inputs) if entry.sigma > 0.0}
     for group in groups:
         present = group.among(rows)
         at = [rows[name] for name in present.names]
         for row, line in zip(at, present.matrix.tolist(), strict=True):
-            mixed[row, at] = [_of_values(inputs[row], inputs[other], rho) for other, rho in zip(at, line, strict=True)]
+            mixed[row, at] = [
+                _of_values(inputs[row], inputs[other], rho)
+                for other, rho in zip(at, line, strict=True)
+            ]
         mixed[np.ix_(at, at)] = np.linalg.cholesky(mixed[np.ix_(at, at)])
     return mixed
 
@@ -317,7 +407,8 @@ def independent(
     draws: Mapping[str, Array], inputs: Iterable[DispersedInput], groups: Iterable[Group]
 ) -> dict[str, Array]:
     """Draws with those of a group replaced by the independent normals behind them."""
-    named, normals_of = {entry.name: entry for entry in inputs}, dict(draws)
+    named = {entry.name: entry for entry in inputs}
+    normals_of = dict(draws)
     for group in groups:
         present = group.among(draws)
         if len(present.names) < 2:
@@ -336,7 +427,9 @@ def together(inputs: Sequence[DispersedInput], groups: Iterable[Group]) -> list[
 
 
 def _of_values(first: DispersedInput, second: DispersedInput, rho: float) -> float:
-    """Correlation of the values of two inputs whose normals have ``rho``, by Gauss-Hermite quadrature."""
+    """Correlation of the values of two inputs whose normals have ``rho``, by Gauss-Hermite
+    quadrature.
+    """
     if first.name == second.name:
         return 1.0
     if first.kind == second.kind == "normal":
@@ -355,7 +448,9 @@ def _nodes() -> tuple[Array, Array]:
     return nodes, weights / math.sqrt(2.0 * math.pi)
 
 
-Draws = Mapping[str, "Array | float"]  # deviations from nominal by the name of the input, (n,) or one for all cases
+Draws = Mapping[
+    str, "Array | float"
+]  # deviations from nominal by the name of the input, (n,) or one for all cases
 
 
 def some_of(draws: Draws, rows: Any) -> dict[str, Any]:
@@ -364,11 +459,15 @@ def some_of(draws: Draws, rows: Any) -> dict[str, Any]:
 
 
 BLOCK = 16_384  # cases that share a substream of each input
-MOST_ATTEMPTS = 1_000  # largest number of redraws of a case; beyond it the dispersions count as impossible
+MOST_ATTEMPTS = (
+    1_000  # largest number of redraws of a case; beyond it the dispersions count as impossible
+)
 
 
 class DrawSource:
-    """Draws of the blocks of a study by one thread; ``physical`` tells which cases can be, (n,) or True for all."""
+    """Draws of the blocks of a study by one thread; ``physical`` tells which cases can be, (n,) or
+    True for all.
+    """
 
     def __init__(
         self,
@@ -385,11 +484,13 @@ class DrawSource:
         self._table = np.empty((len(self._random), BLOCK))
 
     def block(self, number: int) -> tuple[dict[str, Array | float], NDArray[np.intp]]:
-        """Deviations of the cases of block ``number`` (from 0), and the rows drawn again (once per redraw).
+        """Deviations of the cases of block ``number`` (from 0), and the rows drawn again (once per
+        redraw).
 
         The next block overwrites the arrays. Raises Unsuitable where no physical case is found.
         """
-        rows, redrawn = np.arange(BLOCK), [np.empty(0, dtype=np.intp)]
+        rows = np.arange(BLOCK)
+        redrawn = [np.empty(0, dtype=np.intp)]
         for attempt in range(MOST_ATTEMPTS + 1):
             drawn = np.empty((len(self._random), len(rows))) if attempt else self._table
             self._fill(drawn, number, attempt)
@@ -399,14 +500,22 @@ class DrawSource:
             if not len(rows):
                 return self._named(self._table), np.concatenate(redrawn)
             redrawn.append(rows)
-        raise Unsuitable(("dispersions",), "almost all draws are unphysical (C > 2A, thrust < 0, delay < 0)")
+        raise Unsuitable(
+            ("dispersions",), "almost all draws are unphysical (C > 2A, thrust < 0, delay < 0)"
+        )
 
     def _named(self, table: Array) -> dict[str, Array | float]:
-        return {**self._fixed, **{entry.name: row for entry, row in zip(self._random, table, strict=True)}}
+        return {
+            **self._fixed,
+            **{entry.name: row for entry, row in zip(self._random, table, strict=True)},
+        }
 
     def _fill(self, table: Array, block: int, attempt: int) -> None:
-        """Fill ``table`` (inputs, cases) by the deviations of a block; each ``attempt`` has a stream of its own."""
-        at, normals = (self._seed, block, attempt, table.shape[1]), dict[str, Array]()
+        """Fill ``table`` (inputs, cases) by the deviations of a block; each ``attempt`` has a
+        stream of its own.
+        """
+        at = (self._seed, block, attempt, table.shape[1])
+        normals = dict[str, Array]()
         for group in self._groups:
             alone = [_drawn(name, "normal", *at) for name in group.names]
             normals.update(zip(group.names, group.mixed(alone), strict=True))
@@ -417,13 +526,17 @@ class DrawSource:
                 np.multiply(_drawn(entry.name, entry.kind, *at), entry.size, out=row)
 
 
-KEPT = 128  # streams of blocks that are kept, 128 KiB each: all candidates and stages of a study fly the same draws
+# streams of blocks that are kept, 128 KiB each: all candidates and stages of a study fly the same
+# draws
+KEPT = 128
 
 _DRAWING = threading.Lock()
 
 
 def _drawn(name: str, kind: str, seed: int, block: int, attempt: int, count: int) -> Array:
-    """First ``count`` draws of an input, of size one; by the thread that comes first where several want the same."""
+    """First ``count`` draws of an input, of size one; by the thread that comes first where several
+    want the same.
+    """
     with _DRAWING:
         return _stream(name, kind, seed, block, attempt, count)
 
@@ -431,7 +544,9 @@ def _drawn(name: str, kind: str, seed: int, block: int, attempt: int, count: int
 @lru_cache(KEPT)
 def _stream(name: str, kind: str, seed: int, block: int, attempt: int, count: int) -> Array:
     """Read-only draws of `_drawn`."""
-    stream = int.from_bytes(hashlib.blake2b(name.encode(), digest_size=8).digest(), "little")  # the same everywhere
+    stream = int.from_bytes(
+        hashlib.blake2b(name.encode(), digest_size=8).digest(), "little"
+    )  # the same everywhere
     key, counter = np.array([seed, stream], np.uint64), np.array([0, 0, attempt, block], np.uint64)
     generator = np.random.Generator(np.random.Philox(key=key, counter=counter))
     if kind == "normal":

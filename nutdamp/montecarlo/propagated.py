@@ -1,10 +1,11 @@
 """Cases flown, many at once: through real pulse widths, and in closed form for derivatives.
 
-The closed form is the impulse sum Magnus 1970 (17) with exact attitude arcs. In the frame that turns with the nutation,
-by the phase aα with α = ∫ω3 dt, the angular momentum of a free symmetric body does not move: its transverse part is
-AΩ = Aω0 + Σ J e^{iaα}. That frame, in space, turns about H at |H|/A (R(t) = Rot(H t/A) R(0) Rot3(aω3 t)). So a pulse
-adds to a vector, and a coast turns a quaternion; energy dissipation draws H away from axis 3 along an arc that
-`energy_sink` knows. Nothing takes an absolute value or compares: the same code runs on complex arrays, which gives
+The closed form is the impulse sum Magnus 1970 (17) with exact attitude arcs. In the frame that
+turns with the nutation, by the phase aα with α = ∫ω3 dt, the angular momentum of a free symmetric
+body does not move: its transverse part is AΩ = Aω0 + Σ J e^{iaα}. That frame, in space, turns about
+H at |H|/A (R(t) = Rot(H t/A) R(0) Rot3(aω3 t)). So a pulse adds to a vector, and a coast turns a
+quaternion; energy dissipation draws H away from axis 3 along an arc that `energy_sink` knows.
+Nothing takes an absolute value or compares: the same code runs on complex arrays, which gives
 derivatives to rounding (`nutdamp.montecarlo.statistics`).
 """
 
@@ -48,13 +49,19 @@ from nutdamp.schemes.block_model import fire_all, pushes
 
 Array = NDArray[np.float64]
 
-FAR = 8.0  # standard deviations that the quadrature of wide pulses covers to rounding; beyond, accuracy fades slowly
-MOST_NODES = 128  # largest number of nodes of that quadrature: enough for pulses of 20 nutation periods
+# standard deviations that the quadrature of wide pulses covers to rounding; beyond, accuracy fades
+# slowly
+FAR = 8.0
+MOST_NODES = (
+    128  # largest number of nodes of that quadrature: enough for pulses of 20 nutation periods
+)
 
 
 @dataclass(frozen=True, slots=True)
 class Ends:
-    """End states of cases; H in N m s, in the axes named, of which those of t = 0 are fixed in space."""
+    """End states of cases; H in N m s, in the axes named, of which those of t = 0 are fixed in
+    space.
+    """
 
     momentum: Triple  # H in the frame that turns with the nutation: (AΩ1, AΩ2, Cω3)
     before: Triple  # H at t = 0 in the true body axes of t = 0
@@ -64,29 +71,46 @@ class Ends:
     spin_change: Cases  # gain of ω3, rad/s
     propellant: Cases | None  # kg
     nutation: Cases | None = None  # rad; None: the angle of ``momentum``, as for I1 = I2
-    aspects: Array | None = None  # least and largest angle from spin axis to each cone on the way, (m, 2, n) rad
+    aspects: Array | None = (
+        None  # least and largest angle from spin axis to each cone on the way, (m, 2, n) rad
+    )
     drained: Cases = 0.0  # as of `cases.supplied`
 
 
 @dataclass(frozen=True, eq=False)
 class ClosedForm:
-    """Flies cases of ``model`` by the impulse sum, with the dissipation of the estimate, no disturbances, I1 = I2."""
+    """Flies cases of ``model`` by the impulse sum, with the dissipation of the estimate, no
+    disturbances, I1 = I2.
+    """
 
     model: DispersedModel
 
     def __call__(self, cases: DispersedCases) -> Ends:
-        """End states of the ``cases``, whose pulses all come in the order of their centres in the first of them."""
-        # In one piece: any part of the loop would take and return nearly all of the seven numbers that run through it.
+        """End states of the ``cases``, whose pulses all come in the order of their centres in the
+        first of them.
+        """
+        # In one piece: any part of the loop would take and return nearly all of the seven numbers
+        # that run through it.
         A, C, wheel, growth = cases.A, cases.C, cases.wheel, self.model.spacecraft.growth
-        a, per_A = 1.0 - C / A, 1.0 / A
+        a = 1.0 - C / A
+        per_A = 1.0 / A
         sheds = cases.sheds
         (first, second, _), (along, across, spin) = cases.moments, cases.omega0
-        before = x, y, z = first * along, second * across, plus(C * spin, wheel)  # H is the true one, I1 ≠ I2 or not
+        before = x, y, z = (
+            first * along,
+            second * across,
+            plus(C * spin, wheel),
+        )  # H is the true one, I1 ≠ I2 or not
         phase, now, turn = 0.0, 0.0, None
-        centres = [start + 0.5 * width for start, width in zip(cases.starts, cases.widths, strict=True)]
-        order = np.argsort([float(np.real(np.ravel(centre)[0])) for centre in centres], kind="stable")
+        centres = [
+            start + 0.5 * width for start, width in zip(cases.starts, cases.widths, strict=True)
+        ]
+        order = np.argsort(
+            [float(np.real(np.ravel(centre)[0])) for centre in centres], kind="stable"
+        )
         for number in order.tolist():
-            coast, now = centres[number] - now, centres[number]
+            coast = centres[number] - now
+            now = centres[number]
             turn = _turned_on(turn, (x, y, z), coast * per_A)
             if growth == 0.0:
                 phase = phase + plus(a * spin, times(-per_A, wheel)) * coast
@@ -99,9 +123,15 @@ class ClosedForm:
                 spin = (z - wheel) / C
             if sheds is not None:  # half before the pulse and half after it, the rates as they are
                 x, y, A, C = _lighter(x, y, A, C, sheds[number])
-                a, per_A, z = 1.0 - C / A, 1.0 / A, plus(C * spin, wheel)
+                a = 1.0 - C / A
+                per_A = 1.0 / A
+                z = plus(C * spin, wheel)
             rate = plus(a * spin, times(-per_A, wheel))
-            impulse, width, nodes = cases.impulses[number], cases.widths[number], self._nodes[number]
+            impulse, width, nodes = (
+                cases.impulses[number],
+                cases.widths[number],
+                self._nodes[number],
+            )
             along, across, gained = _effective(impulse, rate, a / C, width, nodes, growth)
             cosine, sine = cos_sin(phase)
             x = x + along * cosine - across * sine
@@ -111,7 +141,9 @@ class ClosedForm:
                 z = plus(C * spin, wheel)
             if sheds is not None:
                 x, y, A, C = _lighter(x, y, A, C, sheds[number])
-                a, per_A, z = 1.0 - C / A, 1.0 / A, plus(C * spin, wheel)
+                a = 1.0 - C / A
+                per_A = 1.0 / A
+                z = plus(C * spin, wheel)
         after = (x, y, z) if turn is None else carried(turn, (x, y, z))
         return Ends(
             momentum=(x, y, z),
@@ -128,24 +160,34 @@ class ClosedForm:
     def _nodes(self) -> tuple[int, ...]:
         """Quadrature nodes of each pulse, from the largest phase it may span."""
         body = self.model.spacecraft
-        A, C, spin = body.inertia.A, body.inertia.C, abs(body.spin)
+        A = body.inertia.A
+        C = body.inertia.C
+        spin = abs(body.spin)
         off = {entry.name: FAR * entry.sigma + abs(entry.size) for entry in self.model.inputs.drawn}
         off_A, off_C = off.get("A", 0.0), off.get("C", 0.0)
-        ratio = max(abs(1.0 - (C + off_C) / max(A - off_A, 0.25 * A)), abs(1.0 - (C - off_C) / (A + off_A)))
+        ratio = max(
+            abs(1.0 - (C + off_C) / max(A - off_A, 0.25 * A)), abs(1.0 - (C - off_C) / (A + off_A))
+        )
         added = math.fsum(float(np.linalg.norm(pulse.impulse)) for pulse in self.model.schedule) / C
         rate = ratio * (spin + max(off.get(f"omega0_{axis}", 0.0) for axis in (1, 2, 3)) + added)
-        rate += (abs(body.inertia.wheel) + off.get("wheel momentum", 0.0)) / max(A - off_A, 0.25 * A)
+        rate += (abs(body.inertia.wheel) + off.get("wheel momentum", 0.0)) / max(
+            A - off_A, 0.25 * A
+        )
         return tuple(nodes_for(0.5 * on_time * rate) for on_time in self.model.on_times)
 
 
-def _lighter(x: Cases, y: Cases, A: Cases, C: Cases, sheds: tuple[Cases, Cases]) -> tuple[Cases, Cases, Cases, Cases]:
+def _lighter(
+    x: Cases, y: Cases, A: Cases, C: Cases, sheds: tuple[Cases, Cases]
+) -> tuple[Cases, Cases, Cases, Cases]:
     """AΩ1, AΩ2, A and C with half of ``sheds`` off A and C, which leaves the rates as they are."""
     less = A - 0.5 * sheds[0]
     return x * (less / A), y * (less / A), less, C - 0.5 * sheds[1]
 
 
 def _turned_on(turn: tuple[Cases, ...] | None, momentum: Triple, time: Cases) -> tuple[Cases, ...]:
-    """Quaternion ``turn`` followed by the turn about ``momentum`` (in the turned frame) by |H|·``time``."""
+    """Quaternion ``turn`` followed by the turn about ``momentum`` (in the turned frame) by
+    |H|·``time``.
+    """
     x, y, z = momentum
     size = np.sqrt(x * x + y * y + z * z) + TINY
     half = np.tan(0.5 * size * time)
@@ -156,20 +198,33 @@ def _turned_on(turn: tuple[Cases, ...] | None, momentum: Triple, time: Cases) ->
 
 
 def _slipped(
-    turn: tuple[Cases, ...], momentum: Triple, growth: float, time: Cases, shares: tuple[Cases, Cases]
+    turn: tuple[Cases, ...],
+    momentum: Triple,
+    growth: float,
+    time: Cases,
+    shares: tuple[Cases, Cases],
 ) -> tuple[energy_sink.SinkEffect, tuple[Cases, ...]]:
     """Effect of dissipation in ``time`` s, and ``turn`` with the slip against ``momentum``."""
     x, y, z = momentum
     across = x * x + y * y
     size = np.sqrt(across + z * z) + TINY
     effect = energy_sink.courses(growth, z / size, across / (size * size), time, shares)
-    w, i, j = effect.cosine, effect.sine * y / size, -effect.sine * x / size
+    w = effect.cosine
+    i = effect.sine * y / size
+    j = -effect.sine * x / size
     p, a, b, c = turn
-    return effect, (p * w - a * i - b * j, p * i + a * w - c * j, p * j + b * w + c * i, c * w + a * j - b * i)
+    return effect, (
+        p * w - a * i - b * j,
+        p * i + a * w - c * j,
+        p * j + b * w + c * i,
+        c * w + a * j - b * i,
+    )
 
 
 def carried(turn: tuple[Cases, ...], vector: Triple) -> Triple:
-    """``vector`` turned by the quaternion ``turn``, which rounding has left a little off unit length."""
+    """``vector`` turned by the quaternion ``turn``, which rounding has left a little off unit
+    length.
+    """
     w, a, b, c = turn
     x, y, z = vector
     scale = 2.0 / (w * w + a * a + b * b + c * c)
@@ -184,10 +239,12 @@ def carried(turn: tuple[Cases, ...], vector: Triple) -> Triple:
 def _effective(
     impulse: Triple, rate: Cases, slope: Cases, on_time: Cases, nodes: int, growth: float
 ) -> tuple[Cases, Cases, Cases]:
-    """Impulse (J1, J2) with which a pulse acts on ω at its centre, and its axial part J3; see `response.width_factor`.
+    """Impulse (J1, J2) with which a pulse acts on ω at its centre, and its axial part J3; see
+    `response.width_factor`.
 
-    The factor is the mean of exp(i(φx + β(1 + x²)) - γx) over |x| <= 1 with φ = (ν + aJ3/2C)τ/2, β = aJ3τ/8C and
-    γ = κτ/2, by ``nodes`` Gauss-Legendre nodes; sinc(ντ/2) without J3 and κ. ``rate`` is ν as it begins, ``slope`` a/C.
+    The factor is the mean of exp(i(φx + β(1 + x²)) - γx) over |x| <= 1 with φ = (ν + aJ3/2C)τ/2, β
+    = aJ3τ/8C and γ = κτ/2, by ``nodes`` Gauss-Legendre nodes; sinc(ντ/2) without J3 and κ. ``rate``
+    is ν as it begins, ``slope`` a/C.
     """
     along, across, axial = impulse
     if nothing(on_time):
@@ -202,23 +259,32 @@ def _effective(
         (cosine, sine), grown = cos_sin(angle), growth * half
         level, slant = sine * np.cosh(grown), cosine * np.sinh(grown)
         scale = 1.0 / (angle * angle + grown * grown)
-        real, imaginary = (level * angle + slant * grown) * scale, (slant * angle - level * grown) * scale
+        real, imaginary = (
+            (level * angle + slant * grown) * scale,
+            (slant * angle - level * grown) * scale,
+        )
         return _turned(along, across, real, imaginary, 0.0)
     gained = slope * axial
     swing, bend = (rate + 0.5 * gained) * half, 0.25 * gained * half
     real, imaginary = 0.0, 0.0
     for node, weight in _legendre(nodes):
-        # The two nodes ±x together: cos φx cosh γx - i sin φx sinh γx, turned by the angle of the bend.
+        # The two nodes ±x together: cos φx cosh γx - i sin φx sinh γx, turned by the angle of the
+        # bend.
         level, slant = cos_sin(swing * node)
         grown = np.exp(growth * half * node)
-        level, slant = 0.5 * weight * level * (grown + 1.0 / grown), 0.5 * weight * slant * (grown - 1.0 / grown)
+        level, slant = (
+            0.5 * weight * level * (grown + 1.0 / grown),
+            0.5 * weight * slant * (grown - 1.0 / grown),
+        )
         cosine, sine = cos_sin(bend * (1.0 + node * node))
         real = real + level * cosine + slant * sine
         imaginary = imaginary + level * sine - slant * cosine
     return _turned(along, across, real, imaginary, axial)
 
 
-def _turned(along: Cases, across: Cases, real: Cases, imaginary: Cases, axial: Cases) -> tuple[Cases, Cases, Cases]:
+def _turned(
+    along: Cases, across: Cases, real: Cases, imaginary: Cases, axial: Cases
+) -> tuple[Cases, Cases, Cases]:
     """Complex number ``along``, ``across`` times another, and ``axial``."""
     first = plus(times(along, real), times(-1.0, times(across, imaginary)))
     return first, plus(times(along, imaginary), times(across, real)), axial
@@ -238,7 +304,9 @@ def nodes_for(phase: float) -> int:
 
 @cache
 def _legendre(nodes: int) -> tuple[tuple[float, float], ...]:
-    """Positive nodes of an even Gauss-Legendre rule, with weights for the mean of an even function."""
+    """Positive nodes of an even Gauss-Legendre rule,
+    with weights for the mean of an even function.
+    """
     places, weights = gauss_legendre(nodes)
     return tuple(zip(places[nodes // 2 :].tolist(), weights[nodes // 2 :].tolist(), strict=True))
 
@@ -254,18 +322,26 @@ def fly(
 ) -> tuple[Array, Array, Array, NDArray[np.bool_], Array]:
     """Fire the blocks of ``model`` in each case from its own Sun pulses; ``watch`` sees the motion.
 
-    ``nominal``: `RealWidths.seen_nominally`. Returns rates (3, n) rad/s and quaternions (4, n) at the end of the last
-    pulse; starts (k, n) s of the pulses; whether they fire (k, n): not once the sensor has seen the Sun in other turns
-    than in the nominal flight; when the last pulse ends (n,), s.
+    ``nominal``: `RealWidths.seen_nominally`. Returns rates (3, n) rad/s and quaternions (4, n) at
+    the end of the last pulse; starts (k, n) s of the pulses; whether they fire (k, n): not once the
+    sensor has seen the Sun in other turns than in the nominal flight; when the last pulse ends
+    (n,), s.
     """
-    count, body = rates.shape[1], model.spacecraft
+    count = rates.shape[1]
+    body = model.spacecraft
     assert body.sun_sensor is not None
     assert body.sun is not None
-    starts, seen = np.empty((len(model.schedule), count)), np.empty((len(model.schedule), count), dtype=bool)
+    starts, seen = (
+        np.empty((len(model.schedule), count)),
+        np.empty((len(model.schedule), count), dtype=bool),
+    )
     over = np.zeros(count)
-    rates, quaternion, sun = rates.copy(), quaternion.copy(), in_body(body, cases.tilt, count, body.sun)
+    rates = rates.copy()
+    quaternion = quaternion.copy()
+    sun = in_body(body, cases.tilt, count, body.sun)
     passages = np.flatnonzero(nominal) + 1  # those that the sensor sees of the passages of the Sun
-    pulses, begins = model.schedule.pulses, zip(model.schedule, cases.starts, cases.leads, strict=True)
+    pulses = model.schedule.pulses
+    begins = zip(model.schedule, cases.starts, cases.leads, strict=True)
     shifts = [start - lead - pulse.loaded[0] for pulse, start, lead in begins]
     for begin in range(0, count, batch.BLOCK):
         rows = slice(begin, min(begin + batch.BLOCK, count))
@@ -273,37 +349,68 @@ def fly(
         def part(value: object, rows: slice = rows) -> Array:
             return np.broadcast_to(np.asarray(value, dtype=float), count)[rows]
 
-        start = MotionStretch(bodies.some(rows), np.zeros(len(starts[0, rows])), rates[:, rows], quaternion[:, rows])
-        clock = SunPulseClock(start, sun[:, rows], math.copysign(1.0, body.spin), body.sun_sensor.azimuth)
-        commanded = ((block, number) for block in model.schedule.blocks for number in block.sun_pulses)
-        sees_all, before, alike = all(nominal), 0, np.ones(rows.stop - begin, dtype=bool)
+        start = MotionStretch(
+            bodies.some(rows), np.zeros(len(starts[0, rows])), rates[:, rows], quaternion[:, rows]
+        )
+        clock = SunPulseClock(
+            start, sun[:, rows], math.copysign(1.0, body.spin), body.sun_sensor.azimuth
+        )
+        commanded = (
+            (block, number) for block in model.schedule.blocks for number in block.sun_pulses
+        )
+        sees_all = all(nominal)
+        before = 0
+        alike = np.ones(rows.stop - begin, dtype=bool)
         for index, (block, number) in enumerate(commanded):
             alike &= number <= len(passages)
             passage = int(passages[number - 1]) if number <= len(passages) else before + 1
             for between in () if sees_all else range(before + 1, passage):
-                alike &= body.sun_sensor.sees(clock.angle(clock.sun_pulse(between))) == nominal[between - 1]
-            sun_pulse, before = clock.sun_pulse(passage), passage
+                alike &= (
+                    body.sun_sensor.sees(clock.angle(clock.sun_pulse(between)))
+                    == nominal[between - 1]
+                )
+            sun_pulse = clock.sun_pulse(passage)
+            before = passage
             alike &= body.sun_sensor.sees(clock.angle(sun_pulse)) & ~clock.lost
             seen[index, rows] = alike
-            impulse = np.where(seen[index, rows], np.array([part(impulse) for impulse in cases.impulses[index]]), 0.0)
+            impulse = np.where(
+                seen[index, rows],
+                np.array([part(impulse) for impulse in cases.impulses[index]]),
+                0.0,
+            )
             if cases.thrust[index]:
                 torques = _pushes(cases.thrust[index], seen[index, rows], part)
             else:
                 torques = pushes(pulses[index], impulse / (pulses[index].on_time or 1.0))
             sheds = None
             if cases.per_kg is not None and cases.spent is not None:
-                sheds = np.array([part(per_kg * cases.spent[index]) * seen[index, rows] for per_kg in cases.per_kg])
-            fired = clock.fire(sun_pulse, block.delay + part(shifts[index]), block.width, torques, sheds)
+                sheds = np.array(
+                    [
+                        part(per_kg * cases.spent[index]) * seen[index, rows]
+                        for per_kg in cases.per_kg
+                    ]
+                )
+            fired = clock.fire(
+                sun_pulse, block.delay + part(shifts[index]), block.width, torques, sheds
+            )
             starts[index, rows] = fired + part(cases.leads[index])
             if watch is not None:
                 for here, end in clock.passed:
                     watch.some(rows).motion(here, end - here.since)
-        rates[:, rows], quaternion[:, rows], over[rows] = clock.here.rates, clock.here.quaternion, clock.here.since
+        rates[:, rows], quaternion[:, rows], over[rows] = (
+            clock.here.rates,
+            clock.here.quaternion,
+            clock.here.since,
+        )
     return rates, quaternion, starts, seen, over
 
 
-def _pushes(thrust: Sequence[Thrusting], seen: NDArray[np.bool_], part: Callable[[object], Array]) -> list[TorqueRamp]:
-    """Torques of thrusters through valves of their own, together, between successive corners of their thrust."""
+def _pushes(
+    thrust: Sequence[Thrusting], seen: NDArray[np.bool_], part: Callable[[object], Array]
+) -> list[TorqueRamp]:
+    """Torques of thrusters through valves of their own, together, between successive corners of
+    their thrust.
+    """
     torques = [np.array([part(component) for component in each.torque]) * seen for each in thrust]
     corners = [tuple(map(part, each.opened.corners)) for each in thrust]
     pairs = zip(corners, thrust, strict=True)
@@ -311,28 +418,38 @@ def _pushes(thrust: Sequence[Thrusting], seen: NDArray[np.bool_], part: Callable
     edges = np.sort(np.array(corners).reshape(-1, len(seen)), axis=0)
     ramps = []
     for begin, end in pairwise(edges):
-        levels = [[each.within(0.5 * (begin + end), edge) for each in opened] for edge in (begin, end)]
+        levels = [
+            [each.within(0.5 * (begin + end), edge) for each in opened] for edge in (begin, end)
+        ]
         first, last = (sum(map(operator.mul, torques, level), np.zeros(())) for level in levels)
         ramps.append(TorqueRamp(begin, end, first, last))
     return ramps
 
 
 CASE, STEPPED, LOOKED = 5e-3, 1e-2, 4e-3
-"""Units of work: of a case and of each of its pulses, of a step of a numerical coast, of an observation of its axis."""
+"""Units of work: of a case and of each of its pulses, of a step of a numerical coast, of an
+observation of its axis.
+"""
 
 
 class RealWidths:
-    """Flies cases of ``model`` by Euler's equations, with the disturbances and dissipation of the estimate."""
+    """Flies cases of ``model`` by Euler's equations, with the disturbances and dissipation of the
+    estimate.
+    """
 
     def __init__(self, model: DispersedModel) -> None:
         self.model, self._dynamics = model, make_dynamics(model.spacecraft)
 
     @cached_property
     def seen_nominally(self) -> list[bool]:
-        """Flags of the Sun passages seen in the nominal flight; empty where that cannot be fired."""
+        """Flags of the Sun passages seen in the nominal flight;
+        empty where that cannot be fired.
+        """
         body, blocks = self.model.spacecraft, self.model.schedule.blocks
         if body.sun_sensor is not None and body.sun_sensor.sees_all:
-            return [True] * max((number for block in blocks for number in block.sun_pulses), default=0)
+            return [True] * max(
+                (number for block in blocks for number in block.sun_pulses), default=0
+            )
         try:
             (schedule,), seen = fire_all(body, [blocks])
         except Infeasible:
@@ -341,11 +458,17 @@ class RealWidths:
 
     @cached_property
     def effort(self) -> float:
-        """Units of work of a case: its pulses, and steps and looks at cones in them and in coasts that are no arcs."""
-        moments, rates = np.array(self._dynamics.moments)[:, None], self.model.spacecraft.initial.rates
+        """Units of work of a case: its pulses, and steps and looks at cones in them and in coasts
+        that are no arcs.
+        """
+        moments = np.array(self._dynamics.moments)[:, None]
+        rates = self.model.spacecraft.initial.rates
         arcs = self._bodies(moments, 0.0).free
         # Cases are flown together, from one edge to the next as long as the longest coast takes.
-        late = max((FAR * row.sigma for row in self.model.inputs.drawn if row.name.startswith("timing")), default=0.0)
+        late = max(
+            (FAR * row.sigma for row in self.model.inputs.drawn if row.name.startswith("timing")),
+            default=0.0,
+        )
         lasts = self.model.schedule.end + late * len(self.model.schedule)
         in_steps = min(float(np.sum(self.model.on_times)), lasts) if arcs else lasts
         turned = float(np.linalg.norm(rates)) * in_steps
@@ -355,31 +478,47 @@ class RealWidths:
 
     def __call__(self, cases: DispersedCases) -> Ends:
         """End states of the ``cases``. Raises Infeasible for motions too long to be integrated."""
-        count, body, sheds = number_of(cases), self.model.spacecraft, None
+        count = number_of(cases)
+        body = self.model.spacecraft
+        sheds = None
         watch = watch_over(body, cases.tilt, count) if body.keep else None
-        rates, propellant = _whole(cases.omega0, count), cases.propellant
+        rates = _whole(cases.omega0, count)
+        propellant = cases.propellant
         bodies = self._bodies(_whole(cases.moments, count), cases.wheel)
-        upright = np.eye(4, 1).repeat(count, axis=1)  # the true body axes at t = 0 are where everything is seen from
+        upright = np.eye(4, 1).repeat(
+            count, axis=1
+        )  # the true body axes at t = 0 are where everything is seen from
         if cases.per_kg is not None and cases.spent is not None:
-            sheds = np.array([_whole(cases.per_kg, count) * kg for kg in cases.spent]).reshape(-1, 3, count)
+            sheds = np.array([_whole(cases.per_kg, count) * kg for kg in cases.spent]).reshape(
+                -1, 3, count
+            )
         if self.model.schedule.blocks:
-            settled, turned, _, seen, over = fly(self.model, bodies, rates, upright, cases, self.seen_nominally, watch)
+            settled, turned, _, seen, over = fly(
+                self.model, bodies, rates, upright, cases, self.seen_nominally, watch
+            )
             if cases.spent is not None:
-                propellant = sum((kg * sees for kg, sees in zip(cases.spent, seen, strict=True)), 0.0)
+                propellant = sum(
+                    (kg * sees for kg, sees in zip(cases.spent, seen, strict=True)), 0.0
+                )
         else:
             starts = _whole(cases.starts, count)
-            impulses = np.array([_whole(impulse, count) for impulse in cases.impulses]).reshape(-1, 3, count)
+            impulses = np.array([_whole(impulse, count) for impulse in cases.impulses]).reshape(
+                -1, 3, count
+            )
             if self.model.schedule.shaped:
                 pulses = self._ramps(cases, starts, impulses, sheds)
             else:
-                pulses = batch.Pulses(starts, np.array(self.model.on_times).reshape(-1, 1), impulses, sheds=sheds)
+                pulses = batch.Pulses(
+                    starts, np.array(self.model.on_times).reshape(-1, 1), impulses, sheds=sheds
+                )
             settled, turned = batch.fly(bodies, rates, upright, pulses, watch)
             over = np.max(pulses.edges, axis=0, initial=0.0)
         last = bodies if sheds is None else bodies.lighter(sheds.sum(axis=0))
         if watch is not None:
             watch.turn(batch.MotionStretch(last, over, settled, turned))
         momentum = triple(last.momentum(settled))
-        after, nutation = carried(tuple(turned), momentum), None
+        after = carried(tuple(turned), momentum)
+        nutation = None
         if not np.array_equal(last.moments[0], last.moments[1]):
             nutation = widest_cones(last.moments, settled, body.sense, last.forcing.wheel)[0]
         return Ends(
@@ -396,23 +535,36 @@ class RealWidths:
         )
 
     def _bodies(self, moments: Array, wheel: Cases) -> batch.Bodies:
-        return batch.Bodies(moments, self._dynamics.constant, self._dynamics.forcing._replace(wheel=wheel))
+        return batch.Bodies(
+            moments, self._dynamics.constant, self._dynamics.forcing._replace(wheel=wheel)
+        )
 
-    def _ramps(self, cases: DispersedCases, starts: Array, impulses: Array, sheds: Array | None) -> batch.Pulses:
+    def _ramps(
+        self, cases: DispersedCases, starts: Array, impulses: Array, sheds: Array | None
+    ) -> batch.Pulses:
         """Pulses by the ramps of their thrust, each as a pulse of its own; as in `batch.Pulses`."""
-        pieces, count = list(self._pieces(cases, starts, impulses)), starts.shape[1]
-        begins, lengths, parts, leans, numbers, shares = zip(*pieces, strict=True) if pieces else ((),) * 6
+        pieces = list(self._pieces(cases, starts, impulses))
+        count = starts.shape[1]
+        begins, lengths, parts, leans, numbers, shares = (
+            zip(*pieces, strict=True) if pieces else ((),) * 6
+        )
         falls = None
         if sheds is not None:
-            falls = np.array([share * sheds[number] for number, share in zip(numbers, shares, strict=True)])
+            falls = np.array(
+                [share * sheds[number] for number, share in zip(numbers, shares, strict=True)]
+            )
             falls = falls.reshape(-1, 3, count)
         impulses = np.array(parts).reshape(-1, 3, count)
-        return batch.Pulses(_whole(begins, count), _whole(lengths, count), impulses, _whole(leans, count), falls)
+        return batch.Pulses(
+            _whole(begins, count), _whole(lengths, count), impulses, _whole(leans, count), falls
+        )
 
     def _pieces(
         self, cases: DispersedCases, starts: Array, impulses: Array
     ) -> Iterator[tuple[Array, Cases, Array, Cases, int, Cases]]:
-        """Begin, length, impulse and lean of each ramp, the number of its pulse, and its share of it."""
+        """Begin, length, impulse and lean of each ramp, the number of its pulse, and its share of
+        it.
+        """
         pulses = zip(self.model.schedule, self.model.on_times, starts, impulses, strict=True)
         for number, (pulse, on_time, start, impulse) in enumerate(pulses):
             thrust = cases.thrust[number]
@@ -420,16 +572,30 @@ class RealWidths:
                 yield start, on_time, impulse, 0.0, number, 1.0
                 continue
             for ramp in () if thrust else pulse.command.ramps:
-                share, lean = ramp.impulse / pulse.on_time, (ramp.last - ramp.first) / (ramp.last + ramp.first)
+                share, lean = (
+                    ramp.impulse / pulse.on_time,
+                    (ramp.last - ramp.first) / (ramp.last + ramp.first),
+                )
                 begin = start + (ramp.begin - (pulse.t - 0.5 * on_time))
                 yield begin, ramp.end - ramp.begin, impulse * share, lean, number, share
             for thruster in thrust:
-                acts, passed, fall = thruster.opened.acts[0], 0.0, pulse.command.fall  # of the nominal pulse, evenly
+                # of the nominal pulse, evenly
+                acts = thruster.opened.acts[0]
+                passed = 0.0
+                fall = pulse.command.fall
                 for begin, length, level, lean in thruster.opened.pieces:
                     part = level * length / np.where(acts == 0.0, 1.0, acts)
                     area = level * length * (1.0 + fall * (0.5 - passed - 0.5 * part))
-                    begin, impulse = start - cases.leads[number] + begin, _whole(thruster.torque, len(start)) * area
-                    yield begin, length, impulse, lean - 0.5 * fall * part, number, part / len(thrust)
+                    begin = start - cases.leads[number] + begin
+                    impulse = _whole(thruster.torque, len(start)) * area
+                    yield (
+                        begin,
+                        length,
+                        impulse,
+                        lean - 0.5 * fall * part,
+                        number,
+                        part / len(thrust),
+                    )
                     passed = passed + part
 
 

@@ -1,8 +1,8 @@
 """Statistics of a study: output vectors, percentiles, intervals of shares, sensitivities.
 
-First-order sensitivities are those of the closed form by complex-step differentiation (Squire & Trapp 1998). The shares
-from the cases are first-order Sobol indices, from the means of the outcome over equally likely intervals of each input
-(the correlation ratio, Pearson 1905).
+First-order sensitivities are those of the closed form by complex-step differentiation (Squire &
+Trapp 1998). The shares from the cases are first-order Sobol indices, from the means of the outcome
+over equally likely intervals of each input (the correlation ratio, Pearson 1905).
 """
 
 from __future__ import annotations
@@ -22,11 +22,15 @@ from nutdamp.montecarlo.propagated import ClosedForm, Ends
 from nutdamp.physics.attitude import angle_of_parts
 
 SHOWN, CERTAIN = 1.9599639845400536, 4.891638475714779
-"""Standard deviations of a normal distribution within which 95 % of it lie, and all but a millionth."""
+"""Standard deviations of a normal distribution within which 95 % of it lie, and all but a
+millionth.
+"""
 
 
 def share_interval(successes: int, trials: int, sigmas: float = SHOWN) -> tuple[float, float]:
-    """Confidence interval of a probability from ``successes`` of ``trials``, Wilson 1927; all without a trial."""
+    """Confidence interval of a probability from ``successes`` of ``trials``, Wilson 1927; all
+    without a trial.
+    """
     if trials == 0:
         return 0.0, 1.0
     share, spread = successes / trials, sigmas * sigmas / trials
@@ -37,7 +41,9 @@ def share_interval(successes: int, trials: int, sigmas: float = SHOWN) -> tuple[
 
 
 def cases_to_show(probability: float) -> int:
-    """Fewest cases, all good, after which the lower end of `share_interval` reaches ``probability`` (below 1)."""
+    """Fewest cases, all good, after which the lower end of `share_interval` reaches ``probability``
+    (below 1).
+    """
     return math.ceil(SHOWN * SHOWN * probability / (1.0 - probability))
 
 
@@ -54,7 +60,9 @@ VECTORS = {
 """Rows of `vectors` by output, and of the spin at the end."""
 
 OUTPUTS = tuple(VECTORS)[:5]
-"""In rad, rad, rad, rad/s and kg; the angles are called as the values of `nutdamp.spacecraft.requirements.Part`."""
+"""In rad, rad, rad, rad/s and kg; the angles are called as the values of
+`nutdamp.spacecraft.requirements.Part`.
+"""
 
 ROWS = 11  # rows of `vectors`
 
@@ -63,7 +71,9 @@ def measure(model: DispersedModel, ends: Ends, count: int) -> Array:
     """The `OUTPUTS` (5, n) of ``count`` cases; propellant is NaN where unknown."""
     x, y, z = ends.momentum
     rows = (
-        np.arctan2(np.sqrt(x * x + y * y), model.spacecraft.sense * z) if ends.nutation is None else ends.nutation,
+        np.arctan2(np.sqrt(x * x + y * y), model.spacecraft.sense * z)
+        if ends.nutation is None
+        else ends.nutation,
         angle_of_parts(ends.before, ends.after),
         angle_of_parts(parts_of(model.target), ends.pointed),
         ends.spin_change,
@@ -73,10 +83,11 @@ def measure(model: DispersedModel, ends: Ends, count: int) -> Array:
 
 
 def vectors(model: DispersedModel, ends: Ends, count: int) -> NDArray[Any]:
-    """Quantities (11, n) of ``count`` cases that are linear for small dispersions; `VECTORS` names the rows.
+    """Quantities (11, n) of ``count`` cases that are linear for small dispersions; `VECTORS` names
+    the rows.
 
-    Nutation is the transverse momentum over the axial one, the momentum shift the change of its direction, the axis
-    error that direction less the target, in the body axes of t = 0.
+    Nutation is the transverse momentum over the axial one, the momentum shift the change of its
+    direction, the axis error that direction less the target, in the body axes of t = 0.
     """
     x, y, z = ends.momentum
     before, after, pointed = (_unit(vector) for vector in (ends.before, ends.after, ends.pointed))
@@ -97,10 +108,14 @@ def _unit(vector: Triple) -> Triple:
     return x * size, y * size, z * size
 
 
-EXACT_CASES = 1_000_000  # number of cases up to which every value is kept, and percentiles are exact
+EXACT_CASES = (
+    1_000_000  # number of cases up to which every value is kept, and percentiles are exact
+)
 
 SHARPNESS = 13
-"""Leading bits of the mantissa that the sketch tells apart: bins 0.012 % wide, so their middles are 0.006 % off."""
+"""Leading bits of the mantissa that the sketch tells apart: bins 0.012 % wide, so their middles are
+0.006 % off.
+"""
 
 OCTAVES = 64  # octaves of the sketch: sizes from 2^-64 to 2^64; smaller ones count as zero
 PORTION = 16_384  # values that are counted at once, so that they stay in the cache
@@ -117,13 +132,20 @@ class Exact:
         self.values, self.minimum, self.maximum = values, float(values.min()), float(values.max())
 
     def quantiles(self, probabilities: Array) -> Array:
-        """Values not exceeded with these probabilities (n,) from 0 to 1, to the last bit those of `numpy.quantile`."""
+        """Values not exceeded with these probabilities (n,) from 0 to 1, to the last bit those of
+        `numpy.quantile`.
+        """
         places = np.asarray(probabilities) * (len(self.values) - 1)
         ranks = places.astype(int)
-        share, above = places - ranks, np.ceil(places).astype(int)
-        ordered = np.partition(self.values, sorted({*ranks.tolist(), *above.tolist()}))  # np.unique loads numpy.ma
+        share = places - ranks
+        above = np.ceil(places).astype(int)
+        ordered = np.partition(
+            self.values, sorted({*ranks.tolist(), *above.tolist()})
+        )  # np.unique loads numpy.ma
         low, high = ordered[ranks], ordered[above]
-        return np.asarray(np.where(share < 0.5, low + (high - low) * share, high - (high - low) * (1.0 - share)))
+        return np.asarray(
+            np.where(share < 0.5, low + (high - low) * share, high - (high - low) * (1.0 - share))
+        )
 
     def sizes(self) -> Exact:
         """Distribution of the absolute values."""
@@ -131,11 +153,14 @@ class Exact:
 
 
 class Sketch:
-    """Counts of values by sign, power of two and leading bits of the mantissa: 16 MiB; the two extremes are exact."""
+    """Counts of values by sign, power of two and leading bits of the mantissa: 16 MiB; the two
+    extremes are exact.
+    """
 
     def __init__(self) -> None:
         self.counts = np.zeros(2 * _SIZES, dtype=np.int64)
-        self.minimum, self.maximum = math.inf, -math.inf
+        self.minimum = math.inf
+        self.maximum = -math.inf
 
     def add(self, values: Array) -> None:
         """Count more ``values`` (n,)."""
@@ -154,11 +179,17 @@ class Sketch:
         """Quantiles to 0.006 % of their value."""
         below = np.cumsum(self.counts)
         ranks = np.floor(np.asarray(probabilities) * (below[-1] - 1)).astype(np.int64)
-        lows = ((np.arange(_SIZES, dtype=np.int64) + _LOWEST) << _SHIFT).view(np.float64)  # of the bins
+        lows = ((np.arange(_SIZES, dtype=np.int64) + _LOWEST) << _SHIFT).view(
+            np.float64
+        )  # of the bins
         middles = lows * (1.0 + 0.5 ** (SHARPNESS + 1))
         middles[0] = 0.0
-        values = np.concatenate([-middles[::-1], middles])[np.searchsorted(below, ranks, side="right")]
-        values = np.where(ranks == below[-1] - 1, self.maximum, np.where(ranks == 0, self.minimum, values))
+        values = np.concatenate([-middles[::-1], middles])[
+            np.searchsorted(below, ranks, side="right")
+        ]
+        values = np.where(
+            ranks == below[-1] - 1, self.maximum, np.where(ranks == 0, self.minimum, values)
+        )
         return np.asarray(np.clip(values, self.minimum, self.maximum))
 
     def sizes(self) -> Sketch:
@@ -174,14 +205,17 @@ Distribution = Exact | Sketch  # an output over all cases so far
 
 
 class Worst:
-    """Cases of greatest severity, in a fixed order: the most severe first, then the lower number."""
+    """Cases of greatest severity, in a fixed order: the most severe first,
+    then the lower number.
+    """
 
     def __init__(self, keep: int) -> None:
         self.keep, self.cases, self.severities = keep, np.empty(0, dtype=np.int64), np.empty(0)
 
     def add(self, first: int, severities: Array) -> None:
         """Consider the cases from number ``first`` on."""
-        least, spare = -math.inf, len(severities) - self.keep
+        least = -math.inf
+        spare = len(severities) - self.keep
         if len(self.cases) == self.keep:
             least = self.severities[-1]
         elif spare > 0:
@@ -193,7 +227,8 @@ class Worst:
         self.cases, self.severities = cases[order], severities[order]
 
 
-STEP = 1e-30  # imaginary step, as a share of an input's size: nothing is subtracted, so no digits are lost
+# imaginary step, as a share of an input's size: nothing is subtracted, so no digits are lost
+STEP = 1e-30
 SHARE = 1e-3  # step of central differences, as a share of an input's size
 CLASSES = 128  # intervals of an input over which the cases are averaged, at most
 CLASS_SIZE = 32  # cases in each of them, at least
@@ -213,7 +248,9 @@ class FirstOrder:
         return np.array([entry.sigma for entry in self.inputs])
 
     def independent(self, output: str) -> Array:
-        """Effect of one sigma of each input on that vector, (m, d); of correlated ones beyond those before it."""
+        """Effect of one sigma of each input on that vector, (m, d); of correlated ones beyond those
+        before it.
+        """
         scaled = (self.jacobian * self.sigmas)[VECTORS[output]]
         return np.asarray(scaled @ mixing(self.inputs, self.groups)) if self.groups else scaled
 
@@ -228,29 +265,38 @@ class FirstOrder:
         return np.asarray(np.linalg.norm((self.jacobian * sizes)[VECTORS[output]], axis=0))
 
     def shares(self, output: str) -> Array:
-        """Share of each input in the variance of ``output``, (d,), as of `independent`; zero where nothing varies."""
+        """Share of each input in the variance of ``output``, (d,), as of `independent`; zero where
+        nothing varies.
+        """
         squares = (self.independent(output) ** 2).sum(axis=0)
         return np.asarray(squares / (squares.sum() or 1.0))
 
 
-ALIKE = 0.01  # relative difference up to which derivatives of the closed form may replace those of the flight
+# relative difference up to which derivatives of the closed form may replace those of the flight
+ALIKE = 0.01
 
 
 def as_flown(model: DispersedModel, fly: Callable[[DispersedCases], Ends]) -> FirstOrder:
-    """Derivatives of the model that ``fly`` flies: of the closed form, without rounding, where it agrees with those."""
+    """Derivatives of the model that ``fly`` flies: of the closed form, without rounding, where it
+    agrees with those.
+    """
     flown = by_differences(model, fly)
     if model.schedule.blocks or not flown.inputs:
         return flown
     closed, jacobian = first_order(model).jacobian, flown.jacobian
     for rows in VECTORS.values():
-        apart, size = (np.linalg.norm(vector[rows], axis=0) for vector in (closed - jacobian, jacobian))
+        apart, size = (
+            np.linalg.norm(vector[rows], axis=0) for vector in (closed - jacobian, jacobian)
+        )
         alike = apart <= ALIKE * size
         jacobian[rows, alike] = closed[rows, alike]
     return flown
 
 
 def by_differences(model: DispersedModel, fly: Callable[[DispersedCases], Ends]) -> FirstOrder:
-    """Derivatives by central differences of the model that ``fly`` flies: for blocks fired by Sun pulses."""
+    """Derivatives by central differences of the model that ``fly`` flies: for blocks fired by Sun
+    pulses.
+    """
     steps = np.array([SHARE * abs(entry.size) for entry in model.inputs.drawn])
     out = _varied(model, fly, np.stack([steps, -steps], axis=1))
     return FirstOrder(model.inputs.drawn, 0.5 * (out[:, ::2] - out[:, 1::2]) / steps, model.groups)
@@ -263,8 +309,12 @@ def first_order(model: DispersedModel) -> FirstOrder:
     return FirstOrder(model.inputs.drawn, out.imag / steps, model.groups)
 
 
-def _varied(model: DispersedModel, fly: Callable[[DispersedCases], Ends], steps: NDArray[Any]) -> NDArray[Any]:
-    """Outcome (11, d k) about nominal values (and biases), with each input off by its ``steps`` (d, k) in turn."""
+def _varied(
+    model: DispersedModel, fly: Callable[[DispersedCases], Ends], steps: NDArray[Any]
+) -> NDArray[Any]:
+    """Outcome (11, d k) about nominal values (and biases), with each input off by its ``steps`` (d,
+    k) in turn.
+    """
     draws: dict[str, NDArray[Any]] = {}
     for index, entry in enumerate(model.inputs.drawn):
         draw = np.zeros_like(steps)
@@ -274,11 +324,14 @@ def _varied(model: DispersedModel, fly: Callable[[DispersedCases], Ends], steps:
 
 
 def sampled_shares(draws: Mapping[str, Array], outcome: Array) -> dict[str, dict[str, float]]:
-    """First-order Sobol index of each input, by output, from ``draws`` (n,) and the outcome (11, n) of `vectors`.
+    """First-order Sobol index of each input, by output, from ``draws`` (n,) and the outcome (11, n)
+    of `vectors`.
 
-    What the averaging over few cases adds by chance, (classes - 1)/n of the variance, is taken off; nothing is below 0.
+    What the averaging over few cases adds by chance, (classes - 1)/n of the variance, is taken off;
+    nothing is below 0.
     """
-    count, shares = outcome.shape[1], dict[str, dict[str, float]]()
+    count = outcome.shape[1]
+    shares = dict[str, dict[str, float]]()
     centred = outcome - outcome.mean(axis=1, keepdims=True)
     variances = {name: float((centred[rows] ** 2).sum()) for name, rows in VECTORS.items()}
     classes = min(CLASSES, max(count // CLASS_SIZE, 1))
@@ -300,8 +353,9 @@ def sampled_shares(draws: Mapping[str, Array], outcome: Array) -> dict[str, dict
 
 
 def correlated_shares(draws: Mapping[str, Array], values: Array) -> dict[str, float]:
-    """Squared correlation of each input's ``draws`` (n,) with ``values`` (n,), less what chance adds; for angles to
-    cones and loops, which have no derivatives. Empty where the values do not vary.
+    """Squared correlation of each input's ``draws`` (n,) with ``values`` (n,), less what chance
+    adds; for angles to cones and loops, which have no derivatives. Empty where the values do not
+    vary.
     """
     if len(values) < 3 or np.ptp(values) <= 1e-12 * np.abs(values).max():
         return {}

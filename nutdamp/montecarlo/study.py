@@ -1,4 +1,6 @@
-"""Dispersion studies: many dispersed cases fly one schedule, in rounds, so that a study can be watched and stopped."""
+"""Dispersion studies: many dispersed cases fly one schedule, in rounds, so that a study can be
+watched and stopped.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +24,16 @@ from nutdamp.flight.dynamics import shed
 from nutdamp.flight.end_state import aspects
 from nutdamp.flight.propagation import Flight
 from nutdamp.montecarlo.cases import DispersedModel
-from nutdamp.montecarlo.inputs import BLOCK, DispersedInput, Draws, DrawSource, Group, independent, some_of, together
+from nutdamp.montecarlo.inputs import (
+    BLOCK,
+    DispersedInput,
+    Draws,
+    DrawSource,
+    Group,
+    independent,
+    some_of,
+    together,
+)
 from nutdamp.montecarlo.propagated import Ends, RealWidths
 from nutdamp.montecarlo.statistics import (
     CERTAIN,
@@ -56,7 +67,9 @@ PORTION = 2 * STRIDE  # cases that a thread takes at once; blocks are multiples 
 
 
 class Round:
-    """Some cases of a study, flown by several threads that take one portion of a block of draws after the other."""
+    """Some cases of a study, flown by several threads that take one portion of a block of draws
+    after the other.
+    """
 
     def __init__(self, results: Results, first: int, last: int, out: Array) -> None:
         self.results, self.first, self.last, self.out = results, first, last, out
@@ -67,11 +80,18 @@ class Round:
         self.failures: list[BaseException] = []
         self.lock = threading.Lock()
 
-    def fly(self, threads: int, watch: Callable[[int], None], stopped: Callable[[], bool]) -> tuple[int, int]:
-        """Fly the round; returns the number of flown cases, always the first ones, and of redraws."""
+    def fly(
+        self, threads: int, watch: Callable[[int], None], stopped: Callable[[], bool]
+    ) -> tuple[int, int]:
+        """Fly the round; returns the number of flown cases, always the first ones,
+        and of redraws.
+        """
         count = min(threads, len(self.portions))
-        # Daemons: an interrupt need not wait for the portions that are in work, which nobody uses then.
-        workers = [threading.Thread(target=self._work, args=(stopped,), daemon=True) for _ in range(count)]
+        # Daemons: an interrupt need not wait for the portions that are in work, which nobody uses
+        # then.
+        workers = [
+            threading.Thread(target=self._work, args=(stopped,), daemon=True) for _ in range(count)
+        ]
         for worker in workers:
             worker.start()
         try:
@@ -89,13 +109,15 @@ class Round:
 
     def _work(self, stopped: Callable[[], bool]) -> None:
         try:
-            source, block = self.results.study.source(), -1
+            source = self.results.study.source()
+            block = -1
             while not stopped():
                 with self.lock:
                     portion = next(self.left, None)
                 if portion is None:
                     return
-                begin, end = max(self.first, portion * PORTION), min(self.last, (portion + 1) * PORTION)
+                begin = max(self.first, portion * PORTION)
+                end = min(self.last, (portion + 1) * PORTION)
                 if begin // BLOCK != block:
                     block = begin // BLOCK
                     drawn = source.block(block)
@@ -108,10 +130,14 @@ class Round:
             self.left = iter(())
 
     def _fly(self, drawn: tuple[Draws, NDArray[np.intp]], start: int, begin: int, end: int) -> int:
-        """Fly cases ``begin`` to ``end`` of the block that starts at ``start``; returns the number of redraws."""
+        """Fly cases ``begin`` to ``end`` of the block that starts at ``start``; returns the number
+        of redraws.
+        """
         study, early, (draws, redrawn) = self.results.study, self.results.early, drawn
-        # Whole strides are flown, even for fewer cases: what flies them may let one depend on its stride.
-        low, high = begin - begin % STRIDE, end + -end % STRIDE
+        # Whole strides are flown, even for fewer cases: what flies them may let one depend on its
+        # stride.
+        low = begin - begin % STRIDE
+        high = end + -end % STRIDE
         ends = study.flies(study.model.cases(some_of(draws, slice(low - start, high - start))))
         values = study.values(ends, high - low)
         inner, place = slice(begin - low, end - low), slice(begin - self.first, end - self.first)
@@ -129,21 +155,33 @@ EARLY = 2 * BLOCK  # number of first cases whose outcome is kept whole for `samp
 KEPT_WORST = 1_000  # worst cases that are kept
 
 STAGES = (2_048, 8_192, 20_000, 40_000, 80_000, 160_000)
-"""Numbers of cases after which a share is judged: by its interval of all but a millionth, at the last by that of 95 %.
-Two screen plans, the third is flown of every plan that is shown; the others where that leaves it undecided."""
+"""Numbers of cases after which a share is judged: by its interval of all but a millionth, at the
+last by that of 95 %. Two screen plans, the third is flown of every plan that is shown; the others
+where that leaves it undecided.
+"""
 
-WORTH_SAYING = math.radians(1e-4)  # rad by which cases of falling moments must err for that to be said
+WORTH_SAYING = math.radians(
+    1e-4
+)  # rad by which cases of falling moments must err for that to be said
 
 
 def by_tolerance(
     inputs: Sequence[DispersedInput], groups: Sequence[Group], shares: Mapping[str, float]
 ) -> dict[str, float]:
-    """Sums of the ``shares`` of inputs by the key of the file that they belong to, of correlated ones by name."""
+    """Sums of the ``shares`` of inputs by the key of the file that they belong to, of correlated
+    ones by name.
+    """
     sums: dict[str, float] = {}
     for rows in together(inputs, groups):
         entries = [inputs[row] for row in rows]
-        name = entries[0].tolerance if len(entries) == 1 else " and ".join(entry.name for entry in entries)
-        sums[name] = sums.get(name, 0.0) + math.fsum(shares.get(entry.name, 0.0) for entry in entries)
+        name = (
+            entries[0].tolerance
+            if len(entries) == 1
+            else " and ".join(entry.name for entry in entries)
+        )
+        sums[name] = sums.get(name, 0.0) + math.fsum(
+            shares.get(entry.name, 0.0) for entry in entries
+        )
     return {name: share for name, share in sums.items() if share > 0.0}
 
 
@@ -153,27 +191,38 @@ def threads_here() -> int:
 
 
 class DrawnCases:
-    """Cases of a ``model`` drawn from a ``seed``. They count from 0 here; people see them count from 1."""
+    """Cases of a ``model`` drawn from a ``seed``. They count from 0 here; people see them count
+    from 1.
+    """
 
     model: Any
     seed: int
 
     def source(self) -> DrawSource:
         """Draws for one thread."""
-        return DrawSource(self.model.inputs.drawn, self.seed, self.model.physical, self.model.groups)
+        return DrawSource(
+            self.model.inputs.drawn, self.seed, self.model.physical, self.model.groups
+        )
 
     def draws_of(self, case: int) -> dict[str, float]:
         """Deviations of one case (from 0), by input."""
-        return {name: float(np.ravel(draw)[0]) for name, draw in self.draws_of_all(np.array([case])).items()}
+        return {
+            name: float(np.ravel(draw)[0])
+            for name, draw in self.draws_of_all(np.array([case])).items()
+        }
 
     def draws_of_all(self, cases: NDArray[np.intp]) -> dict[str, Array | float]:
         """Deviations of ``cases`` (from 0, ascending), by input."""
-        source, blocks, parts = self.source(), cases // BLOCK, list[dict[str, Any]]()
+        source = self.source()
+        blocks = cases // BLOCK
+        parts = list[dict[str, Any]]()
         for block in np.unique(blocks).tolist():
             draws, _ = source.block(block)
             parts.append(some_of(draws, cases[blocks == block] % BLOCK))
         return {
-            name: draw if isinstance(draw, float) else np.concatenate([part[name] for part in parts])
+            name: draw
+            if isinstance(draw, float)
+            else np.concatenate([part[name] for part in parts])
             for name, draw in parts[0].items()
         }
 
@@ -197,23 +246,32 @@ class Study(DrawnCases):
 
     def ends_of(self, draws: Draws) -> Ends:
         """End state of one case with these deviations; none: of the estimate itself."""
-        return self.flies(self.model.cases({name: np.atleast_1d(draw) for name, draw in draws.items()}))
+        return self.flies(
+            self.model.cases({name: np.atleast_1d(draw) for name, draw in draws.items()})
+        )
 
     def values(self, ends: Ends, count: int) -> Array:
-        """Rows of `Results.values` of ``count`` cases: `OUTPUTS`, angles to the cones, error of a spin required."""
+        """Rows of `Results.values` of ``count`` cases: `OUTPUTS`, angles to the cones, error of a
+        spin required.
+        """
         body = self.model.spacecraft
         rows = [measure(self.model, ends, count)]
         if ends.aspects is not None:
-            rows.append(np.broadcast_to(ends.aspects, (*ends.aspects.shape[:2], count)).reshape(-1, count))
+            rows.append(
+                np.broadcast_to(ends.aspects, (*ends.aspects.shape[:2], count)).reshape(-1, count)
+            )
         if body.goal.spin is not None:
             rows.append(np.broadcast_to(abs(ends.spin - body.goal.spin), (1, count)))
         return np.concatenate(rows)
 
     def left(self, values: Array) -> Left:
         """Residual of cases by their `values`, whose spin is as far off the goal, above it."""
-        body, aim = self.model.spacecraft, OUTPUTS.index(requirements.aim(self.model.spacecraft).value)
+        body = self.model.spacecraft
+        aim = OUTPUTS.index(requirements.aim(self.model.spacecraft).value)
         cones = len(body.keep)
-        angles = values[len(OUTPUTS) : len(OUTPUTS) + 2 * cones].reshape(cones, 2, -1) if cones else None
+        angles = (
+            values[len(OUTPUTS) : len(OUTPUTS) + 2 * cones].reshape(cones, 2, -1) if cones else None
+        )
         spin = math.nan if body.goal.spin is None else body.goal.spin + values[-1]
         return Left(values[0], values[aim], spin, angles)
 
@@ -228,32 +286,49 @@ class Study(DrawnCases):
 
     @property
     def nominal_aspects(self) -> Array:
-        """Least and largest angle (m, 2) rad from the spin axis to the direction of each cone in that flight."""
+        """Least and largest angle (m, 2) rad from the spin axis to the direction of each cone in
+        that flight.
+        """
         seen = aspects(self.nominal)[: len(self.model.spacecraft.keep)]
         return np.array([(aspect.least, aspect.largest) for aspect in seen])
 
     def severity(self, values: Array, drained: Any) -> Array:
-        """Severity of cases, (n,), by their `values` and the propellant they take; see `requirements.severity`."""
+        """Severity of cases, (n,), by their `values` and the propellant they take; see
+        `requirements.severity`.
+        """
         return np.asarray(requirements.severity(self.model.spacecraft, self.left(values), drained))
 
     @property
     def lightening_error(self) -> str:
-        """Message on the error of falling moments in cases, by the nominal one; empty where negligible."""
+        """Message on the error of falling moments in cases, by the nominal one; empty where
+        negligible.
+        """
         if shed(self.model.spacecraft) is None:
             return ""
-        outputs, exact, part = self.outputs_of({}), self.nominal.residual, requirements.aim(self.model.spacecraft)
+        outputs = self.outputs_of({})
+        exact = self.nominal.residual
+        part = requirements.aim(self.model.spacecraft)
         aim = exact.momentum_shift if part is Part.SHIFT else exact.axis_error
-        errors = {Part.NUTATION: outputs[0] - exact.nutation, part: outputs[OUTPUTS.index(part.value)] - aim}
+        errors = {
+            Part.NUTATION: outputs[0] - exact.nutation,
+            part: outputs[OUTPUTS.index(part.value)] - aim,
+        }
         if max(map(abs, errors.values())) < WORTH_SAYING:
             return ""
-        message = " and ".join(f"{math.degrees(abs(error)):.2g} deg of {part.label}" for part, error in errors.items())
-        text = "cases let the moments of inertia fall at the edges of pulses: in the nominal one that errs by"
+        message = " and ".join(
+            f"{math.degrees(abs(error)):.2g} deg of {part.label}" for part, error in errors.items()
+        )
+        text = (
+            "cases let the moments of inertia fall at the edges of pulses: "
+            "in the nominal one that errs by"
+        )
         return f"{text} {message}"
 
 
 @dataclass(eq=False)
 class Counted(ABC):
-    """Results of a study so far: the cases from 0 to ``done`` of the ``requested``, of which ``met`` comply.
+    """Results of a study so far: the cases from 0 to ``done`` of the ``requested``, of which
+    ``met`` comply.
 
     ``kept``: those that keep each of the ``bounds`` at the end and on the way, required or not.
     """
@@ -279,9 +354,12 @@ class Counted(ABC):
         )
 
     def count(self, severity: Array, left: Left, able: NDArray[np.bool_]) -> None:
-        """Count cases from ``done`` on: their `Study.severity` (n,), residual, and who may comply at all."""
+        """Count cases from ``done`` on: their `Study.severity` (n,), residual, and who may comply
+        at all.
+        """
         body = self.study.model.spacecraft
-        complies, astray = able.copy(), np.zeros((len(body.keep), len(severity)), dtype=bool)
+        complies = able.copy()
+        astray = np.zeros((len(body.keep), len(severity)), dtype=bool)
         for row, bound in enumerate(self.bounds):
             met = np.broadcast_to(bound.met(requirements.left_of(bound, left, body)), len(severity))
             self.kept[row] += np.count_nonzero(met)
@@ -300,7 +378,11 @@ class Counted(ABC):
     @property
     def met_fraction(self) -> float | None:
         """Share of cases that comply; None where nothing is required, and there are no cones."""
-        return self.met / self.done if self.done and requirements.judged(self.study.model.spacecraft) else None
+        return (
+            self.met / self.done
+            if self.done and requirements.judged(self.study.model.spacecraft)
+            else None
+        )
 
     @property
     def probability(self) -> float:
@@ -308,11 +390,14 @@ class Counted(ABC):
         return required_share(self.study.model.spacecraft.requirement)
 
     def interval(self, *, certain: bool = False) -> tuple[float, float]:
-        """Interval of the share that complies: of 95 %, where it must be ``certain`` of all but a millionth."""
+        """Interval of the share that complies: of 95 %, where it must be ``certain`` of all but a
+        millionth.
+        """
         return share_interval(self.met, self.done, CERTAIN if certain else SHOWN)
 
     def shown(self, *, certain: bool = False) -> bool | None:
-        """Compliance of enough cases, or of too few, beyond the interval; None where that is not decided.
+        """Compliance of enough cases, or of too few, beyond the interval; None where that is not
+        decided.
 
         True where nothing is required.
         """
@@ -321,8 +406,11 @@ class Counted(ABC):
         return requirements.enough(*self.interval(certain=certain), self.probability)
 
     def level(self, bound: Bound) -> float | None:
-        """Value of a bound's part that the share of cases required keeps; None where it is not known."""
-        spread, share = self.spread(bound), self.probability
+        """Value of a bound's part that the share of cases required keeps; None where it is not
+        known.
+        """
+        spread = self.spread(bound)
+        share = self.probability
         if spread is None:
             return None
         return float(spread.quantiles(np.array([1.0 - share if bound.inner else share]))[0])
@@ -342,9 +430,15 @@ class Results(Counted):
 
     study: Study
     emptied: int = 0  # cases whose tank runs empty
-    early: Array = field(default_factory=lambda: np.zeros((ROWS, EARLY)))  # `vectors` of the first cases
-    values: Array | None = field(init=False)  # outputs, least and largest angle (rad) to each of m cones: (5 + 2m, n)
-    sketches: list[Sketch] = field(init=False)  # of the outputs, beyond `EXACT_CASES`, in place of ``values``
+    early: Array = field(
+        default_factory=lambda: np.zeros((ROWS, EARLY))
+    )  # `vectors` of the first cases
+    values: Array | None = field(
+        init=False
+    )  # outputs, least and largest angle (rad) to each of m cones: (5 + 2m, n)
+    sketches: list[Sketch] = field(
+        init=False
+    )  # of the outputs, beyond `EXACT_CASES`, in place of ``values``
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -381,25 +475,36 @@ class Results(Counted):
         return None if not len(values) or math.isnan(values[0]) else Exact(values)
 
     def _early_draws(self) -> dict[str, Array]:
-        """Draws of the first cases, without biases; of correlated inputs the independent normals behind them."""
-        model, draws = self.study.model, self.study.draws_of_all(np.arange(min(self.done, EARLY)))
+        """Draws of the first cases, without biases; of correlated inputs the independent normals
+        behind them.
+        """
+        model = self.study.model
+        draws = self.study.draws_of_all(np.arange(min(self.done, EARLY)))
         varied = {name: draw for name, draw in draws.items() if not isinstance(draw, float)}
         return independent(varied, model.inputs.drawn, model.groups)
 
     @cached_property
     def shares(self) -> dict[str, dict[str, float]]:
-        """`sampled_shares` of the first cases, of correlated inputs like `FirstOrder.shares`; call it at the end."""
+        """`sampled_shares` of the first cases, of correlated inputs like `FirstOrder.shares`; call
+        it at the end.
+        """
         return sampled_shares(self._early_draws(), self.early[:, : min(self.done, EARLY)])
 
     def contributions(self, bound: Bound) -> dict[str, float]:
-        """Share of each tolerance in the variance of the value of a bound's part; correlated ones together.
+        """Share of each tolerance in the variance of the value of a bound's part; correlated ones
+        together.
 
-        By first order; of the angle to a cone, which has no derivative, the squared correlation over the first cases.
+        By first order; of the angle to a cone, which has no derivative, the squared correlation
+        over the first cases.
         """
         first, groups = self.study.first_order, self.study.model.groups
         if bound.keep is None:
             each = dict(
-                zip((entry.name for entry in first.inputs), first.shares(bound.part.value).tolist(), strict=True)
+                zip(
+                    (entry.name for entry in first.inputs),
+                    first.shares(bound.part.value).tolist(),
+                    strict=True,
+                )
             )
         else:
             spread = self.spread(bound)
@@ -408,14 +513,18 @@ class Results(Counted):
         return by_tolerance(first.inputs, groups, each)
 
     def take(self, values: Array, severity: Array, emptied: NDArray[np.bool_]) -> None:
-        """Count further cases by their ``values``, see `count`; ``emptied`` (n,): whose tank runs empty."""
+        """Count further cases by their ``values``, see `count`; ``emptied`` (n,): whose tank runs
+        empty.
+        """
         self.emptied += int(np.count_nonzero(emptied))
         for sketch, row in zip(self.sketches, values, strict=False):
             sketch.add(row)
         self.count(severity, self.study.left(values), ~emptied)
 
     def extended(self, requested: int) -> Results:
-        """Copy with room for ``requested`` cases: no fewer than are done, and no more than `EXACT_CASES`."""
+        """Copy with room for ``requested`` cases: no fewer than are done, and no more than
+        `EXACT_CASES`.
+        """
         more = replace(self, requested=requested)
         more.kept, more.broken, more.aspects = self.kept, self.broken, self.aspects
         assert self.values is not None
@@ -434,15 +543,21 @@ def run(
 ) -> Results:
     """Fly the cases that ``results`` is to have and does not have yet; returns ``results``.
 
-    ``watch`` is called now and then with how many are done; they are kept when ``stopped`` says so. ``collect`` is
-    given the number (from 0) of the first of some cases, and their `Results.values`, in order.
+    ``watch`` is called now and then with how many are done; they are kept when ``stopped`` says so.
+    ``collect`` is given the number (from 0) of the first of some cases, and their `Results.values`,
+    in order.
     """
-    # The C library keeps freed memory up to twice the largest block freed so far: else each stride asks for new pages.
+    # The C library keeps freed memory up to twice the largest block freed so far: else each stride
+    # asks for new pages.
     np.empty(FREED, dtype=np.uint8)
     while results.done < results.requested and not stopped():
         first = results.done
         last = min(results.requested, first - first % ROUND + ROUND)
-        out = np.empty((results.rows, last - first)) if results.values is None else results.values[:, first:last]
+        out = (
+            np.empty((results.rows, last - first))
+            if results.values is None
+            else results.values[:, first:last]
+        )
         flights = Round(results, first, last, out)
         done, redrawn = flights.fly(threads, watch, stopped)
         if done == 0:
@@ -463,13 +578,16 @@ def affordable(study: Study, samples: int) -> bool:
 def next_stage(
     begun: Results, samples: int | None = None, *, fly: Callable[[Results], object] | None = None
 ) -> Results:
-    """Results with the cases of the next stage, of ``samples`` in all, default of as many of `STAGES` as it takes.
+    """Results with the cases of the next stage, of ``samples`` in all, default of as many of
+    `STAGES` as it takes.
 
-    The same ones where no more are to be flown: the share is known beyond the default number, or the budgets
-    `work.CASES`, beyond it `work.MORE_CASES`, allow no more. The first stage is flown in any case. ``fly`` flies the
-    cases that results lack, default `run`.
+    The same ones where no more are to be flown: the share is known beyond the default number, or
+    the budgets `work.CASES`, beyond it `work.MORE_CASES`, allow no more. The first stage is flown
+    in any case. ``fly`` flies the cases that results lack, default `run`.
     """
-    stages = STAGES if samples is None else (*(stage for stage in STAGES if stage < samples), samples)
+    stages = (
+        STAGES if samples is None else (*(stage for stage in STAGES if stage < samples), samples)
+    )
     if samples is not None and samples > EXACT_CASES:
         stages = (samples,)  # they are counted and not kept: from the first one on
     stage = next((count for count in stages if count > begun.done), None)
@@ -498,15 +616,19 @@ def flown_in_stages(
     stopped: Callable[[], bool] = lambda: False,
 ) -> Results:
     """Results of all stages of a study, see `next_stage`, unless ``stopped`` says so."""
-    done, further = None, Results(study, 0)
+    done = None
+    further = Results(study, 0)
     while further is not done and not stopped():
-        done, further = further, next_stage(further, samples, fly=fly)
+        done = further
+        further = next_stage(further, samples, fly=fly)
     return further
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Dispersed(results.Data, results.Drawn):
-    """Many dispersed cases; ``core`` holds their distributions, ``unsaved`` the error of a file that was not saved."""
+    """Many dispersed cases; ``core`` holds their distributions, ``unsaved`` the error of a file
+    that was not saved.
+    """
 
     core: Counted
     unsaved: CannotWrite | None = None
@@ -517,7 +639,9 @@ class Dispersed(results.Data, results.Drawn):
         return self.core.met_fraction
 
     def to_dict(self, worst: int = 5) -> dict[str, Any]:
-        """Contents of the file that the command writes with ``--json``, with as many ``worst`` cases."""
+        """Contents of the file that the command writes with ``--json``, with as many ``worst``
+        cases.
+        """
         return finite(results.view(self, "data", worst=worst))
 
     def __repr__(self) -> str:
@@ -528,6 +652,8 @@ SEED = 1  # default seed of the draws
 
 
 def study_of(spacecraft: Spacecraft, schedule: Schedule, *, seed: int = SEED) -> Study:
-    """Study of ``schedule`` with the dispersions of ``spacecraft``; raises BadRequest where it has none."""
+    """Study of ``schedule`` with the dispersions of ``spacecraft``; raises BadRequest where it has
+    none.
+    """
     expect_dispersions(spacecraft.dispersions)
     return Study(DispersedModel(spacecraft, schedule), seed)

@@ -26,7 +26,9 @@ if TYPE_CHECKING:
 
 
 class Cell(NamedTuple):
-    """Text of a cell, flush right for a ``number``; place of its ``dot`` in % of the largest number; ``bar``, %."""
+    """Text of a cell, flush right for a ``number``; place of its ``dot`` in % of the largest
+    number; ``bar``, %.
+    """
 
     text: str
     number: bool
@@ -37,8 +39,8 @@ class Cell(NamedTuple):
 class Sheet(NamedTuple):
     """A table with one row for each thing compared; the first column names it.
 
-    ``mark`` is the row to stand out; ``dots``: names of columns in which a dot shows each number to scale, ``bars``:
-    a bar each percentage; ``folds``: on a phone each row is a list of its own.
+    ``mark`` is the row to stand out; ``dots``: names of columns in which a dot shows each number to
+    scale, ``bars``: a bar each percentage; ``folds``: on a phone each row is a list of its own.
     """
 
     title: str
@@ -57,9 +59,16 @@ class Sheet(NamedTuple):
             dotted, barred = heading.name in self.dots, heading.name in self.bars
             sizes = [*map(number_in, texts)]
             most = max((abs(size) for size in sizes if size is not None), default=0.0) or 1.0
-            shown = [None if size is None or not dotted else 100.0 * abs(size) / most for size in sizes]
+            shown = [
+                None if size is None or not dotted else 100.0 * abs(size) / most for size in sizes
+            ]
             cells = zip(texts, shown, sizes, strict=True)
-            columns.append([Cell(text, heading.number, dot, bar if barred else None) for text, dot, bar in cells])
+            columns.append(
+                [
+                    Cell(text, heading.number, dot, bar if barred else None)
+                    for text, dot, bar in cells
+                ]
+            )
         return tuple(zip(*columns, strict=True))
 
 
@@ -84,7 +93,9 @@ class Points(NamedTuple):
 
 
 class Picture(NamedTuple):
-    """An ``<svg>`` element, its title, a caption, a description, and the ``narrow`` drawing for a phone, if any."""
+    """An ``<svg>`` element, its title, a caption, a description, and the ``narrow`` drawing for a
+    phone, if any.
+    """
 
     svg: str
     title: str
@@ -113,7 +124,9 @@ class Download(NamedTuple):
 
 
 class Beside(NamedTuple):
-    """Blocks side by side where there is room; ``still``: shown only where no script moves the view before them."""
+    """Blocks side by side where there is room; ``still``: shown only where no script moves the view
+    before them.
+    """
 
     blocks: tuple[Block, ...]
     still: bool = False
@@ -135,7 +148,9 @@ class Circle(NamedTuple):
 
 
 class NamedDirection(NamedTuple):
-    """A direction on the globe, (3,) inertial; ``kind`` styles it, ``watched``: its angle to the spin axis is shown."""
+    """A direction on the globe, (3,) inertial; ``kind`` styles it, ``watched``: its angle to the
+    spin axis is shown.
+    """
 
     name: str
     axis: Vector
@@ -145,7 +160,9 @@ class NamedDirection(NamedTuple):
 
 
 EDGES = (350, 150, 1960, 1760)
-"""Frame of a square panel in units of its SVG, which is 2000 wide and high: left, top, right, bottom."""
+"""Frame of a square panel in units of its SVG, which is 2000 wide and high: left, top, right,
+bottom.
+"""
 
 
 class Scale(NamedTuple):
@@ -156,7 +173,9 @@ class Scale(NamedTuple):
 
 
 class Panel(NamedTuple):
-    """A square panel: ``part`` names it for the script, ``zero`` is where the axes cross, if within the frame."""
+    """A square panel: ``part`` names it for the script, ``zero`` is where the axes cross, if within
+    the frame.
+    """
 
     part: str
     title: str
@@ -170,8 +189,8 @@ class Panel(NamedTuple):
 class Strip(NamedTuple):
     """Parts drawn over time; marks in per cent, ``required`` and ``zero`` in units of the SVG.
 
-    ``outside``: a required nutation that lies beyond the scale. ``bars``: row of the channel, left and width of each
-    firing; ``closed``: left and width of times without firing.
+    ``outside``: a required nutation that lies beyond the scale. ``bars``: row of the channel, left
+    and width of each firing; ``closed``: left and width of times without firing.
     """
 
     times: Scale
@@ -185,9 +204,11 @@ class Strip(NamedTuple):
 
 
 class Workbench(NamedTuple):
-    """Names of each quantity for the script and for people, its bound in words; the pulses by number and channel.
+    """Names of each quantity for the script and for people, its bound in words; the pulses by
+    number and channel.
 
-    ``rolling``: the cones roll on each other; ``command``: that which flies the pulses copied to ``file``.
+    ``rolling``: the cones roll on each other; ``command``: that which flies the pulses copied to
+    ``file``.
     """
 
     rows: tuple[tuple[str, str, str], ...]
@@ -198,10 +219,12 @@ class Workbench(NamedTuple):
 
 
 class Moving(NamedTuple):
-    """Fixed parts of the moving view of the plan of a ``scheme``, and its moving parts as the JSON ``data``.
+    """Fixed parts of the moving view of the plan of a ``scheme``, and its moving parts as the JSON
+    ``data``.
 
-    ``longitude``: name of the numbers of the globe; ``how``: the model that is flown; ``absent``: the reason for
-    which there is no ``workbench``; ``command``: that which writes the same rows, if any.
+    ``longitude``: name of the numbers of the globe; ``how``: the model that is flown; ``absent``:
+    the reason for which there is no ``workbench``; ``command``: that which writes the same rows, if
+    any.
     """
 
     scheme: str
@@ -253,20 +276,24 @@ class Control(NamedTuple):
 
 
 def controlled(**given: str) -> Control:
-    """Entries of configuration control on a page; the date defaults to SOURCE_DATE_EPOCH, where that is set.
+    """Entries of configuration control on a page; the date defaults to SOURCE_DATE_EPOCH, where
+    that is set.
 
     Raises BadRequest for other names, and for a SOURCE_DATE_EPOCH that is no number of seconds.
     """
     unknown = sorted({*given} - {*Control._fields})
     if unknown:
         raise BadRequest(f"{unknown[0]}: expected one of {', '.join(Control._fields)}")
-    control, epoch = Control(**given), os.environ.get("SOURCE_DATE_EPOCH", "")
+    control = Control(**given)
+    epoch = os.environ.get("SOURCE_DATE_EPOCH", "")
     if control.date or not epoch:
         return control
     try:
         return control._replace(date=datetime.fromtimestamp(int(epoch), UTC).date().isoformat())
     except (ValueError, OverflowError, OSError):
-        raise BadRequest(f"SOURCE_DATE_EPOCH = {epoch!r}: expected a number of seconds since 1970") from None
+        raise BadRequest(
+            f"SOURCE_DATE_EPOCH = {epoch!r}: expected a number of seconds since 1970"
+        ) from None
 
 
 UNCONTROLLED = Control()  # configuration control of a page without any entry
@@ -281,7 +308,8 @@ class Contender(NamedTuple):
 
 
 class Bar(NamedTuple):
-    """A bound with its texts; ``used``: shares of the limit that the nominal value and that of the cases take.
+    """A bound with its texts; ``used``: shares of the limit that the nominal value and that of the
+    cases take.
 
     NaN where one is not known.
     """
@@ -296,8 +324,8 @@ class Bar(NamedTuple):
 class Page:
     """A whole report: title, decision, motion, schemes at a glance, and sections.
 
-    ``state``: value of the `Light` of the verdict; ``broken``: limits that the schedule of a file breaks. ``source``:
-    the beginning of the hash of the input file.
+    ``state``: value of the `Light` of the verdict; ``broken``: limits that the schedule of a file
+    breaks. ``source``: the beginning of the hash of the input file.
     """
 
     title: str
@@ -346,7 +374,9 @@ def sheet_of(title: str, table: Table) -> Sheet:
 
 
 def facts_of(title: str, table: Table) -> FactList:
-    """A screen's list of names and values as `FactList`; a row without a name continues the one before."""
+    """A screen's list of names and values as `FactList`; a row without a name continues the one
+    before.
+    """
     rows: list[tuple[str, str]] = []
     for name, value in _rows(table):
         if name or not rows:

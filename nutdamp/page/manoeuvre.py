@@ -1,4 +1,6 @@
-"""The manoeuvre sheet: one page for those who fire: conditions to begin, a row a pulse or block, what to do on hold."""
+"""The manoeuvre sheet: one page for those who fire: conditions to begin, a row a pulse or block,
+what to do on hold.
+"""
 
 from __future__ import annotations
 
@@ -32,12 +34,15 @@ if TYPE_CHECKING:
     from nutdamp.planning.screening import Checkpoints
 
 
-CHECKED = 24  # largest number of rows with a range of the nutation; of more evenly spaced ones have one
+CHECKED = (
+    24  # largest number of rows with a range of the nutation; of more evenly spaced ones have one
+)
 FINEST = 6  # largest number of decimals of times
 DECIDED = 10.0  # s of a coast in which nobody can look at telemetry, decide and command a hold
 
 ON_HOLD = (
-    "Fire none of the rows that are left: they are void. Record spin, nutation and phase with their time. Plan again "
+    "Fire none of the rows that are left: they are void. Record spin, "
+    "nutation and phase with their time. Plan again "
     "from that motion, and fire by a new sheet."
 )
 
@@ -45,11 +50,14 @@ ON_HOLD = (
 def manoeuvre_blocks(
     plan: Plan, judged: Verdict, identity: Sequence[tuple[str, str]], summary: str
 ) -> Iterator[document.Block]:
-    """Blocks of the sheet of a plan: ``identity`` of document and file first, then the ``summary`` of the verdict.
+    """Blocks of the sheet of a plan: ``identity`` of document and file first, then the ``summary``
+    of the verdict.
 
-    Only a plan to fly has conditions to begin, limits to hold, boxes and signatures; ideal impulses have none either.
+    Only a plan to fly has conditions to begin, limits to hold, boxes and signatures; ideal impulses
+    have none either.
     """
-    body, ideal = plan.spacecraft, ideal_code(plan)
+    body = plan.spacecraft
+    ideal = ideal_code(plan)
     if not plan.pulses.pulses:
         yield Prose(summary, alarm=bool(judged.status.exit_status))
         return
@@ -69,7 +77,9 @@ def manoeuvre_blocks(
     if flies and points is None:
         yield Prose("Tolerances not checked.")
     if flies:
-        yield FactList(f"GO at t = 0 with{' (nominal)' * (points is None)}", tuple(_conditions(body, points)))
+        yield FactList(
+            f"GO at t = 0 with{' (nominal)' * (points is None)}", tuple(_conditions(body, points))
+        )
     yield _fired(plan, judged, points, flies=flies)
     totals = [("totals", _totals(plan)), ("phase", _phase_note(body))]
     if not flies:
@@ -85,7 +95,8 @@ def manoeuvre_blocks(
 
 def _conditions(body: Spacecraft, points: Checkpoints | None) -> Iterator[tuple[str, str]]:
     """Spin, nutation and phase at which the first row may be fired."""
-    spin, nutation = f"{body.spin * RPM:.5g}", short_angle(body.tilt)
+    spin = f"{body.spin * RPM:.5g}"
+    nutation = short_angle(body.tilt)
     if points is None:
         yield "spin", f"{spin} rpm"
         yield "nutation", f"{nutation} deg"
@@ -99,7 +110,9 @@ def _conditions(body: Spacecraft, points: Checkpoints | None) -> Iterator[tuple[
 
 
 def _window(body: Spacecraft, points: Checkpoints) -> str:
-    """Shift of all pulses in phase and in time with which enough cases comply; rounded towards none."""
+    """Shift of all pulses in phase and in time with which enough cases comply; rounded towards
+    none.
+    """
     probability = required_share(body.requirement)
     share = exact_percent(probability)
     if not requirements.judged(body):
@@ -107,10 +120,14 @@ def _window(body: Spacecraft, points: Checkpoints) -> str:
     window = points.window(probability)
     if window is None:
         return f"none: fewer than {share} of the cases comply at the phases below"
-    turn, digits = abs(body.spin), _decimals(body)
+    turn = abs(body.spin)
+    digits = _decimals(body)
     phases = [_inwards(math.degrees(turn * shift), 1) for shift in window]
     times = [_inwards(shift, digits) for shift in window]
-    return f"{phases[0]} to {phases[1]} deg from those below ({times[0]} to {times[1]} s): {share} of cases comply"
+    return (
+        f"{phases[0]} to {phases[1]} deg from those below ({times[0]} to {times[1]} s): "
+        f"{share} of cases comply"
+    )
 
 
 def _inwards(value: float, digits: int) -> str:
@@ -119,10 +136,11 @@ def _inwards(value: float, digits: int) -> str:
 
 
 class SheetRow(NamedTuple):
-    """A pulse or block, from 0: its first pulse, Sun or spin phase at its start and nutation after it, rad.
+    """A pulse or block, from 0: its first pulse, Sun or spin phase at its start and nutation after
+    it, rad.
 
-    ``hold``: range of the nutation outside of which nothing more is fired, of the last row the limit to accept;
-    ``decide``: time by which that must be known.
+    ``hold``: range of the nutation outside of which nothing more is fired, of the last row the
+    limit to accept; ``decide``: time by which that must be known.
     """
 
     at: int
@@ -144,17 +162,27 @@ def _fired(plan: Plan, judged: Verdict, points: Checkpoints | None, *, flies: bo
     turned = phases(flown)[np.array([0, *counts[:-1]])]
     angles = flown.around_pulses()[1].nutation[np.array(counts) - 1].tolist()
     ends = [pulses[count - 1].over for count in counts]
-    decide = [_deadline(body, end, start) for end, start in zip(ends, starts[1:].tolist(), strict=False)]
+    decide = [
+        _deadline(body, end, start) for end, start in zip(ends, starts[1:].tolist(), strict=False)
+    ]
     holds = ["not set"] * len(counts) if points is None else _ranges(points, counts, angles)
-    limit = next((line.bound.limit for line in judged.lines if line.bound.part is Part.NUTATION), angles[-1])
+    limit = next(
+        (line.bound.limit for line in judged.lines if line.bound.part is Part.NUTATION), angles[-1]
+    )
     holds[-1] = f"accept ≤ {short_angle(limit)}"
     columns = zip(firsts, blocks, turned.tolist(), angles, holds, [*decide, MISSING], strict=True)
     rows = [SheetRow(index, *row) for index, row in enumerate(columns)]
-    return sheet(DataTable("Fire" if flies else "Pulses", [*_columns(plan, rows)], rows, flies), "sheet", folds=True)
+    return sheet(
+        DataTable("Fire" if flies else "Pulses", [*_columns(plan, rows)], rows, flies),
+        "sheet",
+        folds=True,
+    )
 
 
 def _deadline(body: Spacecraft, end: float, start: float) -> str:
-    """Time by which it must be known whether the next row is fired: its start; a short coast leaves no time."""
+    """Time by which it must be known whether the next row is fired: its start; a short coast leaves
+    no time.
+    """
     if start - end < DECIDED:
         return "automatic"
     return clock(body, start) or f"{math.floor(10.0 * start) / 10.0:.1f} s"
@@ -162,9 +190,13 @@ def _deadline(body: Spacecraft, end: float, start: float) -> str:
 
 def _columns(plan: Plan, rows: Sequence[SheetRow]) -> Iterator[Column]:
     """Columns of pulses or of blocks; starts in UTC where there is an epoch, else from t = 0."""
-    body, digits, blocks = plan.spacecraft, _decimals(plan.spacecraft), plan.pulses.blocks
+    body = plan.spacecraft
+    digits = _decimals(plan.spacecraft)
+    blocks = plan.pulses.blocks
 
-    def column(name: str, unit: str, value: Callable[[Any], Any], shown: Callable[[Any], str] = str) -> Column:
+    def column(
+        name: str, unit: str, value: Callable[[Any], Any], shown: Callable[[Any], str] = str
+    ) -> Column:
         return Column("", name, unit, value, shown, "sheet")
 
     def seconds(time: float) -> str:
@@ -179,40 +211,62 @@ def _columns(plan: Plan, rows: Sequence[SheetRow]) -> Iterator[Column]:
     else:
         yield column(Shared.START, "s", lambda row: row.pulse.loaded[0], seconds)
     phase = "Sun phase" if sun_phased(body) else "spin phase"
-    yield column(phase, "deg", lambda row: math.degrees(row.phase) % 360.0, lambda angle: fixed(angle, 1, 360.0))
+    yield column(
+        phase,
+        "deg",
+        lambda row: math.degrees(row.phase) % 360.0,
+        lambda angle: fixed(angle, 1, 360.0),
+    )
     yield column(Shared.THRUSTERS, "", lambda row: _thrusters(row.pulse, body))._replace(kind=TEXT)
     if blocks:
         counts = " (counts)" * (body.commands is not None)
         yield column(Shared.FIRST_SUN_PULSE, "", lambda row: row.block.first)
-        yield column(Shared.DELAY, f"s{counts}", lambda row: _counted(body, "delay", row.block.delay))
-        yield column(Shared.ON_TIME, f"s{counts}", lambda row: _counted(body, "width", row.block.width))
+        yield column(
+            Shared.DELAY, f"s{counts}", lambda row: _counted(body, "delay", row.block.delay)
+        )
+        yield column(
+            Shared.ON_TIME, f"s{counts}", lambda row: _counted(body, "width", row.block.width)
+        )
         yield column(Shared.PULSES, "", lambda row: row.block.count)
         yield column(Shared.EVERY, "spin", lambda row: row.block.every)
     elif plan.pulses.idealised:
-        yield column(Shared.IMPULSE, "N m s", lambda row: row.pulse.magnitude, lambda size: f"{size:.4g}")
+        yield column(
+            Shared.IMPULSE, "N m s", lambda row: row.pulse.magnitude, lambda size: f"{size:.4g}"
+        )
     else:
         yield column(Shared.ON_TIME, "s", lambda row: row.pulse.loaded[1], seconds)
     least, _ = limits(body)
-    yield column(Shared.NUTATION_AFTER, "deg", lambda row: row.nutation, lambda angle: short_angle(angle, least))
+    yield column(
+        Shared.NUTATION_AFTER,
+        "deg",
+        lambda row: row.nutation,
+        lambda angle: short_angle(angle, least),
+    )
     for name, value in (("hold if outside", "hold"), ("decide before", "decide")):
         yield column(name, "deg" * (value == "hold"), attrgetter(value))._replace(when=bool)
     yield column("done", "", lambda _: "☐")._replace(kind=TEXT, when=bool)
 
 
 def _counted(body: Spacecraft, which: str, value: float) -> str:
-    """A ``delay`` or ``width`` in s, and in counts of the steps of the commands, where the file has them."""
+    """A ``delay`` or ``width`` in s, and in counts of the steps of the commands, where the file has
+    them.
+    """
     counts = f" ({body.commands.counts(which, value)})" if body.commands is not None else ""
     return f"{value:.6g}{counts}"
 
 
 def _ranges(points: Checkpoints, counts: Sequence[int], expected: Sequence[float]) -> list[str]:
-    """Range of the nutation after each row that has one, of cases that end well, with that ``expected`` (rad) in it."""
+    """Range of the nutation after each row that has one, of cases that end well, with that
+    ``expected`` (rad) in it.
+    """
     from nutdamp.planning.screening import even
 
     limit = limits(points.study.model.spacecraft)[0]
     rows = [number - 1 for number in even(len(counts), CHECKED)]
     texts = [MISSING] * len(counts)
-    for row, (least, most) in zip(rows, points.nutation_after([counts[row] for row in rows]), strict=True):
+    for row, (least, most) in zip(
+        rows, points.nutation_after([counts[row] for row in rows]), strict=True
+    ):
         bounds = min(least, expected[row]), max(most, expected[row])
         texts[row] = " to ".join(short_angle(bound, limit) for bound in bounds)
     return texts
@@ -224,30 +278,59 @@ def _thrusters(pulse: Pulse, body: Spacecraft) -> str:
         return channel_text(pulse, body)
     channel = channel_of(body, pulse)
     members = [] if channel is None else [thruster.name for thruster in channel.thrusters]
-    return pulse.channel if members in ([], [pulse.channel]) else f"{pulse.channel} ({', '.join(members)})"
+    return (
+        pulse.channel
+        if members in ([], [pulse.channel])
+        else f"{pulse.channel} ({', '.join(members)})"
+    )
 
 
 def _phase_note(body: Spacecraft) -> str:
     if sun_phased(body):
-        return "Sun phase: angle from the Sun sensor to the Sun about axis 3, against the spin, at the commanded start."
+        return (
+            "Sun phase: angle from the Sun sensor to the Sun about axis 3, against the spin, "
+            "at the commanded start."
+        )
     falls = ", positive about +3, so that it falls with this spin" * (body.spin < 0.0)
-    return f"Spin phase: angle by which the body has turned about axis 3 since t = 0{falls}, at the commanded start."
+    return (
+        f"Spin phase: angle by which the body has turned about axis 3 since t = 0{falls}, "
+        "at the commanded start."
+    )
 
 
 def _totals(plan: Plan) -> str:
-    pulses, body, digits = plan.pulses, plan.spacecraft, _decimals(plan.spacecraft)
+    pulses = plan.pulses
+    body = plan.spacecraft
+    digits = _decimals(plan.spacecraft)
     on = math.fsum(pulse.loaded[1] for pulse in pulses)
     date = body.utc(pulses.end, min(digits, MILLISECONDS))
     ends = f"{pulses.end:.{digits}f} s" + (f" ({date})" if date else "")
-    return f"pulses: {len(pulses)}; on-time {on:.{digits}f} s; {spent(pulses)}; the last ends at {ends}"
+    return (
+        f"pulses: {len(pulses)}; on-time {on:.{digits}f} s; {spent(pulses)}; "
+        f"the last ends at {ends}"
+    )
 
 
 def _decimals(body: Spacecraft) -> int:
-    """Decimals of times in s: as many as the steps of commands need, else no finer than the tolerance of timing."""
+    """Decimals of times in s: as many as the steps of commands need, else no finer than the
+    tolerance of timing.
+    """
     tick, given = body.limits.tick, body.dispersions
     if tick is not None:
-        fine = (digits for digits in range(FINEST) if math.isclose(tick, round(tick, digits), rel_tol=1e-9))
+        fine = (
+            digits
+            for digits in range(FINEST)
+            if math.isclose(tick, round(tick, digits), rel_tol=1e-9)
+        )
         return next(fine, FINEST)
-    sizes = [] if given is None else [each.size for each in (given.timing, given.timing_offset) if each is not None]
+    sizes = (
+        []
+        if given is None
+        else [each.size for each in (given.timing, given.timing_offset) if each is not None]
+    )
     coarsest = max(map(abs, sizes), default=0.0)
-    return MILLISECONDS if coarsest == 0.0 else min(max(math.ceil(-math.log10(coarsest) - 1e-9), 0), FINEST)
+    return (
+        MILLISECONDS
+        if coarsest == 0.0
+        else min(max(math.ceil(-math.log10(coarsest) - 1e-9), 0), FINEST)
+    )

@@ -1,8 +1,10 @@
-"""The view of the motion that the script of a page moves: its rows as whole numbers, scales, workbench.
+"""The view of the motion that the script of a page moves: its rows as whole numbers, scales,
+workbench.
 
-The script reads rows and draws them: each number that it shows is one row of the track, rounded here. Only where the
-schedule is changed in the workbench it computes rows of its own, the motion of `propagation.flown` for a rigid body and
-pulses of constant thrust; where the flight has more in it, `absence` gives the reason, and there is no workbench.
+The script reads rows and draws them: each number that it shows is one row of the track, rounded
+here. Only where the schedule is changed in the workbench it computes rows of its own, the motion of
+`propagation.flown` for a rigid body and pulses of constant thrust; where the flight has more in it,
+`absence` gives the reason, and there is no workbench.
 """
 
 from __future__ import annotations
@@ -18,7 +20,16 @@ import numpy as np
 from nutdamp.figures import geometry
 from nutdamp.flight import propagation
 from nutdamp.flight.propagation import Flight, Track
-from nutdamp.page.document import EDGES, Circle, Moving, NamedDirection, Panel, Scale, Strip, Workbench
+from nutdamp.page.document import (
+    EDGES,
+    Circle,
+    Moving,
+    NamedDirection,
+    Panel,
+    Scale,
+    Strip,
+    Workbench,
+)
 from nutdamp.physics import attitude
 from nutdamp.planning.plan import Plan
 from nutdamp.schemes.catalogue import SCHEMES
@@ -33,36 +44,54 @@ from nutdamp.views.text import MISSING, most, quantity
 ROWS_A_TURN, LEAST_ROWS, MOST_ROWS = 24, 600, 2400
 """Even rows in the quickest nutation turn; least and largest number of them altogether."""
 
-COARSE = 12  # rows in a turn below which a line from row to row is no picture of the path, and dots are drawn
+# rows in a turn below which a line from row to row is no picture of the path, and dots are drawn
+COARSE = 12
 STEEP = 25.0  # turns of the nutation from which lines are thin
 SPHERE = 10_000  # length of a unit vector of the globe as whole numbers: 0.006 deg
 ANGLE_DIGITS = 4  # decimals of degrees; more where the largest nutation has not so many figures
-FAR = 4.0  # largest distance of a target from H(0) in the panel of the axis track, as a multiple of the track
+# largest distance of a target from H(0) in the panel of the axis track, as a multiple of the track
+FAR = 4.0
 NONE = -(10**8)  # entry of a row for an angle that does not exist
-QUICK, UNHURRIED, SLOW = 4.0, 15.0, 120.0  # seconds that playing takes at the quickest, at first, and at the slowest
+QUICK, UNHURRIED, SLOW = (
+    4.0,
+    15.0,
+    120.0,
+)  # seconds that playing takes at the quickest, at first, and at the slowest
 
 
 def named_directions(body: Spacecraft) -> tuple[NamedDirection, ...]:
-    """Directions of the globe besides the track: the target, the Sun, the cones that the spin axis keeps."""
+    """Directions of the globe besides the track: the target, the Sun, the cones that the spin axis
+    keeps.
+    """
     directions = []
     if body.goal.axis is not None:
         shift = None if body.requirement is None else body.requirement.momentum_shift
-        circles = [] if shift is None else [Circle(f"H at most {most(shift)} from target", shift, "target")]
+        circles = (
+            []
+            if shift is None
+            else [Circle(f"H at most {most(shift)} from target", shift, "target")]
+        )
         directions.append(NamedDirection("target", body.goal.axis, "target", tuple(circles)))
     for keep in body.watched:
         if keep.direction is not None:
             bounds = [("least", keep.least, "keep-out")] * (keep.least > 0.0)
             bounds += [("most", keep.most, "keep-in")] * (keep.most < math.pi)
             circles = [
-                Circle(f"axis at {word} {most(size)} from {keep.name}", size, kind) for word, size, kind in bounds
+                Circle(f"axis at {word} {most(size)} from {keep.name}", size, kind)
+                for word, size, kind in bounds
             ]
-            directions.append(NamedDirection(keep.name, keep.direction, "watched", tuple(circles), watched=True))
+            directions.append(
+                NamedDirection(keep.name, keep.direction, "watched", tuple(circles), watched=True)
+            )
     return tuple(directions)
 
 
 def moving_of(plan: Plan, craft: str = "SPACECRAFT") -> Moving:
-    """The view of a plan flown through the real pulse widths; ``craft``: words of a command for the spacecraft."""
-    body, named = plan.spacecraft, named_directions(plan.spacecraft)
+    """The view of a plan flown through the real pulse widths; ``craft``: words of a command for the
+    spacecraft.
+    """
+    body = plan.spacecraft
+    named = named_directions(plan.spacecraft)
     # To the millisecond, so that the same rows can be had from ``simulate`` by a short number.
     until = math.ceil(1e3 * geometry.shown_until(body, plan.pulses)) / 1e3
     flown = propagation.flown(body, plan.pulses, until)
@@ -71,17 +100,30 @@ def moving_of(plan: Plan, craft: str = "SPACECRAFT") -> Moving:
     track = flown.sampled(samples, until)
     panels, columns, target, rooms = _panels(flown, track, named)
     strip, span = strip_of(flown, track, until)
-    texts, firing, names = {"none": 0}, [], _pulse_names(flown)
+    texts = {"none": 0}
+    firing = []
+    names = _pulse_names(flown)
     for time in track.t.tolist():  # the number of the text that names the firings at each row
-        on = (name for name, (begins, ends) in zip(names, flown.spans, strict=True) if begins <= time <= ends)
+        on = (
+            name
+            for name, (begins, ends) in zip(names, flown.spans, strict=True)
+            if begins <= time <= ends
+        )
         firing.append(texts.setdefault(" and ".join(on) or "none", len(texts)))
     largest = math.degrees(float(track.nutation.max()))
     # Four figures of the largest nutation.
-    cone = ANGLE_DIGITS if largest < geometry.LEAST else max(ANGLE_DIGITS, 3 - math.floor(math.log10(largest)))
+    cone = (
+        ANGLE_DIGITS
+        if largest < geometry.LEAST
+        else max(ANGLE_DIGITS, 3 - math.floor(math.log10(largest)))
+    )
     clock = max(3, math.ceil(-math.log10(until / (samples - 1))) + 1)
     # The angles of the spin axis, as every table shows them, in units of their last decimal.
     pointing = [
-        [NONE if text == MISSING else round(float(text.removesuffix(" deg")) * 10**ANGLE_DIGITS) for text in column]
+        [
+            NONE if text == MISSING else round(float(text.removesuffix(" deg")) * 10**ANGLE_DIGITS)
+            for text in column
+        ]
         for column in zip(*(angle_texts(body, axis) for axis in track.axis), strict=True)
     ]
     columns |= {
@@ -96,7 +138,9 @@ def moving_of(plan: Plan, craft: str = "SPACECRAFT") -> Moving:
         for name, ways in (("axis", track.axis), ("H", track.momentum)):
             unit = ways / np.linalg.norm(ways, axis=1, keepdims=True)
             columns |= _numbered(name, np.rint(SPHERE * unit.T).astype(int).tolist())
-    watched = (np.degrees(attitude.angle_between(track.axis, each.axis)) for each in named if each.watched)
+    watched = (
+        np.degrees(attitude.angle_between(track.axis, each.axis)) for each in named if each.watched
+    )
     columns |= _numbered("aspect", [_whole(angles, ANGLE_DIGITS) for angles in watched])
     utc = _dates(body, track, clock)
     absent = absence(body, flown.schedule)
@@ -106,7 +150,8 @@ def moving_of(plan: Plan, craft: str = "SPACECRAFT") -> Moving:
         "samples": samples,
         "lead": LEAD,
         "span": span,
-        # The first number and the difference of each from the one before: short where little changes.
+        # The first number and the difference of each from the one before: short where little
+        # changes.
         "columns": {name: np.diff(values, prepend=0).tolist() for name, values in columns.items()},
         "none": NONE,
         "firings": [*texts],
@@ -117,7 +162,9 @@ def moving_of(plan: Plan, craft: str = "SPACECRAFT") -> Moving:
                 "name": direction.name,
                 "kind": direction.kind,
                 "axis": [round(part, 6) for part in direction.axis.tolist()],
-                "circles": [{"radius": circle.radius, "kind": circle.kind} for circle in direction.circles],
+                "circles": [
+                    {"radius": circle.radius, "kind": circle.kind} for circle in direction.circles
+                ],
             }
             for direction in named
         ],
@@ -126,16 +173,27 @@ def moving_of(plan: Plan, craft: str = "SPACECRAFT") -> Moving:
         "bench": None if absent else workbench_data(flown, track, *rooms, until),
     }
     return Moving(
-        plan.scheme, panels, strip, *_speeds(until), angle_names(body), named, utc is not None,
-        "azimuths" if body.attitude is None else "right ascensions", turns > STEEP,
-        propagation.model_name([flown.schedule]), None if absent else workbench_of(flown, craft), absent,
+        plan.scheme,
+        panels,
+        strip,
+        *_speeds(until),
+        angle_names(body),
+        named,
+        utc is not None,
+        "azimuths" if body.attitude is None else "right ascensions",
+        turns > STEEP,
+        propagation.model_name([flown.schedule]),
+        None if absent else workbench_of(flown, craft),
+        absent,
         _command(plan, craft, until, samples),
         json.dumps(data, separators=(",", ":"), ensure_ascii=False).replace("<", "\\u003c"),
-    )  # fmt: skip
+    )
 
 
 def _command(plan: Plan, craft: str, until: float, samples: int) -> tuple[str, ...]:
-    """Command that writes the rows of a plan; none where no scheme by its name and no file gives its pulses."""
+    """Command that writes the rows of a plan; none where no scheme by its name and no file gives
+    its pulses.
+    """
     if plan.from_file:
         pulses = [f"--{'blocks' if plan.pulses.blocks else 'schedule'} {shlex.quote(plan.scheme)}"]
     elif plan.scheme in SCHEMES and plan.spacecraft.goal.sun is None:
@@ -153,14 +211,19 @@ Room = tuple[Vector, float]  # middle (2,) and half the side of a square panel
 def _panels(
     flown: Flight, track: Track, named: Sequence[NamedDirection]
 ) -> tuple[tuple[Panel, ...], dict[str, list[int]], list[int] | None, tuple[Room, Room]]:
-    """Pole curve and axis track, the columns of their paths, the place of the target in the latter, and both rooms."""
+    """Pole curve and axis track, the columns of their paths, the place of the target in the latter,
+    and both rooms.
+    """
     (sky, momentum), target = geometry.sky_paths(flown, track), geometry.sky_target(flown, track)
     # Only if the globe names it and it leaves room for the paths.
     reach = FAR * float(np.hypot(*np.vstack([sky, momentum]).T).max())
     if not (named and np.all(np.hypot(*target.T) <= reach)):
         target = np.empty((0, 2))
     pole = geometry.pole_path(track)
-    rooms = geometry.room(pole, 0.1, centre=True), geometry.room(np.vstack([sky, momentum, target]), 0.1)
+    rooms = (
+        geometry.room(pole, 0.1, centre=True),
+        geometry.room(np.vstack([sky, momentum, target]), 0.1),
+    )
     x, y, _ = geometry.sky_names(flown)
     names = f"ω1, deg/s{geometry.pole_note(flown)}", "ω2, deg/s"
     panels = (
@@ -168,9 +231,16 @@ def _panels(
         panel("sky", "Axis track, H towards you", rooms[1], (x, y)),
     )
     columns: dict[str, list[int]] = {}
-    for name, path, room in zip(("pole", "sky", "momentum"), (pole, sky, momentum), (*rooms, rooms[1]), strict=True):
+    for name, path, room in zip(
+        ("pole", "sky", "momentum"), (pole, sky, momentum), (*rooms, rooms[1]), strict=True
+    ):
         columns |= _numbered(name, placed(path, *room))
-    return panels, columns, [column[0] for column in placed(target, *rooms[1]) if column] or None, rooms
+    return (
+        panels,
+        columns,
+        [column[0] for column in placed(target, *rooms[1]) if column] or None,
+        rooms,
+    )
 
 
 def _numbered(name: str, columns: Sequence[list[int]]) -> dict[str, list[int]]:
@@ -195,33 +265,46 @@ def _dates(body: Spacecraft, track: Track, digits: int) -> dict[str, Any] | None
 
 
 def _pulse_names(flown: Flight) -> tuple[str, ...]:
-    return tuple(f"{number}: {channel_text(pulse, flown.spacecraft)}" for number, pulse in enumerate(flown.schedule, 1))
+    return tuple(
+        f"{number}: {channel_text(pulse, flown.spacecraft)}"
+        for number, pulse in enumerate(flown.schedule, 1)
+    )
 
 
 def _look(track: Track, named: Sequence[NamedDirection]) -> list[float]:
-    """Longitude and latitude in degrees of the viewer of the globe: the track in front, seen a little from the side."""
+    """Longitude and latitude in degrees of the viewer of the globe: the track in front, seen a
+    little from the side.
+    """
     middle = track.momentum[0] / np.linalg.norm(track.momentum[0])
     if named and float(middle @ named[0].axis) > -0.9:
         middle = middle + named[0].axis
     longitude, latitude = attitude.sphere_angles(middle / np.linalg.norm(middle))
-    turned, shown = math.degrees(longitude or 0.0) - 20.0, math.degrees(latitude)
+    turned = math.degrees(longitude or 0.0) - 20.0
+    shown = math.degrees(latitude)
     return [round(turned, 1), round(shown - 25.0 if shown > 0.0 else shown + 25.0, 1)]
 
 
 def _speeds(until: float) -> tuple[tuple[tuple[float, str], ...], float]:
     """Seconds of motion in a second of playing, as number and words; and the one to begin with."""
-    decades = range(math.floor(math.log10(until / SLOW)) - 1, math.ceil(math.log10(until / QUICK)) + 1)
+    decades = range(
+        math.floor(math.log10(until / SLOW)) - 1, math.ceil(math.log10(until / QUICK)) + 1
+    )
     every = [step * 10.0**decade for decade in decades for step in (1, 2, 5)]
     speeds = sorted({1.0, *(round(pace, 12) for pace in every if QUICK <= until / pace <= SLOW)})
     first = min(speeds, key=lambda pace: abs(math.log(until / pace / UNHURRIED)))
     return tuple((pace, "real time" if pace == 1.0 else f"× {pace:g}") for pace in speeds), first
 
 
-EDGE = 0.03  # part of a scale at either end without a number: it would touch those of the other scale
+EDGE = (
+    0.03  # part of a scale at either end without a number: it would touch those of the other scale
+)
 LEAD = 0.012  # part of the axis of time before t = 0: motion at t = 0 is seen beside the cursor
 
-PREFIXES, SHORT = (("", 1.0), ("m", 1e3), ("µ", 1e6), ("n", 1e9)), 0.05
-"""Prefixes of units with their factors, and the largest number of a scale that needs another one."""
+PREFIXES = (("", 1.0), ("m", 1e3), ("µ", 1e6), ("n", 1e9))
+SHORT = 0.05
+"""Prefixes of units with their factors,
+and the largest number of a scale that needs another one.
+"""
 
 
 def placed(points: Vector, middle: Vector, half: float) -> list[list[int]]:
@@ -233,26 +316,46 @@ def placed(points: Vector, middle: Vector, half: float) -> list[list[int]]:
 
 
 def panel(part: str, title: str, room: tuple[Vector, float], names: tuple[str, str]) -> Panel:
-    """A panel with ``room``: its middle (2,) and half its side; the ``names`` of its axes have deg as their unit."""
+    """A panel with ``room``: its middle (2,) and half its side; the ``names`` of its axes have deg
+    as their unit.
+    """
     middle, half = room
     prefix, factor = _prefix(half)
-    scales, inner = [], (1.0 - 2.0 * EDGE) * half
+    scales = []
+    inner = (1.0 - 2.0 * EDGE) * half
     for which, name in enumerate(names):
-        values = np.array(geometry.ticks(float(middle[which]) - inner, float(middle[which]) + inner, 5))
+        values = np.array(
+            geometry.ticks(float(middle[which]) - inner, float(middle[which]) + inner, 5)
+        )
         places = placed(np.column_stack([values, values]), middle[[which, which]], half)[which]
-        scales.append(_scale(name.replace(", deg", f", {prefix}deg"), map(float, places), (factor * values).tolist()))
+        scales.append(
+            _scale(
+                name.replace(", deg", f", {prefix}deg"),
+                map(float, places),
+                (factor * values).tolist(),
+            )
+        )
     (across,), (along,) = placed(np.zeros((1, 2)), middle, half)
     described = f"{title}; {scales[0].name} to the right, {scales[1].name} upwards"
     return Panel(part, title, described, scales[0], scales[1], (across, along))
 
 
 def _prefix(largest: float) -> tuple[str, float]:
-    """The prefix of a unit that keeps numbers up to ``largest`` short, and the factor by which they grow."""
-    return next(((name, factor) for name, factor in PREFIXES if factor * largest >= SHORT), PREFIXES[-1])
+    """The prefix of a unit that keeps numbers up to ``largest`` short, and the factor by which they
+    grow.
+    """
+    return next(
+        ((name, factor) for name, factor in PREFIXES if factor * largest >= SHORT), PREFIXES[-1]
+    )
 
 
 def _scale(name: str, places: Iterable[float], values: Iterable[float]) -> Scale:
-    return Scale(name, tuple((at, f"{value:.6g}".replace("-", "−")) for at, value in zip(places, values, strict=True)))
+    return Scale(
+        name,
+        tuple(
+            (at, f"{value:.6g}".replace("-", "−")) for at, value in zip(places, values, strict=True)
+        ),
+    )
 
 
 def strip_of(flown: Flight, track: Track, until: float) -> tuple[Strip, list[float]]:
@@ -261,7 +364,8 @@ def strip_of(flown: Flight, track: Track, until: float) -> tuple[Strip, list[flo
     angles = np.degrees(np.concatenate([track.nutation, track.body_cone, track.space_cone, [0.0]]))
     low, high = float(angles.min()), float(angles.max())
     margin = 0.06 * (high - low) if high - low > geometry.LEAST else 1.0
-    low, high = low - margin, high + margin
+    low = low - margin
+    high = high + margin
     width, height = 2000, 1000  # in units of the SVG
 
     def rise(angle: float) -> float:
@@ -282,7 +386,9 @@ def strip_of(flown: Flight, track: Track, until: float) -> tuple[Strip, list[flo
     strip = Strip(
         times=_scale("time, s", (100.0 * across(time) for time in times), times),
         angles=_scale(
-            f"{prefix}deg", (rise(angle) * 100.0 / height for angle in marked), (factor * angle for angle in marked)
+            f"{prefix}deg",
+            (rise(angle) * 100.0 / height for angle in marked),
+            (factor * angle for angle in marked),
         ),
         zero=rise(0.0),
         required=rise(level) if low < level < high else None,
@@ -319,7 +425,11 @@ def workbench_of(flown: Flight, craft: str) -> Workbench:
     limits = {bound.part: bound.limit for bound in requirements.required(body)}
     parts = [Part.NUTATION, Part.SHIFT, *[Part.DISTANCE] * (body.goal.axis is not None)]
     rows = [
-        (part.value, part.label, f"≤ {most(limits[part]).removesuffix(' deg')}°" if part in limits else "")
+        (
+            part.value,
+            part.label,
+            f"≤ {most(limits[part]).removesuffix(' deg')}°" if part in limits else "",
+        )
         for part in parts
     ]
     if Part.SPIN in limits:
@@ -328,13 +438,18 @@ def workbench_of(flown: Flight, craft: str) -> Workbench:
     return Workbench(tuple(rows), _pulse_names(flown), body.inertia.symmetric, EDITED, command)
 
 
-def workbench_data(flown: Flight, track: Track, pole: Room, sky: Room, until: float) -> dict[str, Any]:
-    """Data of the script, SI and rad in principal axes: body, pulses, limits, and the scales of the panels.
+def workbench_data(
+    flown: Flight, track: Track, pole: Room, sky: Room, until: float
+) -> dict[str, Any]:
+    """Data of the script, SI and rad in principal axes: body, pulses, limits, and the scales of the
+    panels.
 
-    ``pole`` and ``sky`` are the rooms of the panels, deg/s and deg; ``track`` is shown to ``until`` s.
+    ``pole`` and ``sky`` are the rooms of the panels, deg/s and deg; ``track`` is shown to ``until``
+    s.
     """
     body, limits = flown.spacecraft, flown.spacecraft.limits
-    target, channels = body.goal.axis, geometry.channels_fired(flown)
+    target = body.goal.axis
+    channels = geometry.channels_fired(flown)
     return {
         "body": {
             "moments": body.inertia.moments,
@@ -354,7 +469,9 @@ def workbench_data(flown: Flight, track: Track, pole: Room, sky: Room, until: fl
                 "impulse": pulse.impulse.tolist(),
                 "torque": None if pulse.torque is None else pulse.torque.tolist(),
                 "least": 0.0 if channel is None else channel.min_on_time,
-                "most": None if channel is None or math.isinf(channel.max_on_time) else channel.max_on_time,
+                "most": None
+                if channel is None or math.isinf(channel.max_on_time)
+                else channel.max_on_time,
             }
             for pulse, channel in ((pulse, channel_of(body, pulse)) for pulse in flown.schedule)
         ],

@@ -1,6 +1,8 @@
-"""The page of ``report``: its first screen, the sections below, and the one HTML file that they become.
+"""The page of ``report``: its first screen, the sections below, and the one HTML file that they
+become.
 
-The file needs nothing else: style, script and pictures are inside, and nothing is asked of a network.
+The file needs nothing else: style, script and pictures are inside, and nothing is asked of a
+network.
 """
 
 from __future__ import annotations
@@ -34,7 +36,17 @@ from nutdamp.files.reader import Source
 from nutdamp.files.yaml import dotted
 from nutdamp.flight.verification import verify
 from nutdamp.page import document
-from nutdamp.page.document import Block, Control, Details, FactList, Page, PageSection, Picture, Points, Prose
+from nutdamp.page.document import (
+    Block,
+    Control,
+    Details,
+    FactList,
+    Page,
+    PageSection,
+    Picture,
+    Points,
+    Prose,
+)
 from nutdamp.page.manoeuvre import manoeuvre_blocks
 from nutdamp.page.moving import moving_of
 from nutdamp.planning.decision import Comparison
@@ -49,7 +61,14 @@ from nutdamp.views.check import check_screen
 from nutdamp.views.glance import scheme_table
 from nutdamp.views.guide import Topic
 from nutdamp.views.parts import NOTES, pulse_table
-from nutdamp.views.simulation import BUDGET, BUDGET_NOTE, budget_table, conservation, methods_table, verdict
+from nutdamp.views.simulation import (
+    BUDGET,
+    BUDGET_NOTE,
+    budget_table,
+    conservation,
+    methods_table,
+    verdict,
+)
 from nutdamp.views.text import WARNING, joined, sentence, severity, text
 from nutdamp.views.trade import front_parts, trade_notes
 
@@ -65,12 +84,15 @@ ENDINGS = (".html", ".htm")  # endings of the files that a page is written to
 
 
 def expect_html(path: str) -> None:
-    """Refuse a page that cannot be made, or not in this form, before the work; ``-`` is standard output.
+    """Refuse a page that cannot be made, or not in this form, before the work; ``-`` is standard
+    output.
 
     Raises BadRequest for an ending other than `ENDINGS`, MissingExtra without Jinja or matplotlib.
     """
     if path != "-" and Path(path).suffix.lower() not in ENDINGS:
-        raise BadRequest(f"--output {path}: a report is written as HTML (.html); a browser prints that as PDF")
+        raise BadRequest(
+            f"--output {path}: a report is written as HTML (.html); a browser prints that as PDF"
+        )
     _require_jinja()
     require()
 
@@ -81,19 +103,35 @@ def _require_jinja() -> None:
 
 
 def page_html(page: Page) -> str:
-    """The whole file. All text of a spacecraft file is escaped; the policy in its head allows no other script."""
+    """The whole file. All text of a spacecraft file is escaped; the policy in its head allows no
+    other script.
+    """
     moves = any(isinstance(block, document.Moving) for block in page.motion)
     style, script = (
-        "\n".join(files("nutdamp.page").joinpath(name).read_text("utf-8").strip() for name in (first, *views * moves))
-        for first, views in (("page.css", ["view.css"]), ("page.js", ["motion.js", "bench.js", "view.js"]))
+        "\n".join(
+            files("nutdamp.page").joinpath(name).read_text("utf-8").strip()
+            for name in (first, *views * moves)
+        )
+        for first, views in (
+            ("page.css", ["view.css"]),
+            ("page.js", ["motion.js", "bench.js", "view.js"]),
+        )
     )
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
-    return _templates().get_template("page.html").render(page=page, style=style, script=script, digest=digest)
+    return (
+        _templates()
+        .get_template("page.html")
+        .render(page=page, style=style, script=script, digest=digest)
+    )
 
 
 def block_html(block: Block) -> str:
     """One block of a page, in a box of its own to scroll in where it may be wide."""
-    return _templates().from_string('{% from "blocks.html" import block %}{{ block(made) }}').render(made=block)
+    return (
+        _templates()
+        .from_string('{% from "blocks.html" import block %}{{ block(made) }}')
+        .render(made=block)
+    )
 
 
 @cache
@@ -110,7 +148,9 @@ def _templates() -> Environment:
         keep_trailing_newline=True,
     )
     # Text within a string of a style sheet: all but letters and digits by their numbers.
-    environment.filters["css"] = lambda text: re.sub("[^A-Za-z0-9]", lambda char: f"\\{ord(char[0]):x} ", text)
+    environment.filters["css"] = lambda text: re.sub(
+        "[^A-Za-z0-9]", lambda char: f"\\{ord(char[0]):x} ", text
+    )
     environment.filters.update(labelled=_labelled, whole=_whole)
     return environment
 
@@ -159,7 +199,9 @@ class Report:
         return self.verdict.good and not self.page.broken
 
 
-def made_of(compared: Comparison, repeat: Repeat, control: Control, traded: Sequence[Front] = ()) -> Report:
+def made_of(
+    compared: Comparison, repeat: Repeat, control: Control, traded: Sequence[Front] = ()
+) -> Report:
     """The report, not yet written. Raises MissingExtra without the extra plot."""
     page = report_page(compared, repeat, traded=traded, control=control)
     return Report(compared, page, page_html(page))
@@ -172,8 +214,8 @@ DOTS = ("end", "impulse", "propellant", "nutation", "momentum shift", "axis erro
 class Repeat(NamedTuple):
     """Data to make the page again: the command, and the input file by name and text.
 
-    ``settings``: keys that the command sets in place of those in the file, and their values; ``goal``: its options of
-    the goal.
+    ``settings``: keys that the command sets in place of those in the file, and their values;
+    ``goal``: its options of the goal.
     """
 
     command: str
@@ -183,7 +225,9 @@ class Repeat(NamedTuple):
     goal: tuple[str, ...] = ()
 
     def craft(self, *, built_in: bool = False) -> str:
-        """Words of a command for the spacecraft: none for the built-in one, SPACECRAFT where no file has it."""
+        """Words of a command for the spacecraft: none for the built-in one, SPACECRAFT where no
+        file has it.
+        """
         if not built_in and not Path(self.name).is_file():
             return "SPACECRAFT"
         keys = (f"--set={key}={value}" for key, value in self.settings)
@@ -196,7 +240,9 @@ class Repeat(NamedTuple):
 
 
 def called(body: Spacecraft, how: str) -> Repeat:
-    """The call in Python that makes a page again; where fields were replaced, no file stands for the spacecraft."""
+    """The call in Python that makes a page again; where fields were replaced, no file stands for
+    the spacecraft.
+    """
     if isinstance(body.source, Source):
         return repeated(f"nutdamp.report({body.source.name!r}, {how})", body.source)
     return Repeat(f"nutdamp.report(spacecraft, {how})", "", "")
@@ -209,7 +255,11 @@ def repeated(command: str, source: Source, goal: tuple[str, ...] = ()) -> Repeat
 
 
 def report_page(
-    compared: Comparison, repeat: Repeat, *, traded: Sequence[Front] = (), control: Control = document.UNCONTROLLED
+    compared: Comparison,
+    repeat: Repeat,
+    *,
+    traded: Sequence[Front] = (),
+    control: Control = document.UNCONTROLLED,
 ) -> Page:
     """The page; raises MissingExtra without matplotlib. ``traded``: fronts of time against cost."""
     body, judged, chosen = compared.spacecraft, compared.verdict, compared.recommended
@@ -228,7 +278,10 @@ def report_page(
             contenders=tuple(
                 document.Contender(
                     plan.scheme,
-                    (*[verdicts.spent(plan.pulses)] * plan.feasible, glance.scheme_verdict(compared, plan)),
+                    (
+                        *[verdicts.spent(plan.pulses)] * plan.feasible,
+                        glance.scheme_verdict(compared, plan),
+                    ),
                     plan is chosen,
                 )
                 for plan in compared.plans
@@ -238,7 +291,9 @@ def report_page(
             warnings=tuple(warnings),
         )
         if chosen is not None:
-            broken = broken_limits(body, chosen.pulses) if chosen.from_file else []  # schemes break none
+            broken = (
+                broken_limits(body, chosen.pulses) if chosen.from_file else []
+            )  # schemes break none
             page = replace(
                 page,
                 broken=tuple(broken),
@@ -259,8 +314,16 @@ def report_page(
 def _bar(judged: Verdict, line: Line) -> document.Bar:
     """A required bound with its bar."""
     bound, dispersed = line.bound, line.dispersed
-    level = "" if judged.cases is None else f"{verdicts.exact_percent(judged.cases.probability)} within "
-    alone = "" if line.share is None or judged.cases is None else verdicts.percent(line.share, judged.cases.probability)
+    level = (
+        ""
+        if judged.cases is None
+        else f"{verdicts.exact_percent(judged.cases.probability)} within "
+    )
+    alone = (
+        ""
+        if line.share is None or judged.cases is None
+        else verdicts.percent(line.share, judged.cases.probability)
+    )
     texts = (
         f"nominal {verdicts.value(bound, line.nominal)}",
         "" if dispersed is None else level + verdicts.value(bound, dispersed),
@@ -269,7 +332,9 @@ def _bar(judged: Verdict, line: Line) -> document.Bar:
         f"{alone} keep it" * bool(alone),
         verdicts.line_word(line),
     )
-    used = tuple(math.nan if size is None else float(bound.used(size)) for size in (line.nominal, dispersed))
+    used = tuple(
+        math.nan if size is None else float(bound.used(size)) for size in (line.nominal, dispersed)
+    )
     return document.Bar(bound.label, texts, used, line.met)
 
 
@@ -282,7 +347,8 @@ def _sections(
     more_notes: Sequence[str],
 ) -> Iterator[PageSection]:
     """Sections below the first screen."""
-    chosen, dispersed = compared.recommended, _cases_of(compared)
+    chosen = compared.recommended
+    dispersed = _cases_of(compared)
     if dispersed is not None:
         yield PageSection("dispersion", "Dispersion", tuple(_dispersion(dispersed)))
     yield PageSection("schemes", "Schemes compared", tuple(_schemes(compared, more_notes)))
@@ -321,7 +387,9 @@ def _title(body: Spacecraft) -> str:
 
 
 def _dispersion(dispersed: Dispersion) -> Iterator[Block]:
-    """Verdict, distributions and percentiles of the cases; budget and worst cases behind a title."""
+    """Verdict, distributions and percentiles of the cases;
+    budget and worst cases behind a title.
+    """
     from nutdamp.views.dispersion import cone_lines, dispersion_screen, verdict_lines
 
     judged, results = dispersed.verdict, dispersed.core
@@ -334,14 +402,18 @@ def _dispersion(dispersed: Dispersion) -> Iterator[Block]:
     yield document.Beside(dispersion_pictures(dispersed))
     rest = [
         block
-        for block in document.blocks_of("What is left, by share of the cases", dispersion_screen(dispersed, worst=5))
+        for block in document.blocks_of(
+            "What is left, by share of the cases", dispersion_screen(dispersed, worst=5)
+        )
         if block not in lines and getattr(block, "rows", ()) != required.rows
     ]
     yield Details("Percentiles, tolerance budget and worst cases", tuple(rest))
 
 
 def _schemes(compared: Comparison, more_notes: Sequence[str]) -> Iterator[Block]:
-    """The comparison with the reason of the recommendation, and remarks that have no room on the first screen."""
+    """The comparison with the reason of the recommendation, and remarks that have no room on the
+    first screen.
+    """
     yield Prose(sentence(joined(reasons(compared))))
     chosen = compared.recommended
     yield document.sheet(scheme_table(compared, chosen), dots=DOTS)
@@ -359,22 +431,38 @@ def _trade(compared: Comparison, traded: Sequence[Front]) -> Iterator[Block]:
     chosen = compared.recommended
     notes = () if chosen is None else trade_notes(traded, chosen, compared.verdict)
     yield from (Prose(sentence(text(note))) for note in notes)
-    yield from document.blocks_of("Schedules by their ends", Group(*front_parts(compared.spacecraft, traded)))
+    yield from document.blocks_of(
+        "Schedules by their ends", Group(*front_parts(compared.spacecraft, traded))
+    )
 
 
 def _verification(chosen: Plan) -> Iterator[Block]:
     body = chosen.spacecraft
-    verified = verify(body, chosen.pulses, unrounded(chosen), expected=chosen.options.with_disturbances)
+    verified = verify(
+        body, chosen.pulses, unrounded(chosen), expected=chosen.options.with_disturbances
+    )
     yield Prose(f"{verdict(verified)} {sentence(text(conservation(verified)))}")
-    missing = tuple((method.name, f"not flown; {method.missing}") for method in verified.methods if method.missing)
-    flights = document.sheet_of("Maximum differences from the flown motion", methods_table(verified))
+    missing = tuple(
+        (method.name, f"not flown; {method.missing}")
+        for method in verified.methods
+        if method.missing
+    )
+    flights = document.sheet_of(
+        "Maximum differences from the flown motion", methods_table(verified)
+    )
     budget = document.sheet_of(BUDGET, budget_table(body, verified)), Prose(BUDGET_NOTE)
-    yield Details("Independent flights and error budget", (flights, *[Points(missing)] * bool(missing), *budget))
+    yield Details(
+        "Independent flights and error budget",
+        (flights, *[Points(missing)] * bool(missing), *budget),
+    )
 
 
 def _background(compared: Comparison, judged: Verdict, repeat: Repeat) -> Iterator[Block]:
     body = compared.spacecraft
-    yield Details("Spacecraft", tuple(document.blocks_of("What actuators and tolerances do", check_screen(body))))
+    yield Details(
+        "Spacecraft",
+        tuple(document.blocks_of("What actuators and tolerances do", check_screen(body))),
+    )
     chosen = compared.recommended
     if chosen is not None:
         ends = document.facts_of("Final state", decisions.end_facts(chosen))
@@ -392,7 +480,9 @@ def _file_line(repeat: Repeat) -> str:
 
 def _repeat(repeat: Repeat, judged: Verdict) -> Iterator[Block]:
     yield document.Listing("Command", printable(repeat.command))
-    facts = [] if judged.cases is None else [("seed of the dispersed cases", str(judged.cases.seed))]
+    facts = (
+        [] if judged.cases is None else [("seed of the dispersed cases", str(judged.cases.seed))]
+    )
     facts += [("input file", _file_line(repeat))] if repeat.text else []
     yield FactList("Versions", (*_versions(), *facts))
     if repeat.settings:
@@ -406,7 +496,13 @@ def _versions() -> Iterator[tuple[str, str]]:
     """Versions of the packages that numbers and pictures depend on."""
     yield "nutdamp", __version__
     yield "Python", platform.python_version()
-    packages = {"numpy": "numpy", "scipy": "scipy", "highspy": "highspy", "matplotlib": "matplotlib", "bsk": "Basilisk"}
+    packages = {
+        "numpy": "numpy",
+        "scipy": "scipy",
+        "highspy": "highspy",
+        "matplotlib": "matplotlib",
+        "bsk": "Basilisk",
+    }
     for package, name in packages.items():
         try:
             yield name, version(package)
@@ -416,12 +512,16 @@ def _versions() -> Iterator[tuple[str, str]]:
 
 PICTURES = {
     "motion": (
-        "Pole curve: the tip of the rotation vector ω in the body. Axis track: the spin axis in space, "
+        "Pole curve: the tip of the rotation vector ω in the body. Axis track: "
+        "the spin axis in space, "
         "with the places of the angular momentum H.",
         "Pole curve in the body and track of the spin axis in space, with numbered pulses",
     ),
     "history": (
-        "Nutation on a log axis with what is required, the firings of each channel, and body rates over time.",
+        (
+            "Nutation on a log axis with what is required, the firings of each channel, "
+            "and body rates over time."
+        ),
         "Nutation, firings and body rates over time",
     ),
     "trade": (
@@ -441,22 +541,30 @@ PICTURES = {
 
 
 def flight_pictures(plan: Plan, judged: Verdict) -> tuple[Picture, ...]:
-    """Motion and history of a plan, from its flight through the real widths; raises MissingExtra."""
+    """Motion and history of a plan, from its flight through the real widths;
+    raises MissingExtra.
+    """
     flown, track = overview.shown(plan)
     motion = overview.flight_figure("motion", flown, track, judged)
-    history = (overview.history_figure(flown, track, judged, narrow=narrow) for narrow in (False, True))
+    history = (
+        overview.history_figure(flown, track, judged, narrow=narrow) for narrow in (False, True)
+    )
     return _picture("motion", motion), _picture("history", *history)
 
 
 def trade_picture(compared: Comparison, fronts: Sequence[Front]) -> Picture:
-    """Time against cost, with the recommended plan among the schedules of the fronts; raises MissingExtra."""
+    """Time against cost, with the recommended plan among the schedules of the fronts; raises
+    MissingExtra.
+    """
     draw = partial(studies.trade_figure, compared.spacecraft, fronts, compared.recommended)
     return _picture("trade", draw(), draw(narrow=True))
 
 
 def dispersion_pictures(dispersed: Dispersion) -> tuple[Picture, ...]:
     """Distribution of the cases of a study, and where H ends; raises MissingExtra."""
-    return tuple(_picture(name, studies.dispersion_figure(dispersed, name)) for name in ("cases", "momentum"))
+    return tuple(
+        _picture(name, studies.dispersion_figure(dispersed, name)) for name in ("cases", "momentum")
+    )
 
 
 def _picture(name: str, figure: Figure, narrow: Figure | None = None) -> Picture:
@@ -466,23 +574,36 @@ def _picture(name: str, figure: Figure, narrow: Figure | None = None) -> Picture
     return Picture(image.svg(figure, titled=False), title, *PICTURES[name], phone)
 
 
-EQUATIONS = ("1", "17", "18", "19")  # equations of Magnus that every plan and flight rest on, as the guide numbers them
+EQUATIONS = (
+    "1",
+    "17",
+    "18",
+    "19",
+)  # equations of Magnus that every plan and flight rest on, as the guide numbers them
 
 
 def _method(compared: Comparison) -> Iterator[Block]:
     """A paragraph on the method, the equations used with their symbols, the sources."""
-    unequal = "; with I1 ≠ I2 the true tensor moves freely in between" * (not compared.spacecraft.inertia.symmetric)
+    unequal = "; with I1 ≠ I2 the true tensor moves freely in between" * (
+        not compared.spacecraft.inertia.symmetric
+    )
     wheel = " With the wheel H3 = Cω3 + h stands for the Cω3 below, and ω3 - H3/A for aω3."
     yield Prose(
-        f"Schemes plan on the nominal values of the input file ({', '.join(plan.scheme for plan in compared.plans)}). "
-        "Each schedule is then flown: Euler's equations with the true principal moments are integrated through the "
-        "real pulse widths by Taylor series, coasts of symmetric bodies as exact arcs. Recommendation, requirement and "
-        "verdict go by that flight. By M(17), the impulse sum, each pulse acts at its centre with its effective "
+        "Schemes plan on the nominal values of the input file "
+        f"({', '.join(plan.scheme for plan in compared.plans)}). "
+        "Each schedule is then flown: Euler's equations with the true principal moments are "
+        "integrated through the "
+        "real pulse widths by Taylor series, coasts of symmetric bodies as exact arcs. "
+        "Recommendation, requirement and "
+        "verdict go by that flight. By M(17), the impulse sum, "
+        "each pulse acts at its centre with its effective "
         f"impulse{unequal}.{wheel * (compared.spacecraft.inertia.wheel != 0.0)}"
     )
     chosen = compared.recommended
     topics = [guide.found(number) for number in EQUATIONS]
-    scheme = guide.found(chosen.scheme) if chosen is not None and chosen.scheme in guide.NAMES else None
+    scheme = (
+        guide.found(chosen.scheme) if chosen is not None and chosen.scheme in guide.NAMES else None
+    )
     formulas = [(topic, -1) for topic in topics]  # of an equation the last one, which is in use
     formulas += [] if scheme is None else [(scheme, 0)]
     lines: list[str] = []
@@ -493,8 +614,12 @@ def _method(compared: Comparison) -> Iterator[Block]:
     yield Points((("", guide.SOURCE),))
 
 
-def _symbols(topics: Sequence[Topic], scheme: Topic | None, listed: str) -> Iterator[tuple[str, str]]:
-    """Each symbol of the equations that are ``listed`` once, and those of the formula of the scheme, as it has them."""
+def _symbols(
+    topics: Sequence[Topic], scheme: Topic | None, listed: str
+) -> Iterator[tuple[str, str]]:
+    """Each symbol of the equations that are ``listed`` once, and those of the formula of the
+    scheme, as it has them.
+    """
     rows = (row for topic in topics for row in topic.rows)
     yield from {symbol: text for symbol, text in rows if symbol.removesuffix(")") in listed}.items()
     if scheme is not None:
@@ -520,5 +645,7 @@ CONDITIONS: dict[str, Callable[[Comparison], bool]] = {
 def assumptions(compared: Comparison) -> Iterator[str]:
     """Assumptions and limits of the guide that apply here."""
     for limit in guide.limits():
-        if all(applies(compared) for begin, applies in CONDITIONS.items() if limit.startswith(begin)):
+        if all(
+            applies(compared) for begin, applies in CONDITIONS.items() if limit.startswith(begin)
+        ):
             yield limit.replace("`", "")

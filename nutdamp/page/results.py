@@ -1,4 +1,6 @@
-"""Display and output of the results: functions that `nutdamp.api` names for `nutdamp.common.results`."""
+"""Display and output of the results: functions that `nutdamp.api` names for
+`nutdamp.common.results`.
+"""
 
 from __future__ import annotations
 
@@ -112,7 +114,9 @@ def table(result: Plan | Comparison | Flight | Simulation) -> results.Table:
     """Rows of the pulses, the schemes, or the track."""
     if isinstance(result, Plan | Comparison):
         return _rows(result).array()
-    flight, until = (result, result.shown_to) if isinstance(result, Flight) else (result.shown, result.until)
+    flight, until = (
+        (result, result.shown_to) if isinstance(result, Flight) else (result.shown, result.until)
+    )
     return track_array(flight.sampled(result.samples, until), flight.spacecraft.inertia)
 
 
@@ -121,12 +125,16 @@ def csv(result: Plan | Comparison | Flight | Simulation) -> str | Callable[[IO[b
     if isinstance(result, Plan | Comparison):
         return _rows(feasible(result) if isinstance(result, Plan) else result).csv()
     if isinstance(result, Flight):
-        return partial(write_track, result.pieces(result.samples, result.shown_to), result.spacecraft.inertia)
+        return partial(
+            write_track, result.pieces(result.samples, result.shown_to), result.spacecraft.inertia
+        )
     return partial(write_track, result.pieces(), result.plan.spacecraft.inertia)
 
 
 def figure(result: Plan | Comparison | Flight | Simulation, name: str = "overview") -> Figure:
-    """Figure by its name of a flight, of that of a plan or of the recommended one; raises BadRequest, Infeasible."""
+    """Figure by its name of a flight, of that of a plan or of the recommended one; raises
+    BadRequest, Infeasible.
+    """
     from nutdamp.figures import overview
 
     judged = None if isinstance(result, Flight) else result.verdict
@@ -137,14 +145,17 @@ def figure(result: Plan | Comparison | Flight | Simulation, name: str = "overvie
     if isinstance(result, Plan):
         flight, track = overview.shown(feasible(result))
     elif isinstance(result, Flight):
-        flight, track = result, result.sampled(result.samples, overview.until(result))
+        flight = result
+        track = result.sampled(result.samples, overview.until(result))
     else:
         flight, track = result.shown, result.pictured
     named = units.instance("name", name, str, "the name of a figure")
     try:
         return overview.flight_figure(named, flight, track, judged)
     except KeyError:
-        raise BadRequest(f"there is no figure {name!r}; expected one of {', '.join(overview.DRAWN)}") from None
+        raise BadRequest(
+            f"there is no figure {name!r}; expected one of {', '.join(overview.DRAWN)}"
+        ) from None
 
 
 def save(result: object, path: str | PathLike[str]) -> None:
@@ -165,20 +176,29 @@ def line(result: Spacecraft | Plan | Flight | Comparison) -> str:
         return f"<Spacecraft {result.name}: {shape}>"
     if isinstance(result, Comparison):
         chosen = result.recommended
-        verdict = result.reason if chosen is None else f"recommended {chosen.scheme}, {result.reason}"
+        verdict = (
+            result.reason if chosen is None else f"recommended {chosen.scheme}, {result.reason}"
+        )
         return f"<Comparison of {', '.join(plan.scheme for plan in result)}: {verdict}>"
     if isinstance(result, Flight):
         left = result.residual
-        ended = f"nutation left {degrees(left.nutation)}, momentum shift {degrees(left.momentum_shift)}"
+        ended = (
+            f"nutation left {degrees(left.nutation)}, momentum shift {degrees(left.momentum_shift)}"
+        )
         return f"<Flight of {_summary(result)}: {ended}>"
     if result.flown is None:
         return f"<Plan {result.scheme}: infeasible, {result.why}>"
-    ended = f"{len(result)} pulses until {result.end:.4g} s, nutation left {degrees(result.flown.nutation)}"
+    ended = (
+        f"{len(result)} pulses until {result.end:.4g} s, "
+        f"nutation left {degrees(result.flown.nutation)}"
+    )
     return f"<Plan {result.scheme}: {ended}>"
 
 
 def html(result: Spacecraft | Plan | Flight | Comparison) -> str | None:
-    """HTML table of a result for notebooks, with the picture of its motion; None without the extra plot."""
+    """HTML table of a result for notebooks, with the picture of its motion; None without the extra
+    plot.
+    """
     from nutdamp.figures.image import svg
     from nutdamp.page.report import block_html
 
@@ -187,7 +207,11 @@ def html(result: Spacecraft | Plan | Flight | Comparison) -> str | None:
     except MissingExtra:
         return None
     moves = result.recommended if isinstance(result, Comparison) else result
-    if moves is None or isinstance(moves, Spacecraft) or (isinstance(moves, Plan) and not moves.feasible):
+    if (
+        moves is None
+        or isinstance(moves, Spacecraft)
+        or (isinstance(moves, Plan) and not moves.feasible)
+    ):
         return table
     try:
         picture = svg(moves.figure("motion"))
@@ -210,7 +234,9 @@ def _block(result: Spacecraft | Plan | Flight | Comparison) -> Block:
         return sheet(scheme_table(result, result.recommended))
     if isinstance(result, Flight):
         names = ("nutation", "body_cone", "space_cone", "momentum_shift")
-        rows = tuple((name.replace("_", " "), degrees(getattr(result.residual, name))) for name in names)
+        rows = tuple(
+            (name.replace("_", " "), degrees(getattr(result.residual, name))) for name in names
+        )
         return FactList(f"{result.spacecraft.name}: {_summary(result)}", rows)
     if not result.feasible:
         return Prose(repr(result)[1:-1])

@@ -1,7 +1,8 @@
 """Attitude quaternions: convention, products, rotations, free arcs.
 
-A quaternion (w, x, y, z) is a unit quaternion, scalar first, that leads from body axes to the inertial frame:
-v_inertial = rotate(q, v_body). ``multiply(p, q)`` turns by q first, then by p. Arrays may carry leading axes.
+A quaternion (w, x, y, z) is a unit quaternion, scalar first, that leads from body axes to the
+inertial frame: v_inertial = rotate(q, v_body). ``multiply(p, q)`` turns by q first, then by p.
+Arrays may carry leading axes.
 """
 
 from __future__ import annotations
@@ -22,7 +23,10 @@ _BACK = np.array([1.0, -1.0, -1.0, -1.0])
 
 def multiply(left: Array, right: Array) -> Array:
     """Product of two quaternions, (..., 4) each: the turn ``right``, then the turn ``left``."""
-    return np.stack(product(np.moveaxis(np.asarray(left), -1, 0), np.moveaxis(np.asarray(right), -1, 0)), axis=-1)
+    return np.stack(
+        product(np.moveaxis(np.asarray(left), -1, 0), np.moveaxis(np.asarray(right), -1, 0)),
+        axis=-1,
+    )
 
 
 def product(left: Iterable[Any], right: Iterable[Any]) -> tuple[Any, Any, Any, Any]:
@@ -44,7 +48,12 @@ def rotate(quaternion: Array, vector: Array) -> Array:
     v1, v2, v3 = (vector[..., index] for index in range(3))
     t1, t2, t3 = 2.0 * (y * v3 - z * v2), 2.0 * (z * v1 - x * v3), 2.0 * (x * v2 - y * v1)
     return np.stack(
-        [v1 + w * t1 + y * t3 - z * t2, v2 + w * t2 + z * t1 - x * t3, v3 + w * t3 + x * t2 - y * t1], axis=-1
+        [
+            v1 + w * t1 + y * t3 - z * t2,
+            v2 + w * t2 + z * t1 - x * t3,
+            v3 + w * t3 + x * t2 - y * t1,
+        ],
+        axis=-1,
     )
 
 
@@ -54,7 +63,9 @@ def conjugate(quaternion: Array) -> Array:
 
 
 def matrix(quaternion: Array) -> Array:
-    """Rotation matrix body -> inertial, (4,) -> (3, 3); its columns are the body axes in the inertial frame."""
+    """Rotation matrix body -> inertial, (4,) -> (3, 3); its columns are the body axes in the
+    inertial frame.
+    """
     return rotate(quaternion, np.eye(3)).T
 
 
@@ -62,7 +73,9 @@ def from_matrix(rotation: Array) -> Array:
     """Unit quaternion of a rotation matrix, (3, 3) -> (4,), scalar part not negative."""
     diagonal = np.diagonal(rotation)
     squares = 0.25 * np.array([1 + diagonal.sum(), *(1 - diagonal.sum() + 2 * diagonal)])
-    largest = int(np.argmax(squares))  # the largest component is taken first, so that none is lost to cancellation
+    largest = int(
+        np.argmax(squares)
+    )  # the largest component is taken first, so that none is lost to cancellation
     off = 0.25 * (rotation - rotation.T)
     mixed = 0.25 * (rotation + rotation.T)
     w_times = np.array([off[2, 1], off[0, 2], off[1, 0]])
@@ -98,8 +111,8 @@ def angular_momentum(A: float, C: float, omega: complex, spin: float, wheel: flo
 def frame_n(A: float, C: float, omega: complex, spin: float) -> Array:
     """Quaternion body -> N, the inertial frame of a file that gives none.
 
-    N has z along H, and the spin axis σ·e3 (σ the sign of the spin) in the half plane x >= 0 of x-z; without
-    nutation x lies along body axis 1. Written so that nothing cancels at small angles.
+    N has z along H, and the spin axis σ·e3 (σ the sign of the spin) in the half plane x >= 0 of
+    x-z; without nutation x lies along body axis 1. Written so that nothing cancels at small angles.
     """
     sense = math.copysign(1.0, spin)
     transverse, axial = A * abs(omega), C * abs(spin)
@@ -111,11 +124,20 @@ def frame_n(A: float, C: float, omega: complex, spin: float) -> Array:
     return from_matrix(np.array([x, np.cross(z, x), z]))
 
 
-def arc(A: float, C: float, quaternion: Array, omega: complex, spin: float, times: Array, wheel: float = 0.0) -> Array:
+def arc(
+    A: float,
+    C: float,
+    quaternion: Array,
+    omega: complex,
+    spin: float,
+    times: Array,
+    wheel: float = 0.0,
+) -> Array:
     """Attitude on a torque-free arc of a symmetric body, exact: (n,) s after its start -> (n, 4).
 
-    R(t) = Rot(H t/A) R(0) Rot3(ν t): the body turns about H at |H|/A and about its own axis at ν = ω3 - H3/A = aω3 -
-    h/A, because ω = H/A + ν e3 for a symmetric body (Poinsot's rolling cones, Magnus 1970 fig. 4).
+    R(t) = Rot(H t/A) R(0) Rot3(ν t): the body turns about H at |H|/A and about its own axis at ν =
+    ω3 - H3/A = aω3 - h/A, because ω = H/A + ν e3 for a symmetric body (Poinsot's rolling cones,
+    Magnus 1970 fig. 4).
     """
     body = angular_momentum(A, C, omega, spin, wheel)
     momentum = rotate(quaternion, body)
@@ -127,34 +149,58 @@ def arc(A: float, C: float, quaternion: Array, omega: complex, spin: float, time
     x, y, z = momentum / size if size > 0 else momentum
     sine = np.sin(half_about_momentum)
     turned = product((np.cos(half_about_momentum), sine * x, sine * y, sine * z), quaternion)
-    return np.stack(product(turned, (np.cos(half_about_axis), 0.0, 0.0, np.sin(half_about_axis))), axis=-1)
+    return np.stack(
+        product(turned, (np.cos(half_about_axis), 0.0, 0.0, np.sin(half_about_axis))), axis=-1
+    )
 
 
 def arc_end(
-    A: float, C: float, quaternion: Array, omega: complex, spin: float, time: float, wheel: float = 0.0
+    A: float,
+    C: float,
+    quaternion: Array,
+    omega: complex,
+    spin: float,
+    time: float,
+    wheel: float = 0.0,
 ) -> Array:
-    """`arc` at one ``time`` in s after its start, (4,): plain numbers, a tenth of the cost of arrays."""
-    h1, h2, h3 = A * omega.real, A * omega.imag, C * spin + wheel
+    """`arc` at one ``time`` in s after its start, (4,): plain numbers, a tenth of the cost of
+    arrays.
+    """
+    h1 = A * omega.real
+    h2 = A * omega.imag
+    h3 = C * spin + wheel
     size = math.sqrt(h1 * h1 + h2 * h2 + h3 * h3)
-    half_about_momentum, half_about_axis = 0.5 * size / A * time, 0.5 * ((A - C) / A * spin - wheel / A) * time
-    # Turning about H by an angle is turning in the body about H's body components: q (cos, sin h) = (cos, sin Rh) q.
+    half_about_momentum, half_about_axis = (
+        0.5 * size / A * time,
+        0.5 * ((A - C) / A * spin - wheel / A) * time,
+    )
+    # Turning about H by an angle is turning in the body about H's body components: q (cos, sin h) =
+    # (cos, sin Rh) q.
     sine = math.sin(half_about_momentum) / size if size > 0.0 else 0.0
-    w, x, y, z = product(quaternion.tolist(), (math.cos(half_about_momentum), sine * h1, sine * h2, sine * h3))
-    cosine, sine = math.cos(half_about_axis), math.sin(half_about_axis)
-    return np.array([w * cosine - z * sine, x * cosine + y * sine, y * cosine - x * sine, z * cosine + w * sine])
+    w, x, y, z = product(
+        quaternion.tolist(), (math.cos(half_about_momentum), sine * h1, sine * h2, sine * h3)
+    )
+    cosine = math.cos(half_about_axis)
+    sine = math.sin(half_about_axis)
+    return np.array(
+        [w * cosine - z * sine, x * cosine + y * sine, y * cosine - x * sine, z * cosine + w * sine]
+    )
 
 
 def about_axis(body_axis: Array, body_side: Array, axis: Array, side: Array, phase: float) -> Array:
-    """Quaternion (4,) body -> inertial that lays a ``body_axis`` (3,) along an inertial ``axis`` (3,), unit vectors.
+    """Quaternion (4,) body -> inertial that lays a ``body_axis`` (3,) along an inertial ``axis``
+    (3,), unit vectors.
 
-    ``phase`` rad about it leads from an inertial ``side`` (3,) to a ``body_side`` (3,), both seen along the axis.
+    ``phase`` rad about it leads from an inertial ``side`` (3,) to a ``body_side`` (3,), both seen
+    along the axis.
     """
     frames = []
     for along, towards in ((body_axis, body_side), (axis, side)):
         across = np.cross(along, towards)
         across /= np.linalg.norm(across)
         frames.append(np.column_stack([np.cross(across, along), across, along]))
-    cosine, sine = math.cos(phase), math.sin(phase)
+    cosine = math.cos(phase)
+    sine = math.sin(phase)
     turn = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
     return from_matrix(frames[1] @ turn @ frames[0].T)
 
@@ -162,7 +208,9 @@ def about_axis(body_axis: Array, body_side: Array, axis: Array, side: Array, pha
 def full_turn(angle: float) -> float:
     """Angle reduced to [0, 2π)."""
     turned = angle % (2.0 * math.pi)
-    return turned if turned < 2.0 * math.pi else 0.0  # of a tiny negative angle the remainder rounds up to 2π
+    return (
+        turned if turned < 2.0 * math.pi else 0.0
+    )  # of a tiny negative angle the remainder rounds up to 2π
 
 
 def sphere_angles(vector: Array) -> tuple[float | None, float]:
@@ -177,4 +225,10 @@ def sphere_angles(vector: Array) -> tuple[float | None, float]:
 def on_sphere(right_ascension: float, declination: float) -> Array:
     """Unit vector (3,) towards ``right_ascension`` and ``declination``, rad."""
     across = math.cos(declination)
-    return np.array([across * math.cos(right_ascension), across * math.sin(right_ascension), math.sin(declination)])
+    return np.array(
+        [
+            across * math.cos(right_ascension),
+            across * math.sin(right_ascension),
+            math.sin(declination),
+        ]
+    )

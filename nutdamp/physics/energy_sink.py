@@ -1,34 +1,39 @@
 """Energy sink: dissipation inside the body, in closed form for coasting symmetric bodies.
 
-Flexible parts and liquids drain energy while H stays as it is in space. For the angle θ of axis 3 from H the sink is
+Flexible parts and liquids drain energy while H stays as it is in space. For the angle θ of axis 3
+from H the sink is
 
     dθ/dt = κ sin θ cos θ,   that is   tan θ = tan θ0 e^{κt},   κ = +1/τ prolate, -1/τ oblate,
 
-a linear damper, of which e^{κt} is the small-angle form. As a torque in body axes, beside the free motion, with
-h = H/|H| (exact for any moments; then κ is a given rate, and the energy falls as long as axis 3 is that of least
-moment for κ > 0 or of largest for κ < 0; a sphere has no energy to give, and κ = 0):
+a linear damper, of which e^{κt} is the small-angle form. As a torque in body axes, beside the free
+motion, with h = H/|H| (exact for any moments; then κ is a given rate, and the energy falls as long
+as axis 3 is that of least moment for κ > 0 or of largest for κ < 0; a sphere has no energy to give,
+and κ = 0):
 
     dH1/dt = κ H1 cos²θ,   dH2/dt = κ H2 cos²θ,   dH3/dt = -κ H3 sin²θ,
 
-which is H × s with s = κ h3 (h × e3) = κ h3 (h2, -h1, 0): the body slips against H at s, beside ω = H/I.
-The slip is perpendicular to both H and axis 3, so it changes θ alone. The Euler angles φ about H and ψ about axis 3 of
-a symmetric body are unaffected: dφ/dt = |H|/A and dψ/dt = |H|(1/C - 1/A) cos θ. With s = sin θ0, c = cos θ0, E =
-e^{κt} and N = sqrt(c² + s²E²): sin θ = sE/N, cos θ = c/N, and
+which is H × s with s = κ h3 (h × e3) = κ h3 (h2, -h1, 0): the body slips against H at s, beside ω =
+H/I. The slip is perpendicular to both H and axis 3, so it changes θ alone. The Euler angles φ about
+H and ψ about axis 3 of a symmetric body are unaffected: dφ/dt = |H|/A and dψ/dt = |H|(1/C - 1/A)
+cos θ. With s = sin θ0, c = cos θ0, E = e^{κt} and N = sqrt(c² + s²E²): sin θ = sE/N, cos θ = c/N,
+and
 
     ∫ cos θ dt = asinh(2c sinh(κt)/(1 + N))/κ,
 
-which is -asinh(e^{-κt}/tan θ0)/κ less its value at t = 0, in a form that cancels nowhere: t cos θ0 for κ -> 0, t
-for θ0 -> 0, and zero for θ0 = 90°. Either sense of spin: θ runs from 0 to 180°, and h3 carries the sign.
+which is -asinh(e^{-κt}/tan θ0)/κ less its value at t = 0, in a form that cancels nowhere: t cos θ0
+for κ -> 0, t for θ0 -> 0, and zero for θ0 = 90°. Either sense of spin: θ runs from 0 to 180°, and
+h3 carries the sign.
 
-With a wheel of momentum h, H3 = Cω3 + h takes the place of Cω3. |H| and h are kept, so that the energy changes by
-dE/dθ = |H| sin θ D, D(θ) = |H| cos θ (1/A - 1/C) + h/C: the rate at which ω turns in the body. A linear damper in the
-body takes D² sin²θ, and
+With a wheel of momentum h, H3 = Cω3 + h takes the place of Cω3. |H| and h are kept, so that the
+energy changes by dE/dθ = |H| sin θ D, D(θ) = |H| cos θ (1/A - 1/C) + h/C: the rate at which ω turns
+in the body. A linear damper in the body takes D² sin²θ, and
 
     dθ/dt = κ sin θ D(θ)/D(0) = κ sin θ (u cos θ + v)
 
-with D(0) at the end of axis 3 that is the spin axis, and κ the rate of small angles there. The slip is κ (u h3 + v)
-(h × e3), and dψ/dt = |H|(1/C - 1/A) cos θ - h/C. Where |u| > |v| there is an angle at which D = 0: ω stands still in
-the body, and growth ends. Losses within the wheel follow another law.
+with D(0) at the end of axis 3 that is the spin axis, and κ the rate of small angles there. The slip
+is κ (u h3 + v) (h × e3), and dψ/dt = |H|(1/C - 1/A) cos θ - h/C. Where |u| > |v| there is an angle
+at which D = 0: ω stands still in the body, and growth ends. Losses within the wheel follow another
+law.
 """
 
 from __future__ import annotations
@@ -46,12 +51,20 @@ from nutdamp.physics import attitude
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
-STEPS, CLOSE = 60, 1e-9  # most Newton steps to θ at a time (usual are three), and the error that the last one squares
+STEPS, CLOSE = (
+    60,
+    1e-9,
+)  # most Newton steps to θ at a time (usual are three), and the error that the last one squares
 STILL = 1e-12  # distance in ln tan(θ/2) from the angle with D = 0 within which it is reached
-MOST_TURNED = 10.0  # largest exponent of one of these steps: by e^10 a step that is too far can be taken back
-FOR_EVER = 300.0  # time constants after which the sink has finished: θ is then 0 or 90° to far beyond rounding
-TINY = 1e-200  # offset that keeps quotients like asinh x / x defined at zero and changes nothing elsewhere
-SMALLEST = 1e-150  # least cosine of a nutation angle that is distinguished from zero: its square is still a number
+MOST_TURNED = (
+    10.0  # largest exponent of one of these steps: by e^10 a step that is too far can be taken back
+)
+# time constants after which the sink has finished: θ is then 0 or 90° to far beyond rounding
+FOR_EVER = 300.0
+# offset that keeps quotients like asinh x / x defined at zero and changes nothing elsewhere
+TINY = 1e-200
+# least cosine of a nutation angle that is distinguished from zero: its square is still a number
+SMALLEST = 1e-150
 
 
 class SinkEffect(NamedTuple):
@@ -65,7 +78,9 @@ class SinkEffect(NamedTuple):
 
 
 def damper(A: Any, C: Any, wheel: Any, size: Any, sense: float) -> tuple[Any, Any]:
-    """Shares u and v of the law by |H| = ``size`` and the end ``sense`` of axis 3: (1, 0) without a wheel."""
+    """Shares u and v of the law by |H| = ``size`` and the end ``sense`` of axis 3: (1, 0) without a
+    wheel.
+    """
     if not (wheel if isinstance(wheel, float) else np.any(wheel)):
         return 1.0, 0.0
     by_body, by_wheel = (C - A) / A * size, sense * wheel
@@ -74,9 +89,15 @@ def damper(A: Any, C: Any, wheel: Any, size: Any, sense: float) -> tuple[Any, An
 
 
 def course(
-    growth: float, cosine: float, sine_squared: float, time: float, shares: tuple[Any, Any] = (1.0, 0.0)
+    growth: float,
+    cosine: float,
+    sine_squared: float,
+    time: float,
+    shares: tuple[Any, Any] = (1.0, 0.0),
 ) -> SinkEffect:
-    """Effect of a sink of ``growth`` κ (1/s) after ``time`` s, from θ0 by its ``cosine`` and ``sine_squared``."""
+    """Effect of a sink of ``growth`` κ (1/s) after ``time`` s, from θ0 by its ``cosine`` and
+    ``sine_squared``.
+    """
     if shares[1] != 0.0:
         return _gyrostat_course(growth * shares[0], growth * shares[1], cosine, sine_squared, time)
     exponent = growth * time
@@ -95,13 +116,20 @@ def courses(
     return _course(np, np.arcsinh, cosine, sine_squared, times, exponent, clipped)
 
 
-def _course(module: Any, asinh: Any, cosine: Any, sine_squared: Any, time: Any, exponent: Any, x: Any) -> SinkEffect:
-    """`course` by the functions of a ``module``; ``x`` is ``exponent`` κt clipped to ±`FOR_EVER`."""
-    growing, squared = module.exp(x), cosine * cosine
+def _course(
+    module: Any, asinh: Any, cosine: Any, sine_squared: Any, time: Any, exponent: Any, x: Any
+) -> SinkEffect:
+    """`course` by the functions of a ``module``;
+    ``x`` is ``exponent`` κt clipped to ±`FOR_EVER`.
+    """
+    growing = module.exp(x)
+    squared = cosine * cosine
     size = module.sqrt(squared + sine_squared * growing * growing)
     grown = module.sqrt(0.5 + 0.5 * (squared + sine_squared * growing) / size)
     moving = time * ((x + TINY) / (exponent + TINY))
-    stretched = moving * (module.sinh(x) + TINY) / (x + TINY) * 2.0 / (1.0 + size)  # asinh(c κ stretched)/(c κ)
+    stretched = (
+        moving * (module.sinh(x) + TINY) / (x + TINY) * 2.0 / (1.0 + size)
+    )  # asinh(c κ stretched)/(c κ)
     swing = cosine * 2.0 * module.sinh(x) / (1.0 + size) + TINY
     return SinkEffect(
         transverse=growing / size,
@@ -112,11 +140,14 @@ def _course(module: Any, asinh: Any, cosine: Any, sine_squared: Any, time: Any, 
     )
 
 
-def _gyrostat_course(slope: Any, level: Any, cosine: Any, sine_squared: Any, time: Any) -> SinkEffect:
+def _gyrostat_course(
+    slope: Any, level: Any, cosine: Any, sine_squared: Any, time: Any
+) -> SinkEffect:
     """Effect of θ' = sin θ (p cos θ + r), ``slope`` p and ``level`` r in 1/s, not both zero.
 
-    For z = ln tan(θ/2) - ln tan(θ0/2) it is z' = p cos θ + r, with which t = (z + p∫(1 - cos θ)dt)/(r + p) is closed
-    in z. Its inverse is by Newton steps in the logarithm of the distance from the angle at rest, if there is one.
+    For z = ln tan(θ/2) - ln tan(θ0/2) it is z' = p cos θ + r, with which t = (z + p∫(1 - cos
+    θ)dt)/(r + p) is closed in z. Its inverse is by Newton steps in the logarithm of the distance
+    from the angle at rest, if there is one.
     """
     # Seen from the end of axis 3 at which the rate is the larger, so that nothing cancels.
     end = np.where(np.real(slope * level) < 0.0, -1.0, 1.0)
@@ -124,20 +155,25 @@ def _gyrostat_course(slope: Any, level: Any, cosine: Any, sine_squared: Any, tim
     small = 0.5 * sine_squared / (1.0 + np.where(np.real(cosine) > 0.0, cosine, -cosine))
     above = np.real(cosine) > 0.0
     near, far = np.where(above, 1.0 - small, small), np.where(above, small, 1.0 - small)
-    first, last = level + slope, level - slope  # z' at θ = 0 and at θ = 180°
+    # z' at θ = 0 and at θ = 180°
+    first = level + slope
+    last = level - slope
     begin = first * near + last * far
 
     def clock(way: Any) -> tuple[Any, Any, Any, Any]:
         """Time until z = ``way`` z'(0), z' there over z'(0), e^{2z} and ∫(1 - cos θ)dt."""
         double = 2.0 * begin * way + TINY
-        squared, gained = np.exp(double), 2.0 * way * np.expm1(double) / double
+        squared = np.exp(double)
+        gained = 2.0 * way * np.expm1(double) / double
         change = last * far * gained + TINY
         falls = np.real(change) < -0.5
         ratio = np.where(falls, (first * near + last * far * squared) / begin, 1.0 + change)
         lag = far * gained * np.where(falls, np.log(ratio), np.log1p(change)) / change
         return (begin * way + slope * lag) / first, ratio / (near + far * squared), squared, lag
 
-    with np.errstate(all="ignore"):  # where a logarithm is of nothing there is no such angle, or it is reached
+    with np.errstate(
+        all="ignore"
+    ):  # where a logarithm is of nothing there is no such angle, or it is reached
         rest = 0.5 * np.log(-first * near / (last * far))
         rest = np.where(np.isfinite(rest) & (np.real(first * last) < 0.0), rest, 1.0 / STILL)
         most = np.sign(np.real(time)) * FOR_EVER / (np.abs(begin) + 1e-20 * np.abs(first))
@@ -150,18 +186,24 @@ def _gyrostat_course(slope: Any, level: Any, cosine: Any, sine_squared: Any, tim
             going = (np.real(moves) > 0.0) & (np.abs(gap) > STILL)
             late = np.where(going, until - passed, 0.0)
             turned = begin * moves * late / np.where(going, gap, 1.0) + TINY
-            shorter = np.where(np.abs(turned) > MOST_TURNED, np.copysign(MOST_TURNED, np.real(turned)), turned)
-            step, farthest = -moves * late * np.expm1(-shorter) / turned, 1.01 * np.abs(first * late / (begin + TINY))
+            shorter = np.where(
+                np.abs(turned) > MOST_TURNED, np.copysign(MOST_TURNED, np.real(turned)), turned
+            )
+            step = -moves * late * np.expm1(-shorter) / turned
+            farthest = 1.01 * np.abs(first * late / (begin + TINY))
             step = np.where(np.abs(step) > farthest, np.copysign(farthest, np.real(step)), step)
-            before, way = way, np.clip(way + step, -np.abs(most), np.abs(most))
+            before = way
+            way = np.clip(way + step, -np.abs(most), np.abs(most))
             if np.all(np.abs(way - before) <= CLOSE * np.abs(way)):
                 break
         way = np.where(np.abs(rest - begin * way) <= STILL, rest / begin, way)
         _, _, squared, lag = clock(way)
         z = begin * way
         travel = np.where(np.abs(slope * until) < 1.0, until - lag, (z - level * until) / slope)
-    grown, size = np.exp(z), near + far * squared
-    along, root = (near - far * squared) / size, np.sqrt(size)
+    grown = np.exp(z)
+    size = near + far * squared
+    along = (near - far * squared) / size
+    root = np.sqrt(size)
     return SinkEffect(
         transverse=grown / size,
         along=end * along,
@@ -172,10 +214,11 @@ def _gyrostat_course(slope: Any, level: Any, cosine: Any, sine_squared: Any, tim
 
 
 def time_to_turn(growth: float, cosine: float, sine_squared: float, turned: float) -> float:
-    """Time in s after which ∫cos θ dt is cos θ0 times ``turned`` s, without a wheel; infinite if never.
+    """Time in s after which ∫cos θ dt is cos θ0 times ``turned`` s, without a wheel; infinite if
+    never.
 
-    With z = κ c ``turned`` and c = |cos θ0| > 0 it is κt = z - ln(1 - (e^{2z} - 1) sin²θ0/(2c(1 + c))); flat spin turns
-    no further.
+    With z = κ c ``turned`` and c = |cos θ0| > 0 it is κt = z - ln(1 - (e^{2z} - 1) sin²θ0/(2c(1 +
+    c))); flat spin turns no further.
     """
     c = max(abs(cosine), SMALLEST)
     z = growth * c * turned
@@ -186,15 +229,20 @@ def time_to_turn(growth: float, cosine: float, sine_squared: float, turned: floa
 
 
 def time_to_angle(growth: float, begin: float, end: float, shares: tuple[float, float]) -> float:
-    """Time in s from θ = ``begin`` to ``end``, rad, both above zero, with growth κ not zero; infinite if never."""
+    """Time in s from θ = ``begin`` to ``end``, rad, both above zero, with growth κ not zero;
+    infinite if never.
+    """
     by_body, by_wheel = shares
-    far, rate = math.sin(0.5 * begin) ** 2, by_body * math.cos(begin) + by_wheel
+    far = math.sin(0.5 * begin) ** 2
+    rate = by_body * math.cos(begin) + by_wheel
     ratio = math.tan(0.5 * end) / math.tan(0.5 * begin)
     gained = far * (ratio * ratio - 1.0) / (rate + TINY)
     change = (by_wheel - by_body) * gained + TINY
     if change <= -1.0:
         return math.inf
-    time = (math.log(ratio) + by_body * gained * math.log1p(change) / change) / (growth * (by_body + by_wheel))
+    time = (math.log(ratio) + by_body * gained * math.log1p(change) / change) / (
+        growth * (by_body + by_wheel)
+    )
     return time if time >= 0.0 else math.inf
 
 
@@ -208,21 +256,37 @@ def coast(
     wheel: float = 0.0,
     sense: float = 1.0,
 ) -> SinkEffect:
-    """`course` of a symmetric body from its rates ``omega`` = ω1 + iω2 and ``spin`` at the start, rad/s."""
+    """`course` of a symmetric body from its rates ``omega`` = ω1 + iω2 and ``spin`` at the start,
+    rad/s.
+    """
     first, second, third, size = _direction(A, C, omega, spin, wheel)
     effect_of = courses if isinstance(time, np.ndarray) else course
-    return effect_of(growth, third, first * first + second * second, time, damper(A, C, wheel, size, sense))
+    return effect_of(
+        growth, third, first * first + second * second, time, damper(A, C, wheel, size, sense)
+    )
 
 
-def slip(effect: SinkEffect, first: Any, second: Any, behind: Any, cos_sin: Callable[[Any], tuple[Any, Any]]) -> Any:
-    """Quaternion (w, x, y, z) by which the body has slipped from its free arc; it multiplies that from the right.
+def slip(
+    effect: SinkEffect,
+    first: Any,
+    second: Any,
+    behind: Any,
+    cos_sin: Callable[[Any], tuple[Any, Any]],
+) -> Any:
+    """Quaternion (w, x, y, z) by which the body has slipped from its free arc; it multiplies that
+    from the right.
 
-    ``first`` and ``second``: components of h in the body at the end of the free arc; ``behind``, rad: the
-    excess turn about axis 3, |H|(1/C - 1/A)(∫cos θ dt - t cos θ0).
+    ``first`` and ``second``: components of h in the body at the end of the free arc; ``behind``,
+    rad: the excess turn about axis 3, |H|(1/C - 1/A)(∫cos θ dt - t cos θ0).
     """
     x, y = effect.sine * second, -effect.sine * first
     cosine, sine = cos_sin(0.5 * behind)
-    return effect.cosine * cosine, x * cosine + y * sine, y * cosine - x * sine, effect.cosine * sine
+    return (
+        effect.cosine * cosine,
+        x * cosine + y * sine,
+        y * cosine - x * sine,
+        effect.cosine * sine,
+    )
 
 
 def arc(
@@ -236,10 +300,12 @@ def arc(
     wheel: float = 0.0,
     sense: float = 1.0,
 ) -> tuple[Any, Any, Array]:
-    """Coast of a symmetric body, exact: ω (n,), ω3 (n,) rad/s and attitude (n, 4) at ``times`` (n,) s from its start.
+    """Coast of a symmetric body, exact: ω (n,), ω3 (n,) rad/s and attitude (n, 4) at ``times`` (n,)
+    s from its start.
 
-    ``quaternion`` (4,) body -> inertial, ``omega`` = ω1 + iω2 and ``spin`` hold at its start; ``growth`` is κ in 1/s.
-    At one time that is a number, by plain numbers: a tenth of the cost of arrays.
+    ``quaternion`` (4,) body -> inertial, ``omega`` = ω1 + iω2 and ``spin`` hold at its start;
+    ``growth`` is κ in 1/s. At one time that is a number, by plain numbers: a tenth of the cost of
+    arrays.
     """
     many = isinstance(times, np.ndarray)
     module, exp = (np, np.exp) if many else (math, cmath.exp)
@@ -247,9 +313,12 @@ def arc(
     effect = coast(A, C, growth, omega, spin, times, wheel, sense)
     offset = wheel / C
     pace = (A - C) / A * size / C
-    free, behind = exp(-1j * (pace * third - offset) * times), pace * (effect.travel - third * times)
+    free = exp(-1j * (pace * third - offset) * times)
+    behind = pace * (effect.travel - third * times)
     there = complex(first, second) * free
-    slipped = slip(effect, there.real, there.imag, behind, lambda angle: (module.cos(angle), module.sin(angle)))
+    slipped = slip(
+        effect, there.real, there.imag, behind, lambda angle: (module.cos(angle), module.sin(angle))
+    )
     motion = A, C, quaternion, omega, spin, times, wheel
     if many:
         turned = attitude.multiply(attitude.arc(*motion), np.stack(slipped, axis=-1))
@@ -269,9 +338,11 @@ def rates_on_arc(
     wheel: Any = 0.0,
     sense: float = 1.0,
 ) -> tuple[ComplexArray, Array]:
-    """ω and ω3 of `arc` alone, for many bodies: ``times`` (cases, n) s from the starts of their arcs, else (cases, 1).
+    """ω and ω3 of `arc` alone, for many bodies: ``times`` (cases, n) s from the starts of their
+    arcs, else (cases, 1).
 
-    ``omega`` and ``spin`` at the starts, rad/s, and moments, kg m², are by case; ``growth`` may be zero.
+    ``omega`` and ``spin`` at the starts, rad/s, and moments, kg m², are by case; ``growth`` may be
+    zero.
     """
     offset = wheel / C
     if growth == 0.0:
@@ -279,12 +350,18 @@ def rates_on_arc(
         return np.asarray(omega * np.exp(-1j * (rate * times))), np.broadcast_to(spin, times.shape)
     across, along = A * A * (omega.real**2 + omega.imag**2), C * (spin + offset)
     size = np.sqrt(across + along * along) + TINY
-    effect = courses(growth, along / size, across / (size * size), times, damper(A, C, wheel, size, sense))
+    effect = courses(
+        growth, along / size, across / (size * size), times, damper(A, C, wheel, size, sense)
+    )
     turned = (A - C) / A * size / C * effect.travel - offset * times
-    return np.asarray(omega * np.exp(-1j * turned) * effect.transverse), size * effect.along / C - offset
+    return np.asarray(
+        omega * np.exp(-1j * turned) * effect.transverse
+    ), size * effect.along / C - offset
 
 
-def _direction(A: float, C: float, omega: complex, spin: float, wheel: float) -> tuple[float, float, float, float]:
+def _direction(
+    A: float, C: float, omega: complex, spin: float, wheel: float
+) -> tuple[float, float, float, float]:
     """Unit vector of H in body axes, axis 3 for a body at rest, and |H|."""
     h1, h2, h3 = attitude.angular_momentum(A, C, omega, spin, wheel).tolist()
     size = math.hypot(h1, h2, h3)

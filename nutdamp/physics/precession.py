@@ -1,9 +1,10 @@
 """Precession of H and the spin axis to a target axis: impulses, half cones, rhumb lines.
 
-A transverse impulse is perpendicular to the spin axis S of a symmetric body, so that H·S = C|ω3| = h never changes;
-between impulses S goes round H at |H|/A. Two jumps and half cones follow exactly at any angle, for both spin
-directions. Trains of pulses triggered by the Sun pulse fire at one phase of the spin against the Sun, so that H keeps
-its heading to the direction of the Sun: a rhumb line on the sphere about the Sun.
+A transverse impulse is perpendicular to the spin axis S of a symmetric body, so that H·S = C|ω3| =
+h never changes; between impulses S goes round H at |H|/A. Two jumps and half cones follow exactly
+at any angle, for both spin directions. Trains of pulses triggered by the Sun pulse fire at one
+phase of the spin against the Sun, so that H keeps its heading to the direction of the Sun: a rhumb
+line on the sphere about the Sun.
 
 Angles are in rad, impulses in N m s; arrays of any shape broadcast.
 """
@@ -21,12 +22,13 @@ from nutdamp.physics import attitude
 
 
 def rhumb_end(sun_angle: Any, heading: Any, length: Any) -> tuple[Any, Any, Any]:
-    """End of a rhumb line from ``sun_angle`` γ at a ``heading`` from the direction away from the Sun, right-handed.
+    """End of a rhumb line from ``sun_angle`` γ at a ``heading`` from the direction away from the
+    Sun, right-handed.
 
-    Angle from the Sun, growth of the longitude about it, and the angle by which the meridian of the Sun has turned
-    about the axis against a parallel-transported direction, ∫ cos γ dλ:
-    γ2 = γ + s cos χ, Δλ = tan χ ln[tan(γ2/2)/tan(γ/2)] and ∫ cos γ dλ = tan χ ln[sin γ2 / sin γ], written without
-    the division by cos χ. Not a number where it passes the Sun or the point opposite to it.
+    Angle from the Sun, growth of the longitude about it, and the angle by which the meridian of the
+    Sun has turned about the axis against a parallel-transported direction, ∫ cos γ dλ: γ2 = γ + s
+    cos χ, Δλ = tan χ ln[tan(γ2/2)/tan(γ/2)] and ∫ cos γ dλ = tan χ ln[sin γ2 / sin γ], written
+    without the division by cos χ. Not a number where it passes the Sun or the point opposite to it.
     """
     change = length * np.cos(heading)
     end = sun_angle + change
@@ -39,12 +41,15 @@ def rhumb_end(sun_angle: Any, heading: Any, length: Any) -> tuple[Any, Any, Any]
         per_longitude = np.where(
             short, 1.0 / np.sin(middle), np.log(np.tan(0.5 * end) / np.tan(0.5 * sun_angle)) / safe
         )
-        per_turn = np.where(short, 1.0 / np.tan(middle), np.log(np.sin(end) / np.sin(sun_angle)) / safe)
+        per_turn = np.where(
+            short, 1.0 / np.tan(middle), np.log(np.sin(end) / np.sin(sun_angle)) / safe
+        )
     return end, aside * per_longitude, aside * per_turn
 
 
 def rhumb_course(sun_angle: Any, goal_angle: Any, ahead: Any) -> tuple[Any, Any]:
-    """Heading χ (as in `rhumb_end`) and length of the rhumb line to ``goal_angle``, ``ahead`` in longitude.
+    """Heading χ (as in `rhumb_end`) and length of the rhumb line to ``goal_angle``, ``ahead`` in
+    longitude.
 
     tan χ = Δλ/Δψ with ψ = ln tan(γ/2); the length is Δγ/cos χ, and sin γ |Δλ| along a parallel.
     """
@@ -56,14 +61,22 @@ def rhumb_course(sun_angle: Any, goal_angle: Any, ahead: Any) -> tuple[Any, Any]
 
 
 def turned_by(momentum: Any, torque: float, width: Any, spin: Any, spread: Any = None) -> Any:
-    """Mean turn of H of size ``momentum``, rad, by a pulse of a ``torque`` (N m) fixed in the body that lasts ``width``
-    s, in which the body turns at ``spin`` rad/s; ``spread`` s replaces the width in the mean over the turn.
+    """Mean turn of H of size ``momentum``, rad, by a pulse of a ``torque`` (N m) fixed in the body
+    that lasts ``width`` s, in which the body turns at ``spin`` rad/s; ``spread`` s replaces the
+    width in the mean over the turn.
     """
-    return torque * width * np.sinc(0.5 * spin * (width if spread is None else spread) / np.pi) / momentum
+    return (
+        torque
+        * width
+        * np.sinc(0.5 * spin * (width if spread is None else spread) / np.pi)
+        / momentum
+    )
 
 
 def phasor_sum(count: Any, step: Any) -> Any:
-    """Σ e^{i k ``step``} over k = 0 … ``count`` - 1: e^{i(N-1)ψ/2} sin(Nψ/2)/sin(ψ/2); N where ψ is a whole turn."""
+    """Σ e^{i k ``step``} over k = 0 … ``count`` - 1: e^{i(N-1)ψ/2} sin(Nψ/2)/sin(ψ/2); N where ψ is
+    a whole turn.
+    """
     half = 0.5 * step
     with np.errstate(invalid="ignore", divide="ignore"):
         ratio = np.sin(count * half) / np.sin(half)
@@ -92,21 +105,30 @@ class TwoJumps(NamedTuple):
 
 
 def two_jumps(
-    A: float, h: float, momentum: Array, axes: Array, target: Array, aside: Array | float = 0.0, straight: bool = False
+    A: float,
+    h: float,
+    momentum: Array,
+    axes: Array,
+    target: Array,
+    aside: Array | float = 0.0,
+    straight: bool = False,
 ) -> TwoJumps:
-    """Two jumps from H = ``momentum`` (3,), spin axes ``axes`` (n, 3), to the unit vector ``target`` (3,).
+    """Two jumps from H = ``momentum`` (3,), spin axes ``axes`` (n, 3), to the unit vector
+    ``target`` (3,).
 
-    Between the jumps H must have the same component h along S and along the target: it lies on the line where the
-    planes H·S = h and H·T = h meet. The sum of both jumps is least where the straight way from one end to the other
-    crosses that line when both planes are laid flat. ``aside`` (n,) moves H along the line from there, N m s;
-    ``straight`` takes the foot of the line instead, on the great circle from S to T. With T along H this is Magnus 1970
-    (22) without drift.
+    Between the jumps H must have the same component h along S and along the target: it lies on the
+    line where the planes H·S = h and H·T = h meet. The sum of both jumps is least where the
+    straight way from one end to the other crosses that line when both planes are laid flat.
+    ``aside`` (n,) moves H along the line from there, N m s; ``straight`` takes the foot of the line
+    instead, on the great circle from S to T. With T along H this is Magnus 1970 (22) without drift.
     """
     along = np.cross(axes, target)
     size = np.linalg.norm(along, axis=-1, keepdims=True)
     with np.errstate(divide="ignore", invalid="ignore"):
         along = np.where(size > 0.0, along / size, square_to(target))
-        foot = h * (axes + target) / (1.0 + axes @ target)[:, None]  # of the line, nearest to hS and to hT
+        foot = (
+            h * (axes + target) / (1.0 + axes @ target)[:, None]
+        )  # of the line, nearest to hS and to hT
         place = along @ momentum
         to_line = np.linalg.norm(momentum - foot - place[:, None] * along, axis=-1)
         from_line = np.linalg.norm(h * target - foot, axis=-1)
@@ -122,7 +144,9 @@ def two_jumps(
 
 
 def coast(A: float, momentum: Array, axes: Array, target: Array) -> tuple[Array, Array]:
-    """Time in s until ``axes`` (n, 3) pass ``target`` (3,), on the same cone about ``momentum`` (n, 3); one period."""
+    """Time in s until ``axes`` (n, 3) pass ``target`` (3,), on the same cone about ``momentum`` (n,
+    3); one period.
+    """
     size = np.linalg.norm(momentum, axis=-1)
     unit = momentum / size[:, None]
     sine = np.sum(unit * np.cross(axes, target), axis=-1)
@@ -131,11 +155,14 @@ def coast(A: float, momentum: Array, axes: Array, target: Array) -> tuple[Array,
     return np.arctan2(sine, cosine) % (2.0 * math.pi) / (2.0 * math.pi) * turn, turn
 
 
-def half_cone(h: float, axes: Array, target: Array, cones: int, more: Array | float = 0.0) -> tuple[Array, Array]:
-    """H (n, 3) in the first of ``cones`` half cones from ``axes`` (n, 3) to ``target`` (3,), and h tan δ, N m s.
+def half_cone(
+    h: float, axes: Array, target: Array, cones: int, more: Array | float = 0.0
+) -> tuple[Array, Array]:
+    """H (n, 3) in the first of ``cones`` half cones from ``axes`` (n, 3) to ``target`` (3,), and h
+    tan δ, N m s.
 
-    Half cones of half-angle δ = β/2n lie in a row on the great circle from S to T: n - 1 further jumps are 2h tan δ,
-    the last h tan δ. H is ``more`` (n,) rad further ahead than δ.
+    Half cones of half-angle δ = β/2n lie in a row on the great circle from S to T: n - 1 further
+    jumps are 2h tan δ, the last h tan δ. H is ``more`` (n,) rad further ahead than δ.
     """
     angle = np.arctan2(np.linalg.norm(np.cross(axes, target), axis=-1), axes @ target)
     half = angle / (2 * cones)
@@ -147,12 +174,16 @@ def half_cone(h: float, axes: Array, target: Array, cones: int, more: Array | fl
 
 
 def half_cones_impulse(h: float, angle: float, cones: int) -> float:
-    """Cost of n = ``cones`` half cones, N m s: 2n h tan(β/2n), with β = ``angle`` in rad below nπ; hβ as n grows."""
+    """Cost of n = ``cones`` half cones, N m s: 2n h tan(β/2n), with β = ``angle`` in rad below nπ;
+    hβ as n grows.
+    """
     return 2 * cones * h * math.tan(angle / (2 * cones))
 
 
 def arc_efficiency(spin: float, on_time: float) -> float:
-    """Share of a pulse's impulse that turns H, for a torque fixed in the body: sinc(ω3τ/2), sinc x = sin x / x."""
+    """Share of a pulse's impulse that turns H, for a torque fixed in the body: sinc(ω3τ/2), sinc x
+    = sin x / x.
+    """
     half = 0.5 * spin * on_time
     return math.sin(half) / half if half != 0.0 else 1.0
 
@@ -166,7 +197,9 @@ def reach(torque: float, spin: float, longest: float) -> float:
 
 
 def on_times_to_turn(impulses: Array, torque: float, spin: float) -> Array:
-    """On-times (n,) s of pulses that turn H like ``impulses`` (n,) N m s: (2/ω3) asin(ω3J/2M), NaN beyond 2M/ω3."""
+    """On-times (n,) s of pulses that turn H like ``impulses`` (n,) N m s: (2/ω3) asin(ω3J/2M), NaN
+    beyond 2M/ω3.
+    """
     rate = 0.5 * abs(spin)
     if rate == 0.0:
         return impulses / torque
@@ -182,10 +215,12 @@ def square_to(vector: Array) -> Array:
 
 
 def course(momentum: Array, target: Array, sun: Array | None) -> tuple[Array, float]:
-    """Unit vector (3,) perpendicular to H = ``momentum`` (3,) towards ``target`` (3,), and the length of the way, rad.
+    """Unit vector (3,) perpendicular to H = ``momentum`` (3,) towards ``target`` (3,), and the
+    length of the way, rad.
 
-    Without ``sun`` (3,) along the great circle, with it along the rhumb line, which keeps its angle to the direction
-    of the Sun (`rhumb_course`). Raises Infeasible where an axis points to the Sun or away from it.
+    Without ``sun`` (3,) along the great circle, with it along the rhumb line, which keeps its angle
+    to the direction of the Sun (`rhumb_course`). Raises Infeasible where an axis points to the Sun
+    or away from it.
     """
     here = momentum / float(np.linalg.norm(momentum))
     if sun is None:
@@ -195,12 +230,18 @@ def course(momentum: Array, target: Array, sun: Array | None) -> tuple[Array, fl
         return (ahead / size if size > 0.0 else ahead), angle
     gammas = [float(attitude.angle_between(axis, sun)) for axis in (here, target)]
     if min(*gammas, *(math.pi - gamma for gamma in gammas)) < 1e-6:
-        raise Infeasible("the spin axis points to the Sun or away from it, at t = 0 or on the target: it has no phase")
+        raise Infeasible(
+            "the spin axis points to the Sun or away from it, at t = 0 or on the target: "
+            "it has no phase"
+        )
     dark = np.cross(sun, here)  # along growing longitude
     away = np.cross(dark, here)
     longitude = math.atan2(
-        float(target @ dark) / math.sin(gammas[0]), float(target @ np.cross(dark, sun)) / math.sin(gammas[0])
+        float(target @ dark) / math.sin(gammas[0]),
+        float(target @ np.cross(dark, sun)) / math.sin(gammas[0]),
     )
     heading, way = rhumb_course(gammas[0], gammas[1], longitude)
-    direction = math.cos(heading) * away / np.linalg.norm(away) + math.sin(heading) * dark / np.linalg.norm(dark)
+    direction = math.cos(heading) * away / np.linalg.norm(away) + math.sin(
+        heading
+    ) * dark / np.linalg.norm(dark)
     return np.asarray(direction), float(way)

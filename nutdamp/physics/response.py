@@ -1,9 +1,9 @@
 """Body rates under pulses and lasting torques, in closed form: Magnus 1970 (8)-(17), (23)-(27).
 
 Equation of motion in time, Magnus 1970 (1) and (4)-(6) without the division by ω3, ω = ω1 + iω2:
-dω/dt = -i a ω3(t) ω + M(t)/A,  dω3/dt = M3/C.
-Nothing is divided by ω3 (Magnus' m = M/(Aω3) breaks where the spin passes zero) or by a (a sphere is no exception).
-M = M1 + iM2 in N m, body-fixed unless stated.
+dω/dt = -i a ω3(t) ω + M(t)/A,  dω3/dt = M3/C. Nothing is divided by ω3 (Magnus' m = M/(Aω3) breaks
+where the spin passes zero) or by a (a sphere is no exception). M = M1 + iM2 in N m, body-fixed
+unless stated.
 """
 
 from __future__ import annotations
@@ -21,14 +21,18 @@ from nutdamp.physics import energy_sink
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
-SERIES_REACH = 2.0  # largest half-phase in rad that one power series of `width_factor` spans; beyond it digits cancel
+# largest half-phase in rad that one power series of `width_factor` spans; beyond it digits cancel
+SERIES_REACH = 2.0
 MANY_PANELS = 12  # panels from which on all are summed at once
 SERIES_ORDERS = 60  # orders of that power series: it has converged long before
 
 OUTWARDS = 2000
-"""Largest number of steps outwards by a tenth in the search for an on-time: more decades than numbers have."""
+"""Largest number of steps outwards by a tenth in the search for an on-time: more decades than
+numbers have.
+"""
 
-MOST_PANELS = 20_000  # panels beyond which a pulse keeps less than 1e-4 of its impulse; it counts as keeping none
+# panels beyond which a pulse keeps less than 1e-4 of its impulse; it counts as keeping none
+MOST_PANELS = 20_000
 
 
 def impulse_sum(
@@ -44,13 +48,14 @@ def impulse_sum(
 ) -> tuple[ComplexArray, Array]:
     """Rates after a sum of impulses, Magnus 1970 (17), exact at any angle for symmetric bodies.
 
-    ω(t) = e^{-iaα(t)} [ω0 + (1/A) Σ J_v e^{iaα(t_v)}] over the pulses with t_v <= t, where α = ∫ω3 dt (Magnus (2)):
-    an axial impulse J3 changes the spin by J3/C, and the arcs between stay exact, through spin reversal too. With
-    energy dissipation ω3 changes along the arcs, and the sum has to be taken arc by arc (`propagation.by_impulses`).
-    A ``wheel`` of momentum h N m s turns ω by h t/A besides.
+    ω(t) = e^{-iaα(t)} [ω0 + (1/A) Σ J_v e^{iaα(t_v)}] over the pulses with t_v <= t, where α = ∫ω3
+    dt (Magnus (2)): an axial impulse J3 changes the spin by J3/C, and the arcs between stay exact,
+    through spin reversal too. With energy dissipation ω3 changes along the arcs, and the sum has to
+    be taken arc by arc (`propagation.by_impulses`). A ``wheel`` of momentum h N m s turns ω by h
+    t/A besides.
 
-    ``times`` (n,) s; ``pulse_times`` (k,) s ascending; ``transverse`` (k,) J1 + iJ2 and ``axial`` (k,) J3 in N m s.
-    Returns ω (n,) and ω3 (n,) in rad/s; at t = t_v the pulse has been given.
+    ``times`` (n,) s; ``pulse_times`` (k,) s ascending; ``transverse`` (k,) J1 + iJ2 and ``axial``
+    (k,) J3 in N m s. Returns ω (n,) and ω3 (n,) in rad/s; at t = t_v the pulse has been given.
     """
     a = (A - C) / A
     spins = spin0 + np.concatenate([[0.0], np.cumsum(axial)]) / C
@@ -63,23 +68,29 @@ def impulse_sum(
     return sums[given] * np.exp(-1j * (a * alpha - wheel / A * times)), spins[given]
 
 
-def width_factor(rate: float, slope: float, on_time: float, growth: float = 0.0, drift: float = 0.0) -> complex:
+def width_factor(
+    rate: float, slope: float, on_time: float, growth: float = 0.0, drift: float = 0.0
+) -> complex:
     """Factor on the impulse of a rectangular pulse at its centre, for its effect on ω.
 
-    The nutation turns in the body at ν = ``rate`` + ``slope``·(time since start), rad/s: aω3 + a M3/C t for a constant
-    body torque with axial part, aω3 - h/A with a wheel. The pulse acts on ω exactly as an impulse M τ F at its centre,
-    when ν jumps there by slope·τ: F = (1/τ) ∫ exp(i (rate s + slope (s + τ/2)²/2)) ds over |s| <= τ/2. Without axial
-    part this is sinc(ντ/2), sinc x = sin x / x. Energy dissipation (``growth`` κ in 1/s, see `energy_sink`) turns ν
-    into ν + iκ, by its small-angle part: during the pulse alone, where what is neglected is of order κτ ντ θ²/12.
+    The nutation turns in the body at ν = ``rate`` + ``slope``·(time since start), rad/s: aω3 + a
+    M3/C t for a constant body torque with axial part, aω3 - h/A with a wheel. The pulse acts on ω
+    exactly as an impulse M τ F at its centre, when ν jumps there by slope·τ: F = (1/τ) ∫ exp(i
+    (rate s + slope (s + τ/2)²/2)) ds over |s| <= τ/2. Without axial part this is sinc(ντ/2), sinc x
+    = sin x / x. Energy dissipation (``growth`` κ in 1/s, see `energy_sink`) turns ν into ν + iκ, by
+    its small-angle part: during the pulse alone, where what is neglected is of order κτ ντ θ²/12.
     ``drift`` (rad/s²) is a change of ν that goes on after the pulse.
     """
     half = 0.5 * on_time
-    growth = math.copysign(min(abs(growth), energy_sink.FOR_EVER / half), growth) if half > 0.0 else 0.0
+    growth = (
+        math.copysign(min(abs(growth), energy_sink.FOR_EVER / half), growth) if half > 0.0 else 0.0
+    )
     if slope == 0.0 and drift == 0.0:
         angle = (rate + 1j * growth) * half
         return cmath.sin(angle) / angle if angle != 0.0 else 1.0 + 0.0j
     offset = 0.5 * slope * half * half
-    pace, bend = rate + (slope + drift) * half + 1j * growth, 0.5 * (slope + drift)
+    pace = rate + (slope + drift) * half + 1j * growth
+    bend = 0.5 * (slope + drift)
     turned = (abs(pace) + abs(bend) * half) * half
     if not turned <= MOST_PANELS * SERIES_REACH:
         return 0.0 + 0.0j
@@ -98,8 +109,12 @@ def width_factor(rate: float, slope: float, on_time: float, growth: float = 0.0,
 
 
 def _mean_of_phase(slope: Any, bend: float, half: float) -> Any:
-    """Mean of exp(i(slope s + bend s²)) over |s| <= half, by its power series; ``slope`` is a number or an array."""
-    before, term = 0.0 * slope, 1.0 + 0.0 * slope  # terms c_k half^k of the series of the integrand
+    """Mean of exp(i(slope s + bend s²)) over |s| <= half, by its power series; ``slope`` is a
+    number or an array.
+    """
+    # terms c_k half^k of the series of the integrand
+    before = 0.0 * slope
+    term = 1.0 + 0.0 * slope
     total = term
     for order in range(SERIES_ORDERS):
         sizes = abs(term) + abs(before)
@@ -112,12 +127,16 @@ def _mean_of_phase(slope: Any, bend: float, half: float) -> Any:
     return total
 
 
-def on_time_for(impulse: float, torque: float, rate: float, slope: float, longest: float) -> float | None:
-    """On-time in s of the rectangular pulse that acts on ω like ``impulse`` N m s; None if none up to ``longest``.
+def on_time_for(
+    impulse: float, torque: float, rate: float, slope: float, longest: float
+) -> float | None:
+    """On-time in s of the rectangular pulse that acts on ω like ``impulse`` N m s; None if none up
+    to ``longest``.
 
-    ``torque`` is |M1 + iM2| > 0 in N m, ``rate`` ν and ``slope`` as in `width_factor`. Without axial torque τ = (2/ν)
-    asin(νJ/(2M)), with the limit J/M for ν -> 0 (US patent 4504032 fires by the same formula); a torque that holds
-    longer than half a nutation period works against itself, so 2M/|ν| is the most that one pulse can do.
+    ``torque`` is |M1 + iM2| > 0 in N m, ``rate`` ν and ``slope`` as in `width_factor`. Without
+    axial torque τ = (2/ν) asin(νJ/(2M)), with the limit J/M for ν -> 0 (US patent 4504032 fires by
+    the same formula); a torque that holds longer than half a nutation period works against itself,
+    so 2M/|ν| is the most that one pulse can do.
     """
     sine = 0.5 * abs(rate) * impulse / torque
     if sine > 1.0 and slope == 0.0:
@@ -129,14 +148,17 @@ def on_time_for(impulse: float, torque: float, rate: float, slope: float, longes
     def excess(on_time: float) -> float:
         return torque * on_time * abs(width_factor(rate, slope, on_time)) - impulse
 
-    # From the pulse without axial torque outwards: the first on-time that does enough lies in the last step.
-    low, high = 0.0, min(plain, longest)
+    # From the pulse without axial torque outwards: the first on-time that does enough lies in the
+    # last step.
+    low = 0.0
+    high = min(plain, longest)
     for _ in range(OUTWARDS):
         if excess(high) >= 0.0:
             return rising_zero(excess, low, high)
         if high >= longest or (abs(rate) + 0.5 * abs(slope) * high) * high > 2.0 * math.pi:
             return None
-        low, high = high, min(1.1 * high, longest)
+        low = high
+        high = min(1.1 * high, longest)
     return None
 
 
@@ -144,11 +166,14 @@ PANEL = 2.0  # phase in rad of one Gauss-Legendre panel; ten nodes then err by l
 
 
 def phase_integral(slope: Array, bend: Array, length: Array) -> ComplexArray:
-    """∫ exp(i(slope s + bend s²)) ds from 0 to ``length``, (n,) each, to rounding, by Gauss-Legendre panels.
+    """∫ exp(i(slope s + bend s²)) ds from 0 to ``length``, (n,) each, to rounding, by
+    Gauss-Legendre panels.
 
     Bödewadt writes it with Fresnel's integrals, which cancel as bend -> 0.
     """
-    slope, bend, length = (np.asarray(part, dtype=float) for part in np.broadcast_arrays(slope, bend, length))
+    slope, bend, length = (
+        np.asarray(part, dtype=float) for part in np.broadcast_arrays(slope, bend, length)
+    )
     # The phase may turn back where slope + 2 bend s = 0; this bounds its total variation.
     variation = np.abs(slope) * np.abs(length) + np.abs(bend) * np.square(length)
     counts = np.maximum(np.ceil(variation / PANEL), 1.0).astype(int)
@@ -166,10 +191,11 @@ def phase_integral(slope: Array, bend: Array, length: Array) -> ComplexArray:
 def stepwise_torque(
     times: Array, omega0: complex, spin0: float, A: float, C: float, edges: Array, torques: Array
 ) -> tuple[ComplexArray, Array]:
-    """General solution, Magnus 1970 (8)-(10), for a torque that is constant between edges; exact at any angle.
+    """General solution, Magnus 1970 (8)-(10), for a torque that is constant between edges; exact at
+    any angle.
 
-    ``times`` (n,) s within ``edges`` (k+1,) s ascending; ``omega0``, ``spin0`` in rad/s are those at edges[0];
-    ``torques`` (k, 3) N m. Returns ω (n,) and ω3 (n,) in rad/s.
+    ``times`` (n,) s within ``edges`` (k+1,) s ascending; ``omega0``, ``spin0`` in rad/s are those
+    at edges[0]; ``torques`` (k, 3) N m. Returns ω (n,) and ω3 (n,) in rad/s.
     """
     edges, torques = np.asarray(edges, dtype=float), np.asarray(torques, dtype=float)
     times = np.asarray(times, dtype=float)
@@ -195,15 +221,17 @@ def stepwise_torque(
 def rotating_torques(
     times: Array, omega0: complex, nutation: float, A: float, torques: ComplexArray, rates: Array
 ) -> ComplexArray:
-    """Transverse rate ω under torques that turn uniformly in the body, M(t) = Σ M_p exp(i r_p t), with ω3 constant.
+    """Transverse rate ω under torques that turn uniformly in the body, M(t) = Σ M_p exp(i r_p t),
+    with ω3 constant.
 
-    Magnus 1970 (23), (24) with r_p = b_p ω3, where ω0 of the print is an integration constant: with ω(0) given it is
-    ω(0) + i Σ m_p/(a + b_p). Both are one here, without cancellation near resonance r_p = -aω3, which is (25):
-    ω(t) = e^{-iaω3t} [ω(0) + (1/A) Σ M_p t e^{iδ_p t/2} sinc(δ_p t/2)], δ_p = aω3 + r_p. r_p = aω3 is (26), r_p = -ω3
-    the nearly space-fixed torque of (27), r_p = 0 the constant one of (11).
+    Magnus 1970 (23), (24) with r_p = b_p ω3, where ω0 of the print is an integration constant: with
+    ω(0) given it is ω(0) + i Σ m_p/(a + b_p). Both are one here, without cancellation near
+    resonance r_p = -aω3, which is (25): ω(t) = e^{-iaω3t} [ω(0) + (1/A) Σ M_p t e^{iδ_p t/2}
+    sinc(δ_p t/2)], δ_p = aω3 + r_p. r_p = aω3 is (26), r_p = -ω3 the nearly space-fixed torque of
+    (27), r_p = 0 the constant one of (11).
 
-    ``times`` (n,) s, ``nutation`` aω3 rad/s, with a wheel ω3 - H3/A; ``torques`` (p,) N m, ``rates`` (p,) rad/s.
-    Returns (n,) rad/s.
+    ``times`` (n,) s, ``nutation`` aω3 rad/s, with a wheel ω3 - H3/A; ``torques`` (p,) N m,
+    ``rates`` (p,) rad/s. Returns (n,) rad/s.
     """
     times = np.asarray(times, dtype=float)[:, None]
     half = 0.5 * (nutation + np.asarray(rates, dtype=float)) * times
@@ -215,10 +243,11 @@ def rotating_torques(
 def steady_response(A: float, nutation: float, torque: complex, rate: float = 0.0) -> complex:
     """Part of ω that follows a torque M e^{irt} for ever, at t = 0: -i M/(A(aω3 + r)) in rad/s.
 
-    For r = 0 the permanent rotation Magnus 1970 (13), which is the centre of the pole cone of (11) and K(14), (M2 -
-    iM1)/((A - C)ω3); for r = -ω3 the forced term of (27), which in the axes of the despun frame is K(15), iM/(Cω3).
-    K(14) and K(15) hold without axial torque: the third component of K(15) is 0, and the last line of K(14) must read
-    M = ω_P × ω_z (J_z - J_xy). Infinite at resonance, r = -aω3, and for r = 0 on a sphere. ``nutation`` is aω3.
+    For r = 0 the permanent rotation Magnus 1970 (13), which is the centre of the pole cone of (11)
+    and K(14), (M2 - iM1)/((A - C)ω3); for r = -ω3 the forced term of (27), which in the axes of the
+    despun frame is K(15), iM/(Cω3). K(14) and K(15) hold without axial torque: the third component
+    of K(15) is 0, and the last line of K(14) must read M = ω_P × ω_z (J_z - J_xy). Infinite at
+    resonance, r = -aω3, and for r = 0 on a sphere. ``nutation`` is aω3.
     """
     detuning = nutation + rate
     if detuning == 0.0:
@@ -226,13 +255,16 @@ def steady_response(A: float, nutation: float, torque: complex, rate: float = 0.
     return -1j * torque / (A * detuning)
 
 
-def permanent_rotation(A: float, C: float, spin: float, torque: complex) -> tuple[complex, float, float, float]:
-    """The permanent rotation that a constant body torque allows, Magnus 1970 (13), constant in body and space.
+def permanent_rotation(
+    A: float, C: float, spin: float, torque: complex
+) -> tuple[complex, float, float, float]:
+    """The permanent rotation that a constant body torque allows, Magnus 1970 (13), constant in body
+    and space.
 
     Returns ω (rad/s), its rate ψ̇0 = |ω_i| and the Euler angles ϑ0, φ0 (rad), (14).
 
-    tan ϑ0 = |M|/(|A - C| ω3²), tan φ0 = ω1/ω2 by arctan2; ψ̇0 is |ω|, where the source prints |ω̇|. With
-    ω1 = ψ̇0 sin ϑ0 sin φ0, ω2 = ψ̇0 sin ϑ0 cos φ0, ω3 = ψ̇0 cos ϑ0. Infinite for a sphere.
+    tan ϑ0 = |M|/(|A - C| ω3²), tan φ0 = ω1/ω2 by arctan2; ψ̇0 is |ω|, where the source prints |ω̇|.
+    With ω1 = ψ̇0 sin ϑ0 sin φ0, ω2 = ψ̇0 sin ϑ0 cos φ0, ω3 = ψ̇0 cos ϑ0. Infinite for a sphere.
     """
     omega = steady_response(A, (A - C) / A * spin, torque)
     rate = math.hypot(abs(omega), spin)
@@ -240,9 +272,11 @@ def permanent_rotation(A: float, C: float, spin: float, torque: complex) -> tupl
 
 
 def beat(A: float, nutation: float, torque: complex, rate: float) -> tuple[float, float]:
-    """Largest |ω| (rad/s) that a turning torque adds to rest, and the period (s) of the swelling, Magnus 1970 (27).
+    """Largest |ω| (rad/s) that a turning torque adds to rest, and the period (s) of the swelling,
+    Magnus 1970 (27).
 
-    ω(t) from rest swells to 2|M|/(A|δ|) and back within 2π/|δ|, δ = aω3 + r; both infinite at resonance.
+    ω(t) from rest swells to 2|M|/(A|δ|) and back within 2π/|δ|, δ = aω3 + r; both infinite at
+    resonance.
     """
     detuning = abs(nutation + rate)
     if detuning == 0.0:
@@ -250,11 +284,14 @@ def beat(A: float, nutation: float, torque: complex, rate: float) -> tuple[float
     return 2.0 * abs(torque) / (A * detuning), 2.0 * math.pi / detuning
 
 
-def resonant_time(A: float, axial: float, omega0: complex, torque: complex, nutation: float) -> float:
-    """Time in s for a resonant torque (r = -aω3) to drive the nutation angle to ``nutation`` rad; Magnus 1970 (25).
+def resonant_time(
+    A: float, axial: float, omega0: complex, torque: complex, nutation: float
+) -> float:
+    """Time in s for a resonant torque (r = -aω3) to drive the nutation angle to ``nutation`` rad;
+    Magnus 1970 (25).
 
-    |ω0 + M t/A| = |H3| tan θ/A with H3 = ``axial``, Cω3: the later root, since the pole curve may first run inwards; 0
-    if it is there already.
+    |ω0 + M t/A| = |H3| tan θ/A with H3 = ``axial``, Cω3: the later root, since the pole curve may
+    first run inwards; 0 if it is there already.
     """
     needed = abs(axial) * math.tan(nutation) / A
     speed = torque / A

@@ -1,10 +1,13 @@
-"""Direction of the Sun, Sun pulses of nutating bodies, extreme angles of the spin axis from directions.
+"""Direction of the Sun, Sun pulses of nutating bodies, extreme angles of the spin axis from
+directions.
 
-On a free arc of a symmetric body the axis goes round H on a cone: with H at the angle β from the direction and the
-axis at θ from H it comes as near as |β - θ| and as far as β + θ, if it goes so far round. Where dissipation changes θ
-only the turns that count are followed in steps; any other motion all the way.
+On a free arc of a symmetric body the axis goes round H on a cone: with H at the angle β from the
+direction and the axis at θ from H it comes as near as |β - θ| and as far as β + θ, if it goes so
+far round. Where dissipation changes θ only the turns that count are followed in steps; any other
+motion all the way.
 
-A Sun pulse comes when the Sun passes the azimuth of the sensor in the nutating body. Arrays carry the case last.
+A Sun pulse comes when the Sun passes the azimuth of the sensor in the nutating body. Arrays carry
+the case last.
 """
 
 from __future__ import annotations
@@ -32,8 +35,9 @@ TILTING, NODE = math.radians(0.013056), math.radians(174.876)
 def direction(days: float) -> NDArray[np.float64]:
     """Geocentric unit vector (3,) to the apparent Sun in the mean equator and equinox of J2000.0.
 
-    ``days`` since J2000.0 (2000-01-01T12:00 TT). To 0.01 deg from 1972 to 2100. By J. Meeus, Astronomical Algorithms,
-    2nd ed., chapter 25, "low accuracy", with aberration, taken to ecliptic and equinox of J2000.0 (21).
+    ``days`` since J2000.0 (2000-01-01T12:00 TT). To 0.01 deg from 1972 to 2100. By J. Meeus,
+    Astronomical Algorithms, 2nd ed., chapter 25, "low accuracy", with aberration, taken to ecliptic
+    and equinox of J2000.0 (21).
     """
     centuries = days / 36525.0
     mean_longitude = 280.46646 + centuries * (36000.76983 + centuries * 0.0003032)
@@ -47,8 +51,11 @@ def direction(days: float) -> NDArray[np.float64]:
     seen = centre - ABERRATION * (1.0 + eccentricity * math.cos(anomaly + math.radians(centre)))
     longitude = math.radians(mean_longitude + seen - centuries * (1.396971 + centuries * 0.0003086))
     latitude = centuries * TILTING * math.sin(longitude - NODE)
-    x, y, z = math.cos(latitude) * math.cos(longitude), math.cos(latitude) * math.sin(longitude), math.sin(latitude)
-    cosine, sine = math.cos(OBLIQUITY), math.sin(OBLIQUITY)
+    x = math.cos(latitude) * math.cos(longitude)
+    y = math.cos(latitude) * math.sin(longitude)
+    z = math.sin(latitude)
+    cosine = math.cos(OBLIQUITY)
+    sine = math.sin(OBLIQUITY)
     return np.array([x, cosine * y - sine * z, sine * y + cosine * z])
 
 
@@ -74,7 +81,14 @@ class AxisWatch:
     def of(cls, directions: Array, sense: float, momentum: int | None = None) -> AxisWatch:
         """Observer without observations."""
         shape = len(directions), directions.shape[2]
-        return cls(directions, np.full(shape, math.pi), np.zeros(shape), sense, momentum, np.arange(shape[1]))
+        return cls(
+            directions,
+            np.full(shape, math.pi),
+            np.zeros(shape),
+            sense,
+            momentum,
+            np.arange(shape[1]),
+        )
 
     @property
     def angles(self) -> Array:
@@ -86,7 +100,9 @@ class AxisWatch:
         return replace(self, rows=self.rows[cases])
 
     def motion(self, here: MotionStretch, duration: Array) -> None:
-        """Record the motion that `batch.advance` makes with these arguments, which stay as they are."""
+        """Record the motion that `batch.advance` makes with these arguments, which stay as they
+        are.
+        """
         if here.torque is not None or not here.bodies.free:
             self._steps(here, duration)
         elif here.bodies.forcing.growth == 0.0:
@@ -106,32 +122,53 @@ class AxisWatch:
     def _arc(self, here: MotionStretch, duration: Array) -> None:
         """Record start and inner extremes of arcs; their ends are starts of others."""
         momentum = _rotated(here.quaternion, here.bodies.momentum(here.rates))
-        axis, size = self.sense * _third_axis(here.quaternion), np.sqrt(np.sum(momentum * momentum, axis=0))
-        momentum, way = momentum / size, size / here.bodies.moments[0] * duration
+        axis = self.sense * _third_axis(here.quaternion)
+        size = np.sqrt(np.sum(momentum * momentum, axis=0))
+        momentum = momentum / size
+        way = size / here.bodies.moments[0] * duration
         theta = angle_of_parts(momentum, axis)
         for number, direction in enumerate(self._towards(momentum)):
             begins, beta = angle_of_parts(axis, direction), angle_of_parts(momentum, direction)
             along = np.sum(axis * direction, axis=0) - np.cos(theta) * np.cos(beta)
             ahead = np.sum(_cross(momentum, axis) * direction, axis=0)
-            nearest = np.arctan2(ahead, along) % CIRCLE  # how far round from where it is the axis comes nearest
+            nearest = (
+                np.arctan2(ahead, along) % CIRCLE
+            )  # how far round from where it is the axis comes nearest
             farthest = (nearest + math.pi) % CIRCLE
-            least, largest = np.abs(beta - theta), np.minimum(beta + theta, CIRCLE - beta - theta)
-            self._take(number, np.where(way >= nearest, least, begins), np.where(way >= farthest, largest, begins))
+            least = np.abs(beta - theta)
+            largest = np.minimum(beta + theta, CIRCLE - beta - theta)
+            self._take(
+                number,
+                np.where(way >= nearest, least, begins),
+                np.where(way >= farthest, largest, begins),
+            )
 
     def _slow(self, here: MotionStretch, duration: Array) -> None:
-        """Record arcs with dissipation: in steps the first turn and the last, or all where θ passes β or π - β."""
+        """Record arcs with dissipation: in steps the first turn and the last, or all where θ passes
+        β or π - β.
+        """
         turn = CIRCLE * here.bodies.moments[0] / _momentum(here)
         last = here.moved(here.since + np.maximum(duration - turn, 0.0))
         momentum = _rotated(here.quaternion, here.bodies.momentum(here.rates))
         momentum /= np.sqrt(np.sum(momentum * momentum, axis=0))
         before, after = (
-            angle_of_parts(momentum, self.sense * _third_axis(stretch.quaternion)) for stretch in (here, last)
+            angle_of_parts(momentum, self.sense * _third_axis(stretch.quaternion))
+            for stretch in (here, last)
         )
-        betas = np.array([angle_of_parts(momentum, direction) for direction in self._towards(momentum)])
-        # Else |β - θ| and β + θ change monotonically between the first turn and the last, as θ does.
-        passed = [(before - other) * (after - other) <= 0.0 for other in (*betas, *(math.pi - betas))]
+        betas = np.array(
+            [angle_of_parts(momentum, direction) for direction in self._towards(momentum)]
+        )
+        # Else |β - θ| and β + θ change monotonically between the first turn and the last, as θ
+        # does.
+        passed = [
+            (before - other) * (after - other) <= 0.0 for other in (*betas, *(math.pi - betas))
+        ]
         whole = (duration <= 2.0 * turn) | np.any(passed, axis=0)
-        for cases, begins, lasts in ((whole, here, duration), (~whole, here, turn), (~whole, last, turn)):
+        for cases, begins, lasts in (
+            (whole, here, duration),
+            (~whole, here, turn),
+            (~whole, last, turn),
+        ):
             if cases.any():
                 self.some(cases)._steps(begins.some(cases), lasts[cases])
 
@@ -148,9 +185,13 @@ class AxisWatch:
             looks = np.array([before, *(self._look(here := step) for step in piece.steps(count))])
             before = looks[-1]
             for cosines, rates in looks.transpose(1, 2, 0, 3):
-                steps, cases = np.nonzero(rates[:-1] * rates[1:] < 0.0)  # in between it comes nearest, or goes farthest
+                steps, cases = np.nonzero(
+                    rates[:-1] * rates[1:] < 0.0
+                )  # in between it comes nearest, or goes farthest
                 if len(cases):
-                    slopes = (rates[steps + late, cases] * piece.length[cases] / count for late in (0, 1))
+                    slopes = (
+                        rates[steps + late, cases] * piece.length[cases] / count for late in (0, 1)
+                    )
                     way = _extreme(cosines[steps + 1, cases] - cosines[steps, cases], *slopes)
                     self._record(piece.at((steps + way) / count, cases), cases)
         self._record(here, ...)
@@ -171,8 +212,11 @@ class AxisWatch:
                 momentum = here.bodies.momentum(here.rates)
                 size = np.sqrt(np.sum(momentum * momentum, axis=0))
                 along = momentum[2] / size
-                A, forcing = 0.5 * (here.bodies.moments[0] + here.bodies.moments[1]), here.bodies.forcing
-                by_body, by_wheel = damper(A, here.bodies.moments[2], forcing.wheel, size, forcing.sense)
+                A = 0.5 * (here.bodies.moments[0] + here.bodies.moments[1])
+                forcing = here.bodies.forcing
+                by_body, by_wheel = damper(
+                    A, here.bodies.moments[2], forcing.wheel, size, forcing.sense
+                )
                 pace = growth * (by_body * along + by_wheel)
             if growth != 0.0:  # the axis leaves H at θ' = κ sin θ (u cos θ + v)
                 rate = rate + pace * (along * seen[2] - np.sum(momentum * seen, axis=0) / size)
@@ -193,14 +237,19 @@ class AxisWatch:
                 yield _rotated(back, directions[:, cases])
 
     def _towards(self, momentum: Array) -> Iterator[Array]:
-        """Directions (3, n) of the observed cases, whose H is along the unit vectors ``momentum`` (3, n)."""
+        """Directions (3, n) of the observed cases, whose H is along the unit vectors ``momentum``
+        (3, n).
+        """
         for number, directions in enumerate(self.directions[:, :, self.rows]):
             yield momentum if number == self.momentum else directions
 
 
 def _extreme(rise: Array, before: Array, after: Array) -> Array:
-    """Level point of a cubic from 0 to 1 that gains a ``rise``, with slopes ``before`` and ``after`` of either sign."""
-    square, linear = 3.0 * (before + after - 2.0 * rise), 6.0 * rise - 4.0 * before - 2.0 * after
+    """Level point of a cubic from 0 to 1 that gains a ``rise``, with slopes ``before`` and
+    ``after`` of either sign.
+    """
+    square = 3.0 * (before + after - 2.0 * rise)
+    linear = 6.0 * rise - 4.0 * before - 2.0 * after
     root = np.sqrt(np.maximum(linear * linear - 4.0 * square * before, 0.0))
     with np.errstate(divide="ignore", invalid="ignore"):
         level = 2.0 * before / (np.copysign(root, before) - linear)
@@ -208,11 +257,16 @@ def _extreme(rise: Array, before: Array, after: Array) -> Array:
 
 
 def _torque(here: MotionStretch) -> Array:
-    """Torque (3, n) N m of pulses and disturbances on bodies at the time of ``here``, in body axes."""
+    """Torque (3, n) N m of pulses and disturbances on bodies at the time of ``here``,
+    in body axes.
+    """
     turning = sum(
-        (size * np.exp(1j * rate * here.since) for size, rate in here.bodies.forcing.turning), 0.0 * here.since
+        (size * np.exp(1j * rate * here.since) for size, rate in here.bodies.forcing.turning),
+        0.0 * here.since,
     )
-    lasting = np.array([turning.real, turning.imag, 0.0 * here.since]) + here.bodies.constant[:, None]
+    lasting = (
+        np.array([turning.real, turning.imag, 0.0 * here.since]) + here.bodies.constant[:, None]
+    )
     return lasting if here.torque is None else lasting + here.torque
 
 
@@ -243,11 +297,14 @@ def _third_axis(quaternion: Array) -> Array:
 
 ITERATIONS = 40  # largest number of Newton steps to a Sun pulse; three or four are usual
 EXACT = 1e-13  # tolerance of the time of a Sun pulse, in spin turns
-AHEAD = 8  # largest number of Sun pulses skipped between two computed ones; the mean rate predicts the next
+# largest number of Sun pulses skipped between two computed ones; the mean rate predicts the next
+AHEAD = 8
 
 
 class TorqueRamp(NamedTuple):
-    """Torque that runs linearly from ``first`` (3, n) N m at ``begin`` s to ``last`` at ``end``; times (n,) or one."""
+    """Torque that runs linearly from ``first`` (3, n) N m at ``begin`` s to ``last`` at ``end``;
+    times (n,) or one.
+    """
 
     begin: Any
     end: Any
@@ -258,16 +315,20 @@ class TorqueRamp(NamedTuple):
 class SunPulseClock:
     """Motion of bodies from Sun pulse to Sun pulse, which count from 1, the first after t = 0.
 
-    ``sun`` (3, n) are inertial unit vectors, ``azimuth`` rad is that of the sensor about axis 3 from axis 1, ``sense``
-    the sign of the spin. ``time`` (n,) s is that of the last computed Sun pulse; there was none where ``lost`` (n,):
-    the Sun is too near to the axis to go round. ``over`` (n,) s: end of the last pulse, command and thrust.
+    ``sun`` (3, n) are inertial unit vectors, ``azimuth`` rad is that of the sensor about axis 3
+    from axis 1, ``sense`` the sign of the spin. ``time`` (n,) s is that of the last computed Sun
+    pulse; there was none where ``lost`` (n,): the Sun is too near to the axis to go round. ``over``
+    (n,) s: end of the last pulse, command and thrust.
     """
 
     def __init__(self, start: MotionStretch, sun: Array, sense: float, azimuth: float) -> None:
         self.sun, self.sense, self.azimuth = sun, sense, azimuth
-        self._stretches, self.over = [start], start.since
+        self._stretches = [start]
+        self.over = start.since
         ahead, _ = self._ahead(start, sun)
-        self._number, self.time = 0, start.since + (ahead - CIRCLE) / self._pace  # as if one had come before t = 0
+        # as if one had come before t = 0
+        self._number = 0
+        self.time = start.since + (ahead - CIRCLE) / self._pace
         self.lost = np.zeros(len(start.since), dtype=bool)
 
     @property
@@ -277,8 +338,12 @@ class SunPulseClock:
 
     @property
     def passed(self) -> Iterator[tuple[MotionStretch, Array]]:
-        """Stretches from the end of the last pulse but one to that of the last, each with its end."""
-        return zip(self._stretches, (stretch.since for stretch in self._stretches[1:]), strict=False)
+        """Stretches from the end of the last pulse but one to that of the last,
+        each with its end.
+        """
+        return zip(
+            self._stretches, (stretch.since for stretch in self._stretches[1:]), strict=False
+        )
 
     def fire(
         self,
@@ -290,23 +355,31 @@ class SunPulseClock:
     ) -> Array:
         """Fire a command of ``width`` s, ``delay`` (n,) s after the last Sun pulse, ``sun_pulse``.
 
-        ``pushes`` are its torques, s after its start; the moments fall by ``sheds`` (3, n) kg m², half as the first
-        begins. Returns the starts (n,) s of the commands: not before the end of the previous pulse.
+        ``pushes`` are its torques, s after its start; the moments fall by ``sheds`` (3, n) kg m²,
+        half as the first begins. Returns the starts (n,) s of the commands: not before the end of
+        the previous pulse.
         """
-        before, half = self.here, None if sheds is None else 0.5 * sheds
+        before = self.here
+        half = None if sheds is None else 0.5 * sheds
         starts = np.maximum(sun_pulse.since + delay, self.over)
         self.over = starts + reduce(np.maximum, (push.end for push in pushes), width)
         if not pushes:
             return starts
         begun = sun_pulse.moved(starts + pushes[0].begin)
-        late = np.flatnonzero(sun_pulse.since < before.since)  # it came while the pulse before was on
+        late = np.flatnonzero(
+            sun_pulse.since < before.since
+        )  # it came while the pulse before was on
         if len(late):
-            begun.rates[:, late], begun.quaternion[:, late] = before.some(late).moved(begun.since[late])[2:4]
+            begun.rates[:, late], begun.quaternion[:, late] = before.some(late).moved(
+                begun.since[late]
+            )[2:4]
         begun = begun._replace(bodies=before.bodies.lighter(half))
         self._stretches = [before]
         for push in pushes:
             length = np.where(push.end - push.begin == 0.0, 1.0, push.end - push.begin)
-            slope = None if np.array_equal(push.first, push.last) else (push.last - push.first) / length
+            slope = (
+                None if np.array_equal(push.first, push.last) else (push.last - push.first) / length
+            )
             firing = begun._replace(since=starts + push.begin, torque=push.first, slope=slope)
             begun = firing.moved(starts + push.end)._replace(torque=None, slope=None)
             self._stretches.append(firing)
@@ -314,7 +387,9 @@ class SunPulseClock:
         return starts
 
     def sun_pulse(self, number: int) -> MotionStretch:
-        """Motion at the Sun pulse of this ``number``, if nothing is fired before; numbers must not decrease."""
+        """Motion at the Sun pulse of this ``number``, if nothing is fired before; numbers must not
+        decrease.
+        """
         stretch = self.here
         while self._number < number:
             step = min(number - self._number, AHEAD)
@@ -326,7 +401,8 @@ class SunPulseClock:
             off, rate = self._off(stretch, self.sun)
             astray = np.abs(stretch.since - expected) * pace > math.pi
             self.lost |= astray | (rate <= 0.0) | ~(np.abs(off) < 1e-6)
-            self._number, self.time = self._number + step, stretch.since
+            self._number = self._number + step
+            self.time = stretch.since
         return stretch
 
     def angle(self, here: MotionStretch) -> Array:
@@ -335,10 +411,15 @@ class SunPulseClock:
 
     @property
     def _pace(self) -> Array:
-        """Mean rate (n,) rad/s of the Sun in the free body: |H|/A about H, and ω3 - H3/A about the axis."""
+        """Mean rate (n,) rad/s of the Sun in the free body: |H|/A about H, and ω3 - H3/A about the
+        axis.
+        """
         first, second, _ = self.here.bodies.moments
-        A, momentum = 0.5 * (first + second), self.here.bodies.momentum(self.here.rates)
-        return np.asarray(np.abs(self.sense * _momentum(self.here) / A + self.here.rates[2] - momentum[2] / A))
+        A = 0.5 * (first + second)
+        momentum = self.here.bodies.momentum(self.here.rates)
+        return np.asarray(
+            np.abs(self.sense * _momentum(self.here) / A + self.here.rates[2] - momentum[2] / A)
+        )
 
     def _look_back(self, sun_pulse: MotionStretch, expected: Array, pace: Array) -> None:
         """Recompute in place the Sun pulses that came before the end of the last pulse."""
@@ -352,18 +433,23 @@ class SunPulseClock:
                 whole[..., cases] = part
 
     def _root(self, start: MotionStretch, pace: Array, sun: Array) -> MotionStretch:
-        """Motion as the Sun passes the sensor, at the time nearest to that of ``start``: by Newton's method."""
+        """Motion as the Sun passes the sensor, at the time nearest to that of ``start``: by
+        Newton's method.
+        """
         here = start
         for _ in range(ITERATIONS):
             off, rate = self._off(here, sun)
-            # Where the Sun is near the axis its azimuth may not change for a moment: then by the mean rate.
+            # Where the Sun is near the axis its azimuth may not change for a moment: then by the
+            # mean rate.
             here = here.moved(here.since + off / np.where(rate > 0.1 * pace, rate, pace))
             if np.all(np.abs(off) < CIRCLE * EXACT):
                 break
         return here
 
     def _off(self, here: MotionStretch, sun: Array) -> tuple[Array, Array]:
-        """Angle (n,) in [-π, π) by which the body has to turn until the Sun passes the sensor, and its rate."""
+        """Angle (n,) in [-π, π) by which the body has to turn until the Sun passes the sensor, and
+        its rate.
+        """
         ahead, rate = self._ahead(here, sun)
         return (ahead + math.pi) % CIRCLE - math.pi, rate
 
@@ -372,10 +458,14 @@ class SunPulseClock:
         return ahead(here.rates, here.quaternion, sun, self.azimuth, self.sense)
 
 
-def ahead(rates: Array, quaternion: Array, sun: Array, azimuth: float, sense: float) -> tuple[Array, Array]:
-    """Angle (n,) in [0, 2π) by which bodies have to turn until the Sun passes the sensor, and its rate, rad/s.
+def ahead(
+    rates: Array, quaternion: Array, sun: Array, azimuth: float, sense: float
+) -> tuple[Array, Array]:
+    """Angle (n,) in [0, 2π) by which bodies have to turn until the Sun passes the sensor, and its
+    rate, rad/s.
 
-    ``rates`` (3, n) rad/s, ``quaternion`` (4, n) body -> inertial; the others are those of a `SunPulseClock`.
+    ``rates`` (3, n) rad/s, ``quaternion`` (4, n) body -> inertial; the others are those of a
+    `SunPulseClock`.
     """
     w, x, y, z = quaternion
     s1, s2, s3 = sun

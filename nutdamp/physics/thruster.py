@@ -1,7 +1,9 @@
 """Thruster: valve response (thrust, impulse, centroid), nozzle temperature, tank in blowdown.
 
-Times are in s after the start of the command; thrust is counted in full thrust, so that an impulse is a time, the
-*effective on-time*: that of a rectangular pulse about the centroid with the same impulse and first moment.
+Times are in s after the start of the command; thrust is counted in full thrust, so that an impulse
+is a time, the
+*effective on-time*: that of a rectangular pulse about the centroid with the same impulse and first
+  moment.
 """
 
 from __future__ import annotations
@@ -44,7 +46,10 @@ class Cold:
         return np.exp(lasts) if np.ndim(lasts) else math.exp(lasts)
 
 
-SETTLED, REPEATS = 1e-7, 20  # relative step after which Newton's next one is below a rounding, and most steps
+SETTLED, REPEATS = (
+    1e-7,
+    20,
+)  # relative step after which Newton's next one is below a rounding, and most steps
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,9 +60,13 @@ class Tank:
     pressure: Any  # Pa, when full
     final_pressure: Any  # Pa, with nothing left
     exponent: Any  # power of the pressure that the thrust goes with
-    isp: tuple[tuple[float, float], ...] | None = None  # rows of pressure, Pa, rising, and s; None: of the thrusters
+    isp: tuple[tuple[float, float], ...] | None = (
+        None  # rows of pressure, Pa, rising, and s; None: of the thrusters
+    )
     used: float = 0.0  # kg, before t = 0
-    inertia_per_kg: tuple[float, float, float] | None = None  # kg m² by which I1, I2, I3 fall for each kg used
+    inertia_per_kg: tuple[float, float, float] | None = (
+        None  # kg m² by which I1, I2, I3 fall for each kg used
+    )
 
     @property
     def doubled(self) -> Tank:
@@ -68,26 +77,31 @@ class Tank:
     def pressure_after(self, used: Any) -> Any:
         """Gas pressure (Pa) after ``used`` kg, at most all of it: one number or an array.
 
-        At constant temperature it expands from V0 to V0 + used/density, and final/initial pressure is
-        V0/(V0 + propellant/density): p = p0/(1 + (p0/p1 - 1) used/propellant).
+        At constant temperature it expands from V0 to V0 + used/density, and final/initial pressure
+        is V0/(V0 + propellant/density): p = p0/(1 + (p0/p1 - 1) used/propellant).
         """
         many = np.ndim(used) or np.ndim(self.propellant)
         used = np.minimum(used, self.propellant) if many else min(used, self.propellant)
-        return self.pressure / (1.0 + (self.pressure / self.final_pressure - 1.0) * used / self.propellant)
+        return self.pressure / (
+            1.0 + (self.pressure / self.final_pressure - 1.0) * used / self.propellant
+        )
 
     def thrust_factor(self, used: Any) -> Any:
         """Thrust over that of a full tank."""
         return (self.pressure_after(used) / self.pressure) ** self.exponent
 
     def burn(self, used: Any, flow: Any, time: Any) -> tuple[Any, Any]:
-        """Propellant (kg) of ``time`` s of full thrust after ``used`` kg, and its mean thrust over that of a full tank.
+        """Propellant (kg) of ``time`` s of full thrust after ``used`` kg, and its mean thrust over
+        that of a full tank.
 
-        ``flow`` is that of a full tank, kg/s, times the specific impulse where the tank has it. With p = p0/(1 + κu/U),
-        κ = p0/p1 - 1, and the thrust as its power x, (1 + κu/U)^(x+1) grows linearly in time, past the last kg too.
+        ``flow`` is that of a full tank, kg/s, times the specific impulse where the tank has it.
+        With p = p0/(1 + κu/U), κ = p0/p1 - 1, and the thrust as its power x, (1 + κu/U)^(x+1) grows
+        linearly in time, past the last kg too.
         """
         if self.isp is not None:
             return self._burn(used, flow * time)
-        full, power = self.pressure / self.final_pressure - 1.0, self.exponent + 1.0
+        full = self.pressure / self.final_pressure - 1.0
+        power = self.exponent + 1.0
         grown = 1.0 + full * np.minimum(used, self.propellant) / self.propellant
         level = grown ** (-self.exponent)
         rise = power * full * flow * level * time / (grown * self.propellant)
@@ -99,12 +113,18 @@ class Tank:
     def _burn(self, used: Any, given: Any) -> tuple[Any, Any]:
         """`burn` with the specific impulses of the table; ``given`` is the flow times the time.
 
-        That is the integral over the propellant m of I(m)/F(m), specific impulse over thrust, and the thrust that acts
-        the integral of I(m) over the same: of m/given by Newton's method.
+        That is the integral over the propellant m of I(m)/F(m), specific impulse over thrust, and
+        the thrust that acts the integral of I(m) over the same: of m/given by Newton's method.
         """
-        speed, (nodes, weights) = self.thrust_factor(used) / self.isp_after(used), gauss_legendre(NODES)
+        speed, (nodes, weights) = (
+            self.thrust_factor(used) / self.isp_after(used),
+            gauss_legendre(NODES),
+        )
         first = (-1, *[1] * np.ndim(speed * given))
-        along, weights = np.append(0.5 * (1.0 + nodes), 1.0).reshape(first), weights.reshape(first)  # and the end
+        along, weights = (
+            np.append(0.5 * (1.0 + nodes), 1.0).reshape(first),
+            weights.reshape(first),
+        )  # and the end
         for _ in range(REPEATS):
             pressure = self.pressure_after(used + speed * given * along)
             slowness = self._isp_at(pressure) / (pressure / self.pressure) ** self.exponent
@@ -116,12 +136,17 @@ class Tank:
         return speed * given, 0.5 * speed * (weights * isp).sum(axis=0)
 
     def share(self, used: Any, more: Any) -> Any:
-        """Fraction fired of a pulse that takes ``more`` kg after ``used``: 1, or as far as the propellant lasts."""
-        left, many = self.propellant - used, np.ndim(used) or np.ndim(more) or np.ndim(self.propellant)
+        """Fraction fired of a pulse that takes ``more`` kg after ``used``: 1, or as far as the
+        propellant lasts.
+        """
+        left = self.propellant - used
+        many = np.ndim(used) or np.ndim(more) or np.ndim(self.propellant)
         if not many:
             return 1.0 if more <= left or more == 0.0 else max(left, 0.0) / more
         lasts = np.real(more) <= np.real(left)
-        return np.where(lasts, 1.0, np.where(np.real(left) > 0.0, left, 0.0) / np.where(lasts, 1.0, more))
+        return np.where(
+            lasts, 1.0, np.where(np.real(left) > 0.0, left, 0.0) / np.where(lasts, 1.0, more)
+        )
 
     def isp_after(self, used: Any) -> Any:
         """Specific impulse, s; None where the thrusters have their own."""
@@ -139,13 +164,17 @@ class Tank:
 
 Array = NDArray[np.float64]
 
-NODES = 16  # nodes of Gauss-Legendre quadrature in a stretch of at most `REACH` rad: it errs by less than a rounding
+# nodes of Gauss-Legendre quadrature in a stretch of at most `REACH` rad: it errs by less than a
+# rounding
+NODES = 16
 
 REACH = 2.0
 
 
 class Ramp(NamedTuple):
-    """Thrust that runs linearly from level ``first`` at ``begin`` s to ``last`` at ``end`` s; 1 is full thrust."""
+    """Thrust that runs linearly from level ``first`` at ``begin`` s to ``last`` at ``end`` s; 1 is
+    full thrust.
+    """
 
     begin: float
     end: float
@@ -159,7 +188,9 @@ class Ramp(NamedTuple):
 
 
 class Thrust(NamedTuple):
-    """Response to a command: the effective ``on_time`` s about the ``centroid`` s, by the ``ramps`` of the thrust."""
+    """Response to a command: the effective ``on_time`` s about the ``centroid`` s, by the ``ramps``
+    of the thrust.
+    """
 
     on_time: float
     centroid: float
@@ -170,7 +201,9 @@ NOTHING = Thrust(0.0, 0.0, ())
 
 
 class Opened(NamedTuple):
-    """Thrust that rises, stays at a ``level`` and falls between four ``corners``, s: numbers, or arrays of cases."""
+    """Thrust that rises, stays at a ``level`` and falls between four ``corners``, s: numbers, or
+    arrays of cases.
+    """
 
     corners: tuple[Any, Any, Any, Any]
     level: Any
@@ -196,23 +229,37 @@ class Opened(NamedTuple):
 
     @property
     def acts(self) -> tuple[Any, Any, Any]:
-        """Effective on-time, centroid and spread (of the rectangle with the same second moment), s."""
+        """Effective on-time, centroid and spread (of the rectangle with the same second moment),
+        s.
+        """
         first, second, third, last = self.corners
         pieces = (  # area, centroid, variance
-            (0.5 * self.level * (second - first), (first + 2.0 * second) / 3.0, (second - first) ** 2 / 18.0),
+            (
+                0.5 * self.level * (second - first),
+                (first + 2.0 * second) / 3.0,
+                (second - first) ** 2 / 18.0,
+            ),
             (self.level * (third - second), 0.5 * (second + third), (third - second) ** 2 / 12.0),
-            (0.5 * self.level * (last - third), (2.0 * third + last) / 3.0, (last - third) ** 2 / 18.0),
+            (
+                0.5 * self.level * (last - third),
+                (2.0 * third + last) / 3.0,
+                (last - third) ** 2 / 18.0,
+            ),
         )
         total = sum(area for area, _, _ in pieces)
         whole = np.where(total == 0.0, 1.0, total)
         centroid = sum(area * middle for area, middle, _ in pieces) / whole
-        variance = sum(area * (own + (middle - centroid) ** 2) for area, middle, own in pieces) / whole
+        variance = (
+            sum(area * (own + (middle - centroid) ** 2) for area, middle, own in pieces) / whole
+        )
         return total, np.where(total == 0.0, first, centroid), np.sqrt(12.0 * variance)
 
 
 @dataclass(frozen=True, slots=True)
 class Trapezoid:
-    """Valve with linear rise and fall of the thrust: a triangle where it closes before full thrust is reached."""
+    """Valve with linear rise and fall of the thrust: a triangle where it closes before full thrust
+    is reached.
+    """
 
     open_delay: float = 0.0  # s from the start of the command until the thrust rises
     close_delay: float = 0.0  # s from its end until the thrust falls
@@ -226,35 +273,51 @@ class Trapezoid:
         return 0.0, math.inf
 
     def thrust(self, on_time: float) -> Thrust:
-        """Response to a command of ``on_time`` s, from the areas and first moments of its pieces."""
+        """Response to a command of ``on_time`` s,
+        from the areas and first moments of its pieces.
+        """
         command = self._command(on_time) if self.effective else on_time
-        opened = command + self.close_delay - self.open_delay  # from the first thrust to the beginning of its fall
+        opened = (
+            command + self.close_delay - self.open_delay
+        )  # from the first thrust to the beginning of its fall
         if opened <= 0.0 or on_time <= 0.0:
             return NOTHING
         rise, fall = self.rise_time, self.fall_time
         level = 1.0 if opened >= rise else opened / rise
         flat = max(opened - rise, 0.0)
-        rising, falling = opened - flat, level * fall
+        rising = opened - flat
+        falling = level * fall
         areas = (0.5 * level * rising, flat, 0.5 * level * falling)
         total = math.fsum(areas)
         arms = (rising + 0.5 * flat), (opened + falling / 3.0)
         moment = math.fsum((areas[0] * 2.0 * rising / 3.0, areas[1] * arms[0], areas[2] * arms[1]))
-        ramps, begin = [], self.open_delay
+        ramps = []
+        begin = self.open_delay
         for length, first, last in ((rising, 0.0, level), (flat, 1.0, 1.0), (falling, level, 0.0)):
             if begin + length > begin:
                 ramps.append(Ramp(begin, begin + length, first, last))
                 begin += length
         return Thrust(total, self.open_delay + moment / total, tuple(ramps))
 
-    def opened(self, on_time: float, open_delay: Any, close_delay: Any, rise_time: Any, fall_time: Any) -> Opened:
+    def opened(
+        self, on_time: float, open_delay: Any, close_delay: Any, rise_time: Any, fall_time: Any
+    ) -> Opened:
         """Response to a command with the four times longer by so much, s, elementwise."""
         command = self._command(on_time) if self.effective else on_time
-        opens, rise, fall = self.open_delay + open_delay, self.rise_time + rise_time, self.fall_time + fall_time
+        opens, rise, fall = (
+            self.open_delay + open_delay,
+            self.rise_time + rise_time,
+            self.fall_time + fall_time,
+        )
         held = command + self.close_delay + close_delay - opens
         held = np.where(np.real(held) > 0.0, held, 0.0)
-        level = np.where(np.real(held) < np.real(rise), held / np.where(rise == 0.0, 1.0, rise), 1.0)
+        level = np.where(
+            np.real(held) < np.real(rise), held / np.where(rise == 0.0, 1.0, rise), 1.0
+        )
         level = np.where(held == 0.0, 0.0, level)
-        return Opened((opens, opens + level * rise, opens + held, opens + held + level * fall), level)
+        return Opened(
+            (opens, opens + level * rise, opens + held, opens + held + level * fall), level
+        )
 
     def on_time_for(self, effective: float) -> float:
         """On-time (s) of the command that acts like full thrust for ``effective`` s."""
@@ -263,7 +326,8 @@ class Trapezoid:
     def _command(self, effective: float) -> float:
         """Length (s) of the command that gives full thrust for ``effective`` s.
 
-        With full thrust: effective = τ + close - open + (fall - rise)/2, else (rise + fall)/2 × level².
+        With full thrust: effective = τ + close - open + (fall - rise)/2, else (rise + fall)/2 ×
+        level².
         """
         rise, fall = self.rise_time, self.fall_time
         corner = 0.5 * (rise + fall)
@@ -274,20 +338,29 @@ class Trapezoid:
         return opened + self.open_delay - self.close_delay
 
     def reaches(self, shortest: float, longest: float) -> tuple[float, float]:
-        """Bounds (s) of lead and lag of commands that act from ``shortest`` to ``longest`` s of full thrust.
+        """Bounds (s) of lead and lag of commands that act from ``shortest`` to ``longest`` s of
+        full thrust.
 
-        The lead is the time from the start of the command to that of the effective pulse, the lag that from the end of
-        the effective pulse until command and thrust are over. With full thrust the lead is
-        open + rise/2 + (fall² - rise²)/(24 × effective), the lag mirrors it; a triangle of level h has
-        open + h(2 rise + fall)/3 - h²(rise + fall)/4. Both are monotone but for one maximum.
+        The lead is the time from the start of the command to that of the effective pulse, the lag
+        that from the end of the effective pulse until command and thrust are over. With full thrust
+        the lead is open + rise/2 + (fall² - rise²)/(24 × effective), the lag mirrors it; a triangle
+        of level h has open + h(2 rise + fall)/3 - h²(rise + fall)/4. Both are monotone but for one
+        maximum.
         """
         rise, fall = self.rise_time, self.fall_time
         corner = 0.5 * (rise + fall)
         peaks = []
         if corner > 0.0:
-            tops = (2.0 * (2.0 * rise + fall) / (6.0 * corner), 2.0 * (rise + 2.0 * fall) / (6.0 * corner))
+            tops = (
+                2.0 * (2.0 * rise + fall) / (6.0 * corner),
+                2.0 * (rise + 2.0 * fall) / (6.0 * corner),
+            )
             peaks = [corner * min(top, 1.0) ** 2 for top in tops]
-        places = [shortest, longest, *(min(max(peak, shortest), longest) for peak in (corner, *peaks))]
+        places = [
+            shortest,
+            longest,
+            *(min(max(peak, shortest), longest) for peak in (corner, *peaks)),
+        ]
         leads, lags = [], []
         for place in places:
             if not 0.0 < place < math.inf:
@@ -303,9 +376,11 @@ class Trapezoid:
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """Valve by a table of tests: ``rows`` of on-time, effective on-time and centroid, s, each rising.
+    """Valve by a table of tests: ``rows`` of on-time, effective on-time and centroid, s, each
+    rising.
 
-    Linear between the rows, unknown outside. The thrust is taken as full for the effective on-time about the centroid.
+    Linear between the rows, unknown outside. The thrust is taken as full for the effective on-time
+    about the centroid.
     """
 
     rows: tuple[tuple[float, float, float], ...]
@@ -322,11 +397,15 @@ class Measured:
         return Thrust(effective, centroid, (Ramp(begin, begin + effective, 1.0, 1.0),))
 
     def on_time_for(self, effective: float) -> float:
-        """On-time (s) of the command that acts like full thrust for ``effective`` s; the nearest in the table."""
+        """On-time (s) of the command that acts like full thrust for ``effective`` s; the nearest in
+        the table.
+        """
         return self._between(1, effective, 0)
 
     def opened(self, on_time: float, factor: Any) -> Opened:
-        """Response, not before the command, with all impulses of the table ``factor`` times as large, elementwise."""
+        """Response, not before the command, with all impulses of the table ``factor`` times as
+        large, elementwise.
+        """
         effective, centroid = (self._between(0, on_time, column) for column in (1, 2))
         begin = centroid - 0.5 * effective * factor
         begin = np.where(np.real(begin) > 0.0, begin, 0.0)
@@ -345,28 +424,41 @@ class Measured:
     def reaches(self, shortest: float, longest: float) -> tuple[float, float]:
         """Bounds (s) of lead and lag, see `Trapezoid.reaches`: both linear between the rows."""
         places = [shortest, longest, *(row[1] for row in self.rows if shortest < row[1] < longest)]
-        ramps = [(on_time, self.thrust(on_time).ramps[0]) for on_time in map(self.on_time_for, places)]
+        ramps = [
+            (on_time, self.thrust(on_time).ramps[0]) for on_time in map(self.on_time_for, places)
+        ]
         lags = (max(on_time - ramp.end, 0.0) for on_time, ramp in ramps)
         return max(ramp.begin for _, ramp in ramps), max(lags)
 
 
-Valve = Trapezoid | Measured  # map from commands to thrust. Times of commands are on-times as they are loaded.
+Valve = (
+    Trapezoid | Measured
+)  # map from commands to thrust. Times of commands are on-times as they are loaded.
 
 
 def shape_factor(
-    rate: float, change: float, ramps: Sequence[Ramp], centroid: float, growth: float = 0.0, drift: float = 0.0
+    rate: float,
+    change: float,
+    ramps: Sequence[Ramp],
+    centroid: float,
+    growth: float = 0.0,
+    drift: float = 0.0,
 ) -> complex:
-    """Factor on the impulse at the ``centroid`` for the effect of a shaped pulse on ω: see `response.width_factor`.
+    """Factor on the impulse at the ``centroid`` for the effect of a shaped pulse on ω: see
+    `response.width_factor`.
 
-    F = (1/E) ∫ f(t) exp(i (rate (t - t_c) + drift (t² - t_c²)/2 + change ∫∫ f) - κ (t - t_c)) dt with the thrust f
-    of the ``ramps``, their impulse E, and times from the start of the first: with the whole spin change at the
-    centroid the body turns by the end as far as it does. ``rate`` is ν as the first begins, rad/s, ``change`` its
-    derivative under the full axial torque.
+    F = (1/E) ∫ f(t) exp(i (rate (t - t_c) + drift (t² - t_c²)/2 + change ∫∫ f) - κ (t - t_c)) dt
+    with the thrust f of the ``ramps``, their impulse E, and times from the start of the first: with
+    the whole spin change at the centroid the body turns by the end as far as it does. ``rate`` is ν
+    as the first begins, rad/s, ``change`` its derivative under the full axial torque.
     """
     nodes, weights = gauss_legendre(NODES)
     origin = ramps[0].begin
     centre = centroid - origin
-    total, given, turned = 0.0 + 0.0j, 0.0, 0.0  # ∫ f exp, ∫ f, ∫∫ f up to here
+    # ∫ f exp, ∫ f, ∫∫ f up to here
+    total = 0.0 + 0.0j
+    given = 0.0
+    turned = 0.0
     for ramp in ramps:
         length = ramp.end - ramp.begin
         slope = (ramp.last - ramp.first) / length
@@ -378,20 +470,27 @@ def shape_factor(
         level = ramp.first + slope * s
         swept = turned + given * s + 0.5 * ramp.first * s**2 + slope * s**3 / 6.0
         phase = rate * (time - centre) + 0.5 * drift * (time**2 - centre**2) + change * swept
-        total += half * complex(np.exp(1j * phase - growth * (time - centre)) * level @ np.tile(weights, panels))
+        total += half * complex(
+            np.exp(1j * phase - growth * (time - centre)) * level @ np.tile(weights, panels)
+        )
         turned += given * length + 0.5 * ramp.first * length**2 + slope * length**3 / 6.0
         given += ramp.impulse
     return total / given
 
 
 def spread(ramps: Sequence[Ramp], centroid: float) -> float:
-    """Length (s) of the rectangular pulse that has the same second moment about the ``centroid`` for its impulse."""
+    """Length (s) of the rectangular pulse that has the same second moment about the ``centroid``
+    for its impulse.
+    """
     second, total = 0.0, 0.0
     for ramp in ramps:
         length = ramp.end - ramp.begin
-        begin, slope = ramp.begin - centroid, (ramp.last - ramp.first) / length
+        begin = ramp.begin - centroid
+        slope = (ramp.last - ramp.first) / length
         # ∫ (first + slope s) (begin + s)² ds
         second += ramp.first * (begin * begin * length + begin * length**2 + length**3 / 3.0)
-        second += slope * (0.5 * begin * begin * length**2 + 2.0 * begin * length**3 / 3.0 + 0.25 * length**4)
+        second += slope * (
+            0.5 * begin * begin * length**2 + 2.0 * begin * length**3 / 3.0 + 0.25 * length**4
+        )
         total += ramp.impulse
     return math.sqrt(12.0 * max(second, 0.0) / total) if total > 0.0 else 0.0

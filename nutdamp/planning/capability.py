@@ -1,4 +1,6 @@
-"""Capability of the actuators before any plan: steps of each channel, and best pair for two pulses."""
+"""Capability of the actuators before any plan: steps of each channel,
+and best pair for two pulses.
+"""
 
 from __future__ import annotations
 
@@ -28,9 +30,13 @@ from nutdamp.spacecraft.model import Disturbance, Spacecraft
 RESONANT = 3.0  # beat period over horizon from which a disturbance counts as resonant
 
 SHORTEST, GRID = 1e-6, 600
-"""Part of the longest on-time from which on, and number of on-times among which, the largest step is searched."""
+"""Part of the longest on-time from which on, and number of on-times among which, the largest step
+is searched.
+"""
 
-DIGITS = 9  # digits of misses in rad that are no rounding: among equals the pair that is named first
+DIGITS = (
+    9  # digits of misses in rad that are no rounding: among equals the pair that is named first
+)
 
 
 class ChannelSteps(NamedTuple):
@@ -46,7 +52,9 @@ class ChannelSteps(NamedTuple):
 
 
 class SunPhases(NamedTuple):
-    """Sun pulses of the free motion: ``turn`` s apart on average, the ``first`` at s, or None and the ``refusal``."""
+    """Sun pulses of the free motion: ``turn`` s apart on average, the ``first`` at s, or None and
+    the ``refusal``.
+    """
 
     turn: float
     first: float | None
@@ -65,7 +73,9 @@ def sun_clock(spacecraft: Spacecraft) -> SunPhases | None:
 
 
 class Turns(NamedTuple):
-    """Turn of H by one pulse of a command block at the spin of t = 0: least and most, rad, and their widths, s."""
+    """Turn of H by one pulse of a command block at the spin of t = 0: least and most, rad, and
+    their widths, s.
+    """
 
     channel: Channel
     smallest: float
@@ -75,15 +85,22 @@ class Turns(NamedTuple):
 
 
 def turns(spacecraft: Spacecraft) -> tuple[Turns, ...]:
-    """Turns of each channel that blocks can fire, in the order of the file; nothing where the file has no commands."""
-    steps, commands, spin = [], spacecraft.commands, spacecraft.spin
+    """Turns of each channel that blocks can fire, in the order of the file; nothing where the file
+    has no commands.
+    """
+    steps = []
+    commands = spacecraft.commands
+    spin = spacecraft.spin
     if commands is None:
         return ()
     for channel in usable(spacecraft):
         widths = commandable_widths(commands, channel)
         if len(widths):
-            given, momentum = acts(channel, widths), abs(spacecraft.axial)
-            each = precession.turned_by(momentum, abs(channel.transverse), given.on_time, spin, given.spread)
+            given = acts(channel, widths)
+            momentum = abs(spacecraft.axial)
+            each = precession.turned_by(
+                momentum, abs(channel.transverse), given.on_time, spin, given.spread
+            )
             least, most = int(np.argmin(each)), int(np.argmax(each))
             ends = (float(value[at]) for at in (least, most) for value in (each, widths))
             steps.append(Turns(channel, *ends))
@@ -91,7 +108,9 @@ def turns(spacecraft: Spacecraft) -> tuple[Turns, ...]:
 
 
 class PairFit(NamedTuple):
-    """Two channels for Magnus' two pulses at once: ``miss`` (rad) is the error of direction of the second."""
+    """Two channels for Magnus' two pulses at once: ``miss`` (rad) is the error of direction of the
+    second.
+    """
 
     first: Channel
     second: Channel
@@ -114,7 +133,9 @@ def channel_steps(spacecraft: Spacecraft) -> tuple[ChannelSteps, ...]:
 
 
 class Acting(NamedTuple):
-    """Pulse of a command of ``on_time`` s: ``effective`` s of full thrust, N m s, ``centroid`` s after its start."""
+    """Pulse of a command of ``on_time`` s: ``effective`` s of full thrust, N m s, ``centroid`` s
+    after its start.
+    """
 
     channel: Channel
     on_time: float
@@ -150,13 +171,19 @@ def mounting_angle(spacecraft: Spacecraft) -> float:
 
 
 def nearest_pair(spacecraft: Spacecraft) -> PairFit | None:
-    """The two channels whose directions come nearest to the turn between two half pulses; None without channels."""
+    """The two channels whose directions come nearest to the turn between two half pulses; None
+    without channels.
+    """
     inertia, rate, spin = spacecraft.inertia, spacecraft.transverse_rate, spacecraft.spin
-    needed = cmath.rect(1.0, rigid_body.turn_between_halves(inertia.A, inertia.C, rate, spin, inertia.wheel))
+    needed = cmath.rect(
+        1.0, rigid_body.turn_between_halves(inertia.A, inertia.C, rate, spin, inertia.wheel)
+    )
     usable = [channel for channel in spacecraft.channels if channel.damps]
     torques = np.array([channel.transverse for channel in usable])
     best: PairFit | None = None
-    for first, torque in zip(usable, torques, strict=True):  # a row at a time: many channels have very many pairs
+    for first, torque in zip(
+        usable, torques, strict=True
+    ):  # a row at a time: many channels have very many pairs
         misses = np.angle(torques * np.conj(torque * needed))
         index = int(np.argmin(np.abs(misses).round(DIGITS)))
         if best is None or round(abs(misses[index]), DIGITS) < round(abs(best.miss), DIGITS):
@@ -167,11 +194,12 @@ def nearest_pair(spacecraft: Spacecraft) -> PairFit | None:
 class Consequence(NamedTuple):
     """Effect of one disturbance in the long run.
 
-    ``forced`` (rad/s) is the steady rate about which ω settles, K(14) fixed in the body, K(15) nearly fixed in space,
-    ``tilt`` (rad) the angle between H and the spin axis that goes with it, Magnus 1970 (13)/(14). A torque fixed in
-    space turns H by the ``precession`` M/|H| (rad/s); under any other H goes round, up to ``swing`` rad from the start.
-    From rest the nutation swells to ``beat`` (rad) and back within ``beat_period`` s, (27). At resonance, (25), these
-    are None and ``resonant`` holds the times (s) at which it has driven the nutation to `MARKS`. An axial
+    ``forced`` (rad/s) is the steady rate about which ω settles, K(14) fixed in the body, K(15)
+    nearly fixed in space, ``tilt`` (rad) the angle between H and the spin axis that goes with it,
+    Magnus 1970 (13)/(14). A torque fixed in space turns H by the ``precession`` M/|H| (rad/s);
+    under any other H goes round, up to ``swing`` rad from the start. From rest the nutation swells
+    to ``beat`` (rad) and back within ``beat_period`` s, (27). At resonance, (25), these are None
+    and ``resonant`` holds the times (s) at which it has driven the nutation to `MARKS`. An axial
     part changes the spin at ``spin_rate`` rad/s².
     """
 
@@ -187,39 +215,52 @@ class Consequence(NamedTuple):
 
 
 MARKS = tuple(math.radians(mark) for mark in (10.0, 30.0, 60.0))
-"""Nutation angles for which the time is given that a resonant disturbance takes to drive it there."""
+"""Nutation angles for which the time is given that a resonant
+disturbance takes to drive it there.
+"""
 
 
 def consequences(spacecraft: Spacecraft) -> Iterator[Consequence]:
     """Effect of each disturbance, in the order of the file."""
     A, C, turning = spacecraft.inertia.A, spacecraft.inertia.C, spacecraft.nutation_rate
-    spin, omega0 = spacecraft.inertia.equivalent(spacecraft.spin), complex(*spacecraft.omega0[:2])
+    spin = spacecraft.inertia.equivalent(spacecraft.spin)
+    omega0 = complex(*spacecraft.omega0[:2])
     for disturbance in spacecraft.disturbances:
-        torque, spin_rate = disturbance.transverse, disturbance.axial / C
+        torque = disturbance.transverse
+        spin_rate = disturbance.axial / C
         if torque == 0.0:
             yield Consequence(disturbance, 0.0, None, 0.0, 0.0, 0.0, math.inf, (), spin_rate)
             continue
         largest, period = response.beat(A, turning, torque, disturbance.rate)
-        # A beat that takes longer than everything planned, several times over, is a resonance for the user.
+        # A beat that takes longer than everything planned, several times over, is a resonance for
+        # the user.
         if period > RESONANT * spacecraft.horizon:
             marks = [mark for mark in MARKS if mark > spacecraft.nutation]
-            times = [(mark, response.resonant_time(A, spacecraft.axial, omega0, torque, mark)) for mark in marks]
-            yield Consequence(disturbance, None, None, None, None, None, period, tuple(times), spin_rate)
+            times = [
+                (mark, response.resonant_time(A, spacecraft.axial, omega0, torque, mark))
+                for mark in marks
+            ]
+            yield Consequence(
+                disturbance, None, None, None, None, None, period, tuple(times), spin_rate
+            )
             continue
         steady = abs(response.steady_response(A, turning, torque, disturbance.rate))
         turns = abs(spacecraft.spin + disturbance.rate)  # of the torque in space
         precession = abs(torque) / float(np.linalg.norm(spacecraft.momentum))
         steadily = turns * spacecraft.horizon < 1.0
         ways = precession if steadily else None, None if steadily else 2.0 * precession / turns
-        tilt, swell = (float(rigid_body.nutation_angle(A, C, rate, spin)) for rate in (steady, largest))
+        tilt, swell = (
+            float(rigid_body.nutation_angle(A, C, rate, spin)) for rate in (steady, largest)
+        )
         yield Consequence(disturbance, steady, *ways, tilt, swell, period, (), spin_rate)
 
 
 class SpinAxis(NamedTuple):
     """Principal axis 3 of inertia.
 
-    ``kind`` of `body.axis_class`; ``exponent`` p² in 1/s² and ``growth_time`` s of `body.growth`; ``tilt`` rad against
-    the third axis of the file; ``rates`` in the body, despun and inertially, K(7), K(10), K(13), rad/s.
+    ``kind`` of `body.axis_class`; ``exponent`` p² in 1/s² and ``growth_time`` s of `body.growth`;
+    ``tilt`` rad against the third axis of the file; ``rates`` in the body, despun and inertially,
+    K(7), K(10), K(13), rad/s.
     """
 
     kind: str
@@ -232,6 +273,15 @@ class SpinAxis(NamedTuple):
 def spin_axis(spacecraft: Spacecraft) -> SpinAxis:
     """Class, stability and nutation rates of the spin axis."""
     inertia, spin = spacecraft.inertia, spacecraft.spin
-    kind, grows = rigid_body.axis_class(inertia.moments), rigid_body.growth(inertia.moments, spin, inertia.wheel)
-    rates = rigid_body.nutation_rates(inertia.A, inertia.C, spacecraft.transverse_rate, spin, inertia.wheel)
-    return SpinAxis(kind, grows.squared_exponent, grows.growth_time, rigid_body.principal_tilt(inertia.axes), rates)
+    kind = rigid_body.axis_class(inertia.moments)
+    grows = rigid_body.growth(inertia.moments, spin, inertia.wheel)
+    rates = rigid_body.nutation_rates(
+        inertia.A, inertia.C, spacecraft.transverse_rate, spin, inertia.wheel
+    )
+    return SpinAxis(
+        kind,
+        grows.squared_exponent,
+        grows.growth_time,
+        rigid_body.principal_tilt(inertia.axes),
+        rates,
+    )

@@ -1,4 +1,6 @@
-"""Comparison of plans: the verdict on each, the recommendation by residuals and cost; simulations to a given time."""
+"""Comparison of plans: the verdict on each, the recommendation by residuals and cost; simulations
+to a given time.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +23,14 @@ from nutdamp.planning.verdict import Cases, Cheaper, Line, Verdict, no_plan
 from nutdamp.schemes import catalogue, planner
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import Spacecraft
-from nutdamp.spacecraft.requirements import DAMPED_ANGLE, NEGLIGIBLE, SAME_COST, Part, missed, required
+from nutdamp.spacecraft.requirements import (
+    DAMPED_ANGLE,
+    NEGLIGIBLE,
+    SAME_COST,
+    Part,
+    missed,
+    required,
+)
 
 if TYPE_CHECKING:
     from nutdamp.planning.screening import FlownPlan
@@ -29,13 +38,16 @@ if TYPE_CHECKING:
 PICTURED = 100_000  # largest number of rows of the track of a picture
 
 
-STEADIER_SHIFT = 0.2  # share of the recommended plan's momentum shift below which another plan keeps H much better
+# share of the recommended plan's momentum shift below which another plan keeps H much better
+STEADIER_SHIFT = 0.2
 FEWER_PULSES = 0.5  # share of its pulses up to which another plan is much simpler
-SOONER_END = 0.5  # share of its end up to which another one, a nutation period earlier at least, is much sooner
+# share of its end up to which another one, a nutation period earlier at least, is much sooner
+SOONER_END = 0.5
 STEADIER_COST = 1.1  # largest cost ratio at which a smaller momentum shift is worth a note
 FEWER_COST = 1.05  # largest cost ratio at which fewer pulses are
 SOONER_COST = 1.05  # largest cost ratio at which an earlier end is
-REAL_COST = 1.1  # largest cost ratio of a plan with real widths beside one of ideal impulses that is worth a note
+# largest cost ratio of a plan with real widths beside one of ideal impulses that is worth a note
+REAL_COST = 1.1
 
 SAME_ANGLE, SAME_SPEED = 1e-9, 1e-5
 """rad and m/s by which shifts of H and ΔV may differ and be equal: the rounding of a flight."""
@@ -75,9 +87,11 @@ class Gain(Enum):
 
 @dataclass(frozen=True, eq=False)
 class Recommendation:
-    """Recommended plan of the ``count`` of its ``standing``, by propellant or by impulse; None where none is feasible.
+    """Recommended plan of the ``count`` of its ``standing``, by propellant or by impulse; None
+    where none is feasible.
 
-    ``least``: what is saved, of `catalogue.LEAST`; ``alternatives``: the cheapest plan that gains so much.
+    ``least``: what is saved, of `catalogue.LEAST`; ``alternatives``: the cheapest plan that gains
+    so much.
     """
 
     plan: Plan | None = None
@@ -90,13 +104,17 @@ class Recommendation:
 
 
 def recommend(
-    plans: Sequence[Plan], cases: Mapping[Plan, Cases] | None = None, least: str = catalogue.LEAST[0]
+    plans: Sequence[Plan],
+    cases: Mapping[Plan, Cases] | None = None,
+    least: str = catalogue.LEAST[0],
 ) -> Recommendation:
-    """Recommendation: of the plans that meet the requirement, and damp where it bounds nothing, the `cheapest`.
+    """Recommendation: of the plans that meet the requirement, and damp where it bounds nothing, the
+    `cheapest`.
 
-    Where there is none, that with least nutation left (least distance from a target axis where that is more). Of plans
-    that reach as much those that keep all cones count alone. With ``cases`` a plan meets the requirement in enough of
-    them or not at all; where none does, it is that with which most comply. ``least``: of `catalogue.LEAST`.
+    Where there is none, that with least nutation left (least distance from a target axis where that
+    is more). Of plans that reach as much those that keep all cones count alone. With ``cases`` a
+    plan meets the requirement in enough of them or not at all; where none does, it is that with
+    which most comply. ``least``: of `catalogue.LEAST`.
     """
     feasible = [plan for plan in plans if plan.flown is not None]
     if not feasible:
@@ -109,7 +127,9 @@ def recommend(
     if standing is Standing.COMPLIES:
         best, ground = cheapest(those, least=least)
         gains = _alternatives(best, those)
-        return Recommendation(best, standing, ground, len(those), by_propellant(those), least, gains)
+        return Recommendation(
+            best, standing, ground, len(those), by_propellant(those), least, gains
+        )
     most = max(_complying(cases[plan]) for plan in those) if cases else 0.0
     if cases and standing is Standing.MISSES and most > 0.0 and len(those) > 1:
         best, _ = cheapest([plan for plan in those if _complying(cases[plan]) >= most], least=least)
@@ -124,7 +144,9 @@ def _complying(cases: Cases) -> float:
 
 
 def spent(plan: Plan, least: str, unit: str) -> float:
-    """Amount of what is saved that a plan takes: propellant or impulse, in ``unit``, its end, s, or pulses."""
+    """Amount of what is saved that a plan takes: propellant or impulse, in ``unit``, its end, s, or
+    pulses.
+    """
     if least == "time":
         return plan.pulses.end
     if least == "pulses":
@@ -132,12 +154,15 @@ def spent(plan: Plan, least: str, unit: str) -> float:
     return plan.pulses.total_impulse if least == "impulse" else plan.pulses.cost_in(unit)
 
 
-def cheapest(plans: Sequence[Plan], usual: Plan | None = None, least: str = catalogue.LEAST[0]) -> tuple[Plan, Ground]:
-    """Plan of least propellant (impulse where one is unknown), or of what else is saved, and the deciding ground.
+def cheapest(
+    plans: Sequence[Plan], usual: Plan | None = None, least: str = catalogue.LEAST[0]
+) -> tuple[Plan, Ground]:
+    """Plan of least propellant (impulse where one is unknown), or of what else is saved, and the
+    deciding ground.
 
-    Of costs within `SAME_COST` the ``usual`` one, else that with less propellant where that was not compared, fewer
-    pulses, less ΔV, less momentum shift (distance from the target axis), the earlier end; the first of these that
-    leaves one decides.
+    Of costs within `SAME_COST` the ``usual`` one, else that with less propellant where that was not
+    compared, fewer pulses, less ΔV, less momentum shift (distance from the target axis), the
+    earlier end; the first of these that leaves one decides.
     """
     if len(plans) == 1:
         return plans[0], Ground.ONLY
@@ -167,7 +192,9 @@ def cheapest(plans: Sequence[Plan], usual: Plan | None = None, least: str = cata
 
 
 def nearest(plans: Sequence[Plan]) -> tuple[Plan, Ground]:
-    """Plan of least residual but for `DAMPED_ANGLE`, nearest to the requirement, then `cheapest`; deciding ground."""
+    """Plan of least residual but for `DAMPED_ANGLE`, nearest to the requirement, then `cheapest`;
+    deciding ground.
+    """
     if len(plans) == 1:
         return plans[0], Ground.ONLY
     least = min(map(_missed, plans))
@@ -176,15 +203,24 @@ def nearest(plans: Sequence[Plan]) -> tuple[Plan, Ground]:
         return as_little[0], Ground.LEFT
     body = as_little[0].spacecraft
     least = min(plan.severity for plan in as_little)
-    rounding = NEGLIGIBLE / min((bound.limit for bound in required(body) if bound.part is not Part.SPIN), default=1.0)
+    rounding = NEGLIGIBLE / min(
+        (bound.limit for bound in required(body) if bound.part is not Part.SPIN), default=1.0
+    )
     near = [plan for plan in as_little if plan.severity <= least * (1.0 + SAME_COST) + rounding]
     return (near[0], Ground.NEAREST) if len(near) == 1 else cheapest(near)
 
 
 def _alternatives(best: Plan, plans: Sequence[Plan]) -> dict[Gain, Plan]:
-    """Cheapest of the ``plans`` with each gain on the ``best`` for little more; of command blocks at any cost."""
-    unit, body = _unit(plans), best.spacecraft
-    turned = 0.0 if body.goal.axis is not None or _off(best) <= DAMPED_ANGLE else STEADIER_SHIFT * _off(best)
+    """Cheapest of the ``plans`` with each gain on the ``best`` for little more; of command blocks
+    at any cost.
+    """
+    unit = _unit(plans)
+    body = best.spacecraft
+    turned = (
+        0.0
+        if body.goal.axis is not None or _off(best) <= DAMPED_ANGLE
+        else STEADIER_SHIFT * _off(best)
+    )
     few = FEWER_PULSES * len(best.pulses)
     soon = min(SOONER_END * best.pulses.end, best.pulses.end - body.inertial_period)
     gains_of: dict[Gain, Plan] = {}
@@ -193,10 +229,18 @@ def _alternatives(best: Plan, plans: Sequence[Plan]) -> dict[Gain, Plan]:
         (Gain.SIMPLER, FEWER_COST, lambda plan: len(plan.pulses) <= few),
         (Gain.SOONER, SOONER_COST, lambda plan: plan.pulses.end <= soon),
         (Gain.REAL, REAL_COST, lambda plan: best.pulses.idealised and not plan.pulses.idealised),
-        (Gain.COMMANDED, math.inf, lambda plan: bool(plan.pulses.blocks) and not best.pulses.blocks),
+        (
+            Gain.COMMANDED,
+            math.inf,
+            lambda plan: bool(plan.pulses.blocks) and not best.pulses.blocks,
+        ),
     ):
         most = ratio * best.pulses.cost_in(unit)
-        those = [plan for plan in plans if len(plan.pulses) and gains(plan) and plan.pulses.cost_in(unit) <= most]
+        those = [
+            plan
+            for plan in plans
+            if len(plan.pulses) and gains(plan) and plan.pulses.cost_in(unit) <= most
+        ]
         if those:
             gains_of[gain] = min(those, key=lambda plan: plan.pulses.cost_in(unit))
     return gains_of
@@ -230,16 +274,20 @@ BUG = "internal error, please report"
 """Message on a plan whose scheme raised an unexpected exception, which follows by name."""
 
 SEARCH = 100.0
-"""Steps of progress of a scheme that searches, and of the dispersed cases, beside one of each classic scheme."""
+"""Steps of progress of a scheme that searches, and of the dispersed cases, beside one of each
+classic scheme.
+"""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Comparison(results.Data, results.Tabled):
-    """Plans for one spacecraft, and the recommended one; ``comparison["two-pulse"]`` is one of them.
+    """Plans for one spacecraft, and the recommended one; ``comparison["two-pulse"]`` is one of
+    them.
 
-    ``flown``: the feasible ones in dispersed cases; None where these were not to be flown. ``named``: their schemes
-    were; ``timed``: pulses may be timed one by one though the spacecraft takes commands; ``least``: what is saved;
-    ``preferred``: the robust plan, which is recommended whatever the others cost.
+    ``flown``: the feasible ones in dispersed cases; None where these were not to be flown.
+    ``named``: their schemes were; ``timed``: pulses may be timed one by one though the spacecraft
+    takes commands; ``least``: what is saved; ``preferred``: the robust plan, which is recommended
+    whatever the others cost.
     """
 
     spacecraft: Spacecraft
@@ -274,18 +322,32 @@ class Comparison(results.Data, results.Tabled):
         """Recommended plan and deciding ground."""
         if self.preferred is None:
             return recommend(self.eligible, self.cases, self.least)
-        standing = self.preferred.standing if self.verdicts[self.preferred].met is not False else Standing.MISSES
-        return Recommendation(self.preferred, standing, Ground.ROBUST, 1, by_propellant([self.preferred]), self.least)
+        standing = (
+            self.preferred.standing
+            if self.verdicts[self.preferred].met is not False
+            else Standing.MISSES
+        )
+        return Recommendation(
+            self.preferred, standing, Ground.ROBUST, 1, by_propellant([self.preferred]), self.least
+        )
 
     @property
     def only_commanded(self) -> bool:
-        """True if only commandable plans may be recommended: not ``timed``, nor ``named`` without any of them."""
-        return not self.timed and (not self.named or any(plan.feasible and plan.commandable for plan in self.plans))
+        """True if only commandable plans may be recommended: not ``timed``, nor ``named`` without
+        any of them.
+        """
+        return not self.timed and (
+            not self.named or any(plan.feasible and plan.commandable for plan in self.plans)
+        )
 
     @property
     def eligible(self) -> tuple[Plan, ...]:
         """Feasible plans that may be recommended."""
-        return tuple(plan for plan in self.plans if plan.feasible and (plan.commandable or not self.only_commanded))
+        return tuple(
+            plan
+            for plan in self.plans
+            if plan.feasible and (plan.commandable or not self.only_commanded)
+        )
 
     @property
     def nominal(self) -> bool:
@@ -294,11 +356,16 @@ class Comparison(results.Data, results.Tabled):
 
     @cached_property
     def cases(self) -> Mapping[Plan, Cases]:
-        """Dispersed cases of each feasible plan, from none to all where they have not flown; empty if not to decide."""
+        """Dispersed cases of each feasible plan, from none to all where they have not flown; empty
+        if not to decide.
+        """
         if self.flown is None or not requirements.judged(self.spacecraft):
             return {}
         feasible = (plan for plan in self.plans if plan.feasible)
-        return {plan: self.flown[plan].cases if plan in self.flown else unflown(plan) for plan in feasible}
+        return {
+            plan: self.flown[plan].cases if plan in self.flown else unflown(plan)
+            for plan in feasible
+        }
 
     @cached_property
     def verdicts(self) -> Mapping[Plan, Verdict]:
@@ -312,14 +379,18 @@ class Comparison(results.Data, results.Tabled):
 
     @cached_property
     def verdict(self) -> Verdict:
-        """Judgement of the recommended plan, with the plans that cost less; of no plan where none is feasible."""
+        """Judgement of the recommended plan, with the plans that cost less; of no plan where none
+        is feasible.
+        """
         plan = self.recommended
         if plan is None:
             return no_plan(self.spacecraft)
         return replace(self.verdicts[plan], cheaper=tuple(self._cheaper(plan)))
 
     def _cheaper(self, chosen: Plan) -> Iterator[Cheaper]:
-        """Compared plans that take less of what is saved, with the reason why they are not recommended."""
+        """Compared plans that take less of what is saved, with the reason why they are not
+        recommended.
+        """
         feasible = [plan for plan in self.plans if plan.feasible]
         unit = _unit(feasible)
         most = spent(chosen, self.least, unit) * (1.0 - SAME_COST)
@@ -329,7 +400,9 @@ class Comparison(results.Data, results.Tabled):
                 yield Cheaper(other.scheme, other.pulses, why)
 
     def shortcoming(self, plan: Plan) -> Note | None:
-        """Reason for which a feasible plan may not be recommended, whatever it costs; None where there is none."""
+        """Reason for which a feasible plan may not be recommended, whatever it costs; None where
+        there is none.
+        """
         verdict = self.verdicts[plan]
         missed = next((line for line in verdict.lines if not line.bound.met(line.nominal)), None)
         if missed is not None:
@@ -342,7 +415,10 @@ class Comparison(results.Data, results.Tabled):
                 return note("why-cases-unknown")
             if cases.enough is not True:
                 share = cases.complying if cases.final else cases.high
-                return note("why-few-comply" if cases.final else "why-few-may-comply", complying_percent=100.0 * share)
+                return note(
+                    "why-few-comply" if cases.final else "why-few-may-comply",
+                    complying_percent=100.0 * share,
+                )
         return None
 
     @property
@@ -352,7 +428,8 @@ class Comparison(results.Data, results.Tabled):
 
     @cached_property
     def with_disturbances(self) -> Plan | None:
-        """Recommendation among the schemes planned with the disturbances; None where they were, or there are none.
+        """Recommendation among the schemes planned with the disturbances; None where they were, or
+        there are none.
 
         A scheme that is slow is planned only where no other one complies.
         """
@@ -363,7 +440,10 @@ class Comparison(results.Data, results.Tabled):
         try:
             for slow in (False, True):
                 for plan in self.plans:
-                    if plan.scheme in catalogue.SCHEMES and catalogue.SCHEMES[plan.scheme].slow == slow:
+                    if (
+                        plan.scheme in catalogue.SCHEMES
+                        and catalogue.SCHEMES[plan.scheme].slow == slow
+                    ):
                         aware = replace(plan.options, with_disturbances=True)
                         others = (*others, attempt(body, plan.scheme, aware))
                 best = replace(self, plans=others, flown=None).recommended
@@ -380,7 +460,8 @@ class Comparison(results.Data, results.Tabled):
 
 
 def usual(spacecraft: Spacecraft) -> tuple[str, ...]:
-    """Default schemes of a comparison: the classic ones and optimal; those that can point or set the spin, if needed.
+    """Default schemes of a comparison: the classic ones and optimal; those that can point or set
+    the spin, if needed.
 
     `none` is among them where no pulse may be needed.
     """
@@ -390,7 +471,9 @@ def usual(spacecraft: Spacecraft) -> tuple[str, ...]:
     if spacecraft.commands is not None:  # before those that may take all the work
         slow = [name for name in names if catalogue.SCHEMES[name].slow]
         names = (*(name for name in names if name not in slow), *catalogue.COMMANDED, *slow)
-    return names if reaches_spin(spacecraft) else tuple(dict.fromkeys((*names, *spinning(spacecraft))))
+    return (
+        names if reaches_spin(spacecraft) else tuple(dict.fromkeys((*names, *spinning(spacecraft))))
+    )
 
 
 def compare(
@@ -401,16 +484,20 @@ def compare(
     samples: int | None = None,
     timed: bool = False,
 ) -> Comparison:
-    """Plan the schemes named, else the `usual` ones, and recommend one; one that has a bug takes no other down.
+    """Plan the schemes named, else the `usual` ones, and recommend one; one that has a bug takes no
+    other down.
 
-    With dispersions each plan flies as many of ``samples`` cases (default as `disperse`, without a requirement 0) as
-    it takes to know whether enough comply. ``timed``: see `Comparison`. Raises NutdampError, such as BadRequest, and
-    KeyError for a name not in `schemes.NAMES`.
+    With dispersions each plan flies as many of ``samples`` cases (default as `disperse`, without a
+    requirement 0) as it takes to know whether enough comply. ``timed``: see `Comparison`. Raises
+    NutdampError, such as BadRequest, and KeyError for a name not in `schemes.NAMES`.
     """
     unknown = set(names) - set(catalogue.NAMES)
     if unknown:
         raise KeyError(*sorted(unknown))
-    sizes = [(name, 1.0 if catalogue.SCHEMES[name].classic else SEARCH) for name in names or usual(spacecraft)]
+    sizes = [
+        (name, 1.0 if catalogue.SCHEMES[name].classic else SEARCH)
+        for name in names or usual(spacecraft)
+    ]
     flies = SEARCH if _flies(spacecraft, samples) else 0.0
     with work.steps(sum(size for _, size in sizes) + flies):
         plans = []
@@ -419,9 +506,17 @@ def compare(
                 with work.steps(1.0, size):
                     plans.append(attempt(spacecraft, name, options))
         least = (
-            options.chosen.get("least") if isinstance(options, catalogue.Options) else getattr(options, "least", None)
+            options.chosen.get("least")
+            if isinstance(options, catalogue.Options)
+            else getattr(options, "least", None)
         )
-        return compare_plans(plans, named=bool(names), samples=samples, timed=timed, least=least or catalogue.LEAST[0])
+        return compare_plans(
+            plans,
+            named=bool(names),
+            samples=samples,
+            timed=timed,
+            least=least or catalogue.LEAST[0],
+        )
 
 
 def compare_plans(
@@ -432,7 +527,9 @@ def compare_plans(
     timed: bool = False,
     least: str = catalogue.LEAST[0],
 ) -> Comparison:
-    """Comparison of plans of one spacecraft, as the schedule of a file, in the dispersed cases of `compare`."""
+    """Comparison of plans of one spacecraft, as the schedule of a file, in the dispersed cases of
+    `compare`.
+    """
     nominal = Comparison(plans[0].spacecraft, tuple(plans), named=named, timed=timed, least=least)
     if not _flies(nominal.spacecraft, samples):
         return nominal
@@ -441,11 +538,17 @@ def compare_plans(
     feasible = [plan for plan in plans if plan.feasible]
     with work.steps(len(feasible) + 1.0, SEARCH):
         eligible = nominal.eligible
-        flown = fly_compared(feasible, samples, lambda cases: recommend(eligible, cases, least).plan, eligible)
+        flown = fly_compared(
+            feasible, samples, lambda cases: recommend(eligible, cases, least).plan, eligible
+        )
     compared = replace(nominal, flown=flown)
     for flown_plan in flown.values():
-        if flown_plan.final and samples is None:  # by the cases of any other command: they need not fly again
-            vars(flown_plan.plan)["verdict"] = judge(flown_plan.plan, flown_plan.cases, flown_plan.results)
+        if (
+            flown_plan.final and samples is None
+        ):  # by the cases of any other command: they need not fly again
+            vars(flown_plan.plan)["verdict"] = judge(
+                flown_plan.plan, flown_plan.cases, flown_plan.results
+            )
     return compared
 
 
@@ -459,7 +562,8 @@ def attempt(spacecraft: Spacecraft, scheme: str, options: planner.Choice) -> Pla
     """Plan of a scheme, or one that carries its unexpected exception."""
     try:
         planned = plan(spacecraft, scheme, options)
-        # Judged here, where a failure is that of this scheme alone, and not when the first figure is shown.
+        # Judged here, where a failure is that of this scheme alone, and not when the first figure
+        # is shown.
         _ = planned.residual, planned.delta_v
     except NutdampError:
         raise
@@ -481,7 +585,8 @@ WHY = {
 
 def note_on(line: Line) -> Note:
     """Note on a bound that the nominal value of a plan breaks."""
-    bound, code = line.bound, WHY[line.bound.part]
+    bound = line.bound
+    code = WHY[line.bound.part]
     if bound.part is Part.SPIN:
         return note(code, off_rpm=RPM * line.nominal)
     if bound.part is Part.CONE and bound.keep is not None:
@@ -491,7 +596,8 @@ def note_on(line: Line) -> Note:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Simulation(results.Data, results.Tabled):
-    """Propagation of a ``plan`` to ``until`` s, shown through ``real`` widths or by the impulse sum (17).
+    """Propagation of a ``plan`` to ``until`` s, shown through ``real`` widths or by the impulse sum
+    (17).
 
     Its track has ``samples`` rows; pictures show it to ``drawn_to`` s.
     """
@@ -505,7 +611,9 @@ class Simulation(results.Data, results.Tabled):
     @cached_property
     def _both(self) -> tuple[Flight, Flight]:
         body, pulses = self.plan.spacecraft, self.plan.pulses
-        return propagation.by_impulses(body, pulses, self.until), propagation.flown(body, pulses, self.until)
+        return propagation.by_impulses(body, pulses, self.until), propagation.flown(
+            body, pulses, self.until
+        )
 
     @cached_property
     def impulses(self) -> Flight:
@@ -524,9 +632,13 @@ class Simulation(results.Data, results.Tabled):
 
     @cached_property
     def verdict(self) -> Verdict:
-        """Judgement of the plan; of free motion that fails at t = 0, that at the end of the simulation."""
+        """Judgement of the plan; of free motion that fails at t = 0, that at the end of the
+        simulation.
+        """
         judged = self.plan.verdict
-        return judged if self.plan.pulses.pulses or judged.met else judge(self.plan, seen=self.flown)
+        return (
+            judged if self.plan.pulses.pulses or judged.met else judge(self.plan, seen=self.flown)
+        )
 
     @cached_property
     def extremes(self) -> Extremes:

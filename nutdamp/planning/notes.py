@@ -1,4 +1,6 @@
-"""Notes on plans and decisions, as data: codes of the sentences of ``guide/notes.md``, with their values."""
+"""Notes on plans and decisions, as data: codes of the sentences of ``guide/notes.md``, with their
+values.
+"""
 
 from __future__ import annotations
 
@@ -39,7 +41,10 @@ def infeasibility(plan: Plan) -> str:
         why = f"the best schedule found would leave {math.degrees(plan.worse):.3g}° of nutation"
         decayed = requirements.decayed(plan.spacecraft, plan.worse_at)
         if decayed < plan.spacecraft.nutation:
-            why += f" at {plan.worse_at:.4g} s; without a pulse it decays to {math.degrees(decayed):.3g}° by then"
+            why += (
+                f" at {plan.worse_at:.4g} s; without a pulse it decays to "
+                f"{math.degrees(decayed):.3g}° by then"
+            )
     else:
         why = plan.refusal or ""
     return f"{why}; {CUT}" if why and plan.cut else why
@@ -57,7 +62,9 @@ def strays(aspect: Aspect) -> str:
 
 
 def broken_limits(spacecraft: Spacecraft, schedule: Schedule) -> list[str]:
-    """Broken limits of a schedule, each in a sentence with the first pulse that breaks it and the number of others."""
+    """Broken limits of a schedule, each in a sentence with the first pulse that breaks it and the
+    number of others.
+    """
     grouped: dict[tuple[Limit, tuple[float, float] | None], list[Breach]] = {}
     for breach in breaches(spacecraft, schedule):
         grouped.setdefault((breach.limit, breach.window), []).append(breach)
@@ -67,13 +74,19 @@ def broken_limits(spacecraft: Spacecraft, schedule: Schedule) -> list[str]:
 
 def _broken(breach: Breach) -> str:
     """Message on a pulse that breaks a limit."""
-    pulse, bound, limit = breach.pulse, f"{breach.bound:.6g} s", breach.limit
+    pulse = breach.pulse
+    bound = f"{breach.bound:.6g} s"
+    limit = breach.limit
     if limit is Limit.MAX_PULSES:
         return f"{breach.number} pulses are more than {breach.bound:.0f}"
     begins, ends = breach.window or (math.nan, math.nan)
     start, on_time = pulse.loaded
     on = f"is on for {on_time:.6g} s"
-    early = f"comes less than {bound} after the one before" if breach.bound else "starts before the one before ends"
+    early = (
+        f"comes less than {bound} after the one before"
+        if breach.bound
+        else "starts before the one before ends"
+    )
     how = {
         Limit.RESOLUTION: f"is too short for its time, where times are {breach.by:.2g} s apart",
         Limit.EARLIEST: f"starts before {bound}",
@@ -92,7 +105,9 @@ TURNED = math.radians(0.1)  # turn of H, rad, from which it is mentioned
 
 
 def plan_notes(plan: Plan, *, cones: bool = True) -> tuple[Note, ...]:
-    """Notes on a plan, its scheme's first, broken ``cones`` last; or the reason for the lack of a schedule."""
+    """Notes on a plan, its scheme's first, broken ``cones`` last; or the reason for the lack of a
+    schedule.
+    """
     if not plan.feasible:
         return (note("infeasible", scheme=plan.scheme, why=infeasibility(plan)),)
     notes = [*plan.pulses.notes, *[note("search-ended")] * plan.cut]
@@ -109,12 +124,22 @@ def _bounds(plan: Plan) -> Iterator[Note]:
         return
     spent = plan.pulses.cost_in(bounds.unit)
     scale, unit = (1e3, "g") if bounds.unit == "kg" else (1.0, "N m s")
-    # Where the nutation damps itself, waiting makes any cost small: the least of ideal pulses says nothing.
-    if bounds.first_order is not None and bounds.first_order > 0.0 and plan.spacecraft.growth >= 0.0:
+    # Where the nutation damps itself, waiting makes any cost small: the least of ideal pulses says
+    # nothing.
+    if (
+        bounds.first_order is not None
+        and bounds.first_order > 0.0
+        and plan.spacecraft.growth >= 0.0
+    ):
         least, gap = scale * bounds.first_order, 100.0 * (spent / bounds.first_order - 1.0)
         gap = 0.0 if abs(gap) < 1e-6 else gap
         yield note(
-            "small-angle-bound", cost=scale * spent, unit=unit, bound=least, within_s=bounds.within, gap_percent=gap
+            "small-angle-bound",
+            cost=scale * spent,
+            unit=unit,
+            bound=least,
+            within_s=bounds.within,
+            gap_percent=gap,
         )
     if bounds.rigorous is not None and bounds.rigorous > 0.0:
         yield note("proven-bound", bound=down(scale * bounds.rigorous), unit=unit)
@@ -128,9 +153,19 @@ def _left(plan: Plan) -> Iterator[Note]:
     nutation = plan.flight.residual.nutation
     if nutation >= TELLING and not options.uncorrected:
         allowed = body.goal.spin is not None and plan.meets_requirement
-        yield note("remains-allowed", nutation_deg=math.degrees(nutation)) if allowed else remaining(plan)
+        yield (
+            note("remains-allowed", nutation_deg=math.degrees(nutation))
+            if allowed
+            else remaining(plan)
+        )
     simple = inertia.symmetric and not body.disturbances and body.growth == 0.0
-    if left is not None and not simple and options.equal and not options.resizable and not options.uncorrected:
+    if (
+        left is not None
+        and not simple
+        and options.equal
+        and not options.resizable
+        and not options.uncorrected
+    ):
         off = float(requirements.missed(body, left.nutation, left.aim))
         if off >= TELLING:
             yield note("fixed-length", off_deg=math.degrees(off))
@@ -139,31 +174,52 @@ def _left(plan: Plan) -> Iterator[Note]:
 def hindrances(plan: Plan) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Keys of the file for the limits that certainly end a schedule, and for those that may.
 
-    Certainty of the latter takes a plan without them. The horizon ends it where less than a nutation period is left.
+    Certainty of the latter takes a plan without them. The horizon ends it where less than a
+    nutation period is left.
     """
     body, limits = plan.spacecraft, plan.spacecraft.limits
     channels = {channel.name: channel for channel in body.channels}
-    fired = [(channels[pulse.channel], pulse.loaded[1]) for pulse in plan.pulses if pulse.channel in channels]
-    full = 0 < len(fired) == len(plan.pulses) and all(on >= each.max_on_time * (1.0 - 1e-9) for each, on in fired)
+    fired = [
+        (channels[pulse.channel], pulse.loaded[1])
+        for pulse in plan.pulses
+        if pulse.channel in channels
+    ]
+    full = 0 < len(fired) == len(plan.pulses) and all(
+        on >= each.max_on_time * (1.0 - 1e-9) for each, on in fired
+    )
     late = body.horizon - plan.pulses.end < body.nutation_period
     ended = full or late
-    least = not ended and any(0.0 < on <= channel.min_on_time * (1.0 + 1e-9) for channel, on in fired)
+    least = not ended and any(
+        0.0 < on <= channel.min_on_time * (1.0 + 1e-9) for channel, on in fired
+    )
     certain = {"max_on_time": full, "limits.horizon": late, "min_on_time": least}
-    possible = {"limits.tick": limits.tick is not None and not ended, "limits.blackout": bool(limits.blackout)}
-    return tuple(key for key in certain if certain[key]), tuple(key for key in possible if possible[key])
+    possible = {
+        "limits.tick": limits.tick is not None and not ended,
+        "limits.blackout": bool(limits.blackout),
+    }
+    return tuple(key for key in certain if certain[key]), tuple(
+        key for key in possible if possible[key]
+    )
 
 
 def remaining(plan: Plan) -> Note:
     """Nutation that remains, and the dominant obstacle to less of it."""
-    body, nutation, (certain, possible) = plan.spacecraft, plan.flight.residual.nutation, hindrances(plan)
+    body, nutation, (certain, possible) = (
+        plan.spacecraft,
+        plan.flight.residual.nutation,
+        hindrances(plan),
+    )
     left = math.degrees(nutation)
     if not {"max_on_time", "limits.horizon"} <= {*certain}:
         if body.disturbances and not plan.options.with_disturbances:
             return note("remains-unplanned", nutation_deg=left)
         if body.disturbances:
-            tilt = math.atan(body.inertia.A * abs(steady_omega(body, plan.pulses.end)) / abs(body.axial))
+            tilt = math.atan(
+                body.inertia.A * abs(steady_omega(body, plan.pulses.end)) / abs(body.axial)
+            )
             return note("remains-steady-tilt", nutation_deg=left, tilt_deg=math.degrees(tilt))
-        # Worst over root mean square: the centre is off by half the on-time's error and the start's.
+        # Worst over root mean square: the centre is off by half the on-time's error and the
+        # start's.
         rounding = math.hypot(1.0, 1.5) * math.fsum(rounded_off(body, plan.pulses))
         if nutation <= rounding:
             return note("remains-rounding", nutation_deg=left, rounding_deg=math.degrees(rounding))
@@ -180,18 +236,29 @@ def broken_cone(aspect: Aspect) -> Note:
     assert aspect.broken_at is not None
     bound, angle, at = aspect.broken_at
     angle, limit = math.degrees(angle), math.degrees(bound.limit)
-    return note("cone-broken", angle_deg=angle, direction=aspect.keep.name, at_s=at, limit_deg=limit)
+    return note(
+        "cone-broken", angle_deg=angle, direction=aspect.keep.name, at_s=at, limit_deg=limit
+    )
 
 
 def verdict_notes(verdict: Verdict, plan: Plan, *, looped: bool = False) -> Iterator[Note]:
-    """Notes beside the verdict on a plan; ``looped``: it is that of a closed loop, which goes on firing."""
-    body, flight = plan.spacecraft, verdict.flight or plan.flight
+    """Notes beside the verdict on a plan; ``looped``: it is that of a closed loop, which goes on
+    firing.
+    """
+    body = plan.spacecraft
+    flight = verdict.flight or plan.flight
     final = flight.residual
     if verdict.unshown:
-        yield note("probability-without-tolerances" if body.dispersions is None else "undecided-cases")
+        yield note(
+            "probability-without-tolerances" if body.dispersions is None else "undecided-cases"
+        )
     if verdict.cases is None and requirements.judged(body):
         yield note("no-tolerances" if body.dispersions is None else "tolerances-not-checked")
-    if body.goal.spin is None and body.requirement is not None and body.requirement.spin is not None:
+    if (
+        body.goal.spin is None
+        and body.requirement is not None
+        and body.requirement.spin is not None
+    ):
         yield note("spin-required-without-goal")
     if verdict.empties:
         yield note("tank-empties")
@@ -204,13 +271,26 @@ def verdict_notes(verdict: Verdict, plan: Plan, *, looped: bool = False) -> Iter
     if verdict.status.barred:
         single = body.commands is not None and not plan.pulses.blocks
         yield note("not-commandable" if single else "breaks-limits", scheme=plan.scheme)
-    now, limit = body.nutation, _limit_of(body, Part.NUTATION)
+    now = body.nutation
+    limit = _limit_of(body, Part.NUTATION)
     if requirements.only_nutation(body):
-        idle, damped = (requirements.to_required(body, now, growing=growing) for growing in (True, False))
+        idle, damped = (
+            requirements.to_required(body, now, growing=growing) for growing in (True, False)
+        )
         if damped is not None and damped < body.horizon:
-            yield note("met-without-pulse-from", from_s=damped, nutation_deg=math.degrees(now), limit_deg=limit)
+            yield note(
+                "met-without-pulse-from",
+                from_s=damped,
+                nutation_deg=math.degrees(now),
+                limit_deg=limit,
+            )
         if idle:
-            yield note("met-without-pulse-until", until_s=idle, nutation_deg=math.degrees(now), limit_deg=limit)
+            yield note(
+                "met-without-pulse-until",
+                until_s=idle,
+                nutation_deg=math.degrees(now),
+                limit_deg=limit,
+            )
     if len(plan.pulses):
         if verdict.required and requirements.unaided(body):
             yield note("pulses-unneeded", scheme=plan.scheme)
@@ -220,14 +300,27 @@ def verdict_notes(verdict: Verdict, plan: Plan, *, looped: bool = False) -> Iter
         again = requirements.to_required(flight.spacecraft, left, growing=True)
         if again and left > TELLING:
             after = flight.schedule.end if flight.until is None else flight.until
-            figures_ = {"after_s": after, "left_deg": math.degrees(left), "limit_deg": limit, "lasting_s": again}
+            figures_ = {
+                "after_s": after,
+                "left_deg": math.degrees(left),
+                "limit_deg": limit,
+                "lasting_s": again,
+            }
             if verdict.cases is None:
                 yield note("grows-again", **figures_)
             else:
-                yield note("grows-again-in-cases", share=f"{100.0 * verdict.cases.probability:.10g}", **figures_)
+                yield note(
+                    "grows-again-in-cases",
+                    share=f"{100.0 * verdict.cases.probability:.10g}",
+                    **figures_,
+                )
     limited = body.goal.axis is not None or _limit_of(body, Part.SHIFT) is not None
     if not limited and final.momentum_shift > TURNED:
-        yield note("momentum-shift", scheme=plan.scheme, momentum_shift_deg=math.degrees(final.momentum_shift))
+        yield note(
+            "momentum-shift",
+            scheme=plan.scheme,
+            momentum_shift_deg=math.degrees(final.momentum_shift),
+        )
     yield from _spin_change(plan, flight)
     if body.loop is not None:
         yield note("loop-not-judged")
@@ -237,7 +330,9 @@ def main_causes(verdict: Verdict) -> Iterator[Note]:
     """Inputs that decide the failing cases."""
     if verdict.causes and verdict.tightest is not None:
         part = verdict.tightest.bound.label
-        causes = ", ".join(f"{cause.input} ({100.0 * cause.share:.3g} %)" for cause in verdict.causes)
+        causes = ", ".join(
+            f"{cause.input} ({100.0 * cause.share:.3g} %)" for cause in verdict.causes
+        )
         if verdict.met is False:
             yield note("causes-of-failure", part=part, causes=causes)
         else:
@@ -245,14 +340,18 @@ def main_causes(verdict: Verdict) -> Iterator[Note]:
 
 
 def _spin_change(plan: Plan, flight: Flight) -> Iterator[Note]:
-    """Change of the spin that nobody asked for, and its causes: axial impulses of channels, then what else acts."""
+    """Change of the spin that nobody asked for, and its causes: axial impulses of channels, then
+    what else acts.
+    """
     body = plan.spacecraft
     before, after = RPM * body.spin, RPM * flight.final.spin
     # One of five digits has to change.
     resolution = 10.0 ** (math.floor(math.log10(max(abs(before), abs(after), 1e-9))) - 4)
     if body.goal.spin is not None or abs(after - before) <= resolution:
         return
-    pulses, causes, explained = flight.schedule, list[str](), 0.0
+    pulses = flight.schedule
+    causes = list[str]()
+    explained = 0.0
     for name in dict.fromkeys(pulse.channel for pulse in pulses):
         impulse = math.fsum(float(pulse.impulse[2]) for pulse in pulses if pulse.channel == name)
         explained += RPM * impulse / body.inertia.C
@@ -266,7 +365,13 @@ def _spin_change(plan: Plan, flight: Flight) -> Iterator[Note]:
             "I1 ≠ I2": not body.inertia.symmetric,
         }
         causes += [cause for cause, acts in others.items() if acts]
-    yield note("spin-change", scheme=plan.scheme, before_rpm=before, after_rpm=after, cause=", ".join(causes))
+    yield note(
+        "spin-change",
+        scheme=plan.scheme,
+        before_rpm=before,
+        after_rpm=after,
+        cause=", ".join(causes),
+    )
 
 
 def ideal_code(plan: Plan) -> str:
@@ -276,7 +381,11 @@ def ideal_code(plan: Plan) -> str:
         return ""
     if torquer is not None and plan.spacecraft.steerable is None:
         return "ideal-torquer-assumed"
-    return "ideal-torque-missing" if torquer is not None and torquer.torque is None else "ideal-impulses"
+    return (
+        "ideal-torque-missing"
+        if torquer is not None and torquer.torque is None
+        else "ideal-impulses"
+    )
 
 
 def _limit_of(body: Spacecraft, part: Part) -> float | None:
@@ -300,7 +409,10 @@ def comparison_warnings(compared: Comparison, *, tabulated: bool = False) -> Ite
         yield note("plans-keep-cones", schemes=", ".join(keeping))
     for aspect in at_start(compared.spacecraft):
         if not aspect.kept:
-            yield Note("cone-broken-at-start", tuple(item for item in broken_cone(aspect).items if item[0] != "at_s"))
+            yield Note(
+                "cone-broken-at-start",
+                tuple(item for item in broken_cone(aspect).items if item[0] != "at_s"),
+            )
     others = [plan.scheme for plan in compared.plans if plan.feasible and not plan.commandable]
     better = [scheme for scheme in others if compared.verdicts[compared[scheme]].met]
     if better and chosen.commandable and compared.verdicts[chosen].met is False:
@@ -315,12 +427,25 @@ def _missed(chosen: Plan, compared: Comparison, *, tabulated: bool) -> Iterator[
     if compared.recommendation.standing is Standing.COMPLIES:
         return
     cases = compared.verdicts[chosen].cases
-    if chosen.standing is not Standing.MISSES and compared.cases and not compared.cases[chosen].enough:
-        if chosen.kept is not False and cases is not None and cases.enough is False:  # else the cones are the reason
-            missing = ((plan, each) for plan, each in compared.cases.items() if each.enough is False)
+    if (
+        chosen.standing is not Standing.MISSES
+        and compared.cases
+        and not compared.cases[chosen].enough
+    ):
+        if (
+            chosen.kept is not False and cases is not None and cases.enough is False
+        ):  # else the cones are the reason
+            missing = (
+                (plan, each) for plan, each in compared.cases.items() if each.enough is False
+            )
             schemes = ", ".join(plan.scheme for plan, _ in missing)
-            searched, share = compared.preferred is not None, 100.0 * cases.probability
-            yield note("too-few-cases-robust" if searched else "too-few-cases", schemes=schemes, required_share=share)
+            searched = compared.preferred is not None
+            share = 100.0 * cases.probability
+            yield note(
+                "too-few-cases-robust" if searched else "too-few-cases",
+                schemes=schemes,
+                required_share=share,
+            )
         return
     left = chosen.left
     assert left is not None
@@ -329,7 +454,9 @@ def _missed(chosen: Plan, compared: Comparison, *, tabulated: bool) -> Iterator[
             continue
         if bound.part is Part.SPIN:
             goal = chosen.spacecraft.goal.spin or 0.0
-            yield note("spin-missed", scheme=chosen.scheme, spin_rpm=RPM * left.spin, goal_rpm=RPM * goal)
+            yield note(
+                "spin-missed", scheme=chosen.scheme, spin_rpm=RPM * left.spin, goal_rpm=RPM * goal
+            )
             continue
         yield note(
             "requirement-missed" if bound.required else "not-damped",
@@ -350,7 +477,9 @@ def _missed(chosen: Plan, compared: Comparison, *, tabulated: bool) -> Iterator[
             yield note("disturbances-not-helped")
     if Part.NUTATION in parts and (cause := remaining(chosen)).code != "remains-unplanned":
         reached = [limit for limits in hindrances(chosen) for limit in limits]
-        short = chosen.pulses.total_impulse < body.least_impulse and cause.code != "remains-max-pulses"
+        short = (
+            chosen.pulses.total_impulse < body.least_impulse and cause.code != "remains-max-pulses"
+        )
         if reached and short:
             yield note(
                 "pulses-at-limits",
@@ -363,7 +492,9 @@ def _missed(chosen: Plan, compared: Comparison, *, tabulated: bool) -> Iterator[
         else:
             yield cause.of(chosen.scheme)
     if Part.DISTANCE in parts and chosen.scheme not in (*catalogue.POINTING, *catalogue.COMMANDED):
-        yield note("scheme-does-not-turn", scheme=chosen.scheme, schemes=", ".join(catalogue.POINTING))
+        yield note(
+            "scheme-does-not-turn", scheme=chosen.scheme, schemes=", ".join(catalogue.POINTING)
+        )
     if parts != {Part.SPIN} and any(channel.damps for channel in body.channels):
         if OPTIMAL.name not in {plan.scheme for plan in compared.plans}:
             yield note("optimal-not-compared")
@@ -372,14 +503,19 @@ def _missed(chosen: Plan, compared: Comparison, *, tabulated: bool) -> Iterator[
 
 
 def alternatives(compared: Comparison) -> Iterator[Note]:
-    """Plans that the reader may prefer: much better in some way for little more, each once, with its figures."""
+    """Plans that the reader may prefer: much better in some way for little more, each once, with
+    its figures.
+    """
     recommendation = compared.recommendation
-    chosen, others = recommendation.plan, dict[int, tuple[Gain, Plan]]()
+    chosen = recommendation.plan
+    others = dict[int, tuple[Gain, Plan]]()
     for gain, plan in recommendation.alternatives.items():
         others.setdefault(id(plan), (gain, plan))
     for gain, other in others.values():
         assert chosen is not None
-        yield note(gain.value, scheme=other.scheme, **figures(other, chosen, recommendation.by_propellant))
+        yield note(
+            gain.value, scheme=other.scheme, **figures(other, chosen, recommendation.by_propellant)
+        )
 
 
 def figures(plan: Plan, than: Plan, by_propellant: bool) -> dict[str, Value]:
@@ -388,14 +524,25 @@ def figures(plan: Plan, than: Plan, by_propellant: bool) -> dict[str, Value]:
     assert than.flown is not None
     off, than_off = (math.degrees(left.axis_error) for left in (plan.flown, than.flown))
     counts: dict[str, Value] = {"pulses": len(plan.pulses), "than_pulses": len(than.pulses)}
-    return {**counts, **beside(plan, than, by_propellant), "axis_error_deg": off, "than_axis_error_deg": than_off}
+    return {
+        **counts,
+        **beside(plan, than, by_propellant),
+        "axis_error_deg": off,
+        "than_axis_error_deg": than_off,
+    }
 
 
 def beside(plan: Plan, than: Plan, by_propellant: bool) -> dict[str, Value]:
     """Cost and end of a plan and of the one it is compared with, as values of a note."""
     unit, scale, shown = ("kg", 1e3, "g") if by_propellant else ("N m s", 1.0, "N m s")
     cost, than_cost = (scale * each.pulses.cost_in(unit) for each in (plan, than))
-    return {"cost": cost, "than_cost": than_cost, "unit": shown, "end_s": plan.end, "than_end_s": than.end}
+    return {
+        "cost": cost,
+        "than_cost": than_cost,
+        "unit": shown,
+        "end_s": plan.end,
+        "than_end_s": than.end,
+    }
 
 
 LEAST_CODES = {"impulse": "least-impulse", "time": "least-time", "pulses": "least-pulses"}
@@ -440,10 +587,16 @@ def reasons(compared: Comparison) -> Iterator[Note]:
 
 
 def model_warnings(impulses: Flight, flown: Flight) -> Iterator[Note]:
-    """Difference between the impulse sum (17) and real widths at the end, where it exceeds the tolerance."""
+    """Difference between the impulse sum (17) and real widths at the end, where it exceeds the
+    tolerance.
+    """
     for apart in end_state.deviations(impulses, flown):
         if apart.part is Part.SPIN:
-            yield note("models-differ-in-spin", difference_rad_s=apart.error, limit_rad_s=apart.most)
+            yield note(
+                "models-differ-in-spin", difference_rad_s=apart.error, limit_rad_s=apart.most
+            )
             continue
         difference, most = math.degrees(apart.error), math.degrees(apart.most)
-        yield note("models-differ", difference_deg=difference, part=apart.part.label, limit_deg=most)
+        yield note(
+            "models-differ", difference_deg=difference, part=apart.part.label, limit_deg=most
+        )

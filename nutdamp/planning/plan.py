@@ -1,7 +1,8 @@
 """Planning: plan by a scheme, fly the schedule, judge it, route it round exclusion cones.
 
-A route is a row of great circles, a leg each: straight to the target in shorter legs, which swing the axis less, or by
-dog-legs. It is sought on the sphere, with a margin for nutation; the flight judges the cones.
+A route is a row of great circles, a leg each: straight to the target in shorter legs, which swing
+the axis less, or by dog-legs. It is sought on the sphere, with a margin for nutation; the flight
+judges the cones.
 """
 
 from __future__ import annotations
@@ -41,20 +42,30 @@ MARGINS = tuple(math.radians(margin) for margin in (0.5, 2.0, 5.0, 10.0))
 """rad by which a route keeps clear of the cones."""
 
 BENDS = tuple(sign * math.radians(0.1 * 1.1**step) for step in range(72) for sign in (1.0, -1.0))
-"""rad to either side of the great circle at which way points may lie, up to 87 deg, the smallest first."""
+"""rad to either side of the great circle at which way points may lie, up to 87 deg, the smallest
+first.
+"""
 
 PLACES, PARTS = ((), (0.5,), (0.25, 0.75)), (1, 2, 4)
-"""Way points without, of one and of two dog-legs, as shares of the way to the target; numbers of parts of each leg."""
+"""Way points without, of one and of two dog-legs, as shares of the way to the target; numbers of
+parts of each leg.
+"""
 
-ROUTES, STEPS = 16, 64  # routes that are tried, at most, and points of a leg at which the cones are looked at
+ROUTES, STEPS = (
+    16,
+    64,
+)  # routes that are tried, at most, and points of a leg at which the cones are looked at
 
 Route = tuple[Vector, ...]
 
 
-def schedules(spacecraft: Spacecraft, scheme: str, options: catalogue.SchemeOptions) -> Iterator[Schedule]:
+def schedules(
+    spacecraft: Spacecraft, scheme: str, options: catalogue.SchemeOptions
+) -> Iterator[Schedule]:
     """Schedules of a ``scheme`` over routes that keep clear of the cones, the likeliest first.
 
-    Each is found when needed, as long as there is budget of `work`, of those routes that the scheme can fly.
+    Each is found when needed, as long as there is budget of `work`, of those routes that the scheme
+    can fly.
     """
     as_it_is = not spacecraft.thrust_laws or catalogue.SCHEMES[scheme].on_true_body
     body = spacecraft if as_it_is else valve_commands.plain(spacecraft)
@@ -62,7 +73,8 @@ def schedules(spacecraft: Spacecraft, scheme: str, options: catalogue.SchemeOpti
         if work.exhausted():
             return
         try:
-            legs, goal = Legs(body), body.goal
+            legs = Legs(body)
+            goal = body.goal
             for number, point in enumerate(route, start=1):  # each leg has its share of the horizon
                 here = legs.here
                 to_go = _length((here.momentum, point, *route[number:]))
@@ -86,9 +98,13 @@ def routes(spacecraft: Spacecraft) -> list[Route]:
         bent = _bent(start, spacecraft.target_axis, places, spacecraft.keep, margin)
         if bent is not None and len(bent) * parts > 1:
             shares = np.arange(1, parts + 1) / parts
-            route = tuple(point for leg in pairwise((start, *bent)) for point in _along(*leg, shares))
+            route = tuple(
+                point for leg in pairwise((start, *bent)) for point in _along(*leg, shares)
+            )
             shortest.setdefault(tuple(np.concatenate(route).round(9).tolist()), route)
-    return sorted(shortest.values(), key=lambda route: (round(_length((start, *route)), 3), len(route)))[:ROUTES]
+    return sorted(
+        shortest.values(), key=lambda route: (round(_length((start, *route)), 3), len(route))
+    )[:ROUTES]
 
 
 def _length(corners: Route) -> float:
@@ -98,7 +114,9 @@ def _length(corners: Route) -> float:
 def _bent(
     start: Vector, target: Vector, places: tuple[float, ...], keeps: Sequence[Keep], margin: float
 ) -> Route | None:
-    """Least bent route with way points at ``places`` that is clear by ``margin`` rad; None where there is none."""
+    """Least bent route with way points at ``places`` that is clear by ``margin`` rad; None where
+    there is none.
+    """
     on_the_way = [_along(start, target, np.array([place]))[0] for place in places]
     normal = np.cross(start, target)
     size = float(np.linalg.norm(normal))
@@ -111,16 +129,22 @@ def _bent(
 
 
 def _along(start: Vector, end: Vector, shares: Vector) -> Vector:
-    """Points (n, 3) at ``shares`` (n,) of the great circle between two unit vectors that are not opposite."""
+    """Points (n, 3) at ``shares`` (n,) of the great circle between two unit vectors that are not
+    opposite.
+    """
     angle = float(attitude.angle_between(start, end))
     if angle == 0.0:
         return np.tile(end, (len(shares), 1))
-    weights = np.column_stack([np.sin((1.0 - shares) * angle), np.sin(shares * angle)]) / math.sin(angle)
+    weights = np.column_stack([np.sin((1.0 - shares) * angle), np.sin(shares * angle)]) / math.sin(
+        angle
+    )
     return np.asarray(weights @ np.array([start, end]))
 
 
 def _clear(corners: Route, keeps: Sequence[Keep], margin: float) -> bool:
-    """True if great circles between the ``corners`` keep the cones, by ``margin`` rad or as clearly as their ends."""
+    """True if great circles between the ``corners`` keep the cones, by ``margin`` rad or as clearly
+    as their ends.
+    """
     shares = np.linspace(0.0, 1.0, STEPS)
     points = np.concatenate([_along(*leg, shares) for leg in pairwise(corners)])
     for keep in keeps:
@@ -134,7 +158,9 @@ def _clear(corners: Route, keeps: Sequence[Keep], margin: float) -> bool:
 
 
 NO_NUTATION, ROUNDING = 1e-12, 1e-11
-"""Nutation angle in rad below which there is nothing to plan; relative decrease of it that may be rounding."""
+"""Nutation angle in rad below which there is nothing to plan; relative decrease of it that may be
+rounding.
+"""
 
 
 class Standing(Enum):
@@ -149,11 +175,12 @@ class Standing(Enum):
 class Plan(results.Data, results.Tabled):
     """Schedule of a scheme for a spacecraft, and its judgement.
 
-    Without one: the ``refusal`` of the scheme in its words, or the first ``breach`` of the schedule found, or the cone
-    that the spin axis would break (``astray``) on its way to a target, or the nutation (rad) that would be left where
-    that is ``worse`` than without pulses, at ``worse_at`` s. `nutdamp.planning.decision` has the words of all four.
-    ``failure``: the exception of a scheme that has a bug; ``from_file``: the pulses were read, no scheme planned them.
-    ``cut``: its search ended at its budget of `work`.
+    Without one: the ``refusal`` of the scheme in its words, or the first ``breach`` of the schedule
+    found, or the cone that the spin axis would break (``astray``) on its way to a target, or the
+    nutation (rad) that would be left where that is ``worse`` than without pulses, at ``worse_at``
+    s. `nutdamp.planning.decision` has the words of all four. ``failure``: the exception of a scheme
+    that has a bug; ``from_file``: the pulses were read, no scheme planned them. ``cut``: its search
+    ended at its budget of `work`.
     """
 
     spacecraft: Spacecraft
@@ -210,17 +237,25 @@ class Plan(results.Data, results.Tabled):
     def __bool__(self) -> bool:
         return True  # a plan without pulses is one
 
-    def fly(self, until: float | None = None, *, samples: int = 1000, by_impulses: bool = False) -> Flight:
-        """Fly the schedule through its real pulse widths, or by the impulse sum (17), until ``until`` s.
+    def fly(
+        self, until: float | None = None, *, samples: int = 1000, by_impulses: bool = False
+    ) -> Flight:
+        """Fly the schedule through its real pulse widths, or by the impulse sum (17), until
+        ``until`` s.
 
-        Default: one inertial nutation period after the last pulse. The track has ``samples`` even rows, and rows just
-        before and after each pulse. Raises Infeasible without a schedule, BadRequest where no track can be made.
+        Default: one inertial nutation period after the last pulse. The track has ``samples`` even
+        rows, and rows just before and after each pulse. Raises Infeasible without a schedule,
+        BadRequest where no track can be made.
         """
         schedule = feasible(self).pulses
-        end = units.end_of_flight(self.end + self.spacecraft.inertial_period if until is None else until)
+        end = units.end_of_flight(
+            self.end + self.spacecraft.inertial_period if until is None else until
+        )
         count = units.count("samples", samples, 2)
         fly = propagation.by_impulses if by_impulses else propagation.flown
-        return replace(seen_at(fly(self.spacecraft, schedule, end), end), samples=count, scheme=self.scheme)
+        return replace(
+            seen_at(fly(self.spacecraft, schedule, end), end), samples=count, scheme=self.scheme
+        )
 
     @property
     def carried_at(self) -> float:
@@ -228,9 +263,11 @@ class Plan(results.Data, results.Tabled):
         return self.end
 
     def carried(self, at: float | None = None) -> Spacecraft:
-        """Spacecraft of the file with the state that the flight has ``at`` a time, s (default `carried_at`).
+        """Spacecraft of the file with the state that the flight has ``at`` a time, s (default
+        `carried_at`).
 
-        Raises BadRequest for a spacecraft not read from a file, while a pulse is on, and for a time that is none.
+        Raises BadRequest for a spacecraft not read from a file, while a pulse is on, and for a time
+        that is none.
         """
         time = self.carried_at if at is None else units.end_of_flight(at)
         body: Spacecraft = results.view(feasible(self), "carried", time)
@@ -243,7 +280,11 @@ class Plan(results.Data, results.Tabled):
     @cached_property
     def residual(self) -> Residual | None:
         """Residual by the impulse sum (17)."""
-        return None if self.schedule is None else propagation.by_impulses(self.spacecraft, self.schedule).residual
+        return (
+            None
+            if self.schedule is None
+            else propagation.by_impulses(self.spacecraft, self.schedule).residual
+        )
 
     @cached_property
     def flight(self) -> Flight:
@@ -262,7 +303,8 @@ class Plan(results.Data, results.Tabled):
 
     @cached_property
     def commandable(self) -> bool:
-        """True if the spacecraft can fire it: by command blocks only, or nothing, where it takes such.
+        """True if the spacecraft can fire it: by command blocks only, or nothing, where it takes
+        such.
 
         Pulses and blocks read from a file have to keep its limits and commands too.
         """
@@ -275,21 +317,27 @@ class Plan(results.Data, results.Tabled):
 
     @property
     def held(self) -> tuple[Held, ...]:
-        """Flown residual beside each bound of `requirements`, end and way; empty for an infeasible plan."""
+        """Flown residual beside each bound of `requirements`, end and way; empty for an infeasible
+        plan.
+        """
         return () if self.left is None else requirements.held(self.spacecraft, self.left)
 
     @property
     def meets_requirement(self) -> bool | None:
-        """True if the flown residual keeps the requirement of the file, the spin of the goal, and all cones.
+        """True if the flown residual keeps the requirement of the file, the spin of the goal, and
+        all cones.
 
-        None without these or a schedule; kept cones alone meet nothing. A momentum shift counts from a target axis.
+        None without these or a schedule; kept cones alone meet nothing. A momentum shift counts
+        from a target axis.
         """
         return False if self.feasible and self.kept is False else self.ends_well
 
     @property
     def ends_well(self) -> bool | None:
         """Compliance of the flown residual at the end; None where nothing is required."""
-        required = [line.met for line in self.held if line.bound.required and line.bound.keep is None]
+        required = [
+            line.met for line in self.held if line.bound.required and line.bound.keep is None
+        ]
         return all(required) if required else None
 
     @property
@@ -315,7 +363,11 @@ class Plan(results.Data, results.Tabled):
     @property
     def severity(self) -> float:
         """See `requirements.severity`; infinite for an infeasible plan."""
-        return math.inf if self.left is None else float(requirements.severity(self.spacecraft, self.left))
+        return (
+            math.inf
+            if self.left is None
+            else float(requirements.severity(self.spacecraft, self.left))
+        )
 
     @property
     def spin_change(self) -> float | None:
@@ -325,30 +377,41 @@ class Plan(results.Data, results.Tabled):
 
     @cached_property
     def delta_v(self) -> Vector | None:
-        """Velocity change in the inertial frame, (3,) m/s; None without mass or where a force is not known."""
+        """Velocity change in the inertial frame, (3,) m/s; None without mass or where a force is
+        not known.
+        """
         mass = self.spacecraft.mass
         if not self.feasible or mass is None or any(pulse.force is None for pulse in self.pulses):
             return None
         flown = self.flight
         if self.spacecraft.tank is not None:  # forces accelerate more as the mass falls
-            used, pulses = 0.0, []
+            used = 0.0
+            pulses = []
             for pulse in flown.schedule:
                 taken = pulse.propellant or 0.0
                 scale = mass / (mass - used - 0.5 * taken)
-                pulses.append(replace(pulse, force=None if pulse.force is None else pulse.force * scale))
+                pulses.append(
+                    replace(pulse, force=None if pulse.force is None else pulse.force * scale)
+                )
                 used += taken
             flown = replace(flown, schedule=Schedule(tuple(pulses)))
         return end_state.momentum_gained(flown) / mass
 
     @cached_property
     def aspects(self) -> tuple[Aspect, ...]:
-        """Extreme angles of the flown spin axis from each watched direction; see `end_state.aspects`."""
+        """Extreme angles of the flown spin axis from each watched direction; see
+        `end_state.aspects`.
+        """
         return end_state.aspects(self.flight)
 
     @property
     def kept(self) -> bool | None:
         """True if the flown spin axis keeps its cones; None where the file names none."""
-        return all(line.met for line in self.held if line.bound.keep is not None) if self.spacecraft.keep else None
+        return (
+            all(line.met for line in self.held if line.bound.keep is not None)
+            if self.spacecraft.keep
+            else None
+        )
 
 
 def plan(spacecraft: Spacecraft, scheme: str, options: planner.Choice = None) -> Plan:
@@ -368,11 +431,15 @@ def plan(spacecraft: Spacecraft, scheme: str, options: planner.Choice = None) ->
     chosen = planner.settled(catalogue.SCHEMES[scheme], options, spacecraft)
     with work.budget(scheme, work.SCHEME) as spent:
         try:
-            body = spacecraft if catalogue.SCHEMES[scheme].on_true_body else known(spacecraft, chosen)
+            body = (
+                spacecraft if catalogue.SCHEMES[scheme].on_true_body else known(spacecraft, chosen)
+            )
             result = judged(spacecraft, scheme, planner.schedule(scheme, body, chosen), chosen)
         except Infeasible as reason:
             result = Plan(spacecraft, scheme, None, str(reason))
-        if result.astray is not None and (catalogue.SCHEMES[scheme].points or catalogue.SCHEMES[scheme].reads_commands):
+        if result.astray is not None and (
+            catalogue.SCHEMES[scheme].points or catalogue.SCHEMES[scheme].reads_commands
+        ):
             rerouted = schedules(known(spacecraft, chosen), scheme, chosen)
             others = (judged(spacecraft, scheme, schedule, chosen) for schedule in rerouted)
             result = next((other for other in others if other.feasible), result)
@@ -388,11 +455,19 @@ def reaches_spin(spacecraft: Spacecraft) -> bool:
 def spinning(spacecraft: Spacecraft) -> tuple[str, ...]:
     """Schemes that can set the spin: by command blocks only where there are commands."""
     commanded = spacecraft.commands is not None
-    return tuple(scheme for scheme in catalogue.SPINNING if commanded or not catalogue.SCHEMES[scheme].reads_commands)
+    return tuple(
+        scheme
+        for scheme in catalogue.SPINNING
+        if commanded or not catalogue.SCHEMES[scheme].reads_commands
+    )
 
 
-def alternatives(spacecraft: Spacecraft, scheme: str, options: planner.Choice = None) -> tuple[Plan, ...]:
-    """Feasible plans by alternative schedules of the scheme, maybe that of `plan`; raises KeyError as it does."""
+def alternatives(
+    spacecraft: Spacecraft, scheme: str, options: planner.Choice = None
+) -> tuple[Plan, ...]:
+    """Feasible plans by alternative schedules of the scheme, maybe that of `plan`; raises KeyError
+    as it does.
+    """
     chosen = planner.settled(catalogue.SCHEMES[scheme], options, spacecraft)
     try:
         alternatives = planner.alternatives(scheme, known(spacecraft, chosen), chosen)
@@ -403,7 +478,9 @@ def alternatives(spacecraft: Spacecraft, scheme: str, options: planner.Choice = 
 
 
 def known(spacecraft: Spacecraft, options: catalogue.SchemeOptions) -> Spacecraft:
-    """Spacecraft as schemes know it: with disturbances if requested, no goal of a spin that is there and stays."""
+    """Spacecraft as schemes know it: with disturbances if requested, no goal of a spin that is
+    there and stays.
+    """
     body = spacecraft if options.with_disturbances else replace(spacecraft, disturbances=())
     axial = any(channel.axial for channel in body.channels)
     if body.goal.spin is not None and reaches_spin(body) and not body.spin_drift and not axial:
@@ -411,11 +488,14 @@ def known(spacecraft: Spacecraft, options: catalogue.SchemeOptions) -> Spacecraf
     return body
 
 
-def judged(spacecraft: Spacecraft, scheme: str, schedule: Schedule, options: catalogue.SchemeOptions) -> Plan:
-    """Plan of a schedule: infeasible where it breaks a limit or does not help. Raises Infeasible on flat spin.
+def judged(
+    spacecraft: Spacecraft, scheme: str, schedule: Schedule, options: catalogue.SchemeOptions
+) -> Plan:
+    """Plan of a schedule: infeasible where it breaks a limit or does not help. Raises Infeasible on
+    flat spin.
 
-    It helps where nutation, distance from the target axis or from the requested spin is less than without pulses by
-    the last one.
+    It helps where nutation, distance from the target axis or from the requested spin is less than
+    without pulses by the last one.
     """
     if spacecraft.disturbances:  # which the scheme need not have known
         schedule = schedule.without_proof
@@ -429,8 +509,11 @@ def judged(spacecraft: Spacecraft, scheme: str, schedule: Schedule, options: cat
         if astray is not None:
             return Plan(spacecraft, scheme, None, astray=astray)
     if scheme in catalogue.PLANNED and left is not None:
-        spin, least = spacecraft.goal.spin, requirements.decayed(spacecraft, flown.end) * (1.0 - ROUNDING)
-        respun = spin is not None and abs(flown.flight.settled.spin - spin) < abs(spacecraft.spin - spin)
+        spin = spacecraft.goal.spin
+        least = requirements.decayed(spacecraft, flown.end) * (1.0 - ROUNDING)
+        respun = spin is not None and abs(flown.flight.settled.spin - spin) < abs(
+            spacecraft.spin - spin
+        )
         if not respun and left.nutation >= least and left.axis_error >= spacecraft.to_turn:
             return Plan(spacecraft, scheme, None, worse=left.nutation, worse_at=flown.end)
     return flown
@@ -445,17 +528,19 @@ def judge(
     timed: bool = False,
     seen: Flight | None = None,
 ) -> Verdict:
-    """Judgement of a plan by its nominal values and by dispersed ``cases``, of which ``results`` has all.
+    """Judgement of a plan by its nominal values and by dispersed ``cases``, of which ``results``
+    has all.
 
-    ``nominal``: cases are left out on request; ``timed``: pulses may be commanded one by one; ``seen``: the flight to
-    be judged, default that of the plan.
+    ``nominal``: cases are left out on request; ``timed``: pulses may be commanded one by one;
+    ``seen``: the flight to be judged, default that of the plan.
     """
     body = plan.spacecraft
     if not plan.feasible:
         return no_plan(body, plan.scheme, plan.why or "")
     flight, observed, held = plan.flight, plan.aspects, plan.held
     if seen is not None:
-        flight, observed = seen, end_state.aspects(seen, seen.until)
+        flight = seen
+        observed = end_state.aspects(seen, seen.until)
         held = requirements.held(body, left_on_the_way(flight, observed))
     return judge_schedule(
         flight,
@@ -472,22 +557,31 @@ def judge(
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Verified(results.Data):
-    """A ``plan`` flown by independent methods: ``core`` holds them, conserved quantities and the error budget."""
+    """A ``plan`` flown by independent methods: ``core`` holds them, conserved quantities and the
+    error budget.
+    """
 
     core: Verification
     plan: Plan
 
     @property
     def agree(self) -> bool:
-        """True where an independent integration was flown, and all of them confirm the flown motion."""
+        """True where an independent integration was flown, and all of them confirm the flown
+        motion.
+        """
         return self.core.agree
 
     def __repr__(self) -> str:
-        return f"<Verified {self.plan.scheme}: agrees with {', '.join(self.core.checks) if self.agree else 'nothing'}>"
+        return (
+            f"<Verified {self.plan.scheme}: "
+            f"agrees with {', '.join(self.core.checks) if self.agree else 'nothing'}>"
+        )
 
 
 def feasible(plan: Plan) -> Plan:
-    """A plan with a schedule; raises BadRequest for anything but a `Plan`, Infeasible for one without."""
+    """A plan with a schedule; raises BadRequest for anything but a `Plan`, Infeasible for one
+    without.
+    """
     units.instance("plan", plan, Plan, "a Plan, as nutdamp.plan gives it")
     if not plan.feasible:
         raise Infeasible(f"{plan.scheme} is infeasible: {plan.why}")
@@ -495,11 +589,15 @@ def feasible(plan: Plan) -> Plan:
 
 
 def unrounded(plan_: Plan) -> Schedule | None:
-    """Schedule with commands of any resolution; None without a tick, such a schedule, or a scheme that planned it."""
+    """Schedule with commands of any resolution; None without a tick, such a schedule, or a scheme
+    that planned it.
+    """
     body = plan_.spacecraft
     if body.limits.tick is None or plan_.from_file or plan_.scheme not in catalogue.SCHEMES:
         return None
-    return plan(replace(body, limits=replace(body.limits, tick=None)), plan_.scheme, plan_.options).schedule
+    return plan(
+        replace(body, limits=replace(body.limits, tick=None)), plan_.scheme, plan_.options
+    ).schedule
 
 
 def unflown(plan: Plan) -> Cases:

@@ -1,7 +1,8 @@
 """Robust plans: selection by the share of complying cases.
 
-Candidates are the schedules of the schemes, and variants: later starts, channels left unused, other alignments; of
-`optimal` its earliest ends too, for errors of the rates grow with time, and those of `chance_plan`.
+Candidates are the schedules of the schemes, and variants: later starts, channels left unused, other
+alignments; of `optimal` its earliest ends too, for errors of the rates grow with time, and those of
+`chance_plan`.
 """
 
 from __future__ import annotations
@@ -24,7 +25,15 @@ from nutdamp.montecarlo.study import flown_in_stages, study_of
 from nutdamp.planning import chance_plan
 from nutdamp.planning import plan as planning
 from nutdamp.planning.chance_plan import Tightening, tightening
-from nutdamp.planning.decision import TIES, Comparison, Ground, attempt, by_propellant, cheapest, nearest
+from nutdamp.planning.decision import (
+    TIES,
+    Comparison,
+    Ground,
+    attempt,
+    by_propellant,
+    cheapest,
+    nearest,
+)
 from nutdamp.planning.notes import beside
 from nutdamp.planning.plan import Plan, Standing
 from nutdamp.planning.screening import FlownPlan, entered
@@ -37,19 +46,24 @@ from nutdamp.spacecraft.model import Spacecraft, required_share
 
 # later starts that are tried, in nutation periods as seen in the body (inertial ones for a sphere)
 LATER = (0.25, 0.5, 0.75, 1.0, 2.0)
-# Ends by which the scheme optimal is to be done with least cost, over the earliest one; the first for spin-up.yaml, of
-# which 99.98 % of the cases comply with H kept, and at most 98.4 % with the others.
+# Ends by which the scheme optimal is to be done with least cost, over the earliest one; the first
+# for spin-up.yaml, of which 99.98 % of the cases comply with H kept, and at most 98.4 % with the
+# others.
 WITHIN = (1.35, 1.5, 2.0)
 
 ROBUST = "robust"  # name of the robust plan beside those of schemes
 FRESH = 211  # seed of cases that nothing was chosen by
 
 AS_GOOD = 1.05
-"""Without a requirement: candidates within this factor of the least angle count as equal, so far apart may be luck."""
+"""Without a requirement: candidates within this factor of the least angle count as equal, so far
+apart may be luck.
+"""
 
 
 class Cost(NamedTuple):
-    """Extra cost of one plan over another: propellant kg (None: unknown), impulse N m s, time s, nutation rad."""
+    """Extra cost of one plan over another: propellant kg (None: unknown), impulse N m s, time s,
+    nutation rad.
+    """
 
     propellant: float | None
     impulse: float
@@ -59,10 +73,12 @@ class Cost(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class RobustComparison(results.Data):
-    """Candidates from the best down; ``usual`` is recommended by the comparison, ``chosen`` the robust plan.
+    """Candidates from the best down; ``usual`` is recommended by the comparison, ``chosen`` the
+    robust plan.
 
-    ``ground`` decided among the ``equals`` candidates, by propellant or by impulse. ``tightening``: tolerances with
-    which enough cases would comply, where too few do. ``fresh``: the robust plan in cases by which it was not chosen.
+    ``ground`` decided among the ``equals`` candidates, by propellant or by impulse. ``tightening``:
+    tolerances with which enough cases would comply, where too few do. ``fresh``: the robust plan in
+    cases by which it was not chosen.
     """
 
     comparison: Comparison
@@ -82,12 +98,16 @@ class RobustComparison(results.Data):
 
     @property
     def cost(self) -> Cost | None:
-        """Extra cost of the robust plan over the usual one; None where there is only one of them."""
+        """Extra cost of the robust plan over the usual one;
+        None where there is only one of them.
+        """
         if self.chosen is None or self.usual is None:
             return None
         more, less = self.chosen.plan.pulses, self.usual.plan.pulses
         return Cost(
-            None if more.propellant is None or less.propellant is None else more.propellant - less.propellant,
+            None
+            if more.propellant is None or less.propellant is None
+            else more.propellant - less.propellant,
             more.total_impulse - less.total_impulse,
             more.end - less.end,
             self.chosen.left - self.usual.left,
@@ -95,20 +115,27 @@ class RobustComparison(results.Data):
 
     @property
     def verdict(self) -> Verdict:
-        """Judgement of the robust plan, by the cases that `nutdamp.montecarlo.study` draws for any schedule."""
+        """Judgement of the robust plan, by the cases that `nutdamp.montecarlo.study` draws for any
+        schedule.
+        """
         return self.joined.verdict
 
     @cached_property
     def joined(self) -> Comparison:
-        """Comparison with the robust plan in it as `ROBUST`, unless it is one of those compared, as recommended."""
+        """Comparison with the robust plan in it as `ROBUST`, unless it is one of those compared, as
+        recommended.
+        """
         if self.chosen is None:
             return self.comparison
         kind = _kind(self.chosen.plan)
-        plans, flown = self.comparison.plans, dict(self.comparison.flown or {})
+        plans = self.comparison.plans
+        flown = dict(self.comparison.flown or {})
         same = next((plan for plan in plans if plan.feasible and _kind(plan) == kind), None)
         plan = same or replace(self.chosen.plan, scheme=ROBUST)
         flown[plan] = self.chosen
-        return replace(self.comparison, plans=plans if same else (*plans, plan), flown=flown, preferred=plan)
+        return replace(
+            self.comparison, plans=plans if same else (*plans, plan), flown=flown, preferred=plan
+        )
 
     @property
     def name(self) -> str:
@@ -132,7 +159,8 @@ class Variation(NamedTuple):
 
 def variations_of(comparison: Comparison, options: Options | None = None) -> list[Variation]:
     """Variations of `compare`: the plans compared, and variants of each."""
-    body, options = comparison.spacecraft, options or Options()
+    body = comparison.spacecraft
+    options = options or Options()
     tried = list[Variation]()
     timed = body.commands is None or not comparison.only_commanded
     for base in (plan for plan in comparison.plans if plan.failure is None):
@@ -140,48 +168,74 @@ def variations_of(comparison: Comparison, options: Options | None = None) -> lis
             continue  # none of its variants may be chosen
         tried.append(Variation(partial(list, [("as planned", base)]), VariationKind.PLANNED))
         tried.append(Variation(partial(_alignments, body, base.scheme, options)))
-        tried += [Variation(partial(_planned, *other, base.scheme, options)) for other in _others(body, base)]
+        tried += [
+            Variation(partial(_planned, *other, base.scheme, options))
+            for other in _others(body, base)
+        ]
         if base.scheme == OPTIMAL.name:
-            tried.append(Variation(partial(chance_plan.plans, body, options), VariationKind.MARGINS))
+            tried.append(
+                Variation(partial(chance_plan.plans, body, options), VariationKind.MARGINS)
+            )
             tried.append(Variation(partial(_early, body, options), VariationKind.EARLY))
     return sorted(tried, key=attrgetter("kind"))
 
 
 def compare(
-    comparison: Comparison, variations: Sequence[Variation], watch: Callable[[int], None] = lambda _: None
+    comparison: Comparison,
+    variations: Sequence[Variation],
+    watch: Callable[[int], None] = lambda _: None,
 ) -> RobustComparison:
-    """Make the plans of the ``variations``, let dispersed cases fly each, and recommend one; no schedule comes twice.
+    """Make the plans of the ``variations``, let dispersed cases fly each, and recommend one; no
+    schedule comes twice.
 
-    The cheapest plan of which enough cases comply, in fresh ones too, beyond the intervals of both. ``watch`` is called
-    with how many variations are done. Raises BadRequest for a spacecraft without dispersions.
+    The cheapest plan of which enough cases comply, in fresh ones too, beyond the intervals of both.
+    ``watch`` is called with how many variations are done. Raises BadRequest for a spacecraft
+    without dispersions.
     """
     body = comparison.spacecraft
     entries: dict[object, FlownPlan] = {}
     # No early end costs less than the plan of the whole horizon that leaves as little.
-    least = min((plan.pulses.cost for plan in comparison.plans if plan.scheme == OPTIMAL.name), default=0.0)
+    least = min(
+        (plan.pulses.cost for plan in comparison.plans if plan.scheme == OPTIMAL.name), default=0.0
+    )
     with work.budget("the robust plans", work.FRONTS) as budget:
         for number, variation in enumerate(variations):
             watch(number)
             planned = False
             # The earliest ends have a budget of their own, whatever the margins took.
-            budget.most = work.FRONTS + (budget.done if variation.kind is VariationKind.EARLY else 0.0)
+            budget.most = work.FRONTS + (
+                budget.done if variation.kind is VariationKind.EARLY else 0.0
+            )
             for variant, plan in () if work.exhausted() else variation.plans():
                 kind = _kind(plan)
-                # Planned for other limits or channels, perhaps, but always flown by this spacecraft.
+                # Planned for other limits or channels, perhaps, but always flown by this
+                # spacecraft.
                 if not plan.feasible or kind in entries or not keeps_limits(body, plan.pulses):
                     continue
                 own = plan if plan.spacecraft is body else replace(plan, spacecraft=body)
                 if comparison.only_commanded and not own.commandable:
                     continue
                 planned = True
-                with suppress(Infeasible):  # cases that cannot be flown, such as those that take too long
+                with suppress(
+                    Infeasible
+                ):  # cases that cannot be flown, such as those that take too long
                     known = (comparison.flown or {}).get(plan)
-                    candidate = entered(own, None, variant) if known is None else replace(known, variant=variant)
+                    candidate = (
+                        entered(own, None, variant)
+                        if known is None
+                        else replace(known, variant=variant)
+                    )
                     if candidate is not None:
                         entries[kind] = candidate
             if planned and variation.kind in (VariationKind.MARGINS, VariationKind.EARLY):
-                chosen, ground, fresh = _confirmed(entries, comparison.recommended, comparison.least)
-                cheap = chosen is not None and comparison.least == LEAST[0] and chosen.plan.pulses.cost <= least
+                chosen, ground, fresh = _confirmed(
+                    entries, comparison.recommended, comparison.least
+                )
+                cheap = (
+                    chosen is not None
+                    and comparison.least == LEAST[0]
+                    and chosen.plan.pulses.cost <= least
+                )
                 done = variation.kind is VariationKind.EARLY or cheap
                 if chosen is not None and done:  # other variants seldom cost less
                     return _result(comparison, entries, chosen, ground, fresh)
@@ -189,20 +243,26 @@ def compare(
     chosen, ground, fresh = _confirmed(entries, comparison.recommended, comparison.least)
     if chosen is not None:
         return _result(comparison, entries, chosen, ground, fresh)
-    chosen, ground, equals = _nearest(list(entries.values()), comparison.recommended, comparison.least)
+    chosen, ground, equals = _nearest(
+        list(entries.values()), comparison.recommended, comparison.least
+    )
     if chosen is None or not requirements.judged(body):
         return _result(comparison, entries, chosen, ground, equals=equals)
-    needed = None if chosen.cases.enough else tightening(chosen.plan, required_share(body.requirement))
+    needed = (
+        None if chosen.cases.enough else tightening(chosen.plan, required_share(body.requirement))
+    )
     return _result(comparison, entries, chosen, ground, _fresh(chosen), needed, equals)
 
 
 def _confirmed(
     entries: Mapping[object, FlownPlan], usual: Plan | None, saved: str = LEAST[0]
 ) -> tuple[FlownPlan | None, Ground | None, Cases | None]:
-    """`cheapest` plan of which enough cases comply, in fresh ones too; deciding ground, and these. None without one.
+    """`cheapest` plan of which enough cases comply, in fresh ones too; deciding ground, and these.
+    None without one.
 
-    Plans that damp all come first; those that leave undamped what is not required follow by what they leave. Of equal
-    costs the ``usual`` one; ``saved``: see `LEAST`. None where nothing is required.
+    Plans that damp all come first; those that leave undamped what is not required follow by what
+    they leave. Of equal costs the ``usual`` one; ``saved``: see `LEAST`. None where nothing is
+    required.
     """
     if not entries or not requirements.judged(next(iter(entries.values())).plan.spacecraft):
         return None, None, None
@@ -210,10 +270,16 @@ def _confirmed(
     def undamped(each: FlownPlan) -> float:
         return 0.0 if each.plan.standing is Standing.COMPLIES else each.left
 
-    hopeful = {each.plan: each for each in entries.values() if each.plan.meets_requirement is not False}
-    while hopeful := {plan: each for plan, each in hopeful.items() if each.cases.enough is not False}:
+    hopeful = {
+        each.plan: each for each in entries.values() if each.plan.meets_requirement is not False
+    }
+    while hopeful := {
+        plan: each for plan, each in hopeful.items() if each.cases.enough is not False
+    }:
         least = min(map(undamped, hopeful.values()))
-        plan, ground = cheapest([plan for plan, each in hopeful.items() if undamped(each) == least], usual, saved)
+        plan, ground = cheapest(
+            [plan for plan, each in hopeful.items() if undamped(each) == least], usual, saved
+        )
         candidate = hopeful.pop(plan)
         with suppress(Infeasible):
             candidate.decide(None)
@@ -238,17 +304,20 @@ def _fresh(candidate: FlownPlan) -> Cases | None:
 def _nearest(
     candidates: Sequence[FlownPlan], usual: Plan | None, saved: str = LEAST[0]
 ) -> tuple[FlownPlan | None, Ground | None, int]:
-    """Plan with which most cases comply, or that leaves least where nothing is required or no case complies.
+    """Plan with which most cases comply, or that leaves least where nothing is required or no case
+    complies.
 
-    Of plans as good, but for what the sampling may make of them, the cheapest, of equal costs the ``usual`` one; and
-    how many are as good.
+    Of plans as good, but for what the sampling may make of them, the cheapest, of equal costs the
+    ``usual`` one; and how many are as good.
     """
     if not candidates:
         return None, None, 0
     if not requirements.judged(candidates[0].plan.spacecraft):
         least = min(candidate.left for candidate in candidates)
         equals = [candidate.plan for candidate in candidates if candidate.left <= AS_GOOD * least]
-        best, ground = cheapest([plan for plan in equals if plan.standing is Standing.COMPLIES] or equals, usual, saved)
+        best, ground = cheapest(
+            [plan for plan in equals if plan.standing is Standing.COMPLIES] or equals, usual, saved
+        )
     elif all(candidate.cases.complying == 0.0 for candidate in candidates):
         equals = [candidate.plan for candidate in candidates]
         best, ground = nearest(equals)
@@ -274,7 +343,9 @@ def _result(
     needed: Tightening | None = None,
     equals: int | None = None,
 ) -> RobustComparison:
-    """Result of the search, its candidates by rank; ``equals``: default those of which enough cases comply."""
+    """Result of the search, its candidates by rank; ``equals``: default those of which enough cases
+    comply.
+    """
     usual = None if comparison.recommended is None else entries.get(_kind(comparison.recommended))
     if chosen is not None:
         chosen.finish(None)
@@ -287,13 +358,20 @@ def _result(
     if equals is None:
         equals = sum(each.cases.enough is True for each in candidates)
     probability = required_share(comparison.spacecraft.requirement)
-    return RobustComparison(comparison, candidates, usual, chosen, ground, equals, probability, needed, fresh)
+    return RobustComparison(
+        comparison, candidates, usual, chosen, ground, equals, probability, needed, fresh
+    )
 
 
 def _kind(plan: Plan) -> object:
     """Key shared by plans whose pulses are equal but for rounding."""
     return tuple(
-        (pulse.channel, round(pulse.t, 6), round(pulse.on_time, 6), *np.round(pulse.impulse, 6).tolist())
+        (
+            pulse.channel,
+            round(pulse.t, 6),
+            round(pulse.on_time, 6),
+            *np.round(pulse.impulse, 6).tolist(),
+        )
         for pulse in plan.pulses
     )
 
@@ -309,7 +387,10 @@ def _others(body: Spacecraft, base: Plan) -> Iterator[tuple[str, Spacecraft]]:
     for periods in LATER:  # of the nutation as seen in the body, inertial ones for a sphere
         earliest = body.limits.earliest + periods * body.nutation_period
         if earliest < body.horizon:
-            yield f"from {earliest:.4g} s on", replace(body, limits=replace(body.limits, earliest=earliest))
+            yield (
+                f"from {earliest:.4g} s on",
+                replace(body, limits=replace(body.limits, earliest=earliest)),
+            )
     for name in dict.fromkeys(pulse.channel for pulse in base.pulses):
         left = tuple(channel for channel in body.channels if channel.name != name)
         if left and len(left) < len(body.channels):
@@ -317,10 +398,11 @@ def _others(body: Spacecraft, base: Plan) -> Iterator[tuple[str, Spacecraft]]:
 
 
 def _early(body: Spacecraft, options: Options) -> Iterator[tuple[str, Plan]]:
-    """Earliest end of `optimal`, and its cheapest plans that end little later; the same with H kept where it is free.
+    """Earliest end of `optimal`, and its cheapest plans that end little later; the same with H kept
+    where it is free.
 
-    Free, the pulses on either side of a long axial one damp what the moments of inertia decide; spin-up.yaml:
-    73 % of its cases comply, and 99.98 % with H kept.
+    Free, the pulses on either side of a long axial one damp what the moments of inertia decide;
+    spin-up.yaml: 73 % of its cases comply, and 99.98 % with H kept.
     """
     settled = planner.settled(SCHEMES[OPTIMAL.name], options, body)
     free = isinstance(settled, OptimalOptions) and settled.free_axis is True
@@ -337,13 +419,17 @@ def _early(body: Spacecraft, options: Options) -> Iterator[tuple[str, Plan]]:
                 yield f"by {horizon:.4g} s{label}", attempt(soon, OPTIMAL.name, chosen)
 
 
-def _planned(variant: str, body: Spacecraft, scheme: str, options: Options) -> list[tuple[str, Plan]]:
+def _planned(
+    variant: str, body: Spacecraft, scheme: str, options: Options
+) -> list[tuple[str, Plan]]:
     return [(variant, attempt(body, scheme, options))]
 
 
 def robust_reasons(robust: RobustComparison) -> Iterator[Note]:
     """Reason for the robust plan, or for none."""
-    chosen, count, required = robust.chosen, len(robust.candidates), 100.0 * robust.probability
+    chosen = robust.chosen
+    count = len(robust.candidates)
+    required = 100.0 * robust.probability
     if chosen is None:
         yield note("none-feasible")
     elif count == 1:
@@ -351,9 +437,13 @@ def robust_reasons(robust: RobustComparison) -> Iterator[Note]:
     else:
         share = chosen.cases.complying
         if share is None:
-            yield note("robust-least-left", count=count, equals=robust.equals, required_share=required)
+            yield note(
+                "robust-least-left", count=count, equals=robust.equals, required_share=required
+            )
         elif chosen.cases.enough:
-            yield note("robust-complies", count=count, equals=robust.equals, required_share=required)
+            yield note(
+                "robust-complies", count=count, equals=robust.equals, required_share=required
+            )
         elif share > 0.0:
             yield note("robust-most-cases", count=count, equals=robust.equals)
         if robust.ground in (Ground.LEFT, Ground.NEAREST):

@@ -1,8 +1,9 @@
 """Sequential screening: plans in as many dispersed cases as it takes to know whether enough comply.
 
-All plans fly the same draws, the first cases first, in the stages of `montecarlo.study`. Of a plan that is shown all
-are flown that ``nutdamp disperse`` flies; another one is given up as soon as its interval, which errs once in a million
-times, lies on one side of the share required. `Checkpoints` are what the sheet of a manoeuvre holds a flight against.
+All plans fly the same draws, the first cases first, in the stages of `montecarlo.study`. Of a plan
+that is shown all are flown that ``nutdamp disperse`` flies; another one is given up as soon as its
+interval, which errs once in a million times, lies on one side of the share required. `Checkpoints`
+are what the sheet of a manoeuvre holds a flight against.
 """
 
 from __future__ import annotations
@@ -53,21 +54,30 @@ class Dispersion(Dispersed):
 
 
 def verdict_of(plan: Plan) -> Verdict:
-    """Judgement of a plan in as many dispersed cases as show its share, as ``nutdamp disperse`` flies them."""
-    if not plan.feasible or plan.spacecraft.dispersions is None or not requirements.judged(plan.spacecraft):
+    """Judgement of a plan in as many dispersed cases as show its share, as ``nutdamp disperse``
+    flies them.
+    """
+    if (
+        not plan.feasible
+        or plan.spacecraft.dispersions is None
+        or not requirements.judged(plan.spacecraft)
+    ):
         return judge(plan)
     results = flown_in_stages(study_of(plan.spacecraft, plan.pulses))
     return judge(plan, cases_of(results), results)
 
 
 LIKELIER = 0.01
-"""Least possible gain in the complying share for a plan to be flown further, where too few cases comply with each: a
-hundredth of the cases, which no operator would choose a plan by."""
+"""Least possible gain in the complying share for a plan to be flown further, where too few cases
+comply with each: a hundredth of the cases, which no operator would choose a plan by.
+"""
 
 
 @dataclass(eq=False)
 class FlownPlan:
-    """Plan, as ``variant`` of what its scheme plans, and its dispersed ``results``; ``final``: no more are to fly."""
+    """Plan, as ``variant`` of what its scheme plans, and its dispersed ``results``; ``final``: no
+    more are to fly.
+    """
 
     plan: Plan
     results: Results | None
@@ -81,20 +91,32 @@ class FlownPlan:
 
     @property
     def left(self) -> float:
-        """Residual, rad, that the share required keeps: nutation, or the distance from a target axis if larger."""
-        body, levels = self.plan.spacecraft, {bound.part: level for bound, level in self.cases.levels.items()}
-        nutation, aim = (levels.get(part) for part in (requirements.Part.NUTATION, requirements.aim(body)))
-        return float(requirements.missed(body, math.inf if nutation is None else nutation, aim or 0.0))
+        """Residual, rad, that the share required keeps: nutation, or the distance from a target
+        axis if larger.
+        """
+        body = self.plan.spacecraft
+        levels = {bound.part: level for bound, level in self.cases.levels.items()}
+        nutation, aim = (
+            levels.get(part) for part in (requirements.Part.NUTATION, requirements.aim(body))
+        )
+        return float(
+            requirements.missed(body, math.inf if nutation is None else nutation, aim or 0.0)
+        )
 
     def further(self, samples: int | None) -> None:
-        """Fly the next stage of ``samples`` cases in all, default as many as show the share; raises Infeasible."""
+        """Fly the next stage of ``samples`` cases in all, default as many as show the share; raises
+        Infeasible.
+        """
         assert self.results is not None
         results = next_stage(self.results, samples)
-        self.final, self.results = results is self.results, results
+        self.final = results is self.results
+        self.results = results
         self.cases = cases_of(results, final=self.final)
 
     def decide(self, samples: int | None) -> None:
-        """Fly stages until it is known whether enough cases comply, within the open budget of work."""
+        """Fly stages until it is known whether enough cases comply,
+        within the open budget of work.
+        """
         while not self.final and self.cases.enough is None and not work.exhausted():
             self.further(samples)
 
@@ -105,7 +127,9 @@ class FlownPlan:
 
 
 def entered(plan: Plan, samples: int | None, variant: str = "") -> FlownPlan | None:
-    """Plan that has flown the first stage of its cases; None where that takes more than is left of the budget."""
+    """Plan that has flown the first stage of its cases; None where that takes more than is left of
+    the budget.
+    """
     study = study_of(plan.spacecraft, plan.pulses)
     if not affordable(study, min(STAGES[0], samples or STAGES[0])):
         return None
@@ -118,10 +142,12 @@ def fly_compared(
     choose: Callable[[Mapping[Plan, Cases]], Plan | None],
     eligible: Collection[Plan],
 ) -> dict[Plan, FlownPlan]:
-    """Fly the cases of each plan that decide on it, and all of the plan that ``choose`` takes of the ``eligible``.
+    """Fly the cases of each plan that decide on it, and all of the plan that ``choose`` takes of
+    the ``eligible``.
 
-    ``samples``: number of cases in all, default as many as show the share. The screening has a budget of work of its
-    own, each plan that is shown another. Plans with a case that cannot be flown are left out.
+    ``samples``: number of cases in all, default as many as show the share. The screening has a
+    budget of work of its own, each plan that is shown another. Plans with a case that cannot be
+    flown are left out.
     """
     flown: dict[Plan, FlownPlan] = {}
     with work.budget("the dispersed cases", work.CASES * max(1.0, (samples or 0) / work.SAMPLES)):
@@ -154,7 +180,10 @@ def fly_compared(
 
 CASES = 2 * STRIDE  # dispersed cases that are flown for each range: the first ones of the study
 TAILS = (0.0015, 0.9985)  # quantiles of the cases between which a flight is as expected
-STEPS, HALVINGS = 16, 5  # even steps in which the edge of a window is sought, and halvings of the one that holds it
+STEPS, HALVINGS = (
+    16,
+    5,
+)  # even steps in which the edge of a window is sought, and halvings of the one that holds it
 
 
 class Range(NamedTuple):
@@ -183,27 +212,43 @@ class Checkpoints:
         return _range(np.arctan2(np.hypot(first, second), np.abs(axial + self._initial.wheel)))
 
     def nutation_after(self, counts: Sequence[int]) -> Iterator[Range]:
-        """Nutation, rad, after the first ``counts`` pulses, of the cases that comply after the last one."""
+        """Nutation, rad, after the first ``counts`` pulses, of the cases that comply after the last
+        one.
+        """
         body, schedule = self.study.model.spacecraft, self.study.model.schedule
         well = requirements.complies(self._flown(self.study, self._draws)[1])
         for count in counts:
             part = study_of(body, first_pulses(schedule, count), seed=self.study.seed)
             angles = np.broadcast_to(self._flown(part, self._draws)[0][0], CASES)
-            yield Range(float(angles[well].min()), float(angles[well].max())) if well.any() else _range(angles)
+            yield (
+                Range(float(angles[well].min()), float(angles[well].max()))
+                if well.any()
+                else _range(angles)
+            )
 
     def window(self, probability: float) -> Range | None:
-        """Shifts (s) of all pulses, to half a turn, with which the share ``probability`` complies; None without any."""
+        """Shifts (s) of all pulses, to half a turn, with which the share ``probability`` complies;
+        None without any.
+        """
         if not self._complies(0.0, probability):
             return None
         first = min(pulse.loaded[0] for pulse in self.study.model.schedule)
         half = math.pi / self.study.model.spacecraft.fastest
-        return Range(-self._reach(-1.0, min(half, first), probability), self._reach(1.0, half, probability))
+        return Range(
+            -self._reach(-1.0, min(half, first), probability), self._reach(1.0, half, probability)
+        )
 
     def _reach(self, sense: float, most: float, probability: float) -> float:
-        """Largest shift one way, s, up to ``most``: in even steps, then by halving the one that is too far."""
+        """Largest shift one way, s, up to ``most``: in even steps, then by halving the one that is
+        too far.
+        """
         step = most / STEPS
         good = next(
-            (step * count for count in range(STEPS) if not self._complies(sense * step * (count + 1), probability)),
+            (
+                step * count
+                for count in range(STEPS)
+                if not self._complies(sense * step * (count + 1), probability)
+            ),
             most,
         )
         if good < most:
@@ -213,7 +258,9 @@ class Checkpoints:
         return good
 
     def _complies(self, shift: float, probability: float) -> bool:
-        """True where the share ``probability`` of the cases complies with all pulses ``shift`` s later."""
+        """True where the share ``probability`` of the cases complies with all pulses ``shift`` s
+        later.
+        """
         late = self._draws.get("timing offset", 0.0) + shift
         _, severity = self._flown(self.study, {**self._draws, "timing offset": late})
         return float(np.mean(requirements.complies(severity))) >= probability
@@ -226,12 +273,15 @@ class Checkpoints:
 
 
 def _range(values: object) -> Range:
-    return Range(*np.quantile(np.broadcast_to(np.asarray(values, dtype=np.float64), CASES), TAILS).tolist())
+    return Range(
+        *np.quantile(np.broadcast_to(np.asarray(values, dtype=np.float64), CASES), TAILS).tolist()
+    )
 
 
 def first_pulses(schedule: Schedule, count: int) -> Schedule:
     """First ``count`` pulses of a schedule, and the blocks cut to them."""
-    blocks, left = list[Block](), count
+    blocks = list[Block]()
+    left = count
     for block in schedule.blocks:
         if left > 0:
             blocks.append(replace(block, count=min(block.count, left)))
@@ -240,5 +290,7 @@ def first_pulses(schedule: Schedule, count: int) -> Schedule:
 
 
 def even(count: int, most: int) -> list[int]:
-    """Up to ``most`` (two or more) of the numbers 1 … ``count``, evenly spaced, with the first and the last."""
+    """Up to ``most`` (two or more) of the numbers 1 … ``count``, evenly spaced, with the first and
+    the last.
+    """
     return sorted({round(number) for number in np.linspace(1, count, min(most, count)).tolist()})

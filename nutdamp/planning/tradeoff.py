@@ -1,8 +1,9 @@
 """Pareto fronts of cost and time by the scheme optimal, and certificates of least cost.
 
-A certificate holds the prices of a program of small angles, and its primer curve q(t) of each channel: the worth of a
-second by the prices, over its cost. Where q exceeds one nowhere, no schedule costs less than the worth of the goal
-(weak duality; Lawden 1963, the primer vector); the program fires where q is one.
+A certificate holds the prices of a program of small angles, and its primer curve q(t) of each
+channel: the worth of a second by the prices, over its cost. Where q exceeds one nowhere, no
+schedule costs less than the worth of the goal (weak duality; Lawden 1963, the primer vector); the
+program fires where q is one.
 """
 
 from __future__ import annotations
@@ -38,14 +39,19 @@ from nutdamp.spacecraft.schedule import Bounds
 SAME = 1e-9  # relative difference up to which a bound is that of the plan
 
 ROWS = ("nutation_1", "nutation_2", "shift_1", "shift_2", "spin")  # subjects of the equations
-LOOKS, MOST_LOOKS = 32, 6_000  # moments of the primer curve in a turn of the faster of its two parts, and of all of it
+LOOKS, MOST_LOOKS = (
+    32,
+    6_000,
+)  # moments of the primer curve in a turn of the faster of its two parts, and of all of it
 
 
 @dataclass(frozen=True, eq=False)
 class Certificate:
-    """Proof of a lower cost bound for a plan of optimal, by a ``program`` of small angles and its ``burns``.
+    """Proof of a lower cost bound for a plan of optimal, by a ``program`` of small angles and its
+    ``burns``.
 
-    ``problem`` has the unit of the cost; its spacecraft is the symmetric body that the scheme plans on.
+    ``problem`` has the unit of the cost; its spacecraft is the symmetric body that the scheme plans
+    on.
     """
 
     plan: Plan
@@ -75,13 +81,21 @@ class Certificate:
 
     @property
     def last(self) -> float:
-        """Time, s, from which pulses count in full against decaying nutation; 0 where it grows or stays."""
+        """Time, s, from which pulses count in full against decaying nutation; 0 where it grows or
+        stays.
+        """
         return growth_from(self.spacecraft)
 
     @property
     def cost(self) -> float:
         """Cost of the burns."""
-        price = dict(zip((channel.name for channel in self.program.channels), self.program.costs.tolist(), strict=True))
+        price = dict(
+            zip(
+                (channel.name for channel in self.program.channels),
+                self.program.costs.tolist(),
+                strict=True,
+            )
+        )
         return math.fsum(price[burn.channel.name] * burn.on_time for burn in self.burns)
 
     def moments(self) -> list[Vector]:
@@ -90,7 +104,9 @@ class Certificate:
         turns = body.fastest / (2.0 * math.pi)
         total = sum(end - begin for begin, end in spans)
         pace = min(LOOKS * turns, MOST_LOOKS / max(total, 1e-9))
-        return [np.linspace(begin, end, math.ceil((end - begin) * pace) + 2) for begin, end in spans]
+        return [
+            np.linspace(begin, end, math.ceil((end - begin) * pace) + 2) for begin, end in spans
+        ]
 
 
 def certificate(plan: Plan) -> Certificate:
@@ -99,11 +115,15 @@ def certificate(plan: Plan) -> Certificate:
     if plan.scheme != OPTIMAL.name:
         raise BadRequest(f"a certificate is of a plan of {OPTIMAL.name}, not of {plan.scheme}")
     if not plan.feasible or known is None or known.first_order is None:
-        raise BadRequest(f"{OPTIMAL.name} has no least cost to prove here: {plan.refusal or 'there is no such plan'}")
+        raise BadRequest(
+            f"{OPTIMAL.name} has no least cost to prove here: "
+            f"{plan.refusal or 'there is no such plan'}"
+        )
     chosen = planner.settled(OPTIMAL, plan.options, plan.spacecraft)
     body = planning.known(plan.spacecraft, chosen)
     if body.thrust_laws:
-        chosen, body = valve_commands.options(body, chosen), valve_commands.plain(body)
+        chosen = valve_commands.options(body, chosen)
+        body = valve_commands.plain(body)
     body = model_of(body, three_moments=True).body
     assert isinstance(chosen, OptimalOptions)
     try:
@@ -113,13 +133,19 @@ def certificate(plan: Plan) -> Certificate:
     except Infeasible as reason:
         raise BadRequest(f"{OPTIMAL.name} has no least cost to prove here: {reason}") from None
     proof = bounds.first_order(program, solution.prices)
-    if solution.unmet > UNMET or abs(proof.bound - known.first_order) > SAME * abs(known.first_order):
-        raise BadRequest("the plan is put together from several programs, and none of them proves what all of it costs")
+    if solution.unmet > UNMET or abs(proof.bound - known.first_order) > SAME * abs(
+        known.first_order
+    ):
+        raise BadRequest(
+            "the plan is put together from several programs, and none of them proves what all of "
+            "it costs"
+        )
     return Certificate(plan, problem, program, solution.burns, proof)
 
 
 class Point(NamedTuple):
-    """Schedule of a front: a ``plan``, the ``horizon`` (s) of its search, the ``unit`` of costs (kg or N m s).
+    """Schedule of a front: a ``plan``, the ``horizon`` (s) of its search, the ``unit`` of costs (kg
+    or N m s).
 
     ``nominal``: it is judged by nominal values alone.
     """
@@ -145,18 +171,23 @@ class Point(NamedTuple):
         return self.plan.flight.residual.axis_error
 
     def serves(self, other: Point) -> bool:
-        """True if the schedule costs as little as another one, ends as soon and leaves H as near."""
+        """True if the schedule costs as little as another one,
+        ends as soon and leaves H as near.
+        """
         return self.off <= other.off and self.plan.end <= other.plan.end and self.cost <= other.cost
 
     @property
     def bounds(self) -> Bounds:
-        """Lower bounds on other schedules within the same horizon; unknown for schemes other than optimal."""
+        """Lower bounds on other schedules within the same horizon; unknown for schemes other than
+        optimal.
+        """
         return self.plan.pulses.bounds or Bounds(None, None, self.unit, self.horizon)
 
 
 @dataclass(frozen=True, eq=False)
 class Front:
-    """Schedules of which none is beaten in end and cost at once; H may end ``shift`` rad off its target.
+    """Schedules of which none is beaten in end and cost at once; H may end ``shift`` rad off its
+    target.
 
     ``why`` says why there is none, or, beside points of other schemes, none of optimal.
     """
@@ -166,10 +197,16 @@ class Front:
     why: str | None = None
 
     def least(self, point: Point) -> float | None:
-        """First-order lower bound for a ``point``; no more than those of points that have less time."""
+        """First-order lower bound for a ``point``; no more than those of points that have less
+        time.
+        """
         first, within = point.bounds.first_order, point.bounds.within
         known = [each.bounds.first_order for each in self.points if each.bounds.within <= within]
-        return None if first is None else min(first, *(bound for bound in known if bound is not None), math.inf)
+        return (
+            None
+            if first is None
+            else min(first, *(bound for bound in known if bound is not None), math.inf)
+        )
 
 
 def fronts(
@@ -180,17 +217,24 @@ def fronts(
     shifts: Sequence[float],
     nominal: bool = False,
 ) -> tuple[Front, ...]:
-    """Fronts for each of the ``shifts`` (rad, infinite for any), of at most ``count`` searches each.
+    """Fronts for each of the ``shifts`` (rad, infinite for any), of at most ``count`` searches
+    each.
 
-    What is traded is propellant, with ``options.least`` of impulse that (then pulses do not tell their propellant).
-    A schedule counts for every front whose shift it keeps; that of the whole horizon is what
-    `plan` finds. Where optimal finds none, those of the other schemes count that comply but for
-    where H ends. ``nominal``: see `Point`. The count × len(shifts) searches are the steps of the task.
+    What is traded is propellant, with ``options.least`` of impulse that (then pulses do not tell
+    their propellant). A schedule counts for every front whose shift it keeps; that of the whole
+    horizon is what `plan` finds. Where optimal finds none, those of the other schemes count that
+    comply but for where H ends. ``nominal``: see `Point`. The count × len(shifts) searches are the
+    steps of the task.
     """
     if options.least == "impulse":
-        # The search for the fastest saves time, and counts in kg whatever it can: one unit for all points.
-        spacecraft = replace(spacecraft, channels=tuple(channel.of(isp=None) for channel in spacecraft.channels))
-    ordered, done, unspent = sorted(set(shifts)), 0, work.FRONTS
+        # The search for the fastest saves time, and counts in kg whatever it can: one unit for all
+        # points.
+        spacecraft = replace(
+            spacecraft, channels=tuple(channel.of(isp=None) for channel in spacecraft.channels)
+        )
+    ordered = sorted(set(shifts))
+    done = 0
+    unspent = work.FRONTS
     entries: list[tuple[float, Plan, float]] = []
     why: dict[float, str] = {}
 
@@ -207,7 +251,9 @@ def fronts(
 
     for number, shift in enumerate(ordered, start=1):
         anywhere = math.isinf(shift)
-        allowing = replace(options, free_axis=anywhere, shift=None if anywhere or shift == 0.0 else shift)
+        allowing = replace(
+            options, free_axis=anywhere, shift=None if anywhere or shift == 0.0 else shift
+        )
         # The very search of `plan`, with its budget: one question, one answer.
         whole = plan(spacecraft, OPTIMAL.name, allowing)
         done += 1
@@ -223,12 +269,22 @@ def fronts(
     others: list[Plan] = []
     if why:
         names = [name for name in usual(spacecraft) if name != OPTIMAL.name]
-        compared = compare(spacecraft, names, Options(with_disturbances=options.with_disturbances), samples=0)
+        compared = compare(
+            spacecraft, names, Options(with_disturbances=options.with_disturbances), samples=0
+        )
         ends = {Part.SHIFT, Part.DISTANCE}
-        others = [plan for plan in compared if len(plan.pulses) and {bound.part for bound in plan.shortfalls} <= ends]
+        others = [
+            plan
+            for plan in compared
+            if len(plan.pulses) and {bound.part for bound in plan.shortfalls} <= ends
+        ]
     plans = [*(plan for _, plan, _ in entries), *others]
     counted = [plan.pulses.bounds for plan in plans if plan.pulses.bounds is not None]
-    in_kg = options.least != "impulse" and by_propellant(plans) and all(known.unit == "kg" for known in counted)
+    in_kg = (
+        options.least != "impulse"
+        and by_propellant(plans)
+        and all(known.unit == "kg" for known in counted)
+    )
     unit = "kg" if in_kg else "N m s"
     made_for = [(kept, Point(plan, horizon, unit, nominal)) for kept, plan, horizon in entries]
     rivals = [Point(plan, spacecraft.horizon, unit, nominal) for plan in others]
@@ -236,15 +292,22 @@ def fronts(
 
 
 def _fronts(
-    shifts: Sequence[float], made_for: Sequence[tuple[float, Point]], others: Sequence[Point], why: dict[float, str]
+    shifts: Sequence[float],
+    made_for: Sequence[tuple[float, Point]],
+    others: Sequence[Point],
+    why: dict[float, str],
 ) -> Iterator[Front]:
-    """Fronts of the ``shifts``, the strictest first, of points ``made_for`` one of them; of the ``others`` without."""
+    """Fronts of the ``shifts``, the strictest first, of points ``made_for`` one of them; of the
+    ``others`` without.
+    """
     kept: tuple[Point, ...] = ()
     for shift in shifts:
         own = [point for asked, point in made_for if asked <= shift]
         looser = [point for asked, point in made_for if asked > shift]
         # One that is nowhere worse than another stands for it: ticks prevent exact ends.
-        points = own + [point for point in looser if point.off <= shift + LEFT or any(map(point.serves, own))]
+        points = own + [
+            point for point in looser if point.off <= shift + LEFT or any(map(point.serves, own))
+        ]
         kept = undominated(points or [point for point in others if point.off <= shift + LEFT], kept)
         by_others = all(point.plan.scheme != OPTIMAL.name for point in kept)
         yield Front(shift, kept, why.get(shift) if by_others else None)
@@ -262,7 +325,9 @@ def _sooner(
     if fastest.schedule is None or not len(fastest.schedule):
         return
     yield fastest, spacecraft.horizon
-    begin, end, last = spacecraft.limits.earliest, fastest.pulses.end, max(whole.pulses.end, fastest.pulses.end)
+    begin = spacecraft.limits.earliest
+    end = fastest.pulses.end
+    last = max(whole.pulses.end, fastest.pulses.end)
     for share in np.linspace(0.0, 1.0, count)[1:-1]:
         horizon = begin + (end - begin) * ((last - begin) / (end - begin)) ** float(share)
         body = replace(spacecraft, limits=replace(spacecraft.limits, horizon=horizon))
@@ -272,7 +337,9 @@ def _sooner(
 
 
 def undominated(points: Sequence[Point], stricter: Sequence[Point] = ()) -> tuple[Point, ...]:
-    """Points that cost less than all that end no later, by `SAME_COST`; those of a ``stricter`` front by anything."""
+    """Points that cost less than all that end no later, by `SAME_COST`; those of a ``stricter``
+    front by anything.
+    """
     given = {id(point.plan) for point in stricter}
     kept: list[Point] = []
     for point in sorted(points, key=lambda point: (point.plan.pulses.end, point.cost)):
@@ -290,7 +357,8 @@ def numbered(all_fronts: Sequence[Front]) -> Iterator[tuple[int, Front, Point]]:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Trade(results.Data, results.Written):
-    """Time against cost: ``fronts`` of schedules of the scheme optimal, one for each momentum shift allowed.
+    """Time against cost: ``fronts`` of schedules of the scheme optimal, one for each momentum shift
+    allowed.
 
     ``recommended``: the plan that ``nutdamp plan`` recommends, if any.
     """
@@ -300,7 +368,10 @@ class Trade(results.Data, results.Written):
     recommended: Plan | None = None
 
     def __repr__(self) -> str:
-        return f"<Trade of {self.spacecraft.name}, fronts: {len(self.fronts)}, schedules: {len(self.plans)}>"
+        return (
+            f"<Trade of {self.spacecraft.name}, fronts: {len(self.fronts)}, schedules: "
+            f"{len(self.plans)}>"
+        )
 
     @property
     def plans(self) -> tuple[Plan, ...]:

@@ -1,7 +1,7 @@
 """The verdict on a schedule: the one judgement that every screen, page, figure and file shows.
 
-`requirements` says what a bound is and whether a value keeps it; here its nominal values and dispersed cases become a
-`Status`, and nothing else makes one.
+`requirements` says what a bound is and whether a value keeps it; here its nominal values and
+dispersed cases become a `Status`, and nothing else makes one.
 """
 
 from __future__ import annotations
@@ -28,7 +28,9 @@ if TYPE_CHECKING:
 LOOP = "loop"  # name in place of a scheme
 
 CAUSES, MAIN = 3, 0.1
-"""Main causes that are named, at most, and the least share of the variance of one that is not the first."""
+"""Main causes that are named, at most, and the least share of the variance of one that is not the
+first.
+"""
 
 
 class Status(Enum):
@@ -55,7 +57,9 @@ class Status(Enum):
 
 
 class Light(Enum):
-    """Colour of a verdict: shown in dispersed cases, by nominal values alone, or not to be flown."""
+    """Colour of a verdict: shown in dispersed cases, by nominal values alone,
+    or not to be flown.
+    """
 
     GREEN = "met"
     AMBER = "caution"
@@ -64,11 +68,12 @@ class Light(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Cases:
-    """Share of dispersed cases that complies: ``complying`` of ``samples``, None where nothing is required.
+    """Share of dispersed cases that complies: ``complying`` of ``samples``, None where nothing is
+    required.
 
-    ``probability`` of all must; the share of all lies from ``low`` to ``high``: within 95 %, but while more cases are
-    to fly within all but a millionth. ``levels``: what the share required keeps of each bound; ``shares``: of the cases
-    those that keep it.
+    ``probability`` of all must; the share of all lies from ``low`` to ``high``: within 95 %, but
+    while more cases are to fly within all but a millionth. ``levels``: what the share required
+    keeps of each bound; ``shares``: of the cases those that keep it.
     """
 
     samples: int
@@ -83,12 +88,20 @@ class Cases:
 
     @property
     def enough(self) -> bool | None:
-        """True where enough of all cases comply or nothing is required, False for too few, None if not known."""
-        return True if self.complying is None else requirements.enough(self.low, self.high, self.probability)
+        """True where enough of all cases comply or nothing is required, False for too few, None if
+        not known.
+        """
+        return (
+            True
+            if self.complying is None
+            else requirements.enough(self.low, self.high, self.probability)
+        )
 
 
 class JudgedCases(Protocol):
-    """Dispersed cases that have flown, as far as they are judged; see `montecarlo.study`, which lies below."""
+    """Dispersed cases that have flown, as far as they are judged; see `montecarlo.study`, which
+    lies below.
+    """
 
     study: Any
     done: int
@@ -133,9 +146,11 @@ def cases_of(results: JudgedCases, *, final: bool = True) -> Cases:
 
 
 class Line(NamedTuple):
-    """A bound beside its value with ``nominal`` values and what the share of cases required keeps, rad or rad/s.
+    """A bound beside its value with ``nominal`` values and what the share of cases required keeps,
+    rad or rad/s.
 
-    ``share``: of the cases those that keep this bound alone. Both are None without cases. ``met``: in both.
+    ``share``: of the cases those that keep this bound alone. Both are None without cases. ``met``:
+    in both.
     """
 
     bound: Bound
@@ -163,7 +178,9 @@ class Cause(NamedTuple):
 
 
 class Cheaper(NamedTuple):
-    """Compared plan of a ``scheme`` that costs less than the recommended one, and the note on why it is not that."""
+    """Compared plan of a ``scheme`` that costs less than the recommended one, and the note on why
+    it is not that.
+    """
 
     scheme: str
     schedule: Schedule
@@ -172,11 +189,12 @@ class Cheaper(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Verdict:
-    """Judgement of the ``schedule`` of a ``scheme``, or of a closed loop: its status, and the ``lines`` of all bounds.
+    """Judgement of the ``schedule`` of a ``scheme``, or of a closed loop: its status, and the
+    ``lines`` of all bounds.
 
-    ``flight``: the judged one, with nominal values, and the ``aspects`` of its axis; ``why`` there is no schedule.
-    ``results``: all dispersed cases, None where they were not flown; ``nominal``: by nominal values alone, as
-    requested; ``cheaper``: plans compared that cost less.
+    ``flight``: the judged one, with nominal values, and the ``aspects`` of its axis; ``why`` there
+    is no schedule. ``results``: all dispersed cases, None where they were not flown; ``nominal``:
+    by nominal values alone, as requested; ``cheaper``: plans compared that cost less.
     """
 
     status: Status
@@ -199,7 +217,9 @@ class Verdict:
 
     @property
     def met(self) -> bool | None:
-        """True where all that is required is met and shown; None where nothing is required, and without a plan."""
+        """True where all that is required is met and shown; None where nothing is required, and
+        without a plan.
+        """
         if self.status is Status.NO_PLAN or not self.required:
             return None
         return self.status not in (Status.NOT_ENOUGH, Status.NOT_SHOWN)
@@ -224,7 +244,9 @@ class Verdict:
         """Colour of the verdict."""
         if self.status.exit_status:
             return Light.RED
-        return Light.GREEN if self.cases is not None and self.required and self.good else Light.AMBER
+        return (
+            Light.GREEN if self.cases is not None and self.required and self.good else Light.AMBER
+        )
 
     @property
     def good(self) -> bool:
@@ -238,10 +260,14 @@ class Verdict:
 
     @property
     def tightest(self) -> Line | None:
-        """Line of the required bound that the fewest cases keep, or that is kept most narrowly; None without any."""
+        """Line of the required bound that the fewest cases keep, or that is kept most narrowly;
+        None without any.
+        """
 
         def room(line: Line) -> tuple[float, float]:
-            return 1.0 if line.share is None else line.share, 1.0 - float(line.bound.used(line.value))
+            return 1.0 if line.share is None else line.share, 1.0 - float(
+                line.bound.used(line.value)
+            )
 
         return min(self.required, key=room, default=None)
 
@@ -252,7 +278,9 @@ class Verdict:
 
     @cached_property
     def causes(self) -> tuple[Cause, ...]:
-        """Inputs that decide the failing cases, by the bound that is `tightest`; none where nominal values fail."""
+        """Inputs that decide the failing cases, by the bound that is `tightest`; none where nominal
+        values fail.
+        """
         line = self.tightest
         if self.results is None or line is None or not self.nominally_met:
             return ()
@@ -260,7 +288,11 @@ class Verdict:
             return ()
         shares = self.results.contributions(line.bound)
         ranked = sorted(shares.items(), key=lambda item: -item[1])[:CAUSES]
-        return tuple(Cause(name, share) for at, (name, share) in enumerate(ranked) if at == 0 or share >= MAIN)
+        return tuple(
+            Cause(name, share)
+            for at, (name, share) in enumerate(ranked)
+            if at == 0 or share >= MAIN
+        )
 
 
 def lines_of(held: Sequence[Held], cases: Cases | None, probability: float) -> tuple[Line, ...]:
@@ -269,7 +301,9 @@ def lines_of(held: Sequence[Held], cases: Cases | None, probability: float) -> t
     for bound, value in held:
         share = None if cases is None else cases.shares.get(bound)
         level = None if cases is None else cases.levels.get(bound)
-        met = bool(bound.met(value)) and (share is None or not bound.required or share >= probability)
+        met = bool(bound.met(value)) and (
+            share is None or not bound.required or share >= probability
+        )
         lines.append(Line(bound, value, level, share, met))
     return tuple(lines)
 
@@ -286,14 +320,18 @@ def judge_schedule(
     sendable: bool,
     nominal: bool,
 ) -> Verdict:
-    """Judgement of a ``schedule`` by one flight, and by dispersed ``cases``; ``sendable``: it can be commanded."""
+    """Judgement of a ``schedule`` by one flight, and by dispersed ``cases``; ``sendable``: it can
+    be commanded.
+    """
     body = flight.spacecraft
     status, lines = judged_bounds(body, held, cases, nominal=nominal)
     if status in (Status.FLY, Status.NOT_SHOWN) and not sendable:
         status = Status.NOT_COMMANDABLE
     elif status is Status.FLY and not schedule.pulses:
         status = Status.NO_PULSE
-    return Verdict(status, body, scheme, schedule, lines, cases, results, flight, observed, nominal=nominal)
+    return Verdict(
+        status, body, scheme, schedule, lines, cases, results, flight, observed, nominal=nominal
+    )
 
 
 def no_plan(body: Spacecraft, scheme: str = "", why: str = "") -> Verdict:
@@ -312,16 +350,22 @@ def judge_loop(
     feasible: bool = True,
     lost: bool = False,
 ) -> Verdict:
-    """Judgement of a closed loop by its bounds, in ``cases`` or in one ``flight``; ``lost``: it never falls quiet."""
+    """Judgement of a closed loop by its bounds, in ``cases`` or in one ``flight``; ``lost``: it
+    never falls quiet.
+    """
     status, lines = judged_bounds(body, held, cases, nominal=body.dispersions is not None)
     if not feasible or lost:
         status = status_of(met=False, feasible=feasible)
     schedule = Schedule() if flight is None else flight.schedule
-    return Verdict(status, body, LOOP, schedule, lines, cases, results, flight, observed, nominal=cases is None)
+    return Verdict(
+        status, body, LOOP, schedule, lines, cases, results, flight, observed, nominal=cases is None
+    )
 
 
 def status_of(*, met: bool | None, feasible: bool) -> Status:
-    """Status of what has no bounds to show, as a budget; ``met``: None where nothing is required."""
+    """Status of what has no bounds to show, as a budget; ``met``:
+    None where nothing is required.
+    """
     if not feasible:
         return Status.NO_PLAN
     return Status.NOT_ENOUGH if met is False else Status.FLY
@@ -330,7 +374,9 @@ def status_of(*, met: bool | None, feasible: bool) -> Status:
 def judged_bounds(
     body: Spacecraft, held: Sequence[Held], cases: Cases | None, *, nominal: bool = False
 ) -> tuple[Status, tuple[Line, ...]]:
-    """Status by the bounds of ``requirements`` alone: nominal values, and cases where they decide; and their lines."""
+    """Status by the bounds of ``requirements`` alone: nominal values, and cases where they decide;
+    and their lines.
+    """
     lines = lines_of(held, cases, required_share(body.requirement))
     met = all(bool(line.bound.met(line.nominal)) for line in lines if line.bound.required)
     probable = body.requirement is not None and body.requirement.probability is not None

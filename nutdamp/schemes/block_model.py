@@ -1,9 +1,10 @@
 """Closed-form model of command blocks fired from the Sun pulse, and Sun pulses of a flight.
 
-H follows a rhumb line about the Sun (`precession`), and the nutation is the impulse sum (17) over pulses at even
-times, for very many blocks at once. Commands count by the impulse, the centroid and the spread of their thrust; cold
-nozzles and falling pressure by the impulse of each pulse, but for the nutation, which takes the mean pressure along a
-block. Neglected are the jitter of the Sun pulses by nutation, and second order in the turn by one pulse.
+H follows a rhumb line about the Sun (`precession`), and the nutation is the impulse sum (17) over
+pulses at even times, for very many blocks at once. Commands count by the impulse, the centroid and
+the spread of their thrust; cold nozzles and falling pressure by the impulse of each pulse, but for
+the nutation, which takes the mean pressure along a block. Neglected are the jitter of the Sun
+pulses by nutation, and second order in the turn by one pulse.
 """
 
 from __future__ import annotations
@@ -33,7 +34,8 @@ from nutdamp.spacecraft.requirements import Left
 from nutdamp.spacecraft.schedule import Pulse, Schedule, on_command
 
 SAMPLES = 32  # samples of the Sun's azimuth in each spin turn, between which a Sun pulse is found
-ITERATIONS = 60  # steps by which the moment of a Sun pulse is found in a flight, at most; three or four are usual
+# steps by which the moment of a Sun pulse is found in a flight, at most; three or four are usual
+ITERATIONS = 60
 EXACT = 1e-13  # tolerance of the time of a Sun pulse, in spin turns
 
 BLIND = 32  # spin turns in a row without a Sun pulse, after which none is waited for
@@ -41,7 +43,9 @@ ALWAYS = 500  # Sun pulses that flights of blocks may take whatever work is spen
 NEVER = np.iinfo(np.int64).max  # number of a Sun pulse that is not waited for
 
 FIRED, INTEGRATED = 1.0, 40.0
-"""Units of `work` of a pulse that is fired, and of the motion of all flights to the next where it is integrated."""
+"""Units of `work` of a pulse that is fired, and of the motion of all flights to the next where it
+is integrated.
+"""
 
 KEPT = 4_000_000  # entries of tables of the supply that are kept
 
@@ -49,26 +53,34 @@ KEPT = 4_000_000  # entries of tables of the supply that are kept
 def spin_turn(spacecraft: Spacecraft) -> float:
     """Time between two Sun pulses, s: the average one of the free motion.
 
-    The body turns about H at |H|/A, and about its axis at ω3 - H3/A: together, and at small angles, at ω3.
+    The body turns about H at |H|/A, and about its axis at ω3 - H3/A: together, and at small angles,
+    at ω3.
     """
-    A, size = spacecraft.inertia.A, float(np.linalg.norm(spacecraft.momentum))
+    A = spacecraft.inertia.A
+    size = float(np.linalg.norm(spacecraft.momentum))
     turning = spacecraft.spin - spacecraft.axial / A
     return 2.0 * math.pi / abs(math.copysign(size / A, spacecraft.axial) + turning)
 
 
 def sun_pulses(flown: Flight, until: float) -> Vector:
-    """Times (n,) s up to ``until`` s of the Sun pulses of a flight; raises Infeasible where the sensor sees none."""
+    """Times (n,) s up to ``until`` s of the Sun pulses of a flight; raises Infeasible where the
+    sensor sees none.
+    """
     body = flown.spacecraft
-    sensor, turn = body.sun_sensor, spin_turn(body) * min(1.0, abs(body.spin / flown.settled.spin))
+    sensor = body.sun_sensor
+    turn = spin_turn(body) * min(1.0, abs(body.spin / flown.settled.spin))
     assert sensor is not None
     assert body.sun is not None
     times = np.linspace(0.0, until, max(int(SAMPLES * until / turn), 2) + 1)
-    # The Sun goes round in the body against the spin: what is left to the sensor's azimuth falls to zero.
+    # The Sun goes round in the body against the spin: what is left to the sensor's azimuth falls to
+    # zero.
     ahead = to_sun_pulse(flown, times)
     index = np.flatnonzero((ahead[:-1] < 0.5 * math.pi) & (ahead[1:] > 1.5 * math.pi))
     times_of = times[index] + ahead[index] * turn / (2.0 * math.pi)
     for _ in range(ITERATIONS):
-        off = (to_sun_pulse(flown, np.minimum(times_of, until)) + math.pi) % (2.0 * math.pi) - math.pi
+        off = (to_sun_pulse(flown, np.minimum(times_of, until)) + math.pi) % (
+            2.0 * math.pi
+        ) - math.pi
         times_of += off * turn / (2.0 * math.pi)
         if not len(times_of) or np.abs(off).max() < 2.0 * math.pi * EXACT:
             break
@@ -81,9 +93,12 @@ def sun_pulses(flown: Flight, until: float) -> Vector:
 
 
 def _blind(time: float, angle: float) -> Infeasible:
-    """Reason why there is no Sun pulse: the sensor does not see the Sun at this ``angle`` (rad) from the spin axis."""
+    """Reason why there is no Sun pulse: the sensor does not see the Sun at this ``angle`` (rad)
+    from the spin axis.
+    """
     return Infeasible(
-        f"the Sun sensor does not see the Sun at {time:.4g} s, {math.degrees(angle):.4g}° from the spin axis: "
+        f"the Sun sensor does not see the Sun at {time:.4g} s, {math.degrees(angle):.4g}° from the "
+        "spin axis: "
         "there is no Sun pulse"
     )
 
@@ -96,16 +111,20 @@ def to_sun_pulse(flown: Flight, times: Vector) -> Vector:
     _, quaternions = flown.motion(times)
     seen = attitude.rotate(attitude.conjugate(quaternions), body.sun)
     azimuth = np.arctan2(seen[:, 1], seen[:, 0])
-    return np.asarray(math.copysign(1.0, body.spin) * (azimuth - body.sun_sensor.azimuth) % (2.0 * math.pi))
+    return np.asarray(
+        math.copysign(1.0, body.spin) * (azimuth - body.sun_sensor.azimuth) % (2.0 * math.pi)
+    )
 
 
 class SunPulses:
-    """Sun pulses that flights of a spacecraft wait for, as its sensor gives them; the flights go on together.
+    """Sun pulses that flights of a spacecraft wait for, as its sensor gives them; the flights go on
+    together.
 
-    ``numbers``: those of each flight, 1 the first after t = 0; they must not decrease. Iterating gives the motion of
-    all at a passage of the Sun, and the flights that one of their numbers comes to then. ``seen``: whether the sensor
-    saw each passage so far, (n,); those that it saw count. ``failures``: why a flight ended before its last number, or
-    None. Raises Infeasible where there is no Sun or no sensor.
+    ``numbers``: those of each flight, 1 the first after t = 0; they must not decrease. Iterating
+    gives the motion of all at a passage of the Sun, and the flights that one of their numbers comes
+    to then. ``seen``: whether the sensor saw each passage so far, (n,); those that it saw count.
+    ``failures``: why a flight ended before its last number, or None. Raises Infeasible where there
+    is no Sun or no sensor.
     """
 
     def __init__(self, spacecraft: Spacecraft, numbers: Sequence[Sequence[int]]) -> None:
@@ -126,10 +145,17 @@ class SunPulses:
             self.fail(flight, reason)
 
     def __iter__(self) -> Iterator[tuple[MotionStretch, list[int]]]:
-        clock, sensor, count = self.clock, self._sensor, np.zeros(len(self._due), dtype=np.int64)
-        blind, since, off = 0 * count, 0.0 * count, 0.0 * count  # passages unseen in a row; time and angle of the first
+        clock = self.clock
+        sensor = self._sensor
+        count = np.zeros(len(self._due), dtype=np.int64)
+        blind, since, off = (
+            0 * count,
+            0.0 * count,
+            0.0 * count,
+        )  # passages unseen in a row; time and angle of the first
         while (following := int(self._due.min(initial=NEVER))) < NEVER:
-            before, passage = clock.time, following if sensor.sees_all else len(self.seen) + 1
+            before = clock.time
+            passage = following if sensor.sees_all else len(self.seen) + 1
             motion = clock.sun_pulse(passage)
             for flight in np.flatnonzero(clock.lost & (self._due < NEVER)).tolist():
                 text = f"no Sun pulse comes after {max(float(before[flight]), 0.0):.4g} s"
@@ -150,11 +176,14 @@ class SunPulses:
 
 
 def sun_clock(spacecraft: Spacecraft, flights: int = 1) -> SunPulseClock:
-    """Sun pulses of so many flights of a spacecraft from t = 0; raises Infeasible where it has none."""
+    """Sun pulses of so many flights of a spacecraft from t = 0; raises Infeasible where it has
+    none.
+    """
     sensor, sun = spacecraft.sun_sensor, spacecraft.sun
     if sensor is None or sun is None:
         raise Infeasible("there is no Sun pulse; the file needs sun and sun_sensor")
-    dynamics, start = make_dynamics(spacecraft), spacecraft.initial
+    dynamics = make_dynamics(spacecraft)
+    start = spacecraft.initial
     moments, rates, quaternion, suns = (
         np.repeat(np.asarray(part, dtype=np.float64)[:, None], flights, axis=1)
         for part in (dynamics.moments, start.rates, start.quaternion, sun)
@@ -165,11 +194,16 @@ def sun_clock(spacecraft: Spacecraft, flights: int = 1) -> SunPulseClock:
 
 
 def pushes(pulse: Pulse, torque: Vector) -> list[TorqueRamp]:
-    """Torques of a pulse, from the start of its command, with the ``torque`` (3, n) N m of cases."""
+    """Torques of a pulse, from the start of its command, with the ``torque`` (3, n)
+    N m of cases.
+    """
     if pulse.command is None:
         return [TorqueRamp(0.0, pulse.on_time, torque, torque)]
     back, ramps = pulse.command.start, pulse.command.ramps
-    return [TorqueRamp(ramp.begin - back, ramp.end - back, torque * ramp.first, torque * ramp.last) for ramp in ramps]
+    return [
+        TorqueRamp(ramp.begin - back, ramp.end - back, torque * ramp.first, torque * ramp.last)
+        for ramp in ramps
+    ]
 
 
 def first_sun_pulse(spacecraft: Spacecraft) -> float:
@@ -191,33 +225,45 @@ def fired(spacecraft: Spacecraft, blocks: Sequence[Block]) -> Schedule:
 def fire_all(
     spacecraft: Spacecraft, sequences: Sequence[Sequence[Block]]
 ) -> tuple[list[Schedule | Infeasible], list[NDArray[np.bool_]]]:
-    """Pulses fired by each of the sequences of blocks, with the Sun pulses of its own motion, and `SunPulses.seen`.
+    """Pulses fired by each of the sequences of blocks, with the Sun pulses of its own motion, and
+    `SunPulses.seen`.
 
-    Sun pulses come without the jitter of the sensor, which dispersed cases draw. In the place of a schedule is the
-    reason where there is no Sun pulse, a channel is not known, a pulse would begin before the one before is over, or
-    the tank is empty.
+    Sun pulses come without the jitter of the sensor, which dispersed cases draw. In the place of a
+    schedule is the reason where there is no Sun pulse, a channel is not known, a pulse would begin
+    before the one before is over, or the tank is empty.
     """
-    sun_pulses = SunPulses(spacecraft, [[n for block in blocks for n in block.sun_pulses] for blocks in sequences])
+    sun_pulses = SunPulses(
+        spacecraft, [[n for block in blocks for n in block.sun_pulses] for blocks in sequences]
+    )
     supplies, pulses = [Supply(spacecraft) for _ in sequences], [list[Pulse]() for _ in sequences]
     firings = [iter([block for block in blocks for _ in block.sun_pulses]) for blocks in sequences]
     channels = {channel.name: channel for channel in spacecraft.channels}
-    clock, count = sun_pulses.clock, len(sequences)
-    arcs, per_kg = spacecraft.inertia.symmetric and not spacecraft.disturbances, shed(spacecraft)
+    clock = sun_pulses.clock
+    count = len(sequences)
+    arcs = spacecraft.inertia.symmetric and not spacecraft.disturbances
+    per_kg = shed(spacecraft)
     over = np.zeros(count)
     for motion, flights in sun_pulses:
         work.spend((0.0 if arcs else INTEGRATED) + FIRED * len(flights))
-        delays, widths, given = motion.since * 0.0, np.zeros(count), dict[int, Pulse]()
+        delays = motion.since * 0.0
+        widths = np.zeros(count)
+        given = dict[int, Pulse]()
         for flight in flights:
             block = next(firings[flight])
             channel = channels.get(block.channel)
             if channel is None:
-                sun_pulses.fail(flight, Infeasible(f"the spacecraft has no channel {block.channel}"))
+                sun_pulses.fail(
+                    flight, Infeasible(f"the spacecraft has no channel {block.channel}")
+                )
                 continue
             given[flight] = supplies[flight].fire(on_command(channel, 0.0, block.width), channel)
             delays[flight], widths[flight] = block.delay, block.width
             due = float(motion.since[flight] + delays[flight])
             if due < over[flight] - 1e-9:
-                text = f"a pulse of {block.channel} would begin at {due:.6g} s, before the one before is over"
+                text = (
+                    f"a pulse of {block.channel} would begin at {due:.6g} s, "
+                    "before the one before is over"
+                )
                 sun_pulses.fail(flight, Infeasible(text))
         spent = np.zeros(count)
         spent[list(given)] = [pulse.propellant or 0.0 for pulse in given.values()]
@@ -231,16 +277,29 @@ def fire_all(
     for flight, supply in enumerate(supplies):
         if sun_pulses.failures[flight] is None and supply.shortage is not None:
             sun_pulses.fail(flight, Infeasible(supply.shortage))
-    schedules = [Schedule(tuple(row), blocks=tuple(blocks)) for row, blocks in zip(pulses, sequences, strict=True)]
-    return [reason or each for reason, each in zip(sun_pulses.failures, schedules, strict=True)], sun_pulses.seen
+    schedules = [
+        Schedule(tuple(row), blocks=tuple(blocks))
+        for row, blocks in zip(pulses, sequences, strict=True)
+    ]
+    return [
+        reason or each for reason, each in zip(sun_pulses.failures, schedules, strict=True)
+    ], sun_pulses.seen
 
 
 def _together(given: Mapping[int, Pulse], count: int) -> list[TorqueRamp]:
-    """Torques of ``count`` flights by the pulses of some: of the others, and once a pulse is over, there are none."""
-    zero, together = np.zeros((3, 1)), list[TorqueRamp]()
-    ramps = [pushes(pulse, zero if pulse.torque is None else pulse.torque[:, None]) for pulse in given.values()]
+    """Torques of ``count`` flights by the pulses of some: of the others, and once a pulse is over,
+    there are none.
+    """
+    zero = np.zeros((3, 1))
+    together = list[TorqueRamp]()
+    ramps = [
+        pushes(pulse, zero if pulse.torque is None else pulse.torque[:, None])
+        for pulse in given.values()
+    ]
     for index in range(max(map(len, ramps), default=0)):
-        ramp = TorqueRamp(np.zeros(count), np.zeros(count), np.zeros((3, count)), np.zeros((3, count)))
+        ramp = TorqueRamp(
+            np.zeros(count), np.zeros(count), np.zeros((3, count)), np.zeros((3, count))
+        )
         for flight, each in zip(given, ramps, strict=True):
             over = each[-1].end if each else 0.0
             here = each[index] if index < len(each) else TorqueRamp(over, over, zero, zero)
@@ -253,7 +312,8 @@ def _together(given: Mapping[int, Pulse], count: int) -> list[TorqueRamp]:
 class Trial(NamedTuple):
     """Blocks that are tried, as arrays that broadcast.
 
-    ``wait`` Sun pulses are let pass first; ``delay`` and ``width`` in s, ``count`` pulses, one in ``every`` spins.
+    ``wait`` Sun pulses are let pass first; ``delay`` and ``width`` in s, ``count`` pulses, one in
+    ``every`` spins.
     """
 
     wait: Any
@@ -264,8 +324,9 @@ class Trial(NamedTuple):
 
 
 class Acts(NamedTuple):
-    """Response to commands, s: effective ``on_time``, ``centroid`` after the start, the ``spread`` of the thrust
-    (length of the rectangle with its second moment), and when command and thrust are ``over``.
+    """Response to commands, s: effective ``on_time``, ``centroid`` after the start, the ``spread``
+    of the thrust (length of the rectangle with its second moment), and when command and thrust are
+    ``over``.
     """
 
     on_time: Any
@@ -286,7 +347,9 @@ def acts(channel: Channel, widths: Any) -> Acts:
 @functools.lru_cache(maxsize=4096)
 def _acts(valve: Valve, width: float) -> Acts:
     on_time, centroid, ramps = valve.thrust(width)
-    return Acts(on_time, centroid, spread(ramps, centroid), max([width, *(ramp.end for ramp in ramps)]))
+    return Acts(
+        on_time, centroid, spread(ramps, centroid), max([width, *(ramp.end for ramp in ramps)])
+    )
 
 
 def evenly(values: Any, most: int) -> Any:
@@ -299,8 +362,9 @@ def evenly(values: Any, most: int) -> Any:
 class BlockState:
     """Motion between two blocks: one, or many at once.
 
-    ``sun_angle`` and ``longitude`` of H about the Sun, rad; ``sun_pulse``: when the next one comes, s; ``phasor``:
-    A ω (N m s) then; ``spin`` rad/s; ``used`` kg, 0 where every pulse is of full thrust; ``fired``: pulses by channel.
+    ``sun_angle`` and ``longitude`` of H about the Sun, rad; ``sun_pulse``: when the next one comes,
+    s; ``phasor``: A ω (N m s) then; ``spin`` rad/s; ``used`` kg, 0 where every pulse is of full
+    thrust; ``fired``: pulses by channel.
     """
 
     sun_angle: Any
@@ -324,29 +388,39 @@ class BlockModel:
     def __init__(self, spacecraft: Spacecraft) -> None:
         sun, sensor = spacecraft.sun, spacecraft.sun_sensor
         if sun is None or sensor is None:
-            raise Infeasible("blocks are fired from the Sun pulse: the file needs sun and sun_sensor")
-        self.body, self.inertia, self.sensor = spacecraft, spacecraft.inertia, sensor
+            raise Infeasible(
+                "blocks are fired from the Sun pulse: the file needs sun and sun_sensor"
+            )
+        self.body = spacecraft
+        self.inertia = spacecraft.inertia
+        self.sensor = sensor
         self.sense = math.copysign(1.0, spacecraft.spin)
         start = spacecraft.momentum / float(np.linalg.norm(spacecraft.momentum))
         # About the Sun: longitudes count from the meridian of H at t = 0, right-handed.
         sine = float(np.linalg.norm(np.cross(sun, start)))
         if sine < 1e-6:
             raise Infeasible("the spin axis points to the Sun or away from it: it has no Sun pulse")
-        self._frame = np.array([np.cross(np.cross(sun, start), sun) / sine, np.cross(sun, start) / sine, sun])
+        self._frame = np.array(
+            [np.cross(np.cross(sun, start), sun) / sine, np.cross(sun, start) / sine, sun]
+        )
         self.goal = self._frame @ spacecraft.target_axis
-        supply, rate = Supply(spacecraft), spacecraft.nutation_rate
+        supply = Supply(spacecraft)
+        rate = spacecraft.nutation_rate
         self._slope, self._offset = self.inertia.linear_rate(spacecraft.spin)
         first = first_sun_pulse(spacecraft)
         self.start = BlockState(
             sun_angle=math.atan2(sine, float(sun @ start)),
             longitude=0.0,
-            phasor=self.inertia.A * complex(*spacecraft.omega0[:2].tolist()) * cmath.exp(-1j * rate * first),
+            phasor=self.inertia.A
+            * complex(*spacecraft.omega0[:2].tolist())
+            * cmath.exp(-1j * rate * first),
             sun_pulse=first,
             spin=spacecraft.spin,
             used=supply.used,
             fired=supply.fired,
         )
-        self.turn, self.steady = spin_turn(spacecraft), supply.steady
+        self.turn = spin_turn(spacecraft)
+        self.steady = supply.steady
         self._tables: dict[tuple[Any, ...], tuple[Any, Any]] = {}
 
     def rate(self, spin: Any) -> Any:
@@ -355,27 +429,40 @@ class BlockModel:
 
     def turned_by(self, channel: Channel, width: Any, spin: Any) -> Any:
         """Turn of H by one pulse, rad."""
-        given, momentum = acts(channel, width), abs(self.inertia.axial(spin))
-        return precession.turned_by(momentum, abs(channel.transverse), given.on_time, spin, given.spread)
+        given = acts(channel, width)
+        momentum = abs(self.inertia.axial(spin))
+        return precession.turned_by(
+            momentum, abs(channel.transverse), given.on_time, spin, given.spread
+        )
 
-    def full_pulses(self, state: BlockState, channel: Channel, width: Any, count: Any) -> tuple[Any, Any]:
-        """Equivalent number of full pulses of blocks from ``state``, and the propellant used after them, kg."""
+    def full_pulses(
+        self, state: BlockState, channel: Channel, width: Any, count: Any
+    ) -> tuple[Any, Any]:
+        """Equivalent number of full pulses of blocks from ``state``, and the propellant used after
+        them, kg.
+        """
         if self.steady:
             return count, state.used
         on_times, index = np.unique(acts(channel, width).on_time, return_inverse=True)
-        fired, used, most = int(state.fired.get(channel.name, 0)), float(state.used), int(np.max(count))
+        fired = int(state.fired.get(channel.name, 0))
+        used = float(state.used)
+        most = int(np.max(count))
         key = (channel.name, fired, used, most, on_times.tobytes())
         if key not in self._tables:
             if sum(full.size for full, _ in self._tables.values()) > KEPT:
                 self._tables.clear()
-            self._tables[key] = Supply(self.body, Counter({channel.name: fired}), used).train(channel, on_times, most)
+            self._tables[key] = Supply(self.body, Counter({channel.name: fired}), used).train(
+                channel, on_times, most
+            )
         at = index.reshape(np.shape(width)), np.asarray(count) - 1
         full, spent = self._tables[key]
         return full[at], spent[at]
 
-    def kicks(self, state: BlockState, channel: Channel, trial: Trial, step: Any, *, back: bool = False) -> Any:
-        """Σ of the effective on-times of blocks from ``state``, s, the k-th turned by e^{ik step}; ``back``: the last
-        has none, those before it e^{-i step} each.
+    def kicks(
+        self, state: BlockState, channel: Channel, trial: Trial, step: Any, *, back: bool = False
+    ) -> Any:
+        """Σ of the effective on-times of blocks from ``state``, s, the k-th turned by e^{ik step};
+        ``back``: the last has none, those before it e^{-i step} each.
         """
         full, _ = self.full_pulses(state, channel, trial.width, trial.count)
         total = precession.phasor_sum(trial.count, -step if back else step)
@@ -386,7 +473,9 @@ class BlockModel:
         return acts(channel, trial.width).on_time * mean * (total - cold)
 
     def _cold(self, state: BlockState, channel: Channel, trial: Trial, step: Any) -> Any:
-        """Deficit of the sum of e^{ik step} by cold pulses: a geometric series, as the factor of the k-th decays."""
+        """Deficit of the sum of e^{ik step} by cold pulses: a geometric series, as the factor of
+        the k-th decays.
+        """
         cold = self.body.cold
         if cold is None:
             return 0.0
@@ -396,9 +485,11 @@ class BlockModel:
             return lacks * (1.0 - ratio**trial.count) / (1.0 - ratio)
 
     def heading(self, channel: Channel, delay: Any, width: Any) -> Any:
-        """Heading of H from the direction away from the Sun, right-handed about H, rad: the same for all pulses.
+        """Heading of H from the direction away from the Sun, right-handed about H, rad: the same
+        for all pulses.
 
-        At the centroid of a pulse the Sun has turned in the body by -ω3 (delay + centroid) from the sensor.
+        At the centroid of a pulse the Sun has turned in the body by -ω3 (delay + centroid) from the
+        sensor.
         """
         turned = self.body.spin * (delay + acts(channel, width).centroid)
         from_sun = cmath.phase(channel.transverse) - self.sensor.azimuth + turned
@@ -406,15 +497,21 @@ class BlockModel:
 
     def delay(self, channel: Channel, heading: Any, width: Any) -> Any:
         """Delay in [0, one spin turn) s that gives a ``heading``: the inverse of `heading`."""
-        azimuth = self.sense * heading + math.pi - cmath.phase(channel.transverse) + self.sensor.azimuth
-        return (azimuth / self.body.spin - acts(channel, width).centroid) % (2.0 * math.pi / abs(self.body.spin))
+        azimuth = (
+            self.sense * heading + math.pi - cmath.phase(channel.transverse) + self.sensor.azimuth
+        )
+        return (azimuth / self.body.spin - acts(channel, width).centroid) % (
+            2.0 * math.pi / abs(self.body.spin)
+        )
 
     def damping_delay(self, state: BlockState, channel: Channel, trial: Trial) -> Any:
         """First delay, s, at which blocks take most of the nutation; ``trial.delay`` is not used.
 
-        The kicks of the block, each carried to the first one, add up to a phasor; ω must then point against it.
+        The kicks of the block, each carried to the first one, add up to a phasor; ω must then point
+        against it.
         """
-        interval, rate = trial.every * self.turn, self.rate(self.body.spin)
+        interval = trial.every * self.turn
+        rate = self.rate(self.body.spin)
         kicks = channel.transverse * self.kicks(state, channel, trial, rate * interval)
         to_go = np.angle(-kicks / (state.phasor * np.exp(-1j * rate * trial.wait * self.turn)))
         if rate == 0.0:
@@ -441,7 +538,8 @@ class BlockModel:
         heading = self.heading(channel, trial.delay, trial.width)
         sun_angle, longitude, turned = precession.rhumb_end(state.sun_angle, heading, full * step)
         turn = self.turn * np.abs(self.body.spin / spin)
-        # As H goes round the Sun, its meridian turns about H, and the Sun pulse comes later by as much.
+        # As H goes round the Sun, its meridian turns about H, and the Sun pulse comes later by as
+        # much.
         interval = trial.every * turn + turned / trial.count * turn / (2.0 * math.pi)
         first = state.sun_pulse + trial.wait * self.turn * np.abs(self.body.spin / state.spin)
         following = first + (trial.count - 1) * interval + turn
@@ -461,13 +559,17 @@ class BlockModel:
         )
 
     def apart(self, state: BlockState, flown: Flight) -> BlockState:
-        """Difference of the motion as ``flown`` from ``state``, to be added to the states of other blocks."""
-        end, rate = flown.settled, self.rate(flown.settled.spin)
+        """Difference of the motion as ``flown`` from ``state``, to be added to the states of other
+        blocks.
+        """
+        end = flown.settled
+        rate = self.rate(flown.settled.spin)
         axis = self._frame @ flown.final.momentum
         since = float(state.sun_pulse) - flown.schedule.end
         return BlockState(
             sun_angle=math.atan2(math.hypot(axis[0], axis[1]), axis[2]) - state.sun_angle,
-            longitude=(math.atan2(axis[1], axis[0]) - state.longitude + math.pi) % (2.0 * math.pi) - math.pi,
+            longitude=(math.atan2(axis[1], axis[0]) - state.longitude + math.pi) % (2.0 * math.pi)
+            - math.pi,
             phasor=self.inertia.A * end.omega * cmath.exp(-1j * rate * since) - state.phasor,
             sun_pulse=0.0,
             spin=end.spin - state.spin,
@@ -476,7 +578,9 @@ class BlockModel:
     def left(self, state: BlockState) -> Left:
         """Residual for `requirements`."""
         across, (i, j, k) = np.sin(state.sun_angle), self.goal
-        x, y, z = across * np.cos(state.longitude), across * np.sin(state.longitude), np.cos(state.sun_angle)
+        x = across * np.cos(state.longitude)
+        y = across * np.sin(state.longitude)
+        z = np.cos(state.sun_angle)
         aside = np.sqrt((y * k - z * j) ** 2 + (z * i - x * k) ** 2 + (x * j - y * i) ** 2)
         apart = np.arctan2(aside, x * i + y * j + z * k)
         nutation = np.arctan2(np.abs(state.phasor), np.abs(self.inertia.axial(state.spin)))

@@ -1,8 +1,9 @@
 """Search over command blocks in closed form, and the flights of the best.
 
-Every block of one channel, width, number of pulses and interval is looked at in closed form (`block_model`), at the
-delays next to the two that serve best: one for the heading of H, one for the nutation. Second and third blocks are
-looked for behind the most promising. The best dozen are flown from the Sun pulses of the nutating body.
+Every block of one channel, width, number of pulses and interval is looked at in closed form
+(`block_model`), at the delays next to the two that serve best: one for the heading of H, one for
+the nutation. Second and third blocks are looked for behind the most promising. The best dozen are
+flown from the Sun pulses of the nutating body.
 """
 
 from __future__ import annotations
@@ -32,53 +33,73 @@ from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.requirements import SAME_COST, Left, Part, complies
 from nutdamp.spacecraft.schedule import Schedule
 
-GENTLE = 10  # multiple of `FLOWN`: sequences among which those with the smallest pulses are flown too
-# blocks after one wait up to which all are looked at, and the cheapest of them behind which others are
+GENTLE = (
+    10  # multiple of `FLOWN`: sequences among which those with the smallest pulses are flown too
+)
+# blocks after one wait up to which all are looked at, and the cheapest of them behind which others
+# are
 ALL_BLOCKS = 400
 ALL_FIRSTS = 300
 LONGEST = 5000  # pulses of a block, at most: more would take the whole budget of work to fire
 SOME_COUNTS = 256  # numbers of pulses that are looked at, where a block may have more
 FEW_DELAYS = 16  # delays, up to which each is looked at
 AROUND = (0, 1)  # steps of the delay that are looked at, from the one below the best delay
-MOST_WIDTHS = 24  # widths that are looked at for a second and a third block, where more can be commanded
-# share of a spin turn by which blocks in closed form keep away from blackout windows: nutation moves Sun pulses
+MOST_WIDTHS = (
+    24  # widths that are looked at for a second and a third block, where more can be commanded
+)
+# share of a spin turn by which blocks in closed form keep away from blackout windows: nutation
+# moves Sun pulses
 BESIDE = 0.01
-CHEAPER = 0.9  # multiple of the cost of a sequence below which one that leaves more is looked at, too
-# multiple of the least cost of lowering the nutation above which further blocks are looked for though one complies
+CHEAPER = (
+    0.9  # multiple of the cost of a sequence below which one that leaves more is looked at, too
+)
+# multiple of the least cost of lowering the nutation above which further blocks are looked for
+# though one complies
 DEAR = 1.5
 CORRECTED = 4  # flights whose neighbours are looked at where none complies
-SURELY = 3.0  # largest difference of a block's length from the way to the target, over its end error
+SURELY = (
+    3.0  # largest difference of a block's length from the way to the target, over its end error
+)
 TOGETHER = 32  # sequences behind which others are looked for at once
 
 Array = NDArray[np.float64]
 
 WAITS = 24  # Sun pulses that may pass before a block, so that its nutation meets the one before
-WINDOWS = 8  # blackout windows after which a block is begun, or before which one ends, at most: the first ones
+# blackout windows after which a block is begun, or before which one ends, at most: the first ones
+WINDOWS = 8
 
 FIRST = 24
-"""First blocks behind which others are looked for: so many of the best, of small ones, and of parts of the way."""
+"""First blocks behind which others are looked for: so many of the best, of small ones, and of parts
+of the way.
+"""
 
 BLOCKS = 3  # blocks of a schedule, at most
 
 DOUBTFUL, DOUBTS = 1.5, 100
-"""Share of a bound up to which the closed form may err, and sequences flown since that would make them good."""
+"""Share of a bound up to which the closed form may err, and sequences flown since that would make
+them good.
+"""
 
 ALIKE = 4  # sequences that may come with the same blocks, over those that are wanted
 
 CLOSEST, FEW = 24, 4
-"""Widths and numbers of later blocks that are looked at, by each of their merits, and pulses that count as few."""
+"""Widths and numbers of later blocks that are looked at, by each of their merits, and pulses that
+count as few.
+"""
 
 LOOKED = 2e-6  # units of `work` of a block that is looked at
 
 Blocks = tuple[Block, ...]
 
 FLOWN = 12  # sequences of blocks that are flown; as many more where none of them complies
-DEARER = 1.01  # multiple of the cost of a sequence that complied in a flight from which on none is flown
+DEARER = (
+    1.01  # multiple of the cost of a sequence that complied in a flight from which on none is flown
+)
 
 
 class BlockSequence(NamedTuple):
-    """Blocks, and their rank in closed form, the less, the better: the share of a bound, 0 where all are kept, then
-    the cost, then the time of the end; and the ``share``.
+    """Blocks, and their rank in closed form, the less, the better: the share of a bound, 0 where
+    all are kept, then the cost, then the time of the end; and the ``share``.
     """
 
     blocks: Blocks
@@ -87,7 +108,9 @@ class BlockSequence(NamedTuple):
 
 
 class FlownSequence(NamedTuple):
-    """Flight of a sequence; ``rank``: breaks a limit, share of a bound that is passed, cost, end in s."""
+    """Flight of a sequence; ``rank``: breaks a limit, share of a bound that is passed, cost, end in
+    s.
+    """
 
     rank: tuple[bool, float, float, float]
     schedule: Schedule
@@ -98,15 +121,19 @@ START = BlockSequence((), (math.inf, math.inf, math.inf))  # no blocks, before w
 
 
 class BlockFlights:
-    """Flights of sequences of one spacecraft: ``of`` each, and the least cost that is ``known`` to comply.
+    """Flights of sequences of one spacecraft: ``of`` each, and the least cost that is ``known`` to
+    comply.
 
     ``bounds``: what they are judged by; ``damps``: where the nutation alone is to be lowered.
     """
 
     def __init__(self, spacecraft: Spacecraft) -> None:
-        self.body, self.known = spacecraft, math.inf
+        self.body = spacecraft
+        self.known = math.inf
         self.damps = spacecraft.goal.axis is None and spacecraft.goal.spin is None
-        lower = 0.98 * spacecraft.nutation if self.damps else math.inf  # blocks without a goal are to lower it
+        lower = (
+            0.98 * spacecraft.nutation if self.damps else math.inf
+        )  # blocks without a goal are to lower it
         self.bounds = []
         for bound in requirements.bounds(spacecraft):
             if bound.part is Part.NUTATION:
@@ -124,12 +151,20 @@ class BlockFlights:
     def shares(self, left: Left) -> dict[Part, NDArray[np.float64]]:
         """Share of each bound that is ``left``."""
         left_of, body = requirements.left_of, self.body
-        return {bound.part: np.asarray(bound.used(left_of(bound, left, body))) for bound in self.bounds}
+        return {
+            bound.part: np.asarray(bound.used(left_of(bound, left, body))) for bound in self.bounds
+        }
 
     def fired(self, sequences: Sequence[BlockSequence]) -> Iterator[BlockSequence]:
-        """The sequences that cost no more than one that complied in a flight; a dozen of them are fired together."""
+        """The sequences that cost no more than one that complied in a flight; a dozen of them are
+        fired together.
+        """
         for begin in range(0, len(sequences), FLOWN):
-            some = [each for each in sequences[begin : begin + FLOWN] if each.rank[1] <= self.known * DEARER]
+            some = [
+                each
+                for each in sequences[begin : begin + FLOWN]
+                if each.rank[1] <= self.known * DEARER
+            ]
             new = [sequence.blocks for sequence in some if sequence.blocks not in self._fired]
             if new:
                 self._fired.update(zip(new, self._together(new), strict=True))
@@ -151,7 +186,9 @@ class BlockFlights:
             if isinstance(schedule, Infeasible):
                 raise schedule
             share = float(self.share(left_by(propagation.flown(self.body, schedule))))
-            missed = 0.0 if complies(share) else float(f"{share:.9g}")  # rounding is no reason to wait for a Sun pulse
+            missed = (
+                0.0 if complies(share) else float(f"{share:.9g}")
+            )  # rounding is no reason to wait for a Sun pulse
             rank = not keeps_limits(self.body, schedule), missed, schedule.cost, schedule.end
             self.of[sequence.blocks] = FlownSequence(rank, schedule, sequence)
             if rank[:2] == (False, 0.0):
@@ -175,7 +212,9 @@ def by_blocks(sequences: Iterable[BlockSequence]) -> dict[tuple[Block, ...], Blo
 
 
 def of_each_kind(ranked: Iterable[BlockSequence], *names: str) -> list[BlockSequence]:
-    """The first sequence of each kind, by the fields of its blocks that are named; default channel and interval."""
+    """The first sequence of each kind, by the fields of its blocks that are named; default channel
+    and interval.
+    """
     kinds: dict[tuple[object, ...], BlockSequence] = {}
     fields = operator.attrgetter(*(names or ("channel", "every")))
     for sequence in ranked:
@@ -186,7 +225,9 @@ def of_each_kind(ranked: Iterable[BlockSequence], *names: str) -> list[BlockSequ
 class BlockSearch:
     """The command blocks of one spacecraft and their ranking in closed form."""
 
-    def __init__(self, spacecraft: Spacecraft, channels: Sequence[Channel], commands: Commands) -> None:
+    def __init__(
+        self, spacecraft: Spacecraft, channels: Sequence[Channel], commands: Commands
+    ) -> None:
         self.body, self.channels, self.commands = spacecraft, channels, commands
         self.model = BlockModel(spacecraft)
         self.flights = BlockFlights(spacecraft)
@@ -195,21 +236,31 @@ class BlockSearch:
         self.looked = 0
         self.most = math.inf  # what a sequence may cost
         self._states: dict[Blocks, BlockState] = {(): self.model.start}
-        self.doubtful: list[BlockSequence] = []  # those that may comply in a flight, the cheapest first
+        self.doubtful: list[
+            BlockSequence
+        ] = []  # those that may comply in a flight, the cheapest first
         limits, turn, step = spacecraft.limits, self.model.turn, commands.delay_step
         self.allowed = min(commands.max_count, LONGEST, limits.max_pulses or LONGEST)
         self.pause = math.ceil(limits.gap / turn)
         self.dark = Windows(spacecraft).dark
         self.earliest = max(math.ceil((limits.earliest - self.model.start.sun_pulse) / turn), 0)
-        # Where the nutation alone is to be lowered, and H may end anywhere, delays alone meet phases: fewer waits do.
+        # Where the nutation alone is to be lowered, and H may end anywhere, delays alone meet
+        # phases: fewer waits do.
         self._damps = self.flights.damps
         self._waiting = WAITS // 3 if self._damps and Part.SHIFT not in self._most else WAITS
-        self._every = [every for every in commands.every if every * turn >= limits.gap + float(commands.widths[0])]
+        self._every = [
+            every
+            for every in commands.every
+            if every * turn >= limits.gap + float(commands.widths[0])
+        ]
         self._kinds = list(itertools.product(channels, self._every))
         last_delay = math.floor(min(commands.delay_max, turn) / step * (1.0 + 1e-12))
-        self._last_delay, self._few_delays = last_delay, last_delay < FEW_DELAYS
+        self._last_delay = last_delay
+        self._few_delays = last_delay < FEW_DELAYS
         few = min(last_delay + 1, FEW_DELAYS)
-        self._delays = np.asarray(np.arange(few) * step, dtype=np.float64)  # all that can be commanded, where few
+        self._delays = np.asarray(
+            np.arange(few) * step, dtype=np.float64
+        )  # all that can be commanded, where few
         widths = sum(len(commandable_widths(commands, channel)) for channel in channels)
         # So few blocks after one wait that all are looked at.
         self.small = self._few_delays and widths * few * self.allowed <= ALL_BLOCKS
@@ -226,7 +277,11 @@ class BlockSearch:
                 break
             if number == 2:
                 small = self._further([START], few=2) if abs(self.model.start.phasor) > 0.0 else []
-                firsts = [*_promising(sequences, FIRST), *_promising(small, FIRST), *self._parts()[:FIRST]]
+                firsts = [
+                    *_promising(sequences, FIRST),
+                    *_promising(small, FIRST),
+                    *self._parts()[:FIRST],
+                ]
                 if self.small:  # the 300 cheapest of all
                     grid = self._grid(self.model.start, self.earliest)
                     every = self.behind([START], self.model.start, grid, ALL_FIRSTS)
@@ -237,14 +292,20 @@ class BlockSearch:
             sequences += firsts
         self.most = math.inf
         unsure = (each for each in sequences if each.share <= DOUBTFUL)
-        self.doubtful = list(by_blocks(nsmallest(ALIKE * DOUBTS, unsure, key=lambda each: each.rank[1:])).values())
-        # The flight differs a little, and the more the larger the nutation on the way: half of them are the cheapest
-        # that comply, half those that do most clearly, and the best one of each number of blocks is among them.
-        ranked = [next(alike) for _, alike in itertools.groupby(sorted(sequences, key=_rank), _blocks)]
+        self.doubtful = list(
+            by_blocks(nsmallest(ALIKE * DOUBTS, unsure, key=lambda each: each.rank[1:])).values()
+        )
+        # The flight differs a little, and the more the larger the nutation on the way: half of them
+        # are the cheapest that comply, half those that do most clearly, and the best one of each
+        # number of blocks is among them.
+        ranked = [
+            next(alike) for _, alike in itertools.groupby(sorted(sequences, key=_rank), _blocks)
+        ]
         clear = nsmallest(GENTLE * FLOWN, ranked, key=_share)
         each = {len(sequence.blocks): sequence for sequence in reversed(ranked)}.values()
         first = by_blocks((*ranked[: FLOWN // 2], *clear[: FLOWN // 2], *each))
-        # Nutation on the way goes with what one pulse turns H by: where all those miss, the gentlest of many follow.
+        # Nutation on the way goes with what one pulse turns H by: where all those miss, the
+        # gentlest of many follow.
         gentle = sorted(clear, key=self._largest_pulse)
         more = by_blocks((*_front(ranked)[:FLOWN], *of_each_kind(ranked)[:FLOWN], *gentle))
         others = (sequence for blocks, sequence in more.items() if blocks not in first)
@@ -262,16 +323,21 @@ class BlockSearch:
 
     @property
     def _dear(self) -> bool:
-        """True where the nutation alone has to be lowered, and more blocks may cost much less than those that comply.
+        """True where the nutation alone has to be lowered, and more blocks may cost much less than
+        those that comply.
 
         The least is what kicks cost that all point against ω, or two pulses.
         """
         if self._waiting == WAITS:
             return False
-        kicked = abs(self.model.start.phasor) - math.tan(self._most[Part.NUTATION]) * abs(self.body.axial)
+        kicked = abs(self.model.start.phasor) - math.tan(self._most[Part.NUTATION]) * abs(
+            self.body.axial
+        )
         least = math.inf
         for channel in filter(lambda each: each.transverse, self.channels):
-            shortest = float(acts(channel, commandable_widths(self.commands, channel)).on_time.min())
+            shortest = float(
+                acts(channel, commandable_widths(self.commands, channel)).on_time.min()
+            )
             lasts = max(kicked / abs(channel.transverse), 2.0 * shortest)
             least = min(least, channel.cost_rate(by_propellant=True) * lasts)
         return self.most > DEAR * least
@@ -285,17 +351,25 @@ class BlockSearch:
         """Motion after blocks, in closed form."""
         if blocks not in self._states:
             *before, last = blocks
-            trial = Trial(last.first - _following(before), last.delay, last.width, last.count, last.every)
-            self._states[blocks] = self.model.after(self.state(tuple(before)), self._named[last.channel], trial)
+            trial = Trial(
+                last.first - _following(before), last.delay, last.width, last.count, last.every
+            )
+            self._states[blocks] = self.model.after(
+                self.state(tuple(before)), self._named[last.channel], trial
+            )
         return self._states[blocks]
 
     def _motions(self, before: Sequence[BlockSequence]) -> BlockState:
-        """Motions after some sequences in one, with three more axes behind that of the sequences."""
+        """Motions after some sequences in one,
+        with three more axes behind that of the sequences.
+        """
         states = [self.state(sequence.blocks) for sequence in before]
         if len(states) == 1:
             return states[0]
         names = [field.name for field in fields(BlockState)][:-1]  # of numbers
-        columns: dict[str, Any] = {name: np.array([getattr(state, name) for state in states]) for name in names}
+        columns: dict[str, Any] = {
+            name: np.array([getattr(state, name) for state in states]) for name in names
+        }
         return BlockState(**{name: column[:, None, None, None] for name, column in columns.items()})
 
     def behind(
@@ -306,27 +380,41 @@ class BlockSearch:
         few: int = FLOWN,
         off: BlockState | None = None,
     ) -> list[BlockSequence]:
-        """The best of the ``trials`` of each channel, after the blocks ``before``, from their `_motions`, ``state``.
+        """The best of the ``trials`` of each channel, after the blocks ``before``, from their
+        `_motions`, ``state``.
 
-        The axes of trials are the sequences before, and three more: the best ``few`` are chosen along the last two.
-        ``off``: by how much they end elsewhere than the closed form says.
+        The axes of trials are the sequences before, and three more: the best ``few`` are chosen
+        along the last two. ``off``: by how much they end elsewhere than the closed form says.
         """
-        following, sequences = np.array([_following(each.blocks) for each in before]), list[BlockSequence]()
+        following = np.array([_following(each.blocks) for each in before])
+        sequences = list[BlockSequence]()
         for channel, trial in trials:
             after = self.model.after(state, channel, trial)
             left = self.model.left(after if off is None else after.shifted(off))
-            shape = np.broadcast_shapes((len(before), 1, 1, 1), *map(np.shape, (*trial, left.nutation)))
+            shape = np.broadcast_shapes(
+                (len(before), 1, 1, 1), *map(np.shape, (*trial, left.nutation))
+            )
             self.looked += math.prod(shape)
             work.spend(LOOKED * math.prod(shape))
-            share = self.flights.share(left)  # largest one of a bound; infinite for blocks that may not be
+            share = self.flights.share(
+                left
+            )  # largest one of a bound; infinite for blocks that may not be
             over = np.asarray(after.sun_pulse) > self.body.horizon + self.model.turn
             over = over | self._dark(state, channel, trial, after)
-            if self.body.goal.axis is not None:  # H has gone round the Sun the longer way to the target, or once more
-                over = over | (np.abs(after.longitude - state.longitude - self.model.ahead(state)) > math.pi)
-            over = over if self.body.tank is None else over | (after.used > self.body.tank.propellant)
+            if (
+                self.body.goal.axis is not None
+            ):  # H has gone round the Sun the longer way to the target, or once more
+                over = over | (
+                    np.abs(after.longitude - state.longitude - self.model.ahead(state)) > math.pi
+                )
+            over = (
+                over if self.body.tank is None else over | (after.used > self.body.tank.propellant)
+            )
             share = np.where(over | np.isnan(share) | (after.cost >= self.most), np.inf, share)
             table = shape[0] * shape[1], shape[2] * shape[3]
-            severity, cost = (np.broadcast_to(part, shape).reshape(table) for part in (share, after.cost))
+            severity, cost = (
+                np.broadcast_to(part, shape).reshape(table) for part in (share, after.cost)
+            )
             doubted = np.where(severity <= DOUBTFUL, cost, np.inf)
             keys = (
                 (_in_order(severity, cost), few),
@@ -339,8 +427,16 @@ class BlockSearch:
             every = np.where(count > 1, every, self.commands.every[0])
             share, ends = severity.ravel()[index], np.broadcast_to(after.sun_pulse, shape)[at]
             ranks = np.where(complies(share), 0.0, share), cost.ravel()[index], ends
-            columns = following[at[0]] + wait, np.round(delay, 12), np.round(width, 12), count, every
-            lists = zip(*(column.tolist() for column in (at[0], share, *ranks, *columns)), strict=True)
+            columns = (
+                following[at[0]] + wait,
+                np.round(delay, 12),
+                np.round(width, 12),
+                count,
+                every,
+            )
+            lists = zip(
+                *(column.tolist() for column in (at[0], share, *ranks, *columns)), strict=True
+            )
             for parent, severe, failed, spent, end, *block in lists:
                 blocks = (*before[parent].blocks, Block(channel.name, *block))
                 sequences.append(BlockSequence(blocks, (failed, spent, end), severe))
@@ -348,22 +444,35 @@ class BlockSearch:
 
     def _counts(self, state: BlockState, every: int) -> NDArray[np.int64]:
         """Numbers of pulses up to the horizon."""
-        most = int((self.body.horizon - float(np.min(state.sun_pulse))) / (every * self.model.turn)) + 1
+        most = (
+            int((self.body.horizon - float(np.min(state.sun_pulse))) / (every * self.model.turn))
+            + 1
+        )
         most = max(min(most, self.allowed), 0)
         if most > SOME_COUNTS:
             return np.unique(np.geomspace(1, most, SOME_COUNTS).round().astype(int))
         return np.arange(1, most + 1)
 
     def _single(self) -> list[BlockSequence]:
-        """The best single blocks at the delays that serve best, without those that surely end worse by `_short_by`."""
+        """The best single blocks at the delays that serve best, without those that surely end worse
+        by `_short_by`.
+        """
         start = self.model.start
         waits = self._waits(start, self.earliest, self._waiting if abs(start.phasor) > 0.0 else 1)
-        short = [(channel, every, self._short_by(start, channel, every)) for channel, every in self._kinds]
+        short = [
+            (channel, every, self._short_by(start, channel, every))
+            for channel, every in self._kinds
+        ]
         most = max((lacks.max() for _, _, lacks in short if lacks.size), default=0.0)
         within = surely = DOUBTFUL if self._damps else SURELY
         while True:
             trials = (
-                (channel, self._at_delays(start, channel, waits, np.flatnonzero(lacks[0] <= within)[None], every))
+                (
+                    channel,
+                    self._at_delays(
+                        start, channel, waits, np.flatnonzero(lacks[0] <= within)[None], every
+                    ),
+                )
                 for channel, every, lacks in short
                 if np.any(lacks <= within)
             )
@@ -374,12 +483,15 @@ class BlockSearch:
             within = min(enough, 10.0 * within, most)
 
     def _short_by(self, state: BlockState, channel: Channel, every: int) -> Array:
-        """Least miss of blocks of each width and number, (k, w n) after each of k motions, in shares of its bound.
+        """Least miss of blocks of each width and number, (k, w n) after each of k motions, in
+        shares of its bound.
 
-        Of the spin where it is to change; with a target of the length of the rhumb line, of which a block ends no
-        nearer than a third of the difference; else of the nutation, lowered by the sum of their kicks at most.
+        Of the spin where it is to change; with a target of the length of the rhumb line, of which a
+        block ends no nearer than a third of the difference; else of the nutation, lowered by the
+        sum of their kicks at most.
         """
-        widths, counts = commandable_widths(self.commands, channel)[:, None], self._counts(state, every)
+        widths = commandable_widths(self.commands, channel)[:, None]
+        counts = self._counts(state, every)
         work.spend(LOOKED * widths.size * counts.size * np.size(state.phasor))
         if self._damps:
             return self._undamped(state, channel, every)
@@ -394,16 +506,25 @@ class BlockSearch:
 
     def _undamped(self, state: BlockState, channel: Channel, every: int) -> Array:
         """Nutation that is left at least, as in `_short_by`."""
-        widths, counts = commandable_widths(self.commands, channel)[:, None], self._counts(state, every)
-        trial, step = Trial(0, 0.0, widths, counts, every), self.model.rate(self.body.spin) * self.model.turn
-        kicks = abs(channel.transverse) * np.abs(self.model.kicks(state, channel, trial, every * step))
+        widths = commandable_widths(self.commands, channel)[:, None]
+        counts = self._counts(state, every)
+        trial = Trial(0, 0.0, widths, counts, every)
+        step = self.model.rate(self.body.spin) * self.model.turn
+        kicks = abs(channel.transverse) * np.abs(
+            self.model.kicks(state, channel, trial, every * step)
+        )
         left = np.abs(np.abs(state.phasor) - kicks) / abs(self.body.axial)
-        return np.asarray(left / self._most.get(Part.NUTATION, math.inf)).reshape(-1, len(widths) * len(counts))
+        return np.asarray(left / self._most.get(Part.NUTATION, math.inf)).reshape(
+            -1, len(widths) * len(counts)
+        )
 
     def _further(self, before: Sequence[BlockSequence], few: int) -> list[BlockSequence]:
-        """Blocks behind those ``before`` that go the rest of the way, or take the nutation that is left."""
+        """Blocks behind those ``before`` that go the rest of the way, or take the nutation that is
+        left.
+        """
         step = TOGETHER if self.model.steady and not len(self.dark[0]) else 1
-        least, sequences = self.pause if before and before[0].blocks else self.earliest, list[BlockSequence]()
+        least = self.pause if before and before[0].blocks else self.earliest
+        sequences = list[BlockSequence]()
         for begin in range(0, len(before), step):
             some = before[begin : begin + step]
             state = self._motions(some)
@@ -412,24 +533,32 @@ class BlockSearch:
         return sequences
 
     def _rest(self, state: BlockState, least: int) -> Iterator[tuple[Channel, Trial]]:
-        """Blocks of the widths and numbers that may miss least, the cheapest and the nearest, and of few pulses."""
+        """Blocks of the widths and numbers that may miss least, the cheapest and the nearest, and
+        of few pulses.
+        """
         waits = self._waits(state, least, self._waiting)
         for channel, every in self._kinds:
-            lacks, counts = self._short_by(state, channel, every), self._counts(state, every)
+            lacks = self._short_by(state, channel, every)
+            counts = self._counts(state, every)
             if not lacks.size:
                 continue
             widths = commandable_widths(self.commands, channel)
             spent = np.multiply.outer(acts(channel, widths).on_time, counts).ravel()
             gentle = np.tile(counts <= FEW, len(widths))
-            damping = np.where(gentle, lacks if self._damps else self._undamped(state, channel, every), np.inf)
-            nearest = np.concatenate([_least(_in_order(lacks, spent), CLOSEST), _least(lacks, CLOSEST)], axis=1)
+            damping = np.where(
+                gentle, lacks if self._damps else self._undamped(state, channel, every), np.inf
+            )
+            nearest = np.concatenate(
+                [_least(_in_order(lacks, spent), CLOSEST), _least(lacks, CLOSEST)], axis=1
+            )
             some = evenly(np.flatnonzero(gentle), CLOSEST if len(lacks) > 1 else FEW * CLOSEST)
             for index in (nearest, _least(damping, CLOSEST), some[None]):
                 yield channel, self._at_delays(state, channel, waits, index, every)
 
     def _parts(self) -> list[BlockSequence]:
         """First blocks that go a part of the way to the target."""
-        start, sequences = self.model.start, list[BlockSequence]()
+        start = self.model.start
+        sequences = list[BlockSequence]()
         heading, way = self.model.course(start)
         if self.body.goal.axis is None or not self._every:
             return sequences
@@ -439,29 +568,48 @@ class BlockSearch:
                 step = float(self.model.turned_by(channel, width, start.spin))
                 delay = self.commanded(self.model.delay(channel, heading, width))
                 first = start.sun_pulse + float(delay) + float(acts(channel, width).over)
-                fits = (self.dark[0][:WINDOWS] - first) / (every * self.model.turn) - self.earliest / every
-                counts = np.rint([*shares * float(way) / step, *np.floor(fits), *np.floor(fits) + 1.0])
+                fits = (self.dark[0][:WINDOWS] - first) / (
+                    every * self.model.turn
+                ) - self.earliest / every
+                counts = np.rint(
+                    [*shares * float(way) / step, *np.floor(fits), *np.floor(fits) + 1.0]
+                )
                 counts = np.unique(counts.clip(1, self.allowed).astype(int))
                 rows = np.meshgrid(self._waits(start, self.earliest, 1), counts)
                 wait, count = (row.reshape(-1, 1, 1) for row in rows)
-                sequences += self.behind([START], start, [(channel, Trial(wait, delay, width, count, every))], 1)
+                sequences += self.behind(
+                    [START], start, [(channel, Trial(wait, delay, width, count, every))], 1
+                )
         return sequences
 
     def _grid(self, state: BlockState, least: int) -> Iterator[tuple[Channel, Trial]]:
-        """All blocks, from ``least`` Sun pulses on: by wait, width and number of pulses, and by delay."""
+        """All blocks, from ``least`` Sun pulses on: by wait, width and number of pulses, and by
+        delay.
+        """
         for channel, every in self._kinds:
-            widths, counts = commandable_widths(self.commands, channel), np.arange(1, self.allowed + 1)
+            widths = commandable_widths(self.commands, channel)
+            counts = np.arange(1, self.allowed + 1)
             parts = np.meshgrid(self._waits(state, least, WAITS), widths, counts)
             wait, width, count = (part.reshape(-1, 1) for part in parts)
             yield channel, Trial(wait, self._delays, width, count, every)
 
     def _waits(self, state: BlockState, least: int, few: int) -> list[int]:
-        """Sun pulses that may be let pass before a block: the ``least`` few, and those up to the end of a blackout."""
+        """Sun pulses that may be let pass before a block: the ``least`` few, and those up to the
+        end of a blackout.
+        """
         after = np.floor((self.dark[1] - np.min(state.sun_pulse)) / self.model.turn)
-        later = after[(after > least) & (self.dark[1] < self.body.horizon)][:WINDOWS].astype(int).tolist()
-        return sorted({begin + more for begin in (least, *later) for more in range(few + (begin != least))})
+        later = (
+            after[(after > least) & (self.dark[1] < self.body.horizon)][:WINDOWS]
+            .astype(int)
+            .tolist()
+        )
+        return sorted(
+            {begin + more for begin in (least, *later) for more in range(few + (begin != least))}
+        )
 
-    def _dark(self, state: BlockState, channel: Channel, trial: Trial, after: BlockState) -> NDArray[np.bool_]:
+    def _dark(
+        self, state: BlockState, channel: Channel, trial: Trial, after: BlockState
+    ) -> NDArray[np.bool_]:
         """True where a pulse of the blocks is on in a blackout window, or just beside it."""
         dark = np.zeros(np.shape(after.sun_pulse), dtype=bool)
         if not len(self.dark[0]):
@@ -471,7 +619,9 @@ class BlockSearch:
         first = state.sun_pulse + trial.wait * turn
         interval = (after.sun_pulse - turn - first) / np.maximum(trial.count - 1, 1)
         interval = np.where(np.asarray(trial.count) > 1, interval, turn)
-        aside, lasts = BESIDE * turn, acts(channel, trial.width).over  # aside: nutation moves Sun pulses
+        # aside: nutation moves Sun pulses
+        aside = BESIDE * turn
+        lasts = acts(channel, trial.width).over
         for begins, ends in zip(*self.dark, strict=True):
             low = np.ceil((begins - aside - lasts - first - trial.delay) / interval)
             high = np.floor((ends + aside - first - trial.delay) / interval)
@@ -479,9 +629,15 @@ class BlockSearch:
         return dark
 
     def _at_delays(
-        self, state: BlockState, channel: Channel, waits: Sequence[int], index: NDArray[np.intp], every: int
+        self,
+        state: BlockState,
+        channel: Channel,
+        waits: Sequence[int],
+        index: NDArray[np.intp],
+        every: int,
     ) -> Trial:
-        """Blocks after each of the ``waits`` at the delays that serve the heading best, and the nutation best.
+        """Blocks after each of the ``waits`` at the delays that serve the heading best, and the
+        nutation best.
 
         ``index`` (k, m): widths and numbers as in `_short_by`, for each of k motions.
         """
@@ -496,9 +652,15 @@ class BlockSearch:
             best.append(self.model.delay(channel, self.model.course(state)[0], widths))
         if np.any(state.phasor):
             best.append(self.model.damping_delay(state, channel, trial._replace(delay=0.0)))
-        steps = [np.floor(delay / self.commands.delay_step) + more for delay in best for more in AROUND]
-        alike = np.broadcast_arrays(*steps, np.zeros((1, 1, 1, 1)))  # none at all: best just before a Sun pulse
-        return trial._replace(delay=self.commanded(np.concatenate(alike, axis=-1) * self.commands.delay_step))
+        steps = [
+            np.floor(delay / self.commands.delay_step) + more for delay in best for more in AROUND
+        ]
+        alike = np.broadcast_arrays(
+            *steps, np.zeros((1, 1, 1, 1))
+        )  # none at all: best just before a Sun pulse
+        return trial._replace(
+            delay=self.commanded(np.concatenate(alike, axis=-1) * self.commands.delay_step)
+        )
 
     def commanded(self, delay: Array) -> Array:
         """The nearest delay that can be commanded, of those within a spin turn."""
@@ -507,23 +669,34 @@ class BlockSearch:
         return np.asarray((counts + 0.0) * step)  # 0, not -0
 
     def doubted(self) -> None:
-        """Fly sequences cheaper than the best of the flights, the cheapest first, until one complies."""
-        most, flown = self.flights.known * (1.0 - SAME_COST), self.flights.of
-        self._first_complying([each for each in self.doubtful if each.rank[1] < most and each.blocks not in flown])
+        """Fly sequences cheaper than the best of the flights, the cheapest first, until one
+        complies.
+        """
+        most = self.flights.known * (1.0 - SAME_COST)
+        flown = self.flights.of
+        self._first_complying(
+            [each for each in self.doubtful if each.rank[1] < most and each.blocks not in flown]
+        )
 
     def nearer(self) -> list[BlockSequence]:
-        """Neighbours of the best of the flights that leave least where the closed form errs as it does for those."""
+        """Neighbours of the best of the flights that leave least where the closed form errs as it
+        does for those.
+        """
         sequences = list[BlockSequence]()
         best = of_each_kind(flight.sequence for flight in self.flights.all)
         for flight in (self.flights.of[each.blocks] for each in best[:CORRECTED]):
             *earlier, last = flight.sequence.blocks
-            before, state = START._replace(blocks=tuple(earlier)), self.state(tuple(earlier))
-            off = self.model.apart(self.state(flight.sequence.blocks), propagation.flown(self.body, flight.schedule))
+            before = START._replace(blocks=tuple(earlier))
+            state = self.state(tuple(earlier))
+            off = self.model.apart(
+                self.state(flight.sequence.blocks), propagation.flown(self.body, flight.schedule)
+            )
             trials = [(self._named[last.channel], self._around(before, last))]
             sequences += self.behind([before], state, trials, off=off)
         other = (sequence for sequence in sequences if sequence.blocks not in self.flights.of)
         ranked = by_blocks(sorted(other, key=_rank))
-        clear, first = nsmallest(FLOWN // 2, ranked.values(), key=_share), islice(ranked.values(), FLOWN // 2)
+        clear = nsmallest(FLOWN // 2, ranked.values(), key=_share)
+        first = islice(ranked.values(), FLOWN // 2)
         chosen = by_blocks((*first, *clear, *of_each_kind(ranked.values())))
         for blocks, sequence in chosen.items():  # ranked by the closed form alone
             share = float(self.flights.share(self.model.left(self.state(blocks))))
@@ -533,16 +706,23 @@ class BlockSearch:
 
     def _around(self, before: BlockSequence, last: Block) -> Trial:
         """Blocks about as long and as late as the ``last`` one, behind those ``before``."""
-        channel, number = self._named[last.channel], _following(before.blocks)
+        channel = self._named[last.channel]
+        number = _following(before.blocks)
         every = commandable_widths(self.commands, channel)
         at = int(np.argmin(np.abs(every - last.width)))
         near = every[max(at - 3, 0)] - 1e-12, every[min(at + 3, len(every) - 1)] + 1e-12
         closer = commandable_widths(self.commands, channel, *near, count=MOST_WIDTHS)
         widths = np.union1d(evenly(every, MOST_WIDTHS), closer)
-        as_long = np.rint(last.count * acts(channel, np.array([last.width])).on_time / acts(channel, widths).on_time)
+        as_long = np.rint(
+            last.count
+            * acts(channel, np.array([last.width])).on_time
+            / acts(channel, widths).on_time
+        )
         waits = np.arange(-1, 2) + (last.first - number)
         waits = waits[waits >= (self.pause if before.blocks else self.earliest)]
-        delays = self.commanded(np.asarray(last.delay + np.arange(-3, 4) * self.commands.delay_step, dtype=np.float64))
+        delays = self.commanded(
+            np.asarray(last.delay + np.arange(-3, 4) * self.commands.delay_step, dtype=np.float64)
+        )
         counts = (as_long[:, None] + np.arange(-2, 3)).clip(1, self.allowed).astype(int)
         parts = np.broadcast_arrays(waits[:, None, None], widths[:, None], counts)
         wait, width, count = (part.reshape(-1, 1) for part in parts)
@@ -572,7 +752,9 @@ def _least_of_all(keys: Array, most: int) -> NDArray[np.intp]:
 
 
 def _in_order(shares: Array, cost: Array) -> Array:
-    """Keys that put first what keeps its bounds, by cost, and then what does not, by the share of a bound."""
+    """Keys that put first what keeps its bounds, by cost, and then what does not, by the share of a
+    bound.
+    """
     dearest = float(np.max(cost, where=np.isfinite(cost), initial=1e-300))
     return np.where(complies(shares), cost / dearest - 2.0 + 1e-9 * shares, shares)
 
@@ -580,11 +762,15 @@ def _in_order(shares: Array, cost: Array) -> Array:
 def _promising(sequences: Iterable[BlockSequence], most: int) -> list[BlockSequence]:
     """Sequences that leave least, and a front of miss against cost: ``most`` of each."""
     ranked = of_each_kind(sorted(sequences, key=_rank), "width", "count", "every")
-    return list(by_blocks((*ranked[:most], *_front(ranked)[:most], *_front(ranked, 1.0)[:most])).values())
+    return list(
+        by_blocks((*ranked[:most], *_front(ranked)[:most], *_front(ranked, 1.0)[:most])).values()
+    )
 
 
 def _front(ranked: Iterable[BlockSequence], share: float = CHEAPER) -> list[BlockSequence]:
-    """Of sequences in order of their rank those that cost less than a ``share`` of the cost of all before them."""
+    """Of sequences in order of their rank those that cost less than a ``share`` of the cost of all
+    before them.
+    """
     front = list[BlockSequence]()
     for sequence in ranked:
         if not front or sequence.rank[1] < share * front[-1].rank[1]:

@@ -1,7 +1,8 @@
 """Catalogue of the schemes: names, properties, options.
 
-Options are one frozen class a scheme, checked on creation; the command line makes its options, their help and their
-headings from the fields. No scheme is loaded: the command line needs the names alone.
+Options are one frozen class a scheme, checked on creation; the command line makes its options,
+their help and their headings from the fields. No scheme is loaded: the command line needs the names
+alone.
 """
 
 from __future__ import annotations
@@ -14,12 +15,19 @@ from typing import Any, ClassVar, Self, TypeVar
 from nutdamp.errors import BadRequest, SenselessOption, nearest
 from nutdamp.units import as_given, is_count, is_number
 
-LEAST = ("propellant", "impulse", "time", "pulses")  # quantities that the scheme optimal can minimise
+LEAST = (
+    "propellant",
+    "impulse",
+    "time",
+    "pulses",
+)  # quantities that the scheme optimal can minimise
 
 
 @dataclass(frozen=True)
 class OptionKind:
-    """Kind of the values of an option: ``expected`` in words, and ``unit`` (a dimension of `units`) of a quantity."""
+    """Kind of the values of an option: ``expected`` in words, and ``unit`` (a dimension of `units`)
+    of a quantity.
+    """
 
     expected: str
     unit: str | None = None
@@ -34,7 +42,9 @@ class OptionKind:
         if self.names:
             return isinstance(value, str) and value in self.names
         if self.unit is not None:
-            return is_number(value) and (value > 0.0 if self.unit == "time" else value >= self.least)
+            return is_number(value) and (
+                value > 0.0 if self.unit == "time" else value >= self.least
+            )
         return is_count(value) if self.least else isinstance(value, bool)
 
     @property
@@ -59,22 +69,32 @@ class SchemeOptions:
     """Options of every scheme. Raises SenselessOption for an invalid value."""
 
     equal: ClassVar[bool] = False  # whether the pulses are of one size, which corrections keep
-    with_disturbances: bool = _option(False, FLAG, "Plan on the motion with the disturbances of the file.")
+    with_disturbances: bool = _option(
+        False, FLAG, "Plan on the motion with the disturbances of the file."
+    )
 
     def __post_init__(self) -> None:
         for field in dataclasses.fields(self):
-            value, kind = getattr(self, field.name), field.metadata["kind"]
+            value = getattr(self, field.name)
+            kind = field.metadata["kind"]
             if not kind.takes(value):
                 raise SenselessOption(field.name, as_given(value), f"expected {kind.expected}")
 
     def settled(self, *, keeps_axis: bool) -> Self:  # noqa: ARG002 - what some schemes go by
-        """Copy with the defaults of the spacecraft: ``keeps_axis``, whether something is asked of where H ends."""
+        """Copy with the defaults of the spacecraft: ``keeps_axis``, whether something is asked of
+        where H ends.
+        """
         return self
 
     @property
     def uncorrected(self) -> bool:
-        """True if the schedule is to stay as the scheme gives it, whatever nutation the true motion leaves."""
-        return any(field.metadata["as_is"] and getattr(self, field.name) for field in dataclasses.fields(self))
+        """True if the schedule is to stay as the scheme gives it, whatever nutation the true motion
+        leaves.
+        """
+        return any(
+            field.metadata["as_is"] and getattr(self, field.name)
+            for field in dataclasses.fields(self)
+        )
 
     @property
     def resizable(self) -> bool:
@@ -86,10 +106,13 @@ class SchemeOptions:
 class TwoPulseOptions(SchemeOptions):
     """Options of two-pulse."""
 
-    literal: bool = _option(False, FLAG, "As printed by Magnus: equal halves, small-angle wait.", as_is=True)
+    literal: bool = _option(
+        False, FLAG, "As printed by Magnus: equal halves, small-angle wait.", as_is=True
+    )
 
 
-DEFAULT_SHARE = 0.125  # default on-time of four-pulse as a share of T_ω: 2.6 % of the impulse is lost to the width
+# default on-time of four-pulse as a share of T_ω: 2.6 % of the impulse is lost to the width
+DEFAULT_SHARE = 0.125
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,7 +127,9 @@ class FourPulseOptions(SchemeOptions):
 class HalfConeOptions(SchemeOptions):
     """Options of half-cone; ``cones`` None: the fewest that are nearly cheapest."""
 
-    cones: int | None = _option(None, COUNT, "Half cones; default: until one more saves less than 1 %.")
+    cones: int | None = _option(
+        None, COUNT, "Half cones; default: until one more saves less than 1 %."
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -132,11 +157,16 @@ class RhumbLineOptions(SchemeOptions):
 class OptimalOptions(SchemeOptions):
     """Options of optimal; ``shift`` rad, how far from its target H may end.
 
-    ``free_axis`` None: H may end anywhere unless the spacecraft or ``shift`` asks for something else.
+    ``free_axis`` None: H may end anywhere unless the spacecraft or ``shift`` asks for something
+    else.
     """
 
-    least: str = _option(LEAST[0], OptionKind(f"one of {', '.join(LEAST)}", names=LEAST, none=False), "What to save.")
-    free_axis: bool | None = _option(None, dataclasses.replace(FLAG, none=True), "Let H end anywhere.")
+    least: str = _option(
+        LEAST[0], OptionKind(f"one of {', '.join(LEAST)}", names=LEAST, none=False), "What to save."
+    )
+    free_axis: bool | None = _option(
+        None, dataclasses.replace(FLAG, none=True), "Let H end anywhere."
+    )
     shift: float | None = _option(None, ANGLE, "How far from its target H may end: 0.2deg.")
 
     def __post_init__(self) -> None:
@@ -149,7 +179,11 @@ class OptimalOptions(SchemeOptions):
         """Copy with the default freedom of H; no ``shift`` at all is none."""
         if self.shift is not None:
             return dataclasses.replace(self, free_axis=False, shift=self.shift or None)
-        return self if self.free_axis is not None else dataclasses.replace(self, free_axis=not keeps_axis)
+        return (
+            self
+            if self.free_axis is not None
+            else dataclasses.replace(self, free_axis=not keeps_axis)
+        )
 
 
 KINDS = (
@@ -181,7 +215,9 @@ class Options:
 
     def of(self, kind: type[Chosen]) -> Chosen:
         """Options of one scheme."""
-        return kind(**{name: value for name, value in self.chosen.items() if name in names_of(kind)})
+        return kind(
+            **{name: value for name, value in self.chosen.items() if name in names_of(kind)}
+        )
 
     @property
     def with_disturbances(self) -> bool:
@@ -191,7 +227,9 @@ class Options:
     def without_effect(self, kinds: list[type[SchemeOptions]]) -> Iterator[str]:
         """Names of options that were changed, and that none of the ``kinds`` has."""
         read = {name for kind in kinds for name in names_of(kind)}
-        defaults = {field.name: field.default for kind in KINDS for field in dataclasses.fields(kind)}
+        defaults = {
+            field.name: field.default for kind in KINDS for field in dataclasses.fields(kind)
+        }
         for name, default in defaults.items():
             if self.chosen.get(name, default) != default and name not in read:
                 yield name
@@ -213,15 +251,22 @@ class Scheme:
     options: type[SchemeOptions] = SchemeOptions
     fires: bool = True
     classic: bool = False  # of Magnus 1970
-    points: bool = False  # can turn the spin axis to a target, and is planned when there is one and none is named
+    # can turn the spin axis to a target, and is planned when there is one and none is named
+    points: bool = False
     only_points: bool = False  # does nothing else, and needs a target
     reads_sun: bool = False  # keeps its pulses at a fixed phase to the Sun
     sets_spin: bool = False  # can change the spin rate
-    weighs_alternatives: bool = False  # has a function ``alternatives`` too, of schedules about as good
+    weighs_alternatives: bool = (
+        False  # has a function ``alternatives`` too, of schedules about as good
+    )
     body_fixed: bool = False  # fires channels of the file only, no steerable torquer
-    reads_commands: bool = False  # makes blocks of the ``commands`` of the file, and is planned where there are some
+    reads_commands: bool = (
+        False  # makes blocks of the ``commands`` of the file, and is planned where there are some
+    )
     on_true_body: bool = False  # needs no symmetric model
-    three_moments: bool = False  # plans on three moments as they are, and needs a model for lasting torques alone
+    three_moments: bool = (
+        False  # plans on three moments as they are, and needs a model for lasting torques alone
+    )
     on_true_motion: bool = False  # has such a function too, for three moments
     slow: bool = False  # may take seconds
     by_turns: bool = False  # fires at one phase of each spin turn, so that the body has to spin
@@ -234,8 +279,12 @@ class Scheme:
 
 
 ONE_PULSE = Scheme("one-pulse", classic=True)
-TWO_PULSE = Scheme("two-pulse", TwoPulseOptions, classic=True, points=True, weighs_alternatives=True)
-FOUR_PULSE = Scheme("four-pulse", FourPulseOptions, classic=True, body_fixed=True, on_true_motion=True)
+TWO_PULSE = Scheme(
+    "two-pulse", TwoPulseOptions, classic=True, points=True, weighs_alternatives=True
+)
+FOUR_PULSE = Scheme(
+    "four-pulse", FourPulseOptions, classic=True, body_fixed=True, on_true_motion=True
+)
 OPTIMAL = Scheme(
     "optimal",
     OptimalOptions,
@@ -248,7 +297,13 @@ OPTIMAL = Scheme(
 )
 HALF_CONE = Scheme("half-cone", HalfConeOptions, points=True, only_points=True, body_fixed=True)
 RHUMB_LINE = Scheme(
-    "rhumb-line", RhumbLineOptions, points=True, only_points=True, reads_sun=True, body_fixed=True, by_turns=True
+    "rhumb-line",
+    RhumbLineOptions,
+    points=True,
+    only_points=True,
+    reads_sun=True,
+    body_fixed=True,
+    by_turns=True,
 )
 COMMAND_BLOCK = Scheme(
     "command-block",
@@ -264,14 +319,27 @@ NONE = Scheme("none", fires=False)  # free motion, for comparison
 
 SCHEMES = {
     scheme.name: scheme
-    for scheme in (ONE_PULSE, TWO_PULSE, FOUR_PULSE, OPTIMAL, HALF_CONE, RHUMB_LINE, COMMAND_BLOCK, NONE)
+    for scheme in (
+        ONE_PULSE,
+        TWO_PULSE,
+        FOUR_PULSE,
+        OPTIMAL,
+        HALF_CONE,
+        RHUMB_LINE,
+        COMMAND_BLOCK,
+        NONE,
+    )
 }
 NAMES = tuple(SCHEMES)
 PLANNED = tuple(name for name, scheme in SCHEMES.items() if scheme.fires)
 CLASSIC = tuple(name for name, scheme in SCHEMES.items() if scheme.classic)
 COMPARED = (*CLASSIC, OPTIMAL.name)  # default schemes without a target
 # in the order in which they are shown: those that take seconds last
-POINTING = tuple(scheme.name for scheme in sorted(SCHEMES.values(), key=lambda scheme: scheme.slow) if scheme.points)
+POINTING = tuple(
+    scheme.name
+    for scheme in sorted(SCHEMES.values(), key=lambda scheme: scheme.slow)
+    if scheme.points
+)
 SPINNING = tuple(name for name, scheme in SCHEMES.items() if scheme.sets_spin)
 SUNLIT = tuple(name for name, scheme in SCHEMES.items() if scheme.reads_sun)
 COMMANDED = tuple(name for name, scheme in SCHEMES.items() if scheme.reads_commands)
@@ -280,7 +348,9 @@ COMMANDED = tuple(name for name, scheme in SCHEMES.items() if scheme.reads_comma
 def expect_names(values: Iterable[str]) -> tuple[str, ...]:
     """Names of schemes that there are, each once; raises BadRequest."""
     if isinstance(values, str) or not isinstance(values, Iterable):
-        raise BadRequest(f"names: expected a list of schemes, such as ['two-pulse'], got {as_given(values)}")
+        raise BadRequest(
+            f"names: expected a list of schemes, such as ['two-pulse'], got {as_given(values)}"
+        )
     names = tuple(values)
     for name in names:
         if not isinstance(name, str) or name not in NAMES:
@@ -290,9 +360,15 @@ def expect_names(values: Iterable[str]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(names))
 
 
-def expect_options(value: Any, chosen: Mapping[str, Any], scheme: str | None = None) -> Options | SchemeOptions | None:
-    """Options of schemes, or those ``chosen`` by keyword, which the ``scheme`` must have; raises BadRequest."""
-    if not (value is None or isinstance(value, Options | SchemeOptions)) or (value is not None and chosen):
+def expect_options(
+    value: Any, chosen: Mapping[str, Any], scheme: str | None = None
+) -> Options | SchemeOptions | None:
+    """Options of schemes, or those ``chosen`` by keyword, which the ``scheme`` must have; raises
+    BadRequest.
+    """
+    if not (value is None or isinstance(value, Options | SchemeOptions)) or (
+        value is not None and chosen
+    ):
         raise BadRequest(f"options: expected nutdamp.Options(…) or keywords, got {as_given(value)}")
     if not chosen:
         return value
@@ -300,5 +376,7 @@ def expect_options(value: Any, chosen: Mapping[str, Any], scheme: str | None = N
     if scheme is not None:
         own = SCHEMES[scheme].options
         for unread in options.without_effect([own]):
-            raise BadRequest(f"options: {scheme} has no {unread!r}; there are {', '.join(names_of(own))}")
+            raise BadRequest(
+                f"options: {scheme} has no {unread!r}; there are {', '.join(names_of(own))}"
+            )
     return options

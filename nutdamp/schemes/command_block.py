@@ -1,8 +1,10 @@
-"""Command blocks: pulses as spinners are commanded, by channel, delay after the Sun pulse, width and number.
+"""Command blocks: pulses as spinners are commanded, by channel, delay after the Sun pulse, width
+and number.
 
-Spin and turn are made leg by leg in one row of blocks. The impulse that turns H goes with |H3|: H is turned while that
-is smaller, before the spin is raised or once it is lowered. Trains that turn change the spin too where their channels
-have a torque about axis 3: the spin leg behind them is planned on what they leave, one before them ahead by as much.
+Spin and turn are made leg by leg in one row of blocks. The impulse that turns H goes with |H3|: H
+is turned while that is smaller, before the spin is raised or once it is lowered. Trains that turn
+change the spin too where their channels have a torque about axis 3: the spin leg behind them is
+planned on what they leave, one before them ahead by as much.
 """
 
 from __future__ import annotations
@@ -19,7 +21,15 @@ from nutdamp.errors import Infeasible
 from nutdamp.flight import propagation
 from nutdamp.flight.end_state import left_by
 from nutdamp.schemes.block_model import BlockModel, acts, spin_turn
-from nutdamp.schemes.block_search import BLOCKS, FLOWN, LONGEST, BlockFlights, BlockSearch, BlockSequence, FlownSequence
+from nutdamp.schemes.block_search import (
+    BLOCKS,
+    FLOWN,
+    LONGEST,
+    BlockFlights,
+    BlockSearch,
+    BlockSequence,
+    FlownSequence,
+)
 from nutdamp.schemes.catalogue import CommandBlockOptions
 from nutdamp.schemes.sequential import NO_AXIAL, at_hand
 from nutdamp.schemes.valve_commands import Legs
@@ -36,10 +46,14 @@ FLOWN_PULSES = 2000  # pulses that are flown, after which no further sequence is
 
 
 def scope_note(search: BlockSearch, chosen: FlownSequence, *, first: bool) -> Note:
-    """Scope of the search, and flight against closed form; ``first``: it is the best in that form."""
+    """Scope of the search, and flight against closed form; ``first``:
+    it is the best in that form.
+    """
     form = search.model.left(search.state(chosen.sequence.blocks))
     flown = left_by(propagation.flown(search.body, chosen.schedule))
-    nutation, end = (math.degrees(abs(float(a) - b)) for a, b in zip(form[:2], flown[:2], strict=True))
+    nutation, end = (
+        math.degrees(abs(float(a) - b)) for a, b in zip(form[:2], flown[:2], strict=True)
+    )
     if first:
         return note("blocks-compared", compared=search.looked, nutation_deg=nutation, end_deg=end)
     return note("blocks-flown", nutation_deg=nutation, end_deg=end)
@@ -49,27 +63,49 @@ def cures(search: BlockSearch, chosen: FlownSequence, most: int) -> list[Note]:
     """Keys of the file that keep the blocks ``chosen``, of up to ``most``, from leaving less."""
     left = left_by(propagation.flown(search.body, chosen.schedule))
     shares = search.flights.shares(left)
-    broken = [bound for bound in search.flights.bounds if not requirements.complies(shares[bound.part])]
+    broken = [
+        bound for bound in search.flights.bounds if not requirements.complies(shares[bound.part])
+    ]
     missed = {bound.part: bound.limit for bound in broken}
     more = [note("more-blocks", blocks=BLOCKS)] * (len(chosen.schedule.blocks) == most < BLOCKS)
-    named = [*more, *too_coarse(search.model, search.channels, missed), *used_up(search.body, chosen.schedule)]
+    named = [
+        *more,
+        *too_coarse(search.model, search.channels, missed),
+        *used_up(search.body, chosen.schedule),
+    ]
     return named or [note("finer-commands")]
 
 
-def too_coarse(model: BlockModel, channels: Sequence[Channel], missed: Mapping[Part, float]) -> Iterator[Note]:
-    """Steps of the commands that may, half of each, cost more than the bounds that are ``missed`` (rad) allow."""
+def too_coarse(
+    model: BlockModel, channels: Sequence[Channel], missed: Mapping[Part, float]
+) -> Iterator[Note]:
+    """Steps of the commands that may, half of each, cost more than the bounds that are ``missed``
+    (rad) allow.
+    """
     body, commands = model.body, model.body.commands
     assert commands is not None
-    way, half = body.to_turn if body.goal.axis is not None else 0.0, 0.5 * commands.delay_step
+    way = body.to_turn if body.goal.axis is not None else 0.0
+    half = 0.5 * commands.delay_step
     spin, damped = abs(body.spin), abs(model.rate(body.spin))
-    aside = {Part.DISTANCE: half * spin * way, Part.NUTATION: half * damped * math.tan(body.nutation)}
+    aside = {
+        Part.DISTANCE: half * spin * way,
+        Part.NUTATION: half * damped * math.tan(body.nutation),
+    }
     # The least by which pulses of neighbouring widths differ in turning H; none is a width too.
-    turned = [model.turned_by(channel, commandable_widths(commands, channel), body.spin) for channel in channels]
+    turned = [
+        model.turned_by(channel, commandable_widths(commands, channel), body.spin)
+        for channel in channels
+    ]
     along = 0.5 * min(float(np.diff(np.sort(turns), prepend=0.0).min()) for turns in turned)
     for part in (Part.DISTANCE, Part.NUTATION):
         if aside[part] > missed.get(part, math.inf):
             change = math.degrees(2.0 * aside[part])
-            yield note("finer-delay-step", delay_step_s=commands.delay_step, part=part.label, change_deg=change)
+            yield note(
+                "finer-delay-step",
+                delay_step_s=commands.delay_step,
+                part=part.label,
+                change_deg=change,
+            )
     if along > min(missed.values(), default=math.inf):
         yield note("finer-widths", change_deg=math.degrees(2.0 * along))
 
@@ -95,11 +131,19 @@ def schedule(spacecraft: Spacecraft, options: CommandBlockOptions) -> Schedule:
     """
     commands = spacecraft.commands
     if commands is None or spacecraft.sun_sensor is None or spacecraft.sun is None:
-        raise Infeasible("the file describes no commands: command blocks need the keys sun, sun_sensor and commands")
-    tick, spacecraft = spacecraft.limits.tick, replace(spacecraft, limits=replace(spacecraft.limits, tick=None))
+        raise Infeasible(
+            "the file describes no commands: command blocks need the keys sun, "
+            "sun_sensor and commands"
+        )
+    tick = spacecraft.limits.tick
+    spacecraft = replace(spacecraft, limits=replace(spacecraft.limits, tick=None))
     goal, most = spacecraft.goal.spin, options.max_blocks
-    nutation = next(bound for bound in requirements.bounds(spacecraft) if bound.part is Part.NUTATION)
-    alone = goal is None or (spacecraft.goal.axis is None and bool(nutation.met(spacecraft.nutation)))
+    nutation = next(
+        bound for bound in requirements.bounds(spacecraft) if bound.part is Part.NUTATION
+    )
+    alone = goal is None or (
+        spacecraft.goal.axis is None and bool(nutation.met(spacecraft.nutation))
+    )
     if goal is not None:
         expect_spin(spacecraft, goal, alone=alone)
     if alone:
@@ -109,7 +153,9 @@ def schedule(spacecraft: Spacecraft, options: CommandBlockOptions) -> Schedule:
         missed = [*used_up(spacecraft, chosen.schedule)] or [note("finer-commands")]
         in_legs = (note("blocks-in-legs"), *missed * (not requirements.complies(chosen.rank[1])))
         chosen = chosen._replace(schedule=replace(chosen.schedule, notes=in_legs))
-    steps = np.array([commands.delay_step, *commands.widths, commands.width_step or 0.0]) / (tick or 1.0)
+    steps = np.array([commands.delay_step, *commands.widths, commands.width_step or 0.0]) / (
+        tick or 1.0
+    )
     notes = chosen.schedule.notes
     if tick is not None and np.abs(steps - np.rint(steps)).max() > OFF_TICK:
         notes = (*notes, note("tick-not-kept", tick_s=tick, delay_step_s=commands.delay_step))
@@ -117,10 +163,14 @@ def schedule(spacecraft: Spacecraft, options: CommandBlockOptions) -> Schedule:
 
 
 def expect_spin(spacecraft: Spacecraft, spin: float, *, alone: bool) -> None:
-    """Raise Infeasible where no blocks bring the spin to ``spin`` rad/s; ``alone``: they may turn H more than that."""
+    """Raise Infeasible where no blocks bring the spin to ``spin`` rad/s; ``alone``: they may turn H
+    more than that.
+    """
     change = spin - spacecraft.spin
     if spin * spacecraft.spin <= 0.0:
-        raise Infeasible("cannot reverse the spin: where the body does not turn there is no Sun pulse")
+        raise Infeasible(
+            "cannot reverse the spin: where the body does not turn there is no Sun pulse"
+        )
     if requirements.spins_at(spacecraft, spin):
         return
     if not any(channel.axial for channel in spacecraft.channels):
@@ -128,27 +178,38 @@ def expect_spin(spacecraft: Spacecraft, spin: float, *, alone: bool) -> None:
     able = [channel for channel in spacecraft.channels if channel.axial * change > 0.0]
     if not any(alone or not channel.damps for channel in able):
         across = "" if alone else ", and less across it"
-        raise Infeasible(f"no channel has a torque about axis 3 in the sense of the change of spin{across}")
+        raise Infeasible(
+            f"no channel has a torque about axis 3 in the sense of the change of spin{across}"
+        )
 
 
 def _searched(spacecraft: Spacecraft, most: int | None) -> FlownSequence:
-    """The best of the sequences of up to ``most`` blocks that were looked at together, with notes on its schedule."""
+    """The best of the sequences of up to ``most`` blocks that were looked at together, with notes
+    on its schedule.
+    """
     commands = spacecraft.commands
     assert commands is not None
     able = at_hand(spacecraft, usable(spacecraft, axial=spacecraft.goal.spin is not None))
     channels = [channel for channel in able if commandable_widths(commands, channel).size]
     if not channels:
-        raise Infeasible("no width that can be commanded (commands.width) is one that a channel allows")
+        raise Infeasible(
+            "no width that can be commanded (commands.width) is one that a channel allows"
+        )
     search = BlockSearch(spacecraft, channels, commands)
     outside = " outside the blackout windows" if spacecraft.limits.blackout else ""
-    why = f"no block that can be commanded ends within the horizon{outside}; a longer limits.horizon may help"
+    why = (
+        f"no block that can be commanded ends within the horizon{outside}; "
+        "a longer limits.horizon may help"
+    )
     best = search.best(most or BLOCKS)
     if not best and work.exhausted():
         why = "the budget of work is spent before a block is found"
     for round_ in range(4):  # the best ones, and three searches near the best flights so far
         if round_ > 0 and search.flights.complies:
             break
-        for number, sequence in enumerate(search.flights.fired(best if round_ == 0 else search.nearer())):
+        for number, sequence in enumerate(
+            search.flights.fired(best if round_ == 0 else search.nearer())
+        ):
             pulses = sum(len(flight.schedule) for flight in search.flights.of.values())
             enough = search.flights.complies and number >= FLOWN * (round_ == 0)
             spent = pulses > FLOWN_PULSES * (1 + round_) or (work.exhausted() and pulses > 0)
@@ -176,18 +237,23 @@ def _searched(spacecraft: Spacecraft, most: int | None) -> FlownSequence:
 LEGS = 6  # legs of a row of blocks, at most: spin and turn, and both mended twice
 
 MARGIN = 0.97
-"""Share of a bound that the turn may use up before the spin is changed, and the inverse for what that may add."""
+"""Share of a bound that the turn may use up before the spin is changed, and the inverse for what
+that may add.
+"""
 
 
 def spin_and_turn(spacecraft: Spacecraft, most: int | None) -> FlownSequence:
-    """Blocks, ``most`` of them, that bring the spin to its goal, and turn or damp: the best of the orders tried.
+    """Blocks, ``most`` of them, that bring the spin to its goal, and turn or damp: the best of the
+    orders tried.
 
-    The other order is tried where the cheaper one does not comply. Raises Infeasible with the first reason.
+    The other order is tried where the cheaper one does not comply. Raises Infeasible with the first
+    reason.
     """
     goal, inertia = spacecraft.goal.spin, spacecraft.inertia
     assert goal is not None
     turns_first = abs(inertia.axial(goal)) >= abs(spacecraft.axial)
-    flights, why = BlockFlights(spacecraft), list[Infeasible]()
+    flights = BlockFlights(spacecraft)
+    why = list[Infeasible]()
     for first in (turns_first, not turns_first):
         try:
             gained = _flown(spacecraft, flights, most, goal, turns_first=first)
@@ -202,19 +268,29 @@ def spin_and_turn(spacecraft: Spacecraft, most: int | None) -> FlownSequence:
     return flights.all[0]
 
 
-def _flown(body: Spacecraft, flights: BlockFlights, most: int | None, aim: float, *, turns_first: bool) -> float:
-    """Fly a row of legs, the first of the spin to ``aim`` rad/s; returns the change of the spin, rad/s, by a second
-    leg that turned, where it takes the spin off its goal.
+def _flown(
+    body: Spacecraft, flights: BlockFlights, most: int | None, aim: float, *, turns_first: bool
+) -> float:
+    """Fly a row of legs, the first of the spin to ``aim`` rad/s; returns the change of the spin,
+    rad/s, by a second leg that turned, where it takes the spin off its goal.
     """
-    legs, goal, gained = Legs(body), body.goal.spin, 0.0
+    legs = Legs(body)
+    goal = body.goal.spin
+    gained = 0.0
     assert goal is not None
     ends = [bound for bound in requirements.bounds(body) if bound.part is not Part.SPIN]
     bounds = {bound.part: bound.limit for bound in ends}
-    nutation, shift = bounds[Part.NUTATION], bounds.get(requirements.aim(body))
+    nutation = bounds[Part.NUTATION]
+    shift = bounds.get(requirements.aim(body))
     for number in range(LEGS):
-        here, turns = legs.here, turns_first == (number % 2 == 0)
-        here = replace(here, goal=replace(here.goal, axis=None if shift is None else here.goal.axis, spin=None))
-        slower = min(max(abs(body.inertia.axial(goal) / here.axial), SLOWEST), 1.0)  # nutation opens by its inverse
+        here = legs.here
+        turns = turns_first == (number % 2 == 0)
+        here = replace(
+            here, goal=replace(here.goal, axis=None if shift is None else here.goal.axis, spin=None)
+        )
+        slower = min(
+            max(abs(body.inertia.axial(goal) / here.axial), SLOWEST), 1.0
+        )  # nutation opens by its inverse
         there = requirements.spins_at(here, aim)
         if turns:
             now = Left(here.nutation, here.to_turn, here.spin)
@@ -224,16 +300,23 @@ def _flown(body: Spacecraft, flights: BlockFlights, most: int | None, aim: float
             allowed = MARGIN * slower * nutation, None if shift is None else MARGIN * shift
             horizon = max(here.horizon - _least_time(here, goal), 0.5 * here.horizon)
         elif turns:
-            allowed, horizon = (nutation, shift), here.horizon
+            allowed = (nutation, shift)
+            horizon = here.horizon
         else:
             opened, off = here.nutation / slower / MARGIN, here.to_turn / MARGIN
-            allowed, horizon = (max(opened, nutation), None if shift is None else max(off, shift)), here.horizon
+            allowed = (max(opened, nutation), None if shift is None else max(off, shift))
+            horizon = here.horizon
             spinning = tuple(channel for channel in here.channels if not channel.damps)
-            here, aim = replace(here, goal=replace(here.goal, spin=aim), channels=spinning), goal
+            here = replace(here, goal=replace(here.goal, spin=aim), channels=spinning)
+            aim = goal
         if there or (room is not None and room < 1):
             continue
         try:
-            leg = replace(here, requirement=Requirement(*allowed), limits=replace(here.limits, horizon=horizon))
+            leg = replace(
+                here,
+                requirement=Requirement(*allowed),
+                limits=replace(here.limits, horizon=horizon),
+            )
             legs.fire(_searched(leg, room).schedule)
         except Infeasible:
             if number < 2:
@@ -247,10 +330,16 @@ def _flown(body: Spacecraft, flights: BlockFlights, most: int | None, aim: float
 
 
 def _least_time(body: Spacecraft, spin: float) -> float:
-    """Time, s, that a change to ``spin`` rad/s takes, with some to spare; 0 where no channel gives it."""
-    most, commands, change = 0.0, body.commands, spin - body.spin
+    """Time, s, that a change to ``spin`` rad/s takes, with some to spare; 0 where no channel gives
+    it.
+    """
+    most = 0.0
+    commands = body.commands
+    change = spin - body.spin
     assert commands is not None
     for channel in body.channels:
         on_times = acts(channel, commandable_widths(commands, channel)).on_time
         most = max(most, channel.axial * math.copysign(np.max(on_times, initial=0.0), change))
-    return (2.0 + AMPLE * abs(change) * body.inertia.C / most) * spin_turn(body) if most > 0.0 else 0.0
+    return (
+        (2.0 + AMPLE * abs(change) * body.inertia.C / most) * spin_turn(body) if most > 0.0 else 0.0
+    )

@@ -1,8 +1,8 @@
 """Correction of schedules by least squares on the flown motion, whole or stage by stage.
 
-Moments, on-times and directions are adjusted by a damped Gauss-Newton iteration with bounds for a handful of unknowns.
-scipy.optimize would do it too, but loading it takes longer than a whole plan. Schemes that point the spin axis lay
-their schedules stage by stage along the flown motion.
+Moments, on-times and directions are adjusted by a damped Gauss-Newton iteration with bounds for a
+handful of unknowns. scipy.optimize would do it too, but loading it takes longer than a whole plan.
+Schemes that point the spin axis lay their schedules stage by stage along the flown motion.
 """
 
 from __future__ import annotations
@@ -23,7 +23,13 @@ from nutdamp.flight.dynamics import lightened, make_dynamics, supplied
 from nutdamp.physics import attitude, precession
 from nutdamp.schemes.catalogue import OptimalOptions, Scheme, SchemeOptions
 from nutdamp.schemes.sequential import steady_omega
-from nutdamp.spacecraft.constraints import channel_of, commandable, effective_on_times, keeps_limits, longest_on_time
+from nutdamp.spacecraft.constraints import (
+    channel_of,
+    commandable,
+    effective_on_times,
+    keeps_limits,
+    longest_on_time,
+)
 from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Attitude, Spacecraft, Vector
 from nutdamp.spacecraft.schedule import STEERABLE, Pulse, Schedule, channel_pulse, steerable_pulse
@@ -32,24 +38,36 @@ CONVERGED = 1e-14  # rad; a few roundings of the integration
 ALIKE = 1e-9  # difference in size, relative, up to which pulses are equal
 STEPS = 30
 INTEGRATED = 50_000  # steps of integration after which a correction stops: some seconds
-# least relative gain of a step; near a solution each step gains many digits, so less means a bound in the way
+# least relative gain of a step; near a solution each step gains many digits, so less means a bound
+# in the way
 PROGRESS = 0.01
-CLEARLY = 0.5  # largest residual, over that of an earlier candidate, with which a later or dearer one is taken
-# pulses up to which a schedule is corrected on the true motion: a correction flies all of them some twenty times
+# largest residual, over that of an earlier candidate, with which a later or dearer one is taken
+CLEARLY = 0.5
+# pulses up to which a schedule is corrected on the true motion: a correction flies all of them some
+# twenty times
 MOST_CORRECTED = 1_000
-LEFT_OVER = 0.05  # largest residual, over nutation and turn together, of a schedule that reaches the target
+LEFT_OVER = (
+    0.05  # largest residual, over nutation and turn together, of a schedule that reaches the target
+)
 LEFT_OVER_BY_TICKS = 0.5  # largest residual where the resolution of commands may be to blame
 
-TAIL = 4  # last pulses that are corrected, and rounded to ticks one after the other: as many as there are equations
+# last pulses that are corrected, and rounded to ticks one after the other: as many as there are
+# equations
+TAIL = 4
 
 MOVED, BEFORE, AFTER = 8, 12, 24
-"""Pulses corrected at the end of a schedule of equal ones, each of which has one variable less; of given length so many
-before the equal ones, which damp the nutation, and at the end."""
+"""Pulses corrected at the end of a schedule of equal ones, each of which has one variable less; of
+given length so many before the equal ones, which damp the nutation, and at the end.
+"""
 
-EXACT = 1e-11  # rad of flown residual below which a corrected candidate is as good as exact (6e-10 deg)
+EXACT = (
+    1e-11  # rad of flown residual below which a corrected candidate is as good as exact (6e-10 deg)
+)
 
 CLOSE_IN_COST, CLOSE_IN_SHORT = 1.02, 1.1
-"""Factors of cost and miss within which candidates count as equal: of those the one that ends first is preferred."""
+"""Factors of cost and miss within which candidates count as equal: of those the one that ends first
+is preferred.
+"""
 
 
 class PairCandidate(NamedTuple):
@@ -66,23 +84,38 @@ class PairCandidate(NamedTuple):
     def fired(self, spacecraft: Spacecraft) -> Schedule:
         """The two pulses, commandable."""
         pairs = zip(self.channels, self.timing, strict=True)
-        return Schedule(tuple(commandable(spacecraft, channel_pulse(channel, *timing)) for channel, timing in pairs))
+        return Schedule(
+            tuple(
+                commandable(spacecraft, channel_pulse(channel, *timing))
+                for channel, timing in pairs
+            )
+        )
 
 
 def shortlist(candidates: Iterable[PairCandidate], near: int, most: int) -> list[PairCandidate]:
-    """At most ``most`` candidates to fly: up to ``near`` that are about the best, by their ends, then the others."""
+    """At most ``most`` candidates to fly: up to ``near`` that are about the best, by their ends,
+    then the others.
+    """
     ranked = sorted(candidates, key=lambda candidate: (candidate.short, candidate.cost))
     if not ranked:
         return []
     short, cost = ranked[0].short * CLOSE_IN_SHORT, ranked[0].cost * CLOSE_IN_COST
-    alike = [candidate for candidate in ranked if candidate.short <= short and candidate.cost <= cost]
+    alike = [
+        candidate for candidate in ranked if candidate.short <= short and candidate.cost <= cost
+    ]
     others = [candidate for candidate in ranked if candidate.short > short or candidate.cost > cost]
     return [*sorted(alike, key=lambda candidate: candidate.end)[:near], *others][:most]
 
 
-def best_of(spacecraft: Spacecraft, tried: Iterable[tuple[Schedule, float]]) -> tuple[Schedule | None, Schedule | None]:
-    """First schedule that is exact, else that none behind beats clearly, by residuals (rad); first to break a limit."""
-    least, best, broken = math.inf, None, None
+def best_of(
+    spacecraft: Spacecraft, tried: Iterable[tuple[Schedule, float]]
+) -> tuple[Schedule | None, Schedule | None]:
+    """First schedule that is exact, else that none behind beats clearly, by residuals (rad); first
+    to break a limit.
+    """
+    least = math.inf
+    best = None
+    broken = None
     for schedule, left in tried:
         if not keeps_limits(spacecraft, schedule.pulses):
             broken = broken or schedule
@@ -100,22 +133,26 @@ def left(spacecraft: Spacecraft, schedule: Schedule, *, momentum: bool = True) -
 
 
 def _missed(flight_: propagation.Flight, *, spin: bool = False) -> Vector:
-    """Residual of a flight, (4,) rad: tilt of H from the spin axis in body axes 1, 2; H off target in two.
+    """Residual of a flight, (4,) rad: tilt of H from the spin axis in body axes 1, 2; H off target
+    in two.
 
-    The four are zero exactly when no nutation is left and H lies along the target axis, without one where it was.
-    Under disturbances the tilt counts from the steady response to them, about which nothing is to be damped.
-    ``spin`` adds a fifth, the relative error of the final spin.
+    The four are zero exactly when no nutation is left and H lies along the target axis, without one
+    where it was. Under disturbances the tilt counts from the steady response to them, about which
+    nothing is to be damped. ``spin`` adds a fifth, the relative error of the final spin.
     """
     spacecraft, schedule = flight_.spacecraft, flight_.schedule
     inertia = replace(spacecraft.inertia, moments=flight_.last_moments)
-    body, after = inertia.momentum(flight_.settled.rates), flight_.last_momentum
+    body = inertia.momentum(flight_.settled.rates)
+    after = flight_.last_momentum
     steady = steady_omega(spacecraft, schedule.end)
     body[:2] -= np.array(inertia.moments[:2]) * (steady.real, steady.imag)
     aside = precession.square_to(spacecraft.target_axis)
     across = np.array([aside @ after, np.cross(spacecraft.target_axis, aside) @ after])
     left = np.concatenate([body[:2], across]) / float(np.linalg.norm(body))
     final = spacecraft.goal.spin
-    return left if not spin or final is None else np.append(left, flight_.settled.spin / final - 1.0)
+    return (
+        left if not spin or final is None else np.append(left, flight_.settled.spin / final - 1.0)
+    )
 
 
 def correct(
@@ -128,12 +165,14 @@ def correct(
     equal: bool = False,
     resizable: bool = True,
 ) -> Schedule:
-    """``schedule`` with the ``chosen`` pulses corrected on the flown motion of ``spacecraft``, if that leaves less.
+    """``schedule`` with the ``chosen`` pulses corrected on the flown motion of ``spacecraft``, if
+    that leaves less.
 
-    Starts, on-times within their bounds, and directions of steerable pulses are free. Of ``equal`` pulses, those
-    as large as the last one, the sizes stay as they are, or all change alike where they are ``resizable`` and commands
-    have no ticks. ``momentum``: H too is to be brought to the target axis (without one, back), not only the nutation
-    taken out; ``spin``: and the spin to the rate requested. A schedule without pulses stays as it is.
+    Starts, on-times within their bounds, and directions of steerable pulses are free. Of ``equal``
+    pulses, those as large as the last one, the sizes stay as they are, or all change alike where
+    they are ``resizable`` and commands have no ticks. ``momentum``: H too is to be brought to the
+    target axis (without one, back), not only the nutation taken out; ``spin``: and the spin to the
+    rate requested. A schedule without pulses stays as it is.
     """
     if not schedule.pulses:
         return schedule
@@ -152,7 +191,8 @@ def correct(
         bounds = np.array([part.bounds for part in parts if not part.sized]) / size
         free = np.concatenate([free, [(1.0, 1.0, bounds[:, 0].max(), bounds[:, 1].min())]])
     ends = np.cumsum([len(part.free) for part in parts])
-    steps, dynamics = 0, make_dynamics(spacecraft).remembering()
+    steps = 0
+    dynamics = make_dynamics(spacecraft).remembering()
 
     def build(x: Vector) -> Schedule:
         *own, common = np.split(x, ends)
@@ -184,17 +224,25 @@ class Correction:
     @property
     def momentum(self) -> bool:
         """True if H too has an end condition."""
-        return self.scheme.points and not (isinstance(self.options, OptimalOptions) and self.options.free_axis)
+        return self.scheme.points and not (
+            isinstance(self.options, OptimalOptions) and self.options.free_axis
+        )
 
     def __call__(self, spacecraft: Spacecraft, schedule: Schedule, free: int = TAIL) -> Schedule:
-        """``schedule`` with its last pulse corrected; with up to the last ``free`` ones where H counts."""
+        """``schedule`` with its last pulse corrected; with up to the last ``free`` ones where H
+        counts.
+        """
         if self.options.uncorrected or not 0 < len(schedule) <= MOST_CORRECTED or work.exhausted():
             return schedule
-        # The last pulses, which know what the others did on the model, undo what the true motion made of them.
-        whole, given = free == TAIL, self.options.equal and not self.options.resizable
+        # The last pulses, which know what the others did on the model, undo what the true motion
+        # made of them.
+        whole = free == TAIL
+        given = self.options.equal and not self.options.resizable
         last = free if not (whole and self.options.equal) else AFTER if given else MOVED
         chosen = tuple(range(-min(len(schedule), last), 0)) if self.momentum else (-1,)
-        if self.momentum and whole and given:  # moments alone hardly turn H further; what damped before them does
+        if (
+            self.momentum and whole and given
+        ):  # moments alone hardly turn H further; what damped before them does
             damping = [index for index, pulse in enumerate(schedule) if not alike(schedule, pulse)]
             chosen = (*damping[:BEFORE], *chosen)
         spin = self.scheme.sets_spin and spacecraft.goal.spin is not None
@@ -202,31 +250,44 @@ class Correction:
             axial = [abs(float(pulse.impulse[2])) for pulse in schedule]
             chosen = (*chosen, axial.index(max(axial)))
         sizes = {"equal": self.options.equal, "resizable": self.options.resizable}
-        return correct(spacecraft, schedule, chosen=chosen, momentum=self.momentum, spin=spin, **sizes)
+        return correct(
+            spacecraft, schedule, chosen=chosen, momentum=self.momentum, spin=spin, **sizes
+        )
 
 
 def alike(schedule: Schedule, pulse: Pulse) -> bool:
     """True if a pulse is as large as the last one of a schedule."""
     last = schedule.pulses[-1]
-    size, other = (each.magnitude if last.on_time == 0.0 else each.on_time for each in (pulse, last))
+    size, other = (
+        each.magnitude if last.on_time == 0.0 else each.on_time for each in (pulse, last)
+    )
     return abs(size - other) <= ALIKE * other
 
 
 class _Movable:
-    """Pulse with free parameters: (start, on-time) of a channel, (start, angle, impulse) of a steerable torquer.
+    """Pulse with free parameters: (start, on-time) of a channel, (start, angle, impulse) of a
+    steerable torquer.
 
-    The last one only if it is ``sized`` for itself. ``free`` (n, 4): start, scale, lower and upper bound.
+    The last one only if it is ``sized`` for itself. ``free`` (n, 4): start, scale, lower and upper
+    bound.
     """
 
     def __init__(self, spacecraft: Spacecraft, pulse: Pulse, *, moves: bool, sized: bool) -> None:
-        pace, earliest = 1.0 / spacecraft.fastest, spacecraft.limits.earliest + (pulse.start - pulse.loaded[0])
+        pace = 1.0 / spacecraft.fastest
+        earliest = spacecraft.limits.earliest + (pulse.start - pulse.loaded[0])
         latest = max(spacecraft.horizon - pulse.on_time - (pulse.over - pulse.end), pulse.start)
-        self.pulse, self.channel, self.torquer = pulse, channel_of(spacecraft, pulse), spacecraft.torquer
+        self.pulse, self.channel, self.torquer = (
+            pulse,
+            channel_of(spacecraft, pulse),
+            spacecraft.torquer,
+        )
         self.moves, self.sized, self.size = moves, sized, _size(pulse)
         self.bounds = 0.0, math.inf
         self.given = [(pulse.start, pace, earliest, latest)]
         if self.channel is None:
-            self.given.append((math.atan2(pulse.impulse[1], pulse.impulse[0]), 1.0, -math.inf, math.inf))
+            self.given.append(
+                (math.atan2(pulse.impulse[1], pulse.impulse[0]), 1.0, -math.inf, math.inf)
+            )
         else:
             longest = max(longest_on_time(spacecraft, self.channel), pulse.on_time)
             self.bounds = effective_on_times(self.channel)[0], longest
@@ -235,7 +296,9 @@ class _Movable:
         self.free = np.array(self.given if moves else []).reshape(-1, 4)
 
     def turn(self, x: Vector, factor: float) -> Pulse:
-        """Pulse with these settings; ``factor`` times as large, about its centre, where it is not sized for itself."""
+        """Pulse with these settings; ``factor`` times as large, about its centre, where it is not
+        sized for itself.
+        """
         start, *others = x if self.moves else [start for start, *_ in self.given]
         size = float(others[-1]) if self.sized else factor * self.size
         if self.channel is not None:
@@ -243,7 +306,9 @@ class _Movable:
         else:
             assert self.torquer is not None
             on_time = 0.0 if self.torquer.torque is None else size / self.torquer.torque
-            pulse = steerable_pulse(self.torquer, start + 0.5 * on_time, float(others[0]), impulse=size)
+            pulse = steerable_pulse(
+                self.torquer, start + 0.5 * on_time, float(others[0]), impulse=size
+            )
         return pulse if self.moves else replace(pulse, t=self.pulse.t)
 
 
@@ -255,8 +320,8 @@ def _size(pulse: Pulse) -> float:
 def solve(residual: Callable[[Vector], Vector], free: Vector, enough: Callable[[], bool]) -> Vector:
     """Unknowns (n,) that make ``residual`` (m,) least in norm.
 
-    ``free`` (n, 4): start, natural size and bounds of each. With more unknowns than equations the nearest solution. It
-    is left as it is once there was ``enough`` work.
+    ``free`` (n, 4): start, natural size and bounds of each. With more unknowns than equations the
+    nearest solution. It is left as it is once there was ``enough`` work.
     """
     start, scale, lower, upper = free.T
     difference = 1e-6  # in scaled unknowns: the error of the slopes, far below their size
@@ -266,7 +331,9 @@ def solve(residual: Callable[[Vector], Vector], free: Vector, enough: Callable[[
     for _ in range(STEPS):
         if norm <= CONVERGED or enough():
             break
-        columns = [(residual(x + moved) - value) / difference for moved in np.diag(difference * scale)]
+        columns = [
+            (residual(x + moved) - value) / difference for moved in np.diag(difference * scale)
+        ]
         step = bounded_step(np.column_stack(columns), value, x, scale, lower, upper)
         before = norm
         for shrink in range(8):
@@ -281,8 +348,12 @@ def solve(residual: Callable[[Vector], Vector], free: Vector, enough: Callable[[
     return np.asarray(x)
 
 
-def bounded_step(jacobian: Vector, value: Vector, x: Vector, scale: Vector, lower: Vector, upper: Vector) -> Vector:
-    """Least-squares step (n,) for a ``jacobian`` (m, n) by scaled unknowns; one that would leave its bounds stays."""
+def bounded_step(
+    jacobian: Vector, value: Vector, x: Vector, scale: Vector, lower: Vector, upper: Vector
+) -> Vector:
+    """Least-squares step (n,) for a ``jacobian`` (m, n) by scaled unknowns; one that would leave
+    its bounds stays.
+    """
     free = np.ones(len(x), dtype=bool)
     step = np.zeros(len(x))
     for _ in range(len(x)):
@@ -301,8 +372,8 @@ ROUNDING = 1e-12  # rad; where the spin axis is that near the target already, no
 class FlownBuilder:
     """Pulses chosen so far, and the spacecraft after them.
 
-    ``here`` is the spacecraft at ``now`` s, the end of the last pulse, as if its time began there, with the goal of the
-    whole. ``steps``: of integration that the flight took so far.
+    ``here`` is the spacecraft at ``now`` s, the end of the last pulse, as if its time began there,
+    with the goal of the whole. ``steps``: of integration that the flight took so far.
     """
 
     def __init__(self, spacecraft: Spacecraft) -> None:
@@ -328,14 +399,17 @@ class FlownBuilder:
         return other
 
     def fire(self, pulses: Iterable[Pulse], *, bounded: bool = False) -> None:
-        """Take and fly ``pulses``, in order, timed from ``now``; Infeasible where they are ``bounded`` by work left."""
+        """Take and fly ``pulses``, in order, timed from ``now``; Infeasible where they are
+        ``bounded`` by work left.
+        """
         base = self.now
         for pulse in pulses:
             if bounded and work.exhausted():
                 raise Infeasible("the flight of the pulses for that was not finished")
             self._before.append((self.now, self.here))
             timed = pulse.moved(base)
-            here, pulse_ = self.here, timed.moved(-self.now)
+            here = self.here
+            pulse_ = timed.moved(-self.now)
             flown = propagation.flown(here, Schedule((pulse_,)))
             settled, since, limits = flown.settled, pulse_.over, here.limits
             to_principal = attitude.from_matrix(here.inertia.axes.T)
@@ -344,9 +418,17 @@ class FlownBuilder:
                 here,
                 inertia=lightened(here, pulse_.propellant or 0.0),
                 omega0=settled.rates,
-                attitude=replace(given, quaternion=attitude.multiply(settled.quaternion, to_principal), epoch=None),
+                attitude=replace(
+                    given,
+                    quaternion=attitude.multiply(settled.quaternion, to_principal),
+                    epoch=None,
+                ),
                 disturbances=tuple(
-                    replace(disturbance, transverse=disturbance.transverse * cmath.exp(1j * disturbance.rate * since))
+                    replace(
+                        disturbance,
+                        transverse=disturbance.transverse
+                        * cmath.exp(1j * disturbance.rate * since),
+                    )
                     for disturbance in here.disturbances
                 ),
                 limits=replace(
@@ -354,7 +436,11 @@ class FlownBuilder:
                     horizon=here.horizon - since,
                     earliest=limits.gap,
                     max_pulses=None if limits.max_pulses is None else limits.max_pulses - 1,
-                    blackout=tuple((begins - since, ends - since) for begins, ends in limits.blackout if ends > since),
+                    blackout=tuple(
+                        (begins - since, ends - since)
+                        for begins, ends in limits.blackout
+                        if ends > since
+                    ),
                 ),
             )
             self.steps += flown.steps
@@ -362,7 +448,9 @@ class FlownBuilder:
             self.now = timed.over
 
     def correct(self, last: int, *, resized: int = 0) -> None:
-        """Move the ``last`` pulses until nothing is left; sizes stay, but those of ``resized`` equal ones, as one."""
+        """Move the ``last`` pulses until nothing is left; sizes stay, but those of ``resized``
+        equal ones, as one.
+        """
         taken = min(max(last, resized), len(self.pulses))
         if last == 0 or taken == 0:
             return
@@ -370,7 +458,11 @@ class FlownBuilder:
         made = Schedule(tuple(pulse.moved(-self.now) for pulse in self.pulses[-taken:]))
         del self.pulses[-taken:], self._before[-taken:]
         chosen = range(max(taken - last, 0), taken)
-        self.fire(correct(self.here, made, chosen=chosen, momentum=True, equal=True, resizable=resized > 0))
+        self.fire(
+            correct(
+                self.here, made, chosen=chosen, momentum=True, equal=True, resizable=resized > 0
+            )
+        )
 
     def schedule(self, *notes: Note) -> Schedule:
         """Chosen pulses."""
@@ -378,6 +470,8 @@ class FlownBuilder:
 
 
 def tolerable(spacecraft: Spacecraft) -> float:
-    """Largest residual, rad, at which the target counts as reached: more where commands have ticks."""
+    """Largest residual, rad, at which the target counts as reached:
+    more where commands have ticks.
+    """
     share = LEFT_OVER if spacecraft.limits.tick is None else LEFT_OVER_BY_TICKS
     return max(share * (spacecraft.nutation + spacecraft.to_turn), ROUNDING)

@@ -1,4 +1,6 @@
-"""Body-fixed pulses at every alignment, Magnus 1970 section 4 and fig. 5: for ±1, ±2 one every T_ω/4."""
+"""Body-fixed pulses at every alignment, Magnus 1970 section 4 and fig. 5: for ±1, ±2 one every
+T_ω/4.
+"""
 
 from __future__ import annotations
 
@@ -24,21 +26,28 @@ MOST_FLOWN = 200  # pulses that are laid one by one on the true motion, at most
 def schedule(spacecraft: Spacecraft, options: FourPulseOptions) -> Schedule:
     """Fire each channel whenever it opposes ω and firing helps, until it no longer does.
 
-    Coarse: equal pulses leave at most J/(2A). Fine: a last, shorter pulse leaves nothing, or at most J_min/(2A) where
-    the rest is below the smallest pulse. The sign rule holds for both signs of a ω3. Raises
-    Infeasible where no pulse fits or helps, or ``options.on_time`` is not within a channel's bounds.
+    Coarse: equal pulses leave at most J/(2A). Fine: a last, shorter pulse leaves nothing, or at
+    most J_min/(2A) where the rest is below the smallest pulse. The sign rule holds for both signs
+    of a ω3. Raises Infeasible where no pulse fits or helps, or ``options.on_time`` is not within a
+    channel's bounds.
     """
     channels = at_hand(spacecraft, usable(spacecraft))
     builder = ImpulseBuilder(spacecraft)
-    on_times = {channel.name: _on_time(builder.period, channel, options.on_time) for channel in channels}
+    on_times = {
+        channel.name: _on_time(builder.period, channel, options.on_time) for channel in channels
+    }
     turns = spacecraft.nutation_rate != 0.0
     if not turns:
         fire_components(builder, channels, options.on_time, coarse=options.coarse)
-    while turns and not builder.full and not builder.settled:  # whichever helpful channel comes first
+    while (
+        turns and not builder.full and not builder.settled
+    ):  # whichever helpful channel comes first
         pulses = []
         for channel in channels:  # a full one, or in fine damping one of the remaining size
             full = on_times[channel.name]
-            just_enough = None if options.coarse else builder.on_time_for(channel, builder.left, full)
+            just_enough = (
+                None if options.coarse else builder.on_time_for(channel, builder.left, full)
+            )
             pulses.append(builder.align(channel, full if just_enough is None else just_enough))
         helpful = [pulse for pulse in pulses if pulse is not None and builder.helps(pulse)]
         if not helpful:
@@ -49,19 +58,28 @@ def schedule(spacecraft: Spacecraft, options: FourPulseOptions) -> Schedule:
     return builder.schedule()
 
 
-LOOKS, SHARES = 240, 0.88 ** np.arange(40)  # moments in a period at which pulses are looked at, shares of a full one
-LIKE, LEFT = 0.5, 1e-4  # share of the largest gain with which an earlier pulse is fired; rad left to correction
+# moments in a period at which pulses are looked at, shares of a full one
+LOOKS = 240
+SHARES = 0.88 ** np.arange(40)
+LIKE, LEFT = (
+    0.5,
+    1e-4,
+)  # share of the largest gain with which an earlier pulse is fired; rad left to correction
 
 
 def on_true_motion(spacecraft: Spacecraft, options: FourPulseOptions) -> Schedule:
-    """The law of ideal rate gyros for three moments, whose large nutation turns unevenly and at a rate of its own.
+    """The law of ideal rate gyros for three moments, whose large nutation turns unevenly and at a
+    rate of its own.
 
-    Each pulse is one that lowers, as an impulse, the largest nutation of the motion that follows most.
+    Each pulse is one that lowers, as an impulse, the largest nutation of the motion that follows
+    most.
     """
-    channels, builder = at_hand(spacecraft, usable(spacecraft)), FlownBuilder(spacecraft)
+    channels = at_hand(spacecraft, usable(spacecraft))
+    builder = FlownBuilder(spacecraft)
     most = spacecraft.limits.max_pulses or MOST_FLOWN
     while len(builder.pulses) < most and builder.here.nutation > LEFT and not work.exhausted():
-        pulse, after = _best_pulse(builder.here, channels, options.on_time), builder.fork()
+        pulse = _best_pulse(builder.here, channels, options.on_time)
+        after = builder.fork()
         if pulse is None:
             break
         after.fire([pulse])
@@ -72,14 +90,22 @@ def on_true_motion(spacecraft: Spacecraft, options: FourPulseOptions) -> Schedul
 
 
 def _best_pulse(here: Spacecraft, channels: list[Channel], requested: float | None) -> Pulse | None:
-    """The pulse to fire next, within a period of the motion; None where none lowers the nutation."""
-    windows, earliest, period = Windows(here), here.limits.earliest, min(here.motion_period, here.horizon)
+    """The pulse to fire next, within a period of the motion;
+    None where none lowers the nutation.
+    """
+    windows = Windows(here)
+    earliest = here.limits.earliest
+    period = min(here.motion_period, here.horizon)
     times = earliest + np.linspace(0.0, period, LOOKS)
     rates = propagation.flown(here, Schedule(), float(times[-1])).motion(times)[0].T
-    moments, best = np.tile(np.array(here.inertia.moments)[:, None], LOOKS), list[tuple[float, Pulse]]()
+    moments = np.tile(np.array(here.inertia.moments)[:, None], LOOKS)
+    best = list[tuple[float, Pulse]]()
     for channel in channels:
-        full, tried = _on_time(period, channel, requested), list[tuple[float, float, float]]()
-        for on_time in dict.fromkeys(windows.on_time(full * share, channel.min_on_time, full) for share in SHARES):
+        full = _on_time(period, channel, requested)
+        tried = list[tuple[float, float, float]]()
+        for on_time in dict.fromkeys(
+            windows.on_time(full * share, channel.min_on_time, full) for share in SHARES
+        ):
             after = rates + channel.torque[:, None] * on_time / moments
             left = widest_cones(moments, after, here.sense, here.inertia.wheel)[0]
             starts = times - 0.5 * on_time

@@ -1,8 +1,10 @@
-"""Half cones in a row: the spin axis swings along the great circle to the target, half a nutation turn at a time.
+"""Half cones in a row: the spin axis swings along the great circle to the target, half a nutation
+turn at a time.
 
-From a pure spin n half cones cost 2n C|ω3| tan(β/2n) in n + 1 pulses: one puts H half-way ahead of the spin axis, each
-further one half a turn later puts it ahead again, the last stops it on the target. A nutation at t = 0 is damped first
-only where one pulse cannot take it out: else the first one jumps straight onto its first cone.
+From a pure spin n half cones cost 2n C|ω3| tan(β/2n) in n + 1 pulses: one puts H half-way ahead of
+the spin axis, each further one half a turn later puts it ahead again, the last stops it on the
+target. A nutation at t = 0 is damped first only where one pulse cannot take it out: else the first
+one jumps straight onto its first cone.
 """
 
 from __future__ import annotations
@@ -30,17 +32,23 @@ PATIENCE = 5  # numbers of cones that may fail before the search ends
 # sizes of a body-fixed pulse that are looked at, as shares of the one that an equal cone needs
 SHARES = np.linspace(0.6, 1.3, 15)
 WORTH_WAITING = 0.05  # share of one pulse that waiting for a better phase must save
-UNEQUAL = 0.3  # largest relative difference of a cone from equal ones: enough for a channel to be in phase
-LAGGING = 1.1  # largest ratio of the remaining cones to equal ones after a pulse; beyond, the last have too much to do
+# largest relative difference of a cone from equal ones: enough for a channel to be in phase
+UNEQUAL = 0.3
+# largest ratio of the remaining cones to equal ones after a pulse; beyond, the last have too much
+# to do
+LAGGING = 1.1
 SAMPLES = 96  # moments looked at in each turn of the body
 LONGEST_SEARCH = 6000  # moments looked at for one pulse, at most
-PLACE = 1e-3  # units of `work` of each moment at which a channel is looked at for the first pulse of a row
+# units of `work` of each moment at which a channel is looked at for the first pulse of a row
+PLACE = 1e-3
 
 MOST_CONES = 60  # cones tried at most where their number is not given
 
 
 def schedule(spacecraft: Spacecraft, options: HalfConeOptions) -> Schedule:
-    """So many half cones as requested, or the fewest of which one more saves less than 1 %; raises Infeasible."""
+    """So many half cones as requested, or the fewest of which one more saves less than 1 %; raises
+    Infeasible.
+    """
     expect_aim(spacecraft)
     builder = FlownBuilder(spacecraft)
     if math.tan(spacecraft.nutation) > _reach(spacecraft) / abs(spacecraft.axial):
@@ -50,11 +58,21 @@ def schedule(spacecraft: Spacecraft, options: HalfConeOptions) -> Schedule:
     best: Schedule | None = None
     reasons = list[Infeasible]()
     here = builder.here
-    reach, turn = _reach(here), max(here.to_turn - here.nutation, 0.0)
-    pulses = ((cones, (1.0 if cones == 1 else 2.0) * math.tan(turn / (2 * cones))) for cones in range(1, MOST_CONES))
-    fewest = next((cones for cones, pulse in pulses if 0.0 <= pulse <= reach / abs(here.axial)), MOST_CONES)
-    cones, allowed, horizon = fewest, here.limits.max_pulses, here.horizon
-    half_turns = int(max(horizon - here.limits.earliest, 0.0) / (math.pi * here.inertia.A / abs(here.axial)))
+    reach = _reach(here)
+    turn = max(here.to_turn - here.nutation, 0.0)
+    pulses = (
+        (cones, (1.0 if cones == 1 else 2.0) * math.tan(turn / (2 * cones)))
+        for cones in range(1, MOST_CONES)
+    )
+    fewest = next(
+        (cones for cones, pulse in pulses if 0.0 <= pulse <= reach / abs(here.axial)), MOST_CONES
+    )
+    cones = fewest
+    allowed = here.limits.max_pulses
+    horizon = here.horizon
+    half_turns = int(
+        max(horizon - here.limits.earliest, 0.0) / (math.pi * here.inertia.A / abs(here.axial))
+    )
     while cones <= min(MOST_CONES, half_turns + 1, MOST_CONES if allowed is None else allowed - 1):
         try:
             row = _row(builder.fork(), cones)
@@ -74,7 +92,8 @@ def schedule(spacecraft: Spacecraft, options: HalfConeOptions) -> Schedule:
         raise reasons[-1]
     if allowed is not None and allowed < fewest + 1:
         raise Infeasible(
-            f"{fewest} half cones take {fewest + 1} pulses at least, and limits.max_pulses allows {allowed}"
+            f"{fewest} half cones take {fewest + 1} pulses at least, "
+            f"and limits.max_pulses allows {allowed}"
         )
     if fewest >= MOST_CONES:
         raise Infeasible(
@@ -91,24 +110,38 @@ def _reach(spacecraft: Spacecraft) -> float:
     """Most by which one pulse turns H, N m s."""
     torquer, spin = spacecraft.torquer, spacecraft.spin
     if torquer is not None:
-        return math.inf if torquer.torque is None else precession.reach(torquer.torque, spin, math.inf)
+        return (
+            math.inf if torquer.torque is None else precession.reach(torquer.torque, spin, math.inf)
+        )
     channels = usable(spacecraft)
-    return max((precession.reach(abs(each.transverse), spin, each.max_on_time) for each in channels), default=0.0)
+    return max(
+        (precession.reach(abs(each.transverse), spin, each.max_on_time) for each in channels),
+        default=0.0,
+    )
 
 
 def _row(builder: FlownBuilder, cones: int) -> Schedule:
     """Row of half cones, each planned from the motion that the one before leaves."""
-    spacecraft, damped = builder.here, len(builder.pulses)
+    spacecraft = builder.here
+    damped = len(builder.pulses)
     most = spacecraft.limits.max_pulses
     if most is not None and most < cones + 1:
-        raise Infeasible(f"{cones} half cones take {cones + 1} pulses, and limits.max_pulses leaves {most}")
+        raise Infeasible(
+            f"{cones} half cones take {cones + 1} pulses, and limits.max_pulses leaves {most}"
+        )
     for remaining in range(cones, 1, -1):
         here = builder.here
         steered = None if here.torquer is None else SteerablePair(here, here.torquer).one(remaining)
         builder.fire(steered or (_fixed(here, remaining),))
     builder.fire(pulse_pairs.schedule(builder.here, straight=True))
-    angle, schedule = spacecraft.to_turn, builder.schedule()
-    if len(schedule) == cones + 1 and not damped and spacecraft.nutation < 1e-9 and 0.0 < angle < cones * math.pi:
+    angle = spacecraft.to_turn
+    schedule = builder.schedule()
+    if (
+        len(schedule) == cones + 1
+        and not damped
+        and spacecraft.nutation < 1e-9
+        and 0.0 < angle < cones * math.pi
+    ):
         ideal = precession.half_cones_impulse(abs(spacecraft.axial), angle, cones)
         ratio = f"{schedule.total_impulse / ideal:.4f}"
         return builder.schedule(note("half-cones-ideal", cones=cones, ideal_Nms=ideal, ratio=ratio))
@@ -117,15 +150,18 @@ def _row(builder: FlownBuilder, cones: int) -> Schedule:
 
 def _fixed(here: Spacecraft, cones: int) -> Pulse:
     """Earliest firing of a channel from which the row costs hardly more than from the best one."""
-    # Seldom is one in phase at the far end of its cone: what it misses is made up for by the cones that follow.
-    windows, channels = Windows(here), usable(here)
+    # Seldom is one in phase at the far end of its cone: what it misses is made up for by the cones
+    # that follow.
+    windows = Windows(here)
+    channels = usable(here)
     step = 2.0 * math.pi / here.fastest / SAMPLES  # so many moments in each turn of the body
     room = windows.horizon - here.limits.earliest
     span = min(max(room / (cones + 1), here.inertial_period), room)
     count = min(int(max(span, 0.0) / step) + 1, LONGEST_SEARCH)
     times = np.asarray(here.limits.earliest + np.arange(count) * step, dtype=np.float64)
     _, quaternions = Arc.of(here.inertia, here.initial).motion(times)
-    # Half-angle, rad, of equal cones from the best point of the present one, and the pulse for it, N m s.
+    # Half-angle, rad, of equal cones from the best point of the present one, and the pulse for it,
+    # N m s.
     equal = min((here.to_turn + here.nutation) / (2 * cones), 1.0)
     nominal = abs(here.axial) * (math.tan(here.nutation) + math.tan(equal))
     choices: list[tuple[Vector, Vector, Channel]] = []
@@ -140,8 +176,10 @@ def _fixed(here: Spacecraft, cones: int) -> Pulse:
     if not math.isfinite(least):
         names = ", ".join(channel.name for channel in channels)
         raise Infeasible(
-            f"with {cones} half cones to go, no channel ({names}) comes into phase with a pulse that its on-times and "
-            f"the blackout windows allow in the {span:.4g} s left; --cones with another number, or rhumb-line, can help"
+            f"with {cones} half cones to go, no channel ({names}) comes into phase with a pulse "
+            "that its on-times and "
+            f"the blackout windows allow in the {span:.4g} s left; --cones with another number, "
+            "or rhumb-line, can help"
         )
     near = least + WORTH_WAITING * nominal
     pulses = [
@@ -155,9 +193,13 @@ def _fixed(here: Spacecraft, cones: int) -> Pulse:
 def _costs(
     here: Spacecraft, channel: Channel, push: Vector, cones: int, equal: float, nominal: float
 ) -> tuple[Vector, Vector]:
-    """Cost of the row, (n,) N m s, that begins with a push of H along ``push`` (n, 3), and the on-time of that, s."""
-    h, reach = abs(here.axial), _reach(here)
-    best, chosen = np.full(len(push), np.inf), np.zeros(len(push))
+    """Cost of the row, (n,) N m s, that begins with a push of H along ``push`` (n, 3), and the
+    on-time of that, s.
+    """
+    h = abs(here.axial)
+    reach = _reach(here)
+    best = np.full(len(push), np.inf)
+    chosen = np.zeros(len(push))
     sizes = np.unique(np.minimum(nominal * SHARES, 0.999 * reach))
     on_times = precession.on_times_to_turn(sizes, abs(channel.transverse), here.spin)
     strongest = max(abs(each.transverse) for each in usable(here))
@@ -165,17 +207,27 @@ def _costs(
 
     def spent(jumps: Vector) -> Vector:
         """Impulse (n,) N m s of later ``jumps`` (n,), with their widths as that of the first."""
-        return strongest * precession.on_times_to_turn(np.minimum(jumps, widest), strongest, here.spin)
+        return strongest * precession.on_times_to_turn(
+            np.minimum(jumps, widest), strongest, here.spin
+        )
 
     for size, on_time in zip(sizes.tolist(), on_times.tolist(), strict=True):
         if not channel.min_on_time <= on_time <= channel.max_on_time:
             continue
         momentum = here.momentum + size * push
         half_angle = np.arccos(np.minimum(h / np.linalg.norm(momentum, axis=1), 1.0))
-        rest = np.abs(attitude.angle_between(momentum, here.target_axis) - half_angle) / (2 * (cones - 1))
+        rest = np.abs(attitude.angle_between(momentum, here.target_axis) - half_angle) / (
+            2 * (cones - 1)
+        )
         ahead, last = h * np.tan(half_angle), h * np.tan(rest)
-        costs = abs(channel.transverse) * on_time + spent(ahead + last) + (cones - 2) * spent(2.0 * last) + spent(last)
-        # Cones may differ by so much for a channel to be in phase, but the last must not have too much to do.
+        costs = (
+            abs(channel.transverse) * on_time
+            + spent(ahead + last)
+            + (cones - 2) * spent(2.0 * last)
+            + spent(last)
+        )
+        # Cones may differ by so much for a channel to be in phase, but the last must not have too
+        # much to do.
         costs[(np.abs(half_angle - equal) > UNEQUAL * equal) | (rest > LAGGING * equal)] = np.inf
         costs[ahead + last > 1.02 * reach] = np.inf
         better = costs < best

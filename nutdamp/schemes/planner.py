@@ -1,4 +1,6 @@
-"""Interface of the schemes: a scheme's module has ``schedule(spacecraft, options)``; `catalogue` lists them."""
+"""Interface of the schemes: a scheme's module has ``schedule(spacecraft, options)``; `catalogue`
+lists them.
+"""
 
 from __future__ import annotations
 
@@ -18,23 +20,32 @@ from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.schedule import Schedule
 from nutdamp.units import as_given
 
-MODELLED = 1e-6  # rad that a schedule laid on the symmetric body leaves from which one is laid on the true motion
+# rad that a schedule laid on the symmetric body leaves from which one is laid on the true motion
+MODELLED = 1e-6
 
-LONGER = 4.0  # multiple of the horizon, and of the default one, up to which a sufficient horizon is sought
+# multiple of the horizon, and of the default one, up to which a sufficient horizon is sought
+LONGER = 4.0
 
-Choice = Options | SchemeOptions | None  # options of one scheme, of several, or None for the defaults
+Choice = (
+    Options | SchemeOptions | None
+)  # options of one scheme, of several, or None for the defaults
 
 
 def settled(scheme: Scheme, chosen: Choice, spacecraft: Spacecraft) -> SchemeOptions:
-    """Options of a scheme for a ``spacecraft``: H is kept where it has a target, or a bound on its shift.
+    """Options of a scheme for a ``spacecraft``: H is kept where it has a target, or a bound on its
+    shift.
 
     Raises BadRequest for the options of another scheme.
     """
-    own, required = chosen or scheme.options(), spacecraft.requirement
+    own = chosen or scheme.options()
+    required = spacecraft.requirement
     if isinstance(own, Options):
         own = own.of(scheme.options)
     if not isinstance(own, scheme.options):
-        raise BadRequest(f"options of {scheme.name}: expected {scheme.options.__name__}(…), got {as_given(chosen)}")
+        raise BadRequest(
+            f"options of {scheme.name}: expected {scheme.options.__name__}(…), "
+            f"got {as_given(chosen)}"
+        )
     bound = required is not None and required.momentum_shift is not None
     return own.settled(keeps_axis=bound or spacecraft.goal.axis is not None)
 
@@ -42,23 +53,28 @@ def settled(scheme: Scheme, chosen: Choice, spacecraft: Spacecraft) -> SchemeOpt
 def schedule(name: str, spacecraft: Spacecraft, options: Choice = None) -> Schedule:
     """Pulses of the scheme ``name``, disturbances and all.
 
-    The scheme plans on the symmetric, undisturbed `sequential` of the spacecraft; where that is not exact, the
-    last pulse (the last four of schemes that keep or turn H) is corrected on the true motion. Raises Infeasible with
-    the reason where the scheme cannot work within the limits, and KeyError for a name not in `NAMES`.
+    The scheme plans on the symmetric, undisturbed `sequential` of the spacecraft; where that is not
+    exact, the last pulse (the last four of schemes that keep or turn H) is corrected on the true
+    motion. Raises Infeasible with the reason where the scheme cannot work within the limits, and
+    KeyError for a name not in `NAMES`.
     """
     scheme = SCHEMES[name]
     chosen = settled(scheme, options, spacecraft)
     if not scheme.fires:
         return Schedule()
     if scheme.by_turns and spacecraft.spin == 0.0:
-        raise Infeasible("the body does not turn about axis 3: there is no spin turn to fire once in")
+        raise Infeasible(
+            "the body does not turn about axis 3: there is no spin turn to fire once in"
+        )
     planned: Callable[[Spacecraft, SchemeOptions], Schedule] = import_module(scheme.module).schedule
     if scheme.on_true_body:
         return planned(spacecraft, chosen)
     if spacecraft.thrust_laws:
         on_plain = valve_commands.options(spacecraft, chosen)
         correct = Correction(scheme, on_plain)
-        return valve_commands.planned(spacecraft, lambda body: schedule(name, body, on_plain), correct)
+        return valve_commands.planned(
+            spacecraft, lambda body: schedule(name, body, on_plain), correct
+        )
     model = model_of(spacecraft, turning=chosen.equal, three_moments=scheme.three_moments)
     try:
         whole = planned(model.body, chosen)
@@ -68,7 +84,11 @@ def schedule(name: str, spacecraft: Spacecraft, options: Choice = None) -> Sched
         raise TooShort(short.why, cure) from None
     made = _corrected(scheme, model, whole, chosen)
     unlike = scheme.on_true_motion and not (spacecraft.inertia.symmetric or spacecraft.disturbances)
-    if not unlike or chosen.uncorrected or not (remains := left(spacecraft, made, momentum=False)) > MODELLED:
+    if (
+        not unlike
+        or chosen.uncorrected
+        or not (remains := left(spacecraft, made, momentum=False)) > MODELLED
+    ):
         return made
     on_true = import_module(scheme.module).on_true_motion(spacecraft, chosen)
     other = Correction(scheme, chosen)(spacecraft, on_true)
@@ -76,12 +96,16 @@ def schedule(name: str, spacecraft: Spacecraft, options: Choice = None) -> Sched
 
 
 def _longer_horizon(spacecraft: Spacecraft, planned: Callable[[Spacecraft], Schedule]) -> str:
-    """Message on a horizon that suffices, or that none was found; empty where the budget of work ends before."""
+    """Message on a horizon that suffices, or that none was found; empty where the budget of work
+    ends before.
+    """
 
     def end(horizon: float) -> float | None:
         """End of the schedule within a horizon; None where there is none."""
         try:
-            return planned(replace(spacecraft, limits=replace(spacecraft.limits, horizon=horizon))).end
+            return planned(
+                replace(spacecraft, limits=replace(spacecraft.limits, horizon=horizon))
+            ).end
         except Infeasible:
             return None
 
@@ -97,7 +121,8 @@ def _longer_horizon(spacecraft: Spacecraft, planned: Callable[[Spacecraft], Sche
 
 
 def alternatives(name: str, spacecraft: Spacecraft, options: Choice = None) -> list[Schedule]:
-    """Schedules that the scheme ``name`` weighs against the one that `schedule` gives, which may be among them.
+    """Schedules that the scheme ``name`` weighs against the one that `schedule` gives, which may be
+    among them.
 
     Raises KeyError for a name not in `NAMES`.
     """
@@ -106,15 +131,20 @@ def alternatives(name: str, spacecraft: Spacecraft, options: Choice = None) -> l
         return []
     chosen = settled(scheme, options, spacecraft)
     if spacecraft.thrust_laws:
-        schedules = alternatives(name, valve_commands.plain(spacecraft), valve_commands.options(spacecraft, chosen))
+        schedules = alternatives(
+            name, valve_commands.plain(spacecraft), valve_commands.options(spacecraft, chosen)
+        )
         return [as_commands(name, spacecraft, schedule, chosen) for schedule in schedules]
     model = model_of(spacecraft)
     schedules = import_module(scheme.module).alternatives(model.body, chosen)
     return [_corrected(scheme, model, schedule, chosen) for schedule in schedules]
 
 
-def as_commands(name: str, spacecraft: Spacecraft, schedule: Schedule, options: Choice = None) -> Schedule:
-    """A schedule ``schedule`` for the `plain` body of a ``spacecraft`` as its commands, corrected on its motion.
+def as_commands(
+    name: str, spacecraft: Spacecraft, schedule: Schedule, options: Choice = None
+) -> Schedule:
+    """A schedule ``schedule`` for the `plain` body of a ``spacecraft`` as its commands, corrected
+    on its motion.
 
     Raises KeyError for a name not in `NAMES`.
     """
@@ -123,8 +153,12 @@ def as_commands(name: str, spacecraft: Spacecraft, schedule: Schedule, options: 
     return valve_commands.as_commands(spacecraft, schedule, Correction(scheme, chosen))
 
 
-def _corrected(scheme: Scheme, model: SymmetricModel, schedule: Schedule, options: SchemeOptions) -> Schedule:
-    """A schedule for the ``model`` as one for the true spacecraft, corrected on its motion where that differs."""
+def _corrected(
+    scheme: Scheme, model: SymmetricModel, schedule: Schedule, options: SchemeOptions
+) -> Schedule:
+    """A schedule for the ``model`` as one for the true spacecraft, corrected on its motion where
+    that differs.
+    """
     schedule = model.translate(schedule)
     if not model.exact:
         schedule = schedule.without_proof

@@ -1,9 +1,11 @@
-"""Two pulses that leave no nutation, with H and the spin axis on the target axis: from any motion, exact at any angle.
+"""Two pulses that leave no nutation, with H and the spin axis on the target axis: from any motion,
+exact at any angle.
 
-A steerable torquer is placed for least impulse by `precession`: free are the time of the first pulse and how far aside
-H goes between two. Body-fixed channels are searched: the time of the first alone determines the jump after which H has
-the component C|ω3| along the target that it keeps when the spin axis comes there; times are kept at which the second
-channel then points the right way. Both are corrected on the real widths.
+A steerable torquer is placed for least impulse by `precession`: free are the time of the first
+pulse and how far aside H goes between two. Body-fixed channels are searched: the time of the first
+alone determines the jump after which H has the component C|ω3| along the target that it keeps when
+the spin axis comes there; times are kept at which the second channel then points the right way.
+Both are corrected on the real widths.
 """
 
 from __future__ import annotations
@@ -30,32 +32,40 @@ from nutdamp.spacecraft.equipment import Channel, Steerable
 from nutdamp.spacecraft.model import Spacecraft, SpinState, Vector
 from nutdamp.spacecraft.schedule import Pulse, Schedule, steerable_pulse
 
-# turns of the spin axis looked at from the earliest start, and one more from the end of each blackout window
+# turns of the spin axis looked at from the earliest start, and one more from the end of each
+# blackout window
 SPIN_TURNS = 4
 MOST_WINDOWS = 40  # blackout windows after which a turn is looked at
 FURTHER_TURNS = 60  # further whole turns that the second pulse may wait for, at most
 FURTHER_BESIDE = 12  # the same for the search beside the best places
 MOST_BESIDE = 1000  # moments looked at in that search, at most
-# share of the first steps at which the search for the best choice ends; the cost is flat there to its square
+# share of the first steps at which the search for the best choice ends; the cost is flat there to
+# its square
 NARROWEST = 1e-7
 ROUNDING = 1e-14  # relative gain that counts as one while the best choice is made exact
 SMALLEST = 0.1  # least share of both jumps that each real pulse of the two gets
-# least sine of half the angle by which the spin axis turns between two real pulses: a sixth of a turn to five
+# least sine of half the angle by which the spin axis turns between two real pulses: a sixth of a
+# turn to five
 APART = 0.5
 NOTHING = 1e-12  # jumps below this times C|ω3| are left out
 SHORTLIST = 8  # candidates that are flown and corrected, at most
 PAIR = 5e-5  # units of `work` of each moment of each pair of channels
 ON_CONE = 1e-3  # share of its natural size below which the first jump counts as nothing
-BESIDE = 0.05  # distance beside the target, over the angles at hand, of a search that finds nothing on it
+# distance beside the target, over the angles at hand, of a search that finds nothing on it
+BESIDE = 0.05
 
 SPIN_SAMPLES = 256  # moments looked at in each turn of the spin axis, before the best is made exact
-BACKWARD = 4  # steps in which a pulse and the place to which it sets back the spin axis are made to agree
+BACKWARD = (
+    4  # steps in which a pulse and the place to which it sets back the spin axis are made to agree
+)
 COMPASS_STEPS = 2000  # steps of that search, at most
 EQUAL = 1e-9  # costs that differ by less, relatively, are equal: then the earlier end wins
 
 
 class SteerablePair:
-    """Placement of a steerable torquer from the motion of a ``spacecraft`` at t = 0 to its target axis."""
+    """Placement of a steerable torquer from the motion of a ``spacecraft`` at t = 0 to its target
+    axis.
+    """
 
     def __init__(self, spacecraft: Spacecraft, torquer: Steerable) -> None:
         self.spacecraft, self.torquer = spacecraft, torquer
@@ -70,9 +80,15 @@ class SteerablePair:
         return attitude.rotate(quaternions, np.array([0.0, 0.0, self.spacecraft.sense]))
 
     def on_times(self, jumps: Vector) -> Vector:
-        """On-times (n,) s of pulses that turn H by ``jumps`` (n,) N m s; not a number where no pulse can."""
+        """On-times (n,) s of pulses that turn H by ``jumps`` (n,) N m s; not a number where no
+        pulse can.
+        """
         torque, spin = self.torquer.torque, self.spacecraft.spin
-        return np.zeros_like(jumps) if torque is None else precession.on_times_to_turn(jumps, torque, spin)
+        return (
+            np.zeros_like(jumps)
+            if torque is None
+            else precession.on_times_to_turn(jumps, torque, spin)
+        )
 
     def spent(self, jumps: Vector) -> Vector:
         """Impulse (n,) N m s that ``jumps`` (n,) of H take: more where the pulse is wide."""
@@ -82,48 +98,69 @@ class SteerablePair:
     def set_back(self, jumps: Vector) -> Vector:
         """Angle (n,) rad by which pulses that turn H by ``jumps`` (n,) set the spin axis back.
 
-        A wide pulse acts more on ω than it turns H, by sinc(ντ/2) over sinc(ω3τ/2): seen from its centre.
+        A wide pulse acts more on ω than it turns H, by sinc(ντ/2) over sinc(ω3τ/2): seen from its
+        centre.
         """
         half = 0.5 * self.spacecraft.nutation_rate * self.on_times(jumps)
         return np.asarray((self.spent(jumps) * np.sinc(half / math.pi) - jumps) / self.h)
 
     def pulses(self, jumps: list[tuple[float, Vector]]) -> tuple[Pulse, ...]:
         """Pulses that bring H to the given vectors (3,) N m s at the given moments, in order."""
-        pulses, state, now, momentum = [], self.start, 0.0, self.momentum
+        pulses = []
+        state = self.start
+        now = 0.0
+        momentum = self.momentum
         for moment, after in jumps:
-            rates, quaternions = Arc.of(self.spacecraft.inertia, state, now).motion(np.array([moment]))
+            rates, quaternions = Arc.of(self.spacecraft.inertia, state, now).motion(
+                np.array([moment])
+            )
             body = attitude.matrix(quaternions[0]).T @ (after - momentum)
             push = complex(body[0], body[1])
             if abs(push) > NOTHING * self.h:
                 on_time = float(self.on_times(np.array([abs(push)]))[0])
                 angle = math.atan2(push.imag, push.real)
-                pulse = steerable_pulse(self.torquer, moment, angle, impulse=abs(push), on_time=on_time)
+                pulse = steerable_pulse(
+                    self.torquer, moment, angle, impulse=abs(push), on_time=on_time
+                )
                 pulses.append(commandable(self.spacecraft, pulse))
-            state = SpinState(complex(rates[0, 0], rates[0, 1]) + push / self.A, float(rates[0, 2]), quaternions[0])
+            state = SpinState(
+                complex(rates[0, 0], rates[0, 1]) + push / self.A,
+                float(rates[0, 2]),
+                quaternions[0],
+            )
             now, momentum = moment, after
         return tuple(pulses)
 
     def moments(self) -> Vector:
-        """Moments (n,) s of the first pulse worth looking at: four turns, and one after each blackout window."""
+        """Moments (n,) s of the first pulse worth looking at: four turns, and one after each
+        blackout window.
+        """
         period, first = self.spacecraft.inertial_period, self.spacecraft.limits.earliest
         turn = np.arange(SPIN_SAMPLES) * self.step
         ends = [end for _, end in self.spacecraft.limits.blackout if end > first][:MOST_WINDOWS]
-        parts = [first + number * period + turn for number in range(SPIN_TURNS)] + [end + turn for end in ends]
+        parts = [first + number * period + turn for number in range(SPIN_TURNS)] + [
+            end + turn for end in ends
+        ]
         times = np.unique(np.concatenate(parts))
         return np.asarray(times[times <= self.windows.horizon])
 
     def one(self, cones: int) -> tuple[Pulse, ...]:
-        """First pulse of ``cones`` half cones in a row, at the time from which all of them cost least."""
+        """First pulse of ``cones`` half cones in a row, at the time from which all of them cost
+        least.
+        """
 
         def cost(times: Vector) -> tuple[Vector, Vector]:
-            axes, more = self.axes(times), np.zeros(len(times))
+            axes = self.axes(times)
+            more = np.zeros(len(times))
             for _ in range(BACKWARD):
                 middle, last = precession.half_cone(self.h, axes, self.target, cones, more)
                 jumps = np.linalg.norm(middle - self.momentum, axis=-1)
                 back = self.set_back(jumps)
                 more = (back + (cones - 1) * self.set_back(2.0 * last)) / (2 * cones) - back
             on_times = self.on_times(jumps)
-            allowed = self.windows.allowed(times - 0.5 * on_times, on_times, self.spacecraft.limits.earliest)
+            allowed = self.windows.allowed(
+                times - 0.5 * on_times, on_times, self.spacecraft.limits.earliest
+            )
             spent = self.spent(jumps) + (cones - 1) * self.spent(2.0 * last) + self.spent(last)
             return np.where(allowed & ~np.isnan(spent), spent, np.inf), middle
 
@@ -137,7 +174,9 @@ class SteerablePair:
         return self.pulses([(float(moment[0]), cost(moment)[1][0])])
 
     def two(self, straight: bool = False) -> tuple[Pulse, ...]:
-        """Two pulses that end on the target with least impulse; ``straight``: by a half cone, without choice."""
+        """Two pulses that end on the target with least impulse; ``straight``: by a half cone,
+        without choice.
+        """
         times = self.moments()
         free = precession.two_jumps(self.A, self.h, self.momentum, self.axes(times), self.target)
         least = float(np.nanmin(self.spent(free.first) + self.spent(free.second), initial=np.inf))
@@ -146,7 +185,8 @@ class SteerablePair:
         choice = self._best(times, np.zeros(len(times)), straight, FURTHER_TURNS)
         if (choice is None or choice.cost > least * (1.0 + 1e-6)) and not straight:
             # The limits forbid the best place: others beside it, by shares of both jumps.
-            some, shares = slice(None, None, math.ceil(len(times) / MOST_BESIDE)), np.linspace(-1.0, 1.0, 41)
+            some = slice(None, None, math.ceil(len(times) / MOST_BESIDE))
+            shares = np.linspace(-1.0, 1.0, 41)
             beside = np.repeat(times[some], len(shares)), (shares * free.cost[some, None]).ravel()
             other = self._best(*beside, straight, FURTHER_BESIDE)
             if other is not None and (choice is None or other.cost < choice.cost * (1.0 - EQUAL)):
@@ -159,20 +199,31 @@ class SteerablePair:
             np.array([self.step, 0.0 if straight else 0.02 * choice.jumps]),
         )
         _, second, jumps = self._costs(point[:1], point[1:], choice.further, straight)
-        return self.pulses([(float(point[0]), jumps.middle[0]), (float(second[0]), self.h * self.target)])
+        return self.pulses(
+            [(float(point[0]), jumps.middle[0]), (float(second[0]), self.h * self.target)]
+        )
 
-    def _costs(self, times: Vector, aside: Vector, further: int, straight: bool) -> tuple[Vector, Vector, TwoJumps]:
-        """Impulse (n,) of first pulses at ``times`` (n,) s, infinite where not allowed; moment of the second."""
-        jumps = precession.two_jumps(self.A, self.h, self.momentum, self.axes(times), self.target, aside, straight)
+    def _costs(
+        self, times: Vector, aside: Vector, further: int, straight: bool
+    ) -> tuple[Vector, Vector, TwoJumps]:
+        """Impulse (n,) of first pulses at ``times`` (n,) s, infinite where not allowed; moment of
+        the second.
+        """
+        jumps = precession.two_jumps(
+            self.A, self.h, self.momentum, self.axes(times), self.target, aside, straight
+        )
         second = times + jumps.wait + further * jumps.turn
         long, longer = self.on_times(jumps.first), self.on_times(jumps.second)
         ready = times + 0.5 * long + self.spacecraft.limits.gap
         allowed = self.windows.allowed(times - 0.5 * long, long, self.spacecraft.limits.earliest)
         allowed &= self.windows.allowed(second - 0.5 * longer, longer, ready)
         if self.torquer.torque is not None:
-            # Widths are corrected on both pulses: both must be there, and not do the same a whole turn apart.
+            # Widths are corrected on both pulses: both must be there, and not do the same a whole
+            # turn apart.
             allowed &= np.minimum(jumps.first, jumps.second) > SMALLEST * jumps.cost
-            allowed &= np.sin(math.pi * jumps.wait / jumps.turn) > APART  # a sixth of a turn to five
+            allowed &= (
+                np.sin(math.pi * jumps.wait / jumps.turn) > APART
+            )  # a sixth of a turn to five
         spent = self.spent(jumps.first) + self.spent(jumps.second)
         return np.where(allowed, spent, np.inf), second, jumps
 
@@ -187,7 +238,9 @@ class SteerablePair:
                 index = near[np.argmin(second[near])]
                 point = np.array([times[index], aside[index]])
                 best = _Placement(least, point, further, float(jumps.cost[index]))
-            if not (second < self.windows.horizon).any() or (best is not None and not self.spacecraft.limits.blackout):
+            if not (second < self.windows.horizon).any() or (
+                best is not None and not self.spacecraft.limits.blackout
+            ):
                 break
         return best
 
@@ -207,12 +260,15 @@ class SteerablePair:
                 needed = float(np.linalg.norm(middle - self.momentum, axis=1).min())
             if needed > once:
                 return (
-                    f"one pulse turns H by {turn_of(self.spacecraft, once)} at most (2M/|ω3|, the torque being fixed "
-                    f"in the body), and {turn_of(self.spacecraft, needed)} are needed at once; half-cone with more "
+                    f"one pulse turns H by {turn_of(self.spacecraft, once)} at most (2M/|ω3|, "
+                    "the torque being fixed "
+                    f"in the body), and {turn_of(self.spacecraft, needed)} are needed at once; "
+                    "half-cone with more "
                     "cones or rhumb-line take less"
                 )
         return (
-            f"the pulses (half cones: {cones}) find no room within the {horizon:.4g} s up to limits.horizon, the gap "
+            f"the pulses (half cones: {cones}) find no room within the {horizon:.4g} s up to "
+            "limits.horizon, the gap "
             "and the blackout windows"
         )
 
@@ -225,7 +281,9 @@ class _Placement(NamedTuple):
 
 
 def _descend(cost: Callable[[Vector], Vector], point: Vector, steps: Vector) -> Vector:
-    """Least ``cost`` (points (n, k) -> (n,)) near ``point`` (k,), by a compass search narrowing from ``steps`` (k,)."""
+    """Least ``cost`` (points (n, k) -> (n,)) near ``point`` (k,), by a compass search narrowing
+    from ``steps`` (k,).
+    """
     rose = np.vstack([np.diag(steps), -np.diag(steps)])
     rose = rose[np.any(rose != 0.0, axis=1)]
     best = float(cost(point[None, :])[0])
@@ -237,7 +295,8 @@ def _descend(cost: Callable[[Vector], Vector], point: Vector, steps: Vector) -> 
         costs = cost(around)
         index = int(np.argmin(costs))
         if costs[index] < best * (1.0 - ROUNDING):
-            best, point = float(costs[index]), around[index]
+            best = float(costs[index])
+            point = around[index]
         else:
             narrowed *= 0.5
     return point
@@ -246,17 +305,23 @@ def _descend(cost: Callable[[Vector], Vector], point: Vector, steps: Vector) -> 
 DEAREST = 3.0  # pairs that cost more than this times the floor are not looked at
 
 BODY_SAMPLES, BODY_TURNS = 96, 24
-"""Moments looked at in each turn of the body, and turns within which the first pulse comes, at most."""
+"""Moments looked at in each turn of the body, and turns within which the first pulse comes, at
+most.
+"""
 
 
 def schedule(spacecraft: Spacecraft, *, straight: bool = False) -> Schedule:
-    """Two pulses, where so many are allowed; ``straight``: by one half cone, of a torquer. Raises Infeasible."""
+    """Two pulses, where so many are allowed; ``straight``: by one half cone, of a torquer. Raises
+    Infeasible.
+    """
     torquer = spacecraft.torquer
     if torquer is not None:
         schedule = Schedule(SteerablePair(spacecraft, torquer).two(straight))
         kept = spacecraft.limits.tick is None or keeps_limits(spacecraft, schedule.pulses)
         if kept and (torquer.torque is not None or not model_of(spacecraft).exact):
-            schedule = correction.correct(spacecraft, schedule, chosen=range(len(schedule)), momentum=True)
+            schedule = correction.correct(
+                spacecraft, schedule, chosen=range(len(schedule)), momentum=True
+            )
         return _checked(spacecraft, schedule)
     search = _PairSearch(spacecraft, at_hand(spacecraft, for_pairs(spacecraft)))
 
@@ -273,7 +338,8 @@ def schedule(spacecraft: Spacecraft, *, straight: bool = False) -> Schedule:
         raise Infeasible(search.reason())
     schedule = _checked(spacecraft, best)
     first, second = schedule.pulses
-    wait, ratio = second.t - first.t, f"{schedule.total_impulse / search.floor:.3f}"
+    wait = second.t - first.t
+    ratio = f"{schedule.total_impulse / search.floor:.3f}"
     told = note("pulse-pair", first=first.channel, second=second.channel, wait_s=wait, ratio=ratio)
     return Schedule(schedule.pulses, (told,))
 
@@ -281,16 +347,20 @@ def schedule(spacecraft: Spacecraft, *, straight: bool = False) -> Schedule:
 def _checked(spacecraft: Spacecraft, schedule: Schedule) -> Schedule:
     """Schedule, if it keeps the limits and comes near the target."""
     if not keeps_limits(spacecraft, schedule.pulses):
-        raise Infeasible("with commands on the ticks of limits.tick the two pulses touch another limit")
+        raise Infeasible(
+            "with commands on the ticks of limits.tick the two pulses touch another limit"
+        )
     if correction.left(spacecraft, schedule) <= tolerable(spacecraft):
         return schedule
     widest = max((abs(spacecraft.spin) * pulse.on_time for pulse in schedule), default=0.0)
     if widest == 0.0:
         raise Infeasible(
-            "placed for free motion of a symmetric body, two impulses could not be corrected to end on the target"
+            "placed for free motion of a symmetric body, two impulses could not be corrected to "
+            "end on the target"
         )
     raise Infeasible(
-        f"two pulses as wide as these (the body turns by {math.degrees(widest):.3g}° during one) do not end on the "
+        f"two pulses as wide as these (the body turns by {math.degrees(widest):.3g}° during one) "
+        "do not end on the "
         "target; half-cone with more cones or rhumb-line take smaller ones"
     )
 
@@ -306,10 +376,14 @@ class _PairSearch:
         self.momentum, self.target = spacecraft.momentum, spacecraft.target_axis
         self.floor = max(spacecraft.least_impulse, spacecraft.turning_impulse)
         self.arc = Arc.of(inertia, spacecraft.initial)
-        self.within_reach = False  # whether a pair closed, before on-times and windows were looked at
+        self.within_reach = (
+            False  # whether a pair closed, before on-times and windows were looked at
+        )
 
     def after(self, channel: Channel, times: Vector) -> tuple[TwoJumps, NDArray[np.complex128]]:
-        """Jumps, the first by ``channel`` at ``times`` (n,) s, and the second in the body after the wait, J1 + iJ2."""
+        """Jumps, the first by ``channel`` at ``times`` (n,) s, and the second in the body after the
+        wait, J1 + iJ2.
+        """
         direction = channel.transverse / abs(channel.transverse)
         _, quaternions = self.arc.motion(times)
         push = attitude.rotate(quaternions, np.array([direction.real, direction.imag, 0.0]))
@@ -320,7 +394,8 @@ class _PairSearch:
             middle = self.momentum + first[:, None] * push
             wait, turn = precession.coast(self.A, middle, axes, self.target)
             jump = self.h * self.target - middle
-            # The attitude when the spin axis is on the target: about H, and about axis 3, as on any arc.
+            # The attitude when the spin axis is on the target: about H, and about axis 3, as on any
+            # arc.
             half = 0.5 * np.linalg.norm(middle, axis=1) / self.A * wait
             unit = middle / np.linalg.norm(middle, axis=1)[:, None]
             outer = np.concatenate([np.cos(half)[:, None], np.sin(half)[:, None] * unit], axis=1)
@@ -330,7 +405,9 @@ class _PairSearch:
         return TwoJumps(middle, first, np.linalg.norm(jump, axis=1), wait, turn), body
 
     def all_candidates(self) -> Iterator[PairCandidate]:
-        """Candidates for the target; where that lies on the cone of the spin axis, for targets beside it."""
+        """Candidates for the target; where that lies on the cone of the spin axis, for targets
+        beside it.
+        """
         wide = self.spacecraft.nutation + self.spacecraft.to_turn
         if abs(self.h - self.momentum @ self.target) > ON_CONE * wide**2 * self.h:
             yield from self.candidates()
@@ -338,14 +415,19 @@ class _PairSearch:
         target = self.target
         side = np.cross(self.momentum, target)
         for beside, sense in product((side, np.cross(side, target)), (1.0, -1.0)):
-            moved = target + sense * BESIDE * wide * beside / max(float(np.linalg.norm(beside)), 1e-300)
+            moved = target + sense * BESIDE * wide * beside / max(
+                float(np.linalg.norm(beside)), 1e-300
+            )
             self.target = moved / float(np.linalg.norm(moved))
             yield from self.candidates()
 
     def candidates(self) -> Iterator[PairCandidate]:
         """Pairs that close and keep the limits, the cheapest of each first channel."""
-        turn, first = 2.0 * math.pi / self.spacecraft.fastest, self.spacecraft.limits.earliest
-        ends = [first, *(end for _, end in self.spacecraft.limits.blackout if end > first)][:BODY_TURNS]
+        turn = 2.0 * math.pi / self.spacecraft.fastest
+        first = self.spacecraft.limits.earliest
+        ends = [first, *(end for _, end in self.spacecraft.limits.blackout if end > first)][
+            :BODY_TURNS
+        ]
         span = np.arange(BODY_SAMPLES * max(BODY_TURNS // len(ends), 2)) * (turn / BODY_SAMPLES)
         times = np.unique(np.concatenate([end + span for end in ends]))  # of the first pulse, s
         times = np.asarray(times[times <= self.windows.horizon])
@@ -358,14 +440,19 @@ class _PairSearch:
             after, body = self.after(one, times)
             promising = adjoining & (after.cost <= DEAREST * self.floor)[:-1]
             for further in range(FURTHER_TURNS):
-                if not np.nanmin(times + after.wait + further * after.turn, initial=np.inf) < self.windows.horizon:
+                if (
+                    not np.nanmin(times + after.wait + further * after.turn, initial=np.inf)
+                    < self.windows.horizon
+                ):
                     break
                 work.spend(PAIR * len(times) * len(self.channels))
                 needed = body * np.exp(-1j * self.turning * further * after.turn)
                 for two in self.channels:
                     off = np.angle(needed * two.transverse.conjugate())
                     near = np.abs(off) < 0.5 * math.pi
-                    crosses = np.flatnonzero(promising & near[:-1] & near[1:] & (off[:-1] * off[1:] <= 0.0))
+                    crosses = np.flatnonzero(
+                        promising & near[:-1] & near[1:] & (off[:-1] * off[1:] <= 0.0)
+                    )
                     if len(crosses) > 0:
                         yield from self._placed(one, two, further, times, after, off, crosses)
 
@@ -397,13 +484,18 @@ class _PairSearch:
         prices = [channel.cost_rate(by_propellant=known) for channel in (one, two)]
         pairs = []
         for row in np.flatnonzero(allowed):
-            timing = ((float(first[row]), float(long[row])), (float(second[row]), float(longer[row])))
+            timing = (
+                (float(first[row]), float(long[row])),
+                (float(second[row]), float(longer[row])),
+            )
             cost = sum(price * on_time for price, (_, on_time) in zip(prices, timing, strict=True))
             pairs.append(PairCandidate(cost, timing[1][0] + 0.5 * timing[1][1], (one, two), timing))
         return sorted(pairs, key=lambda candidate: candidate.cost)[:SHORTLIST]
 
     def _on_times(self, channel: Channel, jumps: Vector) -> Vector:
-        """On-times (n,) s with which ``channel`` turns H by ``jumps`` (n,) N m s; not a number beyond its reach."""
+        """On-times (n,) s with which ``channel`` turns H by ``jumps`` (n,) N m s; not a number
+        beyond its reach.
+        """
         on_times = precession.on_times_to_turn(jumps, abs(channel.transverse), self.spacecraft.spin)
         outside = (on_times < channel.min_on_time) | (on_times > channel.max_on_time)
         return np.where(outside, np.nan, on_times)
@@ -417,16 +509,21 @@ class _PairSearch:
         )
         if 2.0 * strongest < self.floor:
             return (
-                f"one pulse turns H by {turn_of(self.spacecraft, strongest)} at most, and two together would have to "
-                f"by {turn_of(self.spacecraft, self.floor)}; half-cone with more cones or rhumb-line take smaller ones"
+                f"one pulse turns H by {turn_of(self.spacecraft, strongest)} at most, "
+                "and two together would have to "
+                f"by {turn_of(self.spacecraft, self.floor)}; half-cone with more cones or "
+                "rhumb-line take smaller ones"
             )
         if self.within_reach:
             return (
-                f"pairs of the channels ({names}) acquire the target, but not within on-times, gap, blackout windows "
+                f"pairs of the channels ({names}) acquire the target, but not within on-times, "
+                "gap, blackout windows "
                 f"and the {self.windows.horizon:.4g} s up to limits.horizon"
             )
         return (
-            f"no two of the channels ({names}) push in the right directions, one after the other, in the "
-            f"{self.windows.horizon:.4g} s up to limits.horizon; a longer horizon, a steerable torquer or rhumb-line "
+            f"no two of the channels ({names}) push in the right directions, one after the other, "
+            "in the "
+            f"{self.windows.horizon:.4g} s up to limits.horizon; a longer horizon, "
+            "a steerable torquer or rhumb-line "
             "can help"
         )

@@ -1,10 +1,12 @@
-"""Sun-synchronous pulse train: short pulses at a fixed inertial phase, one or more in each spin turn.
+"""Sun-synchronous pulse train: short pulses at a fixed inertial phase, one or more in each spin
+turn.
 
-Each pulse turns H by J/(C|ω3|) and gives the nutation a phasor, which from one to the next turns by φ = 2πC/(AK) for K
-pulses a turn. So N leave (J/C|ω3|)|sin(Nφ/2)/sin(φ/2)| of nutation: N is chosen so that they close, a nutation at t = 0
-included, their equal width so that they just reach the target. An excess is bent away by heading a little aside (a
-spiral), and on the flown motion the last pulses are moved until nothing is left. The phase is that of the great circle
-to the target, or fixed against the Sun: then H follows a rhumb line.
+Each pulse turns H by J/(C|ω3|) and gives the nutation a phasor, which from one to the next turns by
+φ = 2πC/(AK) for K pulses a turn. So N leave (J/C|ω3|)|sin(Nφ/2)/sin(φ/2)| of nutation: N is chosen
+so that they close, a nutation at t = 0 included, their equal width so that they just reach the
+target. An excess is bent away by heading a little aside (a spiral), and on the flown motion the
+last pulses are moved until nothing is left. The phase is that of the great circle to the target, or
+fixed against the Sun: then H follows a rhumb line.
 """
 
 from __future__ import annotations
@@ -32,26 +34,39 @@ from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.schedule import TOUCHING, Pulse, Schedule, channel_pulse, steerable_pulse
 
-TURN_SHARE = 0.125  # default on-time as a share of the spin turn: 2.6 % of the impulse is lost to the arc
-SPARE = 3e-3  # pulses that a train has to spare: without them it could not bend, and its phases not bring H nearer
+TURN_SHARE = (
+    0.125  # default on-time as a share of the spin turn: 2.6 % of the impulse is lost to the arc
+)
+# pulses that a train has to spare: without them it could not bend, and its phases not bring H
+# nearer
+SPARE = 3e-3
 LEAST_RATIO = 0.1  # inertia ratio below which the phases of pulses hardly matter to the nutation
-# share of the spin turn up to which pulses widen where the horizon is short: a quarter of the impulse is lost
+# share of the spin turn up to which pulses widen where the horizon is short: a quarter of the
+# impulse is lost
 WIDEST = 0.4
 BENT = 10.0  # times as many spare pulses for a last try
 WIDEST_BEND = 1.3  # rad by which the heading of a train may differ from the course to the target
-SHORT = 60  # pulses up to which their size is corrected on the flown motion too: a longer train has little to spare
+# pulses up to which their size is corrected on the flown motion too: a longer train has little to
+# spare
+SHORT = 60
 OTHERS = 4  # other lengths of the pulses that are tried where the one requested does not do
 
 STEP = math.radians(2.0)  # angle that one ideal impulse turns H by, at most
 
 CLOSED, OPEN = 0.3, 1.2
-"""Sums of the phasors, in pulses: below they count as closed, as the rest is corrected; beyond that has no hope."""
+"""Sums of the phasors, in pulses: below they count as closed, as the rest is corrected; beyond that
+has no hope.
+"""
 
 MOST_PULSES = 600
 
 LAST = 20  # largest number of last pulses that are moved
 
-MOVED = (6, 12, LAST)  # numbers of last pulses that are moved, one after the other until nothing is left
+MOVED = (
+    6,
+    12,
+    LAST,
+)  # numbers of last pulses that are moved, one after the other until nothing is left
 
 TRIES = 4  # counts that are flown, at most
 
@@ -73,84 +88,123 @@ class Train:
         self.windows = Windows(here)
         self.turn = 2.0 * math.pi / abs(here.spin)
         self.h = abs(here.axial)
-        torquer, self.channels, self.shortest, self.longest = here.torquer, list[Channel](), 0.0, math.inf
+        torquer = here.torquer
+        self.channels = list[Channel]()
+        self.shortest = 0.0
+        self.longest = math.inf
         if torquer is not None:
             self.torque = math.inf if torquer.torque is None else torquer.torque
         else:
             # Of directions as different as can be, the one that costs least for its torque first.
-            channels, count = usable(here), options.per_turn
+            channels = usable(here)
+            count = options.per_turn
             if not channels:
                 raise Infeasible("once the nutation is taken out no time is left for the turn")
-            self.channels = [min(channels, key=lambda channel: (channel.price, -abs(channel.transverse)))]
+            self.channels = [
+                min(channels, key=lambda channel: (channel.price, -abs(channel.transverse)))
+            ]
             while len(self.channels) < count:
                 off = [
-                    min(abs(cmath.phase(each.transverse * other.transverse.conjugate())) for other in self.channels)
+                    min(
+                        abs(cmath.phase(each.transverse * other.transverse.conjugate()))
+                        for other in self.channels
+                    )
                     for each in channels
                 ]
                 if max(off) < 0.2:
                     raise Infeasible(
-                        f"{count} pulses a spin turn need {count} channels of different directions, for each passes "
+                        f"{count} pulses a spin turn need {count} channels of different "
+                        "directions, for each passes "
                         f"the phase once a turn; there are {len(self.channels)}"
                     )
                 self.channels.append(channels[off.index(max(off))])
-            self.torque = math.fsum(abs(channel.transverse) for channel in self.channels) / len(self.channels)
+            self.torque = math.fsum(abs(channel.transverse) for channel in self.channels) / len(
+                self.channels
+            )
             self.shortest = max(channel.min_on_time for channel in self.channels)
             self.longest = min(channel.max_on_time for channel in self.channels)
         self.ideal = math.isinf(self.torque)
-        self.widest = min(self.longest, WIDEST * self.turn)  # s, that is worth firing unless a longer one is given
+        self.widest = min(
+            self.longest, WIDEST * self.turn
+        )  # s, that is worth firing unless a longer one is given
         given = options.on_time
-        self.on_time = max(min(self.longest, TURN_SHARE * self.turn), self.shortest) if given is None else given
+        self.on_time = (
+            max(min(self.longest, TURN_SHARE * self.turn), self.shortest)
+            if given is None
+            else given
+        )
         name = f"the shortest pulse, {self.shortest:.4g} s,"
         if given is not None:
             name = f"an on-time of {given:.4g} s"
             if self.ideal:
                 raise Infeasible(
-                    "an on-time is for pulses that last: ideal impulses have none; give the torquer a torque"
+                    "an on-time is for pulses that last: ideal impulses have none; "
+                    "give the torquer a torque"
                 )
             if not self.shortest <= given <= self.longest:
                 allowed = span(self.shortest, self.longest, "s")
                 raise Infeasible(f"{name} is outside what the channels allow: {allowed}")
             if abs(self.windows.nearest_tick(given) - given) > TOUCHING:
                 tick = self.here.limits.tick
-                raise Infeasible(f"an on-time of {given:.6g} s is no multiple of the tick of {tick:.4g} s")
+                raise Infeasible(
+                    f"an on-time of {given:.6g} s is no multiple of the tick of {tick:.4g} s"
+                )
         if not self.ideal and self.on_time > 0.5 * self.turn:
             raise Infeasible(
-                f"{name} is more than half a spin turn ({0.5 * self.turn:.4g} s), after which a torque fixed in the "
+                f"{name} is more than half a spin turn ({0.5 * self.turn:.4g} s), "
+                "after which a torque fixed in the "
                 "body undoes its work"
             )
         self.ahead, self.way = precession.course(here.momentum, here.target_axis, here.goal.sun)
         self.needed = self.h * self.way  # turn of H, N m s
-        self.strongest = self.turns_by(STEP * self.h if self.ideal else self.on_time)  # turn by a full pulse, N m s
+        self.strongest = self.turns_by(
+            STEP * self.h if self.ideal else self.on_time
+        )  # turn by a full pulse, N m s
         most = here.limits.max_pulses
-        self.most = MOST_PULSES if most is None else most  # pulses allowed, and not shorter than they can be
+        self.most = (
+            MOST_PULSES if most is None else most
+        )  # pulses allowed, and not shorter than they can be
         if self.shortest > 0.0:
             self.most = min(self.most, int(_ratio(self.needed, self.turns_by(self.shortest))))
 
     def turns_by(self, size: float) -> float:
         """Turn of H by a pulse of a ``size`` as in `Attempt`, N m s."""
-        return size if self.ideal else self.torque * size * precession.arc_efficiency(self.here.spin, size)
+        return (
+            size
+            if self.ideal
+            else self.torque * size * precession.arc_efficiency(self.here.spin, size)
+        )
 
     def size(self, count: int, bent: float = 1.0) -> float:
-        """Size of ``count`` pulses with ``bent`` times those to spare, on ticks; not a number where it is too far."""
+        """Size of ``count`` pulses with ``bent`` times those to spare, on ticks; not a number where
+        it is too far.
+        """
         share = self.needed / (count - min(bent * self._spare(count), 0.5 * count))
         if self.ideal:
             return share
         width = max(
-            float(precession.on_times_to_turn(np.array([share]), self.torque, self.here.spin)[0]), self.shortest
+            float(precession.on_times_to_turn(np.array([share]), self.torque, self.here.spin)[0]),
+            self.shortest,
         )
         return self.windows.tick_after(width) if math.isfinite(width) else math.nan
 
     def _spare(self, count: int) -> float:
         """Spare pulses of a train of ``count`` that is corrected.
 
-        A pulse moved by an angle of the spin turns its kick by ``a`` times that, and loses half of its square.
+        A pulse moved by an angle of the spin turns its kick by ``a`` times that, and loses half of
+        its square.
         """
         ratio = abs(self.here.nutation_rate / self.here.spin)
-        return SPARE + (float(self.left[count - 1]) / max(ratio, LEAST_RATIO)) ** 2 / min(count, LAST)
+        return SPARE + (float(self.left[count - 1]) / max(ratio, LEAST_RATIO)) ** 2 / min(
+            count, LAST
+        )
 
     def free(self) -> list[Attempt]:
-        """Trains of any length to fly, the most promising first; raises Infeasible where there is none."""
-        left, fewest = self.left, self._fewest(self.strongest)
+        """Trains of any length to fly, the most promising first; raises Infeasible where there is
+        none.
+        """
+        left = self.left
+        fewest = self._fewest(self.strongest)
         if fewest > len(left):
             fewest = self._fewest(self.turns_by(STEP * self.h if self.ideal else self.widest))
         most = min(len(left), self.most)
@@ -162,29 +216,46 @@ class Train:
             if left[best - 1] > OPEN:
                 raise self._in_phase(fewest, most)
             closing = [best]
-        # Of the next few counts the one that closes best, or that ticks make least dear; at last with room to bend.
+        # Of the next few counts the one that closes best, or that ticks make least dear; at last
+        # with room to bend.
         near = [count for count in closing if count <= 1.25 * closing[0] + 3]
         free = self.here.limits.tick is None
         tried = [Attempt(count, self.size(count), True, free) for count in near]
-        tried.sort(key=lambda attempt: float(left[attempt.pulses - 1]) if free else attempt.pulses * attempt.size)
+        tried.sort(
+            key=lambda attempt: (
+                float(left[attempt.pulses - 1]) if free else attempt.pulses * attempt.size
+            )
+        )
         del tried[TRIES:]
         tried += [Attempt(count, self.size(count, BENT), False, free) for count, *_ in tried[:2]]
         widest = math.inf if self.ideal else max(self.on_time, self.widest) + TOUCHING
-        possible = list({attempt[:2]: attempt for attempt in reversed(tried) if attempt.size <= widest}.values())[::-1]
+        possible = list(
+            {attempt[:2]: attempt for attempt in reversed(tried) if attempt.size <= widest}.values()
+        )[::-1]
         if not possible:
             raise self._too_few(most + 1)
         return possible
 
     def held(self) -> list[Attempt]:
-        """Trains of the length requested, the fewest pulses first; raises Infeasible where there is none."""
-        left, fewest = self.left, self._fewest(self.strongest)
+        """Trains of the length requested, the fewest pulses first; raises Infeasible where there is
+        none.
+        """
+        left = self.left
+        fewest = self._fewest(self.strongest)
         most = min(self.most, len(left))
         if fewest > most:
             raise self._too_few(fewest)
         counts = range(fewest, min(most, fewest + 2 * TRIES) + 1)
         closing = [count for count in counts if left[count - 1] <= OPEN]
-        enough = [count for count in closing if count - self.needed / self.strongest >= 0.5 * self._spare(count)]
-        tried = [Attempt(count, self.on_time, bool(left[count - 1] <= CLOSED)) for count in enough or closing]
+        enough = [
+            count
+            for count in closing
+            if count - self.needed / self.strongest >= 0.5 * self._spare(count)
+        ]
+        tried = [
+            Attempt(count, self.on_time, bool(left[count - 1] <= CLOSED))
+            for count in enough or closing
+        ]
         if not tried:
             raise self._in_phase(fewest, counts[-1])
         return tried[: 2 * TRIES]
@@ -195,11 +266,18 @@ class Train:
 
     @cached_property
     def left(self) -> Vector:
-        """Sum of the phasors of the first 1, 2, … pulses and the nutation at the start, in pulses, (n,)."""
-        # Moments (s) of right phase within the limits, undisturbed, and the direction in the body of each push.
+        """Sum of the phasors of the first 1, 2, … pulses and the nutation at the start, in pulses,
+        (n,).
+        """
+        # Moments (s) of right phase within the limits, undisturbed, and the direction in the body
+        # of each push.
         shots: list[tuple[float, complex]] = []
-        ready, on_time = self.here.limits.earliest, 0.0 if self.ideal else self.on_time
-        firsts = [(_aligned(self.here, channel, self.ahead, ready), channel.transverse) for channel in self.channels]
+        ready = self.here.limits.earliest
+        on_time = 0.0 if self.ideal else self.on_time
+        firsts = [
+            (_aligned(self.here, channel, self.ahead, ready), channel.transverse)
+            for channel in self.channels
+        ]
         gap = max(self.here.limits.gap, 0.5 * self.turn / self.options.per_turn - on_time)
 
         def after(first: float, time: float) -> float:
@@ -215,7 +293,8 @@ class Train:
                 first, push = min(firsts, key=lambda shot: after(shot[0], centre))
                 t = after(first, centre)
             else:
-                t, push = centre, _in_body(self.here, self.ahead, centre)
+                t = centre
+                push = _in_body(self.here, self.ahead, centre)
             if t + 0.5 * on_time > self.windows.horizon:
                 break
             free = self.windows.blocked_until(t - 0.5 * on_time, on_time)
@@ -229,10 +308,14 @@ class Train:
         turned = self.here.nutation_rate * np.array([t for t, _ in shots])
         sums = np.cumsum(np.exp(1j * (np.angle(np.array([push for _, push in shots])) + turned)))
         counts = np.arange(1, len(shots) + 1)
-        return np.asarray(np.abs(self.here.inertia.A * self.here.initial.omega * counts / self.needed + sums))
+        return np.asarray(
+            np.abs(self.here.inertia.A * self.here.initial.omega * counts / self.needed + sums)
+        )
 
     def next_pulse(self, here: Spacecraft, remaining: int, attempt: Attempt) -> Pulse | None:
-        """Next pulse of ``remaining`` ones from the motion of ``here``; None where the limits leave no time."""
+        """Next pulse of ``remaining`` ones from the motion of ``here``; None where the limits leave
+        no time.
+        """
         ahead, way = precession.course(here.momentum, here.target_axis, here.goal.sun)
         share = self.h * way / (remaining * self.turns_by(attempt.size))
         if share < 1.0:  # equal pulses would turn H too far: to one side of the target, a spiral
@@ -254,11 +337,16 @@ class Train:
         angle = cmath.phase(_in_body(here, ahead, centre))
         return steerable_pulse(here.torquer, centre, angle, impulse=attempt.size, on_time=on_time)
 
-    def _passing(self, here: Spacecraft, ahead: Vector, on_time: float, ready: float) -> Pulse | None:
+    def _passing(
+        self, here: Spacecraft, ahead: Vector, on_time: float, ready: float
+    ) -> Pulse | None:
         """First firing of a channel at the required phase within the limits."""
         windows = Windows(here)
         for _ in range(MOST_PULSES):
-            moments = [(_aligned(here, channel, ahead, ready + 0.5 * on_time), channel) for channel in self.channels]
+            moments = [
+                (_aligned(here, channel, ahead, ready + 0.5 * on_time), channel)
+                for channel in self.channels
+            ]
             t, channel = min(moments, key=lambda passage: passage[0])
             start = windows.nearest_tick(t - 0.5 * on_time)
             free = windows.blocked_until(start, on_time)
@@ -275,38 +363,53 @@ class Train:
         least = math.degrees(float(self.left[fewest - 1 : most].min()) * self.way / most)
         if abs(ratio - round(ratio)) * most >= 1.0:
             return Infeasible(
-                f"of {fewest} to {most} pulses, as many as limits and on-times allow, no number brings the nutation "
-                f"back to nothing: {least:.3g}° would be left; a longer horizon or another --per-turn can help"
+                f"of {fewest} to {most} pulses, as many as limits and on-times allow, "
+                "no number brings the nutation "
+                f"back to nothing: {least:.3g}° would be left; "
+                "a longer horizon or another --per-turn can help"
             )
         return Infeasible(
-            f"C/(A × pulses per turn) = {ratio:.4g} is so near a whole number that pulse after pulse meets the "
-            f"nutation in nearly the same phase: even the best train, of {fewest} to {most} pulses, "
-            f"would leave {least:.3g}°; another --per-turn, a longer horizon, half-cone or two-pulse can help"
+            f"C/(A × pulses per turn) = {ratio:.4g} is so near a whole number that pulse after "
+            "pulse meets the "
+            "nutation in nearly the same phase: even the best train, "
+            f"of {fewest} to {most} pulses, "
+            f"would leave {least:.3g}°; another --per-turn, a longer horizon, "
+            "half-cone or two-pulse can help"
         )
 
     def _too_few(self, needed: int) -> Infeasible:
         """Message on limits that leave too few times or pulses."""
-        most, moments = self.here.limits.max_pulses, len(self.left)
+        most = self.here.limits.max_pulses
+        moments = len(self.left)
         if most is not None and most < needed:
             return Infeasible(
-                f"a train to the target takes {needed} pulses at least, and limits.max_pulses leaves {most} for it"
+                f"a train to the target takes {needed} pulses at least, "
+                f"and limits.max_pulses leaves {most} for it"
             )
         if needed <= moments:
             return Infeasible(
-                "so many of the shortest pulses turn H beyond the target; lower min_on_time, or take two-pulse"
+                "so many of the shortest pulses turn H beyond the target; lower min_on_time, "
+                "or take two-pulse"
             )
         turns = needed / self.options.per_turn * self.turn
         return TooShort(
-            f"a train to the target takes {needed} pulses, about {turns:.4g} s, and the limits leave moments for "
+            f"a train to the target takes {needed} pulses, about {turns:.4g} s, "
+            "and the limits leave moments for "
             f"{moments}; longer pulses or more of them a turn help, or a longer horizon"
         )
 
 
 def _aligned(here: Spacecraft, channel: Channel, ahead: Vector, ready: float) -> float:
-    """First moment (s) from ``ready`` on at which the torque of ``channel`` points along ``ahead`` (3,), inertial."""
-    direction, turn, t = channel.transverse / abs(channel.transverse), 2.0 * math.pi / abs(here.spin), ready
+    """First moment (s) from ``ready`` on at which the torque of ``channel`` points along ``ahead``
+    (3,), inertial.
+    """
+    direction = channel.transverse / abs(channel.transverse)
+    turn = 2.0 * math.pi / abs(here.spin)
+    t = ready
     for step in range(12):
-        off = cmath.phase(direction * _in_body(here, ahead, t).conjugate())  # the torque is so far ahead of it
+        off = cmath.phase(
+            direction * _in_body(here, ahead, t).conjugate()
+        )  # the torque is so far ahead of it
         change = -off / here.spin
         if step == 0:
             change %= turn
@@ -317,7 +420,9 @@ def _aligned(here: Spacecraft, channel: Channel, ahead: Vector, ready: float) ->
 
 
 def _in_body(here: Spacecraft, direction: Vector, t: float) -> complex:
-    """Components of an inertial ``direction`` (3,) along axes 1 and 2 of the body at ``t`` s, undisturbed."""
+    """Components of an inertial ``direction`` (3,) along axes 1 and 2 of the body at ``t`` s,
+    undisturbed.
+    """
     _, quaternions = Arc.of(here.inertia, here.initial).motion(np.array([t]))
     body = attitude.matrix(quaternions[0]).T @ direction
     return complex(body[0], body[1])
@@ -333,7 +438,9 @@ EXACT, CLEARLY = 1e-10, 0.01
 
 
 def schedule(spacecraft: Spacecraft, options: RhumbLineOptions) -> Schedule:
-    """Train, after one pulse (or a train against ω) where nutation is more than it can absorb; raises Infeasible."""
+    """Train, after one pulse (or a train against ω) where nutation is more than it can absorb;
+    raises Infeasible.
+    """
     expect_aim(spacecraft)
     try:
         return _train(spacecraft, options)
@@ -344,8 +451,11 @@ def schedule(spacecraft: Spacecraft, options: RhumbLineOptions) -> Schedule:
 
 
 def _train(spacecraft: Spacecraft, options: RhumbLineOptions) -> Schedule:
-    """Train from t = 0, or else after damping of the nutation. Raises Infeasible with the reason."""
-    builder, reason = FlownBuilder(spacecraft), Infeasible("")
+    """Train from t = 0, or else after damping of the nutation.
+    Raises Infeasible with the reason.
+    """
+    builder = FlownBuilder(spacecraft)
+    reason = Infeasible("")
     train = Train(builder.here, options)
     if spacecraft.least_impulse <= 0.5 * train.strongest and train.way > ROUNDING:
         try:
@@ -362,7 +472,9 @@ def _train(spacecraft: Spacecraft, options: RhumbLineOptions) -> Schedule:
 
 def _another(spacecraft: Spacecraft, options: RhumbLineOptions) -> str:
     """Advice on a pulse length that works instead of the requested one, the nearest first."""
-    builder, given, ticks = FlownBuilder(spacecraft), options.on_time or 0.0, spacecraft.limits.tick is not None
+    builder = FlownBuilder(spacecraft)
+    given = options.on_time or 0.0
+    ticks = spacecraft.limits.tick is not None
     with suppress(Infeasible):
         if spacecraft.least_impulse > 1e-9 * abs(spacecraft.axial):
             builder = one_pulse.damped(builder)
@@ -371,19 +483,29 @@ def _another(spacecraft: Spacecraft, options: RhumbLineOptions) -> str:
         lengths = {train.size(count) for count in counts if train.left[count - 1] <= OPEN}
         if ticks:
             lengths |= {train.windows.nearest_tick(given), train.windows.tick_after(given)}
-        possible = [length for length in lengths if train.shortest <= length <= train.widest and length > 0.0]
+        possible = [
+            length
+            for length in lengths
+            if train.shortest <= length <= train.widest and length > 0.0
+        ]
         for length in sorted(possible, key=lambda length: abs(length - given))[:OTHERS]:
             digits = 3 - math.floor(math.log10(length))
-            rounded = math.ceil(length * 10.0**digits) / 10.0**digits  # up: so that no more pulses are needed
+            rounded = (
+                math.ceil(length * 10.0**digits) / 10.0**digits
+            )  # up: so that no more pulses are needed
             with suppress(Infeasible):
                 whole = _train(spacecraft, replace(options, on_time=rounded))
-                if correction.left(spacecraft, whole) <= max(10.0 * EXACT, ticks * tolerable(spacecraft)):
+                if correction.left(spacecraft, whole) <= max(
+                    10.0 * EXACT, ticks * tolerable(spacecraft)
+                ):
                     return f"--on-time {rounded:.4g}s works, with {len(whole)} pulses in all"
     return "no other length was found that works"
 
 
 def _best(builder: FlownBuilder, train: Train) -> Schedule:
-    """Train that leaves least, of those that leave nothing the first, unless a later one costs clearly less."""
+    """Train that leaves least, of those that leave nothing the first, unless a later one costs
+    clearly less.
+    """
     best = math.inf, math.inf, Schedule()
     before = sum(pulse.magnitude for pulse in builder.pulses)
     requested = train.options.on_time
@@ -392,12 +514,18 @@ def _best(builder: FlownBuilder, train: Train) -> Schedule:
     )
     for attempt in train.free() if requested is None else train.held():
         # What the rounding of the start of one pulse to a tick leaves counts as nothing.
-        rounding = train.turns_by(attempt.size) / train.h * abs(train.here.spin) * (train.here.limits.tick or 0.0)
+        rounding = (
+            train.turns_by(attempt.size)
+            / train.h
+            * abs(train.here.spin)
+            * (train.here.limits.tick or 0.0)
+        )
         nothing = max(EXACT, rounding)
         if best[0] <= nothing and not attempt.closes:
             continue  # it would cost no less
         schedule, left = _flown(builder.fork(), train, attempt)
-        left, cost = max(left, nothing), schedule.total_impulse - before
+        left = max(left, nothing)
+        cost = schedule.total_impulse - before
         if left < 0.5 * best[0] or (left <= best[0] and cost < (1.0 - CLEARLY) * best[1]):
             best = left, cost, schedule
         cheap = best[1] <= (1.0 + CLEARLY) * floor
@@ -425,7 +553,9 @@ def _flown(builder: FlownBuilder, train: Train, attempt: Attempt) -> tuple[Sched
         if before < EXACT or work.exhausted():
             break
         # A train of more than 60 pulses has little to spare: its size is not corrected.
-        builder.correct(min(last, fired), resized=count if attempt.resizable and count <= SHORT else 0)
+        builder.correct(
+            min(last, fired), resized=count if attempt.resizable and count <= SHORT else 0
+        )
         if train.here.limits.tick is not None and builder.left > 0.5 * before:
             break  # what is left is the rounding of starts
     if not builder.pulses:

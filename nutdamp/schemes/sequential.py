@@ -1,8 +1,9 @@
 """Schedules laid pulse by pulse on the equivalent symmetric body; reasons of infeasibility.
 
-Three different moments turn in the body at another rate than their mean, on an ellipse instead of a circle; lasting
-disturbances move the point about which ω turns. Both are taken out here, so that every scheme plans free motion of
-a symmetric body, and put back in: the schedule is translated to the true actuators and corrected on the true motion.
+Three different moments turn in the body at another rate than their mean, on an ellipse instead of a
+circle; lasting disturbances move the point about which ω turns. Both are taken out here, so that
+every scheme plans free motion of a symmetric body, and put back in: the schedule is translated to
+the true actuators and corrected on the true motion.
 """
 
 from __future__ import annotations
@@ -23,21 +24,28 @@ from nutdamp.spacecraft.equipment import Channel, Steerable
 from nutdamp.spacecraft.model import Attitude, Disturbance, Inertia, Spacecraft, Vector
 from nutdamp.spacecraft.schedule import TOUCHING, Pulse, Schedule, channel_pulse, steerable_pulse
 
-MISSED = 50  # alignments in a row that rounding to ticks or a disturbance may move to before the actuators are ready
-# share of A|ω0| left to correction under dissipation: `response.width_factor` holds at small angles only
+# alignments in a row that rounding to ticks or a disturbance may move to before the actuators are
+# ready
+MISSED = 50
+# share of A|ω0| left to correction under dissipation: `response.width_factor` holds at small angles
+# only
 CORRECTED = 1e-4
 
-ALIGNED = 1e-9  # angle in rad below which a standing ω counts as opposed to a torque (a sphere, where nothing turns)
+# angle in rad below which a standing ω counts as opposed to a torque (a sphere, where nothing
+# turns)
+ALIGNED = 1e-9
 
 MOST_PULSES = 2000
-"""Pulses that are laid one by one, at most: nobody commands more, and each takes its time to be planned and flown."""
+"""Pulses that are laid one by one, at most: nobody commands more, and each takes its time to be
+planned and flown.
+"""
 
 
 class ImpulseBuilder:
     """Predicted transverse rate, and the pulses chosen so far.
 
-    ``omega`` and ``spin`` (rad/s) hold just after the centre of the last pulse at ``now`` s; ``ready`` is the first
-    moment at which the next pulse may start.
+    ``omega`` and ``spin`` (rad/s) hold just after the centre of the last pulse at ``now`` s;
+    ``ready`` is the first moment at which the next pulse may start.
     """
 
     def __init__(self, spacecraft: Spacecraft, *, endless: bool = False) -> None:
@@ -60,8 +68,12 @@ class ImpulseBuilder:
 
     @property
     def settled(self) -> bool:
-        """True if the residual is rounding; under dissipation, if correction of the last pulse suffices."""
-        corrected = 0.0 if self.spacecraft.growth == 0.0 else CORRECTED * self.spacecraft.least_impulse
+        """True if the residual is rounding; under dissipation, if correction of the last pulse
+        suffices.
+        """
+        corrected = (
+            0.0 if self.spacecraft.growth == 0.0 else CORRECTED * self.spacecraft.least_impulse
+        )
         return self.left <= max(1e-13 * abs(self.C * self.spin + self.wheel), corrected)
 
     @property
@@ -86,14 +98,20 @@ class ImpulseBuilder:
 
     def _coast(self, time: float) -> tuple[complex, float]:
         """ω and ω3 at ``time`` s if nothing more is fired and no disturbance drives ω."""
-        since, drift, growth = time - self.now, self.spacecraft.spin_drift, self.spacecraft.growth
-        omega, spin, angle, slower = self.omega, self.spin, self.turning * since, self.wheel / self.C
+        since = time - self.now
+        drift = self.spacecraft.spin_drift
+        growth = self.spacecraft.growth
+        omega = self.omega
+        spin = self.spin
+        angle = self.turning * since
+        slower = self.wheel / self.C
         if growth != 0.0:
             motion = omega, spin, since, self.wheel, self.spacecraft.sense
             effect = energy_sink.coast(self.A, self.C, growth, *motion)
             equivalent = math.hypot(spin + slower, self.A / self.C * abs(omega))  # |H|/C
             angle = self.a * equivalent * effect.travel - slower * since
-            omega, spin = omega * effect.transverse, equivalent * effect.along - slower
+            omega = omega * effect.transverse
+            spin = equivalent * effect.along - slower
         angle += 0.5 * self.a * drift * since * since
         return omega * cmath.exp(-1j * angle), spin + drift * since
 
@@ -101,27 +119,36 @@ class ImpulseBuilder:
         """κ, cos θ and sin²θ of `energy_sink` just after the last pulse."""
         axial, across = (self.C * self.spin + self.wheel) ** 2, (self.A * abs(self.omega)) ** 2
         size = axial + across
-        return self.spacecraft.growth, *((math.sqrt(axial / size), across / size) if size > 0.0 else (1.0, 0.0))
+        return self.spacecraft.growth, *(
+            (math.sqrt(axial / size), across / size) if size > 0.0 else (1.0, 0.0)
+        )
 
     def omega_at(self, time: float) -> complex:
         """ω at ``time`` s if nothing more is fired."""
         free, _ = self._coast(time)
         if not self.spacecraft.disturbances:
             return free
-        since, driven = np.array([time - self.now]), 0.0 + 0.0j
+        since = np.array([time - self.now])
+        driven = 0.0 + 0.0j
         for disturbance in self.spacecraft.disturbances:
             if disturbance.transverse != 0.0:
-                torque = np.array([disturbance.transverse * cmath.exp(1j * disturbance.rate * self.now)])
+                torque = np.array(
+                    [disturbance.transverse * cmath.exp(1j * disturbance.rate * self.now)]
+                )
                 rate = np.array([disturbance.rate])
-                driven += complex(response.rotating_torques(since, 0.0, self.turning, self.A, torque, rate)[0])
+                driven += complex(
+                    response.rotating_torques(since, 0.0, self.turning, self.A, torque, rate)[0]
+                )
         return free + driven
 
     def acts(self, pulse: Pulse) -> complex:
         """Effective impulse of ``pulse`` on ω, J1 + iJ2 in N m s."""
         axial = 0.0 if pulse.torque is None else float(pulse.torque[2])
         _, spin = self._coast(pulse.start)
-        rate, slope = self.rate(spin), self.a * axial / self.C
-        growth, drift = self.spacecraft.growth, self.a * self.spacecraft.spin_drift
+        rate = self.rate(spin)
+        slope = self.a * axial / self.C
+        growth = self.spacecraft.growth
+        drift = self.a * self.spacecraft.spin_drift
         factor = response.width_factor(rate, slope, pulse.on_time, growth, drift)
         return complex(pulse.impulse[0], pulse.impulse[1]) * factor
 
@@ -144,15 +171,24 @@ class ImpulseBuilder:
     def schedule(self) -> Schedule:
         """Chosen pulses."""
         cut = note("most-pulses", pulses=MOST_PULSES)
-        return Schedule(tuple(self.pulses), (cut,) if len(self.pulses) == MOST_PULSES and not self.settled else ())
+        return Schedule(
+            tuple(self.pulses),
+            (cut,) if len(self.pulses) == MOST_PULSES and not self.settled else (),
+        )
 
-    def on_time_for(self, channel: Channel, impulse: float, longest: float = math.inf) -> float | None:
-        """On-time in s for which ``channel`` acts on ω like ``impulse`` N m s; None if none up to ``longest``."""
+    def on_time_for(
+        self, channel: Channel, impulse: float, longest: float = math.inf
+    ) -> float | None:
+        """On-time in s for which ``channel`` acts on ω like ``impulse`` N m s; None if none up to
+        ``longest``.
+        """
         slope = self.a * channel.axial / self.C
         return response.on_time_for(impulse, abs(channel.transverse), self.turning, slope, longest)
 
     def align(self, channel: Channel, on_time: float) -> Pulse | None:
-        """Next pulse of ``channel`` against ω that the limits allow, ``on_time`` s long (made commandable)."""
+        """Next pulse of ``channel`` against ω that the limits allow, ``on_time`` s long (made
+        commandable).
+        """
         windows = self.windows
         on_time = windows.on_time(on_time, channel.min_on_time, channel.max_on_time)
         probe = channel_pulse(channel, self.now, on_time)
@@ -161,11 +197,14 @@ class ImpulseBuilder:
             start = windows.earliest_start(on_time, self.ready) if abs(turn) <= ALIGNED else None
             return None if start is None else channel_pulse(channel, start + 0.5 * on_time, on_time)
         first = turn / self.turning  # and the times below: as long as it takes at the present spin
-        # Rounding may put a pulse just before it may start, but not on the one before it, nor before t = 0.
+        # Rounding may put a pulse just before it may start, but not on the one before it, nor
+        # before t = 0.
         slack = min(TOUCHING, 1e-3 * on_time) if self.pulses else 0.0
 
         def alignment(ready: float) -> float:
-            """Whole turns from ``first`` to the alignment at which a pulse starts at ``ready`` s or next."""
+            """Whole turns from ``first`` to the alignment at which a pulse starts at ``ready`` s or
+            next.
+            """
             since = ready + 0.5 * on_time - slack - self.now
             turned = since
             if not self._even:
@@ -176,7 +215,9 @@ class ImpulseBuilder:
         turns = alignment(self.ready)
         for _ in range(len(windows.limits.blackout) + MISSED):
             turned = first + turns * self.period
-            centre = self.now + (turned if self._even else energy_sink.time_to_turn(*self._sink(), turned))
+            centre = self.now + (
+                turned if self._even else energy_sink.time_to_turn(*self._sink(), turned)
+            )
             if math.isinf(centre):  # dissipation stops the spin before
                 return None
             if self.spacecraft.disturbances or self.spacecraft.growth != 0.0:
@@ -193,15 +234,24 @@ class ImpulseBuilder:
                 start = windows.nearest_tick(start)
                 centre = start + 0.5 * on_time
             free = windows.blocked_until(start, on_time)
-            later = not self.pulses or centre > self.now  # also where the clock cannot tell so short a time
+            later = (
+                not self.pulses or centre > self.now
+            )  # also where the clock cannot tell so short a time
             if start >= self.ready - slack and later and free is None:
-                return channel_pulse(channel, centre, on_time) if windows.allows(start, on_time, self.ready) else None
-            # Rounded to a tick before the actuators are ready, opposed earlier by a disturbance, or blacked out.
+                return (
+                    channel_pulse(channel, centre, on_time)
+                    if windows.allows(start, on_time, self.ready)
+                    else None
+                )
+            # Rounded to a tick before the actuators are ready, opposed earlier by a disturbance, or
+            # blacked out.
             turns = max(turns + 1, alignment(self.ready if free is None else free))
         return None
 
     def steer(self, steerable: Steerable, impulse: float) -> Pulse | None:
-        """Earliest pulse of a steerable torquer that acts against ω like ``impulse`` N m s; None if none can."""
+        """Earliest pulse of a steerable torquer that acts against ω like ``impulse`` N m s; None if
+        none can.
+        """
         on_time = self.on_time_to_steer(steerable, impulse)
         if on_time is None:
             return None
@@ -209,7 +259,9 @@ class ImpulseBuilder:
         return None if start is None else self.steered(steerable, start, impulse, on_time)
 
     def on_time_to_steer(self, steerable: Steerable, impulse: float) -> float | None:
-        """Commandable on-time in s of a pulse like ``impulse`` N m s, 0 of an ideal one; None if it is too weak."""
+        """Commandable on-time in s of a pulse like ``impulse`` N m s, 0 of an ideal one; None if it
+        is too weak.
+        """
         if steerable.torque is None:
             return 0.0
         needed = response.on_time_for(impulse, steerable.torque, self.turning, 0.0, math.inf)
@@ -223,9 +275,15 @@ class ImpulseBuilder:
 
 
 def fire_components(
-    builder: ImpulseBuilder, channels: list[Channel], on_time: float | None = None, *, coarse: bool = False
+    builder: ImpulseBuilder,
+    channels: list[Channel],
+    on_time: float | None = None,
+    *,
+    coarse: bool = False,
 ) -> None:
-    """Pulses where ω does not turn in the body: the channels beside -ω share it, |cos φ| + |sin φ| for ±1, ±2."""
+    """Pulses where ω does not turn in the body: the channels beside -ω share it, |cos φ| + |sin φ|
+    for ±1, ±2.
+    """
     for channel, impulse in components(channels, -builder.A * builder.omega):
         unit = impulse / abs(channel.transverse)
         longest = channel.max_on_time if on_time is None else on_time
@@ -243,7 +301,9 @@ def fire_components(
 
 
 def components(channels: list[Channel], target: complex) -> list[tuple[Channel, float]]:
-    """Impulses >= 0 (N m s) along channel directions that sum to ``target`` with least total; else the nearest."""
+    """Impulses >= 0 (N m s) along channel directions that sum to ``target`` with least total; else
+    the nearest.
+    """
     best: list[tuple[Channel, float]] = []
     least = math.inf
     for left, right in itertools.combinations(channels, 2):
@@ -256,12 +316,16 @@ def components(channels: list[Channel], target: complex) -> list[tuple[Channel, 
             least = first + second
             best = [(left, first), (right, second)]
     if not best:
-        along = [(target * channel.transverse.conjugate()).real / abs(channel.transverse) for channel in channels]
+        along = [
+            (target * channel.transverse.conjugate()).real / abs(channel.transverse)
+            for channel in channels
+        ]
         best = [max(zip(channels, along, strict=True), key=lambda share: share[1])]
     return [(channel, impulse) for channel, impulse in best if impulse > 1e-12 * abs(target)]
 
 
-FADED = 1e-6  # fraction of the nutation below which pulses have nothing to do: dissipation has removed it
+# fraction of the nutation below which pulses have nothing to do: dissipation has removed it
+FADED = 1e-6
 
 
 def bounded_by(spacecraft: Spacecraft) -> str:
@@ -269,7 +333,9 @@ def bounded_by(spacecraft: Spacecraft) -> str:
     limits, channels = spacecraft.limits, spacecraft.channels
     there = {
         f"the horizon of {spacecraft.horizon:.4g} s": True,
-        "on-times": any(channel.min_on_time > 0.0 or math.isfinite(channel.max_on_time) for channel in channels),
+        "on-times": any(
+            channel.min_on_time > 0.0 or math.isfinite(channel.max_on_time) for channel in channels
+        ),
         "gap": limits.gap > 0.0,
         "ticks": limits.tick is not None,
         "blackout windows": bool(limits.blackout),
@@ -288,19 +354,26 @@ def at_hand(spacecraft: Spacecraft, channels: list[Channel]) -> list[Channel]:
     if not spacecraft.channels:
         raise Infeasible("the file names no thrusters, and this scheme fires body-fixed ones")
     if not any(channel.damps for channel in spacecraft.channels):
-        raise Infeasible("no channel has a torque more transverse than axial, so none can damp a nutation")
+        raise Infeasible(
+            "no channel has a torque more transverse than axial, so none can damp a nutation"
+        )
     ticks = "" if spacecraft.limits.tick is None else ", as a multiple of limits.tick"
     time = spacecraft.horizon - spacecraft.limits.earliest
     if time <= 0.0:  # by the file, or where other pulses of the scheme come first
-        raise Infeasible("limits.earliest, or the pulses before, leave no time within limits.horizon")
+        raise Infeasible(
+            "limits.earliest, or the pulses before, leave no time within limits.horizon"
+        )
     raise Infeasible(
-        f"no channel can be on for as long as its min_on_time requires{ticks}, at most for its max_on_time, within "
+        f"no channel can be on for as long as its min_on_time requires{ticks}, "
+        "at most for its max_on_time, within "
         f"the {time:.4g} s from limits.earliest to limits.horizon"
     )
 
 
 def expect_aim(spacecraft: Spacecraft) -> None:
-    """Raise Infeasible without a target to which a scheme could turn the spin axis, or without an actuator."""
+    """Raise Infeasible without a target to which a scheme could turn the spin axis, or without an
+    actuator.
+    """
     if spacecraft.goal.axis is None:
         raise Infeasible("needs a target axis: --target, or goal in the file")
     if spacecraft.torquer is None:
@@ -311,7 +384,10 @@ def no_alignment(spacecraft: Spacecraft, channels: list[Channel]) -> Infeasible:
     """Error where no channel can be fired against ω within the limits, with the cure."""
     omega = complex(spacecraft.omega0[0], spacecraft.omega0[1])
     if spacecraft.nutation_rate == 0.0:
-        off = {channel.name: abs(cmath.phase(-omega * channel.transverse.conjugate())) for channel in channels}
+        off = {
+            channel.name: abs(cmath.phase(-omega * channel.transverse.conjugate()))
+            for channel in channels
+        }
         nearest = min(off, key=lambda name: off[name])
         return Infeasible(
             "ω does not turn in this body, so waiting brings no channel to oppose it; "
@@ -337,14 +413,18 @@ def no_alignment(spacecraft: Spacecraft, channels: list[Channel]) -> Infeasible:
         left = builder.A * abs(builder.omega_at(best.t))
         if left < FADED * builder.left:
             return Infeasible(
-                f"dissipation takes the nutation out before a channel comes to oppose it, at {best.t:.4g} s"
+                "dissipation takes the nutation out before a channel comes to oppose it, "
+                f"at {best.t:.4g} s"
             )
         return Infeasible(
-            f"every channel's shortest pulse is too strong: there are {turn_of(spacecraft, left)} of nutation, and "
+            f"every channel's shortest pulse is too strong: there are {turn_of(spacecraft, left)} "
+            "of nutation, and "
             f"firing would leave {turn_of(spacecraft, builder.left_after(best))}; lower min_on_time"
         )
     if min(ends) <= spacecraft.horizon:
-        return Infeasible("channels oppose the nutation within the horizon, but the pulses planned increase it")
+        return Infeasible(
+            "channels oppose the nutation within the horizon, but the pulses planned increase it"
+        )
     return TooShort(
         f"no channel opposes the nutation before the horizon of {spacecraft.horizon:.4g} s",
         f"the first pulse that does would end at {min(ends):.6g} s: set limits.horizon beyond that",
@@ -358,7 +438,9 @@ def turn_of(spacecraft: Spacecraft, impulse: float) -> str:
 
 @dataclass(frozen=True, eq=False)
 class SymmetricModel:
-    """``body`` is planned on for ``spacecraft``; ``stretch`` (2,) leads from the ellipse of (ω1, ω2) to the circle."""
+    """``body`` is planned on for ``spacecraft``; ``stretch`` (2,) leads from the ellipse of (ω1,
+    ω2) to the circle.
+    """
 
     spacecraft: Spacecraft
     body: Spacecraft
@@ -375,8 +457,10 @@ class SymmetricModel:
         """Schedule with the true actuators."""
         if self.body.inertia.moments == self.spacecraft.inertia.moments:
             return schedule
-        torquer, windows = self.spacecraft.torquer, Windows(self.spacecraft)
-        ready, pulses = self.spacecraft.limits.earliest, list[Pulse]()
+        torquer = self.spacecraft.torquer
+        windows = Windows(self.spacecraft)
+        ready = self.spacecraft.limits.earliest
+        pulses = list[Pulse]()
         for pulse in schedule:
             channel = channel_of(self.spacecraft, pulse)
             if channel is not None:
@@ -384,45 +468,60 @@ class SymmetricModel:
             else:  # longer or shorter, and so moved where the limits require it
                 assert torquer is not None
                 first, second = pulse.impulse[:2] / self.stretch
-                impulse, t, on_time = math.hypot(first, second), pulse.t, 0.0
+                impulse = math.hypot(first, second)
+                t = pulse.t
+                on_time = 0.0
                 if torquer.torque is not None:
                     on_time = windows.on_time(impulse / torquer.torque, 0.0, math.inf)
                     start = windows.earliest_start(on_time, max(pulse.start, ready))
                     t = t if start is None else start + 0.5 * on_time
-                true = steerable_pulse(torquer, t, math.atan2(second, first), impulse=impulse, on_time=on_time)
+                true = steerable_pulse(
+                    torquer, t, math.atan2(second, first), impulse=impulse, on_time=on_time
+                )
             pulses.append(true)
             ready = true.end + self.spacecraft.limits.gap
         return Schedule(tuple(pulses), schedule.notes, schedule.bounds)
 
 
-def model_of(spacecraft: Spacecraft, *, turning: bool = False, three_moments: bool = False) -> SymmetricModel:
+def model_of(
+    spacecraft: Spacecraft, *, turning: bool = False, three_moments: bool = False
+) -> SymmetricModel:
     """Model of a spacecraft, whose torques change ω as the true ones do.
 
-    ``turning``: they turn H so, and ω at t = 0 is as much larger or smaller on average: the circle may be of any size.
-    ``three_moments``: the model has those of the spacecraft.
+    ``turning``: they turn H so, and ω at t = 0 is as much larger or smaller on average: the circle
+    may be of any size. ``three_moments``: the model has those of the spacecraft.
     """
     undisturbed = _without_steady(spacecraft)
     inertia = spacecraft.inertia
     if inertia.symmetric or three_moments:
         return SymmetricModel(spacecraft, _aimed(undisturbed, spacecraft), np.ones(2))
-    # Its nutation has the true rate, and (s1 ω1, s2 ω2) moves on a circle (linearised Euler equations).
-    A, C, across = inertia.nutating(spacecraft.spin), inertia.C, np.array(inertia.moments[:2])
+    # Its nutation has the true rate, and (s1 ω1, s2 ω2) moves on a circle (linearised Euler
+    # equations).
+    A = inertia.nutating(spacecraft.spin)
+    C = inertia.C
+    across = np.array(inertia.moments[:2])
     scale = inertia.circle(spacecraft.spin) * across
     scale /= math.sqrt(scale[0] * scale[1])
     stretch = scale * A / across  # for torques and impulses
     mean = float(np.mean(stretch))
     torquer = undisturbed.steerable
-    if torquer is not None and torquer.torque is not None:  # the stretch differs by direction: near enough for a plan
+    if (
+        torquer is not None and torquer.torque is not None
+    ):  # the stretch differs by direction: near enough for a plan
         torquer = replace(torquer, torque=torquer.torque * mean)
     factors = np.ones(3) if turning else np.array([*stretch, 1.0])
     channels = []
     for channel in undisturbed.channels:
-        thrusters = tuple(replace(thruster, torque=thruster.torque * factors) for thruster in channel.thrusters)
+        thrusters = tuple(
+            replace(thruster, torque=thruster.torque * factors) for thruster in channel.thrusters
+        )
         channels.append(replace(channel, thrusters=thrusters, spends=channel.strength))
     body = replace(
         undisturbed,
         inertia=Inertia((A, A, C), inertia.axes, inertia.wheel),
-        omega0=np.array([*(scale * undisturbed.omega0[:2] / (mean if turning else 1.0)), undisturbed.omega0[2]]),
+        omega0=np.array(
+            [*(scale * undisturbed.omega0[:2] / (mean if turning else 1.0)), undisturbed.omega0[2]]
+        ),
         channels=tuple(channels),
         steerable=torquer,
         limits=replace(spacecraft.limits, horizon=spacecraft.horizon),
@@ -431,43 +530,63 @@ def model_of(spacecraft: Spacecraft, *, turning: bool = False, three_moments: bo
 
 
 def _aimed(body: Spacecraft, spacecraft: Spacecraft) -> Spacecraft:
-    """Copy of the ``body``, which has another H, with the target axis at its distance from H of the ``spacecraft``."""
+    """Copy of the ``body``, which has another H, with the target axis at its distance from H of the
+    ``spacecraft``.
+    """
     if spacecraft.goal.axis is None or body is spacecraft:
         return body
     quaternion = spacecraft.initial.quaternion
     given = spacecraft.attitude or Attitude(quaternion)
     in_file_axes = attitude.multiply(quaternion, attitude.from_matrix(spacecraft.inertia.axes.T))
     held = replace(body, attitude=replace(given, quaternion=in_file_axes))
-    before, after = (momentum / float(np.linalg.norm(momentum)) for momentum in (spacecraft.momentum, held.momentum))
-    # The shortest turn from the one H to the other: two reflections, at the middle between both and at the second.
+    before, after = (
+        momentum / float(np.linalg.norm(momentum))
+        for momentum in (spacecraft.momentum, held.momentum)
+    )
+    # The shortest turn from the one H to the other: two reflections, at the middle between both and
+    # at the second.
     middle = (before + after) / float(np.linalg.norm(before + after))
     axis = spacecraft.goal.axis - 2.0 * (middle @ spacecraft.goal.axis) * middle
     return replace(held, goal=replace(spacecraft.goal, axis=axis - 2.0 * (after @ axis) * after))
 
 
 def _without_steady(spacecraft: Spacecraft) -> Spacecraft:
-    """Spacecraft with ω counted from the steady response to its disturbances; those without one stay."""
+    """Spacecraft with ω counted from the steady response to its disturbances; those without one
+    stay.
+    """
     if not spacecraft.disturbances:
         return spacecraft
     steady = steady_omega(spacecraft, 0.0)
-    left = (replace(each, transverse=0j) if settles(spacecraft, each) else each for each in spacecraft.disturbances)
+    left = (
+        replace(each, transverse=0j) if settles(spacecraft, each) else each
+        for each in spacecraft.disturbances
+    )
     return replace(
         spacecraft,
         omega0=spacecraft.omega0 - np.array([steady.real, steady.imag, 0.0]),
-        disturbances=tuple(disturbance for disturbance in left if disturbance.axial or disturbance.transverse),
+        disturbances=tuple(
+            disturbance for disturbance in left if disturbance.axial or disturbance.transverse
+        ),
     )
 
 
 def settles(spacecraft: Spacecraft, disturbance: Disturbance) -> bool:
-    """True if ω beats against the disturbance at least once within the horizon; else it counts as resonant."""
+    """True if ω beats against the disturbance at least once within the horizon; else it counts as
+    resonant.
+    """
     return abs(spacecraft.nutation_rate + disturbance.rate) * spacecraft.horizon > 2.0 * math.pi
 
 
 def steady_omega(spacecraft: Spacecraft, time: float) -> complex:
     """Steady-state ω of the settling disturbances at ``time`` s, which needs no damping."""
-    A, nutation_rate, steady = spacecraft.inertia.A, spacecraft.nutation_rate, 0.0 + 0.0j
+    A = spacecraft.inertia.A
+    nutation_rate = spacecraft.nutation_rate
+    steady = 0.0 + 0.0j
     for disturbance in spacecraft.disturbances:
         if disturbance.transverse and settles(spacecraft, disturbance):
             turned = cmath.rect(1.0, disturbance.rate * time)
-            steady += response.steady_response(A, nutation_rate, disturbance.transverse, disturbance.rate) * turned
+            steady += (
+                response.steady_response(A, nutation_rate, disturbance.transverse, disturbance.rate)
+                * turned
+            )
     return steady

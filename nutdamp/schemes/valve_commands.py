@@ -1,9 +1,11 @@
-"""Valve commands: translation of rectangular pulses into commands of valves; schedules of several legs.
+"""Valve commands: translation of rectangular pulses into commands of valves; schedules of several
+legs.
 
-A command is known by its effective on-time and the centroid of its thrust (`thruster`). Schemes plan
-for the *plain* body, which fires rectangles of full thrust within the effective bounds of its channels, and keeps
-limits that leave room for the delays. Each of its pulses becomes the command with the same impulse and centroid, cold
-and blowdown included; further effects of the shape of the thrust are corrected on the flown motion.
+A command is known by its effective on-time and the centroid of its thrust (`thruster`). Schemes
+plan for the *plain* body, which fires rectangles of full thrust within the effective bounds of its
+channels, and keeps limits that leave room for the delays. Each of its pulses becomes the command
+with the same impulse and centroid, cold and blowdown included; further effects of the shape of the
+thrust are corrected on the flown motion.
 """
 
 from __future__ import annotations
@@ -34,31 +36,49 @@ from nutdamp.spacecraft.model import Inertia, Limits, Spacecraft
 from nutdamp.spacecraft.schedule import Pulse, Schedule, channel_pulse
 
 ROUNDING = 1e-12  # share by which an on-time may pass its bounds
-# share of the longest pulse that the next plan leaves at either end of all, where there was too little room
+# share of the longest pulse that the next plan leaves at either end of all, where there was too
+# little room
 ROOM = 0.02
-NEARLY = 1.1  # times what the plan leaves on the plain body, that commands may leave without another plan
+# times what the plan leaves on the plain body, that commands may leave without another plan
+NEARLY = 1.1
 EXACT = 1e-10  # rad, the same
-PLANS = 6  # plans, at most, each with on-times that leave room for the weakest pulse of the one before
+PLANS = (
+    6  # plans, at most, each with on-times that leave room for the weakest pulse of the one before
+)
 
-EFFECTIVE = " (on-times and gaps here are those of the thrust, with room for the delays of the valves)"
+EFFECTIVE = (
+    " (on-times and gaps here are those of the thrust, with room for the delays of the valves)"
+)
 """Addition to the reasons of schemes, which know nothing of valves."""
 
 
 def plain(
-    spacecraft: Spacecraft, weakest: float = 1.0, strongest: float = 1.0, room: float = 0.0, used: float = 0.0
+    spacecraft: Spacecraft,
+    weakest: float = 1.0,
+    strongest: float = 1.0,
+    room: float = 0.0,
+    used: float = 0.0,
 ) -> Spacecraft:
     """Body that schemes plan for: rectangles of full thrust within the capability of the channels.
 
-    Pulses may be ``weakest`` to ``strongest`` times as strong, and ``room`` s longer at either end; ``used`` is in kg.
+    Pulses may be ``weakest`` to ``strongest`` times as strong, and ``room`` s longer at either end;
+    ``used`` is in kg.
     """
-    limits, channels, leads, lags = spacecraft.limits, list[Channel](), list[float](), list[float]()
+    limits = spacecraft.limits
+    channels = list[Channel]()
+    leads = list[float]()
+    lags = list[float]()
     for channel in spacecraft.channels:
         shortest, longest = effective_on_times(channel)
         if channel.valve is not None:
             lead, lag = channel.valve.reaches(shortest, longest)
             leads, lags = [*leads, lead], [*lags, lag]
-        least = effective_on_time(channel, shortest_on_time(spacecraft, channel)) * max(strongest, 1.0)
-        channels.append(channel.of(valve=None, min_on_time=least, max_on_time=longest * min(weakest, 1.0)))
+        least = effective_on_time(channel, shortest_on_time(spacecraft, channel)) * max(
+            strongest, 1.0
+        )
+        channels.append(
+            channel.of(valve=None, min_on_time=least, max_on_time=longest * min(weakest, 1.0))
+        )
     lead, lag = max(leads, default=0.0) + room, max(lags, default=0.0) + room
     return replace(
         spacecraft,
@@ -72,7 +92,9 @@ def plain(
             earliest=limits.earliest + lead,
             gap=limits.gap + lead + lag,
             max_pulses=limits.max_pulses,
-            blackout=tuple((max(begins - lag, 0.0), ends + lead) for begins, ends in limits.blackout),
+            blackout=tuple(
+                (max(begins - lag, 0.0), ends + lead) for begins, ends in limits.blackout
+            ),
         ),
     )
 
@@ -88,13 +110,20 @@ def options(spacecraft: Spacecraft, chosen: SchemeOptions) -> SchemeOptions:
     valves = [channel.valve for channel in spacecraft.channels]
     on_times = {requested if valve is None else valve.thrust(requested).on_time for valve in valves}
     if len(on_times) > 1:
-        text = f"an on-time of {requested:.4g} s is for channels with the same valve; these give pulses of different"
+        text = (
+            f"an on-time of {requested:.4g} s is for channels with the same valve; "
+            "these give pulses of different"
+        )
         raise Infeasible(f"{text} length")
     return replace(chosen, on_time=on_times.pop()) if on_times else chosen  # type: ignore[call-arg]
 
 
-def planned(spacecraft: Spacecraft, plan: Callable[[Spacecraft], Schedule], correct: Correction) -> Schedule:
-    """Schedule that ``plan`` gives for the plain body, as commands for the true one; see `as_commands`."""
+def planned(
+    spacecraft: Spacecraft, plan: Callable[[Spacecraft], Schedule], correct: Correction
+) -> Schedule:
+    """Schedule that ``plan`` gives for the plain body, as commands for the true one; see
+    `as_commands`.
+    """
     weakest, strongest, room, used = 1.0, 1.0, 0.0, 0.0
     tried: list[tuple[bool, float, Schedule]] = []
     schedule: Schedule | None = None
@@ -110,7 +139,8 @@ def planned(spacecraft: Spacecraft, plan: Callable[[Spacecraft], Schedule], corr
             raise Infeasible(f"{reason}{EFFECTIVE}") from None
         too_weak, too_strong, longer = _outside(spacecraft, schedule, body.inertia, correct)
         if too_weak or too_strong:
-            weakest, strongest = min([weakest, *too_weak]), max([strongest, *too_strong])
+            weakest = min([weakest, *too_weak])
+            strongest = max([strongest, *too_strong])
             continue
         if used == 0.0 and shed(spacecraft) is not None and schedule.propellant:
             used = schedule.propellant  # once more with the moments half-way
@@ -121,13 +151,18 @@ def planned(spacecraft: Spacecraft, plan: Callable[[Spacecraft], Schedule], corr
             if not tried:
                 raise
             break
-        kept, left = keeps_limits(spacecraft, commands.pulses), _left(spacecraft, commands, correct)
+        kept = keeps_limits(spacecraft, commands.pulses)
+        left = _left(spacecraft, commands, correct)
         tried.append((not kept, left, commands))
         if work.exhausted() or not schedule.pulses:
             break
-        if kept and (spacecraft.limits.tick is not None or left <= NEARLY * _left(body, schedule, correct) + EXACT):
+        if kept and (
+            spacecraft.limits.tick is not None
+            or left <= NEARLY * _left(body, schedule, correct) + EXACT
+        ):
             break
-        # What is longer than planned, or has been moved, met its neighbour or a window: the next one leaves room.
+        # What is longer than planned, or has been moved, met its neighbour or a window: the next
+        # one leaves room.
         room = max(2.0 * room, longer, ROOM * max(pulse.on_time for pulse in schedule))
     assert schedule is not None
     if not tried:
@@ -143,10 +178,11 @@ def _left(spacecraft: Spacecraft, schedule: Schedule, correct: Correction) -> fl
 def as_commands(
     spacecraft: Spacecraft, schedule: Schedule, correct: Correction, inertia: Inertia | None = None
 ) -> Schedule:
-    """A schedule of the plain body as commands; ``correct`` brings them to what is left on the flown motion.
+    """A schedule of the plain body as commands; ``correct`` brings them to what is left on the
+    flown motion.
 
-    ``inertia`` is that of the plain body, default that at t = 0. Commands that give no thrust are left out. Raises
-    Infeasible where the propellant does not last.
+    ``inertia`` is that of the plain body, default that at t = 0. Commands that give no thrust are
+    left out. Raises Infeasible where the propellant does not last.
     """
     commands = _translated(spacecraft, schedule, inertia, correct)
     first = _firing(replace(schedule.without_proof, pulses=commands))
@@ -154,20 +190,31 @@ def as_commands(
     corrected = _on_ticks(spacecraft, first, correct) if ticks else correct(spacecraft, first, TAIL)
     firing = _firing(corrected)
     if firing.pulses:
-        supply, channels = Supply(spacecraft), {channel.name: channel for channel in spacecraft.channels}
-        for pulse in firing:  # as commanded: what an empty tank has weakened would never be more than it has
+        supply = Supply(spacecraft)
+        channels = {channel.name: channel for channel in spacecraft.channels}
+        for pulse in (
+            firing
+        ):  # as commanded: what an empty tank has weakened would never be more than it has
             if pulse.channel in channels:
                 supply.take(channels[pulse.channel], pulse.on_time)
             else:
                 supply.count((pulse,))
         if supply.shortage is not None:
             raise Infeasible(supply.shortage)
-    fired = [pulse for pulse, command in zip(schedule, commands, strict=True) if command.magnitude > 0.0]
-    notes, tank = list(firing.notes), spacecraft.tank
+    fired = [
+        pulse for pulse, command in zip(schedule, commands, strict=True) if command.magnitude > 0.0
+    ]
+    notes = list(firing.notes)
+    tank = spacecraft.tank
     if correct.options.equal and fired:
-        pairs = [pair for pair in zip(fired, corrected, strict=True) if pair[0].on_time == fired[-1].on_time]
+        pairs = [
+            pair
+            for pair in zip(fired, corrected, strict=True)
+            if pair[0].on_time == fired[-1].on_time
+        ]
         alike = [command.loaded[1] for _, command in pairs if command.magnitude > 0.0]
-        shortest, longest = min(alike, default=0.0), max(alike, default=0.0)
+        shortest = min(alike, default=0.0)
+        longest = max(alike, default=0.0)
         if f"{shortest:.4g}" != f"{longest:.4g}":
             notes.append(note("unequal-commands", shortest_s=shortest, longest_s=longest))
     if tank is not None and firing.pulses:
@@ -183,23 +230,41 @@ def _firing(schedule: Schedule) -> Schedule:
 
 
 def _translated(
-    spacecraft: Spacecraft, schedule: Schedule, inertia: Inertia | None, correct: Correction, *, unbounded: bool = False
+    spacecraft: Spacecraft,
+    schedule: Schedule,
+    inertia: Inertia | None,
+    correct: Correction,
+    *,
+    unbounded: bool = False,
 ) -> tuple[Pulse, ...]:
-    """Pulses as the commands of their impulse and centroid; ``unbounded``: as rectangles of any length.
+    """Pulses as the commands of their impulse and centroid; ``unbounded``: as rectangles of any
+    length.
 
-    Where moments fall it changes ω, or the direction of H, as the pulse did with the ``inertia`` of the plan, and where
-    H does not count it comes as the nutation has turned in the body as far. Raises Infeasible where one is too weak.
+    Where moments fall it changes ω, or the direction of H, as the pulse did with the ``inertia`` of
+    the plan, and where H does not count it comes as the nutation has turned in the body as far.
+    Raises Infeasible where one is too weak.
     """
-    supply, channels, pulses = Supply(spacecraft), {channel.name: channel for channel in spacecraft.channels}, []
-    planned_, before, late = inertia or spacecraft.inertia, 0.0, 0.0
+    supply = Supply(spacecraft)
+    channels = {channel.name: channel for channel in spacecraft.channels}
+    pulses = []
+    planned_ = inertia or spacecraft.inertia
+    before = 0.0
+    late = 0.0
     for pulse_ in schedule:
-        here, pulse = lightened(spacecraft, supply.since), pulse_
+        here = lightened(spacecraft, supply.since)
+        pulse = pulse_
         if here.moments != planned_.moments:
             rate = here.nutation_rate(spacecraft.spin)
-            slower = 1.0 if correct.momentum or rate == 0.0 else planned_.nutation_rate(spacecraft.spin) / rate
+            slower = (
+                1.0
+                if correct.momentum or rate == 0.0
+                else planned_.nutation_rate(spacecraft.spin) / rate
+            )
             late += (slower - 1.0) * (pulse_.t - before)
             size = here.C / planned_.C if correct.momentum else here.A / planned_.A
-            pulse = replace(pulse_.moved(late), on_time=size * pulse_.on_time, impulse=size * pulse_.impulse)
+            pulse = replace(
+                pulse_.moved(late), on_time=size * pulse_.on_time, impulse=size * pulse_.impulse
+            )
         before = pulse_.t
         channel = channels.get(pulse.channel)
         if channel is None:
@@ -208,9 +273,16 @@ def _translated(
         on_time = supply.on_time_for(channel, pulse.on_time)
         if on_time > spacecraft.horizon:
             level = pulse.on_time / on_time
-            text = f"a pulse at {level:.2g} times the thrust, cold or at low pressure, would take {on_time:.4g} s"
+            text = (
+                f"a pulse at {level:.2g} times the thrust, cold or at low pressure, "
+                f"would take {on_time:.4g} s"
+            )
             raise Infeasible(f"{text}, longer than limits.horizon")
-        given = replace(pulse, on_time=on_time) if unbounded else channel_pulse(channel, pulse.t, on_time)
+        given = (
+            replace(pulse, on_time=on_time)
+            if unbounded
+            else channel_pulse(channel, pulse.t, on_time)
+        )
         fired = supply.fire(given, channel)
         pulses.append(fired.moved(pulse.t - fired.t))
     return tuple(pulses)
@@ -219,9 +291,13 @@ def _translated(
 def _outside(
     spacecraft: Spacecraft, schedule: Schedule, inertia: Inertia, correct: Correction
 ) -> tuple[list[float], list[float], float]:
-    """Levels of pulses too weak, and too strong, for any command; s by which one becomes longer at each end."""
+    """Levels of pulses too weak, and too strong, for any command; s by which one becomes longer at
+    each end.
+    """
     channels = {channel.name: channel for channel in spacecraft.channels}
-    weak, strong, longer = [], [], 0.0
+    weak = []
+    strong = []
+    longer = 0.0
     translated = _translated(spacecraft, schedule, inertia, correct, unbounded=True)
     for planned_, pulse in zip(schedule, translated, strict=True):
         longer = max(longer, 0.5 * (pulse.on_time - planned_.on_time))
@@ -239,20 +315,27 @@ def _outside(
 
 
 def _on_ticks(spacecraft: Spacecraft, made: Schedule, correct: Correction) -> Schedule:
-    """Schedule on the ticks of its commands: the better of rounding all at once, and the last pulses in turn."""
+    """Schedule on the ticks of its commands: the better of rounding all at once, and the last
+    pulses in turn.
+    """
     smooth = replace(spacecraft, limits=replace(spacecraft.limits, tick=None))
     made = correct(smooth, made, TAIL)
 
     def rounded(schedule: Schedule, count: int) -> Schedule:
         """Copy with the first ``count`` pulses on ticks."""
-        pulses = (commandable(spacecraft, pulse) if index < count else pulse for index, pulse in enumerate(schedule))
+        pulses = (
+            commandable(spacecraft, pulse) if index < count else pulse
+            for index, pulse in enumerate(schedule)
+        )
         return replace(schedule, pulses=supplied(spacecraft, pulses))
 
     in_turn = made
     for behind in range(min(TAIL, len(made)) - 1, 0, -1):
         in_turn = correct(smooth, rounded(in_turn, len(made) - behind), behind)
     roundings = [rounded(schedule, len(made)) for schedule in (made, in_turn)]
-    kept = [schedule for schedule in roundings if keeps_limits(spacecraft, schedule.pulses)] or roundings
+    kept = [
+        schedule for schedule in roundings if keeps_limits(spacecraft, schedule.pulses)
+    ] or roundings
     return min(kept, key=lambda schedule: _left(spacecraft, schedule, correct))
 
 

@@ -1,7 +1,8 @@
-"""Constraints on schedules: earliest start, gap, blackout windows, horizon, on-times, ticks, number of pulses.
+"""Constraints on schedules: earliest start, gap, blackout windows, horizon, on-times, ticks, number
+of pulses.
 
-`Windows` says when a pulse may be on; `breaches` judges whole schedules, for the schemes and for the judge alike. It
-gives data; `nutdamp.planning.decision` has the words.
+`Windows` says when a pulse may be on; `breaches` judges whole schedules, for the schemes and for
+the judge alike. It gives data; `nutdamp.planning.decision` has the words.
 """
 
 from __future__ import annotations
@@ -20,16 +21,27 @@ from numpy.typing import NDArray
 
 from nutdamp.spacecraft.equipment import Block, Channel, Commands
 from nutdamp.spacecraft.model import Spacecraft, Vector
-from nutdamp.spacecraft.schedule import RESOLUTION, TOUCHING, Pulse, Schedule, channel_pulse, on_command, touching
+from nutdamp.spacecraft.schedule import (
+    RESOLUTION,
+    TOUCHING,
+    Pulse,
+    Schedule,
+    channel_pulse,
+    on_command,
+    touching,
+)
 
-OFF_TICK = 1e-6  # share of a tick, or step of commands, by which times may be off it: the rounding of files
+# share of a tick, or step of commands, by which times may be off it: the rounding of files
+OFF_TICK = 1e-6
 
 
 class Windows:
     """Limits of one spacecraft, for one pulse at a time."""
 
     def __init__(self, spacecraft: Spacecraft, *, endless: bool = False) -> None:
-        """Windows of ``spacecraft``; ``endless`` drops the horizon, to show the effect of a longer one."""
+        """Windows of ``spacecraft``; ``endless`` drops the horizon, to show the effect of a longer
+        one.
+        """
         self.limits = spacecraft.limits
         self.horizon = math.inf if endless else spacecraft.horizon
 
@@ -38,20 +50,25 @@ class Windows:
         if not self.limits.blackout:
             return None
         begins, over = self.dark
-        # The first window that is not over when the pulse starts is the only one that it can touch first.
+        # The first window that is not over when the pulse starts is the only one that it can touch
+        # first.
         slack = touching(start + on_time)
         following = int(np.searchsorted(over, start + slack, side="right"))
         touched = following < len(over) and start + on_time > begins[following] + slack
         return float(over[following]) if touched else None
 
     def allows(self, start: float, on_time: float, ready: float) -> bool:
-        """True if a pulse may be on from ``start`` for ``on_time`` s when the actuators are ``ready`` (s)."""
+        """True if a pulse may be on from ``start`` for ``on_time`` s when the actuators are
+        ``ready`` (s).
+        """
         slack = touching(start + on_time)
         within = ready - slack <= start and start + on_time <= self.horizon + slack
         return within and self.blocked_until(start, on_time) is None
 
     def allowed(self, starts: Vector, on_times: Vector, ready: Vector | float) -> NDArray[np.bool_]:
-        """`allows` for many pulses at once, (n,) each; a pulse whose on-time is not a number is not allowed."""
+        """`allows` for many pulses at once, (n,) each; a pulse whose on-time is not a number is not
+        allowed.
+        """
         ends = starts + on_times
         with np.errstate(invalid="ignore"):
             slack = np.maximum(TOUCHING, np.spacing(ends))  # `touching`
@@ -71,8 +88,12 @@ class Windows:
                 merged.append([begins, ends])
         return np.array([begin for begin, _ in merged]), np.array([other for _, other in merged])
 
-    def blocked(self, starts: Vector, ends: Vector, slack: Vector | float = 0.0) -> NDArray[np.bool_]:
-        """True where the time from ``starts`` to ``ends`` (n,) s is in a blackout window for more than ``slack`` s."""
+    def blocked(
+        self, starts: Vector, ends: Vector, slack: Vector | float = 0.0
+    ) -> NDArray[np.bool_]:
+        """True where the time from ``starts`` to ``ends`` (n,) s is in a blackout window for more
+        than ``slack`` s.
+        """
         begins, over = self.dark
         # The first window that is not over at the start is the only one that can be met first.
         following = np.searchsorted(over, starts + slack, side="right")
@@ -109,25 +130,36 @@ class Windows:
 
 
 def free_windows(spacecraft: Spacecraft, horizon: float | None = None) -> list[tuple[float, float]]:
-    """Windows (begin, end) s in which pulses may be on: from the earliest start to the horizon without blackouts.
+    """Windows (begin, end) s in which pulses may be on: from the earliest start to the horizon
+    without blackouts.
 
-    ``horizon`` s, where given, replaces that of the spacecraft. Windows that only touch leave a moment free between
-    them.
+    ``horizon`` s, where given, replaces that of the spacecraft. Windows that only touch leave a
+    moment free between them.
     """
-    earliest, until = spacecraft.limits.earliest, spacecraft.horizon if horizon is None else horizon
+    earliest = spacecraft.limits.earliest
+    until = spacecraft.horizon if horizon is None else horizon
     begins, over = Windows(spacecraft).dark
-    edges = zip([earliest, *np.maximum(over, earliest).tolist()], [*begins.tolist(), math.inf], strict=True)
+    edges = zip(
+        [earliest, *np.maximum(over, earliest).tolist()], [*begins.tolist(), math.inf], strict=True
+    )
     free = [(begin, min(end, until)) for begin, end in edges if begin <= end and begin < until]
     return free if len(begins) or free else [(earliest, earliest)]
 
 
 def rooms(spacecraft: Spacecraft, pulses: Sequence[Pulse]) -> list[tuple[float, float]]:
-    """(begin, end) s between which each of the ``pulses``, in order, may move; the room between two is halved."""
-    limits, ready, bounds = spacecraft.limits, spacecraft.limits.earliest, []
+    """(begin, end) s between which each of the ``pulses``, in order, may move; the room between two
+    is halved.
+    """
+    limits = spacecraft.limits
+    ready = spacecraft.limits.earliest
+    bounds = []
     begins, over = (part.tolist() for part in Windows(spacecraft).dark)
     for pulse in pulses:
-        before, after = bisect_right(over, pulse.start + TOUCHING), bisect_left(begins, pulse.end - TOUCHING)
-        bounds.append([max([ready, *over[:before][-1:]]), min([spacecraft.horizon, *begins[after:][:1]])])
+        before = bisect_right(over, pulse.start + TOUCHING)
+        after = bisect_left(begins, pulse.end - TOUCHING)
+        bounds.append(
+            [max([ready, *over[:before][-1:]]), min([spacecraft.horizon, *begins[after:][:1]])]
+        )
         ready = pulse.end + limits.gap
     for index in range(len(bounds) - 1):
         off, on = pulses[index].end, pulses[index + 1].start
@@ -138,7 +170,8 @@ def rooms(spacecraft: Spacecraft, pulses: Sequence[Pulse]) -> list[tuple[float, 
 
 
 def usable(spacecraft: Spacecraft, *, axial: bool = False) -> list[Channel]:
-    """Channels that schemes fire: more transverse than ``axial`` (or either), with a commandable on-time.
+    """Channels that schemes fire: more transverse than ``axial`` (or either), with a commandable
+    on-time.
 
     One whose torques cancel is none of them.
     """
@@ -155,10 +188,17 @@ SOME_WIDTHS = 500  # of a range in finer steps so many, evenly spread: then neig
 
 
 def commandable_widths(
-    commands: Commands, channel: Channel, least: float = 0.0, most: float = math.inf, count: int = SOME_WIDTHS
+    commands: Commands,
+    channel: Channel,
+    least: float = 0.0,
+    most: float = math.inf,
+    count: int = SOME_WIDTHS,
 ) -> Vector:
-    """Widths (n,) s from ``least`` to ``most`` that a command block of a channel may have: those that give thrust."""
-    least, most = max(least, channel.min_on_time - 1e-12), min(most, channel.max_on_time + 1e-12)
+    """Widths (n,) s from ``least`` to ``most`` that a command block of a channel may have: those
+    that give thrust.
+    """
+    least = max(least, channel.min_on_time - 1e-12)
+    most = min(most, channel.max_on_time + 1e-12)
     widths = commands.some_widths(least, most, count)
     if channel.valve is None:
         return widths
@@ -166,41 +206,66 @@ def commandable_widths(
 
 
 def rounded_off(spacecraft: Spacecraft, pulses: Iterable[Pulse]) -> list[float]:
-    """Effect of half a tick in start and on-time of each pulse, rad, as a root sum of squares; without ticks 0."""
-    body, half = spacecraft, 0.5 * (spacecraft.limits.tick or 0.0)
-    rate, size = body.fastest, abs(body.axial)
-    lengths = ((pulse.magnitude, 1.0 / pulse.on_time if pulse.on_time > 0.0 else 0.0) for pulse in pulses)
+    """Effect of half a tick in start and on-time of each pulse, rad, as a root sum of squares;
+    without ticks 0.
+    """
+    body = spacecraft
+    half = 0.5 * (spacecraft.limits.tick or 0.0)
+    rate = body.fastest
+    size = abs(body.axial)
+    lengths = (
+        (pulse.magnitude, 1.0 / pulse.on_time if pulse.on_time > 0.0 else 0.0) for pulse in pulses
+    )
     return [half * magnitude * math.hypot(share, rate) / size for magnitude, share in lengths]
 
 
 def shortest_on_time(spacecraft: Spacecraft, channel: Channel) -> float:
-    """Shortest on-time that can be commanded, s: min_on_time rounded up to ticks, at least one tick."""
+    """Shortest on-time that can be commanded, s: min_on_time rounded up to ticks, at least one
+    tick.
+    """
     tick = spacecraft.limits.tick
-    return channel.min_on_time if tick is None else max(math.ceil((channel.min_on_time - TOUCHING) / tick), 1) * tick
+    return (
+        channel.min_on_time
+        if tick is None
+        else max(math.ceil((channel.min_on_time - TOUCHING) / tick), 1) * tick
+    )
 
 
 def longest_on_time(spacecraft: Spacecraft, channel: Channel) -> float:
-    """Longest useful on-time of a channel, s: see `longest_useful`, which is for torques across the spin axis."""
+    """Longest useful on-time of a channel, s: see `longest_useful`, which is for torques across the
+    spin axis.
+    """
     longest = effective_on_times(channel)[1]
     return longest_useful(longest, spacecraft.body_period) if channel.damps else longest
 
 
 def effective_on_times(channel: Channel) -> tuple[float, float]:
-    """Bounds (s) of the pulses that a channel can give, in effective on-times: without a valve those commanded."""
-    return effective_on_time(channel, channel.min_on_time), effective_on_time(channel, channel.max_on_time)
+    """Bounds (s) of the pulses that a channel can give, in effective on-times: without a valve
+    those commanded.
+    """
+    return effective_on_time(channel, channel.min_on_time), effective_on_time(
+        channel, channel.max_on_time
+    )
 
 
 def effective_on_time(channel: Channel, on_time: float) -> float:
-    """Time (s) of full thrust that a command of ``on_time`` s acts for: its impulse over the torque.
+    """Time (s) of full thrust that a command of ``on_time`` s acts for: its impulse over the
+    torque.
 
-    An ``on_time`` of 0 is the shortest there is: a valve that closes later than it opens gives thrust for a while.
+    An ``on_time`` of 0 is the shortest there is: a valve that closes later than it opens gives
+    thrust for a while.
     """
     valve = channel.valve
-    return on_time if valve is None or math.isinf(on_time) else valve.thrust(on_time or TOUCHING).on_time
+    return (
+        on_time
+        if valve is None or math.isinf(on_time)
+        else valve.thrust(on_time or TOUCHING).on_time
+    )
 
 
 def longest_useful(max_on_time: float, period: float) -> float:
-    """Longest useful on-time, s: a torque across the spin axis works against itself after half a nutation ``period``.
+    """Longest useful on-time, s: a torque across the spin axis works against itself after half a
+    nutation ``period``.
 
     That is the one in the body, s, at the spin with which the pulse begins.
     """
@@ -211,7 +276,9 @@ PAIRED = 24  # directions about which channels are looked at in pairs
 
 
 def for_pairs(spacecraft: Spacecraft) -> list[Channel]:
-    """`usable`, but of very many channels only the cheapest about each of `PAIRED` directions: pairs are many."""
+    """`usable`, but of very many channels only the cheapest about each of `PAIRED` directions:
+    pairs are many.
+    """
     channels = usable(spacecraft)
     if len(channels) <= PAIRED:
         return channels
@@ -228,10 +295,15 @@ def channel_of(spacecraft: Spacecraft, pulse: Pulse) -> Channel | None:
 
 
 def misfits(commands: Commands | None, block: Block) -> list[tuple[str, str, str]]:
-    """Values of a block that are no command of the file: the column, the value, and what is nearest or allowed."""
+    """Values of a block that are no command of the file: the column, the value, and what is nearest
+    or allowed.
+    """
     if commands is None:
         return []
-    longest = math.floor(commands.delay_max / commands.delay_step * (1.0 + OFF_TICK)) * commands.delay_step
+    longest = (
+        math.floor(commands.delay_max / commands.delay_step * (1.0 + OFF_TICK))
+        * commands.delay_step
+    )
     nearest_delay = min(round(block.delay / commands.delay_step) * commands.delay_step, longest)
     nearest_width = commands.nearest_width(block.width)
     off = [
@@ -242,7 +314,9 @@ def misfits(commands: Commands | None, block: Block) -> list[tuple[str, str, str
         )
         if abs(value - near) > slack
     ]
-    off += [("count", str(block.count), f"{commands.max_count} is the most")] * (block.count > commands.max_count)
+    off += [("count", str(block.count), f"{commands.max_count} is the most")] * (
+        block.count > commands.max_count
+    )
     allowed = ", ".join(map(str, commands.every))
     off += [("every", str(block.every), f"only {allowed}")] * (block.every not in commands.every)
     return off
@@ -252,7 +326,8 @@ def commandable(spacecraft: Spacecraft, pulse: Pulse) -> Pulse:
     """Pulse with start and on-time on the ticks of the commands."""
     if spacecraft.limits.tick is None:
         return pulse
-    windows, channel = Windows(spacecraft), channel_of(spacecraft, pulse)
+    windows = Windows(spacecraft)
+    channel = channel_of(spacecraft, pulse)
     bounds = (0.0, math.inf) if channel is None else (channel.min_on_time, channel.max_on_time)
     if channel is not None and pulse.command is not None:
         start, on_time = pulse.loaded
@@ -263,7 +338,9 @@ def commandable(spacecraft: Spacecraft, pulse: Pulse) -> Pulse:
         return channel_pulse(channel, t, on_time)
     scale = 1.0 if pulse.on_time == 0.0 else on_time / pulse.on_time
     propellant = None if pulse.propellant is None else pulse.propellant * scale
-    return replace(pulse, t=t, on_time=on_time, impulse=pulse.impulse * scale, propellant=propellant)
+    return replace(
+        pulse, t=t, on_time=on_time, impulse=pulse.impulse * scale, propellant=propellant
+    )
 
 
 class Limit(Enum):
@@ -282,10 +359,12 @@ class Limit(Enum):
 
 
 class Breach(NamedTuple):
-    """Breach of a ``limit`` by the pulse ``number`` (from 1), which exceeds its ``bound`` s ``by`` so many s.
+    """Breach of a ``limit`` by the pulse ``number`` (from 1), which exceeds its ``bound`` s ``by``
+    so many s.
 
-    For `Limit.MAX_PULSES` both count pulses, and the pulse is the last one. ``window``: the blackout window, s; the
-    pulse would have to end before its begin, the ``bound``, or to start after its end, whichever is nearer.
+    For `Limit.MAX_PULSES` both count pulses, and the pulse is the last one. ``window``: the
+    blackout window, s; the pulse would have to end before its begin, the ``bound``, or to start
+    after its end, whichever is nearer.
     """
 
     limit: Limit
@@ -299,15 +378,20 @@ class Breach(NamedTuple):
 def breaches(spacecraft: Spacecraft, pulses: Iterable[Pulse]) -> Iterator[Breach]:
     """Breaches of the limits and on-times of the file by ``pulses``, in order, pulse by pulse.
 
-    What is within rounding (`touching`) is no breach; but no pulse may start before t = 0 by anything. Command blocks
-    have steps of their own, from a Sun pulse that comes on no tick: limits.tick is not theirs.
+    What is within rounding (`touching`) is no breach; but no pulse may start before t = 0 by
+    anything. Command blocks have steps of their own, from a Sun pulse that comes on no tick:
+    limits.tick is not theirs.
     """
-    windows, previous_end, number = Windows(spacecraft), -math.inf, 0
+    windows = Windows(spacecraft)
+    previous_end = -math.inf
+    number = 0
     if isinstance(pulses, Schedule) and pulses.blocks:
         windows.limits = replace(windows.limits, tick=None)
     channels = {channel.name: channel for channel in spacecraft.channels}
     for number, pulse in enumerate(pulses, start=1):
-        for limit, bound, by, allowed in _margins(windows, channels.get(pulse.channel), pulse, previous_end):
+        for limit, bound, by, allowed in _margins(
+            windows, channels.get(pulse.channel), pulse, previous_end
+        ):
             if by > allowed:
                 yield Breach(limit, number, pulse, bound, by)
         start = pulse.loaded[0]
@@ -326,11 +410,14 @@ def breaches(spacecraft: Spacecraft, pulses: Iterable[Pulse]) -> Iterator[Breach
 def _margins(
     windows: Windows, channel: Channel | None, pulse: Pulse, previous_end: float
 ) -> Iterator[tuple[Limit, float, float, float]]:
-    """Limits other than blackout windows: each with its bound, the excess of a pulse, and the allowed excess, s.
+    """Limits other than blackout windows: each with its bound, the excess of a pulse, and the
+    allowed excess, s.
 
-    Starts, on-times and ticks are those of the command; horizon and gap wait until its thrust is over too.
+    Starts, on-times and ticks are those of the command; horizon and gap wait until its thrust is
+    over too.
     """
-    limits, slack = windows.limits, touching(pulse.over)
+    limits = windows.limits
+    slack = touching(pulse.over)
     start, on_time = pulse.loaded
     if on_time > 0.0:
         coarsest = RESOLUTION * on_time
@@ -343,7 +430,12 @@ def _margins(
         yield Limit.MAX_ON_TIME, channel.max_on_time, on_time - channel.max_on_time, slack
     if limits.tick is not None:
         for limit, value in ((Limit.START_TICK, start), (Limit.ON_TIME_TICK, on_time)):
-            yield limit, limits.tick, abs(value - windows.nearest_tick(value)), slack + OFF_TICK * limits.tick
+            yield (
+                limit,
+                limits.tick,
+                abs(value - windows.nearest_tick(value)),
+                slack + OFF_TICK * limits.tick,
+            )
 
 
 def keeps_limits(spacecraft: Spacecraft, pulses: Iterable[Pulse]) -> bool:

@@ -1,7 +1,8 @@
-"""Equipment that a spacecraft fires, is commanded with and senses by; SI and rad, in principal axes.
+"""Equipment that a spacecraft fires, is commanded with and senses by; SI and rad, in principal
+axes.
 
-Thrusters, channels of them and Magnus' steerable torquer; a Sun sensor that starts the clock of each spin, and the
-steps of command blocks; the sensor, law and faults of a closed loop.
+Thrusters, channels of them and Magnus' steerable torquer; a Sun sensor that starts the clock of
+each spin, and the steps of command blocks; the sensor, law and faults of a closed loop.
 """
 
 from __future__ import annotations
@@ -23,10 +24,11 @@ Vector = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class SunSensor:
-    """Gives a pulse in each spin, when the Sun passes its ``azimuth``: rad in the body, about axis 3 from axis 1.
+    """Gives a pulse in each spin, when the Sun passes its ``azimuth``: rad in the body, about axis
+    3 from axis 1.
 
-    It sees the Sun at most ``half_width`` rad from ``elevation``, which is counted from the plane square to axis 3
-    towards the spin axis. ``jitter`` s is one sigma of its pulses.
+    It sees the Sun at most ``half_width`` rad from ``elevation``, which is counted from the plane
+    square to axis 3 towards the spin axis. ``jitter`` s is one sigma of its pulses.
     """
 
     azimuth: float
@@ -46,10 +48,11 @@ class SunSensor:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Commands:
-    """Possible command blocks: delays 0, ``delay_step``, … up to ``delay_max`` s, ``widths`` (n,) s, at most
-    ``max_count`` pulses, one in ``every`` so many spins.
+    """Possible command blocks: delays 0, ``delay_step``, … up to ``delay_max`` s, ``widths`` (n,)
+    s, at most ``max_count`` pulses, one in ``every`` so many spins.
 
-    With a ``width_step`` the widths are the shortest and the longest of all in such steps, which no array lists.
+    With a ``width_step`` the widths are the shortest and the longest of all in such steps, which no
+    array lists.
     """
 
     delay_step: float
@@ -60,7 +63,9 @@ class Commands:
     width_step: float | None = None
 
     def some_widths(self, least: float, most: float, count: int) -> Vector:
-        """Widths from ``least`` to ``most`` s that can be commanded; of those in steps ``count``, evenly spread."""
+        """Widths from ``least`` to ``most`` s that can be commanded; of those in steps ``count``,
+        evenly spread.
+        """
         if self.width_step is None:
             return np.asarray(self.widths[(self.widths >= least) & (self.widths <= most)])
         first, last = self.widths.tolist()
@@ -76,7 +81,9 @@ class Commands:
         return float(near[np.abs(near - width).argmin()])
 
     def counts(self, name: str, time: float) -> int:
-        """Steps of a ``delay`` or ``width``, s; in a list of widths the number of the nearest entry, 1 the shortest."""
+        """Steps of a ``delay`` or ``width``, s; in a list of widths the number of the nearest
+        entry, 1 the shortest.
+        """
         step = self.delay_step if name == "delay" else self.width_step
         return 1 + int(np.abs(self.widths - time).argmin()) if step is None else round(time / step)
 
@@ -90,10 +97,11 @@ class Commands:
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """``count`` pulses of ``channel``, each ``width`` s long and begun ``delay`` s after a Sun pulse.
+    """``count`` pulses of ``channel``, each ``width`` s long and begun ``delay`` s after a Sun
+    pulse.
 
-    ``first`` is the number of the Sun pulse of the first one, 1 the first after t = 0; from then on every
-    ``every``-th Sun pulse fires one.
+    ``first`` is the number of the Sun pulse of the first one, 1 the first after t = 0; from then on
+    every ``every``-th Sun pulse fires one.
     """
 
     channel: str
@@ -118,14 +126,16 @@ FOUR_PULSE, ONE_PULSE, BANG = "four-pulse", "one-pulse", "bang"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sensor:
-    """Sensor of the loop: ``scale`` times the truth plus ``bias``, with ``noise`` (one sigma), in steps.
+    """Sensor of the loop: ``scale`` times the truth plus ``bias``, with ``noise`` (one sigma), in
+    steps.
 
-    ``bias``, ``noise`` and the steps of ``quantisation`` are rad/s of a gyro, m/s² of an accelerometer, which is at
-    ``position`` (3,) m from the centre of mass and measures along the unit vector ``axis`` (3,), both in principal
-    axes; the gyros measure about the rows of ``axes`` (2, 3), unit vectors in those. ``rate`` Hz is that of its
-    samples, None is a continuous signal; ``delay`` s until a sample can be used; ``low_pass`` s the time constant of a
-    first-order filter over the samples, 0 is none. ``second`` is what the second gyro has as scale and bias, where that
-    differs.
+    ``bias``, ``noise`` and the steps of ``quantisation`` are rad/s of a gyro, m/s² of an
+    accelerometer, which is at ``position`` (3,) m from the centre of mass and measures along the
+    unit vector ``axis`` (3,), both in principal axes; the gyros measure about the rows of ``axes``
+    (2, 3), unit vectors in those. ``rate`` Hz is that of its samples, None is a continuous signal;
+    ``delay`` s until a sample can be used; ``low_pass`` s the time constant of a first-order filter
+    over the samples, 0 is none. ``second`` is what the second gyro has as scale and bias, where
+    that differs.
     """
 
     kind: str = GYRO
@@ -161,10 +171,10 @@ class Sensor:
 class Loop:
     """Closed loop: fire by ``sensor`` from a nutation of ``start`` rad down to ``stop`` rad.
 
-    ``law`` is one of the names above; ``on_time`` s is the longest pulse of four-pulse (None: as the scheme) and every
-    pulse of bang. After a firing the sensor is not looked at for ``settle`` s, and the next one begins ``min_interval``
-    s later at the earliest. ``predict``: delay, filter and half the on-time are compensated. ``reversed``: channels
-    that in truth push the other way.
+    ``law`` is one of the names above; ``on_time`` s is the longest pulse of four-pulse (None: as
+    the scheme) and every pulse of bang. After a firing the sensor is not looked at for ``settle``
+    s, and the next one begins ``min_interval`` s later at the earliest. ``predict``: delay, filter
+    and half the on-time are compensated. ``reversed``: channels that in truth push the other way.
     """
 
     sensor: Sensor
@@ -182,8 +192,9 @@ class Loop:
 class Thruster:
     """Thruster: ``torque`` (3,) N m, ``thrust`` N or None, ``isp`` s or None.
 
-    ``force`` (3,) N and ``position`` (3,) m, where it acts, are None for a thruster known by its torque only.
-    ``valve`` is what it makes of commands; None gives full thrust from the start of a command to its end.
+    ``force`` (3,) N and ``position`` (3,) m, where it acts, are None for a thruster known by its
+    torque only. ``valve`` is what it makes of commands; None gives full thrust from the start of a
+    command to its end.
     """
 
     name: str
@@ -204,14 +215,17 @@ class Thruster:
         return self.thrust / (self.isp * STANDARD_GRAVITY)
 
 
-CANCELLED = 1e-12  # share of the largest torque of its thrusters below which that of a channel is rounding
+CANCELLED = (
+    1e-12  # share of the largest torque of its thrusters below which that of a channel is rounding
+)
 
 
 @dataclass(frozen=True, slots=True)
 class Channel:
     """Channel: thrusters that fire together, as one body-fixed torque.
 
-    ``spends`` N m s is the impulse that a second of it counts for, where the torque is not the true one.
+    ``spends`` N m s is the impulse that a second of it counts for, where the torque is not the true
+    one.
     """
 
     name: str
@@ -220,11 +234,15 @@ class Channel:
 
     def of(self, **changed: Any) -> Channel:
         """Copy with these fields ``changed`` in each thruster."""
-        return replace(self, thrusters=tuple(replace(thruster, **changed) for thruster in self.thrusters))
+        return replace(
+            self, thrusters=tuple(replace(thruster, **changed) for thruster in self.thrusters)
+        )
 
     @property
     def torque(self) -> Vector:
-        """Sum of the torques, (3,) N m; zero where they cancel, as of a pair for velocity changes, but for rounding."""
+        """Sum of the torques, (3,) N m; zero where they cancel, as of a pair for velocity changes,
+        but for rounding.
+        """
         torques = np.array([thruster.torque for thruster in self.thrusters], dtype=np.float64)
         total = torques.sum(axis=0)
         return np.asarray(np.where(np.abs(total) > CANCELLED * np.abs(torques).max(), total, 0.0))
@@ -252,7 +270,9 @@ class Channel:
 
     @property
     def damps(self) -> bool:
-        """True if the torque is more transverse than axial; thrusters for the spin are left alone."""
+        """True if the torque is more transverse than axial;
+        thrusters for the spin are left alone.
+        """
         return abs(self.transverse) > abs(self.axial)
 
     @property
@@ -274,11 +294,15 @@ class Channel:
 
     @property
     def price(self) -> float:
-        """Propellant, kg (impulse, N m s, where that is unknown), per N m s of transverse impulse."""
+        """Propellant, kg (impulse, N m s, where that is unknown),
+        per N m s of transverse impulse.
+        """
         return self.cost_rate(by_propellant=True) / abs(self.transverse)
 
     def cost_rate(self, *, by_propellant: bool) -> float:
-        """Propellant flow, kg/s, of firing; impulse, N m, where that is unknown or not the measure."""
+        """Propellant flow, kg/s, of firing; impulse, N m,
+        where that is unknown or not the measure.
+        """
         flow = self.mass_flow
         return flow if by_propellant and flow is not None else self.strength
 

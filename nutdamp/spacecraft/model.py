@@ -1,7 +1,9 @@
-"""Spacecraft as the planner sees it: inertia, initial motion, actuators, limits, requirement, dispersions.
+"""Spacecraft as the planner sees it: inertia, initial motion, actuators, limits, requirement,
+dispersions.
 
-Everything here is SI, radians, and in *principal axes*: axis 3 is the spin axis of the plan. ``Inertia.axes``
-leads back to the axes of the file, which is where vectors and quaternions are shown to people.
+Everything here is SI, radians, and in *principal axes*: axis 3 is the spin axis of the plan.
+``Inertia.axes`` leads back to the axes of the file, which is where vectors and quaternions are
+shown to people.
 """
 
 from __future__ import annotations
@@ -41,9 +43,11 @@ SLACK = 1e-9  # rad by which a bound of `Keep` may be passed: rounding
 
 @dataclass(frozen=True, slots=True)
 class Requirement:
-    """Requirement at the end: nutation angle and shift of the angular momentum, rad; None requires nothing.
+    """Requirement at the end: nutation angle and shift of the angular momentum, rad; None requires
+    nothing.
 
-    ``probability`` (0 to 1) is how surely a dispersed flight must meet it; ``spin``: tolerance of the goal's spin.
+    ``probability`` (0 to 1) is how surely a dispersed flight must meet it; ``spin``: tolerance of
+    the goal's spin.
     """
 
     nutation: float | None = None
@@ -65,9 +69,10 @@ def required_share(requirement: Requirement | None) -> float:
 class Goal:
     """Goal of the motion besides zero nutation.
 
-    ``axis`` (3,) is the unit vector, inertial, along which the angular momentum and the spin axis are to lie; None is
-    where the angular momentum is at t = 0. ``spin`` is ω3 in rad/s, signed; None takes it as it comes. ``sun`` (3,) is
-    the inertial direction by which a train of pulses keeps its phase; None is along the great circle to ``axis``.
+    ``axis`` (3,) is the unit vector, inertial, along which the angular momentum and the spin axis
+    are to lie; None is where the angular momentum is at t = 0. ``spin`` is ω3 in rad/s, signed;
+    None takes it as it comes. ``sun`` (3,) is the inertial direction by which a train of pulses
+    keeps its phase; None is along the great circle to ``axis``.
     """
 
     axis: Vector | None = None
@@ -77,7 +82,8 @@ class Goal:
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """Limits of every schedule, in seconds: ``blackout`` holds the windows in which no pulse may be on.
+    """Limits of every schedule, in seconds: ``blackout`` holds the windows in which no pulse may be
+    on.
 
     ``horizon`` None means `Spacecraft.horizon`'s default.
     """
@@ -92,9 +98,11 @@ class Limits:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Keep:
-    """Cone of the spin axis: from ``least`` to ``most`` rad away from an inertial unit vector ``direction`` (3,).
+    """Cone of the spin axis: from ``least`` to ``most`` rad away from an inertial unit vector
+    ``direction`` (3,).
 
-    None is the direction of the angular momentum, wherever it points: the angle from it is the nutation on the way.
+    None is the direction of the angular momentum, wherever it points: the angle from it is the
+    nutation on the way.
     """
 
     name: str
@@ -109,11 +117,12 @@ TRAVEL = "moving center of mass"  # values of `Spacecraft.thrust_laws`
 
 @dataclass(frozen=True, eq=False)
 class Inertia:
-    """Principal moments (kg m²) and the rotation that leads from principal axes to the axes of the file.
+    """Principal moments (kg m²) and the rotation that leads from principal axes to the axes of the
+    file.
 
-    ``moments`` is (I1, I2, I3), those that `inertia.settled` calls equal made so; ``axes`` is 3×3, its columns the
-    principal axes in file axes. ``wheel`` is the momentum h (N m s) of a part that turns otherwise, constant along
-    axis 3: a momentum wheel or a despun platform.
+    ``moments`` is (I1, I2, I3), those that `inertia.settled` calls equal made so; ``axes`` is 3×3,
+    its columns the principal axes in file axes. ``wheel`` is the momentum h (N m s) of a part that
+    turns otherwise, constant along axis 3: a momentum wheel or a despun platform.
     """
 
     moments: rigid_body.Moments
@@ -135,7 +144,9 @@ class Inertia:
 
     @property
     def a(self) -> float:
-        """Inertia ratio (A - C)/A, Magnus (4): positive prolate, negative oblate, zero for a sphere."""
+        """Inertia ratio (A - C)/A, Magnus (4): positive prolate, negative oblate, zero for a
+        sphere.
+        """
         return rigid_body.ratio(self.A, self.C)
 
     def axial(self, spin: Any) -> Any:
@@ -151,7 +162,8 @@ class Inertia:
         return np.asarray(np.asarray(self.moments) * rates + np.array([0.0, 0.0, self.wheel]))
 
     def nutation_rate(self, spin: float) -> float:
-        """Rate ν in rad/s at which a small nutation turns in the body at a ``spin`` ω3: ω3 - H3/A where I1 = I2.
+        """Rate ν in rad/s at which a small nutation turns in the body at a ``spin`` ω3: ω3 - H3/A
+        where I1 = I2.
 
         That of the mean of I1 and I2 where a small nutation grows instead.
         """
@@ -168,11 +180,14 @@ class Inertia:
         if self.wheel == 0.0:
             return self.nutation_rate(1.0)
         (first, second, third), axial = self.moments, self.axial(spin)
-        change = (first - third) * (second * spin - axial) + (second - third) * (first * spin - axial)
+        change = (first - third) * (second * spin - axial) + (second - third) * (
+            first * spin - axial
+        )
         return float(0.5 * change / (first * second * self.nutation_rate(spin)))
 
     def linear_rate(self, spin: float) -> tuple[float, float]:
-        """Slope and offset (rad/s) of `nutation_rate`, taken as linear about a ``spin``: exact where I1 = I2.
+        """Slope and offset (rad/s) of `nutation_rate`, taken as linear about a ``spin``: exact
+        where I1 = I2.
 
         Without a wheel the offset is zero.
         """
@@ -183,10 +198,15 @@ class Inertia:
         """True if I1 ≠ I2 and a small nutation turns on an ellipse."""
         (first, second, third), wheel = self.moments, self.wheel
         rate = spin if wheel else 1.0  # without a wheel the sign is that of any spin
-        return first != second and ((first - third) * rate - wheel) * ((second - third) * rate - wheel) > 0.0
+        return (
+            first != second
+            and ((first - third) * rate - wheel) * ((second - third) * rate - wheel) > 0.0
+        )
 
     def circle(self, spin: float) -> Vector:
-        """Factors (2,) of H1 and H2, the larger one 1, with which a small nutation turns on a circle."""
+        """Factors (2,) of H1 and H2, the larger one 1, with which a small nutation turns on a
+        circle.
+        """
         if not self._swings(spin):
             return np.ones(2)
         (first, second, _), axial = self.moments, self.axial(spin)
@@ -194,12 +214,20 @@ class Inertia:
         return np.array([ratio, 1.0]) / max(ratio, 1.0)
 
     def nutating(self, spin: float) -> float:
-        """Transverse moment of the symmetric body whose small nutation turns as fast, kg m²: A where I1 = I2."""
-        return self.A if self.symmetric else float(self.axial(spin)) / (spin - self.nutation_rate(spin))
+        """Transverse moment of the symmetric body whose small nutation turns as fast, kg m²: A
+        where I1 = I2.
+        """
+        return (
+            self.A
+            if self.symmetric
+            else float(self.axial(spin)) / (spin - self.nutation_rate(spin))
+        )
 
     @property
     def shape(self) -> str:
-        """``prolate``, ``oblate`` or ``sphere``; ``gyrostat`` with a wheel, of which A and C alone do not tell."""
+        """``prolate``, ``oblate`` or ``sphere``; ``gyrostat`` with a wheel, of which A and C alone
+        do not tell.
+        """
         return "gyrostat" if self.wheel else rigid_body.shape(self.A, self.C)
 
     @property
@@ -209,7 +237,9 @@ class Inertia:
 
     @property
     def tensor(self) -> Vector:
-        """Inertia tensor in the axes of the file, (3, 3) kg m², to 14 digits: the accuracy of an eigensolver."""
+        """Inertia tensor in the axes of the file, (3, 3) kg m², to 14 digits: the accuracy of an
+        eigensolver.
+        """
         if self.aligned:
             return np.diag(self.moments)
         tensor = self.axes @ np.diag(self.moments) @ self.axes.T
@@ -226,7 +256,9 @@ class Inertia:
         return cleaned(self.axes @ vector)
 
     def in_file_axes(self, rates: Vector, quaternion: Vector) -> tuple[Vector, Vector]:
-        """Rates (..., 3) and quaternions (..., 4) of the principal axes as those of the axes of the file."""
+        """Rates (..., 3) and quaternions (..., 4) of the principal axes as those of the axes of the
+        file.
+        """
         if self.aligned:
             return rates, quaternion
         return rates @ self.axes.T, attitude.multiply(quaternion, attitude.from_matrix(self.axes.T))
@@ -236,8 +268,8 @@ class Inertia:
 class Disturbance:
     """A torque that nobody commands, in principal body axes.
 
-    ``transverse`` M1 + iM2 (N m, at t = 0) turns about axis 3 of the body at ``rate`` rad/s; 0 is fixed in the body,
-    minus the spin is nearly fixed in space. ``axial`` M3 (N m) is constant.
+    ``transverse`` M1 + iM2 (N m, at t = 0) turns about axis 3 of the body at ``rate`` rad/s; 0 is
+    fixed in the body, minus the spin is nearly fixed in space. ``axial`` M3 (N m) is constant.
     """
 
     transverse: complex
@@ -271,7 +303,8 @@ class Orbit:
 class SpinState:
     """State of the motion at one time, for the closed forms.
 
-    ``omega`` is ω1 + iω2 in rad/s, ``spin`` is ω3 in rad/s, ``quaternion`` (4,) body -> inertial, scalar first.
+    ``omega`` is ω1 + iω2 in rad/s, ``spin`` is ω3 in rad/s, ``quaternion`` (4,) body -> inertial,
+    scalar first.
     """
 
     omega: complex
@@ -301,15 +334,17 @@ class SourceFile(Protocol):
 class Spacecraft(results.Data, results.Shown):
     """Spinning rigid body with its motion at t = 0 and its actuators.
 
-    ``omega0`` (3,) rad/s in principal axes, ``mass`` in kg or None; ``center_of_mass`` (3,) m where the file gives
-    it, in its axes, and its travel with the propellant used, (3,) m/kg in principal axes; ``dissipation`` the time
-    constant in s with which energy dissipation lets the nutation grow or decay, or None; ``nutation_grows`` says
-    which, None: by shape; ``dispersions``: how far true values may differ; ``object_id`` names it in messages,
-    which carry ``orbit``; ``sun`` (3,) is the inertial unit vector to the Sun, where it is known; ``keep`` are
-    cones for the spin axis; ``commands`` is what blocks fired from the Sun pulses of ``sun_sensor`` may hold;
-    ``cold`` and ``tank`` make pulses weaker than the thrusters say, None where they are not; ``loop`` damps by what
-    a sensor shows; ``built_in``: the built-in example, since no file was named; ``document`` are the values of the
-    file, SI, by which `verify` flies on its own; ``source`` is what it was read from, None once a field is replaced.
+    ``omega0`` (3,) rad/s in principal axes, ``mass`` in kg or None; ``center_of_mass`` (3,) m where
+    the file gives it, in its axes, and its travel with the propellant used, (3,) m/kg in principal
+    axes; ``dissipation`` the time constant in s with which energy dissipation lets the nutation
+    grow or decay, or None; ``nutation_grows`` says which, None: by shape; ``dispersions``: how far
+    true values may differ; ``object_id`` names it in messages, which carry ``orbit``; ``sun`` (3,)
+    is the inertial unit vector to the Sun, where it is known; ``keep`` are cones for the spin axis;
+    ``commands`` is what blocks fired from the Sun pulses of ``sun_sensor`` may hold; ``cold`` and
+    ``tank`` make pulses weaker than the thrusters say, None where they are not; ``loop`` damps by
+    what a sensor shows; ``built_in``: the built-in example, since no file was named; ``document``
+    are the values of the file, SI, by which `verify` flies on its own; ``source`` is what it was
+    read from, None once a field is replaced.
     """
 
     name: str
@@ -342,21 +377,26 @@ class Spacecraft(results.Data, results.Shown):
     source: SourceFile | None = field(default=None, init=False)
 
     def with_(self, **keys: object) -> Spacecraft:
-        """Spacecraft with keys of its file changed: ``with_(limits={"horizon": "300 s"}, mass=210.0)``.
+        """Spacecraft with keys of its file changed: ``with_(limits={"horizon": "300 s"},
+        mass=210.0)``.
 
-        Of a mapping only the keys that are in it change, so that the other limits keep their values; entries of a list
-        are named by their ``name``: ``thrusters={"T1": {"force": "12 N"}}``. All is checked as the file is. Raises
-        FaultyFile with everything wrong, BadRequest for what no file can hold or where no file was read.
+        Of a mapping only the keys that are in it change, so that the other limits keep their
+        values; entries of a list are named by their ``name``: ``thrusters={"T1": {"force": "12
+        N"}}``. All is checked as the file is. Raises FaultyFile with everything wrong, BadRequest
+        for what no file can hold or where no file was read.
         """
         if self.source is None:
-            raise BadRequest("with_: expected a spacecraft from nutdamp.load, read or example, with no field replaced")
+            raise BadRequest(
+                "with_: expected a spacecraft from nutdamp.load, read or example, "
+                "with no field replaced"
+            )
         return self.source.changed(keys)
 
     def replace(self, **fields: object) -> Spacecraft:
         """Spacecraft with fields replaced, in SI and principal axes: ``replace(mass=210.0)``.
 
-        Names, types and signs are checked; `with_` checks all that a file is checked for, and keeps the ``document``.
-        Raises BadRequest.
+        Names, types and signs are checked; `with_` checks all that a file is checked for, and keeps
+        the ``document``. Raises BadRequest.
         """
         changed = units.replaced(self, {"document": None, **fields})
         for name in ("mass", "dissipation"):
@@ -381,9 +421,12 @@ class Spacecraft(results.Data, results.Shown):
 
     @property
     def watched(self) -> tuple[Keep, ...]:
-        """Cones that the spin axis has to keep, and the Sun where it is known and none of them is about it."""
+        """Cones that the spin axis has to keep, and the Sun where it is known and none of them is
+        about it.
+        """
         if self.sun is None or any(
-            cone.direction is not None and np.array_equal(cone.direction, self.sun) for cone in self.keep
+            cone.direction is not None and np.array_equal(cone.direction, self.sun)
+            for cone in self.keep
         ):
             return self.keep
         return (*self.keep, Keep("Sun", self.sun))
@@ -392,11 +435,13 @@ class Spacecraft(results.Data, results.Shown):
     def growth(self) -> float:
         """Growth rate κ (1/s) of a small nutation by energy dissipation; negative where it decays.
 
-        By shape it grows in a prolate body and decays in an oblate one, unless the file says what it does, as of a boom
-        that the Sun heats. A sphere has no energy to give, nor has a body in which ω stands still for its wheel: zero.
-        See `physics.energy_sink`.
+        By shape it grows in a prolate body and decays in an oblate one, unless the file says what
+        it does, as of a boom that the Sun heats. A sphere has no energy to give, nor has a body in
+        which ω stands still for its wheel: zero. See `physics.energy_sink`.
         """
-        still = self.nutation_rate == 0.0 and (self.nutation_grows is None or self.inertia.wheel != 0.0)
+        still = self.nutation_rate == 0.0 and (
+            self.nutation_grows is None or self.inertia.wheel != 0.0
+        )
         if self.dissipation is None or still:
             return 0.0
         grows = self.inertia.a > 0.0 if self.nutation_grows is None else self.nutation_grows
@@ -405,7 +450,8 @@ class Spacecraft(results.Data, results.Shown):
     @property
     def damper(self) -> tuple[float, float]:
         """Shares u and v of `energy_sink` at t = 0, for the angle from the spin axis."""
-        inertia, size = self.inertia, float(np.linalg.norm(self.momentum))
+        inertia = self.inertia
+        size = float(np.linalg.norm(self.momentum))
         return energy_sink.damper(inertia.A, inertia.C, self.sense * inertia.wheel, size, 1.0)
 
     @property
@@ -424,7 +470,8 @@ class Spacecraft(results.Data, results.Shown):
     def horizon(self) -> float:
         """End of the planning time, s.
 
-        Default: 20 × the longer of the nutation periods seen in the body and inertially; a sphere: the latter.
+        Default: 20 × the longer of the nutation periods seen in the body and inertially; a sphere:
+        the latter.
         """
         if self.limits.horizon is not None:
             return self.limits.horizon
@@ -434,14 +481,19 @@ class Spacecraft(results.Data, results.Shown):
 
     @cached_property
     def initial(self) -> SpinState:
-        """State at t = 0; without an attitude in the file the inertial frame N of `attitude.frame_n`."""
-        omega, spin = complex(self.omega0[0], self.omega0[1]), float(self.omega0[2])
+        """State at t = 0; without an attitude in the file the inertial frame N of
+        `attitude.frame_n`.
+        """
+        omega = complex(self.omega0[0], self.omega0[1])
+        spin = float(self.omega0[2])
         if self.attitude is None:
             first, second, third = self.inertia.momentum(self.omega0).tolist()
             # With moments of one, rates are momenta: N goes by the true H.
             quaternion = attitude.frame_n(1.0, 1.0, complex(first, second), third)
         else:
-            quaternion = attitude.multiply(self.attitude.quaternion, attitude.from_matrix(self.inertia.axes))
+            quaternion = attitude.multiply(
+                self.attitude.quaternion, attitude.from_matrix(self.inertia.axes)
+            )
         return SpinState(omega, spin, quaternion)
 
     @property
@@ -457,7 +509,9 @@ class Spacecraft(results.Data, results.Shown):
 
     @cached_property
     def target_axis(self) -> Vector:
-        """Direction in which the angular momentum is to end, (3,) unit vector in the inertial frame."""
+        """Direction in which the angular momentum is to end, (3,) unit vector in the inertial
+        frame.
+        """
         if self.goal.axis is not None:
             return self.goal.axis
         momentum = self.momentum
@@ -465,17 +519,29 @@ class Spacecraft(results.Data, results.Shown):
 
     @property
     def to_turn(self) -> float:
-        """Angle from the angular momentum at t = 0 to the target axis, rad; exactly zero without a target."""
-        return 0.0 if self.goal.axis is None else float(attitude.angle_between(self.momentum, self.goal.axis))
+        """Angle from the angular momentum at t = 0 to the target axis, rad; exactly zero without a
+        target.
+        """
+        return (
+            0.0
+            if self.goal.axis is None
+            else float(attitude.angle_between(self.momentum, self.goal.axis))
+        )
 
     @property
     def turning_impulse(self) -> float:
-        """|H3| β in N m s with β = `to_turn`: no schedule of a symmetric body turns H to the target with less."""
+        """|H3| β in N m s with β = `to_turn`: no schedule of a symmetric body turns H to the target
+        with less.
+        """
         return abs(self.axial) * self.to_turn
 
     def direction_in_n(self, tilt: float, azimuth: float) -> Vector:
-        """Inertial unit vector (3,) ``tilt`` rad from H at t = 0, ``azimuth`` rad about it from x of the frame N."""
-        in_n = np.array([math.sin(tilt) * math.cos(azimuth), math.sin(tilt) * math.sin(azimuth), math.cos(tilt)])
+        """Inertial unit vector (3,) ``tilt`` rad from H at t = 0, ``azimuth`` rad about it from x
+        of the frame N.
+        """
+        in_n = np.array(
+            [math.sin(tilt) * math.cos(azimuth), math.sin(tilt) * math.sin(azimuth), math.cos(tilt)]
+        )
         if self.attitude is None:
             return in_n
         body_to_n = replace(self, attitude=None).initial.quaternion
@@ -485,11 +551,14 @@ class Spacecraft(results.Data, results.Shown):
     def angles_of(self, direction: Vector) -> tuple[float | None, float]:
         """Angles of an inertial ``direction`` (3,), rad.
 
-        Right ascension in [0, 2π) and declination where the file has an attitude; else azimuth in [0, 2π) and tilt, as
-        `direction_in_n` takes them. Right ascension and azimuth are None at the pole, where there is none.
+        Right ascension in [0, 2π) and declination where the file has an attitude; else azimuth in
+        [0, 2π) and tilt, as `direction_in_n` takes them. Right ascension and azimuth are None at
+        the pole, where there is none.
         """
         about, declination = attitude.sphere_angles(direction)
-        return about, math.atan2(math.hypot(*direction[:2]), direction[2]) if self.attitude is None else declination
+        return about, math.atan2(
+            math.hypot(*direction[:2]), direction[2]
+        ) if self.attitude is None else declination
 
     def utc(self, time: float, digits: int = DIGITS) -> str | None:
         """Date and time in UTC ``time`` s after the epoch, rounded to ``digits`` of a second.
@@ -505,18 +574,26 @@ class Spacecraft(results.Data, results.Shown):
 
     @cached_property
     def widest(self) -> ConeAngles:
-        """Cone angles at the largest nutation of the free motion from t = 0; constant with I1 = I2."""
+        """Cone angles at the largest nutation of the free motion from t = 0;
+        constant with I1 = I2.
+        """
         return arc_cones(self.inertia.moments, self.omega0, self.sense, self.inertia.wheel)
 
     @property
     def nutation(self) -> float:
-        """Nutation angle θ of the free motion from t = 0, rad, Magnus (19); its largest where I1 ≠ I2."""
+        """Nutation angle θ of the free motion from t = 0, rad, Magnus (19); its largest where I1 ≠
+        I2.
+        """
         return self.widest.nutation
 
     @property
     def tilt(self) -> float:
-        """Angle between H and the spin axis at t = 0 itself, rad: below `nutation` where I1 ≠ I2, else equal."""
-        return rigid_body.momentary(self.inertia.moments, self.omega0, self.sense, self.inertia.wheel).nutation
+        """Angle between H and the spin axis at t = 0 itself, rad: below `nutation` where I1 ≠ I2,
+        else equal.
+        """
+        return rigid_body.momentary(
+            self.inertia.moments, self.omega0, self.sense, self.inertia.wheel
+        ).nutation
 
     @property
     def transverse_rate(self) -> float:
@@ -535,7 +612,9 @@ class Spacecraft(results.Data, results.Shown):
 
     @property
     def sense(self) -> float:
-        """Sign σ of H3 at t = 0: the spin axis is σ·e3, and stays the same end of the body through a reversal."""
+        """Sign σ of H3 at t = 0: the spin axis is σ·e3, and stays the same end of the body through
+        a reversal.
+        """
         return math.copysign(1.0, self.axial)
 
     @property
@@ -556,7 +635,9 @@ class Spacecraft(results.Data, results.Shown):
 
     @property
     def motion_period(self) -> float:
-        """Period of ω in the body, s; with I1 ≠ I2 that of the motion at hand, where no wheel turns in it."""
+        """Period of ω in the body, s; with I1 ≠ I2 that of the motion at hand, where no wheel turns
+        in it.
+        """
         if self.inertia.symmetric or self.inertia.wheel:
             return self.body_period
         return nutation_period(self.inertia.moments, self.omega0)
@@ -564,15 +645,22 @@ class Spacecraft(results.Data, results.Shown):
     @property
     def inertial_period(self) -> float:
         """Nutation period seen inertially, 2π A/|H|, s; with I1 ≠ I2 that of a small nutation."""
-        inertia, spin = self.inertia, self.inertia.equivalent(self.spin)
-        return rigid_body.inertial_period(inertia.nutating(self.spin), inertia.C, self.transverse_rate, spin)
+        inertia = self.inertia
+        spin = self.inertia.equivalent(self.spin)
+        return rigid_body.inertial_period(
+            inertia.nutating(self.spin), inertia.C, self.transverse_rate, spin
+        )
 
     @property
     def nutation_period(self) -> float:
-        """Nutation period seen in the body, s; for a sphere, where that is infinite, seen inertially."""
+        """Nutation period seen in the body, s; for a sphere, where that is infinite, seen
+        inertially.
+        """
         return self.body_period if math.isfinite(self.body_period) else self.inertial_period
 
     @property
     def least_impulse(self) -> float:
-        """A |ω0| in N m s: no schedule can remove the nutation of a symmetric body without dissipation with less."""
+        """A |ω0| in N m s: no schedule can remove the nutation of a symmetric body without
+        dissipation with less.
+        """
         return self.inertia.A * self.transverse_rate

@@ -1,6 +1,8 @@
-"""End conditions: the requirement of the file, the spin rate of the goal, and the definition of damped.
+"""End conditions: the requirement of the file, the spin rate of the goal, and the definition of
+damped.
 
-The only definition of compliance, for one plan or many dispersed cases: all functions take numbers and arrays.
+The only definition of compliance, for one plan or many dispersed cases: all functions take numbers
+and arrays.
 """
 
 from __future__ import annotations
@@ -18,14 +20,18 @@ from nutdamp.spacecraft.model import SLACK, Keep, Spacecraft
 from nutdamp.spacecraft.tolerances import SpinTolerance
 
 DAMPED_SHARE = 0.01
-"""Fraction of the initial nutation (of the turn to a target axis) below which it counts as damped (reached)."""
+"""Fraction of the initial nutation (of the turn to a target axis) below which it counts as damped
+(reached).
+"""
 
 DAMPED_ANGLE = math.radians(1e-3)  # rad that may be left in any case
 SAME_COST = 1e-3  # costs that differ by less, relatively, are equal: then other things decide
 NEGLIGIBLE = math.radians(1e-9)  # rad below which angles are rounding, and shown as nothing
 
 AIMED_SPIN = 0.1
-"""Fraction of the tolerance of the spin to which plans set it: the rest is for what disperses. 0.1 % by default."""
+"""Fraction of the tolerance of the spin to which plans set it: the rest is for what disperses. 0.1
+% by default.
+"""
 
 
 class Part(Enum):
@@ -48,9 +54,11 @@ LABELS = {Part.SPIN: "spin error", Part.DURING: "nutation on the way"}
 
 
 class Bound(NamedTuple):
-    """Bound of a part: its value may not exceed ``limit``, or, of the inner edge of a cone, not fall below it.
+    """Bound of a part: its value may not exceed ``limit``, or, of the inner edge of a cone, not
+    fall below it.
 
-    ``required`` by file or command line, else the definition of damped. ``keep``: the cone of a bound on the way.
+    ``required`` by file or command line, else the definition of damped. ``keep``: the cone of a
+    bound on the way.
     """
 
     part: Part
@@ -78,7 +86,11 @@ class Bound(NamedTuple):
         """Used fraction of the bound: 1 or less where it is kept."""
         if self.keep is None:
             return value / self.limit
-        return (self.limit - SLACK) / np.maximum(value, SLACK) if self.inner else value / (self.limit + SLACK)
+        return (
+            (self.limit - SLACK) / np.maximum(value, SLACK)
+            if self.inner
+            else value / (self.limit + SLACK)
+        )
 
 
 class Held(NamedTuple):
@@ -99,10 +111,12 @@ class Held(NamedTuple):
 
 
 class Left(NamedTuple):
-    """Residual: ``nutation`` and ``aim`` rad (H from the target axis, else from its start), ``spin`` rad/s.
+    """Residual: ``nutation`` and ``aim`` rad (H from the target axis, else from its start),
+    ``spin`` rad/s.
 
-    ``angles`` (m, 2): least and largest angle, rad, from each of the m cones of the file on the way; None where they
-    were not observed. Each is a number or an array over cases, the angles (m, 2, n).
+    ``angles`` (m, 2): least and largest angle, rad, from each of the m cones of the file on the
+    way; None where they were not observed. Each is a number or an array over cases, the angles (m,
+    2, n).
     """
 
     nutation: Any
@@ -117,14 +131,22 @@ def aim(spacecraft: Spacecraft) -> Part:
 
 
 def spin_tolerance(spacecraft: Spacecraft, spin: float) -> float:
-    """Tolerance, rad/s, about a ``spin`` that is required; of a halt it counts from the spin at t = 0."""
+    """Tolerance, rad/s, about a ``spin`` that is required; of a halt it counts from the spin at t =
+    0.
+    """
     requested = spacecraft.requirement
     tolerance = SpinTolerance() if requested is None or requested.spin is None else requested.spin
-    return tolerance.size * (abs(spin) or abs(spacecraft.spin)) if tolerance.relative else tolerance.size
+    return (
+        tolerance.size * (abs(spin) or abs(spacecraft.spin))
+        if tolerance.relative
+        else tolerance.size
+    )
 
 
 def required(spacecraft: Spacecraft) -> tuple[Bound, ...]:
-    """Bounds at the end by the requirement, and of the spin where the goal names one; empty without a requirement."""
+    """Bounds at the end by the requirement, and of the spin where the goal names one; empty without
+    a requirement.
+    """
     requested, goal = spacecraft.requirement, spacecraft.goal
     bounds = []
     if requested is not None and requested.nutation is not None:
@@ -147,18 +169,26 @@ def judged(spacecraft: Spacecraft) -> bool:
 
 
 def bounds(spacecraft: Spacecraft) -> tuple[Bound, ...]:
-    """Bounds `required` at the end; for nutation and target axis without one, those that define damped."""
+    """Bounds `required` at the end; for nutation and target axis without one, those that define
+    damped.
+    """
     limits = required(spacecraft)
     limited = {bound.part for bound in limits}
     if Part.NUTATION not in limited:
-        limits += (Bound(Part.NUTATION, max(DAMPED_SHARE * spacecraft.nutation, DAMPED_ANGLE), False),)
+        limits += (
+            Bound(Part.NUTATION, max(DAMPED_SHARE * spacecraft.nutation, DAMPED_ANGLE), False),
+        )
     if Part.DISTANCE not in limited and spacecraft.goal.axis is not None:
-        limits += (Bound(Part.DISTANCE, max(DAMPED_SHARE * spacecraft.to_turn, DAMPED_ANGLE), False),)
+        limits += (
+            Bound(Part.DISTANCE, max(DAMPED_SHARE * spacecraft.to_turn, DAMPED_ANGLE), False),
+        )
     return limits
 
 
 def edges(keep: Keep) -> tuple[Bound, ...]:
-    """Bounds of a cone: its inner edge, then its outer one; of the cone about H that of the nutation on the way."""
+    """Bounds of a cone: its inner edge, then its outer one; of the cone about H that of the
+    nutation on the way.
+    """
     part = Part.DURING if keep.direction is None else Part.CONE
     inner = (Bound(part, keep.least, True, keep, inner=True),) if keep.least > 0.0 else ()
     outer = (Bound(part, keep.most, True, keep),) if keep.most < math.pi else ()
@@ -183,26 +213,37 @@ def left_of(bound: Bound, left: Left, spacecraft: Spacecraft) -> Any:
 
 
 def held(spacecraft: Spacecraft, left: Left) -> tuple[Held, ...]:
-    """Residual of one motion beside each of the `bounds` at the end, and the `cones` where they were observed."""
+    """Residual of one motion beside each of the `bounds` at the end, and the `cones` where they
+    were observed.
+    """
     way = () if left.angles is None else cones(spacecraft)
-    return tuple(Held(bound, float(left_of(bound, left, spacecraft))) for bound in (*bounds(spacecraft), *way))
+    return tuple(
+        Held(bound, float(left_of(bound, left, spacecraft)))
+        for bound in (*bounds(spacecraft), *way)
+    )
 
 
 def unaided(spacecraft: Spacecraft) -> bool:
     """True if the body keeps all `bounds` up to the horizon without a pulse.
 
-    Dissipation leaves H where it is and lets tan θ grow or decay. With I1 ≠ I2 nutation runs to and fro, and its
-    largest counts. False where it is not known: with disturbances, and with I1 ≠ I2 where there is dissipation or a
-    final spin.
+    Dissipation leaves H where it is and lets tan θ grow or decay. With I1 ≠ I2 nutation runs to and
+    fro, and its largest counts. False where it is not known: with disturbances, and with I1 ≠ I2
+    where there is dissipation or a final spin.
     """
     varying = spacecraft.growth != 0.0 or spacecraft.goal.spin is not None
     if spacecraft.disturbances or (varying and not spacecraft.inertia.symmetric):
         return False
-    nutation = spacecraft.nutation if spacecraft.growth == 0.0 else float(idle(spacecraft, spacecraft.horizon))
+    nutation = (
+        spacecraft.nutation
+        if spacecraft.growth == 0.0
+        else float(idle(spacecraft, spacecraft.horizon))
+    )
     aim = 0.0 if spacecraft.goal.axis is None else spacecraft.to_turn
-    # H stays, and H3 = |H| cos θ with it, so that spin and nutation are worst at one end of the time or the other.
+    # H stays, and H3 = |H| cos θ with it, so that spin and nutation are worst at one end of the
+    # time or the other.
     faster = math.cos(nutation) / math.cos(spacecraft.nutation)
-    most, slower = max(nutation, spacecraft.nutation), spacecraft.inertia.wheel / spacecraft.inertia.C
+    most = max(nutation, spacecraft.nutation)
+    slower = spacecraft.inertia.wheel / spacecraft.inertia.C
     later = (spacecraft.spin + slower) * faster - slower
     ends = [Left(most, aim, spin) for spin in (spacecraft.spin, later)]
     return all(bound.met for left in ends for bound in held(spacecraft, left))
@@ -219,18 +260,23 @@ def decayed(spacecraft: Spacecraft, t: float) -> float:
 
 
 def idle(spacecraft: Spacecraft, t: Any) -> Any:
-    """Nutation, rad, at ``t`` s without control, a number or an array, where I1 = I2 and there is no disturbance."""
-    sine, cosine = math.sin(spacecraft.nutation), math.cos(spacecraft.nutation)
+    """Nutation, rad, at ``t`` s without control, a number or an array, where I1 = I2 and there is
+    no disturbance.
+    """
+    sine = math.sin(spacecraft.nutation)
+    cosine = math.cos(spacecraft.nutation)
     effect = energy_sink.courses(spacecraft.growth, cosine, sine * sine, t, spacecraft.damper)
     return np.arctan2(sine * effect.transverse, effect.along)
 
 
 def reached(spacecraft: Spacecraft, nutation: float, now: float | None = None) -> float:
-    """Time to a nutation (rad) without firing, s; 0 if reached, infinite if never, as beyond the end of growth.
+    """Time to a nutation (rad) without firing, s; 0 if reached, infinite if never, as beyond the
+    end of growth.
 
     ln(tan θ/tan θ0)/κ without a wheel.
 
-    Growing nutation reaches it from below, decaying nutation from above; ``now``: θ0, default that at t = 0.
+    Growing nutation reaches it from below, decaying nutation from above; ``now``: θ0, default that
+    at t = 0.
     """
     growth = spacecraft.growth
     now = spacecraft.nutation if now is None else now
@@ -242,7 +288,8 @@ def reached(spacecraft: Spacecraft, nutation: float, now: float | None = None) -
 
 
 def slower(spacecraft: Spacecraft, nutation: float) -> float:
-    """Time, s, by which a growing nutation comes later to an angle, rad, than at the rate of small angles.
+    """Time, s, by which a growing nutation comes later to an angle, rad, than at the rate of small
+    angles.
 
     Infinite where growth ends before; without a wheel tan θ grows at that rate to the end.
     """
@@ -256,25 +303,42 @@ def slower(spacecraft: Spacecraft, nutation: float) -> float:
 def only_nutation(spacecraft: Spacecraft) -> bool:
     """True if nutation alone can keep a body without pulses from its requirement.
 
-    H stays where it is and there is no final spin, no cone to keep; False where no pulse is needed anyway (`unaided`).
+    H stays where it is and there is no final spin, no cone to keep; False where no pulse is needed
+    anyway (`unaided`).
     """
-    there = aim(spacecraft) is Part.SHIFT or all(bound.part is not Part.DISTANCE for bound in required(spacecraft))
-    return there and spacecraft.goal.spin is None and not spacecraft.keep and not unaided(spacecraft)
+    there = aim(spacecraft) is Part.SHIFT or all(
+        bound.part is not Part.DISTANCE for bound in required(spacecraft)
+    )
+    return (
+        there and spacecraft.goal.spin is None and not spacecraft.keep and not unaided(spacecraft)
+    )
 
 
 def to_required(spacecraft: Spacecraft, nutation: float, *, growing: bool) -> float | None:
-    """Time, s, until the ``nutation`` (rad) of an uncontrolled body is the required one, ``growing`` or decaying.
+    """Time, s, until the ``nutation`` (rad) of an uncontrolled body is the required one,
+    ``growing`` or decaying.
 
-    None where it does not, where none is required, and where it is not known: with disturbances or I1 ≠ I2.
+    None where it does not, where none is required, and where it is not known: with disturbances or
+    I1 ≠ I2.
     """
     required, growth = spacecraft.requirement, spacecraft.growth
-    if required is None or required.nutation is None or spacecraft.disturbances or not spacecraft.inertia.symmetric:
+    if (
+        required is None
+        or required.nutation is None
+        or spacecraft.disturbances
+        or not spacecraft.inertia.symmetric
+    ):
         return None
-    return reached(spacecraft, required.nutation, nutation) if growth != 0.0 and (growth > 0.0) == growing else None
+    return (
+        reached(spacecraft, required.nutation, nutation)
+        if growth != 0.0 and (growth > 0.0) == growing
+        else None
+    )
 
 
 def missed(spacecraft: Spacecraft, nutation: Any, aim: Any) -> Any:
-    """Residual, rad: nutation, or the distance ``aim`` from a target axis if there is one and it is larger.
+    """Residual, rad: nutation, or the distance ``aim`` from a target axis if there is one and it is
+    larger.
 
     Numbers, or arrays over cases.
     """
@@ -282,10 +346,11 @@ def missed(spacecraft: Spacecraft, nutation: Any, aim: Any) -> Any:
 
 
 def severity(spacecraft: Spacecraft, left: Left, drained: Any = 0.0) -> Any:
-    """Largest used fraction of a `required` bound at the end: 1 or less complies; numbers, or arrays over cases.
+    """Largest used fraction of a `required` bound at the end: 1 or less complies; numbers, or
+    arrays over cases.
 
-    Without such bounds what is `missed`, rad. Where a cone is broken, or more than all propellant ``drained`` (a
-    fraction), it is no less than that.
+    Without such bounds what is `missed`, rad. Where a cone is broken, or more than all propellant
+    ``drained`` (a fraction), it is no less than that.
     """
     ends = [bound.used(left_of(bound, left, spacecraft)) for bound in required(spacecraft)]
     parts = ends or [missed(spacecraft, left.nutation, left.aim)]
@@ -297,12 +362,16 @@ def severity(spacecraft: Spacecraft, left: Left, drained: Any = 0.0) -> Any:
 
 
 def complies(severity: Any) -> Any:
-    """True where a `severity`, or the used fraction of a bound, is kept: numbers, or arrays over cases."""
+    """True where a `severity`, or the used fraction of a bound, is kept: numbers, or arrays over
+    cases.
+    """
     return severity <= 1.0
 
 
 def enough(low: float, high: float, probability: float) -> bool | None:
-    """True where a share of cases between ``low`` and ``high`` is as much as must comply, False for less, else None."""
+    """True where a share of cases between ``low`` and ``high`` is as much as must comply, False for
+    less, else None.
+    """
     return True if low >= probability else False if high < probability else None
 
 
@@ -324,9 +393,12 @@ def expect_loop(spacecraft: Spacecraft) -> Loop:
 
 
 def expect_dissipation(spacecraft: Spacecraft) -> None:
-    """Raise BadRequest, with the keys to add, for a spacecraft whose nutation neither grows nor decays."""
+    """Raise BadRequest, with the keys to add, for a spacecraft whose nutation neither grows nor
+    decays.
+    """
     if spacecraft.dissipation is None:
         raise BadRequest(
-            "the spacecraft file has no dissipation: it does not say how fast the nutation grows. For example:\n\n"
+            "the spacecraft file has no dissipation: it does not say how fast the nutation grows. "
+            "For example:\n\n"
             "dissipation: {time_constant: 600 s}"
         )

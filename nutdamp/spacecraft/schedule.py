@@ -20,10 +20,14 @@ if TYPE_CHECKING:
 STEERABLE = "steerable"  # channel name of the pulses of a steerable torquer
 
 
-RESOLUTION = 1e-4  # part of its on-time to which a pulse must be resolved at its time: its impulse then errs by no more
+# part of its on-time to which a pulse must be resolved at its time: its impulse then errs by no
+# more
+RESOLUTION = 1e-4
 
 TOUCHING = 1e-9
-"""s; pulses that overlap by less only touch, as do those that overlap by less than times can be distinguished."""
+"""s; pulses that overlap by less only touch, as do those that overlap by less than times can be
+distinguished.
+"""
 
 Label = TypeVar("Label")
 
@@ -32,9 +36,10 @@ Label = TypeVar("Label")
 class Command:
     """Command of a pulse, ``start`` and ``on_time`` s, and the resulting thrust.
 
-    ``ramps`` have the times of the schedule and levels in parts of the torque of the pulse. ``valve``: one makes
-    another on-time of it; else the thrust is as long as commanded, and falls with the pressure of the tank. ``fall``:
-    by which share of its mean that lowers it from the begin to the end.
+    ``ramps`` have the times of the schedule and levels in parts of the torque of the pulse.
+    ``valve``: one makes another on-time of it; else the thrust is as long as commanded, and falls
+    with the pressure of the tank. ``fall``: by which share of its mean that lowers it from the
+    begin to the end.
     """
 
     start: float
@@ -48,9 +53,10 @@ class Command:
 class Pulse:
     """Rectangular torque pulse, or an ideal impulse (``on_time`` 0, ``torque`` None).
 
-    ``t`` is its centre in s; ``torque`` (3,) N m and ``impulse`` (3,) N m s are in principal body axes;
-    ``force`` (3,) N is the net force, None where it is not known; ``propellant`` kg or None. Through a valve it is what
-    the ``command`` gives: ``t`` is the centroid of its thrust and ``on_time`` the effective one, impulse over torque.
+    ``t`` is its centre in s; ``torque`` (3,) N m and ``impulse`` (3,) N m s are in principal body
+    axes; ``force`` (3,) N is the net force, None where it is not known; ``propellant`` kg or None.
+    Through a valve it is what the ``command`` gives: ``t`` is the centroid of its thrust and
+    ``on_time`` the effective one, impulse over torque.
     """
 
     t: float
@@ -65,7 +71,11 @@ class Pulse:
     @property
     def loaded(self) -> tuple[float, float]:
         """Start and on-time as they are commanded, s."""
-        return (self.start, self.on_time) if self.command is None else (self.command.start, self.command.on_time)
+        return (
+            (self.start, self.on_time)
+            if self.command is None
+            else (self.command.start, self.command.on_time)
+        )
 
     @property
     def through_valve(self) -> bool:
@@ -92,7 +102,8 @@ class Pulse:
         return tuple(time for ramp in self.command.ramps for time in ramp[:2])
 
     def push(self, start: float, end: float) -> tuple[Vector, Vector | None] | None:
-        """Torque (3,) N m at ``start`` and its slope, N m/s, None for none, up to ``end`` s, with no edge in between.
+        """Torque (3,) N m at ``start`` and its slope, N m/s, None for none, up to ``end`` s, with
+        no edge in between.
 
         None where it does not fire then.
         """
@@ -105,11 +116,15 @@ class Pulse:
                 if ramp.first == ramp.last:
                     return self.torque * ramp.first, None
                 slope = (ramp.last - ramp.first) / (ramp.end - ramp.begin)
-                return self.torque * (ramp.first + slope * (start - ramp.begin)), self.torque * slope
+                return self.torque * (
+                    ramp.first + slope * (start - ramp.begin)
+                ), self.torque * slope
         return None
 
     def share(self, times: Vector) -> Vector:
-        """Fraction of the impulse given by each of the ``times`` (n,) s; an ideal impulse at once."""
+        """Fraction of the impulse given by each of the ``times`` (n,) s;
+        an ideal impulse at once.
+        """
         if self.on_time == 0.0:
             return np.where(times >= self.t, 1.0, 0.0)
         if self.command is None:
@@ -117,14 +132,18 @@ class Pulse:
         given = np.zeros(len(times))
         for ramp in self.command.ramps:
             since = np.clip(times, ramp.begin, ramp.end) - ramp.begin
-            given += since * (ramp.first + 0.5 * (ramp.last - ramp.first) * since / (ramp.end - ramp.begin))
+            given += since * (
+                ramp.first + 0.5 * (ramp.last - ramp.first) * since / (ramp.end - ramp.begin)
+            )
         return given / self.on_time
 
     def moved(self, by: float) -> Pulse:
         """Copy ``by`` s later."""
         command = self.command
         if command is not None:
-            ramps = tuple(ramp._replace(begin=ramp.begin + by, end=ramp.end + by) for ramp in command.ramps)
+            ramps = tuple(
+                ramp._replace(begin=ramp.begin + by, end=ramp.end + by) for ramp in command.ramps
+            )
             command = replace(command, start=command.start + by, ramps=ramps)
         return replace(self, t=self.t + by, command=command)
 
@@ -150,7 +169,9 @@ class Pulse:
 
 
 def overlapping(pulses: Iterable[tuple[Label, Pulse]]) -> list[tuple[Label, Label]]:
-    """Labels of pulses that begin while their channel still fires an earlier one, each with the label of that."""
+    """Labels of pulses that begin while their channel still fires an earlier one, each with the
+    label of that.
+    """
     firing: dict[str, tuple[Label, float]] = {}
     overlaps = []
     for label, pulse in sorted(pulses, key=lambda entry: entry[1].loaded[0]):
@@ -173,10 +194,19 @@ def on_command(channel: Channel, start: float, on_time: float) -> Pulse:
     if valve is None:
         return _rectangle(channel, start + 0.5 * on_time, on_time)
     thrust = valve.thrust(on_time)
-    ramps = tuple(ramp._replace(begin=start + ramp.begin, end=start + ramp.end) for ramp in thrust.ramps)
+    ramps = tuple(
+        ramp._replace(begin=start + ramp.begin, end=start + ramp.end) for ramp in thrust.ramps
+    )
     command = Command(start, on_time, ramps)
     if not ramps:
-        return Pulse(start, 0.0, channel.name, np.zeros(3), propellant=channel.mass_flow and 0.0, command=command)
+        return Pulse(
+            start,
+            0.0,
+            channel.name,
+            np.zeros(3),
+            propellant=channel.mass_flow and 0.0,
+            command=command,
+        )
     return replace(_rectangle(channel, start + thrust.centroid, thrust.on_time), command=command)
 
 
@@ -192,16 +222,29 @@ def channel_pulse(channel: Channel, t: float, on_time: float) -> Pulse:
 def _rectangle(channel: Channel, t: float, on_time: float) -> Pulse:
     flow = channel.mass_flow
     propellant = None if flow is None else flow * on_time
-    return Pulse(t, on_time, channel.name, channel.torque * on_time, channel.torque, channel.force, propellant)
+    return Pulse(
+        t,
+        on_time,
+        channel.name,
+        channel.torque * on_time,
+        channel.torque,
+        channel.force,
+        propellant,
+    )
 
 
 def steerable_pulse(
-    steerable: Steerable, t: float, angle: float, *, impulse: float = 0.0, on_time: float | None = None
+    steerable: Steerable,
+    t: float,
+    angle: float,
+    *,
+    impulse: float = 0.0,
+    on_time: float | None = None,
 ) -> Pulse:
     """Pulse of a steerable torquer centred at ``t`` s, about the transverse axis at ``angle`` rad.
 
-    It is ideal, of an ``impulse`` in N m s, where the torquer has no torque; else it lasts for ``on_time`` s, by
-    default as long as the impulse takes.
+    It is ideal, of an ``impulse`` in N m s, where the torquer has no torque; else it lasts for
+    ``on_time`` s, by default as long as the impulse takes.
     """
     direction = np.array([math.cos(angle), math.sin(angle), 0.0])
     torque: Vector | None = None
@@ -219,12 +262,13 @@ def steerable_pulse(
 
 
 class Bounds(NamedTuple):
-    """Lower bounds on the cost of other schedules of the channels ``within`` so many s, in ``unit`` (kg or N m s).
+    """Lower bounds on the cost of other schedules of the channels ``within`` so many s, in ``unit``
+    (kg or N m s).
 
-    ``first_order`` is that of the small-angle program; None where that was not solved. ``rigorous`` holds at any angle
-    for all schedules that leave no more than this one; None where nothing is known to hold: I1 ≠ I2, dissipation,
-    disturbances, a goal for the spin. ``keeping`` is the first-order one of schedules that keep H, where this one need
-    not; None for others.
+    ``first_order`` is that of the small-angle program; None where that was not solved. ``rigorous``
+    holds at any angle for all schedules that leave no more than this one; None where nothing is
+    known to hold: I1 ≠ I2, dissipation, disturbances, a goal for the spin. ``keeping`` is the
+    first-order one of schedules that keep H, where this one need not; None for others.
     """
 
     first_order: float | None
@@ -236,7 +280,8 @@ class Bounds(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Schedule:
-    """Pulses in the order of their centres, notes of the scheme that chose them, and lower bounds on the cost.
+    """Pulses in the order of their centres, notes of the scheme that chose them, and lower bounds
+    on the cost.
 
     ``blocks`` are the commands by which the pulses are fired, where it is not one by one.
     """
@@ -261,7 +306,11 @@ class Schedule:
     @property
     def without_proof(self) -> Schedule:
         """Copy without the rigorous bound: for a motion that the bound was not derived for."""
-        return self if self.bounds is None else replace(self, bounds=self.bounds._replace(rigorous=None))
+        return (
+            self
+            if self.bounds is None
+            else replace(self, bounds=self.bounds._replace(rigorous=None))
+        )
 
     @property
     def idealised(self) -> bool:

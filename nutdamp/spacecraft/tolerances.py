@@ -1,6 +1,8 @@
-"""Tolerances: dispersions of the true values about those of the plan, as a spacecraft file gives them, in SI.
+"""Tolerances: dispersions of the true values about those of the plan, as a spacecraft file gives
+them, in SI.
 
-A dispersed truth is the nominal value plus a draw, or times one plus a draw where the tolerance is relative.
+A dispersed truth is the nominal value plus a draw, or times one plus a draw where the tolerance is
+relative.
 """
 
 from __future__ import annotations
@@ -15,7 +17,8 @@ KINDS = ("normal", "uniform", "triangular", "bias")
 """Distribution, by the meaning of the size: one sigma, half width, half width, a fixed offset."""
 
 
-READING = "reading"  # kind of the signal of a sensor: angular rate of a gyro, acceleration of an accelerometer
+# kind of the signal of a sensor: angular rate of a gyro, acceleration of an accelerometer
+READING = "reading"
 
 Each = Literal["", "axis", "thruster"]
 """Tolerances that may differ by axis or by thruster; empty for a single one."""
@@ -25,8 +28,8 @@ Each = Literal["", "axis", "thruster"]
 class Tolerance:
     """Tolerance of one quantity.
 
-    ``kind`` is one of `KINDS`; ``size`` is SI (rad for angles), or a fraction of the nominal value where ``relative``.
-    Only a bias may be negative; a size of zero disperses nothing.
+    ``kind`` is one of `KINDS`; ``size`` is SI (rad for angles), or a fraction of the nominal value
+    where ``relative``. Only a bias may be negative; a size of zero disperses nothing.
     """
 
     kind: str
@@ -46,9 +49,13 @@ ByThruster = Mapping[str, Tolerance]
 
 
 def tolerance(kind: str, text: str, size: str, by: str = "normal", each: Each = "") -> Any:
-    """Field of `Dispersions` for a quantity of ``kind``, with an example: ``size`` in its distribution ``by``."""
+    """Field of `Dispersions` for a quantity of ``kind``, with an example: ``size`` in its
+    distribution ``by``.
+    """
     default = (None, None, None) if each == "axis" else None
-    return field(default=default, metadata={"kind": kind, "each": each, "text": text, "example": {by: size}})
+    return field(
+        default=default, metadata={"kind": kind, "each": each, "text": text, "example": {by: size}}
+    )
 
 
 def by_thruster(kind: str, text: str, size: str) -> Any:
@@ -59,58 +66,107 @@ def by_thruster(kind: str, text: str, size: str) -> Any:
 
 @dataclass(frozen=True, slots=True)
 class Dispersions:
-    """Tolerances of a spacecraft; None, or no entry, for exactly known values. The steerable torquer is a thruster.
+    """Tolerances of a spacecraft; None, or no entry, for exactly known values. The steerable
+    torquer is a thruster.
 
-    Each field declares the key of the file. ``A`` is of both transverse moments; the axes of ``omega0`` are those of
-    the file. ``correlation``: pairs of inputs, by the names of `nutdamp.montecarlo.inputs`, that vary together.
+    Each field declares the key of the file. ``A`` is of both transverse moments; the axes of
+    ``omega0`` are those of the file. ``correlation``: pairs of inputs, by the names of
+    `nutdamp.montecarlo.inputs`, that vary together.
     """
 
     A: Known = tolerance("inertia", "Of the transverse moment of inertia, kg m² or %.", "2 %")
-    C: Known = tolerance("inertia", "Of the moment of inertia about the spin axis, kg m² or %.", "1.6 kg m^2")
-    wheel_momentum: Known = tolerance("momentum", "Of the angular momentum of the wheel, N m s or %.", "0.5 N m s")
-    omega0: tuple[Known, Known, Known] = tolerance(
-        "rate", "Of each body rate at t = 0, rad/s or %; or a list of three.", "0.1 deg/s", each="axis"
+    C: Known = tolerance(
+        "inertia", "Of the moment of inertia about the spin axis, kg m² or %.", "1.6 kg m^2"
     )
-    thrust: ByThruster = by_thruster("force", "Of each thruster, the same in all its pulses, % or N", "3 %")
+    wheel_momentum: Known = tolerance(
+        "momentum", "Of the angular momentum of the wheel, N m s or %.", "0.5 N m s"
+    )
+    omega0: tuple[Known, Known, Known] = tolerance(
+        "rate",
+        "Of each body rate at t = 0, rad/s or %; or a list of three.",
+        "0.1 deg/s",
+        each="axis",
+    )
+    thrust: ByThruster = by_thruster(
+        "force", "Of each thruster, the same in all its pulses, % or N", "3 %"
+    )
     thrust_per_pulse: Known = tolerance("ratio", "Of the thrust, in each pulse anew, %.", "1 %")
-    thrust_direction: ByThruster = by_thruster("angle", "Tilt of each force about two axes across it, rad", "0.5 deg")
-    position: ByThruster = by_thruster("length", "Of each thruster's position, each component, m", "5 mm")
+    thrust_direction: ByThruster = by_thruster(
+        "angle", "Tilt of each force about two axes across it, rad", "0.5 deg"
+    )
+    position: ByThruster = by_thruster(
+        "length", "Of each thruster's position, each component, m", "5 mm"
+    )
     center_of_mass: Known = tolerance("length", "Of the center of mass, each component, m.", "2 mm")
     timing: Known = tolerance("time", "Shift of each pulse, s.", "5 ms", "uniform")
     timing_offset: Known = tolerance("time", "One shift of the whole schedule, s.", "2 ms", "bias")
     attitude: Known = tolerance(
-        "angle", "Of the direction of the spin axis at t = 0, about two axes across it, rad.", "0.2 deg"
+        "angle",
+        "Of the direction of the spin axis at t = 0, about two axes across it, rad.",
+        "0.2 deg",
     )
-    open_delay: ByThruster = by_thruster("time", "Of each valve's open_delay, the same in all its pulses, s", "1 ms")
-    close_delay: ByThruster = by_thruster("time", "Of each valve's close_delay, the same in all its pulses, s", "1 ms")
-    rise_time: ByThruster = by_thruster("time", "Of each valve's rise_time, the same in all its pulses, s", "0.5 ms")
-    fall_time: ByThruster = by_thruster("time", "Of each valve's fall_time, the same in all its pulses, s", "1 ms")
+    open_delay: ByThruster = by_thruster(
+        "time", "Of each valve's open_delay, the same in all its pulses, s", "1 ms"
+    )
+    close_delay: ByThruster = by_thruster(
+        "time", "Of each valve's close_delay, the same in all its pulses, s", "1 ms"
+    )
+    rise_time: ByThruster = by_thruster(
+        "time", "Of each valve's rise_time, the same in all its pulses, s", "0.5 ms"
+    )
+    fall_time: ByThruster = by_thruster(
+        "time", "Of each valve's fall_time, the same in all its pulses, s", "1 ms"
+    )
     impulse_bit: ByThruster = by_thruster(
         "ratio", "Of the impulses of each impulse_bit, the same in all its pulses, %", "2 %"
     )
-    cold: Known = tolerance("ratio", "Of the factor of a first cold pulse, cold.first, in % of it.", "2 %")
+    cold: Known = tolerance(
+        "ratio", "Of the factor of a first cold pulse, cold.first, in % of it.", "2 %"
+    )
     sensor_bias: Known = tolerance(
-        READING, "Of the bias of each gyro of a loop, rad/s, or of its accelerometer, m/s².", "0.01 deg/s"
+        READING,
+        "Of the bias of each gyro of a loop, rad/s, or of its accelerometer, m/s².",
+        "0.01 deg/s",
     )
-    sensor_scale: Known = tolerance("ratio", "Of the scale of each gyro of a loop, or of its accelerometer, %.", "1 %")
-    sensor_noise: Known = tolerance("ratio", "Of the noise of the sensor of a loop, %.", "20 %", "uniform")
+    sensor_scale: Known = tolerance(
+        "ratio", "Of the scale of each gyro of a loop, or of its accelerometer, %.", "1 %"
+    )
+    sensor_noise: Known = tolerance(
+        "ratio", "Of the noise of the sensor of a loop, %.", "20 %", "uniform"
+    )
     sensor_delay: Known = tolerance(
-        "time", "Of the delay of the sensor of a loop, s; what would be below 0 is drawn again.", "2 ms", "uniform"
+        "time",
+        "Of the delay of the sensor of a loop, s; what would be below 0 is drawn again.",
+        "2 ms",
+        "uniform",
     )
-    cold_pulses: Known = tolerance("ratio", "Of the number of pulses over which nozzles warm up, in %.", "10 %")
-    tank_propellant: Known = tolerance("mass", "Of the propellant in the tank at t = 0, kg or %.", "1 %")
+    cold_pulses: Known = tolerance(
+        "ratio", "Of the number of pulses over which nozzles warm up, in %.", "10 %"
+    )
+    tank_propellant: Known = tolerance(
+        "mass", "Of the propellant in the tank at t = 0, kg or %.", "1 %"
+    )
     tank_pressure: Known = tolerance(
-        "pressure", "Of the pressure at t = 0, for which the file gives the thrust, Pa or %.", "0.2 bar"
+        "pressure",
+        "Of the pressure at t = 0, for which the file gives the thrust, Pa or %.",
+        "0.2 bar",
     )
-    tank_final_pressure: Known = tolerance("pressure", "Of the pressure with nothing left, Pa or %.", "0.2 bar")
-    tank_exponent: Known = tolerance("ratio", "Of the power of the pressure that the thrust goes with, in %.", "5 %")
+    tank_final_pressure: Known = tolerance(
+        "pressure", "Of the pressure with nothing left, Pa or %.", "0.2 bar"
+    )
+    tank_exponent: Known = tolerance(
+        "ratio", "Of the power of the pressure that the thrust goes with, in %.", "5 %"
+    )
     inertia_per_kg: Known = tolerance(
-        "ratio", "Of what each kg that is used takes off the moments of inertia, of all alike, in %.", "10 %"
+        "ratio",
+        "Of what each kg that is used takes off the moments of inertia, of all alike, in %.",
+        "10 %",
     )
     correlation: tuple[tuple[str, str, float], ...] = ()
 
 
-DISPERSIONS = """the spacecraft file has no dispersions: it does not say how far its values may be off. For example:
+DISPERSIONS = """the spacecraft file has no dispersions: it does not say how far its values may be off. \
+For example:
 
 dispersions:
   A: {normal: 2 %}

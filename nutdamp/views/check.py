@@ -1,4 +1,6 @@
-"""The check of a file: derived quantities, channels, valves, disturbances, tolerances; the pair for two pulses."""
+"""The check of a file: derived quantities, channels, valves, disturbances, tolerances; the pair for
+two pulses.
+"""
 
 from __future__ import annotations
 
@@ -25,44 +27,118 @@ from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.views.decisions import aspects_json, direction_json, spacecraft_json
 from nutdamp.views.loop import described, margin_table, warnings
 from nutdamp.views.parts import derived_table, named, summary
-from nutdamp.views.tables import TEXT, Column, DataTable, Shared, angle_of, file_columns, to_figures, values_of
+from nutdamp.views.tables import (
+    TEXT,
+    Column,
+    DataTable,
+    Shared,
+    angle_of,
+    file_columns,
+    to_figures,
+    values_of,
+)
 from nutdamp.views.text import degrees, duration, moment, quantity, small_angle, vector
 from nutdamp.views.tolerances import correlation_json, in_words, size_text, without_effect
 
 
 def channel_table(spacecraft: Spacecraft) -> DataTable:
-    """Torque and on-times of each channel, and the nutation that its shortest and longest pulse take."""
+    """Torque and on-times of each channel, and the nutation that its shortest and longest pulse
+    take.
+    """
 
     def on_times(row: ChannelSteps) -> str:
         most = row.channel.max_on_time
-        return f"{duration(row.channel.min_on_time)} to {'any' if math.isinf(most) else duration(most)}"
+        return (
+            f"{duration(row.channel.min_on_time)} to "
+            f"{'any' if math.isinf(most) else duration(most)}"
+        )
 
     columns = (
-        Column("name", Shared.CHANNEL, "", lambda row: row.channel.name, where="screen json", kind=TEXT),
-        Column("torque#_Nm", "torque, file axes", "N m", lambda row: spacecraft.inertia.in_file(row.channel.torque),
-               vector, "screen json", kind=TEXT),
+        Column(
+            "name", Shared.CHANNEL, "", lambda row: row.channel.name, where="screen json", kind=TEXT
+        ),
+        Column(
+            "torque#_Nm",
+            "torque, file axes",
+            "N m",
+            lambda row: spacecraft.inertia.in_file(row.channel.torque),
+            vector,
+            "screen json",
+            kind=TEXT,
+        ),
         Column("", Shared.ON_TIME, "", on_times, where="screen"),
-        *file_columns("json", "min_on_time_s=channel.min_on_time", "max_on_time_s=channel.max_on_time"),
-        Column("smallest_step_deg", "smallest step", "deg", angle_of("smallest"),
-               lambda step: small_angle(step) if step else "any", "screen json"),
-        Column("largest_step_deg", "largest step", "deg", angle_of("largest"), small_angle, "screen json"),
+        *file_columns(
+            "json", "min_on_time_s=channel.min_on_time", "max_on_time_s=channel.max_on_time"
+        ),
+        Column(
+            "smallest_step_deg",
+            "smallest step",
+            "deg",
+            angle_of("smallest"),
+            lambda step: small_angle(step) if step else "any",
+            "screen json",
+        ),
+        Column(
+            "largest_step_deg",
+            "largest step",
+            "deg",
+            angle_of("largest"),
+            small_angle,
+            "screen json",
+        ),
         *file_columns("json", "damps=channel.damps"),
-    )  # fmt: skip
+    )
     return DataTable("Channels", columns, capability.channel_steps(spacecraft))
 
 
 VALVES = (  # columns of pulses of valves that are alike
-    Column("", Shared.CHANNEL, "", lambda alike: ", ".join(pulse.channel.name for pulse in alike), where="screen",
-           kind=TEXT),
-    Column("on_time_s", "on-time commanded", "", lambda alike: alike[0].on_time, duration, "screen json"),
-    Column("effective_on_time_s", Shared.EFFECTIVE, "", lambda alike: alike[0].effective, duration, "screen json"),
-    Column("impulse_Nms", Shared.IMPULSE, "N m s", lambda alike: alike[0].impulse, to_figures(4), "screen json"),
-    Column("centroid_s", "centroid after the start", "", lambda alike: alike[0].centroid, duration, "screen json"),
-)  # fmt: skip
+    Column(
+        "",
+        Shared.CHANNEL,
+        "",
+        lambda alike: ", ".join(pulse.channel.name for pulse in alike),
+        where="screen",
+        kind=TEXT,
+    ),
+    Column(
+        "on_time_s",
+        "on-time commanded",
+        "",
+        lambda alike: alike[0].on_time,
+        duration,
+        "screen json",
+    ),
+    Column(
+        "effective_on_time_s",
+        Shared.EFFECTIVE,
+        "",
+        lambda alike: alike[0].effective,
+        duration,
+        "screen json",
+    ),
+    Column(
+        "impulse_Nms",
+        Shared.IMPULSE,
+        "N m s",
+        lambda alike: alike[0].impulse,
+        to_figures(4),
+        "screen json",
+    ),
+    Column(
+        "centroid_s",
+        "centroid after the start",
+        "",
+        lambda alike: alike[0].centroid,
+        duration,
+        "screen json",
+    ),
+)
 
 
 def valve_table(spacecraft: Spacecraft) -> DataTable:
-    """Pulses of the shortest and the longest command of each channel; channels that do alike share a row."""
+    """Pulses of the shortest and the longest command of each channel; channels that do alike share
+    a row.
+    """
     alike: dict[tuple[float, ...], list[Acting]] = {}
     for pulse in capability.acting(spacecraft):
         figures = (float(f"{figure:.4g}") for figure in pulse[1:])
@@ -71,11 +147,36 @@ def valve_table(spacecraft: Spacecraft) -> DataTable:
 
 
 TURNS = (
-    Column("name", "command blocks", "", lambda row: row.channel.name, where="screen json", kind=TEXT),
-    Column("smallest_turn_deg", "least turn of H", "deg", angle_of("smallest"), small_angle, "screen json"),
-    Column("smallest_turn_width_s", "by a pulse of", "", lambda row: row.smallest_width, duration, "screen json"),
-    Column("largest_turn_deg", "largest turn", "deg", angle_of("largest"), small_angle, "screen json"),
-    Column("largest_turn_width_s", "by a pulse of", "", lambda row: row.largest_width, duration, "screen json"),
+    Column(
+        "name", "command blocks", "", lambda row: row.channel.name, where="screen json", kind=TEXT
+    ),
+    Column(
+        "smallest_turn_deg",
+        "least turn of H",
+        "deg",
+        angle_of("smallest"),
+        small_angle,
+        "screen json",
+    ),
+    Column(
+        "smallest_turn_width_s",
+        "by a pulse of",
+        "",
+        lambda row: row.smallest_width,
+        duration,
+        "screen json",
+    ),
+    Column(
+        "largest_turn_deg", "largest turn", "deg", angle_of("largest"), small_angle, "screen json"
+    ),
+    Column(
+        "largest_turn_width_s",
+        "by a pulse of",
+        "",
+        lambda row: row.largest_width,
+        duration,
+        "screen json",
+    ),
 )
 
 
@@ -108,21 +209,36 @@ def disturbance_table(spacecraft: Spacecraft) -> DataTable:
         return [{"nutation_deg": math.degrees(mark), "t_s": time} for mark, time in row.resonant]
 
     columns = (
-        Column("", "disturbance", "", lambda row: row.disturbance.name or f"number {numbers[id(row)]}", where="screen",
-               kind=TEXT),
+        Column(
+            "",
+            "disturbance",
+            "",
+            lambda row: row.disturbance.name or f"number {numbers[id(row)]}",
+            where="screen",
+            kind=TEXT,
+        ),
         Column("name", "", "", lambda row: row.disturbance.name or None, where="json", kind=TEXT),
         Column("", "effect", "", lambda row: "; ".join(_effects(row)), where="screen", kind=TEXT),
-        *file_columns("json", "forced_rate_rad_s=forced", "precession_rad_s", "momentum_swing_deg=swing",
-                      "forced_tilt_deg=tilt", "beat_deg", "beat_period_s"),
+        *file_columns(
+            "json",
+            "forced_rate_rad_s=forced",
+            "precession_rad_s",
+            "momentum_swing_deg=swing",
+            "forced_tilt_deg=tilt",
+            "beat_deg",
+            "beat_period_s",
+        ),
         Column("reaches", "", "", reached, where="json"),
         *file_columns("json", "spin_rate_rad_s2=spin_rate"),
-    )  # fmt: skip
+    )
     return DataTable("Disturbances", columns, rows)
 
 
 def _effects(row: Consequence) -> Iterator[str]:
     if row.resonant or row.tilt is None:
-        reached = ", ".join(f"{degrees(mark)} after {duration(time)}" for mark, time in row.resonant)
+        reached = ", ".join(
+            f"{degrees(mark)} after {duration(time)}" for mark, time in row.resonant
+        )
         yield f"resonant with the nutation: drives it to {reached}"
     elif row.disturbance.transverse != 0.0:
         yield f"forces a tilt of {degrees(row.tilt)}, forced rate {quantity(row.forced, 'rad/s')}"
@@ -130,12 +246,17 @@ def _effects(row: Consequence) -> Iterator[str]:
             yield f"precession of H at {quantity(row.precession, 'rad/s')}"
         else:
             yield f"H stays within {degrees(row.swing)}"
-        yield f"from rest the nutation beats up to {degrees(row.beat)} every {duration(row.beat_period)}"
+        yield (
+            f"from rest the nutation beats up to {degrees(row.beat)} every "
+            f"{duration(row.beat_period)}"
+        )
     if row.spin_rate != 0.0:
         yield f"changes the spin by {row.spin_rate:.4g} rad/s²"
 
 
-TOLERANCES = (  # columns of tolerances by their name, distribution and size, and the thrusters that they are given for
+# columns of tolerances by their name, distribution and size, and the thrusters that they are given
+# for
+TOLERANCES = (
     Column("", "dispersion", "", lambda row: in_words(row[0][0]), where="screen", kind=TEXT),
     Column("", "distribution", "", lambda row: row[0][1], where="screen", kind=TEXT),
     Column("", "one sigma or bias", "", lambda row: row[0][2], where="screen"),
@@ -157,11 +278,16 @@ def tolerance_table(spacecraft: Spacecraft) -> DataTable:
 
 def check_screen(spacecraft: Spacecraft, *, verbose: bool = True) -> RenderableType:
     """The screen of ``check`` for one valid file."""
-    table, tolerances = channel_table(spacecraft), tolerance_table(spacecraft)
+    table = channel_table(spacecraft)
+    tolerances = tolerance_table(spacecraft)
     counted = f" (channels: {len(table.rows)}, tolerances: {len(tolerances.rows)})"
     head = [named(spacecraft, "   ", ("VALID", "bold green"), counted)]
     known = (*_spin_axis(spacecraft), *sun_pulse_facts(spacecraft)) if verbose else ()
-    tables = [turn_table(spacecraft), valve_table(spacecraft), *map(tank_table, filter(None, [spacecraft.tank]))]
+    tables = [
+        turn_table(spacecraft),
+        valve_table(spacecraft),
+        *map(tank_table, filter(None, [spacecraft.tank])),
+    ]
     tables += [disturbance_table(spacecraft), _margins(spacecraft), tolerances]
     return summary(
         [*head, derived_table(spacecraft, known)],
@@ -175,7 +301,8 @@ def check_screen(spacecraft: Spacecraft, *, verbose: bool = True) -> RenderableT
 
 def _notes(spacecraft: Spacecraft, verbose: bool) -> Iterator[Note]:
     """Notes on a valid file; ``verbose``: disturbances stand in a table."""
-    clock, dispersions = capability.sun_clock(spacecraft), spacecraft.dispersions
+    clock = capability.sun_clock(spacecraft)
+    dispersions = spacecraft.dispersions
     if spacecraft.utc(0.0) is not None and spacecraft.utc(spacecraft.horizon) is None:
         yield note("dates-end", horizon_s=spacecraft.horizon)
     if clock is not None and clock.refusal:
@@ -188,12 +315,19 @@ def _notes(spacecraft: Spacecraft, verbose: bool) -> Iterator[Note]:
     if not verbose:
         for name, effect in disturbance_table(spacecraft).cells("screen"):
             yield note("disturbance", disturbance=name, effect=effect)
-    angle, pair = math.degrees(capability.mounting_angle(spacecraft)), capability.nearest_pair(spacecraft)
+    angle = math.degrees(capability.mounting_angle(spacecraft))
+    pair = capability.nearest_pair(spacecraft)
     if pair is None:
         yield note("two-pulse-spacing", spacing_deg=angle)
     else:
         off = abs(math.degrees(pair.miss))
-        yield note("two-pulse-pair", spacing_deg=angle, first=pair.first.name, second=pair.second.name, off_deg=off)
+        yield note(
+            "two-pulse-pair",
+            spacing_deg=angle,
+            first=pair.first.name,
+            second=pair.second.name,
+            off_deg=off,
+        )
     if spacecraft.cold is not None:
         levels = ", ".join(f"{100.0 * spacecraft.cold.factor(before):.4g}" for before in range(3))
         yield note("cold-nozzles", levels=levels)
@@ -201,19 +335,26 @@ def _notes(spacecraft: Spacecraft, verbose: bool) -> Iterator[Note]:
         yield note("loop-in-file", loop=described(spacecraft.loop))
     pairs = () if dispersions is None else dispersions.correlation
     if pairs:
-        correlated = (f"{in_words(first)} and {in_words(second)} {size:g}" for first, second, size in pairs)
+        correlated = (
+            f"{in_words(first)} and {in_words(second)} {size:g}" for first, second, size in pairs
+        )
         yield note("correlated-inputs", inputs="; ".join(correlated))
 
 
 def _spin_axis(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
     spin = capability.spin_axis(spacecraft)
-    still = "ω stands still in the body" if spacecraft.inertia.wheel else "a sphere, no axis is special"
+    still = (
+        "ω stands still in the body" if spacecraft.inertia.wheel else "a sphere, no axis is special"
+    )
     stable = f"stable, p² = {spin.exponent:.4g} / s²" if spin.exponent < 0.0 else still
     by_shape = spin.kind == "minimum" and not spacecraft.inertia.wheel
     unstable = " (not under dissipation)" if by_shape or spacecraft.growth > 0.0 else ""
     yield "spin axis", f"{spin.kind} moment of inertia; {stable}{unstable}"
     body, despun, inertial = spin.rates
-    yield "nutation rate", f"{body:.4g} in the body, {despun:.4g} despun, {inertial:.4g} inertially, rad/s"
+    yield (
+        "nutation rate",
+        f"{body:.4g} in the body, {despun:.4g} despun, {inertial:.4g} inertially, rad/s",
+    )
     if not spacecraft.inertia.aligned:
         yield "wobble", f"principal axis 3 is {degrees(spin.tilt)} off the third axis of the file"
         for number, axis in enumerate(spacecraft.inertia.axes.T, start=1):
@@ -222,20 +363,36 @@ def _spin_axis(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
 
 def sun_pulse_facts(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
     """Times of the Sun pulses, and resolution of the timing of blocks by them."""
-    clock, sensor, commands = capability.sun_clock(spacecraft), spacecraft.sun_sensor, spacecraft.commands
+    clock = capability.sun_clock(spacecraft)
+    sensor = spacecraft.sun_sensor
+    commands = spacecraft.commands
     if clock is None or sensor is None:
         return
-    low, high = (0.5 * math.pi - sensor.elevation + side * sensor.half_width for side in (-1.0, 1.0))
-    view = f"sees the Sun from {degrees(max(low, 0.0))} to {degrees(min(high, math.pi))} off the spin axis"
-    yield "Sun sensor", f"at azimuth {degrees(sensor.azimuth)}, jitter {duration(sensor.jitter)}; {view}"
+    low, high = (
+        0.5 * math.pi - sensor.elevation + side * sensor.half_width for side in (-1.0, 1.0)
+    )
+    view = (
+        f"sees the Sun from {degrees(max(low, 0.0))} to {degrees(min(high, math.pi))} off the "
+        "spin axis"
+    )
+    yield (
+        "Sun sensor",
+        f"at azimuth {degrees(sensor.azimuth)}, jitter {duration(sensor.jitter)}; {view}",
+    )
     first = clock.refusal if clock.first is None else f"the first at {moment(clock.first)}"
     yield "Sun pulses", f"one every {duration(clock.turn)} on average; {first}"
     if commands is not None:
-        delays, spin = (commands.delay_step, commands.delay_max), abs(spacecraft.spin)
+        delays = (commands.delay_step, commands.delay_max)
+        spin = abs(spacecraft.spin)
         step, longest = (f"{duration(time)} = {degrees(spin * time)}" for time in delays)
         yield "delay", f"in steps of {step} of spin, up to {longest}"
-        widths, stepped = [duration(width) for width in commands.widths.tolist()], commands.width_step
-        steps = "" if stepped is None else f"in steps of {duration(stepped)}, {widths[0]} to {widths[-1]}"
+        widths = [duration(width) for width in commands.widths.tolist()]
+        stepped = commands.width_step
+        steps = (
+            ""
+            if stepped is None
+            else f"in steps of {duration(stepped)}, {widths[0]} to {widths[-1]}"
+        )
         yield "width", steps or listed(widths, "or")
         every = listed([str(count) for count in commands.every], "or")
         yield "block", f"at most {commands.max_count} pulses; every: {every} of the spins"
@@ -250,15 +407,28 @@ def check_json(reports: list[dict[str, Any]]) -> dict[str, Any]:
     return {"nutdamp": __version__, "files": reports}
 
 
-def failed_json(name: str | None, wrong: FaultyFile | CannotRead, doubts: Sequence[Fault] = ()) -> dict[str, Any]:
+def failed_json(
+    name: str | None, wrong: FaultyFile | CannotRead, doubts: Sequence[Fault] = ()
+) -> dict[str, Any]:
     """A file that could not be read or is faulty; ``doubts`` are warnings."""
-    faults = [Fault(wrong.path, 0, 0, "", wrong.reason)] if isinstance(wrong, CannotRead) else wrong.faults
-    report = {"file": name, "valid": False, "faults": _faults_json(faults), "warnings": _faults_json(doubts)}
+    faults = (
+        [Fault(wrong.path, 0, 0, "", wrong.reason)]
+        if isinstance(wrong, CannotRead)
+        else wrong.faults
+    )
+    report = {
+        "file": name,
+        "valid": False,
+        "faults": _faults_json(faults),
+        "warnings": _faults_json(doubts),
+    }
     return report | {"spacecraft": None, "channels": [], "two_pulse": None}
 
 
 def _faults_json(faults: Sequence[Fault]) -> list[dict[str, Any]]:
-    """Faults, each with its ``place`` as messages have it; line and column are null where it is no place in a file."""
+    """Faults, each with its ``place`` as messages have it; line and column are null where it is no
+    place in a file.
+    """
     return [
         {
             "place": fault.place,
@@ -284,9 +454,13 @@ class CheckedFile(Data):
 
 
 def checked(
-    source: Source, name: str | None, doubts: list[Fault], warn: Callable[[Fault], object] = lambda _: None
+    source: Source,
+    name: str | None,
+    doubts: list[Fault],
+    warn: Callable[[Fault], object] = lambda _: None,
 ) -> CheckedFile:
-    """Check of a source called ``name``; ``doubts`` are added to the list, and ``warn`` is called with each.
+    """Check of a source called ``name``; ``doubts`` are added to the list, and ``warn`` is called
+    with each.
 
     Derived quantities may be faulty, too. Raises FaultyFile.
     """
@@ -299,11 +473,18 @@ def checked(
         raise FaultyFile([Fault(name or source.name, 1, 1, "", str(wrong))]) from wrong
 
 
-def checked_json(name: str | None, spacecraft: Spacecraft, doubts: Sequence[Fault] = ()) -> dict[str, Any]:
-    """A valid file: derived quantities, channels with their steps, the mounting angle for two pulses."""
-    pair, axis = capability.nearest_pair(spacecraft), capability.spin_axis(spacecraft)
-    clock, commands = capability.sun_clock(spacecraft), spacecraft.commands
-    channels, pulses = channel_table(spacecraft).json(), capability.acting(spacecraft)
+def checked_json(
+    name: str | None, spacecraft: Spacecraft, doubts: Sequence[Fault] = ()
+) -> dict[str, Any]:
+    """A valid file: derived quantities, channels with their steps, the mounting angle for two
+    pulses.
+    """
+    pair = capability.nearest_pair(spacecraft)
+    axis = capability.spin_axis(spacecraft)
+    clock = capability.sun_clock(spacecraft)
+    commands = spacecraft.commands
+    channels = channel_table(spacecraft).json()
+    pulses = capability.acting(spacecraft)
     for entry, channel in zip(channels, spacecraft.channels, strict=True):
         if channel.valve is not None:
             own = [[pulse] for pulse in pulses if pulse.channel is channel]
@@ -318,8 +499,12 @@ def checked_json(name: str | None, spacecraft: Spacecraft, doubts: Sequence[Faul
         "channels": channels,
         **({} if spacecraft.tank is None else {"tank": tank_table(spacecraft.tank).json()}),
         "spin_axis": {
-            **values_of(axis, "class=kind", "squared_exponent_1_s2=exponent", "growth_time_s", "tilt_deg"),
-            **{f"nutation_rate_{frame}_rad_s": rate for frame, rate in axis.rates._asdict().items()},
+            **values_of(
+                axis, "class=kind", "squared_exponent_1_s2=exponent", "growth_time_s", "tilt_deg"
+            ),
+            **{
+                f"nutation_rate_{frame}_rad_s": rate for frame, rate in axis.rates._asdict().items()
+            },
             "dissipation_growth_1_s": spacecraft.growth,
         },
         **aspects_json(at_start(spacecraft)),

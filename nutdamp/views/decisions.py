@@ -1,4 +1,5 @@
-"""Final motion and cost in words; plans, comparisons, certificates and spacecraft as JSON-ready dictionaries.
+"""Final motion and cost in words; plans, comparisons, certificates and spacecraft as JSON-ready
+dictionaries.
 
 Vectors are in the axes of the file, angles in degrees.
 """
@@ -18,7 +19,14 @@ from nutdamp.common.results import note
 from nutdamp.flight.end_state import Aspect
 from nutdamp.flight.propagation import Flight, Residual
 from nutdamp.planning.decision import Comparison
-from nutdamp.planning.notes import alternatives, comparison_warnings, infeasibility, plan_notes, reasons, verdict_notes
+from nutdamp.planning.notes import (
+    alternatives,
+    comparison_warnings,
+    infeasibility,
+    plan_notes,
+    reasons,
+    verdict_notes,
+)
 from nutdamp.planning.plan import Plan
 from nutdamp.planning.verdict import Verdict, lines_of
 from nutdamp.schemes import catalogue
@@ -41,12 +49,16 @@ def no_plan(plan: Plan) -> str:
     return f"internal error,\nplease report:\n{type(plan.failure).__name__}"
 
 
-FARTHER = 1.1  # factor of distance or of time by which H ends farther off, or later, for a plan to be worse in it
+# factor of distance or of time by which H ends farther off, or later, for a plan to be worse in it
+FARTHER = 1.1
 
 
 def cost(schedule: Schedule) -> Iterator[tuple[str, str]]:
     """Cost and end of a schedule: names and values."""
-    yield "impulse" if schedule.propellant is None else "propellant", f"{spent(schedule)}, pulses: {len(schedule)}"
+    yield (
+        "impulse" if schedule.propellant is None else "propellant",
+        f"{spent(schedule)}, pulses: {len(schedule)}",
+    )
     yield "last pulse ends", moment(schedule.end) if len(schedule) else "no pulse is needed"
 
 
@@ -56,7 +68,9 @@ def end_facts(plan: Plan) -> Table:
 
 
 def end_rows(flown: Flight, watched: Iterable[Aspect]) -> Iterator[tuple[str, str]]:
-    """Spin axis and H after the last pulse, beside the target and directions ``watched``, and the motion from there."""
+    """Spin axis and H after the last pulse, beside the target and directions ``watched``, and the
+    motion from there.
+    """
     body, final = flown.spacecraft, flown.final
     yield "spin axis ends at", direction_text(body, final.axis)
     yield "H ends at", direction_text(body, final.momentum)
@@ -74,7 +88,9 @@ def end_rows(flown: Flight, watched: Iterable[Aspect]) -> Iterator[tuple[str, st
 
 
 def lasting(flown: Flight) -> str:
-    """Time of the end shown where the motion does not last, and the cause of its change; empty where it lasts."""
+    """Time of the end shown where the motion does not last, and the cause of its change; empty
+    where it lasts.
+    """
     body = flown.spacecraft
     causes = [*["dissipation"] * (body.growth != 0.0), *["disturbances"] * bool(body.disturbances)]
     end = moment(flown.schedule.end if flown.until is None else flown.until)
@@ -87,7 +103,9 @@ def heading(spacecraft: Spacecraft) -> dict[str, Any]:
 
 
 def comparison_json(compared: Comparison) -> dict[str, Any]:
-    """The object of ``plan --json``: the plans, the verdict on one of them, and the words of both."""
+    """The object of ``plan --json``: the plans, the verdict on one of them,
+    and the words of both.
+    """
     judged, chosen = compared.verdict, compared.recommended
     beside = () if chosen is None else verdict_notes(judged, chosen)
     return {
@@ -97,15 +115,19 @@ def comparison_json(compared: Comparison) -> dict[str, Any]:
         "no_pulse_needed": judged.idle,
         "reason": joined(reasons(compared)),
         "notes": [
-            note_json(note) for note in ordered((*comparison_warnings(compared), *beside, *alternatives(compared)))
+            note_json(note)
+            for note in ordered((*comparison_warnings(compared), *beside, *alternatives(compared)))
         ],
         "decision": decision_json(judged),
     }
 
 
 def compared_json(compared: Comparison, plan: Plan) -> dict[str, Any]:
-    """One of the plans compared; ``cases``: the share of dispersed cases that comply, with its interval."""
-    data, judged = plan_json(plan), compared.verdicts[plan]
+    """One of the plans compared; ``cases``: the share of dispersed cases that comply, with its
+    interval.
+    """
+    data = plan_json(plan)
+    judged = compared.verdicts[plan]
     data |= {"status": judged.status.value, "meets_requirement": judged.met}
     if plan.spacecraft.commands is not None:
         data["can_be_commanded"] = plan.commandable if plan.feasible else None
@@ -120,13 +142,24 @@ def spacecraft_json(spacecraft: Spacecraft) -> dict[str, Any]:
     """Derived quantities of a spacecraft at t = 0."""
     inertia = spacecraft.inertia
     return {
-        **values_of(spacecraft, "name", "A_kgm2=inertia.A", "C_kgm2=inertia.C", "a=inertia.a", "shape=inertia.shape"),
+        **values_of(
+            spacecraft,
+            "name",
+            "A_kgm2=inertia.A",
+            "C_kgm2=inertia.C",
+            "a=inertia.a",
+            "shape=inertia.shape",
+        ),
         "moments_kgm2": list(inertia.moments),
         "wheel_momentum_Nms": inertia.wheel,
         "principal_axes": cleaned(inertia.axes.T).tolist(),
         "omega0_rad_s": inertia.in_file(spacecraft.omega0).tolist(),
-        **values_of(spacecraft.widest, "nutation_deg", "body_cone_deg=body", "space_cone_deg=space"),
-        **values_of(spacecraft, "nutation_at_start_deg=tilt", "body_nutation_period_s=motion_period"),
+        **values_of(
+            spacecraft.widest, "nutation_deg", "body_cone_deg=body", "space_cone_deg=space"
+        ),
+        **values_of(
+            spacecraft, "nutation_at_start_deg=tilt", "body_nutation_period_s=motion_period"
+        ),
         "inertial_nutation_period_s": spacecraft.inertial_period,
         "target_axis": cleaned(spacecraft.target_axis).tolist(),
         **values_of(spacecraft, "target_angle_deg=to_turn", "target_spin_rad_s=goal.spin"),
@@ -179,7 +212,9 @@ def target_json(body: Spacecraft) -> dict[str, Any] | None:
 
 
 def aspects_json(aspects: tuple[Aspect, ...]) -> dict[str, Any]:
-    """Range of angles of the spin axis from each direction that is watched; nothing for a file that names none."""
+    """Range of angles of the spin axis from each direction that is watched; nothing for a file that
+    names none.
+    """
     names = ("least_deg", "least_s=least_at", "largest_deg", "largest_s=largest_at")
     bounds = ("min_deg=keep.least", "max_deg=keep.most")
     entries = [values_of(aspect, "name=keep.name", *names, *bounds, "kept") for aspect in aspects]
@@ -188,15 +223,26 @@ def aspects_json(aspects: tuple[Aspect, ...]) -> dict[str, Any]:
 
 def direction_json(body: Spacecraft, direction: Vector) -> dict[str, float | None]:
     """The two angles that name an inertial direction (3,), as `Spacecraft.angles_of`."""
-    around, other = (None if angle is None else math.degrees(angle) for angle in body.angles_of(direction))
+    around, other = (
+        None if angle is None else math.degrees(angle) for angle in body.angles_of(direction)
+    )
     named = {"tilt_deg": other, "azimuth_deg": around}
-    return named if body.attitude is None else {"right_ascension_deg": around, "declination_deg": other}
+    return (
+        named
+        if body.attitude is None
+        else {"right_ascension_deg": around, "declination_deg": other}
+    )
 
 
 def residual_json(residual: Residual | None) -> dict[str, float | None]:
     """Cone angles and shifts in degrees; nulls where there is no schedule."""
     return values_of(
-        residual, "nutation_deg", "body_cone_deg", "space_cone_deg", "momentum_shift_deg", "axis_error_deg"
+        residual,
+        "nutation_deg",
+        "body_cone_deg",
+        "space_cone_deg",
+        "momentum_shift_deg",
+        "axis_error_deg",
     )
 
 
@@ -214,19 +260,25 @@ def decision_json(judged: Verdict) -> dict[str, Any]:
 
 
 PROVES = (
-    "no firing of these channels within the windows that reaches the goal by the equations costs less than bound = "
-    "sum of price times goal - off times |prices of shift| - gained: q is at most 1 at every moment for channels that "
-    "act at once, and for the others gained is at least the integral of cost_per_s times (q - 1) where q is above 1"
+    "no firing of these channels within the windows that reaches the goal by the equations costs "
+    "less than bound = "
+    "sum of price times goal - off times |prices of shift| - gained: "
+    "q is at most 1 at every moment for channels that "
+    "act at once, and for the others gained is at least the integral of cost_per_s times (q - 1) "
+    "where q is above 1"
 )
 
 MODEL = (
-    "small angles, spin as at t = 0: exact for the nutation of symmetric bodies while nothing changes the spin, of "
-    "first order for others and for the direction of H; impulses of any size at once for channels with acts_at_once, "
+    "small angles, spin as at t = 0: exact for the nutation of symmetric bodies while nothing "
+    "changes the spin, of "
+    "first order for others and for the direction of H; impulses of any size at once for channels "
+    "with acts_at_once, "
     "at most the full torque at a time for the others"
 )
 
 NOT_COUNTED = (
-    "gaps, ticks, least and longest on-times, max_pulses, that channels may not be on together, valves, cold nozzles "
+    "gaps, ticks, least and longest on-times, max_pulses, that channels may not be on together, "
+    "valves, cold nozzles "
     "and falling pressure: each can only raise the cost of the same equations"
 )
 
@@ -234,15 +286,19 @@ NOT_COUNTED = (
 def certificate_json(certificate: Certificate) -> dict[str, Any]:
     """The file of ``plan --certificate``: all data to check a least cost by hand, in SI.
 
-    It is about the transverse impulse at small angles. With E1 = e^{i α t} min(1, e^{-κ (t - t_last)}) and E2 =
-    e^{i ω t}, where α is ``nutation_rad_s``, ω is ``spin_rad_s`` and κ is ``growth_per_s``, a second of a channel of
-    the torque (m1, m2, m3) at t adds E1 (f1 m1 + i f2 m2), f being ``circle``, to the equations nutation, E2 (m1 + i
-    m2) to the equations shift, and m3 to the equation spin. Of each equation the file has the goal and the price y,
-    and q(t) of a channel is the sum of y times what it adds, over ``cost_per_s``.
+    It is about the transverse impulse at small angles. With E1 = e^{i α t} min(1, e^{-κ (t -
+    t_last)}) and E2 = e^{i ω t}, where α is ``nutation_rad_s``, ω is ``spin_rad_s`` and κ is
+    ``growth_per_s``, a second of a channel of the torque (m1, m2, m3) at t adds E1 (f1 m1 + i f2
+    m2), f being ``circle``, to the equations nutation, E2 (m1 + i m2) to the equations shift, and
+    m3 to the equation spin. Of each equation the file has the goal and the price y, and q(t) of a
+    channel is the sum of y times what it adds, over ``cost_per_s``.
     """
-    body, program, prices = certificate.spacecraft, certificate.program, certificate.proof.prices.tolist()
+    body = certificate.spacecraft
+    program = certificate.program
+    prices = certificate.proof.prices.tolist()
     equations = zip(certificate.rows, program.influence.goal.tolist(), prices, strict=True)
-    names, pulses = [channel.name for channel in program.channels], certificate.plan.pulses
+    names = [channel.name for channel in program.channels]
+    pulses = certificate.plan.pulses
     return {
         "nutdamp": __version__,
         "certificate": 1,
@@ -255,17 +311,28 @@ def certificate_json(certificate: Certificate) -> dict[str, Any]:
         "last_s": certificate.last,
         "windows_s": [list(span) for span in certificate.windows],
         "unit": certificate.problem.unit,
-        "equations": [{"name": name, "goal_Nms": goal + 0.0, "price": price + 0.0} for name, goal, price in equations],
+        "equations": [
+            {"name": name, "goal_Nms": goal + 0.0, "price": price + 0.0}
+            for name, goal, price in equations
+        ],
         "off_Nms": program.off,
         "channels": [
-            {**values_of(channel, "name", "torque_Nm"), "cost_per_s": float(cost), "acts_at_once": bool(strong)}
-            for channel, cost, strong in zip(program.channels, program.costs, program.strong, strict=True)
+            {
+                **values_of(channel, "name", "torque_Nm"),
+                "cost_per_s": float(cost),
+                "acts_at_once": bool(strong),
+            }
+            for channel, cost, strong in zip(
+                program.channels, program.costs, program.strong, strict=True
+            )
         ],
         **values_of(certificate.proof, "gained", "bound"),
         "burns": [
             {
                 **values_of(burn, "channel=channel.name", "t_s", "on_time_s"),
-                "q": float(certificate.primer(np.array([burn.t]))[0, program.channels.index(burn.channel)]),
+                "q": float(
+                    certificate.primer(np.array([burn.t]))[0, program.channels.index(burn.channel)]
+                ),
             }
             for burn in certificate.burns
         ],
@@ -275,7 +342,10 @@ def certificate_json(certificate: Certificate) -> dict[str, Any]:
             "pulses": [values_of(pulse, "channel", "t_s", "on_time_s") for pulse in pulses],
         },
         "primer": [
-            {"t_s": times.tolist(), "q": dict(zip(names, certificate.primer(times).T.tolist(), strict=True))}
+            {
+                "t_s": times.tolist(),
+                "q": dict(zip(names, certificate.primer(times).T.tolist(), strict=True)),
+            }
             for times in certificate.moments()
         ],
     }

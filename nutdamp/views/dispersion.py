@@ -1,4 +1,5 @@
-"""Results of ``disperse``: percentiles, requirement, cones, and cases; the tolerance budget is in `tolerances`.
+"""Results of ``disperse``: percentiles, requirement, cones, and cases; the tolerance budget is in
+`tolerances`.
 
 The files of loops and the screens of other commands use the same parts.
 """
@@ -29,7 +30,16 @@ from nutdamp.units import screen_unit
 from nutdamp.views import decisions, tolerances
 from nutdamp.views import verdict as verdicts
 from nutdamp.views.parts import bounds_text, named, summary
-from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, Shared, facts, to_figures, values_of
+from nutdamp.views.tables import (
+    TEXT,
+    WHOLE,
+    Column,
+    DataTable,
+    Shared,
+    facts,
+    to_figures,
+    values_of,
+)
 from nutdamp.views.text import degrees, digits
 
 if TYPE_CHECKING:
@@ -38,7 +48,8 @@ if TYPE_CHECKING:
 
 
 PERCENTS = (50.0, 90.0, 95.0, 99.0, 99.7)
-LEVELS, BRIEFLY = tuple(f"{percent:g}" for percent in PERCENTS), ("50", "95", "99.7")
+LEVELS = tuple(f"{percent:g}" for percent in PERCENTS)
+BRIEFLY = ("50", "95", "99.7")
 """Their names, and those on the default screen."""
 
 BOTH = "screen full"  # the default screen, and that of all values
@@ -81,17 +92,25 @@ FLOWN_OUTPUTS = (  # the outputs of a schedule, in the order of `OUTPUTS`
 
 NOTHING = 1e-9  # values, in these units, below which a number is rounding
 
-EMPTY = "the pulses take more propellant than there is, so that the last ones do not fire, and it does not comply"
+EMPTY = (
+    "the pulses take more propellant than there is, so that the last ones do not fire, "
+    "and it does not comply"
+)
 """Note on a case whose tank runs empty."""
 
 
 def dispersion_brief(flown: Dispersion) -> RenderableType:
-    """The default screen of ``disperse``: verdict, percentiles, what counts most, and the worst case."""
+    """The default screen of ``disperse``: verdict, percentiles, what counts most, and the worst
+    case.
+    """
     results, judged = flown.core, flown.verdict
     head = [_title(results, flown.plan.scheme), *verdict_lines(judged, results), *_emptied(results)]
-    notes, case = [*main_causes(judged)], f" · {again(results)} (worst)" * _varies(results)
+    notes = [*main_causes(judged)]
+    case = f" · {again(results)} (worst)" * _varies(results)
     notes += tolerances.unused_notes(results.study.model.inputs.unused)
-    return summary(head, lambda **_: _percentiles(results).screen("screen"), notes, f"--plot cases.png{case}")
+    return summary(
+        head, lambda **_: _percentiles(results).screen("screen"), notes, f"--plot cases.png{case}"
+    )
 
 
 def dispersion_screen(flown: Dispersion, *, worst: int) -> Group:
@@ -101,7 +120,12 @@ def dispersion_screen(flown: Dispersion, *, worst: int) -> Group:
     parts: list[RenderableType] = [*head, Text(), _percentiles(results).screen("full")]
     parts.append(angles_note(body))
     if not results.exact:
-        parts.append(Text("Percentiles are right to 0.006 % of their value; nominal and max are exact.", style="dim"))
+        parts.append(
+            Text(
+                "Percentiles are right to 0.006 % of their value; nominal and max are exact.",
+                style="dim",
+            )
+        )
     ends = facts(decisions.end_rows(flown.plan.flight, flown.plan.aspects))
     parts += [Text(), Text("Nominal case", style="bold"), ends]
     events = [*cone_lines(results), *_emptied(results)]
@@ -114,10 +138,12 @@ def dispersion_screen(flown: Dispersion, *, worst: int) -> Group:
 
 
 def dispersion_json(flown: Dispersion, *, worst: int) -> dict[str, Any]:
-    """Percentiles, requirement, tolerance budget, ``worst`` cases and end of the nominal one; degrees, else SI.
+    """Percentiles, requirement, tolerance budget, ``worst`` cases and end of the nominal one;
+    degrees, else SI.
 
-    ``shares`` are of the nutation, of other outputs below their names; with ``correlation`` each is the increment over
-    those before it. ``effect_deg``: on the nutation, of one sigma of an input alone (or all of a bias).
+    ``shares`` are of the nutation, of other outputs below their names; with ``correlation`` each is
+    the increment over those before it. ``effect_deg``: on the nutation, of one sigma of an input
+    alone (or all of a bias).
     """
     results, study, body = flown.core, flown.core.study, flown.plan.spacecraft
     return {
@@ -142,18 +168,25 @@ def dispersion_json(flown: Dispersion, *, worst: int) -> dict[str, Any]:
 
 def counts_json(results: Results | LoopResults) -> dict[str, Any]:
     """Number of cases, and their seed."""
-    counts = values_of(results, "samples=done", "requested") | {"interrupted": results.done < results.requested}
+    counts = values_of(results, "samples=done", "requested") | {
+        "interrupted": results.done < results.requested
+    }
     return counts | values_of(results, "seed=study.seed", "redrawn")
 
 
 def _worst(results: Results, count: int) -> list[CaseRow]:
-    study, cases = results.study, results.worst.cases[:count].tolist()
+    study = results.study
+    cases = results.worst.cases[:count].tolist()
     return [_flown(study, case, study.draws_of(case)) for case in cases]
 
 
 def _title(results: Results, scheme: str) -> Text:
     study = results.study
-    how = "ideal impulses" if model_name([study.model.schedule]) == IDEAL_IMPULSES else "full simulation"
+    how = (
+        "ideal impulses"
+        if model_name([study.model.schedule]) == IDEAL_IMPULSES
+        else "full simulation"
+    )
     drawn = f"cases: {results.done:,}, seed {study.seed}"
     if results.redrawn:
         drawn += f", unphysical and drawn again: {results.redrawn:,}"
@@ -172,7 +205,9 @@ def _varies(results: Results) -> bool:
 # --- percentiles
 
 
-def percentiles_json(column: str, nominal: float | None, distribution: Distribution | None) -> dict[str, float | None]:
+def percentiles_json(
+    column: str, nominal: float | None, distribution: Distribution | None
+) -> dict[str, float | None]:
     """The ``nominal`` value and the distribution in the unit of a ``column``."""
     spread: list[float | None] = [None] * (len(PERCENTS) + 2)
     if distribution is not None:
@@ -212,7 +247,8 @@ def percentile_row(
 ) -> dict[str, str | None]:
     """A row of `PERCENTILES`: values, or their sizes, to the digits of the largest."""
     if output.signed and nominal is not None and distribution is not None:
-        nominal, distribution = abs(nominal), distribution.sizes()
+        nominal = abs(nominal)
+        distribution = distribution.sizes()
     scale = output.shown_unit[1]
     values = {
         key: math.nan if value is None else scale * value
@@ -229,10 +265,14 @@ def percentile_row(
     return row
 
 
-PERCENTILES = (  # columns of rows of texts: the name without a key, the values by the names of `percentiles_json`
+# columns of rows of texts: the name without a key, the values by the names of `percentiles_json`
+PERCENTILES = (
     Column("", "", "", itemgetter(""), where=BOTH, kind=TEXT),
     Column("", Shared.NOMINAL, "", itemgetter("nominal"), where=BOTH),
-    *(Column("", f"{key} %", "", itemgetter(key), where=BOTH if key in BRIEFLY else "full") for key in LEVELS),
+    *(
+        Column("", f"{key} %", "", itemgetter(key), where=BOTH if key in BRIEFLY else "full")
+        for key in LEVELS
+    ),
     Column("", Shared.MOST, "", itemgetter("max"), where=BOTH),
 )
 
@@ -287,7 +327,9 @@ def requirement_of(judged: Verdict) -> dict[str, Any] | None:
 
 
 def cone_lines(results: Results | LoopResults) -> Iterator[Text]:
-    """Number of cases that break each cone, and range of the angles from the spin axis to its direction."""
+    """Number of cases that break each cone, and range of the angles from the spin axis to its
+    direction.
+    """
     for keep, entry in _cones(results):
         share = verdicts.percent(entry["broken_fraction"], 1.0 - results.probability)
         bounds = ("least_deg", "largest_deg", "nominal_least_deg", "nominal_largest_deg")
@@ -300,7 +342,9 @@ def cone_lines(results: Results | LoopResults) -> Iterator[Text]:
 
 
 def cones_json(results: Results | LoopResults) -> dict[str, Any]:
-    """Number of cases that break each cone, and least and largest angle from it to the axis; nothing without cones."""
+    """Number of cases that break each cone, and least and largest angle from it to the axis;
+    nothing without cones.
+    """
     entries = [entry for _, entry in _cones(results)]
     return {"aspects": entries} if entries else {}
 
@@ -308,7 +352,9 @@ def cones_json(results: Results | LoopResults) -> dict[str, Any]:
 def _cones(results: Results | LoopResults) -> Iterator[tuple[Keep, dict[str, Any]]]:
     """Each cone with its entry in files; none before the first case."""
     body = results.study.model.spacecraft
-    nominal = np.degrees(results.study.nominal_aspects).tolist() if results.done and body.keep else ()
+    nominal = (
+        np.degrees(results.study.nominal_aspects).tolist() if results.done and body.keep else ()
+    )
     for index, (keep, (least, largest)) in enumerate(zip(body.keep, nominal, strict=False)):
         least_of_all, largest_of_all = np.degrees(results.aspects[index]).tolist()
         entry = values_of(keep, "name", "min_deg=least", "max_deg=most")
@@ -320,14 +366,18 @@ def _cones(results: Results | LoopResults) -> Iterator[tuple[Keep, dict[str, Any
 def _emptied(results: Results) -> Iterator[Text]:
     if results.emptied:
         share = verdicts.percent(results.emptied / results.done, 1.0 - results.probability)
-        yield Text.assemble(("Tank ", "bold"), (f"empty too soon in {share} of cases", "red"), f": {EMPTY}.")
+        yield Text.assemble(
+            ("Tank ", "bold"), (f"empty too soon in {share} of cases", "red"), f": {EMPTY}."
+        )
 
 
 # --- cases
 
 
 class CaseRow(NamedTuple):
-    """A case, from 0, or `ESTIMATE`: deviations of inputs, outputs, angles (m, 2) rad to cones, ending of a loop."""
+    """A case, from 0, or `ESTIMATE`: deviations of inputs, outputs, angles (m, 2) rad to cones,
+    ending of a loop.
+    """
 
     case: int
     draws: Mapping[str, float]
@@ -341,7 +391,9 @@ ESTIMATE = -1  # number of the nominal case
 
 def _flown(study: Study, case: int, draws: Mapping[str, float]) -> CaseRow:
     aspects = study.ends_of(draws).aspects
-    return CaseRow(case, draws, study.outputs_of(draws).tolist(), None if aspects is None else aspects[:, :, 0])
+    return CaseRow(
+        case, draws, study.outputs_of(draws).tolist(), None if aspects is None else aspects[:, :, 0]
+    )
 
 
 def case_json(study: Study, case: int, draws: Mapping[str, float]) -> dict[str, Any]:
@@ -349,14 +401,22 @@ def case_json(study: Study, case: int, draws: Mapping[str, float]) -> dict[str, 
     return row_json(study, FLOWN_OUTPUTS, _flown(study, case, draws))
 
 
-def row_json(study: Study | LoopStudy, outputs: Sequence[StudyOutput], row: CaseRow) -> dict[str, Any]:
+def row_json(
+    study: Study | LoopStudy, outputs: Sequence[StudyOutput], row: CaseRow
+) -> dict[str, Any]:
     """A case as `case_json` has it; unknown outputs are None."""
-    inputs = {entry.name: entry.nominal + row.draws.get(entry.name, 0.0) for entry in study.model.inputs.drawn}
+    inputs = {
+        entry.name: entry.nominal + row.draws.get(entry.name, 0.0)
+        for entry in study.model.inputs.drawn
+    }
     data = {"case": row.case + 1, "inputs": inputs}
     data |= {output.key: _output(at, output, row) for at, output in enumerate(outputs)}
     if row.angles is not None and study.model.spacecraft.keep:
         named = zip(study.model.spacecraft.keep, np.degrees(row.angles).tolist(), strict=True)
-        data["aspects"] = [{"name": keep.name, "least_deg": near, "largest_deg": far} for keep, (near, far) in named]
+        data["aspects"] = [
+            {"name": keep.name, "least_deg": near, "largest_deg": far}
+            for keep, (near, far) in named
+        ]
     return data
 
 
@@ -368,14 +428,22 @@ def _output(at: int, output: StudyOutput, row: CaseRow) -> float | int | None:
 
 
 def case_table(
-    study: Study | LoopStudy, outputs: Sequence[StudyOutput], rows: Sequence[CaseRow], effects: Array | None = None
+    study: Study | LoopStudy,
+    outputs: Sequence[StudyOutput],
+    rows: Sequence[CaseRow],
+    effects: Array | None = None,
 ) -> DataTable:
-    """Cases, one row each; ``effects`` of the drawn inputs by which their contributors are ranked."""
+    """Cases, one row each; ``effects`` of the drawn inputs by which
+    their contributors are ranked.
+    """
     return DataTable("Worst cases", tuple(_case_columns(study, outputs, rows, effects)), rows)
 
 
 def _case_columns(
-    study: Study | LoopStudy, outputs: Sequence[StudyOutput], rows: Sequence[CaseRow], effects: Array | None
+    study: Study | LoopStudy,
+    outputs: Sequence[StudyOutput],
+    rows: Sequence[CaseRow],
+    effects: Array | None,
 ) -> Iterator[Column]:
     cones, inputs = study.model.spacecraft.keep, study.model.inputs.drawn
     yield Column("case", "case", "", lambda row: row.case + 1, where="screen csv", kind=WHOLE)
@@ -384,14 +452,27 @@ def _case_columns(
     for entry in inputs:
         yield Column(column(entry), "", "", partial(_true_value, entry), where="csv")
     for at, output in enumerate(outputs):
-        value, where = partial(_output, at, output), "csv" + " screen" * output.ranks
-        yield Column(output.key, output.heading, output.unit, value, to_figures(4, output.scale), where)
+        value = partial(_output, at, output)
+        where = "csv" + " screen" * output.ranks
+        yield Column(
+            output.key, output.heading, output.unit, value, to_figures(4, output.scale), where
+        )
         text = _text_beside(output, map(value, rows))
         yield Column("", output.heading, output.shown_unit[0], value, text, "case")
-    yield Column("stopped", "", "", lambda row: row.stop.name.lower() if row.stop else None, where="csv", kind=TEXT)
+    yield Column(
+        "stopped",
+        "",
+        "",
+        lambda row: row.stop.name.lower() if row.stop else None,
+        where="csv",
+        kind=TEXT,
+    )
     angles = [(which, cone) for cone in cones for which in ("least", "largest")]
-    for at, (key, (which, cone)) in enumerate(zip(cone_columns(study.model.spacecraft), angles, strict=True)):
-        where, name = "csv case" + " screen" * (which in bounded(cone)), f"{which} from {cone.name}"
+    for at, (key, (which, cone)) in enumerate(
+        zip(cone_columns(study.model.spacecraft), angles, strict=True)
+    ):
+        where = "csv case" + " screen" * (which in bounded(cone))
+        name = f"{which} from {cone.name}"
         yield Column(key, name, "deg", partial(_angle, at), to_figures(4), where)
     heading = f"largest {'inputs' if effects is None else 'contributors'}, in sigmas"
     yield Column("", heading, "", partial(_largest, inputs, effects), where="screen", kind=TEXT)
@@ -403,7 +484,9 @@ def _true_value(entry: DispersedInput, row: CaseRow) -> float:
 
 
 def _text_beside(output: StudyOutput, values: Iterable[float | None]) -> Callable[[float], str]:
-    """Text of an output of few cases beside each other, to the digits of the largest; counts are whole."""
+    """Text of an output of few cases beside each other, to the digits of the largest; counts are
+    whole.
+    """
     if not output.unit:
         return "{:.0f}".format
     factor = output.shown_unit[1]
@@ -417,19 +500,27 @@ def _angle(at: int, row: CaseRow) -> float:
 
 def _largest(inputs: Sequence[DispersedInput], effects: Array | None, row: CaseRow) -> str:
     sigmas = np.array([row.draws[entry.name] / (entry.sigma or math.inf) for entry in inputs])
-    order = np.argsort(-np.abs(sigmas if effects is None else effects * sigmas), kind="stable")[:3].tolist()
-    return ", ".join(f"{tolerances.in_words(inputs[at].name)} {sigmas[at]:+.1f}" for at in order if sigmas[at])
+    order = np.argsort(-np.abs(sigmas if effects is None else effects * sigmas), kind="stable")[
+        :3
+    ].tolist()
+    return ", ".join(
+        f"{tolerances.in_words(inputs[at].name)} {sigmas[at]:+.1f}" for at in order if sigmas[at]
+    )
 
 
 def _effects(study: Study) -> Array:
-    return np.hypot(*(study.first_order.effects(output) for output, _ in tolerances.budgeted_outputs(study)))
+    return np.hypot(
+        *(study.first_order.effects(output) for output, _ in tolerances.budgeted_outputs(study))
+    )
 
 
 def case_screen(study: Study, case: int, draws: dict[str, float], *, scheme: str) -> RenderableType:
     """One case (from 0): every input, and the ends of it and of the nominal case."""
     rows = [_flown(study, ESTIMATE, {}), _flown(study, case, draws)]
     outcome = case_table(study, FLOWN_OUTPUTS, rows, _effects(study))
-    empty = [Text(f"Tank empty too soon: {EMPTY}.", "red")] * bool(study.ends_of(draws).drained > 1.0)
+    empty = [Text(f"Tank empty too soon: {EMPTY}.", "red")] * bool(
+        study.ends_of(draws).drained > 1.0
+    )
     title = named(study.model.spacecraft, f": {scheme}, seed {study.seed}, case {case + 1}")
     inputs = tolerances.inputs_table(study.model.inputs.drawn, draws)
     return Group(title, Text(), inputs, Text(), outcome.transposed("case"), *empty)
@@ -446,6 +537,9 @@ def _shares(results: Results) -> Iterator[dict[str, Any]]:
     effects = np.degrees(first.effects("nutation")).tolist()
     for at, entry in enumerate(first.inputs):
         sampled = results.shares.get(entry.name, {})
-        both = {name: {"analytic": linear[name][at], "sampled": sampled.get(name, 0.0)} for name in OUTPUTS}
+        both = {
+            name: {"analytic": linear[name][at], "sampled": sampled.get(name, 0.0)}
+            for name in OUTPUTS
+        }
         about = values_of(entry, "tolerance", "sigma") | {"effect_deg": effects[at]}
         yield {"input": entry.name, **both.pop("nutation"), **about, **both}

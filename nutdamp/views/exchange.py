@@ -15,8 +15,9 @@ if TYPE_CHECKING:
 class Format(NamedTuple):
     """A format: its ``name``, and a ``summary`` for help pages.
 
-    ``message``: a CCSDS message, in either notation. ``track``: ends when requested. ``dated``: needs the epoch and the
-    frame of the attitude. ``needs_orbit``: incomplete without one. ``nutates``: as symmetric bodies do.
+    ``message``: a CCSDS message, in either notation. ``track``: ends when requested. ``dated``:
+    needs the epoch and the frame of the attitude. ``needs_orbit``: incomplete without one.
+    ``nutates``: as symmetric bodies do.
     """
 
     name: str
@@ -32,9 +33,24 @@ FORMATS = {  # formats by name
     row.name: row
     for row in (
         Format("apm", "state and pulses (CCSDS)", message=True, dated=True),
-        Format("aem", "attitude history (CCSDS) as quaternions", message=True, track=True, dated=True),
-        Format("aem-spin", "as spin, nutation and momentum", message=True, track=True, dated=True, nutates=True),
-        Format("opm", "velocity change of each pulse (CCSDS)", message=True, dated=True, needs_orbit=True),
+        Format(
+            "aem", "attitude history (CCSDS) as quaternions", message=True, track=True, dated=True
+        ),
+        Format(
+            "aem-spin",
+            "as spin, nutation and momentum",
+            message=True,
+            track=True,
+            dated=True,
+            nutates=True,
+        ),
+        Format(
+            "opm",
+            "velocity change of each pulse (CCSDS)",
+            message=True,
+            dated=True,
+            needs_orbit=True,
+        ),
         Format("stk", "attitude history as .a", track=True, dated=True),
         Format("spin-table", "CSV, one row a spin", track=True),
         Format("basilisk", "a script that flies the schedule"),
@@ -56,15 +72,20 @@ def _names_where(flag: str) -> list[str]:
 
 
 def export_text(plan: Plan, form: str, *, xml: bool = False, until: float | None = None) -> str:
-    """The text of a plan in the format ``form``; messages in XML or else in keyword = value notation.
+    """The text of a plan in the format ``form``; messages in XML or else in keyword = value
+    notation.
 
-    ``until`` is the end of a track in s, by default the last pulse and an inertial period. Raises BadRequest where the
-    format needs data that the spacecraft file lacks, or cannot hold those of the plan.
+    ``until`` is the end of a track in s, by default the last pulse and an inertial period. Raises
+    BadRequest where the format needs data that the spacecraft file lacks, or cannot hold those of
+    the plan.
     """
     expect_possible(form, xml=xml, until=until)
-    row, pulses = FORMATS[form], plan.pulses
+    row = FORMATS[form]
+    pulses = plan.pulses
     if row.dated:
-        return _dated(plan, row, pulses.end + plan.spacecraft.inertial_period if until is None else until, xml)
+        return _dated(
+            plan, row, pulses.end + plan.spacecraft.inertial_period if until is None else until, xml
+        )
     if form == "json":
         from nutdamp.files.tabular import json_text
         from nutdamp.planning.decision import compare_plans
@@ -81,17 +102,23 @@ def export_text(plan: Plan, form: str, *, xml: bool = False, until: float | None
 
 
 def _dated(plan: Plan, row: Format, until: float, xml: bool) -> str:
-    """A format that needs epoch and frame, with a track to ``until`` s; messages are created now to the second."""
+    """A format that needs epoch and frame, with a track to ``until`` s; messages are created now to
+    the second.
+    """
     from nutdamp.common.time import Epoch
     from nutdamp.files.ccsds import message, write
     from nutdamp.files.export import reference, stk_attitude
     from nutdamp.flight.propagation import flown
 
-    body, place = plan.spacecraft, reference(plan.spacecraft)  # refuses a file without epoch or frame
+    # refuses a file without epoch or frame
+    body = plan.spacecraft
+    place = reference(plan.spacecraft)
     last = until if row.track else plan.pulses.end
     if body.utc(last) is None:
         cure = "an earlier --until" if row.track else "a shorter horizon"
-        raise Unsuitable(("attitude", "epoch"), f"{last:.4g} s after it the year 9999 is over; {cure} helps")
+        raise Unsuitable(
+            ("attitude", "epoch"), f"{last:.4g} s after it the year 9999 is over; {cure} helps"
+        )
     if not row.message:
         about = f"{plan.scheme}, status {plan.verdict.status.value}"
         return stk_attitude(flown(body, plan.pulses, until), until, place, about)
@@ -113,7 +140,12 @@ def export_notes(plan: Plan, form: str) -> list[Note]:
 
 
 def lacking(plan: Plan, form: str) -> str | None:
-    """Data that the format ``form`` needs to be complete and the spacecraft file lacks; None where it is complete."""
+    """Data that the format ``form`` needs to be complete and the spacecraft file lacks; None where
+    it is complete.
+    """
     if not FORMATS[form].needs_orbit or plan.spacecraft.orbit is not None:
         return None
-    return "the spacecraft file has no orbit: this is the part of an OPM with the manoeuvres, and no whole message"
+    return (
+        "the spacecraft file has no orbit: this is the part of an OPM with the manoeuvres, "
+        "and no whole message"
+    )

@@ -1,4 +1,6 @@
-"""Topics of ``explain``: pages, sections, words with a paragraph each, keys of the file; and their screens."""
+"""Topics of ``explain``: pages, sections, words with a paragraph each, keys of the file; and their
+screens.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +23,11 @@ from nutdamp.views.guide import Topic
 
 def _notes() -> Iterator[tuple[str, str]]:
     for code, entry in guide.note_entries().items():
-        sentence = re.sub(r"\{(\w+?)(_[a-zA-Z]+)?\}", lambda name: f"[{name[1].replace('_', ' ')}]", entry.sentence)
+        sentence = re.sub(
+            r"\{(\w+?)(_[a-zA-Z]+)?\}",
+            lambda name: f"[{name[1].replace('_', ' ')}]",
+            entry.sentence,
+        )
         yield code, f"{sentence} {entry.paragraph}"
 
 
@@ -32,7 +38,9 @@ WORDS: tuple[tuple[str, Callable[[], Iterable[tuple[str, str]]]], ...] = (
     ("symbol", lambda: guide.page("symbols").rows),
     ("note", _notes),
 )
-"""Sources of words, each with its kind: pairs of names, separated by commas, and their paragraph."""
+"""Sources of words, each with its kind: pairs of names, separated by commas,
+and their paragraph.
+"""
 
 ALIKE = ("glossary", "symbol")  # kinds whose names of one paragraph mean the same
 
@@ -42,12 +50,19 @@ _UNIT = re.compile(  # end of a heading with hyphens for blanks: its unit
 
 
 def explained(requested: str) -> Topic:
-    """Words, page and keys of the file of that name as one topic; raises BadRequest, which names a near one."""
+    """Words, page and keys of the file of that name as one topic; raises BadRequest, which names a
+    near one.
+    """
     name, _, below = requested.partition(".")
     if name.casefold() == guide.FILE and below:
         return file_topic(below)
-    wanted, texts = _folded(requested), list(_texts(requested))
-    keys = [(path, text) for path, text in file_keys() if wanted in (_folded(path.rpartition(".")[2]), _folded(path))]
+    wanted = _folded(requested)
+    texts = list(_texts(requested))
+    keys = [
+        (path, text)
+        for path, text in file_keys()
+        if wanted in (_folded(path.rpartition(".")[2]), _folded(path))
+    ]
     try:
         topic = guide.found(requested)
     except BadRequest:
@@ -64,7 +79,10 @@ def explained(requested: str) -> Topic:
         topic = Topic(requested, summary, "")
     parts = [_listed(texts), topic.text]
     if keys:
-        parts += ["## In the spacecraft file", _listed((f"{guide.FILE}.{path}", text) for path, text in keys)]
+        parts += [
+            "## In the spacecraft file",
+            _listed((f"{guide.FILE}.{path}", text) for path, text in keys),
+        ]
     return topic._replace(text="\n\n".join(filter(None, parts)))
 
 
@@ -84,7 +102,9 @@ def names() -> Iterator[str]:
 
 def _folded(name: str) -> str:
     """Names in small letters with hyphens; a single letter, which is a symbol, as it is."""
-    return re.sub(r"[\s_]+", "-", name.strip() if len(name.strip()) == 1 else name.strip().casefold())
+    return re.sub(
+        r"[\s_]+", "-", name.strip() if len(name.strip()) == 1 else name.strip().casefold()
+    )
 
 
 def _bare(name: str) -> str:
@@ -96,12 +116,16 @@ def _bare(name: str) -> str:
 
 
 def _texts(requested: str) -> Iterator[tuple[str, str]]:
-    """Kinds and texts of the words of that name, as written, else folded or without unit unless the glossary has it."""
+    """Kinds and texts of the words of that name, as written, else folded or without unit unless the
+    glossary has it.
+    """
     seen: set[str] = set()
     for kind, source in WORDS:
         words = [([*entry.split(", "), entry], entry, text) for entry, text in source()]
         forms = (str,) if seen else (str, _folded, _bare)
-        tiers = ([word for word in words if form(requested) in map(form, word[0])] for form in forms)
+        tiers = (
+            [word for word in words if form(requested) in map(form, word[0])] for form in forms
+        )
         for _, entry, text in next(filter(None, tiers), []):
             if text not in seen:
                 seen.add(text)
@@ -119,7 +143,9 @@ def _sections(wanted: str) -> Iterator[Topic]:
 
 
 def file_keys() -> Iterator[tuple[str, str]]:
-    """Paths and texts of the keys of the file, but for those within a tolerance, which are all alike."""
+    """Paths and texts of the keys of the file, but for those within a tolerance, which are all
+    alike.
+    """
     for title, text in guide.page(guide.FILE).sections:
         if ":" not in title:
             for name, meaning in Topic(title, "", text).rows:
@@ -127,7 +153,9 @@ def file_keys() -> Iterator[tuple[str, str]]:
 
 
 def file_topic(below: str) -> Topic:
-    """A key of the file such as ``thrusters.force`` and those below it; raises BadRequest, which names a near one."""
+    """A key of the file such as ``thrusters.force`` and those below it; raises BadRequest, which
+    names a near one.
+    """
     keys = dict(file_keys())
     if below not in keys:
         paths = tuple(f"{guide.FILE}.{path}" for path in keys)
@@ -138,7 +166,9 @@ def file_topic(below: str) -> Topic:
     parts = [keys[below]]
     for title, text in guide.page(guide.FILE).sections:
         alike, _, named = title.partition(": each of ")
-        if f"{title}.".startswith((f"{below}.", f"{below}:")) or (alike == parent and name in named.split(", ")):
+        if f"{title}.".startswith((f"{below}.", f"{below}:")) or (
+            alike == parent and name in named.split(", ")
+        ):
             parts.append(f"## {title}\n\n{text}")
     return Topic(f"{guide.FILE}.{below}", "a key of the spacecraft file", "\n\n".join(parts))
 
@@ -183,7 +213,9 @@ class _Page(Markdown):
     }
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
-        with console.use_theme(Theme({"markdown.code": "bold"})):  # no dark boxes on light terminals
+        with console.use_theme(
+            Theme({"markdown.code": "bold"})
+        ):  # no dark boxes on light terminals
             yield from super().__rich_console__(console, options)
 
 
@@ -210,7 +242,9 @@ def examples_screen(rows: tuple[tuple[str, str], ...]) -> RenderableType:
 
 def topic_screen(topic: Topic) -> RenderableType:
     """One topic."""
-    return Constrain(_Page(f"**{topic.name}** – {topic.summary}\n\n{topic.text}", hyperlinks=False), WIDEST)
+    return Constrain(
+        _Page(f"**{topic.name}** – {topic.summary}\n\n{topic.text}", hyperlinks=False), WIDEST
+    )
 
 
 def _pairs(rows: Iterable[tuple[str, str]]) -> Table:

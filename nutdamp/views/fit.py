@@ -11,7 +11,16 @@ from rich.text import Text
 
 from nutdamp.common.results import Note, note
 from nutdamp.estimation.parameters import KIND, in_moments, untold
-from nutdamp.estimation.results import CORRELATED, UNTOLD, Carried, Estimate, carried, correlated, doubts, estimates
+from nutdamp.estimation.results import (
+    CORRELATED,
+    UNTOLD,
+    Carried,
+    Estimate,
+    carried,
+    correlated,
+    doubts,
+    estimates,
+)
 from nutdamp.estimation.search import Fit
 from nutdamp.files.carried import notes
 from nutdamp.units import screen_unit
@@ -29,7 +38,11 @@ def in_shown(signal: str) -> tuple[str, float]:
     unit = KIND[signal].unit
     if unit == "s":
         return "ms", 1e3
-    return (unit.replace("rad", "deg"), 180.0 / math.pi) if unit.startswith("rad") else screen_unit(unit)
+    return (
+        (unit.replace("rad", "deg"), 180.0 / math.pi)
+        if unit.startswith("rad")
+        else screen_unit(unit)
+    )
 
 
 def _unit(row: Estimate) -> tuple[str, float]:
@@ -53,7 +66,13 @@ def _file(row: Estimate) -> str | None:
 
 
 def _changed(change: float) -> str:
-    return "0" if abs(change) <= NOTHING else f"{change:+.2g}" if abs(change) < 99.5 else f"{change:+.0f}"
+    return (
+        "0"
+        if abs(change) <= NOTHING
+        else f"{change:+.2g}"
+        if abs(change) < 99.5
+        else f"{change:+.0f}"
+    )
 
 
 def _digits(estimate: Estimate) -> int:
@@ -89,24 +108,53 @@ def signal_table(fit: Fit) -> DataTable:
         return "white" if fit.white(at) else "NOT white, sigmas too small"
 
     columns = (
-        Column("signal", "signal", "", lambda at: fit.model.signals[at], where="screen json", kind=TEXT),
-        Column("samples", "samples", "", lambda at: int(of_signal[at].sum()), where="screen json", kind=WHOLE),
-        Column("outliers", "outliers", "", lambda at: int((of_signal[at] & ~fit.used).sum()), where="screen json",
-               kind=WHOLE),
+        Column(
+            "signal", "signal", "", lambda at: fit.model.signals[at], where="screen json", kind=TEXT
+        ),
+        Column(
+            "samples",
+            "samples",
+            "",
+            lambda at: int(of_signal[at].sum()),
+            where="screen json",
+            kind=WHOLE,
+        ),
+        Column(
+            "outliers",
+            "outliers",
+            "",
+            lambda at: int((of_signal[at] & ~fit.used).sum()),
+            where="screen json",
+            kind=WHOLE,
+        ),
         Column("noise_SI", "", "", lambda at: float(fit.noise[at]), where="json"),
-        Column("", "noise", "", lambda at: fit.noise[at] * in_shown(fit.model.signals[at])[1], to_figures(3), "screen"),
-        Column("", "unit", "", lambda at: in_shown(fit.model.signals[at])[0], where="screen", kind=TEXT),
+        Column(
+            "",
+            "noise",
+            "",
+            lambda at: fit.noise[at] * in_shown(fit.model.signals[at])[1],
+            to_figures(3),
+            "screen",
+        ),
+        Column(
+            "", "unit", "", lambda at: in_shown(fit.model.signals[at])[0], where="screen", kind=TEXT
+        ),
         Column("white", "", "", fit.white, where="json"),
         Column("", "residuals", "", verdict, where="screen", kind=TEXT),
-    )  # fmt: skip
+    )
     return DataTable("Signals", columns, range(len(of_signal)))
 
 
 def fit_screen(fit: Fit, time: float, *, verbose: bool = True) -> RenderableType:
     """The screen of ``fit``; the motion is that at ``time`` s."""
-    rows, names = estimates(fit, time), fit.model.signals
+    rows = estimates(fit, time)
+    names = fit.model.signals
     colored = [name for at, name in enumerate(names) if fit.resolved[at] and not fit.white(at)]
-    test = f"residuals NOT white: {', '.join(colored)}; the sigmas are too small" if colored else "residuals: noise"
+    test = (
+        f"residuals NOT white: {', '.join(colored)}; the sigmas are too small"
+        if colored
+        else "residuals: noise"
+    )
     if outliers := int((~fit.used).sum()):
         test += f"; outliers left out: {outliers}"
     record, values, body = fit.model.record, fit.named, fit.model.spacecraft
@@ -138,7 +186,10 @@ def told(fit: Fit, rows: Sequence[Estimate]) -> Iterator[Note]:
         yield note("fit-kept", estimates=", ".join(kept))
     both = float(carried(fit, fit.model.start).correlation[0, 1])
     tied = [f"A and C {both:+.4f}"] if abs(both) > CORRELATED else []
-    tied += [f"{first} and {second} {value:+.3f}" for first, second, value in correlated(fit)[:MOST_PAIRS]]
+    tied += [
+        f"{first} and {second} {value:+.3f}"
+        for first, second, value in correlated(fit)[:MOST_PAIRS]
+    ]
     if tied:
         yield note("correlated-inputs", inputs=", ".join(tied))
     if fit.model.unequal and fit.model.spacecraft.inertia.symmetric:

@@ -17,7 +17,14 @@ from nutdamp.common.results import Note
 from nutdamp.errors import listed
 from nutdamp.flight.propagation import REAL_WIDTHS, model_name
 from nutdamp.planning.decision import Comparison, speed
-from nutdamp.planning.notes import alternatives, comparison_warnings, infeasibility, plan_notes, reasons, verdict_notes
+from nutdamp.planning.notes import (
+    alternatives,
+    comparison_warnings,
+    infeasibility,
+    plan_notes,
+    reasons,
+    verdict_notes,
+)
 from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import Spacecraft
@@ -25,7 +32,17 @@ from nutdamp.spacecraft.requirements import Bound, Part
 from nutdamp.views import decisions, parts
 from nutdamp.views import verdict as verdicts
 from nutdamp.views.decisions import lasting
-from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable, Shared, angle_of, facts, to_figures
+from nutdamp.views.tables import (
+    TEXT,
+    WHOLE,
+    YES_NO,
+    Column,
+    DataTable,
+    Shared,
+    angle_of,
+    facts,
+    to_figures,
+)
 from nutdamp.views.text import (
     digits,
     joined,
@@ -42,7 +59,9 @@ SHORT_NAMES = ("RA", "dec")  # right ascension and declination, where there is l
 
 
 def scheme_table(compared: Comparison, chosen: Plan | None) -> DataTable:
-    """One row a scheme, with residuals of the flight through real widths; the ``chosen`` one stands out."""
+    """One row a scheme, with residuals of the flight through real widths; the ``chosen`` one stands
+    out.
+    """
     mark = next((index for index, plan in enumerate(compared.plans) if plan is chosen), None)
     how = model_name(plan.pulses for plan in compared.plans)
     ideal = [plan.scheme for plan in compared.plans if plan.pulses.idealised]
@@ -74,10 +93,12 @@ def _four(value: float) -> str:
 
 
 def _columns(compared: Comparison, chosen: Plan | None) -> Iterator[Column]:
-    body, least = compared.spacecraft, limits(compared.spacecraft)
+    body = compared.spacecraft
+    least = limits(compared.spacecraft)
     feasible = [plan for plan in compared.plans if plan.feasible]
     fuelled = any(plan.pulses.propellant is not None for plan in feasible)
-    aimed, everywhere = body.goal.axis is not None, "screen full page"
+    aimed = body.goal.axis is not None
+    everywhere = "screen full page"
 
     def met(plan: Plan) -> bool | None:
         return compared.verdicts[plan].met if plan.feasible else None
@@ -89,10 +110,14 @@ def _columns(compared: Comparison, chosen: Plan | None) -> Iterator[Column]:
     def shortly(largest: float) -> Callable[[float], str]:
         return lambda angle: short_angle(math.radians(angle), largest)
 
-    yield Column("scheme", Shared.SCHEME, "", attrgetter("scheme"), where=f"{everywhere} csv", kind=TEXT)
+    yield Column(
+        "scheme", Shared.SCHEME, "", attrgetter("scheme"), where=f"{everywhere} csv", kind=TEXT
+    )
     yield Column("feasible", "", "", attrgetter("feasible"), where="csv", kind=YES_NO)
     yield Column("recommended", "", "", lambda plan: plan is chosen, where="csv", kind=YES_NO)
-    yield Column("status", "", "", lambda plan: compared.verdicts[plan].status.value, where="csv", kind=TEXT)
+    yield Column(
+        "status", "", "", lambda plan: compared.verdicts[plan].status.value, where="csv", kind=TEXT
+    )
     yield Column("meets_requirement", "", "", met, where="csv", kind=YES_NO)
     yield Column("met_fraction", "", "", share, where="csv")
     count = _feasible(lambda plan: len(plan.pulses))
@@ -113,30 +138,69 @@ def _columns(compared: Comparison, chosen: Plan | None) -> Iterator[Column]:
         heading = f"{name.replace('_', ' ')}, impulses (17)"
         yield Column("", heading, "deg", angle_of(f"residual.{name}"), small_angle, "full")
     ends = ("full page", everywhere) if aimed else (everywhere, "")
-    shown = {"nutation": everywhere, "body_cone": "full", "space_cone": "full", "momentum_shift": ends[0],
-             "axis_error": ends[1]}  # fmt: skip
+    shown = {
+        "nutation": everywhere,
+        "body_cone": "full",
+        "space_cone": "full",
+        "momentum_shift": ends[0],
+        "axis_error": ends[1],
+    }
     for name, where in shown.items():
-        heading, angle = name.replace("_", " "), angle_of(f"flown.{name}")
+        heading = name.replace("_", " ")
+        angle = angle_of(f"flown.{name}")
         if "screen" in where:
             yield Column("", heading, "", angle, shortly(least[name != "nutation"]), "screen")
-        yield Column(f"{name}_deg", heading, "deg", angle, small_angle, where.removeprefix("screen ") + " csv")
-    keys = ("tilt_deg", "azimuth_deg") if body.attitude is None else ("right_ascension_deg", "declination_deg")
+        yield Column(
+            f"{name}_deg",
+            heading,
+            "deg",
+            angle,
+            small_angle,
+            where.removeprefix("screen ") + " csv",
+        )
+    keys = (
+        ("tilt_deg", "azimuth_deg")
+        if body.attitude is None
+        else ("right_ascension_deg", "declination_deg")
+    )
     names = parts.angle_names(body) if body.attitude is None else SHORT_NAMES
     for at, key in enumerate(keys):
-        yield Column(f"axis_{key}", "", "", _feasible(partial(_direction, "axis", key)), where="csv")
-        yield Column("", f"axis {names[at]}", "deg", _feasible(partial(_shown_direction, at)), where="full page")
+        yield Column(
+            f"axis_{key}", "", "", _feasible(partial(_direction, "axis", key)), where="csv"
+        )
+        yield Column(
+            "",
+            f"axis {names[at]}",
+            "deg",
+            _feasible(partial(_shown_direction, at)),
+            where="full page",
+        )
     for key in keys:
-        yield Column(f"momentum_{key}", "", "", _feasible(partial(_direction, "momentum", key)), where="csv")
+        yield Column(
+            f"momentum_{key}", "", "", _feasible(partial(_direction, "momentum", key)), where="csv"
+        )
     yield Column("spin_rad_s", "", "", _feasible("flight.final.spin"), where="csv")
     if body.goal.spin is not None:
-        yield Column("", "final spin", "rad/s", _feasible("flight.settled.spin"), to_figures(6), "full")
+        yield Column(
+            "", "final spin", "rad/s", _feasible("flight.settled.spin"), to_figures(6), "full"
+        )
     where = "full csv" + " page" * any(plan.spin_change for plan in compared.plans)
-    yield Column("spin_change_rad_s", "spin change", "rad/s", attrgetter("spin_change"), _four, where)
+    yield Column(
+        "spin_change_rad_s", "spin change", "rad/s", attrgetter("spin_change"), _four, where
+    )
     yield Column("delta_v_m_s", "", "", speed, where="csv")
     for bound in (*requirements.required(body), *requirements.cones(body)):
         name = f"{bound.label} {verdicts.limit(bound)}"
         yield Column("", name, "", _feasible(partial(_bound, bound)), where="full", kind=TEXT)
-    yield Column("", Shared.VERDICT, "", partial(scheme_verdict, compared), where=everywhere, kind=TEXT, met=met)
+    yield Column(
+        "",
+        Shared.VERDICT,
+        "",
+        partial(scheme_verdict, compared),
+        where=everywhere,
+        kind=TEXT,
+        met=met,
+    )
     yield Column("why", "", "", infeasibility, where="csv", kind=TEXT)
 
 
@@ -155,31 +219,45 @@ def _bound(bound: Bound, plan: Plan) -> str:
 
 
 def glance(compared: Comparison, robust: Sequence[Note] | None = None) -> RenderableType:
-    """The screen of a comparison and the plan to fly, one of those compared, or of the reason why there is none.
+    """The screen of a comparison and the plan to fly, one of those compared, or of the reason why
+    there is none.
 
     ``robust``: notes on the choice, where dispersed cases made it.
     """
     judged, plan = compared.verdict, compared.recommended
-    head, fired = [*parts.title(compared.spacecraft), headline(compared)], None
+    head = [*parts.title(compared.spacecraft), headline(compared)]
+    fired = None
     ending: list[RenderableType] = []
     if plan is not None:
         head.append(verdicts.coloured(verdicts.statement(judged), judged.light))
         ending = [verdicts.bound_table(judged).screen("screen"), ends(plan), Text()]
         least = limits(compared.spacecraft)[0]
-        fired = parts.block_table(plan.flight) if plan.pulses.blocks else parts.pulse_table(plan.flight, least=least)
+        fired = (
+            parts.block_table(plan.flight)
+            if plan.pulses.blocks
+            else parts.pulse_table(plan.flight, least=least)
+        )
     schemes = scheme_table(compared, plan).screen("screen", between=" ")
 
     def table(first: int | None = None) -> RenderableType:
-        rows = [*ending, fired.screen("screen", first=first), Text()] if fired is not None and fired.rows else ending
+        rows = (
+            [*ending, fired.screen("screen", first=first), Text()]
+            if fired is not None and fired.rows
+            else ending
+        )
         return Group(*rows, schemes)
 
-    written = "--blocks blocks.csv" if plan is not None and plan.pulses.blocks else "--csv pulses.csv"
+    written = (
+        "--blocks blocks.csv" if plan is not None and plan.pulses.blocks else "--csv pulses.csv"
+    )
     every = [*(robust or ()), *notes(compared, robust=robust is not None)]
     return parts.summary(head, table, every, f"{written} · --plot plan.png · nutdamp report")
 
 
 def notes(compared: Comparison, *, robust: bool = False) -> list[Note]:
-    """Warnings, then notes in the order of their worth; a ``robust`` plan was made for what others miss."""
+    """Warnings, then notes in the order of their worth; a ``robust`` plan was made for what others
+    miss.
+    """
     chosen = compared.recommended
     infeasible = [note for plan in compared.plans if not plan.feasible for note in plan_notes(plan)]
     if chosen is None:
@@ -191,7 +269,9 @@ def notes(compared: Comparison, *, robust: bool = False) -> list[Note]:
 
 
 def headline(compared: Comparison) -> Text:
-    """Headline of the plan to fly: scheme, pulses, cost and end; or that it is not enough, not needed, not found."""
+    """Headline of the plan to fly: scheme, pulses, cost and end; or that it is not enough, not
+    needed, not found.
+    """
     judged = compared.verdict
     lead, about = verdicts.headline(judged, compared)
     return Text.assemble((lead, f"bold {verdicts.STYLES[judged.light]}"), about)
@@ -203,16 +283,23 @@ def ends(plan: Plan) -> Table:
     left = flight.residual
     formula, (least, turn) = plan.residual, limits(body)
     angles = [f"nutation {short_angle(left.nutation, least)}"]
-    if not body.inertia.wheel and left.body_cone < 0.5 * math.pi:  # where ω need not lie near H, cones tell nothing
+    if (
+        not body.inertia.wheel and left.body_cone < 0.5 * math.pi
+    ):  # where ω need not lie near H, cones tell nothing
         angles += [f"body cone {short_angle(left.body_cone, least)}"]
         angles += [f"space cone {short_angle(left.space_cone, least)}"]
-    if formula is not None and (by_impulses := short_angle(formula.nutation, least)) not in angles[0].split():
+    if (
+        formula is not None
+        and (by_impulses := short_angle(formula.nutation, least)) not in angles[0].split()
+    ):
         angles[0] += f" (17: {by_impulses})"
     rows = [("after pulses, deg", "  ".join(angles))]
     first, second = parts.angle_texts(body, flight.final.axis)
     names = parts.angle_names(body) if body.attitude is None else SHORT_NAMES
     turned = f"turned by {short_angle(left.momentum_shift, turn)} deg"
-    turned = turned if body.goal.axis is None else f"{short_angle(left.axis_error, turn)} deg off target"
+    turned = (
+        turned if body.goal.axis is None else f"{short_angle(left.axis_error, turn)} deg off target"
+    )
     final = flight.final.spin
     spin = f"; spin {final * RPM:.5g} rpm" * (not requirements.spins_at(body, final))
     rows.append(("axis", f"{names[0]} {first}, {names[1]} {second}; H {turned}{spin}"))
@@ -225,7 +312,12 @@ def comparison_screen(compared: Comparison) -> RenderableType:
     """All tables of ``plan``, the verdict on top."""
     judged, chosen = compared.verdict, compared.recommended
     schemes = scheme_table(compared, chosen).transposed("full")
-    results: list[RenderableType] = [Text(), parts.derived_table(compared.spacecraft), Text(), schemes]
+    results: list[RenderableType] = [
+        Text(),
+        parts.derived_table(compared.spacecraft),
+        Text(),
+        schemes,
+    ]
     lead: list[RenderableType] = [parts.named(compared.spacecraft), headline(compared)]
     remarks = [note for plan in compared.plans for note in plan_notes(plan)]
     results += [Text(), *map(screen_line, ordered(remarks))] if remarks else []
@@ -238,16 +330,25 @@ def comparison_screen(compared: Comparison) -> RenderableType:
         totals: dict[str, float] = {}
         for pulse in pulses:
             totals[pulse.channel] = totals.get(pulse.channel, 0.0) + pulse.loaded[1]
-        on_times = facts((f"on-time of {channel}", f"{total:.4f} s") for channel, total in totals.items())
+        on_times = facts(
+            (f"on-time of {channel}", f"{total:.4f} s") for channel, total in totals.items()
+        )
         results += [Text(), parts.pulse_table(chosen.flight).screen("full"), Text(), on_times]
-    why, warnings = joined(reasons(compared)), comparison_warnings(compared, tabulated=True)
+    why = joined(reasons(compared))
+    warnings = comparison_warnings(compared, tabulated=True)
     beside = [*warnings, *verdict_notes(judged, chosen), *alternatives(compared)]
     return Group(
         *lead,
         Text(sentence(verdicts.statement(judged)), verdicts.STYLES[judged.light]),
         Text(sentence(f"{chosen.scheme}: {why}")),
         *(
-            Text(f"cheaper: {cheaper.scheme}, {verdicts.spent(cheaper.schedule)}, {text(cheaper.why)}", "dim")
+            Text(
+                (
+                    f"cheaper: {cheaper.scheme}, {verdicts.spent(cheaper.schedule)}, "
+                    f"{text(cheaper.why)}"
+                ),
+                "dim",
+            )
             for cheaper in judged.cheaper
         ),
         *map(screen_line, ordered(beside)),

@@ -1,8 +1,9 @@
-"""The guide that ``nutdamp explain`` shows, read from its Markdown pages; `nutdamp.views.explain` finds words in them.
+"""The guide that ``nutdamp explain`` shows, read from its Markdown pages; `nutdamp.views.explain`
+finds words in them.
 
-A page begins with ``# Title`` and a line of summary; its topic has the name of the file. On the pages of `ENTRIES` each
-``## name`` begins a topic of its own, again with a line of summary. Rows are those of tables of two columns, and
-entries of lists that begin with ``**name**:``.
+A page begins with ``# Title`` and a line of summary; its topic has the name of the file. On the
+pages of `ENTRIES` each ``## name`` begins a topic of its own, again with a line of summary. Rows
+are those of tables of two columns, and entries of lists that begin with ``**name**:``.
 """
 
 from __future__ import annotations
@@ -23,7 +24,9 @@ FORMULA = re.compile(r"(?:^    .+\n?)+", re.MULTILINE)
 
 
 class Topic(NamedTuple):
-    """One thing to explain: the ``name`` to request it by, one line about it, and its ``text`` in Markdown."""
+    """One thing to explain: the ``name`` to request it by, one line about it, and its ``text`` in
+    Markdown.
+    """
 
     name: str
     summary: str
@@ -51,7 +54,9 @@ ENTRIES = ("schemes", "motion", "equations")  # pages whose sections are topics 
 
 @cache
 def page(name: str) -> Topic:
-    """The page of that name; of a page of `ENTRIES` its introduction and the names of its topics."""
+    """The page of that name; of a page of `ENTRIES` its introduction
+    and the names of its topics.
+    """
     if name not in ENTRIES:
         return _topic(_text(name))._replace(name=name)
     intro = _topic(_text(name).partition("\n## ")[0])
@@ -66,14 +71,18 @@ def entries(name: str) -> tuple[Topic, ...]:
 
 
 def _text(name: str) -> str:
-    """The text of a page, without comments and pictures, and of links the words alone, which are names of topics."""
+    """The text of a page, without comments and pictures, and of links the words alone, which are
+    names of topics.
+    """
     text = (FOLDER / f"{name}.md").read_text(encoding="utf-8")
     text = re.sub(r"<!--.*?-->\n?|!\[.*?\]\(.*?\)\n?", "", text, flags=re.DOTALL)
     return re.sub(r"\[([^\]\n]+)\]\([^)\s]*\)", r"\1", text)
 
 
 def _topic(text: str) -> Topic:
-    """The topic of a text whose first line is its name, and whose first paragraph is the summary."""
+    """The topic of a text whose first line is its name,
+    and whose first paragraph is the summary.
+    """
     name, summary, *rest = text.strip("\n").split("\n\n", 2)
     return Topic(name, " ".join(summary.split()), "".join(rest))
 
@@ -82,7 +91,19 @@ PAGES = (  # the pages in groups
     ("To begin", ("tutorial", "reading", "cases", "glossary")),
     (
         "How to",
-        ("pointing", "trade", "robust", "blocks", "valves", "loop", "budget", "campaign", "fit", "report", "library"),
+        (
+            "pointing",
+            "trade",
+            "robust",
+            "blocks",
+            "valves",
+            "loop",
+            "budget",
+            "campaign",
+            "fit",
+            "report",
+            "library",
+        ),
     ),
     ("Reference", ("commands", "file", "csv", "json", "notes", "units")),
     ("Theory", ("schemes", "motion", "equations", "symbols", "limits")),
@@ -92,9 +113,14 @@ PAGES = (  # the pages in groups
 FILE = "file"  # name of the page on the spacecraft file
 SCHEMES, MOTION = entries("schemes"), entries("motion")
 
-SOURCE = 'M(n): K. Magnus, "Untersuchungen über zeitabhängig selbsterregte, symmetrische Kreisel", 1970'
+SOURCE = (
+    'M(n): K. Magnus, "Untersuchungen über zeitabhängig selbsterregte, symmetrische Kreisel", 1970'
+)
 
-NAMES = (*(name for _, names in PAGES for name in names), *(topic.name for topic in (*SCHEMES, *MOTION)))
+NAMES = (
+    *(name for _, names in PAGES for name in names),
+    *(topic.name for topic in (*SCHEMES, *MOTION)),
+)
 """Names of pages, and of the topics on them that are no equations."""
 
 NUMBER = re.compile(r"(?P<source>m|k|§)?\s*\(?\s*(?P<number>[0-9]+(\.[0-9]+)?)\s*\)?")
@@ -115,7 +141,9 @@ def found(requested: str) -> Topic:
         called = number if "." in number else f"{'K' if match['source'] == 'k' else 'M'}({number})"
         if equation := next((entry for entry in EQUATIONS if entry.number == called), None):
             return equation.topic
-        raise BadRequest(f"there is no equation {called}; there are M(1) to M(27), K(5) to K(15) and 24.4")
+        raise BadRequest(
+            f"there is no equation {called}; there are M(1) to M(27), K(5) to K(15) and 24.4"
+        )
     raise BadRequest(f"there is no topic {requested!r}; {meant(name, NAMES)}")
 
 
@@ -138,8 +166,8 @@ def limits() -> tuple[str, ...]:
 class Equation(NamedTuple):
     """A numbered equation as printed, and its use in nutdamp.
 
-    ``symbols`` are names of `SYMBOLS`; ``changed`` tells the differences from the print, with the formula used instead
-    where there is one; ``place`` is the dotted name of the code that holds it.
+    ``symbols`` are names of `SYMBOLS`; ``changed`` tells the differences from the print, with the
+    formula used instead where there is one; ``place`` is the dotted name of the code that holds it.
     """
 
     number: str
@@ -151,10 +179,13 @@ class Equation(NamedTuple):
 
     @classmethod
     def of(cls, topic: Topic) -> Equation:
-        """The equation of a topic of `equations.md`: its formula, symbols and place, and its changes."""
+        """The equation of a topic of `equations.md`: its formula, symbols and place, and its
+        changes.
+        """
         facts = dict(topic.rows)
         changed = topic.text.partition(facts["place"])[2].strip("\n")
-        formula, symbols = topic.text.partition("\n\n")[0], tuple(facts["symbols"].split())
+        formula = topic.text.partition("\n\n")[0]
+        symbols = tuple(facts["symbols"].split())
         return cls(topic.name, topic.summary, formula, symbols, facts["place"], changed)
 
     @property
@@ -174,18 +205,24 @@ class Equation(NamedTuple):
 SYMBOLS = dict(page("symbols").rows)  # symbols of the sources with their units
 
 EQUATIONS = tuple(map(Equation.of, entries("equations")))
-"""Equations of Magnus 1970, of the lecture texts "Kreisel-Bewegungen" and "Kreiseltheorie", and of nutdamp itself."""
+"""Equations of Magnus 1970, of the lecture texts "Kreisel-Bewegungen" and "Kreiseltheorie", and of
+nutdamp itself.
+"""
 
 
 class NoteEntry(NamedTuple):
-    """A code of the catalogue: its severity, its sentence with names of values in braces, and what it means."""
+    """A code of the catalogue: its severity, its sentence with names of values in braces, and what
+    it means.
+    """
 
     severity: str
     sentence: str
     paragraph: str
 
 
-NOTE_ENTRY = re.compile(r"^## (\S+) \((\w+)\)\n\n((?:> [^\n]*\n)+)\n(.*?)(?=\n## |\Z)", re.MULTILINE | re.DOTALL)
+NOTE_ENTRY = re.compile(
+    r"^## (\S+) \((\w+)\)\n\n((?:> [^\n]*\n)+)\n(.*?)(?=\n## |\Z)", re.MULTILINE | re.DOTALL
+)
 
 
 @cache

@@ -1,4 +1,6 @@
-"""Screens and data of the closed loop: firings, dead band and margins, and the budget of holding the nutation."""
+"""Screens and data of the closed loop: firings, dead band and margins, and the budget of holding
+the nutation.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +30,17 @@ from nutdamp.views import decisions, tables
 from nutdamp.views import verdict as verdicts
 from nutdamp.views.decisions import heading
 from nutdamp.views.parts import opening, pulse_table, seconds, summary
-from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable, Shared, angle_of, facts, to_figures
+from nutdamp.views.tables import (
+    TEXT,
+    WHOLE,
+    YES_NO,
+    Column,
+    DataTable,
+    Shared,
+    angle_of,
+    facts,
+    to_figures,
+)
 from nutdamp.views.text import (
     duration,
     lasting,
@@ -44,11 +56,14 @@ from nutdamp.views.text import (
 
 SHOWN = 40  # largest number of firings in a table of a screen
 ROUNDING = 1e-12  # share of the nutation that a firing leaves by rounding alone
-TILTED = 1e-3  # share of start below which what tilted gyros show of the spin does not matter, whatever stop
+# share of start below which what tilted gyros show of the spin does not matter, whatever stop
+TILTED = 1e-3
 
 
 class FiringRow(NamedTuple):
-    """A firing, from 0, with the nutation before and after it, rad; ``apart``: start, on-time, nutation by DOP853."""
+    """A firing, from 0, with the nutation before and after it, rad; ``apart``: start, on-time,
+    nutation by DOP853.
+    """
 
     at: int
     firing: Fired
@@ -61,44 +76,104 @@ APART = "{:.1e}".format  # text of a difference
 
 FIRINGS = (
     Column("", "firing", "", lambda row: row.at + 1, where="screen verified", kind=WHOLE),
-    Column("channel", Shared.CHANNEL, "", lambda row: row.firing.pulse.channel, where="verified verified_json",
-           kind=TEXT),
+    Column(
+        "channel",
+        Shared.CHANNEL,
+        "",
+        lambda row: row.firing.pulse.channel,
+        where="verified verified_json",
+        kind=TEXT,
+    ),
     Column("", Shared.START, "s", lambda row: row.firing.pulse.start, seconds, "screen"),
-    Column("start_s", Shared.START, "s", lambda row: row.firing.pulse.loaded[0], seconds, "verified verified_json"),
-    Column("start_difference_s", "differs by", "s", lambda row: row.apart[0], APART, "verified verified_json"),
+    Column(
+        "start_s",
+        Shared.START,
+        "s",
+        lambda row: row.firing.pulse.loaded[0],
+        seconds,
+        "verified verified_json",
+    ),
+    Column(
+        "start_difference_s",
+        "differs by",
+        "s",
+        lambda row: row.apart[0],
+        APART,
+        "verified verified_json",
+    ),
     Column("", Shared.ON_TIME, "s", lambda row: row.firing.pulse.on_time, seconds, "screen"),
-    Column("on_time_s", Shared.ON_TIME, "s", lambda row: row.firing.pulse.loaded[1], seconds, "verified verified_json"),
-    Column("on_time_difference_s", "differs by", "s", lambda row: row.apart[1], APART, "verified verified_json"),
+    Column(
+        "on_time_s",
+        Shared.ON_TIME,
+        "s",
+        lambda row: row.firing.pulse.loaded[1],
+        seconds,
+        "verified verified_json",
+    ),
+    Column(
+        "on_time_difference_s",
+        "differs by",
+        "s",
+        lambda row: row.apart[1],
+        APART,
+        "verified verified_json",
+    ),
     Column("", Shared.CHANNEL, "", lambda row: row.firing.pulse.channel, where="screen", kind=TEXT),
     *tables.file_columns("json", "decided_s=firing.decided"),
     Column("seen_deg", "nutation seen", "deg", angle_of("firing.seen"), small_angle, "screen json"),
     Column("", "before", "deg", angle_of("before"), small_angle, "screen"),
     Column("", "after", "deg", angle_of("after"), small_angle, "screen"),
     Column("", "nutation", "deg", angle_of("firing.true_nutation"), small_angle, "verified"),
-    Column("nutation_difference_deg", "differs by", "deg", lambda row: math.degrees(row.apart[2]), APART,
-           "verified verified_json"),
-)  # fmt: skip
+    Column(
+        "nutation_difference_deg",
+        "differs by",
+        "deg",
+        lambda row: math.degrees(row.apart[2]),
+        APART,
+        "verified verified_json",
+    ),
+)
 
 
 def firing_table(run: LoopRun) -> DataTable:
     """The firings of a run."""
     before, after = run.flight.around_pulses()
     angles = zip(run.fired, before.nutation.tolist(), after.nutation.tolist(), strict=True)
-    return DataTable("Firings", FIRINGS, [FiringRow(index, *row) for index, row in enumerate(angles)])
+    return DataTable(
+        "Firings", FIRINGS, [FiringRow(index, *row) for index, row in enumerate(angles)]
+    )
 
 
 MARGINS = (
     Column("channel", Shared.CHANNEL, "", lambda row: row.channel, where="screen json", kind=TEXT),
     Column("late_deg", "late", "deg", angle_of("late"), to_figures(4), "screen json"),
     *tables.file_columns("json", "latest_deg"),
-    Column("gain", "remaining", "%", lambda row: row.gain,
-           lambda gain: f"{100.0 * gain:.4g}" if gain >= ROUNDING else "0", "screen json"),
-    Column("growth", "growth in a period", "%", lambda row: row.growth, lambda growth: f"{100.0 * (growth - 1.0):.3g}",
-           "screen json"),
-    Column("", "delay margin", "", lambda row: row.delay, lambda delay: "none" if delay < 0.0 else duration(delay),
-           "screen"),
+    Column(
+        "gain",
+        "remaining",
+        "%",
+        lambda row: row.gain,
+        lambda gain: f"{100.0 * gain:.4g}" if gain >= ROUNDING else "0",
+        "screen json",
+    ),
+    Column(
+        "growth",
+        "growth in a period",
+        "%",
+        lambda row: row.growth,
+        lambda growth: f"{100.0 * (growth - 1.0):.3g}",
+        "screen json",
+    ),
+    Column(
+        "",
+        "delay margin",
+        "",
+        lambda row: row.delay,
+        lambda delay: "none" if delay < 0.0 else duration(delay),
+        "screen",
+    ),
     *tables.file_columns("json", "delay_margin_s=delay", "damps", "reversed=turned"),
-)  # fmt: skip
+)
 
 
 def margin_table(rows: tuple[Margin, ...]) -> DataTable:
@@ -111,7 +186,9 @@ def loop_screen(plan: LoopPlan, *, verbose: bool = True) -> RenderableType:
     run, judged = plan.flown_run, plan.verdict
     (_, spent), (_, end) = decisions.cost(plan.flight.schedule)
     fired = f"{spent}, last ends at {end}" if run.fired else "no firing"
-    headline = Text.assemble("LOOP ", (run.loop.law, "bold"), f": {fired}; first quiet {_settled(run)}")
+    headline = Text.assemble(
+        "LOOP ", (run.loop.law, "bold"), f": {fired}; first quiet {_settled(run)}"
+    )
     head = [*opening(plan.spacecraft, verbose), headline, *_verdict(plan)]
     head.append(verdicts.bound_table(judged).screen("screen"))
     return summary(
@@ -119,20 +196,28 @@ def loop_screen(plan: LoopPlan, *, verbose: bool = True) -> RenderableType:
         partial(firing_table(run).screen, "screen", first=SHOWN - 1) if run.fired else None,
         _notes(plan, judged),
         "--plot loop.png · nutdamp disperse --loop",
-        more=[margin_table(plan.margins).screen("screen"), facts(decisions.end_rows(plan.flight, plan.aspects))],
+        more=[
+            margin_table(plan.margins).screen("screen"),
+            facts(decisions.end_rows(plan.flight, plan.aspects)),
+        ],
         verbose=verbose,
     )
 
 
 def _notes(plan: LoopPlan, judged: Verdict) -> Iterator[Note]:
-    run, band, share = plan.flown_run, math.degrees(plan.band.most), 100.0 * SURELY
+    run = plan.flown_run
+    band = math.degrees(plan.band.most)
+    share = 100.0 * SURELY
     yield from warnings(plan.spacecraft)
     yield from verdict_notes(judged, plan, looped=True)
     if run.settled is None:
         yield note("dead-band", band_deg=band, cases_share=share)
     else:
-        largest, when = math.degrees(plan.largest[0]), plan.largest[1]
-        yield note("dead-band-held", band_deg=band, cases_share=share, largest_deg=largest, at_s=when)
+        largest = math.degrees(plan.largest[0])
+        when = plan.largest[1]
+        yield note(
+            "dead-band-held", band_deg=band, cases_share=share, largest_deg=largest, at_s=when
+        )
     least = min(plan.margins, key=lambda margin: margin.delay, default=None)
     if least is not None and least.delay >= 0.0:
         yield note("delay-margin", margin_s=least.delay, channel=least.channel)
@@ -151,7 +236,11 @@ def _verdict(plan: LoopPlan) -> Iterator[Text]:
         yield screen_line(stopped(run))
     elif run.lost:
         full = run.stop is Ending.FULL
-        why = "limits.max_pulses is reached" if full else "the loop is never down to its stop threshold"
+        why = (
+            "limits.max_pulses is reached"
+            if full
+            else "the loop is never down to its stop threshold"
+        )
         yield verdicts.coloured(f"{case}{verdicts.lead(judged)}: {why}", judged.light)
     else:
         yield verdicts.coloured(f"{case}{words}", judged.light)
@@ -162,7 +251,11 @@ def described(loop: Loop, *, thresholds: bool = True) -> str:
     sensor = loop.sensor
     kind = "gyros" if sensor.kind == GYRO else "an accelerometer"
     rate = "a continuous signal" if sensor.rate is None else f"{sensor.rate:g} Hz"
-    timing = "firings centred on their moments" if loop.predict else "firings begun as the sensor shows their moment"
+    timing = (
+        "firings centred on their moments"
+        if loop.predict
+        else "firings begun as the sensor shows their moment"
+    )
     band = f"; fires from {most(loop.start)} down to {most(loop.stop)}" if thresholds else ""
     return f"Loop: {loop.law}, from {kind} ({rate}){band}; {timing}"
 
@@ -182,11 +275,15 @@ def stopped(run: LoopRun) -> Note:
     """The reason why the loop was stopped by a fault."""
     channels = ", ".join(dict.fromkeys(firing.pulse.channel for firing in run.fired))
     at = run.fired[-1].pulse.end if run.fired else 0.0
-    return note(STOPS[run.stop], at_s=at, firings=len(run.fired), channel=run.channel, channels=channels)
+    return note(
+        STOPS[run.stop], at_s=at, firings=len(run.fired), channel=run.channel, channels=channels
+    )
 
 
 def warnings(spacecraft: Spacecraft) -> Iterator[Note]:
-    """Parts of the loop in the file that will feed the nutation, or waste propellant: before it is flown."""
+    """Parts of the loop in the file that will feed the nutation, or waste propellant: before it is
+    flown.
+    """
     loop = spacecraft.loop
     if loop is None:
         return
@@ -199,7 +296,9 @@ def warnings(spacecraft: Spacecraft) -> Iterator[Note]:
     late = feeding(spacecraft, loop)
     if late is not None:
         yield note("loop-does-not-damp", why=too_late(late))
-    band, start, stop = dead_band(spacecraft, loop), math.degrees(loop.start), math.degrees(loop.stop)
+    band = dead_band(spacecraft, loop)
+    start = math.degrees(loop.start)
+    stop = math.degrees(loop.stop)
     step, noise = math.degrees(band.step), math.degrees(band.noise)
     if band.step > loop.start * (1.0 + 1e-9):
         yield note("start-below-pulse", start_deg=start, step_deg=step)
@@ -218,33 +317,56 @@ def _settled(run: LoopRun) -> str:
         return f"at {moment(run.settled)}"
     if not run.fired and not run.lost:
         return "always: it never shows the start threshold"
-    return "never: the loop is not down to the stop threshold" if run.loop.stop > 0.0 else "never: loop.stop is 0"
+    return (
+        "never: the loop is not down to the stop threshold"
+        if run.loop.stop > 0.0
+        else "never: loop.stop is 0"
+    )
 
 
 def verification_screen(verification: LoopVerification) -> RenderableType:
     """The loop beside the same by DOP853."""
     run, other = verification.run, verification.other
-    parts = [*opening(run.flight.spacecraft, verbose=True), Text(described(run.loop), style="bold"), Text()]
+    parts = [
+        *opening(run.flight.spacecraft, verbose=True),
+        Text(described(run.loop), style="bold"),
+        Text(),
+    ]
     if other is None:
         return Group(*parts, Text(f"NOT CONFIRMED by DOP853: {verification.missing}."))
     result = f"DOP853, the file alone, {verification.evaluations:,} evaluations, fires "
     if verification.agree:
-        result += f"alike: {len(run.fired)} firings, times within {verification.worst:.1g} s ({AGREE:g} s allowed)."
+        result += (
+            f"alike: {len(run.fired)} firings, times within {verification.worst:.1g} s "
+            f"({AGREE:g} s allowed)."
+        )
     elif verification.same:
-        result += f"DIFFERENTLY: times differ by up to {verification.worst:.2g} s ({AGREE:g} s allowed)."
+        result += (
+            f"DIFFERENTLY: times differ by up to {verification.worst:.2g} s ({AGREE:g} s allowed)."
+        )
     else:
-        result += f"DIFFERENTLY: {len(other.fired)} firings instead of {len(run.fired)}, or other channels."
-    return Group(*parts, _differences(verification).screen("verified", first=SHOWN - 1), Text(), Text(result))
+        result += (
+            f"DIFFERENTLY: {len(other.fired)} firings instead of {len(run.fired)}, "
+            "or other channels."
+        )
+    return Group(
+        *parts, _differences(verification).screen("verified", first=SHOWN - 1), Text(), Text(result)
+    )
 
 
 def _differences(verification: LoopVerification) -> DataTable:
     pairs = enumerate(zip(verification.run.fired, verification.pairs, strict=False))
-    rows = [FiringRow(index, firing, firing.true_nutation, apart=apart) for index, (firing, apart) in pairs]
+    rows = [
+        FiringRow(index, firing, firing.true_nutation, apart=apart)
+        for index, (firing, apart) in pairs
+    ]
     return DataTable("Differences by DOP853", FIRINGS, rows)
 
 
 def loop_json(plan: LoopPlan) -> dict[str, Any]:
-    """Firings with the nutation seen, final motion, dead band, margin of each channel before it feeds, and notes."""
+    """Firings with the nutation seen, final motion, dead band, margin of each channel before it
+    feeds, and notes.
+    """
     run, body = plan.flown_run, plan.spacecraft
     pulses = zip(pulse_table(run.flight).json("flown"), firing_table(run).json(), strict=True)
     faults = [stopped(run)] if run.stop.fault else []
@@ -280,45 +402,114 @@ def verified_json(verification: LoopVerification) -> dict[str, Any]:
     }
 
 
-SLOW = 0.1  # share of its spin by which a year may change it before figures of the present spin mislead
+# share of its spin by which a year may change it before figures of the present spin mislead
+SLOW = 0.1
 
 
 def _of_cycle(name: str, scale: float = 1.0) -> Callable[[HeldNutation], float | None]:
     """A figure of the limit cycle times ``scale``; None without one."""
     figure = attrgetter(f"cycle.{name}")
-    return lambda held: None if held.cycle is None or figure(held) is None else scale * float(figure(held))
+    return lambda held: (
+        None if held.cycle is None or figure(held) is None else scale * float(figure(held))
+    )
 
 
 FILES, EVERYWHERE = "csv json", "screen csv json"
 
 
 HELD = (
-    Column("start_deg", Shared.START, "deg", angle_of("thresholds.start"), to_figures(4), EVERYWHERE),
+    Column(
+        "start_deg", Shared.START, "deg", angle_of("thresholds.start"), to_figures(4), EVERYWHERE
+    ),
     Column("stop_deg", "stop", "deg", angle_of("thresholds.stop"), to_figures(4), EVERYWHERE),
     *tables.file_columns(FILES, "first_firing_s=begins"),
-    Column("pulses_per_day", Shared.PULSES, "1/day", _of_cycle("pulses", DAY), to_figures(4), f"{EVERYWHERE} other"),
+    Column(
+        "pulses_per_day",
+        Shared.PULSES,
+        "1/day",
+        _of_cycle("pulses", DAY),
+        to_figures(4),
+        f"{EVERYWHERE} other",
+    ),
     Column("cycles_per_day", "", "", _of_cycle("cycles", DAY), where=f"{FILES} other"),
     Column("impulse_Nms_per_year", "", "", _of_cycle("impulse", YEAR), where=FILES),
-    Column("propellant_kg_per_year", Shared.PROPELLANT, "kg/year", _of_cycle("propellant", YEAR), to_figures(4),
-           f"{EVERYWHERE} other"),
+    Column(
+        "propellant_kg_per_year",
+        Shared.PROPELLANT,
+        "kg/year",
+        _of_cycle("propellant", YEAR),
+        to_figures(4),
+        f"{EVERYWHERE} other",
+    ),
     Column("sigma", "", "", _of_cycle("doubt"), where=FILES),
-    Column("", "cycle", "", _of_cycle("cycles"),
-           lambda cycles: lasting(1.0 / cycles) if cycles > 0.0 else "no pause", "screen"),
+    Column(
+        "",
+        "cycle",
+        "",
+        _of_cycle("cycles"),
+        lambda cycles: lasting(1.0 / cycles) if cycles > 0.0 else "no pause",
+        "screen",
+    ),
     Column("spin_change_rad_s_per_day", "", "", _of_cycle("spin_rate", DAY), where=FILES),
-    Column("nutation_low_deg", "after firing", "deg", angle_of("cycle.low"), to_figures(3), EVERYWHERE),
-    Column("nutation_high_deg", "before firing", "deg", angle_of("cycle.high"), to_figures(3), EVERYWHERE),
-    Column("nutation_largest_deg", Shared.MOST, "deg", angle_of("cycle.largest"), to_figures(3), EVERYWHERE),
-    Column("", Shared.SPIN, "%/day", lambda held: None if held.slows is None else 100.0 * held.slows * DAY / YEAR,
-           to_figures(2), "screen"),
+    Column(
+        "nutation_low_deg", "after firing", "deg", angle_of("cycle.low"), to_figures(3), EVERYWHERE
+    ),
+    Column(
+        "nutation_high_deg",
+        "before firing",
+        "deg",
+        angle_of("cycle.high"),
+        to_figures(3),
+        EVERYWHERE,
+    ),
+    Column(
+        "nutation_largest_deg",
+        Shared.MOST,
+        "deg",
+        angle_of("cycle.largest"),
+        to_figures(3),
+        EVERYWHERE,
+    ),
+    Column(
+        "",
+        Shared.SPIN,
+        "%/day",
+        lambda held: None if held.slows is None else 100.0 * held.slows * DAY / YEAR,
+        to_figures(2),
+        "screen",
+    ),
     *tables.file_columns(FILES, "noise_deg=band.noise", "smallest_pulse_deg=band.step"),
-    Column("tank_lasts_days", "tank", "days", lambda held: None if held.lasts is None else held.lasts / DAY,
-           to_figures(4), "screen", lambda budget: budget.spacecraft.tank is not None),
-    Column("tank_lasts_days", "", "", lambda held: None if held.lasts is None else held.lasts / DAY, where=FILES),
-    Column("", Shared.VERDICT, "", lambda held: verdicts.MET[bool(held.meets_requirement)], where="screen", kind=TEXT,
-           when=lambda budget: budget.meets_requirement is not None, met=lambda held: held.meets_requirement),
-    Column("meets_requirement", "", "", lambda held: held.meets_requirement, where=FILES, kind=YES_NO),
+    Column(
+        "tank_lasts_days",
+        "tank",
+        "days",
+        lambda held: None if held.lasts is None else held.lasts / DAY,
+        to_figures(4),
+        "screen",
+        lambda budget: budget.spacecraft.tank is not None,
+    ),
+    Column(
+        "tank_lasts_days",
+        "",
+        "",
+        lambda held: None if held.lasts is None else held.lasts / DAY,
+        where=FILES,
+    ),
+    Column(
+        "",
+        Shared.VERDICT,
+        "",
+        lambda held: verdicts.MET[bool(held.meets_requirement)],
+        where="screen",
+        kind=TEXT,
+        when=lambda budget: budget.meets_requirement is not None,
+        met=lambda held: held.meets_requirement,
+    ),
+    Column(
+        "meets_requirement", "", "", lambda held: held.meets_requirement, where=FILES, kind=YES_NO
+    ),
     Column("why", "", "", lambda held: held.why or None, where=FILES, kind=TEXT),
-)  # fmt: skip
+)
 
 
 def budget_table(budget: Budget) -> DataTable:
@@ -328,15 +519,20 @@ def budget_table(budget: Budget) -> DataTable:
 
 def budget_screen(budget: Budget, *, verbose: bool = True) -> RenderableType:
     """The screen of ``budget``."""
-    head = [*opening(budget.spacecraft, verbose), *(Text(line, "bold") for line in sentences(_outlook(budget)))]
+    head = [
+        *opening(budget.spacecraft, verbose),
+        *(Text(line, "bold") for line in sentences(_outlook(budget))),
+    ]
     rows = partial(budget_table(budget).screen, "screen") if budget.held else None
     steps = "--csv budget.csv · --plot budget.png · nutdamp loop"
     return summary(head, rows, _budget_notes(budget), steps, verbose=verbose)
 
 
 def _outlook(budget: Budget) -> Iterator[Note]:
-    body, limit = budget.spacecraft, None if budget.largest is None else math.degrees(budget.largest)
-    now, until = math.degrees(body.nutation), budget.until_largest
+    body = budget.spacecraft
+    limit = None if budget.largest is None else math.degrees(budget.largest)
+    now = math.degrees(body.nutation)
+    until = budget.until_largest
     if body.growth == 0.0:
         yield note("nutation-stays", nutation_deg=now)
     elif body.growth < 0.0:
@@ -346,7 +542,12 @@ def _outlook(budget: Budget) -> Iterator[Note]:
         elif until == 0.0:
             yield note("nutation-decayed", e_fold_lasting_s=decay, limit_deg=limit)
         else:
-            yield note("nutation-decays-below", e_fold_lasting_s=decay, limit_deg=limit, until_lasting_s=until)
+            yield note(
+                "nutation-decays-below",
+                e_fold_lasting_s=decay,
+                limit_deg=limit,
+                until_lasting_s=until,
+            )
     elif body.nutation == 0.0:
         yield note("no-nutation-yet")
     elif limit is None:
@@ -383,7 +584,9 @@ def _budget_notes(budget: Budget) -> Iterator[Note]:
         step = math.degrees(band.step)
         yield note("smallest-pulse", step_deg=step, least_deg=0.5 * step)
     for begins in dict.fromkeys(row.begins for row in budget.held):
-        starts = ", ".join(most(row.thresholds.start) for row in budget.held if row.begins == begins)
+        starts = ", ".join(
+            most(row.thresholds.start) for row in budget.held if row.begins == begins
+        )
         if math.isinf(begins):
             yield note("first-firing-by-noise")
         elif begins == 0.0:
@@ -407,17 +610,29 @@ def _row_warnings(row: HeldNutation, budget: Budget) -> Iterator[Note]:
     if row.why:
         yield note("no-limit-cycle", why=row.why, start_deg=start, stop_deg=stop)
     else:
-        yield from warnings(replace(body, loop=replace(loop, start=row.thresholds.start, stop=row.thresholds.stop)))
+        yield from warnings(
+            replace(body, loop=replace(loop, start=row.thresholds.start, stop=row.thresholds.stop))
+        )
     if row.cycle is not None and row.cycle.cycles == 0.0:
         yield note("never-quiet", start_deg=start, stop_deg=stop)
     if row.noisy:
-        yield note("start-noisy", start_deg=start, noise_share=100.0 * NOISY, known_share=100.0 * WIDENED)
+        yield note(
+            "start-noisy", start_deg=start, noise_share=100.0 * NOISY, known_share=100.0 * WIDENED
+        )
     if row.other is not None and row.cycle is not None:
         words = ("never falls quiet", "falls quiet between firings")
         held, other = (words[cycle.cycles > 0.0] for cycle in (row.cycle, row.other))
         used = None if row.other.propellant is None else row.other.propellant * YEAR
-        yield note("two-limit-cycles", held=held, held_percent=100.0 * row.share, other=other, start_deg=start,
-                   stop_deg=stop, pulses=f"{row.other.pulses * DAY:.4g}", propellant=quantity(used, "kg"))  # fmt: skip
+        yield note(
+            "two-limit-cycles",
+            held=held,
+            held_percent=100.0 * row.share,
+            other=other,
+            start_deg=start,
+            stop_deg=stop,
+            pulses=f"{row.other.pulses * DAY:.4g}",
+            propellant=quantity(used, "kg"),
+        )
 
 
 def budget_csv(budget: Budget) -> str:
@@ -431,14 +646,22 @@ def budget_json(budget: Budget) -> dict[str, Any]:
     others = replace(table, rows=[replace(held, cycle=held.other) for held in budget.held])
     return {
         **heading(budget.spacecraft),
-        "notes": [note_json(entry) for entry in (*_outlook(budget), *ordered(_budget_notes(budget)))],
+        "notes": [
+            note_json(entry) for entry in (*_outlook(budget), *ordered(_budget_notes(budget)))
+        ],
         **tables.values_of(
-            budget, "growth_1_s=spacecraft.growth", "largest_deg", "until_largest_s", "law=spacecraft.loop.law"
+            budget,
+            "growth_1_s=spacecraft.growth",
+            "largest_deg",
+            "until_largest_s",
+            "law=spacecraft.loop.law",
         ),
         "status": budget.status.value,
         "meets_requirement": budget.meets_requirement,
         "thresholds": [
             row | {"other": None if held.other is None else rates}
-            for held, row, rates in zip(budget.held, table.json(), others.json("other"), strict=True)
+            for held, row, rates in zip(
+                budget.held, table.json(), others.json("other"), strict=True
+            )
         ],
     }

@@ -1,4 +1,6 @@
-"""Dispersed closed loops, for ``disperse --loop``: percentiles, share that settles, worst cases; one case alone."""
+"""Dispersed closed loops, for ``disperse --loop``: percentiles, share that settles, worst cases;
+one case alone.
+"""
 
 from __future__ import annotations
 
@@ -58,29 +60,41 @@ def _cases(study: LoopStudy, rows: Sequence[CaseRow]) -> DataTable:
 
 
 def _worst(results: LoopResults, count: int) -> list[CaseRow]:
-    study, cases = results.study, results.worst.cases[:count].tolist()
+    study = results.study
+    cases = results.worst.cases[:count].tolist()
     return [
-        CaseRow(case, study.draws_of(case), results.values[:, case].tolist(), results.angles[:, :, case])
+        CaseRow(
+            case, study.draws_of(case), results.values[:, case].tolist(), results.angles[:, :, case]
+        )
         for case in cases
     ]
 
 
 def _flown_case(study: LoopStudy, case: int, flown: FlownLoops) -> CaseRow:
     values = study.measured(flown)[0][:, 0].tolist()
-    return CaseRow(case, study.draws_of(case), values, flown.aspects[:, :, 0], flown.pilots[0].ending[0])
+    return CaseRow(
+        case, study.draws_of(case), values, flown.aspects[:, :, 0], flown.pilots[0].ending[0]
+    )
 
 
 def loop_cases_brief(flown: LoopDispersion) -> RenderableType:
-    """The default screen of ``disperse --loop``: verdict, percentiles, what counts most, and the worst case."""
+    """The default screen of ``disperse --loop``: verdict, percentiles, what counts most, and the
+    worst case.
+    """
     results = flown.core
     notes = list[Note]()
-    for output, part in zip(SHARED, ("the time to quiet", "the largest nutation", "propellant"), strict=True):
+    for output, part in zip(
+        SHARED, ("the time to quiet", "the largest nutation", "propellant"), strict=True
+    ):
         shares = results.shares(output.name).items()  # the rest is noise
         notes += leading(part, {in_words(name): share for name, share in shares if share >= MAIN})
     notes += unused_notes(results.study.model.inputs.unused)
     worst = [f"{dispersion.again(results)} (worst)"] * bool(len(results.worst.cases))
-    head, table = [*_title(results), *_verdicts(flown)], _percentiles(results)
-    return summary(head, lambda **_: table.screen("screen"), notes, " · ".join(["--csv cases.csv", *worst]))
+    head = [*_title(results), *_verdicts(flown)]
+    table = _percentiles(results)
+    return summary(
+        head, lambda **_: table.screen("screen"), notes, " · ".join(["--csv cases.csv", *worst])
+    )
 
 
 def _title(results: LoopResults) -> list[RenderableType]:
@@ -94,9 +108,13 @@ def _title(results: LoopResults) -> list[RenderableType]:
 def _verdicts(flown: LoopDispersion) -> Iterator[RenderableType]:
     results = flown.core
     yield from dispersion.verdict_lines(flown.verdict, results)
-    stopped = [(stop, count) for stop, count in results.stops.most_common() if stop is not Ending.END]
+    stopped = [
+        (stop, count) for stop, count in results.stops.most_common() if stop is not Ending.END
+    ]
     lasting = "and is not stopped, " if stopped else ""
-    yield Text.assemble(("Falls quiet ", "bold"), f"{lasting}in {_share(results.settled, results.done)}.")
+    yield Text.assemble(
+        ("Falls quiet ", "bold"), f"{lasting}in {_share(results.settled, results.done)}."
+    )
     parts = [f"stopped in {count:,}: {stop.value}" for stop, count in stopped]
     never = results.done - results.settled - sum(count for _, count in stopped)
     if never:
@@ -104,25 +122,40 @@ def _verdicts(flown: LoopDispersion) -> Iterator[RenderableType]:
     if parts:
         yield Text(f"Of the others: {'; '.join(parts)}.")
     if results.idle:
-        yield Text(f"In {results.idle:,} cases the sensor never shows the start threshold, and nothing fires.")
+        yield Text(
+            f"In {results.idle:,} cases the sensor never shows the start threshold, "
+            "and nothing fires."
+        )
     expected = degrees(results.study.band.most)
     share = _share(results.within, len(results.of("quiet")))
-    yield Text.assemble(("Dead band ", "bold"), f"(at most {expected}, from the nominal sensor): kept in {share}.")
+    yield Text.assemble(
+        ("Dead band ", "bold"), f"(at most {expected}, from the nominal sensor): kept in {share}."
+    )
 
 
 def loop_cases_screen(flown: LoopDispersion, *, worst: int) -> Group:
     """All tables of ``disperse --loop``."""
     results, study = flown.core, flown.core.study
     parts: list[RenderableType] = [*_title(results), Text(), _percentiles(results).screen("full")]
-    parts += [dispersion.angles_note(study.spacecraft), Text(), *_verdicts(flown), *_shares(results)]
-    anew = ", ".join(f"{in_words(entry.name)} {size_text(entry)}" for entry in study.model.of_firings)
+    parts += [
+        dispersion.angles_note(study.spacecraft),
+        Text(),
+        *_verdicts(flown),
+        *_shares(results),
+    ]
+    anew = ", ".join(
+        f"{in_words(entry.name)} {size_text(entry)}" for entry in study.model.of_firings
+    )
     if anew:
         parts.append(Text(f"Each firing draws anew, one sigma or bias: {anew}.", "dim"))
     rows = _worst(results, worst)
     if rows:
-        table, options = _cases(study, rows), dispersion.again(results)
+        table = _cases(study, rows)
+        options = dispersion.again(results)
         parts += [Text(), Text(table.title, style="bold"), table.screen("screen")]
-        parts.append(Text(f"Inspect one: {options}; firing by firing: nutdamp loop {options}", "dim"))
+        parts.append(
+            Text(f"Inspect one: {options}; firing by firing: nutdamp loop {options}", "dim")
+        )
     return Group(*parts, *unused_table(study.model.inputs.unused))
 
 
@@ -153,21 +186,40 @@ def _shares(results: LoopResults) -> Iterator[RenderableType]:
         share = shares[output.name]
         return 100.0 * share[entry.name] if share else None
 
-    ranked = sorted(inputs, key=lambda entry: -max(share.get(entry.name, 0.0) for share in shares.values()))
+    ranked = sorted(
+        inputs, key=lambda entry: -max(share.get(entry.name, 0.0) for share in shares.values())
+    )
     table = DataTable(
         "What it depends on",
         (
-            Column("", Shared.INPUT, "", lambda entry: in_words(entry.name), where="screen", kind=TEXT),
+            Column(
+                "", Shared.INPUT, "", lambda entry: in_words(entry.name), where="screen", kind=TEXT
+            ),
             Column("", "one sigma", "", size_text, where="screen"),
-            *(Column("", output.heading, "%", partial(percent, output), lambda share: f"{share:.1f}", "screen")
-              for output in SHARED),
+            *(
+                Column(
+                    "",
+                    output.heading,
+                    "%",
+                    partial(percent, output),
+                    lambda share: f"{share:.1f}",
+                    "screen",
+                )
+                for output in SHARED
+            ),
         ),
         ranked[:MOST_ROWS],
-    )  # fmt: skip
+    )
     yield from (Text(), Text(table.title, style="bold"), table.screen("screen"))
-    note = "Squared correlation over the cases that fall quiet; the rest is noise and what is not linear."
+    note = (
+        "Squared correlation over the cases that fall quiet; "
+        "the rest is noise and what is not linear."
+    )
     if results.study.model.groups:
-        note += " Of correlated inputs each has what it adds to those before it in the file's correlation."
+        note += (
+            " Of correlated inputs each has what it adds to those before it in the file's "
+            "correlation."
+        )
     yield Text(note, "dim")
 
 
@@ -177,15 +229,25 @@ def loop_case_screen(study: LoopStudy, case: int, flown: FlownLoops) -> Group:
     nominal = CaseRow(dispersion.ESTIMATE, {}, study.nominal.tolist(), study.nominal_aspects)
     table = _cases(study, [nominal, row]).transposed("case", names="")
     title = named(study.spacecraft, f": loop, seed {study.seed}, case {case + 1}")
-    parts: list[RenderableType] = [title, Text(), inputs_table(study.model.inputs.drawn, row.draws), Text(), table]
+    parts: list[RenderableType] = [
+        title,
+        Text(),
+        inputs_table(study.model.inputs.drawn, row.draws),
+        Text(),
+        table,
+    ]
     if row.stop is not None and row.stop is not Ending.END:
         parts.append(Text.assemble(("Stopped: ", "bold red"), f"{row.stop.value}."))
-    parts.append(Text(f"Firing by firing: nutdamp loop --seed {study.seed} --case {case + 1}", "dim"))
+    parts.append(
+        Text(f"Firing by firing: nutdamp loop --seed {study.seed} --case {case + 1}", "dim")
+    )
     return Group(*parts)
 
 
 def loop_cases_json(flown: LoopDispersion, *, worst: int) -> dict[str, Any]:
-    """Percentiles, the shares that fall quiet and keep the dead band, requirement, worst cases; degrees, else SI."""
+    """Percentiles, the shares that fall quiet and keep the dead band, requirement, worst cases;
+    degrees, else SI.
+    """
     results, study = flown.core, flown.core.study
     return {
         **decisions.heading(study.spacecraft),
@@ -200,7 +262,11 @@ def loop_cases_json(flown: LoopDispersion, *, worst: int) -> dict[str, Any]:
             "expected_deg": math.degrees(study.band.most),
             **_fraction(results.within, len(results.of("quiet"))),
         },
-        "stopped": {stop.name.lower(): count for stop, count in results.stops.items() if stop is not Ending.END},
+        "stopped": {
+            stop.name.lower(): count
+            for stop, count in results.stops.items()
+            if stop is not Ending.END
+        },
         "requirement": dispersion.requirement_of(flown.verdict),
         "decision": verdict_json(flown.verdict),
         **dispersion.cones_json(results),
@@ -226,7 +292,9 @@ def _fraction(count: int, of: int) -> dict[str, float | None]:
 
 
 class LoopCasesWriter:
-    """Writer of a row a case: number (from 1), true inputs, outputs, least and largest angle to each cone; degrees."""
+    """Writer of a row a case: number (from 1), true inputs, outputs, least and largest angle to
+    each cone; degrees.
+    """
 
     def __init__(self, stream: IO[bytes], study: LoopStudy) -> None:
         self._stream, self._study, self._table = stream, study, _cases(study, ())
@@ -234,10 +302,17 @@ class LoopCasesWriter:
         stream.flush()
 
     def write(self, first: int, values: Array, stops: list[Ending], angles: Array) -> None:
-        """Write the cases from ``first`` (from 0) on, with their outputs (8, n) and ``angles`` (m, 2, n) rad."""
+        """Write the cases from ``first`` (from 0) on, with their outputs (8, n) and ``angles`` (m,
+        2, n) rad.
+        """
         drawn = self._study.draws_of_all(np.arange(first, first + len(stops)))
         rows = []
         for row, stop in enumerate(stops):
-            draws = {name: draw if isinstance(draw, float) else float(draw[row]) for name, draw in drawn.items()}
-            rows.append(CaseRow(first + row, draws, values[:, row].tolist(), angles[..., row], stop))
+            draws = {
+                name: draw if isinstance(draw, float) else float(draw[row])
+                for name, draw in drawn.items()
+            }
+            rows.append(
+                CaseRow(first + row, draws, values[:, row].tolist(), angles[..., row], stop)
+            )
         self._stream.write(replace(self._table, rows=rows).csv().partition("\n")[2].encode())

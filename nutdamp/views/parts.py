@@ -1,4 +1,6 @@
-"""Parts that all screens and pages share: the line and the angles of a spacecraft, pulses and blocks, notes."""
+"""Parts that all screens and pages share: the line and the angles of a spacecraft, pulses and
+blocks, notes.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +29,18 @@ from nutdamp.spacecraft.model import Keep, Spacecraft, Vector
 from nutdamp.spacecraft.requirements import Part
 from nutdamp.spacecraft.schedule import STEERABLE, Pulse, Schedule
 from nutdamp.units import screen_unit
-from nutdamp.views.tables import TEXT, WHOLE, WIDTH, Column, DataTable, Shared, angle_of, facts, lines_of, to_figures
+from nutdamp.views.tables import (
+    TEXT,
+    WHOLE,
+    WIDTH,
+    Column,
+    DataTable,
+    Shared,
+    angle_of,
+    facts,
+    lines_of,
+    to_figures,
+)
 from nutdamp.views.text import (
     RPM,
     degrees,
@@ -50,7 +63,9 @@ MILLISECONDS = 3  # digits of a second that tables show of a date
 
 
 class PulseRow(NamedTuple):
-    """A pulse of ``body``, counted from 0; motion just before and after all pulses; spin phase at its start, rad."""
+    """A pulse of ``body``, counted from 0; motion just before and after all pulses; spin phase at
+    its start, rad.
+    """
 
     at: int
     pulse: Pulse
@@ -76,7 +91,9 @@ def _cone(name: str, when: str, where: str) -> Column:
     def value(row: PulseRow) -> float:
         return math.degrees(getattr(getattr(row, when), name)[row.at])
 
-    return Column(f"{name}_{when}_deg", f"{name.replace('_', ' ')} {when}", "deg", value, small_angle, where)
+    return Column(
+        f"{name}_{when}_deg", f"{name.replace('_', ' ')} {when}", "deg", value, small_angle, where
+    )
 
 
 def _vector(name: str, unit: str) -> Column:
@@ -88,7 +105,9 @@ def _vector(name: str, unit: str) -> Column:
 
 
 def clock(body: Spacecraft, time: float, digits: int = MILLISECONDS) -> str | None:
-    """Time of day in UTC, with the day where it is another one than at t = 0; None without an epoch."""
+    """Time of day in UTC, with the day where it is another one than at t = 0; None without an
+    epoch.
+    """
     zero, date = body.utc(0.0, digits), body.utc(time, digits)
     if date is None or zero is None:
         return None
@@ -102,9 +121,13 @@ def sun_phased(body: Spacecraft) -> bool:
 
 
 def phases(flown: Flight) -> Vector:
-    """Phase of the body at the commanded start of each pulse, rad: from the Sun sensor to the Sun, or since t = 0."""
+    """Phase of the body at the commanded start of each pulse, rad: from the Sun sensor to the Sun,
+    or since t = 0.
+    """
     starts = np.array([pulse.loaded[0] for pulse in flown.schedule])
-    return -to_sun_pulse(flown, starts) if sun_phased(flown.spacecraft) else spin_phases(flown, starts)
+    return (
+        -to_sun_pulse(flown, starts) if sun_phased(flown.spacecraft) else spin_phases(flown, starts)
+    )
 
 
 def _valves(schedule: Schedule) -> bool:
@@ -116,15 +139,35 @@ PULSES = (
     Column("pulse", "pulse", "", lambda row: row.at + 1, where=f"{PEOPLE} csv", kind=WHOLE),
     Column("t_s", "centre", "s", lambda row: row.pulse.t, seconds, FILES),
     Column("start_s", Shared.START, "s", lambda row: row.pulse.loaded[0], seconds, FILES),
-    Column("on_time_s", Shared.ON_TIME, "s", lambda row: row.pulse.loaded[1],
-           lambda value: seconds(value) if value else "ideal", f"{PEOPLE} {FILES}"),
+    Column(
+        "on_time_s",
+        Shared.ON_TIME,
+        "s",
+        lambda row: row.pulse.loaded[1],
+        lambda value: seconds(value) if value else "ideal",
+        f"{PEOPLE} {FILES}",
+    ),
     Column("", Shared.EFFECTIVE, "s", lambda row: row.pulse.on_time, seconds, "full page", _valves),
-    Column("", Shared.CHANNEL, "", lambda row: channel_text(row.pulse, row.body), where=PEOPLE, kind=TEXT),
+    Column(
+        "",
+        Shared.CHANNEL,
+        "",
+        lambda row: channel_text(row.pulse, row.body),
+        where=PEOPLE,
+        kind=TEXT,
+    ),
     Column("channel", Shared.CHANNEL, "", lambda row: row.pulse.channel, where=FILES, kind=TEXT),
     _vector("torque", "Nm"),
     _vector("impulse", "Nms"),
     Column("propellant_kg", Shared.PROPELLANT, "kg", lambda row: row.pulse.propellant, where=FILES),
-    Column("", Shared.IMPULSE, "N m s", lambda row: row.pulse.magnitude, lambda size: digits(size, 4), "full page"),
+    Column(
+        "",
+        Shared.IMPULSE,
+        "N m s",
+        lambda row: row.pulse.magnitude,
+        lambda size: digits(size, 4),
+        "full page",
+    ),
     _cone("nutation", "before", "full simulate page csv flown"),
     _cone("nutation", "after", "full simulate page csv flown"),
     _cone("body_cone", "before", "page flown"),
@@ -134,7 +177,7 @@ PULSES = (
     Column("effective_start_s", "", "", lambda row: row.pulse.start, where=FILES, when=_valves),
     Column("effective_on_time_s", "", "", lambda row: row.pulse.on_time, where=FILES, when=_valves),
     Column("utc", "", "", lambda row: row.body.utc(row.pulse.loaded[0]), where=FILES, kind=TEXT),
-)  # fmt: skip
+)
 
 
 def commanded(schedule: Schedule, body: Spacecraft) -> DataTable:
@@ -158,16 +201,30 @@ def pulse_table(flown: Flight, *, scheme: str = "", least: float = math.inf) -> 
 
 
 def _dated(body: Spacecraft) -> tuple[Column, ...]:
-    """The columns for a spacecraft: one time of the start for people, UTC where there is an epoch, and one phase."""
+    """The columns for a spacecraft: one time of the start for people, UTC where there is an epoch,
+    and one phase.
+    """
     if body.utc(0.0) is None:
         start = Column("", Shared.START, "s", lambda row: row.pulse.loaded[0], seconds, PEOPLE)
         columns = tuple(column for column in PULSES if column.key != "utc")
     else:
-        start = Column("", Shared.START, "UTC", lambda row: clock(row.body, row.pulse.loaded[0]), where=PEOPLE,
-                       kind=TEXT)  # fmt: skip
+        start = Column(
+            "",
+            Shared.START,
+            "UTC",
+            lambda row: clock(row.body, row.pulse.loaded[0]),
+            where=PEOPLE,
+            kind=TEXT,
+        )
         columns = PULSES
-    phase = Column("", "Sun phase" if sun_phased(body) else "spin phase", "deg",
-                   lambda row: math.degrees(row.phase) % 360.0, lambda angle: f"{angle:.1f}", PEOPLE)  # fmt: skip
+    phase = Column(
+        "",
+        "Sun phase" if sun_phased(body) else "spin phase",
+        "deg",
+        lambda row: math.degrees(row.phase) % 360.0,
+        lambda angle: f"{angle:.1f}",
+        PEOPLE,
+    )
     return (columns[0], start, phase, *columns[1:])
 
 
@@ -194,35 +251,93 @@ def _nine(value: float) -> float:
 EVERYWHERE = "screen page csv"
 BLOCKS = (
     Column("block", "block", "", lambda row: row.at + 1, where=EVERYWHERE, kind=WHOLE),
-    Column("channel", Shared.CHANNEL, "", lambda row: row.block.channel, where=EVERYWHERE, kind=TEXT),
-    Column("first_sun_pulse", Shared.FIRST_SUN_PULSE, "", lambda row: row.block.first, where=EVERYWHERE, kind=WHOLE),
-    Column("first_utc", "first pulse", "UTC", lambda row: row.body.utc(row.pulses[0].loaded[0]), where="csv page",
-           kind=TEXT),
+    Column(
+        "channel", Shared.CHANNEL, "", lambda row: row.block.channel, where=EVERYWHERE, kind=TEXT
+    ),
+    Column(
+        "first_sun_pulse",
+        Shared.FIRST_SUN_PULSE,
+        "",
+        lambda row: row.block.first,
+        where=EVERYWHERE,
+        kind=WHOLE,
+    ),
+    Column(
+        "first_utc",
+        "first pulse",
+        "UTC",
+        lambda row: row.body.utc(row.pulses[0].loaded[0]),
+        where="csv page",
+        kind=TEXT,
+    ),
     Column("delay_s", Shared.DELAY, "s", lambda row: row.block.delay, to_figures(6), EVERYWHERE),
-    Column("delay_counts", Shared.DELAY, "counts", partial(_counts, "delay"), where=EVERYWHERE, kind=WHOLE),
-    Column("delay_deg", Shared.DELAY, "deg", lambda row: _nine(math.degrees(row.block.delay * abs(row.body.spin))),
-           lambda angle: f"{angle:.2f}", EVERYWHERE),
+    Column(
+        "delay_counts",
+        Shared.DELAY,
+        "counts",
+        partial(_counts, "delay"),
+        where=EVERYWHERE,
+        kind=WHOLE,
+    ),
+    Column(
+        "delay_deg",
+        Shared.DELAY,
+        "deg",
+        lambda row: _nine(math.degrees(row.block.delay * abs(row.body.spin))),
+        lambda angle: f"{angle:.2f}",
+        EVERYWHERE,
+    ),
     Column("width_s", "width", "s", lambda row: row.block.width, to_figures(6), EVERYWHERE),
-    Column("width_counts", "width", "counts", partial(_counts, "width"), where=EVERYWHERE, kind=WHOLE),
+    Column(
+        "width_counts", "width", "counts", partial(_counts, "width"), where=EVERYWHERE, kind=WHOLE
+    ),
     Column("count", Shared.PULSES, "", lambda row: row.block.count, where=EVERYWHERE, kind=WHOLE),
-    Column("every", Shared.EVERY, "turn", lambda row: row.block.every, where=EVERYWHERE, kind=WHOLE),
-    Column("impulse_Nms", Shared.IMPULSE, "N m s",
-           lambda row: _nine(math.fsum(pulse.magnitude for pulse in row.pulses)), to_figures(6), "csv page"),
-    Column("nutation_after_deg", Shared.NUTATION_AFTER, "deg", angle_of("nutation"), small_angle, "csv page"),
-)  # fmt: skip
+    Column(
+        "every", Shared.EVERY, "turn", lambda row: row.block.every, where=EVERYWHERE, kind=WHOLE
+    ),
+    Column(
+        "impulse_Nms",
+        Shared.IMPULSE,
+        "N m s",
+        lambda row: _nine(math.fsum(pulse.magnitude for pulse in row.pulses)),
+        to_figures(6),
+        "csv page",
+    ),
+    Column(
+        "nutation_after_deg",
+        Shared.NUTATION_AFTER,
+        "deg",
+        angle_of("nutation"),
+        small_angle,
+        "csv page",
+    ),
+)
 
 
 def block_table(flown: Flight) -> DataTable:
-    """The blocks of a flown schedule as they are loaded: times in s and in counts of the steps of the commands."""
+    """The blocks of a flown schedule as they are loaded: times in s and in counts of the steps of
+    the commands.
+    """
     _, after = flown.around_pulses()
-    pulses, body, rows = flown.schedule.pulses, flown.spacecraft, []
+    pulses = flown.schedule.pulses
+    body = flown.spacecraft
+    rows = []
     lasts = accumulate(block.count for block in flown.schedule.blocks)
     for index, (block, last) in enumerate(zip(flown.schedule.blocks, lasts, strict=True)):
-        rows.append(BlockRow(index, block, body, pulses[last - block.count : last], float(after.nutation[last - 1])))
+        rows.append(
+            BlockRow(
+                index,
+                block,
+                body,
+                pulses[last - block.count : last],
+                float(after.nutation[last - 1]),
+            )
+        )
     return DataTable("Command blocks", BLOCKS, rows, flown.schedule)
 
 
-EVENLY = 8  # largest number of pulses of a block on a screen: the first, the last, and evenly some between
+# largest number of pulses of a block on a screen: the first, the last, and evenly some between
+EVENLY = 8
 
 
 def shown_rows(table: DataTable, blocks: tuple[Block, ...]) -> DataTable:
@@ -233,14 +348,21 @@ def shown_rows(table: DataTable, blocks: tuple[Block, ...]) -> DataTable:
     for last, block in zip(accumulate(block.count for block in blocks), blocks, strict=True):
         step = max(math.ceil((block.count - 1) / (EVENLY - 1)), 1)
         shown += sorted({*range(last - block.count, last, step), last - 1})
-    rows = [table.rows[index] for index in shown if index < len(table.rows)]  # a track may end before the last one
+    rows = [
+        table.rows[index] for index in shown if index < len(table.rows)
+    ]  # a track may end before the last one
     return replace(table, rows=rows)
 
 
 LINES = 40  # lines of a default screen
 WIDE, FEWEST = 160, 24  # columns where no cell is broken, and lines of the smallest screen there
 NOTES = 3  # notes on it, at most, besides warnings
-SIZES = ((14, NOTES), (8, NOTES), (4, NOTES), (1, 0))  # rows before the last one, and notes: the first that fits
+SIZES = (
+    (14, NOTES),
+    (8, NOTES),
+    (4, NOTES),
+    (1, 0),
+)  # rows before the last one, and notes: the first that fits
 
 
 def opening(body: Spacecraft, verbose: bool) -> Iterator[RenderableType]:
@@ -257,7 +379,8 @@ def summary(
     more: Iterable[RenderableType] = (),
     verbose: bool = False,
 ) -> RenderableType:
-    """A default screen, warnings below its ``head``, and ``steps`` to take next; ``table`` by its ``first`` rows.
+    """A default screen, warnings below its ``head``, and ``steps`` to take next; ``table`` by its
+    ``first`` rows.
 
     ``verbose``: with all rows and notes, and ``more`` parts.
     """
@@ -292,9 +415,16 @@ def _dense(part: RenderableType) -> Iterator[RenderableType]:
 
 
 def blocks_screen(flown: Flight, velocity: Vector | None) -> RenderableType:
-    """The blocks of a flown schedule, its figures before and after, and its ``velocity`` change (3,) m/s."""
+    """The blocks of a flown schedule, its figures before and after, and its ``velocity`` change
+    (3,) m/s.
+    """
     table = block_table(flown)
-    return Group(Text(table.title, style="bold"), table.screen("screen"), Text(), facts(_effects(flown, velocity)))
+    return Group(
+        Text(table.title, style="bold"),
+        table.screen("screen"),
+        Text(),
+        facts(_effects(flown, velocity)),
+    )
 
 
 def _effects(flown: Flight, velocity: Vector | None) -> Iterator[tuple[str, str]]:
@@ -308,12 +438,19 @@ def _effects(flown: Flight, velocity: Vector | None) -> Iterator[tuple[str, str]
     for name, *ends in zip(angle_names(body), *turned, strict=True):
         yield f"H: {name}", " to ".join(ends)
     assert body.sun is not None
-    aspects = (attitude.angle_between(momentum, body.sun) for momentum in (body.momentum, final.momentum))
+    aspects = (
+        attitude.angle_between(momentum, body.sun) for momentum in (body.momentum, final.momentum)
+    )
     yield "Sun angle of H", " to ".join(degrees(float(angle)) for angle in aspects)
     yield "spin", f"{spin_text(body.spin)} to {spin_text(final.spin)}"
     largest = float(max(before.nutation.max(), after.nutation.max()))
-    yield "nutation", f"{degrees(body.nutation)} to {degrees(final.nutation)}; largest {degrees(largest)}"
-    used, tank, spent = schedule.propellant, body.tank, mass(schedule.propellant)
+    yield (
+        "nutation",
+        f"{degrees(body.nutation)} to {degrees(final.nutation)}; largest {degrees(largest)}",
+    )
+    used = schedule.propellant
+    tank = body.tank
+    spent = mass(schedule.propellant)
     if used is not None and tank is not None:
         spent += f" of {mass(tank.propellant)}; {mass(tank.propellant - used)} left"
     if used is not None and body.mass is not None:
@@ -325,31 +462,43 @@ def _effects(flown: Flight, velocity: Vector | None) -> Iterator[tuple[str, str]
 
 def title(body: Spacecraft) -> list[Text]:
     """Name of a spacecraft and its motion at t = 0, on one line where they fit."""
-    what = f"{body.inertia.shape}, {body.spin * RPM:.4g} rpm, nutation {short_angle(body.widest.nutation)} deg"
+    what = (
+        f"{body.inertia.shape}, {body.spin * RPM:.4g} rpm, "
+        f"nutation {short_angle(body.widest.nutation)} deg"
+    )
     name = named(body)
     fits = len(name) + len(what) + 3 <= WIDTH
     return [Text.assemble(name, f"   {what}")] if fits else [name, Text(what)]
 
 
 def named(body: Spacecraft, *more: str | tuple[str, str]) -> Text:
-    """Name of a spacecraft, with a word where it is one that nobody asked for, and ``more`` text after it."""
+    """Name of a spacecraft, with a word where it is one that nobody asked for, and ``more`` text
+    after it.
+    """
     return Text.assemble((body.name, "bold"), " (built-in example)" * body.built_in, *more)
 
 
 def angle_names(body: Spacecraft) -> tuple[str, str]:
-    """Names of the two angles of a direction: along and above the equator, or from H(0) and about it."""
+    """Names of the two angles of a direction: along and above the equator, or from H(0) and about
+    it.
+    """
     return ("tilt", "azimuth") if body.attitude is None else ("right ascension", "declination")
 
 
 def angle_texts(body: Spacecraft, direction: Vector) -> tuple[str, str]:
     """The two angles of an inertial direction (3,), in the order of `angle_names`."""
     around, other = body.angles_of(direction)
-    return (pointing(other), longitude(around)) if body.attitude is None else (longitude(around), pointing(other))
+    return (
+        (pointing(other), longitude(around))
+        if body.attitude is None
+        else (longitude(around), pointing(other))
+    )
 
 
 def direction_text(body: Spacecraft, direction: Vector) -> str:
     """An inertial direction (3,) by name and number of its angles."""
-    names, texts = angle_names(body), angle_texts(body, direction)
+    names = angle_names(body)
+    texts = angle_texts(body, direction)
     return ", ".join(f"{name} {text}" for name, text in zip(names, texts, strict=True))
 
 
@@ -359,11 +508,16 @@ def spin_text(spin: float) -> str:
 
 
 def aspect_facts(aspects: Iterable[Aspect]) -> Iterator[tuple[str, str]]:
-    """Least angle of the spin axis from each direction that is watched, and its limit; ✗ where it is broken."""
+    """Least angle of the spin axis from each direction that is watched, and its limit; ✗ where it
+    is broken.
+    """
     for aspect in aspects:
         keep = aspect.keep
-        mark, bounds = "" if aspect.kept else "✗ ", bounds_text(keep)
-        near, far = (f"{degrees(angle)} at {moment(at)}" for angle, at in (aspect[1:3], aspect[3:5]))
+        mark = "" if aspect.kept else "✗ "
+        bounds = bounds_text(keep)
+        near, far = (
+            f"{degrees(angle)} at {moment(at)}" for angle, at in (aspect[1:3], aspect[3:5])
+        )
         moves = aspect.largest_at > 0.0 or aspect.least_at > 0.0
         seen = f"{near} to {far}" if moves else f"{degrees(aspect.least)} at t = 0"
         yield f"axis from {keep.name}", f"{mark}{seen}" + (f" ({bounds})" if bounds else "")
@@ -407,17 +561,25 @@ def _derived(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
     if not inertia.symmetric:
         unit, factor = screen_unit("kg m²")
         first, second, _ = factor * np.asarray(inertia.moments)
-        yield "", f"I1 = {first:.6g}, I2 = {second:.6g} {unit}; schemes but optimal plan on their mean"
+        yield (
+            "",
+            f"I1 = {first:.6g}, I2 = {second:.6g} {unit}; schemes but optimal plan on their mean",
+        )
     if inertia.wheel:
         whole = f"H3 = C ω3 + h = {quantity(spacecraft.axial, 'N m s')}"
         yield "wheel", f"h = {quantity(inertia.wheel, 'N m s')} along axis 3: {whole}"
-    yield "spin", spin_text(spacecraft.spin) + ": the spin axis is body axis -3" * (spacecraft.sense < 0.0)
+    yield (
+        "spin",
+        spin_text(spacecraft.spin) + ": the spin axis is body axis -3" * (spacecraft.sense < 0.0),
+    )
     now = "" if inertia.symmetric else f"{degrees(spacecraft.tilt)} at t = 0, at most "
     cones = f"body cone {degrees(motion.body)} + space cone {degrees(motion.space)}"
     yield "nutation", f"{now}{degrees(motion.nutation)} = {cones}"
     period = spacecraft.motion_period
     still = math.isinf(period)
-    in_body = "none in the body, where ω does not turn" if still else f"{duration(period)} in the body"
+    in_body = (
+        "none in the body, where ω does not turn" if still else f"{duration(period)} in the body"
+    )
     yield "nutation period", f"{in_body}, {duration(spacecraft.inertial_period)} inertially"
     if spacecraft.dissipation is not None:
         yield "dissipation", _dissipation(spacecraft, spacecraft.dissipation)
@@ -439,7 +601,8 @@ def _derived(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
         yield "", f"β = {degrees(spacecraft.to_turn)} from H; {symbol} = {turn}{least}"
     if spacecraft.goal.spin is not None:
         yield "final spin", spin_text(spacecraft.goal.spin)
-    actuators, torquer = [], spacecraft.torquer
+    actuators = []
+    torquer = spacecraft.torquer
     if torquer is not None:
         strength = "an ideal impulse" if torquer.torque is None else quantity(torquer.torque, "N m")
         assumed = " (assumed: the file names no actuator)" if spacecraft.steerable is None else ""
@@ -454,7 +617,9 @@ def _derived(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
 
 
 def _dissipation(spacecraft: Spacecraft, time_constant: float) -> str:
-    """Effect of energy dissipation on the nutation, and a note where it is too fast for its model."""
+    """Effect of energy dissipation on the nutation,
+    and a note where it is too fast for its model.
+    """
     if spacecraft.growth == 0.0:
         return "none: a sphere has no energy to lose"
     what = "grows" if spacecraft.growth > 0.0 else "decays"

@@ -1,4 +1,6 @@
-"""Results of ``plan --robust``: candidates by the share of cases that comply, the plan to fly and its cost."""
+"""Results of ``plan --robust``: candidates by the share of cases that comply, the plan to fly and
+its cost.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +18,16 @@ from nutdamp.planning.screening import FlownPlan
 from nutdamp.spacecraft import requirements
 from nutdamp.views.decisions import final_json, plan_json, target_json
 from nutdamp.views.glance import comparison_screen
-from nutdamp.views.tables import TEXT, Column, DataTable, Shared, angle_of, file_columns, to_figures, values_of
+from nutdamp.views.tables import (
+    TEXT,
+    Column,
+    DataTable,
+    Shared,
+    angle_of,
+    file_columns,
+    to_figures,
+    values_of,
+)
 from nutdamp.views.text import joined, note_json, screen_line, small_angle
 from nutdamp.views.tolerances import in_words, stated_text
 from nutdamp.views.verdict import cases_json, exact_percent, percent, share_text
@@ -41,11 +52,14 @@ def robust_screen(robust: RobustComparison) -> RenderableType:
 
 
 def robust_notes(robust: RobustComparison) -> list[Note]:
-    """Tolerances with which enough cases would comply, where they are known, and the plan against the usual one."""
+    """Tolerances with which enough cases would comply, where they are known, and the plan against
+    the usual one.
+    """
     needed = robust.tightening
     if needed is None or robust.chosen is None:
         return list(robust_cost(robust))
-    sizes, tolerances = [], [entry.tolerance for entry, _ in needed.inputs]
+    sizes = []
+    tolerances = [entry.tolerance for entry, _ in needed.inputs]
     for entry, relative in needed.inputs:
         less = stated_text(entry._replace(size=needed.factor * entry.size), relative, down=True)
         named = in_words(entry.tolerance if tolerances.count(entry.tolerance) == 1 else entry.name)
@@ -64,7 +78,9 @@ def robust_notes(robust: RobustComparison) -> list[Note]:
 
 
 def robust_json(robust: RobustComparison) -> dict[str, Any]:
-    """Part of ``plan --robust --json`` beside the plans: candidates, the best first, the one to fly, and its cost."""
+    """Part of ``plan --robust --json`` beside the plans: candidates, the best first, the one to
+    fly, and its cost.
+    """
     chosen, fresh, cost, needed = robust.chosen, robust.fresh, robust.cost, robust.tightening
     given = [entry for entry in (*robust.candidates, chosen, robust.usual) if entry is not None]
     entries = dict(zip(map(id, given), _table(robust, given).json(), strict=True))
@@ -72,7 +88,9 @@ def robust_json(robust: RobustComparison) -> dict[str, Any]:
         **values_of(robust, "probability"),
         "target": target_json(robust.comparison.spacecraft),
         "candidates": [entries[id(candidate)] for candidate in robust.candidates],
-        "recommended": None if chosen is None else {**entries[id(chosen)], "plan": plan_json(chosen.plan)},
+        "recommended": None
+        if chosen is None
+        else {**entries[id(chosen)], "plan": plan_json(chosen.plan)},
         "reason": joined(robust_reasons(robust)),
         "notes": [note_json(note) for note in robust_notes(robust)],
         "meets_requirement": robust.verdict.met,
@@ -85,13 +103,21 @@ def robust_json(robust: RobustComparison) -> dict[str, Any]:
                 for entry, _ in needed.inputs[::-1]
             },
             "inputs": [
-                {"name": entry.name, entry.kind: entry.size, "needed": needed.factor * entry.size, "unit": entry.unit}
+                {
+                    "name": entry.name,
+                    entry.kind: entry.size,
+                    "needed": needed.factor * entry.size,
+                    "unit": entry.unit,
+                }
                 for entry, _ in needed.inputs
             ],
-            "checked": values_of(needed, "samples=cases", "seed", "met_fraction=complied", "at_least=least"),
+            "checked": values_of(
+                needed, "samples=cases", "seed", "met_fraction=complied", "at_least=least"
+            ),
         },
         "against": entries.get(id(robust.usual)),
-        "cost": cost and values_of(cost, "propellant_kg", "total_impulse_Nms=impulse", "end_s", "nutation_deg"),
+        "cost": cost
+        and values_of(cost, "propellant_kg", "total_impulse_Nms=impulse", "end_s", "nutation_deg"),
     }
 
 
@@ -101,36 +127,74 @@ def _table(robust: RobustComparison, candidates: list[FlownPlan]) -> DataTable:
 
 
 def _columns(robust: RobustComparison) -> Iterator[Column]:
-    """Columns of the candidates; ``full``: of the screen, with propellant only where all have it."""
-    body, level = robust.comparison.spacecraft, exact_percent(robust.probability)
+    """Columns of the candidates; ``full``: of the screen,
+    with propellant only where all have it.
+    """
+    body = robust.comparison.spacecraft
+    level = exact_percent(robust.probability)
     fuelled = all(candidate.plan.pulses.propellant is not None for candidate in robust.candidates)
     yield Column("scheme", "plan", "", attrgetter("plan.scheme"), where="full json", kind=TEXT)
     yield from file_columns("json", "variant")
-    yield Column("", "variant", "", lambda row: row.variant + " *" * (row is robust.usual), where="full", kind=TEXT)
+    yield Column(
+        "",
+        "variant",
+        "",
+        lambda row: row.variant + " *" * (row is robust.usual),
+        where="full",
+        kind=TEXT,
+    )
     yield Column("pulses", "", "", lambda row: len(row.plan.pulses), where="json")
-    yield Column("end_s", Shared.END, "s", attrgetter("plan.pulses.end"), lambda end: f"{end:.3f}", "full json")
-    impulse, where = attrgetter("plan.pulses.total_impulse"), "json" if fuelled else "full json"
+    yield Column(
+        "end_s",
+        Shared.END,
+        "s",
+        attrgetter("plan.pulses.end"),
+        lambda end: f"{end:.3f}",
+        "full json",
+    )
+    impulse = attrgetter("plan.pulses.total_impulse")
+    where = "json" if fuelled else "full json"
     yield Column("total_impulse_Nms", Shared.IMPULSE, "N m s", impulse, to_figures(4), where)
     yield from file_columns("json", "propellant_kg=plan.pulses.propellant")
-    yield Column("", Shared.PROPELLANT, "g", attrgetter("plan.pulses.propellant"), to_figures(4, 1e3), "full" * fuelled)
+    yield Column(
+        "",
+        Shared.PROPELLANT,
+        "g",
+        attrgetter("plan.pulses.propellant"),
+        to_figures(4, 1e3),
+        "full" * fuelled,
+    )
     yield from file_columns("json", "nominal_nutation_deg=plan.flown.nutation", "left_deg=left")
     yield Column("", Shared.NOMINAL, "deg", angle_of("plan.flown.nutation"), small_angle, "full")
     yield Column("", level, "deg", angle_of("left"), small_angle, "full")
     yield from file_columns("json", "samples=cases.samples", "met_fraction=cases.complying")
-    yield Column("", "cases that comply", "", attrgetter("cases"), share_text, "full" * requirements.judged(body))
+    yield Column(
+        "",
+        "cases that comply",
+        "",
+        attrgetter("cases"),
+        share_text,
+        "full" * requirements.judged(body),
+    )
     yield Column("final", "", "", lambda row: final_json(row.plan.flight), where="json")
 
 
 def _candidates(robust: RobustComparison) -> list[RenderableType]:
     named = list(robust.candidates[:MOST_ROWS])
-    named += [entry for entry in (robust.chosen, robust.usual) if entry is not None and entry not in named]
+    named += [
+        entry for entry in (robust.chosen, robust.usual) if entry is not None and entry not in named
+    ]
     rest = len(robust.candidates) - len(named)
-    level, pointed = exact_percent(robust.probability), robust.comparison.spacecraft.goal.axis is not None
+    level = exact_percent(robust.probability)
+    pointed = robust.comparison.spacecraft.goal.axis is not None
     left = "nutation" + " or axis error" * pointed
     notes = [
         *[f"Plans that rank below these: {rest}."] * bool(rest),
         *["Losing plans stopped early."] * any(not entry.final for entry in robust.candidates),
-        f"nominal, {level}: the {left} left with nominal values, and not exceeded in so many cases.",
+        (
+            f"nominal, {level}: the {left} left with nominal values, "
+            "and not exceeded in so many cases."
+        ),
         *["* is recommended without --robust."] * (robust.usual is not None),
     ]
     return [_table(robust, named).screen("full"), Text(" ".join(notes), style="dim")]
@@ -139,7 +203,9 @@ def _candidates(robust: RobustComparison) -> list[RenderableType]:
 def _fresh(robust: RobustComparison) -> Iterator[str]:
     fresh = robust.fresh
     if fresh is not None and fresh.complying is not None:
-        shares = (percent(share, robust.probability) for share in (fresh.complying, fresh.low, fresh.high))
+        shares = (
+            percent(share, robust.probability) for share in (fresh.complying, fresh.low, fresh.high)
+        )
         met, low, high = shares
         new = f"{fresh.samples:,} new cases (seed {fresh.seed}), not used for the choice"
         yield f"Of {new}, {met} comply; 95 % interval {low} to {high}."

@@ -1,7 +1,9 @@
-"""The simulation of a schedule and its verification: ends, cone angles around each pulse, extremes of the axis track.
+"""The simulation of a schedule and its verification: ends, cone angles around each pulse, extremes
+of the axis track.
 
-Also the schedule spin by spin. Where the file has a Sun sensor a spin begins with its pulse, 1 with the first one, as
-in command blocks; the time before that is spin 0. Else spin 1 begins at t = 0, and in each ∫ω3 dt grows by 2π.
+Also the schedule spin by spin. Where the file has a Sun sensor a spin begins with its pulse, 1 with
+the first one, as in command blocks; the time before that is spin 0. Else spin 1 begins at t = 0,
+and in each ∫ω3 dt grows by 2π.
 """
 
 from __future__ import annotations
@@ -34,10 +36,31 @@ from nutdamp.spacecraft.requirements import Part
 from nutdamp.spacecraft.schedule import Pulse, Schedule
 from nutdamp.views import decisions, parts, tables
 from nutdamp.views import verdict as verdicts
-from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, FittedColumns, Shared, angle_of, facts, to_figures
-from nutdamp.views.text import MISSING, degrees, longitude, moment, pointing, screen_line, small_angle
+from nutdamp.views.tables import (
+    TEXT,
+    WHOLE,
+    Column,
+    DataTable,
+    FittedColumns,
+    Shared,
+    angle_of,
+    facts,
+    to_figures,
+)
+from nutdamp.views.text import (
+    MISSING,
+    degrees,
+    longitude,
+    moment,
+    pointing,
+    screen_line,
+    small_angle,
+)
 
-MODELS = {IMPULSE_SUM: "impulse approximation (17)", REAL_WIDTHS: "full simulation"}  # names of the two models
+MODELS = {
+    IMPULSE_SUM: "impulse approximation (17)",
+    REAL_WIDTHS: "full simulation",
+}  # names of the two models
 
 
 def _direction(name: str, at: int, flight: Flight) -> str:
@@ -47,12 +70,22 @@ def _direction(name: str, at: int, flight: Flight) -> str:
 def _columns(simulation: Simulation) -> Iterator[Column]:
     body = simulation.flown.spacecraft
     yield Column("", "model", "", lambda flight: MODELS[flight.model], where="screen", kind=TEXT)
-    names = ["nutation", "body_cone", "space_cone", "momentum_shift", *["axis_error"] * (body.goal.axis is not None)]
+    names = [
+        "nutation",
+        "body_cone",
+        "space_cone",
+        "momentum_shift",
+        *["axis_error"] * (body.goal.axis is not None),
+    ]
     for name in names:
-        yield Column("", name.replace("_", " "), "", attrgetter(f"residual.{name}"), degrees, "screen")
+        yield Column(
+            "", name.replace("_", " "), "", attrgetter(f"residual.{name}"), degrees, "screen"
+        )
     for heading, name in (("spin axis", "axis"), ("H", "momentum")):
         for at, angle in enumerate(parts.angle_names(body)):
-            yield Column("", f"{heading}: {angle}", "", partial(_direction, name, at), where="screen")
+            yield Column(
+                "", f"{heading}: {angle}", "", partial(_direction, name, at), where="screen"
+            )
     yield Column("", Shared.SPIN, "rad/s", attrgetter("final.spin"), to_figures(6), "screen")
 
 
@@ -77,7 +110,9 @@ def simulation_screen(simulation: Simulation, *, verbose: bool = True) -> Render
 
 
 def _notes(simulation: Simulation) -> Iterator[Note]:
-    extremes, begun, pulses = simulation.extremes, len(simulation.shown.schedule), len(simulation.plan.pulses)
+    extremes = simulation.extremes
+    begun = len(simulation.shown.schedule)
+    pulses = len(simulation.plan.pulses)
     if begun < pulses:
         yield note("track-cut", until_s=extremes.until, begun=begun, pulses=pulses)
     judged = simulation.plan.flight.residual.nutation
@@ -92,7 +127,9 @@ def _notes(simulation: Simulation) -> Iterator[Note]:
     yield from verdict_notes(simulation.verdict, simulation.plan)
     (near, near_at), (far, far_at) = extremes.nearest, extremes.farthest
     near, far = math.degrees(near), math.degrees(far)
-    yield note("axis-track", nearest_deg=near, nearest_s=near_at, farthest_deg=far, farthest_s=far_at)
+    yield note(
+        "axis-track", nearest_deg=near, nearest_s=near_at, farthest_deg=far, farthest_s=far_at
+    )
     if simulation.flown.spacecraft.attitude is None:
         yield note("frame-n")
 
@@ -105,16 +142,24 @@ def _fired(simulation: Simulation) -> Iterator[RenderableType]:
         shown = parts.shown_rows(parts.pulse_table(flight), schedule.blocks)
         yield shown.screen("simulate")
         if len(shown.rows) < len(schedule):
-            yield Text(f"{len(shown.rows)} of {len(schedule)} pulses; --json writes all.", style="dim")
+            yield Text(
+                f"{len(shown.rows)} of {len(schedule)} pulses; --json writes all.", style="dim"
+            )
 
 
 def _extremes(simulation: Simulation) -> Iterator[tuple[str, str]]:
     extremes, body = simulation.extremes, simulation.shown.spacecraft
-    yield "spin axis in x, in y", f"{_range(extremes.x)}, {_range(extremes.y)} of the inertial frame"
+    yield (
+        "spin axis in x, in y",
+        f"{_range(extremes.x)}, {_range(extremes.y)} of the inertial frame",
+    )
     if body.attitude is not None:
         frame = body.attitude.frame or "the frame of the file"
         west, east = map(longitude, extremes.right_ascension)
-        yield "right ascension", f"{west.removesuffix(' deg')} to {east} in {frame}, from its axis x towards y"
+        yield (
+            "right ascension",
+            f"{west.removesuffix(' deg')} to {east} in {frame}, from its axis x towards y",
+        )
         yield "declination", _range(extremes.declination)
     yield from parts.aspect_facts(aspects(simulation.shown, extremes.until))
     yield "track", f"{extremes.rows} rows, 0 to {moment(extremes.until)}"
@@ -126,8 +171,15 @@ def _range(values: tuple[float, float]) -> str:
 
 
 def simulation_json(simulation: Simulation) -> dict[str, Any]:
-    """Pulses with the cone angles around them, ends of both models, and extremes of the axis track in degrees."""
-    flight, extremes, impulses, flown = simulation.shown, simulation.extremes, simulation.impulses, simulation.flown
+    """Pulses with the cone angles around them, ends of both models, and extremes of the axis track
+    in degrees.
+    """
+    flight, extremes, impulses, flown = (
+        simulation.shown,
+        simulation.extremes,
+        simulation.impulses,
+        simulation.flown,
+    )
     attitude = flight.spacecraft.attitude
     return {
         **decisions.heading(flight.spacecraft),
@@ -153,7 +205,8 @@ def simulation_json(simulation: Simulation) -> dict[str, Any]:
             "x_deg": [*map(math.degrees, extremes.x)],
             "y_deg": [*map(math.degrees, extremes.y)],
             # Western and eastern end, for any range between.
-            "right_ascension_deg": attitude and [math.degrees(full_turn(angle)) for angle in extremes.right_ascension],
+            "right_ascension_deg": attitude
+            and [math.degrees(full_turn(angle)) for angle in extremes.right_ascension],
             "declination_deg": attitude and [*map(math.degrees, extremes.declination)],
         },
     }
@@ -162,13 +215,18 @@ def simulation_json(simulation: Simulation) -> dict[str, Any]:
 BETWEEN = "; "  # separator of the values of several pulses in one spin
 MOST_SPINS = 100_000  # largest number of spins: more make no table that anyone reads
 DIGITS = 9  # decimals of seconds and degrees that are written
-SAME = 1e-9  # share of a spin after t = 0 within which the first Sun pulse comes at once: no spin is before it
+# share of a spin after t = 0 within which the first Sun pulse comes at once: no spin is before it
+SAME = 1e-9
 PIECES = 16  # pieces of each turn over which ω3 is integrated by `end_state.LEGENDRE`
-NEWTON = 3  # Newton steps to the end of a turn within its piece: the second one is at rounding already
+NEWTON = (
+    3  # Newton steps to the end of a turn within its piece: the second one is at rounding already
+)
 
 
 class SpinRow(NamedTuple):
-    """A spin by its number, with its date, begin, end and period, s, and the pulses commanded in it."""
+    """A spin by its number, with its date, begin, end and period, s, and the pulses commanded in
+    it.
+    """
 
     number: int
     utc: str | None
@@ -188,37 +246,61 @@ SPINS = (
     Column("start_s", "", "", lambda row: round(row.begin, DIGITS), where="csv"),
     Column("period_s", "", "", lambda row: round(row.period, DIGITS), where="csv"),
     Column("pulses", "", "", lambda row: len(row.fired), where="csv", kind=WHOLE),
-    Column("channel", "", "", lambda row: BETWEEN.join(pulse.channel for pulse in row.fired), where="csv", kind=TEXT),
-    Column("phase_deg", "", "", _several(lambda row, pulse: 360.0 * (1.0 - (row.end - pulse.loaded[0]) / row.period)),
-           where="csv", kind=TEXT),
+    Column(
+        "channel",
+        "",
+        "",
+        lambda row: BETWEEN.join(pulse.channel for pulse in row.fired),
+        where="csv",
+        kind=TEXT,
+    ),
+    Column(
+        "phase_deg",
+        "",
+        "",
+        _several(lambda row, pulse: 360.0 * (1.0 - (row.end - pulse.loaded[0]) / row.period)),
+        where="csv",
+        kind=TEXT,
+    ),
     Column("on_time_s", "", "", _several(lambda _, pulse: pulse.loaded[1]), where="csv", kind=TEXT),
-)  # fmt: skip
+)
 
 
 def spin_table(body: Spacecraft, schedule: Schedule, until: float) -> str:
-    """The spins from t = 0 to ``until`` s as CSV, those after that to the last pulse too; the last one is whole.
+    """The spins from t = 0 to ``until`` s as CSV, those after that to the last pulse too; the last
+    one is whole.
 
-    ``phase_deg`` is the part of its spin before a pulse is commanded, ``on_time_s`` the length of the command.
-    Without an epoch ``start_utc`` is empty. Raises BadRequest for more than `MOST_SPINS`, Infeasible where the sensor
-    does not see the Sun.
+    ``phase_deg`` is the part of its spin before a pulse is commanded, ``on_time_s`` the length of
+    the command. Without an epoch ``start_utc`` is empty. Raises BadRequest for more than
+    `MOST_SPINS`, Infeasible where the sensor does not see the Sun.
     """
     last = max(until, max((pulse.loaded[0] for pulse in schedule), default=0.0))
     if last * abs(body.spin) > 2.0 * math.pi * MOST_SPINS:
-        raise BadRequest(f"the table would have more than {MOST_SPINS} spins; choose an earlier end (until)")
+        raise BadRequest(
+            f"the table would have more than {MOST_SPINS} spins; choose an earlier end (until)"
+        )
     first, begins = _begins(body, schedule, last)
     fired: dict[int, list[Pulse]] = {}
     for pulse in sorted(schedule, key=lambda pulse: pulse.loaded[0]):
-        fired.setdefault(max(int(np.searchsorted(begins, pulse.loaded[0], "right")) - 1, 0), []).append(pulse)
+        fired.setdefault(
+            max(int(np.searchsorted(begins, pulse.loaded[0], "right")) - 1, 0), []
+        ).append(pulse)
     rows = []
-    for index, (begin, end) in enumerate(pairwise(begins[: np.searchsorted(begins, last, "right") + 1].tolist())):
+    for index, (begin, end) in enumerate(
+        pairwise(begins[: np.searchsorted(begins, last, "right") + 1].tolist())
+    ):
         # Spin 0 is the rest of a spin: it ends a whole period after it began.
         period = end - begin if first + index > 0 else begins[2] - begins[1]
-        rows.append(SpinRow(first + index, body.utc(begin), begin, end, period, fired.get(index, [])))
+        rows.append(
+            SpinRow(first + index, body.utc(begin), begin, end, period, fired.get(index, []))
+        )
     return DataTable("Spins", SPINS, rows).csv()
 
 
 def _begins(body: Spacecraft, schedule: Schedule, last: float) -> tuple[int, Vector]:
-    """Number of the first spin, and begins of it and those after it, s: to after ``last``, and three at least."""
+    """Number of the first spin, and begins of it and those after it, s: to after ``last``, and
+    three at least.
+    """
     from nutdamp.schemes.block_model import spin_turn, sun_pulses
 
     if body.spin == 0.0:
@@ -232,7 +314,8 @@ def _begins(body: Spacecraft, schedule: Schedule, last: float) -> tuple[int, Vec
             at_once = len(times) > 0 and times[0] < SAME * turn
             first, begins = (1, times) if at_once else (0, np.append(0.0, times))
         else:
-            first, begins = 1, _turns(flown, until)
+            first = 1
+            begins = _turns(flown, until)
         if len(begins) > 2 and begins[-1] > last:
             return first, begins
         until = last + 6.0 * 2.0 * math.pi / max(abs(flown.settled.spin), 1e-3 * abs(body.spin))
@@ -240,7 +323,9 @@ def _begins(body: Spacecraft, schedule: Schedule, last: float) -> tuple[int, Vec
 
 
 def _turns(flown: Flight, until: float) -> Vector:
-    """Times of 0, 1, 2, … turns of the body about axis 3, up to ``until`` s, (n,); none after the spin ends."""
+    """Times of 0, 1, 2, … turns of the body about axis 3, up to ``until`` s, (n,); none after the
+    spin ends.
+    """
     spin = abs(flown.spacecraft.spin)
     edges = [np.array([0.0])]
     for leg in flown.legs:
@@ -261,10 +346,15 @@ def _turns(flown: Flight, until: float) -> Vector:
 
 
 def _turned(flown: Flight, begins: Vector, ends: Vector) -> Vector:
-    """∫ω3 dt over stretches (n,), rad, positive in the sense of the spin at t = 0; each within one leg."""
-    sense, half = math.copysign(1.0, flown.spacecraft.spin), 0.5 * (ends - begins)
+    """∫ω3 dt over stretches (n,), rad, positive in the sense of the spin at t = 0; each within one
+    leg.
+    """
+    sense = math.copysign(1.0, flown.spacecraft.spin)
+    half = 0.5 * (ends - begins)
     turned = np.zeros(len(begins))
-    for node, weight in ((sign * node, weight) for node, weight in LEGENDRE for sign in (1.0, -1.0)):
+    for node, weight in (
+        (sign * node, weight) for node, weight in LEGENDRE for sign in (1.0, -1.0)
+    ):
         rates, _ = flown.motion(begins + half * (1.0 + node))
         turned += weight * half * sense * rates[:, 2]
     return turned
@@ -273,7 +363,8 @@ def _turned(flown: Flight, begins: Vector, ends: Vector) -> Vector:
 SHOWN = 1e-9 * math.pi / 180.0  # rad; smaller differences are shown as rounding
 BUDGET = "Error budget: what each imperfection leaves, alone"  # the title of `budget_table`
 BUDGET_NOTE = (  # note on `budget_table`
-    "Plans are tuned to what is fired, so that the rows do not add up. A row 'without' shows what the same pulses "
+    "Plans are tuned to what is fired, so that the rows do not add up. "
+    "A row 'without' shows what the same pulses "
     "leave without that effect, more or less."
 )
 
@@ -281,14 +372,28 @@ BUDGET_NOTE = (  # note on `budget_table`
 def verification_brief(plan: Plan, verification: Verification) -> RenderableType:
     """The default screen of ``verify``: verdict, requirement, methods."""
     notes = [conservation(verification)]
-    # The imperfection that leaves the most nutation alone, where one leaves more than ideal impulses.
-    single = [row for row in verification.budget if row.name not in (IDEAL, AS_FLOWN) and WITHOUT not in row.name]
+    # The imperfection that leaves the most nutation alone, where one leaves more than ideal
+    # impulses.
+    single = [
+        row
+        for row in verification.budget
+        if row.name not in (IDEAL, AS_FLOWN) and WITHOUT not in row.name
+    ]
     most = max(single, key=lambda row: row.nutation, default=None)
     if most is not None and most.nutation - verification.budget[0].nutation > SHOWN:
-        notes.append(note("largest-imperfection", imperfection=most.name, nutation_deg=math.degrees(most.nutation)))
+        notes.append(
+            note(
+                "largest-imperfection",
+                imperfection=most.name,
+                nutation_deg=math.degrees(most.nutation),
+            )
+        )
     notes += _missing(verification)
     return parts.summary(
-        [*_head(plan, verification)], lambda **_: methods_table(verification), notes, "--json verified.json"
+        [*_head(plan, verification)],
+        lambda **_: methods_table(verification),
+        notes,
+        "--json verified.json",
     )
 
 
@@ -317,7 +422,9 @@ def verification_screen(plan: Plan, verification: Verification) -> RenderableTyp
 
 
 def verification_json(flown: Flight, name: str, verification: Verification) -> dict[str, Any]:
-    """Methods with their differences from the motion of ``flown`` (rad), conservation, error budget."""
+    """Methods with their differences from the motion of ``flown`` (rad), conservation, error
+    budget.
+    """
     spacecraft = flown.spacecraft
     return {
         **decisions.heading(spacecraft),
@@ -327,7 +434,9 @@ def verification_json(flown: Flight, name: str, verification: Verification) -> d
         "final": decisions.final_json(flown),
         "target": decisions.target_json(spacecraft),
         "methods": DataTable("", METHODS, verification.methods).json(),
-        **tables.values_of(verification, "momentum_drift=momentum.drift", "momentum_kept=momentum.kept"),
+        **tables.values_of(
+            verification, "momentum_drift=momentum.drift", "momentum_kept=momentum.kept"
+        ),
         **tables.values_of(verification, "energy_drift=energy.drift", "energy_kept=energy.kept"),
         "budget": DataTable("", IMPERFECTIONS, verification.budget, spacecraft).json(),
     }
@@ -339,13 +448,24 @@ def _difference(value: float | None) -> str:
     return "0" if value == 0.0 else "< 1e-12" if value < 1e-12 else f"{value:.1e}"
 
 
-NUTATION = Column("nutation_deg", Part.NUTATION.label, "deg", angle_of("nutation"), small_angle, "json screen")
+NUTATION = Column(
+    "nutation_deg", Part.NUTATION.label, "deg", angle_of("nutation"), small_angle, "json screen"
+)
 METHODS = (
     Column("name", "method", "", attrgetter("name"), where="json screen", kind=TEXT),
     NUTATION,
-    Column("momentum_shift_deg", Part.SHIFT.label, "deg", angle_of("momentum_shift"), small_angle, "json screen"),
+    Column(
+        "momentum_shift_deg",
+        Part.SHIFT.label,
+        "deg",
+        angle_of("momentum_shift"),
+        small_angle,
+        "json screen",
+    ),
     Column("axis_difference_rad", "Δaxis", "rad", attrgetter("axis"), _difference, "json screen"),
-    Column("momentum_difference_rad", "ΔH", "rad", attrgetter("momentum"), _difference, "json screen"),
+    Column(
+        "momentum_difference_rad", "ΔH", "rad", attrgetter("momentum"), _difference, "json screen"
+    ),
     Column("rate_difference", "Δrates", "relative", attrgetter("rate"), _difference, "json screen"),
     Column("result_difference", "", "", attrgetter("result"), where="json"),
     Column("missing", "", "", lambda row: row.missing or None, where="json", kind=TEXT),
@@ -363,13 +483,17 @@ IMPERFECTIONS = (
 
 
 def methods_table(verification: Verification) -> FittedColumns:
-    """One row a way to fly the schedule: its residuals, and its difference from the flown motion."""
+    """One row a way to fly the schedule: its residuals,
+    and its difference from the flown motion.
+    """
     rows = [method for method in verification.methods if not method.missing]
     return DataTable("Methods", METHODS, rows).screen("screen")
 
 
 def budget_table(spacecraft: Spacecraft, verification: Verification) -> FittedColumns:
-    """One row an imperfection: residuals with it alone; then residuals without each effect that plans include."""
+    """One row an imperfection: residuals with it alone; then residuals without each effect that
+    plans include.
+    """
     return DataTable(BUDGET, IMPERFECTIONS, verification.budget, spacecraft).screen("screen")
 
 
@@ -382,13 +506,19 @@ def verdict(verification: Verification) -> str:
     """Sentence whether the integrations from outside confirm the flown motion."""
     if not verification.checks:
         return "NOT CONFIRMED: no independent integration was flown to the end."
-    names, how = (verification.checks, "agree") if verification.agree else (verification.disagreeing, "DO NOT AGREE")
+    names, how = (
+        (verification.checks, "agree")
+        if verification.agree
+        else (verification.disagreeing, "DO NOT AGREE")
+    )
     return f"The flown motion and {' and '.join(names)} {how} (within {AGREE:g} rad)."
 
 
 def conservation(verification: Verification) -> Note:
     """The change of |H| and of the energy on coasts, and its cause."""
-    return note("on-coasts", momentum=_course(verification.momentum), energy=_course(verification.energy))
+    return note(
+        "on-coasts", momentum=_course(verification.momentum), energy=_course(verification.energy)
+    )
 
 
 def _course(course: Conservation) -> str:

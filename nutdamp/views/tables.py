@@ -1,7 +1,8 @@
-"""Tables declared once: each column has a name in files, a heading for people, a unit, and a value of a row.
+"""Tables declared once: each column has a name in files, a heading for people, a unit, and a value
+of a row.
 
-Screens, pages, CSV, JSON and arrays are made from the same declaration, so that a number that stands in several
-places is computed, named and rounded in one.
+Screens, pages, CSV, JSON and arrays are made from the same declaration, so that a number that
+stands in several places is computed, named and rounded in one.
 """
 
 from __future__ import annotations
@@ -27,7 +28,9 @@ from nutdamp.units import screen_unit
 
 NARROW = 60  # characters below which a table becomes one block a row
 GAPS = (2, 1)  # characters between two columns, and where there is little room
-WORD = re.compile(r"(?:[<≤≥✗] )?\S+(?: %(?!\S))?")  # pattern of the words that a column keeps on one line
+WORD = re.compile(
+    r"(?:[<≤≥✗] )?\S+(?: %(?!\S))?"
+)  # pattern of the words that a column keeps on one line
 WIDTH = 80  # columns of a default screen
 
 
@@ -80,13 +83,18 @@ SHORT = 12  # characters of a verdict that stays on one line: "NOT met" does, a 
 
 
 class FittedColumns(Table):
-    """A table of numbers; where the screen is too narrow to show them whole, each row is a block of its own."""
+    """A table of numbers; where the screen is too narrow to show them whole, each row is a block of
+    its own.
+    """
 
     whole: tuple[str, ...] = ()
     """Headings of columns whose cells stay on one line."""
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
-        texts = [[str(column.header), *(_cell(cell).plain for cell in column.cells)] for column in self.columns]
+        texts = [
+            [str(column.header), *(_cell(cell).plain for cell in column.cells)]
+            for column in self.columns
+        ]
         unbroken = [str(column.header) in self.whole for column in self.columns]
         for gap in GAPS if options.max_width >= NARROW else ():
             widths = _widths(texts, options.max_width - gap * (len(self.columns) - 1), unbroken)
@@ -106,7 +114,9 @@ class FittedColumns(Table):
                 named = f"{names[0]}:" if " " in names[0] else names[0]
                 yield Text(f"{named} {first.plain.strip()}".strip(), style="bold")
             rows = [
-                (name, cell) for name, cell in zip(names[1:], others, strict=True) if cell.plain.strip() not in EMPTY
+                (name, cell)
+                for name, cell in zip(names[1:], others, strict=True)
+                if cell.plain.strip() not in EMPTY
             ]
             if rows:
                 yield Padding(facts(rows), (0, 0, 0, 2))
@@ -117,15 +127,25 @@ def _cell(cell: RenderableType) -> Text:
 
 
 def _widths(columns: list[list[str]], room: int, unbroken: list[bool]) -> list[int] | None:
-    """Characters for each column such that no word and no cell of ``unbroken`` ones is cut; None without ``room``."""
-    least = [max((cell_len(word) for text in texts for word in WORD.findall(text)), default=0) for texts in columns]
+    """Characters for each column such that no word and no cell of ``unbroken`` ones is cut; None
+    without ``room``.
+    """
+    least = [
+        max((cell_len(word) for text in texts for word in WORD.findall(text)), default=0)
+        for texts in columns
+    ]
     whole, rows = ([_longest(texts[begin:]) for texts in columns] for begin in (0, 1))
-    widths = [most if kept else fewest for fewest, most, kept in zip(least, whole, unbroken, strict=True)]
+    widths = [
+        most if kept else fewest for fewest, most, kept in zip(least, whole, unbroken, strict=True)
+    ]
     spare = room - sum(widths)
     if spare < 0:
         return None
     for wanted in (rows, whole):  # a heading is broken before a row is
-        for at in (0, *range(len(widths) - 1, 0, -1)):  # names of rows first, then reasons, which stand last
+        for at in (
+            0,
+            *range(len(widths) - 1, 0, -1),
+        ):  # names of rows first, then reasons, which stand last
             wider = max(min(wanted[at] - widths[at], spare), 0)
             widths[at] += wider
             spare -= wider
@@ -138,7 +158,9 @@ def _longest(texts: list[str]) -> int:
 
 
 def columns(*names: str, text: tuple[str, ...] = ()) -> FittedColumns:
-    """A table of numbers, flush right under their headings, but for the first column and those named ``text``."""
+    """A table of numbers, flush right under their headings, but for the first column and those
+    named ``text``.
+    """
     table = FittedColumns(box=None, pad_edge=False, header_style="bold")
     for index, name in enumerate(names):
         table.add_column(name, justify="left" if index == 0 or name in text else "right")
@@ -149,7 +171,9 @@ TEXT, REAL, WHOLE, YES_NO = "U", "f8", "i8", "bool"
 """Kinds of values: text, number, whole number, and yes or no."""
 
 
-UNIT = re.compile(r"_(deg|rad_s|s|kg|Nms?|kgm2|Pa)$")  # ends of names in files that are no part of an attribute
+UNIT = re.compile(
+    r"_(deg|rad_s|s|kg|Nms?|kgm2|Pa)$"
+)  # ends of names in files that are no part of an attribute
 
 
 def value_at(row: Any, path: str) -> Any:
@@ -176,7 +200,9 @@ def _named_value(name: str) -> tuple[str, Callable[[Any], Any]]:
 
 
 def values_of(source: Any, *names: str) -> dict[str, Any]:
-    """Values for JSON by their names: ``key`` of an attribute and its unit, or ``key=path``; angles are degrees."""
+    """Values for JSON by their names: ``key`` of an attribute and its unit, or ``key=path``; angles
+    are degrees.
+    """
     return {key: _plain(value(source)) for key, value in map(_named_value, names)}
 
 
@@ -193,11 +219,12 @@ def to_figures(count: int, scale: float = 1.0) -> Callable[[float], str]:
 class Column(NamedTuple):
     """One column.
 
-    ``key``: its name in CSV and JSON; ``#`` stands for the three components of a vector, which CSV has in columns of
-    their own. ``value`` of a row in the unit of the key, or of the heading without a key; None where it is not known.
-    ``text``: the value as people read it, in the unit of screens. ``where``: the places that have the column, separated
-    by blanks. ``when``: tables that have it, by their source, else all. ``met``: whether a requirement is met, where a
-    verdict is coloured.
+    ``key``: its name in CSV and JSON; ``#`` stands for the three components of a vector, which CSV
+    has in columns of their own. ``value`` of a row in the unit of the key, or of the heading
+    without a key; None where it is not known. ``text``: the value as people read it, in the unit of
+    screens. ``where``: the places that have the column, separated by blanks. ``when``: tables that
+    have it, by their source, else all. ``met``: whether a requirement is met, where a verdict is
+    coloured.
     """
 
     key: str
@@ -225,7 +252,9 @@ class Heading(NamedTuple):
 
 @dataclass(frozen=True)
 class DataTable:
-    """Rows of one result under their columns; ``source`` decides which there are, ``mark`` is a row to stand out."""
+    """Rows of one result under their columns; ``source`` decides which there are, ``mark`` is a row
+    to stand out.
+    """
 
     title: str
     columns: Sequence[Column]
@@ -241,7 +270,10 @@ class DataTable:
     def headings(self, place: str) -> tuple[Heading, ...]:
         """Headings for people."""
         shown = self.at(place)
-        return tuple(Heading(column.heading, screen_unit(column.unit)[0], column.kind != TEXT) for column in shown)
+        return tuple(
+            Heading(column.heading, screen_unit(column.unit)[0], column.kind != TEXT)
+            for column in shown
+        )
 
     def cells(self, place: str) -> tuple[tuple[str, ...], ...]:
         """Texts for people, row by row."""
@@ -249,20 +281,30 @@ class DataTable:
         return tuple(tuple(_text(column, row) for column in shown) for row in self.rows)
 
     def screen(self, place: str, *, between: str = "\n", first: int | None = None) -> FittedColumns:
-        """A table of a screen; ``between`` heading and unit, and of many rows the ``first`` ones and the last."""
+        """A table of a screen; ``between`` heading and unit, and of many rows the ``first`` ones
+        and the last.
+        """
         shown = self.at(place)
         headed = [(column.headed(between), column) for column in shown]
         text = tuple(name for name, column in headed if column.kind == TEXT)
         table = columns(*(name for name, _ in headed), text=text)
-        cells = {name: [_text(column, row) for row in self.rows] for name, column in headed if column.met}
-        table.whole = tuple(name for name, texts in cells.items() if max(map(len, texts), default=0) <= SHORT)
+        cells = {
+            name: [_text(column, row) for row in self.rows] for name, column in headed if column.met
+        }
+        table.whole = tuple(
+            name for name, texts in cells.items() if max(map(len, texts), default=0) <= SHORT
+        )
         last = len(self.rows) - 1
         cut = last if first is None or last < first + 2 else first
         for index, row in enumerate(self.rows):
             if index < cut or index == last:
-                table.add_row(*(self._cell(column, row, index, at == 0) for at, column in enumerate(shown)))
+                table.add_row(
+                    *(self._cell(column, row, index, at == 0) for at, column in enumerate(shown))
+                )
             elif index == cut:
-                more = next((at for at, column in enumerate(shown) if at and column.kind == TEXT), 1)
+                more = next(
+                    (at for at, column in enumerate(shown) if at and column.kind == TEXT), 1
+                )
                 left_out = {0: "…", more: f"{last - cut} more"}
                 table.add_row(*(left_out.get(at, "") for at in range(len(shown))))
         return table
@@ -273,47 +315,75 @@ class DataTable:
         return Text(_text(column, row), "bold" if first and index == self.mark else style)
 
     def transposed(self, place: str, corner: str = "", names: str = "dim") -> FittedColumns:
-        """Quantities down and rows across, named by the first column; ``corner``: heading, ``names``: their style."""
+        """Quantities down and rows across, named by the first column; ``corner``: heading,
+        ``names``: their style.
+        """
         name, *shown = self.at(place)
         table = columns(corner, *(_text(name, row) for row in self.rows))
         for column in shown:
-            cells = (self._cell(column, row, index, first=False) for index, row in enumerate(self.rows))
+            cells = (
+                self._cell(column, row, index, first=False) for index, row in enumerate(self.rows)
+            )
             table.add_row(Text(column.headed(", "), style=names), *cells)
         return table
 
     def array(self) -> NDArray[np.void]:
         """Fields as in CSV files; unknown values are NaN or empty."""
         names, kinds, rows = self._fields()
-        longest = [max([1, *(len(row[at]) for row in rows)]) if kind == TEXT else "" for at, kind in enumerate(kinds)]
+        longest = [
+            max([1, *(len(row[at]) for row in rows)]) if kind == TEXT else ""
+            for at, kind in enumerate(kinds)
+        ]
         types = [f"{kind}{length}" for kind, length in zip(kinds, longest, strict=True)]
         return np.array(rows, dtype=list(zip(names, types, strict=True)))
 
     def csv(self) -> str:
         """A CSV file; unknown values are empty."""
         names, _, rows = self._fields()
-        texts = ([number(cell) if isinstance(cell, float) else str(cell) for cell in row] for row in rows)
+        texts = (
+            [number(cell) if isinstance(cell, float) else str(cell) for cell in row] for row in rows
+        )
         return csv_text(names, texts)
 
     def json(self, place: str = "json") -> list[dict[str, Any]]:
         """A dict a row; vectors are lists, unknown values None."""
         shown = self.at(place)
-        return [{column.key.replace("#", ""): _plain(column.value(row)) for column in shown} for row in self.rows]
+        return [
+            {column.key.replace("#", ""): _plain(column.value(row)) for column in shown}
+            for row in self.rows
+        ]
 
     def _fields(self) -> tuple[list[str], list[str], list[tuple[Any, ...]]]:
         """Names, kinds and rows of the file, a vector in three columns."""
         shown = self.at("csv")
         names = [name for column in shown for name in _names(column)]
-        kinds = [TEXT if column.kind == YES_NO else column.kind for column in shown for _ in _names(column)]
-        return names, kinds, [tuple(part for column in shown for part in _parts(column, row)) for row in self.rows]
+        kinds = [
+            TEXT if column.kind == YES_NO else column.kind
+            for column in shown
+            for _ in _names(column)
+        ]
+        return (
+            names,
+            kinds,
+            [tuple(part for column in shown for part in _parts(column, row)) for row in self.rows],
+        )
 
 
 def _text(column: Column, row: Any) -> str:
     value, (_, factor) = column.value(row), screen_unit(column.unit)
-    return MISSING if value is None else column.text(value if factor == 1.0 else np.multiply(factor, value))
+    return (
+        MISSING
+        if value is None
+        else column.text(value if factor == 1.0 else np.multiply(factor, value))
+    )
 
 
 def _names(column: Column) -> list[str]:
-    return [column.key.replace("#", f"_{axis}") for axis in (1, 2, 3)] if "#" in column.key else [column.key]
+    return (
+        [column.key.replace("#", f"_{axis}") for axis in (1, 2, 3)]
+        if "#" in column.key
+        else [column.key]
+    )
 
 
 def _parts(column: Column, row: Any) -> list[Any]:

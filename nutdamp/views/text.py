@@ -1,7 +1,7 @@
 """Numbers as people read them (four digits, units, degrees), and notes in words.
 
-The sentences of notes stand in ``guide/notes.md``. A value is shown by the unit in which its name ends, so that the
-sentences hold no formats; one without, in the unit that the note names, if any.
+The sentences of notes stand in ``guide/notes.md``. A value is shown by the unit in which its name
+ends, so that the sentences hold no formats; one without, in the unit that the note names, if any.
 """
 
 from __future__ import annotations
@@ -33,7 +33,9 @@ LONG = (  # units of long times: their length, s, and the time, s, up to which t
 
 
 def quantity(value: float | None, unit: str, digits: int = 4) -> str:
-    """A number with its unit, that of the screen for it, or the word for an unknown or infinite one."""
+    """A number with its unit, that of the screen for it, or the word for an unknown or infinite
+    one.
+    """
     if value is None or math.isnan(value):
         return MISSING
     if math.isinf(value):
@@ -43,14 +45,20 @@ def quantity(value: float | None, unit: str, digits: int = 4) -> str:
 
 
 def digits(value: float, count: int) -> str:
-    """A number to ``count`` figures, final zeros too, for columns and labels where the others have as many."""
+    """A number to ``count`` figures, final zeros too, for columns and labels where the others have
+    as many.
+    """
     return f"{value:#.{count}g}".rstrip(".")
 
 
 def sentence(clause: str) -> str:
-    """A clause with a capital letter, unless it begins with a scheme or a key, and a full stop, unless it asks."""
+    """A clause with a capital letter, unless it begins with a scheme or a key, and a full stop,
+    unless it asks.
+    """
     first, _, _ = clause.partition(" ")
-    begun = clause if "." in first or first.rstrip(":") in NAMES else clause[:1].upper() + clause[1:]
+    begun = (
+        clause if "." in first or first.rstrip(":") in NAMES else clause[:1].upper() + clause[1:]
+    )
     return begun if begun.endswith("?") else f"{begun}."
 
 
@@ -65,8 +73,14 @@ def degrees(angle: float | None) -> str:
 
 
 def small_angle(angle: float) -> str:
-    """An angle given in degrees, without the unit and with final zeros; below 1e-9 deg it is shown as rounding."""
-    return digits(angle, 4) if abs(angle) >= 1e-9 else degrees(math.radians(angle)).removesuffix(" deg")
+    """An angle given in degrees, without the unit and with final zeros; below 1e-9 deg it is shown
+    as rounding.
+    """
+    return (
+        digits(angle, 4)
+        if abs(angle) >= 1e-9
+        else degrees(math.radians(angle)).removesuffix(" deg")
+    )
 
 
 FINE = 0.01  # share of a limit below which what is left of it is shown as 0
@@ -74,7 +88,9 @@ COARSE = 5e-4  # degrees below which an angle without a limit is shown as 0
 
 
 def short_angle(angle: float | None, largest: float = math.inf) -> str:
-    """An angle given in rad, in degrees to three figures; "0" where it does not matter beside a ``largest`` (rad)."""
+    """An angle given in rad, in degrees to three figures; "0" where it does not matter beside a
+    ``largest`` (rad).
+    """
     if angle is None or math.isnan(angle):
         return MISSING
     least = COARSE if math.isinf(largest) else min(COARSE, FINE * math.degrees(largest))
@@ -88,11 +104,15 @@ def most(angle: float) -> str:
 
 def mass(value: float | None) -> str:
     """Propellant given in kg, in g below a kilogram."""
-    return quantity(1e3 * value, "g") if value is not None and value < 1.0 else quantity(value, "kg")
+    return (
+        quantity(1e3 * value, "g") if value is not None and value < 1.0 else quantity(value, "kg")
+    )
 
 
 def cost(value: float | None, unit: str) -> str:
-    """Propellant in kg as `mass` has it, an impulse with its ``unit``: four figures, final zeros too, for columns."""
+    """Propellant in kg as `mass` has it, an impulse with its ``unit``: four figures, final zeros
+    too, for columns.
+    """
     if value is None or value == 0.0 or not math.isfinite(value):
         return mass(value) if unit == "kg" else quantity(value, unit)
     size, unit = (1e3 * value, "g") if unit == "kg" and value < 1.0 else (value, unit)
@@ -101,11 +121,15 @@ def cost(value: float | None, unit: str) -> str:
 
 
 LONG_TIME, LONGEST_TIME = 1e3, 3.6e6
-"""Times, s, between which durations are written as h:mm:ss: beyond a thousand hours these mislead."""
+"""Times, s, between which durations are written as h:mm:ss:
+beyond a thousand hours these mislead.
+"""
 
 
 def duration(value: float | None) -> str:
-    """A time given in s, in ms below a tenth of a second, from 1,000 s on in hours, minutes and seconds."""
+    """A time given in s, in ms below a tenth of a second, from 1,000 s on in hours, minutes and
+    seconds.
+    """
     if value is not None and LONG_TIME <= value < LONGEST_TIME:
         whole = round(value)
         return f"{whole // 3600}:{whole // 60 % 60:02d}:{whole % 60:02d}"
@@ -133,17 +157,23 @@ def vector(components: Iterable[float]) -> str:
 
 
 def pointing(angle: float | None) -> str:
-    """An angle of a direction given in rad, in degrees to four decimals, as every place shows it."""
+    """An angle of a direction given in rad, in degrees to four decimals,
+    as every place shows it.
+    """
     return MISSING if angle is None else f"{fixed(math.degrees(angle), 4)} deg"
 
 
 def longitude(angle: float | None) -> str:
-    """A right ascension or azimuth given in rad, in degrees from 0 to below 360; a direction at the pole has none."""
+    """A right ascension or azimuth given in rad, in degrees from 0 to below 360; a direction at the
+    pole has none.
+    """
     return MISSING if angle is None else f"{fixed(math.degrees(angle) % 360.0, 4, 360.0)} deg"
 
 
 def steering(impulse: Sequence[float]) -> str:
-    """Direction of a transverse torque in the 1-2 plane, from axis 1 towards axis 2: 0 to below 360 degrees."""
+    """Direction of a transverse torque in the 1-2 plane, from axis 1 towards axis 2: 0 to below 360
+    degrees.
+    """
     return f"{fixed(math.degrees(math.atan2(impulse[1], impulse[0])) % 360.0, 2, 360.0)}°"
 
 
@@ -158,7 +188,9 @@ WARNING, NOTE, REASON = "warning", "note", "reason"
 
 NAME = re.compile(r"\{(\w+)\}")
 INSTEAD = re.compile(r"\{(\w+)\} instead of \{(than_\1)\}")
-UNITS: dict[str, Callable[[float], str]] = {  # texts of values by the end of their names, the first that fits
+UNITS: dict[
+    str, Callable[[float], str]
+] = {  # texts of values by the end of their names, the first that fits
     "_deg": lambda value: degrees(math.radians(value)),
     "_rad_s": lambda value: quantity(value, "rad/s"),
     "lasting_s": lasting,
@@ -178,7 +210,8 @@ def severity(note: Note) -> str:
 
 def text(note: Note) -> str:
     """The sentence of a note with its values, without a full stop."""
-    entry, values = note_entries()[note.code], note.values
+    entry = note_entries()[note.code]
+    values = note.values
     unit, factor = screen_unit(str(values.get("unit", "")))
     shown = {name: _shown(name, value, factor) for name, value in values.items()} | {"unit": unit}
     first, *clauses = entry.sentence.removesuffix(".").split("; ")
@@ -188,7 +221,9 @@ def text(note: Note) -> str:
 
 def _compared(clause: str, shown: Mapping[str, str]) -> str:
     """A clause without "instead of" the same value, as it is ``shown``."""
-    return INSTEAD.sub(lambda pair: pair[0] if shown[pair[1]] != shown[pair[2]] else f"{{{pair[1]}}}", clause)
+    return INSTEAD.sub(
+        lambda pair: pair[0] if shown[pair[1]] != shown[pair[2]] else f"{{{pair[1]}}}", clause
+    )
 
 
 def _shown(name: str, value: Value, factor: float) -> str:
@@ -200,13 +235,20 @@ def _shown(name: str, value: Value, factor: float) -> str:
 
 def note_json(note: Note) -> dict[str, Any]:
     """A note for JSON files."""
-    return {"code": note.code, "severity": severity(note), "values": note.values, "text": text(note)}
+    return {
+        "code": note.code,
+        "severity": severity(note),
+        "values": note.values,
+        "text": text(note),
+    }
 
 
 def screen_line(note: Note) -> Text:
     """A note for screens: severity, code, sentence."""
     level = severity(note)
-    return Text.assemble((f"{level}[{note.code}]: ", "bold red" if level == WARNING else "bold"), text(note))
+    return Text.assemble(
+        (f"{level}[{note.code}]: ", "bold red" if level == WARNING else "bold"), text(note)
+    )
 
 
 _quiet: ContextVar[bool] = ContextVar("quiet", default=False)
@@ -228,7 +270,9 @@ def quietly(hidden: bool) -> Iterator[None]:
 
 
 def ordered(notes: Iterable[Note]) -> list[Note]:
-    """Notes without repetition, warnings first; those that say the same of several schemes are one, which names all."""
+    """Notes without repetition, warnings first; those that say the same of several schemes are one,
+    which names all.
+    """
     merged: dict[Note, list[str]] = {}
     for entry in notes:
         alike = Note(entry.code, tuple(item for item in entry.items if item[0] != "scheme"))

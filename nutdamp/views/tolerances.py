@@ -1,4 +1,6 @@
-"""Tolerances in words, and the tolerance budget: effect of each input alone, and its share of the variance."""
+"""Tolerances in words, and the tolerance budget: effect of each input alone, and its share of the
+variance.
+"""
 
 from __future__ import annotations
 
@@ -40,7 +42,8 @@ ROUNDING = 1e-12  # rad; a smaller variation is rounding
 class BudgetRow(NamedTuple):
     """A line of the tolerance budget: one input, or several together; ``inputs``: their rows.
 
-    ``size``: one sigma or bias; ``effects``: alone on the two `budgeted_outputs`, rad; ``bias``: nothing of it varies.
+    ``size``: one sigma or bias; ``effects``: alone on the two `budgeted_outputs`, rad; ``bias``:
+    nothing of it varies.
     """
 
     name: str
@@ -51,7 +54,9 @@ class BudgetRow(NamedTuple):
 
 
 def _budget_rows(study: Study) -> list[BudgetRow]:
-    """The inputs that count most, the largest first, and the others together; none where nothing varies."""
+    """The inputs that count most, the largest first, and the others together; none where nothing
+    varies.
+    """
     inputs, first = study.model.inputs.drawn, study.first_order
     if not any(entry.sigma for entry in inputs):
         return []
@@ -68,7 +73,9 @@ def _budget_rows(study: Study) -> list[BudgetRow]:
     for name, size, members in groups:
         nutation, aim = np.sqrt((effects[:, members] ** 2).sum(axis=1)).tolist()
         of = [row for at in members for row in units[at]]
-        rows.append(BudgetRow(name, size, (nutation, aim), of, not any(inputs[row].sigma for row in of)))
+        rows.append(
+            BudgetRow(name, size, (nutation, aim), of, not any(inputs[row].sigma for row in of))
+        )
     return rows
 
 
@@ -79,46 +86,79 @@ def _effect(first: FirstOrder, output: str, rows: list[int]) -> float:
 
 
 def _named(entries: list[DispersedInput]) -> tuple[str, str]:
-    name, size = (", ".join(map(text, entries)) for text in (lambda entry: in_words(entry.name), size_text))
+    name, size = (
+        ", ".join(map(text, entries)) for text in (lambda entry: in_words(entry.name), size_text)
+    )
     return (f"{name} (correlated)" if len(entries) > 1 else name), size
 
 
 def tolerance_budget(results: Results) -> list[RenderableType]:
-    """Shares of the variance by input, by first order and by the cases, and the tolerances that count most."""
-    study, rows = results.study, _budget_rows(results.study)
+    """Shares of the variance by input, by first order and by the cases, and the tolerances that
+    count most.
+    """
+    study = results.study
+    rows = _budget_rows(results.study)
     if not rows:
         return [Text("Nothing varies from case to case, so there is no tolerance budget.")]
     inputs, first, sampled = study.model.inputs.drawn, study.first_order, results.shares
     outputs = dict(budgeted_outputs(study))
-    rest = (1.0 - math.fsum(fractions[output] for fractions in sampled.values()) for output in outputs)
-    shares = [max(share, 0.0) * (first.sigma(output) > ROUNDING) for share, output in zip(rest, outputs, strict=True)]
+    rest = (
+        1.0 - math.fsum(fractions[output] for fractions in sampled.values()) for output in outputs
+    )
+    shares = [
+        max(share, 0.0) * (first.sigma(output) > ROUNDING)
+        for share, output in zip(rest, outputs, strict=True)
+    ]
 
     def linear(output: str, row: BudgetRow) -> str:
-        return "bias" if row.bias else _percent(float(first.shares(output)[row.inputs].sum())) if row.inputs else ""
+        return (
+            "bias"
+            if row.bias
+            else _percent(float(first.shares(output)[row.inputs].sum()))
+            if row.inputs
+            else ""
+        )
 
     def seen(at: int, output: str, row: BudgetRow) -> str:
-        cases = math.fsum(sampled.get(inputs[index].name, {}).get(output, 0.0) for index in row.inputs)
+        cases = math.fsum(
+            sampled.get(inputs[index].name, {}).get(output, 0.0) for index in row.inputs
+        )
         return "" if row.bias else _percent(cases if row.inputs else shares[at])
 
     def effect(at: int, row: BudgetRow) -> str:
         return f"{math.degrees(row.effects[at]):.3g}" if row.inputs else ""
 
     columns = [
-        Column("", Shared.INPUT, "", lambda row: row.name.replace(", ", ",\n"), where="screen", kind=TEXT),
-        Column("", "one sigma\nor bias", "", lambda row: row.size.replace(", ", ",\n"), where="screen"),
+        Column(
+            "",
+            Shared.INPUT,
+            "",
+            lambda row: row.name.replace(", ", ",\n"),
+            where="screen",
+            kind=TEXT,
+        ),
+        Column(
+            "", "one sigma\nor bias", "", lambda row: row.size.replace(", ", ",\n"), where="screen"
+        ),
     ]
     for at, (output, label) in enumerate(outputs.items()):
         columns.append(Column("", label, "deg", partial(effect, at), where="screen"))
         columns.append(Column("", Shared.LINEAR, "%", partial(linear, output), where="screen"))
         columns.append(Column("", Shared.CASES, "%", partial(seen, at, output), where="screen"))
-    table = DataTable("Tolerance budget", columns, [*rows, BudgetRow("interactions", "", (0.0, 0.0), [], False)])
+    table = DataTable(
+        "Tolerance budget", columns, [*rows, BudgetRow("interactions", "", (0.0, 0.0), [], False)]
+    )
     caption = (
-        "Effect: of the input alone. Shares of the variance of the residual vector: linear by derivatives of the "
-        f"flight; cases by the first {min(results.done, EARLY):,} cases (first-order Sobol index), an estimate that "
+        "Effect: of the input alone. Shares of the variance of the residual vector: "
+        "linear by derivatives of the "
+        f"flight; cases by the first {min(results.done, EARLY):,} cases (first-order Sobol index), "
+        "an estimate that "
         "may not total 100 %."
     )
     if study.model.groups:
-        caption += " Correlated inputs vary together: their effect is the root mean square of the group."
+        caption += (
+            " Correlated inputs vary together: their effect is the root mean square of the group."
+        )
     return [Text(table.title, "bold"), table.screen("screen"), Text(caption, "dim")]
 
 
@@ -127,7 +167,9 @@ def _percent(share: float) -> str:
 
 
 def leading(part: str, shares: Mapping[str, float]) -> Iterator[Note]:
-    """The largest ``shares`` of the variance of ``part``, by the names of their inputs for people."""
+    """The largest ``shares`` of the variance of ``part``,
+    by the names of their inputs for people.
+    """
     ranked = sorted(shares.items(), key=lambda item: -item[1])
     causes = [f"{key} ({100 * share:.1f} %)" for key, share in ranked if share >= MAIN]
     if any(shares.values()):
@@ -137,12 +179,16 @@ def leading(part: str, shares: Mapping[str, float]) -> Iterator[Note]:
 def unused_notes(unused: Sequence[Unused]) -> Iterator[Note]:
     """Dispersions of the file that change nothing."""
     if unused:
-        yield note("dispersions-without-effect", dispersions=", ".join(in_words(entry.name) for entry in unused))
+        yield note(
+            "dispersions-without-effect",
+            dispersions=", ".join(in_words(entry.name) for entry in unused),
+        )
 
 
 def budgeted_outputs(study: Study) -> tuple[tuple[str, str], tuple[str, str]]:
     """The outputs of the tolerance budget, and their names for people."""
-    first, second = Part.NUTATION, requirements.aim(study.model.spacecraft)
+    first = Part.NUTATION
+    second = requirements.aim(study.model.spacecraft)
     return (first.value, first.label), (second.value, second.label)
 
 
@@ -160,11 +206,22 @@ def inputs_table(drawn: Sequence[DispersedInput], draws: Mapping[str, float]) ->
     columns = (
         Column("", Shared.INPUT, "", lambda row: in_words(row.name), where="screen", kind=TEXT),
         Column("", Shared.NOMINAL, "", lambda row: scaled(row, row.nominal), where="screen"),
-        Column("", Shared.THIS_CASE, "", lambda row: scaled(row, row.nominal + draws[row.name]), where="screen"),
+        Column(
+            "",
+            Shared.THIS_CASE,
+            "",
+            lambda row: scaled(row, row.nominal + draws[row.name]),
+            where="screen",
+        ),
         Column("", "off by", "", off, where="screen"),
-        Column("", "in sigmas", "", lambda row: f"{draws[row.name] / row.sigma:+.2f}" if row.sigma else "bias",
-               where="screen"),
-    )  # fmt: skip
+        Column(
+            "",
+            "in sigmas",
+            "",
+            lambda row: f"{draws[row.name] / row.sigma:+.2f}" if row.sigma else "bias",
+            where="screen",
+        ),
+    )
     return DataTable("Inputs", columns, drawn).screen("screen")
 
 
@@ -188,11 +245,17 @@ def without_effect(unused: Iterable[Unused]) -> Iterator[tuple[str, str]]:
 
 
 def in_words(name: str) -> str:
-    """A tolerance, or an input, in words: ``thrust_direction`` and ``omega0_1`` are keys of the file."""
+    """A tolerance, or an input, in words: ``thrust_direction`` and ``omega0_1`` are keys of the
+    file.
+    """
     key, blank, whose = name.replace("tank ", "tank_", 1).partition(" ")
     if key.startswith("omega0"):
         return f"initial ω{key.removeprefix('omega0').removeprefix('_')}"
-    return ("jitter of the Sun sensor" if key == "sun_sensor.jitter" else key.replace("_", " ")) + blank + whose
+    return (
+        ("jitter of the Sun sensor" if key == "sun_sensor.jitter" else key.replace("_", " "))
+        + blank
+        + whose
+    )
 
 
 def size_text(entry: DispersedInput) -> str:
@@ -204,7 +267,9 @@ def size_text(entry: DispersedInput) -> str:
 
 
 def stated_text(entry: DispersedInput, relative: bool, *, down: bool = False) -> str:
-    """The size as the file gives it, in % where it is ``relative``; to three digits, ``down``: never rounded up."""
+    """The size as the file gives it, in % where it is ``relative``; to three digits, ``down``:
+    never rounded up.
+    """
     share = entry.nominal != 0.0 and (relative or entry.unit == "")
     unit, scale = ("%", 100.0 / abs(entry.nominal)) if share else unit_of_people(entry)
     value = scale * entry.size

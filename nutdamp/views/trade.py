@@ -1,4 +1,6 @@
-"""Fronts of ``trade``: schedules by their ends on screens and in files, and notes beside a recommendation."""
+"""Fronts of ``trade``: schedules by their ends on screens and in files, and notes beside a
+recommendation.
+"""
 
 from __future__ import annotations
 
@@ -23,12 +25,23 @@ from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.requirements import DAMPED_ANGLE, SAME_COST, Part
 from nutdamp.views.decisions import FARTHER, heading, plan_json
 from nutdamp.views.parts import derived_table, named, pulse_table, requested, summary
-from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable, Shared, angle_of, file_columns, values_of
+from nutdamp.views.tables import (
+    TEXT,
+    WHOLE,
+    YES_NO,
+    Column,
+    DataTable,
+    Shared,
+    angle_of,
+    file_columns,
+    values_of,
+)
 from nutdamp.views.text import cost, degrees, fixed, sentences, small_angle
 from nutdamp.views.verdict import coloured, lead, share_text, verdict_json
 
 ROWS = 18  # points on the default screen, at most: evenly some of more
-SOONER = 0.05  # share of its time by which a plan that costs as much has to end sooner to be worth a remark
+# share of its time by which a plan that costs as much has to end sooner to be worth a remark
+SOONER = 0.05
 FAILS = "is not to be flown"  # by its verdict
 
 
@@ -71,30 +84,61 @@ def _columns(rows: Sequence[TradeRow]) -> Iterator[Column]:
                  "brief")  # fmt: skip
     yield from file_columns("csv", "shift_allowed_deg=front.shift")
     yield Column(
-        "end_s", Shared.END, "s", attrgetter("point.plan.pulses.end"), lambda end: f"{end:.3f}", "csv full brief"
+        "end_s",
+        Shared.END,
+        "s",
+        attrgetter("point.plan.pulses.end"),
+        lambda end: f"{end:.3f}",
+        "csv full brief",
     )
     yield Column("", "cost", "", lambda row: row.spent(row.point.cost), where="full brief")
-    yield Column("", "small-angle bound", "", lambda row: row.spent(row.least), where="full" * bounded)
     yield Column(
-        "pulses", Shared.PULSES, "", lambda row: len(row.point.plan.pulses), where="csv full brief", kind=WHOLE
+        "", "small-angle bound", "", lambda row: row.spent(row.least), where="full" * bounded
     )
-    spent = ("propellant_kg=point.plan.pulses.propellant", "total_impulse_Nms=point.plan.pulses.total_impulse")
+    yield Column(
+        "pulses",
+        Shared.PULSES,
+        "",
+        lambda row: len(row.point.plan.pulses),
+        where="csv full brief",
+        kind=WHOLE,
+    )
+    spent = (
+        "propellant_kg=point.plan.pulses.propellant",
+        "total_impulse_Nms=point.plan.pulses.total_impulse",
+    )
     yield from file_columns("csv", *spent, "first_order_least=least")
     yield Column("least_unit", "", "", attrgetter("point.unit"), where="csv", kind=TEXT)
     yield from file_columns("csv", "nutation_deg=point.plan.flight.residual.nutation")
     shift = angle_of("point.plan.flight.residual.momentum_shift")
-    yield Column("momentum_shift_deg", Part.SHIFT.label, "deg", shift, small_angle, "csv full brief")
+    yield Column(
+        "momentum_shift_deg", Part.SHIFT.label, "deg", shift, small_angle, "csv full brief"
+    )
     yield from file_columns("csv", "axis_error_deg=point.plan.flight.residual.axis_error")
     yield Column("", f"vs point {first}", "%", _saved, where="full")
     yield Column("", "vs first", "%", _saved, where="" if others else "brief")
     scheme = "csv full brief" if others else "csv"
-    yield Column("scheme", Shared.SCHEME, "", attrgetter("point.plan.scheme"), where=scheme, kind=TEXT)
+    yield Column(
+        "scheme", Shared.SCHEME, "", attrgetter("point.plan.scheme"), where=scheme, kind=TEXT
+    )
     yield Column("status", "", "", attrgetter("point.verdict.status.value"), where="csv", kind=TEXT)
     yield from file_columns("csv", "share=point.verdict.cases.complying")
-    yield Column("meets_requirement", "", "", lambda row: row.point.verdict.met, where="csv", kind=YES_NO)
-    yield Column("", "comply", "", attrgetter("point.verdict.cases"), share_text, "full brief" * flown)
-    yield Column("", Shared.VERDICT, "", attrgetter("point.verdict"), lead, "full brief" * judged, kind=TEXT,
-                 met=lambda row: row.point.verdict.met)  # fmt: skip
+    yield Column(
+        "meets_requirement", "", "", lambda row: row.point.verdict.met, where="csv", kind=YES_NO
+    )
+    yield Column(
+        "", "comply", "", attrgetter("point.verdict.cases"), share_text, "full brief" * flown
+    )
+    yield Column(
+        "",
+        Shared.VERDICT,
+        "",
+        attrgetter("point.verdict"),
+        lead,
+        "full brief" * judged,
+        kind=TEXT,
+        met=lambda row: row.point.verdict.met,
+    )
 
 
 def _saved(row: TradeRow) -> str:
@@ -103,8 +147,11 @@ def _saved(row: TradeRow) -> str:
 
 
 def trade_brief(spacecraft: Spacecraft, fronts: Sequence[Front]) -> RenderableType:
-    """The default screen of ``trade``: the cheapest and the earliest schedule, the points of all fronts."""
-    points, notes = rows_of(fronts), missing(spacecraft, fronts)
+    """The default screen of ``trade``: the cheapest and the earliest schedule, the points of all
+    fronts.
+    """
+    points = rows_of(fronts)
+    notes = missing(spacecraft, fronts)
     if points and spacecraft.commands is not None:
         notes.append(note("trade-not-commandable"))
     shown = {round(at) for at in np.linspace(0, len(points) - 1, ROWS).tolist()} if points else ()
@@ -127,8 +174,13 @@ def _head(spacecraft: Spacecraft, fronts: Sequence[Front]) -> Iterator[Text]:
         return
     good = [row for row in points if not fails(row.point)]
     for name, order in (("Cheapest", itemgetter(0, 1)), ("Earliest", itemgetter(1, 0))):
-        row = min(good or points, key=lambda row: order((row.point.cost, row.point.plan.pulses.end)))
-        costs = f"{row.spent(row.point.cost)}, ends at {row.point.plan.pulses.end:.3f} s (point {row.number})"
+        row = min(
+            good or points, key=lambda row: order((row.point.cost, row.point.plan.pulses.end))
+        )
+        costs = (
+            f"{row.spent(row.point.cost)}, ends at {row.point.plan.pulses.end:.3f} s (point "
+            f"{row.number})"
+        )
         yield Text.assemble((f"{name}: ", "bold"), costs)
     if required := requested(spacecraft):
         light = next((row.point.verdict.light for row in good), Light.RED)
@@ -138,28 +190,44 @@ def _head(spacecraft: Spacecraft, fronts: Sequence[Front]) -> Iterator[Text]:
 
 def trade_screen(spacecraft: Spacecraft, fronts: Sequence[Front]) -> RenderableType:
     """All tables of ``trade``."""
-    return Group(*_head(spacecraft, fronts), Text(), derived_table(spacecraft), *front_parts(spacecraft, fronts))
+    return Group(
+        *_head(spacecraft, fronts),
+        Text(),
+        derived_table(spacecraft),
+        *front_parts(spacecraft, fronts),
+    )
 
 
 def front_parts(spacecraft: Spacecraft, fronts: Sequence[Front]) -> list[RenderableType]:
     """The table of each front under its name."""
     parts: list[RenderableType] = []
     for front in fronts:
-        parts += [Text(), Text(front_name(front, pointing=spacecraft.goal.axis is not None), style="bold")]
+        parts += [
+            Text(),
+            Text(front_name(front, pointing=spacecraft.goal.axis is not None), style="bold"),
+        ]
         if front.why is not None:
             parts.append(Text(_without_optimal(front)))
         if front.points:
-            parts.append(_table([row for row in rows_of(fronts) if row.front is front]).screen("full"))
+            parts.append(
+                _table([row for row in rows_of(fronts) if row.front is front]).screen("full")
+            )
     priced = [(row.spent(row.point.cost), row.spent(row.least)) for row in rows_of(fronts)
               if row.least is not None and row.point.cost < row.least]  # fmt: skip
-    below = [note("trade-below-bound")] * any(spent != least for spent, least in priced)  # as the table writes both
+    below = [note("trade-below-bound")] * any(
+        spent != least for spent, least in priced
+    )  # as the table writes both
     for sentence in sentences((*below, *_ends_off(fronts))):
         parts += [Text(), Text(sentence, style="dim")]
     return parts
 
 
 def _ends_off(fronts: Sequence[Front]) -> Iterator[Note]:
-    off = [row.point.plan.flight.residual.axis_error for row in rows_of(fronts) if row.front.shift == 0.0]
+    off = [
+        row.point.plan.flight.residual.axis_error
+        for row in rows_of(fronts)
+        if row.front.shift == 0.0
+    ]
     if max(off, default=0.0) > DAMPED_ANGLE:
         yield note("trade-ends-off")
 
@@ -179,8 +247,13 @@ def missing(spacecraft: Spacecraft, traded: Sequence[Front]) -> list[Note]:
     fronts: dict[str, list[str]] = {}
     for entry in traded:
         if entry.why is not None:
-            fronts.setdefault(_without_optimal(entry), []).append(front_name(entry, pointing=pointing))
-    return [note("trade-missing", fronts=", ".join(names), why=reason) for reason, names in fronts.items()]
+            fronts.setdefault(_without_optimal(entry), []).append(
+                front_name(entry, pointing=pointing)
+            )
+    return [
+        note("trade-missing", fronts=", ".join(names), why=reason)
+        for reason, names in fronts.items()
+    ]
 
 
 def schemes_of(fronts: Sequence[Front]) -> list[str]:
@@ -194,7 +267,9 @@ def front_name(front: Front, *, pointing: bool) -> str:
         return "H may end anywhere"
     if front.shift == 0.0:
         return "H ends on its target" if pointing else "H ends where it was"
-    return f"H ends within {degrees(front.shift)} of " + ("its target" if pointing else "where it was")
+    return f"H ends within {degrees(front.shift)} of " + (
+        "its target" if pointing else "where it was"
+    )
 
 
 # --- files
@@ -239,11 +314,17 @@ def schedule_paths(folder: str, count: int) -> list[str]:
 # --- beside a recommended plan
 
 
-def _better(fronts: Sequence[Front], chosen: Plan, *, misses: bool) -> tuple[float, float, TradeRow] | None:
-    """Share of the cost saved, s earlier, and the cheapest, then earliest, point that is better than ``chosen``."""
-    until, better = chosen.pulses.end, []
+def _better(
+    fronts: Sequence[Front], chosen: Plan, *, misses: bool
+) -> tuple[float, float, TradeRow] | None:
+    """Share of the cost saved, s earlier, and the cheapest, then earliest, point that is better
+    than ``chosen``.
+    """
+    until = chosen.pulses.end
+    better = []
     for row in rows_of(fronts):
-        saved, end = 1.0 - row.point.cost / chosen.pulses.cost_in(row.point.unit), row.point.plan.pulses.end
+        saved = 1.0 - row.point.cost / chosen.pulses.cost_in(row.point.unit)
+        end = row.point.plan.pulses.end
         cheaper = saved > SAME_COST and end <= until
         able = row.point.verdict.met and not fails(row.point)
         if able and (misses or cheaper or _sooner(row.point.plan, chosen, saved)):
@@ -252,18 +333,25 @@ def _better(fronts: Sequence[Front], chosen: Plan, *, misses: bool) -> tuple[flo
 
 
 def _sooner(plan: Plan, chosen: Plan, saved: float) -> bool:
-    """True where a plan that saves that share of the cost, about none, ends clearly sooner with H about as near."""
+    """True where a plan that saves that share of the cost, about none, ends clearly sooner with H
+    about as near.
+    """
     shifts = [flown.flight.residual.axis_error for flown in (plan, chosen)]
     ends_sooner = plan.pulses.end < (1.0 - SOONER) * chosen.pulses.end
     return abs(saved) <= SAME_COST and ends_sooner and shifts[0] <= FARTHER * shifts[1] + SAME_ANGLE
 
 
 def trade_notes(fronts: Sequence[Front], chosen: Plan, judged: Verdict) -> Iterator[Note]:
-    """The schedule of a front that is better than the ``chosen`` plan, with its command; or that costs more."""
+    """The schedule of a front that is better than the ``chosen`` plan, with its command; or that
+    costs more.
+    """
     better = _better(fronts, chosen, misses=judged.met is False)
     if better is not None:
-        row, shift = better[2], better[2].front.shift
-        bound = "--free-axis " if math.isinf(shift) else f'--shift "{degrees(shift)}" ' * (shift > 0.0)
+        row = better[2]
+        shift = better[2].front.shift
+        bound = (
+            "--free-axis " if math.isinf(shift) else f'--shift "{degrees(shift)}" ' * (shift > 0.0)
+        )
         horizon = f'--set "limits.horizon={row.point.horizon:.6g} s"'
         command = f"nutdamp plan SPACECRAFT --scheme {row.point.plan.scheme} {bound}{horizon}"
         shown = notes.figures(row.point.plan, chosen, row.point.unit == "kg")
@@ -271,14 +359,21 @@ def trade_notes(fronts: Sequence[Front], chosen: Plan, judged: Verdict) -> Itera
             yield note("trade-meets", point=row.number, command=command, **shown)
         else:
             yield note("trade-better", point=row.number, command=command, **shown)
-    rows = [row for row in rows_of(fronts) if row.point.plan.pulses.end <= chosen.pulses.end and not fails(row.point)]
+    rows = [
+        row
+        for row in rows_of(fronts)
+        if row.point.plan.pulses.end <= chosen.pulses.end and not fails(row.point)
+    ]
     nearest = min(rows, key=lambda row: row.point.cost, default=None)
     if nearest is None:
         return
-    spent, cheapest = chosen.pulses.cost_in(nearest.point.unit), nearest.point.cost
+    spent = chosen.pulses.cost_in(nearest.point.unit)
+    cheapest = nearest.point.cost
     if spent < cheapest * (1.0 - SAME_COST):
         if chosen.scheme not in schemes_of(fronts):
             saved = 100.0 * (1.0 - spent / cheapest)
-            yield note("trade-dearer", scheme=chosen.scheme, saved_percent=saved, point=nearest.number)
+            yield note(
+                "trade-dearer", scheme=chosen.scheme, saved_percent=saved, point=nearest.number
+            )
     elif spent < cheapest and nearest.spent(spent) != nearest.spent(cheapest):
         yield note("trade-alike", point=nearest.number)

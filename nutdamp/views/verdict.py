@@ -43,8 +43,9 @@ DAMPED = {Part.DISTANCE: "reached"}
 """Words for a bound that nobody requires; of others damped."""
 
 TRAIN, EVEN = 5, 0.05
-"""Pulses of one channel, at least, that are a train, and the share by which their distances may differ: the widths of
-their commands change as the nutation falls."""
+"""Pulses of one channel, at least, that are a train, and the share by which their distances may
+differ: the widths of their commands change as the nutation falls.
+"""
 
 FIGURES = 8  # of a value beside its limit, at most
 
@@ -64,7 +65,8 @@ def spent(schedule: Schedule) -> str:
 
 def fired(schedule: Schedule) -> str:
     """Number of pulses, of blocks and of trains; cost, and end of the last one."""
-    trains, single = [], 0
+    trains = []
+    single = 0
     for channel, run in groupby(schedule, attrgetter("channel")):
         del channel
         times = [pulse.t for pulse in run]
@@ -76,21 +78,30 @@ def fired(schedule: Schedule) -> str:
     if schedule.blocks or not trains:
         count = f"pulses {len(schedule)}"
     else:
-        count = " and ".join([*(f"train of {number}" for number in trains), *[f"pulses {single}"] * bool(single)])
+        count = " and ".join(
+            [*(f"train of {number}" for number in trains), *[f"pulses {single}"] * bool(single)]
+        )
     blocks = f"blocks {len(schedule.blocks)}, " if schedule.blocks else ""
     return f"{blocks}{count}, {spent(schedule)}, ends at {duration(schedule.end)}"
 
 
 def headline(verdict: Verdict, compared: Comparison | None = None) -> tuple[str, str]:
-    """Headline in two parts, the status and what it is about; of no plan the reasons of the comparison."""
-    words, pulses = lead(verdict), verdict.schedule
+    """Headline in two parts, the status and what it is about; of no plan the reasons of the
+    comparison.
+    """
+    words = lead(verdict)
+    pulses = verdict.schedule
     if verdict.status is Status.NO_PLAN:
         why = verdict.why if compared is None else joined(reasons(compared))
         return words, f": {why}" * bool(why)
     if verdict.idle:
         return words, f" needed: {idle(verdict)}"
     ideal = " (ideal impulses)" * pulses.idealised
-    about = f" {verdict.scheme}{ideal}" if words == HEADLINES[Status.FLY] else f": {verdict.scheme}{ideal}"
+    about = (
+        f" {verdict.scheme}{ideal}"
+        if words == HEADLINES[Status.FLY]
+        else f": {verdict.scheme}{ideal}"
+    )
     date = verdict.spacecraft.utc(pulses.end)
     return words, f"{about}: {fired(pulses)}" + ("" if date is None else f", {date[:10]}")
 
@@ -101,18 +112,24 @@ def idle(verdict: Verdict) -> str:
     there = f"nutation {degrees(body.nutation)} at t = 0"
     if body.goal.axis is not None:
         there += f", H {degrees(body.to_turn)} from the target"
-    return there + (f", kept up to the horizon of {duration(body.horizon)}" if body.growth > 0.0 else "")
+    return there + (
+        f", kept up to the horizon of {duration(body.horizon)}" if body.growth > 0.0 else ""
+    )
 
 
 def statement(verdict: Verdict) -> str:
-    """Sentence on the requirement, in words that leave no doubt about its subject; without a full stop."""
+    """Sentence on the requirement, in words that leave no doubt about its subject; without a full
+    stop.
+    """
     cases, body = verdict.cases, verdict.spacecraft
     if verdict.status is Status.NO_PLAN:
         return verdict.why or "no plan is feasible"
     broken = " and ".join(strays(aspect) for aspect in verdict.aspects if not aspect.kept)
     counted = ""
     if cases is not None and cases.complying is not None:
-        counted = f"{share_text(cases)} of cases comply ({exact_percent(cases.probability)} required)"
+        counted = (
+            f"{share_text(cases)} of cases comply ({exact_percent(cases.probability)} required)"
+        )
     if not verdict.required:
         bounds = [line for line in verdict.lines if not line.bound.required]
         return f"no requirement in file; {', '.join(map(bound_word, bounds))} with nominal values"
@@ -160,7 +177,9 @@ def line_word(line: Line) -> str:
 
 
 def share_text(cases: Cases | None) -> str:
-    """Share that complies; where not all cases have flown, the end of its interval towards the share required."""
+    """Share that complies; where not all cases have flown, the end of its interval towards the
+    share required.
+    """
     if cases is None or cases.complying is None:
         return MISSING
     if cases.final:
@@ -171,7 +190,9 @@ def share_text(cases: Cases | None) -> str:
 
 
 def percent(share: float, *others: float) -> str:
-    """A share in percent to one decimal; to more where it would be taken for one of the ``others``, or for all."""
+    """A share in percent to one decimal; to more where it would be taken for one of the ``others``,
+    or for all.
+    """
     distinct = [other for other in (*others, 0.0, 1.0) if other != share]
     for digits in range(1, 12):
         shown = f"{100.0 * share:.{digits}f}"
@@ -200,7 +221,9 @@ def limit(bound: Bound) -> str:
 
 
 def value(bound: Bound, number: float | None) -> str:
-    """Value of a bound's part, with as many digits as it takes to stand on its side of the limit; rounding is 0."""
+    """Value of a bound's part, with as many digits as it takes to stand on its side of the limit;
+    rounding is 0.
+    """
     if number is None or math.isnan(number):
         return MISSING
     scale, unit = (RPM, "rpm") if bound.part is Part.SPIN else (math.degrees(1.0), "deg")
@@ -208,8 +231,13 @@ def value(bound: Bound, number: float | None) -> str:
         shown = "0" if abs(number) < SMALL * bound.limit else f"{scale * number:.3g}"
     else:
         shown = short_angle(number, bound.limit)
-    edge, figures = float(f"{scale * bound.limit:.4g}"), 3
-    while (float(shown) > edge) != (number > bound.limit) and number != bound.limit and figures < FIGURES:
+    edge = float(f"{scale * bound.limit:.4g}")
+    figures = 3
+    while (
+        (float(shown) > edge) != (number > bound.limit)
+        and number != bound.limit
+        and figures < FIGURES
+    ):
         figures += 1
         shown = f"{scale * number:.{figures}g}"
     return f"{shown} {unit}"
@@ -225,20 +253,30 @@ def margin(line: Line) -> str:
     return f"{short_angle(line.margin, line.bound.limit)} deg"
 
 
-def bound_table(verdict: Verdict, lines: Sequence[Line] | None = None, title: str = "Requirement") -> DataTable:
-    """One row a bound: limit, nominal value, that in the share of cases required, cases that keep it alone, margin."""
+def bound_table(
+    verdict: Verdict, lines: Sequence[Line] | None = None, title: str = "Requirement"
+) -> DataTable:
+    """One row a bound: limit, nominal value, that in the share of cases required, cases that keep
+    it alone, margin.
+    """
     cases = verdict.cases
     level = Shared.NOMINAL if cases is None else f"{exact_percent(cases.probability)} within"
     dispersed = "page screen" * (cases is not None)
     everywhere = "page screen"
 
     def alone(line: Line) -> str:
-        return MISSING if line.share is None or cases is None else percent(line.share, cases.probability)
+        return (
+            MISSING
+            if line.share is None or cases is None
+            else percent(line.share, cases.probability)
+        )
 
     columns = (
         Column("", "requirement", "", lambda line: line.bound.label, where=everywhere, kind=TEXT),
         Column("", "limit", "", lambda line: limit(line.bound), where=everywhere),
-        Column("", Shared.NOMINAL, "", lambda line: value(line.bound, line.nominal), where=everywhere),
+        Column(
+            "", Shared.NOMINAL, "", lambda line: value(line.bound, line.nominal), where=everywhere
+        ),
         Column("", level, "", lambda line: value(line.bound, line.dispersed), where=dispersed),
         Column("", "keep it", "", alone, where=dispersed),
         Column("", "margin", "", margin, where=everywhere),
@@ -249,7 +287,8 @@ def bound_table(verdict: Verdict, lines: Sequence[Line] | None = None, title: st
 
 def scheme_word(compared: Comparison, plan: Any) -> str:
     """Verdict on one of the plans compared, or in short why it is not recommended."""
-    verdict, why = compared.verdicts[plan], compared.shortcoming(plan)
+    verdict = compared.verdicts[plan]
+    why = compared.shortcoming(plan)
     if why is not None:
         return text(why)
     if verdict.required:
@@ -269,15 +308,21 @@ def line_json(line: Line) -> dict[str, Any]:
     unit, scale = ("rad_s", 1.0) if bound.part is Part.SPIN else ("deg", math.degrees(1.0))
     sizes = (bound.limit, line.nominal, line.dispersed, line.margin)
     named_sizes = zip(("limit", "nominal", "dispersed", "margin"), sizes, strict=True)
-    values = {f"{name}_{unit}": None if size is None else scale * size for name, size in named_sizes}
+    values = {
+        f"{name}_{unit}": None if size is None else scale * size for name, size in named_sizes
+    }
     return {**named, **values, "share": line.share, "met": line.met}
 
 
 def cases_json(cases: Cases | None) -> dict[str, Any] | None:
-    """Share of the cases that comply, its interval, and the share required; None where none were flown."""
+    """Share of the cases that comply, its interval, and the share required; None where none were
+    flown.
+    """
     if cases is None or cases.complying is None:
         return None
-    return values_of(cases, "samples", "seed", "met_fraction=complying", "low", "high", "probability")
+    return values_of(
+        cases, "samples", "seed", "met_fraction=complying", "low", "high", "probability"
+    )
 
 
 def verdict_json(verdict: Verdict) -> dict[str, Any]:

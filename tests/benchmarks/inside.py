@@ -1,9 +1,11 @@
-"""Times of the work inside one process, for `run.py`: rows of its table as JSON, on standard output.
+"""Times of the work inside one process, for `run.py`: rows of its table as JSON, on standard
+output.
 
     python tests/benchmarks/inside.py    (in a folder with dispersed.yaml)
 
-The peers are what one would else write: `scipy.integrate.solve_ivp` (DOP853, rtol 1e-10) on Euler's equations and the
-quaternion, one case at a time from edge to edge; and Basilisk, where it is installed.
+The peers are what one would else write: `scipy.integrate.solve_ivp` (DOP853, rtol 1e-10) on Euler's
+equations and the quaternion, one case at a time from edge to edge; and Basilisk, where it is
+installed.
 """
 
 import importlib.util
@@ -39,7 +41,9 @@ TURNS = 5
 
 
 def medians(works: dict[str, Callable[[], int]]) -> dict[str, float]:
-    """Median time in s of one case of each work; they take turns, and each tells how many cases it flew."""
+    """Median time in s of one case of each work; they take turns, and each tells how many cases it
+    flew.
+    """
     times: dict[str, list[float]] = {name: [] for name in works}
     for turn in range(TURNS + 1):
         for name, work in works.items():
@@ -72,8 +76,17 @@ def by_solve_ivp(body: Spacecraft, schedule: Schedule) -> Array:
         torque = np.zeros(3) if pulse.torque is None else pulse.torque
         for end, acting in ((pulse.start, np.zeros(3)), (pulse.end, torque)):
             if end > now:
-                solved = solve_ivp(slope, (now, end), y, method="DOP853", rtol=1e-10, atol=1e-12, args=tuple(acting))
-                y, now = solved.y[:, -1], end
+                solved = solve_ivp(
+                    slope,
+                    (now, end),
+                    y,
+                    method="DOP853",
+                    rtol=1e-10,
+                    atol=1e-12,
+                    args=tuple(acting),
+                )
+                y = solved.y[:, -1]
+                now = end
     return np.asarray(y)
 
 
@@ -82,7 +95,9 @@ def works() -> dict[str, Callable[[], int]]:
     body = load("dispersed.yaml")
     schedule = planning.plan(body, "two-pulse").pulses
     settled = propagation.flown(body, schedule).settled
-    assert np.abs(by_solve_ivp(body, schedule)[:3] - settled.rates).max() < 1e-7  # the peer does the same work
+    assert (
+        np.abs(by_solve_ivp(body, schedule)[:3] - settled.rates).max() < 1e-7
+    )  # the peer does the same work
     study = study_of(body, schedule)
     truths = [realised(study.model, study.draws_of(case)) for case in range(PEER_CASES)]
 
@@ -129,9 +144,17 @@ def rows() -> list[dict[str, Any]]:
     found: list[dict[str, Any]] = []
 
     def faster(name: str, of: str, than: str, limit: float | None = None) -> None:
-        ratio, against = times[than] / times[of], f"faster than {than}"
+        ratio = times[than] / times[of]
+        against = f"faster than {than}"
         found.append(
-            {"name": name, "seconds": times[of], "ratio": ratio, "against": against, "limit": limit, "at_least": True}
+            {
+                "name": name,
+                "seconds": times[of],
+                "ratio": ratio,
+                "against": against,
+                "limit": limit,
+                "at_least": True,
+            }
         )
 
     faster("a single flight", "one flight", "solve_ivp")

@@ -1,9 +1,11 @@
-"""Writes the results in golden.json anew: its schedules, specified by hand, flown by the reference integrator alone.
+"""Writes the results in golden.json anew: its schedules, specified by hand, flown by the reference
+integrator alone.
 
     python tests/golden/make_golden.py
 
-Nothing of nutdamp takes part. Each case of the file gives a body, its motion at t = 0, and its pulses; the results are
-the motion at the end of the last pulse, in the frame N: rates, attitude, H, nutation angle and shift of H.
+Nothing of nutdamp takes part. Each case of the file gives a body, its motion at t = 0, and its
+pulses; the results are the motion at the end of the last pulse, in the frame N: rates, attitude, H,
+nutation angle and shift of H.
 """
 
 import json
@@ -25,12 +27,15 @@ def event(pulse: dict[str, Any]) -> reference.Push | reference.Kick:
     """An impulse (N m s) at a moment, or a torque (N m) between two."""
     if "impulse_Nms" in pulse:
         return reference.Kick(pulse["t_s"], np.array(pulse["impulse_Nms"], dtype=float))
-    return reference.Push(pulse["start_s"], pulse["end_s"], np.array(pulse["torque_Nm"], dtype=float))
+    return reference.Push(
+        pulse["start_s"], pulse["end_s"], np.array(pulse["torque_Nm"], dtype=float)
+    )
 
 
 def fly(case: dict[str, Any]) -> dict[str, Any]:
     """The results of one case: principal moments kg m², rates rad/s, and what is fired."""
-    moments, rates = case["moments_kgm2"], np.array(case["rates_rad_s"], dtype=float)
+    moments = case["moments_kgm2"]
+    rates = np.array(case["rates_rad_s"], dtype=float)
     start = reference.Motion(rates, reference.frame_n(moments, rates))
     events = [event(pulse) for pulse in case["pulses"]]
     end = max(one.t if isinstance(one, reference.Kick) else one.end for one in events)

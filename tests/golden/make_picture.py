@@ -12,7 +12,16 @@ if __name__ == "__main__":
     drawing = ("--plot", str(Path(__file__).with_name("two-pulse.png")), "--figure", "motion")
     with TemporaryDirectory() as empty:  # where no spacecraft.yaml is found
         subprocess.run(
-            [sys.executable, "-m", "nutdamp", "simulate", "--scheme", "two-pulse", "--flown", *drawing],
+            [
+                sys.executable,
+                "-m",
+                "nutdamp",
+                "simulate",
+                "--scheme",
+                "two-pulse",
+                "--flown",
+                *drawing,
+            ],
             cwd=empty,
             check=True,
         )

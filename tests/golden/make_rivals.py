@@ -1,9 +1,10 @@
-"""Makes rivals.json: what the independent search of support/rivals.py finds for 300 layouts of strong thrusters.
+"""Makes rivals.json: what the independent search of support/rivals.py finds for 300 layouts of
+strong thrusters.
 
     python tests/golden/make_rivals.py
 
-Nothing of nutdamp's planning takes part. Takes some ten minutes of processor time. Each row is the cheapest schedule
-found for one layout: cost in kg (null: none), pulses as channel, start, on-time.
+Nothing of nutdamp's planning takes part. Takes some ten minutes of processor time. Each row is the
+cheapest schedule found for one layout: cost in kg (null: none), pulses as channel, start, on-time.
 """
 
 import json
@@ -23,7 +24,11 @@ def row(seed: int) -> dict[str, Any]:
     best = rivals.cheapest(*rivals.strong_layout(seed), starts=30, seed=seed)
     if best is None:
         return {"seed": seed, "cost_kg": None}
-    return {"seed": seed, "cost_kg": best.cost, "pulses": [pulse for pulse in best.pulses if pulse[2] > 0.0]}
+    return {
+        "seed": seed,
+        "cost_kg": best.cost,
+        "pulses": [pulse for pulse in best.pulses if pulse[2] > 0.0],
+    }
 
 
 if __name__ == "__main__":

@@ -1,6 +1,8 @@
-"""Writes sun.csv: where the Sun is seen, by ERFA (pip install pyerfa), whose theory errs by some milliarcseconds.
+"""Writes sun.csv: where the Sun is seen, by ERFA (pip install pyerfa), whose theory errs by some
+milliarcseconds.
 
-Days since J2000.0 (TT) and the geocentric direction of the Sun in the celestial reference frame, with aberration.
+Days since J2000.0 (TT) and the geocentric direction of the Sun in the celestial reference frame,
+with aberration.
 """
 
 from importlib import import_module
@@ -20,7 +22,10 @@ if __name__ == "__main__":
         distance = float(np.linalg.norm(heliocentric["p"]))
         velocity = barycentric["v"] * erfa.DAU / erfa.DAYSEC / erfa.CMPS
         x, y, z = erfa.ab(
-            -heliocentric["p"] / distance, velocity, distance, float(np.sqrt(1.0 - velocity @ velocity))
+            -heliocentric["p"] / distance,
+            velocity,
+            distance,
+            float(np.sqrt(1.0 - velocity @ velocity)),
         ).tolist()
         lines.append(f"{days:.2f},{x:.9f},{y:.9f},{z:.9f}")
     FILE.write_text("\n".join(lines) + "\n", encoding="utf-8")

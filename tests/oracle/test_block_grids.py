@@ -1,4 +1,6 @@
-"""Command blocks of small grids: none of all sequences of one or two blocks, flown, complies for less."""
+"""Command blocks of small grids: none of all sequences of one or two blocks, flown, complies for
+less.
+"""
 
 import math
 from collections.abc import Iterator
@@ -22,9 +24,14 @@ def grid(seed: int) -> nutdamp.Spacecraft:
 
     Odd seeds are like the seed before, but spin the other way and are three times as large.
     """
-    rng, reversed_ = np.random.default_rng(seed // 2), seed % 2 == 1
-    A, spin, scale = 10.0 ** rng.uniform(0.5, 2.5), rng.uniform(0.8, 2.0), 3.0 if reversed_ else 1.0
-    C, turn, sign = A * rng.uniform(0.7, 1.7), 2.0 * math.pi / spin, -1.0 if reversed_ else 1.0
+    rng = np.random.default_rng(seed // 2)
+    reversed_ = seed % 2 == 1
+    A = 10.0 ** rng.uniform(0.5, 2.5)
+    spin = rng.uniform(0.8, 2.0)
+    scale = 3.0 if reversed_ else 1.0
+    C = A * rng.uniform(0.7, 1.7)
+    turn = 2.0 * math.pi / spin
+    sign = -1.0 if reversed_ else 1.0
     degrees, phase, azimuth, at = rng.uniform(1.0, 6.0), *rng.uniform(-math.pi, math.pi, 3)
     delays = 3
     width = rng.uniform(0.05, 0.12) * turn
@@ -73,7 +80,9 @@ def blocks_of(body: nutdamp.Spacecraft, first: int) -> Iterator[Block]:
 
 
 def cheapest(body: nutdamp.Spacecraft, most: float) -> float:
-    """The least propellant, kg, below ``most`` of one or two blocks that comply; ``most`` where none does."""
+    """The least propellant, kg, below ``most`` of one or two blocks that comply; ``most`` where
+    none does.
+    """
     flow = {one.name: one.mass_flow or 0.0 for one in body.channels}
 
     def cost(block: Block) -> float:
@@ -104,6 +113,8 @@ def test_no_blocks_of_a_small_grid_are_cheaper(seed: int) -> None:
     body = grid(seed)
     plan = nutdamp.plan(body, "command-block", nutdamp.Options(max_blocks=2))
     if plan.meets_requirement:
-        assert cheapest(body, 0.999 * present(plan.propellant)) == pytest.approx(0.999 * present(plan.propellant))
+        assert cheapest(body, 0.999 * present(plan.propellant)) == pytest.approx(
+            0.999 * present(plan.propellant)
+        )
     else:
         assert math.isinf(cheapest(body, math.inf))

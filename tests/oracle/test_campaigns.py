@@ -1,7 +1,9 @@
-"""Command blocks against campaigns that were flown: what the planner says of each, and by how much that differs.
+"""Command blocks against campaigns that were flown: what the planner says of each, and by how much
+that differs.
 
-The figures are those of the status reports of Lunar Prospector and of the weekly reports of ACE; the files in configs/
-say what of the spacecraft is published, computed from them and assumed. Nothing here is fitted but what they say.
+The figures are those of the status reports of Lunar Prospector and of the weekly reports of ACE;
+the files in configs/ say what of the spacecraft is published, computed from them and assumed.
+Nothing here is fitted but what they say.
 """
 
 import csv
@@ -40,25 +42,36 @@ def flown(body: Spacecraft, *blocks: Block) -> propagation.Flight:
     return propagation.flown(body, fired(body, blocks))
 
 
-# --- Lunar Prospector ------------------------------------------------------------------------------------------------
+# --- Lunar Prospector
+# ------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("channel", ["+M2", deep("-M2")])
-def test_pulses_of_lunar_prospector_turn_it_as_far_as_reported_or_a_little_more(channel: str) -> None:
+def test_pulses_of_lunar_prospector_turn_it_as_far_as_reported_or_a_little_more(
+    channel: str,
+) -> None:
     for count, reported, difference in (
-        (40, 8.5, 0.10),  # report 30: the arm in the file is computed from these; the way bends about the Sun
+        (
+            40,
+            8.5,
+            0.10,
+        ),  # report 30: the arm in the file is computed from these; the way bends about the Sun
         (23, 4.7, 0.24),  # report 27: 5 % more than flown
         (4, 0.7, 0.16),  # report 79, a year later: the tanks have run down, and 0.7 has one digit
     ):
         turn = flown(at_rest("lunar-prospector", 11.96), Block(channel, 1, 1.0, 0.2, count))
-        assert math.degrees(turn.residual.momentum_shift) - reported == pytest.approx(difference, abs=0.03)
+        assert math.degrees(turn.residual.momentum_shift) - reported == pytest.approx(
+            difference, abs=0.03
+        )
         assert math.degrees(turn.residual.nutation) < 0.2  # "less than 0.3 deg" would be seen
     assert turn.schedule.propellant == pytest.approx(0.01, abs=0.005)  # report 79 rounds to 5 g
 
 
 @pytest.mark.deep
 def test_lunar_prospector_is_planned_as_it_was_flown(run: Run) -> None:
-    """The turn of report 30, 8.5 deg, as a user asks for it: the plan has its 40 pulses of 0.2 s, in one block."""
+    """The turn of report 30, 8.5 deg, as a user asks for it: the plan has its 40 pulses of 0.2 s,
+    in one block.
+    """
     goal = ("--target", "270deg,75.06deg", "--set", "state.nutation=0deg", "--max-blocks", "1")
     scheme = ("--scheme", "command-block", "--blocks", "-")
     screen = run("plan", "-", *goal, *scheme, stdin=example_text("lunar-prospector"))
@@ -67,11 +80,14 @@ def test_lunar_prospector_is_planned_as_it_was_flown(run: Run) -> None:
     assert (row["count"], float(row["width_s"])) == ("40", 0.2)
 
 
-# --- ACE -------------------------------------------------------------------------------------------------------------
+# --- ACE
+# --------------------------------------------------------------------------------------------------
 
 
 class Campaign(NamedTuple):
-    """A campaign of ACE: pulses, s, rpm before and after, propellant lbm, Sun angle before and after."""
+    """A campaign of ACE: pulses, s, rpm before and after, propellant lbm, Sun angle before and
+    after.
+    """
 
     pulses: int
     took: float
@@ -99,15 +115,17 @@ def sun_of(body: Spacecraft) -> Vector:
 @spread("side", [1.0, -1.0], quick=1)
 @spread("date", [*reversed(CAMPAIGNS)], quick=1, deep=4)
 def test_campaigns_of_ace_end_as_reported(date: str, side: float) -> None:
-    """Nobody reports the heading: the one that ends at the Sun angle reported, to either side, is fired here.
+    """Nobody reports the heading: the one that ends at the Sun angle reported, to either side, is
+    fired here.
 
-    Times reported hold what comes before the first pulse and after the last: up to two spins. Propellant: within
-    13 %; few pulses took more each, as the first ones are colder and longer.
+    Times reported hold what comes before the first pulse and after the last: up to two spins.
+    Propellant: within 13 %; few pulses took more each, as the first ones are colder and longer.
     """
     one = CAMPAIGNS[date]
     body = at_rest("ace", 0.5 * (one.before + one.after))
     body = replace(body, sun=body.direction_in_n(math.radians(one.sun[0]), 0.3))
-    model, thruster = BlockModel(body), next(channel for channel in body.channels if channel.name == "P1")
+    model = BlockModel(body)
+    thruster = next(channel for channel in body.channels if channel.name == "P1")
     step = float(model.turned_by(thruster, WIDTH, body.spin))
     change = math.radians(one.sun[1] - one.sun[0])
     delay = float(model.delay(thruster, side * math.acos(change / (one.pulses * step)), WIDTH))
@@ -118,15 +136,19 @@ def test_campaigns_of_ace_end_as_reported(date: str, side: float) -> None:
     # As H goes about the Sun, Sun pulses come sooner or later.
     assert abs(turn.schedule.end - turn.schedule.pulses[0].start - spins) < 0.75 * model.turn
     assert 0.0 < one.took - spins < 2.0 * model.turn
-    difference = 3.0 * present(turn.schedule.propellant) / (one.used * POUND) - 1.0  # three thrusters fire
+    difference = (
+        3.0 * present(turn.schedule.propellant) / (one.used * POUND) - 1.0
+    )  # three thrusters fire
     assert -0.14 < difference < (0.01 if one.pulses > 50 else -0.02)
 
 
 @pytest.mark.parametrize("date", CAMPAIGNS)
 def test_the_spin_of_ace_rises_as_reported(date: str) -> None:
-    """A side effect of thrusters that are 0.2 deg off, from the first campaign; 0.0011 to 0.005 rpm are reported.
+    """A side effect of thrusters that are 0.2 deg off, from the first campaign; 0.0011 to 0.005 rpm
+    are reported.
 
-    Within 20 % or the last digit of the reports; and the note names the spin before and after, and the channel.
+    Within 20 % or the last digit of the reports; and the note names the spin before and after, and
+    the channel.
     """
     one = CAMPAIGNS[date]
     body = at_rest("ace", one.before)
@@ -147,18 +169,28 @@ def test_the_spin_of_ace_rises_as_reported(date: str) -> None:
 
 @pytest.mark.weekly
 def test_ace_is_planned_with_about_the_pulses_reported() -> None:
-    """The Sun angle of 13 November 2012, 6.37 to 11.81 deg, with a way of 16 deg past the Sun: 99 pulses were flown."""
+    """The Sun angle of 13 November 2012, 6.37 to 11.81 deg, with a way of 16 deg past the Sun: 99
+    pulses were flown.
+    """
     body = at_rest("ace", 5.0832)
-    sun, start = sun_of(body), body.momentum / np.linalg.norm(body.momentum)
+    sun = sun_of(body)
+    start = body.momentum / np.linalg.norm(body.momentum)
     aside = np.cross(sun, start) / np.linalg.norm(np.cross(sun, start))
-    away, end = np.cross(aside, sun), math.radians(11.81)
+    away = np.cross(aside, sun)
+    end = math.radians(11.81)
     circle = [
         math.cos(end) * sun + math.sin(end) * (math.cos(a) * away + math.sin(a) * aside)
         for a in np.linspace(0.0, 2.0 * math.pi, 721).tolist()
     ]
-    target = min(circle, key=lambda one: abs(float(attitude.angle_between(one, start)) - math.radians(14.0)))
+    target = min(
+        circle, key=lambda one: abs(float(attitude.angle_between(one, start)) - math.radians(14.0))
+    )
     commands = present(body.commands)
-    body = replace(body, commands=replace(commands, widths=np.array([WIDTH])), goal=replace(body.goal, axis=target))
+    body = replace(
+        body,
+        commands=replace(commands, widths=np.array([WIDTH])),
+        goal=replace(body.goal, axis=target),
+    )
     plan = planning.plan(body, "command-block", nutdamp.Options(max_blocks=1))
     assert plan.feasible
     (block,) = plan.pulses.blocks

@@ -1,4 +1,6 @@
-"""Plans on three moments and with strong thrusters, against linear programs and searches of `support`; with a wheel."""
+"""Plans on three moments and with strong thrusters, against linear programs and searches of
+`support`; with a wheel.
+"""
 
 import csv
 import json
@@ -29,7 +31,9 @@ from nutdamp.spacecraft.schedule import Schedule
 from nutdamp.views.decisions import spacecraft_json
 
 DEAR, BEATEN = 1.005, 0.995
-"""Cost of a plan over that of the schedule known, at most; over the bound of small angles, at least."""
+"""Cost of a plan over that of the schedule known, at most; over the bound of small angles, at
+least.
+"""
 
 
 @spread("seed", range(90), quick=1, deep=30)
@@ -61,7 +65,9 @@ def test_no_bound_is_above_a_flown_schedule_and_no_plan_dear_or_missed(seed: int
     ],
 )
 def test_a_schedule_known_is_not_missed(name: str, shift: float, least: str) -> None:
-    """4.893 g at 3.535 s that missed the target, and 9.635 g that missed the bound on the shift; 16.41 g."""
+    """4.893 g at 3.535 s that missed the target, and 9.635 g that missed the bound on the shift;
+    16.41 g.
+    """
     (beside,) = case(f"{name}.yaml").parent.glob(f"{name}-*.csv")
     with beside.open(encoding="utf-8") as stream:
         rows = [(float(row["start_s"]), float(row["on_time_s"])) for row in csv.DictReader(stream)]
@@ -71,14 +77,21 @@ def test_a_schedule_known_is_not_missed(name: str, shift: float, least: str) -> 
     if least == "time":
         assert made.pulses.end <= max(map(sum, rows))
     else:
-        assert made.pulses.cost_in("kg") <= 1.001 * np.sum(rows, axis=0)[1] * 10.0 / (220.0 * 9.80665)
+        assert made.pulses.cost_in("kg") <= 1.001 * np.sum(rows, axis=0)[1] * 10.0 / (
+            220.0 * 9.80665
+        )
 
 
 def test_a_schedule_of_touching_pulses_is_taken_down_on_the_true_motion() -> None:
-    """10.838 g, where the four burns below, found by SLSQP, take 10.664 g: little more time than the goal needs."""
+    """10.838 g, where the four burns below, found by SLSQP, take 10.664 g: little more time than
+    the goal needs.
+    """
     torques = np.array([[-5.302, -19.8, 0.0], [10.92, -2.006, 0.0], [11.74, 43.83, 0.0]])
-    size, off = np.linalg.norm(torques, axis=1).tolist(), 0.00404
-    thrusters = [Thruster(f"c{i}", torque, None, size[i], 220.0) for i, torque in enumerate(torques)]
+    size = np.linalg.norm(torques, axis=1).tolist()
+    off = 0.00404
+    thrusters = [
+        Thruster(f"c{i}", torque, None, size[i], 220.0) for i, torque in enumerate(torques)
+    ]
     body = Spacecraft(
         "touching",
         Inertia((131.3, 168.1, 202.5)),
@@ -91,7 +104,10 @@ def test_a_schedule_of_touching_pulses_is_taken_down_on_the_true_motion() -> Non
     ons = [0.208138, 0.116382, 0.097601, 0.635167]
     (left,) = ends(body, torques[which], np.array([starts + ons]))
     assert max(math.hypot(*left[:2]), math.hypot(*left[2:]) - off) < 1e-6
-    known = sum(float(body.channels[index].mass_flow or 0.0) * on for index, on in zip(which, ons, strict=True))
+    known = sum(
+        float(body.channels[index].mass_flow or 0.0) * on
+        for index, on in zip(which, ons, strict=True)
+    )
     made = flies(body, shift=off)
     assert made.pulses.cost_in("kg") <= DEAR * known
     # A descent from there begins with H where the pulses leave it, not on its target.
@@ -106,19 +122,33 @@ def test_a_shift_allowed_is_used_by_channels_that_fire_one_after_the_other() -> 
     """A symmetric body of weak thrusters: 10.47 g, where the schedule beside it takes 10.26 g."""
     body = load_spacecraft(case("shift-symmetric-ss6.yaml"))
     with case("shift-symmetric-ss6-meets.csv").open(encoding="utf-8") as stream:
-        known = sum(float(row["on_time_s"]) for row in csv.DictReader(stream)) * 10.0 / (220.0 * 9.80665)
+        known = (
+            sum(float(row["on_time_s"]) for row in csv.DictReader(stream))
+            * 10.0
+            / (220.0 * 9.80665)
+        )
     assert flies(body, shift=math.radians(0.1)).pulses.cost_in("kg") <= 1.001 * known
 
 
 @pytest.mark.deep
-@pytest.mark.parametrize(("rate", "schemes"), [(0.5, ("four-pulse",)), (0.3, ("two-pulse", "four-pulse"))])
-def test_a_large_nutation_of_three_moments_is_damped_on_the_true_motion(rate: float, schemes: tuple[str, ...]) -> None:
-    """31.7° were left, and by optimal 14.1° where two-pulse left nothing; the ideal rate-gyro law takes 74.2 N m s."""
-    body = load_spacecraft(case("three-moments-large.yaml")).replace(omega0=np.array([rate, 0.0, 1.0]))
+@pytest.mark.parametrize(
+    ("rate", "schemes"), [(0.5, ("four-pulse",)), (0.3, ("two-pulse", "four-pulse"))]
+)
+def test_a_large_nutation_of_three_moments_is_damped_on_the_true_motion(
+    rate: float, schemes: tuple[str, ...]
+) -> None:
+    """31.7° were left, and by optimal 14.1° where two-pulse left nothing; the ideal rate-gyro law
+    takes 74.2 N m s.
+    """
+    body = load_spacecraft(case("three-moments-large.yaml")).replace(
+        omega0=np.array([rate, 0.0, 1.0])
+    )
     costs = []
     for scheme in (*schemes, "optimal"):
         made = plan(body, scheme)
-        pushes = [Push(pulse.start, pulse.end, pulse.impulse / pulse.on_time) for pulse in made.pulses]
+        pushes = [
+            Push(pulse.start, pulse.end, pulse.impulse / pulse.on_time) for pulse in made.pulses
+        ]
         end = fly(body.inertia.moments, body.omega0, pushes, made.pulses.end)
         assert nutation(body.inertia.moments, end.rates, 1.0) < math.radians(1e-6)
         costs.append(made.pulses.total_impulse)
@@ -127,7 +157,9 @@ def test_a_large_nutation_of_three_moments_is_damped_on_the_true_motion(rate: fl
 
 
 def test_the_period_shown_is_that_of_the_motion_at_hand() -> None:
-    """4K/p = 42.94 s, of a small nutation 33.25 s; it is the time after which the rates are those at t = 0."""
+    """4K/p = 42.94 s, of a small nutation 33.25 s; it is the time after which the rates are those
+    at t = 0.
+    """
     body = load_spacecraft(case("three-moments-large.yaml"))
     assert body.motion_period == pytest.approx(42.94, abs=5e-3)
     assert spacecraft_json(body)["body_nutation_period_s"] == body.motion_period
@@ -135,10 +167,14 @@ def test_the_period_shown_is_that_of_the_motion_at_hand() -> None:
     assert again.rates == pytest.approx(body.omega0, abs=1e-9)
 
 
-# --- plans of bodies with a wheel, end to end: what each scheme plans, flown by the reference integrator
+# --- plans of bodies with a wheel, end to end: what each scheme plans, flown by the reference
+# integrator
 
 THRUSTERS = [
-    {"name": f"{sign}M{axis}", "torque": [int(f"{sign}2") * (axis == 1), int(f"{sign}2") * (axis == 2), 0]}
+    {
+        "name": f"{sign}M{axis}",
+        "torque": [int(f"{sign}2") * (axis == 1), int(f"{sign}2") * (axis == 2), 0],
+    }
     for axis in (1, 2)
     for sign in "+-"
 ]
@@ -152,7 +188,14 @@ COMSAT: dict[str, Any] = {
     "thrusters": THRUSTERS,
 }
 
-MOTIONS = [("0 rpm", 60), ("0 rpm", -60), ("3 rpm", 60), ("-3 rpm", 150), ("1 rpm", -90), ("20 rpm", 30)]
+MOTIONS = [
+    ("0 rpm", 60),
+    ("0 rpm", -60),
+    ("3 rpm", 60),
+    ("-3 rpm", 150),
+    ("1 rpm", -90),
+    ("20 rpm", 30),
+]
 """Spin, and momentum of the wheel in N m s: both senses, and H against the spin."""
 
 
@@ -166,22 +209,40 @@ def end_of(plan: nutdamp.Plan) -> tuple[float, np.ndarray]:
     wheel, moments = body.inertia.wheel, body.inertia.moments
     rotation = attitude.matrix(body.initial.quaternion)
     flown = reference.fly(
-        moments, body.omega0, events(plan.pulses), plan.pulses.end, rotation, growth=body.growth, wheel=wheel
+        moments,
+        body.omega0,
+        events(plan.pulses),
+        plan.pulses.end,
+        rotation,
+        growth=body.growth,
+        wheel=wheel,
     )
     sense = math.copysign(1.0, moments[2] * body.spin + wheel)
-    return reference.nutation(moments, flown.rates, sense, wheel), reference.momentum(moments, flown, wheel)
+    return reference.nutation(moments, flown.rates, sense, wheel), reference.momentum(
+        moments, flown, wheel
+    )
 
 
-@spread(("scheme", "motion"), [(scheme, motion) for scheme in ("one-pulse", "two-pulse", "four-pulse", "optimal")
-                               for motion in MOTIONS], quick=8)  # fmt: skip
+@spread(
+    ("scheme", "motion"),
+    [
+        (scheme, motion)
+        for scheme in ("one-pulse", "two-pulse", "four-pulse", "optimal")
+        for motion in MOTIONS
+    ],
+    quick=8,
+)
 def test_damping(scheme: str, motion: tuple[str, int]) -> None:
     """No nutation is left; schemes that keep H leave it where it was."""
     spin, wheel = motion
     required = {"nutation": "0.1 deg", "momentum_shift": "0.02 deg"}
     plan = planned(
-        scheme, state={"spin": spin, "nutation": "1 deg"}, wheel={"momentum": wheel}, requirement=required,
+        scheme,
+        state={"spin": spin, "nutation": "1 deg"},
+        wheel={"momentum": wheel},
+        requirement=required,
         limits={"horizon": "1500 s"},
-    )  # fmt: skip
+    )
     nutation, momentum = end_of(plan)
     assert nutation == pytest.approx(plan.flight.residual.nutation, abs=1e-9)
     assert nutation < math.radians(0.01)
@@ -195,9 +256,16 @@ def test_damping(scheme: str, motion: tuple[str, int]) -> None:
         assert plan.pulses.total_impulse >= 0.99 * floor
 
 
-@spread(("scheme", "motion"), [(scheme, motion) for scheme in ("two-pulse", "half-cone", "rhumb-line", "optimal")
-                               for motion in MOTIONS[2:5]] + [("optimal", motion) for motion in MOTIONS[:2]],
-        quick=5)  # fmt: skip
+@spread(
+    ("scheme", "motion"),
+    [
+        (scheme, motion)
+        for scheme in ("two-pulse", "half-cone", "rhumb-line", "optimal")
+        for motion in MOTIONS[2:5]
+    ]
+    + [("optimal", motion) for motion in MOTIONS[:2]],
+    quick=5,
+)
 def test_turns_to_a_target(scheme: str, motion: tuple[str, int]) -> None:
     """The axis ends on the target, also where the thrusters stand still in space."""
     spin, wheel = motion
@@ -215,7 +283,9 @@ def test_turns_to_a_target(scheme: str, motion: tuple[str, int]) -> None:
 
 @spread("horizon", ["60 s", "150 s", "300 s", "628 s"], quick=2)
 def test_thrusters_that_stand_still_in_space(horizon: str) -> None:
-    """Two pulses push H along one line alone: what they miss beside it must be small, not nothing."""
+    """Two pulses push H along one line alone: what they miss beside it must be small,
+    not nothing.
+    """
     plan = planned(
         "optimal",
         dissipation={"time_constant": "2 hours", "nutation": "grows"},
@@ -231,7 +301,10 @@ def test_thrusters_that_stand_still_in_space(horizon: str) -> None:
 
 def test_a_train_needs_a_body_that_spins() -> None:
     """Others reach the target without one."""
-    aimed = {"goal": {"right_ascension": "50 deg", "declination": "86 deg"}, "limits": {"horizon": "100 s"}}
+    aimed = {
+        "goal": {"right_ascension": "50 deg", "declination": "86 deg"},
+        "limits": {"horizon": "100 s"},
+    }
     assert not planned("rhumb-line", **aimed).feasible
     plan = planned("optimal", **aimed)
     nutation, momentum = end_of(plan)
@@ -246,7 +319,9 @@ def test_three_moments_dissipation_and_a_spin_that_changes(scheme: str) -> None:
         "inertia": {"tensor": [[300, 0, 0], [0, 330, 0], [0, 0, 200]]},
         "state": {"spin": "-1 rpm", "nutation": "2 deg"},
         "dissipation": {"time_constant": "2 hours", "nutation": "grows"},
-        "thrusters": [{**thruster, "torque": [*thruster["torque"][:2], 0.1]} for thruster in THRUSTERS],
+        "thrusters": [
+            {**thruster, "torque": [*thruster["torque"][:2], 0.1]} for thruster in THRUSTERS
+        ],
     }
     plan = planned(scheme, **changes)
     nutation, momentum = end_of(plan)
@@ -255,7 +330,9 @@ def test_three_moments_dissipation_and_a_spin_that_changes(scheme: str) -> None:
     # The largest of a nutation that swings between two angles is not that of one moment.
     assert nutation <= residual.nutation + 1e-9
     assert residual.nutation < math.radians(0.05)
-    assert reference.angle(momentum, plan.spacecraft.momentum) == pytest.approx(residual.momentum_shift, abs=1e-9)
+    assert reference.angle(momentum, plan.spacecraft.momentum) == pytest.approx(
+        residual.momentum_shift, abs=1e-9
+    )
 
 
 # --- the scheme optimal on random layouts of strong thrusters, against a search of many starts

@@ -1,7 +1,9 @@
-"""The worked cases of the guide: published figures that a file was made from, and those that it predicts.
+"""The worked cases of the guide: published figures that a file was made from, and those that it
+predicts.
 
-``configs/`` says what of each spacecraft is published, computed from published figures and assumed. A tolerance is the
-rounding of the published figure, unless the test says by how much nutdamp is off.
+``configs/`` says what of each spacecraft is published, computed from published figures and assumed.
+A tolerance is the rounding of the published figure, unless the test says by how much nutdamp is
+off.
 """
 
 import math
@@ -56,7 +58,9 @@ def ends(plan: nutdamp.Plan) -> tuple[float, float]:
 
 def test_isee_3_is_spun_up_by_the_11_pulses_that_were_sent() -> None:
     """Pulses, width and propellant are inputs, by C and thrust; the 34 s are not."""
-    body = nutdamp.example("isee-3").with_(state={"nutation": "0.02 deg"}, goal={"spin": "19.733 rpm"})
+    body = nutdamp.example("isee-3").with_(
+        state={"nutation": "0.02 deg"}, goal={"spin": "19.733 rpm"}
+    )
     plan = nutdamp.plan(body, "command-block")
     (block,) = plan.pulses.blocks
     assert (block.count, block.width) == (11, 0.193)
@@ -72,15 +76,21 @@ def test_isee_3_is_spun_up_by_the_11_pulses_that_were_sent() -> None:
 
 
 def test_genesis_thrusters_move_it_as_reported(tmp_path: Path) -> None:
-    """10 December 2002 is the input of the cant; 1.4 m/s by half a kilogram (9 August 2004) is predicted."""
-    body = nutdamp.example("genesis").with_(channels={"AX": ["S1", "S2", "D1", "D2"]}, state={"nutation": 0})
+    """10 December 2002 is the input of the cant; 1.4 m/s by half a kilogram (9 August 2004) is
+    predicted.
+    """
+    body = nutdamp.example("genesis").with_(
+        channels={"AX": ["S1", "S2", "D1", "D2"]}, state={"nutation": 0}
+    )
     plan = given(tmp_path / "skm.csv", body, "AX", 291.0)
     assert speed(plan) == pytest.approx(1.25, abs=0.005)
     assert used(plan) * 1.4 / speed(plan) == pytest.approx(0.5, abs=0.05)
 
 
 def test_genesis_spins_up_from_1_6_to_10_rpm(tmp_path: Path) -> None:
-    """Nothing of it is published but the spins, and that it moves the spacecraft. The page shows the plan."""
+    """Nothing of it is published but the spins, and that it moves the spacecraft. The page shows
+    the plan.
+    """
     body = nutdamp.example("genesis").with_(state={"nutation": "0.3 deg"})
     plan = given(tmp_path / "up.csv", body, "UP", 417.3716)
     nutation, spin = ends(plan)
@@ -101,8 +111,12 @@ def test_lunar_prospector_turns_by_4_7_deg_with_one_pulse_less_than_reported() -
     assert block.count == 22  # report 27: 23
 
 
-def test_lunar_prospector_trims_its_spin_less_than_a_valve_without_delay_would(tmp_path: Path) -> None:
-    """Report 79: 0.155 rpm in 0.63 s. C is that of 0.7 s for 0.2 rpm (report 30), with fuller tanks."""
+def test_lunar_prospector_trims_its_spin_less_than_a_valve_without_delay_would(
+    tmp_path: Path,
+) -> None:
+    """Report 79: 0.155 rpm in 0.63 s. C is that of 0.7 s for 0.2 rpm (report 30), with fuller
+    tanks.
+    """
     plan = given(tmp_path / "trim.csv", prospector(channels={"T1": ["T1"]}), "T1", 0.63)
     change = (plan.spacecraft.spin - plan.flight.final.spin) / RPM
     assert change / 0.155 == pytest.approx(1.16, abs=0.01)
@@ -112,7 +126,9 @@ def test_lunar_prospector_trims_its_spin_less_than_a_valve_without_delay_would(t
 def test_two_burns_of_lunar_prospector_on_one_day(tmp_path: Path) -> None:
     """Report 71: thrust, isp and mass make the first one come out, and predict the second."""
     fired = {"force": "11.18 N", "isp": "180.3 s", "max_on_time": "60 s"}
-    body = prospector(channels={"DV": ["A1", "A2"]}, mass="142 kg", thrusters={"A1": fired, "A2": fired})
+    body = prospector(
+        channels={"DV": ["A1", "A2"]}, mass="142 kg", thrusters={"A1": fired, "A2": fired}
+    )
     first = given(tmp_path / "first.csv", body, "DV", 43.5)
     assert (speed(first), used(first)) == pytest.approx((6.85, 0.55), abs=0.006)
     second = given(tmp_path / "second.csv", body.replace(mass=142.0 - used(first)), "DV", 46.5)
@@ -121,7 +137,9 @@ def test_two_burns_of_lunar_prospector_on_one_day(tmp_path: Path) -> None:
 
 
 def test_ulysses_regains_in_three_hours_what_a_firing_took() -> None:
-    """8 November 1990: firings took a fifth, which was back after a few hours; these are the inputs."""
+    """8 November 1990: firings took a fifth, which was back after a few hours; these are the
+    inputs.
+    """
     body = nutdamp.example("ulysses").with_(state={"nutation": "0.4 deg"})
     (thruster, _) = body.channels
     taken = thruster.max_on_time * float(np.linalg.norm(thruster.torque)) / body.inertia.A
@@ -139,7 +157,8 @@ def test_ulysses_holds_its_nutation_for_little_hydrazine() -> None:
     assert present(cycle.propellant) * 365.25 * 86400.0 == pytest.approx(0.26, abs=0.005)
 
 
-# --- The program of the flywheel: I = diag(350, 300, 400), spin about axis 1, I dω/dt = -ω × (I ω + 10 Ω) -------------
+# --- The program of the flywheel: I = diag(350, 300, 400), spin about axis 1, I dω/dt = -ω × (I ω +
+# 10 Ω) -------------
 
 PROGRAM = np.array([350.0, 300.0, 400.0])
 
@@ -165,7 +184,9 @@ def test_the_flywheel_holds_the_body_as_in_the_published_program() -> None:
     assert free.nutation == pytest.approx(float(nutation.max()), rel=1e-3)
     rising = np.flatnonzero((solution.y[1, :-1] < 0.0) & (solution.y[1, 1:] >= 0.0))
     period = np.diff(solution.t[rising]).mean()
-    assert 2.0 * math.pi / abs(body.nutation_rate) == pytest.approx(period, rel=0.01)  # of a nutation that is not small
+    assert 2.0 * math.pi / abs(body.nutation_rate) == pytest.approx(
+        period, rel=0.01
+    )  # of a nutation that is not small
 
 
 @spread(("rpm", "held"), [(0.0, False), (250.0, False), (350.0, True), (450.0, True)], quick=2)
@@ -190,7 +211,8 @@ def test_the_flywheel_holds_from_319_newton_metre_seconds_on() -> None:
         nutdamp.example("flywheel").with_(wheel={"momentum": 0.999 * least})
 
 
-# --- Satellites of communications -------------------------------------------------------------------------------------
+# --- Satellites of communications
+# -------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("spin", "pair", "cost"), [("0 rpm", 31.416, 1.0), ("1 rpm", 60.0, 1.149)])
@@ -222,9 +244,13 @@ def test_legs_take_as_many_pulses_as_their_angle_holds_turns_of_one() -> None:
         body = plan.carried()
 
 
-# --- the figures of Magnus 1970 as numbers: pole curve of the four-pulse scheme (5), axis tracks (6)-(8)
+# --- the figures of Magnus 1970 as numbers: pole curve of the four-pulse scheme (5), axis tracks
+# (6)-(8)
 
-BODIES = {name: load_spacecraft(places.CONFIGS / f"magnus-{name}.yaml") for name in ("a09", "a03", "oblate")}
+BODIES = {
+    name: load_spacecraft(places.CONFIGS / f"magnus-{name}.yaml")
+    for name in ("a09", "a03", "oblate")
+}
 every_body = pytest.mark.parametrize("spacecraft", BODIES.values(), ids=BODIES)
 
 
@@ -236,7 +262,9 @@ def coarse(spacecraft: Spacecraft, on_time: float = 0.05) -> Schedule:
 def unbounded(spacecraft: Spacecraft) -> Spacecraft:
     """The spacecraft with thrusters that can fire as short as one likes."""
     free = tuple(
-        replace(channel, thrusters=tuple(replace(one, min_on_time=0.0) for one in channel.thrusters))
+        replace(
+            channel, thrusters=tuple(replace(one, min_on_time=0.0) for one in channel.thrusters)
+        )
         for channel in spacecraft.channels
     )
     return replace(spacecraft, channels=free, steerable=None)
@@ -244,15 +272,20 @@ def unbounded(spacecraft: Spacecraft) -> Spacecraft:
 
 def around(spacecraft: Spacecraft, made: Schedule) -> tuple[np.ndarray, np.ndarray]:
     """ω just before and after each pulse by the impulse sum."""
-    before, after = (track.rates for track in propagation.by_impulses(spacecraft, made).around_pulses())
+    before, after = (
+        track.rates for track in propagation.by_impulses(spacecraft, made).around_pulses()
+    )
     return before[:, 0] + 1j * before[:, 1], after[:, 0] + 1j * after[:, 1]
 
 
 @every_body
-def test_fig_5_pole_curve_steps_inwards_by_equal_amounts_each_quarter_turn(spacecraft: Spacecraft) -> None:
+def test_fig_5_pole_curve_steps_inwards_by_equal_amounts_each_quarter_turn(
+    spacecraft: Spacecraft,
+) -> None:
     """|ω| falls by J/A at each pulse, down to the rest of at most J/(2A); then no pulse helps.
 
-    π/2 in the body between pulses, clockwise for prolate bodies and mirrored for oblate ones, whatever a is.
+    π/2 in the body between pulses, clockwise for prolate bodies and mirrored for oblate ones,
+    whatever a is.
     """
     made = coarse(spacecraft)
     before, after = around(spacecraft, made)
@@ -261,15 +294,23 @@ def test_fig_5_pole_curve_steps_inwards_by_equal_amounts_each_quarter_turn(space
     expected = spacecraft.transverse_rate - step * np.arange(1, len(made) + 1)
     assert np.abs(after) == pytest.approx(np.abs(expected), abs=1e-13)
     assert abs(after[-1]) <= 0.5 * step
-    # On arcs between pulses |ω| is constant, and each pulse is fired straight at the origin or through it.
+    # On arcs between pulses |ω| is constant, and each pulse is fired straight at the origin or
+    # through it.
     assert np.abs(before[1:]) == pytest.approx(np.abs(after[:-1]), rel=1e-12)
-    arcs, gaps = np.angle(before[1:] / after[:-1]), np.diff([pulse.t for pulse in made])
-    assert arcs == pytest.approx(np.full(len(arcs), -math.copysign(math.pi / 2, spacecraft.inertia.a)), abs=1e-12)
+    arcs = np.angle(before[1:] / after[:-1])
+    gaps = np.diff([pulse.t for pulse in made])
+    assert arcs == pytest.approx(
+        np.full(len(arcs), -math.copysign(math.pi / 2, spacecraft.inertia.a)), abs=1e-12
+    )
     assert gaps == pytest.approx(np.full(len(gaps), spacecraft.body_period / 4), rel=1e-12)
 
 
-def test_fig_5_the_curve_of_an_oblate_body_is_the_mirror_image_and_each_faster_the_farther_a_is_from_zero() -> None:
-    """Mirrored on the axis of the first pulse it is that of the prolate one; the time for it goes as 1/|a|."""
+def test_fig_5_the_curve_of_an_oblate_body_is_the_mirror_image_and_each_faster_the_farther_a_is_from_zero() -> (
+    None
+):
+    """Mirrored on the axis of the first pulse it is that of the prolate one; the time for it goes
+    as 1/|a|.
+    """
     curves = []
     for name in ("a03", "oblate"):
         spacecraft = unbounded(BODIES[name])
@@ -281,15 +322,22 @@ def test_fig_5_the_curve_of_an_oblate_body_is_the_mirror_image_and_each_faster_t
     assert np.abs(np.angle(prolate[0] * oblate[0])).max() < 1e-9
     quarters = []
     for a in (0.9, 0.3, 0.1, -0.1, -0.6, -0.9):
-        made = coarse(replace(BODIES["a09"], inertia=Inertia((100.0, 100.0, 100.0 * (1 - a)))), on_time=0.01)
+        made = coarse(
+            replace(BODIES["a09"], inertia=Inertia((100.0, 100.0, 100.0 * (1 - a)))), on_time=0.01
+        )
         quarters.append(abs(a) * (made.pulses[-1].t - made.pulses[0].t) / (len(made) - 1))
     assert quarters == pytest.approx([quarters[0]] * 6, rel=1e-9)
 
 
-@pytest.mark.parametrize(("name", "arc_deg"), [("a09", 10.0), ("a03", 210.0)], ids=["fig 6", "fig 7"])
+@pytest.mark.parametrize(
+    ("name", "arc_deg"), [("a09", 10.0), ("a03", 210.0)], ids=["fig 6", "fig 7"]
+)
 def test_fig_6_and_7_arcs_of_the_axis_track(name: str, arc_deg: float) -> None:
-    """Between pulses the spin axis runs ω_n T_ω/4 about H: 10° for a = 0.9, 210° for a = 0.3, at small angles."""
-    spacecraft, inertia = unbounded(BODIES[name]), BODIES[name].inertia
+    """Between pulses the spin axis runs ω_n T_ω/4 about H: 10° for a = 0.9, 210° for a = 0.3, at
+    small angles.
+    """
+    spacecraft = unbounded(BODIES[name])
+    inertia = BODIES[name].inertia
     small = replace(spacecraft, omega0=spacecraft.omega0 * (1e-3, 1e-3, 1.0))
     rate = inertia.C * small.spin / inertia.A
     assert math.degrees(rate * small.body_period / 4) == pytest.approx(arc_deg, rel=1e-12)
@@ -298,7 +346,8 @@ def test_fig_6_and_7_arcs_of_the_axis_track(name: str, arc_deg: float) -> None:
     for leg in legs[:3]:
         body, quaternion = leg.path.motion(np.linspace(leg.start, leg.end, 400))
         momentum = attitude.rotate(quaternion[0], body[0] * (inertia.A, inertia.A, inertia.C))
-        up, axis = momentum / np.linalg.norm(momentum), attitude.rotate(quaternion, np.array([0.0, 0.0, 1.0]))
+        up = momentum / np.linalg.norm(momentum)
+        axis = attitude.rotate(quaternion, np.array([0.0, 0.0, 1.0]))
         flat = axis - np.outer(axis @ up, up)
         flat /= np.linalg.norm(flat, axis=1, keepdims=True)
         steps = np.arctan2(np.cross(flat[:-1], flat[1:]) @ up, np.sum(flat[:-1] * flat[1:], axis=1))
@@ -306,26 +355,38 @@ def test_fig_6_and_7_arcs_of_the_axis_track(name: str, arc_deg: float) -> None:
 
 
 @every_body
-def test_fig_6_and_7_the_centre_of_each_arc_is_where_h_has_jumped_to(spacecraft: Spacecraft) -> None:
+def test_fig_6_and_7_the_centre_of_each_arc_is_where_h_has_jumped_to(
+    spacecraft: Spacecraft,
+) -> None:
     for leg in propagation.by_impulses(spacecraft, coarse(spacecraft)).legs[1:]:
         if leg.end > leg.start:
             body, quaternion = leg.path.motion(np.linspace(leg.start, leg.end, 30))
             momentum = attitude.rotate(quaternion, body * spacecraft.inertia.moments)
-            away = attitude.angle_between(attitude.rotate(quaternion, np.array([0.0, 0.0, 1.0])), momentum)
+            away = attitude.angle_between(
+                attitude.rotate(quaternion, np.array([0.0, 0.0, 1.0])), momentum
+            )
             assert np.ptp(away) < 1e-12
             assert np.abs(momentum - momentum[0]).max() < 1e-11 * np.linalg.norm(momentum[0])
 
 
 @every_body
 def test_fig_8_two_pulses_stop_the_axis_where_h_was(spacecraft: Spacecraft) -> None:
-    """D0 -> D1 at half the cone, half a turn on the smaller circle, and back to D0 with no nutation left."""
-    before, after = propagation.by_impulses(spacecraft, two_pulse(spacecraft, TwoPulseOptions())).around_pulses()
-    start, d0, d1, back = spacecraft.nutation, before.momentum[0], after.momentum[0], after.momentum[1]
+    """D0 -> D1 at half the cone, half a turn on the smaller circle, and back to D0 with no nutation
+    left.
+    """
+    before, after = propagation.by_impulses(
+        spacecraft, two_pulse(spacecraft, TwoPulseOptions())
+    ).around_pulses()
+    start = spacecraft.nutation
+    d0 = before.momentum[0]
+    d1 = after.momentum[0]
+    back = after.momentum[1]
     assert (before.nutation[0], after.nutation[0]) == pytest.approx((start, start / 2), rel=1e-12)
     assert attitude.angle_between(d0, d1) == pytest.approx(start / 2, rel=1e-12)
     assert attitude.angle_between(d0, back) < 1e-13
     assert attitude.angle_between(after.axis[1], d0) < 1e-13
-    # Half a turn: at the second pulse the axis stands opposite, seen from D1, to where it stood at the first.
+    # Half a turn: at the second pulse the axis stands opposite, seen from D1, to where it stood at
+    # the first.
     up = d1 / np.linalg.norm(d1)
     first, second = (axis - (axis @ up) * up for axis in (after.axis[0], before.axis[1]))
     assert attitude.angle_between(first, -second) < 1e-7

@@ -1,4 +1,6 @@
-"""Figures of flights: what their lines hold, titles, labels, cones; that nothing overlaps or is cut."""
+"""Figures of flights: what their lines hold, titles, labels, cones; that nothing overlaps or is
+cut.
+"""
 
 import math
 import re
@@ -58,7 +60,8 @@ def panel(figure: Figure, title: str) -> Axes:
     return axes
 
 
-# --- what is drawn ---------------------------------------------------------------------------------------------------
+# --- what is drawn
+# --------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.deep
@@ -68,10 +71,16 @@ def test_path_and_pulses_together_are_the_track_in_degrees(case: str) -> None:
     body, space, *_ = drawn("motion", case).axes
     rates = np.degrees(track.rates[:, :2])
     for axes, rows in ((body, rates), (space, geometry.sky_paths(made, track)[0])):
-        shown = {tuple(point) for name in ("path", "firing") for point in points(axes, name).round(9)}
+        shown = {
+            tuple(point) for name in ("path", "firing") for point in points(axes, name).round(9)
+        }
         assert shown == {tuple(point) for point in rows.round(9)}
-    firing = np.any([(track.t >= begins) & (track.t <= ends) for begins, ends in made.spans], axis=0)
-    assert {tuple(point) for point in points(body, "firing").round(9)} == {tuple(row) for row in rates[firing].round(9)}
+    firing = np.any(
+        [(track.t >= begins) & (track.t <= ends) for begins, ends in made.spans], axis=0
+    )
+    assert {tuple(point) for point in points(body, "firing").round(9)} == {
+        tuple(row) for row in rates[firing].round(9)
+    }
     away = np.degrees(angle_between(track.axis, track.momentum[0]))
     assert np.hypot(*points(space, "path")[0]) == pytest.approx(away[0])
     marks = points(space, H_MARKS)
@@ -85,7 +94,9 @@ def test_a_turn_says_how_far_to_which_target_and_marks_it_where_h_ends() -> None
     """It is 110 degrees: nutation alone would be a word about the least of it."""
     _, space = drawn("motion", "far target").axes
     (target,) = points(space, "target")
-    assert target == pytest.approx(110.0 * np.array([math.cos(math.radians(20.0)), math.sin(math.radians(20.0))]))
+    assert target == pytest.approx(
+        110.0 * np.array([math.cos(math.radians(20.0)), math.sin(math.radians(20.0))])
+    )
     assert points(space, H_MARKS)[-1] == pytest.approx(target, abs=1e-6)
     check_text("pictures.title-turn", drawn("motion", "far target").get_suptitle())
     for name, places_ in (("overview", (1, 2)), ("motion", (1,))):
@@ -99,7 +110,9 @@ def test_a_turn_says_how_far_to_which_target_and_marks_it_where_h_ends() -> None
 
 
 @pytest.mark.deep
-@pytest.mark.parametrize("case", ["wide pulses", weekly("34 pulses"), weekly("ideal impulses"), weekly("long name")])
+@pytest.mark.parametrize(
+    "case", ["wide pulses", weekly("34 pulses"), weekly("ideal impulses"), weekly("long name")]
+)
 @pytest.mark.parametrize("name", NAMES)
 def test_planes_have_equal_scales_and_all_axes_their_units(name: str, case: str) -> None:
     for axes in drawn(name, case).axes:
@@ -122,16 +135,24 @@ def test_planes_have_equal_scales_and_all_axes_their_units(name: str, case: str)
 def test_the_pole_curve_shows_where_the_channels_push() -> None:
     """+2 up, -1 left, by the file's names; only those that fire."""
     axes = panel(drawn("motion", "34 pulses"), "Pole curve")
-    ways = {note.get_text(): np.array(note.xy) for note in axes.texts if isinstance(note, Annotation)}
+    ways = {
+        note.get_text(): np.array(note.xy) for note in axes.texts if isinstance(note, Annotation)
+    }
     for name, way in (("+1", (1, 0)), ("-1", (-1, 0)), ("+2", (0, 1)), ("-2", (0, -1))):
         assert ways[name] / np.linalg.norm(ways[name]) == pytest.approx(way, abs=1e-9)
     few = flight_picture("motion", SIXTEEN, kicks(SIXTEEN, 3, 0.45, 0.05)).axes[0]
-    assert {note.get_text() for note in few.texts if note.get_text().startswith("T")} == {"T0", "T1", "T2"}
+    assert {note.get_text() for note in few.texts if note.get_text().startswith("T")} == {
+        "T0",
+        "T1",
+        "T2",
+    }
 
 
 @pytest.mark.parametrize("name", ["overview", "motion"])
 @pytest.mark.parametrize(("across", "drawn_too"), [(0.0, False), (1e-16, False), (0.5, True)])
-def test_a_torque_along_the_spin_axis_has_no_arrow(name: str, across: float, drawn_too: bool) -> None:
+def test_a_torque_along_the_spin_axis_has_no_arrow(
+    name: str, across: float, drawn_too: bool
+) -> None:
     """Not even one of rounding, where nothing else fires."""
     body = replace(WIDE, channels=(*WIDE.channels, channel("UP", across, 0.0, 2.0)))
     pulses = Schedule((channel_pulse(body.channels[-1], 1.0, 0.5),))
@@ -143,7 +164,9 @@ def test_a_torque_along_the_spin_axis_has_no_arrow(name: str, across: float, dra
 def test_bars_stand_where_the_thrusters_are_on_and_are_all_numbered() -> None:
     made, _ = flown("blackouts")
     axes = drawn("history", "blackouts").axes[1]
-    rows = dict(zip([label.get_text() for label in axes.get_yticklabels()], axes.get_yticks(), strict=True))
+    rows = dict(
+        zip([label.get_text() for label in axes.get_yticklabels()], axes.get_yticks(), strict=True)
+    )
     bars = [one.get_paths()[0].get_extents() for one in axes.collections if not one.get_hatch()]
     for box, pulse in zip(bars, made.schedule, strict=True):
         assert (box.x0, box.x1) == pytest.approx((pulse.start, pulse.end))
@@ -165,7 +188,11 @@ def test_of_many_firings_those_that_can_be_read_are_numbered() -> None:
         return sorted(int(note.get_text()) for note in notes(axes) if note.get_text().isdigit())
 
     assert numbered(drawn("motion", "celestial").axes[0])[:1] == [2]
-    assert len(flown("34 pulses")[0].schedule) == len(drawn("history", "34 pulses").axes[1].collections) == 34
+    assert (
+        len(flown("34 pulses")[0].schedule)
+        == len(drawn("history", "34 pulses").axes[1].collections)
+        == 34
+    )
     assert all(1 <= len(numbered(axes)) <= 16 for axes in drawn("motion", "34 pulses").axes[:2])
 
 
@@ -183,7 +210,9 @@ def test_histories_hold_the_track() -> None:
     assert (np.degrees(track.nutation[~seen]) <= decay.get_ylim()[0]).all()
 
 
-@pytest.mark.parametrize(("case", "panels"), [("no pulses", 2), ("wide pulses", 3), deep("three moments", 4)])
+@pytest.mark.parametrize(
+    ("case", "panels"), [("no pulses", 2), ("wide pulses", 3), deep("three moments", 4)]
+)
 def test_no_panel_is_empty(case: str, panels: int) -> None:
     """Rows of firings where there are some, the spin where it changes."""
     assert len(drawn("history", case).axes) == panels
@@ -197,7 +226,11 @@ def test_the_log_axis_reaches_the_requirement_and_what_is_left() -> None:
         axes = flight_picture("history", body, Schedule()).axes[0]
         low, high = axes.get_ylim()
         assert high >= 10.0 * low
-        levels = [float(np.asarray(one.get_ydata())[0]) for one in axes.lines if one.get_label() == "required"]
+        levels = [
+            float(np.asarray(one.get_ydata())[0])
+            for one in axes.lines
+            if one.get_label() == "required"
+        ]
         assert levels == ([] if bound is None else [pytest.approx(math.degrees(bound))])
         assert all(low < level < high for level in levels)
         assert low < degrees < high or degrees == 0.0
@@ -206,42 +239,69 @@ def test_the_log_axis_reaches_the_requirement_and_what_is_left() -> None:
 
 @pytest.mark.parametrize(
     ("limits", "share", "colour"),
-    [(0.02, None, style.MISSED), (0.12, None, style.UNCHECKED), (0.12, 1.0, style.INK), (0.12, 0.5, style.MISSED)],
+    [
+        (0.02, None, style.MISSED),
+        (0.12, None, style.UNCHECKED),
+        (0.12, 1.0, style.INK),
+        (0.12, 0.5, style.MISSED),
+    ],
 )
-def test_the_title_has_the_verdict_in_its_colour(limits: float, share: float | None, colour: str) -> None:
+def test_the_title_has_the_verdict_in_its_colour(
+    limits: float, share: float | None, colour: str
+) -> None:
     """Red where it is not met, amber where cases do not show it, of 5° (0.087 rad) of nutation."""
     plan = planning.Plan(replace(WIDE, requirement=Requirement(limits)), "none", Schedule())
-    verdict = planning.judge(plan, None if share is None else Cases(100, 1, 0.9, share, share, share))
+    verdict = planning.judge(
+        plan, None if share is None else Cases(100, 1, 0.9, share, share, share)
+    )
     figure = overview.history_figure(*overview.shown(plan), verdict)
     assert to_hex(present(figure._suptitle).get_color()) == colour  # type: ignore[attr-defined]
     assert heading(figure).endswith(statement(verdict))
 
 
-# --- how far they reach, and titles ----------------------------------------------------------------------------------
+# --- how far they reach, and titles
+# ----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("case", ["reversed", "no pulses", "three moments", "120 pulses"])
 def test_time_axes_end_soon_after_the_last_pulse(case: str) -> None:
     made, _ = flown(case)
     body, pulses = made.spacecraft, made.schedule
-    inertial = 2.0 * math.pi * body.inertia.A / float(np.linalg.norm(np.asarray(body.inertia.moments) * body.omega0))
+    inertial = (
+        2.0
+        * math.pi
+        * body.inertia.A
+        / float(np.linalg.norm(np.asarray(body.inertia.moments) * body.omega0))
+    )
     if body.inertia.symmetric:
         assert body.inertial_period == pytest.approx(inertial)
     end = max((pulse.start + pulse.on_time for pulse in pulses), default=0.0)
-    after = min(body.inertial_period, max(0.25 * end, 0.25 * body.body_period)) if len(pulses) else body.inertial_period
+    after = (
+        min(body.inertial_period, max(0.25 * end, 0.25 * body.body_period))
+        if len(pulses)
+        else body.inertial_period
+    )
     assert geometry.shown_until(body, pulses) == pytest.approx(end + after)
 
 
 @pytest.mark.deep
 def test_the_axes_of_time_reach_as_far_as_is_drawn() -> None:
     for name in ("overview", "history"):
-        timed = [axes for axes in drawn(name, "wide pulses").axes if axes.get_xlabel().startswith("time, s")]
+        timed = [
+            axes
+            for axes in drawn(name, "wide pulses").axes
+            if axes.get_xlabel().startswith("time, s")
+        ]
         assert timed
-        assert [axes.get_xlim()[1] for axes in timed] == pytest.approx([flown("wide pulses")[1].t[-1]] * len(timed))
+        assert [axes.get_xlim()[1] for axes in timed] == pytest.approx(
+            [flown("wide pulses")[1].t[-1]] * len(timed)
+        )
 
 
 def test_a_slow_nutation_leaves_no_sheet_blank() -> None:
-    """A needle turns once in 60 s inertially: half a minute of nothing once followed its last pulse."""
+    """A needle turns once in 60 s inertially: half a minute of nothing once followed its last
+    pulse.
+    """
     body = spinner(239, 6.01, 4.2, 8.0, channels=cross(20.0))
     pulses = kicks(body, 9, 4.0, 0.05)
     assert body.inertial_period > 40.0
@@ -250,7 +310,10 @@ def test_a_slow_nutation_leaves_no_sheet_blank() -> None:
 
 def test_flights_from_python_end_alike_unless_they_name_an_end() -> None:
     plan = planning.plan(BODY, "two-pulse")
-    for made, end in ((plan.fly(), geometry.shown_until(BODY, plan.pulses)), (plan.fly(30.0), 30.0)):
+    for made, end in (
+        (plan.fly(), geometry.shown_until(BODY, plan.pulses)),
+        (plan.fly(30.0), 30.0),
+    ):
         assert made.figure().axes[-1].get_xlim()[1] == pytest.approx(end)
 
 
@@ -259,9 +322,12 @@ def test_of_a_very_long_time_all_pictures_say_how_much_is_drawn() -> None:
     made = propagation.flown(WIDE, Schedule(), 1e6)
     track = made.sampled(1000, 1e6)
     figure = overview.history_figure(made, track)
-    axes, until = figure.axes[-1], present(re.search(r"the first ([\d.]+) s of 1e\+06 s", heading(figure)))
+    axes = figure.axes[-1]
+    until = present(re.search(r"the first ([\d.]+) s of 1e\+06 s", heading(figure)))
     assert float(until[1]) == pytest.approx(axes.get_xlim()[1], rel=1e-3)
-    assert heading(overview.flight_figure("motion", made, track)).endswith(f"drawn: the first {until[1]} s of 1e+06 s")
+    assert heading(overview.flight_figure("motion", made, track)).endswith(
+        f"drawn: the first {until[1]} s of 1e+06 s"
+    )
     assert "drawn" not in heading(drawn("history", "wide pulses"))
 
 
@@ -269,7 +335,9 @@ def test_titles_name_scheme_model_and_result_in_lines_that_fit() -> None:
     for by_impulses in (False, True):
         figure = planning.plan(BODY, "two-pulse").fly(by_impulses=by_impulses).figure("motion")
         check_text(f"pictures.title-{'impulses' if by_impulses else 'widths'}", heading(figure))
-    made, track = overview.shown(planning.Plan(spinner(), "schedules/of/the/second/attempt/" * 4, Schedule()))
+    made, track = overview.shown(
+        planning.Plan(spinner(), "schedules/of/the/second/attempt/" * 4, Schedule())
+    )
     figure = overview.flight_figure("motion", made, track)
     assert 1 < max(map(len, figure.get_suptitle().split("\n"))) <= 11 * figure.get_figwidth()
 
@@ -282,7 +350,8 @@ def test_views_of_the_sky_say_how_they_lie(case: str) -> None:
     assert sum(f"H towards you, {right} to the right" in title for title in titles) == 1
 
 
-# --- the cones of the film -------------------------------------------------------------------------------------------
+# --- the cones of the film
+# -------------------------------------------------------------------------------------------
 
 
 @pytest.mark.deep
@@ -297,43 +366,60 @@ def test_what_is_magnified_says_so() -> None:
         if widest >= sphere.WIDE:
             assert much == 1.0
         else:
-            assert 0.4 * np.tan(sphere.DRAWN) < much * np.tan(widest) <= np.tan(sphere.DRAWN) * (1 + 1e-9)
+            assert (
+                0.4 * np.tan(sphere.DRAWN)
+                < much * np.tan(widest)
+                <= np.tan(sphere.DRAWN) * (1 + 1e-9)
+            )
 
 
 def test_seen_from_outside_the_three_axes_lie_in_one_plane_and_the_cones_touch() -> None:
     """Whatever the magnification: on paper the rims have one tangent where ω ends."""
     for case in ("0.01°", "wide pulses", "needle at 60°"):
         made, track = flown(case)
-        looked, cones = sphere.view(made, track), geometry.cones(made, track.rates[0], track.quaternion[0])
+        looked = sphere.view(made, track)
+        cones = geometry.cones(made, track.rates[0], track.quaternion[0])
         assert np.isfinite(looked.seen(cones.rotation)[0][0]).all()
         steps = [1e-5 * np.cross(axis, cones.rotation) for axis in (cones.axis, cones.momentum)]
         one, other = (
-            looked.seen(cones.rotation + step)[0][0] - looked.seen(cones.rotation - step)[0][0] for step in steps
+            looked.seen(cones.rotation + step)[0][0] - looked.seen(cones.rotation - step)[0][0]
+            for step in steps
         )
-        assert abs(one[0] * other[1] - one[1] * other[0]) < 1e-6 * np.linalg.norm(one) * np.linalg.norm(other)
+        assert abs(one[0] * other[1] - one[1] * other[0]) < 1e-6 * np.linalg.norm(
+            one
+        ) * np.linalg.norm(other)
 
 
 @pytest.mark.deep
 @pytest.mark.parametrize("case", ["three moments", "three moments, oblate", "oblate", "reversed"])
 def test_cones_are_filled_from_their_apex_to_all_of_their_rim(case: str) -> None:
     made, track = flown(case)
-    looked, cones = sphere.view(made, track), geometry.cones(made, track.rates[0], track.quaternion[0])
+    looked = sphere.view(made, track)
+    cones = geometry.cones(made, track.rates[0], track.quaternion[0])
     axes = Figure().subplots()
     sphere.draw_cones(axes, looked, cones)
-    filled = [patch for patch in axes.patches if isinstance(patch, Polygon) and len(patch.get_xy()) > 3]
+    filled = [
+        patch for patch in axes.patches if isinstance(patch, Polygon) and len(patch.get_xy()) > 3
+    ]
     assert len(filled) == 2
-    for patch, rim, within in zip(filled, (cones.space, cones.body), (cones.swept, cones.body), strict=True):
+    for patch, rim, within in zip(
+        filled, (cones.space, cones.body), (cones.swept, cones.body), strict=True
+    ):
         seen = np.vstack([looked.seen(rim)[0], looked.seen(within)[0], [[0.0, 0.0]]])
         edges = np.diff(patch.get_xy(), axis=0)
         to_points = seen[:, None, :] - patch.get_xy()[None, :-1, :]
         cross_product = edges[:, 0] * to_points[..., 1] - edges[:, 1] * to_points[..., 0]
         assert (cross_product >= -1e-12).all()  # convex, and nothing of the cone outside
-        assert {tuple(point) for point in patch.get_xy().round(12)} <= {tuple(point) for point in seen.round(12)}
+        assert {tuple(point) for point in patch.get_xy().round(12)} <= {
+            tuple(point) for point in seen.round(12)
+        }
 
 
-# --- the globe -------------------------------------------------------------------------------------------------------
+# --- the globe
+# --------------------------------------------------------------------------------------------------
 
-SUN, TURN = np.array([0.6, 0.0, 0.8]), Goal(axis=np.array([0.0, 0.6, 0.8]))
+SUN = np.array([0.6, 0.0, 0.8])
+TURN = Goal(axis=np.array([0.0, 0.6, 0.8]))
 
 
 @pytest.mark.parametrize(
@@ -371,21 +457,30 @@ def test_the_globe_shows_where_the_axis_the_sun_and_the_cones_are() -> None:
     lines = [np.asarray(line.get_xydata()) for line in axes.lines if line.get_color() == style.GREY]
     circles = [line[np.isfinite(line).all(axis=1)] for line in lines if len(line) == geometry.RIM]
     for circle, angle in zip(circles, (0.3, 1.2), strict=False):
-        assert np.degrees(angle_between(on_globe(circle), front)) == pytest.approx(np.degrees(angle), abs=1e-6)
+        assert np.degrees(angle_between(on_globe(circle), front)) == pytest.approx(
+            np.degrees(angle), abs=1e-6
+        )
         assert len(circle) > geometry.RIM / 2
-    assert angle_between(on_globe(places["t = 0"]), front) == pytest.approx(angle_between(track.axis[0], SUN))
+    assert angle_between(on_globe(places["t = 0"]), front) == pytest.approx(
+        angle_between(track.axis[0], SUN)
+    )
 
 
 def on_globe(places: Vector) -> Vector:
     """Unit vectors (n, 3) of places (n, 2) in front, towards the viewer."""
-    return np.concatenate([places, np.sqrt(1.0 - np.sum(places**2, axis=-1, keepdims=True))], axis=-1)
+    return np.concatenate(
+        [places, np.sqrt(1.0 - np.sum(places**2, axis=-1, keepdims=True))], axis=-1
+    )
 
 
-# --- labels ----------------------------------------------------------------------------------------------------------
+# --- labels
+# --------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("role", "complete"), [("vital", True), ("label", False)])
-def test_vital_labels_are_never_left_out_and_others_where_there_is_no_room(role: str, complete: bool) -> None:
+def test_vital_labels_are_never_left_out_and_others_where_there_is_no_room(
+    role: str, complete: bool
+) -> None:
     figure = Figure((3.0, 2.0), layout="constrained")
     axes = figure.subplots()
     for number in range(30):
@@ -404,11 +499,14 @@ def test_vital_labels_are_never_left_out_and_others_where_there_is_no_room(role:
     ],
 )
 def test_labels_of_firings_have_room(name: str, case: str) -> None:
-    """Inside the panel, on no other label, no bar and no hatching; every pulse has one where there is room."""
+    """Inside the panel, on no other label, no bar and no hatching; every pulse has one where there
+    is room.
+    """
     figure = drawn(name, case)
     texts(figure)
     axes = next(axes for axes in figure.axes if axes.collections and not axes.get_ylabel())
-    window, found = axes.get_window_extent(), notes(axes)
+    window = axes.get_window_extent()
+    found = notes(axes)
     boxes = [note.get_window_extent() for note in found]
     for box in boxes:
         assert (window.p0 - 1.0 <= box.p0).all()
@@ -424,9 +522,13 @@ def test_labels_of_firings_have_room(name: str, case: str) -> None:
     pulses = flown(case)[0].schedule.pulses
     if case != "120 pulses":
         assert numbers == list(range(1, len(pulses) + 1))
-    for number in {*range(1, len(pulses) + 1)} - {*numbers}:  # no room: the label before it in its row is near
+    for number in {*range(1, len(pulses) + 1)} - {
+        *numbers
+    }:  # no room: the label before it in its row is near
         pulse = pulses[number - 1]
-        before = [pulses[n - 1] for n in numbers if pulses[n - 1].channel == pulse.channel and n < number][-1]
+        before = [
+            pulses[n - 1] for n in numbers if pulses[n - 1].channel == pulse.channel and n < number
+        ][-1]
         gap = np.diff(axes.transData.transform([(0.0, 0.0), (pulse.t - before.t, 0.0)])[:, 0])[0]
         assert gap < 30.0 * figure.dpi / 72.0
 
@@ -435,9 +537,15 @@ def test_steering_angles_are_those_of_the_table_and_say_from_where() -> None:
     pulses = flown("steered")[0].schedule.pulses[::2]
     axes = flight_picture("history", STEERED, Schedule(pulses)).axes[1]
     assert "from body axis +1" in axes.get_title("right")
-    angles = [float(said[1]) for note in axes.texts if (said := re.search(r"at ([\d.]+)°", note.get_text()))]
+    angles = [
+        float(said[1])
+        for note in axes.texts
+        if (said := re.search(r"at ([\d.]+)°", note.get_text()))
+    ]
     impulses = [pulse.impulse for pulse in pulses]
-    assert angles == [round(math.degrees(math.atan2(one[1], one[0])) % 360.0, 2) for one in impulses]
+    assert angles == [
+        round(math.degrees(math.atan2(one[1], one[0])) % 360.0, 2) for one in impulses
+    ]
 
 
 def number_of(note: Annotation) -> int:
@@ -451,19 +559,29 @@ def test_each_number_belongs_to_its_own_stretch_of_the_path(case: str) -> None:
     made, track = flown(case)
     figure = drawn("motion", case)
     texts(figure)
-    firings = {part.pulse + 1: part for part in geometry.stretches(made, track) if part.pulse is not None}
+    firings = {
+        part.pulse + 1: part for part in geometry.stretches(made, track) if part.pulse is not None
+    }
     paths = (geometry.pole_path(track), geometry.sky_paths(made, track)[0])
     for axes, path in zip(figure.axes[:2], paths, strict=True):
-        numbered = [note for note in notes(axes) if note.get_text().removeprefix("firing ").isdigit()]
+        numbered = [
+            note for note in notes(axes) if note.get_text().removeprefix("firing ").isdigit()
+        ]
         if len(firings) <= 10:
             assert sorted(number_of(note) for note in numbered) == list(range(1, len(firings) + 1))
         for note in numbered:
-            box, away = note.get_window_extent(), {}
+            box = note.get_window_extent()
+            away = {}
             place = 0.5 * (box.p0 + box.p1)
             for number, part in firings.items():
                 ends = path[part.first : part.last + 1]
-                fine = [np.interp(np.linspace(0.0, len(ends) - 1.0, 200), range(len(ends)), way) for way in ends.T]
-                away[number] = np.hypot(*(axes.transData.transform(np.transpose(fine)) - place).T).min()
+                fine = [
+                    np.interp(np.linspace(0.0, len(ends) - 1.0, 200), range(len(ends)), way)
+                    for way in ends.T
+                ]
+                away[number] = np.hypot(
+                    *(axes.transData.transform(np.transpose(fine)) - place).T
+                ).min()
             assert away[number_of(note)] <= min(away.values()) + 3.0, (case, note.get_text())
 
 
@@ -476,10 +594,13 @@ def test_no_label_lies_under_the_star_of_the_target(azimuth: float) -> None:
     check_star(axes, np.asarray(star.get_xydata())[0], 0.45 * star.get_markersize())
 
 
-# --- many pulses, many turns -----------------------------------------------------------------------------------------
+# --- many pulses, many turns
+# -----------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("count", "most"), [(1, 17), (10, 17), (34, 17), (120, 17), (457, 24), (2, 3), (1000, 3)])
+@pytest.mark.parametrize(
+    ("count", "most"), [(1, 17), (10, 17), (34, 17), (120, 17), (457, 24), (2, 3), (1000, 3)]
+)
 def test_of_many_the_first_the_last_and_round_numbers_are_shown(count: int, most: int) -> None:
     shown = [number + 1 for number in style.thinned(count, most)]
     assert (shown[0], shown[-1]) == (1, count)
@@ -490,8 +611,11 @@ def test_of_many_the_first_the_last_and_round_numbers_are_shown(count: int, most
 
 
 def test_pulses_in_one_place_of_a_path_have_one_number() -> None:
-    """Three in a row at least, each beside the one before; with more than can be numbered, none are gathered."""
-    near, far = np.zeros(2), np.array([1.0, 0.0])
+    """Three in a row at least, each beside the one before; with more than can be numbered, none are
+    gathered.
+    """
+    near = np.zeros(2)
+    far = np.array([1.0, 0.0])
     assert overview.together([far, near, near, near, far], 2.0) == [[0], [1, 2, 3], [4]]
     assert overview.together([near, near, far, far], 2.0) == [[0], [1], [2], [3]]
     assert overview.together([far * 0.09 * step for step in range(4)], 2.0) == [[0, 1, 2, 3]]
@@ -500,17 +624,26 @@ def test_pulses_in_one_place_of_a_path_have_one_number() -> None:
 
 @pytest.mark.deep
 def test_firings_that_cannot_be_told_apart_are_drawn_as_one() -> None:
-    """120 firings of 10 ms, 0.4 s apart, over a minute: bars thinner than a pixel would alias. Nothing is lost."""
+    """120 firings of 10 ms, 0.4 s apart, over a minute: bars thinner than a pixel would alias.
+    Nothing is lost.
+    """
     made, track = flown("120 pulses")
     every = geometry.blocks(made, float(track.t[-1]))
     assert [(block.first, block.last, block.many) for block in every] == [(1, 120, 120)]
     assert every[0].on == pytest.approx(1.2)
-    assert (every[0].begins, every[0].ends) == pytest.approx((made.schedule.pulses[0].start, made.schedule.end))
+    assert (every[0].begins, every[0].ends) == pytest.approx(
+        (made.schedule.pulses[0].start, made.schedule.end)
+    )
     patches = drawn("history", "120 pulses").axes[2].patches
-    assert len([patch for patch in patches if to_hex(patch.get_facecolor()) == style.PULSE.lower()]) == 1
+    assert (
+        len([patch for patch in patches if to_hex(patch.get_facecolor()) == style.PULSE.lower()])
+        == 1
+    )
     apart, track = flown("16 channels")
     assert [block.many for block in geometry.blocks(apart, float(track.t[-1]))] == [1] * 32
-    pair = replace(made, schedule=Schedule(kicks(BODY, 2, 0.01, 0.005).pulses))  # close together, yet two bars
+    pair = replace(
+        made, schedule=Schedule(kicks(BODY, 2, 0.01, 0.005).pulses)
+    )  # close together, yet two bars
     assert [block.many for block in geometry.blocks(pair, 100.0)] == [1, 1]
 
 
@@ -520,7 +653,9 @@ def test_many_turns_are_drawn_thin() -> None:
     for until in (5.0, 60.0, 600.0):
         made = propagation.flown(spinner(), Schedule(), until)
         space = overview.flight_figure("motion", made, made.sampled(1000, until)).axes[1]
-        widths.append(next(line.get_linewidth() for line in space.lines if line.get_label() == "path"))
+        widths.append(
+            next(line.get_linewidth() for line in space.lines if line.get_label() == "path")
+        )
     assert widths[0] > widths[1] > widths[2]
 
 
@@ -532,14 +667,17 @@ def test_where_h_moves_little_it_is_shown_enlarged() -> None:
     (left, right), (low, high) = inset.get_xlim(), inset.get_ylim()
     assert ((momentum >= [left, low]) & (momentum <= [right, high])).all()
     much = present(re.search(r"× ([\d.]+)", inset.get_title()))
-    widths = [panel.get_window_extent().width / np.ptp(panel.get_xlim()) for panel in (inset, space)]
+    widths = [
+        panel.get_window_extent().width / np.ptp(panel.get_xlim()) for panel in (inset, space)
+    ]
     ratio = widths[0] / widths[1]
     assert ratio > 5.0
     assert float(much[1]) == pytest.approx(ratio, rel=0.06)
     assert body.get_aspect() == inset.get_aspect() == 1.0
 
 
-# --- nothing overlaps, nothing is cut, all is seen -------------------------------------------------------------------
+# --- nothing overlaps, nothing is cut, all is seen
+# -------------------------------------------------------------------
 
 
 @pytest.mark.filterwarnings("ignore:Glyph .* missing")  # of a name in another script
@@ -554,7 +692,11 @@ def test_where_h_moves_little_it_is_shown_enlarged() -> None:
 )
 def test_no_text_is_cut_or_covers_another_and_no_number_is_minus_zero(name: str, case: str) -> None:
     check_layout(drawn(name, case))
-    assert not [text for text, _ in texts(drawn(name, case)) if re.fullmatch(r"[-−]0(\.0*)?", text.get_text())]
+    assert not [
+        text
+        for text, _ in texts(drawn(name, case))
+        if re.fullmatch(r"[-−]0(\.0*)?", text.get_text())
+    ]
 
 
 @pytest.mark.weekly
@@ -573,7 +715,9 @@ def test_words_and_swatches_can_be_seen_on_white_and_in_the_dark(name: str, case
     assert all(contrast(style.GREY, paper) > 3.0 for paper, _ in pages())
 
 
-def test_characters_without_a_glyph_are_question_marks_and_nothing_is_said(capfd: pytest.CaptureFixture[str]) -> None:
+def test_characters_without_a_glyph_are_question_marks_and_nothing_is_said(
+    capfd: pytest.CaptureFixture[str],
+) -> None:
     """U+E000 is in no font; the Greek is in the one that comes with matplotlib."""
     figure = style.sheet(2.0, 1.0)
     title = figure.suptitle("ω\ue000 x")

@@ -1,4 +1,6 @@
-"""Pictures as files, inline SVG and films: formats, the same bytes each time, what a frame shows, what is refused."""
+"""Pictures as files, inline SVG and films: formats, the same bytes each time, what a frame shows,
+what is refused.
+"""
 
 import hashlib
 import io
@@ -43,19 +45,27 @@ pytestmark = pytest.mark.usefixtures("plans_shared")
 
 
 @pytest.mark.parametrize(
-    ("path", "magic"), [("a.png", b"\x89PNG"), ("b.SVG", b"<?xml"), deep("c.d.pdf", b"%PDF"), ("-", b"\x89PNG")]
+    ("path", "magic"),
+    [("a.png", b"\x89PNG"), ("b.SVG", b"<?xml"), deep("c.d.pdf", b"%PDF"), ("-", b"\x89PNG")],
 )
-def test_the_ending_says_the_format_and_the_same_flight_gives_the_same_file(path: str, magic: bytes) -> None:
+def test_the_ending_says_the_format_and_the_same_flight_gives_the_same_file(
+    path: str, magic: bytes
+) -> None:
     figure = drawn("history", "no pulses")
     content = image.rendered(figure, path)
     assert content.startswith(magic)
     assert image.rendered(figure, path) == content
 
 
-def test_other_endings_and_missing_programs_are_named_with_the_cure(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_other_endings_and_missing_programs_are_named_with_the_cure(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     figure = drawn("history", "no pulses")
     said = [
-        *(refusal(BadRequest, image.ending, path) for path in ("a.bmp", "a", "png", "a.png.gz", ".png")),
+        *(
+            refusal(BadRequest, image.ending, path)
+            for path in ("a.bmp", "a", "png", "a.png.gz", ".png")
+        ),
         *(refusal(BadRequest, film_format, path) for path in ("a.webm", "gif")),
     ]
     with pytest.raises(BadRequest):
@@ -77,16 +87,21 @@ def test_other_endings_and_missing_programs_are_named_with_the_cure(monkeypatch:
 
 def test_settings_of_the_user_change_nothing() -> None:
     plain = image.rendered(drawn("history", "no pulses"), "a.png")
-    with mpl.rc_context({"axes.facecolor": "red", "font.size": 20, "text.usetex": True, "savefig.dpi": 10}):
+    with mpl.rc_context(
+        {"axes.facecolor": "red", "font.size": 20, "text.usetex": True, "savefig.dpi": 10}
+    ):
         assert image.rendered(drawn("history", "no pulses"), "a.png") == plain
         assert mpl.rcParams["font.size"] == 20
 
 
-# --- SVG -------------------------------------------------------------------------------------------------------------
+# --- SVG
+# --------------------------------------------------------------------------------------------------
 
 
 def test_inline_svg_stands_in_any_page() -> None:
-    """As wide as what holds it, in the colour of the text around, and no rule or id of it meets another's."""
+    """As wide as what holds it, in the colour of the text around, and no rule or id of it meets
+    another's.
+    """
     shown = [image.svg(drawn("history", case)) for case in ("wide pulses", "no pulses")]
     ids = []
     for text in shown:
@@ -110,7 +125,9 @@ def test_inline_svg_stands_in_any_page() -> None:
 def test_a_path_that_goes_straight_back_is_drawn_once() -> None:
     """Out, back, and aside: dashes both ways would look like a solid line."""
     out = np.array([[0.0, 0.0], [0.0, 0.0], [1.0, 0.0], [0.0, 0.0], [0.0, 1.0]])
-    np.testing.assert_array_equal(geometry.once(out), [[0, 0], [0, 0], [1, 0], [np.nan, np.nan], [0, 0], [0, 1]])
+    np.testing.assert_array_equal(
+        geometry.once(out), [[0, 0], [0, 0], [1, 0], [np.nan, np.nan], [0, 0], [0, 1]]
+    )
     turn = np.linspace(0.0, 2 * np.pi, 50)
     circle = np.column_stack([np.cos(turn), np.sin(turn)])
     np.testing.assert_array_equal(geometry.once(circle), circle)
@@ -119,20 +136,27 @@ def test_a_path_that_goes_straight_back_is_drawn_once() -> None:
 def digest() -> str:
     """Of the overview, which holds every panel, as a file and in a page."""
     file = image.rendered(flight_picture("overview", WIDE, "four-pulse"), "a.svg")
-    return hashlib.sha256(file + image.svg(flight_picture("overview", WIDE, "four-pulse")).encode()).hexdigest()
+    return hashlib.sha256(
+        file + image.svg(flight_picture("overview", WIDE, "four-pulse")).encode()
+    ).hexdigest()
 
 
 @pytest.mark.weekly
 def test_another_process_makes_the_same_bytes() -> None:
-    """Here hashes of texts are random, as they are for users; there they are those of the seed 1."""
+    """Here hashes of texts are random, as they are for users;
+    there they are those of the seed 1.
+    """
     folders = [str(places.TESTS), str(Path(__file__).parent)]
     code = f"import sys; sys.path[:0] = {folders}; import {__name__}; print({__name__}.digest())"
     environment = {**os.environ, "PYTHONHASHSEED": "1"}
-    other = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
+    other = subprocess.run(
+        [sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True
+    )
     assert other.stdout == f"{digest()}\n"
 
 
-# --- films -----------------------------------------------------------------------------------------------------------
+# --- films
+# --------------------------------------------------------------------------------------------------
 
 
 @pytest.fixture
@@ -157,19 +181,23 @@ def test_a_gif_has_its_frames_its_size_and_its_pace(
     """And the frames are the scene to the pixel."""
     made, end = damped
     timed = timing(WIDE, end, 20, 0.4)
-    stream, done = io.BytesIO(), list[int]()
+    stream = io.BytesIO()
+    done = list[int]()
     monkeypatch.setattr(work, "reach", done.append)
     image.film(stream, made, timed, "a.gif", 401)
     assert done == list(range(1, 9))
     picture = Image.open(stream)
     assert (picture.format, picture.size, getattr(picture, "n_frames", 1)) == ("GIF", (400, 240), 8)
     assert (picture.info["duration"], picture.info["loop"]) == (50, 0)
-    scene, frames = style.styled()(Scene)(made, timed, 401), []
+    scene = style.styled()(Scene)(made, timed, 401)
+    frames = []
     for number in range(timed.frames):
         picture.seek(number)
         frames.append(np.asarray(picture.convert("RGB")).astype(int))
         style.styled()(scene.show)(number)
-        off = np.abs(frames[-1] - image.LEVELS[style.styled()(scene.pixels)()].astype(int)).max(axis=2)
+        off = np.abs(frames[-1] - image.LEVELS[style.styled()(scene.pixels)()].astype(int)).max(
+            axis=2
+        )
         assert np.count_nonzero(off > 40) < 0.002 * off.size  # colours that the palette has not
     assert frames[0][0, 0].tolist() == [255, 255, 255]
     assert np.ptp(frames[0]) > 150  # nothing blank
@@ -179,7 +207,8 @@ def test_a_gif_has_its_frames_its_size_and_its_pace(
 
 @pytest.mark.deep
 def test_a_film_in_which_nothing_moves_has_all_its_frames() -> None:
-    made, stream = propagation.flown(spinner(degrees=0.0), Schedule(), 5.0), io.BytesIO()
+    made = propagation.flown(spinner(degrees=0.0), Schedule(), 5.0)
+    stream = io.BytesIO()
     image.film(stream, made, Timing(5.0, 4, 10, 1.0), "a.gif", 320)
     assert getattr(Image.open(stream), "n_frames", 1) == 4
 
@@ -187,10 +216,17 @@ def test_a_film_in_which_nothing_moves_has_all_its_frames() -> None:
 @pytest.mark.usefixtures("plain")
 def test_the_film_begins_before_a_pulse_at_once_and_ends_with_the_motion() -> None:
     body = spinner(degrees=20.0)
-    kick = Schedule((Pulse(0.0, 0.0, "steerable", -body.inertia.A * np.append(body.omega0[:2], 0.0)),))
-    scene = Scene(propagation.flown(body, kick, body.inertial_period), Timing(body.inertial_period, 8, 10, 1.0), 400)
+    kick = Schedule(
+        (Pulse(0.0, 0.0, "steerable", -body.inertia.A * np.append(body.omega0[:2], 0.0)),)
+    )
+    scene = Scene(
+        propagation.flown(body, kick, body.inertial_period),
+        Timing(body.inertial_period, 8, 10, 1.0),
+        400,
+    )
     seen = [
-        np.degrees(attitude.angle_between(scene.cones(frame).axis, scene.cones(frame).momentum)) for frame in (0, 1)
+        np.degrees(attitude.angle_between(scene.cones(frame).axis, scene.cones(frame).momentum))
+        for frame in (0, 1)
     ]
     assert seen == pytest.approx([20.0, 0.0], abs=1e-9)
 
@@ -200,16 +236,28 @@ def test_the_film_begins_before_a_pulse_at_once_and_ends_with_the_motion() -> No
 def test_a_frame_shows_the_cones_of_its_moment_on_scales_that_stand_still(
     damped: tuple[propagation.Flight, float],
 ) -> None:
-    """Marks of H, ω and the spin axis stand where the flight has them, and only once, whatever was shown before."""
+    """Marks of H, ω and the spin axis stand where the flight has them, and only once, whatever was
+    shown before.
+    """
     made, end = damped
     timed = Timing(end, 10, 10, 1.0)
-    scene, scales = Scene(made, timed, 400), []
+    scene = Scene(made, timed, 400)
+    scales = []
     for number in (0, 3, 7):
         scene.show(number)
         scene.pixels()
-        scales.append([(axes.get_xlim(), axes.get_ylim(), axes.get_position().bounds) for axes in scene.figure.axes])
+        scales.append(
+            [
+                (axes.get_xlim(), axes.get_ylim(), axes.get_position().bounds)
+                for axes in scene.figure.axes
+            ]
+        )
         track = made.sampled(2, float(timed.times[number]) or 1e-9)
-        squares = [line for line in scene.sky.lines if line.get_marker() == "s" and np.size(line.get_xdata())]
+        squares = [
+            line
+            for line in scene.sky.lines
+            if line.get_marker() == "s" and np.size(line.get_xdata())
+        ]
         (place,) = (np.asarray(square.get_xydata(), dtype=float)[0] for square in squares)
         away = np.degrees(attitude.angle_between(track.axis[-1], track.momentum[0]))
         assert np.hypot(*place) == pytest.approx(away, abs=1e-6)
@@ -225,18 +273,23 @@ def diamonds(axes: Axes) -> list[Line2D]:
 @pytest.mark.usefixtures("plain")
 def test_where_frames_follow_the_turns_a_mark_over_body_axis_1_shows_how_the_body_rolls() -> None:
     made = propagation.flown(spinner(degrees=20.0), Schedule(), 4.0)
-    scene, seen = Scene(made, Timing(4.0, 24, 10, 1.0), 320), []
+    scene = Scene(made, Timing(4.0, 24, 10, 1.0), 320)
+    seen = []
     for number in (0, 5):
         scene.show(number)
         (mark,), (solid,) = diamonds(scene.sky), diamonds(scene.space)
         x, y = np.radians(np.asarray(mark.get_xydata(), dtype=float)[0])
         angle = math.hypot(x, y)
-        local = np.array([x * math.sin(angle) / angle, y * math.sin(angle) / angle, math.cos(angle)])
+        local = np.array(
+            [x * math.sin(angle) / angle, y * math.sin(angle) / angle, math.cos(angle)]
+        )
         direction = local @ scene.plane
         in_body = attitude.matrix(scene.quaternions[number]).T @ direction
         assert in_body[0] > 0.0
         assert in_body[1] == pytest.approx(0.0, abs=1e-3)
-        assert np.asarray(solid.get_xydata())[0] == pytest.approx(scene.looked.seen(direction)[0][0], abs=1e-4)
+        assert np.asarray(solid.get_xydata())[0] == pytest.approx(
+            scene.looked.seen(direction)[0][0], abs=1e-4
+        )
         seen.append(direction)
     assert float(seen[0] @ seen[1]) < 0.999
     scene = Scene(made, Timing(4.0, 4, 10, 1.0), 320)
@@ -288,7 +341,11 @@ def test_an_mp4_is_one(damped: tuple[propagation.Flight, float]) -> None:
 # --- every spacecraft with every option, in pairs: nothing breaks, and a file is written
 
 FILES = tuple(sorted(path.stem for path in places.CONFIGS.glob("*.yaml")))
-DISPERSED = {name for name in FILES if "\ndispersions:" in (places.CONFIGS / f"{name}.yaml").read_text("utf-8")}
+DISPERSED = {
+    name
+    for name in FILES
+    if "\ndispersions:" in (places.CONFIGS / f"{name}.yaml").read_text("utf-8")
+}
 SPINS = {"couples-minisat": "--spin=-10rpm", "despun-comsat": ""}
 """Spins of those that turn the other way, or do not turn at all."""
 
@@ -298,18 +355,37 @@ TOLERANCES = "--set 'dispersions.omega0={normal: 0.05 deg/s}'"
 CASES = ("", "--nominal", "--disperse 300", "--robust", "--robust --disperse 3000")
 GOALS = ("", "--spin 10rpm", "--spin keep", "--target 10deg,45deg")
 SCHEMES = ("", "--scheme two-pulse", "--scheme four-pulse", "--scheme optimal")
-PAGES = ("", "--trade 2", "--with-disturbances", "--title T --document D --issue 1 --author A --date 2026-03-01")
-SAVED = ("", "--least time", "--least pulses", "--least impulse", "--free-axis", "--shift 1deg", "--timed")
+PAGES = (
+    "",
+    "--trade 2",
+    "--with-disturbances",
+    "--title T --document D --issue 1 --author A --date 2026-03-01",
+)
+SAVED = (
+    "",
+    "--least time",
+    "--least pulses",
+    "--least impulse",
+    "--free-axis",
+    "--shift 1deg",
+    "--timed",
+)
 DRAWN = ("--plot p.png", "--figure motion --plot p.svg", "--plot p.pdf")
 OTHERS = (
     "simulate --plot p.png",
     "simulate --flown --figure motion --plot p.svg",
     "simulate --scheme none --until 30s --plot p.svg",
-    *(f"disperse --samples 300 --figure {name} --plot p.svg" for name in ("overview", "cases", "momentum")),
+    *(
+        f"disperse --samples 300 --figure {name} --plot p.svg"
+        for name in ("overview", "cases", "momentum")
+    ),
     "trade --points 2 --plot p.png",
     "trade --points 2 --allow any --plot p.pdf",
 )
-FIRST = (("genesis", "", "--spin 10rpm", "", ""), ("single-thruster", "--robust --disperse 3000", "", "", ""))
+FIRST = (
+    ("genesis", "", "--spin 10rpm", "", ""),
+    ("single-thruster", "--robust --disperse 3000", "", "", ""),
+)
 """Reports that broke."""
 
 TABLES = {

@@ -55,7 +55,11 @@ TOLERANCES = Dispersions(
     attitude=normal(0.002),
 )
 BODY = replace(
-    spinner(channels=cross(8.0, min_on_time=0.02, max_on_time=2.0), requirement=REQUIRED, limits=Limits(horizon=40.0)),
+    spinner(
+        channels=cross(8.0, min_on_time=0.02, max_on_time=2.0),
+        requirement=REQUIRED,
+        limits=Limits(horizon=40.0),
+    ),
     dispersions=TOLERANCES,
 )
 
@@ -67,12 +71,15 @@ def line(axes: Axes, label: str) -> Vector:
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 
-# --- trades ----------------------------------------------------------------------------------------------------------
+# --- trades
+# --------------------------------------------------------------------------------------------------
 
 
 @cache
 def traded() -> tuple[tradeoff.Front, ...]:
-    """Two hand-made fronts that begin with one schedule: later ends cost less, and a free H less still."""
+    """Two hand-made fronts that begin with one schedule: later ends cost less, and a free H less
+    still.
+    """
     strict = ((0.0, 1.0), (4.0, 0.97), (10.0, 0.95), (20.0, 0.94))
     free = ((5.0, 0.94), (12.0, 0.91), (22.0, 0.895))
     first, *others = (traded_point(*one) for one in strict)
@@ -84,7 +91,9 @@ def traded() -> tuple[tradeoff.Front, ...]:
 def traded_point(later: float, share: float) -> tradeoff.Point:
     """The two pulses of the compared body, ``later`` s and of a ``share`` of their impulse."""
     made = planning.plan(BODY, "two-pulse")
-    pulses = tuple(replace(one, t=one.t + later, impulse=one.impulse * share) for one in made.pulses)
+    pulses = tuple(
+        replace(one, t=one.t + later, impulse=one.impulse * share) for one in made.pulses
+    )
     least = share * made.total_impulse
     schedule = Schedule(pulses, bounds=Bounds(0.99 * least, 0.9 * least, "N m s", 40.0))
     return tradeoff.Point(replace(made, scheme="optimal", schedule=schedule), 40.0, "N m s")
@@ -102,8 +111,12 @@ def test_the_trade_numbers_every_point_and_explains_its_marks() -> None:
     least = min(point.bounds.rigorous or 0.0 for front in traded() for point in front.points)
     bound = f"lower bound, {cost(down(least), 'N m s')}"
     assert {"H ends where it was", "H may end anywhere", bound} <= legend_words(figure)
-    assert sum(", " in note.get_text() for note in axes.texts) == 1  # the schedule of both fronts has one mark
-    assert line(axes, "recommended: two-pulse (not traded)")[0] == pytest.approx([chosen.end, chosen.total_impulse])
+    assert (
+        sum(", " in note.get_text() for note in axes.texts) == 1
+    )  # the schedule of both fronts has one mark
+    assert line(axes, "recommended: two-pulse (not traded)")[0] == pytest.approx(
+        [chosen.end, chosen.total_impulse]
+    )
     last = max(point.plan.end for front in traded() for point in front.points)
     assert last < axes.get_xlim()[1] < 2.0 * last
 
@@ -122,22 +135,35 @@ def test_fronts_without_points_say_why() -> None:
     figure = studies.trade_figure(spinner(), (tradeoff.Front(0.0, (), "no channel"),))
     check_layout(figure)
     assert not figure.axes
-    assert any("H ends where it was \N{EN DASH} none: no channel" in text.get_text() for text, _ in texts(figure))
-    missing = tradeoff.Front(0.0, (), "within 40 s H cannot be kept where it is; " + "set limits.horizon to more " * 5)
+    assert any(
+        "H ends where it was \N{EN DASH} none: no channel" in text.get_text()
+        for text, _ in texts(figure)
+    )
+    missing = tradeoff.Front(
+        0.0, (), "within 40 s H cannot be kept where it is; " + "set limits.horizon to more " * 5
+    )
     figure = studies.trade_figure(BODY, (missing, traded()[1]))
     check_layout(figure)
     said = " ".join(figure.axes[0].get_title(loc="left").split())
     assert said.startswith("H ends where it was \N{EN DASH} none: within 40 s H cannot be kept")
-    assert not any("none" in text.get_text() for text, _ in texts(studies.trade_figure(BODY, traded())))
+    assert not any(
+        "none" in text.get_text() for text, _ in texts(studies.trade_figure(BODY, traded()))
+    )
 
 
 @pytest.mark.weekly
 @pytest.mark.parametrize("body", [BODY, spinner(phase=0.0)], ids=["channels", "at once"])
-def test_points_that_do_not_meet_the_requirement_are_crossed_out_and_all_have_their_place(body: Spacecraft) -> None:
-    body = replace(body, requirement=Requirement(momentum_shift=math.radians(0.05)), dispersions=None)
+def test_points_that_do_not_meet_the_requirement_are_crossed_out_and_all_have_their_place(
+    body: Spacecraft,
+) -> None:
+    body = replace(
+        body, requirement=Requirement(momentum_shift=math.radians(0.05)), dispersions=None
+    )
     both = tradeoff.fronts(body, OptimalOptions(), count=3, shifts=(0.0, math.inf))
     plans = [point for _, _, point in tradeoff.numbered(both)]
-    failing = {(point.plan.end, point.cost) for point in plans if point.plan.meets_requirement is False}
+    failing = {
+        (point.plan.end, point.cost) for point in plans if point.plan.meets_requirement is False
+    }
     figure = studies.trade_figure(body, both)
     check_layout(figure)
     low, high = figure.axes[0].get_xlim()
@@ -151,9 +177,13 @@ def test_points_that_do_not_meet_the_requirement_are_crossed_out_and_all_have_th
 
 @pytest.mark.deep
 @pytest.mark.parametrize(("count", "later", "cheaper"), [(5, 0.4, 0.004), (80, 0.006, 0.0022)])
-def test_of_points_close_together_those_are_numbered_that_have_room(count: int, later: float, cheaper: float) -> None:
+def test_of_points_close_together_those_are_numbered_that_have_room(
+    count: int, later: float, cheaper: float
+) -> None:
     """Each nearest to its own number."""
-    close = tradeoff.Front(0.0, tuple(traded_point(later * step, 1.0 - cheaper * step) for step in range(count)))
+    close = tradeoff.Front(
+        0.0, tuple(traded_point(later * step, 1.0 - cheaper * step) for step in range(count))
+    )
     figure = studies.trade_figure(BODY, (close,))
     check_layout(figure)
     (axes,) = figure.axes
@@ -164,17 +194,23 @@ def test_of_points_close_together_those_are_numbered_that_have_room(count: int, 
     spots = {label.get_text(): np.asarray(axes.transData.transform(label.xy)) for label in labels}
     for label in shown if count == 5 else ():
         box = label.get_window_extent()
-        away = {other: np.hypot(*(np.clip(spot, box.min, box.max) - spot)) for other, spot in spots.items()}
+        away = {
+            other: np.hypot(*(np.clip(spot, box.min, box.max) - spot))
+            for other, spot in spots.items()
+        }
         assert away.pop(label.get_text()) < 0.5 * min(away.values())
 
 
-# --- what is said of trades ------------------------------------------------------------------------------------------
+# --- what is said of trades
+# ------------------------------------------------------------------------------------------
 
 EASY = replace(WIDE, requirement=Requirement(nutation=math.radians(30.0)))
 
 
 def front_of(body: Spacecraft, *shares: float) -> tradeoff.Front:
-    """One schedule a share of the cost, with H anywhere, all of which end as the plan of two-pulse does."""
+    """One schedule a share of the cost, with H anywhere, all of which end as the plan of two-pulse
+    does.
+    """
     plan = planning.plan(body, "two-pulse")
     bounds = Bounds(plan.pulses.cost_in("N m s"), None, "N m s", 60.0)
     points = []
@@ -188,7 +224,9 @@ def front_of(body: Spacecraft, *shares: float) -> tradeoff.Front:
 def half_of(front: tradeoff.Front) -> tradeoff.Front:
     """A front of the first pulse alone of its first point, which leaves nutation and shifts H."""
     point = front.points[0]
-    half = replace(point.plan, schedule=replace(point.plan.pulses, pulses=point.plan.pulses.pulses[:1]))
+    half = replace(
+        point.plan, schedule=replace(point.plan.pulses, pulses=point.plan.pulses.pulses[:1])
+    )
     return replace(front, points=(point._replace(plan=half),))
 
 
@@ -198,10 +236,15 @@ def codes(fronts: tuple[tradeoff.Front, ...], chosen: planning.Plan) -> list[str
 
 
 def test_a_schedule_that_is_better_is_named_beside_the_recommended_one() -> None:
-    """One that costs less, one as cheap a nutation period earlier, one that meets what the plan does not."""
+    """One that costs less, one as cheap a nutation period earlier, one that meets what the plan
+    does not.
+    """
     chosen = compare(EASY, ["two-pulse"])["two-pulse"]
     cheaper = (front_of(EASY, 0.999999, 0.95, 0.9),)
-    assert [codes((front_of(EASY, *shares),), chosen) for shares in ((1.0, 1.1), (1.0,))] == [[], []]
+    assert [codes((front_of(EASY, *shares),), chosen) for shares in ((1.0, 1.1), (1.0,))] == [
+        [],
+        [],
+    ]
     assert codes((), chosen) == []
     late = replace(EASY, limits=replace(EASY.limits, earliest=EASY.nutation_period))
     later = compare(late, ["two-pulse"])["two-pulse"]
@@ -215,7 +258,8 @@ def test_a_schedule_that_is_better_is_named_beside_the_recommended_one() -> None
     assert [codes(*pair) for pair in pairs] == [["trade-better"], ["trade-better"], ["trade-meets"]]
     assert next(trade_notes(cheaper, chosen, chosen.verdict)).values["point"] == 3
     check_text(
-        "pictures.trade-better", "\n".join(text(note) for pair in pairs for note in trade_notes(*pair, pair[1].verdict))
+        "pictures.trade-better",
+        "\n".join(text(note) for pair in pairs for note in trade_notes(*pair, pair[1].verdict)),
     )
 
 
@@ -224,14 +268,18 @@ def test_a_point_that_no_command_block_fires_is_not_to_be_flown() -> None:
     assert front.points[0].verdict.status is Status.NOT_COMMANDABLE
     assert fails(front.points[0])
     assert codes((front,), compare(EASY, ["two-pulse"])["two-pulse"]) == []
-    assert codes((front_of(EASY, 0.9),), compare(EASY, ["two-pulse"])["two-pulse"]) == ["trade-better"]
+    assert codes((front_of(EASY, 0.9),), compare(EASY, ["two-pulse"])["two-pulse"]) == [
+        "trade-better"
+    ]
 
 
 def test_a_recommended_plan_that_is_not_traded_and_costs_less_is_explained() -> None:
     chosen = planning.plan(replace(WIDE, steerable=Steerable(20.0)), "one-pulse")
     dearer = front_of(WIDE, 1.0)
     share = 0.9 * dearer.points[0].plan.pulses.cost_in("N m s") / chosen.pulses.total_impulse
-    pulses = tuple(replace(one, impulse=one.impulse * share, t=one.t + 60.0) for one in chosen.pulses)
+    pulses = tuple(
+        replace(one, impulse=one.impulse * share, t=one.t + 60.0) for one in chosen.pulses
+    )
     cheap = replace(chosen, schedule=replace(chosen.pulses, pulses=pulses))
     (dear,) = trade_notes((dearer,), cheap, cheap.verdict)
     assert (dear.code, dear.values["point"]) == ("trade-dearer", 1)
@@ -241,15 +289,23 @@ def test_a_recommended_plan_that_is_not_traded_and_costs_less_is_explained() -> 
     cheaper = replace(cheap, schedule=replace(cheap.pulses, pulses=(little,)))
     assert codes((half_of(dearer),), cheaper) == ["trade-dearer"]
     (point,) = half_of(dearer).points
-    failing = point._replace(plan=replace(point.plan, spacecraft=replace(WIDE, requirement=Requirement(nutation=1e-6))))
+    failing = point._replace(
+        plan=replace(point.plan, spacecraft=replace(WIDE, requirement=Requirement(nutation=1e-6)))
+    )
     assert fails(failing)
-    assert codes((replace(dearer, points=(failing,)),), cheaper) == [], "it is not compared with what fails"
+    assert codes((replace(dearer, points=(failing,)),), cheaper) == [], (
+        "it is not compared with what fails"
+    )
     # Costs that count as equal are told where they read differently.
     assert codes((front_of(WIDE, 1.0009),), dearer.points[0].plan) == ["trade-alike"]
 
 
-def test_a_table_says_why_h_ends_beside_where_it_was_and_how_costs_lie_below_their_first_order_least() -> None:
-    """The first of two pulses alone shifts H: on a front where H is not to move that is explained."""
+def test_a_table_says_why_h_ends_beside_where_it_was_and_how_costs_lie_below_their_first_order_least() -> (
+    None
+):
+    """The first of two pulses alone shifts H:
+    on a front where H is not to move that is explained.
+    """
     whole = front_of(WIDE, 1.0)
     shifted, still = (replace(front, shift=0.0) for front in (half_of(whole), whole))
     for front, code, told in (
@@ -285,9 +341,12 @@ def drawn(name: str, which: str = "shift") -> Figure:
 
 @pytest.mark.deep
 @pytest.mark.parametrize(
-    ("name", "which"), [*((name, "shift") for name in NAMES), *(weekly(name, "target") for name in NAMES)]
+    ("name", "which"),
+    [*((name, "shift") for name in NAMES), *(weekly(name, "target") for name in NAMES)],
 )
-def test_studies_are_drawn_whole_seen_on_any_page_and_say_what_is_met(name: str, which: str) -> None:
+def test_studies_are_drawn_whole_seen_on_any_page_and_say_what_is_met(
+    name: str, which: str
+) -> None:
     check_layout(drawn(name, which))
     check_colours(drawn(name, which))
     verdict = study(which).verdict
@@ -307,14 +366,20 @@ def test_curves_hold_all_cases(which: str) -> None:
         places, shares = line(axes, "cases within").T
         assert (places[-1], shares[-1]) == (pytest.approx(values[-1]), 100.0)
         for place, share in zip(places[::37], shares[::37], strict=True):
-            assert 100.0 * np.mean(values <= place * (1.0 + 1e-9)) == pytest.approx(share, abs=200.0 / len(values))
+            assert 100.0 * np.mean(values <= place * (1.0 + 1e-9)) == pytest.approx(
+                share, abs=200.0 / len(values)
+            )
         (dot,) = (one for one in axes.lines if one.get_marker() == "o")
-        assert np.asarray(dot.get_xydata())[0] == pytest.approx([np.quantile(values, 0.997), 99.7], rel=0.02)
+        assert np.asarray(dot.get_xydata())[0] == pytest.approx(
+            [np.quantile(values, 0.997), 99.7], rel=0.02
+        )
 
 
 def test_a_curve_with_a_long_tail_reaches_its_end_on_a_log_axis() -> None:
     """Which begins at the least value, or six decades before the largest."""
-    values = np.append(np.random.default_rng(1).random(99_990), np.full(10, 50.0)) * math.radians(1.0)
+    values = np.append(np.random.default_rng(1).random(99_990), np.full(10, 50.0)) * math.radians(
+        1.0
+    )
     axes = Figure().subplots()
     studies.draw_distribution(axes, Exact(values), "nutation left, °", None)
     assert axes.get_xscale() == "log"
@@ -333,12 +398,16 @@ def test_cases_that_are_all_alike_are_told_in_words(bias: float) -> None:
     results = studied(replace(BODY, dispersions=still), 50)
     figure = studies.dispersion_figure(results, "cases")
     check_layout(figure)
-    for axes, output, required in zip(figure.axes, ("nutation", "momentum_shift"), (0.5, 0.2), strict=True):
+    for axes, output, required in zip(
+        figure.axes, ("nutation", "momentum_shift"), (0.5, 0.2), strict=True
+    ):
         most = results.core.distribution(output)
         assert most is not None
         left = math.degrees(most.maximum)
         assert (left >= 1e-6) == bool(bias)
-        said = f"all 50 cases:\n{f'{left:#.3g}°' if bias else 'below 1e-6°'}, required {required:.3f}°"
+        said = (
+            f"all 50 cases:\n{f'{left:#.3g}°' if bias else 'below 1e-6°'}, required {required:.3f}°"
+        )
         assert [text.get_text() for text in axes.texts] == [said]
         assert not len(axes.get_xticks())
         assert not axes.lines
@@ -348,18 +417,26 @@ def test_cases_that_are_all_alike_are_told_in_words(bias: float) -> None:
 @pytest.mark.parametrize("size", [0.0005, 0.001])
 def test_the_ticks_of_small_shifts_keep_apart(size: float) -> None:
     thrust = dict.fromkeys(TOLERANCES.thrust, Tolerance("normal", size, relative=True))
-    body = replace(BODY, dispersions=Dispersions(thrust=thrust, timing=Tolerance("uniform", 0.05 * size)))
+    body = replace(
+        BODY, dispersions=Dispersions(thrust=thrust, timing=Tolerance("uniform", 0.05 * size))
+    )
     figure = studies.dispersion_figure(studied(body, 500), "momentum")
     check_layout(figure)
     assert "the 500 cases" in legend_words(figure)
     ticks = figure.axes[0].get_xticklabels()
-    boxes = sorted((box for text, box in texts(figure) if text in ticks), key=lambda box: float(box[0]))
+    boxes = sorted(
+        (box for text, box in texts(figure) if text in ticks), key=lambda box: float(box[0])
+    )
     assert len(boxes) >= 3
-    assert min(float(right[0] - left[2]) * 72.0 / figure.dpi for left, right in pairwise(boxes)) > 4.0
+    assert (
+        min(float(right[0] - left[2]) * 72.0 / figure.dpi for left, right in pairwise(boxes)) > 4.0
+    )
 
 
 @pytest.mark.deep
-@pytest.mark.parametrize(("which", "output"), [("shift", "momentum_shift"), ("target", "axis_error")])
+@pytest.mark.parametrize(
+    ("which", "output"), [("shift", "momentum_shift"), ("target", "axis_error")]
+)
 def test_final_h_lies_as_far_out_as_the_table_says(which: str, output: str) -> None:
     results = study(which).core
     cases = studies.momentum_cases(results)
@@ -377,10 +454,14 @@ def test_final_h_lies_as_far_out_as_the_table_says(which: str, output: str) -> N
 
 
 def test_the_ellipse_holds_its_share_and_is_that_of_the_covariance() -> None:
-    points = np.random.default_rng(2).multivariate_normal([1.0, -2.0], [[4.0, 1.5], [1.5, 1.0]], 100_000)
+    points = np.random.default_rng(2).multivariate_normal(
+        [1.0, -2.0], [[4.0, 1.5], [1.5, 1.0]], 100_000
+    )
     inverse = np.linalg.inv(np.cov(points.T))
     for share in (0.5, 0.9, 0.997):
-        rim, inside = (rows - points.mean(axis=0) for rows in (studies.ellipse(points, share), points))
+        rim, inside = (
+            rows - points.mean(axis=0) for rows in (studies.ellipse(points, share), points)
+        )
         sizes = np.sqrt(np.einsum("ij,jk,ik->i", rim, inverse, rim))
         assert np.ptp(sizes) < 1e-6 * sizes[0]
         # Rayleigh: of normal cases this share lies within.
@@ -398,26 +479,40 @@ def test_nothing_that_varies_is_drawn(name: str) -> None:
 
 
 @pytest.mark.deep
-@pytest.mark.parametrize("required", [None, Requirement(nutation=0.01), Requirement(0.01, momentum_shift=0.01)])
+@pytest.mark.parametrize(
+    "required", [None, Requirement(nutation=0.01), Requirement(0.01, momentum_shift=0.01)]
+)
 def test_captions_name_no_bound_that_is_not_drawn(required: Requirement | None) -> None:
     varied = Dispersions(A=Tolerance("normal", 0.02, relative=True))
     results = studied(replace(BODY, requirement=required, dispersions=varied), 50)
     _, momentum = dispersion_pictures(results)
-    assert "required" not in momentum.caption  # the circle of a requirement may lie outside the picture
+    assert (
+        "required" not in momentum.caption
+    )  # the circle of a requirement may lie outside the picture
 
 
-# --- loops -----------------------------------------------------------------------------------------------------------
+# --- loops
+# --------------------------------------------------------------------------------------------------
 
 
 def looping(requirement: Requirement | None = None) -> Spacecraft:
-    forces = {"+M1": (0.0, -9.0, 0.0), "-M1": (0.0, 9.0, 0.0), "+M2": (9.0, 0.0, 0.0), "-M2": (-9.0, 0.0, 0.0)}
+    forces = {
+        "+M1": (0.0, -9.0, 0.0),
+        "-M1": (0.0, 9.0, 0.0),
+        "+M2": (9.0, 0.0, 0.0),
+        "-M2": (-9.0, 0.0, 0.0),
+    }
     channels = tuple(
-        Channel(name, (replace(jet(name, (0.0, 0.0, 0.8), force), min_on_time=0.02, max_on_time=0.3),))
+        Channel(
+            name, (replace(jet(name, (0.0, 0.0, 0.8), force), min_on_time=0.02, max_on_time=0.3),)
+        )
         for name, force in forces.items()
     )
     loop = Loop(Sensor(rate=20.0), start=math.radians(0.5), stop=math.radians(0.05))
     dispersions = Dispersions(omega0=(normal(0.004),) * 3)
-    return replace(spinner(channels=channels), loop=loop, dispersions=dispersions, requirement=requirement)
+    return replace(
+        spinner(channels=channels), loop=loop, dispersions=dispersions, requirement=requirement
+    )
 
 
 @pytest.mark.deep
@@ -430,7 +525,9 @@ def test_numbers_of_firings_do_not_touch_the_bars_of_the_row_above() -> None:
     numbers = [text.get_window_extent() for text in fired.texts if text.get_text()]
     assert numbers
     for number in numbers:
-        (_, row), (_, above) = fired.transData.inverted().transform([(0.0, number.y0), (0.0, number.y1)])
+        (_, row), (_, above) = fired.transData.inverted().transform(
+            [(0.0, number.y0), (0.0, number.y1)]
+        )
         bottom = fired.transData.transform((0.0, math.ceil(row) - 0.5 * BAR))[1]
         assert math.ceil(above) == math.ceil(row)
         assert 72.0 / figure.dpi * (bottom - number.y1) > 3.0
@@ -443,8 +540,14 @@ def test_dispersed_loops_show_the_shift_that_is_required(most: float, beside: bo
     figure = studies.loop_cases_figure(LoopDispersion(results))
     check_layout(figure)
     nutation, shift = figure.axes
-    assert line(nutation, "cases within")[-1] == pytest.approx([np.degrees(results.of("nutation").max()), 100.0])
-    levels = [float(np.asarray(one.get_xdata())[0]) for one in shift.lines if one.get_label() == "required"]
+    assert line(nutation, "cases within")[-1] == pytest.approx(
+        [np.degrees(results.of("nutation").max()), 100.0]
+    )
+    levels = [
+        float(np.asarray(one.get_xdata())[0])
+        for one in shift.lines
+        if one.get_label() == "required"
+    ]
     assert levels == ([pytest.approx(most)] if beside else [])
     assert f"required {most:#.3g}".rstrip(".") in shift.get_title()
 

@@ -1,4 +1,6 @@
-"""A campaign: ACE follows the Sun by a turn a week, each planned from the file that the one before led to."""
+"""A campaign: ACE follows the Sun by a turn a week, each planned from the file that the one before
+led to.
+"""
 
 import math
 
@@ -15,7 +17,8 @@ WEEK = 7 * 86400.0
 @pytest.mark.parametrize("weeks", [2, weekly(52)])
 def test_weekly_turns_keep_the_cone_and_their_propellant_adds_up(weeks: int) -> None:
     spacecraft = nutdamp.example("ace")
-    first, used = present(spacecraft.mass), 0.0
+    first = present(spacecraft.mass)
+    used = 0.0
     for _ in range(weeks):
         x, y, z = present(spacecraft.sun).tolist()
         spacecraft = nutdamp.plan(spacecraft, "none").carried(WEEK)

@@ -1,4 +1,6 @@
-"""Valid spacecraft, ordinary and degenerate, through every command and scheme: no traceback, no NaN, a proper exit."""
+"""Valid spacecraft, ordinary and degenerate, through every command and scheme: no traceback, no
+NaN, a proper exit.
+"""
 
 import json
 import math
@@ -42,30 +44,48 @@ def spacecraft(rng: np.random.Generator) -> dict[str, Any]:
     odd = [1.0, 1.0 + 1e-12, 1.0 - 1e-9, 1.0 + 1e-4, 2.0, 0.01]
     ratio = float(rng.choice([rng.uniform(0.2, 1.9), *odd], p=[0.6, *[0.4 / 6] * 6]))
     spin = float(rng.choice([-1.0, 1.0])) * power(rng, -2.0, 1.0)
-    degrees = float(rng.choice([0.0, 1e-7, 0.5, 5.0, 30.0, 70.0, 89.9], p=[0.06, 0.04, 0.2, 0.43, 0.2, 0.06, 0.01]))
+    degrees = float(
+        rng.choice(
+            [0.0, 1e-7, 0.5, 5.0, 30.0, 70.0, 89.9], p=[0.06, 0.04, 0.2, 0.43, 0.2, 0.06, 0.01]
+        )
+    )
     body: dict[str, Any] = {"name": "fuzz", "inertia": {"A": A, "C": ratio * A}}
     if chance(0.15):
         split = float(rng.choice([1e-10, 0.01, 0.2]))
         moments = [A * (1.0 + split), A * (1.0 - split), min(ratio, 1.5) * A]
-        if not moments[1] <= moments[2] <= moments[0] and 2 * max(moments) <= sum(moments):  # stable, and a body
+        if not moments[1] <= moments[2] <= moments[0] and 2 * max(moments) <= sum(
+            moments
+        ):  # stable, and a body
             body["inertia"] = {"tensor": np.diag(moments).tolist()}
-    body["state"] = {"spin": spin, "nutation": f"{degrees} deg", "phase": float(rng.uniform(-3.0, 3.0))}
+    body["state"] = {
+        "spin": spin,
+        "nutation": f"{degrees} deg",
+        "phase": float(rng.uniform(-3.0, 3.0)),
+    }
     if chance(0.2):
         body["attitude"] = {"quaternion": rng.normal(size=4).tolist(), "frame": "EME2000"}
         if chance(0.7):
             body["attitude"]["epoch"] = "2026-03-01T12:00:00Z"
     tangent = math.tan(math.radians(max(min(degrees, 80.0), 0.1)))
-    strength, period = ratio * A * spin * spin * tangent * power(rng, -2.0, 2.0), 2.0 * math.pi / abs(spin)
+    strength = ratio * A * spin * spin * tangent * power(rng, -2.0, 2.0)
+    period = 2.0 * math.pi / abs(spin)
     body["thrusters"] = []
     for number in range(int(rng.choice([0, 1, 2, 4, 8], p=[0.1, 0.15, 0.2, 0.45, 0.1]))):
-        torque = rng.normal(size=3) * np.array([1.0, 1.0, rng.choice([0.0, 0.3, 10.0], p=[0.7, 0.2, 0.1])])
+        torque = rng.normal(size=3) * np.array(
+            [1.0, 1.0, rng.choice([0.0, 0.3, 10.0], p=[0.7, 0.2, 0.1])]
+        )
         if chance(0.7):
-            torque = np.array([math.cos(0.5 * math.pi * number), math.sin(0.5 * math.pi * number), 0.0])
+            torque = np.array(
+                [math.cos(0.5 * math.pi * number), math.sin(0.5 * math.pi * number), 0.0]
+            )
         one: dict[str, Any] = {"name": f"T{number}", "torque": (strength * torque).tolist()}
         if chance(0.6):
             one |= {"isp": 220, "lever_arm": 0.8}
         if chance(0.3):
-            one |= {"min_on_time": 0.01 / abs(spin), "max_on_time": float(rng.choice([0.1, 1.0])) / abs(spin)}
+            one |= {
+                "min_on_time": 0.01 / abs(spin),
+                "max_on_time": float(rng.choice([0.1, 1.0])) / abs(spin),
+            }
         body["thrusters"].append(one)
     if chance(0.15):
         body["steerable"] = {} if chance(0.3) else {"torque": strength}
@@ -91,12 +111,22 @@ def spacecraft(rng: np.random.Generator) -> dict[str, Any]:
         if chance(share):
             body[key] = part
     if chance(0.25) and "attitude" not in body:
-        body["goal"] = {"tilt": f"{rng.choice([0.0, degrees, 3.0, 60.0, 179.9, 179.999999])} deg", "azimuth": 0.0}
+        body["goal"] = {
+            "tilt": f"{rng.choice([0.0, degrees, 3.0, 60.0, 179.9, 179.999999])} deg",
+            "azimuth": 0.0,
+        }
     elif chance(0.1):
         body["goal"] = {"spin": spin * float(rng.choice([1.0, 1.01, 0.8]))}
     if chance(0.7):
-        wide, thrust = {"A": {"normal": "1 %"}, "timing": {"uniform": "5 ms"}}, {"thrust": {"normal": "2 %"}}
-        body["dispersions"] = {**wide, "omega0": {"normal": 1e-3 * abs(spin)}, **(thrust if body["thrusters"] else {})}
+        wide, thrust = (
+            {"A": {"normal": "1 %"}, "timing": {"uniform": "5 ms"}},
+            {"thrust": {"normal": "2 %"}},
+        )
+        body["dispersions"] = {
+            **wide,
+            "omega0": {"normal": 1e-3 * abs(spin)},
+            **(thrust if body["thrusters"] else {}),
+        }
     return {key: part for key, part in body.items() if key not in ("thrusters", "limits") or part}
 
 
@@ -107,7 +137,10 @@ OTHERS = (
     "check f.yaml --json -; check f.yaml",
     "disperse CHOSEN --samples 100 --json -",
     "export CHOSEN PLACED --format FORMAT",
-    "export CHOSEN PLACED --format apm -o f.apm; import apm f.apm --schedule f.csv; simulate f.yaml --schedule f.csv",
+    (
+        "export CHOSEN PLACED --format apm -o f.apm; import apm f.apm --schedule f.csv; "
+        "simulate f.yaml --schedule f.csv"
+    ),
     "plan f.yaml --scheme one-pulse --scheme two-pulse --scheme four-pulse",
     "simulate f.yaml --scheme none --samples 20 --json -",
     "disperse CHOSEN --case 3",
@@ -115,7 +148,9 @@ OTHERS = (
     "plan CHOSEN; simulate CHOSEN --samples 20",
     "plan CHOSEN --robust --json -",
 )
-"""In rotation; their number has no common factor with that of the schemes, so that each command meets each scheme."""
+"""In rotation; their number has no common factor with that of the schemes, so that each command
+meets each scheme.
+"""
 
 RARE = (
     (11, 0, "verify CHOSEN --json -"),
@@ -127,12 +162,14 @@ RARE = (
 
 
 def commands(seed: int, body: dict[str, Any]) -> Iterator[list[str]]:
-    """What is done with the spacecraft of a seed: a plan of a scheme, and two or more other commands.
+    """What is done with the spacecraft of a seed: a plan of a scheme, and two or more other
+    commands.
 
     Optimal, which takes longest, is planned less often.
     """
     scheme = "optimal" if seed % 25 == 0 else SCHEMES[seed % len(SCHEMES)]
-    axis, chosen = "tilt" in body.get("goal", {}), f"f.yaml --scheme {scheme}"
+    axis = "tilt" in body.get("goal", {})
+    chosen = f"f.yaml --scheme {scheme}"
     if scheme in ("half-cone", "rhumb-line") and not axis and seed % 7:
         chosen += f" --target {(0, 40, 140)[seed % 3]}deg,{(10, 2, 80)[seed // 3 % 3]}deg"
     unusual = "", "--with-disturbances", "--coarse", "--literal", "--free-axis", "--per-turn 2", ""
@@ -143,7 +180,11 @@ def commands(seed: int, body: dict[str, Any]) -> Iterator[list[str]]:
         "TOPIC": ("", scheme, "17", "file", "units", "nutation")[seed // 97 % 6],
         "--robust": "" if scheme == "optimal" else "--robust",
     }
-    rows = [f"plan CHOSEN {unusual[seed // 5 % 7]} --json -", OTHERS[seed % 13], OTHERS[(seed // 3 + 4) % 13]]
+    rows = [
+        f"plan CHOSEN {unusual[seed // 5 % 7]} --json -",
+        OTHERS[seed % 13],
+        OTHERS[(seed // 3 + 4) % 13],
+    ]
     for row in [*rows, *(rare for every, rest, rare in RARE if seed % every == rest)]:
         for command in row.split("; "):
             yield [part for word in command.split() for part in words.get(word, word).split()]
@@ -167,9 +208,11 @@ def faults(seed: int, folder: Path, planner: Planner) -> list[str]:
         try:
             done = within(folder, *arguments)
         except Exception:  # a bug: the other seeds are tried all the same
-            problem, said = "an error that is no message", traceback.format_exc()
+            problem = "an error that is no message"
+            said = traceback.format_exc()
         else:
-            problem, said = problem_of(arguments, done, folder), done.stderr
+            problem = problem_of(arguments, done, folder)
+            said = done.stderr
         if problem:
             wrong.append(f"seed {seed}: nutdamp {' '.join(arguments)}: {problem}\n{said[-1500:]}")
     return wrong
@@ -180,10 +223,14 @@ def problem_of(arguments: list[str], done: subprocess.CompletedProcess[str], fol
     files = [one for one in folder.iterdir() if one.suffix in (".csv", ".apm")]
     pages = [SCRIPTED.sub("", one.read_text(encoding="utf-8")) for one in folder.glob("*.html")]
     texts = [done.stdout, done.stderr, *(one.read_text(encoding="utf-8") for one in files), *pages]
-    shown = done.stderr + ("" if "basilisk" in arguments else done.stdout)  # that format is a script
+    shown = done.stderr + (
+        "" if "basilisk" in arguments else done.stdout
+    )  # that format is a script
     internal = INTERNAL.search(shown)
     if done.returncode not in STATUSES or internal:
-        return f"status {done.returncode}, {internal.group() if internal else 'no text from within'}"
+        return (
+            f"status {done.returncode}, {internal.group() if internal else 'no text from within'}"
+        )
     if done.returncode == 2 and "f.yaml:" in done.stderr and ": warning" not in done.stderr:
         return "the file is not valid"
     if any(NOT_A_NUMBER.search(text) for text in texts):
@@ -201,7 +248,8 @@ def problem_of(arguments: list[str], done: subprocess.CompletedProcess[str], fol
 def planner(monkeypatch: pytest.MonkeyPatch) -> Planner:
     """The commands of a seed share its schedules: to find them takes most of the time.
 
-    And independent integrations give up sooner than a user's do: those of a thousand turns take most of what is left.
+    And independent integrations give up sooner than a user's do: those of a thousand turns take
+    most of what is left.
     """
     one = Planner()
     monkeypatch.setattr(schemes, "schedule", one.schedule)
@@ -231,7 +279,9 @@ def test_files_that_went_wrong_once(seed: int, tmp_path: Path, planner: Planner)
 
 
 @spread("seed", range(400), quick=0, deep=40)
-def test_files_over_the_whole_schema_get_results_or_reasons(seed: int, tmp_path: Path, planner: Planner) -> None:
+def test_files_over_the_whole_schema_get_results_or_reasons(
+    seed: int, tmp_path: Path, planner: Planner
+) -> None:
     (tmp_path / "f.yaml").write_text(json.dumps(equipped(seed), indent=1), encoding="utf-8")
     for row in EVERY if seed % 5 == 0 else EVERY[:-1]:
         done = within(tmp_path, *row.split())
@@ -244,5 +294,7 @@ def test_files_over_the_whole_schema_get_results_or_reasons(seed: int, tmp_path:
 def test_ordinary_and_degenerate_spacecraft_get_results_or_reasons(
     block: int, tmp_path: Path, planner: Planner
 ) -> None:
-    assert [one for seed in range(block, SEEDS, BLOCKS) for one in faults(seed, tmp_path, planner)] == []
+    assert [
+        one for seed in range(block, SEEDS, BLOCKS) for one in faults(seed, tmp_path, planner)
+    ] == []
     assert planner.calls > 0

@@ -1,4 +1,6 @@
-"""Every scheme under any limits ends: a feasible plan keeps them all and comes nearer, an infeasible one says why."""
+"""Every scheme under any limits ends: a feasible plan keeps them all and comes nearer, an
+infeasible one says why.
+"""
 
 import itertools
 import math
@@ -49,7 +51,9 @@ from nutdamp.spacecraft.requirements import Part
 from nutdamp.spacecraft.schedule import TOUCHING, Schedule, channel_pulse
 
 PLENTY = 3_000_000
-"""Calls of functions; most plans take a tenth of that, so that an endless search fails, not hangs."""
+"""Calls of functions; most plans take a tenth of that, so that an endless search fails,
+not hangs.
+"""
 
 DAMPING = {
     "one-pulse": ("one-pulse", Options()),
@@ -62,7 +66,9 @@ POINTING = ["two-pulse", "half-cone", "rhumb-line"]
 Requested = tuple[str, Options]
 
 
-def check(body: Spacecraft, scheme: str, options: Options | None = None, most: int = 3 * PLENTY) -> planning.Plan:
+def check(
+    body: Spacecraft, scheme: str, options: Options | None = None, most: int = 3 * PLENTY
+) -> planning.Plan:
     with within(most):
         plan = planning.plan(body, scheme, options)
         left, residual = plan.flown, plan.residual
@@ -75,11 +81,18 @@ def check(body: Spacecraft, scheme: str, options: Options | None = None, most: i
     assert all(two.t > one.t for one, two in itertools.pairwise(plan.pulses))
     assert left is not None
     for angles in (left, present(residual)):
-        assert np.isfinite([angles.nutation, angles.body_cone, angles.space_cone, angles.momentum_shift]).all()
+        assert np.isfinite(
+            [angles.nutation, angles.body_cone, angles.space_cone, angles.momentum_shift]
+        ).all()
     if body.inertia.symmetric and not body.disturbances and plan.spin_change is not None:
         # After a long wait the clock tells the width of a pulse to its own rounding only.
-        slips = [abs(one.impulse[2]) * 4 * np.spacing(one.end) / one.on_time for one in plan.pulses if one.on_time]
-        change, rounding = math.fsum(one.impulse[2] for one in plan.pulses), 1e-9 * abs(body.spin) * body.inertia.C
+        slips = [
+            abs(one.impulse[2]) * 4 * np.spacing(one.end) / one.on_time
+            for one in plan.pulses
+            if one.on_time
+        ]
+        change = math.fsum(one.impulse[2] for one in plan.pulses)
+        rounding = 1e-9 * abs(body.spin) * body.inertia.C
         assert plan.spin_change * body.inertia.C == pytest.approx(change, abs=rounding + sum(slips))
     if body.goal.axis is None:
         # Where ω stands still in the body, each of two channels beside it fires a pair.
@@ -91,7 +104,10 @@ def check(body: Spacecraft, scheme: str, options: Options | None = None, most: i
     requested = body.nutation + body.to_turn
     assert left.nutation < body.nutation or left.axis_error < body.to_turn or requested < 1e-12
     if body.inertia.symmetric:
-        assert max(left.nutation, left.axis_error) <= (0.05 if body.limits.tick is None else 0.5) * requested
+        assert (
+            max(left.nutation, left.axis_error)
+            <= (0.05 if body.limits.tick is None else 0.5) * requested
+        )
     return plan
 
 
@@ -121,14 +137,18 @@ def test_whatever_the_limits_with_a_target(block: int, scheme: str) -> None:
 HARD = {
     "tick as long as the horizon": Limits(tick=10.0, horizon=10.0),
     "tick longer than the horizon": Limits(tick=1e3, horizon=10.0),
-    "tick of a nanosecond": Limits(tick=1e-9, earliest=1.0 / 3.0, blackout=((1.0, 2.0 / 3.0 + 1.0),)),
+    "tick of a nanosecond": Limits(
+        tick=1e-9, earliest=1.0 / 3.0, blackout=((1.0, 2.0 / 3.0 + 1.0),)
+    ),
     "horizon too short for anything": Limits(horizon=1e-3),
     "earliest at the end": Limits(earliest=124.0),
     "earliest after the default horizon": Limits(earliest=1e9),
     "gap longer than the horizon": Limits(gap=1e6),
     "all dark": Limits(blackout=((0.0, 1e9),)),
     "hundred dark windows": Limits(blackout=tuple((0.7 * n, 0.7 * n + 0.6) for n in range(100))),
-    "dark but for moments": Limits(blackout=tuple((0.7 * n, 0.7 * n + 0.69999) for n in range(1000))),
+    "dark but for moments": Limits(
+        blackout=tuple((0.7 * n, 0.7 * n + 0.69999) for n in range(1000))
+    ),
     "windows of no length": Limits(blackout=tuple((0.1 * n, 0.1 * n) for n in range(200))),
     "one pulse": Limits(max_pulses=1),
     "a year": Limits(horizon=3.2e7, gap=3600.0),
@@ -153,7 +173,9 @@ def test_awkward_limits_with_a_target(hard: Limits, scheme: str) -> None:
 
 @pytest.mark.parametrize("requested", DAMPING.values(), ids=DAMPING)
 def test_units_do_not_matter(requested: Requested) -> None:
-    """Inertia and torques scaled together: the same pulses. Spin × s, torques × s²: the same pulses s times as fast."""
+    """Inertia and torques scaled together: the same pulses. Spin × s, torques × s²: the same pulses
+    s times as fast.
+    """
     plain = planning.plan(spinner(channels=cross(20.0)), *requested)
     for mass, rate in ((1e-12, 1.0), (1e9, 1.0), (1.0, 1e-6), (1.0, 1e3)):
         body = spinner(120.0 * mass, 80.0 * mass, 3.0 * rate, channels=cross(20.0 * mass * rate**2))
@@ -161,13 +183,17 @@ def test_units_do_not_matter(requested: Requested) -> None:
         assert scaled.feasible == plain.feasible
         for one, other in zip(plain.pulses, scaled.pulses, strict=True):
             assert other.channel == one.channel
-            assert (other.t * rate, other.on_time * rate) == pytest.approx((one.t, one.on_time), rel=1e-8)
+            assert (other.t * rate, other.on_time * rate) == pytest.approx(
+                (one.t, one.on_time), rel=1e-8
+            )
 
 
 @pytest.mark.deep
 @pytest.mark.parametrize("requested", DAMPING.values(), ids=DAMPING)
 @spread("degrees", [1e-9, 1e-6, 1e-3, 70.0, 89.0], quick=2)
-def test_nutation_from_next_to_nothing_to_next_to_a_right_angle(degrees: float, requested: Requested) -> None:
+def test_nutation_from_next_to_nothing_to_next_to_a_right_angle(
+    degrees: float, requested: Requested
+) -> None:
     for C, spin in ((40.0, 3.0), (80.0, -3.0), (120.0, 3.0), (240.0, -3.0)):
         torque = spinner(120.0, C, spin, degrees).least_impulse * 3.0
         check(spinner(120.0, C, spin, degrees, channels=cross(torque)), *requested)
@@ -175,16 +201,29 @@ def test_nutation_from_next_to_nothing_to_next_to_a_right_angle(degrees: float, 
             check(spinner(120.0, C, spin, degrees, steerable=Steerable(torque)), *requested)
 
 
-@spread("requested", [DAMPING[name] for name in ("one-pulse", "two-pulse", "two-pulse, literal")], quick=1)
+@spread(
+    "requested",
+    [DAMPING[name] for name in ("one-pulse", "two-pulse", "two-pulse, literal")],
+    quick=1,
+)
 @spread("torque", [30.0, 100.0], quick=1)
 @spread("moments", [(120.0, 100.0, 80.0), (80.0, 70.0, 120.0)], quick=1, ids=["prolate", "oblate"])
 def test_torquer_on_a_body_of_three_different_moments_keeps_the_limits(
     moments: tuple[float, float, float], torque: float, requested: Requested
 ) -> None:
-    """Going from the symmetric model to the body changes on-times, and must not move starts out of the limits."""
+    """Going from the symmetric model to the body changes on-times, and must not move starts out of
+    the limits.
+    """
     windows = Limits(blackout=((0.0, 3.0),))
-    for limits in (Limits(tick=0.01), Limits(earliest=2.0), Limits(earliest=2.0, tick=0.1), windows):
-        plan = planning.plan(spinner(moments=moments, steerable=Steerable(torque), limits=limits), *requested)
+    for limits in (
+        Limits(tick=0.01),
+        Limits(earliest=2.0),
+        Limits(earliest=2.0, tick=0.1),
+        windows,
+    ):
+        plan = planning.plan(
+            spinner(moments=moments, steerable=Steerable(torque), limits=limits), *requested
+        )
         assert plan.feasible, infeasibility(plan)
         assert violations(plan.spacecraft, plan.pulses) == []
 
@@ -199,17 +238,28 @@ TRUE_BODIES = {
 @spread("scheme", POINTING, quick=1)
 @spread("true_body", TRUE_BODIES.values(), quick=1, ids=TRUE_BODIES)
 def test_what_the_model_does_not_know_is_trimmed(true_body: Spacecraft, scheme: str) -> None:
-    for body in (replace(true_body, channels=cross(60.0)), replace(true_body, steerable=Steerable(60.0))):
-        left = present(planning.plan(aimed(body, 12.0, 45.0), scheme, Options(with_disturbances=True)).flown)
+    for body in (
+        replace(true_body, channels=cross(60.0)),
+        replace(true_body, steerable=Steerable(60.0)),
+    ):
+        left = present(
+            planning.plan(aimed(body, 12.0, 45.0), scheme, Options(with_disturbances=True)).flown
+        )
         assert max(left.nutation, left.axis_error) < 1e-9
 
 
 @pytest.mark.weekly
 @pytest.mark.parametrize("scheme", ["half-cone", "rhumb-line"])
 @pytest.mark.parametrize("horizon", [0.6, 1.5, 6.0])
-def test_the_horizon_that_is_named_is_long_enough_for_the_whole_plan(scheme: str, horizon: float) -> None:
-    """What was named covered the pulses that damp the nutation first, and the way to the target had no room."""
-    body = aimed(spinner(channels=cross(20.0, max_on_time=2.0), limits=Limits(horizon=horizon)), 20.0, 45.0)
+def test_the_horizon_that_is_named_is_long_enough_for_the_whole_plan(
+    scheme: str, horizon: float
+) -> None:
+    """What was named covered the pulses that damp the nutation first, and the way to the target had
+    no room.
+    """
+    body = aimed(
+        spinner(channels=cross(20.0, max_on_time=2.0), limits=Limits(horizon=horizon)), 20.0, 45.0
+    )
     why = infeasibility(planning.plan(body, scheme))
     named = present(re.search(r"limits\.horizon = (\S+) s is long enough$", why))
     assert planning.plan(replace(body, limits=Limits(horizon=float(named[1]))), scheme).feasible
@@ -223,13 +273,28 @@ def at(name: str) -> Spacecraft:
 ODD: list[dict[str, Any]] = [{"max_on_time": 0.05}, {"min_on_time": 0.12, "max_on_time": 0.19}]
 RUNS_AWAY = (
     channel("T0", 0.0, 0.07812199696304258, 0.0),
-    channel("T1", 0.0017921515598551382, -0.004499826153832031, 0.00026736933327888593, min_on_time=0.0352),
-    channel("T2", -0.0058350853171264165, -0.022754617512655954, 0.00035239014198196254, min_on_time=0.0038),
+    channel(
+        "T1",
+        0.0017921515598551382,
+        -0.004499826153832031,
+        0.00026736933327888593,
+        min_on_time=0.0352,
+    ),
+    channel(
+        "T2",
+        -0.0058350853171264165,
+        -0.022754617512655954,
+        0.00035239014198196254,
+        min_on_time=0.0038,
+    ),
 )
 LATE = Limits(horizon=2194.4435233461004, earliest=1844.9859185150808)
 ENDLESS = {
     # Closings of H, half turns and trials of two-pulse are not laid out one by one.
-    **{f"a = {a}": ("two-pulse", spinner(120.0, 120.0 * (1 - a), channels=cross(8.0)), None) for a in (1e-6, 1e-15)},
+    **{
+        f"a = {a}": ("two-pulse", spinner(120.0, 120.0 * (1 - a), channels=cross(8.0)), None)
+        for a in (1e-6, 1e-15)
+    },
     "116 days": ("two-pulse", spinner(channels=cross(8.0), limits=Limits(horizon=1e7)), True),
     "116 dark days": (
         "two-pulse",
@@ -250,17 +315,30 @@ ENDLESS = {
         ),
         None,
     ),
-    # Such a pulse ends within the slack for rounding: the next alignment was the same one, again and again.
-    **{f"nanosecond {scheme}": (scheme, at("crash-max-on-time-1e-9-hang"), True) for scheme in CLASSIC},
-    # Thrusters whose torque about axis 3 spins a needle up to hundreds of turns a minute: minutes, before.
+    # Such a pulse ends within the slack for rounding: the next alignment was the same one, again
+    # and again.
+    **{
+        f"nanosecond {scheme}": (scheme, at("crash-max-on-time-1e-9-hang"), True)
+        for scheme in CLASSIC
+    },
+    # Thrusters whose torque about axis 3 spins a needle up to hundreds of turns a minute: minutes,
+    # before.
     **{f"89° {scheme}": (scheme, at("slow-89-deg"), None) for scheme in CLASSIC},
     # No gain, no further pulse.
-    "weak": ("four-pulse", spinner(channels=(channel("weak", 1e-30, 0.0, 0.0, max_on_time=0.1),)), None),
-    # A tick longer than a channel may fire, or no multiple of it within the bounds: that channel is left out.
+    "weak": (
+        "four-pulse",
+        spinner(channels=(channel("weak", 1e-30, 0.0, 0.0, max_on_time=0.1),)),
+        None,
+    ),
+    # A tick longer than a channel may fire, or no multiple of it within the bounds: that channel is
+    # left out.
     **{
         f"odd {number}": (
             "four-pulse",
-            spinner(channels=(*cross(3.0), channel("odd", 2.0, 2.0, 0.0, **times)), limits=Limits(tick=0.1)),
+            spinner(
+                channels=(*cross(3.0), channel("odd", 2.0, 2.0, 0.0, **times)),
+                limits=Limits(tick=0.1),
+            ),
             True,
         )
         for number, times in enumerate(ODD)
@@ -279,7 +357,9 @@ def test_what_was_searched_for_ever_is_planned_or_declined(
 
 def test_alignments_that_a_disturbance_moves_before_the_gap_is_over_are_passed_by() -> None:
     """They were awaited in steps of a nanosecond."""
-    left = present(check(at("never-returns"), "four-pulse", Options(with_disturbances=True), PLENTY).flown)
+    left = present(
+        check(at("never-returns"), "four-pulse", Options(with_disturbances=True), PLENTY).flown
+    )
     assert left.nutation < 1e-9
 
 
@@ -318,13 +398,20 @@ def test_the_next_alignment_is_found_or_given_up() -> None:
 @given(
     st.floats(0.0, 1e6),
     st.sampled_from([1e-9, 1e-3, 0.1, 0.25, 1.0 / 3.0, 1.7]),
-    st.lists(st.tuples(st.integers(0, 10_000), st.sampled_from([-2, -1, -0.5, 0, 0.5, 1, 2])), max_size=20),
+    st.lists(
+        st.tuples(st.integers(0, 10_000), st.sampled_from([-2, -1, -0.5, 0, 0.5, 1, 2])),
+        max_size=20,
+    ),
 )
 def test_windows_that_end_beside_a_tick_are_left_behind(
     ready: float, tick: float, holes: list[tuple[int, float]]
 ) -> None:
-    """An end a slack beside a tick is where rounding may call the tick neither before it nor after it."""
-    blackout = tuple((number * tick, (number + 3) * tick + part * TOUCHING) for number, part in holes)
+    """An end a slack beside a tick is where rounding may call the tick neither before it nor after
+    it.
+    """
+    blackout = tuple(
+        (number * tick, (number + 3) * tick + part * TOUCHING) for number, part in holes
+    )
     windows = Windows(spinner(limits=Limits(horizon=1e9, tick=tick, blackout=blackout)))
     with within(20_000):
         start = windows.earliest_start(0.5 * tick, ready)
@@ -346,7 +433,10 @@ def test_a_search_that_gains_a_little_in_every_step_ends() -> None:
 @pytest.mark.weekly
 @spread("degrees", [89.9, 89.999], quick=1, deep=1)
 def test_up_to_a_right_angle_every_scheme_answers(degrees: float) -> None:
-    for body in (spinner(degrees=degrees, channels=cross(5e3)), spinner(degrees=degrees, steerable=Steerable(1e4))):
+    for body in (
+        spinner(degrees=degrees, channels=cross(5e3)),
+        spinner(degrees=degrees, steerable=Steerable(1e4)),
+    ):
         for scheme in (*CLASSIC, "half-cone", "rhumb-line"):
             with within(10 * PLENTY):
                 plan = planning.plan(body if scheme in CLASSIC else aimed(body, 30.0, 10.0), scheme)
@@ -356,11 +446,14 @@ def test_up_to_a_right_angle_every_scheme_answers(degrees: float) -> None:
 @pytest.mark.weekly
 def test_a_planned_schedule_is_flown_in_so_many_steps_and_a_track_in_more() -> None:
     """One pulse that spins a needle up to turn after turn."""
-    body, screw = spinner(2.0, 2e-4, spin=1e-3, degrees=60.0), channel("screw", 1e-5, 0.0, 1e-4)
+    body = spinner(2.0, 2e-4, spin=1e-3, degrees=60.0)
+    screw = channel("screw", 1e-5, 0.0, 1e-4)
     with pytest.raises(Infeasible, match="too many steps"):
         propagation.flown(body, Schedule((channel_pulse(screw, 500.0, 1000.0),)))
     assert (
-        0 < propagation.flown(body, Schedule((channel_pulse(screw, 50.0, 100.0),))).steps <= propagation.PLANNED_STEPS
+        0
+        < propagation.flown(body, Schedule((channel_pulse(screw, 50.0, 100.0),))).steps
+        <= propagation.PLANNED_STEPS
     )
     tumbling = spinner(moments=(100.0, 120.0, 80.0), degrees=5.0)
     assert propagation.flown(tumbling, Schedule(), 30_000.0).steps > propagation.PLANNED_STEPS
@@ -378,10 +471,14 @@ def draw(number: int) -> Spacecraft:
     requirement = None
     if rng.random() < 0.5:
         nutation = body.nutation * power(rng, -3.0, -0.3) if rng.random() < 0.85 else None
-        shift = body.nutation * power(rng, -2.0, 0.0) if rng.random() < 0.5 or not nutation else None
+        shift = (
+            body.nutation * power(rng, -2.0, 0.0) if rng.random() < 0.5 or not nutation else None
+        )
         requirement = Requirement(nutation, shift)
     body = replace(body, requirement=requirement)
-    return aimed(body, rng.uniform(1.0, 30.0), rng.uniform(0.0, 360.0)) if rng.random() < 0.1 else body
+    return (
+        aimed(body, rng.uniform(1.0, 30.0), rng.uniform(0.0, 360.0)) if rng.random() < 0.1 else body
+    )
 
 
 def cost(plan: Plan, others: tuple[Plan, ...]) -> float:
@@ -395,23 +492,34 @@ def left(plan: Plan) -> tuple[float, float]:
 
 
 def complies(body: Spacecraft, nutation: float, distance: float) -> bool:
-    """The rule, written down again: the requirement, and what counts as damped where it says nothing."""
-    requirement, least = body.requirement or Requirement(), math.radians(1e-3)
+    """The rule, written down again: the requirement, and what counts as damped where it says
+    nothing.
+    """
+    requirement = body.requirement or Requirement()
+    least = math.radians(1e-3)
     most, far = requirement.nutation, requirement.momentum_shift
     if far is None:
         far = math.inf if body.goal.axis is None else max(0.01 * body.to_turn, least)
-    return nutation <= (max(0.01 * body.nutation, least) if most is None else most) and distance <= far
+    return (
+        nutation <= (max(0.01 * body.nutation, least) if most is None else most) and distance <= far
+    )
 
 
 def standing(number: int, compared: Comparison) -> Standing | None:
-    """What the recommended plan reaches, once it is seen that none beats it and that what is said of it is so."""
-    body, chosen, warnings = compared.spacecraft, compared.recommended, [*comparison_warnings(compared)]
+    """What the recommended plan reaches, once it is seen that none beats it and that what is said
+    of it is so.
+    """
+    body = compared.spacecraft
+    chosen = compared.recommended
+    warnings = [*comparison_warnings(compared)]
     assert not compared.failed, (number, [one.failure for one in compared.failed])
     feasible = tuple(one for one in compared.plans if one.flown is not None)
     if chosen is None or chosen.flown is None:
         assert not feasible
         return None
-    for other in feasible:  # none leaves no more of anything and costs less, by more than counts as equal
+    for (
+        other
+    ) in feasible:  # none leaves no more of anything and costs less, by more than counts as equal
         no_more = all(theirs <= own for theirs, own in zip(left(other), left(chosen), strict=True))
         cheaper = cost(other, feasible) < cost(chosen, feasible) * (1.0 - 1e-3)
         assert not (no_more and cheaper), (number, chosen.scheme, other.scheme)
@@ -422,10 +530,14 @@ def standing(number: int, compared: Comparison) -> Standing | None:
     if good:
         assert cost(chosen, tuple(good)) <= 1.001 * min(cost(one, tuple(good)) for one in good)
         return chosen.standing
-    counts = 1 if body.goal.axis is None else 2  # the nutation, or the distance from a target where that is more
+    counts = (
+        1 if body.goal.axis is None else 2
+    )  # the nutation, or the distance from a target where that is more
     alike = [max(left(one)[:counts]) for one in feasible if one.standing is chosen.standing]
     assert max(left(chosen)[:counts]) <= min(alike) + math.radians(1e-3), number
-    missed = [entry.values for entry in warnings if entry.code in ("requirement-missed", "not-damped")]
+    missed = [
+        entry.values for entry in warnings if entry.code in ("requirement-missed", "not-damped")
+    ]
     assert missed, number
     for values in missed:
         left_deg = math.degrees(left(chosen)[values["part"] != Part.NUTATION.label])
@@ -438,7 +550,8 @@ def standing(number: int, compared: Comparison) -> Standing | None:
 @pytest.mark.weekly
 def test_nothing_beats_what_is_recommended_and_what_is_said_of_it_is_so() -> None:
     """Its residuals too, by an integrator that shares nothing with the flights here."""
-    standings, flown = [], 0
+    standings = []
+    flown = 0
     for number in range(COUNT):
         body = draw(number)
         # The rule does not know schemes by name.
@@ -447,9 +560,12 @@ def test_nothing_beats_what_is_recommended_and_what_is_said_of_it_is_so() -> Non
         chosen = compared.recommended
         if number % 7 or chosen is None or body.goal.axis is not None or len(chosen.pulses) > 30:
             continue
-        outcome, flown = Outcome(body, chosen.pulses), flown + 1
+        outcome = Outcome(body, chosen.pulses)
+        flown = flown + 1
         surely, hardly = (
-            complies(body, *(angle * (1 + off) + off for angle in (outcome.nutation, outcome.shift)))
+            complies(
+                body, *(angle * (1 + off) + off for angle in (outcome.nutation, outcome.shift))
+            )
             for off in (1e-8, -1e-8)
         )
         assert surely <= (chosen.standing is Standing.COMPLIES) <= hardly
@@ -472,7 +588,9 @@ SCHEMES = ("one-pulse", "two-pulse", "four-pulse")
 
 
 def tolerant(seed: int) -> Spacecraft:
-    """The built-in example with other moments, motion, tolerances and requirement: some plans comply, others do not."""
+    """The built-in example with other moments, motion, tolerances and requirement: some plans
+    comply, others do not.
+    """
     rng = np.random.default_rng(seed)
     size = float(10.0 ** rng.uniform(-1.0, 0.0))
     requirement: dict[str, Any] = {"nutation": f"{rng.uniform(0.2, 0.8)} deg"}
@@ -480,7 +598,11 @@ def tolerant(seed: int) -> Spacecraft:
         requirement["momentum_shift"] = f"{rng.uniform(0.1, 1.0)} deg"
     return nutdamp.example().with_(
         inertia={"A": 120.0, "C": 120.0 * rng.uniform(0.4, 1.6)},
-        state={"spin": f"{rng.choice([-20, 30])} rpm", "nutation": f"{rng.uniform(2.0, 8.0)} deg", "phase": "40 deg"},
+        state={
+            "spin": f"{rng.choice([-20, 30])} rpm",
+            "nutation": f"{rng.uniform(2.0, 8.0)} deg",
+            "phase": "40 deg",
+        },
         requirement=requirement | {"probability": float(rng.choice([0.9, 0.99, 0.997]))},
         dispersions={
             "A": {"normal": f"{0.5 * size} %"},
@@ -495,14 +617,19 @@ def tolerant(seed: int) -> Spacecraft:
 def test_plan_and_disperse_say_the_same(seed: int) -> None:
     """Of the plan recommended, all; of the others as far as their cases were flown."""
     compared = compare(tolerant(seed), SCHEMES, samples=4_000)
-    verdict, recommended = compared.verdict, present(compared.recommended)
+    verdict = compared.verdict
+    recommended = present(compared.recommended)
     for plan in compared:
         cases = compared.verdicts[plan].cases
         if cases is None:
             continue
         flown = nutdamp.disperse(plan, 4_000).verdict
         if plan is recommended:
-            assert (verdict.status, verdict.lines, verdict.cases) == (flown.status, flown.lines, present(flown.cases))
+            assert (verdict.status, verdict.lines, verdict.cases) == (
+                flown.status,
+                flown.lines,
+                present(flown.cases),
+            )
         if cases.enough is not None:
             assert compared.verdicts[plan].status is flown.status, plan.scheme
         assert cases.low <= (present(flown.cases).complying or 0.0) <= cases.high
@@ -513,7 +640,13 @@ def test_plan_and_disperse_say_the_same(seed: int) -> None:
 
 
 PLANS = st.lists(
-    st.tuples(st.floats(0.0, 0.8), st.floats(0.1, 2.0), st.floats(1.0, 9.0), st.integers(1, 4), st.floats(0.99, 1.0)),
+    st.tuples(
+        st.floats(0.0, 0.8),
+        st.floats(0.1, 2.0),
+        st.floats(1.0, 9.0),
+        st.integers(1, 4),
+        st.floats(0.99, 1.0),
+    ),
     min_size=1,
     max_size=6,
 )
@@ -523,17 +656,35 @@ PLANS = st.lists(
 def test_of_the_plans_that_meet_the_one_that_takes_least_is_recommended(
     figures: list[tuple[float, float, float, int, float]], least: str
 ) -> None:
-    """By brute force: what is saved within a thousandth, then propellant; half a degree may be left."""
+    """By brute force: what is saved within a thousandth, then propellant; half a degree may be
+    left.
+    """
     flown = {}
     for left, cost, end, pulses, low in figures:
-        plan = judged("any", left, propellant=cost, impulse=cost, end=end, pulses=pulses, required=HALF_A_DEGREE)
+        plan = judged(
+            "any",
+            left,
+            propellant=cost,
+            impulse=cost,
+            end=end,
+            pulses=pulses,
+            required=HALF_A_DEGREE,
+        )
         flown[plan] = FlownPlan(plan, None, cases=Cases(2_048, 1, 0.997, low, low, 1.0))
     compared = Comparison(next(iter(flown)).spacecraft, tuple(flown), flown, least=least)
-    meeting = [plan for plan, each in flown.items() if plan.flown and each.cases.low >= 0.997 and plan.ends_well]
+    meeting = [
+        plan
+        for plan, each in flown.items()
+        if plan.flown and each.cases.low >= 0.997 and plan.ends_well
+    ]
     assert (compared.verdict.status is Status.FLY) is bool(meeting)
     if meeting:
         measure = {"propellant": "propellant", "impulse": "total_impulse", "time": "end"}.get(least)
         spent = [len(plan) if measure is None else getattr(plan, measure) for plan in meeting]
-        equal = [plan for plan, amount in zip(meeting, spent, strict=True) if amount <= min(spent) * 1.001]
+        equal = [
+            plan
+            for plan, amount in zip(meeting, spent, strict=True)
+            if amount <= min(spent) * 1.001
+        ]
         assert compared.recommended in equal
         assert compared.verdict.schedule.cost <= min(plan.pulses.cost for plan in equal) * 1.001

@@ -1,4 +1,6 @@
-"""All commands, the page, its sheet and the library give one verdict on a plan: status, share and bounds."""
+"""All commands, the page, its sheet and the library give one verdict on a plan: status, share and
+bounds.
+"""
 
 import json
 import re
@@ -21,11 +23,21 @@ from nutdamp.views.verdict import verdict_json
 pytestmark = pytest.mark.usefixtures("plans_shared")
 
 EXIT = {status.value: status.exit_status for status in Status}
-BASES = ("example", "single-thruster", "upper-stage", "cluster", "couples-minisat", "genesis", "despun-comsat")
+BASES = (
+    "example",
+    "single-thruster",
+    "upper-stage",
+    "cluster",
+    "couples-minisat",
+    "genesis",
+    "despun-comsat",
+)
 
 
 def random_file(seed: int) -> str:
-    """One of the examples with another nutation, requirement and tolerances: some plans comply, others do not."""
+    """One of the examples with another nutation, requirement and tolerances: some plans comply,
+    others do not.
+    """
     rng = np.random.default_rng(seed)
     file = yaml.safe_load(example_text(str(rng.choice(BASES))))
     if "epoch" in file.get("attitude", {}):
@@ -58,7 +70,9 @@ def files() -> Iterator[Any]:
 
 
 def judged(decision: dict[str, Any]) -> dict[str, Any]:
-    """What every decision tells: status, cases, and each bound with its values, which round differently in the last."""
+    """What every decision tells: status, cases, and each bound with its values, which round
+    differently in the last.
+    """
     told = {key: decision[key] for key in ("status", "scheme", "met", "verdict", "causes", "cases")}
     told["requirement"] = [
         {key: round(value, 9) if isinstance(value, float) else value for key, value in line.items()}
@@ -127,7 +141,9 @@ def test_everything_that_judges_a_plan_says_the_same(run: Run, tmp_path: Path, t
 
 
 @spread("seed", range(12), quick=0, deep=2)
-def test_a_point_of_a_trade_is_judged_as_its_schedule_is(run: Run, tmp_path: Path, seed: int) -> None:
+def test_a_point_of_a_trade_is_judged_as_its_schedule_is(
+    run: Run, tmp_path: Path, seed: int
+) -> None:
     (tmp_path / "body.yaml").write_text(random_file(seed))
     made = call(run, "trade body.yaml --points 2 --allow 0deg --schedules points --json -")
     points = [point for front in json.loads(made.stdout)["fronts"] for point in front["points"]]
@@ -135,6 +151,8 @@ def test_a_point_of_a_trade_is_judged_as_its_schedule_is(run: Run, tmp_path: Pat
     assert made.returncode == (0 if passing else 4 if points else 3)
     for number, point in enumerate(points, start=1):
         (name,) = (tmp_path / "points").glob(f"*{number}*.csv")
-        told = json.loads(call(run, f"simulate body.yaml --schedule {name} --json -").stdout)["decision"]
+        told = json.loads(call(run, f"simulate body.yaml --schedule {name} --json -").stdout)[
+            "decision"
+        ]
         assert point["status"] == told["status"]
         assert point["share"] == (told["cases"] and told["cases"]["met_fraction"])

@@ -1,4 +1,6 @@
-"""The broken spacecraft files of files/broken_files.txt, with the faults that must be found in them."""
+"""The broken spacecraft files of files/broken_files.txt, with the faults that must be found in
+them.
+"""
 
 from pathlib import Path
 
@@ -20,10 +22,14 @@ def broken_files() -> dict[str, tuple[str, list[str]]]:
     """Text and expected faults of each case in broken_files.txt."""
     beginnings = {"HEAD": HEAD, "BODY": BODY, "BASE": BASE, "SPIN": SPIN, "THRUSTERS": THRUSTERS}
     cases: dict[str, tuple[str, list[str]]] = {}
-    for case in (Path(__file__).with_name("broken_files.txt")).read_text("utf-8").split("\n=== ")[1:]:
+    for case in (
+        (Path(__file__).with_name("broken_files.txt")).read_text("utf-8").split("\n=== ")[1:]
+    ):
         name, *lines = case.rstrip().split("\n")
         faults = [line.removeprefix("--> ") for line in lines if line.startswith("--> ")]
-        text = "".join(beginnings.get(line, f"{line}\n") for line in lines[: len(lines) - len(faults)])
+        text = "".join(
+            beginnings.get(line, f"{line}\n") for line in lines[: len(lines) - len(faults)]
+        )
         assert name not in cases
         cases[name] = text, faults
     return cases

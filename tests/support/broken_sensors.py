@@ -1,4 +1,6 @@
-"""Records with sensors that are broken: what happens to the columns of a CSV file of telemetry, and what `fit` says."""
+"""Records with sensors that are broken: what happens to the columns of a CSV file of telemetry, and
+what `fit` says.
+"""
 
 import math
 from collections.abc import Callable
@@ -17,7 +19,9 @@ Fault = Callable[[Array, np.random.Generator], None]
 """What is done to the columns (n, k) of a record, in place."""
 
 CROSSED = (("star",), ("star", "omega_3"), ("sun",), ("quaternion",))
-"""Kinds of records besides those of `KINDS`: of crossings of a star or the Sun, or of quaternions."""
+"""Kinds of records besides those of `KINDS`: of crossings of a star or the Sun,
+or of quaternions.
+"""
 
 SENSORS = ("bias", "misalignment", "wobble")
 """First words of what is estimated of the sensors themselves."""
@@ -43,7 +47,9 @@ def _first(values: Array) -> float:
 
 
 def _held(values: Array, value: float) -> Array:
-    return np.where((np.arange(len(values)) > 0.5 * len(values)) & np.isfinite(values), value, values)
+    return np.where(
+        (np.arange(len(values)) > 0.5 * len(values)) & np.isfinite(values), value, values
+    )
 
 
 def _swapped(table: Array, _: np.random.Generator) -> None:
@@ -73,7 +79,8 @@ def _steps(values: Array) -> Array:
 
 
 def _clipped(values: Array) -> Array:
-    middle, size = float(np.nanmedian(values)), 0.6 * float(np.nanstd(values)) * math.sqrt(2.0)
+    middle = float(np.nanmedian(values))
+    size = 0.6 * float(np.nanstd(values)) * math.sqrt(2.0)
     return np.clip(values, middle - size, middle + size)
 
 
@@ -89,7 +96,9 @@ FAULTS: dict[str, Fault] = {
     "x57": _all(lambda values: math.degrees(1.0) * values),
     "coarse": _to(0, _steps),
     "dead_later": _to(0, lambda values: _held(values, 0.0)),
-    "stuck_later": _to(-1, lambda values: _held(values, values[np.isfinite(values)][len(values) // 3])),
+    "stuck_later": _to(
+        -1, lambda values: _held(values, values[np.isfinite(values)][len(values) // 3])
+    ),
     "huge_one": _to(0, lambda values: 0.0 * values + 1e14),
     "spikes": _spikes,
     "signs": _signs,
@@ -99,7 +108,9 @@ FAULTS: dict[str, Fault] = {
     "clipped": _to(0, _clipped),
     "noise": _noise,
     "outliers": _outliers,
-    "drifts": _to(0, lambda values: values + 3.0 * np.nanstd(values) * np.linspace(0.0, 1.0, len(values))),
+    "drifts": _to(
+        0, lambda values: values + 3.0 * np.nanstd(values) * np.linspace(0.0, 1.0, len(values))
+    ),
 }
 """The first ten are for CI."""
 
@@ -114,8 +125,9 @@ UNTELLABLE: dict[str, tuple[tuple[str, ...], ...]] = {
 }
 """Kinds of records that do not tell a fault.
 
-A body turned by 180 deg about its axis moves alike: both transverse signs, or that of a lone transverse signal.
-Without the spin beside them transverse signals of another size are another nutation.
+A body turned by 180 deg about its axis moves alike: both transverse signs, or that of a lone
+transverse signal. Without the spin beside them transverse signals of another size are another
+nutation.
 """
 
 
@@ -137,8 +149,11 @@ def _apart(name: str, difference: float) -> float:
 
 
 def outcome(folder: Path, number: int, fault: str) -> tuple[str, float, str]:
-    """What `fit` does with a record and a fault: accepted or refused; the farthest estimate in sigmas; words."""
-    told, path = record_of(folder, number), next(folder.glob(f"{7000 + number}.csv"))
+    """What `fit` does with a record and a fault: accepted or refused; the farthest estimate in
+    sigmas; words.
+    """
+    told = record_of(folder, number)
+    path = next(folder.glob(f"{7000 + number}.csv"))
     header, *rows = path.read_text().splitlines()
     cells = [row.split(",") for row in rows]
     table = np.array([[float(cell or "nan") for cell in row[1:]] for row in cells])
@@ -151,7 +166,9 @@ def outcome(folder: Path, number: int, fault: str) -> tuple[str, float, str]:
     path.write_text("\n".join([header, *lines]) + "\n", encoding="utf-8")
     sun = folder / f"{7000 + number}-sun.csv"
     try:
-        record = read_telemetry(path, told.spacecraft, sun if sun.exists() else None, told.record.schedule)[0]
+        record = read_telemetry(
+            path, told.spacecraft, sun if sun.exists() else None, told.record.schedule
+        )[0]
         fitted = compared(told.spacecraft, record)
     except NutdampError as error:
         return "refused", 0.0, str(error)

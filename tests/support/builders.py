@@ -1,4 +1,6 @@
-"""Spacecraft for the tests in one line each, in principal axes and SI, and a guard against endless loops."""
+"""Spacecraft for the tests in one line each, in principal axes and SI, and a guard against endless
+loops.
+"""
 
 import math
 import sys
@@ -17,7 +19,15 @@ from nutdamp.planning.decision import Comparison
 from nutdamp.planning.notes import comparison_warnings, reasons
 from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft.equipment import Channel, Steerable, Thruster
-from nutdamp.spacecraft.model import Attitude, Goal, Inertia, Limits, Requirement, Spacecraft, Vector
+from nutdamp.spacecraft.model import (
+    Attitude,
+    Goal,
+    Inertia,
+    Limits,
+    Requirement,
+    Spacecraft,
+    Vector,
+)
 from nutdamp.spacecraft.requirements import Left
 from nutdamp.spacecraft.schedule import Pulse, Schedule
 
@@ -41,13 +51,23 @@ def spinner(
     mass: float | None = None,
     attitude: Attitude | None = None,
 ) -> Spacecraft:
-    """A body with ``degrees`` of nutation and arg ω0 = ``phase`` rad; the example of the physics sheet by default."""
+    """A body with ``degrees`` of nutation and arg ω0 = ``phase`` rad; the example of the physics
+    sheet by default.
+    """
     moments = moments or (A, A, C)
     mean = 0.5 * (moments[0] + moments[1])
     omega = moments[2] * abs(spin) * math.tan(math.radians(degrees)) / mean
     rates = np.array([omega * math.cos(phase), omega * math.sin(phase), spin])
     return Spacecraft(
-        "test", Inertia(moments), rates, mass, attitude, channels, steerable, requirement, limits or Limits()
+        "test",
+        Inertia(moments),
+        rates,
+        mass,
+        attitude,
+        channels,
+        steerable,
+        requirement,
+        limits or Limits(),
     )
 
 
@@ -58,9 +78,13 @@ def aimed(spacecraft: Spacecraft, tilt: float, azimuth: float) -> Spacecraft:
 
 
 def off_target(spacecraft: Spacecraft, made: Schedule) -> float:
-    """Angle of H from the target by the reference integrator, rad; for bodies without an attitude in the file."""
+    """Angle of H from the target by the reference integrator, rad; for bodies without an attitude
+    in the file.
+    """
     outcome = Outcome(spacecraft, made)
-    return reference.angle(reference.momentum(spacecraft.inertia.moments, outcome.motion), spacecraft.target_axis)
+    return reference.angle(
+        reference.momentum(spacecraft.inertia.moments, outcome.motion), spacecraft.target_axis
+    )
 
 
 def channel(
@@ -78,7 +102,9 @@ def channel(
     return Channel(name, (Thruster(name, turn, push, thrust, isp, min_on_time, max_on_time),))
 
 
-def cross(torque: float, *, min_on_time: float = 0.0, max_on_time: float = math.inf) -> tuple[Channel, ...]:
+def cross(
+    torque: float, *, min_on_time: float = 0.0, max_on_time: float = math.inf
+) -> tuple[Channel, ...]:
     """The thrusters of Magnus 1970: +1, -1, +2, -2."""
     directions = {
         "+1": (torque, 0.0, 0.0),
@@ -166,7 +192,9 @@ def within(calls: int) -> Iterator[None]:
 
 @dataclass(frozen=True, eq=False)
 class Judged(Plan):
-    """A plan whose flown residual is given, and the spin at its end where that is not the one at t = 0."""
+    """A plan whose flown residual is given, and the spin at its end where that is not the one at t
+    = 0.
+    """
 
     ended: Residual | None = None
     ended_spin: float | None = None
@@ -178,7 +206,9 @@ class Judged(Plan):
     @property
     def left(self) -> Left | None:
         spin = self.spacecraft.spin if self.ended_spin is None else self.ended_spin
-        return None if self.ended is None else Left(self.ended.nutation, self.ended.axis_error, spin)
+        return (
+            None if self.ended is None else Left(self.ended.nutation, self.ended.axis_error, spin)
+        )
 
 
 def judged(
@@ -201,14 +231,18 @@ def judged(
     spacecraft = replace(spinner(requirement=required), goal=goal or Goal())
     share = None if propellant is None else propellant / max(pulses, 1)
     each = np.array([impulse / max(pulses, 1), 0.0, 0.0])
-    fired = tuple(Pulse(end * (one + 1) / pulses, 0.0, "T", each, propellant=share) for one in range(pulses))
+    fired = tuple(
+        Pulse(end * (one + 1) / pulses, 0.0, "T", each, propellant=share) for one in range(pulses)
+    )
     theta, turned = math.radians(nutation), math.radians(shift)
     ended = Residual(theta, theta, 0.0, turned, turned)
     return Judged(spacecraft, name, Schedule(fired), ended=ended, ended_spin=spin)
 
 
 def noted(notes: Iterable[results.Note]) -> str:
-    """Codes of notes with their values, one a line: ``momentum-shift scheme=x momentum_shift_deg=0.25``."""
+    """Codes of notes with their values, one a line: ``momentum-shift scheme=x
+    momentum_shift_deg=0.25``.
+    """
     return "\n".join(" ".join((entry.code, *map(_valued, entry.items))) for entry in notes)
 
 

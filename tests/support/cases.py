@@ -1,4 +1,6 @@
-"""Which of many like cases run always (quick), which in CI too (deep), and which by hand (weekly)."""
+"""Which of many like cases run always (quick), which in CI too (deep),
+and which by hand (weekly).
+"""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -9,11 +11,17 @@ import pytest
 
 
 def spread(
-    names: str | Sequence[str], values: Iterable[Any], *, quick: int = 1, deep: int | None = None, **options: Any
+    names: str | Sequence[str],
+    values: Iterable[Any],
+    *,
+    quick: int = 1,
+    deep: int | None = None,
+    **options: Any,
 ) -> pytest.MarkDecorator:
     """As ``pytest.mark.parametrize``, of whose cases ``quick``, evenly spread, run always.
 
-    Of the others ``deep``, evenly spread (one in eight, where it is None), are marked deep, the rest weekly.
+    Of the others ``deep``, evenly spread (one in eight, where it is None), are marked deep, the
+    rest weekly.
     """
     listed = list(values)
     always = _evenly(range(len(listed)), quick)

@@ -1,4 +1,6 @@
-"""Whether a schedule keeps the limits of its spacecraft, written from the contract and not from nutdamp."""
+"""Whether a schedule keeps the limits of its spacecraft, written from the contract and not from
+nutdamp.
+"""
 
 import itertools
 
@@ -27,12 +29,21 @@ def violations(spacecraft: Spacecraft, made: Schedule) -> list[str]:
             if pulse.start < end - ROUNDING and pulse.end > begin + ROUNDING:
                 found.append(f"in the blackout {begin!r} to {end!r}: {where}")
         for value in (pulse.start, pulse.on_time):
-            if limits.tick is not None and abs(value - round(value / limits.tick) * limits.tick) > ROUNDING:
+            if (
+                limits.tick is not None
+                and abs(value - round(value / limits.tick) * limits.tick) > ROUNDING
+            ):
                 found.append(f"off the ticks of {limits.tick!r}: {where}")
         for channel in spacecraft.channels:
             if channel.name == pulse.channel:
-                if not channel.min_on_time - ROUNDING <= pulse.on_time <= channel.max_on_time + ROUNDING:
-                    found.append(f"not {channel.min_on_time!r} to {channel.max_on_time!r} s: {where}")
+                if (
+                    not channel.min_on_time - ROUNDING
+                    <= pulse.on_time
+                    <= channel.max_on_time + ROUNDING
+                ):
+                    found.append(
+                        f"not {channel.min_on_time!r} to {channel.max_on_time!r} s: {where}"
+                    )
                 if not np.array_equal(pulse.impulse, channel.torque * pulse.on_time):
                     found.append(f"impulse is not torque times on-time: {where}")
     for before, after in itertools.pairwise(sorted(made, key=lambda pulse: pulse.start)):

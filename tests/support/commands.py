@@ -1,4 +1,6 @@
-"""Commands as users run them: what refused ones say as one text, and the JSON, CSV and folders of others."""
+"""Commands as users run them: what refused ones say as one text, and the JSON, CSV and folders of
+others.
+"""
 
 import csv
 import io
@@ -28,8 +30,14 @@ WIDER = {
     "A": "0.5 %", "C": "0.5 %", "omega0": "0.1 deg/s", "thrust": "2 %", "thrust_per_pulse": "1 %",
     "thrust_direction": "0.5 deg", "position": "5 mm", "attitude": "0.2 deg",
 }  # fmt: skip
-"""Tolerances of the built-in example with which no plan that is made without them complies often enough."""
-WIDE = [part for key, size in WIDER.items() for part in ("--set", f"dispersions.{key}={{normal: {size}}}")]
+"""Tolerances of the built-in example with which no plan that is made without them complies often
+enough.
+"""
+WIDE = [
+    part
+    for key, size in WIDER.items()
+    for part in ("--set", f"dispersions.{key}={{normal: {size}}}")
+]
 """Sets them."""
 BUILT_IN = "warning: no spacecraft file given: using the built-in example (see `nutdamp init`)\n"
 """First line of standard error where no file is named, with -q too."""
@@ -38,7 +46,11 @@ SCHEDULE = "t_s,on_time_s,channel,impulse_1_Nms,impulse_2_Nms,impulse_3_Nms\n1,0
 
 def contents(folder: Path) -> dict[str, bytes]:
     """Every file of a folder, by its path there."""
-    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    return {
+        str(path.relative_to(folder)): path.read_bytes()
+        for path in folder.rglob("*")
+        if path.is_file()
+    }
 
 
 def names(folder: Path) -> list[str]:
@@ -52,8 +64,12 @@ def written(folder: Path, **files: str) -> None:
         (folder / name.replace("_", ".")).write_text(text, encoding="utf-8")
 
 
-def refusals(run: Run, folder: Path, commands: Iterable[str], status: int = 2, stdin: str | None = None) -> str:
-    """What each of the commands says, behind it; none prints a result, and none touches a file of the folder."""
+def refusals(
+    run: Run, folder: Path, commands: Iterable[str], status: int = 2, stdin: str | None = None
+) -> str:
+    """What each of the commands says, behind it; none prints a result, and none touches a file of
+    the folder.
+    """
     before = contents(folder)
     said = []
     for command in commands:
@@ -62,15 +78,21 @@ def refusals(run: Run, folder: Path, commands: Iterable[str], status: int = 2, s
         assert "Traceback" not in refused.stderr, command
         assert contents(folder) == before, command
         shown = (
-            refused.stderr.removeprefix(BUILT_IN).rpartition("\nError: ")[2].replace(str(folder), "FOLDER").rstrip("\n")
+            refused.stderr.removeprefix(BUILT_IN)
+            .rpartition("\nError: ")[2]
+            .replace(str(folder), "FOLDER")
+            .rstrip("\n")
         )
-        shown = re.sub("^No such option.*", "No such option", shown)  # each version of click says more in its own way
+        shown = re.sub(
+            "^No such option.*", "No such option", shown
+        )  # each version of click says more in its own way
         said.append(f"$ {command}\n{shown}")
     return "\n".join(said)
 
 
 def transcript(run: Run, commands: Iterable[str], only: str = "") -> str:
-    """What commands print, behind each of them; behind a semicolon the exit status that is right, where it is not 0.
+    """What commands print, behind each of them; behind a semicolon the exit status that is right,
+    where it is not 0.
 
     Of their results only paragraphs that have what ``only`` is a pattern of.
     """
@@ -78,7 +100,9 @@ def transcript(run: Run, commands: Iterable[str], only: str = "") -> str:
     for line in commands:
         command, _, status = line.partition("; ")
         ended = call(run, command, status=int(status or 0))
-        kept = "\n\n".join(part for part in ended.stdout.split("\n\n") if re.search(only, part)).rstrip()
+        kept = "\n\n".join(
+            part for part in ended.stdout.split("\n\n") if re.search(only, part)
+        ).rstrip()
         shown += f"$ {command}\n{kept}\n{ended.stderr}\n"
     return shown
 
@@ -94,7 +118,9 @@ def call(run: Run, command: str, **options: Any) -> subprocess.CompletedProcess[
 
 
 def result(run: Run, command: str, *, status: Status = 0, stdin: str | None = None) -> Any:
-    """The JSON that a command prints, and nothing else, with ``--json -`` where it is not export."""
+    """The JSON that a command prints, and nothing else,
+    with ``--json -`` where it is not export.
+    """
     line = command if command.startswith("export") else f"{command} --json -"
     return json.loads(call(run, line, stdin=stdin, status=status).stdout)
 
@@ -112,7 +138,9 @@ def rows(text: str) -> list[dict[str, str]]:
     return list(csv.DictReader(text.splitlines()))
 
 
-def python(folder: Path, code: str, *arguments: str, status: int = 0) -> subprocess.CompletedProcess[str]:
+def python(
+    folder: Path, code: str, *arguments: str, status: int = 0
+) -> subprocess.CompletedProcess[str]:
     """Run code in a Python of its own."""
     ended = subprocess.run(
         [sys.executable, "-c", code, *arguments],

@@ -1,4 +1,6 @@
-"""What tests of files share: plans that are exported, their motion, and the faults of what must be refused."""
+"""What tests of files share: plans that are exported, their motion, and the faults of what must be
+refused.
+"""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache
@@ -23,23 +25,32 @@ from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.schedule import Pulse, Schedule
 
 QUICK = ("steerable-stage", "tilted tensor, backwards", "oblate, backwards")
-CASES = pytest.mark.parametrize("case", [name if name in QUICK else deep(name) for name in messages.CASES])
+CASES = pytest.mark.parametrize(
+    "case", [name if name in QUICK else deep(name) for name in messages.CASES]
+)
 """Names of the plans of `support.messages`."""
 
 Write = Callable[..., Path]
 
 
 def faults(read: Callable[..., object], *given: Any) -> list[str]:
-    """All that is wrong with what ``read(*given)`` must refuse, each as ``LINE:COLUMN: KEY: problem``."""
+    """All that is wrong with what ``read(*given)`` must refuse, each as ``LINE:COLUMN: KEY:
+    problem``.
+    """
     try:
         read(*given)
     except FaultyFile as wrong:
-        return [f"{fault.line}:{fault.column}: {fault.where}: {fault.problem}" for fault in wrong.faults]
+        return [
+            f"{fault.line}:{fault.column}: {fault.where}: {fault.problem}" for fault in wrong.faults
+        ]
     pytest.fail(f"taken without a fault: {given}")
 
 
-def check_faults(key: str, read: Callable[[Any], object], inputs: Iterable[Any] | Mapping[str, Any]) -> None:
-    """Fails where ``read`` takes one of the inputs, or finds other faults in it than the text kept as ``key`` says.
+def check_faults(
+    key: str, read: Callable[[Any], object], inputs: Iterable[Any] | Mapping[str, Any]
+) -> None:
+    """Fails where ``read`` takes one of the inputs, or finds other faults in it than the text kept
+    as ``key`` says.
 
     The text has each input, or its name where they have some, and below it the faults.
     """
@@ -47,11 +58,17 @@ def check_faults(key: str, read: Callable[[Any], object], inputs: Iterable[Any] 
     lines = []
     for name, given in named:
         shown = name if isinstance(name, str) else " -> ".join(map(str, name))
-        lines += [printable(shown.strip().replace("\n", " | ")), *(f"    {fault}" for fault in faults(read, given))]
+        lines += [
+            printable(shown.strip().replace("\n", " | ")),
+            *(f"    {fault}" for fault in faults(read, given)),
+        ]
     check_text(key, "\n".join(lines))
 
 
-ORBIT = "orbit={position: [7000 km, -12 km, 3.5 km], velocity: [0.1 km/s, 7400, 120 m/s], center: earth}"
+ORBIT = (
+    "orbit={position: [7000 km, -12 km, 3.5 km], velocity: [0.1 km/s, 7400, 120 m/s], center: "
+    "earth}"
+)
 PUSHED = ("ace", "communications-spinner", "couples-minisat")
 """Files whose thrusters push the body too."""
 
@@ -72,7 +89,9 @@ thrusters:
 @cache
 def pushing(name: str, *, orbit: bool = True) -> planning.Plan:
     """A plan whose pulses change the velocity."""
-    body = load_spacecraft(messages.CONFIGS / f"{name}.yaml", [parse_setting(ORBIT)] if orbit else [])
+    body = load_spacecraft(
+        messages.CONFIGS / f"{name}.yaml", [parse_setting(ORBIT)] if orbit else []
+    )
     plan = planning.plan(body, "four-pulse")
     assert plan.feasible
     return plan
@@ -85,14 +104,22 @@ def valved() -> planning.Plan:
     return planning.plan(read_spacecraft(text, "f.yaml"), "four-pulse")
 
 
-def motions(body: Spacecraft, pulses: Schedule, times: Sequence[float], rotation: Vector) -> list[reference.Motion]:
+def motions(
+    body: Spacecraft, pulses: Schedule, times: Sequence[float], rotation: Vector
+) -> list[reference.Motion]:
     """The motion at ``times`` s by the reference integrator, from ``rotation`` on."""
     motion = reference.Motion(body.omega0, rotation)
     at = {0.0: motion}
-    edges = sorted({0.0, max(times), *(edge for pulse in pulses for edge in (pulse.start, pulse.end))})
+    edges = sorted(
+        {0.0, max(times), *(edge for pulse in pulses for edge in (pulse.start, pulse.end))}
+    )
     for begin, end in pairwise(edges):
         middle = 0.5 * (begin + end)
-        torques = [pulse.torque for pulse in pulses if pulse.torque is not None and pulse.start < middle < pulse.end]
+        torques = [
+            pulse.torque
+            for pulse in pulses
+            if pulse.torque is not None and pulse.start < middle < pulse.end
+        ]
         ends = sorted({end, *(time for time in times if begin < time < end)})
         torque = np.sum([np.zeros(3), *torques], axis=0)
         moved = reference.coast(body.inertia.moments, motion, torque, np.array(ends) - begin)
@@ -113,7 +140,9 @@ def velocity_change(plan: planning.Plan, pulse: Pulse) -> Vector:
 
 @st.composite
 def slips(draw: st.DrawFn, text: str) -> list[str]:
-    """The lines of ``text`` after some slips of hand: dropped, doubled, swapped, cut, with something put in."""
+    """The lines of ``text`` after some slips of hand: dropped, doubled, swapped, cut, with
+    something put in.
+    """
     lines = text.splitlines(keepends=True)
     for _ in range(draw(st.integers(1, 4))):
         if not lines:
@@ -130,5 +159,7 @@ def slips(draw: st.DrawFn, text: str) -> list[str]:
             case "cut":
                 lines[index] = lines[index][:place] + draw(st.text(max_size=3))
             case "insert":
-                lines[index] = lines[index][:place] + draw(st.text(max_size=3)) + lines[index][place:]
+                lines[index] = (
+                    lines[index][:place] + draw(st.text(max_size=3)) + lines[index][place:]
+                )
     return lines

@@ -21,7 +21,9 @@ def normal(size: float, *, relative: bool = False) -> Tolerance:
     return Tolerance("normal", size, relative)
 
 
-def jet(name: str, position: tuple[float, ...], force: tuple[float, ...], isp: float = 220.0) -> Thruster:
+def jet(
+    name: str, position: tuple[float, ...], force: tuple[float, ...], isp: float = 220.0
+) -> Thruster:
     """A thruster that is known by position and force."""
     return Thruster(
         name,
@@ -57,13 +59,20 @@ def everything(scale: float = 1.0, names: tuple[str, ...] = ("T1", "T2")) -> Dis
 
 
 def with_jets(
-    *, moments: tuple[float, float, float] = (120.0, 120.0, 80.0), spin: float = 3.0, scale: float = 1.0
+    *,
+    moments: tuple[float, float, float] = (120.0, 120.0, 80.0),
+    spin: float = 3.0,
+    scale: float = 1.0,
 ) -> DispersedModel:
     """Three pulses of two thrusters, the last of both together, with every tolerance."""
     channels = (*(Channel(one.name, (one,)) for one in JETS), Channel("both", JETS))
     body = spinner(moments=moments, spin=spin, channels=channels)
     first, second, both = channels
-    pulses = (channel_pulse(first, 0.9, 0.4), channel_pulse(second, 2.1, 0.7), channel_pulse(both, 3.2, 0.2))
+    pulses = (
+        channel_pulse(first, 0.9, 0.4),
+        channel_pulse(second, 2.1, 0.7),
+        channel_pulse(both, 3.2, 0.2),
+    )
     return DispersedModel(replace(body, dispersions=everything(scale)), Schedule(pulses))
 
 
@@ -74,7 +83,8 @@ def sinking(model: DispersedModel, time_constant: float = 15.0) -> DispersedMode
 
 def wheeled(model: DispersedModel, wheel: float, *, spin: float | None = None) -> DispersedModel:
     """The same with a wheel whose momentum (N m s) is dispersed, and another ``spin`` (rad/s)."""
-    body, given = model.spacecraft, model.spacecraft.dispersions or Dispersions()
+    body = model.spacecraft
+    given = model.spacecraft.dispersions or Dispersions()
     rates = body.omega0 if spin is None else np.array([*body.omega0[:2], spin])
     held = replace(
         body,
@@ -87,7 +97,10 @@ def wheeled(model: DispersedModel, wheel: float, *, spin: float | None = None) -
 
 
 def steered(
-    *, moments: tuple[float, float, float] = (120.0, 120.0, 80.0), spin: float = 3.0, scale: float = 1.0
+    *,
+    moments: tuple[float, float, float] = (120.0, 120.0, 80.0),
+    spin: float = 3.0,
+    scale: float = 1.0,
 ) -> DispersedModel:
     """Two pulses of a steerable torquer, one of them early, and an ideal impulse."""
     torquer = Steerable(20.0, 220.0, 0.8)

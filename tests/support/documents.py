@@ -1,4 +1,6 @@
-"""The file of a spacecraft that a test has built, for `verify`, which flies by the values of a file alone."""
+"""The file of a spacecraft that a test has built, for `verify`, which flies by the values of a file
+alone.
+"""
 
 from dataclasses import replace
 from typing import Any
@@ -30,11 +32,14 @@ def documented(spacecraft: Spacecraft) -> Spacecraft:
         "attitude": spacecraft.attitude and {"quaternion": spacecraft.attitude.quaternion.tolist()},
         "steerable": spacecraft.steerable and _values(spacecraft.steerable, "torque isp lever_arm"),
         "cold": spacecraft.cold and _values(spacecraft.cold, "first pulses"),
-        "tank": tank and _values(tank, "propellant pressure final_pressure exponent isp inertia_per_kg"),
+        "tank": tank
+        and _values(tank, "propellant pressure final_pressure exponent isp inertia_per_kg"),
     }
     if spacecraft.channels:
         each = {channel.name: len(channel.thrusters) for channel in spacecraft.channels}
-        file["channels"] = {name: [f"{name} {number}" for number in range(count)] for name, count in each.items()}
+        file["channels"] = {
+            name: [f"{name} {number}" for number in range(count)] for name, count in each.items()
+        }
     if spacecraft.dissipation is not None:
         grows = {None: None, True: "grows", False: "decays"}[spacecraft.nutation_grows]
         file["dissipation"] = {"time_constant": spacecraft.dissipation, "nutation": grows}
@@ -56,13 +61,21 @@ def _values(part: object, names: str) -> dict[str, Any]:
 def _thruster(jet: Thruster, axes: Vector) -> dict[str, Any]:
     known: dict[str, Any] = {"isp": jet.isp}
     if jet.position is not None and jet.force is not None:
-        known |= {"position": (axes @ jet.position).tolist(), "direction": (axes @ jet.force).tolist()}
+        known |= {
+            "position": (axes @ jet.position).tolist(),
+            "direction": (axes @ jet.force).tolist(),
+        }
         known["force"] = float(np.linalg.norm(jet.force))
     else:
         size = float(np.linalg.norm(jet.torque))
-        known |= {"torque": (axes @ jet.torque).tolist(), "lever_arm": jet.thrust and size / jet.thrust}
+        known |= {
+            "torque": (axes @ jet.torque).tolist(),
+            "lever_arm": jet.thrust and size / jet.thrust,
+        }
     if isinstance(jet.valve, Measured):
-        known["impulse_bit"] = [[time, full * (jet.thrust or 1.0), mean] for time, full, mean in jet.valve.rows]
+        known["impulse_bit"] = [
+            [time, full * (jet.thrust or 1.0), mean] for time, full, mean in jet.valve.rows
+        ]
     elif isinstance(jet.valve, Trapezoid):
         known["valve"] = _values(jet.valve, "open_delay close_delay rise_time fall_time")
         known["valve"]["on_time_is"] = "effective" if jet.valve.effective else "command"
@@ -70,7 +83,8 @@ def _thruster(jet: Thruster, axes: Vector) -> dict[str, Any]:
 
 
 def _disturbances(spacecraft: Spacecraft) -> list[dict[str, Any]]:
-    axes, rows = spacecraft.inertia.axes, []
+    axes = spacecraft.inertia.axes
+    rows = []
     for each in spacecraft.disturbances:
         across = axes @ [each.transverse.real, each.transverse.imag, 0.0]
         rows.append({"torque": across.tolist(), "rate": each.rate or None})

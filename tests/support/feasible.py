@@ -9,7 +9,9 @@ from nutdamp.schemes.catalogue import Options
 from nutdamp.spacecraft.model import Spacecraft
 
 
-def feasible_by(scheme: str, spacecraft: Spacecraft, options: Options | None = None) -> planning.Plan:
+def feasible_by(
+    scheme: str, spacecraft: Spacecraft, options: Options | None = None
+) -> planning.Plan:
     plan = planning.plan(spacecraft, scheme, options)
     assert plan.feasible, infeasibility(plan)
     assert violations(spacecraft, plan.pulses) == []

@@ -1,4 +1,6 @@
-"""Flights that tests of several packages look at: the spin axis on its way, and dispersed command blocks."""
+"""Flights that tests of several packages look at: the spin axis on its way, and dispersed command
+blocks.
+"""
 
 import math
 from dataclasses import replace
@@ -28,22 +30,29 @@ def axis_path(spacecraft: Spacecraft, made: Schedule, until: float, dense: int =
 
     It is asked ``dense`` times in each turn of the axis, and between two edges of pulses.
     """
-    moments, sense = spacecraft.inertia.moments, math.copysign(1.0, spacecraft.spin)
+    moments = spacecraft.inertia.moments
+    sense = math.copysign(1.0, spacecraft.spin)
     motion = reference.Motion(spacecraft.omega0, attitude.matrix(spacecraft.initial.quaternion))
     pushes = [one for one in events(made) if isinstance(one, reference.Push)]
     edges = sorted({0.0, until, *(one.start for one in pushes), *(one.end for one in pushes)})
     path = [motion.rotation[:, 2] * sense]
     for begin, end in pairwise(edges):
-        torque = sum((one.torque for one in pushes if one.start < 0.5 * (begin + end) < one.end), np.zeros(3))
+        torque = sum(
+            (one.torque for one in pushes if one.start < 0.5 * (begin + end) < one.end), np.zeros(3)
+        )
         count = dense * max(1, math.ceil((end - begin) / spacecraft.inertial_period))
-        motions = reference.coast(moments, motion, torque, np.linspace(begin, end, count + 1)[1:] - begin)
+        motions = reference.coast(
+            moments, motion, torque, np.linspace(begin, end, count + 1)[1:] - begin
+        )
         path += [one.rotation[:, 2] * sense for one in motions]
         motion = motions[-1]
     return np.array(path)
 
 
 BODY_ERRORS = Dispersions(
-    A=normal(0.03, relative=True), C=normal(0.03, relative=True), omega0=(normal(0.01), normal(0.01), normal(0.05))
+    A=normal(0.03, relative=True),
+    C=normal(0.03, relative=True),
+    omega0=(normal(0.01), normal(0.01), normal(0.05)),
 )
 """Errors of the body alone: then `sun_pulses.fired` fires the same pulses."""
 
@@ -55,8 +64,12 @@ def by_blocks(
     moments: tuple[float, float, float] = (110.0, 110.0, 150.0),
     **fields: Any,
 ) -> DispersedModel:
-    """Three blocks of two thrusters, one of them with an axial torque, of an oblate body that nutates by 2 deg."""
-    body = spinner(moments=moments, spin=spin, degrees=2.0, channels=(channel("T", 8.0, 3.0, 2.0), *cross(9.0)))
+    """Three blocks of two thrusters, one of them with an axial torque, of an oblate body that
+    nutates by 2 deg.
+    """
+    body = spinner(
+        moments=moments, spin=spin, degrees=2.0, channels=(channel("T", 8.0, 3.0, 2.0), *cross(9.0))
+    )
     turn = 2.0 * math.pi / abs(spin)
     blocks = (
         Block("T", 2, 0.3 * turn, 0.05 * turn, 6, 1),

@@ -1,11 +1,13 @@
-"""Texts of messages and notes: kept in one file, asserted by key, so that a change of wording is one change.
+"""Texts of messages and notes: kept in one file, asserted by key, so that a change of wording is
+one change.
 
-A test names a text by its key: ``check_text("plan.not-met", screen.stderr)``. After a change of wording
+A test names a text by its key: ``check_text("plan.not-met", screen.stderr)``. After a change of
+wording
 
     python tests/support/golden.py [PYTEST ARGUMENTS …]
 
-writes the texts of the tests that run (without arguments of all but the weekly ones, and drops keys that none uses).
-Read the difference as one would read the screen.
+writes the texts of the tests that run (without arguments of all but the weekly ones, and drops keys
+that none uses). Read the difference as one would read the screen.
 """
 
 import contextlib
@@ -27,7 +29,9 @@ RESIDUE = re.compile(r"\d(?:\.\d+)?e-(?:1\d|[2-9]\d)\b")
 
 
 def check_text(key: str, text: str) -> None:
-    """Fails where ``text`` is not the one kept as ``key``; digits that are rounding residue do not count."""
+    """Fails where ``text`` is not the one kept as ``key``; digits that are rounding residue do not
+    count.
+    """
     text = RESIDUE.sub("<residue>", text).rstrip("\n")
     text = "\n".join(line.rstrip() for line in text.split("\n"))
     if os.environ.get(WRITE):
@@ -35,8 +39,13 @@ def check_text(key: str, text: str) -> None:
         return
     kept = load_texts().get(key)
     if kept is None:
-        pytest.fail(f"no text {key!r} in {FILE.name}: write it by `python tests/support/golden.py TEST`\n{text}")
-    assert text == kept, f"text {key!r} has changed: is it right? then `python tests/support/golden.py TEST`"
+        pytest.fail(
+            f"no text {key!r} in {FILE.name}: write it by `python tests/support/golden.py "
+            f"TEST`\n{text}"
+        )
+    assert text == kept, (
+        f"text {key!r} has changed: is it right? then `python tests/support/golden.py TEST`"
+    )
 
 
 @contextlib.contextmanager
@@ -68,7 +77,9 @@ def _store(key: str, text: str) -> None:
         fcntl.flock(lock, fcntl.LOCK_EX)
         texts = load_texts() | {key: text}
         fresh = FILE.with_suffix(".new")
-        fresh.write_text("".join(f"=== {name}\n{texts[name]}\n" for name in sorted(texts)), encoding="utf-8")
+        fresh.write_text(
+            "".join(f"=== {name}\n{texts[name]}\n" for name in sorted(texts)), encoding="utf-8"
+        )
         fresh.replace(FILE)
 
 

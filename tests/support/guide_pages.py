@@ -1,4 +1,6 @@
-"""Pages and lists of the guide that are made from the code: ``python tests/support/guide_pages.py`` writes them."""
+"""Pages and lists of the guide that are made from the code: ``python tests/support/guide_pages.py``
+writes them.
+"""
 
 import re
 from collections.abc import Iterator
@@ -13,7 +15,8 @@ from nutdamp.views.guide import FOLDER
 
 
 class KeyGuide(NamedTuple):
-    """A key of the file: its ``path`` as `explain` takes it, such as ``thrusters.force``, and its declaration.
+    """A key of the file: its ``path`` as `explain` takes it, such as ``thrusters.force``, and its
+    declaration.
 
     ``section`` is the model of its value, where that is a mapping or a list of mappings.
     """
@@ -35,9 +38,13 @@ class KeyGuide(NamedTuple):
     @property
     def text(self) -> str:
         """Description, unit, default and example."""
-        unit, default, example = "", "", next(iter(self.field.examples), None)
+        unit = ""
+        default = ""
+        example = next(iter(self.field.examples), None)
         if self.section is ToleranceSection:
-            names = [unit for kind in unit_kinds(QUANTITIES[self.name]) for unit in KINDS[kind].factors]
+            names = [
+                unit for kind in unit_kinds(QUANTITIES[self.name]) for unit in KINDS[kind].factors
+            ]
             unit = f"unit {listed([*dict.fromkeys(names)], 'or')}"
         elif self.section is None:
             unit = _what(self.field)
@@ -66,8 +73,18 @@ def _what(field: fields.Key) -> str:
         factors = KINDS[quantity.kind].factors
         return f"unit {listed([*factors], 'or')}" if factors else "plain numbers, without unit"
     choices = next((get_args(part) for part in parts if get_origin(part) is Literal), ())
-    plain = next((part for part in parts if get_origin(part) in (list, dict) or isinstance(part, type)), None)
-    return listed(choices, "or") if choices else "a whole number" if plain is int else "a text" if plain is str else ""
+    plain = next(
+        (part for part in parts if get_origin(part) in (list, dict) or isinstance(part, type)), None
+    )
+    return (
+        listed(choices, "or")
+        if choices
+        else "a whole number"
+        if plain is int
+        else "a text"
+        if plain is str
+        else ""
+    )
 
 
 def _within(annotation: Any) -> Iterator[Any]:
@@ -86,7 +103,9 @@ def flow(value: object) -> str:
 
 
 def _sections(key: KeyGuide, every: list[KeyGuide]) -> Iterator[str]:
-    """The keys below ``key``, section by section; those of tolerances, which are all alike, once."""
+    """The keys below ``key``, section by section; those of tolerances, which are all alike,
+    once.
+    """
     if key.section is None:
         return
     children = [entry for entry in every if entry.parent == key.path]
@@ -138,15 +157,22 @@ def _line(kind: Kind) -> str:
     """The SI unit first, then the others and their values in it."""
     if not kind.factors:
         return "no unit"
-    named = ((unit, "" if factor == 1.0 else f" = {factor:.6g} {kind.si}") for unit, factor in kind.factors.items())
+    named = (
+        (unit, "" if factor == 1.0 else f" = {factor:.6g} {kind.si}")
+        for unit, factor in kind.factors.items()
+    )
     others = [f"{unit}{worth}".rstrip() for unit, worth in named if unit != kind.si]
     return "; ".join([kind.si, *others] if kind.si else others)
 
 
 def pages() -> dict[str, str]:
     """The text of each such page."""
-    rows = "".join(f"- **{kind.noun.partition(' ')[2]}**: {_line(kind)}\n" for kind in KINDS.values())
-    units = re.sub(r"(- \*\*.*\n)+", lambda _: rows, (FOLDER / "units.md").read_text(encoding="utf-8"))
+    rows = "".join(
+        f"- **{kind.noun.partition(' ')[2]}**: {_line(kind)}\n" for kind in KINDS.values()
+    )
+    units = re.sub(
+        r"(- \*\*.*\n)+", lambda _: rows, (FOLDER / "units.md").read_text(encoding="utf-8")
+    )
     return {"file": _file(), "units": units}
 
 

@@ -11,16 +11,25 @@ from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.schedule import Schedule
 
 
-def silent(*signals: str, until: float = 10.0, count: int = 11, schedule: Schedule | None = None) -> Record:
+def silent(
+    *signals: str, until: float = 10.0, count: int = 11, schedule: Schedule | None = None
+) -> Record:
     """A record of ``signals`` that are all zero but for the axis, which points along z."""
     zeros = {name: np.full(count, float(name == "axis_z")) for name in signals}
     return Record(np.linspace(0.0, until, count), zeros, schedule=schedule or Schedule())
 
 
 def told(
-    body: Spacecraft, record: Record, given: Mapping[str, float], sigmas: Mapping[str, float], *, unequal: bool = False
+    body: Spacecraft,
+    record: Record,
+    given: Mapping[str, float],
+    sigmas: Mapping[str, float],
+    *,
+    unequal: bool = False,
 ) -> Fit:
-    """The ``given`` values of parameters, the others as the file has them; each known to a step where that is all."""
+    """The ``given`` values of parameters, the others as the file has them; each known to a step
+    where that is all.
+    """
     model = Model(body, record, unequal=unequal)
     parameters = model.parameters
     unknown = ({*given} | {*sigmas}) - {one.name for one in parameters}
@@ -30,4 +39,6 @@ def told(
     count = len(model.measured)
     used = np.ones(count, dtype=bool)
     noise = np.ones(len(model.signals))
-    return Fit(model, values, covariance, noise, used, np.zeros(count), np.zeros((count, len(parameters))))
+    return Fit(
+        model, values, covariance, noise, used, np.zeros(count), np.zeros((count, len(parameters)))
+    )

@@ -1,4 +1,6 @@
-"""Texts and colours of a figure: every text that is drawn, none cut, none over another, all to be seen."""
+"""Texts and colours of a figure: every text that is drawn, none cut, none over another, all to be
+seen.
+"""
 
 import re
 from itertools import combinations
@@ -71,7 +73,9 @@ def pages() -> list[tuple[str, dict[str, str]]]:
     assert len(papers) == len(inks) == 2
     lighter = {INK: inks[1], PAPER: papers[1]}
     for kind in ("fill", "stroke"):
-        for selectors, colour in re.findall(rf"^\s*(\[style[^{{]*)\{{ {kind}: (#\w+) !important", css, re.MULTILINE):
+        for selectors, colour in re.findall(
+            rf"^\s*(\[style[^{{]*)\{{ {kind}: (#\w+) !important", css, re.MULTILINE
+        ):
             for one in re.findall(rf"{kind}: (#\w+)", selectors):
                 assert lighter.setdefault(one, colour) == colour
     return [(papers[0], {INK: inks[0], PAPER: papers[0]}), (papers[1], lighter)]
@@ -81,20 +85,28 @@ def contrast(one: Colour, other: str) -> float:
     """Ratio of WCAG 2.1 of a colour, which may be translucent, on a paper."""
     *under, alpha = to_rgba(one)
     bright = []
-    for parts in (np.array(to_rgb(other)), alpha * np.array(under) + (1.0 - alpha) * np.array(to_rgb(other))):
+    for parts in (
+        np.array(to_rgb(other)),
+        alpha * np.array(under) + (1.0 - alpha) * np.array(to_rgb(other)),
+    ):
         linear = np.where(parts <= 0.03928, parts / 12.92, ((parts + 0.055) / 1.055) ** 2.4)
         bright.append(float(np.dot(linear, (0.2126, 0.7152, 0.0722))))
     return (max(bright) + 0.05) / (min(bright) + 0.05)
 
 
 def best(handle: Artist, paper: str, shades: dict[str, str]) -> float:
-    """How well a swatch of a legend is seen: by its fill, its edge or its line, whichever is seen best."""
+    """How well a swatch of a legend is seen: by its fill, its edge or its line, whichever is seen
+    best.
+    """
     if isinstance(handle, Line2D):
         colours = [handle.get_color()] if handle.get_linestyle() != "None" else []
         colours += [handle.get_markeredgecolor()] if handle.get_marker() != "None" else []
     else:
         assert isinstance(handle, Patch)
-        colours = [handle.get_facecolor(), *[handle.get_edgecolor()] * (handle.get_linewidth() > 0.0)]
+        colours = [
+            handle.get_facecolor(),
+            *[handle.get_edgecolor()] * (handle.get_linewidth() > 0.0),
+        ]
     found = []
     for colour in colours:
         *_, alpha = to_rgba(colour)
@@ -110,7 +122,11 @@ def check_colours(figure: Figure) -> None:
         for text, _ in texts(figure):
             colour = to_hex(text.get_color())
             assert contrast(shades.get(colour, colour), paper) >= 4.5, text.get_text()
-        for part in (figure, *figure.subfigs, *(inner for outer in figure.subfigs for inner in outer.subfigs)):
+        for part in (
+            figure,
+            *figure.subfigs,
+            *(inner for outer in figure.subfigs for inner in outer.subfigs),
+        ):
             for legend in part.legends:
                 for handle, text in zip(legend.legend_handles, legend.get_texts(), strict=True):
                     assert handle is not None

@@ -9,5 +9,7 @@ flight.to_csv("track.csv")
 
 track = flight.to_numpy()  # fields are named as the columns of the CSV
 print(plan.to_numpy()[["start_s", "on_time_s", "channel"]])
-print(f"at most {track['nutation_deg'].max():.3f} deg, at the end {track['nutation_deg'][-1]:.1e} deg")
+print(
+    f"at most {track['nutation_deg'].max():.3f} deg, at the end {track['nutation_deg'][-1]:.1e} deg"
+)
 print(nutdamp.compare(spacecraft).recommended)

@@ -18,7 +18,9 @@ rad = math.radians
 NAMES = {"+M1": (1.0, 0.0), "-M1": (-1.0, 0.0), "+M2": (0.0, 1.0), "-M2": (0.0, -1.0)}
 
 
-def four(torque: float = 6.0, least: float = 0.002, most: float = 0.3, **given: Any) -> tuple[Channel, ...]:
+def four(
+    torque: float = 6.0, least: float = 0.002, most: float = 0.3, **given: Any
+) -> tuple[Channel, ...]:
     """The channels of Magnus 1970."""
     return tuple(
         channel(name, torque * x, torque * y, 0.0, min_on_time=least, max_on_time=most, **given)
@@ -26,12 +28,15 @@ def four(torque: float = 6.0, least: float = 0.002, most: float = 0.3, **given: 
     )
 
 
-def around(count: int, torque: float, first: float = 0.0, least: float = 0.002) -> tuple[Channel, ...]:
+def around(
+    count: int, torque: float, first: float = 0.0, least: float = 0.002
+) -> tuple[Channel, ...]:
     """Channels ``T0``, ``T1`` … with torques evenly round axis 3."""
     angles = [first + 2.0 * math.pi * number / count for number in range(count)]
     torques = [(torque * math.cos(angle), torque * math.sin(angle), 0.0) for angle in angles]
     return tuple(
-        channel(f"T{number}", *each, min_on_time=least, max_on_time=1.0) for number, each in enumerate(torques)
+        channel(f"T{number}", *each, min_on_time=least, max_on_time=1.0)
+        for number, each in enumerate(torques)
     )
 
 
@@ -43,13 +48,17 @@ AXIAL = tuple(
 """Three channels with axial parts."""
 
 
-def fired_by(degrees: float = 2.0, channels: tuple[Channel, ...] = FOUR, **given: Any) -> Spacecraft:
+def fired_by(
+    degrees: float = 2.0, channels: tuple[Channel, ...] = FOUR, **given: Any
+) -> Spacecraft:
     """A spinner with these channels; ``loop`` and ``dissipation`` may be given too."""
     fields = {name: given.pop(name) for name in ("loop", "dissipation") if name in given}
     return replace(spinner(degrees=degrees, channels=channels, **given), **fields)
 
 
-def fires(sensor: Sensor | None = None, start: float = 0.3, stop: float = 0.1, **given: Any) -> Loop:
+def fires(
+    sensor: Sensor | None = None, start: float = 0.3, stop: float = 0.1, **given: Any
+) -> Loop:
     """A loop with the two thresholds; of an ideal gyro by default."""
     return Loop(sensor or Sensor(), start=rad(start), stop=rad(stop), **given)
 
@@ -63,7 +72,10 @@ def turned(*angles: float) -> Vector:
     """Axes (3, 3) turned by three angles, rad, about the axes 1, 2, 3 in this order."""
     axes = np.eye(3)
     for axis, angle in enumerate(angles):
-        axes = matrix(np.array([math.cos(0.5 * angle), *(math.sin(0.5 * angle) * np.eye(3)[axis])])) @ axes
+        axes = (
+            matrix(np.array([math.cos(0.5 * angle), *(math.sin(0.5 * angle) * np.eye(3)[axis])]))
+            @ axes
+        )
     return axes
 
 
@@ -73,7 +85,9 @@ def transverse_size(rates: Vector) -> float:
 
 
 def follow_few_cycles(patch: pytest.MonkeyPatch) -> None:
-    """Budgets by 8 chains of 4 cycles or 60 firings: known to some 3 %, which changes none of their texts."""
+    """Budgets by 8 chains of 4 cycles or 60 firings: known to some 3 %, which changes none of their
+    texts.
+    """
     patch.setattr(budget.Map.cycle, "__defaults__", (8, 4))
     patch.setattr(budget.Map.attractors, "__defaults__", ((), 8))
     patch.setattr(budget, "FIRINGS", 60)

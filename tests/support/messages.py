@@ -1,4 +1,6 @@
-"""Plans to write as messages: every file in configs/ that has an epoch, and bodies that none of them is."""
+"""Plans to write as messages: every file in configs/ that has an epoch, and bodies that none of
+them is.
+"""
 
 import math
 from functools import cache
@@ -43,13 +45,20 @@ BODIES = {
     "sphere": STEERED.format(name="Sphere", A=100, C=100, spin="30 rpm"),
 }
 
-CASES = (*(path.stem for path in sorted(CONFIGS.glob("*.yaml")) if "epoch:" in path.read_text("utf-8")), *BODIES)
+CASES = (
+    *(path.stem for path in sorted(CONFIGS.glob("*.yaml")) if "epoch:" in path.read_text("utf-8")),
+    *BODIES,
+)
 """Names of the plans."""
 
 
 def spacecraft(name: str) -> Spacecraft:
     """The spacecraft of a case."""
-    return read_spacecraft(BODIES[name], name) if name in BODIES else load_spacecraft(CONFIGS / f"{name}.yaml")
+    return (
+        read_spacecraft(BODIES[name], name)
+        if name in BODIES
+        else load_spacecraft(CONFIGS / f"{name}.yaml")
+    )
 
 
 @cache

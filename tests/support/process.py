@@ -14,7 +14,9 @@ import pytest
 from nutdamp.cli.main import main
 
 Run = Callable[..., "subprocess.CompletedProcess[str]"]
-"""``run("plan", "--json", "-", stdin=…, columns=80, status=0)``: the type of the fixtures that run the command line."""
+"""``run("plan", "--json", "-", stdin=…, columns=80, status=0)``: the type of the fixtures that run
+the command line.
+"""
 
 Status = int | tuple[int, ...] | None
 """The exit status that is right, or all of them; any where it is None."""
@@ -25,7 +27,9 @@ def environment(columns: int) -> dict[str, str]:
     return {"COLUMNS": str(columns), "NO_COLOR": "1", "PYTHONUTF8": "1"}
 
 
-def checked(ended: subprocess.CompletedProcess[str], status: Status) -> subprocess.CompletedProcess[str]:
+def checked(
+    ended: subprocess.CompletedProcess[str], status: Status
+) -> subprocess.CompletedProcess[str]:
     """The command that has ended; fails where its status is not the right one."""
     right = status if isinstance(status, tuple) else (status,)
     assert status is None or ended.returncode in right, (ended.returncode, ended.stderr)
@@ -33,13 +37,25 @@ def checked(ended: subprocess.CompletedProcess[str], status: Status) -> subproce
 
 
 def within(
-    folder: Path, *arguments: str, stdin: str | None = None, columns: int = 80, status: Status = None
+    folder: Path,
+    *arguments: str,
+    stdin: str | None = None,
+    columns: int = 80,
+    status: Status = None,
 ) -> subprocess.CompletedProcess[str]:
-    """Run the command line in this process, in ``folder``; an error that is a bug of nutdamp is raised."""
-    out, err = (io.TextIOWrapper(io.BytesIO(), encoding="utf-8", write_through=True) for _ in range(2))
+    """Run the command line in this process, in ``folder``; an error that is a bug of nutdamp is
+    raised.
+    """
+    out, err = (
+        io.TextIOWrapper(io.BytesIO(), encoding="utf-8", write_through=True) for _ in range(2)
+    )
     given = io.TextIOWrapper(io.BytesIO((stdin or "").encode()), encoding="utf-8")
     handler = signal.getsignal(signal.SIGTERM)
-    with pytest.MonkeyPatch.context() as patch, contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+    with (
+        pytest.MonkeyPatch.context() as patch,
+        contextlib.redirect_stdout(out),
+        contextlib.redirect_stderr(err),
+    ):
         patch.setattr(sys, "argv", ["nutdamp", *arguments])
         patch.setattr(sys, "stdin", given)
         patch.chdir(folder)
@@ -58,7 +74,11 @@ def within(
 
 
 def apart(
-    folder: Path, *arguments: str, stdin: str | None = None, columns: int = 80, status: Status = None
+    folder: Path,
+    *arguments: str,
+    stdin: str | None = None,
+    columns: int = 80,
+    status: Status = None,
 ) -> subprocess.CompletedProcess[str]:
     """Run the command line as a process of its own in ``folder``."""
     ended = subprocess.run(

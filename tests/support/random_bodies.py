@@ -1,4 +1,6 @@
-"""Random spacecraft with all kinds of limits and actuators, and random files over the whole schema, by seed."""
+"""Random spacecraft with all kinds of limits and actuators, and random files over the whole schema,
+by seed.
+"""
 
 import math
 from typing import Any
@@ -16,12 +18,20 @@ def power(rng: np.random.Generator, least: float, most: float) -> float:
 
 
 def random_channels(rng: np.random.Generator, needed: float, period: float) -> tuple[Channel, ...]:
-    """One to six, of any direction, mostly transverse; on-times from a thousandth to a multiple of what is needed."""
+    """One to six, of any direction, mostly transverse; on-times from a thousandth to a multiple of
+    what is needed.
+    """
     made = []
     for index in range(rng.integers(1, 7)):
-        angle = rng.choice([0.0, 0.5 * math.pi, math.pi, -0.5 * math.pi, rng.uniform(-math.pi, math.pi)])
+        angle = rng.choice(
+            [0.0, 0.5 * math.pi, math.pi, -0.5 * math.pi, rng.uniform(-math.pi, math.pi)]
+        )
         size = needed / (period * power(rng, -1.5, 0.5))
-        torque = size * math.cos(angle), size * math.sin(angle), size * float(rng.choice([0.0] * 3 + [0.05, -0.2, 1.5]))
+        torque = (
+            size * math.cos(angle),
+            size * math.sin(angle),
+            size * float(rng.choice([0.0] * 3 + [0.05, -0.2, 1.5])),
+        )
         shortest = period * power(rng, -4.0, -1.0) if rng.random() < 0.5 else 0.0
         longest = shortest + period * power(rng, -3.0, 0.0) if rng.random() < 0.5 else math.inf
         jet: dict[str, Any] = {"isp": 220.0 if rng.random() < 0.5 else None, "thrust": 1.0}
@@ -34,7 +44,10 @@ def random_limits(rng: np.random.Generator, period: float, horizon: float) -> Li
     """Each limit in about half of the cases; blackouts overlap and come in any order."""
     end = horizon if rng.random() < 0.5 else period * power(rng, -1.0, 2.0)
     tick = rng.choice([1e-3, 0.01, 0.1, period * power(rng, -4.0, -0.5)])
-    windows = [tuple(sorted(rng.uniform(0.0, min(end, 10 * period), 2).tolist())) for _ in range(rng.integers(0, 4))]
+    windows = [
+        tuple(sorted(rng.uniform(0.0, min(end, 10 * period), 2).tolist()))
+        for _ in range(rng.integers(0, 4))
+    ]
     return Limits(
         horizon=None if end == horizon else end,
         earliest=end * float(rng.choice([0.0, 0.0, 0.1, rng.uniform(0.0, 0.9)])),
@@ -46,7 +59,9 @@ def random_limits(rng: np.random.Generator, period: float, horizon: float) -> Li
 
 
 def random_spacecraft(rng: np.random.Generator) -> Spacecraft:
-    """Prolate, oblate, sphere, nearly one, flat disc; now and then triaxial; thrusters, a torquer, or both."""
+    """Prolate, oblate, sphere, nearly one, flat disc; now and then triaxial; thrusters, a torquer,
+    or both.
+    """
     A = power(rng, -1.0, 4.0)
     usual = [rng.uniform(-0.99, 0.95), rng.uniform(-0.99, 0.95)]
     a = float(rng.choice([*usual, 0.0, -1.0, 0.25, 0.2, -1 / 3, 1e-3, -1e-9]))
@@ -58,7 +73,8 @@ def random_spacecraft(rng: np.random.Generator) -> Spacecraft:
     degrees = float(rng.choice([rng.uniform(0.01, 10.0), rng.uniform(1.0, 40.0)]))
     phase = float(rng.choice([0.0, 0.5 * math.pi, math.pi, rng.uniform(-math.pi, math.pi)]))
     plain = spinner(spin=spin, degrees=degrees, phase=phase, moments=moments)
-    period, needed = min(plain.body_period, plain.inertial_period), plain.least_impulse
+    period = min(plain.body_period, plain.inertial_period)
+    needed = plain.least_impulse
     torque = needed / (period * power(rng, -1.5, 0.5)) if rng.random() < 0.7 else None
     return spinner(
         spin=spin,
@@ -73,11 +89,15 @@ def random_spacecraft(rng: np.random.Generator) -> Spacecraft:
 
 
 def disturbed_spacecraft(rng: np.random.Generator) -> Spacecraft:
-    """Any disturbances, gaps, ticks and windows: alignments wander, and some are never to be had."""
-    A, a = power(rng, -1, 3), float(rng.choice([0.3, -0.5, 0.0, 1e-3, 0.9, -1.0]))
+    """Any disturbances, gaps, ticks and windows: alignments wander,
+    and some are never to be had.
+    """
+    A = power(rng, -1, 3)
+    a = float(rng.choice([0.3, -0.5, 0.0, 1e-3, 0.9, -1.0]))
     spin, degrees = float(rng.choice([3.0, -0.2])), float(rng.choice([0.1, 5.0, 60.0]))
     plain = spinner(A, A * (1 - a), spin, degrees)
-    period, torque = min(plain.body_period, plain.inertial_period), plain.least_impulse * plain.inertial_period
+    period = min(plain.body_period, plain.inertial_period)
+    torque = plain.least_impulse * plain.inertial_period
     size = plain.least_impulse / period
     turning = float(rng.choice([0.0, -spin, -plain.inertia.a * spin, rng.normal()]))
     torques = [
@@ -90,7 +110,9 @@ def disturbed_spacecraft(rng: np.random.Generator) -> Spacecraft:
         gap=float(rng.choice([0.0, power(rng, -2, 1) * period])),
         earliest=float(rng.choice([0.0, 0.1 * period])),
         tick=float(rng.choice([1e-3, 0.3, 3.0])) * period if rng.random() < 0.3 else None,
-        blackout=tuple((float(begin), float(end)) for begin, end in ends) if rng.random() < 0.5 else (),
+        blackout=tuple((float(begin), float(end)) for begin, end in ends)
+        if rng.random() < 0.5
+        else (),
     )
     return Spacecraft(
         "disturbed",
@@ -107,7 +129,9 @@ LAWS, KINDS = ("four-pulse", "one-pulse", "bang"), ("gyro", "accelerometer")
 
 
 class Draws:
-    """What a file holds, from a seed: ``chance`` of a section, one of several, a number between two."""
+    """What a file holds, from a seed: ``chance`` of a section, one of several, a number between
+    two.
+    """
 
     def __init__(self, seed: int) -> None:
         self.rng = np.random.default_rng(seed)
@@ -123,32 +147,41 @@ class Draws:
 
 
 def equipped(seed: int) -> dict[str, Any]:
-    """A valid spacecraft file as a dictionary: a body with jets in their places, and anything that it may carry."""
+    """A valid spacecraft file as a dictionary: a body with jets in their places, and anything that
+    it may carry.
+    """
     draws = Draws(seed)
-    A, ratio, spin = (
-        power(draws.rng, 0.0, 3.5),
-        draws.between(0.3, 1.8),
-        draws.pick(-1.0, 1.0) * power(draws.rng, -0.7, 0.7),
-    )
+    A = power(draws.rng, 0.0, 3.5)
+    ratio = draws.between(0.3, 1.8)
+    spin = draws.pick(-1.0, 1.0) * power(draws.rng, -0.7, 0.7)
     if abs(ratio - 1.0) < 0.02:
         ratio += 0.05
     degrees = draws.pick(0.3, 2.0, 5.0, 12.0)
-    arm, turn = math.sqrt(A / 100.0), 2.0 * math.pi / abs(spin)
+    arm = math.sqrt(A / 100.0)
+    turn = 2.0 * math.pi / abs(spin)
     file: dict[str, Any] = {"name": f"spacecraft {seed}", "inertia": {"A": A, "C": ratio * A}}
     if draws.chance(0.2) and not 0.85 < ratio < 1.15:
         file["inertia"] = {"tensor": np.diag([A * 1.03, A * 0.97, ratio * A]).tolist()}
     phase = f"{draws.between(-180.0, 180.0)} deg"
-    file["state"] = {"spin": f"{spin * 30.0 / math.pi} rpm", "nutation": f"{degrees} deg", "phase": phase}
+    file["state"] = {
+        "spin": f"{spin * 30.0 / math.pi} rpm",
+        "nutation": f"{degrees} deg",
+        "phase": phase,
+    }
     if draws.chance(0.7):
         file["mass"] = f"{power(draws.rng, 1.6, 3.0)} kg"
-    level = A * spin * spin * ratio * math.tan(math.radians(degrees)) * draws.between(0.3, 3.0)  # N m
+    level = (
+        A * spin * spin * ratio * math.tan(math.radians(degrees)) * draws.between(0.3, 3.0)
+    )  # N m
     file["thrusters"] = _jets(draws, arm, level / arm, turn)
     if draws.chance(0.3):
         file["channels"] = {"+M1": ["T1"], "-M1": ["T2"], "+M2": ["T3"], "-M2": ["T4"]}
         if draws.chance(0.5):
             file["channels"]["axial"] = ["T1", "T2", "T3", "T4"]
     if draws.chance(0.15):
-        file["steerable"] = draws.pick({}, {"torque": level}, {"torque": level, "isp": 220, "lever_arm": arm})
+        file["steerable"] = draws.pick(
+            {}, {"torque": level}, {"torque": level, "isp": 220, "lever_arm": arm}
+        )
     if draws.chance(0.2):
         file["valve"] = _valve(draws, 0.01 * turn)
     _feed(draws, file)
@@ -179,7 +212,9 @@ def _jets(draws: Draws, arm: float, force: float, turn: float) -> list[dict[str,
         jets.append({**one, **common})
         if bits:
             widths = [0.005 * turn, 0.02 * turn, 0.2 * turn]
-            jets[-1]["impulse_bit"] = [[w, (w - 0.001 * turn) * force, 0.5 * w + 0.001 * turn] for w in widths]
+            jets[-1]["impulse_bit"] = [
+                [w, (w - 0.001 * turn) * force, 0.5 * w + 0.001 * turn] for w in widths
+            ]
             jets[-1].pop("min_on_time", None)
             jets[-1].pop("max_on_time", None)
     if draws.chance(0.2):
@@ -197,7 +232,9 @@ def _jets(draws: Draws, arm: float, force: float, turn: float) -> list[dict[str,
 
 def _valve(draws: Draws, size: float) -> dict[str, Any]:
     keys = ("open_delay", "close_delay", "rise_time", "fall_time")
-    valve: dict[str, Any] = {key: f"{1e3 * draws.between(0.0, size)} ms" for key in keys if draws.chance(0.6)}
+    valve: dict[str, Any] = {
+        key: f"{1e3 * draws.between(0.0, size)} ms" for key in keys if draws.chance(0.6)
+    }
     if draws.chance(0.3):
         valve["on_time_is"] = draws.pick("command", "effective")
     return valve or {"open_delay": "1 ms"}
@@ -226,22 +263,47 @@ def _surroundings(draws: Draws, file: dict[str, Any], level: float, turn: float)
     """Attitude, Sun, cones, command blocks, disturbances, energy dissipation."""
     if draws.chance(0.55):
         quaternion = draws.rng.normal(size=4).tolist()
-        file["attitude"] = {"quaternion": quaternion, "frame": draws.pick("EME2000", "J2000", "GCRF"), "epoch": EPOCH}
-        file["sun"] = draws.pick("epoch", [f"{draws.between(0.0, 360.0)} deg", f"{draws.between(-20.0, 20.0)} deg"])
+        file["attitude"] = {
+            "quaternion": quaternion,
+            "frame": draws.pick("EME2000", "J2000", "GCRF"),
+            "epoch": EPOCH,
+        }
+        file["sun"] = draws.pick(
+            "epoch", [f"{draws.between(0.0, 360.0)} deg", f"{draws.between(-20.0, 20.0)} deg"]
+        )
         if draws.chance(0.4):
             file["keep"] = [{"name": "Sun", "direction": "sun", "min": "2 deg"}]
             if draws.chance(0.5):
-                file["keep"].append({"name": "Earth", "direction": ["10 deg", "-30 deg"], "max": "179 deg"})
+                file["keep"].append(
+                    {"name": "Earth", "direction": ["10 deg", "-30 deg"], "max": "179 deg"}
+                )
         if draws.chance(0.5):
             file["sun_sensor"] = {"azimuth": f"{draws.between(0.0, 360.0)} deg"}
             if draws.chance(0.3):
-                file["sun_sensor"] |= {"elevation": "0 deg", "half_width": "80 deg", "jitter": "0.5 ms"}
-            steps = draws.pick([0.05 * turn, 0.1 * turn], {"step": 0.01 * turn, "min": 0.02 * turn, "max": 0.2 * turn})
-            file["commands"] = {"delay_step": 0.01 * turn, "delay_max": draws.pick(0.9, 1.2) * turn, "width": steps}
+                file["sun_sensor"] |= {
+                    "elevation": "0 deg",
+                    "half_width": "80 deg",
+                    "jitter": "0.5 ms",
+                }
+            steps = draws.pick(
+                [0.05 * turn, 0.1 * turn],
+                {"step": 0.01 * turn, "min": 0.02 * turn, "max": 0.2 * turn},
+            )
+            file["commands"] = {
+                "delay_step": 0.01 * turn,
+                "delay_max": draws.pick(0.9, 1.2) * turn,
+                "width": steps,
+            }
             if draws.chance(0.5):
-                file["commands"] |= {"max_count": draws.pick(1, 20, 255), "every": draws.pick([1], [1, 2])}
+                file["commands"] |= {
+                    "max_count": draws.pick(1, 20, 255),
+                    "every": draws.pick([1], [1, 2]),
+                }
         if draws.chance(0.2):
-            file |= {"object_id": "2026-001A", "orbit": {"position": ["7000 km", 0, 0], "velocity": [0, "7.5 km/s", 0]}}
+            file |= {
+                "object_id": "2026-001A",
+                "orbit": {"position": ["7000 km", 0, 0], "velocity": [0, "7.5 km/s", 0]},
+            }
     if draws.chance(0.2):
         small = 1e-3 * level
         leak = {"name": "leak", "torque": [small, 0.0, draws.pick(0.0, 0.1 * small)]}
@@ -256,8 +318,13 @@ def _surroundings(draws: Draws, file: dict[str, Any], level: float, turn: float)
 def _demands(draws: Draws, file: dict[str, Any], degrees: float, turn: float) -> None:
     """Requirement, limits, goal."""
     if draws.chance(0.8):
-        asked = {"nutation": f"{degrees * draws.pick(0.05, 0.3)} deg", "momentum_shift": f"{degrees} deg"}
-        file["requirement"] = {key: angle for key, angle in asked.items() if key == "nutation" or draws.chance(0.4)}
+        asked = {
+            "nutation": f"{degrees * draws.pick(0.05, 0.3)} deg",
+            "momentum_shift": f"{degrees} deg",
+        }
+        file["requirement"] = {
+            key: angle for key, angle in asked.items() if key == "nutation" or draws.chance(0.4)
+        }
         if draws.chance(0.5):
             file["requirement"]["probability"] = draws.pick("99.7 %", 0.9, "95 %")
     limits = {
@@ -272,18 +339,30 @@ def _demands(draws: Draws, file: dict[str, Any], degrees: float, turn: float) ->
     if not file["limits"]:
         del file["limits"]
     if draws.chance(0.15):
-        file["goal"] = {"tilt": f"{draws.pick(1.0, 5.0, 30.0)} deg", "azimuth": f"{draws.between(0.0, 360.0)} deg"}
+        file["goal"] = {
+            "tilt": f"{draws.pick(1.0, 5.0, 30.0)} deg",
+            "azimuth": f"{draws.between(0.0, 360.0)} deg",
+        }
     elif draws.chance(0.1) and any(one["name"] == "S" for one in file["thrusters"]):
-        file["goal"] = {"spin": f"{float(file['state']['spin'].split()[0]) * draws.pick(0.99, 1.01)} rpm"}
+        file["goal"] = {
+            "spin": f"{float(file['state']['spin'].split()[0]) * draws.pick(0.99, 1.01)} rpm"
+        }
 
 
 def _loop(draws: Draws, degrees: float, turn: float, spin: float, channel: str) -> dict[str, Any]:
-    kind, sensor = draws.pick(*KINDS), dict[str, Any]()
+    kind = draws.pick(*KINDS)
+    sensor = dict[str, Any]()
     signal = 1e-3 * spin if kind == "gyro" else 1e-4 * spin * spin
     sensor["kind"] = kind
     if kind == "accelerometer":
         sensor |= {"position": ["0.8 m", 0, 0], "axis": [0, 0, 1]}
-    some = {"noise": signal, "quantisation": 0.3 * signal, "bias": signal, "scale": "101 %", "delay": 0.01 * turn}
+    some = {
+        "noise": signal,
+        "quantisation": 0.3 * signal,
+        "bias": signal,
+        "scale": "101 %",
+        "delay": 0.01 * turn,
+    }
     if kind == "accelerometer" or draws.chance(0.7):  # else a continuous signal
         sensor |= {key: value for key, value in some.items() if draws.chance(0.4)}
         sensor["rate"] = f"{draws.pick(40.0, 100.0) / turn} Hz"
@@ -298,7 +377,12 @@ def _loop(draws: Draws, degrees: float, turn: float, spin: float, channel: str) 
     }
     if law == "bang" or (law == "four-pulse" and draws.chance(0.2)):
         loop["on_time"] = 0.02 * turn
-    more = {"settle": 0.05 * turn, "min_interval": 0.1 * turn, "predict": False, "faults": {"reversed": [channel]}}
+    more = {
+        "settle": 0.05 * turn,
+        "min_interval": 0.1 * turn,
+        "predict": False,
+        "faults": {"reversed": [channel]},
+    }
     return loop | {key: value for key, value in more.items() if draws.chance(0.2)}
 
 
@@ -321,7 +405,11 @@ def _dispersions(draws: Draws, file: dict[str, Any], turn: float, spin: float) -
         "attitude": spread(0.2, "deg"),
     }
     if "valve" in file and not any("impulse_bit" in one for one in file["thrusters"]):
-        times = {key: float(time.split()[0]) for key, time in file["valve"].items() if key != "on_time_is"}  # ms
+        times = {
+            key: float(time.split()[0])
+            for key, time in file["valve"].items()
+            if key != "on_time_is"
+        }  # ms
         known |= {key: spread(min(0.2 * turn, 0.3 * time), "ms") for key, time in times.items()}
     if any("impulse_bit" in one for one in file["thrusters"]):
         known["impulse_bit"] = spread(2.0, "%")
@@ -335,7 +423,13 @@ def _dispersions(draws: Draws, file: dict[str, Any], turn: float, spin: float) -
         }
     if "loop" in file:
         known |= {"sensor_scale": spread(1.0, "%"), "sensor_delay": spread(0.1 * turn, "ms")}
-    chosen: dict[str, Any] = {key: value for key, value in known.items() if draws.chance(0.5)} or {"A": known["A"]}
-    if {"A", "C"} <= set(chosen) and not {"bias"} & {*chosen["A"], *chosen["C"]} and "A" in file["inertia"]:
+    chosen: dict[str, Any] = {key: value for key, value in known.items() if draws.chance(0.5)} or {
+        "A": known["A"]
+    }
+    if (
+        {"A", "C"} <= set(chosen)
+        and not {"bias"} & {*chosen["A"], *chosen["C"]}
+        and "A" in file["inertia"]
+    ):
         chosen["correlation"] = [["A", "C", draws.pick(0.9, -0.5)]]
     return chosen

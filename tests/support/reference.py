@@ -4,15 +4,16 @@ Euler's equations and the rotation matrix R (body -> inertial) of a rigid body,
 
     I dω/dt = M - ω × (I ω),      dR/dt = R [ω]×,
 
-from one edge of a pulse to the next by DOP853. Torques and impulses are fixed in the body. Angles are compared by
-the chord between unit vectors, which is exact at both ends of the scale.
+from one edge of a pulse to the next by DOP853. Torques and impulses are fixed in the body. Angles
+are compared by the chord between unit vectors, which is exact at both ends of the scale.
 
-With energy dissipation it is H in space that is integrated, where dissipation cannot change it, and the attitude:
+With energy dissipation it is H in space that is integrated, where dissipation cannot change it, and
+the attitude:
 
     dH/dt = R M,      dR/dt = R [I⁻¹ RᵀH + s]×,
 
-s the turn of axis 3 away from H at κ sin θ cos θ; with a wheel at κ sin θ D(θ)/D(0), D dE/dθ over |H| sin θ. No torque
-of dissipation stands in these equations.
+s the turn of axis 3 away from H at κ sin θ cos θ; with a wheel at κ sin θ D(θ)/D(0), D dE/dθ over
+|H| sin θ. No torque of dissipation stands in these equations.
 
 A ``wheel`` adds its constant momentum h e3 to I ω, wherever H stands.
 """
@@ -29,7 +30,9 @@ from scipy.integrate import solve_ivp
 Array = NDArray[np.float64]
 
 RTOL = 1e-13
-"""Relative tolerance of one step; what adds up over a flight of some hundred radians stays below 1e-11."""
+"""Relative tolerance of one step; what adds up over a flight of some hundred radians stays below
+1e-11.
+"""
 
 
 class Push(NamedTuple):
@@ -41,7 +44,9 @@ class Push(NamedTuple):
 
 
 class Swell(NamedTuple):
-    """A body torque that runs evenly from ``first`` (3,) N m at ``start`` s to ``last`` at ``end`` s."""
+    """A body torque that runs evenly from ``first`` (3,) N m at ``start`` s to ``last`` at ``end``
+    s.
+    """
 
     start: float
     end: float
@@ -73,7 +78,9 @@ def vector(*components: float) -> Array:
 
 
 def frame_n(moments: Sequence[float], rates: Array, wheel: float = 0.0) -> Array:
-    """Rotation body -> N: z along H, the spin axis in the half plane x >= 0 of x-z, or body axis 1 along x."""
+    """Rotation body -> N: z along H, the spin axis in the half plane x >= 0 of x-z, or body axis 1
+    along x.
+    """
     h = np.asarray(moments) * rates + vector(0, 0, wheel)
     z = h / np.linalg.norm(h)
     spin_axis = vector(0, 0, math.copysign(1, h[2]))
@@ -109,14 +116,28 @@ def turned(first: Array, second: Array) -> float:
     """Angle of the rotation that leads from one attitude to another, rad; for small ones."""
     between = first.T @ second
     return 0.5 * float(
-        np.linalg.norm([between[2, 1] - between[1, 2], between[0, 2] - between[2, 0], between[1, 0] - between[0, 1]])
+        np.linalg.norm(
+            [
+                between[2, 1] - between[1, 2],
+                between[0, 2] - between[2, 0],
+                between[1, 0] - between[0, 1],
+            ]
+        )
     )
 
 
 def through_valve(
-    start: float, on_time: float, torque: Array, *, opening: float, closing: float, rise: float, fall: float
+    start: float,
+    on_time: float,
+    torque: Array,
+    *,
+    opening: float,
+    closing: float,
+    rise: float,
+    fall: float,
 ) -> list[Swell]:
-    """What a command gives through a valve: the level rises at 1/rise while it is open and falls at 1/fall once not.
+    """What a command gives through a valve: the level rises at 1/rise while it is open and falls at
+    1/fall once not.
 
     By the level at each moment, up to one; no formula for impulse or centroid stands here.
     """
@@ -124,7 +145,12 @@ def through_valve(
     if closed <= opened:
         return []
     peak = 1.0 if rise == 0.0 else min(1.0, (closed - opened) / rise)
-    corners = [(opened, 0.0), (opened + peak * rise, peak), (closed, peak), (closed + peak * fall, 0.0)]
+    corners = [
+        (opened, 0.0),
+        (opened + peak * rise, peak),
+        (closed, peak),
+        (closed + peak * fall, 0.0),
+    ]
     return [
         Swell(begin, end, low * torque, high * torque)
         for (begin, low), (end, high) in itertools.pairwise(corners)
@@ -150,7 +176,9 @@ def coast(
     growing: Array | None = None,
     wheel: float = 0.0,
 ) -> list[Motion]:
-    """The motion at ``times`` (n,) s > 0 under a constant body torque, or one ``growing`` by so many (3,) N m/s."""
+    """The motion at ``times`` (n,) s > 0 under a constant body torque, or one ``growing`` by so
+    many (3,) N m/s.
+    """
     A, B, C = (float(one) for one in moments)
     m1, m2, m3 = (float(one) for one in torque)
     g1, g2, g3 = (0.0, 0.0, 0.0) if growing is None else (float(one) for one in growing)
@@ -180,9 +208,16 @@ def coast(
 
 
 def sinking(
-    moments: Sequence[float], motion: Motion, torque: Array, times: Array, growth: float, wheel: float = 0.0
+    moments: Sequence[float],
+    motion: Motion,
+    torque: Array,
+    times: Array,
+    growth: float,
+    wheel: float = 0.0,
 ) -> list[Motion]:
-    """`coast` of a body in which energy dissipation lets a small nutation grow at the rate ``growth`` κ, 1/s."""
+    """`coast` of a body in which energy dissipation lets a small nutation grow at the rate
+    ``growth`` κ, 1/s.
+    """
     A, B, C = (float(one) for one in moments)
     x, y_, z = (float(one) for one in torque)
     sense = math.copysign(1.0, C * float(motion.rates[2]) + wheel)
@@ -194,21 +229,41 @@ def sinking(
     def slope(_: float, y: Array) -> list[float]:
         hx, hy, hz, a, b, c, d, e, f, g, h, i = y.tolist()
         size = math.sqrt(hx * hx + hy * hy + hz * hz)
-        u1, u2, u3 = ((a * hx + d * hy + g * hz), (b * hx + e * hy + h * hz), (c * hx + f * hy + i * hz))
+        u1, u2, u3 = (
+            (a * hx + d * hy + g * hz),
+            (b * hx + e * hy + h * hz),
+            (c * hx + f * hy + i * hz),
+        )
         # s = κ (u·e3) (u × e3), u the direction of H in the body.
-        sinks = growth * (sense * pace(size, u3 / size) / pace(size, sense) if wheel else u3 / size) / size
-        p, q, r = u1 / A + sinks * u2, u2 / B - sinks * u1, (u3 - wheel) / C
+        sinks = (
+            growth
+            * (sense * pace(size, u3 / size) / pace(size, sense) if wheel else u3 / size)
+            / size
+        )
+        p = u1 / A + sinks * u2
+        q = u2 / B - sinks * u1
+        r = (u3 - wheel) / C
         rates = [a * x + b * y_ + c * z, d * x + e * y_ + f * z, g * x + h * y_ + i * z]
         return [*rates, *_turning([a, b, c, d, e, f, g, h, i], p, q, r)]
 
     h0 = momentum(moments, motion, wheel)
     y0 = np.concatenate([h0, motion.rotation.ravel()])
     atol = np.array([RTOL * float(np.linalg.norm(h0))] * 3 + [RTOL] * 9)
-    solution = solve_ivp(slope, (0.0, float(times[-1])), y0, method="DOP853", t_eval=times, rtol=RTOL, atol=0.1 * atol)
+    solution = solve_ivp(
+        slope,
+        (0.0, float(times[-1])),
+        y0,
+        method="DOP853",
+        t_eval=times,
+        rtol=RTOL,
+        atol=0.1 * atol,
+    )
     assert solution.success
     found = [(y[:3], y[3:].reshape(3, 3)) for y in solution.y.T]
     inner = vector(0, 0, wheel)
-    return [Motion((rotation.T @ h - inner) / np.asarray(moments), rotation) for h, rotation in found]
+    return [
+        Motion((rotation.T @ h - inner) / np.asarray(moments), rotation) for h, rotation in found
+    ]
 
 
 def fly(
@@ -220,10 +275,13 @@ def fly(
     growth: float = 0.0,
     wheel: float = 0.0,
 ) -> Motion:
-    """The motion at ``until`` s, kicks at that moment included; restarts at every edge of a torque."""
+    """The motion at ``until`` s, kicks at that moment included;
+    restarts at every edge of a torque.
+    """
     events = list(events)
     start = frame_n(moments, rates, wheel) if rotation is None else rotation
-    motion, now = Motion(np.asarray(rates, dtype=float), start), 0.0
+    motion = Motion(np.asarray(rates, dtype=float), start)
+    now = 0.0
     edges = {0.0, until}
     for event in events:
         edges |= {event.t} if isinstance(event, Kick) else {event.start, event.end}
@@ -241,7 +299,8 @@ def fly(
                 if growth
                 else coast(moments, motion, torque, span, growing, wheel)
             )
-            motion, now = found[0], edge
+            motion = found[0]
+            now = edge
         for event in events:
             if isinstance(event, Kick) and event.t == edge:
                 motion = Motion(motion.rates + event.impulse / np.asarray(moments), motion.rotation)

@@ -1,7 +1,8 @@
-"""An independent search for cheap schedules of strong thrusters: SLSQP from many random starts, on its own motion.
+"""An independent search for cheap schedules of strong thrusters: SLSQP from many random starts, on
+its own motion.
 
-Nothing of nutdamp's planning is used. The motion is that of exact torque-free arcs,
-R(t) = Rot(H t/A) R Rot3(aω3 t), between kicks; a pulse of real width is a few kicks, evenly spread over it.
+Nothing of nutdamp's planning is used. The motion is that of exact torque-free arcs, R(t) = Rot(H
+t/A) R Rot3(aω3 t), between kicks; a pulse of real width is a few kicks, evenly spread over it.
 """
 
 import math
@@ -25,14 +26,17 @@ NARROW = 0.1
 
 
 def strong_layout(seed: int) -> tuple[Spacecraft, bool]:
-    """2 to 12 channels, each worth 10 to 1000 times A|ω0| in an inertial period, some with axial torque; 1° to 60°.
+    """2 to 12 channels, each worth 10 to 1000 times A|ω0| in an inertial period, some with axial
+    torque; 1° to 60°.
 
     The horizon is 0.3 to 3 inertial periods. Also whether H may end anywhere.
     """
     rng = np.random.default_rng([10, seed])
-    A, spin = rng.uniform(60, 200), rng.uniform(0.5, 6) * rng.choice([-1, 1])
+    A = rng.uniform(60, 200)
+    spin = rng.uniform(0.5, 6) * rng.choice([-1, 1])
     C = A * float(rng.choice([rng.uniform(0.3, 0.95), rng.uniform(1.05, 1.9)]))
-    theta, phase = math.radians(rng.uniform(1, 60)), rng.uniform(0, 2 * math.pi)
+    theta = math.radians(rng.uniform(1, 60))
+    phase = rng.uniform(0, 2 * math.pi)
     omega = C * abs(spin) * math.tan(theta) / A
     rates = np.array([omega * math.cos(phase), omega * math.sin(phase), spin])
     period = 2 * math.pi * A / math.hypot(A * omega, C * spin)
@@ -40,13 +44,18 @@ def strong_layout(seed: int) -> tuple[Spacecraft, bool]:
     axial = rng.random() < 0.3
     channels = []
     for index in range(int(rng.integers(2, 13))):
-        angle, size = rng.uniform(0, 2 * math.pi), strength * rng.uniform(0.5, 1.5)
+        angle = rng.uniform(0, 2 * math.pi)
+        size = strength * rng.uniform(0.5, 1.5)
         along = rng.uniform(-0.3, 0.3) * size if axial else 0.0
         torque = np.array([size * math.cos(angle), size * math.sin(angle), along])
         name = f"T{index}"
-        channels.append(Channel(name, (Thruster(name, torque, None, size * rng.uniform(0.8, 1.25), 220.0),)))
+        channels.append(
+            Channel(name, (Thruster(name, torque, None, size * rng.uniform(0.8, 1.25), 220.0),))
+        )
     limits = Limits(horizon=float(rng.uniform(0.3, 3) * period))
-    body = Spacecraft(f"strong {seed}", Inertia((A, A, C)), rates, channels=tuple(channels), limits=limits)
+    body = Spacecraft(
+        f"strong {seed}", Inertia((A, A, C)), rates, channels=tuple(channels), limits=limits
+    )
     return body, bool(rng.random() < 0.35)
 
 
@@ -70,7 +79,8 @@ def cheapest(spacecraft: Spacecraft, free_axis: bool, starts: int, seed: int = 0
 
 def _descended(body: Spacecraft, free_axis: bool, rng: np.random.Generator) -> Rival | None:
     """SLSQP over starts and on-times of two to five pulses of random channels at random moments."""
-    horizon, count = body.horizon, int(rng.integers(1 if free_axis else 2, 4 if free_axis else 6))
+    horizon = body.horizon
+    count = int(rng.integers(1 if free_axis else 2, 4 if free_axis else 6))
     which = rng.integers(len(body.channels), size=count)
     torques = np.array([body.channels[index].torque for index in which])
     flows = np.array([body.channels[index].mass_flow for index in which], dtype=float)
@@ -129,7 +139,9 @@ def _descended(body: Spacecraft, free_axis: bool, rng: np.random.Generator) -> R
 
 
 def ends(body: Spacecraft, torques: Array, x: Array, free_axis: bool) -> Array:
-    """What schedules x (k, 2n), starts and on-times in s, leave: transverse momentum and shift of H, over |H|."""
+    """What schedules x (k, 2n), starts and on-times in s, leave: transverse momentum and shift of
+    H, over |H|.
+    """
     A, _, C = body.inertia.moments
     count = len(torques)
     rotation = np.tile(frame_n(body.inertia.moments, body.omega0), (len(x), 1, 1))
@@ -152,9 +164,12 @@ def ends(body: Spacecraft, torques: Array, x: Array, free_axis: bool) -> Array:
 
 
 def _coasted(A: float, C: float, rotation: Array, rates: Array, time: Array) -> tuple[Array, Array]:
-    """R(t) = Rot(H t/A) R Rot3(aω3 t), for k bodies: rotation (k, 3, 3), rates (k, 3), time (k,)."""
+    """R(t) = Rot(H t/A) R Rot3(aω3 t), for k bodies: rotation (k, 3, 3), rates (k, 3),
+    time (k,).
+    """
     turn = (A - C) / A * rates[:, 2] * time
-    cosine, sine = np.cos(turn), np.sin(turn)
+    cosine = np.cos(turn)
+    sine = np.sin(turn)
     axis = np.einsum("kij,kj->ki", rotation, rates * [1.0, 1.0, C / A])
     speed = np.sqrt(np.einsum("ki,ki->k", axis, axis))
     axis = axis / speed[:, None]

@@ -32,7 +32,12 @@ BODY = spinner(channels=cross(20.0), requirement=Requirement(0.01, 0.005))
 def kicks(body: Spacecraft, count: int, step: float, on_time: float) -> Schedule:
     """So many short pulses of all channels in turn, whatever they do."""
     channels = body.channels
-    return Schedule(tuple(channel_pulse(channels[n % len(channels)], 0.5 + n * step, on_time) for n in range(count)))
+    return Schedule(
+        tuple(
+            channel_pulse(channels[n % len(channels)], 0.5 + n * step, on_time)
+            for n in range(count)
+        )
+    )
 
 
 NAMES = ("overview", "motion", "history")  # the last one is the picture of the report
@@ -43,8 +48,14 @@ H_MARKS = "H"
 
 CASES: dict[str, tuple[Spacecraft, Schedule | str]] = {
     "wide pulses": (BODY, "two-pulse"),
-    "three moments": (spinner(moments=(120, 100, 80), degrees=25.0, channels=cross(40.0)), "two-pulse"),
-    "three moments, oblate": (spinner(moments=(80, 90, 120), degrees=10.0, channels=cross(1.0)), Schedule()),
+    "three moments": (
+        spinner(moments=(120, 100, 80), degrees=25.0, channels=cross(40.0)),
+        "two-pulse",
+    ),
+    "three moments, oblate": (
+        spinner(moments=(80, 90, 120), degrees=10.0, channels=cross(1.0)),
+        Schedule(),
+    ),
     "34 pulses": (spinner(degrees=8.0, channels=cross(20.0, max_on_time=0.05)), "four-pulse"),
     "120 pulses": (BODY, kicks(BODY, 120, 0.4, 0.01)),
     "16 channels": (SIXTEEN, kicks(SIXTEEN, 32, 0.45, 0.05)),
@@ -56,14 +67,25 @@ CASES: dict[str, tuple[Spacecraft, Schedule | str]] = {
     "0.01°": (spinner(degrees=0.01, channels=cross(1.0)), "two-pulse"),
     "sphere": (spinner(100, 100, 3.0, 10.0, steerable=TORQUER), "two-pulse"),
     "blackouts": (
-        spinner(channels=cross(20.0), limits=Limits(earliest=1.0, blackout=((3.0, 4.5), (6.0, 7.0), (20.0, 25.0)))),
+        spinner(
+            channels=cross(20.0),
+            limits=Limits(earliest=1.0, blackout=((3.0, 4.5), (6.0, 7.0), (20.0, 25.0))),
+        ),
         "four-pulse",
     ),
     "far target": (aimed(spinner(steerable=Steerable()), 110.0, 20.0), "two-pulse"),
-    "celestial": (replace(BODY, attitude=Attitude(np.array([0.7, 0.1, 0.7, 0.1]))), kicks(BODY, 5, 0.9, 0.2)),
+    "celestial": (
+        replace(BODY, attitude=Attitude(np.array([0.7, 0.1, 0.7, 0.1]))),
+        kicks(BODY, 5, 0.9, 0.2),
+    ),
     "one pulse": (BODY, kicks(BODY, 1, 1.0, 0.3)),
     "one pulse at once": (STEERED, Schedule((steerable_pulse(TORQUER, 0.2, 1.0, impulse=20.0),))),
-    "steered": (STEERED, Schedule(tuple(steerable_pulse(TORQUER, t, t, on_time=0.01) for t in (0.005, 0.9, 1.8, 2.6)))),
+    "steered": (
+        STEERED,
+        Schedule(
+            tuple(steerable_pulse(TORQUER, t, t, on_time=0.01) for t in (0.005, 0.9, 1.8, 2.6))
+        ),
+    ),
     "no pulses": (WIDE, Schedule()),
     "no nutation": (spinner(degrees=0.0, channels=cross(20.0)), Schedule()),
     "long name": (replace(WIDE, name="$x$ of a\nprogramme_with 測 " * 5), "one-pulse"),
@@ -87,7 +109,11 @@ def drawn(name: str, case: str) -> Figure:
 
 def flight_picture(name: str, body: Spacecraft, pulses: Schedule | str = "two-pulse") -> Figure:
     """A figure of a schedule, or of the one of a scheme."""
-    plan = planning.plan(body, pulses) if isinstance(pulses, str) else planning.Plan(body, "trial", pulses)
+    plan = (
+        planning.plan(body, pulses)
+        if isinstance(pulses, str)
+        else planning.Plan(body, "trial", pulses)
+    )
     return figure_of(name, *overview.shown(plan))
 
 
@@ -106,7 +132,11 @@ def studied(body: Spacecraft, count: int, scheme: str = "two-pulse") -> Dispersi
 
 def points(axes: Axes, label: str) -> Vector:
     """The points of the line of that label, without the gaps."""
-    (data,) = (np.asarray(one.get_xydata(), dtype=np.float64) for one in axes.lines if one.get_label() == label)
+    (data,) = (
+        np.asarray(one.get_xydata(), dtype=np.float64)
+        for one in axes.lines
+        if one.get_label() == label
+    )
     return np.asarray(data[np.isfinite(data).all(axis=1)])
 
 
@@ -131,9 +161,10 @@ def check_star(axes: Axes, place: Vector, radius: float) -> None:
     middle = axes.transData.transform(place)
     for note in axes.texts:
         box = note.get_window_extent()
-        assert np.hypot(*(np.clip(middle, box.min, box.max) - middle)) > radius * axes.figure.dpi / 72.0, (
-            note.get_text()
-        )
+        assert (
+            np.hypot(*(np.clip(middle, box.min, box.max) - middle))
+            > radius * axes.figure.dpi / 72.0
+        ), note.get_text()
 
 
 @cache
@@ -144,7 +175,9 @@ def compared_text(text: str, names: tuple[str, ...] = CLASSIC) -> Comparison:
 
 def tree(page: Page | str) -> Node:
     """What a page holds."""
-    return parsed((page if isinstance(page, str) else page_html(page)).removeprefix("<!DOCTYPE html>"))
+    return parsed(
+        (page if isinstance(page, str) else page_html(page)).removeprefix("<!DOCTYPE html>")
+    )
 
 
 def downloaded(link: Node) -> str:

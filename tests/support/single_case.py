@@ -1,4 +1,6 @@
-"""One case as a spacecraft and a schedule of its own, so that everything that flies those can fly it."""
+"""One case as a spacecraft and a schedule of its own, so that everything that flies those can fly
+it.
+"""
 
 from dataclasses import replace
 
@@ -19,11 +21,17 @@ Array = NDArray[np.float64]
 
 
 def timed(model: DispersedModel, cases: DispersedCases) -> DispersedCases:
-    """The ``cases`` with the starts, and the impulses, that their own Sun pulses give; else as they are."""
+    """The ``cases`` with the starts, and the impulses, that their own Sun pulses give; else as they
+    are.
+    """
     if not model.schedule.blocks:
         return cases
-    count, dynamics = number_of(cases), make_dynamics(model.spacecraft)
-    moments, rates = (np.array([np.broadcast_to(part, count) for part in of]) for of in (cases.moments, cases.omega0))
+    count = number_of(cases)
+    dynamics = make_dynamics(model.spacecraft)
+    moments, rates = (
+        np.array([np.broadcast_to(part, count) for part in of])
+        for of in (cases.moments, cases.omega0)
+    )
     upright = np.tile([[1.0], [0.0], [0.0], [0.0]], count)
     bodies = batch.Bodies(moments, dynamics.constant, dynamics.forcing._replace(wheel=cases.wheel))
     nominal = propagated.RealWidths(model).seen_nominally
@@ -34,9 +42,13 @@ def timed(model: DispersedModel, cases: DispersedCases) -> DispersedCases:
 
 
 def realised(model: DispersedModel, draws: Draws) -> tuple[Spacecraft, Schedule]:
-    """The true spacecraft, its attitude in the frame of the estimate, and the pulses that it really gets."""
-    body, case = model.spacecraft, timed(model, model.cases(draws))
-    pulses, spent = [], case.spent or (None,) * len(case.starts)
+    """The true spacecraft, its attitude in the frame of the estimate, and the pulses that it really
+    gets.
+    """
+    body = model.spacecraft
+    case = timed(model, model.cases(draws))
+    pulses = []
+    spent = case.spent or (None,) * len(case.starts)
     for number, (planned, used) in enumerate(zip(model.schedule, spent, strict=True)):
         width, start = case.widths[number], case.starts[number]
         impulse = np.array(case.impulses[number], dtype=float).reshape(3)
@@ -46,18 +58,23 @@ def realised(model: DispersedModel, draws: Draws) -> tuple[Spacecraft, Schedule]
         if case.thrust[number]:
             begin = float(np.squeeze(start - case.leads[number]))
             pulses += [
-                _thrusting(planned, begin, one, propellant, len(case.thrust[number])) for one in case.thrust[number]
+                _thrusting(planned, begin, one, propellant, len(case.thrust[number]))
+                for one in case.thrust[number]
             ]
         elif planned.command is not None:
             moved = planned.moved(t - planned.t)
             pulses.append(replace(moved, impulse=impulse, torque=torque, propellant=propellant))
         else:
-            pulses.append(Pulse(t, planned.on_time, planned.channel, impulse, torque, propellant=propellant))
+            pulses.append(
+                Pulse(t, planned.on_time, planned.channel, impulse, torque, propellant=propellant)
+            )
     tilt = np.array([*case.tilt, 0.0], dtype=float)
     angle = float(np.linalg.norm(tilt))
     turn = np.array([np.cos(0.5 * angle), *(0.5 * np.sinc(0.5 * angle / np.pi) * tilt)])
     axes = body.inertia.axes
-    quaternion = attitude.multiply(attitude.multiply(body.initial.quaternion, turn), attitude.from_matrix(axes.T))
+    quaternion = attitude.multiply(
+        attitude.multiply(body.initial.quaternion, turn), attitude.from_matrix(axes.T)
+    )
     first, second, third = (float(moment) for moment in case.moments)
     per_kg = None
     if case.per_kg is not None:
@@ -65,7 +82,9 @@ def realised(model: DispersedModel, draws: Draws) -> tuple[Spacecraft, Schedule]
         per_kg = one, two, three
     true = replace(
         body,
-        inertia=replace(body.inertia, moments=(first, second, third), wheel=float(np.squeeze(case.wheel))),
+        inertia=replace(
+            body.inertia, moments=(first, second, third), wheel=float(np.squeeze(case.wheel))
+        ),
         omega0=np.array(case.omega0, dtype=float),
         attitude=Attitude(quaternion),
         tank=None if body.tank is None else replace(body.tank, inertia_per_kg=per_kg),
@@ -73,22 +92,45 @@ def realised(model: DispersedModel, draws: Draws) -> tuple[Spacecraft, Schedule]
     return true, Schedule(tuple(pulses))
 
 
-def _thrusting(planned: Pulse, start: float, one: Thrusting, propellant: float | None, count: int) -> Pulse:
-    """What one of ``count`` thrusters gives of a pulse, as a pulse of its own; its command begins at ``start`` s."""
+def _thrusting(
+    planned: Pulse, start: float, one: Thrusting, propellant: float | None, count: int
+) -> Pulse:
+    """What one of ``count`` thrusters gives of a pulse, as a pulse of its own; its command begins
+    at ``start`` s.
+    """
     acts, centroid, _ = (float(np.squeeze(part)) for part in one.opened.acts)
     ramps = []
-    for begin, length, level, lean in (tuple(float(np.squeeze(part)) for part in piece) for piece in one.opened.pieces):
+    for begin, length, level, lean in (
+        tuple(float(np.squeeze(part)) for part in piece) for piece in one.opened.pieces
+    ):
         if start + begin + length > start + begin:
-            ramps.append(Ramp(start + begin, start + begin + length, level * (1.0 - lean), level * (1.0 + lean)))
+            ramps.append(
+                Ramp(
+                    start + begin,
+                    start + begin + length,
+                    level * (1.0 - lean),
+                    level * (1.0 + lean),
+                )
+            )
     torque = np.array([float(np.squeeze(part)) for part in one.torque])
     assert planned.command is not None
     command = Command(start, planned.command.on_time, tuple(ramps))
     used = None if propellant is None else propellant / count
-    return Pulse(start + centroid, acts, planned.channel, acts * torque, torque, propellant=used, command=command)
+    return Pulse(
+        start + centroid,
+        acts,
+        planned.channel,
+        acts * torque,
+        torque,
+        propellant=used,
+        command=command,
+    )
 
 
 def flown_outputs(model: DispersedModel, draws: Draws) -> Array:
-    """The outputs (5,) of one case with real pulse widths, true moments and disturbances, by `propagation.flown`."""
+    """The outputs (5,) of one case with real pulse widths, true moments and disturbances, by
+    `propagation.flown`.
+    """
     true, schedule = realised(model, draws)
     made = propagation.flown(true, schedule)
     settled, left = made.settled, made.residual

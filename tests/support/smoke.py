@@ -1,9 +1,11 @@
-"""Runs every command of an installed nutdamp once, in a temporary folder, with nothing but the standard library.
+"""Runs every command of an installed nutdamp once, in a temporary folder, with nothing but the
+standard library.
 
     python tests/support/smoke.py [NUTDAMP]
 
-NUTDAMP is the program to run, by default the one beside this Python. Prints what went wrong and leaves with 1 where an
-exit status is not the one expected, a traceback or a warning is printed, or a file is missing or not of its kind.
+NUTDAMP is the program to run, by default the one beside this Python. Prints what went wrong and
+leaves with 1 where an exit status is not the one expected, a traceback or a warning is printed, or
+a file is missing or not of its kind.
 """
 
 import json
@@ -104,13 +106,21 @@ check again.yaml
 """.strip().splitlines()
 """One call a line; behind a semicolon the exit statuses that are right, where that is not 0."""
 
-BEGINNINGS = {".png": b"\x89PNG", ".pdf": b"%PDF", ".gif": b"GIF8", ".svg": b"<?xml", ".html": b"<!doctype"}
+BEGINNINGS = {
+    ".png": b"\x89PNG",
+    ".pdf": b"%PDF",
+    ".gif": b"GIF8",
+    ".svg": b"<?xml",
+    ".html": b"<!doctype",
+}
 """How a file of a kind begins."""
 
 
 def main() -> int:
     """Run all; 1 where something is wrong."""
-    program = str(Path(sys.argv[1]).absolute() if sys.argv[1:] else Path(sys.executable).with_name("nutdamp"))
+    program = str(
+        Path(sys.argv[1]).absolute() if sys.argv[1:] else Path(sys.executable).with_name("nutdamp")
+    )
     with tempfile.TemporaryDirectory() as folder:
         faults = list(_faults(program, Path(folder)))
     for fault in faults:
@@ -127,13 +137,18 @@ def _faults(program: str, folder: Path) -> Iterator[str]:
     def run(arguments: str) -> subprocess.CompletedProcess[str]:
         environment = {**os.environ, "COLUMNS": "80", "NO_COLOR": "1", "PYTHONUTF8": "1"}
         command = [program, *shlex.split(arguments)]
-        return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
+        return subprocess.run(
+            command, cwd=folder, env=environment, capture_output=True, text=True, check=False
+        )
 
     for line in CALLS:
         arguments, _, statuses = line.partition("; ")
         done = run(arguments)
         if str(done.returncode) not in (statuses or "0").split():
-            yield f"nutdamp {arguments}: exit status {done.returncode}, expected {statuses or 0}\n{done.stderr}"
+            yield (
+                f"nutdamp {arguments}: exit status {done.returncode}, "
+                f"expected {statuses or 0}\n{done.stderr}"
+            )
         elif re.search(r"Traceback|Warning", done.stderr):
             yield f"nutdamp {arguments}:\n{done.stderr}"
         for name in re.findall(r"(?:--json|--csv|--plot|--schedules|-o) (\S+)", arguments):

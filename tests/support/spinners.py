@@ -1,4 +1,6 @@
-"""Spinners that are commanded by blocks, and their flight by an integrator that shares nothing with the planner."""
+"""Spinners that are commanded by blocks, and their flight by an integrator that shares nothing with
+the planner.
+"""
 
 import itertools
 import math
@@ -35,11 +37,19 @@ requirement: {nutation: 0.3 deg, momentum_shift: 0.1 deg}
 """A spinner that is commanded by blocks, as a file."""
 
 
-def commanded(body: Spacecraft, sun: Array, azimuth: float = 0.4, grid: int = 500, widths: int = 40) -> Spacecraft:
-    """The body with a Sun, a sensor, and blocks of delays and widths in steps of a spin turn over ``grid``."""
+def commanded(
+    body: Spacecraft, sun: Array, azimuth: float = 0.4, grid: int = 500, widths: int = 40
+) -> Spacecraft:
+    """The body with a Sun, a sensor, and blocks of delays and widths in steps of a spin turn over
+    ``grid``.
+    """
     turn = 2.0 * math.pi / abs(body.spin)
     commands = Commands(
-        turn / grid, turn * (1.0 - 1.0 / grid), np.arange(4.0, 4.0 + widths) * (turn / 400), 255, (1, 2)
+        turn / grid,
+        turn * (1.0 - 1.0 / grid),
+        np.arange(4.0, 4.0 + widths) * (turn / 400),
+        255,
+        (1, 2),
     )
     return replace(
         body,
@@ -51,37 +61,54 @@ def commanded(body: Spacecraft, sun: Array, azimuth: float = 0.4, grid: int = 50
 
 
 def some_body(seed: int, *, target: bool = True) -> Spacecraft:
-    """A spinner from rest, or nutating a little, with a target 1 to 60 deg away; the Sun is not near its axis."""
+    """A spinner from rest, or nutating a little, with a target 1 to 60 deg away; the Sun is not
+    near its axis.
+    """
     rng = np.random.default_rng(seed)
-    A, spin = 100.0, rng.choice([-1.0, 1.0]) * rng.uniform(0.3, 3.0)
+    A = 100.0
+    spin = rng.choice([-1.0, 1.0]) * rng.uniform(0.3, 3.0)
     C = A * rng.choice([rng.uniform(0.4, 0.85), rng.uniform(1.15, 1.9)])
     turn = rng.uniform(1.0, 60.0)
     torque = C * spin**2 * math.radians(turn) * rng.uniform(0.15, 1.0)
-    body = spinner(A, C, spin, rng.choice([0.0, 0.0, 0.3]), rng.uniform(0.0, 6.0), channels=cross(torque))
+    body = spinner(
+        A, C, spin, rng.choice([0.0, 0.0, 0.3]), rng.uniform(0.0, 6.0), channels=cross(torque)
+    )
     while True:
         sun = rng.normal(size=3)
         sun /= np.linalg.norm(sun)
         aim = aimed(body, turn, rng.uniform(0.0, 360.0))
-        ends = [float(attitude.angle_between(sun, axis)) for axis in (aim.momentum, aim.target_axis)]
+        ends = [
+            float(attitude.angle_between(sun, axis)) for axis in (aim.momentum, aim.target_axis)
+        ]
         if min(*ends, *(math.pi - end for end in ends)) > 0.4:
             return commanded(aim if target else body, sun, rng.uniform(-3.0, 3.0))
 
 
-def flown_by_reference(body: Spacecraft, blocks: Iterable[Block]) -> tuple[reference.Motion, list[float]]:
-    """The motion after the last pulse, and when each began: Euler's equations, Sun pulses as their roots."""
+def flown_by_reference(
+    body: Spacecraft, blocks: Iterable[Block]
+) -> tuple[reference.Motion, list[float]]:
+    """The motion after the last pulse, and when each began: Euler's equations, Sun pulses as their
+    roots.
+    """
     moments = np.asarray(body.inertia.moments)
     torques = {one.name: one.torque for one in body.channels}
     assert body.sun is not None
     assert body.sun_sensor is not None
     sun, mark = body.sun, body.sun_sensor.azimuth
     state = np.concatenate([body.omega0, attitude.matrix(body.initial.quaternion).ravel()])
-    now, passed, last, starts = 0.0, 0, -math.inf, []
+    now = 0.0
+    passed = 0
+    last = -math.inf
+    starts = []
     turn = 2.0 * math.pi / abs(body.spin)
 
     def slope(_: float, y: Array, torque: Array) -> Array:
-        w, rotation = y[:3], y[3:].reshape(3, 3)
+        w = y[:3]
+        rotation = y[3:].reshape(3, 3)
         cross_ = np.array([[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]])
-        return np.concatenate([(torque - cross_ @ (moments * w)) / moments, (rotation @ cross_).ravel()])
+        return np.concatenate(
+            [(torque - cross_ @ (moments * w)) / moments, (rotation @ cross_).ravel()]
+        )
 
     def behind(y: Array) -> float:
         """Sine of the angle by which the Sun is past the sensor, and positive cosine near it."""
@@ -93,10 +120,19 @@ def flown_by_reference(body: Spacecraft, blocks: Iterable[Block]) -> tuple[refer
         return bool(math.cos(mark) * seen[0] + math.sin(mark) * seen[1] > 0.0)
 
     def move(until: float, torque: Array, *, stops: bool = False) -> list[float]:
-        """Sun pulses on the way; ``state`` and ``now`` go on, to the first one where it ``stops`` there."""
+        """Sun pulses on the way; ``state`` and ``now`` go on, to the first one where it ``stops``
+        there.
+        """
         nonlocal state, now
         found = solve_ivp(
-            slope, (now, until), state, method="DOP853", rtol=1e-11, atol=1e-13, args=(torque,), dense_output=True
+            slope,
+            (now, until),
+            state,
+            method="DOP853",
+            rtol=1e-11,
+            atol=1e-13,
+            args=(torque,),
+            dense_output=True,
         )
         at = found.sol
         assert at is not None
@@ -108,16 +144,20 @@ def flown_by_reference(body: Spacecraft, blocks: Iterable[Block]) -> tuple[refer
             if pair[0] * pair[1] < 0.0 and before(at(edge[0]))
         ]
         stop = next((root for root in roots if root > last + 0.3 * turn), until) if stops else until
-        state, now, roots = at(stop), stop, [root for root in roots if root <= stop]
+        state = at(stop)
+        now = stop
+        roots = [root for root in roots if root <= stop]
         return [float(root) for root in roots]
 
-    none, due = np.zeros(3), {}
+    none = np.zeros(3)
+    due = {}
     for block in blocks:
         due.update({block.first + k * block.every: block for k in range(block.count)})
     while due:
         for root in move(now + 0.05 * turn, none, stops=True) if min(due) > passed else []:
             if root > last + 0.3 * turn:
-                passed, last = passed + 1, root
+                passed = passed + 1
+                last = root
         if passed >= min(due):
             block = due.pop(min(due))
             starts.append(last + block.delay)
@@ -126,5 +166,6 @@ def flown_by_reference(body: Spacecraft, blocks: Iterable[Block]) -> tuple[refer
             seen += move(starts[-1] + block.width, torques[block.channel])
             for root in seen:
                 if root > last + 0.3 * turn:
-                    passed, last = passed + 1, root
+                    passed = passed + 1
+                    last = root
     return reference.Motion(state[:3], state[3:].reshape(3, 3)), starts

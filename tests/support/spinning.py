@@ -1,4 +1,6 @@
-"""Bodies and spins that the tables of unit/physics run over, and their motion under torques that change with time."""
+"""Bodies and spins that the tables of unit/physics run over, and their motion under torques that
+change with time.
+"""
 
 import math
 from collections.abc import Callable, Sequence
@@ -14,8 +16,12 @@ EPS = float(np.finfo(float).eps)
 BODIES = [(120.0, 80.0), (80.0, 120.0), (100.0, 100.0), (100.0, 200.0), (100.0, 5.0)]
 """A, C of a prolate and an oblate body, a sphere, a flat disc and a needle."""
 
-spinners = pytest.mark.parametrize(("A", "C", "spin"), [(*body, spin) for body in BODIES for spin in (3.0, -3.0)])
-plain_spinners = pytest.mark.parametrize(("A", "C", "spin"), [(*b, spin) for b in BODIES[:2] for spin in (3.0, -3.0)])
+spinners = pytest.mark.parametrize(
+    ("A", "C", "spin"), [(*body, spin) for body in BODIES for spin in (3.0, -3.0)]
+)
+plain_spinners = pytest.mark.parametrize(
+    ("A", "C", "spin"), [(*b, spin) for b in BODIES[:2] for spin in (3.0, -3.0)]
+)
 
 
 def about(axis: Array | Sequence[float], angle: float) -> Array:
@@ -29,7 +35,9 @@ def turning(*torques: tuple[complex, float]) -> Callable[[float], tuple[float, f
     """Torque at each moment of transverse torques (N m) that turn in the body at so many rad/s."""
 
     def torque(t: float) -> tuple[float, float, float]:
-        total = sum((size * complex(math.cos(rate * t), math.sin(rate * t)) for size, rate in torques), 0j)
+        total = sum(
+            (size * complex(math.cos(rate * t), math.sin(rate * t)) for size, rate in torques), 0j
+        )
         return total.real, total.imag, 0.0
 
     return torque
@@ -44,7 +52,8 @@ def driven(
 ) -> list[Motion]:
     """The motion at ``times[1:]`` under a body torque, from ``motion`` at ``times[0]``, by DOP853.
 
-    With a ``growth`` κ dissipation adds κ H1 cos²θ, κ H2 cos²θ, -κ H3 sin²θ, and the attitude slips as |H| stays.
+    With a ``growth`` κ dissipation adds κ H1 cos²θ, κ H2 cos²θ, -κ H3 sin²θ, and the attitude slips
+    as |H| stays.
     """
     A, B, C = (float(one) for one in moments)
 
@@ -62,6 +71,8 @@ def driven(
         return [*rates, *_turning(rotation, p + slip * B * q, q - slip * A * p, r)]
 
     start = np.concatenate([motion.rates, motion.rotation.ravel()])
-    flown = solve_ivp(slope, (times[0], times[-1]), start, "DOP853", times[1:], rtol=RTOL, atol=0.1 * RTOL)
+    flown = solve_ivp(
+        slope, (times[0], times[-1]), start, "DOP853", times[1:], rtol=RTOL, atol=0.1 * RTOL
+    )
     assert flown.success
     return [Motion(y[:3], y[3:].reshape(3, 3)) for y in flown.y.T]

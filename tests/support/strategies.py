@@ -28,17 +28,24 @@ def triaxial_spinners(draw: st.DrawFn) -> Spacecraft:
     """Triangle inequality kept: I1 = y² + z² and round of a mass distribution."""
     x, y, z = (draw(st.floats(30.0, 80.0)) for _ in range(3))
     return spinner(
-        spin=draw(spins), degrees=draw(st.floats(0.1, 60.0)), phase=draw(angles), moments=(y + z, z + x, x + y)
+        spin=draw(spins),
+        degrees=draw(st.floats(0.1, 60.0)),
+        phase=draw(angles),
+        moments=(y + z, z + x, x + y),
     )
 
 
 @st.composite
 def schedules(draw: st.DrawFn, *, ideal: bool = False, axial: bool = True) -> Schedule:
-    """Up to five pulses of different channels, which may overlap; widths from none to longer than a nutation."""
+    """Up to five pulses of different channels, which may overlap; widths from none to longer than a
+    nutation.
+    """
     pulses = []
     for index in range(draw(st.integers(0, 5))):
         on_time = 0.0 if ideal else draw(st.sampled_from([0.0, 0.01]) | st.floats(0.05, 3.0))
         t = draw(st.floats(0.5 * on_time, UNTIL - 0.5 * on_time))
-        impulse = [draw(st.floats(-40.0, 40.0)) for _ in range(2)] + [draw(st.floats(-60.0, 60.0)) if axial else 0.0]
+        impulse = [draw(st.floats(-40.0, 40.0)) for _ in range(2)] + [
+            draw(st.floats(-60.0, 60.0)) if axial else 0.0
+        ]
         pulses.append(pulse(t, on_time, np.array(impulse), f"T{index}"))
     return Schedule(tuple(pulses))

@@ -1,4 +1,6 @@
-"""Synthetic telemetry by DOP853 (tests/reference.py) with noise, gaps, outliers, steps and biases."""
+"""Synthetic telemetry by DOP853 (tests/reference.py) with noise, gaps, outliers,
+steps and biases.
+"""
 
 import math
 from dataclasses import dataclass
@@ -22,7 +24,9 @@ GYRO_BIAS = math.radians(0.02)
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """A file, the record of a body that differs from it, and the true values of what is estimated."""
+    """A file, the record of a body that differs from it,
+    and the true values of what is estimated.
+    """
 
     spacecraft: nutdamp.Spacecraft
     record: Record
@@ -30,7 +34,9 @@ class Case:
     noise: float
 
 
-def motion(moments: tuple[float, float, float], rates: Array, times: Array, growth: float = 0.0) -> Array:
+def motion(
+    moments: tuple[float, float, float], rates: Array, times: Array, growth: float = 0.0
+) -> Array:
     """Body rates (n, 3) at ``times`` (n,) s from 0, rad/s."""
     start = reference.Motion(rates, np.eye(3))
     still = np.zeros(3)
@@ -44,7 +50,9 @@ def motion(moments: tuple[float, float, float], rates: Array, times: Array, grow
 
 
 def gyro_case(seed: int) -> Case:
-    """A minute of gyro data or so of a prolate or oblate body of either sense of spin, drawn by ``seed``."""
+    """A minute of gyro data or so of a prolate or oblate body of either sense of spin, drawn by
+    ``seed``.
+    """
     draw = np.random.default_rng([16, seed])
     prolate = seed % 2 == 0
     A = 120.0
@@ -56,7 +64,11 @@ def gyro_case(seed: int) -> Case:
         {
             "name": "synthetic",
             "inertia": {"A": A, "C": C},
-            "state": {"spin": spin, "nutation": f"{math.degrees(nutation)} deg", "phase": f"{math.degrees(phase)} deg"},
+            "state": {
+                "spin": spin,
+                "nutation": f"{math.degrees(nutation)} deg",
+                "phase": f"{math.degrees(phase)} deg",
+            },
             "dispersions": {"A": {"normal": "0.5 %"}, "C": {"normal": "0.5 %"}},
         }
     )
@@ -66,8 +78,13 @@ def gyro_case(seed: int) -> Case:
     growing = draw.uniform() < 0.5
     truth["growth"] = draw.uniform(0.0005, 0.003) * (1.0 if prolate else -1.0) if growing else 0.0
     period = 2.0 * math.pi / abs(1.0 - truth["C"] / truth["A"]) / abs(spin)
-    length, count = draw.uniform(3.0, 12.0) * period, int(draw.integers(150, 500))
-    times = np.sort(draw.uniform(0.0, length, count)) if draw.uniform() < 0.3 else np.linspace(0.0, length, count)
+    length = draw.uniform(3.0, 12.0) * period
+    count = int(draw.integers(150, 500))
+    times = (
+        np.sort(draw.uniform(0.0, length, count))
+        if draw.uniform() < 0.3
+        else np.linspace(0.0, length, count)
+    )
     times -= times[0]
     rates_ = motion((truth["A"], truth["A"], truth["C"]), rates, times, truth["growth"])
     tilt = math.radians(1.0) * draw.normal(size=2)
@@ -79,7 +96,9 @@ def gyro_case(seed: int) -> Case:
     shown = turned + bias + noise * draw.normal(size=turned.shape)
     outliers = draw.uniform(size=shown.shape) < draw.choice([0.0, 0.01, 0.03])
     shown = np.where(
-        outliers, shown + noise * draw.choice([-1.0, 1.0], shown.shape) * draw.uniform(15, 500, shown.shape), shown
+        outliers,
+        shown + noise * draw.choice([-1.0, 1.0], shown.shape) * draw.uniform(15, 500, shown.shape),
+        shown,
     )
     if draw.uniform() < 0.5:  # steps up to twice the noise
         step = draw.uniform(0.5, 2.0) * noise

@@ -1,4 +1,6 @@
-"""Synthetic telemetry of every kind of column, as CSV files: bodies within the tolerances of files, flown by DOP853."""
+"""Synthetic telemetry of every kind of column, as CSV files: bodies within the tolerances of files,
+flown by DOP853.
+"""
 
 import math
 from dataclasses import dataclass
@@ -46,7 +48,9 @@ FARTHEST = math.cos(math.radians(25.0))
 
 @dataclass(frozen=True, eq=False)
 class Telemetry:
-    """A file, the record of a body that differs from it, and the true values of what may be estimated."""
+    """A file, the record of a body that differs from it, and the true values of what may be
+    estimated.
+    """
 
     spacecraft: nutdamp.Spacecraft
     record: Record
@@ -55,9 +59,12 @@ class Telemetry:
 
 
 def file_of(draw: np.random.Generator, seed: int) -> tuple[nutdamp.Spacecraft, bool]:
-    """A spacecraft file, and whether it is prolate; the Sun is so far from the axis that it goes round the sensor."""
+    """A spacecraft file, and whether it is prolate; the Sun is so far from the axis that it goes
+    round the sensor.
+    """
     body, prolate = _any_file(draw, seed)
-    again, up = np.random.default_rng([18, seed]), np.array([0.0, 0.0, 1.0])
+    again = np.random.default_rng([18, seed])
+    up = np.array([0.0, 0.0, 1.0])
     assert body.sun is not None
     while abs(float(attitude.rotate(body.initial.quaternion, up) @ body.sun)) > FARTHEST:
         facing = again.normal(size=4)
@@ -89,7 +96,12 @@ def _any_file(draw: np.random.Generator, seed: int) -> tuple[nutdamp.Spacecraft,
             "sun_sensor": {"azimuth": "35 deg"},
             "thrusters": [{"name": "T1", "torque": [8, 0, 0]}, {"name": "T2", "torque": [0, 8, 0]}],
             "loop": {
-                "sensor": {"kind": "accelerometer", "rate": "10 Hz", "position": ["0.8 m", 0, 0], "axis": [0, 0, 1]},
+                "sensor": {
+                    "kind": "accelerometer",
+                    "rate": "10 Hz",
+                    "position": ["0.8 m", 0, 0],
+                    "axis": [0, 0, 1],
+                },
                 "law": "four-pulse",
                 "start": "0.5 deg",
                 "stop": "0.05 deg",
@@ -106,7 +118,9 @@ def _any_file(draw: np.random.Generator, seed: int) -> tuple[nutdamp.Spacecraft,
 
 
 def telemetry(folder: Path, seed: int, kind: tuple[str, ...] | None = None) -> Telemetry:
-    """The record of number ``seed``, of a kind or that whose turn it is, through a CSV file in ``folder``."""
+    """The record of number ``seed``, of a kind or that whose turn it is, through a CSV file in
+    ``folder``.
+    """
     draw = np.random.default_rng([17, seed])
     kind = kind or KINDS[seed % len(KINDS)]
     body, prolate = file_of(draw, seed)
@@ -115,7 +129,9 @@ def telemetry(folder: Path, seed: int, kind: tuple[str, ...] | None = None) -> T
     turn = np.array([*(ATTITUDE * draw.normal(size=2)), draw.uniform(-1.0, 1.0)])
     if kind in (("radec",), ("axis",)):  # which do not show how the body is turned about the axis
         turn[2] = 0.0
-    truth = {"A": A, "C": C, "C/A": C / A} | {f"omega_{at + 1}": float(one) for at, one in enumerate(rates)}
+    truth = {"A": A, "C": C, "C/A": C / A} | {
+        f"omega_{at + 1}": float(one) for at, one in enumerate(rates)
+    }
     truth |= {f"attitude_{at + 1}": float(one) for at, one in enumerate(turn)}
     growing = draw.uniform() < 0.4 and "fired" not in kind
     truth["growth"] = draw.uniform(0.0005, 0.003) * (1.0 if prolate else -1.0) if growing else 0.0
@@ -124,12 +140,16 @@ def telemetry(folder: Path, seed: int, kind: tuple[str, ...] | None = None) -> T
     turned = np.array([math.cos(0.5 * turn[2]), 0.0, 0.0, math.sin(0.5 * turn[2])])
     quaternion = attitude.multiply(body.initial.quaternion, attitude.multiply(tilted, turned))
     period = 2.0 * math.pi / abs(1.0 - C / A) / abs(rates[2])
-    length, count = draw.uniform(4.0, 12.0) * period, int(draw.integers(200, 500))
+    length = draw.uniform(4.0, 12.0) * period
+    count = int(draw.integers(200, 500))
     times: Array = np.linspace(0.0, length, count).round(6)
     fired = _fired(draw, body, length) if "fired" in kind else Schedule()
-    flight = _Flight((A, A, C), reference.Motion(rates, attitude.matrix(quaternion)), truth, draw, fired, length)
+    flight = _Flight(
+        (A, A, C), reference.Motion(rates, attitude.matrix(quaternion)), truth, draw, fired, length
+    )
     columns = _columns(draw, kind, body, flight, times, truth)
-    path, sun = folder / f"{seed}.csv", None
+    path = folder / f"{seed}.csv"
+    sun = None
     utc = draw.uniform() < 0.3
     begin = Epoch.parse(EPOCH)
     stamps = [begin.plus(float(one)).text if utc else f"{one:.6f}" for one in times]
@@ -151,7 +171,9 @@ def telemetry(folder: Path, seed: int, kind: tuple[str, ...] | None = None) -> T
 
 def _fired(draw: np.random.Generator, body: nutdamp.Spacecraft, length: float) -> Schedule:
     pulses = zip(body.channels, (0.3, 0.65), strict=True)
-    return Schedule(tuple(channel_pulse(one, share * length, draw.uniform(0.3, 0.8)) for one, share in pulses))
+    return Schedule(
+        tuple(channel_pulse(one, share * length, draw.uniform(0.3, 0.8)) for one, share in pulses)
+    )
 
 
 class _Flight:
@@ -167,13 +189,18 @@ class _Flight:
         length: float,
     ) -> None:
         """Draws thrust factors and delays of the channels of ``fired`` into ``truth``."""
-        self.moments, self.growth = moments, truth["growth"]
+        self.moments = moments
+        self.growth = truth["growth"]
         self.begins = [(0.0, start, np.zeros(3))]
         for pulse in fired:
-            factor, late = 1.0 + 0.03 * draw.normal(), 0.05 * draw.normal()
+            factor = 1.0 + 0.03 * draw.normal()
+            late = 0.05 * draw.normal()
             truth |= {f"thrust {pulse.channel}": factor, f"delay {pulse.channel}": late}
             assert pulse.torque is not None
-            for time, torque in ((pulse.start + late, factor * pulse.torque), (pulse.end + late, np.zeros(3))):
+            for time, torque in (
+                (pulse.start + late, factor * pulse.torque),
+                (pulse.end + late, np.zeros(3)),
+            ):
                 self.begins.append((time, self.at(np.array([time]))[0], torque))
         self.length = length
 
@@ -194,9 +221,11 @@ class _Flight:
         return found
 
     def change(self, rates: Array) -> Array:
-        """dω/dt (n, 3) on a coast: H stands still in space, and the body turns with ω and what dissipation adds.
+        """dω/dt (n, 3) on a coast: H stands still in space, and the body turns with ω and what
+        dissipation adds.
 
-        Not by differences of the motion, whose errors are as large as the noise of an accelerometer.
+        Not by differences of the motion, whose errors are as large as the noise of an
+        accelerometer.
         """
         momentum = rates * np.array(self.moments)
         along = momentum / np.linalg.norm(momentum, axis=1, keepdims=True)
@@ -224,8 +253,11 @@ def _columns(
     times: Array,
     truth: dict[str, float],
 ) -> dict[str, Array]:
-    """Columns with noise, outliers, steps and gaps; what their sensors are off goes into ``truth``."""
-    motions, made = flight.at(times), {}
+    """Columns with noise, outliers, steps and gaps;
+    what their sensors are off goes into ``truth``.
+    """
+    motions = flight.at(times)
+    made = {}
     rates = np.array([one.rates for one in motions])
     noise = 10.0 ** draw.uniform(-2.5, -1.3) * math.pi / 180.0
     sense = math.copysign(1.0, body.spin)
@@ -242,7 +274,8 @@ def _columns(
             values = _spoilt(draw, shown[:, int(number) - 1], noise)
             made[f"omega_{number}_{unit}"] = values * factor
     if "acceleration" in kind:
-        arm, change = np.array([0.8, 0.0, 0.0]), flight.change(rates)
+        arm = np.array([0.8, 0.0, 0.0])
+        change = flight.change(rates)
         truth["bias_acceleration"] = 0.002
         felt = (np.cross(change, arm) + np.cross(rates, np.cross(rates, arm)))[:, 2] + 0.002
         made["acceleration_m_s2"] = _spoilt(draw, felt, 0.3 * noise)
@@ -266,7 +299,9 @@ def _columns(
         assert body.sun is not None
         to = np.array([-0.6, 0.64, 0.48]) if "star" in kind else body.sun
         x, y, z = np.array([one.rotation.T @ to for one in motions]).T
-        made["crossing_azimuth_deg"] = np.degrees(np.arctan2(y, x) + noise * draw.normal(size=len(x)))
+        made["crossing_azimuth_deg"] = np.degrees(
+            np.arctan2(y, x) + noise * draw.normal(size=len(x))
+        )
         made["crossing_elevation_deg"] = np.degrees(np.arcsin(z) + noise * draw.normal(size=len(x)))
         if "star" in kind:
             made["crossing_ra_deg"] = np.full(len(x), math.degrees(math.atan2(to[1], to[0])))
@@ -289,4 +324,6 @@ def _spoilt(draw: np.random.Generator, values: Array, noise: float) -> Array:
     if draw.uniform() < 0.3:
         step = draw.uniform(0.5, 1.5) * noise
         shown = np.rint(shown / step) * step
-    return np.asarray(np.where(draw.uniform(size=len(values)) < draw.choice([0.0, 0.2]), math.nan, shown))
+    return np.asarray(
+        np.where(draw.uniform(size=len(values)) < draw.choice([0.0, 0.2]), math.nan, shown)
+    )

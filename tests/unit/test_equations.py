@@ -1,4 +1,6 @@
-"""Each numbered equation has a place in the code and a test; those without a test of their own are checked here."""
+"""Each numbered equation has a place in the code and a test; those without a test of their own are
+checked here.
+"""
 
 import itertools
 from importlib import import_module
@@ -17,15 +19,26 @@ from nutdamp.views.guide import EQUATIONS
 
 PHYSICS = Path(__file__).parent / "physics"
 TESTED = {
-    "test_forced.py::test_stepwise_torques_8_9_10": [f"M({number})" for number in (1, 2, 3, 5, 6, 8, 9, 10)],
+    "test_forced.py::test_stepwise_torques_8_9_10": [
+        f"M({number})" for number in (1, 2, 3, 5, 6, 8, 9, 10)
+    ],
     "test_inertia.py::test_magnus_4_ratio_and_shape": ["M(4)"],
-    "test_attitude.py::test_magnus_17_steps_at_the_moment_of_an_impulse_and_turns_at_minus_a_omega3": ["M(7)"],
+    "test_attitude.py::test_magnus_17_steps_at_the_moment_of_an_impulse_and_turns_at_minus_a_omega3": [
+        "M(7)"
+    ],
     "test_forced.py::test_constant_torque_11_circles_the_centre_of_its_pole_cone": ["M(11)"],
     "test_attitude.py::test_magnus_12_omega_is_back_in_the_body_after_t_omega": ["M(12)"],
-    "test_forced.py::test_permanent_rotation_13_stays_and_has_the_euler_angles_14": ["M(13)", "M(14)"],
+    "test_forced.py::test_permanent_rotation_13_stays_and_has_the_euler_angles_14": [
+        "M(13)",
+        "M(14)",
+    ],
     "../test_equations.py::test_a_pulse_in_the_schedule_is_15": ["M(15)"],
     "test_attitude.py::test_magnus_17_is_the_motion": ["M(16)", "M(17)"],
-    "test_attitude.py::test_magnus_18_19_20_are_the_angles_between_the_vectors": ["M(18)", "M(19)", "M(20)"],
+    "test_attitude.py::test_magnus_18_19_20_are_the_angles_between_the_vectors": [
+        "M(18)",
+        "M(19)",
+        "M(20)",
+    ],
     "../test_equations.py::test_one_pulse_21": ["M(21)"],
     "test_attitude.py::test_magnus_21_and_22_made_exact": ["M(22)"],
     "test_forced.py::test_rotating_torques_23_24": ["M(23)", "M(24)"],
@@ -41,8 +54,14 @@ TESTED = {
 """The equations that each test checks."""
 
 
-def test_every_equation_of_magnus_1_to_27_and_kreisel_5_to_15_is_there_once_with_place_and_test() -> None:
-    sources = [*(f"M({number})" for number in range(1, 28)), *(f"K({number})" for number in range(5, 16)), "24.4"]
+def test_every_equation_of_magnus_1_to_27_and_kreisel_5_to_15_is_there_once_with_place_and_test() -> (
+    None
+):
+    sources = [
+        *(f"M({number})" for number in range(1, 28)),
+        *(f"K({number})" for number in range(5, 16)),
+        "24.4",
+    ]
     assert [one.number for one in EQUATIONS] == [*sources, "energy sink", "gyrostat"]
     assert sorted(itertools.chain(*TESTED.values())) == sorted(str(one.number) for one in EQUATIONS)
     for equation in EQUATIONS:

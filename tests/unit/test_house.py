@@ -19,7 +19,9 @@ FLOORS = 22
 """Longest chain of imports, those within functions and for types alone too."""
 
 MOST_MODULES, MOST_OUTSIDE = 136, 112
-"""Modules without the markers of packages, and of them those outside views, figures and the page."""
+"""Modules without the markers of packages, and of them those outside views,
+figures and the page.
+"""
 
 RIDDLES = re.compile(r"(What|Whether|How|Which|That|Why|Where|When)\b")
 """First words of a docstring that does not say what the thing is."""
@@ -37,7 +39,9 @@ def trees() -> dict[str, ast.Module]:
 def documented(tree: ast.Module) -> Iterator[str]:
     """The docstrings of a module, its classes and its functions."""
     for node in ast.walk(tree):
-        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and (text := ast.get_docstring(node)):
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and (
+            text := ast.get_docstring(node)
+        ):
             yield text
 
 
@@ -48,37 +52,54 @@ def test_packages_are_folders_and_nothing_more() -> None:
 
 
 def test_a_module_can_be_read_in_a_sitting() -> None:
-    lines = {path: len((PACKAGE / path).read_text(encoding="utf-8").splitlines()) for path in trees()}
+    lines = {
+        path: len((PACKAGE / path).read_text(encoding="utf-8").splitlines()) for path in trees()
+    }
     assert {path: count for path, count in lines.items() if count > LONGEST} == {}
-    short = {path for path, count in lines.items() if count < SHORTEST and not path.endswith("__.py")}
+    short = {
+        path for path, count in lines.items() if count < SHORTEST and not path.endswith("__.py")
+    }
     assert {path for path in short if not path.startswith("schemes/")} == set()
 
 
 def test_the_house_can_be_held_in_the_head() -> None:
     modules = [path for path in trees() if not path.endswith("__init__.py")]
     assert len(modules) <= MOST_MODULES
-    assert len([path for path in modules if not path.startswith(("views/", "figures/", "page/"))]) <= MOST_OUTSIDE
+    assert (
+        len([path for path in modules if not path.startswith(("views/", "figures/", "page/"))])
+        <= MOST_OUTSIDE
+    )
 
 
 @cache
 def imported(module: str) -> frozenset[str]:
-    """Modules of the package that a module imports, anywhere in it, by their names below the package."""
+    """Modules of the package that a module imports, anywhere in it, by their names below the
+    package.
+    """
     names = set()
     for node in ast.walk(trees()[f"{module.replace('.', '/')}.py"]):
         if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("nutdamp"):
             base = (node.module or "").removeprefix("nutdamp").removeprefix(".")
             names |= {f"{base}.{alias.name}".removeprefix(".") for alias in node.names} | {base}
-    return frozenset(name for name in names if name != module and f"{name.replace('.', '/')}.py" in trees())
+    return frozenset(
+        name for name in names if name != module and f"{name.replace('.', '/')}.py" in trees()
+    )
 
 
 @cache
 def chain(module: str) -> tuple[str, ...]:
-    """The longest chain of imports down from a module; fails with RecursionError where they run in a circle."""
+    """The longest chain of imports down from a module; fails with RecursionError where they run in
+    a circle.
+    """
     return (module, *max(map(chain, imported(module)), key=len, default=()))
 
 
 def test_imports_run_down_few_floors_and_never_in_a_circle() -> None:
-    modules = [path.removesuffix(".py").replace("/", ".") for path in trees() if not path.endswith("__init__.py")]
+    modules = [
+        path.removesuffix(".py").replace("/", ".")
+        for path in trees()
+        if not path.endswith("__init__.py")
+    ]
     assert len(max(map(chain, modules), key=len)) <= FLOORS
 
 
@@ -87,12 +108,20 @@ HEADED = {"Column": 1, "Heading": 0}
 
 
 def headings(tree: ast.Module) -> Iterator[str]:
-    """The headings of tables that stand in a module as literals, those of tables without declaration too."""
+    """The headings of tables that stand in a module as literals, those of tables without
+    declaration too.
+    """
     for node in ast.walk(tree):
         if not isinstance(node, ast.Call):
             continue
         name = node.func.id if isinstance(node.func, ast.Name) else getattr(node.func, "attr", "")
-        given = node.args if name == "columns" else node.args[HEADED[name] :][:1] if name in HEADED else []
+        given = (
+            node.args
+            if name == "columns"
+            else node.args[HEADED[name] :][:1]
+            if name in HEADED
+            else []
+        )
         yield from (
             each.value
             for each in given
@@ -106,7 +135,9 @@ def test_a_heading_of_tables_stands_in_one_module() -> None:
         if path.partition("/")[0] in ("views", "figures", "page", "cli"):
             for heading in headings(tree):
                 homes[heading].add(path)
-    shared = next(node for node in trees()["views/tables.py"].body if getattr(node, "name", "") == "Shared")
+    shared = next(
+        node for node in trees()["views/tables.py"].body if getattr(node, "name", "") == "Shared"
+    )
     for node in ast.walk(shared):
         if isinstance(node, ast.Constant) and isinstance(node.value, str):
             homes[node.value].add("views/tables.py")
@@ -149,7 +180,11 @@ def test_docstrings_say_what_a_thing_is(package: str) -> None:
 
 # --- one judgement
 
-REQUIREMENTS, VERDICT, WORDS = "spacecraft/requirements.py", "planning/verdict.py", "views/verdict.py"
+REQUIREMENTS, VERDICT, WORDS = (
+    "spacecraft/requirements.py",
+    "planning/verdict.py",
+    "views/verdict.py",
+)
 REQUIRED = {"nutation", "momentum_shift", "spin"}
 """Fields of a requirement."""
 
@@ -163,18 +198,27 @@ COMPARE = {
 
 SHARES = {
     VERDICT: "share of the cases that keep one bound alone",
-    "planning/chance_plan.py": "trials of margins and of tolerances, whose plans are judged like all others",
-    "planning/screening.py": "shifts of a schedule that is judged, for the phase window of its sheet",
+    "planning/chance_plan.py": (
+        "trials of margins and of tolerances, whose plans are judged like all others"
+    ),
+    "planning/screening.py": (
+        "shifts of a schedule that is judged, for the phase window of its sheet"
+    ),
 }
 """Modules that compare a share of cases with the one required, but give no plan a status by it."""
 
-SAID = re.compile(r"\b((NOT )?met|FLY|NO PULSE|NO PLAN|(NOT )?ENOUGH|NOT SHOWN|CANNOT BE COMMANDED)\b")
+SAID = re.compile(
+    r"\b((NOT )?met|FLY|NO PULSE|NO PLAN|(NOT )?ENOUGH|NOT SHOWN|CANNOT BE COMMANDED)\b"
+)
 WORDED = {
     (VERDICT, "met"): "value of `Light`, the class of a part of the page",
     ("views/dispersion.py", "met"): "key of JSON",
     ("planning/notes.py", "met-without-pulse-from"): "code of a note",
     ("planning/notes.py", "met-without-pulse-until"): "code of a note",
-    ("files/study_rules.py", "given alone; name what must be met with it: nutation, momentum_shift or spin"): "a fault",
+    (
+        "files/study_rules.py",
+        "given alone; name what must be met with it: nutation, momentum_shift or spin",
+    ): "a fault",
 }
 """Texts with a word of the verdict that do not tell one."""
 
@@ -185,7 +229,9 @@ def named(node: ast.AST) -> str:
 
 
 def limits(node: ast.AST, stored: set[str]) -> bool:
-    """True for an expression with the limit of a bound or a field of a requirement, maybe under a name ``stored``."""
+    """True for an expression with the limit of a bound or a field of a requirement, maybe under a
+    name ``stored``.
+    """
     for part in ast.walk(node):
         owner = named(part.value) if isinstance(part, ast.Attribute) else ""
         if owner in ("requirement", "required", "requested") and named(part) in REQUIRED:
@@ -198,33 +244,51 @@ def limits(node: ast.AST, stored: set[str]) -> bool:
 def sizes(node: ast.AST) -> Iterator[list[ast.expr]]:
     """Both sides of the comparisons of sizes in a tree, or all of a chain."""
     for part in ast.walk(node):
-        if isinstance(part, ast.Compare) and isinstance(part.ops[0], ast.Lt | ast.LtE | ast.Gt | ast.GtE):
+        if isinstance(part, ast.Compare) and isinstance(
+            part.ops[0], ast.Lt | ast.LtE | ast.Gt | ast.GtE
+        ):
             yield [part.left, *part.comparators]
 
 
 def judges(function: ast.FunctionDef) -> bool:
-    """True where a function compares something with a limit, by whatever name it has it, or a severity with 1."""
+    """True where a function compares something with a limit, by whatever name it has it, or a
+    severity with 1.
+    """
     stored = set[str]()
     for node in 3 * [*ast.walk(function)]:  # names of names too
-        if isinstance(node, ast.Assign) and not isinstance(node.value, ast.BoolOp) and limits(node.value, stored):
-            stored |= {named(part) for target in node.targets for part in getattr(target, "elts", [target])}
+        if (
+            isinstance(node, ast.Assign)
+            and not isinstance(node.value, ast.BoolOp)
+            and limits(node.value, stored)
+        ):
+            stored |= {
+                named(part) for target in node.targets for part in getattr(target, "elts", [target])
+            }
     return any(
         any(limits(side, stored) for side in sides)
-        or ({"severity", "severities", "shares"} & {*map(named, sides)} and ast.unparse(sides[-1]) == "1.0")
+        or (
+            {"severity", "severities", "shares"} & {*map(named, sides)}
+            and ast.unparse(sides[-1]) == "1.0"
+        )
         for sides in sizes(function)
     )
 
 
 def test_only_the_requirements_compare_a_residual_with_a_bound() -> None:
     functions = [(path, node) for path, tree in trees().items() for node in ast.walk(tree)]
-    judging = {path for path, node in functions if isinstance(node, ast.FunctionDef) and judges(node)}
+    judging = {
+        path for path, node in functions if isinstance(node, ast.FunctionDef) and judges(node)
+    }
     assert judging == {REQUIREMENTS, *COMPARE}
 
 
 def test_only_the_requirements_compare_a_share_with_the_one_required() -> None:
     written = ((path, sides) for path, tree in trees().items() for sides in sizes(tree))
     shares = ((path, sides) for path, sides in written if "probability" in map(named, sides))
-    assert {path for path, sides in shares if not isinstance(sides[-1], ast.Constant)} == {REQUIREMENTS, *SHARES}
+    assert {path for path, sides in shares if not isinstance(sides[-1], ast.Constant)} == {
+        REQUIREMENTS,
+        *SHARES,
+    }
 
 
 def test_only_the_verdict_makes_a_status_and_only_its_view_names_one() -> None:
@@ -238,7 +302,9 @@ def test_only_the_verdict_makes_a_status_and_only_its_view_names_one() -> None:
                 names.add(path)
             elif isinstance(node, ast.Constant) and isinstance(node.value, str) and path != WORDS:
                 words |= {
-                    (path, text) for text in {node.value} if SAID.search(text) and inspect.cleandoc(text) not in prose
+                    (path, text)
+                    for text in {node.value}
+                    if SAID.search(text) and inspect.cleandoc(text) not in prose
                 }
     assert (makes, names) == ({VERDICT}, {VERDICT, WORDS})
     assert words == {*WORDED}

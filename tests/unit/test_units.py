@@ -1,4 +1,6 @@
-"""Quantities with units, as in files and on command lines; errors cross the border between processes whole."""
+"""Quantities with units, as in files and on command lines; errors cross the border between
+processes whole.
+"""
 
 import math
 import pickle
@@ -17,17 +19,35 @@ from nutdamp.units import KINDS, LARGEST, SI, US, parse, pattern, screen_unit, s
 
 UNITS = {
     "mass": {"250 kg": 250.0, "250 g": 0.25, "10 lbm": 4.5359237, "1 slug": 14.593902937206},
-    "length": {"0.8 m": 0.8, "5 mm": 0.005, "5 cm": 0.05, "5 km": 5000.0, "10 ft": 3.048, "10 in": 0.254},
-    "time": {"120 s": 120.0, "20 ms": 0.02, "2 min": 120.0, "2 hours": 7200.0, "3 sec": 3.0, "1 hour": 3600.0},
+    "length": {
+        "0.8 m": 0.8,
+        "5 mm": 0.005,
+        "5 cm": 0.05,
+        "5 km": 5000.0,
+        "10 ft": 3.048,
+        "10 in": 0.254,
+    },
+    "time": {
+        "120 s": 120.0,
+        "20 ms": 0.02,
+        "2 min": 120.0,
+        "2 hours": 7200.0,
+        "3 sec": 3.0,
+        "1 hour": 3600.0,
+    },
     "force": {"10 N": 10.0, "10 mN": 0.01, "5 lbf": 22.241108076303},
     "torque": {
         "8 mN m": 0.008,
         **dict.fromkeys(("10 ft lbf", "10 ft-lbf", "120 in·lbf"), 13.558179483314),
-        **dict.fromkeys(("8Nm", "8 Nm", "8 N m", "8 N*m", "8 N·m", "  8   N   m ", "+8 N m", "8. N m"), 8.0),
+        **dict.fromkeys(
+            ("8Nm", "8 Nm", "8 N m", "8 N*m", "8 N·m", "  8   N   m ", "+8 N m", "8. N m"), 8.0
+        ),
         **dict.fromkeys(("0.8e1 N m", "80E-1N m"), 8.0),
     },
     "inertia": {
-        **dict.fromkeys(("120 kg m^2", "120 kg m²", "120 kgm^2", "120 kg*m²", "120kg·m^2", "120 kg-m^2"), 120.0),
+        **dict.fromkeys(
+            ("120 kg m^2", "120 kg m²", "120 kgm^2", "120 kg*m²", "120kg·m^2", "120 kg-m^2"), 120.0
+        ),
         **dict.fromkeys(("10 slug ft^2", "10 slug-ft²"), 13.558179483314),
         "1e6 lbm in^2": 292.6396534292,
     },
@@ -60,7 +80,10 @@ def test_every_unit_and_its_spellings(kind: str) -> None:
         assert parse(text, kind) == pytest.approx(value, rel=1e-13)  # of NIST SP 811 for US units
         assert re.search(pattern(kind), text)
     spellings = [re.sub(r"[ *·-]*", "", text).replace("²", "^2") for text in UNITS[kind]]
-    assert all(any(text.endswith(unit.replace(" ", "")) for text in spellings) for unit in KINDS[kind].factors)
+    assert all(
+        any(text.endswith(unit.replace(" ", "")) for text in spellings)
+        for unit in KINDS[kind].factors
+    )
 
 
 def test_numbers_are_si_and_a_right_angle_is_half_of_pi() -> None:
@@ -79,15 +102,34 @@ REFUSED: list[tuple[object, str]] = [
         ("5 KG", "mass"),
         ("5 m s", "time"),
     ],
-    *[("120 kg", "inertia"), ("5 rpm", "angle"), ("5 deg", "ratio"), ("1 m", "number"), ("1", "number")],
-    *[(text, "mass") for text in ("1,5 kg", "1_000 kg", "1 500 kg", "heavy", "", "0x10 kg", "1e400 kg")],
-    *[(True, "mass"), (None, "time"), ([1], "time"), ({}, "number"), (math.nan, "mass"), (-math.inf, "mass")],
+    *[
+        ("120 kg", "inertia"),
+        ("5 rpm", "angle"),
+        ("5 deg", "ratio"),
+        ("1 m", "number"),
+        ("1", "number"),
+    ],
+    *[
+        (text, "mass")
+        for text in ("1,5 kg", "1_000 kg", "1 500 kg", "heavy", "", "0x10 kg", "1e400 kg")
+    ],
+    *[
+        (True, "mass"),
+        (None, "time"),
+        ([1], "time"),
+        ({}, "number"),
+        (math.nan, "mass"),
+        (-math.inf, "mass"),
+    ],
     *[("1e308 min", "time"), (10**400, "mass"), (1.1e15, "mass"), ("-2e15 N m", "torque")],
 ]
 
 
 def test_refusals_say_what_is_allowed() -> None:
-    check_text("units.refused", "\n".join(refusal(ValueError, parse, value, kind) for value, kind in REFUSED))
+    check_text(
+        "units.refused",
+        "\n".join(refusal(ValueError, parse, value, kind) for value, kind in REFUSED),
+    )
     for unit in ("Deg", "dg", "secs", "Sec", "hrs", "rp m", "deg°", "M", "KM", "msec", "arcmin"):
         for kind in KINDS:
             with pytest.raises(ValueError, match="is not a"):
@@ -113,7 +155,9 @@ def test_any_text_is_a_quantity_or_a_value_error(text: str, kind: str, bare: boo
     st.sampled_from([(kind, unit) for kind in KINDS for unit in KINDS[kind].factors]),
     st.sampled_from(["", " ", "   "]),
 )
-def test_what_parses_fits_the_pattern(number: float, kind_and_unit: tuple[str, str], space: str) -> None:
+def test_what_parses_fits_the_pattern(
+    number: float, kind_and_unit: tuple[str, str], space: str
+) -> None:
     kind, unit = kind_and_unit
     text = f"{number!r}{space}{unit}"
     assert parse(text, kind) == number * KINDS[kind].factors[unit]
@@ -121,12 +165,20 @@ def test_what_parses_fits_the_pattern(number: float, kind_and_unit: tuple[str, s
 
 
 SCREENS = [
-    ("kg", "lbm", 1 / 0.45359237), ("g", "lbm", 1e-3 / 0.45359237), ("kg/year", "lbm/year", 1 / 0.45359237),
-    ("N", "lbf", 1 / 4.4482216152605), ("N s", "lbf s", 1 / 4.4482216152605),
-    ("N m", "ft lbf", 1 / 1.3558179483314004), ("N m s", "ft lbf s", 1 / 1.3558179483314004),
-    ("kg m²", "slug ft²", 1 / 1.3558179483314004), ("m", "ft", 1 / 0.3048), ("mm", "in", 1 / 25.4),
-    ("m/s", "ft/s", 1 / 0.3048), ("m/s²", "ft/s²", 1 / 0.3048), ("bar", "psi", 14.503773773020923),
-]  # fmt: skip
+    ("kg", "lbm", 1 / 0.45359237),
+    ("g", "lbm", 1e-3 / 0.45359237),
+    ("kg/year", "lbm/year", 1 / 0.45359237),
+    ("N", "lbf", 1 / 4.4482216152605),
+    ("N s", "lbf s", 1 / 4.4482216152605),
+    ("N m", "ft lbf", 1 / 1.3558179483314004),
+    ("N m s", "ft lbf s", 1 / 1.3558179483314004),
+    ("kg m²", "slug ft²", 1 / 1.3558179483314004),
+    ("m", "ft", 1 / 0.3048),
+    ("mm", "in", 1 / 25.4),
+    ("m/s", "ft/s", 1 / 0.3048),
+    ("m/s²", "ft/s²", 1 / 0.3048),
+    ("bar", "psi", 14.503773773020923),
+]
 """Units of SI and of US screens, and factors by NIST SP 811."""
 
 
@@ -143,7 +195,9 @@ def test_screens_have_us_units_where_requested(si: str, us: str, factor: float) 
     assert screen_unit(si) == (si, 1.0)
 
 
-@pytest.mark.parametrize("unit", ["", "s", "ms", "min", "rad/s", "mrad/s", "deg", "rpm", "%", "%/day", "1/day", "Hz"])
+@pytest.mark.parametrize(
+    "unit", ["", "s", "ms", "min", "rad/s", "mrad/s", "deg", "rpm", "%", "%/day", "1/day", "Hz"]
+)
 def test_angles_rates_times_and_shares_are_the_same_in_both_systems(unit: str) -> None:
     with screen_units(US):
         assert screen_unit(unit, 2.0) == (unit, 2.0)
@@ -166,7 +220,11 @@ EVERY = [
 
 
 def test_every_kind_of_error_survives_pickling() -> None:
-    kinds = {kind for kind in vars(errors).values() if isinstance(kind, type) and issubclass(kind, BaseException)}
+    kinds = {
+        kind
+        for kind in vars(errors).values()
+        if isinstance(kind, type) and issubclass(kind, BaseException)
+    }
     assert {type(error) for error in EVERY} == kinds
     for error in EVERY:
         again = pickle.loads(pickle.dumps(error))
@@ -179,4 +237,5 @@ def test_a_pool_of_processes_reports_a_missing_file(tmp_path: Path) -> None:
     with get_context("spawn").Pool(1) as pool:
         waiting = pool.apply_async(nutdamp.load, (tmp_path / "missing.yaml",))
         with pytest.raises(errors.CannotRead, match=r"missing\.yaml"):
-            waiting.get()  # where the error cannot be rebuilt the pool waits for it for ever; see the test above
+            # where the error cannot be rebuilt the pool waits for it for ever; see the test above
+            waiting.get()

@@ -1,8 +1,10 @@
-"""Messages on attitude or orbit, whatever their notation: blocks of keywords, their tables, and KVN and XML.
+"""Messages on attitude or orbit, whatever their notation: blocks of keywords, their tables, and KVN
+and XML.
 
-The tables are those of CCSDS 504.0-B-2: 3-1 to 3-3 (APM), 4-2 to 4-4 (AEM), 7-3 and 7-5 (tags in XML); and of CCSDS
-502.0-B-3: 3-1 to 3-3 (OPM). Keyword = value notation (KVN) follows CCSDS 504.0-B-2 section 6 (502.0-B-3 section 7
-alike), XML section 7. Keywords are checked against their tables, and every fault has its line: nothing is guessed.
+The tables are those of CCSDS 504.0-B-2: 3-1 to 3-3 (APM), 4-2 to 4-4 (AEM), 7-3 and 7-5 (tags in
+XML); and of CCSDS 502.0-B-3: 3-1 to 3-3 (OPM). Keyword = value notation (KVN) follows CCSDS
+504.0-B-2 section 6 (502.0-B-3 section 7 alike), XML section 7. Keywords are checked against their
+tables, and every fault has its line: nothing is guessed.
 """
 
 from __future__ import annotations
@@ -36,7 +38,9 @@ SIGNIFICANT = 16  # most digits that a number may have
 
 
 class Keyword(NamedTuple):
-    """One row of a table: its unit (None of texts), whether it must be there, and the XML tag besides the block's."""
+    """One row of a table: its unit (None of texts), whether it must be there, and the XML tag
+    besides the block's.
+    """
 
     name: str
     unit: str | None = None
@@ -51,7 +55,9 @@ class Layout:
         self.tag, self.keywords = tag, keywords
 
 
-def _rows(*names: str, unit: str | None = None, required: bool = True, tag: str = "") -> tuple[Keyword, ...]:
+def _rows(
+    *names: str, unit: str | None = None, required: bool = True, tag: str = ""
+) -> tuple[Keyword, ...]:
     return tuple(Keyword(name, unit, required, tag) for name in names)
 
 
@@ -59,8 +65,15 @@ _FRAMES = _rows("REF_FRAME_A", "REF_FRAME_B")
 _QUATERNION = _rows("Q1", "Q2", "Q3", "QC", unit="", tag="quaternion")
 ANGVEL = ("ANGVEL_X", "ANGVEL_Y", "ANGVEL_Z")
 
-_SPIN = (*_rows("SPIN_ALPHA", "SPIN_DELTA", "SPIN_ANGLE", unit="deg"), *_rows("SPIN_ANGLE_VEL", unit="deg/s"))
-MOMENTUM = ("MOMENTUM_ALPHA", "MOMENTUM_DELTA", "NUTATION_VEL")  # direction of H, rate of the spin axis about it
+_SPIN = (
+    *_rows("SPIN_ALPHA", "SPIN_DELTA", "SPIN_ANGLE", unit="deg"),
+    *_rows("SPIN_ANGLE_VEL", unit="deg/s"),
+)
+MOMENTUM = (
+    "MOMENTUM_ALPHA",
+    "MOMENTUM_DELTA",
+    "NUTATION_VEL",
+)  # direction of H, rate of the spin axis about it
 
 HEADER = (
     *_rows("CLASSIFICATION", required=False),
@@ -68,14 +81,20 @@ HEADER = (
     *_rows("MESSAGE_ID", required=False),
 )
 
-APM_METADATA = (*_rows("OBJECT_NAME", "OBJECT_ID"), *_rows("CENTER_NAME", required=False), *_rows("TIME_SYSTEM"))
+APM_METADATA = (
+    *_rows("OBJECT_NAME", "OBJECT_ID"),
+    *_rows("CENTER_NAME", required=False),
+    *_rows("TIME_SYSTEM"),
+)
 
 APM_BLOCKS: dict[str, Layout] = {
     "QUAT": Layout(
         "quaternionState",
         *_FRAMES,
         *_QUATERNION,
-        *_rows("Q1_DOT", "Q2_DOT", "Q3_DOT", "QC_DOT", unit="1/s", required=False, tag="quaternionDot"),
+        *_rows(
+            "Q1_DOT", "Q2_DOT", "Q3_DOT", "QC_DOT", unit="1/s", required=False, tag="quaternionDot"
+        ),
     ),
     "EULER": Layout(
         "eulerAngleState",
@@ -84,7 +103,9 @@ APM_BLOCKS: dict[str, Layout] = {
         *_rows("ANGLE_1", "ANGLE_2", "ANGLE_3", unit="deg"),
         *_rows("ANGLE_1_DOT", "ANGLE_2_DOT", "ANGLE_3_DOT", unit="deg/s", required=False),
     ),
-    "ANGVEL": Layout("angularVelocity", *_FRAMES, *_rows("ANGVEL_FRAME"), *_rows(*ANGVEL, unit="deg/s")),
+    "ANGVEL": Layout(
+        "angularVelocity", *_FRAMES, *_rows("ANGVEL_FRAME"), *_rows(*ANGVEL, unit="deg/s")
+    ),
     "SPIN": Layout(
         "spin",
         *_FRAMES,
@@ -95,7 +116,9 @@ APM_BLOCKS: dict[str, Layout] = {
         *_rows(MOMENTUM[2], unit="deg/s", required=False),
     ),
     "INERTIA": Layout(
-        "inertia", *_rows("INERTIA_REF_FRAME"), *_rows("IXX", "IYY", "IZZ", "IXY", "IXZ", "IYZ", unit="kg*m**2")
+        "inertia",
+        *_rows("INERTIA_REF_FRAME"),
+        *_rows("IXX", "IYY", "IZZ", "IXY", "IXZ", "IYZ", unit="kg*m**2"),
     ),
     "MAN": Layout(
         "maneuverParameters",
@@ -112,7 +135,10 @@ OPM_METADATA = _rows("OBJECT_NAME", "OBJECT_ID", "CENTER_NAME", "REF_FRAME", "TI
 
 OPM_BLOCKS: dict[str, Layout] = {
     "STATE": Layout(
-        "stateVector", *_rows("EPOCH"), *_rows("X", "Y", "Z", unit="km"), *_rows("X_DOT", "Y_DOT", "Z_DOT", unit="km/s")
+        "stateVector",
+        *_rows("EPOCH"),
+        *_rows("X", "Y", "Z", unit="km"),
+        *_rows("X_DOT", "Y_DOT", "Z_DOT", unit="km/s"),
     ),
     "SPACECRAFT": Layout("spacecraftParameters", *_rows("MASS", unit="kg", required=False)),
     "MANEUVER": Layout(
@@ -124,7 +150,9 @@ OPM_BLOCKS: dict[str, Layout] = {
         *_rows("MAN_DV_1", "MAN_DV_2", "MAN_DV_3", unit="km/s"),
     ),
 }
-"""Keywords written in the blocks of an OPM, in their order; the names of the blocks are not in the message."""
+"""Keywords written in the blocks of an OPM, in their order; the names of the blocks are not in the
+message.
+"""
 
 LAYOUTS = {**APM_BLOCKS, **OPM_BLOCKS}
 
@@ -144,11 +172,18 @@ QUATERNION_ANGVEL, SPIN, SPIN_NUTATION_MOM = "QUATERNION/ANGVEL", "SPIN", "SPIN/
 
 AEM_RECORDS = {
     QUATERNION_ANGVEL: Layout(
-        "quaternionAngVel", *_rows("EPOCH"), *_QUATERNION, *_rows(*ANGVEL, unit="deg/s", tag="angVel")
+        "quaternionAngVel",
+        *_rows("EPOCH"),
+        *_QUATERNION,
+        *_rows(*ANGVEL, unit="deg/s", tag="angVel"),
     ),
     SPIN: Layout("spin", *_rows("EPOCH"), *_SPIN),
     SPIN_NUTATION_MOM: Layout(
-        "spinNutationMom", *_rows("EPOCH"), *_SPIN, *_rows(*MOMENTUM[:2], unit="deg"), *_rows(MOMENTUM[2], unit="deg/s")
+        "spinNutationMom",
+        *_rows("EPOCH"),
+        *_SPIN,
+        *_rows(*MOMENTUM[:2], unit="deg"),
+        *_rows(MOMENTUM[2], unit="deg/s"),
     ),
 }
 """A data line of each ATTITUDE_TYPE (table 4-4)."""
@@ -157,7 +192,8 @@ AEM_RECORDS = {
 class MessageEntry(NamedTuple):
     """A keyword (none in data lines) with its value, as texts.
 
-    ``tag`` wraps it in XML besides that of the block; ``line`` counts from 1 in a message that was read.
+    ``tag`` wraps it in XML besides that of the block; ``line`` counts from 1 in a message that was
+    read.
     """
 
     keyword: str
@@ -177,7 +213,9 @@ class MessageBlock(NamedTuple):
 
 
 class Segment(NamedTuple):
-    """Metadata and the data that they describe: blocks (APM), or records of the layout ``record`` (AEM)."""
+    """Metadata and the data that they describe: blocks (APM), or records of the layout ``record``
+    (AEM).
+    """
 
     metadata: MessageBlock
     blocks: tuple[MessageBlock, ...] = ()
@@ -197,9 +235,16 @@ Values = Sequence[str | float | None]
 
 
 def block(name: str, keywords: tuple[Keyword, ...], values: Values, *comments: str) -> MessageBlock:
-    """A block of ``values`` of the first ``keywords``, None where one is left out; numbers in the unit of the table."""
+    """A block of ``values`` of the first ``keywords``, None where one is left out; numbers in the
+    unit of the table.
+    """
     entries = tuple(
-        MessageEntry(keyword.name, value if isinstance(value, str) else number(value), keyword.unit, keyword.tag)
+        MessageEntry(
+            keyword.name,
+            value if isinstance(value, str) else number(value),
+            keyword.unit,
+            keyword.tag,
+        )
         for keyword, value in zip(keywords, values, strict=False)
         if value is not None
     )
@@ -207,7 +252,9 @@ def block(name: str, keywords: tuple[Keyword, ...], values: Values, *comments: s
 
 
 def number(value: float) -> str:
-    """A number as the standard has it: at most 16 digits, at least one on either side of the point, no -0."""
+    """A number as the standard has it: at most 16 digits, at least one on either side of the point,
+    no -0.
+    """
     if value == 0.0:
         return "0.0"
     exact = Decimal(repr(float(value)))
@@ -225,7 +272,9 @@ def number(value: float) -> str:
 
 
 def label(text: str) -> str:
-    """A name as a value of the standard: printable ASCII in capitals; UNKNOWN where nothing is left."""
+    """A name as a value of the standard: printable ASCII in capitals; UNKNOWN where nothing is
+    left.
+    """
     return " ".join(_ascii(text).upper().split())[:200] or "UNKNOWN"
 
 
@@ -270,7 +319,9 @@ def _fill(place: Element, block: MessageBlock) -> None:
     for tag, group in groupby(block.entries, attrgetter("tag")):
         parent = SubElement(place, tag) if tag else place
         for entry in group:
-            SubElement(parent, entry.keyword, {"units": entry.unit} if entry.unit else {}).text = entry.value
+            SubElement(
+                parent, entry.keyword, {"units": entry.unit} if entry.unit else {}
+            ).text = entry.value
 
 
 _PAIR = re.compile(r"([A-Z0-9_]+)\s*=\s*(.*?)(?:\s+\[([^\]]*)\])?")
@@ -283,12 +334,24 @@ def to_kvn(message: Message) -> str:
     lines = [f"CCSDS_{message.kind}_VERS = {VERSION_OF[message.kind]}", *_block(message.header)]
     for segment in message.segments:
         metadata = _block(segment.metadata)
-        lines += ["", "META_START", *metadata, "META_STOP"] if message.kind == "AEM" else ["", *metadata]
+        lines += (
+            ["", "META_START", *metadata, "META_STOP"] if message.kind == "AEM" else ["", *metadata]
+        )
         for block in segment.blocks:
-            inside, named = _block(block), block.name in APM_BLOCKS
-            lines += ["", f"{block.name}_START", *inside, f"{block.name}_STOP"] if named else ["", *inside]
+            inside = _block(block)
+            named = block.name in APM_BLOCKS
+            lines += (
+                ["", f"{block.name}_START", *inside, f"{block.name}_STOP"]
+                if named
+                else ["", *inside]
+            )
         if segment.records:
-            lines += ["", "DATA_START", *(" ".join(record) for record in segment.records), "DATA_STOP"]
+            lines += [
+                "",
+                "DATA_START",
+                *(" ".join(record) for record in segment.records),
+                "DATA_STOP",
+            ]
     return "\n".join(lines) + "\n"
 
 
@@ -296,7 +359,10 @@ def _block(block: MessageBlock) -> list[str]:
     width = max((len(entry.keyword) for entry in block.entries), default=0)
     return [
         *(f"COMMENT {comment}" for comment in block.comments),
-        *(f"{word:<{width}} = {value}" + (f" [{unit}]" if unit else "") for word, value, unit, *_ in block.entries),
+        *(
+            f"{word:<{width}} = {value}" + (f" [{unit}]" if unit else "")
+            for word, value, unit, *_ in block.entries
+        ),
     ]
 
 
@@ -314,14 +380,19 @@ _NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
 
 
 class Checked:
-    """A block by keyword; problems are faults of its message, and an unreadable value is then None."""
+    """A block by keyword; problems are faults of its message,
+    and an unreadable value is then None.
+    """
 
-    def __init__(self, message: MessageReader, block: MessageBlock, keywords: tuple[Keyword, ...]) -> None:
+    def __init__(
+        self, message: MessageReader, block: MessageBlock, keywords: tuple[Keyword, ...]
+    ) -> None:
         self.message, self.block = message, block
         self.entries: dict[str, MessageEntry] = {}
         self._numbers: dict[str, float] = {}
         known = {keyword.name: keyword for keyword in keywords}
-        order, last = list(known), ""
+        order = list(known)
+        last = ""
         for entry in block.entries:
             name = entry.keyword
             if name not in known:
@@ -329,11 +400,15 @@ class Checked:
                 cure = f"did you mean {close}?" if close else f"known here: {', '.join(order)}"
                 message.fault(entry.line, name, f"unknown keyword; {cure}")
             elif name in self.entries:
-                message.fault(entry.line, name, f"given again, first in line {self.entries[name].line}")
+                message.fault(
+                    entry.line, name, f"given again, first in line {self.entries[name].line}"
+                )
             else:
                 self.entries[name] = entry
                 if last and order.index(name) < order.index(last):
-                    self.fault(name, f"comes after {last}; the order of the standard is {', '.join(order)}")
+                    self.fault(
+                        name, f"comes after {last}; the order of the standard is {', '.join(order)}"
+                    )
                 else:
                     last = name
                 unit = known[name].unit
@@ -350,7 +425,9 @@ class Checked:
                     self.fault(name, f"expected {expected}, got [{entry.unit}]")
         for keyword in keywords:
             if keyword.required and keyword.name not in self.entries:
-                self.fault(keyword.name, f"missing{f' in this {block.name} block' if block.name else ''}")
+                self.fault(
+                    keyword.name, f"missing{f' in this {block.name} block' if block.name else ''}"
+                )
 
     def fault(self, keyword: str, problem: str) -> None:
         """Something wrong with a keyword, or, where it is missing, with the block."""
@@ -391,7 +468,9 @@ UNIT = 1e-4  # deviation from length one up to which a quaternion counts as roun
 
 
 def unit_quaternion(parts: list[float]) -> Vector:
-    """The quaternion (4,) of a message, made length one; raises ValueError where it is off by more than rounding."""
+    """The quaternion (4,) of a message, made length one; raises ValueError where it is off by more
+    than rounding.
+    """
     length = math.hypot(*parts)
     if not math.isclose(length, 1.0, abs_tol=UNIT):
         raise ValueError(f"the quaternion has length {length:.6g}; expected 1")
@@ -403,9 +482,11 @@ BODY = re.compile(r"SC_BODY(_[A-Z0-9]+)?")  # frames fixed in the body
 
 
 class MessageReader:
-    """Reader of a message in KVN that begins with ``keyword``: its blocks, which share frames and a time system.
+    """Reader of a message in KVN that begins with ``keyword``: its blocks, which share frames and a
+    time system.
 
-    Raises CannotRead, or FaultyFile for XML, another message, and another version, which makes no sense by the tables.
+    Raises CannotRead, or FaultyFile for XML, another message, and another version, which makes no
+    sense by the tables.
     """
 
     def __init__(self, path: str, keyword: str) -> None:
@@ -423,7 +504,8 @@ class MessageReader:
             content = raw.strip()
             if not content or content.split(maxsplit=1)[0] == "COMMENT":
                 continue
-            pair, entries = _PAIR.fullmatch(content), begun[0 if within is None else -1][2]
+            pair = _PAIR.fullmatch(content)
+            entries = begun[0 if within is None else -1][2]
             if within == "DATA" and content not in ("DATA_START", "DATA_STOP"):
                 entries.append(MessageEntry("", content, line=line))
             elif pair is not None:
@@ -436,7 +518,11 @@ class MessageReader:
             elif within is not None and content == f"{within}_STOP":
                 within = None
             elif _WORD.fullmatch(content) and content.endswith("_STOP"):
-                self.fault(line, content, "no block is open" if within is None else f"expected {within}_STOP")
+                self.fault(
+                    line,
+                    content,
+                    "no block is open" if within is None else f"expected {within}_STOP",
+                )
             else:
                 self.fault(line, "", f"{content[:40]!r} is no KEYWORD = value")
         if within is not None:
@@ -445,12 +531,19 @@ class MessageReader:
         self.outside, *self.blocks = blocks  # first what is in no block
         first = next(iter(self.outside.entries), None)
         if first is None or not VERSIONS.fullmatch(first.keyword):
-            self.fault(1, "", f"not an {keyword.split('_')[1]}: its first line is {keyword} = {VERSION}")
+            self.fault(
+                1, "", f"not an {keyword.split('_')[1]}: its first line is {keyword} = {VERSION}"
+            )
             raise FaultyFile(self.faults)
         if first.keyword != keyword:
-            raise FaultyFile([Fault(path, first.line, 1, first.keyword, f"another message; expected {keyword}")])
+            raise FaultyFile(
+                [Fault(path, first.line, 1, first.keyword, f"another message; expected {keyword}")]
+            )
         if first.value != VERSION:
-            problem = f"version {first.value!r} is not read, its keywords are others; expected version {VERSION}"
+            problem = (
+                f"version {first.value!r} is not read, its keywords are others; "
+                f"expected version {VERSION}"
+            )
             raise FaultyFile([Fault(path, first.line, 1, keyword, problem)])
 
     def fault(self, line: int, where: str, problem: str) -> None:
@@ -461,13 +554,17 @@ class MessageReader:
         """Take the time system of the metadata."""
         self.system = block.text("TIME_SYSTEM") or "UTC"
         if self.system not in ("UTC", *UNIFORM):
-            block.fault("TIME_SYSTEM", f"expected UTC, {listed(list(UNIFORM), 'or')}, got {self.system!r}")
+            block.fault(
+                "TIME_SYSTEM", f"expected UTC, {listed(list(UNIFORM), 'or')}, got {self.system!r}"
+            )
             self.system = "UTC"
         elif self.system != "UTC":
             self.remark(f"times are {self.system}; the spacecraft file has them in UTC")
 
     def endpoints(self, block: Checked, *, reversible: bool = True) -> bool | None:
-        """True where the block leads from inertial frame to body, False for the reverse; None for other frames."""
+        """True where the block leads from inertial frame to body, False for the reverse; None for
+        other frames.
+        """
         first, second = block.text("REF_FRAME_A"), block.text("REF_FRAME_B")
         if first is None or second is None:
             return None
@@ -475,20 +572,33 @@ class MessageReader:
         inertial, body = (first, second) if forward else (second, first)
         keyword, other = ("REF_FRAME_A", "REF_FRAME_B")[:: 1 if forward else -1]
         if not BODY.fullmatch(body):
-            block.fault("REF_FRAME_B", f"{second!r}: one of the two frames must be the body, SC_BODY_1")
+            block.fault(
+                "REF_FRAME_B", f"{second!r}: one of the two frames must be the body, SC_BODY_1"
+            )
             return None
         if inertial not in (*FRAMES, *SAME_AXES):
-            block.fault(keyword, f"{inertial!r} is no inertial frame known here; expected one of {', '.join(FRAMES)}")
+            block.fault(
+                keyword,
+                (
+                    f"{inertial!r} is no inertial frame known here; "
+                    f"expected one of {', '.join(FRAMES)}"
+                ),
+            )
             return None
         if not forward and not reversible:
-            block.fault("REF_FRAME_A", "the body comes first; this block leads from the inertial frame to the body")
+            block.fault(
+                "REF_FRAME_A",
+                "the body comes first; this block leads from the inertial frame to the body",
+            )
             return None
         self.body_frame(block, other, body)
         known = SAME_AXES.get(inertial, inertial)
         if known != inertial:
             self.remark(f"{inertial} is taken as {known}, whose axes are the same")
         if self.frame not in (None, known):
-            block.fault(keyword, f"{inertial!r} here, {self.frame!r} in another block; expected one frame")
+            block.fault(
+                keyword, f"{inertial!r} here, {self.frame!r} in another block; expected one frame"
+            )
         self.frame = self.frame or known
         return forward
 
@@ -499,12 +609,16 @@ class MessageReader:
         if not BODY.fullmatch(frame):
             block.fault(keyword, f"{frame!r} is no frame fixed in the body; expected SC_BODY_1")
         elif self.body not in (None, frame):
-            block.fault(keyword, f"{frame!r} here, {self.body!r} in another block; expected one body frame")
+            block.fault(
+                keyword, f"{frame!r} here, {self.body!r} in another block; expected one body frame"
+            )
         else:
             self.body = frame
 
     def rates_in_body(self, block: Checked, axes: str) -> bool:
-        """True for rates along the axes of the body, False for those of the inertial frame, a fault for others."""
+        """True for rates along the axes of the body, False for those of the inertial frame, a fault
+        for others.
+        """
         in_body = BODY.fullmatch(axes) is not None
         if not in_body and SAME_AXES.get(axes, axes) != self.frame:
             block.fault("ANGVEL_FRAME", f"{axes!r} is neither REF_FRAME_A nor REF_FRAME_B")

@@ -1,9 +1,11 @@
-"""Attitude messages read in KVN, turned into a spacecraft file and a schedule, or merged into a spacecraft file.
+"""Attitude messages read in KVN, turned into a spacecraft file and a schedule, or merged into a
+spacecraft file.
 
-In a parameter message (APM) attitude and rates come from QUAT (or EULER) and ANGVEL, or else from SPIN by annex F5. A
-history (AEM) gives quaternions, and rates where it has them; the other forms of an ephemeris leave the rates open or
-hold for symmetric bodies alone. A merge sets attitude, epoch and rates, and the inertia where that is asked for; all
-else of the file stays, with its comments and units.
+In a parameter message (APM) attitude and rates come from QUAT (or EULER) and ANGVEL, or else from
+SPIN by annex F5. A history (AEM) gives quaternions, and rates where it has them; the other forms of
+an ephemeris leave the rates open or hold for symmetric bodies alone. A merge sets attitude, epoch
+and rates, and the inertia where that is asked for; all else of the file stays, with its comments
+and units.
 """
 
 from __future__ import annotations
@@ -19,8 +21,22 @@ import numpy as np
 from nutdamp.common.time import DIGITS, Epoch
 from nutdamp.errors import BadRequest, Fault, FaultyFile, printable
 from nutdamp.files.ccsds import message
-from nutdamp.files.ccsds.message import QUATERNION_ANGVEL, Checked, Keyword, MessageBlock, MessageReader
-from nutdamp.files.editing import Edits, Later, attitude_edits, carry_text, epoch_after, inertia_edits, rate_edits
+from nutdamp.files.ccsds.message import (
+    QUATERNION_ANGVEL,
+    Checked,
+    Keyword,
+    MessageBlock,
+    MessageReader,
+)
+from nutdamp.files.editing import (
+    Edits,
+    Later,
+    attitude_edits,
+    carry_text,
+    epoch_after,
+    inertia_edits,
+    rate_edits,
+)
 from nutdamp.files.fields import LONGEST_NAME
 from nutdamp.files.reader import Source, read_spacecraft
 from nutdamp.files.yaml import Node, read_bytes
@@ -29,7 +45,9 @@ from nutdamp.physics.body import principal_axes
 from nutdamp.spacecraft.model import Attitude, Inertia, Spacecraft, Vector
 from nutdamp.spacecraft.schedule import STEERABLE, Pulse, Schedule
 
-AGREES = 1e-4  # difference up to which SPIN agrees with the other blocks: rad, and relative for rates
+AGREES = (
+    1e-4  # difference up to which SPIN agrees with the other blocks: rad, and relative for rates
+)
 
 _VERSION = "CCSDS_APM_VERS"
 _OUTSIDE = (Keyword(_VERSION), *message.HEADER, *message.APM_METADATA, Keyword("EPOCH"))
@@ -37,7 +55,9 @@ _NUTATION = ("NUTATION", "NUTATION_PER", "NUTATION_PHASE")
 
 
 class Manoeuvre(NamedTuple):
-    """A torque (3,) N m fixed in the body from ``start`` s after the epoch for ``duration`` s; ``mass`` kg or None."""
+    """A torque (3,) N m fixed in the body from ``start`` s after the epoch for ``duration`` s;
+    ``mass`` kg or None.
+    """
 
     start: float
     duration: float
@@ -46,10 +66,11 @@ class Manoeuvre(NamedTuple):
 
 
 class ApmContents(NamedTuple):
-    """Contents of a message, in body axes: ``quaternion`` body -> frame, scalar first; ``rates`` rad/s.
+    """Contents of a message, in body axes: ``quaternion`` body -> frame, scalar first; ``rates``
+    rad/s.
 
-    ``tensor`` kg m²; ``nutation`` rad as SPIN states it, where its rates count; ``lines`` where blocks begin;
-    ``remarks`` for the reader.
+    ``tensor`` kg m²; ``nutation`` rad as SPIN states it, where its rates count; ``lines`` where
+    blocks begin; ``remarks`` for the reader.
     """
 
     name: str
@@ -76,7 +97,8 @@ class _ApmReader(MessageReader):
         self.about = Checked(self, self.outside, _OUTSIDE)
         self.by_name: dict[str, list[Checked]] = {name: [] for name in message.APM_BLOCKS}
         self.nutation: float | None = None
-        order, last = list(message.APM_BLOCKS), ""
+        order = list(message.APM_BLOCKS)
+        last = ""
         for block in self.blocks:
             name, line = block.name, block.line
             if name not in message.APM_BLOCKS:
@@ -96,11 +118,15 @@ class _ApmReader(MessageReader):
     def read(self) -> ApmContents:
         outside = self.about
         self.take_system(outside)
-        epoch, quaternion = outside.epoch("EPOCH", self.system), self._attitude()
+        epoch = outside.epoch("EPOCH", self.system)
+        quaternion = self._attitude()
         quaternion, rates = self._spin(quaternion, self._rates(quaternion))
-        tensor, manoeuvres = self._inertia(), self._manoeuvres(epoch)
+        tensor = self._inertia()
+        manoeuvres = self._manoeuvres(epoch)
         if rates is None and not self.faults:
-            self.fault(1, "ANGVEL", "missing; without an ANGVEL or a SPIN block the motion is not known")
+            self.fault(
+                1, "ANGVEL", "missing; without an ANGVEL or a SPIN block the motion is not known"
+            )
         if self.faults or epoch is None or rates is None:
             raise FaultyFile(self.faults)
         if quaternion is None:
@@ -126,16 +152,20 @@ class _ApmReader(MessageReader):
         forward: bool | None = None
         block = self._first("QUAT")
         if block is not None:
-            forward, parts = self.endpoints(block), block.numbers("QC", "Q1", "Q2", "Q3")
+            forward = self.endpoints(block)
+            parts = block.numbers("QC", "Q1", "Q2", "Q3")
             try:
                 turn = None if parts is None else message.unit_quaternion(parts)
             except ValueError as wrong:
                 block.fault("Q1", str(wrong))
         elif (block := self._first("EULER")) is not None:
-            forward, parts = self.endpoints(block), block.numbers("ANGLE_1", "ANGLE_2", "ANGLE_3")
+            forward = self.endpoints(block)
+            parts = block.numbers("ANGLE_1", "ANGLE_2", "ANGLE_3")
             sequence = block.text("EULER_ROT_SEQ") or ""
             if not re.fullmatch("[XYZ]{3}", sequence) or sequence[1] in (sequence[0], sequence[2]):
-                block.fault("EULER_ROT_SEQ", f"{sequence!r} is no sequence of three turns, such as ZXZ")
+                block.fault(
+                    "EULER_ROT_SEQ", f"{sequence!r} is no sequence of three turns, such as ZXZ"
+                )
             elif parts is not None:
                 turn = euler(sequence, *map(math.radians, parts))
         if turn is None or forward is None:
@@ -147,22 +177,28 @@ class _ApmReader(MessageReader):
         block = self._first("ANGVEL")
         if block is None:
             return None
-        forward, parts = self.endpoints(block), block.numbers(*message.ANGVEL)
+        forward = self.endpoints(block)
+        parts = block.numbers(*message.ANGVEL)
         axes = block.text("ANGVEL_FRAME")
         if parts is None or axes is None or forward is None:
             return None
         # The rate "from A to B" is that of B against A (annex F4).
-        rates, faults = np.radians(parts) if forward else -np.radians(parts), len(self.faults)
+        rates = np.radians(parts) if forward else -np.radians(parts)
+        faults = len(self.faults)
         if self.rates_in_body(block, axes):
             self.body_frame(block, "ANGVEL_FRAME", axes)
             return rates
         if quaternion is not None:
             return np.asarray(attitude.matrix(quaternion).T @ rates)
         if len(self.faults) == faults:
-            block.fault("ANGVEL_FRAME", f"rates in {axes} need an attitude, and the message gives none")
+            block.fault(
+                "ANGVEL_FRAME", f"rates in {axes} need an attitude, and the message gives none"
+            )
         return None
 
-    def _spin(self, quaternion: Vector | None, rates: Vector | None) -> tuple[Vector | None, Vector | None]:
+    def _spin(
+        self, quaternion: Vector | None, rates: Vector | None
+    ) -> tuple[Vector | None, Vector | None]:
         """Fill in values that the other blocks lack; remark where SPIN contradicts them."""
         block = self._first("SPIN")
         if block is None or self.endpoints(block, reversible=False) is None:
@@ -188,11 +224,22 @@ class _ApmReader(MessageReader):
         elif with_momentum and (values := block.numbers(*message.MOMENTUM)) is not None:
             right, up, about_momentum = map(math.radians, values)
             rate += about_momentum * (attitude.matrix(turn).T @ attitude.on_sphere(right, up))
-        off = 0.0 if quaternion is None else min(np.linalg.norm(quaternion - sign * turn) for sign in (1.0, -1.0))
+        off = (
+            0.0
+            if quaternion is None
+            else min(np.linalg.norm(quaternion - sign * turn) for sign in (1.0, -1.0))
+        )
         if off > 0.5 * AGREES:
-            self.remark(f"line {block.block.line}: SPIN gives another attitude than the blocks before it, which count")
-        if rates is not None and not np.allclose(rates, rate, rtol=0.0, atol=AGREES * np.linalg.norm(rates)):
-            self.remark(f"line {block.block.line}: SPIN gives other rates than ANGVEL, which counts")
+            self.remark(
+                f"line {block.block.line}: SPIN gives another attitude than the blocks before it, "
+                "which count"
+            )
+        if rates is not None and not np.allclose(
+            rates, rate, rtol=0.0, atol=AGREES * np.linalg.norm(rates)
+        ):
+            self.remark(
+                f"line {block.block.line}: SPIN gives other rates than ANGVEL, which counts"
+            )
         return turn if quaternion is None else quaternion, rate if rates is None else rates
 
     def _inertia(self) -> Vector | None:
@@ -211,8 +258,10 @@ class _ApmReader(MessageReader):
         manoeuvres: list[Manoeuvre] = []
         last: tuple[Epoch, int] | None = None
         for block in self.by_name["MAN"]:
-            begins, duration = block.epoch("MAN_EPOCH_START", self.system), block.number("MAN_DURATION")
-            torque, mass = block.numbers("MAN_TOR_X", "MAN_TOR_Y", "MAN_TOR_Z"), block.number("MAN_DELTA_MASS")
+            begins = block.epoch("MAN_EPOCH_START", self.system)
+            duration = block.number("MAN_DURATION")
+            torque = block.numbers("MAN_TOR_X", "MAN_TOR_Y", "MAN_TOR_Z")
+            mass = block.number("MAN_DELTA_MASS")
             frame = block.text("MAN_REF_FRAME")
             self.body_frame(block, "MAN_REF_FRAME", frame)
             if duration is not None and duration <= 0.0:
@@ -220,20 +269,32 @@ class _ApmReader(MessageReader):
             if mass is not None and mass > 0.0:
                 block.fault("MAN_DELTA_MASS", f"{mass:g} kg would be gained; expected 0 or less")
             if torque is not None and not any(torque):
-                block.fault("MAN_TOR_X", "the torque is zero; expected at least one component other than 0")
+                block.fault(
+                    "MAN_TOR_X", "the torque is zero; expected at least one component other than 0"
+                )
             if begins is not None:
                 if epoch is not None and begins < epoch:
                     block.fault("MAN_EPOCH_START", "begins before EPOCH, the start of the motion")
                 if last is not None and begins < last[0]:
-                    block.fault("MAN_EPOCH_START", f"begins before the block of line {last[1]}; put them in order")
+                    block.fault(
+                        "MAN_EPOCH_START",
+                        f"begins before the block of line {last[1]}; put them in order",
+                    )
                 last = begins, block.block.line
-            if begins is not None and epoch is not None and duration is not None and torque is not None:
+            if (
+                begins is not None
+                and epoch is not None
+                and duration is not None
+                and torque is not None
+            ):
                 manoeuvres.append(Manoeuvre(begins.since(epoch), duration, np.array(torque), mass))
         return tuple(manoeuvres)
 
 
 def euler(sequence: str, *angles: float) -> Vector:
-    """Quaternion of successive turns by ``angles`` (rad) about the axes of the turned body (annex F3)."""
+    """Quaternion of successive turns by ``angles`` (rad) about the axes of the turned body (annex
+    F3).
+    """
     turn = np.array([1.0, 0.0, 0.0, 0.0])
     for axis, angle in zip(sequence, angles, strict=True):
         step = np.zeros(4)
@@ -243,11 +304,15 @@ def euler(sequence: str, *angles: float) -> Vector:
 
 
 AEM_VERSION = "CCSDS_AEM_VERS"  # keyword of the first line
-COLUMNS = {"QUATERNION": 4, QUATERNION_ANGVEL: 7}  # numbers in a record of each ATTITUDE_TYPE read, besides its time
+COLUMNS = {
+    "QUATERNION": 4,
+    QUATERNION_ANGVEL: 7,
+}  # numbers in a record of each ATTITUDE_TYPE read, besides its time
 
 
 class History(NamedTuple):
-    """Attitude of an object at ``times`` (n,) s after ``epoch``: ``quaternions`` (n, 4) body -> frame, scalar first.
+    """Attitude of an object at ``times`` (n,) s after ``epoch``: ``quaternions`` (n, 4) body ->
+    frame, scalar first.
 
     ``rates`` (n, 3) rad/s in body axes, or None where the message has none.
     """
@@ -261,10 +326,15 @@ class History(NamedTuple):
     remarks: tuple[str, ...]
 
     def at(self, time: float) -> tuple[Epoch, Vector, Vector | None]:
-        """Epoch, quaternion and rates of the first record from ``time`` s on; raises BadRequest past the last."""
+        """Epoch, quaternion and rates of the first record from ``time`` s on; raises BadRequest
+        past the last.
+        """
         index = int(np.searchsorted(self.times, time))
         if index == len(self.times):
-            raise BadRequest(f"the history ends {self.times[-1]:.6g} s after its first record: expected a time in it")
+            raise BadRequest(
+                f"the history ends {self.times[-1]:.6g} s after its first record: "
+                "expected a time in it"
+            )
         rates = None if self.rates is None else self.rates[index]
         return self.epoch.plus(float(self.times[index])), self.quaternions[index], rates
 
@@ -291,7 +361,10 @@ def read_history(path: str) -> History:
     if reader.faults:
         raise FaultyFile(reader.faults)
     first = reader.times[0]
-    times, turns = np.array([time.since(first) for time in reader.times]), np.array(reader.quaternions)
+    times, turns = (
+        np.array([time.since(first) for time in reader.times]),
+        np.array(reader.quaternions),
+    )
     rates = None if reader.rates is None else np.array(reader.rates)
     return History(reader.name, first, reader.frame, times, turns, rates, tuple(reader.remarks))
 
@@ -308,23 +381,32 @@ class _HistoryReader(MessageReader):
         block = Checked(self, metadata, message.AEM_METADATA)
         self.name = (block.text("OBJECT_NAME") or self.name)[:LONGEST_NAME]
         self.take_system(block)
-        forward, kind = self.endpoints(block), block.text("ATTITUDE_TYPE")
+        forward = self.endpoints(block)
+        kind = block.text("ATTITUDE_TYPE")
         if kind is not None and kind not in COLUMNS:
             block.fault("ATTITUDE_TYPE", f"{kind!r} is not read; expected {' or '.join(COLUMNS)}")
-        axes, turning = block.text("ANGVEL_FRAME"), kind == QUATERNION_ANGVEL
+        axes = block.text("ANGVEL_FRAME")
+        turning = kind == QUATERNION_ANGVEL
         if turning and axes is None:
-            block.fault("ANGVEL_FRAME", f"missing; {QUATERNION_ANGVEL} needs the frame of the rates")
+            block.fault(
+                "ANGVEL_FRAME", f"missing; {QUATERNION_ANGVEL} needs the frame of the rates"
+            )
         in_body = not turning or axes is None or self.rates_in_body(block, axes)
         if self.faults or kind is None or forward is None:
             return
         if not turning:
             self.rates = None
         for record in records.entries:
-            self._record(record.line, record.value.split(), COLUMNS[kind], forward=forward, in_body=in_body)
+            self._record(
+                record.line, record.value.split(), COLUMNS[kind], forward=forward, in_body=in_body
+            )
 
-    def _record(self, line: int, cells: list[str], columns: int, *, forward: bool, in_body: bool) -> None:
+    def _record(
+        self, line: int, cells: list[str], columns: int, *, forward: bool, in_body: bool
+    ) -> None:
         try:
-            time, numbers = Epoch.parse(cells[0], self.system), [float(cell) for cell in cells[1:]]
+            time = Epoch.parse(cells[0], self.system)
+            numbers = [float(cell) for cell in cells[1:]]
             if len(numbers) != columns or not all(map(math.isfinite, numbers)):
                 raise ValueError(f"expected a time and {columns} numbers")
             parts = message.unit_quaternion([numbers[3], *numbers[:3]])
@@ -341,7 +423,9 @@ class _HistoryReader(MessageReader):
         self.quaternions.append(quaternion)
         if self.rates is not None:
             rates = np.radians(numbers[4:]) * (1.0 if forward else -1.0)
-            self.rates.append(rates if in_body else np.asarray(attitude.matrix(quaternion).T @ rates))
+            self.rates.append(
+                rates if in_body else np.asarray(attitude.matrix(quaternion).T @ rates)
+            )
 
 
 ALIKE = 1e-9  # relative difference up to which torques count as transverse, and as of one magnitude
@@ -355,14 +439,21 @@ SAME_NUTATION, ROUNDED = 0.01, 1e-5
 
 
 def imported(contents: ApmContents, path: str) -> tuple[str, Spacecraft, Schedule]:
-    """Text of the spacecraft file, the spacecraft, and the manoeuvres; FaultyFile, by lines of the message."""
+    """Text of the spacecraft file, the spacecraft, and the manoeuvres; FaultyFile, by lines of the
+    message.
+    """
     if contents.tensor is None:
-        problem = "missing; a spacecraft file needs moments of inertia: --into merges the message into one that has"
+        problem = (
+            "missing; a spacecraft file needs moments of inertia: "
+            "--into merges the message into one that has"
+        )
         raise FaultyFile([Fault(path, 1, 1, "INERTIA", f"{problem} them")])
     _, axes = principal_axes(contents.tensor)
     torques = [axes.T @ manoeuvre.torque for manoeuvre in contents.manoeuvres]
     sizes = [float(np.linalg.norm(torque)) for torque in torques]
-    transverse = all(abs(torque[2]) <= ALIKE * size for torque, size in zip(torques, sizes, strict=True))
+    transverse = all(
+        abs(torque[2]) <= ALIKE * size for torque, size in zip(torques, sizes, strict=True)
+    )
     alike = sizes and transverse and max(sizes) - min(sizes) <= ALIKE * max(sizes)
     # Texts are in double quotes, in which JSON and YAML agree.
     lines = [
@@ -386,12 +477,16 @@ def imported(contents: ApmContents, path: str) -> tuple[str, Spacecraft, Schedul
     # Pulses of the steerable torquer; one that overlaps another has a name of its own.
     pulses: list[Pulse] = []
     free = 0.0
-    for number, (manoeuvre, torque) in enumerate(zip(contents.manoeuvres, torques, strict=True), start=1):
+    for number, (manoeuvre, torque) in enumerate(
+        zip(contents.manoeuvres, torques, strict=True), start=1
+    ):
         start, lasts, used = manoeuvre.start, manoeuvre.duration, manoeuvre.mass
         alone = start >= free - 1e-9
         spent = None if used is None else -used
         channel = STEERABLE if alone else f"MAN{number}"
-        pulses.append(Pulse(start + 0.5 * lasts, lasts, channel, torque * lasts, torque, propellant=spent))
+        pulses.append(
+            Pulse(start + 0.5 * lasts, lasts, channel, torque * lasts, torque, propellant=spent)
+        )
         free = max(free, start + lasts) if alone else free
     try:
         return text, read_spacecraft(text, path), Schedule(tuple(pulses))
@@ -399,7 +494,9 @@ def imported(contents: ApmContents, path: str) -> tuple[str, Spacecraft, Schedul
         faults = []
         for fault in wrong.faults:
             block = _BLOCKS.get(fault.where.partition(".")[0].partition("[")[0], "")
-            line = contents.lines.get(block, contents.lines.get("SPIN", 1) if block == "ANGVEL" else 1)
+            line = contents.lines.get(
+                block, contents.lines.get("SPIN", 1) if block == "ANGVEL" else 1
+            )
             faults.append(Fault(path, line, 1, block or fault.where, fault.problem))
         raise FaultyFile(faults) from None
 
@@ -410,13 +507,16 @@ def contradictions(contents: ApmContents, body: Spacecraft) -> list[str]:
     if stated is None or abs(follows - abs(stated)) <= ROUNDED + SAME_NUTATION * abs(stated):
         return []
     return [
-        f"SPIN says a nutation of {math.degrees(abs(stated)):.4g} deg, but with this INERTIA NUTATION_PER gives one "
+        f"SPIN says a nutation of {math.degrees(abs(stated)):.4g} deg, "
+        "but with this INERTIA NUTATION_PER gives one "
         f"of {math.degrees(follows):.4g} deg, which the file has; one of the three is wrong"
     ]
 
 
 def ratio_doubts(contents: ApmContents, body: Spacecraft) -> list[str]:
-    """Doubt where spin, nutation and period of SPIN are those of another C/A than that of the ``body`` merged into."""
+    """Doubt where spin, nutation and period of SPIN are those of another C/A than that of the
+    ``body`` merged into.
+    """
     if not contents.nutation or body.spin == 0.0:
         return []
     first, second, third = contents.rates.tolist()
@@ -425,8 +525,10 @@ def ratio_doubts(contents: ApmContents, body: Spacecraft) -> list[str]:
     if abs(implied - ratio) <= SAME_NUTATION * ratio:
         return []
     return [
-        f"spin, nutation and period of SPIN are those of C/A = {implied:.4g}, and the file has {ratio:.4g}: "
-        f"the spin and the nutation of {math.degrees(abs(contents.nutation)):.4g} deg are kept, not the period"
+        f"spin, nutation and period of SPIN are those of C/A = {implied:.4g}, "
+        f"and the file has {ratio:.4g}: "
+        f"the spin and the nutation of {math.degrees(abs(contents.nutation)):.4g} deg are kept, "
+        "not the period"
     ]
 
 
@@ -440,36 +542,57 @@ def _inertia(tensor: Vector) -> list[str]:
 
 def _actuators(manoeuvres: tuple[Manoeuvre, ...], torquer: float | None) -> list[str]:
     if not manoeuvres:
-        return ["# The message fires nothing; without thrusters an ideal steerable impulse is assumed."]
+        return [
+            "# The message fires nothing; without thrusters an ideal steerable impulse is assumed."
+        ]
     if torquer is not None:
         first = round(manoeuvres[0].start, DIGITS)
         return [
-            "# All manoeuvres of the message are transverse and of one torque, as a steerable torquer gives them.",
+            (
+                "# All manoeuvres of the message are transverse and of one torque, "
+                "as a steerable torquer gives them."
+            ),
             f"steerable: {{torque: {torquer!r} N m}}",
-            *[f"limits: {{earliest: {first!r} s}}   # the first manoeuvre begins then"] * bool(first),
+            *[f"limits: {{earliest: {first!r} s}}   # the first manoeuvre begins then"]
+            * bool(first),
         ]
     distinct = {tuple(manoeuvre.torque.tolist()): None for manoeuvre in manoeuvres}
     return [
-        "# The torques that the message fires, as thrusters to begin with; without any, an ideal steerable impulse is",
+        (
+            "# The torques that the message fires, as thrusters to begin with; without any, "
+            "an ideal steerable impulse is"
+        ),
         "# assumed.",
         "# thrusters:",
         *(
-            f"#   - {{name: MAN{number}, torque: [{', '.join(f'{part!r} N m' for part in torque)}]}}"
+            (
+                f"#   - {{name: MAN{number}, torque: "
+                f"[{', '.join(f'{part!r} N m' for part in torque)}]}}"
+            )
             for number, torque in enumerate(distinct, start=1)
         ),
     ]
 
 
-def merged_text(source: Source, contents: ApmContents | History, at: float = 0.0, *, inertia: bool) -> str:
-    """The text of a spacecraft file with the motion of a message, of a history the record from ``at`` s on.
+def merged_text(
+    source: Source, contents: ApmContents | History, at: float = 0.0, *, inertia: bool
+) -> str:
+    """The text of a spacecraft file with the motion of a message, of a history the record from
+    ``at`` s on.
 
     Of SPIN with a nutation the spin and the angle; see `ratio_doubts`.
 
-    Raises BadRequest where the message has no ``inertia`` to merge, and where the file would be none for nutdamp.
+    Raises BadRequest where the message has no ``inertia`` to merge, and where the file would be
+    none for nutdamp.
     """
     given: Vector | None
     if isinstance(contents, ApmContents):
-        epoch, turn, given, tensor = contents.epoch, contents.quaternion, contents.rates, contents.tensor
+        epoch, turn, given, tensor = (
+            contents.epoch,
+            contents.quaternion,
+            contents.rates,
+            contents.tensor,
+        )
     else:
         (epoch, turn, given), tensor = contents.at(at), None
     if inertia and tensor is None:
@@ -483,11 +606,15 @@ def merged_text(source: Source, contents: ApmContents | History, at: float = 0.0
     if isinstance(contents, ApmContents) and contents.nutation:
         first, second, third = after.inertia.momentum(after.omega0).tolist()
         share = abs(third) * math.tan(abs(contents.nutation)) / math.hypot(first, second)
-        after = replace(after, omega0=after.omega0 * (share, share, 1.0))  # the angle stays, whatever C/A the file has
+        after = replace(
+            after, omega0=after.omega0 * (share, share, 1.0)
+        )  # the angle stays, whatever C/A the file has
     quaternion = before.initial.quaternion
     if turn is not None:
         quaternion = attitude.multiply(turn, attitude.from_matrix(axes))
-        after = replace(after, attitude=Attitude(turn, epoch_after(epoch.text, 0.0), contents.frame))
+        after = replace(
+            after, attitude=Attitude(turn, epoch_after(epoch.text, 0.0), contents.frame)
+        )
     later = Later(before, after, quaternion)
 
     def edits(tree: Node) -> Edits:

@@ -1,7 +1,8 @@
-"""Attitude parameter (APM), attitude ephemeris (AEM) and orbit parameter messages (OPM, CCSDS 502.0-B-3) written.
+"""Attitude parameter (APM), attitude ephemeris (AEM) and orbit parameter messages (OPM, CCSDS
+502.0-B-3) written.
 
-Body axes are those of the spacecraft file, which messages call `message.BODY_FRAME`. Nutation by annex F5 is the steady
-motion of bodies symmetric about axis 3: others have the spin alone.
+Body axes are those of the spacecraft file, which messages call `message.BODY_FRAME`. Nutation by
+annex F5 is the steady motion of bodies symmetric about axis 3: others have the spin alone.
 """
 
 from __future__ import annotations
@@ -17,7 +18,14 @@ from nutdamp.common.numerics import cleaned
 from nutdamp.common.time import Epoch
 from nutdamp.errors import BadRequest
 from nutdamp.files.ccsds import message
-from nutdamp.files.ccsds.message import BODY_FRAME, QUATERNION_ANGVEL, SPIN, SPIN_NUTATION_MOM, block, label
+from nutdamp.files.ccsds.message import (
+    BODY_FRAME,
+    QUATERNION_ANGVEL,
+    SPIN,
+    SPIN_NUTATION_MOM,
+    block,
+    label,
+)
 from nutdamp.files.export import AttitudeSegment, Reference, interpolated
 from nutdamp.flight.dynamics import shed
 from nutdamp.flight.end_state import momentum_gained
@@ -38,16 +46,21 @@ def spinning(inertia: Inertia) -> bool:
 
 
 def spin_values(inertia: Inertia, rates: Vector, quaternion: Vector) -> dict[str, Vector]:
-    """Every keyword of the spin, (n,) each in deg, deg/s and s, for a motion in the axes of the file.
+    """Every keyword of the spin, (n,) each in deg, deg/s and s, for a motion in the axes of the
+    file.
 
     ``rates`` (n, 3) rad/s; ``quaternion`` (n, 4) body -> frame, scalar first.
     """
     first, second, third = (cleaned(attitude.rotate(quaternion, axis)) for axis in np.eye(3))
     right_ascension, declination = _on_sphere(third)
-    # The first axis after the first two turns is the node; the angle from it to body axis 1 is the third.
-    node = cleaned(np.stack([-np.sin(right_ascension), np.cos(right_ascension), 0.0 * declination], axis=-1))
+    # The first axis after the first two turns is the node; the angle from it to body axis 1 is the
+    # third.
+    node = cleaned(
+        np.stack([-np.sin(right_ascension), np.cos(right_ascension), 0.0 * declination], axis=-1)
+    )
     momentum = rates @ inertia.tensor + inertia.wheel * inertia.axes[:, 2]
-    size, transverse = np.linalg.norm(momentum, axis=-1), np.hypot(momentum[:, 0], momentum[:, 1])
+    size = np.linalg.norm(momentum, axis=-1)
+    transverse = np.hypot(momentum[:, 0], momentum[:, 1])
     phase = np.where(transverse > 0.0, np.arctan2(-momentum[:, 1], momentum[:, 0]), 0.0)
     of_momentum = _on_sphere(cleaned(attitude.rotate(quaternion, momentum)))
     along = [np.sum(node * axis, axis=-1) for axis in (first, second)]
@@ -66,7 +79,9 @@ def spin_values(inertia: Inertia, rates: Vector, quaternion: Vector) -> dict[str
 
 
 def _on_sphere(vectors: Vector) -> tuple[Vector, Vector]:
-    """Right ascension in [0, 2π) and declination of vectors (n, 3), rad; the former is 0 at a pole."""
+    """Right ascension in [0, 2π) and declination of vectors (n, 3), rad;
+    the former is 0 at a pole.
+    """
     x, y, z = vectors.T
     turned = np.arctan2(y, x) % FULL
     return np.where(turned < FULL, turned, 0.0), np.arctan2(z, np.hypot(x, y))
@@ -76,11 +91,15 @@ ORIGINATOR = "NUTDAMP"
 
 
 def apm(plan: Plan, reference: Reference, created: Epoch) -> message.Message:
-    """The message for a plan, made at ``created``; raises BadRequest for an ideal impulse, which has no duration."""
-    body, frames = plan.spacecraft, (reference.frame, BODY_FRAME)
+    """The message for a plan, made at ``created``; raises BadRequest for an ideal impulse, which
+    has no duration.
+    """
+    body = plan.spacecraft
+    frames = (reference.frame, BODY_FRAME)
     motion = body.inertia.in_file_axes(body.initial.rates, body.initial.quaternion)
     rates, quaternion = map(cleaned, motion)
-    # The quaternion from A to B turns the axes of A into those of B (annex F2), as body -> inertial turns vectors.
+    # The quaternion from A to B turns the axes of A into those of B (annex F2), as body -> inertial
+    # turns vectors.
     scalar, *vector = quaternion.tolist()
     blocks = [
         block("", (message.Keyword("EPOCH"),), [reference.epoch.text], *_unsaid(body)),
@@ -115,15 +134,24 @@ def _identity(body: Spacecraft) -> tuple[str, str]:
 
 
 def _unsaid(body: Spacecraft) -> list[str]:
-    wheel, per_kg, of_file, spins = body.inertia.wheel, shed(body), "of the spacecraft file", spinning(body.inertia)
+    wheel = body.inertia.wheel
+    per_kg = shed(body)
+    of_file = "of the spacecraft file"
+    spins = spinning(body.inertia)
     momentum = f"{wheel:.9g} N*m*s along principal axis 3"
     values = ", ".join(f"{moment:.9g}" for moment in (() if per_kg is None else per_kg))
     remarks = {
         f"The disturbances {of_file} are not in this message.": body.disturbances,
         f"The energy dissipation {of_file} is not in this message.": body.dissipation is not None,
         f"The wheel {of_file}, {momentum}, is in no keyword of this message.": wheel,
-        f"INERTIA is that at EPOCH: the principal moments fall by {values} kg*m**2 for each kg used.": values,
-        "No SPIN block: the body is not symmetric about its third axis, as the model of that block is.": not spins,
+        (
+            f"INERTIA is that at EPOCH: the principal moments fall by {values} kg*m**2 for each kg "
+            "used."
+        ): values,
+        (
+            "No SPIN block: the body is not symmetric about its third axis, "
+            "as the model of that block is."
+        ): not spins,
     }
     return [remark for remark, holds in remarks.items() if holds]
 
@@ -142,46 +170,79 @@ def _manoeuvres(name: str, plan: Plan, reference: Reference) -> Iterator[message
         else:
             if pulse.force is None:
                 change = f"the velocity change by pulse {place} ({pulse.channel})"
-                raise BadRequest(f"{change} is not known; give the thrusters position, direction and force")
+                raise BadRequest(
+                    f"{change} is not known; give the thrusters position, direction and force"
+                )
             if pulse.propellant is None:
                 used = f"the propellant of pulse {place} ({pulse.channel})"
                 raise BadRequest(f"{used} is not known, which an OPM needs; give the thrusters isp")
             assert plan.spacecraft.mass is not None
             gained = momentum_gained(replace(plan.flight, schedule=Schedule((pulse,))))  # inertial
-            values = [*timing, mass, reference.frame, *(KILO * cleaned(gained / plan.spacecraft.mass))]
+            values = [
+                *timing,
+                mass,
+                reference.frame,
+                *(KILO * cleaned(gained / plan.spacecraft.mass)),
+            ]
         comments = [f"pulse {place}: {pulse.channel}"]
         if pulse.through_valve:
             start, on_time = pulse.loaded
-            comments.append(f"Commanded: {on_time:.9g} s from {reference.epoch.plus(max(start, 0.0)).text} on.")
+            comments.append(
+                f"Commanded: {on_time:.9g} s from {reference.epoch.plus(max(start, 0.0)).text} on."
+            )
             thrust = f"{pulse.on_time:.9g} s at the torque given."
             comments.append(f"Start and duration below are those of the thrust: {thrust}")
         yield _block(name, values, *comments)
 
 
 def aem(
-    plan: Plan, flown: Flight, until: float, reference: Reference, created: Epoch, kind: str = QUATERNION_ANGVEL
+    plan: Plan,
+    flown: Flight,
+    until: float,
+    reference: Reference,
+    created: Epoch,
+    kind: str = QUATERNION_ANGVEL,
 ) -> message.Message:
-    """The message for the flight of a plan from 0 to ``until`` s, in segments that end at the edges of pulses.
+    """The message for the flight of a plan from 0 to ``until`` s, in segments that end at the edges
+    of pulses.
 
     ``kind`` is the ATTITUDE_TYPE, SPIN where the body has not the nutation of SPIN/NUTATION_MOM.
     """
     body = plan.spacecraft
     if kind == SPIN_NUTATION_MOM and not spinning(body.inertia):
         kind = SPIN
-    segments = tuple(_segment(body, stretch, reference, kind) for stretch in interpolated(flown, until))
+    segments = tuple(
+        _segment(body, stretch, reference, kind) for stretch in interpolated(flown, until)
+    )
     return message.Message("AEM", _header(plan, created), segments)
 
 
-ALONE = "SPIN_ANGLE_VEL is the rate about the third axis at that moment; no transverse rates, no nutation."
+ALONE = (
+    "SPIN_ANGLE_VEL is the rate about the third axis at that moment; no transverse rates, "
+    "no nutation."
+)
 """Comment on records of the spin alone."""
 
 
-def _segment(body: Spacecraft, stretch: AttitudeSegment, reference: Reference, kind: str) -> message.Segment:
+def _segment(
+    body: Spacecraft, stretch: AttitudeSegment, reference: Reference, kind: str
+) -> message.Segment:
     times = [reference.epoch.plus(seconds).text for seconds in stretch.t.tolist()]
     useable = (times[0], None, None, times[-1])  # all of it
     axes = BODY_FRAME if kind == QUATERNION_ANGVEL else None
     method = "LAGRANGE" if kind == SPIN else "HERMITE"
-    values = [*_identity(body), None, reference.frame, BODY_FRAME, "UTC", *useable, kind, axes, method, "3"]
+    values = [
+        *_identity(body),
+        None,
+        reference.frame,
+        BODY_FRAME,
+        "UTC",
+        *useable,
+        kind,
+        axes,
+        method,
+        "3",
+    ]
     comments = [f"pulses completed: {stretch.completed}", *[ALONE] * (kind == SPIN)]
     if kind == QUATERNION_ANGVEL:
         columns = np.column_stack([stretch.quaternion[:, [1, 2, 3, 0]], np.degrees(stretch.rates)])
@@ -189,10 +250,16 @@ def _segment(body: Spacecraft, stretch: AttitudeSegment, reference: Reference, k
         spin = spin_values(body.inertia, stretch.rates, stretch.quaternion)
         if kind == SPIN:
             spin["SPIN_ANGLE_VEL"] = np.degrees(stretch.rates[:, 2])
-        columns = np.column_stack([spin[keyword.name] for keyword in message.AEM_RECORDS[kind].keywords[1:]])
-    records = tuple((time, *map(message.number, row)) for time, row in zip(times, columns.tolist(), strict=True))
+        columns = np.column_stack(
+            [spin[keyword.name] for keyword in message.AEM_RECORDS[kind].keywords[1:]]
+        )
+    records = tuple(
+        (time, *map(message.number, row)) for time, row in zip(times, columns.tolist(), strict=True)
+    )
     return message.Segment(
-        block("", message.AEM_METADATA, values, *comments), records=records, record=message.AEM_RECORDS[kind]
+        block("", message.AEM_METADATA, values, *comments),
+        records=records,
+        record=message.AEM_RECORDS[kind],
     )
 
 
@@ -205,11 +272,17 @@ KILO = 1e-3
 
 
 def opm(plan: Plan, reference: Reference, created: Epoch) -> message.Message:
-    """The message for a plan, made at ``created``; raises BadRequest where mass, forces or propellant are unknown."""
+    """The message for a plan, made at ``created``; raises BadRequest where mass, forces or
+    propellant are unknown.
+    """
     body = plan.spacecraft
     if body.mass is None:
-        raise BadRequest("an OPM needs the velocity change of each pulse; add the key mass to the spacecraft file")
-    orbit, blocks = body.orbit, []
+        raise BadRequest(
+            "an OPM needs the velocity change of each pulse; add the key mass to the spacecraft "
+            "file"
+        )
+    orbit = body.orbit
+    blocks = []
     centre = None if orbit is None else orbit.center
     about = [*_identity(body), centre, reference.frame, "UTC"]
     if orbit is not None:
@@ -217,4 +290,6 @@ def opm(plan: Plan, reference: Reference, created: Epoch) -> message.Message:
         blocks.append(_block("STATE", [reference.epoch.text, *state]))
     blocks += [_block("SPACECRAFT", [body.mass]), *_manoeuvres("MANEUVER", plan, reference)]
     metadata = block("", message.OPM_METADATA, about, *(PART if orbit is None else ()))
-    return message.Message("OPM", _header(plan, created), (message.Segment(metadata, tuple(blocks)),))
+    return message.Message(
+        "OPM", _header(plan, created), (message.Segment(metadata, tuple(blocks)),)
+    )

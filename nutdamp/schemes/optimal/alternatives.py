@@ -1,8 +1,10 @@
-"""Schedules beside those of the linear program: simple spin changes, other ends, other schemes as starts.
+"""Schedules beside those of the linear program: simple spin changes, other ends, other schemes as
+starts.
 
-And firing almost without a pause, one channel after another: the earliest end, and the least cost in a short horizon.
-Channels share each slot of time: what one after another can supply is the convex hull of what each can. The slots
-become burns without gaps, whose lengths are then found on the true motion.
+And firing almost without a pause, one channel after another: the earliest end, and the least cost
+in a short horizon. Channels share each slot of time: what one after another can supply is the
+convex hull of what each can. The slots become burns without gaps, whose lengths are then found on
+the true motion.
 """
 
 from __future__ import annotations
@@ -45,9 +47,14 @@ from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.requirements import DAMPED_ANGLE, SAME_COST
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
 
-LINES = 4  # programs one after the other, each about the flight of the one before: at large angles small ones mislead
+# programs one after the other, each about the flight of the one before: at large angles small ones
+# mislead
+LINES = 4
 PROGRAM = 4.0  # units of work of a program
-STARTS, MOST_PULSES = 8, 200  # starts in a nutation period of a channel with a transverse torque; pulses at most
+STARTS, MOST_PULSES = (
+    8,
+    200,
+)  # starts in a nutation period of a channel with a transverse torque; pulses at most
 CORRECTED = 4  # flights by which the length of a spin change is corrected
 
 
@@ -67,8 +74,12 @@ def spin_changes(problem: Problem) -> Iterator[Schedule]:
                     yield schedule
 
 
-def _spin_change(problem: Problem, goal: float, channel: Channel, start: float, turn: float) -> Schedule | None:
-    """The pulses of a ``channel`` from ``start`` s on, one each ``turn`` s or one after the other; else None."""
+def _spin_change(
+    problem: Problem, goal: float, channel: Channel, start: float, turn: float
+) -> Schedule | None:
+    """The pulses of a ``channel`` from ``start`` s on, one each ``turn`` s or one after the other;
+    else None.
+    """
     spacecraft, tick = problem.spacecraft, problem.spacecraft.limits.tick
     rate = channel.axial / spacecraft.inertia.C
     whole = (goal - spacecraft.spin) / rate
@@ -92,18 +103,30 @@ def _spin_change(problem: Problem, goal: float, channel: Channel, start: float, 
             break
         whole += missed / rate
     held = requirements.held(spacecraft, left_by(flight))
-    return schedule if all(bound.met for bound in held) and keeps_limits(spacecraft, schedule) else None
+    return (
+        schedule
+        if all(bound.met for bound in held) and keeps_limits(spacecraft, schedule)
+        else None
+    )
 
 
 CLEARLY, ABOUT = 0.8, 0.002
-"""Share of the end at which small angles must allow the cost, for an earlier one to be looked for, and the excess."""
+"""Share of the end at which small angles must allow the cost, for an earlier one to be looked for,
+and the excess.
+"""
 
-BISECTIONS, ROUNDS, PARTS = 3, 3, (0.2, 0.4, 0.6)
-"""Steps in which the earliest end is found that they allow; earlier ends looked for one after the other; horizons that
-are tried in turn, as parts of the way from the earliest end that they allow to the end there is."""
+BISECTIONS = 3
+ROUNDS = 3
+PARTS = (0.2, 0.4, 0.6)
+"""Steps in which the earliest end is found that they allow; earlier ends looked for one after the
+other; horizons that are tried in turn, as parts of the way from the earliest end that they allow to
+the end there is.
+"""
 
 EARLIER, MOST_ENDS, INTEGRATED = 300.0, 900.0, 4.0
-"""Units of `work` after which no other end is looked for, and for all of them; how many more with three moments."""
+"""Units of `work` after which no other end is looked for, and for all of them; how many more with
+three moments.
+"""
 
 
 def hastened(
@@ -111,8 +134,9 @@ def hastened(
 ) -> Schedule:
     """The ``best``, or one that ends earlier, costs and leaves as much, and has no more pulses.
 
-    ``first`` is the program's solution for the whole horizon; ``cheapest`` gives the cheapest schedule found within a
-    horizon, s. By how much earlier an end may be small angles tell; the horizons that are tried lie a little later.
+    ``first`` is the program's solution for the whole horizon; ``cheapest`` gives the cheapest
+    schedule found within a horizon, s. By how much earlier an end may be small angles tell; the
+    horizons that are tried lie a little later.
     """
     if problem.options.least not in ("propellant", "impulse") or first.unmet > UNMET:
         return best
@@ -122,7 +146,11 @@ def hastened(
 
     def better(schedule: Schedule) -> bool:
         less = schedule.end < best.end and len(schedule) <= len(best)
-        return less and problem.price(schedule) <= dearest and problem.left(problem.flown(schedule)) <= left
+        return (
+            less
+            and problem.price(schedule) <= dearest
+            and problem.left(problem.flown(schedule)) <= left
+        )
 
     more = 1.0 if problem.spacecraft.inertia.symmetric else INTEGRATED
     with work.budget("an earlier end", more * MOST_ENDS) as spent:
@@ -133,7 +161,10 @@ def hastened(
         for _ in range(ROUNDS):
             ends = [] if over() else _earlier_ends(problem, best.end, allowed)
             schedules = (cheapest(end) for end in ends if not over())
-            earlier = next((schedule for schedule in schedules if schedule is not None and better(schedule)), None)
+            earlier = next(
+                (schedule for schedule in schedules if schedule is not None and better(schedule)),
+                None,
+            )
             if earlier is None:
                 break
             best = earlier
@@ -141,7 +172,9 @@ def hastened(
 
 
 def _earlier_ends(problem: Problem, end: float, most: float) -> list[float]:
-    """Horizons to try for an earlier ``end`` s, after what small angles allow at a cost of ``most``; none near it."""
+    """Horizons to try for an earlier ``end`` s, after what small angles allow at a cost of
+    ``most``; none near it.
+    """
     begin = problem.spacecraft.limits.earliest
     span = end - begin
 
@@ -153,7 +186,8 @@ def _earlier_ends(problem: Problem, end: float, most: float) -> list[float]:
     # Nor may it cost them more than `ABOUT` over what they cost in all of the span.
     if clearly > most or clearly > (most := min(most, cost(1.0) * (1.0 + ABOUT))):
         return []
-    low, high = 0.0, CLEARLY
+    low = 0.0
+    high = CLEARLY
     for _ in range(BISECTIONS):
         middle = 0.5 * (low + high)
         low, high = (low, middle) if cost(middle) <= most else (middle, high)
@@ -161,7 +195,8 @@ def _earlier_ends(problem: Problem, end: float, most: float) -> list[float]:
 
 
 def by_other_schemes(spacecraft: Spacecraft, *, shift: bool) -> Iterator[Schedule]:
-    """Schedules by the channels of the ``spacecraft`` for the same goal, one after the other; ``shift``: H counts.
+    """Schedules by the channels of the ``spacecraft`` for the same goal, one after the other;
+    ``shift``: H counts.
 
     The later ones take longer to plan, and are rarely better.
     """
@@ -170,18 +205,29 @@ def by_other_schemes(spacecraft: Spacecraft, *, shift: bool) -> Iterator[Schedul
     # The Sun keeps the phase of trains alone.
     body = replace(spacecraft, steerable=None, goal=replace(spacecraft.goal, sun=None))
     model = SymmetricModel(body, body, np.ones(2)) if body.inertia.symmetric else model_of(body)
-    plans: list[tuple[Scheme, Callable[[Spacecraft, Any], Schedule | Iterable[Schedule]], SchemeOptions]]
+    plans: list[
+        tuple[Scheme, Callable[[Spacecraft, Any], Schedule | Iterable[Schedule]], SchemeOptions]
+    ]
     if not shift:
         plans = [(ONE_PULSE, one_pulse.schedule, SchemeOptions())]
         if not body.inertia.symmetric:
-            plans.append((FOUR_PULSE, lambda _, options: four_pulse.on_true_motion(body, options), FourPulseOptions()))
+            plans.append(
+                (
+                    FOUR_PULSE,
+                    lambda _, options: four_pulse.on_true_motion(body, options),
+                    FourPulseOptions(),
+                )
+            )
     elif body.goal.axis is None:
         plans = [(TWO_PULSE, two_pulse.alternatives, TwoPulseOptions())]
     else:
         plans = [(TWO_PULSE, two_pulse.schedule, TwoPulseOptions())]
         if body.spin != 0.0:
             plans.append((RHUMB_LINE, rhumb_line.schedule, RhumbLineOptions()))
-        plans += [(HALF_CONE, half_cone.schedule, HalfConeOptions(cones=cones)) for cones in (None, 12, 6, 3)]
+        plans += [
+            (HALF_CONE, half_cone.schedule, HalfConeOptions(cones=cones))
+            for cones in (None, 12, 6, 3)
+        ]
     for scheme, plan, options in plans:
         if work.exhausted():
             return
@@ -191,20 +237,29 @@ def by_other_schemes(spacecraft: Spacecraft, *, shift: bool) -> Iterator[Schedul
         except Infeasible:
             continue
         if not body.inertia.symmetric:
-            every = [Correction(scheme, options)(body, model.translate(schedule)) for schedule in every]
+            every = [
+                Correction(scheme, options)(body, model.translate(schedule)) for schedule in every
+            ]
         yield from (schedule for schedule in every if keeps_limits(spacecraft, schedule))
 
 
 SLOTS, MOST_SLOTS = 40, 320  # slots in the faster of the two turns, at ω3 and at aω3, and in all
-NEWTON_STEPS, CONVERGED = 25, 1e-12  # for the lengths of burns, and the end error, over |H|, at which they end
+NEWTON_STEPS, CONVERGED = (
+    25,
+    1e-12,
+)  # for the lengths of burns, and the end error, over |H|, at which they end
 SHORTEST = 0.02  # share of a slot below which a burn is left out before the lengths are found
 
-HALVINGS, LONGER = 10, (0.0, 0.01, 0.03, 0.08, 0.2, 0.4, 0.8)
-"""Steps in which the earliest end by small angles is found, and shares added to it that are tried in turn."""
+HALVINGS = 10
+LONGER = (0.0, 0.01, 0.03, 0.08, 0.2, 0.4, 0.8)
+"""Steps in which the earliest end by small angles is found, and shares added to it that are tried
+in turn.
+"""
 
 
 class Pieces(NamedTuple):
-    """Numbers ``which`` (n,) of channels that fire one after the other, -1 where none does, and for how long, s.
+    """Numbers ``which`` (n,) of channels that fire one after the other, -1 where none does, and for
+    how long, s.
 
     ``off`` (2,) N m s is how far from the target H is to end, where it may.
     """
@@ -215,7 +270,9 @@ class Pieces(NamedTuple):
 
 
 def earliest(problem: Problem) -> Schedule | None:
-    """The schedule of one channel after another that ends first, as far as it is found; None where there is none."""
+    """The schedule of one channel after another that ends first, as far as it is found; None where
+    there is none.
+    """
     begin, horizon = problem.spacecraft.limits.earliest, problem.spacecraft.horizon
     influence = small_angles(problem.spacecraft, problem.equations)
     if _pieces(problem, influence, horizon) is None:
@@ -235,10 +292,14 @@ def earliest(problem: Problem) -> Schedule | None:
 
 
 def within(problem: Problem, horizon: float) -> Schedule | None:
-    """A schedule of one channel after another within ``horizon`` s that leaves nothing; None where none is found."""
+    """A schedule of one channel after another within ``horizon`` s that leaves nothing; None where
+    none is found.
+    """
     influence = small_angles(problem.spacecraft, problem.equations)
     late = 0.0
-    for _ in range(LINES):  # programs, each about the flight of the one before: at large angles small ones mislead
+    for _ in range(
+        LINES
+    ):  # programs, each about the flight of the one before: at large angles small ones mislead
         pieces = None if work.exhausted() else _pieces(problem, influence, horizon - late)
         if pieces is None:
             return None
@@ -262,10 +323,13 @@ def _slot(problem: Problem) -> float:
 
 
 def _pieces(problem: Problem, influence: Influence, horizon: float) -> Pieces | None:
-    """The cheapest firing of one channel after another in time order; None where none is worth one, to first order."""
+    """The cheapest firing of one channel after another in time order; None where none is worth one,
+    to first order.
+    """
     body, channels, limits = problem.spacecraft, problem.channels, problem.spacecraft.limits
     if limits.gap > 0.0 or limits.tick is not None or limits.max_pulses is not None or not channels:
-        return None  # burns may not follow each other without a gap, begin at any time and be of any number
+        # burns may not follow each other without a gap, begin at any time and be of any number
+        return None
     begin = limits.earliest
     count = min(max(math.ceil((horizon - begin) / _slot(problem)), 2 * SLOTS // 3), MOST_SLOTS)
     edges = np.linspace(begin, horizon, count + 1)
@@ -277,9 +341,12 @@ def _pieces(problem: Problem, influence: Influence, horizon: float) -> Pieces | 
     centres = 0.5 * (edges[1:] + edges[:-1])[free]
     lost = influence.widths(np.array([width]))[0]
     torques = np.array([channel.torque for channel in channels])
-    # What a whole slot of each channel adds to each equation, over all there is to do; columns channel by channel.
+    # What a whole slot of each channel adds to each equation, over all there is to do; columns
+    # channel by channel.
     size = float(np.linalg.norm(influence.goal)) or 1.0
-    whole = np.einsum("nek,ck->ecn", influence.rows(centres) * lost[:, None], torques) * (width / size)
+    whole = np.einsum("nek,ck->ecn", influence.rows(centres) * lost[:, None], torques) * (
+        width / size
+    )
     equations, slots = len(influence.goal), len(free)
     program = GrowingProgram(influence.goal / size, np.ones(slots + 1), np.ones(equations))
     slack = np.hstack([np.eye(equations), -np.eye(equations)])
@@ -292,18 +359,27 @@ def _pieces(problem: Problem, influence: Influence, horizon: float) -> Pieces | 
     program.add(np.zeros(ring.shape[1]), ring, np.ones(ring.shape[1]), free_shares)
     every = np.ones(slots * len(channels))
     cost = np.repeat(problem.costs / float(problem.costs.max()), slots)
-    program.add(cost, whole.reshape(equations, -1), every, Shares(np.tile(np.arange(slots), len(channels)), every))
+    program.add(
+        cost,
+        whole.reshape(equations, -1),
+        every,
+        Shares(np.tile(np.arange(slots), len(channels)), every),
+    )
     optimum = program.optimum()
     if optimum is None or float(optimum.x[: 2 * equations].sum()) > UNMET:
         return None
     fired = np.zeros((len(channels), count + 1))  # and one slot more, in which nothing fires
     around, shares = np.split(optimum.x[2 * equations :], [ring.shape[1]])
     fired[:, free] = shares.reshape(len(channels), slots) * width
-    return _in_order(fired, width, -size * (ring @ around)[2:4] if problem.off > 0.0 else np.zeros(2))
+    return _in_order(
+        fired, width, -size * (ring @ around)[2:4] if problem.off > 0.0 else np.zeros(2)
+    )
 
 
 def _in_order(times: Vector, width: float, off: Vector) -> Pieces | None:
-    """Burns from ``times`` (channels, slots) s: in each slot first what fired before, last what fires on after it."""
+    """Burns from ``times`` (channels, slots) s: in each slot first what fired before, last what
+    fires on after it.
+    """
     pieces = list[tuple[int, float]]()
     for mine, following in itertools.pairwise(times.T):
         before = pieces[-1][0] if pieces else -1
@@ -325,18 +401,29 @@ def _burns(problem: Problem, which: NDArray[np.int_], times: Vector) -> Schedule
     """The pieces, one after the other."""
     starts = problem.spacecraft.limits.earliest + np.concatenate([[0.0], np.cumsum(times)[:-1]])
     pieces = zip(which.tolist(), starts.tolist(), times.tolist(), strict=True)
-    on = [(problem.channels[number], start, time) for number, start, time in pieces if number >= 0 and time > 0.0]
-    return Schedule(tuple(channel_pulse(channel, start + 0.5 * time, time) for channel, start, time in on))
+    on = [
+        (problem.channels[number], start, time)
+        for number, start, time in pieces
+        if number >= 0 and time > 0.0
+    ]
+    return Schedule(
+        tuple(channel_pulse(channel, start + 0.5 * time, time) for channel, start, time in on)
+    )
 
 
 def _exact(problem: Problem, pieces: Pieces) -> Schedule:
-    """The schedule whose flown motion leaves nothing but ``off``, by Newton's method for the lengths of its pieces."""
+    """The schedule whose flown motion leaves nothing but ``off``, by Newton's method for the
+    lengths of its pieces.
+    """
     which, times, off = pieces
     aside = np.array([0.0, 0.0, *off, 0.0])[problem.equations.chosen]
-    body, size = problem.spacecraft, float(np.linalg.norm(problem.spacecraft.momentum))
+    body = problem.spacecraft
+    size = float(np.linalg.norm(problem.spacecraft.momentum))
     scale = np.full(len(times), float(times.max(initial=1e-9)))
     most = body.horizon - body.limits.earliest
-    task = Task(body, problem.equations, problem.channels, problem.costs) if problem.closed else None
+    task = (
+        Task(body, problem.equations, problem.channels, problem.costs) if problem.closed else None
+    )
     firing = which >= 0
 
     def left(rows: Vector) -> Vector:
@@ -353,7 +440,9 @@ def _exact(problem: Problem, pieces: Pieces) -> Schedule:
         if np.linalg.norm(value) <= CONVERGED or work.exhausted():
             break
         slopes = (left(times + 1e-6 * np.diag(scale)) - value).T / 1e-6
-        move = bounded_step(slopes, value, times, scale, np.zeros(len(times)), np.full(len(times), most))
+        move = bounded_step(
+            slopes, value, times, scale, np.zeros(len(times)), np.full(len(times), most)
+        )
         for shrink in range(6):
             trial = np.clip(times + move * 0.5**shrink, 0.0, most)
             following = left(trial[None])[0]

@@ -1,9 +1,10 @@
 """Interior-point descent of many pulse sequences at once, each to the cheapest schedule near it.
 
-Channels and their order stay. Unknown are starts and on-times; the misses of the flight must vanish, and on-times, gap,
-windows and horizon bound them linearly. A primal-dual interior-point iteration with quasi-Newton curvature (Nocedal and
-Wright 2006, ch. 18.3 and 19) keeps all bounds at every step, on arrays that carry the sequence first. Slopes are
-differences of flights, which cost little where hundreds are flown at a time.
+Channels and their order stay. Unknown are starts and on-times; the misses of the flight must
+vanish, and on-times, gap, windows and horizon bound them linearly. A primal-dual interior-point
+iteration with quasi-Newton curvature (Nocedal and Wright 2006, ch. 18.3 and 19) keeps all bounds at
+every step, on arrays that carry the sequence first. Slopes are differences of flights, which cost
+little where hundreds are flown at a time.
 """
 
 from __future__ import annotations
@@ -20,7 +21,13 @@ from nutdamp.common import work
 from nutdamp.common.numerics import cos_sin
 from nutdamp.flight.dynamics import make_dynamics
 from nutdamp.physics import attitude, batch
-from nutdamp.schemes.optimal.refinement import AROUND, EndEquations, Influence, small_angles, square_to_target
+from nutdamp.schemes.optimal.refinement import (
+    AROUND,
+    EndEquations,
+    Influence,
+    small_angles,
+    square_to_target,
+)
 from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Spacecraft, Vector
 
@@ -30,14 +37,18 @@ Indices = NDArray[np.int_]
 Complex = NDArray[np.complex128]
 
 DIFFERENCE = 1e-6  # step of the difference quotients, in scaled unknowns
-FLIGHT, CASE = 0.05, 0.0003  # units of `work` of a stretch of a flight of many sequences, and of each of them
+FLIGHT, CASE = (
+    0.05,
+    0.0003,
+)  # units of `work` of a stretch of a flight of many sequences, and of each of them
 RADIAN, CASE_RADIAN = 0.8, 0.0025  # and where it is integrated, of each radian
 
 
 class Sequences(NamedTuple):
     """Channels ``which`` (b, n), by number, of b sequences of n pulses.
 
-    ``begins`` and ``ends`` (b, n) s: the window of each pulse; ``shortest`` and ``longest`` (b, n) s: its on-time.
+    ``begins`` and ``ends`` (b, n) s: the window of each pulse; ``shortest`` and ``longest`` (b, n)
+    s: its on-time.
     """
 
     which: Indices
@@ -52,14 +63,20 @@ class Sequences(NamedTuple):
 
 
 class Task:
-    """Task of ``channels`` at ``costs`` per second, see `EndEquations`; H may end ``off`` N m s off target.
+    """Task of ``channels`` at ``costs`` per second, see `EndEquations`; H may end ``off`` N m s off
+    target.
 
-    Unknowns x (b, 2n) of a sequence are the starts of its pulses, then their on-times, s; two more where H may end
-    off its target: how far, over ``off``.
+    Unknowns x (b, 2n) of a sequence are the starts of its pulses, then their on-times, s; two more
+    where H may end off its target: how far, over ``off``.
     """
 
     def __init__(
-        self, body: Spacecraft, equations: EndEquations, channels: tuple[Channel, ...], costs: Vector, off: float = 0.0
+        self,
+        body: Spacecraft,
+        equations: EndEquations,
+        channels: tuple[Channel, ...],
+        costs: Vector,
+        off: float = 0.0,
     ) -> None:
         self.body, self.channels, self.costs = body, channels, costs
         self.chosen = equations.chosen
@@ -68,13 +85,16 @@ class Task:
         self.loose = 2 if self.off > 0.0 else 0
         self.momentum = float(np.linalg.norm(body.momentum))
         self.spin = body.spin if body.goal.spin is None else body.goal.spin
-        size = max(body.least_impulse, body.turning_impulse, body.inertia.C * abs(self.spin - body.spin))
+        size = max(
+            body.least_impulse, body.turning_impulse, body.inertia.C * abs(self.spin - body.spin)
+        )
         self.unit = size / np.linalg.norm(self.torques, axis=1)
         """s of each channel that are worth all there is to do"""
         self.least = float(np.min(costs * self.unit))
         self.shortest = np.array([channel.min_on_time for channel in channels])
         self.pace = min(1.0 / body.fastest, body.inertial_period)
-        dynamics, start = make_dynamics(body), body.initial
+        dynamics = make_dynamics(body)
+        start = body.initial
         # External torques with and without disturbances, see `batch.Bodies`.
         self._forced = dynamics.constant, dynamics.forcing
         self._coasting = np.zeros(3), dynamics.forcing._replace(turning=())
@@ -87,8 +107,8 @@ class Task:
     def misses(self, which: Indices, x: Vector, kicks: int) -> Vector:
         """Misses of the flights of ``x`` (b, …), (b, equations), over |H|.
 
-        Pulses act as so many ``kicks`` spread over them, without disturbances, with I1 ≠ I2 as at small angles; 0: the
-        true motion.
+        Pulses act as so many ``kicks`` spread over them, without disturbances, with I1 ≠ I2 as at
+        small angles; 0: the true motion.
         """
         parts = [slice(begin, begin + batch.BLOCK) for begin in range(0, len(x), batch.BLOCK)]
         flown = [self._misses(which[part], x[part], kicks) for part in parts]
@@ -103,11 +123,15 @@ class Task:
         momentum, turn = flown(which, x, kicks)
         inertial = attitude.rotate(turn.T, momentum.T)
         shift = inertial @ self._across.T
-        shift[inertial @ self.body.target_axis < 0.0] += self.momentum  # the other way round is no solution
+        shift[inertial @ self.body.target_axis < 0.0] += (
+            self.momentum
+        )  # the other way round is no solution
         if self.loose:
             shift = shift - self.off * x[:, -2:]
         spin = momentum[2] - self.body.inertia.axial(self.spin)
-        return np.asarray(np.column_stack([momentum[:2].T, shift, spin])[:, self.chosen] / self.momentum)
+        return np.asarray(
+            np.column_stack([momentum[:2].T, shift, spin])[:, self.chosen] / self.momentum
+        )
 
     def _at_small_angles(self, linear: Influence, which: Indices, x: Vector) -> Vector:
         """Misses by the equations of small angles."""
@@ -123,13 +147,17 @@ class Task:
     def _in_turn(self, which: Indices, x: Vector, kicks: int) -> tuple[Vector, Vector]:
         """H in body axes (3, b) and quaternions (4, b) at the end, stretch by stretch."""
         count, n = which.shape
-        turned = float(np.max(x[:, n - 1] + x[:, 2 * n - 1])) * float(np.linalg.norm(self._start[1]))
+        turned = float(np.max(x[:, n - 1] + x[:, 2 * n - 1])) * float(
+            np.linalg.norm(self._start[1])
+        )
         work.spend(turned * (RADIAN + CASE_RADIAN * count))
         moments, rates, turn = (np.repeat(part[:, None], count, axis=1) for part in self._start)
         bodies = batch.Bodies(moments, *(self._coasting if kicks else self._forced))
         now = np.zeros(count)
         for pulse in range(n):
-            begin, on_time, torque = x[:, pulse], x[:, n + pulse], self.torques[which[:, pulse]].T
+            begin = x[:, pulse]
+            on_time = x[:, n + pulse]
+            torque = self.torques[which[:, pulse]].T
             for kick in range(kicks):
                 t = begin + on_time * ((kick + 0.5) / kicks)
                 batch.advance(batch.MotionStretch(bodies, now, rates, turn), t - now)
@@ -143,13 +171,15 @@ class Task:
 
     def _together(self, which: Indices, x: Vector, kicks: int) -> tuple[Vector, Vector]:
         """`_in_turn` of a body without external torque, all stretches at once."""
-        # In the frame that turns with the nutation pulses add to H whatever it is, and between them the body turns
-        # about H and its own axis: so the motion at all edges is known first, and then all turns are. A quaternion is
-        # a pair of complex numbers, w + iz and x + iy.
+        # In the frame that turns with the nutation pulses add to H whatever it is, and between them
+        # the body turns about H and its own axis: so the motion at all edges is known first, and
+        # then all turns are. A quaternion is a pair of complex numbers, w + iz and x + iy.
         count, n = which.shape
         (A, _, C), rates, turn = self._start
         wheel = self.body.inertia.wheel
-        parts, starts, widths = max(kicks, 1), x[:, :n], x[:, n : 2 * n]
+        parts = max(kicks, 1)
+        starts = x[:, :n]
+        widths = x[:, n : 2 * n]
         impulses = np.repeat(self.torques[which] * (widths / parts)[:, :, None], parts, axis=1)
         if kicks:
             shares = (np.arange(kicks) + 0.5) / kicks
@@ -165,39 +195,56 @@ class Task:
         begun = np.exp(1j * (phase - within))  # as each pulse begins
         added = impulses[:, :, 0] + 1j * impulses[:, :, 1]
         if not kicks and self.torques[:, 2].any():
-            added = self._pulsed(which, np.zeros_like(added), before, widths)[0] * np.exp(1j * within)
+            added = self._pulsed(which, np.zeros_like(added), before, widths)[0] * np.exp(
+                1j * within
+            )
         elif not kicks:
             added = added * np.exp(0.5j * within) * np.sinc(within / (2.0 * np.pi))
         after = A * complex(rates[0], rates[1]) + np.cumsum(added * begun, axis=1)
-        across = (after - added * begun) / begun  # in body axes as each pulse begins: H turns back in a coast
+        across = (
+            after - added * begun
+        ) / begun  # in body axes as each pulse begins: H turns back in a coast
         size = np.sqrt(across.real**2 + across.imag**2 + before**2)
         cosine, sine = cos_sin(0.5 / A * size * coasts)
         sine /= np.where(size > 0.0, size, 1.0)
         half = np.exp(0.5j * turned)
         first, second = (cosine + 1j * (sine * before)) * half, sine * across * half
         if not kicks:
-            turns = zip((first, second), self._pulsed(which, across, before, widths)[1:], strict=True)
+            turns = zip(
+                (first, second), self._pulsed(which, across, before, widths)[1:], strict=True
+            )
             first, second = (np.stack(pair, axis=2).reshape(count, 2 * n) for pair in turns)
         first, second = _product(first, second)
         momentum = after[:, -1] * np.exp(-1j * phase[:, -1])
         spun = attitude.product(turn, (first.real, second.real, second.imag, first.imag))
         return np.array([momentum.real, momentum.imag, axial[:, -1]]), np.array(spun)
 
-    def _pulsed(self, which: Indices, across: Complex, before: Vector, widths: Vector) -> tuple[Complex, ...]:
-        """H across axis 3 (b, n) after pulses, each alone, that begin with H ``across`` and along it; turn of each."""
+    def _pulsed(
+        self, which: Indices, across: Complex, before: Vector, widths: Vector
+    ) -> tuple[Complex, ...]:
+        """H across axis 3 (b, n) after pulses, each alone, that begin with H ``across`` and along
+        it; turn of each.
+        """
         count = which.size
         moments = np.repeat(self._start[0][:, None], count, axis=1)
-        rates = np.array([across.real, across.imag, before - self.body.inertia.wheel]).reshape(3, -1) / moments
+        rates = (
+            np.array([across.real, across.imag, before - self.body.inertia.wheel]).reshape(3, -1)
+            / moments
+        )
         turns = np.repeat(np.array([[1.0], [0.0], [0.0], [0.0]]), count, axis=1)
         bodies = batch.Bodies(moments, *self._coasting)
-        stretch = batch.MotionStretch(bodies, np.zeros(count), rates, turns, self.torques[which].reshape(-1, 3).T)
+        stretch = batch.MotionStretch(
+            bodies, np.zeros(count), rates, turns, self.torques[which].reshape(-1, 3).T
+        )
         batch.advance(stretch, widths.ravel())
         pairs = (rates[0], rates[1]), (turns[0], turns[3]), (turns[1], turns[2])
         after, *turned = ((real + 1j * imaginary).reshape(which.shape) for real, imaginary in pairs)
         return after * self._start[0][0], *turned
 
     def slopes(self, which: Indices, x: Vector, scale: Vector, here: Vector, kicks: int) -> Vector:
-        """Slopes of the misses, ``here`` now, by the unknowns in units of ``scale`` (b, …): (b, equations, …)."""
+        """Slopes of the misses, ``here`` now, by the unknowns in units of ``scale`` (b, …): (b,
+        equations, …).
+        """
         number = x.shape[1]
         moved = x[:, None, :] + DIFFERENCE * scale[:, None, :] * np.eye(number)
         there = self.misses(np.repeat(which, number, axis=0), moved.reshape(-1, number), kicks)
@@ -209,12 +256,21 @@ class Task:
         return np.asarray(np.sum(self.costs[which] * on, axis=-1))
 
     def bounds(self, sequences: Sequences) -> tuple[Vector, Vector]:
-        """Rows (r, …) and levels (b, r): rows @ x >= levels keeps gap, windows, on-times and ``off``."""
+        """Rows (r, …) and levels (b, r): rows @ x >= levels keeps gap, windows, on-times and
+        ``off``.
+        """
         count, n = sequences.which.shape
-        identity, zero = np.eye(n), np.zeros((n, n))
+        identity = np.eye(n)
+        zero = np.zeros((n, n))
         after = identity - np.eye(n, k=-1)
         matrix = np.block(
-            [[after, -np.eye(n, k=-1)], [identity, zero], [-identity, -identity], [zero, identity], [zero, -identity]]
+            [
+                [after, -np.eye(n, k=-1)],
+                [identity, zero],
+                [-identity, -identity],
+                [zero, identity],
+                [zero, -identity],
+            ]
         )[1:]
         levels = [np.full((count, n - 1), self.body.limits.gap), sequences.begins, -sequences.ends]
         levels += [sequences.shortest, -sequences.longest]
@@ -227,31 +283,42 @@ class Task:
 
 
 def _product(first: Complex, second: Complex) -> tuple[Complex, Complex]:
-    """Product (b,) of quaternions (b, n) in their order, each a pair of complex numbers as in `Task`."""
+    """Product (b,) of quaternions (b, n) in their order, each a pair of complex numbers as in
+    `Task`.
+    """
     while (count := first.shape[1]) > 1:
         last = count & ~1
         u, v, w, z = first[:, :last:2], second[:, :last:2], first[:, 1::2], second[:, 1::2]
         products = (u * w - v * z.conj(), first), (u * z + v * w.conj(), second)
-        first, second = (np.concatenate([product, rest[:, last:]], axis=1) for product, rest in products)
+        first, second = (
+            np.concatenate([product, rest[:, last:]], axis=1) for product, rest in products
+        )
     return first[:, 0], second[:, 0]
 
 
-WHOLE, SHARES = np.array([1.0]), np.array([0.5, 0.2, 0.05, 0.01])  # of a step, where all of it does not help
+WHOLE, SHARES = (
+    np.array([1.0]),
+    np.array([0.5, 0.2, 0.05, 0.01]),
+)  # of a step, where all of it does not help
 
 BARRIER, SETTLED = 1e-9, 1e-7
-"""Share of the cost at which the barrier of the bounds ends; relative error of the conditions for an optimum at which a
-sequence is done."""
+"""Share of the cost at which the barrier of the bounds ends; relative error of the conditions for
+an optimum at which a sequence is done.
+"""
 
 FLAT, PROXIMAL = 1e-5, 1e-9
-"""Share of the cost below which the next step's promise, the barrier and the misses are not worth taking it; weight
-that keeps the multipliers finite where equations depend on one another."""
+"""Share of the cost below which the next step's promise, the barrier and the misses are not worth
+taking it; weight that keeps the multipliers finite where equations depend on one another.
+"""
 
 
 class DescentState(NamedTuple):
-    """State of the descents of b sequences: unknowns ``x`` (b, v), slacks of the r bounds and their multipliers.
+    """State of the descents of b sequences: unknowns ``x`` (b, v), slacks of the r bounds and their
+    multipliers.
 
-    ``misses`` (b, m), ``slopes`` (b, m, v), ``prices`` (b, m) multipliers of the equations, ``curvature`` (b, v, v) of
-    the Lagrangian, ``barrier`` and ``penalty`` (b,), ``error`` (b,) of the conditions for an optimum.
+    ``misses`` (b, m), ``slopes`` (b, m, v), ``prices`` (b, m) multipliers of the equations,
+    ``curvature`` (b, v, v) of the Lagrangian, ``barrier`` and ``penalty`` (b,), ``error`` (b,) of
+    the conditions for an optimum.
     """
 
     x: Vector
@@ -269,12 +336,16 @@ class DescentState(NamedTuple):
 class Descent:
     """The descents of ``sequences`` from ``x`` (b, v), which must lie within all bounds."""
 
-    def __init__(self, task: Task, sequences: Sequences, x: Vector, *, kicks: int, barrier: float = 0.1) -> None:
+    def __init__(
+        self, task: Task, sequences: Sequences, x: Vector, *, kicks: int, barrier: float = 0.1
+    ) -> None:
         self.task, self.sequences, self.kicks = task, sequences, kicks
         which, (count, number) = sequences.which, x.shape
         n = which.shape[1]
         # Natural sizes of the unknowns.
-        self.scale = np.hstack([np.full((count, n), task.pace), task.unit[which], np.ones((count, task.loose))])
+        self.scale = np.hstack(
+            [np.full((count, n), task.pace), task.unit[which], np.ones((count, task.loose))]
+        )
         rows, levels = task.bounds(sequences)
         scaled = rows * self.scale[:, None, :]
         size = np.abs(scaled).max(axis=2)
@@ -310,7 +381,10 @@ class Descent:
     def of(self, rows: Indices) -> Descent:
         """The descents of some of the sequences."""
         some = copy.copy(self)
-        some.sequences, some.state = self.sequences.of(rows), DescentState._make(part[rows] for part in self.state)
+        some.sequences, some.state = (
+            self.sequences.of(rows),
+            DescentState._make(part[rows] for part in self.state),
+        )
         some.scale, some.rows, some.price = self.scale[rows], self.rows[rows], self.price[rows]
         return some
 
@@ -329,7 +403,9 @@ class Descent:
         state, which = self.state, self.sequences.which
         for _ in range(steps):
             curvature = _weighted(self.rows, 1.0 / state.slack**2)
-            move, _ = _newton(state.slopes, curvature, np.zeros_like(state.x), state.misses, state.prices * 0.0)
+            move, _ = _newton(
+                state.slopes, curvature, np.zeros_like(state.x), state.misses, state.prices * 0.0
+            )
             move[~np.isfinite(move).all(axis=1)] = 0.0
             closer = np.einsum("bri,bi->br", self.rows, move)
             step = _to_bound(state.slack, closer, np.full(len(move), 0.5))[:, None]
@@ -338,7 +414,11 @@ class Descent:
             better = np.abs(misses).sum(axis=1) < np.abs(state.misses).sum(axis=1)
             if not better.any():
                 break
-            state.x[better], state.slack[better], state.misses[better] = x[better], slack[better], misses[better]
+            state.x[better], state.slack[better], state.misses[better] = (
+                x[better],
+                slack[better],
+                misses[better],
+            )
 
     def _stepped(self) -> DescentState:
         """The state of all descents one step on."""
@@ -369,31 +449,59 @@ class Descent:
         dual = old.dual + _to_bound(old.dual, dearer, old.barrier)[:, None] * dearer
         central = old.barrier[:, None] / slack
         dual = np.clip(dual, 1e-2 * central, 1e2 * central)
-        gradient = self.price + np.einsum("bmi,bm->bi", slopes, prices) - np.einsum("br,bri->bi", dual, rows)
+        gradient = (
+            self.price
+            + np.einsum("bmi,bm->bi", slopes, prices)
+            - np.einsum("br,bri->bi", dual, rows)
+        )
         wrong = np.maximum(np.abs(gradient).max(axis=1), np.abs(misses).max(axis=1))
-        near = np.maximum(wrong, np.abs(dual * slack - old.barrier[:, None]).max(axis=1)) < 10.0 * old.barrier
-        barrier = np.where(near, np.maximum(np.minimum(0.2 * old.barrier, old.barrier**1.5), BARRIER), old.barrier)
+        near = (
+            np.maximum(wrong, np.abs(dual * slack - old.barrier[:, None]).max(axis=1))
+            < 10.0 * old.barrier
+        )
+        barrier = np.where(
+            near, np.maximum(np.minimum(0.2 * old.barrier, old.barrier**1.5), BARRIER), old.barrier
+        )
         flat = (np.abs(ahead) < FLAT) & (old.barrier < FLAT) & (np.abs(misses).max(axis=1) < FLAT)
         error = np.where(flat | lost, 0.0, np.maximum(wrong, (dual * slack).max(axis=1)))
-        return DescentState(x, slack, dual, misses, slopes, prices, curvature, barrier, penalty, error)
+        return DescentState(
+            x, slack, dual, misses, slopes, prices, curvature, barrier, penalty, error
+        )
 
 
 class _LineSearch:
-    """The search along a step for less of cost, barrier and misses, which fall by ``slope`` (b,) at first."""
+    """The search along a step for less of cost, barrier and misses, which fall by ``slope`` (b,) at
+    first.
+    """
 
     def __init__(self, descent: Descent, penalty: Vector, slope: Vector) -> None:
-        self.descent, self.old, self.penalty, self.slope = descent, descent.state, penalty, np.minimum(slope, 0.0)
-        self.x, self.slack, self.misses = self.old.x.copy(), self.old.slack.copy(), self.old.misses.copy()
+        self.descent, self.old, self.penalty, self.slope = (
+            descent,
+            descent.state,
+            penalty,
+            np.minimum(slope, 0.0),
+        )
+        self.x, self.slack, self.misses = (
+            self.old.x.copy(),
+            self.old.slack.copy(),
+            self.old.misses.copy(),
+        )
         self.active = np.arange(len(penalty))  # sequences for which no step was good enough so far
         self.before = self._merit(self.x, self.slack, self.misses, self.active)
 
     def tried(self, step: Vector, shares: Vector = WHOLE) -> Vector:
-        """Take the first share of the scaled ``step`` (k, v) that falls enough, or the last: the misses of these."""
-        count, k = len(shares), np.tile(self.active, len(shares))
-        share, old = np.repeat(shares, len(self.active)), self.old
+        """Take the first share of the scaled ``step`` (k, v) that falls enough, or the last: the
+        misses of these.
+        """
+        count = len(shares)
+        k = np.tile(self.active, len(shares))
+        share = np.repeat(shares, len(self.active))
+        old = self.old
         step = share[:, None] * np.tile(step, (count, 1))
         slack = old.slack[k] + np.einsum("bri,bi->br", self.descent.rows[k], step)
-        inside = np.all(slack > LEAST_ROOM * old.slack[k], axis=1)  # as much of the room must be left
+        inside = np.all(
+            slack > LEAST_ROOM * old.slack[k], axis=1
+        )  # as much of the room must be left
         x = np.where(inside[:, None], old.x[k] + step * self.descent.scale[k], old.x[k])
         slack = np.where(inside[:, None], slack, old.slack[k])
         misses = self.descent.task.misses(self.descent.sequences.which[k], x, self.descent.kicks)
@@ -401,7 +509,9 @@ class _LineSearch:
         enough = (inside & (self._merit(x, slack, misses, k) <= least)).reshape(count, -1)
         stuck = ~enough.any(axis=0)
         # Rows of the first that falls enough.
-        first = np.where(stuck, count - 1, np.argmax(enough, axis=0)) * len(stuck) + np.arange(len(stuck))
+        first = np.where(stuck, count - 1, np.argmax(enough, axis=0)) * len(stuck) + np.arange(
+            len(stuck)
+        )
         for part, there in ((self.x, x), (self.slack, slack), (self.misses, misses)):
             part[self.active] = there[first]
         self.active = self.active[stuck]
@@ -418,8 +528,12 @@ def _weighted(rows: Vector, weight: Vector) -> Vector:
     return np.asarray(np.matmul(np.swapaxes(rows * weight[:, :, None], 1, 2), rows))
 
 
-def _newton(slopes: Vector, curvature: Vector, uphill: Vector, misses: Vector, prices: Vector) -> tuple[Vector, Vector]:
-    """Step (b, v) in scaled unknowns and prices (b, m) of the equations, by the conditions for an optimum."""
+def _newton(
+    slopes: Vector, curvature: Vector, uphill: Vector, misses: Vector, prices: Vector
+) -> tuple[Vector, Vector]:
+    """Step (b, v) in scaled unknowns and prices (b, m) of the equations, by the conditions for an
+    optimum.
+    """
     count, m, v = slopes.shape
     system = np.zeros((count, v + m, v + m))
     system[:, :v, :v] = curvature
@@ -446,7 +560,9 @@ def _to_bound(value: Vector, change: Vector, barrier: Vector) -> Vector:
 
 
 def _curved(curvature: Vector, moved: Vector, change: Vector) -> Vector:
-    """Powell's damped BFGS update of (b, v, v) by the ``change`` (b, v) of the gradient along ``moved`` (b, v)."""
+    """Powell's damped BFGS update of (b, v, v) by the ``change`` (b, v) of the gradient along
+    ``moved`` (b, v).
+    """
     along = np.einsum("bij,bj->bi", curvature, moved)
     size, gain = np.einsum("bi,bi->b", moved, along), np.einsum("bi,bi->b", moved, change)
     spread = np.where(size > gain, size - gain, 1.0)
@@ -455,5 +571,8 @@ def _curved(curvature: Vector, moved: Vector, change: Vector) -> Vector:
     gain = np.einsum("bi,bi->b", moved, change)
     good = (size > 1e-20) & (gain > 1e-20)
     size, gain = np.where(good, size, 1.0)[:, None, None], np.where(good, gain, 1.0)[:, None, None]
-    update = change[:, :, None] * change[:, None, :] / gain - along[:, :, None] * along[:, None, :] / size
+    update = (
+        change[:, :, None] * change[:, None, :] / gain
+        - along[:, :, None] * along[:, None, :] / size
+    )
     return np.asarray(curvature + np.where(good[:, None, None], update, 0.0))

@@ -1,8 +1,10 @@
-"""Least-cost firing of body-fixed channels: a linear program over channels and firing times, by column generation.
+"""Least-cost firing of body-fixed channels: a linear program over channels and firing times, by
+column generation.
 
-Unknown are on-times. Time is cut into slots in which a channel can be on for at most the slot, so that long burns
-and what their width loses come out right; a channel that gives all that is needed within one slot fires impulses at
-any moment. Columns enter the program by their price, since a handful of equations needs few of them.
+Unknown are on-times. Time is cut into slots in which a channel can be on for at most the slot, so
+that long burns and what their width loses come out right; a channel that gives all that is needed
+within one slot fires impulses at any moment. Columns enter the program by their price, since a
+handful of equations needs few of them.
 """
 
 from __future__ import annotations
@@ -22,15 +24,18 @@ from nutdamp.spacecraft.constraints import Windows
 from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Spacecraft, Vector
 
-SLACK_COST = 1e3  # cost of what no column supplies, over the dearest channel's: used only where there is no solution
+# cost of what no column supplies, over the dearest channel's: used only where there is no solution
+SLACK_COST = 1e3
 PROVED = 1e-6  # shortfall by which a program is proved to have no solution, over all there is to do
 LOOK = 0.05  # peaks of the price this far below zero are looked at more closely within their slots
 
 
 class ProgramColumns(NamedTuple):
-    """Unknowns of the program, n each: index of the channel, moment in s, width in s (0: an impulse).
+    """Unknowns of the program, n each: index of the channel, moment in s, width in s (0: an
+    impulse).
 
-    Columns of the same ``burn``, a number from 0 on, are together on for no longer than their channel may be.
+    Columns of the same ``burn``, a number from 0 on, are together on for no longer than their
+    channel may be.
     """
 
     channel: NDArray[np.int_]
@@ -44,7 +49,9 @@ class ProgramColumns(NamedTuple):
 
     def joined(self, other: ProgramColumns) -> ProgramColumns:
         """These columns and others."""
-        return ProgramColumns._make(np.concatenate(parts) for parts in zip(self, other, strict=True))
+        return ProgramColumns._make(
+            np.concatenate(parts) for parts in zip(self, other, strict=True)
+        )
 
 
 def alone(channel: NDArray[np.int_], t: Vector, width: Vector) -> ProgramColumns:
@@ -67,7 +74,9 @@ class Burn:
 
 
 def above(worth: Vector, least: float, most: int) -> tuple[NDArray[np.int_], NDArray[np.int_]]:
-    """Channels and slots (n,) whose ``worth`` (channels, slots) is more than the ``least``; the ``most`` best ones."""
+    """Channels and slots (n,) whose ``worth`` (channels, slots) is more than the ``least``; the
+    ``most`` best ones.
+    """
     channel, slot = np.nonzero(worth > least)
     if len(slot) > most:
         best = np.argpartition(worth[channel, slot], -most)[-most:]
@@ -76,14 +85,22 @@ def above(worth: Vector, least: float, most: int) -> tuple[NDArray[np.int_], NDA
 
 
 def peaks(worth: Vector, least: float) -> tuple[NDArray[np.int_], NDArray[np.int_]]:
-    """Channels and moments (n,) whose ``worth`` (channels, moments) is more than the ``least``, and highest nearby."""
+    """Channels and moments (n,) whose ``worth`` (channels, moments) is more than the ``least``, and
+    highest nearby.
+    """
     padded = np.pad(worth, ((0, 0), (1, 1)), constant_values=-np.inf)
-    channel, moment = np.nonzero((worth >= padded[:, :-2]) & (worth >= padded[:, 2:]) & (worth > least))
+    channel, moment = np.nonzero(
+        (worth >= padded[:, :-2]) & (worth >= padded[:, 2:]) & (worth > least)
+    )
     return channel, moment
 
 
-def burns(channels: Sequence[Channel], columns: ProgramColumns, on_times: Vector, apart: float) -> tuple[Burn, ...]:
-    """Columns of a channel that are less than ``apart`` s from one another as one burn about their common centre."""
+def burns(
+    channels: Sequence[Channel], columns: ProgramColumns, on_times: Vector, apart: float
+) -> tuple[Burn, ...]:
+    """Columns of a channel that are less than ``apart`` s from one another as one burn about their
+    common centre.
+    """
     result: list[Burn] = []
     order = np.lexsort((columns.t, columns.channel))
     channel, t, _, burn = columns.of(order)
@@ -96,30 +113,43 @@ def burns(channels: Sequence[Channel], columns: ProgramColumns, on_times: Vector
 
 
 SLOTS, MOST_SLOTS = 64, 600_000
-"""Slots in the faster of the turns at ω3 and at aω3, and of all channels: of a longer horizon no more is seen."""
+"""Slots in the faster of the turns at ω3 and at aω3, and of all channels: of a longer horizon no
+more is seen.
+"""
 
-SOLVED, SLOT, COLUMN, LIMITED = 3.0, 3e-4, 1.5e-3, 0.06  # units of `work`: solution, slot, column, limited burn
+SOLVED, SLOT, COLUMN, LIMITED = (
+    3.0,
+    3e-4,
+    1.5e-3,
+    0.06,
+)  # units of `work`: solution, slot, column, limited burn
 
 PRICE, PEAK = 1e-7, 1e-6
-"""Relative reduced cost below which a column cannot lower the cost any more, and that for the best moment of a strong
-channel, which may lie close beside one taken."""
+"""Relative reduced cost below which a column cannot lower the cost any more, and that for the best
+moment of a strong channel, which may lie close beside one taken.
+"""
 
 BEST, MANY = 250, 4
-"""Columns taken in per round, the best priced first, and over one the share of all worth taking in that is taken in
-while they do not supply what is needed."""
+"""Columns taken in per round, the best priced first, and over one the share of all worth taking in
+that is taken in while they do not supply what is needed.
+"""
 
 FIRST, ROUNDS = 400, 60  # columns to begin with, and rounds in which more are taken in
 
 TINIEST, SOME = 1e-6, 1e-12
-"""Coefficient below which an equation is not scaled up; share of what is needed below which an on-time is none."""
+"""Coefficient below which an equation is not scaled up; share of what is needed below which an
+on-time is none.
+"""
 
 
 @dataclass(frozen=True, slots=True)
 class Solution:
-    """Burns of least ``cost`` in time order; ``unmet``: share of all there is to do that columns cannot supply.
+    """Burns of least ``cost`` in time order; ``unmet``: share of all there is to do that columns
+    cannot supply.
 
-    Where the program could not be solved both are infinite. ``off`` (2,) N m s is how far from the target H is to end,
-    where it may. ``prices`` (equations,) are what one more N m s of each goal costs, zero where that is not known.
+    Where the program could not be solved both are infinite. ``off`` (2,) N m s is how far from the
+    target H is to end, where it may. ``prices`` (equations,) are what one more N m s of each goal
+    costs, zero where that is not known.
     """
 
     burns: tuple[Burn, ...]
@@ -132,22 +162,34 @@ class Solution:
 class Program:
     """The linear program of one spacecraft.
 
-    ``costs`` (channels,) per second of on-time. ``influence`` holds the equations, which may be exchanged for others
-    between solutions. ``off`` N m s is how far from its target H may end. ``haste``: by how much (relatively) the end
-    of the horizon seems dearer than its beginning, among equals the early moments are taken. ``forbidden`` (channels,
-    slots) may not be used.
+    ``costs`` (channels,) per second of on-time. ``influence`` holds the equations, which may be
+    exchanged for others between solutions. ``off`` N m s is how far from its target H may end.
+    ``haste``: by how much (relatively) the end of the horizon seems dearer than its beginning,
+    among equals the early moments are taken. ``forbidden`` (channels, slots) may not be used.
     """
 
     def __init__(
-        self, body: Spacecraft, channels: tuple[Channel, ...], costs: Vector, influence: Influence, off: float = 0.0
+        self,
+        body: Spacecraft,
+        channels: tuple[Channel, ...],
+        costs: Vector,
+        influence: Influence,
+        off: float = 0.0,
     ) -> None:
-        self.spacecraft, self.channels, self.costs, self.off, self.haste = body, channels, costs, off, 0.0
-        begin, slot = body.limits.earliest, 2 * math.pi / body.fastest / SLOTS
+        self.spacecraft = body
+        self.channels = channels
+        self.costs = costs
+        self.off = off
+        self.haste = 0.0
+        begin = body.limits.earliest
+        slot = 2 * math.pi / body.fastest / SLOTS
         self.end = min(body.horizon, begin + MOST_SLOTS // len(channels) * slot)
         edges = np.linspace(begin, self.end, max(math.ceil((self.end - begin) / slot), 1) + 1)
         self.width = float(edges[1] - edges[0])
         self.centres: Vector = 0.5 * (edges[1:] + edges[:-1])
-        self.forbidden: NDArray[np.bool_] = np.tile(Windows(body).blocked(edges[:-1], edges[1:]), (len(channels), 1))
+        self.forbidden: NDArray[np.bool_] = np.tile(
+            Windows(body).blocked(edges[:-1], edges[1:]), (len(channels), 1)
+        )
         self._pool: ProgramColumns | None = None
         self._torques = np.array([channel.torque for channel in channels])
         self.aim(influence)
@@ -163,7 +205,8 @@ class Program:
         self.strong: NDArray[np.bool_] = self._unit < self.width
         self._price = self.costs * self._unit
         self._dearest = float(self._price.max())
-        # Columns (equations, n) for free in all directions of the shift, where H may end off its target.
+        # Columns (equations, n) for free in all directions of the shift, where H may end off its
+        # target.
         self._ring = np.zeros((len(influence.goal), AROUND.shape[1] if self.off > 0.0 else 0))
         if self.off > 0.0:
             self._ring[2:4] = AROUND
@@ -171,12 +214,17 @@ class Program:
         self._looked = 0
 
     def solve(self, columns: ProgramColumns | None = None, *, enough: bool = False) -> Solution:
-        """Least cost over the ``columns`` given, or over all that is not forbidden, by column generation.
+        """Least cost over the ``columns`` given, or over all that is not forbidden, by column
+        generation.
 
-        ``enough``: only to see whether there is a solution, at whatever cost; it ends once that is known.
+        ``enough``: only to see whether there is a solution, at whatever cost; it ends once that is
+        known.
         """
-        work.spend(SOLVED + (SLOT * self.forbidden.size if columns is None else COLUMN * len(columns.t)))
-        count, generate = len(self.influence.goal), columns is None
+        work.spend(
+            SOLVED + (SLOT * self.forbidden.size if columns is None else COLUMN * len(columns.t))
+        )
+        count = len(self.influence.goal)
+        generate = columns is None
         if self._scale == 0.0:
             return Solution((), 0.0, 0.0, np.zeros(2), np.zeros(count))
         chosen = self._first() if columns is None else columns
@@ -186,7 +234,9 @@ class Program:
             return Solution((), math.inf, math.inf, np.zeros(2), np.zeros(count))
         for _ in range(ROUNDS if generate else 0):
             unmet = float(optimum.x[: 2 * count].sum())
-            if work.exhausted() or (enough and (unmet <= SOME or self._out_of_reach(optimum.prices))):
+            if work.exhausted() or (
+                enough and (unmet <= SOME or self._out_of_reach(optimum.prices))
+            ):
                 break
             new = self._priced(optimum.prices, chosen, unmet)
             if not len(new.t):
@@ -195,11 +245,14 @@ class Program:
             better = master.optimum()
             if better is None:  # what would lower the cost is lost on the solver
                 break
-            chosen, optimum = chosen.joined(new), better
+            chosen = chosen.joined(new)
+            optimum = better
         if generate:
             self._pool = chosen
         free, amounts = np.split(optimum.x, [len(optimum.x) - len(chosen.t)])
-        off = -(self._ring @ free[2 * count :])[2:4] * self._scale if self.off > 0.0 else np.zeros(2)
+        off = (
+            -(self._ring @ free[2 * count :])[2:4] * self._scale if self.off > 0.0 else np.zeros(2)
+        )
         used = amounts > SOME
         on_times = amounts[used] * self._unit[chosen.channel[used]]
         return Solution(
@@ -211,17 +264,25 @@ class Program:
         )
 
     def _master(self, columns: ProgramColumns, *, growing: bool) -> GrowingProgram:
-        """The program of these columns, in units of all there is to do, after slacks and the ring."""
-        count, ring = len(self.influence.goal), self._ring
-        if growing:  # the most that one unit of any channel does in each of the equations, or a little more
+        """The program of these columns, in units of all there is to do,
+        after slacks and the ring.
+        """
+        count = len(self.influence.goal)
+        ring = self._ring
+        if (
+            growing
+        ):  # the most that one unit of any channel does in each of the equations, or a little more
             reach = (np.abs(self._slot_rows()).max(axis=2) @ np.abs(self._direction).T).max(axis=1)
         else:
             reach = np.abs(self._coefficients(columns)).max(axis=1, initial=0.0)
         # Where H may end off its target, the shares of the directions add up to no more than `off`.
-        shares, limited = min(ring.shape[1], 1), int(self._longest(columns).limit.max(initial=-1)) + 1
+        shares = min(ring.shape[1], 1)
+        limited = int(self._longest(columns).limit.max(initial=-1)) + 1
         work.spend(LIMITED * limited)
         limits = np.concatenate([np.full(shares, self.off / self._scale), np.ones(limited)])
-        master = GrowingProgram(self.influence.goal / self._scale, limits, np.maximum(reach, TINIEST))
+        master = GrowingProgram(
+            self.influence.goal / self._scale, limits, np.maximum(reach, TINIEST)
+        )
         rows = np.zeros((count + shares, 2 * count + ring.shape[1]))
         rows[:count] = np.hstack([np.eye(count), -np.eye(count), ring])
         rows[count:, 2 * count :] = 1.0
@@ -234,11 +295,17 @@ class Program:
         """Let the program have these columns."""
         most = np.where(columns.width > 0.0, columns.width / self._unit[columns.channel], np.inf)
         share = self._longest(columns)
-        share = share._replace(limit=share.limit + np.where(share.limit < 0, 0, int(self.off > 0.0)))
-        master.add(self._costs(columns.channel, columns.t), self._coefficients(columns), most, share)
+        share = share._replace(
+            limit=share.limit + np.where(share.limit < 0, 0, int(self.off > 0.0))
+        )
+        master.add(
+            self._costs(columns.channel, columns.t), self._coefficients(columns), most, share
+        )
 
     def _longest(self, columns: ProgramColumns) -> Shares:
-        """Shares in the limits, one per burn, that hold its on-time, over the longest that its channel may be on."""
+        """Shares in the limits, one per burn, that hold its on-time, over the longest that its
+        channel may be on.
+        """
         longest = np.array([channel.max_on_time for channel in self.channels])[columns.channel]
         bounded = (columns.burn >= 0) & np.isfinite(longest)
         limit = np.full(len(longest), -1)
@@ -268,44 +335,68 @@ class Program:
         """Coefficients of one N m s in each slot, (equations, 3, slots)."""
         if self._grid is None:
             lost = self.influence.widths(np.array([self.width]))[0]
-            self._grid = np.ascontiguousarray((self.influence.rows(self.centres) * lost[:, None]).transpose(1, 2, 0))
+            self._grid = np.ascontiguousarray(
+                (self.influence.rows(self.centres) * lost[:, None]).transpose(1, 2, 0)
+            )
         return self._grid
 
     def _worth(self, weights: Vector) -> Vector:
-        """Worth of one unit of each channel in each slot by prices ``weights``, (channels, slots)."""
-        worth = self._direction @ (weights @ self._slot_rows().reshape(len(weights), -1)).reshape(3, -1)
+        """Worth of one unit of each channel in each slot by prices ``weights``, (channels,
+        slots).
+        """
+        worth = self._direction @ (weights @ self._slot_rows().reshape(len(weights), -1)).reshape(
+            3, -1
+        )
         if self.forbidden.any():
             worth[self.forbidden] = -np.inf
         return np.asarray(worth)
 
     def _gains(self, weights: Vector) -> Vector:
         """Worth of one unit of each channel in each slot, less its cost, (channels, slots)."""
-        gains, every = self._worth(weights), np.arange(len(self.channels))[:, None]
+        gains = self._worth(weights)
+        every = np.arange(len(self.channels))[:, None]
         # Large: in place, and with one time where none is dearer.
         gains -= self._costs(every, self.centres if self.haste else self.centres[:1])
         return gains
 
     def reachable(self) -> bool | None:
-        """True where all slots together can supply the goal, see `supplies`; None where that is not known."""
-        if self._scale == 0.0 or self.strong.any():  # strong ones act at moments, of which slots are only samples
+        """True where all slots together can supply the goal, see `supplies`; None where that is not
+        known.
+        """
+        if (
+            self._scale == 0.0 or self.strong.any()
+        ):  # strong ones act at moments, of which slots are only samples
             return None
         work.spend(SOLVED + SLOT * self.forbidden.size)
-        most = np.einsum("ekn,ck->ecn", self._slot_rows(), self._direction) * (self.width / self._unit)[None, :, None]
-        return supplies(most[:, ~self.forbidden], self.influence.goal / self._scale, self.off / self._scale)
+        most = (
+            np.einsum("ekn,ck->ecn", self._slot_rows(), self._direction)
+            * (self.width / self._unit)[None, :, None]
+        )
+        return supplies(
+            most[:, ~self.forbidden], self.influence.goal / self._scale, self.off / self._scale
+        )
 
     def _out_of_reach(self, weights: Vector) -> bool:
-        """True where prices ``weights`` prove that all slots together do not supply the goal (Farkas' lemma)."""
+        """True where prices ``weights`` prove that all slots together do not supply the goal
+        (Farkas' lemma).
+        """
         if self.strong.any():  # these act at moments, of which the slots are only samples
             return False
         most = float(np.maximum(self._worth(weights), 0.0).sum(axis=1) @ (self.width / self._unit))
         loose = self.off / self._scale * float(np.linalg.norm(weights[2:4]))
-        return float(weights @ self.influence.goal) / self._scale - most - loose > PROVED * float(np.abs(weights).max())
+        return float(weights @ self.influence.goal) / self._scale - most - loose > PROVED * float(
+            np.abs(weights).max()
+        )
 
     def _first(self) -> ProgramColumns:
-        """Columns to begin with: those of the last time, or along the shortest way to the goal, spread over time."""
+        """Columns to begin with: those of the last time, or along the shortest way to the goal,
+        spread over time.
+        """
         if self._pool is not None:
             return self._pool.of(~self.forbidden[self._pool.channel, self._slot(self._pool.t)])
-        worth = self._gains(self.influence.goal / self._scale) * (self._dearest / self._price)[:, None]
+        worth = (
+            self._gains(self.influence.goal / self._scale) * (self._dearest / self._price)[:, None]
+        )
         channel, slot = np.nonzero(worth > 0.7 * worth.max(initial=0.0) - 0.3)
         chosen = np.linspace(0, len(slot) - 1, min(FIRST, len(slot))).astype(int)
         return self._slots(channel[chosen], slot[chosen])
@@ -314,43 +405,58 @@ class Program:
         return alone(channel, self.centres[slot], np.where(self.strong[channel], 0.0, self.width))
 
     def _priced(self, duals: Vector, taken: ProgramColumns, unmet: float) -> ProgramColumns:
-        """Columns worth more than they cost: whole slots of a weak channel, the best moments of a strong one."""
+        """Columns worth more than they cost: whole slots of a weak channel, the best moments of a
+        strong one.
+        """
         gains = self._gains(duals)
         weak = np.where(self.strong[:, None], -np.inf, gains)
         weak[taken.channel, self._slot(taken.t)] = -np.inf
-        # More of them at a time as long as something is unmet: then most of what there is may be needed.
+        # More of them at a time as long as something is unmet: then most of what there is may be
+        # needed.
         most = max(BEST, int(np.count_nonzero(weak > PRICE)) // MANY if unmet > SOME else 0)
         columns = self._slots(*above(weak, PRICE, most))
         return columns.joined(self._peaks(gains, duals)) if self.strong.any() else columns
 
     def _peaks(self, gains: Vector, duals: Vector) -> ProgramColumns:
-        """Moments within slots at which a strong channel is worth most, in slots in which it costs little more."""
+        """Moments within slots at which a strong channel is worth most, in slots in which it costs
+        little more.
+        """
         channel, slot = peaks(np.where(self.strong[:, None], gains, -np.inf), -LOOK)
         order = np.argsort(gains[channel, slot])[::-1][: 2 * BEST]
         channel, centre = channel[order], self.centres[slot[order]]
-        within = 0.25 * self.width * np.arange(-2, 3)  # both ends of the slot among them: there may be none beside it
+        within = (
+            0.25 * self.width * np.arange(-2, 3)
+        )  # both ends of the slot among them: there may be none beside it
         times = centre[:, None] + within
         fives = alone(np.repeat(channel, 5), times.ravel(), np.zeros(times.size))
-        worth = (duals @ self._coefficients(fives) - self._costs(fives.channel, fives.t)).reshape(-1, 5)
-        # By the parabola through the best of the five and those beside it; at an end of them, that end.
+        worth = (duals @ self._coefficients(fives) - self._costs(fives.channel, fives.t)).reshape(
+            -1, 5
+        )
+        # By the parabola through the best of the five and those beside it; at an end of them, that
+        # end.
         best = np.argmax(worth, axis=1)
-        every, inner = np.arange(len(best)), np.clip(best, 1, 3)
+        every = np.arange(len(best))
+        inner = np.clip(best, 1, 3)
         low, top, high = (worth[every, inner + shift] for shift in (-1, 0, 1))
         bend = low - 2.0 * top + high
         aside = np.divide(0.5 * (low - high), bend, out=np.zeros_like(bend), where=bend < 0.0)
         aside = np.where(best == inner, aside, best - inner)
         most = np.where(best == inner, top - 0.25 * (low - high) * aside, worth[every, best])
-        t, good = times[every, inner] + aside * (times[:, 1] - times[:, 0]), most > PEAK
+        t = times[every, inner] + aside * (times[:, 1] - times[:, 0])
+        good = most > PEAK
         return alone(channel[good], t[good], np.zeros(int(good.sum())))
 
     def forbid(self, channel: Channel | None, start: float, end: float) -> None:
-        """Forbid the slots of a channel (of all channels) that lie within ``start`` to ``end`` s."""
+        """Forbid the slots of a channel (of all channels)
+        that lie within ``start`` to ``end`` s.
+        """
         inside = (self.centres > start) & (self.centres < end)
         rows = slice(None) if channel is None else self.channels.index(channel)
         self.forbidden[rows, inside] = True
 
     def about(self, burns: Sequence[Burn], zoom: float = 1.0) -> ProgramColumns:
-        """Columns from which ``burns`` may be made anew: their slots, and an eighth of the faster turn on each side.
+        """Columns from which ``burns`` may be made anew: their slots, and an eighth of the faster
+        turn on each side.
 
         Strong channels fire within that divided by ``zoom``.
         """
@@ -364,8 +470,13 @@ class Program:
             if self.strong[index]:
                 times = burn.t + np.linspace(-1.0, 1.0, 17) * reach / zoom
                 times = np.clip(times, self.centres[0] - half, self.centres[-1] + half)
-                times = times[(np.diff(times, prepend=-np.inf) > 0.0) & ~self.forbidden[index, self._slot(times)]]
-                impulses = impulses.joined(ProgramColumns(*np.broadcast_arrays(index, times, 0.0, number)))
+                times = times[
+                    (np.diff(times, prepend=-np.inf) > 0.0)
+                    & ~self.forbidden[index, self._slot(times)]
+                ]
+                impulses = impulses.joined(
+                    ProgramColumns(*np.broadcast_arrays(index, times, 0.0, number))
+                )
             else:
                 first, last = self._slot(np.array([burn.t - reach, burn.t + reach]))
                 near = np.arange(first, last + 1)
@@ -384,19 +495,27 @@ class Program:
 Way = tuple[Literal["simplex", "ipm"], bool]
 SIMPLEX: Way = ("simplex", False)
 INTERIOR: Way = ("ipm", True)
-"""Method and presolving: where the dual simplex loses its way, interior points, which do not know the trouble, mostly
-find the solution."""
+"""Method and presolving: where the dual simplex loses its way, interior points, which do not know
+the trouble, mostly find the solution.
+"""
 
 LARGE = 10_000
-"""Unknowns above which `INTERIOR` comes first: a step of the dual simplex then passes thousands of their bounds, at a
-time that grows with the square of their number, where interior points take 0.4 s instead of 10 s for 75,000."""
+"""Unknowns above which `INTERIOR` comes first: a step of the dual simplex then passes thousands of
+their bounds, at a time that grows with the square of their number, where interior points take 0.4 s
+instead of 10 s for 75,000.
+"""
 
 MOST_STEPS = 100_000  # steps of the simplex or of the interior points, in one way of solving
-SMALL, NONZERO = 10_000, 1e-2  # coefficients that count for nothing here, and units of `work` of each above them
+SMALL, NONZERO = (
+    10_000,
+    1e-2,
+)  # coefficients that count for nothing here, and units of `work` of each above them
 
 
 class Optimum(NamedTuple):
-    """Unknowns ``x`` (n,), ``prices`` (m,) of one more of each right-hand side, ``shadows`` of the limits, ≤ 0."""
+    """Unknowns ``x`` (n,), ``prices`` (m,) of one more of each right-hand side, ``shadows`` of the
+    limits, ≤ 0.
+    """
 
     x: Vector
     prices: Vector
@@ -404,17 +523,21 @@ class Optimum(NamedTuple):
 
 
 class Shares(NamedTuple):
-    """The ``limit`` (n,), a number from 0 on or -1 for none, in which each unknown has this ``share`` (n,)."""
+    """The ``limit`` (n,), a number from 0 on or -1 for none, in which each unknown has this
+    ``share`` (n,).
+    """
 
     limit: NDArray[np.int_]
     share: Vector
 
 
 class GrowingProgram:
-    """Least cost @ x with equations and upper limits, 0 ≤ x ≤ most; each column added counts from the next solution on.
+    """Least cost @ x with equations and upper limits, 0 ≤ x ≤ most; each column added counts from
+    the next solution on.
 
-    Begins without columns: ``right`` (m,) of the equations, ``limits`` (k,) of the rows that come below them. Equations
-    are divided by their ``level`` (m,), which should be about the largest of their coefficients.
+    Begins without columns: ``right`` (m,) of the equations, ``limits`` (k,) of the rows that come
+    below them. Equations are divided by their ``level`` (m,), which should be about the largest of
+    their coefficients.
     """
 
     def __init__(self, right: Vector, limits: Vector, level: Vector) -> None:
@@ -422,13 +545,17 @@ class GrowingProgram:
         self._costs = np.zeros(0)
         self._highs = _SilentSolver()
         least = np.concatenate([right / level, np.full(len(limits), -highspy.kHighsInf)])
-        for lower, upper in zip(least.tolist(), [*(right / level).tolist(), *limits.tolist()], strict=True):
+        for lower, upper in zip(
+            least.tolist(), [*(right / level).tolist(), *limits.tolist()], strict=True
+        ):
             self._highs.addRow(lower, upper, 0, np.zeros(0, dtype=np.int32), np.zeros(0))
 
     def add(self, cost: Vector, rows: Vector, most: Vector, shares: Shares | None = None) -> None:
-        """More unknowns: ``cost`` (n,), coefficients ``rows`` (m + k, n) and the ``most`` (n,) that they may be.
+        """More unknowns: ``cost`` (n,), coefficients ``rows`` (m + k, n) and the ``most`` (n,) that
+        they may be.
 
-        ``rows`` may end before the last limits; ``shares`` are further coefficients, in one limit each.
+        ``rows`` may end before the last limits; ``shares`` are further coefficients, in one limit
+        each.
         """
         rows = rows / np.concatenate([self._level, np.ones(len(rows) - len(self._level))])[:, None]
         column, row = np.nonzero(rows.T)
@@ -442,7 +569,9 @@ class GrowingProgram:
         starts = np.searchsorted(column, np.arange(len(cost))).astype(np.int32)
         self._costs = np.concatenate([self._costs, cost])
         zeros = np.zeros(len(cost))
-        self._highs.addCols(len(cost), cost, zeros, most, len(values), starts, row.astype(np.int32), values)
+        self._highs.addCols(
+            len(cost), cost, zeros, most, len(values), starts, row.astype(np.int32), values
+        )
 
     def limit(self, row: Vector, most: float) -> None:
         """One more limit, of the unknowns (n,) that there are: row @ x ≤ most."""
@@ -450,7 +579,9 @@ class GrowingProgram:
         self._highs.addRow(-highspy.kHighsInf, most, len(used), used.astype(np.int32), row[used])
 
     def optimum(self) -> Optimum | None:
-        """The cheapest solution, from the last one's basis if there is one; None where no way of solving succeeds."""
+        """The cheapest solution, from the last one's basis if there is one; None where no way of
+        solving succeeds.
+        """
         first, second = (SIMPLEX, INTERIOR) if len(self._costs) <= LARGE else (INTERIOR, SIMPLEX)
         optimum = self._solved(*first)
         if optimum is None:
@@ -488,23 +619,32 @@ class _SilentSolver(highspy.Highs):
             self.setOptionValue(f"{side}_feasibility_tolerance", 1e-9)
 
     def enableCallbacks(self) -> None:
-        """No banner: in highspy 1.16 the constructor calls this, which prints one to stdout, where CSV and JSON go."""
+        """No banner: in highspy 1.16 the constructor calls this, which prints one to stdout, where
+        CSV and JSON go.
+        """
         self.setOptionValue("output_flag", False)
         highspy.Highs.enableCallbacks(self)
 
 
-CORNERS, FLAT = 3000, 1e-12  # looked at, at most, and share of the weight of one below which it is none
+CORNERS, FLAT = (
+    3000,
+    1e-12,
+)  # looked at, at most, and share of the weight of one below which it is none
 
 MET, BEYOND = 3e-8, 1e-6
-"""Distance from the goal, over all there is to do, that is none; share of it that proves it, despite rounding."""
+"""Distance from the goal, over all there is to do, that is none; share of it that proves it,
+despite rounding.
+"""
 
 
 def supplies(most: Vector, goal: Vector, off: float = 0.0) -> bool | None:
     """True where some parts between 0 and 1 of the columns ``most`` (m, n) add up to ``goal`` (m,).
 
-    ``off``: by how much its rows 2 and 3 may be missed, in norm. None where that is not known after `CORNERS`.
+    ``off``: by how much its rows 2 and 3 may be missed, in norm. None where that is not known after
+    `CORNERS`.
     """
-    corners, weights = -goal[None, :], np.ones(1)
+    corners = -goal[None, :]
+    weights = np.ones(1)
     for _ in range(CORNERS):
         nearest = weights @ corners
         distance = float(np.linalg.norm(nearest))
@@ -525,7 +665,9 @@ def supplies(most: Vector, goal: Vector, off: float = 0.0) -> bool | None:
 
 
 def _nearest(corners: Vector, weights: Vector) -> tuple[Vector, Vector]:
-    """Corners (k, m) and weights (k,) of the point nearest to zero in their hull, those without weight left out."""
+    """Corners (k, m) and weights (k,) of the point nearest to zero in their hull, those without
+    weight left out.
+    """
     while True:
         system = np.pad(corners @ corners.T, ((1, 0), (1, 0)), constant_values=1.0)
         system[0, 0] = 0.0
@@ -538,4 +680,5 @@ def _nearest(corners: Vector, weights: Vector) -> tuple[Vector, Vector]:
         weights = (1.0 - share) * weights + share * weights_of
         kept = weights > FLAT
         kept[np.flatnonzero(falling)[int(np.argmin(steps))]] = False
-        corners, weights = corners[kept], weights[kept] / weights[kept].sum()
+        corners = corners[kept]
+        weights = weights[kept] / weights[kept].sum()

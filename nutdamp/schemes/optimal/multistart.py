@@ -1,9 +1,11 @@
-"""Schedules from very many starts, each brought to the cheapest near it, for strong thrusters and short horizons.
+"""Schedules from very many starts, each brought to the cheapest near it, for strong thrusters and
+short horizons.
 
-Sequences of a few channels at random moments, corners of the horizon among them, are descended as ideal impulses,
-which fly in closed form; the better half goes on, twice. About the best of them every channel is then priced at every
-moment (Lawden's primer vector): where a small impulse is worth more than it costs it is added, and the descent
-repeated. Last, the best few go down on the true motion through real widths, without the pulses that nothing needs.
+Sequences of a few channels at random moments, corners of the horizon among them, are descended as
+ideal impulses, which fly in closed form; the better half goes on, twice. About the best of them
+every channel is then priced at every moment (Lawden's primer vector): where a small impulse is
+worth more than it costs it is added, and the descent repeated. Last, the best few go down on the
+true motion through real widths, without the pulses that nothing needs.
 """
 
 from __future__ import annotations
@@ -21,29 +23,55 @@ from nutdamp.spacecraft.constraints import free_windows
 from nutdamp.spacecraft.model import Vector
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
 
-UNMET_COST = 100.0  # cost of a miss beside the propellant when the better part is chosen, per |H|, over the least cost
+# cost of a miss beside the propellant when the better part is chosen, per |H|, over the least cost
+UNMET_COST = 100.0
 NEAR = 1.03  # schedules of ideal impulses so much dearer than the best go on to the true motion
-HALF = 0.5  # share of the least on-time from which a pulse is lengthened to it; shorter ones are left out
+# share of the least on-time from which a pulse is lengthened to it; shorter ones are left out
+HALF = 0.5
 STARTS, BEST = 512, 8  # random sequences to begin with, and schedules that go on to the next stage
-ROUNDS = ((12, 1 / 2), (12, 1 / 3), (40, 1.0))  # steps of descent, and share of the sequences that goes on after them
-SPARE, ADDITIONS = 2, 2  # more pulses than equations, which may go back to nothing; rounds of adding them
-MOMENTS, SMALL = 97, 1e-6  # moments at which each channel is priced, by an impulse of that share of all there is to do
+ROUNDS = (
+    (12, 1 / 2),
+    (12, 1 / 3),
+    (40, 1.0),
+)  # steps of descent, and share of the sequences that goes on after them
+SPARE, ADDITIONS = (
+    2,
+    2,
+)  # more pulses than equations, which may go back to nothing; rounds of adding them
+MOMENTS, SMALL = (
+    97,
+    1e-6,
+)  # moments at which each channel is priced, by an impulse of that share of all there is to do
 GAIN = 1e-4  # share of the cost that is worth another round, and by which two schedules differ
-FOUND, EXACT = 1e-6, 1e-10  # largest miss, over |H|, of ideal impulses, and of a flight through real widths
+FOUND, EXACT = (
+    1e-6,
+    1e-10,
+)  # largest miss, over |H|, of ideal impulses, and of a flight through real widths
 NEEDLESS, NOTHING = 1e-3, 1e-10
-"""Shares of all there is to do below which a pulse may be left out, and is even where nothing makes good for it."""
+"""Shares of all there is to do below which a pulse may be left out, and is even where nothing makes
+good for it.
+"""
 
-WIDE, MOST_KICKS = 0.25, 24  # rad of the faster turn from which a pulse is first so many kicks, and the most of them
+WIDE, MOST_KICKS = (
+    0.25,
+    24,
+)  # rad of the faster turn from which a pulse is first so many kicks, and the most of them
 
 CLOSE, MOVES, FEWEST_MOVES = 1e-5, 30, 3
-"""Barrier for a schedule that is nearly the cheapest nearby; steps of its descent, over its pulses; the fewest."""
+"""Barrier for a schedule that is nearly the cheapest nearby; steps of its descent, over its pulses;
+the fewest.
+"""
 
 APART, INSIDE = 1e-2, 0.98
-"""Barrier for one that has lost its way from there; share of the way off the target that H may end, to begin with."""
+"""Barrier for one that has lost its way from there; share of the way off the target that H may end,
+to begin with.
+"""
 
 
 class Moments(NamedTuple):
-    """Pulses still without order: channels ``which``, centres ``t`` and on-times ``on`` in s, (b, n) each."""
+    """Pulses still without order: channels ``which``, centres ``t`` and on-times ``on`` in s, (b,
+    n) each.
+    """
 
     which: NDArray[np.int_]
     t: Vector
@@ -60,11 +88,15 @@ class Moments(NamedTuple):
 
 
 def schedules(task: Task, known: Iterable[Schedule] = ()) -> list[Schedule]:
-    """Schedules that leave nothing and are the cheapest nearby, the cheapest first; ``known`` ones are improved too."""
+    """Schedules that leave nothing and are the cheapest nearby, the cheapest first; ``known`` ones
+    are improved too.
+    """
     if not np.all(task.unit > 0.0):
         return []
     rng = np.random.default_rng(0)  # the same plan every time
-    for pulses in range(_pulses(task, 0), 0, -1):  # fewer where gap and windows leave no room for more
+    for pulses in range(
+        _pulses(task, 0), 0, -1
+    ):  # fewer where gap and windows leave no room for more
         sequences, x = random_starts(task, pulses, STARTS, rng)
         if len(x):
             break
@@ -88,10 +120,14 @@ def schedules(task: Task, known: Iterable[Schedule] = ()) -> list[Schedule]:
 
 
 def cheapened(task: Task, schedule: Schedule) -> Schedule | None:
-    """A schedule of the same channels after a few steps down on the true motion; None where there is none."""
+    """A schedule of the same channels after a few steps down on the true motion; None where there
+    is none.
+    """
     sequences, x = laid_out(task, _together([_moments_of(task, schedule)]), bounded=True)
     ways = [(CLOSE, max(MOVES // len(schedule), FEWEST_MOVES))]
-    if len(schedule) <= _pulses(task, 2 * SPARE):  # pulses that touched lie apart now, and miss too much for few steps
+    if len(schedule) <= _pulses(
+        task, 2 * SPARE
+    ):  # pulses that touched lie apart now, and miss too much for few steps
         ways.append((APART, MOVES))
     for barrier, steps in ways if len(x) else ():
         if lowered := _lowered(Descent(task, sequences, x, kicks=0, barrier=barrier), steps):
@@ -100,14 +136,20 @@ def cheapened(task: Task, schedule: Schedule) -> Schedule | None:
 
 
 def _pulses(task: Task, spare: int) -> int:
-    """Pulses of a sequence: one for each equation, at least three so that there is a choice, and ``spare`` ones."""
+    """Pulses of a sequence: one for each equation, at least three so that there is a choice, and
+    ``spare`` ones.
+    """
     most = task.body.limits.max_pulses
     count = max(len(task.chosen), 3) + spare
     return count if most is None else min(count, most)
 
 
-def random_starts(task: Task, pulses: int, count: int, rng: np.random.Generator) -> tuple[Sequences, Vector]:
-    """Random channels and moments of ``count`` sequences; many begin or end with the time there is."""
+def random_starts(
+    task: Task, pulses: int, count: int, rng: np.random.Generator
+) -> tuple[Sequences, Vector]:
+    """Random channels and moments of ``count`` sequences;
+    many begin or end with the time there is.
+    """
     limits, horizon = task.body.limits, task.body.horizon
     which = rng.integers(len(task.channels), size=(count, pulses))
     share = np.sort(rng.uniform(size=(count, pulses)), axis=1)
@@ -118,7 +160,8 @@ def random_starts(task: Task, pulses: int, count: int, rng: np.random.Generator)
 
 
 def laid_out(task: Task, moments: Moments, *, bounded: bool = False) -> tuple[Sequences, Vector]:
-    """Sequences that fit, and their unknowns: pulses in order, moved apart and into windows, strictly within bounds.
+    """Sequences that fit, and their unknowns: pulses in order, moved apart and into windows,
+    strictly within bounds.
 
     Pulses may still vanish unless on-times are ``bounded`` from below.
     """
@@ -130,7 +173,9 @@ def laid_out(task: Task, moments: Moments, *, bounded: bool = False) -> tuple[Se
     # The windows without blackout in which the moments lie, or the nearest.
     nearest = np.argmin(np.maximum(begins - t[..., None], t[..., None] - ends), axis=-1)
     begins, ends = begins[nearest], ends[nearest]
-    longest = np.minimum(np.array([channel.max_on_time for channel in task.channels])[which], ends - begins)
+    longest = np.minimum(
+        np.array([channel.max_on_time for channel in task.channels])[which], ends - begins
+    )
     inside = 1e-4 * (task.body.horizon - limits.earliest) / which.shape[1]
     edge = 1e-3 * np.minimum(task.unit[which], np.maximum(longest - least, 0.0))
     on = np.minimum(np.maximum(on, least + edge), longest - edge)
@@ -158,7 +203,9 @@ def _best(descent: Descent) -> Descent:
     cost, left = descent.cost, descent.left
     chosen: list[int] = []
     for row in np.argsort(cost, kind="stable").tolist():
-        if left[row] < FOUND and all(abs(cost[row] - cost[other]) > GAIN * cost[other] for other in chosen):
+        if left[row] < FOUND and all(
+            abs(cost[row] - cost[other]) > GAIN * cost[other] for other in chosen
+        ):
             chosen.append(row)
     return descent.of(np.array(chosen[:BEST], dtype=int))
 
@@ -181,16 +228,23 @@ def _added(task: Task, best: Descent, pulses: int, rng: np.random.Generator) -> 
             added = np.concatenate([channel[chosen], spare])
             t = np.concatenate([grid[moment[chosen]], rng.uniform(grid[0], grid[-1], len(spare))])
             on = task.unit[added] * np.repeat([0.02, 0.01], [len(chosen), len(spare)])
-            every.append(Moments(*(np.concatenate(pair) for pair in zip(old, (added, t, on), strict=True))))
+            every.append(
+                Moments(*(np.concatenate(pair) for pair in zip(old, (added, t, on), strict=True)))
+            )
     return every
 
 
 def _worth(task: Task, ideal: Moments, x: Vector, prices: Vector, t: Vector) -> Vector:
-    """Saving by a small impulse of each channel at ``t`` (k,) s beside the pulses of unknowns x, (channels, k)."""
+    """Saving by a small impulse of each channel at ``t`` (k,) s beside the pulses of unknowns x,
+    (channels, k).
+    """
     count = len(task.channels)
     channel = np.repeat(np.arange(count), len(t))
     added = channel, np.tile(t, count), SMALL * task.unit[channel]
-    joined = (np.column_stack([new, np.tile(old, (len(new), 1))]) for new, old in zip(added, ideal, strict=True))
+    joined = (
+        np.column_stack([new, np.tile(old, (len(new), 1))])
+        for new, old in zip(added, ideal, strict=True)
+    )
     which, centres, on = Moments(*joined).in_order()
     loose = np.tile(x[2 * len(ideal.which) :], (len(channel), 1))
     there = task.misses(which, np.hstack([centres - 0.5 * on, on, loose]), 1)
@@ -201,11 +255,21 @@ def _worth(task: Task, ideal: Moments, x: Vector, prices: Vector, t: Vector) -> 
 
 
 def _flown(task: Task, best: Descent, known: Iterable[Schedule]) -> list[Schedule]:
-    """Schedules on the true motion from the best of ideal impulses and from ``known`` ones, the cheapest first."""
-    given = [_moments_of(task, schedule) for schedule in known if 0 < len(schedule) <= _pulses(task, 2 * SPARE)]
+    """Schedules on the true motion from the best of ideal impulses and from ``known`` ones, the
+    cheapest first.
+    """
+    given = [
+        _moments_of(task, schedule)
+        for schedule in known
+        if 0 < len(schedule) <= _pulses(task, 2 * SPARE)
+    ]
     ideal = _every(best)
-    near = int(np.count_nonzero(best.cost <= NEAR * best.cost[0])) if ideal else 0  # the cheapest come first
-    flown = _on_the_true_motion(task, [*ideal[:near], *given]) or _on_the_true_motion(task, ideal[near:])
+    near = (
+        int(np.count_nonzero(best.cost <= NEAR * best.cost[0])) if ideal else 0
+    )  # the cheapest come first
+    flown = _on_the_true_motion(task, [*ideal[:near], *given]) or _on_the_true_motion(
+        task, ideal[near:]
+    )
     lean, spare = list[Moments](), list[Moments]()
     for moments in flown:
         (spare if len(_needed(task, moments).which) < len(moments.which) else lean).append(moments)
@@ -227,12 +291,14 @@ def _on_the_true_motion(task: Task, every: Sequence[Moments]) -> list[Moments]:
         together = _together([moments for moments in fewer if len(moments.which) == count])
         sequences, x = laid_out(task, together, bounded=True)
         if len(x):
-            barrier, widest = 1e-4, float(np.max(together.on)) / task.pace
+            barrier = 1e-4
+            widest = float(np.max(together.on)) / task.pace
             if widest > WIDE:  # kicks fly faster than the true motion
                 kicks = min(math.ceil(widest / WIDE), MOST_KICKS)
                 descent = Descent(task, sequences, x, kicks=kicks, barrier=barrier)
                 descent.run(30)
-                x, barrier = descent.state.x, 1e-6
+                x = descent.state.x
+                barrier = 1e-6
             lowered += _lowered(Descent(task, sequences, x, kicks=0, barrier=barrier), 20)
     return lowered
 
@@ -271,14 +337,24 @@ def _schedule(task: Task, moments: Moments) -> Schedule:
 
 def _needed(task: Task, moments: Moments) -> Moments:
     """One sequence (n,) without needless pulses, and with pulses of a channel that touch as one."""
-    kept = moments.on > np.maximum(NEEDLESS * task.unit[moments.which], HALF * task.shortest[moments.which])
+    kept = moments.on > np.maximum(
+        NEEDLESS * task.unit[moments.which], HALF * task.shortest[moments.which]
+    )
     moments = moments.of(kept)
-    which, start, on = moments.which.tolist(), (moments.t - 0.5 * moments.on).tolist(), moments.on.tolist()
+    which, start, on = (
+        moments.which.tolist(),
+        (moments.t - 0.5 * moments.on).tolist(),
+        moments.on.tolist(),
+    )
     for number in reversed(range(1, len(which))):
         before = number - 1
         together = start[number] + on[number] - start[before]
         touching = start[number] - start[before] - on[before] < NEEDLESS * task.unit[which[number]]
-        if which[number] == which[before] and touching and together < task.channels[which[number]].max_on_time:
+        if (
+            which[number] == which[before]
+            and touching
+            and together < task.channels[which[number]].max_on_time
+        ):
             on[before] = together
             del which[number], start[number], on[number]
     return Moments(np.array(which, dtype=int), np.array(start) + 0.5 * np.array(on), np.array(on))

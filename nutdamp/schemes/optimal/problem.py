@@ -1,4 +1,5 @@
-"""Problem of the scheme optimal: channels, costs, equations, program of small angles, bounds and reasons.
+"""Problem of the scheme optimal: channels, costs, equations, program of small angles, bounds and
+reasons.
 
 Burns of the linear program become pulses that can be fired: few, within on-times, gap and number.
 """
@@ -28,19 +29,26 @@ from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.schedule import TOUCHING, Bounds, Schedule, channel_pulse
 
-UNMET = 1e-7  # share of what there is to do that columns may fail to supply: the program's own tolerance
+# share of what there is to do that columns may fail to supply: the program's own tolerance
+UNMET = 1e-7
 REPAIRS = 60  # rounds in which burns that break a limit are moved elsewhere
 
 THRIFT, GAIN = 0.004, 0.0005
-"""Shares of the least cost given away for fewer pulses, of many and of few: so little is not worth a search."""
+"""Shares of the least cost given away for fewer pulses, of many and of few: so little is not worth
+a search.
+"""
 
 
 def thinned(program: Program, solution: Solution, cost: float, *, fewest: bool) -> Solution:
-    """Fewest burns that hardly cost more than ``cost``, or at any cost: the longest are kept and may grow."""
+    """Fewest burns that hardly cost more than ``cost``, or at any cost: the longest are kept and
+    may grow.
+    """
     few = len(solution.burns) <= 2 * len(program.influence.goal)
     most = max(cost, solution.cost) * (1.0 + (GAIN if few else THRIFT))
     order = sorted(solution.burns, key=lambda burn: -burn.impulse)
-    best, low, high = solution, 1, len(order)
+    best = solution
+    low = 1
+    high = len(order)
     allowed = program.spacecraft.limits.max_pulses
     if fewest or (allowed is not None and high > allowed):
         most = math.inf
@@ -55,9 +63,11 @@ def thinned(program: Program, solution: Solution, cost: float, *, fewest: bool) 
 
 
 def repaired(program: Program, solution: Solution) -> Solution | None:
-    """The solution with burns that keep on-times, gap and max_pulses: slots of one that does not are forbidden.
+    """The solution with burns that keep on-times, gap and max_pulses: slots of one that does not
+    are forbidden.
 
-    Where that leaves too little, too long burns become several side by side. None where that does not help either.
+    Where that leaves too little, too long burns become several side by side. None where that does
+    not help either.
     """
     allowed = program.forbidden.copy()
     kept = _repaired(program, solution)
@@ -82,17 +92,28 @@ def _repaired(program: Program, solution: Solution) -> Solution | None:
 
 
 def _divide(program: Program, burns: tuple[Burn, ...]) -> bool:
-    """Forbid slots at regular distances about too long burns, so that none can be too long; true if there are any."""
-    every, divided = np.arange(len(program.centres)), False
+    """Forbid slots at regular distances about too long burns, so that none can be too long; true if
+    there are any.
+    """
+    every = np.arange(len(program.centres))
+    divided = False
     for row, channel in enumerate(program.channels):
         most = channel.max_on_time
-        long = [burn for burn in burns if burn.channel is channel and burn.on_time > most + TOUCHING]
+        long = [
+            burn for burn in burns if burn.channel is channel and burn.on_time > most + TOUCHING
+        ]
         window = math.floor(most / program.width + TOUCHING) if long else 0
         if window == 0:
             continue
         divided = True
-        # Between two the thruster is off no shorter than for its shortest pulse: valves take their time.
-        pause = max(math.ceil(max(program.spacecraft.limits.gap, channel.min_on_time) / program.width - TOUCHING), 1)
+        # Between two the thruster is off no shorter than for its shortest pulse: valves take their
+        # time.
+        pause = max(
+            math.ceil(
+                max(program.spacecraft.limits.gap, channel.min_on_time) / program.width - TOUCHING
+            ),
+            1,
+        )
         middles = np.searchsorted(program.centres, [burn.t for burn in long])
         nearest = np.searchsorted(0.5 * (middles[1:] + middles[:-1]), every)
         pieces = np.array([math.ceil(burn.on_time / (window * program.width)) for burn in long])
@@ -106,16 +127,25 @@ def _divide(program: Program, burns: tuple[Burn, ...]) -> bool:
 
 
 def broken_by(program: Program, burns: tuple[Burn, ...]) -> tuple[Channel, float, float] | None:
-    """Span to forbid, s, of a burn too long (its begin), too short, too near another or one too many; else None."""
+    """Span to forbid, s, of a burn too long (its begin), too short, too near another or one too
+    many; else None.
+    """
     limits, width = program.spacecraft.limits, program.width
     for burn in burns:
         longest, shortest = burn.channel.max_on_time, burn.channel.min_on_time
         if burn.on_time > longest + TOUCHING:
-            return burn.channel, burn.t - (burn.on_time + width), burn.t - 0.5 * longest + 0.5 * width
+            return (
+                burn.channel,
+                burn.t - (burn.on_time + width),
+                burn.t - 0.5 * longest + 0.5 * width,
+            )
         if burn.on_time < 0.5 * shortest:
             return burn.channel, burn.t - 2.0 * width, burn.t + 2.0 * width
     for earlier, later in itertools.pairwise(burns):
-        if later.t - 0.5 * later.on_time < earlier.t + 0.5 * earlier.on_time + limits.gap - TOUCHING:
+        if (
+            later.t - 0.5 * later.on_time
+            < earlier.t + 0.5 * earlier.on_time + limits.gap - TOUCHING
+        ):
             less = min(earlier, later, key=lambda burn: burn.on_time)
             reach = 0.5 * less.on_time + width
             return less.channel, less.t - reach, less.t + reach
@@ -131,17 +161,24 @@ def as_pulses(spacecraft: Spacecraft, burns: tuple[Burn, ...]) -> Schedule:
     pulses = []
     for burn in burns:
         on_time = min(max(burn.on_time, burn.channel.min_on_time), burn.channel.max_on_time)
-        start = min(max(burn.t - 0.5 * on_time, spacecraft.limits.earliest), spacecraft.horizon - on_time)
+        start = min(
+            max(burn.t - 0.5 * on_time, spacecraft.limits.earliest), spacecraft.horizon - on_time
+        )
         pulses.append(channel_pulse(burn.channel, start + 0.5 * on_time, on_time))
     return Schedule(tuple(pulses))
 
 
-LEFT = math.radians(1e-6)  # largest nutation and distance from the target, rad, and spin error, as a share, of a plan
+LEFT = math.radians(
+    1e-6
+)  # largest nutation and distance from the target, rad, and spin error, as a share, of a plan
 
-BEATEN = 0.005  # share by which a schedule costs less than the bound of small angles, that refutes the bound
+# share by which a schedule costs less than the bound of small angles, that refutes the bound
+BEATEN = 0.005
 
 SHARPEST, DEARER = 1e-3, 0.03
-"""Relative accuracy of a least time by small angles; share above its cost from which shorter ones are looked at."""
+"""Relative accuracy of a least time by small angles; share above its cost from which shorter ones
+are looked at.
+"""
 
 
 class Problem:
@@ -154,9 +191,14 @@ class Problem:
         if requested and not any(channel.axial for channel in self.channels):
             raise Infeasible(NO_AXIAL)
         self.equations = EndEquations(shift=not options.free_axis, spin=requested)
-        in_kg = options.least != "impulse" and all(channel.mass_flow is not None for channel in self.channels)
+        in_kg = options.least != "impulse" and all(
+            channel.mass_flow is not None for channel in self.channels
+        )
         self.unit = "kg" if in_kg else "N m s"
-        prices = {channel.name: channel.mass_flow if in_kg else channel.strength for channel in spacecraft.channels}
+        prices = {
+            channel.name: channel.mass_flow if in_kg else channel.strength
+            for channel in spacecraft.channels
+        }
         # Cost per second of every channel of which it is known.
         self.prices = {name: price for name, price in prices.items() if price is not None}
         self.costs = np.array([self.prices[channel.name] for channel in self.channels])
@@ -172,7 +214,9 @@ class Problem:
         alone = not self._dynamics.constant.any() and not self._dynamics.forcing.turning
         return alone and self.spacecraft.growth == 0.0
 
-    def program(self, spacecraft: Spacecraft | None = None, equations: EndEquations | None = None) -> Program:
+    def program(
+        self, spacecraft: Spacecraft | None = None, equations: EndEquations | None = None
+    ) -> Program:
         """The linear program of small angles, with another horizon or other equations if given."""
         body, equations = spacecraft or self.spacecraft, equations or self.equations
         off = self.off if equations.shift else 0.0
@@ -182,8 +226,12 @@ class Problem:
     def off(self) -> float:
         """Distance from its target, N m s, at which H may end."""
         body = self.spacecraft
-        axial = float(abs(body.inertia.axial(body.spin if body.goal.spin is None else body.goal.spin)))
-        if not body.inertia.symmetric:  # what is along axis 3 swings, and is to be enough at its least
+        axial = float(
+            abs(body.inertia.axial(body.spin if body.goal.spin is None else body.goal.spin))
+        )
+        if (
+            not body.inertia.symmetric
+        ):  # what is along axis 3 swings, and is to be enough at its least
             axial = min(axial, float(np.linalg.norm(body.momentum)) * math.cos(body.nutation))
         return axial * math.sin(min(self.options.shift or 0.0, 0.5 * math.pi))
 
@@ -198,9 +246,15 @@ class Problem:
         return program.solve(enough=True).unmet <= UNMET if known is None else known
 
     def least_horizon(
-        self, low: float, high: float, sharp: float = SHARPEST, feasible: Callable[[float], bool] | None = None
+        self,
+        low: float,
+        high: float,
+        sharp: float = SHARPEST,
+        feasible: Callable[[float], bool] | None = None,
     ) -> float:
-        """The earliest ``feasible`` end (to small angles) from ``low`` to ``high`` s, to a share ``sharp`` of it."""
+        """The earliest ``feasible`` end (to small angles) from ``low`` to ``high`` s, to a share
+        ``sharp`` of it.
+        """
         while high - low > sharp * high:
             middle = 0.5 * (low + high)
             low, high = (low, middle) if (feasible or self.feasible)(middle) else (middle, high)
@@ -210,10 +264,15 @@ class Problem:
         """The schedule with the lower bounds of its cost."""
 
         def least(program: Program, solution: Solution) -> float | None:
-            return None if solution.unmet > UNMET else bounds.first_order(program, solution.prices).bound
+            return (
+                None
+                if solution.unmet > UNMET
+                else bounds.first_order(program, solution.prices).bound
+            )
 
         program = self.program()
-        first_order, keeping = least(program, first or program.solve()), None
+        first_order = least(program, first or program.solve())
+        keeping = None
         if self.options.free_axis and not work.exhausted():
             still = self.program(equations=EndEquations(shift=True, spin=self.equations.spin))
             keeping = least(still, still.solve())
@@ -223,8 +282,11 @@ class Problem:
         return Schedule(schedule.pulses, schedule.notes, lower)
 
     def rigorous(self, schedule: Schedule) -> float | None:
-        """Lower bound of the cost of schedules that leave no more than this one; None where none is known."""
-        left, cost = self.leaves(self.flown(schedule)), self.price(schedule)
+        """Lower bound of the cost of schedules that leave no more than this one; None where none is
+        known.
+        """
+        left = self.leaves(self.flown(schedule))
+        cost = self.price(schedule)
         return bounds.rigorous(self.spacecraft, self.prices, cost, left, shift=self.equations.shift)
 
     def price(self, schedule: Schedule) -> float:
@@ -240,29 +302,46 @@ class Problem:
         return schedule is None or self.price(schedule) > least * (1.0 + share)
 
     def cheaper(self, known: Schedule | None, other: Schedule | None) -> Schedule | None:
-        """The cheaper of two schedules, of which there may be none; the known with fewer pulses where that counts."""
+        """The cheaper of two schedules, of which there may be none; the known with fewer pulses
+        where that counts.
+        """
         there = [schedule for schedule in (known, other) if schedule is not None]
-        return min(there, key=lambda schedule: (self.worth(schedule), self.price(schedule)), default=None)
+        return min(
+            there, key=lambda schedule: (self.worth(schedule), self.price(schedule)), default=None
+        )
 
     def left(self, flown: Flight) -> float:
-        """Largest end error of a flight, rad: nutation, distance from the target, and spin as a share of itself."""
+        """Largest end error of a flight, rad: nutation, distance from the target, and spin as a
+        share of itself.
+        """
         (nutation, off), goal = self.leaves(flown), self.spacecraft.goal
         spin = 0.0 if goal.spin is None else abs(flown.settled.spin / goal.spin - 1.0)
         return max(nutation, max(off - (self.options.shift or 0.0), 0.0), spin)
 
     def leaves(self, flown: Flight) -> Allowed:
         """End errors of the axis and of H in a flight."""
-        return Allowed(flown.residual.nutation, flown.residual.axis_error if self.equations.shift else 0.0)
+        return Allowed(
+            flown.residual.nutation, flown.residual.axis_error if self.equations.shift else 0.0
+        )
 
     def not_found(self) -> str:
-        """Reason for no schedule although the program has solutions: the limits that it does not know of."""
+        """Reason for no schedule although the program has solutions: the limits that it does not
+        know of.
+        """
         body, limits = self.spacecraft, self.spacecraft.limits
-        if limits.max_pulses is not None and body.inertia.symmetric and body.growth == 0.0 and not body.disturbances:
+        if (
+            limits.max_pulses is not None
+            and body.inertia.symmetric
+            and body.growth == 0.0
+            and not body.disturbances
+        ):
             most = max(abs(channel.transverse) * channel.max_on_time for channel in self.channels)
             if limits.max_pulses * most < body.least_impulse:
                 return (
-                    f"limits.max_pulses = {limits.max_pulses} is too few: so many pulses give at most "
-                    f"{100.0 * limits.max_pulses * most / body.least_impulse:.4g} % of the impulse that takes out the "
+                    f"limits.max_pulses = {limits.max_pulses} is too few: "
+                    "so many pulses give at most "
+                    f"{100.0 * limits.max_pulses * most / body.least_impulse:.4g} % of the impulse "
+                    "that takes out the "
                     f"nutation, {math.ceil(body.least_impulse / most)} pulses or more all of it"
                 )
         shortest = max(channel.min_on_time for channel in self.channels)
@@ -276,6 +355,8 @@ class Problem:
         }
         named = [name for name, limited in kept.items() if limited] or ["one pulse after the other"]
         return (
-            "not found: for small angles, without other limits than the horizon, there are schedules; on the true "
-            f"motion none was found with {', '.join(named)}; shorter horizons were tried too, a longer one may help"
+            "not found: for small angles, without other limits than the horizon, "
+            "there are schedules; on the true "
+            f"motion none was found with {', '.join(named)}; shorter horizons were tried too, "
+            "a longer one may help"
         )

@@ -1,12 +1,14 @@
 """Equations of the end errors, refinement of a schedule on its flight, rounding to ticks.
 
-Five equations at most, all in N m s: nutation (two: the transverse momentum in the body, turned back to t = 0; with
-I1 ≠ I2 times the factors with which it turns on a circle), momentum shift (two, square to the target axis) and spin
-(one); first those of small angles, then those along a flight. What turns H is the torque in space, whatever I1 and I2.
+Five equations at most, all in N m s: nutation (two: the transverse momentum in the body, turned
+back to t = 0; with I1 ≠ I2 times the factors with which it turns on a circle), momentum shift (two,
+square to the target axis) and spin (one); first those of small angles, then those along a flight.
+What turns H is the torque in space, whatever I1 and I2.
 
-Refinement moves and lengthens pulses until the flown motion leaves nothing: a quasi-Newton iteration for the nearest
-solution, with the slopes of the equations, which cost no flights, corrected at each step (Broyden 1965). On ticks,
-starts and on-times are stepped to and fro, two pulses at a time, by the linear model of the end error.
+Refinement moves and lengthens pulses until the flown motion leaves nothing: a quasi-Newton
+iteration for the nearest solution, with the slopes of the equations, which cost no flights,
+corrected at each step (Broyden 1965). On ticks, starts and on-times are stepped to and fro, two
+pulses at a time, by the linear model of the end error.
 """
 
 from __future__ import annotations
@@ -29,11 +31,13 @@ from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.schedule import TOUCHING, Schedule, channel_pulse
 
 MOST_GROWN, KNOTS = 14.0, 400
-"""Exponent of growth or decay beyond which nothing (a millionth, of pulses that a clock still resolves) is left of the
-nutation, or all is lost; even moments, besides the edges of pulses, at which ω3 is read from a flight with it."""
+"""Exponent of growth or decay beyond which nothing (a millionth, of pulses that a clock still
+resolves) is left of the nutation, or all is lost; even moments, besides the edges of pulses, at
+which ω3 is read from a flight with it.
+"""
 
-# Steps in a turn by which small changes of a motion of three moments are followed, terms of each one's exponential, the
-# most steps, and units of `work` of each.
+# Steps in a turn by which small changes of a motion of three moments are followed, terms of each
+# one's exponential, the most steps, and units of `work` of each.
 STEPS, ORDERS, MOST_VARIED, VARIED = 32, 10, 300_000, 0.004
 
 
@@ -58,8 +62,8 @@ class EndEquations:
 class Influence:
     """Coefficients ``rows`` (n, equations, 3) of one N m s about each body axis at times (n,) s.
 
-    ``goal`` (equations,) N m s is what all pulses together are to add. ``turning`` (equations,) rad/s are the rates at
-    which the effects turn, for what is lost to a width.
+    ``goal`` (equations,) N m s is what all pulses together are to add. ``turning`` (equations,)
+    rad/s are the rates at which the effects turn, for what is lost to a width.
     """
 
     rows: Callable[[Vector], Vector]
@@ -67,22 +71,33 @@ class Influence:
     turning: Vector
 
     def widths(self, width: Vector) -> Vector:
-        """Share of the effect that is left of impulses spread over ``width`` (n,) s, (n, equations)."""
+        """Share of the effect that is left of impulses spread over ``width`` (n,) s, (n,
+        equations).
+        """
         return np.sinc(np.outer(width, self.turning) / (2 * np.pi))
 
 
 def growth_from(spacecraft: Spacecraft) -> float:
-    """Time, s, from which nutation counts: the end of the horizon where it is damped (or all is lost), else 0."""
+    """Time, s, from which nutation counts: the end of the horizon where it is damped (or all is
+    lost), else 0.
+    """
     growth = spacecraft.growth
     return min(spacecraft.horizon, MOST_GROWN / -growth) if growth < 0.0 else 0.0
 
 
 def small_angles(spacecraft: Spacecraft, equations: EndEquations) -> Influence:
-    """Σ J d e^{iaω3t} = -A ω0 and Σ J d e^{iω3t} = Δh: exact for the nutation, of first order for H.
+    """Σ J d e^{iaω3t} = -A ω0 and Σ J d e^{iω3t} = Δh: exact for the nutation, of first order for
+    H.
 
-    What dissipation damps counts from the end of the horizon, what it lets grow from t = 0: no row exceeds one.
+    What dissipation damps counts from the end of the horizon, what it lets grow from t = 0: no row
+    exceeds one.
     """
-    inertia, spin, goal, growth = spacecraft.inertia, spacecraft.spin, spacecraft.goal, spacecraft.growth
+    inertia, spin, goal, growth = (
+        spacecraft.inertia,
+        spacecraft.spin,
+        spacecraft.goal,
+        spacecraft.growth,
+    )
     last = growth_from(spacecraft)
     shift = -square_to_target(spacecraft) @ spacecraft.momentum
     if np.any(shift):  # as long as the way there is on the sphere
@@ -95,27 +110,37 @@ def small_angles(spacecraft: Spacecraft, equations: EndEquations) -> Influence:
     def rows(times: Vector) -> Vector:
         turned = np.exp(1j * np.outer(times, [spacecraft.nutation_rate, spin]))
         turned[:, 0] *= np.exp(np.minimum(-growth * (times - last), 0.0))
-        return _all_rows(_complex_product(turned[:, 0]) * circle, _complex_product(turned[:, 1]))[:, equations.chosen]
+        return _all_rows(_complex_product(turned[:, 0]) * circle, _complex_product(turned[:, 1]))[
+            :, equations.chosen
+        ]
 
     return Influence(rows, every[equations.chosen], _turning(spacecraft)[equations.chosen])
 
 
 def along(flight: Flight, equations: EndEquations, step: float) -> Influence:
-    """The equations about a flight, at its true angles: what its pulses add, less what it leaves, is the goal.
+    """The equations about a flight, at its true angles: what its pulses add, less what it leaves,
+    is the goal.
 
-    That a firing also turns the body under the pulses that follow is neglected. Pulses count in parts of at most
-    ``step`` s.
+    That a firing also turns the body under the pulses that follow is neglected. Pulses count in
+    parts of at most ``step`` s.
     """
-    schedule, goal = flight.schedule, 0.0 - misses(flight, equations)
-    here = Influence(partial(_rows, flight, equations), goal, _turning(flight.spacecraft)[equations.chosen])
+    schedule = flight.schedule
+    goal = 0.0 - misses(flight, equations)
+    here = Influence(
+        partial(_rows, flight, equations), goal, _turning(flight.spacecraft)[equations.chosen]
+    )
     if not len(schedule):
         return here
     counts = [int(np.ceil(pulse.on_time / step)) or 1 for pulse in schedule]
     parts = np.concatenate([np.arange(count) + 0.5 for count in counts])
     widths = np.repeat([pulse.on_time for pulse in schedule], counts) / np.repeat(counts, counts)
     times = np.repeat([pulse.start for pulse in schedule], counts) + widths * parts
-    impulses = np.repeat([pulse.impulse / count for pulse, count in zip(schedule, counts, strict=True)], counts, 0)
-    return replace(here, goal=goal + np.einsum("nek,nk,ne->e", here.rows(times), impulses, here.widths(widths)))
+    impulses = np.repeat(
+        [pulse.impulse / count for pulse, count in zip(schedule, counts, strict=True)], counts, 0
+    )
+    return replace(
+        here, goal=goal + np.einsum("nek,nk,ne->e", here.rows(times), impulses, here.widths(widths))
+    )
 
 
 def _rows(flight: Flight, equations: EndEquations, times: Vector) -> Vector:
@@ -126,7 +151,9 @@ def _rows(flight: Flight, equations: EndEquations, times: Vector) -> Vector:
 
 
 def _nutation_rows(flight: Flight, times: Vector) -> Vector:
-    """Effect (n, 2, …) on the nutation of one N m s about each body axis at ``times`` (n,) s of a flight."""
+    """Effect (n, 2, …) on the nutation of one N m s about each body axis at ``times`` (n,) s of a
+    flight.
+    """
     body = flight.spacecraft
     circle = body.inertia.circle(body.spin)
     if body.inertia.symmetric or body.growth != 0.0:
@@ -146,10 +173,17 @@ def _nutation_rows(flight: Flight, times: Vector) -> Vector:
 
 @lru_cache(maxsize=2)
 def _variations(flight: Flight) -> tuple[Vector, Vector, Vector]:
-    """Even knots (n,) s of a flight; what leads small changes of H in the body there back to t = 0, and its slopes."""
+    """Even knots (n,) s of a flight; what leads small changes of H in the body there back to t = 0,
+    and its slopes.
+    """
     body = flight.spacecraft
-    last, pace = max(body.horizon, flight.schedule.end), max(body.fastest, float(np.linalg.norm(body.omega0)))
-    knots = np.linspace(0.0, last, min(math.ceil(last * pace / (2 * math.pi) * STEPS), MOST_VARIED) + 2)
+    last, pace = (
+        max(body.horizon, flight.schedule.end),
+        max(body.fastest, float(np.linalg.norm(body.omega0))),
+    )
+    knots = np.linspace(
+        0.0, last, min(math.ceil(last * pace / (2 * math.pi) * STEPS), MOST_VARIED) + 2
+    )
     step = float(knots[1])
     work.spend(VARIED * len(knots))
 
@@ -160,8 +194,12 @@ def _variations(flight: Flight) -> tuple[Vector, Vector, Vector]:
         return np.swapaxes(np.cross(turns, np.eye(3)), 1, 2)
 
     # Magnus' series of fourth order: exact where the rates are constant.
-    early, late = (jacobian(knots[:-1] + (0.5 + side * math.sqrt(3.0) / 6.0) * step) for side in (-1.0, 1.0))
-    exponent = -step * (0.5 * (early + late) + math.sqrt(3.0) / 12.0 * step * (late @ early - early @ late))
+    early, late = (
+        jacobian(knots[:-1] + (0.5 + side * math.sqrt(3.0) / 6.0) * step) for side in (-1.0, 1.0)
+    )
+    exponent = -step * (
+        0.5 * (early + late) + math.sqrt(3.0) / 12.0 * step * (late @ early - early @ late)
+    )
     steps = term = np.tile(np.eye(3), (len(exponent), 1, 1))
     for order in range(1, ORDERS):
         term = term @ exponent / order
@@ -177,7 +215,9 @@ def misses(flight: Flight, equations: EndEquations) -> Vector:
     nutation = complex(*across) * _turned_back(flight, np.array([flight.schedule.end]))[0]
     final = end.spin if body.goal.spin is None else body.goal.spin
     shift = square_to_target(body) @ flight.last_momentum
-    return np.array([nutation.real, nutation.imag, *shift, body.inertia.C * (end.spin - final)])[equations.chosen]
+    return np.array([nutation.real, nutation.imag, *shift, body.inertia.C * (end.spin - final)])[
+        equations.chosen
+    ]
 
 
 def _turning(spacecraft: Spacecraft) -> Vector:
@@ -185,8 +225,11 @@ def _turning(spacecraft: Spacecraft) -> Vector:
 
 
 def square_to_target(spacecraft: Spacecraft) -> Vector:
-    """Two inertial unit vectors (2, 3) square to the target axis: body axes 1 and 2 at t = 0 as seen along it."""
-    axis, body = spacecraft.target_axis, attitude.matrix(spacecraft.initial.quaternion)
+    """Two inertial unit vectors (2, 3) square to the target axis: body axes 1 and 2 at t = 0 as
+    seen along it.
+    """
+    axis = spacecraft.target_axis
+    body = attitude.matrix(spacecraft.initial.quaternion)
     sense = np.sign(axis @ body[:, 2]) or 1.0
     first = body[:, 0] - axis * (axis @ body[:, 0])
     if np.linalg.norm(first) < 0.5:  # the target lies near body axis 1
@@ -196,40 +239,63 @@ def square_to_target(spacecraft: Spacecraft) -> Vector:
 
 
 def _turned_back(flight: Flight, times: Vector) -> Vector:
-    """e^{i∫ν dt}, and what dissipation adds until the end: turns ω at ``times`` (n,) s back to t = 0."""
+    """e^{i∫ν dt}, and what dissipation adds until the end: turns ω at ``times`` (n,) s back to t =
+    0.
+    """
     spacecraft, schedule = flight.spacecraft, flight.schedule
     inertia, drift = spacecraft.inertia, spacecraft.spin_drift
     slope, offset = inertia.linear_rate(spacecraft.spin)
-    if spacecraft.growth != 0.0:  # dissipation changes ω3: on coasts ω/H3, or tan θ, grows by e^{κt} exactly
+    if (
+        spacecraft.growth != 0.0
+    ):  # dissipation changes ω3: on coasts ω/H3, or tan θ, grows by e^{κt} exactly
         knots, spins, turned = _spins(flight, max(float(np.max(times)), flight.legs[-1].start))
         grown = np.minimum(-spacecraft.growth * (times - schedule.end), MOST_GROWN)
-        least, axial = math.exp(-MOST_GROWN) * abs(spacecraft.axial), inertia.axial(spins)
-        now, then = (np.maximum(np.abs(np.interp(at, knots, axial)), least) for at in (times, schedule.end))
+        least = math.exp(-MOST_GROWN) * abs(spacecraft.axial)
+        axial = inertia.axial(spins)
+        now, then = (
+            np.maximum(np.abs(np.interp(at, knots, axial)), least) for at in (times, schedule.end)
+        )
         phase = slope * np.interp(times, knots, turned) + offset * times
         return np.asarray(np.exp(1j * phase + grown) * then / now)
     turned = (spacecraft.spin + 0.5 * drift * times) * times
-    for pulse in schedule if inertia.symmetric else ():  # changes of three moments are followed, see `_variations`
+    for pulse in (
+        schedule if inertia.symmetric else ()
+    ):  # changes of three moments are followed, see `_variations`
         if pulse.impulse[2] and pulse.on_time > 0.0:
             since, after = np.maximum(times - pulse.start, 0.0), np.maximum(times - pulse.end, 0.0)
-            turned = turned + 0.5 * pulse.impulse[2] / (inertia.C * pulse.on_time) * (since**2 - after**2)
+            turned = turned + 0.5 * pulse.impulse[2] / (inertia.C * pulse.on_time) * (
+                since**2 - after**2
+            )
     return np.asarray(np.exp(1j * (slope * turned + offset * times)))
 
 
 @lru_cache(maxsize=2)
 def _spins(flight: Flight, last: float) -> tuple[Vector, Vector, Vector]:
-    """Moments up to ``last`` s, ω3 there in rad/s, and by how much it has turned the body since t = 0, (n,) each."""
-    knots = np.unique(np.concatenate([[leg.start for leg in flight.legs], np.linspace(0.0, last, KNOTS)]))
+    """Moments up to ``last`` s, ω3 there in rad/s, and by how much it has turned the body since t =
+    0, (n,) each.
+    """
+    knots = np.unique(
+        np.concatenate([[leg.start for leg in flight.legs], np.linspace(0.0, last, KNOTS)])
+    )
     spins = flight.motion(knots)[0][:, 2]
-    return knots, spins, np.concatenate([[0.0], np.cumsum(0.5 * (spins[1:] + spins[:-1]) * np.diff(knots))])
+    return (
+        knots,
+        spins,
+        np.concatenate([[0.0], np.cumsum(0.5 * (spins[1:] + spins[:-1]) * np.diff(knots))]),
+    )
 
 
 def _complex_product(factors: Vector) -> Vector:
     """Multiplication by complex ``factors`` (n,) as real matrices (n, 2, 2)."""
-    return np.stack([np.stack([factors.real, -factors.imag], -1), np.stack([factors.imag, factors.real], -1)], 1)
+    return np.stack(
+        [np.stack([factors.real, -factors.imag], -1), np.stack([factors.imag, factors.real], -1)], 1
+    )
 
 
 def _all_rows(nutation: Vector, shifts: Vector) -> Vector:
-    """All five equations, (n, 5, 3), from the effects of axes on the nutation and on H, (n, 2, …) each."""
+    """All five equations, (n, 5, 3), from the effects of axes on the nutation and on H, (n, 2, …)
+    each.
+    """
     rows = np.zeros((len(nutation), 5, 3))
     rows[:, :2, : nutation.shape[2]] = nutation
     rows[:, 2:4, : shifts.shape[2]] = shifts
@@ -238,32 +304,48 @@ def _all_rows(nutation: Vector, shifts: Vector) -> Vector:
 
 
 REACH, TICK_STEPS, MODELS = 2.0, 300, 4
-"""Ticks that a setting may lie from its exact value; steps of a tick, two pulses at a time, by one model; models."""
+"""Ticks that a setting may lie from its exact value; steps of a tick, two pulses at a time, by one
+model; models.
+"""
 
-WAYS = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])  # a step: of the start, of the on-time
-CONVERGED, NEWTON_STEPS = 1e-13, 25  # share of |H| left: a few roundings of the flight; steps to it, at most
+WAYS = np.array(
+    [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]]
+)  # a step: of the start, of the on-time
+CONVERGED, NEWTON_STEPS = (
+    1e-13,
+    25,
+)  # share of |H| left: a few roundings of the flight; steps to it, at most
 
 
 class Refinement:
-    """The schedule of a ``flight`` with its pulses moved and lengthened, as little as it takes, to meet ``equations``.
+    """The schedule of a ``flight`` with its pulses moved and lengthened, as little as it takes, to
+    meet ``equations``.
 
-    ``fly`` flies schedules of its spacecraft; ``aside`` (equations,) N m s is to be left of them. Settings x are
-    (c1, τ1, c2, τ2 …) s, with their scale and how far each may go.
+    ``fly`` flies schedules of its spacecraft; ``aside`` (equations,) N m s is to be left of them.
+    Settings x are (c1, τ1, c2, τ2 …) s, with their scale and how far each may go.
     """
 
     def __init__(
-        self, flight: Flight, equations: EndEquations, aside: Vector, fly: Callable[[Schedule], Flight]
+        self,
+        flight: Flight,
+        equations: EndEquations,
+        aside: Vector,
+        fly: Callable[[Schedule], Flight],
     ) -> None:
         self.flight, self.equations, self.aside, self.fly = flight, equations, aside, fly
         spacecraft, schedule = flight.spacecraft, flight.schedule
         self.size, self.windows = float(np.linalg.norm(spacecraft.momentum)), Windows(spacecraft)
-        names, pace = {channel.name: channel for channel in spacecraft.channels}, 1.0 / spacecraft.fastest
+        names = {channel.name: channel for channel in spacecraft.channels}
+        pace = 1.0 / spacecraft.fastest
         self.channels = [names[pulse.channel] for pulse in schedule]
         self.room = rooms(spacecraft, schedule.pulses)
         self.bounds = [(channel.min_on_time, channel.max_on_time) for channel in self.channels]
         settings = []
         for pulse, channel, (begun, latest) in zip(schedule, self.channels, self.room, strict=True):
-            t, on, before, after = pulse.t, pulse.on_time, max(pulse.start - begun, 0.0), max(latest - pulse.end, 0.0)
+            t = pulse.t
+            on = pulse.on_time
+            before = max(pulse.start - begun, 0.0)
+            after = max(latest - pulse.end, 0.0)
             settings.append((t, pace, t - 0.5 * before, t + 0.5 * after))
             most = min(longest_on_time(spacecraft, channel), on + min(before, after))
             settings.append((on, min(on, pace), min(channel.min_on_time, on), max(most, on)))
@@ -281,7 +363,8 @@ class Refinement:
 
     def slopes(self, flight: Flight) -> Vector:
         """Slopes of what is left by the scaled parameters, (equations, 2k)."""
-        columns, times = [], np.array([(pulse.start, pulse.end) for pulse in flight.schedule]).T
+        columns = []
+        times = np.array([(pulse.start, pulse.end) for pulse in flight.schedule]).T
         edges = (_rows(flight, self.equations, each) for each in times)
         for begin, end, channel in zip(*edges, self.channels, strict=True):
             on, off = begin @ channel.torque, end @ channel.torque
@@ -290,7 +373,9 @@ class Refinement:
 
     def refined(self) -> Schedule:
         """The schedule that leaves least; how little is for the caller to judge."""
-        x, value, slopes = self.start, self.left(self.flight), self.slopes(self.flight)
+        x = self.start
+        value = self.left(self.flight)
+        slopes = self.slopes(self.flight)
         for _ in range(NEWTON_STEPS):
             norm = float(np.linalg.norm(value))
             if norm <= CONVERGED:
@@ -312,14 +397,21 @@ class Refinement:
         return self.schedule(x) if tick is None else self._on_ticks(x, tick)
 
     def _on_ticks(self, x: Vector, tick: float) -> Schedule:
-        """The schedule of least misses on ticks, by linear models one after the other; settings x are exact."""
+        """The schedule of least misses on ticks, by linear models one after the other; settings x
+        are exact.
+        """
         centres, needed = x.reshape(-1, 2).T
-        on_times = [self.windows.on_time(on, *bounds) for on, bounds in zip(needed, self.bounds, strict=True)]
+        on_times = [
+            self.windows.on_time(on, *bounds)
+            for on, bounds in zip(needed, self.bounds, strict=True)
+        ]
         exact = np.column_stack([centres - 0.5 * needed, needed]) / tick
         ticks = np.rint(np.column_stack([exact[:, 0], np.array(on_times) / tick]))
         best, least = self.flight, np.inf
         for _ in range(MODELS):
-            settings = tick * np.ravel(np.column_stack([ticks[:, 0] + 0.5 * ticks[:, 1], ticks[:, 1]]))
+            settings = tick * np.ravel(
+                np.column_stack([ticks[:, 0] + 0.5 * ticks[:, 1], ticks[:, 1]])
+            )
             flight = self.fly(self.schedule(settings))
             missing = self.left(flight)
             size = float(np.linalg.norm(missing))
@@ -329,8 +421,12 @@ class Refinement:
             ticks = self._stepped(ticks, exact, tick, missing, self.slopes(flight) / self.scale)
         return best.schedule
 
-    def _stepped(self, ticks: Vector, exact: Vector, tick: float, missing: Vector, slopes: Vector) -> Vector:
-        """Ticks (k, 2) near the ``exact`` ones that leave less, where these leave ``missing``; ``slopes`` per s."""
+    def _stepped(
+        self, ticks: Vector, exact: Vector, tick: float, missing: Vector, slopes: Vector
+    ) -> Vector:
+        """Ticks (k, 2) near the ``exact`` ones that leave less, where these leave ``missing``;
+        ``slopes`` per s.
+        """
         (begun, latest), (shortest, longest) = np.array(self.room).T, np.array(self.bounds).T
 
         def allowed(ticks: Vector) -> NDArray[np.bool_]:

@@ -1,4 +1,6 @@
-"""fit, export and import: telemetry and messages in, estimates, messages and spacecraft files out."""
+"""fit, export and import: telemetry and messages in, estimates,
+messages and spacecraft files out.
+"""
 
 import json
 import math
@@ -30,30 +32,58 @@ COMMENTS = [line.partition("#")[2] for line in example_text().splitlines() if "#
 
 def write_rows(path: Path, header: str, rows: Array, digits: int = 5) -> None:
     """A CSV file of telemetry."""
-    lines = [f"{row[0]:.6g}," + ",".join(f"{value:.{digits}f}" for value in row[1:]) for row in rows]
+    lines = [
+        f"{row[0]:.6g}," + ",".join(f"{value:.{digits}f}" for value in row[1:]) for row in rows
+    ]
     path.write_text("\n".join([header, *lines]) + "\n", encoding="utf-8")
 
 
 def flight(
     folder: Path, seed: int, *, every: int = 1, bias: float = 0.0, wide: bool = False
 ) -> tuple[float, float, Array]:
-    """A minute of 10 Hz gyro data with 0.01 deg/s of noise, of the example or, ``wide``, of `WIDE`: A, C, rates."""
+    """A minute of 10 Hz gyro data with 0.01 deg/s of noise, of the example or, ``wide``, of `WIDE`:
+    A, C, rates.
+    """
     draw, (moments, degrees) = np.random.default_rng(seed), (0.005, 0.1) if wide else (0.002, 0.05)
     A, C = 120.0 * (1.0 + moments * draw.normal()), 80.0 * (1.0 + moments * draw.normal())
     rates = nutdamp.example().omega0 + math.radians(degrees) * draw.normal(size=3)
     rates = np.array([*rates[:2], rates[2]])
     times = np.arange(601) / 10.0
-    shown = np.degrees(motion((A, A, C), rates, times)) + 0.01 * draw.normal(size=(601, 3)) + [bias, 0.0, 0.0]
+    shown = (
+        np.degrees(motion((A, A, C), rates, times))
+        + 0.01 * draw.normal(size=(601, 3))
+        + [bias, 0.0, 0.0]
+    )
     header = "t_s,omega_1_deg_s,omega_2_deg_s,omega_3_deg_s"
     write_rows(folder / "flight.csv", header, np.column_stack([times, shown])[::every])
     return A, C, rates
 
 
-def fly_probe(run: Run, folder: Path, rows: str, until: int, *changed: str, samples: int = 151) -> Array:
-    """Rates in rad/s, (n, 4) with the time, of a flight in which probe.csv is fired; the file says nothing of that."""
+def fly_probe(
+    run: Run, folder: Path, rows: str, until: int, *changed: str, samples: int = 151
+) -> Array:
+    """Rates in rad/s, (n, 4) with the time, of a flight in which probe.csv is fired; the file says
+    nothing of that.
+    """
     (folder / "probe.csv").write_text(f"{PROBE}{rows}\n", encoding="utf-8")
-    command = ["simulate", "-q", "--schedule", "probe.csv", "--flown", "--until", f"{until}s", "--csv", "t.csv"]
-    run(*command, "--samples", str(samples), *(part for each in changed for part in ("--set", each)), status=(0, 4))
+    command = [
+        "simulate",
+        "-q",
+        "--schedule",
+        "probe.csv",
+        "--flown",
+        "--until",
+        f"{until}s",
+        "--csv",
+        "t.csv",
+    ]
+    run(
+        *command,
+        "--samples",
+        str(samples),
+        *(part for each in changed for part in ("--set", each)),
+        status=(0, 4),
+    )
     return np.loadtxt(folder / "t.csv", delimiter=",", skiprows=1, usecols=range(4))
 
 
@@ -74,21 +104,32 @@ def estimates(folder: Path) -> dict[str, dict[str, Any]]:
     return {row["quantity"]: row for row in results(folder)["estimates"]}
 
 
-def test_estimates_are_shown_and_become_a_file_with_comments_and_settings_at_an_epoch(run: Run, tmp_path: Path) -> None:
+def test_estimates_are_shown_and_become_a_file_with_comments_and_settings_at_an_epoch(
+    run: Run, tmp_path: Path
+) -> None:
     A, C, rates = flight(tmp_path, 2, every=3)
     changed = ("--set", "thrusters.+M1.force=12N", "--set", "limits.horizon=90s")
     shown = fit(run, "flight.csv", "-o", "now.yaml", "--at", "90s", "--json", "f.json", *changed)
-    for text in ("C/A only, never A and C apart", "bias of omega_3: kept as the file has it", "A and C +0.9992"):
+    for text in (
+        "C/A only, never A and C apart",
+        "bias of omega_3: kept as the file has it",
+        "A and C +0.9992",
+    ):
         assert text in shown
-    rows, ratio = estimates(tmp_path), estimates(tmp_path)["C/A"]
+    rows = estimates(tmp_path)
+    ratio = estimates(tmp_path)["C/A"]
     assert abs(ratio["value"] - C / A) < 4.0 * ratio["sigma"]
     assert ratio["sigma"] < 1e-4
     assert (ratio["from"], rows["bias_omega_3"]["from"]) == ("data", "file")
     assert [signal["white"] for signal in results(tmp_path)["record"]["signals"]] == [True] * 3
     assert f"{ratio['value']:.7g}"[:6] in shown
-    before, after = example_text(), (tmp_path / "now.yaml").read_text()
+    before = example_text()
+    after = (tmp_path / "now.yaml").read_text()
     assert [line.partition("#")[2] for line in after.splitlines() if "#" in line] == COMMENTS
-    keys = [{line.split(":")[0] for line in text.splitlines() if line[:1].isalpha()} for text in (before, after)]
+    keys = [
+        {line.split(":")[0] for line in text.splitlines() if line[:1].isalpha()}
+        for text in (before, after)
+    ]
     assert keys[0] | {"limits"} == keys[1]
     now = nutdamp.load(tmp_path / "now.yaml")
     assert now.limits.horizon == 90.0
@@ -101,26 +142,39 @@ def test_estimates_are_shown_and_become_a_file_with_comments_and_settings_at_an_
 
 
 def test_the_picture_has_a_heading_and_shows_no_rounding_as_noise(run: Run, tmp_path: Path) -> None:
-    """Of data without noise the third rate is constant: neither residuals nor autocorrelations say anything."""
-    times, example = np.arange(201) / 10.0, nutdamp.example()
+    """Of data without noise the third rate is constant: neither residuals nor autocorrelations say
+    anything.
+    """
+    times = np.arange(201) / 10.0
+    example = nutdamp.example()
     shown = motion((example.inertia.A, example.inertia.A, example.inertia.C), example.omega0, times)
     write_rows(tmp_path / "exact.csv", RATES, np.column_stack([times, shown]), digits=17)
     fit(run, "exact.csv", "--plot", "f.svg")
     picture = (tmp_path / "f.svg").read_text()
     for text in (f"{example.name}: fit of a free rigid body", "only rounding"):
         assert text in picture
-    assert picture.count("only rounding") == 4  # a panel for each rate, and that of the autocorrelation
+    assert (
+        picture.count("only rounding") == 4
+    )  # a panel for each rate, and that of the autocorrelation
 
 
 def faults(text: str) -> list[str]:
-    return [line for line in text.removeprefix(BUILT_IN).splitlines() if line and not line.startswith(("Usage", "Try"))]
+    return [
+        line
+        for line in text.removeprefix(BUILT_IN).splitlines()
+        if line and not line.startswith(("Usage", "Try"))
+    ]
 
 
 def test_faults_and_records_without_content(run: Run, tmp_path: Path) -> None:
     flight(tmp_path, 1)
     slow = [f"{0.05 * at:.2f},{0.1 + 0.001 * at},0.1" for at in range(20)]
     many = [f"{at},x,{'y' if at < 6 else 0.1}" for at in range(601)]
-    files = {"bad.csv": ["t_s,omega_1", "0,1"], "short.csv": [RATES[:31], *slow], "many.csv": [RATES[:31], *many]}
+    files = {
+        "bad.csv": ["t_s,omega_1", "0,1"],
+        "short.csv": [RATES[:31], *slow],
+        "many.csv": [RATES[:31], *many],
+    }
     for name, lines in files.items():
         (tmp_path / name).write_text("\n".join(lines) + "\n")
     texts = []
@@ -146,8 +200,12 @@ def test_rates_in_another_unit_are_a_fault_of_their_column(run: Run, tmp_path: P
         ("deg_s", -30.0),
         ("rad_s", math.pi**2 / 180.0),
     ):
-        lines = [f"{at},{0.1 * math.cos(at)},{value * (1.0 + 1e-3 * math.sin(at))}" for at in range(40)]
-        (tmp_path / "unit.csv").write_text("\n".join([f"t_s,omega_1_{unit},omega_3_{unit}", *lines]) + "\n")
+        lines = [
+            f"{at},{0.1 * math.cos(at)},{value * (1.0 + 1e-3 * math.sin(at))}" for at in range(40)
+        ]
+        (tmp_path / "unit.csv").write_text(
+            "\n".join([f"t_s,omega_1_{unit},omega_3_{unit}", *lines]) + "\n"
+        )
         texts += faults(run("fit", "unit.csv", status=2).stderr)
     check_text("fit.units", "\n".join(texts))
 
@@ -169,11 +227,15 @@ def test_rates_in_another_unit_are_a_fault_of_their_column(run: Run, tmp_path: P
         ("gyro-quant", "sc", 0, "fit-coarse: omega_1, omega_2"),
     ],
 )
-def test_broken_sensors_are_named(run: Run, tmp_path: Path, record: str, body: str, status: int, said: str) -> None:
+def test_broken_sensors_are_named(
+    run: Run, tmp_path: Path, record: str, body: str, status: int, said: str
+) -> None:
     """And nothing is written of what they show, but a JSON file."""
     files = places.case(f"fit-{record}.csv"), places.case(f"fit-{body}.yaml")
     screen = run("fit", *map(str, files), "-o", "now.yaml", "--json", "f.json")
-    assert (screen.returncode, (tmp_path / "now.yaml").exists()) == (status, status == 0), screen.stderr
+    assert (screen.returncode, (tmp_path / "now.yaml").exists()) == (status, status == 0), (
+        screen.stderr
+    )
     notes = results(tmp_path).get("notes", [])
     told = [f"{note['code']}: {' '.join(map(str, note['values'].values()))}" for note in notes]
     assert said in "; ".join([*told, screen.stderr])
@@ -181,7 +243,13 @@ def test_broken_sensors_are_named(run: Run, tmp_path: Path, record: str, body: s
 
 def test_what_coarse_steps_do_to_an_estimate_is_in_its_sigma(run: Run, tmp_path: Path) -> None:
     """The same record without steps has a nutation of 4.602 deg; with them it was 7 sigma off."""
-    run("fit", str(places.case("fit-gyro-quant.csv")), str(places.case("fit-sc.yaml")), "--json", "f.json")
+    run(
+        "fit",
+        str(places.case("fit-gyro-quant.csv")),
+        str(places.case("fit-sc.yaml")),
+        "--json",
+        "f.json",
+    )
     nutation = estimates(tmp_path)["nutation"]
     assert abs(nutation["value"] - 4.602) < 3.0 * nutation["sigma"] < 0.6
     assert results(tmp_path)["kept"] == ["bias_omega_3"]
@@ -191,15 +259,28 @@ def test_what_a_steady_spin_does_not_tell_is_as_the_file_has_it(run: Run, tmp_pa
     files = str(places.case("fit-steady-spin.csv")), str(places.case("fit-tiny.yaml"))
     assert run("fit", *files, "--json", "f.json").returncode == 0
     rows = estimates(tmp_path)
-    assert (rows["nutation"]["value"], rows["spin"]["value"]) == (0.0, pytest.approx(math.degrees(3.0)))
+    assert (rows["nutation"]["value"], rows["spin"]["value"]) == (
+        0.0,
+        pytest.approx(math.degrees(3.0)),
+    )
     assert rows.keys().isdisjoint({"phase", "C/A"})
     assert results(tmp_path)["kept"] == ["bias_omega_1", "bias_omega_2", "bias_omega_3"]
-    run("fit", str(places.case("fit-steady-spin.csv")), str(places.case("fit-sc.yaml")), "--json", "f.json")
+    run(
+        "fit",
+        str(places.case("fit-steady-spin.csv")),
+        str(places.case("fit-sc.yaml")),
+        "--json",
+        "f.json",
+    )
     assert not any("A and C +0.0000" in note["text"] for note in results(tmp_path)["notes"])
 
 
-def test_what_is_far_from_the_file_is_written_where_that_is_accepted(run: Run, tmp_path: Path) -> None:
-    """Both values are said; a column that was swapped makes C/A another one, and so does what it leads to."""
+def test_what_is_far_from_the_file_is_written_where_that_is_accepted(
+    run: Run, tmp_path: Path
+) -> None:
+    """Both values are said; a column that was swapped makes C/A another one, and so does what it
+    leads to.
+    """
     files = str(places.case("fit-gyro-swap12.csv")), str(places.case("fit-sc.yaml"))
     assert run("fit", *files, "--accept", "-o", "now.yaml", "--json", "f.json").returncode == 0
     far = next(note for note in results(tmp_path)["notes"] if note["code"] == "fit-far")
@@ -212,31 +293,50 @@ def test_what_is_far_from_the_file_is_written_where_that_is_accepted(run: Run, t
 def test_a_spin_other_than_that_of_the_file_is_said_with_both(
     run: Run, tmp_path: Path, spin: float, said: bool
 ) -> None:
-    times, rates = np.arange(201) / 10.0, np.array([0.14, 0.12, spin * math.pi])
-    shown = motion((120.0, 120.0, 80.0), rates, times) + 1e-4 * np.random.default_rng(1).normal(size=(201, 3))
+    times = np.arange(201) / 10.0
+    rates = np.array([0.14, 0.12, spin * math.pi])
+    shown = motion((120.0, 120.0, 80.0), rates, times) + 1e-4 * np.random.default_rng(1).normal(
+        size=(201, 3)
+    )
     write_rows(tmp_path / "gyro.csv", RATES, np.column_stack([times, shown]), digits=9)
-    assert run("fit", "gyro.csv", "--json", "f.json", "--set", "dispersions.omega0={normal: 1 deg/s}").returncode == 0
+    assert (
+        run(
+            "fit", "gyro.csv", "--json", "f.json", "--set", "dispersions.omega0={normal: 1 deg/s}"
+        ).returncode
+        == 0
+    )
     values = [note["values"] for note in results(tmp_path)["notes"] if note["code"] == "fit-spin"]
     assert [pytest.approx({"spin_rpm": 30.0 * spin, "file_rpm": 30.0}, rel=1e-4)] * said == values
 
 
 @pytest.mark.deep
-def test_remarks_are_in_the_json_and_a_schedule_outside_the_record_is_doubted(run: Run, tmp_path: Path) -> None:
+def test_remarks_are_in_the_json_and_a_schedule_outside_the_record_is_doubted(
+    run: Run, tmp_path: Path
+) -> None:
     flight(tmp_path, 11, bias=0.05)
     assert run("fit", "flight.csv", "--schedule", "late.csv").returncode == 1
     (tmp_path / "late.csv").write_text(f"{PROBE}99,0.3,+M1\n", encoding="utf-8")
     shown = fit(run, "flight.csv", "--schedule", "late.csv", "--json", "f.json")
     notes = results(tmp_path)["notes"]
     check_text("fit.notes", "\n".join(note["text"] for note in notes))
-    assert all(" ".join(f"{note['severity']}[{note['code']}]: {note['text']}".split()) in shown for note in notes)
+    assert all(
+        " ".join(f"{note['severity']}[{note['code']}]: {note['text']}".split()) in shown
+        for note in notes
+    )
 
 
 @pytest.mark.deep
 def test_a_channel_that_did_not_fire_is_not_calibrated(run: Run, tmp_path: Path) -> None:
     flight(tmp_path, 10, every=5)
     (tmp_path / "probe.csv").write_text(f"{PROBE}20,0.3,+M1\n", encoding="utf-8")
-    refused = run("fit", "flight.csv", "--schedule", "probe.csv", "-o", "now.yaml", "--json", "f.json")
-    assert (refused.returncode, (tmp_path / "now.yaml").exists(), (tmp_path / "f.json").exists()) == (3, False, True)
+    refused = run(
+        "fit", "flight.csv", "--schedule", "probe.csv", "-o", "now.yaml", "--json", "f.json"
+    )
+    assert (
+        refused.returncode,
+        (tmp_path / "now.yaml").exists(),
+        (tmp_path / "f.json").exists(),
+    ) == (3, False, True)
     shown = fit(run, "flight.csv", "--schedule", "probe.csv", "-o", "now.yaml", "--accept")
     assert "did it fire? Its force stays as it was" in shown
     assert "pulses fired meanwhile: 1" in shown
@@ -247,19 +347,30 @@ def test_a_channel_that_did_not_fire_is_not_calibrated(run: Run, tmp_path: Path)
 
 @pytest.mark.weekly
 def test_a_schedule_that_does_not_match_the_record_is_doubted(run: Run, tmp_path: Path) -> None:
-    """Pulses of +M2 at 20 s: in the schedule a second late, of the channel across, or after the record."""
+    """Pulses of +M2 at 20 s: in the schedule a second late, of the channel across, or after the
+    record.
+    """
     rows = fly_probe(run, tmp_path, "20,0.5,+M2", 30)
     rows[:, 1:] += 1e-4 * np.random.default_rng(3).normal(size=(len(rows), 3))
     write_rows(tmp_path / "gyro.csv", RATES, rows, digits=7)
     shown = {}
-    for name, row in (("late", "21,0.5,+M2"), ("other", "20,0.5,-M2"), ("after", "20,0.5,+M2\n100,0.5,+M1")):
+    for name, row in (
+        ("late", "21,0.5,+M2"),
+        ("other", "20,0.5,-M2"),
+        ("after", "20,0.5,+M2\n100,0.5,+M1"),
+    ):
         (tmp_path / "s.csv").write_text(f"{PROBE}{row}\n", encoding="utf-8")
-        shown[name] = fit(run, "gyro.csv", "--schedule", "s.csv", "-o", f"{name}.yaml", "--accept", columns=140)
+        shown[name] = fit(
+            run, "gyro.csv", "--schedule", "s.csv", "-o", f"{name}.yaml", "--accept", columns=140
+        )
         assert "e+0" not in shown[name]
     for name, text in (
         ("late", "delay of +M2 -1000 for 0 ms (-20.0)"),
         ("late", "the delay of +M2, -1000 ms, is not written"),
-        ("other", "-M2 gave -100 % of its thrust: it pushes the other way: another channel, or reversed?"),
+        (
+            "other",
+            "-M2 gave -100 % of its thrust: it pushes the other way: another channel, or reversed?",
+        ),
         ("after", "pulses fired meanwhile: 1"),
         ("after", "1 of 2 pulses of the schedule are outside the record, 0 s to 30 s"),
     ):
@@ -269,8 +380,12 @@ def test_a_schedule_that_does_not_match_the_record_is_doubted(run: Run, tmp_path
 
 
 @pytest.mark.deep
-def test_the_library_gives_the_same_file_and_fits_it_again_with_what_was_known(run: Run, tmp_path: Path) -> None:
-    """The second fit adds to the first: A keeps the sigma that two tolerances and the ratio leave it."""
+def test_the_library_gives_the_same_file_and_fits_it_again_with_what_was_known(
+    run: Run, tmp_path: Path
+) -> None:
+    """The second fit adds to the first: A keeps the sigma that two tolerances and the ratio leave
+    it.
+    """
     flight(tmp_path, 8)
     fit(run, "flight.csv", "-q", "-o", "now.yaml", "--at", "80s", "--json", "f.json")
     first = nutdamp.fit(tmp_path / "flight.csv", nutdamp.example())
@@ -279,7 +394,9 @@ def test_the_library_gives_the_same_file_and_fits_it_again_with_what_was_known(r
     assert (tmp_path / "library.yaml").read_bytes() == (tmp_path / "now.yaml").read_bytes()
     assert len(first.figure().axes) >= 3
     assert json.loads(json.dumps(first.to_dict(80.0))) == results(tmp_path)
-    assert first.spacecraft(80.0).omega0 == pytest.approx(nutdamp.load(tmp_path / "now.yaml").omega0, rel=1e-12)
+    assert first.spacecraft(80.0).omega0 == pytest.approx(
+        nutdamp.load(tmp_path / "now.yaml").omega0, rel=1e-12
+    )
     with pytest.raises(BadRequest):
         nutdamp.fit(tmp_path / "flight.csv", nutdamp.example().replace(mass=200.0)).text()
     again = nutdamp.fit(tmp_path / "flight.csv", first.spacecraft(0.0))
@@ -303,14 +420,18 @@ def test_fit_plan_disperse_complies_where_the_blind_plan_does_not(run: Run, tmp_
 
 
 @pytest.mark.weekly
-def test_plans_from_the_estimate_meet_the_requirement_on_the_true_bodies(run: Run, tmp_path: Path) -> None:
+def test_plans_from_the_estimate_meet_the_requirement_on_the_true_bodies(
+    run: Run, tmp_path: Path
+) -> None:
     for seed in range(30):
         A, C, rates = flight(tmp_path, 100 + seed)
         fit(run, "flight.csv", "-q", "-o", "now.yaml", "--at", "90s")
         now = nutdamp.load(tmp_path / "now.yaml")
         plan = present(nutdamp.compare(now).recommended)
         true = motion((A, A, C), rates, np.array([0.0, 90.0]))[-1]
-        truth = now.with_(inertia={"A": A, "C": C}, state={"spin": float(true[2])}).replace(omega0=true)
+        truth = now.with_(inertia={"A": A, "C": C}, state={"spin": float(true[2])}).replace(
+            omega0=true
+        )
         left = flown(truth, plan.pulses).residual
         assert left.nutation < math.radians(0.5)
         assert left.momentum_shift < math.radians(0.2)
@@ -321,13 +442,26 @@ def test_thrusters_are_calibrated_by_the_schedule_that_was_fired(run: Run, tmp_p
     changed = ("thrusters.+M1.force=9.6N", "inertia.C=80.3 kg m^2")
     rows = fly_probe(run, tmp_path, "8,0.3,+M1\n16,0.3,-M2", 24, *changed, samples=161)
     write_rows(tmp_path / "gyro.csv", RATES, rows, digits=17)
-    fit(run, "gyro.csv", "-q", "--schedule", "probe.csv", "-o", "now.yaml", "--at", "30s", "--json", "f.json")
+    fit(
+        run,
+        "gyro.csv",
+        "-q",
+        "--schedule",
+        "probe.csv",
+        "-o",
+        "now.yaml",
+        "--at",
+        "30s",
+        "--json",
+        "f.json",
+    )
     values = {name: row["value"] for name, row in estimates(tmp_path).items()}
     assert values["thrust +M1"] / values["A"] == pytest.approx(0.96 / 120.0, rel=1e-4)
     assert values["thrust -M2"] / values["A"] == pytest.approx(1.0 / 120.0, rel=1e-4)
     assert abs(values["delay +M1"]) < 0.1
     now = nutdamp.load(tmp_path / "now.yaml")
-    force, known = {each.name: each.thrusters[0].force for each in now.channels}["+M1"], now.dispersions
+    force = {each.name: each.thrusters[0].force for each in now.channels}["+M1"]
+    known = now.dispersions
     assert force == pytest.approx([0.0, -10.0 * values["thrust +M1"], 0.0])
     assert known is not None
     assert known.thrust["+M1"].size < 0.006
@@ -337,12 +471,16 @@ def test_thrusters_are_calibrated_by_the_schedule_that_was_fired(run: Run, tmp_p
 
 
 @pytest.mark.weekly
-def test_a_delay_becomes_that_of_the_valve_and_a_second_fit_finds_none(run: Run, tmp_path: Path) -> None:
+def test_a_delay_becomes_that_of_the_valve_and_a_second_fit_finds_none(
+    run: Run, tmp_path: Path
+) -> None:
     late = "valve={open_delay: 40 ms, close_delay: 40 ms}"
     rows = fly_probe(run, tmp_path, "8,0.3,+M1\n16,0.3,-M2", 24, late, samples=161)
     write_rows(tmp_path / "gyro.csv", RATES, rows, digits=17)
     assert "is not written" not in fit(run, "gyro.csv", "--schedule", "probe.csv", "-o", "now.yaml")
-    valves = {channel.name: channel.valve for channel in nutdamp.load(tmp_path / "now.yaml").channels}
+    valves = {
+        channel.name: channel.valve for channel in nutdamp.load(tmp_path / "now.yaml").channels
+    }
     fit(run, "gyro.csv", "now.yaml", "-q", "--schedule", "probe.csv", "--json", "f.json")
     for name in ("+M1", "-M2"):
         valve = valves[name]
@@ -375,7 +513,19 @@ def test_messages_go_to_standard_output_or_a_file(run: Run, tmp_path: Path) -> N
     track = call(run, "export dated.yaml --format aem --scheme two-pulse -o track.XML")
     assert (track.stdout, "wrote track.XML: two-pulse, 2 pulses" in track.stderr) == ("", True)
     assert "<quaternionAngVel>" in (tmp_path / "track.XML").read_text()
-    quiet = run("export", "-q", "dated.yaml", "--format", "stk", "--scheme", "none", "-o", "free.a", "--until", "2 s")
+    quiet = run(
+        "export",
+        "-q",
+        "dated.yaml",
+        "--format",
+        "stk",
+        "--scheme",
+        "none",
+        "-o",
+        "free.a",
+        "--until",
+        "2 s",
+    )
     assert (quiet.returncode, quiet.stdout, quiet.stderr) == (0, "", "")
     assert (tmp_path / "free.a").read_text().splitlines()[-2].startswith("2.000000000 ")
     assert exported(run, "export --format basilisk --scheme two-pulse")  # needs no epoch
@@ -384,7 +534,8 @@ def test_messages_go_to_standard_output_or_a_file(run: Run, tmp_path: Path) -> N
 def test_the_plan_as_json_is_that_of_plan(run: Run) -> None:
     """By its dispersed cases, whether a scheme is named or not."""
     for scheme in ("--scheme four-pulse", ""):
-        commands, status = ("export --format json -o -", "plan"), 4 if scheme else 0
+        commands = ("export --format json -o -", "plan")
+        status = 4 if scheme else 0
         data, planned = (result(run, f"{command} {scheme}", status=status) for command in commands)
         assert data["recommended"] == planned["recommended"]
         (plan,) = (plan for plan in planned["plans"] if plan["scheme"] == data["recommended"])
@@ -418,29 +569,50 @@ def test_what_a_format_needs_is_named_and_can_be_pasted(run: Run, tmp_path: Path
     )
     check_text("cli.export.needs", said)
     lines = said[said.index("attitude:\n") : said.index("\n$ export ideal")]
-    written(tmp_path, pasted_yaml="name: P\ninertia: {A: 120, C: 80}\nomega0: [0.1, 0, 3]\n" + lines)
+    written(
+        tmp_path, pasted_yaml="name: P\ninertia: {A: 120, C: 80}\nomega0: [0.1, 0, 3]\n" + lines
+    )
     for name in ("pasted", "ideal"):
         assert exported(run, f"export {name}.yaml --format aem --scheme one-pulse")
 
 
-def test_epochs_that_messages_cannot_hold_are_refused_with_their_place(run: Run, tmp_path: Path) -> None:
+def test_epochs_that_messages_cannot_hold_are_refused_with_their_place(
+    run: Run, tmp_path: Path
+) -> None:
     """And planned without dates. What no file says has no place in one."""
     late = DATED.replace("2026-03-01T12:00:00Z", "9999-12-31T23:59:59.5Z")
     written(tmp_path, late_yaml=late, old_yaml=DATED.replace("2026", "1960"))
-    commands = [f"export late.yaml --format {form} --scheme two-pulse" for form in ("apm", "aem", "opm", "stk")]
-    commands.append("export late.yaml --format aem-spin --scheme two-pulse --set attitude.epoch=9999-12-31T23:59:59Z")
+    commands = [
+        f"export late.yaml --format {form} --scheme two-pulse"
+        for form in ("apm", "aem", "opm", "stk")
+    ]
+    commands.append(
+        "export late.yaml --format aem-spin --scheme two-pulse --set "
+        "attitude.epoch=9999-12-31T23:59:59Z"
+    )
     aem = "--format aem --scheme two-pulse"
-    commands += [f"export old.yaml {aem}", f"export old.yaml {aem} --set attitude.epoch=1961-03-01T12:00:00Z"]
+    commands += [
+        f"export old.yaml {aem}",
+        f"export old.yaml {aem} --set attitude.epoch=1961-03-01T12:00:00Z",
+    ]
     commands += ["check old.yaml", "plan late.yaml --scheme two-pulse -o later.yaml --at 1s"]
     said = refusals(run, tmp_path, commands)
     check_text("cli.export.epochs", said + "\n" + call(run, "check late.yaml -q").stdout)
     assert result(run, "plan late.yaml --scheme two-pulse")["plans"][0]["pulses"][1]["utc"] is None
     assert call(run, "plan late.yaml --scheme two-pulse").returncode == 0
-    far = run("plan", "-", "--scheme", "one-pulse", stdin=DATED + "limits: {horizon: 1e15, earliest: 9e14}\n")
+    far = run(
+        "plan",
+        "-",
+        "--scheme",
+        "one-pulse",
+        stdin=DATED + "limits: {horizon: 1e15, earliest: 9e14}\n",
+    )
     assert (far.returncode in (0, 3), far.stderr) == (True, "")
 
 
-def test_a_plan_that_misses_the_requirement_is_exported_and_an_infeasible_one_not(run: Run, tmp_path: Path) -> None:
+def test_a_plan_that_misses_the_requirement_is_exported_and_an_infeasible_one_not(
+    run: Run, tmp_path: Path
+) -> None:
     written(tmp_path, short_yaml=DATED + "limits: {horizon: 1 ms}\n")
     written(tmp_path, strict_yaml=DATED + "requirement: {momentum_shift: 0.1 deg}\n")
     infeasible = call(run, "export short.yaml --format apm --scheme two-pulse -o none.apm")
@@ -472,16 +644,28 @@ def test_an_orbit_makes_an_opm_whole_and_without_one_it_is_a_part(run: Run, tmp_
 
 
 def test_a_spin_table_needs_no_epoch_and_goes_on_as_requested(run: Run) -> None:
-    table = rows(run("export", "--format", "spin-table", "--scheme", "two-pulse", "--until", "9 s").stdout)
+    table = rows(
+        run("export", "--format", "spin-table", "--scheme", "two-pulse", "--until", "9 s").stdout
+    )
     assert [row["spin"] for row in table] == ["1", "2", "3", "4", "5"]
     assert sum(int(row["pulses"]) for row in table) == 2
 
 
 def test_angles_that_are_rounding_are_written_as_0(run: Run) -> None:
-    """The spin axis of this file lies on the equator of the frame, and body axis 1 along the node."""
-    text = exported(run, f"export {places.case('geo-target.yaml')} --format apm --scheme four-pulse")
-    angles = dict(re.findall(r"^(SPIN_[A-Z]+|NUTATION_PHASE) += (\S+) \[deg\]$", text, re.MULTILINE))
-    assert (angles["SPIN_ALPHA"], angles["SPIN_DELTA"], angles["SPIN_ANGLE"]) == ("270.0", "0.0", "0.0")
+    """The spin axis of this file lies on the equator of the frame,
+    and body axis 1 along the node.
+    """
+    text = exported(
+        run, f"export {places.case('geo-target.yaml')} --format apm --scheme four-pulse"
+    )
+    angles = dict(
+        re.findall(r"^(SPIN_[A-Z]+|NUTATION_PHASE) += (\S+) \[deg\]$", text, re.MULTILINE)
+    )
+    assert (angles["SPIN_ALPHA"], angles["SPIN_DELTA"], angles["SPIN_ANGLE"]) == (
+        "270.0",
+        "0.0",
+        "0.0",
+    )
 
 
 def test_an_imported_schedule_is_simulated(run: Run, tmp_path: Path) -> None:
@@ -513,11 +697,19 @@ def test_a_message_that_fires_nothing_gives_an_empty_schedule(run: Run, tmp_path
 
 def test_faults_of_a_message_are_reported_by_line(run: Run, tmp_path: Path) -> None:
     """What only a spacecraft file rules out points at the block that it came from."""
-    text, flat = exported(run, APM), ("IZZ               = 80.0", "IZZ               = 800.0")
-    written(tmp_path, keyword_apm=text.replace("QC ", "QD ").replace(*flat), flat_apm=text.replace(*flat))
+    text = exported(run, APM)
+    flat = ("IZZ               = 80.0", "IZZ               = 800.0")
+    written(
+        tmp_path,
+        keyword_apm=text.replace("QC ", "QD ").replace(*flat),
+        flat_apm=text.replace(*flat),
+    )
     written(tmp_path, still_apm=text.replace("ANGVEL_Z     = 180.0", "ANGVEL_Z     = 0.0"))
     written(tmp_path, there_xml=exported(run, f"{APM} --xml"))
     assert len(set(contents(tmp_path).values())) == 5
     files = ("keyword.apm", "flat.apm", "still.apm", "there.xml")
-    check_text("cli.import.faults", refusals(run, tmp_path, [f"import apm {file} -o out.yaml" for file in files]))
+    check_text(
+        "cli.import.faults",
+        refusals(run, tmp_path, [f"import apm {file} -o out.yaml" for file in files]),
+    )
     assert refusals(run, tmp_path, ["import opm flat.apm"])

@@ -1,4 +1,6 @@
-"""``check``, ``init``, ``schema``, ``simulate``, help, version and completion; what each command loads."""
+"""``check``, ``init``, ``schema``, ``simulate``, help, version and completion; what each command
+loads.
+"""
 
 import json
 import os
@@ -35,19 +37,25 @@ thrusters: [{name: T1, torque: [0, 8, 0], min_on_time: 20 ms}, {name: SPIN, torq
 """
 
 
-# --- check -----------------------------------------------------------------------------------------------------------
+# --- check
+# --------------------------------------------------------------------------------------------------
 
 
-def test_each_of_several_files_is_shown_as_alone_with_a_blank_line_below(run: Run, tmp_path: Path) -> None:
+def test_each_of_several_files_is_shown_as_alone_with_a_blank_line_below(
+    run: Run, tmp_path: Path
+) -> None:
     written(tmp_path, good_yaml=GOOD, plain_yaml=EXACT)
     alone = [run("check", name).stdout for name in ("good.yaml", "plain.yaml")]
     assert run("check", "good.yaml", "plain.yaml").stdout == "".join(f"{text}\n" for text in alone)
 
 
-# --- init, schema, version --------------------------------------------------------------------------------------------
+# --- init, schema, version
+# --------------------------------------------------------------------------------------------
 
 
-def test_init_writes_a_file_that_plans_and_takes_the_place_of_none_unless_forced(run: Run, tmp_path: Path) -> None:
+def test_init_writes_a_file_that_plans_and_takes_the_place_of_none_unless_forced(
+    run: Run, tmp_path: Path
+) -> None:
     assert run("init").returncode == 0
     assert run("plan", "--scheme", "two-pulse").returncode == 0
     assert "--force" in refusals(run, tmp_path, ["init"], 1)
@@ -58,7 +66,9 @@ def test_init_writes_a_file_that_plans_and_takes_the_place_of_none_unless_forced
     assert run("plan", "other.yaml", "--scheme", "two-pulse").returncode == 0
 
 
-def test_init_lists_and_writes_the_spacecraft_that_ship_with_nutdamp(run: Run, tmp_path: Path) -> None:
+def test_init_lists_and_writes_the_spacecraft_that_ship_with_nutdamp(
+    run: Run, tmp_path: Path
+) -> None:
     listed = run("init", "--list").stdout
     configs = [path.stem for path in places.CONFIGS.glob("*.yaml")]
     assert configs
@@ -76,7 +86,8 @@ def test_schema_is_json_and_the_version_is_that_of_the_package(run: Run, tmp_pat
     assert __version__ in run("--version").stdout
 
 
-# --- check ------------------------------------------------------------------------------------------------------------
+# --- check
+# --------------------------------------------------------------------------------------------------
 
 
 def test_check_prints_derived_quantities(run: Run) -> None:
@@ -89,7 +100,9 @@ def test_check_prints_derived_quantities(run: Run) -> None:
 def test_check_shows_all_faults_of_all_files(run: Run, tmp_path: Path) -> None:
     written(tmp_path, good_yaml=GOOD, typo_yaml=TYPO, tensor_yaml=TENSOR)
     # A bad file counts before one that cannot be read.
-    ended = call(run, "check typo.yaml good.yaml missing.yaml tensor.yaml --json check.json", status=2)
+    ended = call(
+        run, "check typo.yaml good.yaml missing.yaml tensor.yaml --json check.json", status=2
+    )
     check_text("cli.check.files", ended.stderr + ended.stdout)
     files = json.loads((tmp_path / "check.json").read_text())["files"]
     assert [entry["valid"] for entry in files] == [False, True, False, True]
@@ -99,8 +112,11 @@ def test_check_shows_all_faults_of_all_files(run: Run, tmp_path: Path) -> None:
     assert axes[0][2] == pytest.approx(-axes[2][0], abs=1e-12)  # the tilt about axis 2
 
 
-def test_check_goes_on_after_what_turns_out_late(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    spin_axis, problem = capability.spin_axis, "the motion changes too fast to be integrated"
+def test_check_goes_on_after_what_turns_out_late(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    spin_axis = capability.spin_axis
+    problem = "the motion changes too fast to be integrated"
 
     def late(spacecraft: Spacecraft) -> capability.SpinAxis:
         if spacecraft.name == "Late":
@@ -137,20 +153,28 @@ def test_warnings_are_shown_by_every_command_and_in_json(run: Run, tmp_path: Pat
     for command in ("check -q", "plan --scheme one-pulse -q", "simulate --scheme none -q"):
         assert call(run, f"{command} fast.yaml").stderr.startswith(ended.stderr)
     allowed = [
-        call(run, f"trade --points 1 --set limits.horizon=10ms --allow {angle}") for angle in ("0.1", "0.1deg", "0")
+        call(run, f"trade --points 1 --set limits.horizon=10ms --allow {angle}")
+        for angle in ("0.1", "0.1deg", "0")
     ]
     check_text("cli.check.allow", "\n".join(trade.stderr for trade in allowed))
 
 
 def test_a_misspelt_inertia_stops_every_command(run: Run, tmp_path: Path) -> None:
     written(tmp_path, typo_yaml=TYPO)
-    commands = [f"{command} typo.yaml" for command in ("plan", "simulate --scheme none", "check", "verify", "report")]
+    commands = [
+        f"{command} typo.yaml"
+        for command in ("plan", "simulate --scheme none", "check", "verify", "report")
+    ]
     check_text("cli.check.misspelt", refusals(run, tmp_path, commands))
 
 
 def test_what_is_set_is_planned_and_checked_in_all_files(run: Run, tmp_path: Path) -> None:
     planned = result(
-        run, "plan -q --nominal --scheme four-pulse --set 'state.nutation=8 deg' --set limits.horizon=300s"
+        run,
+        (
+            "plan -q --nominal --scheme four-pulse --set 'state.nutation=8 deg' --set "
+            "limits.horizon=300s"
+        ),
     )
     assert planned["spacecraft"]["nutation_deg"] == pytest.approx(8.0)
     for name in ("a.yaml", "b.yaml"):
@@ -178,10 +202,18 @@ dispersions:
 """
 
 
-def test_check_says_what_could_be_drawn_and_what_touches_nothing_that_can_fire(run: Run, tmp_path: Path) -> None:
+def test_check_says_what_could_be_drawn_and_what_touches_nothing_that_can_fire(
+    run: Run, tmp_path: Path
+) -> None:
     written(tmp_path, sat_yaml=DISPERSED, exact_yaml=DISPERSED.partition("dispersions:")[0])
     check_text("cli.check.dispersions", run("check", "sat.yaml", "-v").stdout)
-    inputs = ["thrust left 1", "thrust T2", "direction left 1 a", "direction left 1 b", "timing of each pulse"]
+    inputs = [
+        "thrust left 1",
+        "thrust T2",
+        "direction left 1 a",
+        "direction left 1 b",
+        "timing of each pulse",
+    ]
     dispersions = result(run, "check sat.yaml")["files"][0]["dispersions"]
     assert [entry["name"] for entry in dispersions["inputs"]] == inputs
     assert set(dispersions["unused"]) == {"A", "thrust T3", "direction T2", "direction T3"}
@@ -190,7 +222,9 @@ def test_check_says_what_could_be_drawn_and_what_touches_nothing_that_can_fire(r
 
 
 def test_of_very_many_faults_the_first_hundred_are_shown(run: Run, tmp_path: Path) -> None:
-    thrusters = "".join(f"  - {{name: T{number}, paint: red, torque: [8, 0, 0]}}\n" for number in range(300))
+    thrusters = "".join(
+        f"  - {{name: T{number}, paint: red, torque: [8, 0, 0]}}\n" for number in range(300)
+    )
     written(tmp_path, f_yaml=f"{EXACT}thrusters:\n{thrusters}")
     shown = run("check", "f.yaml").stderr.splitlines()
     assert (len(shown), shown[-1]) == (101, "and 200 more faults")
@@ -200,19 +234,31 @@ def test_of_very_many_faults_the_first_hundred_are_shown(run: Run, tmp_path: Pat
 def test_a_broken_file_stops_the_plan(run: Run, tmp_path: Path, name: str) -> None:
     text, expected = BROKEN[name]
     written(tmp_path, broken_yaml=text)
-    said = refusals(run, tmp_path, ["plan broken.yaml --csv pulses.csv --json plan.json"]).splitlines()[1:]
+    said = refusals(
+        run, tmp_path, ["plan broken.yaml --csv pulses.csv --json plan.json"]
+    ).splitlines()[1:]
     assert len(said) == len(expected)
     for line, fault in zip(said, expected, strict=True):
         assert line.startswith(f"broken.yaml:{':'.join(fault.split(':')[:2])}: ")
 
 
 def test_what_is_no_text_is_refused(run: Run, tmp_path: Path) -> None:
-    for content in (bytes(range(256)), "name: Düse\n".encode("latin-1"), "name: X\n".encode("utf-16"), b"name: X\0\n"):
+    for content in (
+        bytes(range(256)),
+        "name: Düse\n".encode("latin-1"),
+        "name: X\n".encode("utf-16"),
+        b"name: X\0\n",
+    ):
         (tmp_path / "broken.yaml").write_bytes(content)
-        assert refusals(run, tmp_path, ["plan broken.yaml"]).splitlines()[1].startswith("broken.yaml:1:")
+        assert (
+            refusals(run, tmp_path, ["plan broken.yaml"])
+            .splitlines()[1]
+            .startswith("broken.yaml:1:")
+        )
 
 
-# --- help and completion ----------------------------------------------------------------------------------------------
+# --- help and completion
+# ----------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("command", ["", *COMMANDS])
@@ -233,28 +279,51 @@ def test_trade_shows_no_option_that_it_does_not_read(run: Run) -> None:
 
 
 COMPLETED = {
-    **{f"{words} {name}": f"file {name}" for words, name in (
-        ("plan", "sp"), ("check a.yaml", "sp"), ("init", "sp"), ("import apm", "sp"), ("simulate --schedule", "pul"),
-        ("plan --csv", "out"), ("plan --json", "out"), ("plan --plot", "out"), ("report -o", "out"),
-        ("schema --output", "out"))},
-    "trade --schedules out": "file out", "ver": "plain verify", "plan --targ": "plain --target",
+    **{
+        f"{words} {name}": f"file {name}"
+        for words, name in (
+            ("plan", "sp"),
+            ("check a.yaml", "sp"),
+            ("init", "sp"),
+            ("import apm", "sp"),
+            ("simulate --schedule", "pul"),
+            ("plan --csv", "out"),
+            ("plan --json", "out"),
+            ("plan --plot", "out"),
+            ("report -o", "out"),
+            ("schema --output", "out"),
+        )
+    },
+    "trade --schedules out": "file out",
+    "ver": "plain verify",
+    "plan --targ": "plain --target",
     "plan --scheme two": "plain two-pulse",
-}  # fmt: skip
+}
 
 
 def test_shells_complete_commands_options_choices_and_leave_files_to_the_shell() -> None:
     shell = ShellComplete(group, {}, "nutdamp", "_NUTDAMP_COMPLETE")
     for words, expected in COMPLETED.items():
         *before, last = words.split()
-        assert [f"{item.type} {item.value}" for item in shell.get_completions(before, last)] == [expected], words
+        assert [f"{item.type} {item.value}" for item in shell.get_completions(before, last)] == [
+            expected
+        ], words
 
 
 @pytest.mark.deep
 def test_completion_is_that_of_a_process_called_nutdamp() -> None:
     code = "import sys; sys.argv = ['nutdamp']; from nutdamp.cli.main import main; main()"
-    asked = {"_NUTDAMP_COMPLETE": "bash_complete", "COMP_WORDS": "nutdamp plan sp", "COMP_CWORD": "2"}
+    asked = {
+        "_NUTDAMP_COMPLETE": "bash_complete",
+        "COMP_WORDS": "nutdamp plan sp",
+        "COMP_CWORD": "2",
+    }
     process = subprocess.run(
-        [sys.executable, "-c", code], env={**os.environ, **asked}, capture_output=True, text=True, check=False
+        [sys.executable, "-c", code],
+        env={**os.environ, **asked},
+        capture_output=True,
+        text=True,
+        check=False,
     )
     assert (process.stdout, process.stderr) == ("file,sp\n", "")
 
@@ -266,10 +335,13 @@ def test_every_file_of_every_command_is_completed() -> None:
         command = group.get_command(context, name)
         assert command is not None
         for parameter in command.params:
-            assert parameter.name not in files or isinstance(parameter.type, FileName), f"{name}: {parameter.name}"
+            assert parameter.name not in files or isinstance(parameter.type, FileName), (
+                f"{name}: {parameter.name}"
+            )
 
 
-# --- what a command loads ---------------------------------------------------------------------------------------------
+# --- what a command loads
+# ---------------------------------------------------------------------------------------------
 
 LOADED = """
 import contextlib, sys
@@ -282,17 +354,34 @@ for words, heavy in {commands!r}:
 HEAVY = ("scipy", "matplotlib", "pydantic", "jinja2")
 LEAN = [
     [("--help", ("numpy", "yaml", "rich", *HEAVY))],
-    [("plan -q", ("numpy.ma", *HEAVY)), ("plan -q --scheme optimal --free-axis", ("numpy.ma", *HEAVY)),
-     ("disperse -q --samples 100", HEAVY), ("simulate -q --scheme optimal", HEAVY)],
-    [(words, HEAVY) for words in ("plan -q --scheme optimal --least time", "plan -q --target 10deg,20deg",
-                                  "plan -q --robust --scheme one-pulse", "trade -q --points 2",
-                                  "disperse -q --samples 100 --scheme optimal")],
-]  # fmt: skip
+    [
+        ("plan -q", ("numpy.ma", *HEAVY)),
+        ("plan -q --scheme optimal --free-axis", ("numpy.ma", *HEAVY)),
+        ("disperse -q --samples 100", HEAVY),
+        ("simulate -q --scheme optimal", HEAVY),
+    ],
+    [
+        (words, HEAVY)
+        for words in (
+            "plan -q --scheme optimal --least time",
+            "plan -q --target 10deg,20deg",
+            "plan -q --robust --scheme one-pulse",
+            "trade -q --points 2",
+            "disperse -q --samples 100 --scheme optimal",
+        )
+    ],
+]
 
 
-@pytest.mark.parametrize("commands", [LEAN[0], pytest.param(LEAN[1], marks=pytest.mark.deep), weekly(LEAN[2])])
-def test_a_command_loads_what_it_needs(tmp_path: Path, commands: list[tuple[str, tuple[str, ...]]]) -> None:
-    """A symmetric body needs no scipy; numpy.ma, as `numpy.unique` loads it, is a tenth of the start-up."""
+@pytest.mark.parametrize(
+    "commands", [LEAN[0], pytest.param(LEAN[1], marks=pytest.mark.deep), weekly(LEAN[2])]
+)
+def test_a_command_loads_what_it_needs(
+    tmp_path: Path, commands: list[tuple[str, tuple[str, ...]]]
+) -> None:
+    """A symmetric body needs no scipy; numpy.ma, as `numpy.unique` loads it, is a tenth of the
+    start-up.
+    """
     shown = python(tmp_path, LOADED.format(commands=commands)).stdout
     loaded = [line for line in shown.splitlines() if line.startswith("LOADED by")]
     assert loaded == [f"LOADED by {words}" for words, _ in commands]
@@ -302,7 +391,8 @@ def test_a_command_loads_what_it_needs(tmp_path: Path, commands: list[tuple[str,
 def test_products_of_small_matrices_have_one_thread(tmp_path: Path) -> None:
     """Unless the environment says otherwise."""
     code = (
-        "import os, sys\n{}\nfrom nutdamp.cli.main import main\nsys.argv = ['nutdamp', '--version']\n"
+        "import os, sys\n{}\nfrom nutdamp.cli.main import main\nsys.argv = ['nutdamp', "
+        "'--version']\n"
         "try: main()\nfinally: print(os.environ['OPENBLAS_NUM_THREADS'])"
     )
     for given, used in (
@@ -329,7 +419,12 @@ def test_the_screen_of_a_scheme(run: Run) -> None:
 
 
 def test_the_track_has_the_columns_of_the_contract(run: Run, tmp_path: Path) -> None:
-    assert run("simulate", "--scheme", "four-pulse", "--csv", "track.csv", "--samples", "50").returncode == 4
+    assert (
+        run(
+            "simulate", "--scheme", "four-pulse", "--csv", "track.csv", "--samples", "50"
+        ).returncode
+        == 4
+    )
     track = rows((tmp_path / "track.csv").read_text())
     assert tuple(track[0]) == HEADER
     times = [float(row["t_s"]) for row in track]
@@ -368,7 +463,9 @@ def test_a_written_schedule_is_judged_as_the_plan_wherever_the_simulation_ends(
     for until in ("", "--until 300s"):
         flight = result(run, f"simulate {file} --schedule own.csv {until}", status=status)
         assert flight["judged_s"] == pytest.approx(planned["plans"][0]["end_s"], abs=1e-9)
-        ways = zip(planned["decision"]["requirement"], flight["decision"]["requirement"], strict=True)
+        ways = zip(
+            planned["decision"]["requirement"], flight["decision"]["requirement"], strict=True
+        )
         for before, after in ways:
             assert after["nominal_deg"] == pytest.approx(before["nominal_deg"], abs=1e-9)
             assert after["part"] == before["part"]
@@ -377,12 +474,18 @@ def test_a_written_schedule_is_judged_as_the_plan_wherever_the_simulation_ends(
 
 
 def test_schedules_by_hand_may_be_short_and_settings_are_doubted(run: Run, tmp_path: Path) -> None:
-    written(tmp_path, own_csv=SCHEDULE.replace(",channel", "").replace("1,0,steerable,4", "1,0,-5") + "2,0.5,0,4,0\n")
+    written(
+        tmp_path,
+        own_csv=SCHEDULE.replace(",channel", "").replace("1,0,steerable,4", "1,0,-5")
+        + "2,0.5,0,4,0\n",
+    )
     first, second = result(run, "simulate --schedule own.csv", status=4)["pulses"]
     assert first["torque_Nm"] is None
     assert second["torque_Nm"] == pytest.approx([0, 8, 0])
     run("plan", "--scheme", "one-pulse", "--csv", "pulses.csv")
-    edited = run("simulate", "--schedule", "pulses.csv", "--set", "state.nutation=0.2", "--quiet", status=4)
+    edited = run(
+        "simulate", "--schedule", "pulses.csv", "--set", "state.nutation=0.2", "--quiet", status=4
+    )
     check_text("cli.simulate.doubts", edited.stderr)  # which --quiet leaves
 
 
@@ -395,19 +498,27 @@ def test_without_a_scheme_the_recommended_plan_is_propagated_and_named(run: Run)
 def test_free_motion_keeps_its_nutation_and_the_end_can_be_chosen(run: Run) -> None:
     free = result(run, "simulate --scheme none", status=4)
     assert free["pulses"] == []
-    assert free["flown"]["nutation_deg"] == pytest.approx(free["spacecraft"]["nutation_deg"], rel=1e-12)
+    assert free["flown"]["nutation_deg"] == pytest.approx(
+        free["spacecraft"]["nutation_deg"], rel=1e-12
+    )
     early = result(run, "simulate --scheme two-pulse --until '3 s'")
     assert early["until_s"] == 3.0
     assert early["flown"]["nutation_deg"] > 1.0  # the second pulse is still to come
 
 
 def test_the_exit_status_is_that_of_plan(run: Run, tmp_path: Path) -> None:
-    """3 where the scheme is infeasible, 4 where it is not shown that its plan meets the requirement; so for none."""
+    """3 where the scheme is infeasible, 4 where it is not shown that its plan meets the
+    requirement; so for none.
+    """
     written(tmp_path, ideal_yaml=EXACT)
     infeasible = run("simulate", "ideal.yaml", "--scheme", "four-pulse")
     assert (infeasible.returncode, "infeasible" in infeasible.stderr) == (3, True)
     tight = ("--set", "requirement.momentum_shift=1e-4 deg")
-    for scheme, settings, status in (("one-pulse", (), 4), ("two-pulse", (), 0), ("two-pulse", tight, 4)):
+    for scheme, settings, status in (
+        ("one-pulse", (), 4),
+        ("two-pulse", (), 0),
+        ("two-pulse", tight, 4),
+    ):
         assert run("plan", "--scheme", scheme, *settings).returncode == status
         ended = run("simulate", "--scheme", scheme, *settings)
         assert (ended.returncode, "\nNOT ENOUGH: " in ended.stdout) == (status, status == 4)

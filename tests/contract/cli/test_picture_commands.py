@@ -11,7 +11,17 @@ from pathlib import Path
 import pytest
 from support import places
 from support.cases import deep, spread, weekly
-from support.commands import BUILT_IN, EXACT, call, contents, names, python, refusals, words, written
+from support.commands import (
+    BUILT_IN,
+    EXACT,
+    call,
+    contents,
+    names,
+    python,
+    refusals,
+    words,
+    written,
+)
 from support.golden import check_text
 from support.markup import parsed
 from support.process import Run
@@ -29,11 +39,18 @@ FILM = ("--seconds", "0.5", "--fps", "10", "--width", "320")
 
 
 @pytest.mark.deep
-@spread(("ending", "magic"), [("png", b"\x89PNG"), ("svg", b"<?xml"), ("pdf", b"%PDF")], quick=1, deep=0)
+@spread(
+    ("ending", "magic"), [("png", b"\x89PNG"), ("svg", b"<?xml"), ("pdf", b"%PDF")], quick=1, deep=0
+)
 def test_the_ending_says_the_format(run: Run, tmp_path: Path, ending: str, magic: bytes) -> None:
     pytest.importorskip("matplotlib")
-    assert call(run, f"simulate --scheme two-pulse --figure motion --plot a.{ending}").returncode == 0
-    assert call(run, f"plan --nominal --scheme two-pulse --figure motion --plot b.{ending}").returncode == 0
+    assert (
+        call(run, f"simulate --scheme two-pulse --figure motion --plot a.{ending}").returncode == 0
+    )
+    assert (
+        call(run, f"plan --nominal --scheme two-pulse --figure motion --plot b.{ending}").returncode
+        == 0
+    )
     disperse = "disperse --scheme four-pulse --samples 200 --figure cases"
     assert call(run, f"{disperse} --plot c.{ending}").returncode == 4
     assert names(tmp_path) == [f"{name}.{ending}" for name in "abc"]
@@ -41,8 +58,11 @@ def test_the_ending_says_the_format(run: Run, tmp_path: Path, ending: str, magic
 
 
 @pytest.mark.deep
-def test_plan_draws_the_recommended_plan_alone_and_simulate_another_figure(run: Run, tmp_path: Path) -> None:
-    """two-pulse for the built-in example: the same picture as that scheme alone, and not that of another.
+def test_plan_draws_the_recommended_plan_alone_and_simulate_another_figure(
+    run: Run, tmp_path: Path
+) -> None:
+    """two-pulse for the built-in example: the same picture as that scheme alone, and not that of
+    another.
 
     By nominal values it is optimal.
     """
@@ -55,7 +75,12 @@ def test_plan_draws_the_recommended_plan_alone_and_simulate_another_figure(run: 
     }.items():
         run("plan", *options.split(), *draw, f"{name}.png")
     for figure in ("motion", "overview"):
-        assert run("simulate", "--scheme", "none", "--plot", f"{figure}.png", "--figure", figure).returncode == 4
+        assert (
+            run(
+                "simulate", "--scheme", "none", "--plot", f"{figure}.png", "--figure", figure
+            ).returncode
+            == 4
+        )
     drawn = contents(tmp_path)
     assert drawn["recommended.png"] == drawn["two.png"]
     assert drawn["cheapest.png"] == drawn["optimal.png"]
@@ -70,21 +95,50 @@ def test_disperse_draws_what_is_named(run: Run, tmp_path: Path) -> None:
     }
     for figure in (*texts, "all"):
         named = () if figure == "all" else ("--figure", figure)
-        run("disperse", "--scheme", "two-pulse", "--samples", "200", "-q", "--plot", f"{figure}.svg", *named)
+        run(
+            "disperse",
+            "--scheme",
+            "two-pulse",
+            "--samples",
+            "200",
+            "-q",
+            "--plot",
+            f"{figure}.svg",
+            *named,
+        )
         drawn = (tmp_path / f"{figure}.svg").read_text(encoding="utf-8")
-        assert all(text in drawn for text in (texts.values() if figure == "all" else [texts[figure]]))
+        assert all(
+            text in drawn for text in (texts.values() if figure == "all" else [texts[figure]])
+        )
 
 
 @pytest.mark.deep
 def test_standard_output_takes_the_picture_alone() -> None:
-    command = [sys.executable, "-m", "nutdamp", "plan", "-q", "--nominal", "--plot", "-", "--figure", "motion"]
-    ended = subprocess.run(command, env={**os.environ, "COLUMNS": "80"}, capture_output=True, check=True)
+    command = [
+        sys.executable,
+        "-m",
+        "nutdamp",
+        "plan",
+        "-q",
+        "--nominal",
+        "--plot",
+        "-",
+        "--figure",
+        "motion",
+    ]
+    ended = subprocess.run(
+        command, env={**os.environ, "COLUMNS": "80"}, capture_output=True, check=True
+    )
     assert ended.stdout.startswith(b"\x89PNG")
     assert ended.stdout.endswith(b"IEND\xaeB`\x82")
 
 
-def test_a_film_is_written_whole_and_ends_soon_after_the_last_pulse(run: Run, tmp_path: Path) -> None:
-    """7.434 s, a quarter of that, in half a second of film: 5 frames for 3.5 turns of the nutation."""
+def test_a_film_is_written_whole_and_ends_soon_after_the_last_pulse(
+    run: Run, tmp_path: Path
+) -> None:
+    """7.434 s, a quarter of that, in half a second of film:
+    5 frames for 3.5 turns of the nutation.
+    """
     ended = run("animate", "--scheme", "two-pulse", "-o", "film.gif", *FILM)
     assert (ended.returncode, ended.stdout) == (0, "")
     said = re.sub(".* done after .*\n", "", ended.stderr)  # how far it is, where it takes long
@@ -113,20 +167,34 @@ def test_figure_film_and_page_name_the_plan_that_they_show(
 
     monkeypatch.setattr(image, "film", captioned)
     craft = str(places.CONFIGS / "lunar-prospector.yaml")
-    for command in ("plan --plot a.svg", "animate -o a.gif --seconds 0.5", "report -o a.html", "plan --csv p.csv"):
+    for command in (
+        "plan --plot a.svg",
+        "animate -o a.gif --seconds 0.5",
+        "report -o a.html",
+        "plan --csv p.csv",
+    ):
         name, *options = command.split()
         assert run(name, craft, "-q", *options).returncode == 0
     assert [caption.split("\n")[0] for caption in captions] == ["Lunar Prospector: command-block"]
-    assert "Lunar Prospector: command-block by real pulse widths" in (tmp_path / "a.svg").read_text()
+    assert (
+        "Lunar Prospector: command-block by real pulse widths" in (tmp_path / "a.svg").read_text()
+    )
     page = parsed((tmp_path / "a.html").read_text(encoding="utf-8"))
     titles = [node.text for node in page.all("p") if node.attributes.get("class") == "heading"]
     assert len(titles) == 2
     assert all(title.startswith("Lunar Prospector: command-block by") for title in titles)
     shown = [node.text for node in page.all("p") if node.attributes.get("class") == "how"]
     assert "--scheme command-block" in shown[-1].replace("\n", " ")
-    assert run("animate", craft, "-q", "--schedule", "p.csv", "-o", "b.gif", "--seconds", "0.5").returncode == 0
+    assert (
+        run(
+            "animate", craft, "-q", "--schedule", "p.csv", "-o", "b.gif", "--seconds", "0.5"
+        ).returncode
+        == 0
+    )
     assert captions[1].startswith("Lunar Prospector: p.csv\n")
-    assert run("report", craft, "-q", "--schedule", "p.csv", "-o", "b.html").returncode == 4  # single pulses
+    assert (
+        run("report", craft, "-q", "--schedule", "p.csv", "-o", "b.html").returncode == 4
+    )  # single pulses
     assert "--scheme p.csv" not in parsed((tmp_path / "b.html").read_text(encoding="utf-8")).text
 
 
@@ -179,11 +247,14 @@ def test_what_is_not_installed_is_exit_1_with_the_cure_before_the_work(
     assert (ended.stdout, names(tmp_path)) == ("", [])
 
 
-# --- report -----------------------------------------------------------------------------------------------------------
+# --- report
+# --------------------------------------------------------------------------------------------------
 
 
 def page_of(folder: Path) -> str:
-    return parsed((folder / "report.html").read_text(encoding="utf-8")).text.replace("\N{NO-BREAK SPACE}", " ")
+    return parsed((folder / "report.html").read_text(encoding="utf-8")).text.replace(
+        "\N{NO-BREAK SPACE}", " "
+    )
 
 
 def verdict_of(folder: Path, kind: str) -> str:
@@ -223,7 +294,11 @@ def test_what_is_repeated_gives_the_same_page(run: Run, tmp_path: Path) -> None:
 @pytest.mark.usefixtures("plain_pages")
 @pytest.mark.parametrize(
     "options",
-    ["--set omega0=[0.2,0,3] --target 10deg,45deg", deep("--target 0.3,-0.2 --spin 28.65rpm"), "--spin keep"],
+    [
+        "--set omega0=[0.2,0,3] --target 10deg,45deg",
+        deep("--target 0.3,-0.2 --spin 28.65rpm"),
+        "--spin keep",
+    ],
 )
 def test_commands_of_a_page_fly_the_spacecraft_of_its_own(
     run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, options: str
@@ -236,12 +311,20 @@ def test_commands_of_a_page_fly_the_spacecraft_of_its_own(
 
     monkeypatch.setattr(report, "moving_of", view)
     (tmp_path / "my craft.yaml").write_text(EXACT, encoding="utf-8")
-    assert run("report", "my craft.yaml", "--scheme", "two-pulse", *options.split()).returncode in (0, 4)
+    assert run("report", "my craft.yaml", "--scheme", "two-pulse", *options.split()).returncode in (
+        0,
+        4,
+    )
     assert run("report", "-", "--scheme", "two-pulse", stdin=EXACT).returncode == 0
     named, read = crafts
     assert read == "SPACECRAFT"
     usual = ["my craft.yaml", *options.split()]
-    assert run("plan", *usual, "--nominal", "--scheme", "two-pulse", "--csv", "edited.csv", "-q").returncode == 0
+    assert (
+        run(
+            "plan", *usual, "--nominal", "--scheme", "two-pulse", "--csv", "edited.csv", "-q"
+        ).returncode
+        == 0
+    )
     for pulses in (["--scheme", "two-pulse"], ["--schedule", "edited.csv"]):
         flown, repeated = (
             json.loads(run("simulate", *words, *pulses, "--flown", "--json", "-").stdout)
@@ -266,7 +349,12 @@ def test_standard_output_holds_the_page_alone(run: Run, tmp_path: Path) -> None:
     ("more", "options", "status", "said"),
     [
         deep("", "--scheme four-pulse", 3, "NO PLAN: no scheme is feasible"),
-        ("requirement: {momentum_shift: 0.01 deg}\n", "--scheme one-pulse", 4, "NOT met with nominal values"),
+        (
+            "requirement: {momentum_shift: 0.01 deg}\n",
+            "--scheme one-pulse",
+            4,
+            "NOT met with nominal values",
+        ),
     ],
     ids=["infeasible", "missed"],
 )
@@ -302,9 +390,16 @@ def test_a_page_of_a_schedule_judges_that_flight_alone(run: Run, tmp_path: Path)
 
 @pytest.mark.deep
 @pytest.mark.usefixtures("plain_pages")
-def test_a_page_of_command_blocks_knows_that_they_can_be_commanded(run: Run, tmp_path: Path) -> None:
+def test_a_page_of_command_blocks_knows_that_they_can_be_commanded(
+    run: Run, tmp_path: Path
+) -> None:
     craft = str(places.case("cb1015.yaml"))
-    assert run("plan", craft, "--scheme", "command-block", "--blocks", "b.csv", "--csv", "p.csv").returncode == 0
+    assert (
+        run(
+            "plan", craft, "--scheme", "command-block", "--blocks", "b.csv", "--csv", "p.csv"
+        ).returncode
+        == 0
+    )
     assert run("report", craft, "--blocks", "b.csv").returncode == 0
     assert "FLY" in verdict_of(tmp_path, "caution")
     assert run("report", craft, "--schedule", "p.csv").returncode == 4
@@ -313,18 +408,23 @@ def test_a_page_of_command_blocks_knows_that_they_can_be_commanded(run: Run, tmp
 
 @pytest.mark.weekly
 @pytest.mark.usefixtures("plain_pages")
-def test_a_page_with_the_robust_plan_recommends_what_plan_robust_does(run: Run, tmp_path: Path) -> None:
+def test_a_page_with_the_robust_plan_recommends_what_plan_robust_does(
+    run: Run, tmp_path: Path
+) -> None:
     craft = str(places.case("rob2.yaml"))
     data = json.loads(run("plan", craft, "--robust", "--json", "-").stdout)
     assert run("report", craft, "--robust").returncode == 0
-    assert f"{100.0 * data['robust']['recommended']['met_fraction']:.2f} % of cases comply" in verdict_of(
-        tmp_path, "met"
+    assert (
+        f"{100.0 * data['robust']['recommended']['met_fraction']:.2f} % of cases comply"
+        in verdict_of(tmp_path, "met")
     )
 
 
 def test_an_old_page_stays_where_the_new_one_cannot_be_made(run: Run, tmp_path: Path) -> None:
     written(tmp_path, report_html="old", nameless_yaml="name: X\n", craft_yaml=EXACT)
-    assert "has no dispersions" in refusals(run, tmp_path, ["report nameless.yaml", "report craft.yaml --disperse 100"])
+    assert "has no dispersions" in refusals(
+        run, tmp_path, ["report nameless.yaml", "report craft.yaml --disperse 100"]
+    )
 
 
 @pytest.mark.usefixtures("plain_pages")
@@ -340,7 +440,9 @@ def test_an_old_page_stays_where_the_new_one_cannot_be_made(run: Run, tmp_path: 
         weekly("spacecraft.yaml --trade", "small-angle bound"),
     ],
 )
-def test_numbers_of_cases_and_of_points_may_be_left_out(run: Run, tmp_path: Path, options: str, text: str) -> None:
+def test_numbers_of_cases_and_of_points_may_be_left_out(
+    run: Run, tmp_path: Path, options: str, text: str
+) -> None:
     run("init")
     assert run("report", "--scheme", "two-pulse", *options.split()).returncode in (0, 4)
     assert text in page_of(tmp_path)
@@ -350,14 +452,24 @@ def test_numbers_of_cases_and_of_points_may_be_left_out(run: Run, tmp_path: Path
 @pytest.mark.deep
 @pytest.mark.usefixtures("plain_pages")
 def test_with_a_target_the_page_says_how_far_off_it_ends(run: Run, tmp_path: Path) -> None:
-    assert run("report", "--nominal", "--scheme", "half-cone", "--target", "10deg,45deg").returncode == 0
-    for text in ("H ends attilt 10.0000 deg, azimuth 45.0000 deg", "limit ≤ 0.2 deg", "deg off target", "turn by 10°"):
+    assert (
+        run("report", "--nominal", "--scheme", "half-cone", "--target", "10deg,45deg").returncode
+        == 0
+    )
+    for text in (
+        "H ends attilt 10.0000 deg, azimuth 45.0000 deg",
+        "limit ≤ 0.2 deg",
+        "deg off target",
+        "turn by 10°",
+    ):
         assert text in page_of(tmp_path)
 
 
 @pytest.mark.weekly
 def test_a_page_shows_what_was_set(run: Run) -> None:
-    page = run("report", "-o", "-", "-q", "--scheme", "two-pulse", "--set", "state.nutation=8 deg").stdout
+    page = run(
+        "report", "-o", "-", "-q", "--scheme", "two-pulse", "--set", "state.nutation=8 deg"
+    ).stdout
     said = words(parsed(page).text)
     assert "damp 8°" in said
     assert "Set in place of what the file says" in said
@@ -367,7 +479,15 @@ def test_a_page_shows_what_was_set(run: Run) -> None:
 
 @pytest.mark.weekly
 def test_a_long_name_leaves_no_warning_of_the_picture(run_apart: Run) -> None:
-    ended = run_apart("report", str(places.case("long-name.yaml")), "--scheme", "two-pulse", "-o", "r.html", status=0)
+    ended = run_apart(
+        "report",
+        str(places.case("long-name.yaml")),
+        "--scheme",
+        "two-pulse",
+        "-o",
+        "r.html",
+        status=0,
+    )
     assert "Warning" not in ended.stderr
 
 

@@ -1,4 +1,6 @@
-"""``nutdamp plan``: what it prints and writes, of nominal and of robust plans, and what it leaves with."""
+"""``nutdamp plan``: what it prints and writes, of nominal and of robust plans, and what it leaves
+with.
+"""
 
 import json
 import math
@@ -53,26 +55,41 @@ FILES = {
     "rest_yaml": BALL.replace("5 deg", "0 deg"),
 }
 SCREENS = {
-    "a weak thruster": ["plan -v weak.yaml --scheme one-pulse; 4", "plan -v weak.yaml --scheme two-pulse; 4"],
+    "a weak thruster": [
+        "plan -v weak.yaml --scheme one-pulse; 4",
+        "plan -v weak.yaml --scheme two-pulse; 4",
+    ],
     "a thruster that does not damp": ["plan -v axial.yaml; 3"],
     "no nutation": ["plan -v rest.yaml --scheme two-pulse --scheme optimal"],
     "a sphere": ["plan -v ball.yaml --scheme two-pulse"],
-    "requirements": [f"plan -v x.yaml --scheme two-pulse --set 'requirement={{{parts}}}' {more}" for parts, more in (
-        ("nutation: 0.5 deg, momentum_shift: 1e-12 deg", ""), ("momentum_shift: 0.2 deg", "--target 2deg,0deg"),
-        ("nutation: 10 deg", ""))],
-    "what a scheme cannot do": ["plan -v --spin 31rpm; 3", "simulate --scheme two-pulse --spin 31rpm; 3",
-                                "plan -v x.yaml --scheme half-cone --scheme two-pulse",
-                                "plan -v --scheme one-pulse --target 10deg,45deg; 4"],
-    "robust": ["plan -v exact.yaml --robust; 2",
-               "plan -v sat.yaml --robust --set limits.horizon=1ms --scheme one-pulse --scheme optimal; 3"],
-}  # fmt: skip
+    "requirements": [
+        f"plan -v x.yaml --scheme two-pulse --set 'requirement={{{parts}}}' {more}"
+        for parts, more in (
+            ("nutation: 0.5 deg, momentum_shift: 1e-12 deg", ""),
+            ("momentum_shift: 0.2 deg", "--target 2deg,0deg"),
+            ("nutation: 10 deg", ""),
+        )
+    ],
+    "what a scheme cannot do": [
+        "plan -v --spin 31rpm; 3",
+        "simulate --scheme two-pulse --spin 31rpm; 3",
+        "plan -v x.yaml --scheme half-cone --scheme two-pulse",
+        "plan -v --scheme one-pulse --target 10deg,45deg; 4",
+    ],
+    "robust": [
+        "plan -v exact.yaml --robust; 2",
+        "plan -v sat.yaml --robust --set limits.horizon=1ms --scheme one-pulse --scheme optimal; 3",
+    ],
+}
 
 
 @pytest.mark.parametrize("kind", SCREENS)
 def test_the_screen_of_awkward_spacecraft_and_requests(run: Run, tmp_path: Path, kind: str) -> None:
     written(tmp_path, **FILES)
     shown = transcript(
-        run, SCREENS[kind], r"equirement|infeasible|cannot|does not|needs|\n\S+pulse: |least impulse|there is no"
+        run,
+        SCREENS[kind],
+        r"equirement|infeasible|cannot|does not|needs|\n\S+pulse: |least impulse|there is no",
     )
     check_text(f"cli.plan.screen.{kind}", shown)
     assert kind != "requirements" or "momentum shift within 1e-12 deg" in shown  # not "< 1e-9 deg"
@@ -92,9 +109,11 @@ def test_the_built_in_example_is_planned_in_an_empty_folder(run: Run) -> None:
 
 CONTRACT = {
     "": "nutdamp spacecraft plans recommended",
-    "spacecraft": "name A_kgm2 C_kgm2 a shape omega0_rad_s nutation_deg body_cone_deg space_cone_deg "
+    "spacecraft": "name A_kgm2 C_kgm2 a shape omega0_rad_s nutation_deg body_cone_deg "
+    "space_cone_deg "
     "body_nutation_period_s inertial_nutation_period_s",
-    "plan": "scheme feasible why meets_requirement pulses total_impulse_Nms least_impulse_Nms propellant_kg end_s "
+    "plan": "scheme feasible why meets_requirement pulses total_impulse_Nms least_impulse_Nms "
+    "propellant_kg end_s "
     "delta_v_m_s spin_change_rad_s residual flown",
     "cases": "samples seed met_fraction low high probability",
     "residual": "nutation_deg body_cone_deg space_cone_deg momentum_shift_deg axis_error_deg",
@@ -109,29 +128,53 @@ def lacking(kind: str, found: dict[str, Any]) -> set[str]:
 def test_json_and_csv_follow_the_contract_and_agree(run: Run, tmp_path: Path) -> None:
     data = result(run, "plan --csv pulses.csv")
     assert lacking("", data) == lacking("spacecraft", data["spacecraft"]) == set()
-    assert [plan["scheme"] for plan in data["plans"]] == ["one-pulse", "two-pulse", "four-pulse", "optimal"]
+    assert [plan["scheme"] for plan in data["plans"]] == [
+        "one-pulse",
+        "two-pulse",
+        "four-pulse",
+        "optimal",
+    ]
     for plan in data["plans"]:
         assert lacking("plan", plan) == lacking("cases", plan["cases"]) == set()
         assert set(plan["residual"]) == set(plan["flown"]) == set(CONTRACT["residual"].split())
         for pulse in plan["pulses"]:
             assert set(pulse) == set(CONTRACT["pulse"].split())
-            assert pulse["start_s"] == pytest.approx(pulse["t_s"] - pulse["on_time_s"] / 2, abs=1e-12)
-            assert pulse["impulse_Nms"] == pytest.approx([m * pulse["on_time_s"] for m in pulse["torque_Nm"]])
+            assert pulse["start_s"] == pytest.approx(
+                pulse["t_s"] - pulse["on_time_s"] / 2, abs=1e-12
+            )
+            assert pulse["impulse_Nms"] == pytest.approx(
+                [m * pulse["on_time_s"] for m in pulse["torque_Nm"]]
+            )
     assert (data["no_pulse_needed"], data["recommended"]) == (False, "two-pulse")
     nutation, shift = data["plans"][0]["requirement"]
-    assert (nutation["part"], nutation["met"], nutation["limit_deg"]) == ("nutation", False, pytest.approx(0.5))
-    assert nutation["nominal_deg"] < 0.5 < nutation["dispersed_deg"]  # met with nominal values, in too few cases
-    assert (shift["part"], shift["met"], shift["limit_deg"]) == ("momentum_shift", False, pytest.approx(0.2))
+    assert (nutation["part"], nutation["met"], nutation["limit_deg"]) == (
+        "nutation",
+        False,
+        pytest.approx(0.5),
+    )
+    assert (
+        nutation["nominal_deg"] < 0.5 < nutation["dispersed_deg"]
+    )  # met with nominal values, in too few cases
+    assert (shift["part"], shift["met"], shift["limit_deg"]) == (
+        "momentum_shift",
+        False,
+        pytest.approx(0.2),
+    )
     assert shift["nominal_deg"] == pytest.approx(data["plans"][0]["flown"]["momentum_shift_deg"])
     text = (tmp_path / "pulses.csv").read_bytes().decode()
     assert text.endswith("\r\n")  # RFC 4180
     (first, second) = rows(run("plan", "--nominal", "--scheme", "two-pulse", "--csv", "-").stdout)
     assert (first["pulse"], second["pulse"]) == ("1", "2")
-    table, recommended = rows(text), next(plan for plan in data["plans"] if plan["scheme"] == data["recommended"])
+    table = rows(text)
+    recommended = next(plan for plan in data["plans"] if plan["scheme"] == data["recommended"])
     assert tuple(table[0]) == PULSES_HEADER
     assert [float(row["t_s"]) for row in table] == [pulse["t_s"] for pulse in recommended["pulses"]]
-    assert float(table[-1]["nutation_after_deg"]) == pytest.approx(recommended["flown"]["nutation_deg"], abs=1e-12)
-    assert float(table[0]["nutation_before_deg"]) == pytest.approx(data["spacecraft"]["nutation_deg"], rel=1e-9)
+    assert float(table[-1]["nutation_after_deg"]) == pytest.approx(
+        recommended["flown"]["nutation_deg"], abs=1e-12
+    )
+    assert float(table[0]["nutation_before_deg"]) == pytest.approx(
+        data["spacecraft"]["nutation_deg"], rel=1e-9
+    )
 
 
 def test_schemes_are_named_and_a_spin_is_a_part_of_the_requirement(run: Run) -> None:
@@ -141,7 +184,9 @@ def test_schemes_are_named_and_a_spin_is_a_part_of_the_requirement(run: Run) -> 
 
 
 def test_nothing_feasible_is_exit_3_and_leaves_an_old_schedule(run: Run, tmp_path: Path) -> None:
-    """What misses the requirement is written too, with status 4; without nutation the schedule is empty."""
+    """What misses the requirement is written too, with status 4; without nutation the schedule is
+    empty.
+    """
     written(tmp_path, weak_yaml=WEAK, pulses_csv="old")
     late = "plan -v weak.yaml --set limits.horizon=0.1s --json plan.json --csv pulses.csv; 3"
     check_text("cli.plan.late", transcript(run, [late]))
@@ -150,7 +195,13 @@ def test_nothing_feasible_is_exit_3_and_leaves_an_old_schedule(run: Run, tmp_pat
     for plan in data["plans"]:
         assert (plan["feasible"], plan["pulses"]) == (False, [])
         assert plan["why"]
-        assert plan["total_impulse_Nms"] is plan["propellant_kg"] is plan["end_s"] is plan["delta_v_m_s"] is None
+        assert (
+            plan["total_impulse_Nms"]
+            is plan["propellant_kg"]
+            is plan["end_s"]
+            is plan["delta_v_m_s"]
+            is None
+        )
         assert set(plan["flown"].values()) == set(plan["residual"].values()) == {None}
     assert (tmp_path / "pulses.csv").read_text() == "old"
     assert call(run, "plan weak.yaml --scheme two-pulse --csv pulses.csv").returncode == 4
@@ -160,23 +211,32 @@ def test_nothing_feasible_is_exit_3_and_leaves_an_old_schedule(run: Run, tmp_pat
 
 
 def test_literal_reproduces_the_printed_scheme(run: Run, tmp_path: Path) -> None:
-    written(tmp_path, ideal_yaml="name: X\ninertia: {A: 120, C: 80}\nstate: {spin: 3, nutation: 10 deg}\n")
+    written(
+        tmp_path,
+        ideal_yaml="name: X\ninertia: {A: 120, C: 80}\nstate: {spin: 3, nutation: 10 deg}\n",
+    )
     exact, literal = (
-        result(run, f"plan ideal.yaml --scheme two-pulse {flag}")["plans"][0] for flag in ("", "--literal")
+        result(run, f"plan ideal.yaml --scheme two-pulse {flag}")["plans"][0]
+        for flag in ("", "--literal")
     )
     assert exact["residual"]["momentum_shift_deg"] < 1e-9
-    assert literal["residual"]["momentum_shift_deg"] == pytest.approx(0.19, abs=0.005)  # PHYSICS: 0.19° at 10°
+    assert literal["residual"]["momentum_shift_deg"] == pytest.approx(
+        0.19, abs=0.005
+    )  # PHYSICS: 0.19° at 10°
     first, second = (math.hypot(*pulse["impulse_Nms"]) for pulse in literal["pulses"])
     assert first == pytest.approx(second, rel=1e-12)
 
 
-# --- targets, the Sun, the spin ---------------------------------------------------------------------------------------
+# --- targets, the Sun, the spin
+# ---------------------------------------------------------------------------------------
 
 
 @pytest.mark.deep
 def test_a_target_compares_the_schemes_that_can_point(run: Run) -> None:
     """Propellant, time and residual of each, in one table that fits the screen."""
-    alone = run("plan", "-v", "--quiet", "--nominal", "--target", "10deg,45deg", "--scheme", "rhumb-line").stdout
+    alone = run(
+        "plan", "-v", "--quiet", "--nominal", "--target", "10deg,45deg", "--scheme", "rhumb-line"
+    ).stdout
     assert "β = 10 deg from H" in alone
     compared = run("plan", "-v", "--quiet", "--nominal", "--target", "2deg,45deg").stdout
     assert all(name in compared for name in ("two-pulse", "half-cone", "rhumb-line", "optimal"))
@@ -186,10 +246,19 @@ def test_a_target_compares_the_schemes_that_can_point(run: Run) -> None:
 
 
 def test_cones_pulses_per_turn_and_the_sun_are_heeded(run: Run, tmp_path: Path) -> None:
-    written(tmp_path, body_yaml="name: b\ninertia: {A: 120, C: 80}\nstate: {spin: 3, nutation: 0}\n")
+    written(
+        tmp_path, body_yaml="name: b\ninertia: {A: 120, C: 80}\nstate: {spin: 3, nutation: 0}\n"
+    )
     aimed = "plan body.yaml --target 30deg,0deg --scheme"
-    cones, straight, turns, by_sun = (result(run, f"{aimed} {options}")["plans"][0] for options in (
-        "half-cone --cones=3", "rhumb-line", "rhumb-line --per-turn=2", "rhumb-line --sun 40deg,60deg"))  # fmt: skip
+    cones, straight, turns, by_sun = (
+        result(run, f"{aimed} {options}")["plans"][0]
+        for options in (
+            "half-cone --cones=3",
+            "rhumb-line",
+            "rhumb-line --per-turn=2",
+            "rhumb-line --sun 40deg,60deg",
+        )
+    )
     assert cones["flown"]["axis_error_deg"] < 1e-7
     assert len(cones["pulses"]) == 4
     assert turns["flown"]["axis_error_deg"] < 1e-7
@@ -201,7 +270,10 @@ def test_cones_pulses_per_turn_and_the_sun_are_heeded(run: Run, tmp_path: Path) 
 REPORTED = (
     "--target 1,45.5 --scheme two-pulse",
     "--spin 31 --scheme optimal",
-    *(f"--target {angles} --scheme two-pulse" for angles in ("0,0", "0.2,1.5", "10deg,'45 °'", "'2 rad',0")),
+    *(
+        f"--target {angles} --scheme two-pulse"
+        for angles in ("0,0", "0.2,1.5", "10deg,'45 °'", "'2 rad',0")
+    ),
     *(f"--spin {spin} --scheme optimal" for spin in ("3.25", "'31 rad/s'")),
     "--scheme one-pulse --least time",
     "--scheme two-pulse --on-time 200ms",
@@ -213,21 +285,38 @@ REPORTED = (
 )
 
 
-def test_numbers_hardly_meant_and_options_that_no_scheme_reads_are_reported(run: Run, tmp_path: Path) -> None:
+def test_numbers_hardly_meant_and_options_that_no_scheme_reads_are_reported(
+    run: Run, tmp_path: Path
+) -> None:
     """Others are not."""
     written(tmp_path, x_yaml=EXACT)
-    said = (f"$ plan {options}\n" + run("plan", "x.yaml", *shlex.split(options)).stderr for options in REPORTED)
+    said = (
+        f"$ plan {options}\n" + run("plan", "x.yaml", *shlex.split(options)).stderr
+        for options in REPORTED
+    )
     check_text("cli.plan.reported", "".join(said))
 
 
 @pytest.mark.deep
 def test_the_sun_is_reported_of_schemes_that_do_not_read_it(run: Run) -> None:
-    command = ("plan", "--nominal", "--target", "10deg,45deg", "--sun", "70deg,0deg", "--scheme", "rhumb-line")
+    command = (
+        "plan",
+        "--nominal",
+        "--target",
+        "10deg,45deg",
+        "--sun",
+        "70deg,0deg",
+        "--scheme",
+        "rhumb-line",
+    )
     assert "--sun" not in run(*command).stderr
-    check_text("cli.plan.sun", run(*command, "--scheme", "half-cone", "--scheme", "two-pulse").stderr)
+    check_text(
+        "cli.plan.sun", run(*command, "--scheme", "half-cone", "--scheme", "two-pulse").stderr
+    )
 
 
-# --- a scheme that has a bug ------------------------------------------------------------------------------------------
+# --- a scheme that has a bug
+# ------------------------------------------------------------------------------------------
 
 
 @pytest.fixture
@@ -241,7 +330,9 @@ def faulty(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("faulty")
-def test_after_an_internal_error_the_comparison_goes_on_and_is_exit_1(run: Run, tmp_path: Path) -> None:
+def test_after_an_internal_error_the_comparison_goes_on_and_is_exit_1(
+    run: Run, tmp_path: Path
+) -> None:
     ended = run("plan", "-v", "--nominal", "--json", "plan.json", "--csv", "pulses.csv", status=1)
     assert "\nFLY optimal: " in ended.stdout
     check_text("cli.plan.internal-error", ended.stderr)
@@ -264,16 +355,29 @@ def test_pages_and_robust_plans_go_on_too(run: Run, tmp_path: Path) -> None:
     written(tmp_path, sat_yaml=UNTRUSTED)
     assert run("report", "--disperse", "500").returncode == 1
     assert "ZeroDivisionError" in (tmp_path / "report.html").read_text(encoding="utf-8")
-    robust = run("plan", "-v", "sat.yaml", "--robust", "--scheme", "two-pulse", "--scheme", "four-pulse", status=1)
+    robust = run(
+        "plan",
+        "-v",
+        "sat.yaml",
+        "--robust",
+        "--scheme",
+        "two-pulse",
+        "--scheme",
+        "four-pulse",
+        status=1,
+    )
     assert "Robust plan: four-pulse" in robust.stdout
     assert "two-pulse: internal error, please report: ZeroDivisionError" in robust.stderr
 
 
-# --- robust plans -----------------------------------------------------------------------------------------------------
+# --- robust plans
+# --------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.deep
-def test_the_screen_the_json_and_the_csv_tell_of_the_same_robust_plan(run: Run, tmp_path: Path) -> None:
+def test_the_screen_the_json_and_the_csv_tell_of_the_same_robust_plan(
+    run: Run, tmp_path: Path
+) -> None:
     written(tmp_path, sat_yaml=UNTRUSTED)
     command = (
         "plan",
@@ -288,7 +392,8 @@ def test_the_screen_the_json_and_the_csv_tell_of_the_same_robust_plan(run: Run, 
         "pulses.csv",
     )
     ended = run(*command, status=0)
-    said, data = words(ended.stdout), json.loads((tmp_path / "plan.json").read_text("utf-8"))
+    said = words(ended.stdout)
+    data = json.loads((tmp_path / "plan.json").read_text("utf-8"))
     assert "four-pulse, recommended without --robust" in said
     assert "Robust plan: four-pulse, without b" in said
     assert data["recommended"] == data["decision"]["scheme"] == "robust"
@@ -305,12 +410,24 @@ def test_the_screen_the_json_and_the_csv_tell_of_the_same_robust_plan(run: Run, 
 
 
 @pytest.mark.deep
-@pytest.mark.parametrize(("degrees", "status"), [(3.0, "FLY four-pulse: "), (0.001, "NOT ENOUGH: robust: ")])
-def test_the_requirement_with_its_probability(run: Run, tmp_path: Path, degrees: float, status: str) -> None:
-    requirement = f"requirement: {{nutation: {degrees} deg, probability: 95 %}}\nlimits: {{tick: 1 ms}}\n"
+@pytest.mark.parametrize(
+    ("degrees", "status"), [(3.0, "FLY four-pulse: "), (0.001, "NOT ENOUGH: robust: ")]
+)
+def test_the_requirement_with_its_probability(
+    run: Run, tmp_path: Path, degrees: float, status: str
+) -> None:
+    requirement = (
+        f"requirement: {{nutation: {degrees} deg, probability: 95 %}}\nlimits: {{tick: 1 ms}}\n"
+    )
     written(tmp_path, sat_yaml=UNTRUSTED + requirement)
     ended = run(
-        "plan", "-v", "sat.yaml", "--scheme", "four-pulse", "--robust", status=0 if status.startswith("FLY") else 4
+        "plan",
+        "-v",
+        "sat.yaml",
+        "--scheme",
+        "four-pulse",
+        "--robust",
+        status=0 if status.startswith("FLY") else 4,
     )
     assert ended.stdout.startswith(f"Sat\n{status}")
     assert re.search(r"[\d.]+ % of cases comply \(95 % required\)", words(ended.stdout))
@@ -318,18 +435,24 @@ def test_the_requirement_with_its_probability(run: Run, tmp_path: Path, degrees:
 
 @pytest.mark.deep
 def test_the_plan_made_for_wide_tolerances_complies_where_no_scheme_does(run: Run) -> None:
-    """85.6 % of cases comply with two-pulse, the best of them; the cheapest plan that new cases confirm flies."""
+    """85.6 % of cases comply with two-pulse, the best of them; the cheapest plan that new cases
+    confirm flies.
+    """
     data = result(run, shlex.join(["plan", "--robust", *WIDE]))
     robust, fresh = data["robust"], data["robust"]["fresh"]
     assert data["decision"]["status"] == "fly"
     assert 0.997 <= fresh["low"] < fresh["met_fraction"] < fresh["high"]
     assert (robust["against"]["scheme"], robust["against"]["met_fraction"]) == ("two-pulse", 0.8562)
-    enough = [plan["propellant_kg"] for plan in robust["candidates"] if plan["met_fraction"] >= 0.997]
+    enough = [
+        plan["propellant_kg"] for plan in robust["candidates"] if plan["met_fraction"] >= 0.997
+    ]
     assert robust["recommended"]["propellant_kg"] == min(enough) < max(enough)
 
 
 @pytest.mark.weekly
-def test_each_candidate_says_where_it_ends_and_the_screen_the_chosen_one(run: Run, tmp_path: Path) -> None:
+def test_each_candidate_says_where_it_ends_and_the_screen_the_chosen_one(
+    run: Run, tmp_path: Path
+) -> None:
     written(tmp_path, sat_yaml=UNTRUSTED)
     options = ("--scheme", "optimal", "--target", "3deg,45deg", "--robust")
     ended = run("plan", "-v", "sat.yaml", *options, "--json", "plan.json")
@@ -339,7 +462,9 @@ def test_each_candidate_says_where_it_ends_and_the_screen_the_chosen_one(run: Ru
         assert plan["final"]["momentum"]["tilt_deg"] == pytest.approx(3.0, abs=0.1)
     assert data["recommended"]["final"] == data["recommended"]["plan"]["final"]
     for row in ("H ends at", "target"):
-        assert re.search(rf"^{row} +tilt 3\.0000 deg, azimuth 45\.0000 deg$", ended.stdout, re.MULTILINE)
+        assert re.search(
+            rf"^{row} +tilt 3\.0000 deg, azimuth 45\.0000 deg$", ended.stdout, re.MULTILINE
+        )
 
 
 # --- what is recommended: dispersed cases, command blocks, needless pulses, spin changes, free H
@@ -373,9 +498,9 @@ def test_dispersed_cases_decide_unless_nominal_values_shall(run: Run) -> None:
 
 def test_the_share_is_the_same_on_every_screen(run: Run) -> None:
     share = planned(run, *QUICK)["decision"]["cases"]["met_fraction"]
-    assert json.loads(run("disperse", "--scheme", "two-pulse", "-q", "--json", "-").stdout)["requirement"][
-        "met_fraction"
-    ] == pytest.approx(share)
+    assert json.loads(run("disperse", "--scheme", "two-pulse", "-q", "--json", "-").stdout)[
+        "requirement"
+    ]["met_fraction"] == pytest.approx(share)
 
 
 @pytest.mark.deep
@@ -420,7 +545,10 @@ def test_a_spacecraft_with_commands_fires_command_blocks(run: Run) -> None:
     found = planned(run, body, *schemes)
     assert found["recommended"] == "command-block"
     assert found["by scheme"]["two-pulse"]["can_be_commanded"] is False
-    assert found["by scheme"]["two-pulse"]["propellant_kg"] < found["by scheme"]["command-block"]["propellant_kg"]
+    assert (
+        found["by scheme"]["two-pulse"]["propellant_kg"]
+        < found["by scheme"]["command-block"]["propellant_kg"]
+    )
     assert {each["code"] for each in found["decision"]["cheaper"]} == {"why-single-pulses"}
     assert planned(run, body, *schemes, "--timed")["recommended"] == "two-pulse"
     named = planned(run, body, "--scheme", "two-pulse", status=4)
@@ -449,13 +577,17 @@ def test_no_plan_can_be_commanded() -> None:
     ],
 )
 def test_the_cheapest_blocks(run: Run, name: str, settings: tuple[str, ...], most_g: float) -> None:
-    plan = planned(run, str(case(f"{name}.yaml")), "--scheme", "command-block", *settings)["plans"][0]
+    plan = planned(run, str(case(f"{name}.yaml")), "--scheme", "command-block", *settings)["plans"][
+        0
+    ]
     assert plan["meets_requirement"] is True
     assert 1e3 * plan["propellant_kg"] <= most_g
 
 
 def test_the_axis_is_kept_where_something_asks_for_it(run: Run) -> None:
-    free = planned(run, "--scheme", "optimal", "--nominal", "--set", "requirement={nutation: 0.5 deg}")["plans"][0]
+    free = planned(
+        run, "--scheme", "optimal", "--nominal", "--set", "requirement={nutation: 0.5 deg}"
+    )["plans"][0]
     kept = planned(run, "--scheme", "optimal", "--nominal")["plans"][0]
     assert free["bounds"]["keeping"] == pytest.approx(kept["bounds"]["first_order"], rel=1e-6)
     assert kept["bounds"]["keeping"] is None
@@ -477,10 +609,14 @@ def test_what_the_requirement_allows_is_left_where_the_spin_changes(run: Run, le
 def test_command_blocks_set_the_spin(run: Run) -> None:
     found = planned(run, str(case("isee3-spinup.yaml")), "--spin", "19.733rpm")
     assert found["recommended"] == "command-block"
-    assert all(found["by scheme"][name]["meets_requirement"] for name in ("command-block", "optimal"))
+    assert all(
+        found["by scheme"][name]["meets_requirement"] for name in ("command-block", "optimal")
+    )
 
 
 @pytest.mark.parametrize(("name", "more"), [("tail_pulse", ("--at", "60s")), ("fit-dead-gyro", ())])
-def test_motion_is_no_outlier_and_a_stuck_gyro_no_motion(run: Run, name: str, more: tuple[str, ...]) -> None:
+def test_motion_is_no_outlier_and_a_stuck_gyro_no_motion(
+    run: Run, name: str, more: tuple[str, ...]
+) -> None:
     ended = run("fit", str(case(f"{name}.csv")), str(case(f"{name}.yaml")), *more, status=3)
     check_text(f"fit.{name}", ended.stderr)

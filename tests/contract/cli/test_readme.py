@@ -1,8 +1,9 @@
-"""The README and the guide are true: sessions give the output shown, files load, snippets run, links lead somewhere,
-commands are those of CI; and the smoke test of CI can fail: it sees tracebacks, wrong exit statuses, missing files and
-untried commands.
+"""The README and the guide are true: sessions give the output shown, files load, snippets run,
+links lead somewhere, commands are those of CI; and the smoke test of CI can fail: it sees
+tracebacks, wrong exit statuses, missing files and untried commands.
 
-With `NUTDAMP_WRITE_TEXTS=1` in the environment the test of the sessions writes the output of today into the pages.
+With `NUTDAMP_WRITE_TEXTS=1` in the environment the test of the sessions writes the output of today
+into the pages.
 """
 
 import ast
@@ -51,7 +52,9 @@ PAGES = (README, *sorted(guide.FOLDER.glob("*.md")))
 TEXTS = {page: page.read_text(encoding="utf-8") for page in PAGES}
 SESSION = re.compile(r"```console\n(\$ nutdamp .+?)\n```", re.DOTALL)
 SESSIONS = [page.stem for page in PAGES if SESSION.search(TEXTS[page]) and page.stem != "motion"]
-"""Pages with sessions; the commands of motion draw the figures of the source, and the tests of explain fly them."""
+"""Pages with sessions; the commands of motion draw the figures of the source, and the tests of
+explain fly them.
+"""
 REST = "…"
 """Last line of an output of which only the beginning is shown."""
 
@@ -82,7 +85,9 @@ def outcome(run: Run, part: str) -> str:
     command, _, shown = part.partition("\n")
     name, *arguments = shlex.split(command)
     assert name == "nutdamp"
-    lines = tidy(run(*arguments, status=(0, 4)).stdout)  # 4: the requirement is missed, which is part of a story
+    lines = tidy(
+        run(*arguments, status=(0, 4)).stdout
+    )  # 4: the requirement is missed, which is part of a story
     if (before := tidy(shown))[-1:] == [REST]:
         lines = [*lines[: len(before) - 1], REST]
     return "".join(f"{line}\n" for line in (f"$ {command}", *lines))
@@ -103,7 +108,11 @@ def test_what_the_readme_shows_of_files_is_what_is_there() -> None:
 
 def test_every_snippet_of_python_is_an_example_that_runs() -> None:
     """`tests/contract/library` runs those examples."""
-    snippets = [code for text in TEXTS.values() for code in re.findall(r"```python\n(.+?)```", text, re.DOTALL)]
+    snippets = [
+        code
+        for text in TEXTS.values()
+        for code in re.findall(r"```python\n(.+?)```", text, re.DOTALL)
+    ]
     examples = ("library_example.py", "library_sweep.py")
     for name, code in zip(examples, snippets, strict=True):
         assert (places.TESTS / "support" / name).read_text(encoding="utf-8").endswith(code)
@@ -111,7 +120,9 @@ def test_every_snippet_of_python_is_an_example_that_runs() -> None:
 
 def test_links_lead_to_pages_and_sections() -> None:
     for page, text in TEXTS.items():
-        for target in re.findall(r"\]\(([^)\s]+)\)", re.sub(r"```.*?```", "", text, flags=re.DOTALL)):
+        for target in re.findall(
+            r"\]\(([^)\s]+)\)", re.sub(r"```.*?```", "", text, flags=re.DOTALL)
+        ):
             path, _, section = target.partition("#")
             linked = page if not path else (page.parent / path).resolve()
             assert linked.exists(), (page.name, target)
@@ -161,7 +172,9 @@ def test_the_smoke_test_sees_what_is_wrong(tmp_path: Path, program: str, faults:
     path = tmp_path / "program"
     path.write_text(program)
     path.chmod(0o755)
-    ended = subprocess.run([sys.executable, smoke.__file__, str(path)], capture_output=True, text=True, check=False)
+    ended = subprocess.run(
+        [sys.executable, smoke.__file__, str(path)], capture_output=True, text=True, check=False
+    )
     assert ended.returncode == 1
     assert [fault for fault in faults if f"FAILED: {fault}" not in ended.stderr] == []
 
@@ -174,7 +187,8 @@ def test_ci_tries_every_command_and_the_lowest_versions_that_are_declared() -> N
         assert re.fullmatch(r"[a-z][a-z0-9-]*>=[0-9.]+", entry)
 
 
-# --- every command that a screen or a page prints runs: next steps, commands of notes, those of the report
+# --- every command that a screen or a page prints runs: next steps, commands of notes, those of the
+# report
 
 VALUE = rf"""(?:"[^"]*"|'[^']*'|FILE|FOLDER|{"|".join(NAMES)}|[^\s;,()]*[\d.=][^\s;,()]*)"""
 OPTIONS = rf"(?: --?[a-z][\w-]*(?: {VALUE})?)*"
@@ -193,8 +207,13 @@ def printed(command: str, shown: str) -> Iterator[str]:
 
 
 def check_commands(run: Run, commands: Iterator[str]) -> int:
-    """Fails where one of the commands is refused, or is not to be understood; the number of them."""
-    named = {re.sub("|".join(NAMES_OF_FILES), lambda name: NAMES_OF_FILES[name[0]], each) for each in commands}
+    """Fails where one of the commands is refused, or is not to be understood;
+    the number of them.
+    """
+    named = {
+        re.sub("|".join(NAMES_OF_FILES), lambda name: NAMES_OF_FILES[name[0]], each)
+        for each in commands
+    }
     for command in sorted(named):
         assert "Traceback" not in call(run, command, status=(0, 3, 4)).stderr, command
     return len(named)
@@ -219,7 +238,9 @@ def check_commands(run: Run, commands: Iterator[str]) -> int:
         deep("upper-stage", "budget", 4),
     ],
 )
-def test_every_command_on_a_screen_runs(run: Run, tmp_path: Path, craft: str, command: str, count: int) -> None:
+def test_every_command_on_a_screen_runs(
+    run: Run, tmp_path: Path, craft: str, command: str, count: int
+) -> None:
     """In a folder with that spacecraft file, since next steps name none."""
     (tmp_path / "spacecraft.yaml").write_text(example_text(craft))
     ended = call(run, command, columns=400)
@@ -250,7 +271,9 @@ TOPICS = (
 
 
 def explained(*arguments: str, columns: int = 80) -> str:
-    ended = CliRunner().invoke(group, ["explain", *arguments], env={"COLUMNS": str(columns), "NO_COLOR": "1"})
+    ended = CliRunner().invoke(
+        group, ["explain", *arguments], env={"COLUMNS": str(columns), "NO_COLOR": "1"}
+    )
     assert ended.exit_code == 0, ended.output
     return ended.stdout
 
@@ -264,11 +287,18 @@ def test_every_topic_and_every_equation_is_listed() -> None:
     lines = explained(columns=80).splitlines()
     assert len(lines) <= 40  # one screen
     assert max(map(len, lines)) <= 80
-    assert all(f"• {equation.number}: {equation.subject}" in equations for equation in guide.EQUATIONS)
+    assert all(
+        f"• {equation.number}: {equation.subject}" in equations for equation in guide.EQUATIONS
+    )
 
 
-@pytest.mark.parametrize("topic", [pytest.param(name, marks=[] if number % 6 == 0 else pytest.mark.deep)
-                                   for number, name in enumerate(TOPICS)])  # fmt: skip
+@pytest.mark.parametrize(
+    "topic",
+    [
+        pytest.param(name, marks=[] if number % 6 == 0 else pytest.mark.deep)
+        for number, name in enumerate(TOPICS)
+    ],
+)
 def test_each_topic_fits_the_screen_and_loses_nothing(topic: str) -> None:
     """Rules of tables apart, every letter of its text is there, if not in the same line."""
     whole = letters(explained(topic, columns=300))
@@ -291,7 +321,9 @@ def test_a_scheme_says_how_when_with_which_options_and_within_what_limits() -> N
     every = {name for other in SCHEMES.values() for name in names_of(other.options)} - set(SHARED)
     for scheme in NAMES:
         shown = explained(scheme)
-        options = "Options" if scheme == "none" else "Options of nutdamp plan"  # other commands take none of them
+        options = (
+            "Options" if scheme == "none" else "Options of nutdamp plan"
+        )  # other commands take none of them
         for title in ("How it works", "Equation", "When to use it", options, "Limits"):
             assert f"\n{title}\n" in shown
         for option in every:
@@ -303,7 +335,8 @@ def test_an_equation_has_its_formula_its_symbols_and_what_is_changed() -> None:
     for equation in guide.EQUATIONS:
         if equation.number in ("energy sink", "gyrostat"):  # of no source
             continue
-        shown, formulas = words(explained(equation.number)), equation.topic.formulas
+        shown = words(explained(equation.number))
+        formulas = equation.topic.formulas
         lines = [line for formula in formulas for line in formula.splitlines()]
         assert all(words(line) in shown for line in lines)
         assert words(equation.changed.replace("`", "")) in shown
@@ -314,28 +347,45 @@ def test_an_equation_has_its_formula_its_symbols_and_what_is_changed() -> None:
 
 
 def test_numbers_and_figures_as_people_write_them() -> None:
-    written = {"17": "M(17)", "m17": "M(17)", "(17)": "M(17)", "M 17": "M(17)", "k7": "K(7)", "K(7)": "K(7)",
-               "24.4": "24.4", "§24.4": "24.4"}  # fmt: skip
+    written = {
+        "17": "M(17)",
+        "m17": "M(17)",
+        "(17)": "M(17)",
+        "M 17": "M(17)",
+        "k7": "K(7)",
+        "K(7)": "K(7)",
+        "24.4": "24.4",
+        "§24.4": "24.4",
+    }
     assert {requested: guide.found(requested).name for requested in written} == written
-    assert all(guide.found(name) is FIGURES for name in ("Abb. 5", "abb8", "fig. 6", "Figures", "FIGURES"))
+    assert all(
+        guide.found(name) is FIGURES for name in ("Abb. 5", "abb8", "fig. 6", "Figures", "FIGURES")
+    )
 
 
 def test_every_key_of_the_models_is_in_the_file_topic() -> None:
     """With its description, unit and example; and each can be requested alone."""
-    shown, schema = words(explained("file")), json_schema()
+    shown = words(explained("file"))
+    schema = json_schema()
     every = list(keys())
-    models = set(schema["properties"]).union(*(section["properties"] for section in schema["$defs"].values()))
+    models = set(schema["properties"]).union(
+        *(section["properties"] for section in schema["$defs"].values())
+    )
     assert {key.name for key in every} == models | set(TOLERANCE_KINDS)
     for key in every:
         assert words(f"{key.name}: {key.text.replace('`', '')}") in shown, key.path
         assert key.field.description
         assert key.field.examples
     asked = (
-        "limits.horizon state.spin thrusters.force attitude.frame attitude.quaternion limits.max_pulses dispersions.A"
+        "limits.horizon state.spin thrusters.force attitude.frame attitude.quaternion "
+        "limits.max_pulses dispersions.A"
     )
     texts = {key.path: key.text for key in every}
     alone = words(explained("file.dispersions.thrust"))
-    check_text("cli.explain.keys", "\n".join(f"{path}: {texts[path]}" for path in asked.split()) + f"\n{alone}")
+    check_text(
+        "cli.explain.keys",
+        "\n".join(f"{path}: {texts[path]}" for path in asked.split()) + f"\n{alone}",
+    )
 
 
 def test_examples_can_be_set() -> None:
@@ -354,7 +404,9 @@ sun_sensor: {azimuth: 0}
     settable = [key for key in keys() if not key.parent and key.name not in ("state", "omega0")]
     assert len(settable) > 10
     for key in settable:
-        example = {"+M1": ["T1", "T2"]} if key.name == "channels" else (key.field.examples or [None])[0]
+        example = (
+            {"+M1": ["T1", "T2"]} if key.name == "channels" else (key.field.examples or [None])[0]
+        )
         read_spacecraft(base, "f.yaml", [parse_setting(f"{key.path}={flow(example)}")])
 
 
@@ -369,9 +421,13 @@ def test_every_unit_is_in_the_units_topic() -> None:
                 assert shown == pytest.approx(factor, rel=1e-5)
 
 
-# --- the figures of Magnus 1970 ---------------------------------------------------------------------------------------
+# --- the figures of Magnus 1970
+# ---------------------------------------------------------------------------------------
 
-DRAWN = [re.split(r" (?=--?[a-z])", line) for line in re.findall(r"^\$ (.+)$", FIGURES.text, re.MULTILINE)]
+DRAWN = [
+    re.split(r" (?=--?[a-z])", line)
+    for line in re.findall(r"^\$ (.+)$", FIGURES.text, re.MULTILINE)
+]
 
 
 def command_of(name: str) -> list[str]:
@@ -392,7 +448,9 @@ VIEWS = places.ROOT / "nutdamp" / "views"
 
 
 def declared(package: str) -> Iterator[str]:
-    """Headings of tables as the code has them: of Column(…), Heading(…) and columns(…), and in lists of heads."""
+    """Headings of tables as the code has them: of Column(…), Heading(…) and columns(…), and in
+    lists of heads.
+    """
     for node in nodes((places.ROOT / "nutdamp" / package).glob("*.py")):
         parts: list[ast.expr] = []
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
@@ -424,7 +482,9 @@ def texts_in(node: ast.expr) -> Iterator[str]:
 
 
 def test_every_heading_of_a_table_is_explained() -> None:
-    headings = {" ".join(heading.split()) for package in ("views", "page") for heading in declared(package)} - {""}
+    headings = {
+        " ".join(heading.split()) for package in ("views", "page") for heading in declared(package)
+    } - {""}
     assert len(headings) > 60
     assert {heading for heading in headings if not is_known(heading)} == set()
 
@@ -484,11 +544,21 @@ def columns_written() -> Iterator[str]:
 
 
 def keys_of_columns() -> Iterator[tuple[str, str]]:
-    """Names of columns that go into files, and the places that have them as far as they are written out."""
+    """Names of columns that go into files, and the places that have them as far as they are written
+    out.
+    """
     for node in nodes(VIEWS.glob("*.py")):
-        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "Column":
+        if (
+            isinstance(node, ast.Call)
+            and isinstance(node.func, ast.Name)
+            and node.func.id == "Column"
+        ):
             key, *others = node.args
-            texts = [text for other in (*others, *(word.value for word in node.keywords)) for text in texts_in(other)]
+            texts = [
+                text
+                for other in (*others, *(word.value for word in node.keywords))
+                for text in texts_in(other)
+            ]
             if isinstance(key, ast.Constant) and key.value:
                 yield str(key.value), " ".join(texts)
         for name in keys_named(node, "file_columns"):
@@ -497,7 +567,9 @@ def keys_of_columns() -> Iterator[tuple[str, str]]:
 
 
 def keys_named(node: ast.AST, function: str) -> Iterator[str]:
-    """Names in files that a call of ``function`` has behind its first argument, with or without a path."""
+    """Names in files that a call of ``function`` has behind its first argument, with or without a
+    path.
+    """
     if isinstance(node, ast.Call) and ast.unparse(node.func).rpartition(".")[2] == function:
         for name in node.args[1:]:
             if isinstance(name, ast.Constant):
@@ -518,7 +590,11 @@ def keys_written() -> Iterator[str]:
         "trade",
         "verdict",
     )
-    functions = (node for node in nodes(VIEWS / f"{name}.py" for name in names) if isinstance(node, ast.FunctionDef))
+    functions = (
+        node
+        for node in nodes(VIEWS / f"{name}.py" for name in names)
+        if isinstance(node, ast.FunctionDef)
+    )
     for node in itertools.chain.from_iterable(map(ast.walk, functions)):
         for key in node.keys if isinstance(node, ast.Dict) else ():
             if isinstance(key, ast.Constant) and isinstance(key.value, str):
@@ -528,7 +604,9 @@ def keys_written() -> Iterator[str]:
 
 
 @pytest.mark.parametrize(("page", "written"), [("csv", columns_written), ("json", keys_written)])
-def test_the_reference_has_every_column_and_every_name(page: str, written: Callable[[], Iterator[str]]) -> None:
+def test_the_reference_has_every_column_and_every_name(
+    page: str, written: Callable[[], Iterator[str]]
+) -> None:
     listed = {name for names, _ in guide.page(page).rows for name in names.split(", ")}
     names = set(written())
     assert len(names) > 70
@@ -556,7 +634,9 @@ def test_the_commands_of_the_figures_draw(run: Run, tmp_path: Path, name: str) -
     pytest.importorskip("matplotlib")
     command = command_of(name)
     small = ["--seconds", "0.2", "--fps", "5", "--width", "320"] if command[0] == "animate" else []
-    run(*command, *small, status=4 if command[0] == "plan" else 0)  # full pulses miss the requirement
+    run(
+        *command, *small, status=4 if command[0] == "plan" else 0
+    )  # full pulses miss the requirement
     assert (tmp_path / name).stat().st_size > 1000
 
 
@@ -578,17 +658,27 @@ def transverse(row: dict[str, float]) -> complex:
 
 
 @pytest.mark.parametrize(("name", "a"), [("abb6", 0.9), ("abb7", 0.3), ("oblate", -0.3)])
-def test_abb_5_to_7_show_what_the_source_shows(run: Run, tmp_path: Path, name: str, a: float) -> None:
-    """At least two rounds of four pulses a quarter turn apart, inwards; the axis turns by 90° (1 - a)/|a| between."""
+def test_abb_5_to_7_show_what_the_source_shows(
+    run: Run, tmp_path: Path, name: str, a: float
+) -> None:
+    """At least two rounds of four pulses a quarter turn apart, inwards; the axis turns by 90° (1 -
+    a)/|a| between.
+    """
     flown = track(run, tmp_path, name)
-    jumps = [(left, right) for left, right in itertools.pairwise(flown) if right["pulse"] > left["pulse"]]
+    jumps = [
+        (left, right) for left, right in itertools.pairwise(flown) if right["pulse"] > left["pulse"]
+    ]
     before, after = ([pair[side] for pair in jumps] for side in (0, 1))
     assert len(jumps) >= 8
     for left, right in zip(after[:-1], before[1:], strict=True):
         turn = transverse(right) / transverse(left)
-        assert math.degrees(math.atan2(turn.imag, turn.real)) == pytest.approx(-math.copysign(90.0, a), abs=1e-6)
+        assert math.degrees(math.atan2(turn.imag, turn.real)) == pytest.approx(
+            -math.copysign(90.0, a), abs=1e-6
+        )
     # the rate of the nutation in space at small angles, over a quarter of the period in the body
-    turned = math.degrees((1.0 - a) * flown[0]["omega_3_rad_s"] * (before[2]["t_s"] - before[1]["t_s"]))
+    turned = math.degrees(
+        (1.0 - a) * flown[0]["omega_3_rad_s"] * (before[2]["t_s"] - before[1]["t_s"])
+    )
     assert turned == pytest.approx(90.0 * (1.0 - a) / abs(a), rel=1e-6)
     assert flown[-1]["nutation_deg"] < 0.1 * flown[0]["nutation_deg"]
 
@@ -604,7 +694,9 @@ def test_abb_8_stops_the_axis_where_h_was(run: Run, tmp_path: Path) -> None:
 
 def test_abb_2_is_a_circle_about_a_centre_aside(run: Run, tmp_path: Path) -> None:
     flown = track(run, tmp_path, "abb2")
-    centre = complex(1.0, -3.0) / (40.0 * flown[0]["omega_3_rad_s"])  # (M2 - i M1)/((A - C) ω3), Magnus 1970 (13)
+    centre = complex(1.0, -3.0) / (
+        40.0 * flown[0]["omega_3_rad_s"]
+    )  # (M2 - i M1)/((A - C) ω3), Magnus 1970 (13)
     radii = [abs(transverse(row) - centre) for row in flown]
     assert max(radii) == pytest.approx(min(radii), rel=1e-6)
     assert abs(centre) > 0.1 * radii[0]

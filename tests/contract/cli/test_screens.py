@@ -66,12 +66,19 @@ def test_no_digit_is_lost_on_a_narrow_screen(run: Run, command: str) -> None:
 
 @spread("name", sorted(path.stem for path in places.CONFIGS.glob("*.yaml")), quick=2, deep=20)
 def test_default_screens_are_short_and_cut_nothing(run: Run, name: str) -> None:
-    """Headline, requirement, one table, notes, next steps: 40 lines of 80 columns; a row of the table is one line."""
+    """Headline, requirement, one table, notes, next steps: 40 lines of 80 columns; a row of the
+    table is one line.
+    """
     commands = ["check", "simulate --samples 100", "simulate --scheme none --samples 100"]
     text = (places.CONFIGS / f"{name}.yaml").read_text(encoding="utf-8")
-    commands += ["loop"] * ("\nloop:" in text) + ["budget"] * ("\nloop:" in text and "\ndissipation:" in text)
+    commands += ["loop"] * ("\nloop:" in text) + ["budget"] * (
+        "\nloop:" in text and "\ndissipation:" in text
+    )
     for command in commands:
-        usual, wide = (call(run, f"{command} {places.CONFIGS}/{name}.yaml", columns=width) for width in (80, 200))
+        usual, wide = (
+            call(run, f"{command} {places.CONFIGS}/{name}.yaml", columns=width)
+            for width in (80, 200)
+        )
         assert usual.returncode in (0, 4), usual.stderr
         lines = usual.stdout.splitlines()
         assert len(lines) <= 40
@@ -90,7 +97,9 @@ def tables(shown: str) -> list[list[str]]:
 
 def test_a_width_into_which_nothing_fits_hides_nothing(run: Run) -> None:
     """COLUMNS=0 printed nothing, with exit status 0."""
-    none, one, seven, usual = (call(run, "plan -v -q --scheme two-pulse", columns=width) for width in (0, 1, 7, 80))
+    none, one, seven, usual = (
+        call(run, "plan -v -q --scheme two-pulse", columns=width) for width in (0, 1, 7, 80)
+    )
     assert none.stdout == usual.stdout
     for ended in (one, seven):
         assert ended.returncode == 0
@@ -129,16 +138,21 @@ def test_four_or_five_schemes_fit_a_usual_screen(run: Run, name: str) -> None:
     assert [line.split("  ")[0] for line in lines[:3]] == ["pulses", "end, s", "impulse, N m s"]
 
 
-def test_a_scheme_without_thrusters_says_so_and_a_bound_keeps_its_sign_on_its_line(run: Run) -> None:
+def test_a_scheme_without_thrusters_says_so_and_a_bound_keeps_its_sign_on_its_line(
+    run: Run,
+) -> None:
     """Long names of channels are broken, not "< 1e-9" after the last pulse."""
-    (verdicts,) = re.findall("^verdict .*?\n\n", call(run, f"plan {STEERED} -v -q").stdout, re.MULTILINE | re.DOTALL)
+    (verdicts,) = re.findall(
+        "^verdict .*?\n\n", call(run, f"plan {STEERED} -v -q").stdout, re.MULTILINE | re.DOTALL
+    )
     assert verdicts.split().count("no") == verdicts.split().count("thrusters") == 2
     shown = call(run, f"plan {STEERED} --scheme two-pulse -v -q").stdout
     assert re.search("  < 1e-9$", shown, re.MULTILINE)
     assert not re.search("<$", shown, re.MULTILINE)
 
 
-# --- progress of long runs --------------------------------------------------------------------------------------------
+# --- progress of long runs
+# --------------------------------------------------------------------------------------------
 
 
 class Terminal(io.StringIO):
@@ -147,7 +161,9 @@ class Terminal(io.StringIO):
 
 
 class Clock:
-    """A clock that is set by hand; its timers, in place of those of `threading`, ring as it is set."""
+    """A clock that is set by hand; its timers, in place of those of `threading`,
+    ring as it is set.
+    """
 
     def __init__(self) -> None:
         self.now, self.timers = 100.0, list[tuple[float, Callable[[], None]]]()
@@ -206,7 +222,14 @@ def test_progress_is_shown_after_a_second_and_a_time_after_a_tenth_of_the_steps(
         clock.set(1.0)
         seen.append(lines[0].__rich__())
         with work.steps(1000.0) as task:
-            for done, now in ((0, 2.0), (99, 9.9), (100, 10.0), (500, 600.0), (996, 900.0), (1000, 910.0)):
+            for done, now in (
+                (0, 2.0),
+                (99, 9.9),
+                (100, 10.0),
+                (500, 600.0),
+                (996, 900.0),
+                (1000, 910.0),
+            ):
                 task.reach(done)
                 clock.set(now)
                 seen.append(lines[0].__rich__())
@@ -233,7 +256,11 @@ def test_progress_is_shown_after_a_second_and_a_time_after_a_tenth_of_the_steps(
 
 @pytest.mark.parametrize(("stream", "quiet"), [(io.StringIO(), False), (Terminal(), True)])
 def test_no_progress_is_shown_in_a_pipe_or_where_it_is_not_wanted(
-    monkeypatch: pytest.MonkeyPatch, clock: Clock, lines: list[Any], stream: io.StringIO, quiet: bool
+    monkeypatch: pytest.MonkeyPatch,
+    clock: Clock,
+    lines: list[Any],
+    stream: io.StringIO,
+    quiet: bool,
 ) -> None:
     monkeypatch.setattr(sys, "stderr", stream)
     with screen.working("planning", quiet=quiet), work.steps(2.0) as task:
@@ -258,7 +285,9 @@ def test_a_run_is_requested_to_stop_and_a_second_ctrl_c_interrupts(number: signa
 
 WIDTH, LINES = 80, 40
 CONFIG_FILES = sorted(places.CONFIGS.glob("*.yaml"))
-DISPERSED_FILES = [path for path in CONFIG_FILES if "\ndispersions:" in path.read_text(encoding="utf-8")]
+DISPERSED_FILES = [
+    path for path in CONFIG_FILES if "\ndispersions:" in path.read_text(encoding="utf-8")
+]
 STUDIED = [
     *(f"disperse {path} --samples 200" for path in DISPERSED_FILES),
     *(f"verify {path}" for path in CONFIG_FILES),
@@ -267,7 +296,9 @@ STUDIED = [
 
 
 def check_screen(shown: str) -> None:
-    """No more lines and columns than there are, no cut value, one table with each of its rows on a line, few notes."""
+    """No more lines and columns than there are, no cut value, one table with each of its rows on a
+    line, few notes.
+    """
     lines = shown.splitlines()
     assert len(lines) <= LINES
     assert max(map(len, lines)) <= WIDTH
@@ -277,15 +308,20 @@ def check_screen(shown: str) -> None:
     assert len(tables) <= 1
     for table in tables:
         heads = present(re.match(r"(?: .*\n)*.*\n", table))
-        assert not re.search("^ ", table[heads.end() :], re.MULTILINE), "a row goes on in another line"
+        assert not re.search("^ ", table[heads.end() :], re.MULTILINE), (
+            "a row goes on in another line"
+        )
     assert lines[-1].startswith("-v all values")
 
 
 @pytest.mark.parametrize(
     "command",
-    [f"disperse {DISPERSED_FILES[-1]} --scheme one-pulse --samples 200", "verify --scheme two-pulse",
-     "trade --points 2 --allow 0"],
-)  # fmt: skip
+    [
+        f"disperse {DISPERSED_FILES[-1]} --scheme one-pulse --samples 200",
+        "verify --scheme two-pulse",
+        "trade --points 2 --allow 0",
+    ],
+)
 def test_a_default_screen_fits_a_terminal(run: Run, command: str) -> None:
     check_screen(call(run, command, columns=WIDTH).stdout)
 
@@ -304,7 +340,16 @@ def test_of_many_points_some_are_shown_the_first_and_the_last_among_them() -> No
     rows = re.findall(r"^(\d+) .*FLY$", shown, re.MULTILINE)
     assert (len(rows), rows[0], rows[-1]) == (ROWS, "1", "100")
     assert f"note[trade-points]: points on this screen: {ROWS} of 100" in shown
-    assert len([line for line in printed(trade_screen(body, fronts), WIDTH) if re.match(r"\d+ .*FLY$", line)]) == 100
+    assert (
+        len(
+            [
+                line
+                for line in printed(trade_screen(body, fronts), WIDTH)
+                if re.match(r"\d+ .*FLY$", line)
+            ]
+        )
+        == 100
+    )
 
 
 def test_a_trade_without_a_schedule_says_why() -> None:
@@ -316,17 +361,30 @@ def test_a_trade_without_a_schedule_says_why() -> None:
 # --- --units us: no number stays in SI where its dimension has a US unit; files are SI all the same
 
 PAIRS = {
-    "kg m²": ("slug ft²", 1.3558179483314), "kg": ("lbm", 0.45359237), "g": ("lbm", 453.59237),
-    "N m s": ("ft lbf s", 1.3558179483314), "N m": ("ft lbf", 1.3558179483314), "N s": ("lbf s", 4.4482216152605),
-    "N": ("lbf", 4.4482216152605), "mm": ("in", 25.4), "m": ("ft", 0.3048), "bar": ("psi", 0.068947572931684),
-}  # fmt: skip
-"""Units of SI, those of US screens, and how many of the former one of the latter is (NIST SP 811)."""
+    "kg m²": ("slug ft²", 1.3558179483314),
+    "kg": ("lbm", 0.45359237),
+    "g": ("lbm", 453.59237),
+    "N m s": ("ft lbf s", 1.3558179483314),
+    "N m": ("ft lbf", 1.3558179483314),
+    "N s": ("lbf s", 4.4482216152605),
+    "N": ("lbf", 4.4482216152605),
+    "mm": ("in", 25.4),
+    "m": ("ft", 0.3048),
+    "bar": ("psi", 0.068947572931684),
+}
+"""Units of SI, those of US screens,
+and how many of the former one of the latter is (NIST SP 811).
+"""
 
 
 def units(names: list[str]) -> re.Pattern[str]:
-    """Pattern of a unit, behind a number of its own or not: no part of a word, nor of a name such as "+M1"."""
+    """Pattern of a unit, behind a number of its own or not: no part of a word, nor of a name such
+    as "+M1".
+    """
     words = "|".join(sorted(names, key=len, reverse=True))
-    return re.compile(rf"(?:(-?[0-9.]+(?:e-?[0-9]+)?) )?(?<![\w°µ'|.+-])({words})((?:/\w+²?)?)(?![\w|²'-]| s\b)")
+    return re.compile(
+        rf"(?:(-?[0-9.]+(?:e-?[0-9]+)?) )?(?<![\w°µ'|.+-])({words})((?:/\w+²?)?)(?![\w|²'-]| s\b)"
+    )
 
 
 SI_UNITS, US_UNITS = units(list(PAIRS)), units([name for name, _ in PAIRS.values()])
@@ -338,15 +396,24 @@ LOOPED, DISPERSED = (
 )
 SHORT = ["check -v", "simulate -v --scheme two-pulse --samples 100"]
 LONG = [
-    "plan --nominal", "plan -v --nominal", "simulate -v --scheme optimal", "verify -v --scheme two-pulse",
+    "plan --nominal",
+    "plan -v --nominal",
+    "simulate -v --scheme optimal",
+    "verify -v --scheme two-pulse",
     "trade -v --points 2",
-]  # fmt: skip
+]
 STUDIES = ["disperse --scheme two-pulse --case 3", "disperse -v --samples 500 --scheme two-pulse"]
 LOOPS = [
-    "loop -v --until 400s", "budget -v", "disperse -v --loop --samples 50", "disperse --loop --samples 9 --case 3",
+    "loop -v --until 400s",
+    "budget -v",
+    "disperse -v --loop --samples 50",
+    "disperse --loop --samples 9 --case 3",
     "verify --loop --set limits.horizon=300s",
-]  # fmt: skip
-FITS = [f"fit -v {places.CASES}/{name}.csv {places.CASES}/{name}.yaml" for name in ("accelerometer", "axis-tumble")]
+]
+FITS = [
+    f"fit -v {places.CASES}/{name}.csv {places.CASES}/{name}.yaml"
+    for name in ("accelerometer", "axis-tumble")
+]
 
 
 def of_configs(commands: list[str], names: list[str]) -> list[str]:
@@ -386,18 +453,26 @@ def test_nor_on_the_screens_of_long_studies(run: Run, command: str) -> None:
 def test_tanks_and_tolerances_are_shown_in_us_units(run: Run, tmp_path: Path) -> None:
     """Pressure and propellant of a tank, and tolerances in their own units."""
     (tmp_path / "s.yaml").write_text(
-        example_text() + "tank: {propellant: 30 kg, pressure: 22 bar, final_pressure: 8 bar}\n", encoding="utf-8"
+        example_text() + "tank: {propellant: 30 kg, pressure: 22 bar, final_pressure: 8 bar}\n",
+        encoding="utf-8",
     )
-    shown = run("check", "s.yaml", "-v", "--units", "us", "--set", "mass=250 kg", columns=120).stdout
+    shown = run(
+        "check", "s.yaml", "-v", "--units", "us", "--set", "mass=250 kg", columns=120
+    ).stdout
     assert re.search(r"^0 +319.1 psi", shown, re.MULTILINE)
     assert re.search(r"^66.14 +116 psi", shown, re.MULTILINE)
     assert not SI_UNITS.findall(shown)
 
 
-@pytest.mark.parametrize("command", [
-    "check --json FILE", "simulate --scheme two-pulse --csv FILE", "plan --scheme two-pulse --nominal --json FILE",
-    deep("disperse --scheme two-pulse --samples 9 --json FILE"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "command",
+    [
+        "check --json FILE",
+        "simulate --scheme two-pulse --csv FILE",
+        "plan --scheme two-pulse --nominal --json FILE",
+        deep("disperse --scheme two-pulse --samples 9 --json FILE"),
+    ],
+)
 def test_files_are_si(run: Run, tmp_path: Path, command: str) -> None:
     for units in ("si", "us"):
         call(run, command.replace("FILE", units) + f" -q --units {units}")
@@ -406,6 +481,10 @@ def test_files_are_si(run: Run, tmp_path: Path, command: str) -> None:
 
 def test_reasons_without_a_plan_have_no_units(run: Run) -> None:
     """A torquer too weak for half the nutation."""
-    weak = call(run, "plan -v --scheme two-pulse --set steerable.torque=0.1 --set thrusters=[] --units us -q", status=3)
+    weak = call(
+        run,
+        "plan -v --scheme two-pulse --set steerable.torque=0.1 --set thrusters=[] --units us -q",
+        status=3,
+    )
     assert "infeasible" in weak.stdout
     assert not SI_UNITS.findall(weak.stdout)

@@ -1,4 +1,6 @@
-"""Where output goes when a stream, a disk or a signal is in its way; command lines that are refused before the work."""
+"""Where output goes when a stream, a disk or a signal is in its way; command lines that are refused
+before the work.
+"""
 
 import json
 import os
@@ -12,7 +14,19 @@ from typing import IO
 import pytest
 from support import places
 from support.cases import deep, spread, weekly
-from support.commands import BUILT_IN, DATED, EXACT, SCHEDULE, call, contents, names, python, refusals, result, written
+from support.commands import (
+    BUILT_IN,
+    DATED,
+    EXACT,
+    SCHEDULE,
+    call,
+    contents,
+    names,
+    python,
+    refusals,
+    result,
+    written,
+)
 from support.golden import check_text
 from support.process import Run
 
@@ -22,12 +36,18 @@ from nutdamp.files.reader import example_text
 pytestmark = pytest.mark.usefixtures("plans_shared")
 
 FULL = Path("/dev/full")
-POSIX = pytest.mark.skipif(os.name != "posix", reason="needs limits, signals and descriptors of POSIX")
+POSIX = pytest.mark.skipif(
+    os.name != "posix", reason="needs limits, signals and descriptors of POSIX"
+)
 NEEDS_FULL = pytest.mark.skipif(not FULL.exists(), reason="no /dev/full here")
-LINUX = pytest.mark.skipif(sys.platform != "linux", reason="names of files are bytes on Linux alone")
+LINUX = pytest.mark.skipif(
+    sys.platform != "linux", reason="names of files are bytes on Linux alone"
+)
 
 
-def process(folder: Path, command: str, *, stdout: int | IO[str] = -1, **more: str) -> subprocess.CompletedProcess[str]:
+def process(
+    folder: Path, command: str, *, stdout: int | IO[str] = -1, **more: str
+) -> subprocess.CompletedProcess[str]:
     """A command as a process, with that standard output and more in its environment."""
     return subprocess.run(
         [sys.executable, "-m", "nutdamp", *command.split()],
@@ -45,14 +65,19 @@ def shell(folder: Path, call: str, *arguments: str) -> subprocess.CompletedProce
     """``$0 -m nutdamp`` in a shell."""
     environment = {**os.environ, "COLUMNS": "80", "NO_COLOR": "1"}
     line = ["sh", "-c", call, sys.executable, *arguments]
-    return subprocess.run(line, cwd=folder, env=environment, capture_output=True, text=True, check=False)
+    return subprocess.run(
+        line, cwd=folder, env=environment, capture_output=True, text=True, check=False
+    )
 
 
-# --- streams ----------------------------------------------------------------------------------------------------------
+# --- streams
+# --------------------------------------------------------------------------------------------------
 
 
 @NEEDS_FULL
-@spread("command", ["check -q", "plan -q", "plan -q --json -", "--help", "explain"], quick=1, deep=2)
+@spread(
+    "command", ["check -q", "plan -q", "plan -q --json -", "--help", "explain"], quick=1, deep=2
+)
 def test_a_full_standard_output_is_said_in_one_line(tmp_path: Path, command: str) -> None:
     with FULL.open("w") as full:
         ended = process(tmp_path, command, stdout=full)
@@ -62,11 +87,15 @@ def test_a_full_standard_output_is_said_in_one_line(tmp_path: Path, command: str
 
 @pytest.mark.deep
 @POSIX
-def test_a_process_without_standard_output_or_without_a_reader_does_its_work(tmp_path: Path) -> None:
+def test_a_process_without_standard_output_or_without_a_reader_does_its_work(
+    tmp_path: Path,
+) -> None:
     for command in ("plan --quiet", "plan --quiet --csv -"):
         closed = shell(tmp_path, f'exec "$0" -m nutdamp {command} --json pulses.json >&-')
         assert (closed.returncode, closed.stderr, names(tmp_path)) == (0, BUILT_IN, ["pulses.json"])
-    left = shell(tmp_path, '"$0" -m nutdamp simulate --scheme none --samples 50000 --csv - | head -n 1')
+    left = shell(
+        tmp_path, '"$0" -m nutdamp simulate --scheme none --samples 50000 --csv - | head -n 1'
+    )
     assert left.stdout.startswith("t_s,")
     assert "Traceback" not in left.stderr
 
@@ -80,10 +109,13 @@ def test_a_screen_without_greek_letters_gets_question_marks(tmp_path: Path) -> N
 
 def test_no_blanks_fill_up_lines_in_a_pipe(run: Run) -> None:
     for command in ("plan", "check", "simulate --scheme two-pulse"):
-        assert not [line for line in call(run, command).stdout.splitlines() if line != line.rstrip()]
+        assert not [
+            line for line in call(run, command).stdout.splitlines() if line != line.rstrip()
+        ]
 
 
-# --- disks and signals ------------------------------------------------------------------------------------------------
+# --- disks and signals
+# ------------------------------------------------------------------------------------------------
 
 
 @POSIX
@@ -91,12 +123,17 @@ def test_no_blanks_fill_up_lines_in_a_pipe(run: Run) -> None:
     ("command", "shown"),
     [
         deep("simulate --scheme two-pulse --csv big.csv --json small.json", "momentum shift"),
-        deep("disperse --scheme two-pulse --samples 2000 --csv big.csv --json small.json", "nutation, deg"),
+        deep(
+            "disperse --scheme two-pulse --samples 2000 --csv big.csv --json small.json",
+            "nutation, deg",
+        ),
         weekly("plan --plot big.svg --json small.json", "fly two-pulse"),
         weekly("trade --points 1 --plot big.png --json small.json", "cheapest: "),
     ],
 )
-def test_the_result_is_shown_where_a_file_cannot_be_saved(tmp_path: Path, command: str, shown: str) -> None:
+def test_the_result_is_shown_where_a_file_cannot_be_saved(
+    tmp_path: Path, command: str, shown: str
+) -> None:
     """A run that may write no file beyond 32 KiB, as on a disk that is nearly full."""
     ended = shell(tmp_path, 'ulimit -f 64; exec "$0" -m nutdamp "$@"', *command.split(), "-q")
     assert ended.returncode == 1, ended.stderr
@@ -116,7 +153,9 @@ def test_the_result_is_shown_where_a_file_cannot_be_saved(tmp_path: Path, comman
         deep("trade --points 1 --schedules file"),
     ],
 )
-def test_each_file_that_cannot_be_saved_is_named_below_the_result(run: Run, tmp_path: Path, command: str) -> None:
+def test_each_file_that_cannot_be_saved_is_named_below_the_result(
+    run: Run, tmp_path: Path, command: str
+) -> None:
     written(tmp_path, file="")
     ended = call(run, f"{command} -q", status=1)
     assert "Sounder-1" in ended.stdout
@@ -180,7 +219,9 @@ run(group)
     quick=1,
     deep=4,
 )
-def test_sigterm_ends_a_command_in_order(tmp_path: Path, arguments: str, module: str, function: str) -> None:
+def test_sigterm_ends_a_command_in_order(
+    tmp_path: Path, arguments: str, module: str, function: str
+) -> None:
     written(tmp_path, spacecraft_yaml=EXACT)
     code = TERMINATED.format(arguments=arguments, module=module, function=function)
     ended = python(tmp_path, code, status=128 + signal.SIGTERM)
@@ -196,11 +237,13 @@ def test_sigterm_while_a_file_is_written_leaves_what_was_there(tmp_path: Path) -
     assert contents(tmp_path) == {"x.csv": b"before"}
 
 
-# --- where nothing is feasible ----------------------------------------------------------------------------------------
+# --- where nothing is feasible
+# ----------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
-    "command", ["plan", "simulate --scheme two-pulse", "verify", "disperse", "trade --points 1", "loop"]
+    "command",
+    ["plan", "simulate --scheme two-pulse", "verify", "disperse", "trade --points 1", "loop"],
 )
 def test_where_nothing_is_feasible_the_json_file_says_so(run: Run, command: str) -> None:
     data = result(run, f"{command} {places.case('infeasible.yaml')}", status=3)
@@ -208,7 +251,8 @@ def test_where_nothing_is_feasible_the_json_file_says_so(run: Run, command: str)
     assert data.get("feasible") is False or data.get("recommended", 0) is None or "fronts" in data
 
 
-# --- names that look like markup, control the terminal, or are not UTF-8 ----------------------------------------------
+# --- names that look like markup, control the terminal, or are not UTF-8
+# ----------------------------------------------
 
 MARKUP = """
 name: "[red]Evil[/] [/] :rocket:"
@@ -224,17 +268,28 @@ dispersions: {A: {normal: 1 %}, thrust: {normal: 2 %}}
 
 @spread(
     "command",
-    ["check", "plan --scheme one-pulse", "simulate --scheme one-pulse", "disperse --scheme one-pulse --case 1",
-     "verify", "plan --robust --scheme one-pulse", "trade --points 1", "disperse --samples 100"],
+    [
+        "check",
+        "plan --scheme one-pulse",
+        "simulate --scheme one-pulse",
+        "disperse --scheme one-pulse --case 1",
+        "verify",
+        "plan --robust --scheme one-pulse",
+        "trade --points 1",
+        "disperse --samples 100",
+    ],
     quick=4,
-)  # fmt: skip
+)
 def test_names_that_look_like_markup_are_shown_as_they_are(run: Run, command: str) -> None:
     ended = call(run, f"{command} -", stdin=MARKUP)
     assert "Traceback" not in ended.stderr
     assert "[red]Evil[/] [/] :rocket:" in ended.stdout
     if command == "check":
         lines = ended.stdout.splitlines()
-        assert all(any(line.startswith(f"{name}  ") for line in lines) for name in ("[red]", "[/]", ":rocket:"))
+        assert all(
+            any(line.startswith(f"{name}  ") for line in lines)
+            for name in ("[red]", "[/]", ":rocket:")
+        )
 
 
 HOSTILE = "\x1b]0;PWNED\x07\x1b[2J\x9b31m"
@@ -248,27 +303,48 @@ def test_what_does_not_print_is_shown_as_its_escape() -> None:
     assert visible("not UTF-8: \udcff") == r"not UTF-8: \udcff"
 
 
-def test_no_control_character_of_a_name_a_unit_or_an_option_reaches_the_terminal(run: Run, tmp_path: Path) -> None:
+def test_no_control_character_of_a_name_a_unit_or_an_option_reaches_the_terminal(
+    run: Run, tmp_path: Path
+) -> None:
     """Whatever file it stands in."""
     (tmp_path / f"there-{HOSTILE}\n.csv").write_text(SCHEDULE)
-    (tmp_path / f"there-{HOSTILE}\n.yaml").write_text(BODY.replace("inertia", "inetria") + '"\x1b[2J": 1\n')
+    (tmp_path / f"there-{HOSTILE}\n.yaml").write_text(
+        BODY.replace("inertia", "inetria") + '"\x1b[2J": 1\n'
+    )
     (tmp_path / f"good-{HOSTILE}\n.yaml").write_text(BODY)
     head = "CCSDS_APM_VERS = 2.0\nCREATION_DATE = 2026-03-01T12:00:00\nORIGINATOR = X\n"
-    written(tmp_path, body_yaml=BODY, message_txt=f"{head}INERTIA_START\nIXX = 120 [{HOSTILE}]\nINERTIA_STOP\n")
-    two, said = ("plan", "body.yaml", "--scheme", "two-pulse"), ""
+    written(
+        tmp_path,
+        body_yaml=BODY,
+        message_txt=f"{head}INERTIA_START\nIXX = 120 [{HOSTILE}]\nINERTIA_STOP\n",
+    )
+    two = ("plan", "body.yaml", "--scheme", "two-pulse")
+    said = ""
     for status, *command in (
-        (1, "plan", f"{HOSTILE}\n.yaml"), (2, HOSTILE), (2, "plan", "--scheme", HOSTILE),
-        (2, "plan", "--on-time", HOSTILE), (1, "check", f"{HOSTILE}.yaml", "--json", "-"),
-        (1, *two, "--csv", f"no/{HOSTILE}/folder.csv"), (2, *two, "--plot", f"{HOSTILE}.{HOSTILE}"),
+        (1, "plan", f"{HOSTILE}\n.yaml"),
+        (2, HOSTILE),
+        (2, "plan", "--scheme", HOSTILE),
+        (2, "plan", "--on-time", HOSTILE),
+        (1, "check", f"{HOSTILE}.yaml", "--json", "-"),
+        (1, *two, "--csv", f"no/{HOSTILE}/folder.csv"),
+        (2, *two, "--plot", f"{HOSTILE}.{HOSTILE}"),
         (1, "simulate", "body.yaml", "--schedule", f"{HOSTILE}.csv"),
-        (0, "simulate", "body.yaml", "--schedule", f"there-{HOSTILE}\n.csv"), (2, "check", f"there-{HOSTILE}\n.yaml"),
-        (2, "import", "apm", "message.txt"), (2, "import", "apm", f"there-{HOSTILE}\n.csv"),
-        *((2, *command, "body.yaml", "--schedule", str(places.case("crash-ansi-channel.csv")))
-          for command in (("simulate",), ("verify",), ("export", "--format", "json"))),
-    ):  # fmt: skip
+        (0, "simulate", "body.yaml", "--schedule", f"there-{HOSTILE}\n.csv"),
+        (2, "check", f"there-{HOSTILE}\n.yaml"),
+        (2, "import", "apm", "message.txt"),
+        (2, "import", "apm", f"there-{HOSTILE}\n.csv"),
+        *(
+            (2, *command, "body.yaml", "--schedule", str(places.case("crash-ansi-channel.csv")))
+            for command in (("simulate",), ("verify",), ("export", "--format", "json"))
+        ),
+    ):
         ended = run(*command, status=status)
         assert not CONTROL.search(ended.stdout + ended.stderr)
-        said += ended.stderr.rpartition("\nError: ")[2].replace(str(places.CASES), "CASES").replace(str(tmp_path), "")
+        said += (
+            ended.stderr.rpartition("\nError: ")[2]
+            .replace(str(places.CASES), "CASES")
+            .replace(str(tmp_path), "")
+        )
     check_text("cli.streams.hostile", said)
     assert not CONTROL.search(run("plan", f"--{HOSTILE}").stderr)
     shown = run("check", f"good-{HOSTILE}\n.yaml", "--json", "-").stdout
@@ -284,7 +360,12 @@ ODD = os.fsdecode(b"d\xfcse")
 def odd(run: Run, tmp_path: Path) -> None:
     """A spacecraft with an attitude; beside it a schedule, odd as well."""
     (tmp_path / f"{ODD}.yaml").write_text(example_text() + BODY[BODY.index("attitude") :])
-    assert run("plan", f"{ODD}.yaml", "--scheme", "two-pulse", "--csv", f"{ODD}.csv", "--quiet").returncode == 0
+    assert (
+        run(
+            "plan", f"{ODD}.yaml", "--scheme", "two-pulse", "--csv", f"{ODD}.csv", "--quiet"
+        ).returncode
+        == 0
+    )
 
 
 @LINUX
@@ -297,16 +378,30 @@ def odd(run: Run, tmp_path: Path) -> None:
         "check {0}.yaml --json out.json",
         "simulate {0}.yaml --schedule {0}.csv --json out.json --plot out.svg",
         "verify {0}.yaml --schedule {0}.csv --json out.json",
-        "disperse {0}.yaml --schedule {0}.csv --samples 50 --json out.json --plot out.png --csv {0}.out",
+        (
+            "disperse {0}.yaml --schedule {0}.csv --samples 50 --json out.json --plot out.png "
+            "--csv "
+            "{0}.out"
+        ),
         "trade {0}.yaml --points 1 --json out.json --schedules {0}",
         "report {0}.yaml -o {0}.html",
         "animate {0}.yaml --schedule {0}.csv -o {0}.gif --seconds 0.2 --fps 5 --width 320",
         "export {0}.yaml --schedule {0}.csv --format apm -o {0}.xml",
-        *(f"export {{0}}.yaml --schedule {{0}}.csv --format {form} -o {{0}}.{ending}" for form, ending in (
-            ("apm", "apm"), ("aem", "aem"), ("stk", "a"), ("basilisk", "py"), ("json", "json"))),
+        *(
+            f"export {{0}}.yaml --schedule {{0}}.csv --format {form} -o {{0}}.{ending}"
+            for form, ending in (
+                ("apm", "apm"),
+                ("aem", "aem"),
+                ("stk", "a"),
+                ("basilisk", "py"),
+                ("json", "json"),
+            )
+        ),
     ],
-)  # fmt: skip
-def test_every_command_takes_names_that_are_not_utf_8(run: Run, tmp_path: Path, command: str) -> None:
+)
+def test_every_command_takes_names_that_are_not_utf_8(
+    run: Run, tmp_path: Path, command: str
+) -> None:
     assert "Traceback" not in run(*command.format(ODD).split(), status=(0, 4)).stderr
     for path in tmp_path.iterdir():
         if path.suffix == ".json":
@@ -321,17 +416,29 @@ def test_where_such_names_are_shown_or_written_they_are_escaped_and_json_gives_t
     run: Run, tmp_path: Path
 ) -> None:
     """A message of such a name becomes a spacecraft file."""
-    assert run("export", f"{ODD}.yaml", "--format", "apm", "--scheme", "none", "-o", f"{ODD}.apm").returncode == 4
+    assert (
+        run(
+            "export", f"{ODD}.yaml", "--format", "apm", "--scheme", "none", "-o", f"{ODD}.apm"
+        ).returncode
+        == 4
+    )
     message = run("import", "apm", f"{ODD}.apm")
-    assert message.stdout.startswith(r"# From the attitude parameter message d\udcfcse.apm; numbers as given there.")
+    assert message.stdout.startswith(
+        r"# From the attitude parameter message d\udcfcse.apm; numbers as given there."
+    )
     written(tmp_path, again_yaml=message.stdout)
     assert run("check", "again.yaml").returncode == 0
     ended = run("check", f"{ODD}.yaml", "missing" + ODD, "--json", "-")
-    assert [entry["file"] for entry in json.loads(ended.stdout)["files"]] == [f"{ODD}.yaml", "missing" + ODD]
+    assert [entry["file"] for entry in json.loads(ended.stdout)["files"]] == [
+        f"{ODD}.yaml",
+        "missing" + ODD,
+    ]
     assert ended.stderr == "nutdamp: cannot read missingd\\udcfcse: no such file or directory\n"
 
 
-def test_an_interrupt_while_modules_are_imported_ends_quietly(run_apart: Run, tmp_path: Path) -> None:
+def test_an_interrupt_while_modules_are_imported_ends_quietly(
+    run_apart: Run, tmp_path: Path
+) -> None:
     (tmp_path / "click.py").write_text("raise KeyboardInterrupt")  # `python -m` looks here first
     ended = run_apart("--version")
     assert (ended.returncode, ended.stdout, ended.stderr) == (130, "", "interrupted\n")
@@ -341,53 +448,141 @@ def test_an_interrupt_while_modules_are_imported_ends_quietly(run_apart: Run, tm
 
 TARGET = "--target 10deg,45deg"
 USAGE = {
-    "commands": ["fly", "simulatte", "plan --no-such-option", "import aem there.aem", "disperse --resume x.npz",
-                 "disperse --flown", "disperse --impulses"],
-    "schemes": ["plan --scheme five-pulse", "plan --scheme two-puls", "report --scheme three-pulse"],
-    "numbers": ["plan --on-time '20 Hz'", "plan --on-time 0", "simulate --scheme one-pulse --until -1",
-                "simulate --scheme one-pulse --until '1 m'", "simulate --scheme one-pulse --samples 1",
-                "disperse --samples 0", "disperse --samples -5", "disperse --samples 1.5", "disperse --samples many",
-                "disperse --case 0", "disperse --threads 0", "disperse --seed -1", "report --disperse 0",
-                "report --disperse nan", "report --disperse 1.5", "report --trade 0",
-                "animate -o a.gif --until '-1 s'", "animate -o a.gif --seconds 0", "animate -o a.gif --fps 0",
-                "animate -o a.gif --width 10", "export dated.yaml --format aem --until '0 s'",
-                "export --format spin-table --scheme none --until '1e9 s'"],
-    "angles": ["plan --spin 0rpm", "plan --target 10,45",
-               "plan --scheme rhumb-line --target 40deg,0deg --sun 190deg,0deg",
-               "report --target 10deg"],
+    "commands": [
+        "fly",
+        "simulatte",
+        "plan --no-such-option",
+        "import aem there.aem",
+        "disperse --resume x.npz",
+        "disperse --flown",
+        "disperse --impulses",
+    ],
+    "schemes": [
+        "plan --scheme five-pulse",
+        "plan --scheme two-puls",
+        "report --scheme three-pulse",
+    ],
+    "numbers": [
+        "plan --on-time '20 Hz'",
+        "plan --on-time 0",
+        "simulate --scheme one-pulse --until -1",
+        "simulate --scheme one-pulse --until '1 m'",
+        "simulate --scheme one-pulse --samples 1",
+        "disperse --samples 0",
+        "disperse --samples -5",
+        "disperse --samples 1.5",
+        "disperse --samples many",
+        "disperse --case 0",
+        "disperse --threads 0",
+        "disperse --seed -1",
+        "report --disperse 0",
+        "report --disperse nan",
+        "report --disperse 1.5",
+        "report --trade 0",
+        "animate -o a.gif --until '-1 s'",
+        "animate -o a.gif --seconds 0",
+        "animate -o a.gif --fps 0",
+        "animate -o a.gif --width 10",
+        "export dated.yaml --format aem --until '0 s'",
+        "export --format spin-table --scheme none --until '1e9 s'",
+    ],
+    "angles": [
+        "plan --spin 0rpm",
+        "plan --target 10,45",
+        "plan --scheme rhumb-line --target 40deg,0deg --sun 190deg,0deg",
+        "report --target 10deg",
+    ],
     "settings": ["plan --set mass"],
-    "endings": ["plan --plot a.jpg", "plan --plot a", "simulate --scheme one-pulse --plot picture.bmp",
-                "disperse --samples 10 --plot x.jpg", "animate -o a.webm", "report -o report.pdf",
-                "report -o report.md", "report -o report"],
+    "endings": [
+        "plan --plot a.jpg",
+        "plan --plot a",
+        "simulate --scheme one-pulse --plot picture.bmp",
+        "disperse --samples 10 --plot x.jpg",
+        "animate -o a.webm",
+        "report -o report.pdf",
+        "report -o report.md",
+        "report -o report",
+    ],
     "figures": ["plan --plot a.png --figure globe", "disperse --figure cases"],
-    "dropped figures": ["plan --plot a.png --figure history", "disperse --plot a.png --figure budget"],
-    "left out": ["animate", "import", "export dated.yaml", "export --format apm body.yaml other.yaml"],
-    "contradictions": ["plan --scheme one-pulse --scheme two-pulse --csv x.csv",
-                       "plan --scheme one-pulse --scheme two-pulse --plot a.png",
-                       "simulate --scheme one-pulse --schedule x.csv", "disperse --scheme two-pulse --schedule x.csv",
-                       "animate -o a.gif --scheme none --schedule a.csv",
-                       "export dated.yaml --format apm --scheme two-pulse --schedule p.csv",
-                       "plan --robust --nominal", "report --nominal --disperse 100", "report --disperse --nominal",
-                       "report --schedule p.csv --blocks b.csv", "report --scheme optimal --schedule p.csv",
-                       "report --schedule p.csv --robust", "report --robust --nominal",
-                       "disperse --case 3 --csv x.csv", "export dated.yaml --format stk --xml",
-                       "export --format spin-table --scheme none --xml",
-                       "export dated.yaml --format apm --until '3 s'"],
-    "standard output": ["plan --csv - --json -", "plan --plot - --csv -", "disperse --csv - --json -",
-                        "import apm there.apm -o - --schedule -"],
-    "options of plan": ["simulate --scheme four-pulse --coarse", "verify --on-time 200ms", "disperse --literal",
-                        "animate -o x.gif --cones 3", "export --format json --free-axis", "report --per-turn 2",
-                        "trade --shift 1deg"],
-    "sun": [f"{command} --sun 70deg,0deg" for command in (
-        f"plan --scheme half-cone {TARGET}", "plan", f"simulate --scheme two-pulse {TARGET}", f"trade {TARGET}",
-        "simulate dated.yaml --schedule pulses.csv", f"report --scheme optimal {TARGET}")],
-    "targets": [*(f"{command} --scheme {scheme}" for scheme in ("half-cone", "rhumb-line")
-                  for command in ("plan", "simulate", "verify", "export --format json", "report")),
-                "plan --scheme half-cone --scheme rhumb-line"],
-    "topics": [f"explain {topic}" for topic in ("tow-pulse", "nutaton", "unitz", "28", "K4", "file.thruster",
-                                                "file.horizon", "file.qqq.zzz", "weather")],
+    "dropped figures": [
+        "plan --plot a.png --figure history",
+        "disperse --plot a.png --figure budget",
+    ],
+    "left out": [
+        "animate",
+        "import",
+        "export dated.yaml",
+        "export --format apm body.yaml other.yaml",
+    ],
+    "contradictions": [
+        "plan --scheme one-pulse --scheme two-pulse --csv x.csv",
+        "plan --scheme one-pulse --scheme two-pulse --plot a.png",
+        "simulate --scheme one-pulse --schedule x.csv",
+        "disperse --scheme two-pulse --schedule x.csv",
+        "animate -o a.gif --scheme none --schedule a.csv",
+        "export dated.yaml --format apm --scheme two-pulse --schedule p.csv",
+        "plan --robust --nominal",
+        "report --nominal --disperse 100",
+        "report --disperse --nominal",
+        "report --schedule p.csv --blocks b.csv",
+        "report --scheme optimal --schedule p.csv",
+        "report --schedule p.csv --robust",
+        "report --robust --nominal",
+        "disperse --case 3 --csv x.csv",
+        "export dated.yaml --format stk --xml",
+        "export --format spin-table --scheme none --xml",
+        "export dated.yaml --format apm --until '3 s'",
+    ],
+    "standard output": [
+        "plan --csv - --json -",
+        "plan --plot - --csv -",
+        "disperse --csv - --json -",
+        "import apm there.apm -o - --schedule -",
+    ],
+    "options of plan": [
+        "simulate --scheme four-pulse --coarse",
+        "verify --on-time 200ms",
+        "disperse --literal",
+        "animate -o x.gif --cones 3",
+        "export --format json --free-axis",
+        "report --per-turn 2",
+        "trade --shift 1deg",
+    ],
+    "sun": [
+        f"{command} --sun 70deg,0deg"
+        for command in (
+            f"plan --scheme half-cone {TARGET}",
+            "plan",
+            f"simulate --scheme two-pulse {TARGET}",
+            f"trade {TARGET}",
+            "simulate dated.yaml --schedule pulses.csv",
+            f"report --scheme optimal {TARGET}",
+        )
+    ],
+    "targets": [
+        *(
+            f"{command} --scheme {scheme}"
+            for scheme in ("half-cone", "rhumb-line")
+            for command in ("plan", "simulate", "verify", "export --format json", "report")
+        ),
+        "plan --scheme half-cone --scheme rhumb-line",
+    ],
+    "topics": [
+        f"explain {topic}"
+        for topic in (
+            "tow-pulse",
+            "nutaton",
+            "unitz",
+            "28",
+            "K4",
+            "file.thruster",
+            "file.horizon",
+            "file.qqq.zzz",
+            "weather",
+        )
+    ],
     "examples": ["init --from lunar-prospecter", "init --from zzz"],
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("kind", USAGE)
@@ -398,10 +593,15 @@ def test_a_bad_command_line_is_exit_2(run: Run, tmp_path: Path, kind: str) -> No
 
 TWICE = [
     *(f"plan in.yaml {option} in.yaml" for option in ("--csv", "--json", "--plot")),
-    *(f"plan in.yaml --csv {way}" for way in (
-        "./in.yaml", "deep/../in.yaml", "FOLDER/in.yaml", "symbolic.yaml", "hard.yaml")),
+    *(
+        f"plan in.yaml --csv {way}"
+        for way in ("./in.yaml", "deep/../in.yaml", "FOLDER/in.yaml", "symbolic.yaml", "hard.yaml")
+    ),
     "plan symbolic.yaml --csv in.yaml",
-    *(f"plan in.yaml --csv new.csv --json {way}" for way in ("new.csv", "deep/../new.csv", "dangling")),
+    *(
+        f"plan in.yaml --csv new.csv --json {way}"
+        for way in ("new.csv", "deep/../new.csv", "dangling")
+    ),
     "simulate in.yaml --schedule s.csv --csv s.csv",
     "simulate in.yaml --schedule s.csv --json in.yaml",
     "disperse in.yaml --schedule s.csv --json s.csv",
@@ -417,7 +617,7 @@ TWICE = [
     "import apm in.yaml -o in.yaml",
     "import apm in.yaml -o new.csv --schedule new.csv",
     "plan --csv spacecraft.yaml",
-]  # fmt: skip
+]
 
 
 def test_one_file_for_two_purposes_is_exit_2(run: Run, tmp_path: Path) -> None:
@@ -432,39 +632,63 @@ def test_one_file_for_two_purposes_is_exit_2(run: Run, tmp_path: Path) -> None:
     check_text("cli.refused.twice", refusals(run, tmp_path, TWICE))
 
 
-def test_what_is_no_file_may_be_named_twice_and_an_output_may_get_the_name_that_is_read_unnamed(run: Run) -> None:
-    ended = run("plan", "--scheme", "one-pulse", "--quiet", "--csv", os.devnull, "--json", os.devnull)
+def test_what_is_no_file_may_be_named_twice_and_an_output_may_get_the_name_that_is_read_unnamed(
+    run: Run,
+) -> None:
+    ended = run(
+        "plan", "--scheme", "one-pulse", "--quiet", "--csv", os.devnull, "--json", os.devnull
+    )
     assert (ended.returncode, ended.stderr) == (4, BUILT_IN)
-    assert run("plan", "--scheme", "two-pulse", "--quiet", "--csv", "spacecraft.yaml").returncode == 0
+    assert (
+        run("plan", "--scheme", "two-pulse", "--quiet", "--csv", "spacecraft.yaml").returncode == 0
+    )
 
 
 @pytest.mark.parametrize(
-    "arguments", [["--csv", "out"], pytest.param(["--csv", "-", "--json", "out"], marks=pytest.mark.deep)]
+    "arguments",
+    [["--csv", "out"], pytest.param(["--csv", "-", "--json", "out"], marks=pytest.mark.deep)],
 )
 def test_standard_output_is_a_purpose_too(tmp_path: Path, arguments: list[str]) -> None:
     with (tmp_path / "out").open("w") as out:
         command = [sys.executable, "-m", "nutdamp", "plan", *arguments]
-        ended = subprocess.run(command, cwd=tmp_path, stdout=out, stderr=subprocess.PIPE, text=True, check=False)
+        ended = subprocess.run(
+            command, cwd=tmp_path, stdout=out, stderr=subprocess.PIPE, text=True, check=False
+        )
     assert ended.returncode == 2
     assert "goes to this file" in ended.stderr
 
 
 UNREACHABLE = [
-    "plan missing.yaml", "check missing.yaml", "report missing.yaml", "export missing.yaml --format apm",
-    "simulate --schedule missing.csv", "import apm missing.apm", "plan --json folder", "plan --plot no/x.png",
-    "plan --csv no/such/x.csv", "plan --csv no/x.csv", "simulate --scheme none --json no/x.json",
-    "trade --points 1000 --csv no/x.csv", "disperse --samples 1e10 --json no/x.json",
-    "animate -o no/x.gif --seconds 600", "report -o no/x.html", "export --format json -o no/x.json",
-    "export dated.yaml --format apm --scheme two-pulse -o no/x.apm", "verify --json no/x.json",
+    "plan missing.yaml",
+    "check missing.yaml",
+    "report missing.yaml",
+    "export missing.yaml --format apm",
+    "simulate --schedule missing.csv",
+    "import apm missing.apm",
+    "plan --json folder",
+    "plan --plot no/x.png",
+    "plan --csv no/such/x.csv",
+    "plan --csv no/x.csv",
+    "simulate --scheme none --json no/x.json",
+    "trade --points 1000 --csv no/x.csv",
+    "disperse --samples 1e10 --json no/x.json",
+    "animate -o no/x.gif --seconds 600",
+    "report -o no/x.html",
+    "export --format json -o no/x.json",
+    "export dated.yaml --format apm --scheme two-pulse -o no/x.apm",
+    "verify --json no/x.json",
     "import apm empty.apm -o no/x.yaml",
-]  # fmt: skip
+]
 
 
 def test_what_cannot_be_read_or_written_is_exit_1(run: Run, tmp_path: Path) -> None:
     """Before the work: some of these would take hours."""
     (tmp_path / "folder").mkdir()
     written(tmp_path, dated_yaml=DATED)
-    written(tmp_path, empty_apm=run("export", "dated.yaml", "--format", "apm", "--scheme", "none").stdout)
+    written(
+        tmp_path,
+        empty_apm=run("export", "dated.yaml", "--format", "apm", "--scheme", "none").stdout,
+    )
     commands = [f"{command} --quiet" for command in UNREACHABLE]
     check_text("cli.refused.unreachable", refusals(run, tmp_path, commands, 1))
 
@@ -479,7 +703,12 @@ def test_a_path_that_cannot_be_is_exit_1(run: Run, tmp_path: Path) -> None:
     (tmp_path / "loop-a").symlink_to("loop-b")
     (tmp_path / "loop-b").symlink_to("loop-a")
     circle, long = ("symlink loop", "too many levels of symbolic links"), ("file name too long",)
-    paths = {"loop-a": circle, "loop-a/x.csv": circle, "x" * 300: long, "/".join(["y" * 200] * 25): long}
+    paths = {
+        "loop-a": circle,
+        "loop-a/x.csv": circle,
+        "x" * 300: long,
+        "/".join(["y" * 200] * 25): long,
+    }
     for command in ("plan --scheme one-pulse --csv", "simulate --scheme none --json", "init"):
         for path, reasons in paths.items():
             ended = run(*command.split(), path, status=1)
@@ -488,7 +717,12 @@ def test_a_path_that_cannot_be_is_exit_1(run: Run, tmp_path: Path) -> None:
 
 @pytest.mark.skipif(not Path("/dev/zero").exists(), reason="no such device")
 def test_a_device_is_not_read(run: Run, tmp_path: Path) -> None:
-    commands = ["check /dev/zero", "plan /dev/full", "simulate -q --schedule /dev/zero", "import /dev/null"]
+    commands = [
+        "check /dev/zero",
+        "plan /dev/full",
+        "simulate -q --schedule /dev/zero",
+        "import /dev/null",
+    ]
     commands.append("fit -q /dev/zero")
     check_text("cli.refused.devices", refusals(run, tmp_path, commands, 1))
 
@@ -508,7 +742,9 @@ SCHEDULES = {
     "nan": f"{HEADER}nan,0,1,0,0\n",
     "a short row": f"{HEADER}1,0,1\n",
     "a column twice": f"t_s,{HEADER}1,1,0,1,0,0\n",
-    "pulses that overlap": SCHEDULE.replace("1,0,steerable,4,0,0", "1,1,+M1,8,0,0\n1.5,1,+M1,8,0,0"),
+    "pulses that overlap": SCHEDULE.replace(
+        "1,0,steerable,4,0,0", "1,1,+M1,8,0,0\n1.5,1,+M1,8,0,0"
+    ),
     "semicolons": SCHEDULE.replace(",", ";"),
 }
 
@@ -517,17 +753,37 @@ def test_a_broken_schedule_is_exit_2_with_its_place(run: Run, tmp_path: Path) ->
     said = ""
     for name, text in SCHEDULES.items():
         (tmp_path / "broken.csv").write_text(text)
-        said += f"{name}: " + refusals(run, tmp_path, ["simulate -q --schedule broken.csv --csv track.csv"]) + "\n"
+        said += (
+            f"{name}: "
+            + refusals(run, tmp_path, ["simulate -q --schedule broken.csv --csv track.csv"])
+            + "\n"
+        )
     check_text("cli.refused.schedules", said)
     (tmp_path / "broken.csv").write_bytes(bytes(range(256)))
     assert refusals(run, tmp_path, ["simulate --schedule broken.csv"])
 
 
-@pytest.mark.parametrize("command", ["plan", "simulate --scheme none", "trade", "disperse --samples 10", "verify",
-    "loop", "budget", "report -o -", "animate -o x.gif", "check", "export --format json"])  # fmt: skip
+@pytest.mark.parametrize(
+    "command",
+    [
+        "plan",
+        "simulate --scheme none",
+        "trade",
+        "disperse --samples 10",
+        "verify",
+        "loop",
+        "budget",
+        "report -o -",
+        "animate -o x.gif",
+        "check",
+        "export --format json",
+    ],
+)
 def test_every_command_that_reads_a_spacecraft_sets(run: Run, tmp_path: Path, command: str) -> None:
     """A fault of a setting reaches the user from each of them, so each of them reads it."""
-    ended = run(*command.split(), "-q", "--set", "limits.horizn=3 s", "--set", "mass=-1 kg", status=2)
+    ended = run(
+        *command.split(), "-q", "--set", "limits.horizn=3 s", "--set", "mass=-1 kg", status=2
+    )
     check_text("cli.refused.set", ended.stderr.removeprefix(BUILT_IN))
     assert "--set KEY=VALUE" in run(command.split()[0], "--help").stdout
     assert contents(tmp_path) == {}

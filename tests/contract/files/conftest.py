@@ -8,7 +8,9 @@ from support.contract import Write
 
 @pytest.fixture
 def write(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Write:
-    """``write(text, name)``: a file of that text in an empty folder, from which its name leads to it."""
+    """``write(text, name)``: a file of that text in an empty folder, from which its name leads to
+    it.
+    """
     monkeypatch.chdir(tmp_path)
 
     def write(text: str | bytes, name: str = "in.csv") -> Path:

@@ -1,4 +1,6 @@
-"""APMs: every form that the standard allows is read, what is wrong is reported by line; there and back."""
+"""APMs: every form that the standard allows is read, what is wrong is reported by line; there and
+back.
+"""
 
 import math
 import re
@@ -87,7 +89,10 @@ MAN_STOP
 """
 ENDS = "REF_FRAME_A = EME2000\nREF_FRAME_B = SC_BODY_1\n"
 MOMENTUM = "MOMENTUM_ALPHA = 0\nMOMENTUM_DELTA = 70\nNUTATION_VEL = 0.01\n"
-SPIN = f"SPIN_START\n{ENDS}SPIN_ALPHA = 0\nSPIN_DELTA = 80\nSPIN_ANGLE = 45\nSPIN_ANGLE_VEL = 1\n{MOMENTUM}SPIN_STOP\n"
+SPIN = (
+    f"SPIN_START\n{ENDS}SPIN_ALPHA = 0\nSPIN_DELTA = 80\nSPIN_ANGLE = 45\nSPIN_ANGLE_VEL = "
+    f"1\n{MOMENTUM}SPIN_STOP\n"
+)
 """The example of annex F5.4."""
 
 Read = Callable[[str | bytes], ApmContents]
@@ -121,10 +126,24 @@ def test_everything_is_read(read: Read) -> None:
     assert apm.epoch.text == "2026-03-01T12:00:00.500000000"
     assert apm.quaternion == pytest.approx([0.8, 0.0, 0.6, 0.0])
     assert apm.rates == pytest.approx(np.radians([8.0, 4.0, 180.0]))
-    assert present(apm.tensor).tolist() == [[120.0, -1.0, 2.0], [-1.0, 100.0, 0.0], [2.0, 0.0, 80.0]]
+    assert present(apm.tensor).tolist() == [
+        [120.0, -1.0, 2.0],
+        [-1.0, 100.0, 0.0],
+        [2.0, 0.0, 80.0],
+    ]
     first, second = apm.manoeuvres
-    assert (first.start, first.duration, first.torque.tolist(), first.mass) == (1.5, 0.5, [6.0, 0.0, 0.0], -0.01)
-    assert (second.start, second.duration, second.torque.tolist(), second.mass) == (3.5, 1.0, [0.0, -6.0, 0.0], None)
+    assert (first.start, first.duration, first.torque.tolist(), first.mass) == (
+        1.5,
+        0.5,
+        [6.0, 0.0, 0.0],
+        -0.01,
+    )
+    assert (second.start, second.duration, second.torque.tolist(), second.mass) == (
+        3.5,
+        1.0,
+        [0.0, -6.0, 0.0],
+        None,
+    )
     assert apm.remarks == ()
     # Line ends of the standard.
     wrong = faults(read, edited("Q2 = 0.6", "Q2 = x"))
@@ -132,12 +151,17 @@ def test_everything_is_read(read: Read) -> None:
         assert len(read(GOOD.replace("\n", ending)).manoeuvres) == 2
         assert faults(read, edited("Q2 = 0.6", "Q2 = x").replace("\n", ending)) == wrong
     # No attitude, and another name for the axes.
-    bare, renamed = read(without("QUAT").replace("EME2000", "ICRF")), read(GOOD.replace("EME2000", "ICRF"))
+    bare, renamed = (
+        read(without("QUAT").replace("EME2000", "ICRF")),
+        read(GOOD.replace("EME2000", "ICRF")),
+    )
     assert (bare.quaternion, renamed.frame) == (None, "GCRF")
     # A spin block that says something else.
     spun = read(before("INERTIA", SPIN))
     assert spun.rates == pytest.approx(apm.rates)
-    check_text("files.apm-remarks", "\n".join("\n".join(found.remarks) for found in (bare, renamed, spun)))
+    check_text(
+        "files.apm-remarks", "\n".join("\n".join(found.remarks) for found in (bare, renamed, spun))
+    )
 
 
 def test_the_spin_of_the_standards_example(read: Read) -> None:
@@ -147,19 +171,28 @@ def test_the_spin_of_the_standards_example(read: Read) -> None:
     axes = attitude.matrix(present(apm.quaternion))
     assert axes[:, 2] == pytest.approx([0.1736, 0.0, 0.9848], abs=5e-5)
     # 1 deg/s about the third axis and 0.01 deg/s about H make up the rates.
-    expected = math.radians(1.0) * axes[:, 2] + math.radians(0.01) * np.array([0.3420201, 0.0, 0.9396926])
+    expected = math.radians(1.0) * axes[:, 2] + math.radians(0.01) * np.array(
+        [0.3420201, 0.0, 0.9396926]
+    )
     assert axes @ apm.rates == pytest.approx(expected, rel=1e-7)
-    # The other form of the block says the same: H is 10 deg from the axis, and goes round in 36000 s.
+    # The other form of the block says the same: H is 10 deg from the axis, and goes round in 36000
+    # s.
     h = axes.T @ np.array([math.cos(math.radians(70.0)), 0.0, math.sin(math.radians(70.0))])
     phase = math.degrees(math.atan2(-h[1], h[0]))
     other = f"NUTATION = 10\nNUTATION_PER = 36000\nNUTATION_PHASE = {phase}\n"
     assert read(edited(MOMENTUM, other, SPIN_ALONE)).rates == pytest.approx(apm.rates, rel=1e-12)
-    assert read(edited(MOMENTUM, "", SPIN_ALONE)).rates == pytest.approx([0.0, 0.0, math.radians(1.0)], abs=1e-15)
+    assert read(edited(MOMENTUM, "", SPIN_ALONE)).rates == pytest.approx(
+        [0.0, 0.0, math.radians(1.0)], abs=1e-15
+    )
 
 
 def test_frames_the_other_way_round_and_rates_in_the_inertial_frame(read: Read) -> None:
-    """From the body to the frame the quaternion is the inverse, and the rate that of the frame against the body."""
-    turned = GOOD.replace(ENDS, "REF_FRAME_A = SC_BODY_1\nREF_FRAME_B = EME2000\n").replace("Q2 = 0.6", "Q2 = -0.6")
+    """From the body to the frame the quaternion is the inverse, and the rate that of the frame
+    against the body.
+    """
+    turned = GOOD.replace(ENDS, "REF_FRAME_A = SC_BODY_1\nREF_FRAME_B = EME2000\n").replace(
+        "Q2 = 0.6", "Q2 = -0.6"
+    )
     inertial = edited("ANGVEL_FRAME = SC_BODY_1", "ANGVEL_FRAME = EME2000")
     rates = attitude.matrix(np.array([0.8, 0.0, 0.6, 0.0])) @ np.array([8.0, 4.0, 180.0])
     for axis, rate, seen in zip("XYZ", (8, 4, 180), rates.tolist(), strict=True):
@@ -175,9 +208,15 @@ def test_euler_angles(read: Read) -> None:
     angles = "EULER_ROT_SEQ = XYZ\nANGLE_1 = 20\nANGLE_2 = -30\nANGLE_3 = 140\n"
     apm = read(before("ANGVEL", f"EULER_START\n{ENDS}{angles}EULER_STOP\n", without("QUAT")))
     one, two, three = np.radians([20.0, -30.0, 140.0])
-    about_x = np.array([[1, 0, 0], [0, math.cos(one), math.sin(one)], [0, -math.sin(one), math.cos(one)]])
-    about_y = np.array([[math.cos(two), 0, -math.sin(two)], [0, 1, 0], [math.sin(two), 0, math.cos(two)]])
-    about_z = np.array([[math.cos(three), math.sin(three), 0], [-math.sin(three), math.cos(three), 0], [0, 0, 1]])
+    about_x = np.array(
+        [[1, 0, 0], [0, math.cos(one), math.sin(one)], [0, -math.sin(one), math.cos(one)]]
+    )
+    about_y = np.array(
+        [[math.cos(two), 0, -math.sin(two)], [0, 1, 0], [math.sin(two), 0, math.cos(two)]]
+    )
+    about_z = np.array(
+        [[math.cos(three), math.sin(three), 0], [-math.sin(three), math.cos(three), 0], [0, 0, 1]]
+    )
     turned = attitude.matrix(present(apm.quaternion)).T
     assert turned == pytest.approx(about_z @ about_y @ about_x, abs=1e-15)
     assert euler("ZXZ", 0.0, 0.0, 0.0).tolist() == [1.0, 0.0, 0.0, 0.0]
@@ -201,11 +240,17 @@ BROKEN = (
     ("QUAT_START\n", ""),
     ("ANGVEL_X = 8 [deg/s]", "ANGVEL_X = 8 [rad/s]"),
     ("ANGVEL_FRAME = SC_BODY_1", "ANGVEL_FRAME = GCRF"),
-    *((f"{block}_REF_FRAME = SC_BODY_1", f"{block}_REF_FRAME = EME2000") for block in ("INERTIA", "MAN")),
+    *(
+        (f"{block}_REF_FRAME = SC_BODY_1", f"{block}_REF_FRAME = EME2000")
+        for block in ("INERTIA", "MAN")
+    ),
     *(("MAN_DURATION = 0.5 [s]", f"MAN_DURATION = {value} [s]") for value in (-0.5, 0)),
     ("MAN_DELTA_MASS = -0.01", "MAN_DELTA_MASS = 0.01"),
     ("MAN_TOR_X = 6", "MAN_TOR_X = 0"),
-    *(("MAN_EPOCH_START = 2026-03-01T12:00:02", f"MAN_EPOCH_START = 2026-03-01T12:00:0{s}") for s in (0, 5)),
+    *(
+        ("MAN_EPOCH_START = 2026-03-01T12:00:02", f"MAN_EPOCH_START = 2026-03-01T12:00:0{s}")
+        for s in (0, 5)
+    ),
     ("COMMENT first", "torque about axis 1"),
     ("MAN_DELTA_MASS = -0.01 [kg]", "MAN_DELTA_VEL = 1"),
 )
@@ -237,7 +282,13 @@ XML = ("<?xml version='1.0'?>\n<apm/>", " \n<apm", "<!DOCTYPE apm [<!ENTITY a 'b
 
 def test_what_is_no_such_message(read: Read) -> None:
     """Unreadable, another message, XML, too large."""
-    others = ("", "hello\n", "CCSDS_AEM_VERS = 2.0\n", "CCSDS_APM_VERS = 1.0\nQ_FRAME_A = X\n", XML[0])
+    others = (
+        "",
+        "hello\n",
+        "CCSDS_AEM_VERS = 2.0\n",
+        "CCSDS_APM_VERS = 1.0\nQ_FRAME_A = X\n",
+        XML[0],
+    )
     check_faults("files.apm-none", read, others)
     for encoding in ("utf-8-sig", "utf-16", "utf-16-le", "utf-16-be"):
         for text in XML:
@@ -274,11 +325,14 @@ def test_a_message_without_inertia_makes_no_spacecraft_file_of_its_own(read: Rea
         imported(read(without("INERTIA")), "message.apm")
 
 
-# --- spacecraft files from messages: there and back keeps state, inertia and manoeuvres, and plans the same schedule
+# --- spacecraft files from messages: there and back keeps state, inertia and manoeuvres, and plans
+# the same schedule
 
 
 PLANNED_ALIKE = 1e-6
-"""Relative difference of two schedules that were trimmed from states that differ in the last digit."""
+"""Relative difference of two schedules that were trimmed from states
+that differ in the last digit.
+"""
 
 Taken = tuple[ApmContents, str, Spacecraft, Schedule]
 Take = Callable[[str | planning.Plan], Taken]
@@ -286,10 +340,16 @@ Take = Callable[[str | planning.Plan], Taken]
 
 @pytest.fixture
 def take(write: Write) -> Take:
-    """``take(message)``, or that of a plan: what is read, the file it becomes, its spacecraft and schedule."""
+    """``take(message)``, or that of a plan: what is read, the file it becomes, its spacecraft and
+    schedule.
+    """
 
     def take(message: str | planning.Plan) -> Taken:
-        contents = read_apm(str(write(message if isinstance(message, str) else export_text(message, "apm"), "a.apm")))
+        contents = read_apm(
+            str(
+                write(message if isinstance(message, str) else export_text(message, "apm"), "a.apm")
+            )
+        )
         return contents, *imported(contents, "a.apm")
 
     return take
@@ -301,7 +361,9 @@ def test_state_inertia_and_manoeuvres_come_back(case: str, take: Take) -> None:
     body = plan.spacecraft
     apm, text, back, schedule = take(plan)
     assert apm.remarks == ()
-    assert apm.rates == pytest.approx(messages.in_file_axes(body, body.initial.rates), rel=1e-13, abs=1e-15)
+    assert apm.rates == pytest.approx(
+        messages.in_file_axes(body, body.initial.rates), rel=1e-13, abs=1e-15
+    )
     axes = attitude.matrix(present(apm.quaternion))
     assert axes == pytest.approx(messages.columns(body, body.initial.quaternion), abs=1e-14)
     assert apm.tensor == pytest.approx(body.inertia.tensor, rel=1e-15)
@@ -315,31 +377,42 @@ def test_state_inertia_and_manoeuvres_come_back(case: str, take: Take) -> None:
     assert present(back.attitude).frame == present(body.attitude).frame
     assert "no thruster layout" in text
     for manoeuvre, one, two in zip(apm.manoeuvres, plan.pulses, schedule, strict=True):
-        assert manoeuvre.torque == pytest.approx(messages.in_file_axes(body, present(one.torque)), rel=1e-14, abs=1e-15)
+        assert manoeuvre.torque == pytest.approx(
+            messages.in_file_axes(body, present(one.torque)), rel=1e-14, abs=1e-15
+        )
         assert [manoeuvre.start, two.start] == pytest.approx([one.start] * 2, abs=0.51e-9)
         assert [manoeuvre.duration, two.on_time] == pytest.approx([one.on_time] * 2, rel=1e-15)
         assert two.impulse == pytest.approx(one.impulse, rel=1e-12, abs=1e-12)
         assert two.propellant == (one.propellant and pytest.approx(one.propellant, rel=1e-15))
-    # The schedule, flown from what came back, leaves what the plan leaves, and is read as a file without warnings.
-    flown, expected = propagation.flown(back, schedule), plan.flown
+    # The schedule, flown from what came back, leaves what the plan leaves, and is read as a file
+    # without warnings.
+    flown = propagation.flown(back, schedule)
+    expected = plan.flown
     assert flown.residual.nutation == pytest.approx(present(expected).nutation, abs=1e-9)
-    assert flown.residual.momentum_shift == pytest.approx(present(expected).momentum_shift, abs=1e-9)
+    assert flown.residual.momentum_shift == pytest.approx(
+        present(expected).momentum_shift, abs=1e-9
+    )
     Path("back.csv").write_text(pulse_table(flown).csv(), encoding="utf-8")
     again, warnings = read_pulses(Path("back.csv"), back)
     assert warnings == []
-    assert [pulse.start for pulse in again] == pytest.approx([pulse.start for pulse in schedule], abs=1e-14)
+    assert [pulse.start for pulse in again] == pytest.approx(
+        [pulse.start for pulse in schedule], abs=1e-14
+    )
 
 
 @pytest.mark.parametrize("scheme", ["one-pulse", "two-pulse"])
 @pytest.mark.parametrize(
-    "case", ["steerable-stage", "prolate, backwards", "oblate, backwards", deep("oblate"), deep("sphere")]
+    "case",
+    ["steerable-stage", "prolate, backwards", "oblate, backwards", deep("oblate"), deep("sphere")],
 )
 def test_a_steerable_torquer_plans_the_same_again(case: str, scheme: str, take: Take) -> None:
     body = replace(messages.spacecraft(case), limits=Limits(earliest=1.5))
     plan = planning.plan(body, scheme)
     assert plan.feasible
     _, text, back, _ = take(plan)
-    assert present(back.steerable).torque == pytest.approx(present(present(body.steerable).torque), rel=1e-14)
+    assert present(back.steerable).torque == pytest.approx(
+        present(present(body.steerable).torque), rel=1e-14
+    )
     again = planning.plan(read_spacecraft(text, "back.yaml"), scheme)
     for one, two in zip(plan.pulses, again.pulses, strict=True):
         assert two.t == pytest.approx(one.t, rel=PLANNED_ALIKE)
@@ -352,22 +425,36 @@ def test_torques_of_several_kinds_are_suggested_as_thrusters(take: Take) -> None
     _, text, back, _ = take(plan)
     assert back.steerable is None
     assert "    - [120.0 kg m^2, 3.0 kg m^2, 6.0 kg m^2]\n" in text
-    taken = read_spacecraft(text.replace("# thrusters:", "thrusters:").replace("#   - {", "  - {"), "taken.yaml")
-    torques = {tuple(np.round(taken.inertia.axes @ channel.torque, 12)) for channel in taken.channels}
-    fired = [messages.in_file_axes(plan.spacecraft, pulse.torque) for pulse in plan.pulses if pulse.torque is not None]
+    taken = read_spacecraft(
+        text.replace("# thrusters:", "thrusters:").replace("#   - {", "  - {"), "taken.yaml"
+    )
+    torques = {
+        tuple(np.round(taken.inertia.axes @ channel.torque, 12)) for channel in taken.channels
+    }
+    fired = [
+        messages.in_file_axes(plan.spacecraft, pulse.torque)
+        for pulse in plan.pulses
+        if pulse.torque is not None
+    ]
     assert torques == {tuple(np.round(torque, 12)) for torque in fired}
 
 
-def test_overlapping_manoeuvres_keep_apart_and_stand_in_the_order_of_their_starts(take: Take) -> None:
+def test_overlapping_manoeuvres_keep_apart_and_stand_in_the_order_of_their_starts(
+    take: Take,
+) -> None:
     """A long pulse that begins first may have its centre after a short one."""
     text = export_text(messages.planned("prolate"), "apm")
-    first, second = text.index("MAN_START"), text.rindex("MAN_START")
+    first = text.index("MAN_START")
+    second = text.rindex("MAN_START")
     _, _, back, schedule = take(text[:second] + text[first:second] + text[second:])
     assert [pulse.channel for pulse in schedule] == ["steerable", "MAN2", "steerable"]
     assert propagation.flown(back, schedule).settled.spin == pytest.approx(math.pi)
     torque = np.array([1.0, 0.0, 0.0])
     pulses = Schedule(
-        (Pulse(2.0, 2.0, "long", 2.0 * torque, torque), Pulse(1.5, 0.2, "short", 0.4 * torque, 2 * torque))
+        (
+            Pulse(2.0, 2.0, "long", 2.0 * torque, torque),
+            Pulse(1.5, 0.2, "short", 0.4 * torque, 2 * torque),
+        )
     )
     assert [pulse.channel for pulse in pulses] == ["short", "long"]
     _, _, back, schedule = take(planning.Plan(messages.spacecraft("prolate"), "by hand", pulses))
@@ -394,7 +481,9 @@ def test_what_no_spacecraft_can_be_points_at_the_block(take: Take) -> None:
     check_faults("files.apm-no-spacecraft", lambda edit: take(text.replace(*edit)), edits)
 
 
-def test_times_of_another_system_become_utc_and_a_nutation_that_contradicts_is_said(take: Take) -> None:
+def test_times_of_another_system_become_utc_and_a_nutation_that_contradicts_is_said(
+    take: Take,
+) -> None:
     """A period of 720 s is none of this inertia, so that 0.1 deg cannot be."""
     text = earlier("mms1.apm.txt").read_text(encoding="utf-8")
     moments = []

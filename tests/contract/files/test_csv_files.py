@@ -1,4 +1,6 @@
-"""Schedules, command blocks and telemetry that people wrote or edited: what is read, and every fault with its place."""
+"""Schedules, command blocks and telemetry that people wrote or edited: what is read, and every
+fault with its place.
+"""
 
 import csv
 import io
@@ -20,7 +22,16 @@ from support.spinners import FILE
 
 import nutdamp
 from nutdamp.errors import CannotRead
-from nutdamp.estimation.parameters import ACCELERATION, AXIS, DIRECTION, GYROS, QUATERNION, SEEN, SUN_ASPECT, Record
+from nutdamp.estimation.parameters import (
+    ACCELERATION,
+    AXIS,
+    DIRECTION,
+    GYROS,
+    QUATERNION,
+    SEEN,
+    SUN_ASPECT,
+    Record,
+)
 from nutdamp.files import tabular
 from nutdamp.files.reader import example_text, read_spacecraft
 from nutdamp.files.schedules import BLOCKS_HEADER, read_blocks, read_pulses
@@ -40,7 +51,10 @@ pytestmark = pytest.mark.usefixtures("plans_shared")
 EXAMPLE = read_spacecraft(example_text(), "example.yaml")
 STEERED = replace(EXAMPLE, channels=(), steerable=Steerable(5.0, 220.0, 1.0))
 TOP = "start_s,on_time_s,channel"
-TORQUES, IMPULSES = "torque_1_Nm,torque_2_Nm,torque_3_Nm", "impulse_1_Nms,impulse_2_Nms,impulse_3_Nms"
+TORQUES, IMPULSES = (
+    "torque_1_Nm,torque_2_Nm,torque_3_Nm",
+    "impulse_1_Nms,impulse_2_Nms,impulse_3_Nms",
+)
 Read = Callable[..., tuple[Schedule, list[str]]]
 
 
@@ -85,7 +99,9 @@ def test_a_longer_on_time_is_what_the_thruster_then_does(read: Read, written: st
     check_text("files.schedule-ignored", "\n".join(unknown))
 
 
-def test_what_was_written_is_read_without_a_word_and_three_columns_are_enough(read: Read, written: str) -> None:
+def test_what_was_written_is_read_without_a_word_and_three_columns_are_enough(
+    read: Read, written: str
+) -> None:
     plan = planning.plan(EXAMPLE, "four-pulse")
     whole, warnings = read(written)
     assert propagation.flown(EXAMPLE, whole).residual == plan.flown
@@ -112,7 +128,9 @@ def test_the_centre_of_a_pulse_from_a_falling_tank_is_read_as_it_was_written(rea
     assert all(pulse.t < pulse.loaded[0] + 0.4999 * pulse.loaded[1] for pulse in plan.pulses)
     again, warnings = read(pulse_table(plan.flight).csv(), body)
     assert warnings == []
-    assert [pulse.t for pulse in again] == pytest.approx([pulse.t for pulse in plan.pulses], rel=1e-12)
+    assert [pulse.t for pulse in again] == pytest.approx(
+        [pulse.t for pulse in plan.pulses], rel=1e-12
+    )
 
 
 def test_steered_pulses_and_ideal_impulses_have_a_torque_or_an_impulse(read: Read) -> None:
@@ -136,11 +154,23 @@ def test_on_times_off_the_limits_are_flown_with_a_warning(run: Run, tmp_path: Pa
     """Too short, too long, off the ticks: as given, and reported."""
     (tmp_path / "s.csv").write_text(f"{TOP}\n1,0.001,+M1\n5.0123456,3,+M2\n")
     flown = run(
-        "simulate", "--schedule", "s.csv", "--set", "limits.tick=10 ms", "--samples", "2", "--json", "-", status=4
+        "simulate",
+        "--schedule",
+        "s.csv",
+        "--set",
+        "limits.tick=10 ms",
+        "--samples",
+        "2",
+        "--json",
+        "-",
+        status=4,
     )
     pulses = json.loads(flown.stdout)["pulses"]
     assert [pulse["on_time_s"] for pulse in pulses] == [0.001, 3.0]
-    assert [pulse["impulse_Nms"][:2] for pulse in pulses] == [[pytest.approx(0.008), 0], [0, pytest.approx(24.0)]]
+    assert [pulse["impulse_Nms"][:2] for pulse in pulses] == [
+        [pytest.approx(0.008), 0],
+        [0, pytest.approx(24.0)],
+    ]
     check_text("files.schedule-limits", flown.stderr)
 
 
@@ -176,15 +206,17 @@ def test_pulses_of_one_channel_never_overlap(read: Read, start: float) -> None:
     on_time = 4096.0 if start else 0.5
     text = f"{TOP}\n{{!r}},{on_time!r},+M1\n{start!r},{on_time!r},+M1\n{start!r},{on_time!r},-M1\n"
     assert len(read(text.format(start + on_time))[0]) == 3
-    assert [fault.partition(":1: ")[::2] for fault in faults(read, text.format(start + on_time * 0.99))] == [
-        ("2", "start_s: its channel is still firing the pulse of line 3")
-    ]
+    assert [
+        fault.partition(":1: ")[::2] for fault in faults(read, text.format(start + on_time * 0.99))
+    ] == [("2", "start_s: its channel is still firing the pulse of line 3")]
 
 
 def test_an_overlap_behind_a_shorter_pulse_is_seen() -> None:
     """The long pulse still fires when the third begins, whatever came in between."""
     times = {"a": (0.0, 10.0), "b": (1.0, 1.0), "c": (5.0, 1.0)}
-    pulses = [(name, Pulse(start + 0.5 * on, on, "T", np.zeros(3))) for name, (start, on) in times.items()]
+    pulses = [
+        (name, Pulse(start + 0.5 * on, on, "T", np.zeros(3))) for name, (start, on) in times.items()
+    ]
     assert overlapping(pulses) == [("b", "a"), ("c", "a")]
 
 
@@ -194,14 +226,19 @@ def test_schemes_plan_no_pulse_that_the_clock_cannot_tell(late: float) -> None:
     body = replace(EXAMPLE, limits=Limits(horizon=late + 1000.0, earliest=late))
     plans = [planning.plan(body, scheme) for scheme in ("one-pulse", "two-pulse", "four-pulse")]
     assert not any(plan.feasible for plan in plans)
-    (reason,) = {(infeasibility(plan) or "").rpartition(") ")[2] for plan in plans}  # which pulse hangs on rounding
+    (reason,) = {
+        (infeasibility(plan) or "").rpartition(") ")[2] for plan in plans
+    }  # which pulse hangs on rounding
     check_text(f"files.schedule-late-{late:.0e}", reason)
 
 
-# --- command blocks --------------------------------------------------------------------------------------------------
+# --- command blocks
+# --------------------------------------------------------------------------------------------------
 
 CRAFT = read_spacecraft(FILE, "f.yaml")
-WIDTHS = FILE.replace("width: {step: 10 ms, min: 100 ms, max: 500 ms}", "width: [500 ms, 100 ms, 300 ms]")
+WIDTHS = FILE.replace(
+    "width: {step: 10 ms, min: 100 ms, max: 500 ms}", "width: [500 ms, 100 ms, 300 ms]"
+)
 HEAD = "channel,first_sun_pulse,delay_s,width_s,count\n"
 COUNTS = "channel,first_sun_pulse,delay_counts,width_counts,count\n"
 GOAL = ("--target", "10deg,89deg")
@@ -221,9 +258,21 @@ def rows_of(path: Path) -> list[dict[str, str]]:
 
 def test_what_plan_writes_is_what_simulate_fires(run: Run, tmp_path: Path) -> None:
     """The screen has what an operator compares before and after."""
-    text = FILE + "tank: {propellant: 30 kg, pressure: 22 bar, final_pressure: 8 bar, exponent: 1}\n"
+    text = (
+        FILE + "tank: {propellant: 30 kg, pressure: 22 bar, final_pressure: 8 bar, exponent: 1}\n"
+    )
     planned = run(
-        "plan", "-v", "-", *GOAL, "--scheme", "command-block", *BLOCKS, "--csv", "pulses.csv", stdin=text, status=0
+        "plan",
+        "-v",
+        "-",
+        *GOAL,
+        "--scheme",
+        "command-block",
+        *BLOCKS,
+        "--csv",
+        "pulses.csv",
+        stdin=text,
+        status=0,
     )
     (row,) = rows_of(tmp_path / "blocks.csv")
     assert tuple(row) == BLOCKS_HEADER
@@ -257,16 +306,28 @@ def test_counts_alone_are_read_where_the_spacecraft_file_has_the_steps(blocks: R
     listed = read_spacecraft(WIDTHS, "f.yaml")
     (block,), _ = blocks(COUNTS + "T1,1,500,2,4\n", listed)
     assert (block.delay, block.width) == (1.0, 0.3)
-    check_faults("files.blocks-widths", lambda text: blocks(text, listed), [COUNTS + "T1,1,500,4,4\n"])
-    bare = read_spacecraft("\n".join(row for row in FILE.splitlines() if not row.startswith("commands")), "f.yaml")
-    check_faults("files.blocks-no-commands", lambda text: blocks(text, bare), [COUNTS + "T1,1,500,2,4\n"])
+    check_faults(
+        "files.blocks-widths", lambda text: blocks(text, listed), [COUNTS + "T1,1,500,4,4\n"]
+    )
+    bare = read_spacecraft(
+        "\n".join(row for row in FILE.splitlines() if not row.startswith("commands")), "f.yaml"
+    )
+    check_faults(
+        "files.blocks-no-commands", lambda text: blocks(text, bare), [COUNTS + "T1,1,500,2,4\n"]
+    )
 
 
 def test_widths_of_a_list_are_written_by_their_number(run: Run, tmp_path: Path) -> None:
-    assert run("plan", "-", *GOAL, "--scheme", "command-block", *BLOCKS, stdin=WIDTHS).returncode in (0, 4)
+    assert run(
+        "plan", "-", *GOAL, "--scheme", "command-block", *BLOCKS, stdin=WIDTHS
+    ).returncode in (0, 4)
     rows = rows_of(tmp_path / "blocks.csv")
     assert rows
-    assert {(row["width_s"], row["width_counts"]) for row in rows} <= {("0.1", "1"), ("0.3", "2"), ("0.5", "3")}
+    assert {(row["width_s"], row["width_counts"]) for row in rows} <= {
+        ("0.1", "1"),
+        ("0.3", "2"),
+        ("0.5", "3"),
+    }
 
 
 FAULTY_BLOCKS = (
@@ -278,11 +339,16 @@ FAULTY_BLOCKS = (
 )
 
 
-def test_all_faults_of_a_file_are_listed_and_what_cannot_be_commanded_is_named(blocks: ReadBlocks) -> None:
+def test_all_faults_of_a_file_are_listed_and_what_cannot_be_commanded_is_named(
+    blocks: ReadBlocks,
+) -> None:
     check_faults("files.blocks", blocks, FAULTY_BLOCKS)
     assert [block.count for block in blocks(HEAD + "T1,1,1,0.1,5000\n")[0]] == [5000]
     every = HEAD.replace("\n", ",every\n")
-    check_text("files.blocks-warned", "\n".join(blocks(every + "T1,3,4.899,0.153,4,3\nT1,20,1.001,0.1,300,1\n")[1]))
+    check_text(
+        "files.blocks-warned",
+        "\n".join(blocks(every + "T1,3,4.899,0.153,4,3\nT1,20,1.001,0.1,300,1\n")[1]),
+    )
 
 
 def test_a_single_flight_has_no_jitter_of_the_sun_pulses(run: Run, blocks: ReadBlocks) -> None:
@@ -308,30 +374,40 @@ def test_where_no_blocks_can_be_written_or_fired(run: Run, tmp_path: Path) -> No
     )
     refused.append(run("plan", "-", stdin=bad))
     assert [screen.returncode for screen in refused] == [2, 3, 2, 2]
-    check_text("files.blocks-refused", "\n".join(screen.stderr.rpartition("\n\n")[2] for screen in refused))
+    check_text(
+        "files.blocks-refused", "\n".join(screen.stderr.rpartition("\n\n")[2] for screen in refused)
+    )
 
 
 @pytest.mark.deep
 def test_disperse_and_verify_fire_the_blocks_of_a_file(run: Run) -> None:
-    """The same cases as of the plan from which the file was written: each from its own Sun pulses."""
+    """The same cases as of the plan from which the file was written:
+    each from its own Sun pulses.
+    """
     text = FILE + "dispersions: {thrust: {normal: 3 %}, A: {normal: 1 %}}\n"
     scheme = ("--scheme", "command-block")
     assert run("plan", "-", *GOAL, *scheme, *BLOCKS, stdin=text).returncode in (0, 4)
     by_file, by_scheme = (
-        result(run, f"disperse - {' '.join((*GOAL, *source))} --samples 100", stdin=text, status=(0, 4))
+        result(
+            run, f"disperse - {' '.join((*GOAL, *source))} --samples 100", stdin=text, status=(0, 4)
+        )
         for source in (BLOCKS, scheme)
     )
     assert by_file["requirement"] == by_scheme["requirement"]
     for name, percentiles in by_file["percentiles"].items():
         assert percentiles == pytest.approx(by_scheme["percentiles"][name], rel=1e-9, abs=1e-9)
     assert "blocks.csv" in run("verify", "-", *GOAL, *BLOCKS, stdin=text, status=0).stdout
-    assert run("verify", "-", *GOAL, *BLOCKS, "--schedule", "blocks.csv", stdin=text).returncode == 2
+    assert (
+        run("verify", "-", *GOAL, *BLOCKS, "--schedule", "blocks.csv", stdin=text).returncode == 2
+    )
 
 
 # --- telemetry
 
 BODY = nutdamp.example()
-DATED = BODY.with_(attitude={"quaternion": [1, 0, 0, 0], "epoch": "2026-03-01T12:00:00Z", "frame": "EME2000"})
+DATED = BODY.with_(
+    attitude={"quaternion": [1, 0, 0, 0], "epoch": "2026-03-01T12:00:00Z", "frame": "EME2000"}
+)
 ReadRecord = Callable[..., tuple[Record, list[str]]]
 
 
@@ -344,7 +420,9 @@ def read_record(write: Write) -> ReadRecord:
 
 
 def test_signals_in_all_their_units(read_record: ReadRecord) -> None:
-    record, warnings = read_record("t_s,omega_1_deg_s,omega_3_rad_s\n0,1.5,3\n0.1,,3.1\n0.3,-2,nan\n")
+    record, warnings = read_record(
+        "t_s,omega_1_deg_s,omega_3_rad_s\n0,1.5,3\n0.1,,3.1\n0.3,-2,nan\n"
+    )
     assert warnings == []
     assert_array_equal(record.times, [0.0, 0.1, 0.3])
     assert_allclose(record.signals[GYROS[0]], np.radians([1.5, math.nan, -2.0]))
@@ -370,28 +448,40 @@ def test_sun_pulses_by_samples_and_by_a_file_of_their_own(read_record: ReadRecor
 def test_a_crossing_is_of_the_direction_in_its_row_or_of_the_sun(read_record: ReadRecord) -> None:
     sunny = DATED.with_(sun="epoch")
     crossed = "crossing_azimuth_deg,crossing_elevation_deg"
-    record, _ = read_record(f"t_s,{crossed},crossing_ra_deg,crossing_dec_deg\n0,90,0,0,-90\n1,0,30,,\n2,,,,\n", sunny)
+    record, _ = read_record(
+        f"t_s,{crossed},crossing_ra_deg,crossing_dec_deg\n0,90,0,0,-90\n1,0,30,,\n2,,,,\n", sunny
+    )
     times, rows = record.samples((*SEEN, *DIRECTION))
     assert_array_equal(times, [0.0, 1.0])
     assert_allclose(rows[:, :3], [[0.0, 1.0, 0.0], [math.cos(math.pi / 6), 0.0, 0.5]], atol=1e-15)
-    assert_allclose(rows[:, 3:], np.array([[0.0, 0.0, -1.0], present(sunny.sun).tolist()]), atol=1e-15)
+    assert_allclose(
+        rows[:, 3:], np.array([[0.0, 0.0, -1.0], present(sunny.sun).tolist()]), atol=1e-15
+    )
     record, _ = read_record(f"t_s,{crossed}\n0,90,0\n", sunny)
     assert_allclose(record.samples(DIRECTION)[1], [present(sunny.sun)])
 
 
-def test_quaternions_give_the_axis_and_the_turn_in_place_of_an_axis(read_record: ReadRecord) -> None:
+def test_quaternions_give_the_axis_and_the_turn_in_place_of_an_axis(
+    read_record: ReadRecord,
+) -> None:
     half = math.sqrt(0.5)
-    record, _ = read_record(f"t_s,q_w,q_x,q_y,q_z,axis_x,axis_y,axis_z\n0,{half},{half},0,0,1,0,0\n1,,,,,1,0,0\n")
+    record, _ = read_record(
+        f"t_s,q_w,q_x,q_y,q_z,axis_x,axis_y,axis_z\n0,{half},{half},0,0,1,0,0\n1,,,,,1,0,0\n"
+    )
     times, turned = record.samples(QUATERNION)
     assert_array_equal(times, [0.0])
     assert_allclose(turned, [[half, half, 0.0, 0.0]])
     assert_allclose(record.samples(AXIS)[1], [[0.0, -1.0, 0.0]], atol=1e-15)
 
 
-def test_sun_aspect_angles_are_those_of_their_rows_or_of_the_pulses_in_a_file(read_record: ReadRecord) -> None:
+def test_sun_aspect_angles_are_those_of_their_rows_or_of_the_pulses_in_a_file(
+    read_record: ReadRecord,
+) -> None:
     record, _ = read_record("t_s,sun_aspect_deg\n0,60\n2,\n")
     assert_allclose(record.signals[SUN_ASPECT], [math.pi / 3, math.nan])
-    record, _ = read_record("t_s,omega_1_rad_s\n0,0.1\n1,0.2\n2,0.3\n", sun="t_s,sun_aspect_deg\n0.5,90\n1,60\n")
+    record, _ = read_record(
+        "t_s,omega_1_rad_s\n0,0.1\n1,0.2\n2,0.3\n", sun="t_s,sun_aspect_deg\n0.5,90\n1,60\n"
+    )
     assert_array_equal(record.times, [0.0, 0.5, 1.0, 2.0])
     assert_array_equal(record.sun_pulses, [0.5, 1.0])
     assert_allclose(record.signals[SUN_ASPECT], [math.nan, math.pi / 2, math.pi / 3, math.nan])
@@ -429,7 +519,9 @@ FAULTY_RECORDS = (
 )
 
 
-def test_faults_have_their_place_and_columns_not_known_are_said(read_record: ReadRecord, tmp_path: Path) -> None:
+def test_faults_have_their_place_and_columns_not_known_are_said(
+    read_record: ReadRecord, tmp_path: Path
+) -> None:
     check_faults("files.telemetry", read_record, FAULTY_RECORDS)
     for many in (1, 2):  # one more than is shown is shown too, of two more their number
         rows = "".join(f"{number},x\n" for number in range(tabular.MOST_FAULTS + many))

@@ -57,7 +57,14 @@ def test_numbers_have_sixteen_digits_and_read_back(value: float) -> None:
 
 
 def test_numbers_and_texts_are_short_and_plain() -> None:
-    short = {-0.0: "0.0", 120.0: "120.0", 0.25: "0.25", 1e-9: "0.000000001", -2e-5: "-0.00002", 1e22: "1.0E+22"}
+    short = {
+        -0.0: "0.0",
+        120.0: "120.0",
+        0.25: "0.25",
+        1e-9: "0.000000001",
+        -2e-5: "-0.00002",
+        1e22: "1.0E+22",
+    }
     assert {value: number(value) for value in short} == short
     assert label("  Überflieger-1\tα ") == "UBERFLIEGER-1"
     assert label("卫星") == "UNKNOWN"
@@ -74,17 +81,26 @@ def test_lines_keywords_and_both_notations(case: str) -> None:
         assert line.isprintable()
     assert "[" not in aem  # units are not written in this message
     starts = re.findall("^([A-Z]+)_START$", apm, re.MULTILINE)
-    expected = ["QUAT", "ANGVEL", *(["SPIN"] if plan.spacecraft.inertia.symmetric else []), "INERTIA"]
+    expected = [
+        "QUAT",
+        "ANGVEL",
+        *(["SPIN"] if plan.spacecraft.inertia.symmetric else []),
+        "INERTIA",
+    ]
     assert starts == [*expected, *["MAN"] * len(plan.pulses)]
     for name in set(starts):
         for body in re.findall(f"^{name}_START$(.*?)^{name}_STOP$", apm, re.MULTILINE | re.DOTALL):
             keywords = re.findall("^([A-Z0-9_]+) *=", body, re.MULTILINE)
             allowed = [keyword.name for keyword in APM_BLOCKS[name].keywords]
             assert keywords == [keyword for keyword in allowed if keyword in keywords]
-            assert {keyword.name for keyword in APM_BLOCKS[name].keywords if keyword.required} <= set(keywords)
+            assert {
+                keyword.name for keyword in APM_BLOCKS[name].keywords if keyword.required
+            } <= set(keywords)
             assert "COMMENT" not in body.split("=", 1)[1]
     pairs = re.findall(r"^([A-Z0-9_]+) *= (.*?)(?: \[.*\])?$", apm, re.MULTILINE)
-    top = "CCSDS_APM_VERS CREATION_DATE ORIGINATOR MESSAGE_ID OBJECT_NAME OBJECT_ID TIME_SYSTEM EPOCH"
+    top = (
+        "CCSDS_APM_VERS CREATION_DATE ORIGINATOR MESSAGE_ID OBJECT_NAME OBJECT_ID TIME_SYSTEM EPOCH"
+    )
     assert " ".join(keyword for keyword, _ in pairs[:8]) == top
     # The other notation holds the same.
     root = ElementTree.fromstring(export_text(plan, "apm", xml=True).split("\n", 1)[1])
@@ -92,11 +108,14 @@ def test_lines_keywords_and_both_notations(case: str) -> None:
     leaves = [leaf for leaf in root.iter() if leaf.tag != "COMMENT"]
     tagged = [(leaf.tag, leaf.text) for leaf in leaves if leaf.text and leaf.text.strip()]
     volatile = ("CREATION_DATE", "MESSAGE_ID")
-    plain, other = ([pair for pair in found if pair[0] not in volatile] for found in (pairs[1:], tagged))
+    plain, other = (
+        [pair for pair in found if pair[0] not in volatile] for found in (pairs[1:], tagged)
+    )
     assert plain == other
     root = ElementTree.fromstring(export_text(plan, "aem", xml=True).split("\n", 1)[1])
     states = [
-        " ".join(leaf.text or "" for leaf in state.iter() if not len(leaf)) for state in root.iter("attitudeState")
+        " ".join(leaf.text or "" for leaf in state.iter() if not len(leaf))
+        for state in root.iter("attitudeState")
     ]
     assert states == re.findall(r"^([0-9]{4}-\S+ .*)$", aem, re.MULTILINE)
 
@@ -106,15 +125,26 @@ def test_names_epochs_and_products_of_inertia_are_those_of_the_standard() -> Non
     assert "OBJECT_NAME = TILTED" in text
     assert "OBJECT_ID   = 2026-031A" in text
     assert "OBJECT_ID   = UNKNOWN" in export_text(messages.planned("prolate"), "apm")
-    assert "EPOCH = 2026-03-01T12:00:00.250000000" in export_text(messages.planned("steerable-stage"), "apm")
+    assert "EPOCH = 2026-03-01T12:00:00.250000000" in export_text(
+        messages.planned("steerable-stage"), "apm"
+    )
     tensor = dict(re.findall(r"^(I[XYZ]{2}) *= (\S+)", text, re.MULTILINE))
-    assert tensor == {"IXX": "120.0", "IYY": "104.0", "IZZ": "80.0", "IXY": "-3.0", "IXZ": "-6.0", "IYZ": "4.0"}
+    assert tensor == {
+        "IXX": "120.0",
+        "IYY": "104.0",
+        "IZZ": "80.0",
+        "IXY": "-3.0",
+        "IXZ": "-6.0",
+        "IYZ": "4.0",
+    }
 
 
 def test_sixty_rpm_of_a_flat_body_spin_backwards_about_the_axis() -> None:
     """C/A = 1.5 at 360 deg/s: the body turns at -180 deg/s about its axis, which turns about H."""
     body = messages.spacecraft("oblate")
-    text = export_text(planning.Plan(replace(body, omega0=body.omega0 * 2.0), "none", Schedule()), "apm")
+    text = export_text(
+        planning.Plan(replace(body, omega0=body.omega0 * 2.0), "none", Schedule()), "apm"
+    )
     (about_axis,) = re.findall(r"SPIN_ANGLE_VEL = (\S+)", text)
     assert float(about_axis) == pytest.approx(-180.0, rel=1e-14)
     assert "MAN_START" not in text
@@ -130,13 +160,17 @@ def test_what_a_message_leaves_out_is_said() -> None:
         export_text(other, "apm").partition("MAN_START")[0]
         for other in (disturbed, varied(plan, tank=TANK), tilted, wheeled)
     )
-    comments = (line for head in heads for line in re.findall("^COMMENT (?!nutdamp).*", head, re.MULTILINE))
+    comments = (
+        line for head in heads for line in re.findall("^COMMENT (?!nutdamp).*", head, re.MULTILINE)
+    )
     check_text("files.apm-comments", "\n".join(line for line in comments if line not in usual))
 
 
 @pytest.mark.parametrize("xml", [False, True])
 @pytest.mark.parametrize("form", ["apm", "opm"])
-def test_comments_say_what_is_commanded_and_that_the_keywords_are_the_thrust(form: str, xml: bool) -> None:
+def test_comments_say_what_is_commanded_and_that_the_keywords_are_the_thrust(
+    form: str, xml: bool
+) -> None:
     plan = valved()
     text = export_text(plan, form, xml=xml)
     assert len(plan.pulses) > 1
@@ -145,10 +179,13 @@ def test_comments_say_what_is_commanded_and_that_the_keywords_are_the_thrust(for
         utc = (plan.spacecraft.utc(present(pulse.command).start) or "").removesuffix("Z")
         assert f"Commanded: {present(pulse.command).on_time:.9g} s from {utc} on." in text
         assert f"those of the thrust: {pulse.on_time:.9g} s at the torque given." in text
-    assert "Commanded" not in export_text(planning.plan(read_spacecraft(VALVED, "f.yaml"), "one-pulse"), form, xml=xml)
+    assert "Commanded" not in export_text(
+        planning.plan(read_spacecraft(VALVED, "f.yaml"), "one-pulse"), form, xml=xml
+    )
 
 
-# --- orbit parameter messages ----------------------------------------------------------------------------------------
+# --- orbit parameter messages
+# ----------------------------------------------------------------------------------------
 
 
 def manoeuvres(text: str) -> list[dict[str, str]]:
@@ -167,7 +204,9 @@ def test_velocity_changes_are_those_of_each_pulse(name: str) -> None:
         velocity = 1e3 * np.array([float(manoeuvre[f"MAN_DV_{axis}"]) for axis in (1, 2, 3)])
         assert velocity == pytest.approx(velocity_change(plan, pulse), rel=1e-7, abs=1e-12)
         assert float(manoeuvre["MAN_DURATION"]) == pytest.approx(pulse.on_time, rel=1e-15)
-        assert float(manoeuvre["MAN_DELTA_MASS"]) == pytest.approx(-present(pulse.propellant), rel=1e-15)
+        assert float(manoeuvre["MAN_DELTA_MASS"]) == pytest.approx(
+            -present(pulse.propellant), rel=1e-15
+        )
         total += velocity
     assert total == pytest.approx(present(plan.delta_v), rel=1e-9, abs=1e-15)
 
@@ -179,7 +218,15 @@ def test_without_an_orbit_only_the_manoeuvres_are_written() -> None:
     keywords = [re.findall(r"^(\w+) +=", text, re.MULTILINE) for text in (whole, part)]
     state = ["EPOCH", "X", "Y", "Z", "X_DOT", "Y_DOT", "Z_DOT"]
     assert [word for word in keywords[0] if word not in (*state, "CENTER_NAME")] == keywords[1]
-    head = ["CREATION_DATE", "ORIGINATOR", "MESSAGE_ID", "OBJECT_NAME", "OBJECT_ID", "CENTER_NAME", "REF_FRAME"]
+    head = [
+        "CREATION_DATE",
+        "ORIGINATOR",
+        "MESSAGE_ID",
+        "OBJECT_NAME",
+        "OBJECT_ID",
+        "CENTER_NAME",
+        "REF_FRAME",
+    ]
     assert keywords[0][:17] == ["CCSDS_OPM_VERS", *head, "TIME_SYSTEM", *state, "MASS"]
     assert manoeuvres(whole) == manoeuvres(part)
     only = [line for line in part.splitlines() if line.startswith("COMMENT") and line not in whole]
@@ -187,11 +234,18 @@ def test_without_an_orbit_only_the_manoeuvres_are_written() -> None:
     assert "<stateVector>" not in export_text(plans[1], "opm", xml=True)
 
 
-# --- what cannot be exported -----------------------------------------------------------------------------------------
+# --- what cannot be exported
+# -----------------------------------------------------------------------------------------
 
 ORBITAL = {
-    "velocity not known": ("position: [0, 0.5, 0.8], direction: [1, 0, 0], force: 10 N", "torque: [8, 0, 0]"),
-    "propellant not known": ("direction: [1, 0, 0], force: 10 N, isp: 220 s", "direction: [1, 0, 0], force: 10 N"),
+    "velocity not known": (
+        "position: [0, 0.5, 0.8], direction: [1, 0, 0], force: 10 N",
+        "torque: [8, 0, 0]",
+    ),
+    "propellant not known": (
+        "direction: [1, 0, 0], force: 10 N, isp: 220 s",
+        "direction: [1, 0, 0], force: 10 N",
+    ),
     "no mass": ("mass: 250 kg\n", ""),
 }
 
@@ -209,15 +263,26 @@ def test_what_cannot_be_exported_is_refused() -> None:
     }
     cases: dict[str, tuple[planning.Plan, str, dict[str, Any]]] = {
         "an ideal impulse": (ideal, "apm", {}),
-        **{f"no attitude, {form}": (varied(plan, attitude=None), form, {}) for form in ("apm", "aem", "stk")},
+        **{
+            f"no attitude, {form}": (varied(plan, attitude=None), form, {})
+            for form in ("apm", "aem", "stk")
+        },
         "no epoch": (varied(plan, attitude=replace(attitude, epoch=None)), "apm", {}),
-        "a frame that no format knows": (varied(plan, attitude=replace(attitude, frame="TEME")), "apm", {}),
+        "a frame that no format knows": (
+            varied(plan, attitude=replace(attitude, frame="TEME")),
+            "apm",
+            {},
+        ),
         "XML for STK": (plan, "stk", {"xml": True}),
         "an end of an APM": (plan, "apm", {"until": 3.0}),
         "a late end": (plan, "aem", {"until": 1e7}),
         "after the year 9999": (plan, "aem", {"until": 1e12}),
         **{name: (other, "opm", {}) for name, other in orbital.items()},
-        "very many spins": (planning.Plan(spinner(), "none", Schedule()), "spin-table", {"until": 1e6}),
+        "very many spins": (
+            planning.Plan(spinner(), "none", Schedule()),
+            "spin-table",
+            {"until": 1e6},
+        ),
         "no spin": (
             planning.Plan(spinner(degrees=0.0, channels=(brake,)), "by hand", halted),
             "spin-table",
@@ -230,16 +295,21 @@ def test_what_cannot_be_exported_is_refused() -> None:
         f"{name}: {refusal(BadRequest, export_text, other, form, **options)}"
         for name, (other, form, options) in cases.items()
     )
-    check_text("files.not-exported", re.sub("[0-9]{8,} records", "very many records", "\n".join(said)))
+    check_text(
+        "files.not-exported", re.sub("[0-9]{8,} records", "very many records", "\n".join(said))
+    )
 
 
-# --- the script for Basilisk, which tests/optional/basilisk runs -----------------------------------------------------
+# --- the script for Basilisk, which tests/optional/basilisk runs
+# -----------------------------------------------------
 
 
 def test_it_is_python_with_the_schedule_in_the_axes_of_the_file() -> None:
     plan = messages.planned("tilted tensor, backwards")
     tank = Tank(2.0, 22e5, 16e5, 1.0)
-    named = replace(plan, spacecraft=replace(plan.spacecraft, name='a """ name \\ of {many} parts', tank=tank))
+    named = replace(
+        plan, spacecraft=replace(plan.spacecraft, name='a """ name \\ of {many} parts', tank=tank)
+    )
     tree = ast.parse(export_text(named, "basilisk"))
     values = {
         node.targets[0].id: node.value
@@ -255,27 +325,40 @@ def test_it_is_python_with_the_schedule_in_the_axes_of_the_file() -> None:
     assert sum(duration for _, duration, _ in schedule) == pytest.approx(plan.pulses.end, rel=1e-14)
 
 
-@pytest.mark.parametrize("moments", [(100.0, 130.0, 180.0), (130.0, 100.0, 80.0), (120.0, 120.0, 80.0)])
-def test_the_cones_that_the_script_prints_are_those_of_the_residual(moments: tuple[float, float, float]) -> None:
+@pytest.mark.parametrize(
+    "moments", [(100.0, 130.0, 180.0), (130.0, 100.0, 80.0), (120.0, 120.0, 80.0)]
+)
+def test_the_cones_that_the_script_prints_are_those_of_the_residual(
+    moments: tuple[float, float, float],
+) -> None:
     """The function alone, as it stands in the script."""
     parsed = ast.parse(export_text(messages.planned("prolate"), "basilisk"))
-    (cones,) = (node for node in parsed.body if isinstance(node, ast.FunctionDef) and node.name == "largest_cones")
+    (cones,) = (
+        node
+        for node in parsed.body
+        if isinstance(node, ast.FunctionDef) and node.name == "largest_cones"
+    )
     names: dict[str, Any] = {"math": math, "PRINCIPAL_MOMENTS": np.array(moments)}
     exec(compile(ast.Module([cones], []), "fly.py", "exec"), names)
     for rates in ([0.4, 0.1, 2.0], [0.1, -0.4, -2.0], [1e-6, 1e-7, 2.0]):
         for sense in (1.0, -1.0):
             expected = tuple(arc_cones(moments, rates, sense))
-            assert names["largest_cones"](np.array(rates), sense) == pytest.approx(expected, rel=1e-9)
+            assert names["largest_cones"](np.array(rates), sense) == pytest.approx(
+                expected, rel=1e-9
+            )
 
 
-# --- histories of the attitude: fine enough for whoever interpolates, and the motion of the integrator
+# --- histories of the attitude: fine enough for whoever interpolates, and the motion of the
+# integrator
 
 HEADER = [column.key for column in SPINS]
 
 
 def flown_on(plan: planning.Plan) -> propagation.Flight:
     """The flight to the end of a track."""
-    return propagation.flown(plan.spacecraft, plan.pulses, plan.pulses.end + plan.spacecraft.inertial_period)
+    return propagation.flown(
+        plan.spacecraft, plan.pulses, plan.pulses.end + plan.spacecraft.inertial_period
+    )
 
 
 @CASES
@@ -288,7 +371,8 @@ def test_records_are_close_and_continuous(case: str) -> None:
         assert two.t[0] == pytest.approx(one.t[-1], abs=4e-9)
     quaternion = np.concatenate([stretch.quaternion for stretch in track])
     assert np.all(np.sum(quaternion[1:] * quaternion[:-1], axis=1) > 0.9)  # no jumps of sign
-    ends, worst = [pulse.end for pulse in flown.schedule], 0.0
+    ends = [pulse.end for pulse in flown.schedule]
+    worst = 0.0
     for stretch in track:
         assert stretch.completed == sum(end <= stretch.t[0] + 1e-9 for end in ends)
         assert len(stretch.t) >= 4
@@ -296,18 +380,27 @@ def test_records_are_close_and_continuous(case: str) -> None:
         assert stretch.t.tolist() == (np.rint(stretch.t * 1e9) / 1e9).tolist()
         turns = np.linalg.norm(stretch.rates, axis=1)[1:] * np.diff(stretch.t)
         assert turns.max() <= 1.02 * TURN < math.radians(18.0)
-        # Readers that look at quaternions only take one turn about a fixed axis from record to record.
+        # Readers that look at quaternions only take one turn about a fixed axis from record to
+        # record.
         middle = stretch.quaternion[1:] + stretch.quaternion[:-1]  # half of the turn
         middle /= np.linalg.norm(middle, axis=1, keepdims=True)
-        leg = next(leg for leg in flown.legs if leg.start - 1e-9 <= stretch.t[0] and stretch.t[-1] <= leg.end + 1e-9)
+        leg = next(
+            leg
+            for leg in flown.legs
+            if leg.start - 1e-9 <= stretch.t[0] and stretch.t[-1] <= leg.end + 1e-9
+        )
         _, truth = leg.path.motion(0.5 * (stretch.t[1:] + stretch.t[:-1]))
         for one, two in zip(middle, truth, strict=True):
-            worst = max(worst, messages.turned(attitude.matrix(one), messages.columns(flown.spacecraft, two)))
+            worst = max(
+                worst,
+                messages.turned(attitude.matrix(one), messages.columns(flown.spacecraft, two)),
+            )
     assert worst <= 0.01
 
 
 def stk(plan: planning.Plan) -> tuple[dict[str, str], np.ndarray]:
-    """Keywords of a file for STK with their values, and its rows: time, quaternion scalar last, rates in deg/s.
+    """Keywords of a file for STK with their values, and its rows: time, quaternion scalar last,
+    rates in deg/s.
 
     The motion must be that of the flight.
     """
@@ -319,14 +412,20 @@ def stk(plan: planning.Plan) -> tuple[dict[str, str], np.ndarray]:
     assert int(keywords["NumberOfAttitudePoints"]) == len(rows)
     assert keywords["CentralBody"] == "Earth"
     assert np.all(np.diff(rows[:, 0]) > 0.0)
-    body, flown = plan.spacecraft, flown_on(plan)
+    body = plan.spacecraft
+    flown = flown_on(plan)
     for t, *values in rows.tolist():
-        # A row at the time of a jump shows the motion before it; the one a nanosecond later the motion after it.
-        leg = next(leg for leg in flown.legs if leg.start <= t <= leg.end + 0.6e-9 and leg.end > leg.start)
+        # A row at the time of a jump shows the motion before it; the one a nanosecond later the
+        # motion after it.
+        leg = next(
+            leg for leg in flown.legs if leg.start <= t <= leg.end + 0.6e-9 and leg.end > leg.start
+        )
         rates, quaternion = leg.path.motion(np.array([t]))
         turn = np.array([values[3], *values[:3]])
         assert messages.turned(attitude.matrix(turn), messages.columns(body, quaternion[0])) <= 1e-6
-        assert np.radians(values[4:]) == pytest.approx(messages.in_file_axes(body, rates[0]), abs=1e-8)
+        assert np.radians(values[4:]) == pytest.approx(
+            messages.in_file_axes(body, rates[0]), abs=1e-8
+        )
     return keywords, rows
 
 
@@ -339,7 +438,9 @@ def test_files_for_stk_have_the_motion_of_the_flight(case: str) -> None:
     assert np.abs(rows[:, :1] - edges).min(axis=0).max() <= 0.51e-9
     if case == "steerable-stage":
         assert keywords["ScenarioEpoch"] == "1 Mar 2026 12:00:00.250000000"
-    assert keywords["CoordinateAxes"] == ("ICRF" if present(plan.spacecraft.attitude).frame == "GCRF" else "J2000")
+    assert keywords["CoordinateAxes"] == (
+        "ICRF" if present(plan.spacecraft.attitude).frame == "GCRF" else "J2000"
+    )
 
 
 def test_ideal_impulses_let_the_rates_jump_within_a_nanosecond() -> None:
@@ -352,14 +453,20 @@ def test_ideal_impulses_let_the_rates_jump_within_a_nanosecond() -> None:
 def unit(right_ascension: float, declination: float) -> Vector:
     """The direction of two angles in deg."""
     alpha, delta = math.radians(right_ascension), math.radians(declination)
-    return np.array([math.cos(delta) * math.cos(alpha), math.cos(delta) * math.sin(alpha), math.sin(delta)])
+    return np.array(
+        [math.cos(delta) * math.cos(alpha), math.cos(delta) * math.sin(alpha), math.sin(delta)]
+    )
 
 
 def first_axis(alpha: float, delta: float, angle: float) -> Vector:
-    """Body axis 1 by the turns Z-X-Z of annex F5, deg: about z by 90 + alpha, about x by 90 - delta, then angle."""
+    """Body axis 1 by the turns Z-X-Z of annex F5, deg: about z by 90 + alpha, about x by 90 -
+    delta, then angle.
+    """
     node = np.array([-math.sin(math.radians(alpha)), math.cos(math.radians(alpha)), 0.0])
     turned = math.radians(angle)
-    return np.asarray(math.cos(turned) * node + math.sin(turned) * np.cross(unit(alpha, delta), node))
+    return np.asarray(
+        math.cos(turned) * node + math.sin(turned) * np.cross(unit(alpha, delta), node)
+    )
 
 
 @spread("case", [name for name in messages.BODIES if "tensor" not in name], quick=2)
@@ -375,60 +482,90 @@ def test_spin_nutation_and_momentum_are_those_of_the_motion(case: str) -> None:
     assert sum(any(pulse.start < time < pulse.end for pulse in plan.pulses) for time in times) > 3
     moved = motions(body, plan.pulses, times, messages.columns(body, body.initial.quaternion))
     for (_, numbers), motion in zip(rows, moved, strict=True):
-        alpha, delta, angle, own, momentum_alpha, momentum_delta, about = map(float, numbers.split())
+        alpha, delta, angle, own, momentum_alpha, momentum_delta, about = map(
+            float, numbers.split()
+        )
         momentum = reference.momentum(body.inertia.moments, motion)
         assert unit(alpha, delta) == pytest.approx(motion.rotation[:, 2], abs=1e-8)
         assert first_axis(alpha, delta, angle) == pytest.approx(motion.rotation[:, 0], abs=1e-8)
-        assert unit(momentum_alpha, momentum_delta) == pytest.approx(momentum / np.linalg.norm(momentum), abs=1e-10)
-        turned = math.radians(about) * unit(momentum_alpha, momentum_delta) + math.radians(own) * unit(alpha, delta)
+        assert unit(momentum_alpha, momentum_delta) == pytest.approx(
+            momentum / np.linalg.norm(momentum), abs=1e-10
+        )
+        turned = math.radians(about) * unit(momentum_alpha, momentum_delta) + math.radians(
+            own
+        ) * unit(alpha, delta)
         assert turned == pytest.approx(motion.rotation @ motion.rates, abs=2e-8)
 
 
 def leaning() -> Spacecraft:
     """A symmetric body whose axis leans by 1 deg from the third axis of its file."""
     lean = math.radians(1.0)
-    turn = np.array([[1, 0, 0], [0, math.cos(lean), -math.sin(lean)], [0, math.sin(lean), math.cos(lean)]])
+    turn = np.array(
+        [[1, 0, 0], [0, math.cos(lean), -math.sin(lean)], [0, math.sin(lean), math.cos(lean)]]
+    )
     tensor = (turn @ np.diag([120.0, 120.0, 80.0]) @ turn.T).tolist()
-    return read_spacecraft(messages.BODIES["prolate"].replace("{A: 120, C: 80}", f"{{tensor: {tensor}}}"), "leaning")
+    return read_spacecraft(
+        messages.BODIES["prolate"].replace("{A: 120, C: 80}", f"{{tensor: {tensor}}}"), "leaning"
+    )
 
 
 @spread("case", ["leaning", *(name for name in messages.BODIES if "tensor" in name)], quick=2)
 @pytest.mark.parametrize("xml", [False, True])
 def test_bodies_without_steady_nutation_have_the_spin_of_each_moment(case: str, xml: bool) -> None:
-    """The attitude by annex F5, and the rate about the third axis of the file; as keywords and values, and as XML."""
-    plan = planning.Plan(leaning(), "none", Schedule()) if case == "leaning" else messages.planned(case)
+    """The attitude by annex F5, and the rate about the third axis of the file; as keywords and
+    values, and as XML.
+    """
+    plan = (
+        planning.Plan(leaning(), "none", Schedule())
+        if case == "leaning"
+        else messages.planned(case)
+    )
     body = plan.spacecraft
     assert (case == "leaning") == body.inertia.symmetric
     text = export_text(plan, "aem-spin", xml=xml)
     if xml:
         root = ElementTree.fromstring(text.split("\n", 1)[1])
         leaves = [
-            [leaf.text or "" for leaf in spin] for state in root.iter("attitudeState") for spin in state.iter("spin")
+            [leaf.text or "" for leaf in spin]
+            for state in root.iter("attitudeState")
+            for spin in state.iter("spin")
         ]
         kinds = {entry.text for entry in root.iter("ATTITUDE_TYPE")}
     else:
         leaves = [line.split() for line in re.findall(r"^[0-9]{4}-\S+ .*$", text, re.MULTILINE)]
         kinds = set(re.findall(r"^ATTITUDE_TYPE += (\S+)$", text, re.MULTILINE))
     assert kinds == {"SPIN"}
-    start, rows = Epoch.parse(present(body.attitude).epoch or ""), leaves[::6]
+    start = Epoch.parse(present(body.attitude).epoch or "")
+    rows = leaves[::6]
     assert len(rows) > 10
     times = [Epoch.parse(moment).since(start) for moment, *_ in rows]
-    moved = motions(body, plan.pulses, times, messages.columns(body, body.initial.quaternion) @ body.inertia.axes)
+    moved = motions(
+        body,
+        plan.pulses,
+        times,
+        messages.columns(body, body.initial.quaternion) @ body.inertia.axes,
+    )
     for (_, *numbers), motion in zip(rows, moved, strict=True):
         alpha, delta, angle, rate = map(float, numbers)
         columns = motion.rotation @ body.inertia.axes.T
         assert unit(alpha, delta) == pytest.approx(columns[:, 2], abs=1e-8)
         assert first_axis(alpha, delta, angle) == pytest.approx(columns[:, 0], abs=1e-8)
-        assert math.radians(rate) == pytest.approx(messages.in_file_axes(body, motion.rates)[2], abs=2e-8)
+        assert math.radians(rate) == pytest.approx(
+            messages.in_file_axes(body, motion.rates)[2], abs=2e-8
+        )
 
 
 def test_only_a_message_without_nutation_is_remarked_upon() -> None:
     plans = [messages.planned("prolate"), messages.planned("tilted tensor, backwards")]
-    assert [[note.code for note in export_notes(plan, "aem-spin")] for plan in plans] == [[], ["spin-alone"]]
+    assert [[note.code for note in export_notes(plan, "aem-spin")] for plan in plans] == [
+        [],
+        ["spin-alone"],
+    ]
     assert export_notes(plans[1], "aem") == []
 
 
-# --- a schedule spin by spin -----------------------------------------------------------------------------------------
+# --- a schedule spin by spin
+# -----------------------------------------------------------------------------------------
 
 SUNLIT = spinners.FILE.replace("C: 180", "C: 150")
 
@@ -441,7 +578,10 @@ def table(text: str) -> list[dict[str, str]]:
 def turned(body: Spacecraft, pulses: Schedule, ends: list[float]) -> Iterable[float]:
     """∫ω3 dt from 0 to each of ``ends`` s by Simpson on the reference integrator, rad."""
     inner = (edge for pulse in pulses for edge in (pulse.start, pulse.end) if edge < ends[-1])
-    grids = [np.linspace(a, b, 2 * math.ceil(60 * (b - a)) + 41) for a, b in pairwise(sorted({0.0, *ends, *inner}))]
+    grids = [
+        np.linspace(a, b, 2 * math.ceil(60 * (b - a)) + 41)
+        for a, b in pairwise(sorted({0.0, *ends, *inner}))
+    ]
     moved = iter(motions(body, pulses, np.concatenate(grids).tolist(), np.eye(3)))
     total = 0.0
     for grid in grids:
@@ -461,8 +601,12 @@ def test_a_spin_is_a_turn_about_axis_3(moments: tuple[float, float, float], spin
     starts, periods = ([float(row[name]) for row in rows] for name in ("start_s", "period_s"))
     assert len(rows) > 4
     assert starts[-1] <= 9.0 < starts[-1] + periods[-1]
-    assert [(row["spin"], row["start_utc"]) for row in rows] == [(str(number + 1), "") for number in range(len(rows))]
-    angles = turned(body, pulses, [start + period for start, period in zip(starts, periods, strict=True)])
+    assert [(row["spin"], row["start_utc"]) for row in rows] == [
+        (str(number + 1), "") for number in range(len(rows))
+    ]
+    angles = turned(
+        body, pulses, [start + period for start, period in zip(starts, periods, strict=True)]
+    )
     for turns, angle in enumerate(angles, start=1):
         assert abs(angle) == pytest.approx(2.0 * math.pi * turns, abs=2e-8)
     assert sum(int(row["pulses"]) for row in rows) == 3
@@ -470,12 +614,18 @@ def test_a_spin_is_a_turn_about_axis_3(moments: tuple[float, float, float], spin
 
 
 def test_every_pulse_is_in_its_spin_with_its_phase() -> None:
-    body = aimed(spinner(degrees=0.0, channels=cross(60.0), limits=Limits(earliest=7.0)), 12.0, 45.0)
+    body = aimed(
+        spinner(degrees=0.0, channels=cross(60.0), limits=Limits(earliest=7.0)), 12.0, 45.0
+    )
     plan = planning.plan(body, "rhumb-line")
     rows = table(export_text(plan, "spin-table"))
     fired: list[tuple[float, str, float]] = []
     for row in rows:
-        cells = [row[name].split("; ") for name in HEADER[-3:]] if row["pulses"] != "0" else [[], [], []]
+        cells = (
+            [row[name].split("; ") for name in HEADER[-3:]]
+            if row["pulses"] != "0"
+            else [[], [], []]
+        )
         assert [len(cell) for cell in cells] == 3 * [int(row["pulses"])]
         for name, phase, on_time in zip(*cells, strict=True):
             assert 0.0 <= float(phase) < 360.0
@@ -484,13 +634,17 @@ def test_every_pulse_is_in_its_spin_with_its_phase() -> None:
     starts = [pulse.start for pulse in plan.pulses]
     assert [name for _, name, _ in fired] == [pulse.channel for pulse in plan.pulses]
     assert [start for start, _, _ in fired] == pytest.approx(starts, abs=1e-8)
-    assert [on for _, _, on in fired] == pytest.approx([pulse.on_time for pulse in plan.pulses], abs=1e-9)
+    assert [on for _, _, on in fired] == pytest.approx(
+        [pulse.on_time for pulse in plan.pulses], abs=1e-9
+    )
     assert [rows[0][name] for name in HEADER[-4:]] == ["0", "", "", ""]
     assert float(rows[-1]["start_s"]) < starts[-1]
 
 
 def test_with_a_sensor_spins_are_counted_by_sun_pulses() -> None:
-    """At each the Sun is at the azimuth of the sensor, and blocks are numbered and delayed alike."""
+    """At each the Sun is at the azimuth of the sensor,
+    and blocks are numbered and delayed alike.
+    """
     body = read_spacecraft(SUNLIT, "sunlit.yaml")
     goal = replace(body.goal, axis=np.array([0.0, math.sin(0.03), math.cos(0.03)]))
     plan = planning.plan(replace(body, goal=goal), "command-block")
@@ -498,14 +652,20 @@ def test_with_a_sensor_spins_are_counted_by_sun_pulses() -> None:
     rows = table(export_text(plan, "spin-table"))
     assert [rows[0][name] for name in HEADER[:3]] == ["0", "1998-01-07T12:00:00.000000000Z", "0.0"]
     for row in rows[1::3]:
-        moved = reference.fly(body.inertia.moments, body.omega0, events(plan.pulses), float(row["start_s"]), np.eye(3))
+        moved = reference.fly(
+            body.inertia.moments, body.omega0, events(plan.pulses), float(row["start_s"]), np.eye(3)
+        )
         seen = moved.rotation.T @ present(body.sun)
         assert math.degrees(math.atan2(seen[1], seen[0])) == pytest.approx(35.0, abs=1e-6)
     fired = {int(row["spin"]): row for row in rows if row["pulses"] != "0"}
     blocks = plan.pulses.blocks
-    assert sorted(fired) == [block.first + index * block.every for block in blocks for index in range(block.count)]
+    assert sorted(fired) == [
+        block.first + index * block.every for block in blocks for index in range(block.count)
+    ]
     row = fired[blocks[0].first]
-    assert float(row["phase_deg"]) / 360.0 * float(row["period_s"]) == pytest.approx(blocks[0].delay, abs=1e-8)
+    assert float(row["phase_deg"]) / 360.0 * float(row["period_s"]) == pytest.approx(
+        blocks[0].delay, abs=1e-8
+    )
     assert float(row["on_time_s"]) == pytest.approx(blocks[0].width, rel=1e-12)
 
 
@@ -522,7 +682,9 @@ def test_a_pulse_before_the_first_sun_pulse_is_in_spin_0_and_commands_are_those_
     body = read_spacecraft(SUNLIT + valve, "sunlit.yaml")
     pulse = on_command(body.channels[0], 6.0, 0.2)
     assert pulse.on_time == pytest.approx(0.186, rel=1e-12)
-    (row,) = [row for row in table(spin_table(body, Schedule((pulse,)), 10.0)) if row["pulses"] == "1"]
+    (row,) = [
+        row for row in table(spin_table(body, Schedule((pulse,)), 10.0)) if row["pulses"] == "1"
+    ]
     assert float(row["on_time_s"]) == 0.2
     phase = 360.0 * (6.0 - float(row["start_s"])) / float(row["period_s"])
     assert float(row["phase_deg"]) == pytest.approx(phase, abs=1e-6)

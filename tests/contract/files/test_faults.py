@@ -1,4 +1,6 @@
-"""Spacecraft files that are refused or doubted: each gives exactly its faults, at their places, with a cure."""
+"""Spacecraft files that are refused or doubted: each gives exactly its faults, at their places,
+with a cure.
+"""
 
 import copy
 import json
@@ -67,7 +69,9 @@ paintwork: red
 """
     repeated = BASE + "thrusters:\n- &t {name: T1, torque: [8, 0, 0], isp: 0}\n- *t\n"
     texts = (several, repeated, SPIN + "inertia: {A: 120 kg, C: 80}\n")
-    check_text("files.several-faults", "\n\n".join("\n".join(map(str, faults_of(text))) for text in texts))
+    check_text(
+        "files.several-faults", "\n\n".join("\n".join(map(str, faults_of(text))) for text in texts)
+    )
 
 
 def test_very_many_faults_are_found_in_few_calls() -> None:
@@ -77,7 +81,24 @@ def test_very_many_faults_are_found_in_few_calls() -> None:
         assert len(faults_of(f"{BASE}thrusters:\n{thrusters}channels: {{a: [{names}]}}\n")) == 360
 
 
-SLIPS = ["", "~", "true", ".nan", "1e999", "-1", "0", "[]", "{}", "'", "\t", "*a", "&a x", "!!x y", "5 Hz", "- a"]
+SLIPS = [
+    "",
+    "~",
+    "true",
+    ".nan",
+    "1e999",
+    "-1",
+    "0",
+    "[]",
+    "{}",
+    "'",
+    "\t",
+    "*a",
+    "&a x",
+    "!!x y",
+    "5 Hz",
+    "- a",
+]
 
 
 @st.composite
@@ -122,10 +143,26 @@ def test_a_mutated_example_is_read_or_refused(data: bytes, tmp_path: Path) -> No
     judge(lambda: load_spacecraft(path))
 
 
-SECTIONS = ["inertia", "omega0", "state", "attitude", "thrusters", "channels", "steerable", "requirement", "limits"]
+SECTIONS = [
+    "inertia",
+    "omega0",
+    "state",
+    "attitude",
+    "thrusters",
+    "channels",
+    "steerable",
+    "requirement",
+    "limits",
+]
 VALUES = st.recursive(
-    st.none() | st.booleans() | st.integers(-(10**20), 10**20) | st.floats() | st.sampled_from(["3 kg", "x", "1 s"]),
-    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=4), inner, max_size=4),
+    st.none()
+    | st.booleans()
+    | st.integers(-(10**20), 10**20)
+    | st.floats()
+    | st.sampled_from(["3 kg", "x", "1 s"]),
+    lambda inner: (
+        st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=4), inner, max_size=4)
+    ),
     max_leaves=6,
 )
 DISTURBANCES = st.fixed_dictionaries(
@@ -150,16 +187,24 @@ def test_any_value_of_any_shape_is_read_or_refused(entry: tuple[str, object]) ->
     judge(lambda: read_spacecraft("\n".join([*lines, f"{key}: {json.dumps(value)}"]), "f.yaml"))
 
 
-# --- numbers without a unit that are hardly meant --------------------------------------------------------------------
+# --- numbers without a unit that are hardly meant
+# --------------------------------------------------------------------
 
 DATED = "attitude: {quaternion: [1, 0, 0, 0], epoch: 2026-03-01T12:00:00Z, frame: GCRF}\n"
-THRUSTER = "thrusters: [{{name: T, position: [0, {}, 0.8], direction: [1, 0, 0], force: 10, min_on_time: {}}}]\n"
+THRUSTER = (
+    "thrusters: [{{name: T, position: [0, {}, 0.8], direction: [1, 0, 0], force: 10, "
+    "min_on_time: {}}}]\n"
+)
 TENSOR = "name: X\ninertia: {tensor: [[120, 0, 0], [0, 110, 0], [0, 0, 80]]}\n"
 
 
 def whole(lines: str) -> str:
     """A file that has these lines, and what else it needs before them."""
-    return lines if lines.startswith("name") else (BODY if lines.startswith(("state", "omega0")) else BASE) + lines
+    return (
+        lines
+        if lines.startswith("name")
+        else (BODY if lines.startswith(("state", "omega0")) else BASE) + lines
+    )
 
 
 def doubts_of(lines: str) -> list[Fault]:
@@ -184,7 +229,8 @@ DOUBTED = (
     THRUSTER.format(0.3, 20),
     THRUSTER.format(0.3, 0) + "valve: {open_delay: 8, close_delay: 12 ms}",
     THRUSTER.format("0.3", "0, impulse_bit: [[0.02, 0.15, 16], [0.04, 0.36, 30 s]]"),
-    THRUSTER.format(0.3, "0, isp: 200") + "tank: {propellant: 3, pressure: 22, final_pressure: 8 Pa}",
+    THRUSTER.format(0.3, "0, isp: 200")
+    + "tank: {propellant: 3, pressure: 22, final_pressure: 8 Pa}",
     THRUSTER.format(0.3, 0) + "cold: {first: 90, pulses: 4}",
     THRUSTER.format(0.3, "20 ms, max_on_time: 2000"),
     "steerable: {torque: 3, lever_arm: 800}",
@@ -192,7 +238,8 @@ DOUBTED = (
     f"{DATED}orbit: {{position: [0, 7000 km, 0], velocity: [0, 0, -7.5]}}",
     "requirement: {nutation: 0.5}",
     "requirement: {nutation: 0.5 deg, momentum_shift: 0.2}",
-    "state: {spin: 3, nutation: 2 deg}\nrequirement: {nutation: 0.05}",  # 2.9 deg, more than there is
+    # 2.9 deg, more than there is
+    "state: {spin: 3, nutation: 2 deg}\nrequirement: {nutation: 0.05}",
     "omega0: [0.02, 0, 3]\nrequirement: {nutation: 0.05}",
     f"{TENSOR}omega0: [0.02, 0, 3]\nrequirement: {{nutation: 0.05}}",
     # In the order of the file.
@@ -223,7 +270,9 @@ UNDOUBTED = (
 
 def test_numbers_beyond_what_can_be_meant_are_taken_with_a_warning() -> None:
     said = (
-        "\n    ".join([lines.strip().replace("\n", " | "), *(doubt.as_warning for doubt in doubts_of(lines))])
+        "\n    ".join(
+            [lines.strip().replace("\n", " | "), *(doubt.as_warning for doubt in doubts_of(lines))]
+        )
         for lines in DOUBTED
     )
     check_text("files.doubts", "\n".join(said))
@@ -251,10 +300,16 @@ def test_an_angle_too_large_is_refused_with_its_likely_unit_where_degrees_are_a_
         *(f"state: {{spin: 3, nutation: {value}}}" for value in ("95", "-0.1", "95 deg", "2 rad")),
         *(
             f"name: X\ninertia: {{{keys}}}\nomega0: [0.1, 0, 3]"
-            for keys in ("Ixx: 120, Iyy: 118, Izz: 80", "I1: 1, I2: 2, I3: 2", "ixx: 1, Jyy: 1, I_zz: 1")
+            for keys in (
+                "Ixx: 120, Iyy: 118, Izz: 80",
+                "I1: 1, I2: 2, I3: 2",
+                "ixx: 1, Jyy: 1, I_zz: 1",
+            )
         ),
     )
-    check_faults("files.likely-units", lambda lines: read_spacecraft(whole(lines), "f.yaml"), angles)
+    check_faults(
+        "files.likely-units", lambda lines: read_spacecraft(whole(lines), "f.yaml"), angles
+    )
 
 
 def test_a_refused_file_gives_its_warnings_too() -> None:
@@ -277,7 +332,8 @@ def test_python_warns_where_the_library_was_called(tmp_path: Path) -> None:
         assert caught[0].filename == __file__
 
 
-# --- loops -----------------------------------------------------------------------------------------------------------
+# --- loops
+# --------------------------------------------------------------------------------------------------
 
 LOOPING = """\
 name: Upper
@@ -342,7 +398,10 @@ def test_senseless_values_of_every_key_are_refused_where_they_stand() -> None:
     keys = {key for key in LoopSection.fields() if key not in ("sensor", "faults")}
     keys |= {f"sensor.{key}" for key in LoopSensorSection.fields()}
     assert set(SENSELESS) == keys | {f"faults.{key}" for key in LoopFaultsSection.fields()}
-    for name, sensor, table in (("gyro", GYRO, SENSELESS), ("accelerometer", ACCELEROMETER, OF_ACCELEROMETER)):
+    for name, sensor, table in (
+        ("gyro", GYRO, SENSELESS),
+        ("accelerometer", ACCELEROMETER, OF_ACCELEROMETER),
+    ):
         assert looped(sensor).loop is not None
         cases = [(key, value) for key, values in table.items() for value in values.split("; ")]
         texts = {f"{key} -> {value}": (sensor, key, value) for key, value in cases}
@@ -413,7 +472,9 @@ def nodes(schema: object) -> Iterator[dict[str, Any]]:
     """All mappings within a schema."""
     if isinstance(schema, dict):
         yield schema
-    inner = schema.values() if isinstance(schema, dict) else schema if isinstance(schema, list) else ()
+    inner = (
+        schema.values() if isinstance(schema, dict) else schema if isinstance(schema, list) else ()
+    )
     for part in inner:
         yield from nodes(part)
 
@@ -477,7 +538,9 @@ dispersions.timing: [{normal: 0.1 sec}]
 def test_what_validates_and_what_not() -> None:
     VALIDATOR.validate(plain(example_text()))
     VALIDATOR.validate(EVERYTHING)
-    VALIDATOR.validate({"name": "S", "inertia": {"tensor": [[1, 0, 0]] * 3}, "state": {"spin": 3, "nutation": 0}})
+    VALIDATOR.validate(
+        {"name": "S", "inertia": {"tensor": [[1, 0, 0]] * 3}, "state": {"spin": 3, "nutation": 0}}
+    )
     for expected, table in ((True, SPELLINGS), (False, SLIPS_OF_KEYS)):
         for path, values in plain(table).items():
             for value in values:
@@ -489,7 +552,12 @@ def test_keywords_are_in_the_order_of_the_alphabet_and_keys_in_that_of_the_file(
         for key, field in section["properties"].items():
             assert list(field) == sorted(field), key
     names = list(SCHEMA["properties"])
-    assert names.index("name") < names.index("inertia") < names.index("thrusters") < names.index("limits")
+    assert (
+        names.index("name")
+        < names.index("inertia")
+        < names.index("thrusters")
+        < names.index("limits")
+    )
 
 
 def test_every_key_is_explained_and_has_an_example_that_is_valid() -> None:
@@ -508,4 +576,6 @@ def test_every_key_is_explained_and_has_an_example_that_is_valid() -> None:
     keys = SCHEMA["properties"].items()
     root = {key: field["examples"][0] for key, field in keys if key not in ("omega0", "channels")}
     assert read_spacecraft(json.dumps(root), "examples").name == root["name"]
-    assert not any(node.get("type") == "null" or node.get("default", 0) is None for node in nodes(SCHEMA))
+    assert not any(
+        node.get("type") == "null" or node.get("default", 0) is None for node in nodes(SCHEMA)
+    )

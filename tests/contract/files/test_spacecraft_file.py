@@ -86,14 +86,27 @@ def test_everything_a_file_can_say() -> None:
     assert craft.inertia.aligned
     assert_array_equal(craft.omega0, [0.12, 0.05, 3.0])
     assert_array_equal(present(craft.attitude).quaternion, [1, 0, 0, 0])
-    assert (present(craft.attitude).epoch, present(craft.attitude).frame) == ("2026-03-01T12:00:00Z", "EME2000")
+    assert (present(craft.attitude).epoch, present(craft.attitude).frame) == (
+        "2026-03-01T12:00:00Z",
+        "EME2000",
+    )
     assert [channel.name for channel in craft.channels] == ["+M1", "1"]
     first, second = channel(craft, "+M1").thrusters
     assert_allclose(first.torque, [0, 8, -5], atol=0, rtol=1e-15)
     assert_array_equal(present(first.force), [10, 0, 0])
-    assert (first.thrust, first.isp, first.min_on_time, first.max_on_time) == (10.0, 220.0, 0.02, 2.0)
+    assert (first.thrust, first.isp, first.min_on_time, first.max_on_time) == (
+        10.0,
+        220.0,
+        0.02,
+        2.0,
+    )
     assert_array_equal(second.torque, [0, -8, 0])
-    assert (second.force, second.thrust, second.min_on_time, second.max_on_time) == (None, 10.0, 0.0, math.inf)
+    assert (second.force, second.thrust, second.min_on_time, second.max_on_time) == (
+        None,
+        10.0,
+        0.0,
+        math.inf,
+    )
     assert second.mass_flow == pytest.approx(10.0 / (220.0 * STANDARD_GRAVITY))
     assert craft.steerable == Steerable(20.0, 220.0, 1.0)
     assert present(craft.requirement).nutation == pytest.approx(math.radians(0.5))
@@ -103,20 +116,36 @@ def test_everything_a_file_can_say() -> None:
 
 def test_the_least_a_file_must_say_and_what_that_leaves_open() -> None:
     craft = read(f"{{{LEAST}}}")
-    assert (craft.mass, craft.attitude, craft.steerable, craft.requirement, craft.dissipation) == (None,) * 5
-    assert (craft.channels, craft.limits, craft.disturbances, craft.growth) == ((), Limits(), (), 0.0)
+    assert (craft.mass, craft.attitude, craft.steerable, craft.requirement, craft.dissipation) == (
+        None,
+    ) * 5
+    assert (craft.channels, craft.limits, craft.disturbances, craft.growth) == (
+        (),
+        Limits(),
+        (),
+        0.0,
+    )
     assert present(craft.torquer).torque is None
     assert of("requirement: {}").requirement is None
     assert of("disturbances: []").disturbances == ()
     # Without channels each thruster is one; without a lever arm its thrust is open.
-    one, other = of("thrusters: [{name: a, torque: [1, 0, 0], isp: 220}, {name: b, torque: [0, 1, 0]}]").channels
-    assert [(one.name, one.thrusters[0].name), (other.name, other.thrusters[0].name)] == [("a", "a"), ("b", "b")]
+    one, other = of(
+        "thrusters: [{name: a, torque: [1, 0, 0], isp: 220}, {name: b, torque: [0, 1, 0]}]"
+    ).channels
+    assert [(one.name, one.thrusters[0].name), (other.name, other.thrusters[0].name)] == [
+        ("a", "a"),
+        ("b", "b"),
+    ]
     assert (one.thrusters[0].thrust, one.mass_flow) == (None, None)
 
 
 def test_files_of_yaml_or_json_are_loaded_by_their_path(tmp_path: Path) -> None:
     path = tmp_path / "spacecraft.json"
-    contents = {"name": "Sat ☉", "inertia": {"A": 1e2, "C": "80 kg m²"}, "omega0": [0.1, 0, "30 rpm"]}
+    contents = {
+        "name": "Sat ☉",
+        "inertia": {"A": 1e2, "C": "80 kg m²"},
+        "omega0": [0.1, 0, "30 rpm"],
+    }
     path.write_text(json.dumps(contents, indent="\t"), "utf-8")
     assert load_spacecraft(path).name == "Sat ☉"
     assert load_spacecraft(path).spin == pytest.approx(math.pi)
@@ -132,19 +161,27 @@ def test_files_of_yaml_or_json_are_loaded_by_their_path(tmp_path: Path) -> None:
         assert present(dated).epoch == f"2024-02-29T{time}"  # as it is written
 
 
-@pytest.mark.parametrize("inertia", ["A: 120, C: 80", "tensor: [[100, 0, 0], [0, 130, 0], [0, 0, 180]]"])
+@pytest.mark.parametrize(
+    "inertia", ["A: 120, C: 80", "tensor: [[100, 0, 0], [0, 130, 0], [0, 0, 180]]"]
+)
 def test_the_nutation_of_a_state_is_the_angle_of_h_and_the_spin_axis(inertia: str) -> None:
     """In vectors, with I1 ≠ I2 too; the mean of both moments would be up to 1.5 deg off."""
-    for spin, phase, nutation in product((3.0, -3.0), (0.0, 40.0, 90.0, -200.0), (0.0, 1e-9, 10.0, 89.0)):
+    for spin, phase, nutation in product(
+        (3.0, -3.0), (0.0, 40.0, 90.0, -200.0), (0.0, 1e-9, 10.0, 89.0)
+    ):
         state = f"state: {{spin: {spin}, nutation: {nutation} deg, phase: {phase} deg}}"
         craft = of(state, f"name: S, inertia: {{{inertia}}}")
         assert craft.spin == spin
         assert math.degrees(craft.tilt) == pytest.approx(nutation, rel=1e-13)
         momentum = np.array(craft.inertia.moments) * craft.omega0
-        angle = math.degrees(reference.angle(momentum, np.array([0.0, 0.0, math.copysign(1.0, spin)])))
+        angle = math.degrees(
+            reference.angle(momentum, np.array([0.0, 0.0, math.copysign(1.0, spin)]))
+        )
         assert angle == pytest.approx(nutation, rel=1e-13, abs=1e-15)
         if nutation:
-            turns = (math.atan2(craft.omega0[1], craft.omega0[0]) - math.radians(phase)) / (2 * math.pi)
+            turns = (math.atan2(craft.omega0[1], craft.omega0[0]) - math.radians(phase)) / (
+                2 * math.pi
+            )
             assert turns == pytest.approx(round(turns), abs=1e-15)
     craft = of("state: {spin: 30 rpm, nutation: 5 deg}", f"name: S, inertia: {{{inertia}}}")
     assert craft.omega0[0] > craft.omega0[1] == 0.0  # the phase that is not given
@@ -152,7 +189,8 @@ def test_the_nutation_of_a_state_is_the_angle_of_h_and_the_spin_axis(inertia: st
 
 def test_a_state_is_about_the_principal_axis_and_its_nutation_is_the_largest() -> None:
     craft = of(
-        "state: {spin: -2, nutation: 5 deg}", "name: S, inertia: {tensor: [[2, 0, 0.1], [0, 2, 0], [0.1, 0, 3]]}"
+        "state: {spin: -2, nutation: 5 deg}",
+        "name: S, inertia: {tensor: [[2, 0, 0.1], [0, 2, 0], [0.1, 0, 3]]}",
     )
     assert craft.spin == -2.0
     assert craft.tilt == pytest.approx(math.radians(5), rel=1e-12)
@@ -160,7 +198,9 @@ def test_a_state_is_about_the_principal_axis_and_its_nutation_is_the_largest() -
 
 
 def test_a_pair_for_velocity_changes_is_flown_and_never_fired_to_damp() -> None:
-    """Two thrusters along axis 3 on both sides: their torques cancel, with 3 mm of tolerance in position not quite."""
+    """Two thrusters along axis 3 on both sides: their torques cancel, with 3 mm of tolerance in
+    position not quite.
+    """
     body = load_spacecraft(places.case("lp71-dv-pair.yaml"))
     (pair,) = body.channels
     assert not pair.torque.any()
@@ -168,16 +208,24 @@ def test_a_pair_for_velocity_changes_is_flown_and_never_fired_to_damp() -> None:
     assert not pair.axial
     assert not any(plan.feasible for plan in compare(body, CLASSIC))
     pulses = Schedule((channel_pulse(pair, 21.75, 43.5),))
-    assert propagation.flown(body, pulses).residual.nutation == pytest.approx(body.nutation, rel=1e-9)
+    assert propagation.flown(body, pulses).residual.nutation == pytest.approx(
+        body.nutation, rel=1e-9
+    )
     burn = run(Results(study_of(body, pulses), 500)).distribution("nutation")
     assert burn is not None
     assert burn.quantiles(np.array([0.95]))[0] > 1.2 * body.nutation
     both = replace(body, channels=(*cross(8.0), pair), dispersions=None)
-    assert pair.name not in {pulse.channel for plan in compare(both, CLASSIC) for pulse in plan.pulses}
+    assert pair.name not in {
+        pulse.channel for plan in compare(both, CLASSIC) for pulse in plan.pulses
+    }
 
 
 def test_bodies_at_the_edge_of_what_can_be() -> None:
-    for moments in ("A: 1, C: 2", "tensor: [[1, 0, 0], [0, 1, 0], [0, 0, 2]]", "A: 1e-3, C: 2e-3"):  # a flat disc
+    for moments in (
+        "A: 1, C: 2",
+        "tensor: [[1, 0, 0], [0, 1, 0], [0, 0, 2]]",
+        "A: 1e-3, C: 2e-3",
+    ):  # a flat disc
         assert read(f"{{name: S, inertia: {{{moments}}}, omega0: [0, 0, 1]}}").inertia.a == -1.0
     for tensor in (  # a spin about an outer axis, or of a sphere
         "[[120, 0, 0], [0, 80, 0], [0, 0, 79.999]]",
@@ -189,12 +237,17 @@ def test_bodies_at_the_edge_of_what_can_be() -> None:
     ):
         spin = read(f"{{name: S, inertia: {{tensor: {tensor}}}, omega0: [0, 0.1, 1]}}").spin
         assert spin == pytest.approx(1.0, rel=0.2)
-    rounded = "{name: S, inertia: {tensor: [[200, 10, 0], [10.0000001, 200, 0], [0, 0, 300]]}, omega0: [0, 0, 1]}"
+    rounded = (
+        "{name: S, inertia: {tensor: [[200, 10, 0], [10.0000001, 200, 0], [0, 0, 300]]}, "
+        "omega0: [0, 0, 1]}"
+    )
     assert_allclose(read(rounded).inertia.moments, [190.0, 210.0, 300.0], rtol=1e-8)
 
 
 def test_vectors_of_a_tensor_file_are_turned_to_principal_axes() -> None:
-    turn = attitude.matrix(np.array([0.98, 0.1, -0.12, 0.12]) / np.linalg.norm([0.98, 0.1, -0.12, 0.12]))
+    turn = attitude.matrix(
+        np.array([0.98, 0.1, -0.12, 0.12]) / np.linalg.norm([0.98, 0.1, -0.12, 0.12])
+    )
     tensor = turn @ np.diag([130.0, 120.0, 80.0]) @ turn.T
     position, direction = np.array([0.1, 0.5, 0.8]), np.array([1.0, -0.2, 0.1])
     omega0, torque = np.array([0.12, 0.05, 3.0]), np.array([0.0, -8.0, 1.0])
@@ -204,7 +257,10 @@ def test_vectors_of_a_tensor_file_are_turned_to_principal_axes() -> None:
         "inertia": {"tensor": tensor.tolist()},
         "omega0": (turn @ omega0).tolist(),
         "attitude": {"quaternion": [0.5, 0.5, -0.5, 0.5]},
-        "thrusters": [{"name": "a", "force": 10, **pushed}, {"name": "b", "torque": (turn @ torque).tolist()}],
+        "thrusters": [
+            {"name": "a", "force": 10, **pushed},
+            {"name": "b", "torque": (turn @ torque).tolist()},
+        ],
     }
     craft = read(json.dumps(contents))
     # Principal axes have no sense of their own: the file's may come out turned by 180 degrees.
@@ -224,7 +280,11 @@ def test_vectors_of_a_tensor_file_are_turned_to_principal_axes() -> None:
     assert_allclose(attitude.rotate(craft.initial.quaternion, momentum), in_frame, rtol=1e-12)
     # A diagonal tensor changes nothing.
     whole = read(EVERYTHING)
-    aligned = read(EVERYTHING.replace("A: 120 kg m^2, C: 80 kg m^2", "tensor: [[120, 0, 0], [0, 120, 0], [0, 0, 80]]"))
+    aligned = read(
+        EVERYTHING.replace(
+            "A: 120 kg m^2, C: 80 kg m^2", "tensor: [[120, 0, 0], [0, 120, 0], [0, 0, 80]]"
+        )
+    )
     assert aligned.inertia.aligned
     assert aligned.inertia.moments == whole.inertia.moments
     assert_array_equal(aligned.omega0, whole.omega0)
@@ -236,34 +296,45 @@ def test_disturbances() -> None:
     expected = {
         "{name: T, torque: [20 mN m, 0.1, 1e-3]}": Disturbance(0.02 + 0.1j, 0.001, 0.0, "T"),
         "{kind: constant, torque: [0, 0, -1]}": Disturbance(0j, -1.0),
-        "{kind: rotating, torque: [5 mN m, -1, 0], rate: 60 rpm}": Disturbance(0.005 - 1j, 0.0, 2 * math.pi),
+        "{kind: rotating, torque: [5 mN m, -1, 0], rate: 60 rpm}": Disturbance(
+            0.005 - 1j, 0.0, 2 * math.pi
+        ),
         "{torque: [0, 2, 0], rate: -3}": Disturbance(2j, 0.0, -3.0),
         "{kind: rotating, torque: [1, 0, 0], fixed_in: inertial}": Disturbance(1 + 0j, 0.0, 3.0),
         "{torque: [1, 0, 0], fixed_in: inertial}": Disturbance(1 + 0j, 0.0, 3.0),
         "{kind: axial, torque: -1 mN m}": Disturbance(0j, -0.001),
         "{kind: axial, torque: 2}": Disturbance(0j, 2.0),
         "{kind: axial, torque: [0, 0, 2 N m]}": Disturbance(0j, 2.0),
-        "{torque: [1, 0, 1e-13], rate: 2}": Disturbance(1 + 0j, 1e-13, 2.0),  # rounding, but not dropped
+        "{torque: [1, 0, 1e-13], rate: 2}": Disturbance(
+            1 + 0j, 1e-13, 2.0
+        ),  # rounding, but not dropped
     }
-    craft = of(f"thrusters: [{{name: T, torque: [1, 0, 0]}}], disturbances: [{', '.join(expected)}]")
+    craft = of(
+        f"thrusters: [{{name: T, torque: [1, 0, 0]}}], disturbances: [{', '.join(expected)}]"
+    )
     assert craft.disturbances == tuple(expected.values())
 
 
 def test_disturbances_are_turned_to_principal_axes_with_nothing_dropped() -> None:
     craft = read(
-        "{name: S, inertia: {tensor: [[120, 0, 3], [0, 118, 2], [3, 2, 80]]}, omega0: [0.1, 0.2, 3], disturbances: ["
-        "{torque: [0.1, 0.2, 0.3]}, {torque: [0.1, 0.2, 0], rate: 2}, {torque: [0.1, 0.2, 0], fixed_in: inertial}, "
+        "{name: S, inertia: {tensor: [[120, 0, 3], [0, 118, 2], [3, 2, 80]]}, omega0: [0.1, 0.2, "
+        "3], disturbances: ["
+        "{torque: [0.1, 0.2, 0.3]}, {torque: [0.1, 0.2, 0], rate: 2}, {torque: [0.1, 0.2, 0], "
+        "fixed_in: inertial}, "
         "{kind: axial, torque: 0.3}]}"
     )
     assert [disturbance.rate for disturbance in craft.disturbances] == [0.0, 2.0, -craft.spin, 0.0]
     torques = [(0.1, 0.2, 0.3), (0.1, 0.2, 0), (0.1, 0.2, 0), (0, 0, 0.3)]
     for disturbance, torque in zip(craft.disturbances, torques, strict=True):
-        principal = np.array([disturbance.transverse.real, disturbance.transverse.imag, disturbance.axial])
+        principal = np.array(
+            [disturbance.transverse.real, disturbance.transverse.imag, disturbance.axial]
+        )
         assert np.all(principal != 0.0)
         assert_allclose(craft.inertia.axes @ principal, torque, atol=1e-16)
     # A turn about axis 3 alone leaves no axial dust.
     craft = read(
-        "{name: S, inertia: {tensor: [[120, 3, 0], [3, 118, 0], [0, 0, 80]]}, omega0: [0.1, 0.2, 3], "
+        "{name: S, inertia: {tensor: [[120, 3, 0], [3, 118, 0], [0, 0, 80]]}, omega0: [0.1, 0.2, "
+        "3], "
         "disturbances: [{torque: [0.1, 0.2, 0], rate: 2}, {kind: axial, torque: 1}]}"
     )
     turning, axial = craft.disturbances
@@ -282,8 +353,12 @@ def test_disturbances_are_turned_to_principal_axes_with_nothing_dropped() -> Non
         (120, 80, ", nutation: decays", -0.01),
     ],
 )
-def test_dissipation_does_what_the_shape_or_the_file_says(A: float, C: float, says: str, growth: float) -> None:
-    """The motion is that of dH/dt = H x (ω + s), s = κ h3 (h x e3), in body axes; a boom in the Sun fed Ulysses so."""
+def test_dissipation_does_what_the_shape_or_the_file_says(
+    A: float, C: float, says: str, growth: float
+) -> None:
+    """The motion is that of dH/dt = H x (ω + s), s = κ h3 (h x e3), in body axes; a boom in the Sun
+    fed Ulysses so.
+    """
     text = f"inertia: {{A: {A}, C: {C}}}, state: {{spin: 0.5, nutation: 2 deg}}"
     craft = read(f"{{name: S, {text}, dissipation: {{time_constant: 100 s{says}}}}}")
     assert (craft.dissipation, craft.growth) == (100.0, growth)
@@ -294,7 +369,9 @@ def test_dissipation_does_what_the_shape_or_the_file_says(A: float, C: float, sa
         slip = growth * along[2] * np.cross(along, [0.0, 0.0, 1.0])
         return np.cross(momentum, momentum / inertia + slip)
 
-    end = solve_ivp(changes, (0.0, 60.0), inertia * craft.omega0, "DOP853", rtol=1e-11, atol=1e-12).y[:, -1]
+    end = solve_ivp(
+        changes, (0.0, 60.0), inertia * craft.omega0, "DOP853", rtol=1e-11, atol=1e-12
+    ).y[:, -1]
     left = seen_at(propagation.flown(craft, Schedule(), 60.0), 60.0).final
     assert left.nutation == pytest.approx(math.atan2(math.hypot(end[0], end[1]), end[2]), rel=1e-7)
     assert left.spin == pytest.approx(end[2] / inertia[2], rel=1e-9)
@@ -310,7 +387,11 @@ def uncommented(text: str, *keys: str) -> str:
 
 def test_the_example_is_the_one_it_describes_and_shows_every_key() -> None:
     craft = read(example_text())
-    assert (craft.name, craft.mass, craft.inertia.moments) == ("Sounder-1", 250.0, (120.0, 120.0, 80.0))
+    assert (craft.name, craft.mass, craft.inertia.moments) == (
+        "Sounder-1",
+        250.0,
+        (120.0, 120.0, 80.0),
+    )
     assert craft.spin == pytest.approx(math.pi)
     assert craft.nutation == pytest.approx(math.radians(5))
     torques = {channel.name: channel.torque.tolist() for channel in craft.channels}
@@ -334,13 +415,23 @@ def test_what_the_example_shows_in_comments_works() -> None:
     rates = {disturbance.name: disturbance.rate for disturbance in craft.disturbances}
     assert rates == {"leak": 0.0, "pump": -3.0, "sunlight": -craft.spin, "drag": 0.0}
     assert (craft.spin_drift, craft.dissipation) == (-0.001 / 80, 600.0)
-    assert present(craft.dispersions).thrust.keys() == {"+M1", "-M1", "+M2", "-M2", "spin-up", "steerable"}
+    assert present(craft.dispersions).thrust.keys() == {
+        "+M1",
+        "-M1",
+        "+M2",
+        "-M2",
+        "spin-up",
+        "steerable",
+    }
     assert present(craft.dispersions).timing_offset == Tolerance("bias", 0.002)
     others = re.sub(r"^(state|inertia): .*\n", "", example_text(), flags=re.MULTILINE)
-    assert read(uncommented(others, "inertia", "omega0")).nutation == pytest.approx(math.radians(5), rel=0.05)
+    assert read(uncommented(others, "inertia", "omega0")).nutation == pytest.approx(
+        math.radians(5), rel=0.05
+    )
 
 
-# --- the files in configs/ -------------------------------------------------------------------------------------------
+# --- the files in configs/
+# -------------------------------------------------------------------------------------------
 
 FILES = sorted(places.CONFIGS.glob("*.yaml"))
 
@@ -348,7 +439,11 @@ FILES = sorted(places.CONFIGS.glob("*.yaml"))
 def test_they_name_their_sources() -> None:
     assert len(FILES) >= 8
     for path in FILES:
-        comment = [line for line in path.read_text(encoding="utf-8").splitlines()[:30] if line.startswith("#")]
+        comment = [
+            line
+            for line in path.read_text(encoding="utf-8").splitlines()[:30]
+            if line.startswith("#")
+        ]
         assert len(comment) >= 3
         assert any("assumed" in line.lower() for line in comment)
 
@@ -371,7 +466,10 @@ def test_it_is_planned(path: Path) -> None:
 
 # --- valves, impulse bits, cold nozzles, tanks and dispersions
 
-THRUSTER = "  - {name: N, torque: [X, Y, 0], lever_arm: 0.8, isp: 220, min_on_time: 20 ms, max_on_time: 50 ms}\n"
+THRUSTER = (
+    "  - {name: N, torque: [X, Y, 0], lever_arm: 0.8, isp: 220, min_on_time: 20 ms, "
+    "max_on_time: 50 ms}\n"
+)
 BODY = """\
 name: Sat
 inertia: {A: 120, C: 80}
@@ -404,13 +502,24 @@ def read_rows(write: Write) -> ReadRows:
 
 
 def test_valves_impulse_bits_cold_nozzles_and_tanks_are_read() -> None:
-    body = read_lines(VALVE, COLD, body=BODY.replace("b,", "b, valve: {open_delay: 1 ms, on_time_is: effective},", 1))
+    body = read_lines(
+        VALVE,
+        COLD,
+        body=BODY.replace("b,", "b, valve: {open_delay: 1 ms, on_time_is: effective},", 1),
+    )
     every = Trapezoid(0.008, 0.012, 0.005, 0.010)
-    assert [channel.valve for channel in body.channels] == [every, Trapezoid(0.001, effective=True), every, every]
+    assert [channel.valve for channel in body.channels] == [
+        every,
+        Trapezoid(0.001, effective=True),
+        every,
+        every,
+    ]
     assert (body.cold, body.tank) == (Cold(0.9, 4.0), None)
     first, *others = read_lines(VALVE, body=with_table()).channels
     assert isinstance(first.valve, Measured)
-    assert [row[1] for row in first.valve.rows] == pytest.approx([0.015, 0.036])  # 8 N m at 0.8 m are 10 N
+    assert [row[1] for row in first.valve.rows] == pytest.approx(
+        [0.015, 0.036]
+    )  # 8 N m at 0.8 m are 10 N
     assert (first.min_on_time, first.max_on_time) == (0.02, 0.04)
     assert [other.valve for other in others] == [every] * 3
     rows = ", isp: [[8 bar, 215 s], [22 bar, 228 s]]}"
@@ -420,7 +529,10 @@ def test_valves_impulse_bits_cold_nozzles_and_tanks_are_read() -> None:
 
 
 def test_valves_of_no_times_are_none_and_plans_the_same_to_the_last_bit() -> None:
-    zero = read_lines("valve: {open_delay: 0, close_delay: 0 s, rise_time: 0, fall_time: 0, on_time_is: effective}\n")
+    zero = read_lines(
+        "valve: {open_delay: 0, close_delay: 0 s, rise_time: 0, fall_time: 0, on_time_is: "
+        "effective}\n"
+    )
     for scheme in ("one-pulse", "four-pulse"):
         one, other = (planning.plan(body, scheme).pulses for body in (read_lines(), zero))
         assert [repr(pulse) for pulse in one] == [repr(pulse) for pulse in other]
@@ -456,24 +568,32 @@ FAULTY_TABLES = (
 
 
 def test_faults_have_their_place() -> None:
-    # The last, of thrusters that fire as one with different valves, is none where all have the same.
+    # The last, of thrusters that fire as one with different valves, is none where all have the
+    # same.
     read_lines(FAULTY[-1])
     check_faults(
-        "files.thrust", lambda lines: read_lines(lines, body=BODY if "both" not in lines else with_table()), FAULTY
+        "files.thrust",
+        lambda lines: read_lines(lines, body=BODY if "both" not in lines else with_table()),
+        FAULTY,
     )
-    check_faults("files.thrust-impulse-bit", lambda table: read_lines(body=with_table(table)), FAULTY_TABLES)
+    check_faults(
+        "files.thrust-impulse-bit", lambda table: read_lines(body=with_table(table)), FAULTY_TABLES
+    )
     others = {
         "a tank that cannot know what is used": (TANK, ", lever_arm: 0.8, isp: 220", ""),
         "an impulse bit without thrust": ("", "0], lever_arm: 0.8, isp: 220", f"0], {TABLE}"),
         "no thrusters": ("", BODY[BODY.index("thrusters") :], VALVE + COLD),
     }
     check_faults(
-        "files.thrust-others", lambda edit: read_lines(edit[0], body=BODY.replace(edit[1], edit[2], 1)), others
+        "files.thrust-others",
+        lambda edit: read_lines(edit[0], body=BODY.replace(edit[1], edit[2], 1)),
+        others,
     )
 
 
 def test_the_thrusts_of_a_file_are_looked_up_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    calls, thrusts = [], thruster_rules.thrusts
+    calls = []
+    thrusts = thruster_rules.thrusts
 
     def counted(facts: Facts) -> dict[str, float | None]:
         calls.append(facts)
@@ -491,21 +611,25 @@ def test_a_plan_in_blowdown_leaves_nothing_and_says_the_pressure() -> None:
     assert present(plan.flown).nutation < math.radians(1e-6)
     used = 0.0
     for pulse in plan.pulses:
-        thrust, taken = np.linalg.norm(present(pulse.torque)) / 8.0, present(pulse.propellant)
+        thrust = np.linalg.norm(present(pulse.torque)) / 8.0
+        taken = present(pulse.propellant)
         ends = [present(body.tank).thrust_factor(used + more) for more in (0.0, taken)]
         assert ends[1] < thrust < ends[0]  # the mean, as the pressure falls
         assert thrust == pytest.approx(math.sqrt(ends[0] * ends[1]), rel=1e-3)
         used += taken
     assert 15.0 < 1e-5 * present(body.tank).pressure_after(used) < 17.0
     values = one_of(plan.pulses.notes, "pressure-falls")
-    assert values == pytest.approx({"full_bar": 22.0, "left_bar": 1e-5 * present(body.tank).pressure_after(used)})
+    assert values == pytest.approx(
+        {"full_bar": 22.0, "left_bar": 1e-5 * present(body.tank).pressure_after(used)}
+    )
 
 
 def test_velocity_grows_as_the_mass_falls() -> None:
     """The rocket equation: one long pulse along the spin axis."""
     body = read_spacecraft(
         "name: Sat\ninertia: {A: 120, C: 80}\nomega0: [0.001, 0, 3]\nmass: 10 kg\n"
-        "thrusters:\n  - {name: a, position: [0.001, 0, 0], direction: [0, 0, 1], force: 100, isp: 200}\n"
+        "thrusters:\n  - {name: a, position: [0.001, 0, 0], direction: [0, 0, 1], force: 100, isp: "
+        "200}\n"
         "tank: {propellant: 5 kg, pressure: 1e6, final_pressure: 1e6}\n",
         "sat.yaml",
     )
@@ -556,7 +680,8 @@ def test_rows_of_a_schedule_are_commands(read_rows: ReadRows) -> None:
     check_faults("files.thrust-faulty-rows", lambda given: read_rows(*given), rows)
 
 
-# --- dispersions -----------------------------------------------------------------------------------------------------
+# --- dispersions
+# --------------------------------------------------------------------------------------------------
 
 ACTUATORS = """\
 thrusters:
@@ -573,7 +698,11 @@ def dispersed(dispersions: str, actuators: str = ACTUATORS) -> Spacecraft:
     return read_spacecraft(f"{BASE}{actuators}dispersions: {dispersions}\n", "f.yaml")
 
 
-RATES = (Tolerance("normal", math.pi), Tolerance("bias", -0.01), Tolerance("uniform", 0.01, relative=True))
+RATES = (
+    Tolerance("normal", math.pi),
+    Tolerance("bias", -0.01),
+    Tolerance("uniform", 0.01, relative=True),
+)
 DISPERSED: tuple[tuple[str, dict[str, Any]], ...] = (
     ("{}", {}),
     ("{timing_offset: {bias: -2 ms}}", {"timing_offset": Tolerance("bias", -0.002)}),
@@ -583,18 +712,28 @@ DISPERSED: tuple[tuple[str, dict[str, Any]], ...] = (
     ("{thrust: {normal: 3 %}}", {"thrust": dict.fromkeys(NAMES, THREE_PERCENT)}),
     ("{thrust: {T2: {normal: 3 %}}}", {"thrust": {"T2": THREE_PERCENT}}),
     # A thrust becomes a fraction: 10 N; 8 N m on 0.8 m; 20 N m on 2 m.
-    ("{thrust: {T1: {normal: 0.3 N}, T2: {normal: 300 mN}}}", {"thrust": dict.fromkeys(("T1", "T2"), THREE_PERCENT)}),
+    (
+        "{thrust: {T1: {normal: 0.3 N}, T2: {normal: 300 mN}}}",
+        {"thrust": dict.fromkeys(("T1", "T2"), THREE_PERCENT)},
+    ),
     ("{thrust: {steerable: {normal: 0.3 N}}}", {"thrust": {"steerable": THREE_PERCENT}}),
     ("{thrust_per_pulse: {normal: 3 %}}", {"thrust_per_pulse": THREE_PERCENT}),
     ("{thrust_per_pulse: {normal: 0.03}}", {"thrust_per_pulse": THREE_PERCENT}),
-    ("{thrust_direction: {normal: 0.5 rad}}", {"thrust_direction": dict.fromkeys(NAMES, Tolerance("normal", 0.5))}),
+    (
+        "{thrust_direction: {normal: 0.5 rad}}",
+        {"thrust_direction": dict.fromkeys(NAMES, Tolerance("normal", 0.5))},
+    ),
     ("{position: {normal: 5 mm}}", {"position": dict.fromkeys(NAMES, Tolerance("normal", 0.005))}),
     ("{position: {T1: {normal: 5 mm}}}", {"position": {"T1": Tolerance("normal", 0.005)}}),
 )
 OF_OTHERS = (
     ("", "{thrust: {normal: 3 %}}", "steerable"),  # the torquer that is assumed
     ("", "{thrust: {steerable: {normal: 3 %}}}", "steerable"),
-    ("thrusters: [{name: normal, torque: [0, 8, 0]}]\n", "{thrust: {normal: {normal: 3 %}}}", "normal"),
+    (
+        "thrusters: [{name: normal, torque: [0, 8, 0]}]\n",
+        "{thrust: {normal: {normal: 3 %}}}",
+        "normal",
+    ),
 )
 
 
@@ -603,18 +742,28 @@ def test_dispersions_are_read_in_si() -> None:
         assert dispersed(text).dispersions == Dispersions(**fields), text
     for kind in ("normal", "uniform", "triangular", "bias"):
         text = f"{{A: {{{kind}: 2 %}}, C: {{{kind}: 0.5 kg m^2}}, timing: {{{kind}: 5 ms}}}}"
-        percent, value, time = Tolerance(kind, 0.02, relative=True), Tolerance(kind, 0.5), Tolerance(kind, 0.005)
+        percent, value, time = (
+            Tolerance(kind, 0.02, relative=True),
+            Tolerance(kind, 0.5),
+            Tolerance(kind, 0.005),
+        )
         assert dispersed(text).dispersions == Dispersions(A=percent, C=value, timing=time)
     for actuators, text, name in OF_OTHERS:
         assert dispersed(text, actuators).dispersions == Dispersions(thrust={name: THREE_PERCENT})
 
 
 def test_positions_are_in_principal_axes_as_forces_and_torques_are() -> None:
-    tensor = "name: S\ninertia: {tensor: [[120, 0, 4], [0, 100, 3], [4, 3, 80]]}\nomega0: [0, 0, 3]\n"
-    craft = read_spacecraft(f"{tensor}{ACTUATORS}requirement: {{nutation: 1 deg, probability: 99.7 %}}\n", "f.yaml")
+    tensor = (
+        "name: S\ninertia: {tensor: [[120, 0, 4], [0, 100, 3], [4, 3, 80]]}\nomega0: [0, 0, 3]\n"
+    )
+    craft = read_spacecraft(
+        f"{tensor}{ACTUATORS}requirement: {{nutation: 1 deg, probability: 99.7 %}}\n", "f.yaml"
+    )
     first, second, *_ = (channel.thrusters[0] for channel in craft.channels)
     assert_allclose(craft.inertia.axes @ present(first.position), [0, 0.3, 0.8], atol=1e-15)
-    assert_allclose(np.cross(present(first.position), present(first.force)), first.torque, atol=1e-14)
+    assert_allclose(
+        np.cross(present(first.position), present(first.force)), first.torque, atol=1e-14
+    )
     assert second.position is None
     assert present(craft.requirement).probability == pytest.approx(0.997)
     assert craft.dispersions is None
@@ -638,14 +787,23 @@ loop: {sensor: {kind: KIND, rate: 10 Hz, noise: 0.01 SENSED}, start: 0.5 deg}
 """
 
 
-@pytest.mark.parametrize(("kind", "unit"), [("gyro", "deg/s"), ("accelerometer, position: [1, 0, 0]", "m/s^2")])
+@pytest.mark.parametrize(
+    ("kind", "unit"), [("gyro", "deg/s"), ("accelerometer, position: [1, 0, 0]", "m/s^2")]
+)
 def test_whatever_any_schedule_or_loop_draws_once_may_be_correlated(kind: str, unit: str) -> None:
     """The file names inputs as the study does, each beside the next."""
-    craft, tolerances = (text.replace("KIND", kind).replace("SENSED", unit) for text in (CRAFT, EVERY_TOLERANCE))
+    craft, tolerances = (
+        text.replace("KIND", kind).replace("SENSED", unit) for text in (CRAFT, EVERY_TOLERANCE)
+    )
     alone = dispersed(tolerances.replace(", PAIRS", ""), craft)
-    names = [drawn.name for drawn in reachable(alone).drawn if not drawn.name.endswith("of each pulse")]
+    names = [
+        drawn.name for drawn in reachable(alone).drawn if not drawn.name.endswith("of each pulse")
+    ]
     assert len(names) > 25
     pairs = [(first, second, 0.1) for first, second in pairwise(names)]
-    text = f"correlation: [{', '.join(f'[{first}, {second}, {size}]' for first, second, size in pairs)}]"
+    text = (
+        "correlation: "
+        f"[{', '.join(f'[{first}, {second}, {size}]' for first, second, size in pairs)}]"
+    )
     dispersions = dispersed(tolerances.replace("PAIRS", text), craft).dispersions
     assert present(dispersions).correlation == tuple(pairs)

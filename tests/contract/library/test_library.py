@@ -1,4 +1,6 @@
-"""nutdamp as a library: names, spacecraft from files and dicts, what it refuses; plans, flights and studies."""
+"""nutdamp as a library: names, spacecraft from files and dicts, what it refuses; plans, flights and
+studies.
+"""
 
 import csv
 import doctest
@@ -65,7 +67,9 @@ def planned() -> Any:
 
 
 def python(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([sys.executable, *arguments], cwd=folder, capture_output=True, text=True, check=False)
+    return subprocess.run(
+        [sys.executable, *arguments], cwd=folder, capture_output=True, text=True, check=False
+    )
 
 
 def test_importing_loads_nothing_that_takes_time(tmp_path: Path) -> None:
@@ -91,7 +95,10 @@ def test_a_type_checker_knows_what_comes_back(tmp_path: Path) -> None:
     shown = python(tmp_path, "-m", "mypy", "--strict", "typed.py").stdout
     assert "ndarray" in shown
     assert "numpy.float64" in shown or "floating" in shown
-    assert 'typed.py:4: error: Argument 1 to "to_csv" of "Written" has incompatible type "int"' in shown
+    assert (
+        'typed.py:4: error: Argument 1 to "to_csv" of "Written" has incompatible type "int"'
+        in shown
+    )
     assert "Found 1 error" in shown
 
 
@@ -99,7 +106,8 @@ def test_a_type_checker_knows_what_comes_back(tmp_path: Path) -> None:
 def test_the_examples_of_the_readme_run(run: Run, tmp_path: Path) -> None:
     run("init")
     example, sweep = (
-        python(tmp_path, str(places.TESTS / "support" / f"library_{name}.py")) for name in ("example", "sweep")
+        python(tmp_path, str(places.TESTS / "support" / f"library_{name}.py"))
+        for name in ("example", "sweep")
     )
     assert example.returncode == sweep.returncode == 0, example.stderr + sweep.stderr
     assert "<Plan two-pulse: 2 pulses until 7.434 s" in example.stdout
@@ -116,9 +124,12 @@ def test_the_examples_of_the_readme_run(run: Run, tmp_path: Path) -> None:
 
 @pytest.mark.deep
 @pytest.mark.usefixtures("plain_pages")
-def test_every_function_has_an_example_that_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_every_function_has_an_example_that_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.chdir(tmp_path)
-    finder, runner = doctest.DocTestFinder(), doctest.DocTestRunner(optionflags=doctest.ELLIPSIS)
+    finder = doctest.DocTestFinder()
+    runner = doctest.DocTestRunner(optionflags=doctest.ELLIPSIS)
     for name in sorted({*nutdamp.__all__} - {"errors", "__version__"}):
         function = getattr(nutdamp, name)
         if not isinstance(function, type):
@@ -128,7 +139,8 @@ def test_every_function_has_an_example_that_runs(tmp_path: Path, monkeypatch: py
 
 
 def test_every_result_shows_itself_in_one_short_line_and_as_json(tmp_path: Path) -> None:
-    body, stage = CRAFT.with_(limits={"horizon": "8 s"}), nutdamp.example("upper-stage")
+    body = CRAFT.with_(limits={"horizon": "8 s"})
+    stage = nutdamp.example("upper-stage")
     plan = planned()
     for result in (
         nutdamp.simulate(plan, 20.0),
@@ -168,7 +180,9 @@ def test_there_is_one_type_of_each_name() -> None:
 def test_every_residual_carries_the_name_of_its_model() -> None:
     plan = planned()
     models = ("impulse sum (17)", "real pulse widths")
-    for residual, by_impulses, model in zip((plan.residual, plan.flown), (True, False), models, strict=True):
+    for residual, by_impulses, model in zip(
+        (plan.residual, plan.flown), (True, False), models, strict=True
+    ):
         again = plan.fly(by_impulses=by_impulses).residual
         assert residual is not None
         assert residual.model == again.model == model
@@ -192,7 +206,9 @@ def test_a_dict_is_read_as_the_file_is() -> None:
 
 
 def test_with_changes_the_keys_named_and_no_others(tmp_path: Path) -> None:
-    first = nutdamp.load(KEYS).with_(limits={"horizon": "300 s"}, requirement={"momentum_shift": "1 deg"})
+    first = nutdamp.load(KEYS).with_(
+        limits={"horizon": "300 s"}, requirement={"momentum_shift": "1 deg"}
+    )
     assert (first.limits.horizon, first.limits.max_pulses) == (300.0, 3)
     assert present(first.requirement).nutation == pytest.approx(math.radians(0.5))
     again = first.with_(limits={"max_pulses": 2})
@@ -205,17 +221,28 @@ def test_with_changes_the_keys_named_and_no_others(tmp_path: Path) -> None:
     (tmp_path / "own.yaml").write_text(TILTED)
     held = nutdamp.load(tmp_path / "own.yaml", set={"steerable.isp": 200.0})
     compared = nutdamp.compare(held, ["two-pulse"])
-    for body in (held, compared["two-pulse"].spacecraft, nutdamp.plan(held, "none").fly(3.0).spacecraft):
+    for body in (
+        held,
+        compared["two-pulse"].spacecraft,
+        nutdamp.plan(held, "none").fly(3.0).spacecraft,
+    ):
         named = body.with_(name="Other", mass=3)
         assert (named.name, named.mass, present(named.steerable).isp) == ("Other", 3.0, 200.0)
 
 
 def test_fields_are_replaced_in_si() -> None:
     lighter = CRAFT.replace(mass=np.float64(200.0), omega0=[0.1, 0.0, 3])
-    assert (lighter.mass, lighter.name, lighter.rates.tolist()) == (200.0, CRAFT.name, [0.1, 0.0, 3.0])
+    assert (lighter.mass, lighter.name, lighter.rates.tolist()) == (
+        200.0,
+        CRAFT.name,
+        [0.1, 0.0, 3.0],
+    )
     assert nutdamp.plan(lighter, "two-pulse").feasible
     assert CRAFT.mass != 200.0
-    assert (CRAFT.source is None, lighter.source is None) == (False, True)  # it is no longer what its file says
+    assert (CRAFT.source is None, lighter.source is None) == (
+        False,
+        True,
+    )  # it is no longer what its file says
 
 
 CALM = nutdamp.read("name: X\ninertia: {A: 120, C: 80}\nomega0: [0, 0, 3]\n")
@@ -297,7 +324,9 @@ def test_a_wrong_argument_is_reported_with_what_was_expected() -> None:
 
 
 def test_what_cannot_be_says_so_in_an_error_of_the_package(tmp_path: Path) -> None:
-    infeasible = nutdamp.plan(nutdamp.read("name: X\ninertia: {A: 120, C: 80}\nomega0: [0.1, 0, 3]\n"), "four-pulse")
+    infeasible = nutdamp.plan(
+        nutdamp.read("name: X\ninertia: {A: 120, C: 80}\nomega0: [0.1, 0, 3]\n"), "four-pulse"
+    )
     assert not infeasible.feasible
     assert len(infeasible.to_numpy()) == len(infeasible) == 0
     calls: list[tuple[type[Exception], Call]] = [
@@ -312,14 +341,20 @@ def test_what_cannot_be_says_so_in_an_error_of_the_package(tmp_path: Path) -> No
             call()
         assert issubclass(kind, nutdamp.NutdampError)
     assert list(tmp_path.iterdir()) == []
-    keys: list[dict[str, Any]] = [{"limits": {"horizon": "3 kg"}}, {"limit": {"horizon": 3}}, {"limits": "soon"}]
+    keys: list[dict[str, Any]] = [
+        {"limits": {"horizon": "3 kg"}},
+        {"limit": {"horizon": 3}},
+        {"limits": "soon"},
+    ]
     for number, each in enumerate([*keys, {"thrusters": {"T9": {"force": 3}}}]):
         with refused(errors.FaultyFile, f"library.with-{number}"):
             CRAFT.with_(**each)
 
 
 FOLDER = places.TESTS / "benchmarks"
-CLOCKS = re.compile(r"\btimeout *=|\bperf_counter\b|\bmonotonic\b|\btime\.time\b|\bprocess_time\b|\bsetitimer\b")
+CLOCKS = re.compile(
+    r"\btimeout *=|\bperf_counter\b|\bmonotonic\b|\btime\.time\b|\bprocess_time\b|\bsetitimer\b"
+)
 MEASURING = {"benchmarks", Path(__file__).name}
 
 
@@ -341,13 +376,19 @@ def test_their_files_are_sound(run_py: dict[str, Any]) -> None:
         assert process.against in names
     for process in (*run_py["PROCESSES"], *run_py["JOBS"]):
         files = {part for part in process.arguments if part.endswith(".yaml")}
-        assert all(Path(part).is_file() for part in files - {"four.yaml", "sixteen.yaml", "dispersed.yaml"})
+        assert all(
+            Path(part).is_file() for part in files - {"four.yaml", "sixteen.yaml", "dispersed.yaml"}
+        )
 
 
-def test_peers_fly_the_same_cases(run_py: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_peers_fly_the_same_cases(
+    run_py: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     (tmp_path / "dispersed.yaml").write_text(run_py["DISPERSED"], encoding="utf-8")
     monkeypatch.chdir(tmp_path)
-    works = runpy.run_path(str(FOLDER / "inside.py"))["works"]()  # compares solve_ivp with the flight on the way
+    works = runpy.run_path(str(FOLDER / "inside.py"))[
+        "works"
+    ]()  # compares solve_ivp with the flight on the way
     assert works["one flight"]() == works["solve_ivp"]() > 10
 
 
@@ -362,11 +403,17 @@ def test_the_table_of_the_readme_and_missed_limits(run_py: dict[str, Any]) -> No
         text = line(row("name", 0.1, ratio, "import numpy", 1.5, memory=memory, memory_limit=250.0))
         assert ("MISSED" in text) is missed
     for ratio, missed in ((4000.0, True), (6000.0, False)):
-        assert ("MISSED" in line(row("name", 1e-7, ratio, "faster than it", 5000.0, at_least=True))) is missed
+        assert (
+            "MISSED" in line(row("name", 1e-7, ratio, "faster than it", 5000.0, at_least=True))
+        ) is missed
 
 
 def test_no_test_looks_at_a_clock() -> None:
-    sources = [path for path in places.TESTS.rglob("*.py") if not MEASURING & {*path.relative_to(places.TESTS).parts}]
+    sources = [
+        path
+        for path in places.TESTS.rglob("*.py")
+        if not MEASURING & {*path.relative_to(places.TESTS).parts}
+    ]
     lines = [
         f"{path}:{number}: {line.strip()}"
         for path in sources
@@ -403,13 +450,19 @@ def test_files_are_those_of_the_command_line(run: Run, tmp_path: Path) -> None:
 def test_a_comparison_has_the_numbers_of_the_command(run: Run) -> None:
     """With dispersed cases, too."""
     schemes = ("two-pulse", "four-pulse")
-    shown = json.loads(run("plan", *(part for each in schemes for part in ("--scheme", each)), "--json", "-").stdout)
+    shown = json.loads(
+        run(
+            "plan", *(part for each in schemes for part in ("--scheme", each)), "--json", "-"
+        ).stdout
+    )
     assert written(nutdamp.compare(CRAFT, schemes).to_dict()) == shown
     assert [plan["meets_requirement"] for plan in shown["plans"]] == [True, False]
     assert shown["decision"]["cases"]["samples"] == 20_000
 
 
-def test_arrays_and_data_frames_have_the_columns_of_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_arrays_and_data_frames_have_the_columns_of_files(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     plan = nutdamp.plan(nutdamp.read(TILTED), "two-pulse")
     pandas = types.ModuleType("pandas")
     pandas.DataFrame = dict  # type: ignore[attr-defined]
@@ -432,7 +485,8 @@ def test_arrays_and_data_frames_have_the_columns_of_files(tmp_path: Path, monkey
 
 
 def test_the_track_is_in_the_axes_of_the_file() -> None:
-    craft, tensor = nutdamp.read(TILTED), np.array([[120.0, 3, 6], [3, 118, -4], [6, -4, 80]])
+    craft = nutdamp.read(TILTED)
+    tensor = np.array([[120.0, 3, 6], [3, 118, -4], [6, -4, 80]])
     made = nutdamp.plan(craft, "none").fly(until=5.0, samples=200)
     track = made.track
     assert track.rates[0] == pytest.approx([0.2, 0.1, 3.0], abs=1e-14)
@@ -451,7 +505,9 @@ def test_a_written_schedule_is_read_as_a_plan(tmp_path: Path) -> None:
     again = nutdamp.load_schedule(tmp_path / "pulses.csv", CRAFT)
     assert again.fly().residual == plan.fly().residual
     assert again.propellant == pytest.approx(plan.propellant, rel=1e-12)
-    (tmp_path / "edited.csv").write_text((tmp_path / "pulses.csv").read_text().replace("-M1", "+M9"))
+    (tmp_path / "edited.csv").write_text(
+        (tmp_path / "pulses.csv").read_text().replace("-M1", "+M9")
+    )
     with pytest.warns(UserWarning, match=r"\+M9"):
         nutdamp.load_schedule(tmp_path / "edited.csv", CRAFT)
 
@@ -470,14 +526,24 @@ def test_the_recommended_plan_is_one_of_those_compared() -> None:
 
 def test_so_many_dispersed_cases_as_are_requested_decide() -> None:
     """Those of `disperse`; with the plans that it is not about so few of them as it takes."""
-    nominal, compared = (nutdamp.compare(CRAFT, ["four-pulse", "two-pulse"], samples=count) for count in (0, 2_100))
+    nominal, compared = (
+        nutdamp.compare(CRAFT, ["four-pulse", "two-pulse"], samples=count) for count in (0, 2_100)
+    )
     assert nominal.recommended is nominal["four-pulse"]
-    assert (nominal.flown, nominal.cases, nominal.verdict.cases, nominal.verdict.results) == (None, {}, None, None)
+    assert (nominal.flown, nominal.cases, nominal.verdict.cases, nominal.verdict.results) == (
+        None,
+        {},
+        None,
+        None,
+    )
     assert [nominal.verdicts[plan].met for plan in nominal] == [True, True]
     chosen, other = compared["two-pulse"], compared["four-pulse"]
     assert compared.recommended is chosen
     assert [plan.meets_requirement for plan in compared] == [True, True]
-    assert [compared.verdicts[plan].status.value for plan in (chosen, other)] == ["fly", "not-enough"]
+    assert [compared.verdicts[plan].status.value for plan in (chosen, other)] == [
+        "fly",
+        "not-enough",
+    ]
     cases, few = compared.cases[chosen], compared.cases[other]
     assert (cases.samples, cases.final, cases.enough) == (2_100, True, True)
     assert cases.complying == nutdamp.disperse(chosen, 2_100).met_fraction == 1.0
@@ -487,8 +553,12 @@ def test_so_many_dispersed_cases_as_are_requested_decide() -> None:
 
 
 def test_dictionaries_hold_no_number_that_json_has_not() -> None:
-    """A sphere has no nutation period in the body, and an ideal torquer no torque and no propellant."""
-    ball = nutdamp.read("name: Ball\ninertia: {A: 100, C: 100}\nstate: {spin: 3, nutation: 5 deg}\n")
+    """A sphere has no nutation period in the body, and an ideal torquer no torque and no
+    propellant.
+    """
+    ball = nutdamp.read(
+        "name: Ball\ninertia: {A: 100, C: 100}\nstate: {spin: 3, nutation: 5 deg}\n"
+    )
     compared = nutdamp.compare(ball)
     assert ball.to_dict()["body_nutation_period_s"] is None
     for each in (ball, compared, *compared):
@@ -508,9 +578,15 @@ def test_studies_have_the_numbers_of_the_commands(run: Run, dispersed: Path) -> 
     chosen.to_csv(dispersed / "pulses.csv")
     held = nutdamp.load_schedule(dispersed / "pulses.csv", craft)
     for command, made in (
-        (("disperse", "--samples", "200", "--seed", "3"), nutdamp.disperse(chosen, 200, seed=3).to_dict()),
+        (
+            ("disperse", "--samples", "200", "--seed", "3"),
+            nutdamp.disperse(chosen, 200, seed=3).to_dict(),
+        ),
         (("verify",), nutdamp.verify(chosen).to_dict()),
-        (("verify", "--schedule", "pulses.csv"), {**nutdamp.verify(held).to_dict(), "scheme": "pulses.csv"}),
+        (
+            ("verify", "--schedule", "pulses.csv"),
+            {**nutdamp.verify(held).to_dict(), "scheme": "pulses.csv"},
+        ),
     ):
         run(*command, "--json", "own.json", status=(0, 4))
         assert json.loads((dispersed / "own.json").read_text()) == written(made)
@@ -518,7 +594,18 @@ def test_studies_have_the_numbers_of_the_commands(run: Run, dispersed: Path) -> 
 
 def test_a_trade_has_the_numbers_of_the_command(run: Run) -> None:
     changed = {"limits": {"horizon": "8 s"}}
-    options = ("--points", "2", "--allow", "0", "--least", "impulse", "--set", "limits.horizon=8 s", "--json", "-")
+    options = (
+        "--points",
+        "2",
+        "--allow",
+        "0",
+        "--least",
+        "impulse",
+        "--set",
+        "limits.horizon=8 s",
+        "--json",
+        "-",
+    )
     found = nutdamp.trade(CRAFT.with_(**changed), points=2, allow=(0.0,), least="impulse")
     assert written(found.to_dict()) == json.loads(run("trade", *options).stdout)
     assert len(found.plans) == len(found.fronts[0].points) > 0
@@ -529,16 +616,36 @@ def test_an_export_is_that_of_the_command(run: Run, tmp_path: Path) -> None:
     attitude = {"quaternion": [1, 0, 0, 0], "epoch": "2026-03-01T12:00:00Z", "frame": "EME2000"}
     timed = "attitude={quaternion: [1, 0, 0, 0], epoch: 2026-03-01T12:00:00Z, frame: EME2000}"
     plan = nutdamp.plan(CRAFT.with_(attitude=attitude), "two-pulse")
-    for form, name in (("stk", "x.a"), ("basilisk", "x.py"), ("json", "x.json"), ("aem", "x.xml"), ("apm", "x.apm")):
-        run("export", "--format", form, "--scheme", "two-pulse", "--set", timed, "-o", f"command-{name}")
+    for form, name in (
+        ("stk", "x.a"),
+        ("basilisk", "x.py"),
+        ("json", "x.json"),
+        ("aem", "x.xml"),
+        ("apm", "x.apm"),
+    ):
+        run(
+            "export",
+            "--format",
+            form,
+            "--scheme",
+            "two-pulse",
+            "--set",
+            timed,
+            "-o",
+            f"command-{name}",
+        )
         nutdamp.export(plan, form, tmp_path / name)
         texts = [(tmp_path / file).read_text() for file in (name, f"command-{name}")]
-        mine, its = (re.sub(r"(CREATION_DATE|MESSAGE_ID)( *= *|>)[^<\n]*", r"\1", text) for text in texts)
+        mine, its = (
+            re.sub(r"(CREATION_DATE|MESSAGE_ID)( *= *|>)[^<\n]*", r"\1", text) for text in texts
+        )
         assert mine == its
 
 
 @pytest.mark.weekly
-def test_a_report_is_that_of_the_command(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_report_is_that_of_the_command(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "own.yaml").write_text(TILTED)
     chosen = ("--scheme", "two-pulse", "--set", "limits.horizon=100 s")
@@ -552,7 +659,9 @@ def test_a_report_is_that_of_the_command(run: Run, tmp_path: Path, monkeypatch: 
     assert made.comparison["two-pulse"].feasible
     mine, its = (re.sub(r"<pre>nutdamp.*report.*</pre>", "", text) for text in texts)
     assert mine == its
-    again = nutdamp.report({**KEYS, "limits": {"horizon": "100 s"}}, tmp_path / "dict.html", ["two-pulse"])
+    again = nutdamp.report(
+        {**KEYS, "limits": {"horizon": "100 s"}}, tmp_path / "dict.html", ["two-pulse"]
+    )
     assert again.summary == made.summary
     assert str(again.content).startswith("<!DOCTYPE html>")
 
@@ -564,12 +673,16 @@ def test_a_report_of_replaced_fields_names_no_file(tmp_path: Path) -> None:
     text = (tmp_path / "own.html").read_text()
     assert "<h1>Other · damp" in text
     assert not parsed(text).all("a")
-    assert f"nutdamp.report(spacecraft, {str(tmp_path / 'own.html')!r}, ['two-pulse'])" in parsed(text).text
+    assert (
+        f"nutdamp.report(spacecraft, {str(tmp_path / 'own.html')!r}, ['two-pulse'])"
+        in parsed(text).text
+    )
 
 
 @pytest.mark.weekly
 def test_a_report_disperses_as_disperse_does(dispersed: Path) -> None:
-    craft, options = nutdamp.load(dispersed / "spacecraft.yaml"), nutdamp.Options(on_time=0.2)
+    craft = nutdamp.load(dispersed / "spacecraft.yaml")
+    options = nutdamp.Options(on_time=0.2)
     made = nutdamp.report(craft, dispersed / "own.html", options=options, disperse=200)
     text = (dispersed / "own.html").read_text()
     assert ", options=nutdamp.Options(on_time=0.2), disperse=200)" in text
@@ -594,8 +707,10 @@ def test_flights_comparisons_and_plans_draw_themselves() -> None:
 
 @pytest.mark.deep
 def test_studies_draw_themselves_and_write_their_rows(tmp_path: Path) -> None:
-    stage, plan = nutdamp.example("upper-stage"), nutdamp.plan(CRAFT, "two-pulse")
-    budget, simulated = nutdamp.budget(stage), nutdamp.simulate(plan, 20.0, samples=50)
+    stage = nutdamp.example("upper-stage")
+    plan = nutdamp.plan(CRAFT, "two-pulse")
+    budget = nutdamp.budget(stage)
+    simulated = nutdamp.simulate(plan, 20.0, samples=50)
     for result in (budget, simulated, nutdamp.loop(stage, 60.0), nutdamp.disperse(plan, 50)):
         assert result.figure().axes
     for rows in (budget, simulated):
@@ -626,11 +741,14 @@ def test_notebooks_show_small_tables() -> None:
     compared = nutdamp.compare(craft)
     plan = compared["two-pulse"]
     for shown in (craft, compared, plan, plan.fly(), nutdamp.plan(craft, "four-pulse")):
-        tags, text = Tags(), present(shown._repr_html_())
+        tags = Tags()
+        text = present(shown._repr_html_())
         tags.feed(text)
         assert tags.open == []
         assert "table" in tags.seen or "infeasible" in text
-        assert ("svg" in tags.seen) == (shown is not craft and "infeasible" not in text)  # the motion beside the table
+        assert ("svg" in tags.seen) == (
+            shown is not craft and "infeasible" not in text
+        )  # the motion beside the table
         assert "b" not in tags.seen
         assert repr(shown).startswith(f"<{type(shown).__name__}")
 

@@ -1,4 +1,6 @@
-"""Flights by Basilisk against `propagation.flown`: agreement to 1e-8 rad is promised, and far less is found."""
+"""Flights by Basilisk against `propagation.flown`: agreement to 1e-8 rad is promised, and far less
+is found.
+"""
 
 import math
 import sys
@@ -40,7 +42,11 @@ BODIES = {
 def _installed(request: pytest.FixtureRequest) -> None:
     if request.node.get_closest_marker("basilisk"):
         pytest.importorskip(
-            "Basilisk", reason="NOT CHECKED against Basilisk, which is not installed: pip install 'nutdamp[verify]'"
+            "Basilisk",
+            reason=(
+                "NOT CHECKED against Basilisk, which is not installed: "
+                "pip install 'nutdamp[verify]'"
+            ),
         )
 
 
@@ -51,7 +57,10 @@ def spinner(name: str, theta: float = math.radians(5.0), *, thrusters: bool = Tr
     torque = transverse * omega  # about a second of firing takes the nutation out
     directions = {"+1": (1, 0, 0.1), "-1": (-1, 0, 0), "+2": (0, 1, 0), "-2": (0, -1, -0.1)}
     channels = [
-        Channel(channel, (Thruster(channel, torque * np.array(direction, dtype=float), max_on_time=2.0),))
+        Channel(
+            channel,
+            (Thruster(channel, torque * np.array(direction, dtype=float), max_on_time=2.0),),
+        )
         for channel, direction in directions.items()
     ]
     return Spacecraft(
@@ -66,25 +75,41 @@ def reference(flown: propagation.Flight, times: np.ndarray) -> tuple[np.ndarray,
     """Rates and quaternions at ``times``, after a jump where there is one."""
     legs = [next(leg for leg in reversed(flown.legs) if leg.start <= time) for time in times]
     rows = [leg.path.motion(np.array([time])) for leg, time in zip(legs, times, strict=True)]
-    return np.array([rates[0] for rates, _ in rows]), np.array([quaternion[0] for _, quaternion in rows])
+    return np.array([rates[0] for rates, _ in rows]), np.array(
+        [quaternion[0] for _, quaternion in rows]
+    )
 
 
-def difference(spacecraft: Spacecraft, schedule: Schedule, until: float, found: BasiliskFlight) -> float:
-    """Largest difference from the flown motion: directions of H and of all body axes in rad, rates over |ω|."""
+def difference(
+    spacecraft: Spacecraft, schedule: Schedule, until: float, found: BasiliskFlight
+) -> float:
+    """Largest difference from the flown motion: directions of H and of all body axes in rad, rates
+    over |ω|.
+    """
     rates, quaternion = reference(propagation.flown(spacecraft, schedule, until), found.t)
     inertia = spacecraft.inertia
     still = abs(inertia.wheel) / min(inertia.moments)
-    worst = [np.linalg.norm(rates - found.rates, axis=1) / np.maximum(np.linalg.norm(rates, axis=1), still)]
-    pairs = [(inertia.momentum(rates), inertia.momentum(found.rates)), *((axis, axis) for axis in np.eye(3))]
+    worst = [
+        np.linalg.norm(rates - found.rates, axis=1)
+        / np.maximum(np.linalg.norm(rates, axis=1), still)
+    ]
+    pairs = [
+        (inertia.momentum(rates), inertia.momentum(found.rates)),
+        *((axis, axis) for axis in np.eye(3)),
+    ]
     for mine, theirs in pairs:
         worst.append(
-            attitude.angle_between(attitude.rotate(quaternion, mine), attitude.rotate(found.quaternion, theirs))
+            attitude.angle_between(
+                attitude.rotate(quaternion, mine), attitude.rotate(found.quaternion, theirs)
+            )
         )
     return float(np.max(worst))
 
 
 def overlapping() -> Schedule:
-    """Pulses at times that no clock of nanoseconds knows: overlapping, one within another, one with axial torque."""
+    """Pulses at times that no clock of nanoseconds knows: overlapping, one within another, one with
+    axial torque.
+    """
     return Schedule(
         (
             pulse(1.0 / 3.0, 0.1 * math.pi, 20.0, -5.0, 0.0),
@@ -127,10 +152,13 @@ def test_built_in_example(capfd: pytest.CaptureFixture[str]) -> None:
     assert np.all(found.quaternion[:, 0] >= 0.0)
     assert np.linalg.norm(found.quaternion, axis=1) == pytest.approx(1.0, abs=1e-14)
     assert found.rates.shape == (len(found.t), 3)
-    # What the plan is for: the nutation is gone and H is back, by a simulator that knows nothing of the plan.
+    # What the plan is for: the nutation is gone and H is back, by a simulator that knows nothing of
+    # the plan.
     last = found.rates[-1] * body.inertia.moments
     assert math.hypot(last[0], last[1]) / last[2] < 1e-8
-    start = attitude.rotate(body.initial.quaternion, body.initial.rates * np.array(body.inertia.moments))
+    start = attitude.rotate(
+        body.initial.quaternion, body.initial.rates * np.array(body.inertia.moments)
+    )
     assert attitude.angle_between(start, attitude.rotate(found.quaternion[-1], last)) < 1e-8
 
 
@@ -143,21 +171,34 @@ def test_ideal_impulses_and_overlapping_pulses_off_the_nanosecond_grid(name: str
     assert [one.on_time for one in schedule] == [0.0, 0.0]
     until = schedule.end + steered.inertial_period
     assert difference(steered, schedule, until, fly(steered, schedule, until)) <= FOUND
-    kicks = [(0.0, (5.0, 0.0, 3.0)), (1.1, (0.0, -4.0, 0.0)), (1.1, (1.0, 2.0, -30.0)), (4.0, (0.0, 7.0, 0.0))]
+    kicks = [
+        (0.0, (5.0, 0.0, 3.0)),
+        (1.1, (0.0, -4.0, 0.0)),
+        (1.1, (1.0, 2.0, -30.0)),
+        (4.0, (0.0, 7.0, 0.0)),
+    ]
     schedule = Schedule(tuple(Pulse(t, 0.0, "by hand", np.array(impulse)) for t, impulse in kicks))
     found = fly(body, schedule, 4.0)
     assert difference(body, schedule, 4.0, found) <= FOUND
-    assert found.rates[0] == pytest.approx(body.initial.rates + kicks[0][1] / np.array(body.inertia.moments))
+    assert found.rates[0] == pytest.approx(
+        body.initial.rates + kicks[0][1] / np.array(body.inertia.moments)
+    )
     assert difference(body, overlapping(), 8.0, fly(body, overlapping(), 8.0)) <= FOUND
 
 
 @pytest.mark.basilisk
 @pytest.mark.parametrize(("spin", "wheel"), [(0.0, 90.0), (-1.0, 150.0), (2.0, -400.0)])
 def test_a_wheel(spin: float, wheel: float) -> None:
-    """A balanced wheel without motor torque; of three moments too, through pulses with axial torque and kicks."""
+    """A balanced wheel without motor torque; of three moments too, through pulses with axial torque
+    and kicks.
+    """
     for name in ("prolate", next(each for each in BODIES if len(set(BODIES[each][0])) == 3)):
         body = spinner(name)
-        body = replace(body, inertia=replace(body.inertia, wheel=wheel), omega0=np.array([*body.omega0[:2], spin]))
+        body = replace(
+            body,
+            inertia=replace(body.inertia, wheel=wheel),
+            omega0=np.array([*body.omega0[:2], spin]),
+        )
         pulses = (*overlapping(), Pulse(4.0, 0.0, "by hand", np.array([5.0, -3.0, 4.0])))
         schedule = Schedule(pulses)
         assert difference(body, schedule, 12.0, fly(body, schedule, 12.0)) <= FOUND
@@ -176,8 +217,12 @@ def test_flight_that_ends_within_a_pulse() -> None:
 
 
 @pytest.mark.basilisk
-@pytest.mark.parametrize("quaternion", [(0, 1, 0, 0), (0, 0, 0, -1), (-0.5, 0.5, -0.5, 0.5), (1e-9, 0.6, 0.0, -0.8)])
-def test_attitude_of_the_file_and_tilted_axes(quaternion: tuple[float, float, float, float]) -> None:
+@pytest.mark.parametrize(
+    "quaternion", [(0, 1, 0, 0), (0, 0, 0, -1), (-0.5, 0.5, -0.5, 0.5), (1e-9, 0.6, 0.0, -0.8)]
+)
+def test_attitude_of_the_file_and_tilted_axes(
+    quaternion: tuple[float, float, float, float],
+) -> None:
     axes = attitude.matrix(np.array([math.cos(0.2), math.sin(0.2) * 0.6, math.sin(0.2) * 0.8, 0.0]))
     body = spinner("triaxial")
     turned = np.array(quaternion) / np.linalg.norm(quaternion)
@@ -191,7 +236,11 @@ def test_attitude_of_the_file_and_tilted_axes(quaternion: tuple[float, float, fl
     "disturbances",
     [
         (Disturbance(0.02 - 0.05j), Disturbance(0.0, axial=-0.1)),
-        (Disturbance(0.05 + 0.02j, rate=-3.0), Disturbance(0.01j, rate=0.7, axial=0.02), Disturbance(0.03 + 0j)),
+        (
+            Disturbance(0.05 + 0.02j, rate=-3.0),
+            Disturbance(0.01j, rate=0.7, axial=0.02),
+            Disturbance(0.03 + 0j),
+        ),
     ],
     quick=1,
     ids=["constant", "turning"],
@@ -227,13 +276,17 @@ def test_error_of_turning_torques_falls_with_the_fourth_power_of_the_step() -> N
 
 @pytest.mark.basilisk
 def test_body_at_rest() -> None:
-    body = replace(spinner("triaxial"), omega0=np.zeros(3), attitude=Attitude(np.array([0.6, 0.0, 0.8, 0.0])))
+    body = replace(
+        spinner("triaxial"), omega0=np.zeros(3), attitude=Attitude(np.array([0.6, 0.0, 0.8, 0.0]))
+    )
     found = fly(body, Schedule(), 3.0, samples=3)
     assert np.all(found.rates == 0.0)
     assert np.all(found.quaternion == found.quaternion[0])
 
 
-def test_what_cannot_be_flown_is_refused_before_basilisk_is_requested(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_cannot_be_flown_is_refused_before_basilisk_is_requested(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """It has a fixed step, so the count of steps is known before."""
     monkeypatch.setitem(sys.modules, "Basilisk", None)
     body = spinner("prolate")

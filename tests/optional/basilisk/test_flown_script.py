@@ -28,10 +28,14 @@ def _installed() -> None:
 
 
 def check(plan: planning.Plan, folder: Path) -> None:
-    """What the script prints in a process without nutdamp's folder on the path is the residual of the plan."""
+    """What the script prints in a process without nutdamp's folder on the path is the residual of
+    the plan.
+    """
     script = folder / "fly.py"
     script.write_text(export_text(plan, "basilisk"), encoding="utf-8")
-    ran = subprocess.run([sys.executable, "-I", str(script)], cwd=folder, capture_output=True, text=True, check=False)
+    ran = subprocess.run(
+        [sys.executable, "-I", str(script)], cwd=folder, capture_output=True, text=True, check=False
+    )
     assert ran.returncode == 0, ran.stderr
     lines = (line.split("  ", 1) for line in ran.stdout.splitlines() if "  " in line)
     left = present(plan.flown)
@@ -52,7 +56,9 @@ def test_ideal_impulses_and_disturbances(tmp_path: Path) -> None:
     assert all(pulse.torque is None for pulse in ideal.pulses)
     check(ideal, tmp_path)
     disturbances = (Disturbance(0.05 + 0.02j, axial=0.01), Disturbance(0.03j, rate=-3.0))
-    disturbed = planning.plan(replace(messages.spacecraft("oblate"), disturbances=disturbances), "two-pulse")
+    disturbed = planning.plan(
+        replace(messages.spacecraft("oblate"), disturbances=disturbances), "two-pulse"
+    )
     assert present(disturbed.flown).nutation > math.radians(1e-3)
     check(disturbed, tmp_path)
 

@@ -9,7 +9,15 @@ from typing import Any
 
 import pytest
 
-NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome", "microsoft-edge", "msedge")
+NAMES = (
+    "chromium",
+    "chromium-browser",
+    "google-chrome",
+    "google-chrome-stable",
+    "chrome",
+    "microsoft-edge",
+    "msedge",
+)
 """What the executables are called on Linux and Windows."""
 
 PLACES = (
@@ -25,7 +33,8 @@ def chromium() -> Iterator[Any]:
     """A running browser."""
     why = "NOT CHECKED in a browser: "
     playwright = pytest.importorskip(
-        "playwright.sync_api", reason=f"{why}playwright is not installed: pip install 'nutdamp[browser]'"
+        "playwright.sync_api",
+        reason=f"{why}playwright is not installed: pip install 'nutdamp[browser]'",
     )
     places = (shutil.which(name) for name in (*NAMES, *PLACES))
     executable = next((path for path in places if path is not None), None)
@@ -40,13 +49,16 @@ def chromium() -> Iterator[Any]:
 
 @pytest.fixture
 def browse(chromium: Any) -> Callable[..., Any]:
-    """Opens a file in a new tab; whatever the browser complains of or fetches from elsewhere fails the test.
+    """Opens a file in a new tab; whatever the browser complains of or fetches from elsewhere fails
+    the test.
 
     ``browse(path, width=1400, scheme="light", **context)`` is entered with ``with``.
     """
 
     @contextmanager
-    def opened(path: Path, width: int = 1400, scheme: str = "light", **options: Any) -> Iterator[Any]:
+    def opened(
+        path: Path, width: int = 1400, scheme: str = "light", **options: Any
+    ) -> Iterator[Any]:
         said: list[str] = []
         context = chromium.new_context(
             viewport={"width": width, "height": 900}, color_scheme=scheme, offline=True, **options
@@ -54,7 +66,12 @@ def browse(chromium: Any) -> Callable[..., Any]:
         page = context.new_page()
         page.on("console", lambda message: said.append(message.text))
         page.on("pageerror", lambda error: said.append(str(error)))
-        page.on("request", lambda request: said.append(request.url) if request.url[:5] not in ("file:", "data:") else 0)
+        page.on(
+            "request",
+            lambda request: (
+                said.append(request.url) if request.url[:5] not in ("file:", "data:") else 0
+            ),
+        )
         page.goto(path.as_uri())
         yield page
         context.close()

@@ -41,7 +41,9 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
 
     def page(text: str) -> Path:
         if text not in known:
-            made = report_page(compare(read_spacecraft(text, "a.yaml"), CLASSIC), Repeat("", "", ""))
+            made = report_page(
+                compare(read_spacecraft(text, "a.yaml"), CLASSIC), Repeat("", "", "")
+            )
             known[text] = folder / f"{len(known)}.html"
             known[text].write_text(page_html(made), encoding="utf-8")
         return known[text]
@@ -82,9 +84,13 @@ def on_screen(page: Any, which: str, x: float, y: float) -> tuple[float, float]:
 
 
 @spread("file", [EXAMPLE, LEAP, TARGET], quick=1, ids=["example", "leap", "target"])
-def test_its_numbers_are_those_of_simulate_at_ten_times(browse: Browse, written: Any, run: Run, file: str) -> None:
+def test_its_numbers_are_those_of_simulate_at_ten_times(
+    browse: Browse, written: Any, run: Run, file: str
+) -> None:
     with browse(written(file)) as page:
-        (command,) = re.findall(r"nutdamp (simulate .*?) FILE", page.locator(".moving .how").text_content())
+        (command,) = re.findall(
+            r"nutdamp (simulate .*?) FILE", page.locator(".moving .how").text_content()
+        )
         done = run(*shlex.split(command.replace("SPACECRAFT", "-")), "-", "-q", stdin=file)
         track = list(csv.DictReader(io.StringIO(done.stdout)))
         last = int(part(page, "slider").get_attribute("max"))
@@ -96,7 +102,11 @@ def test_its_numbers_are_those_of_simulate_at_ten_times(browse: Browse, written:
             digits = len(text(page, "t").removesuffix(" s").split(".")[1])
             assert digits >= 3
             assert text(page, "t") == f"{float(expected['t_s']):.{digits}f} s"
-            for name, key in (("theta", "nutation_deg"), ("mu", "body_cone_deg"), ("lambda", "space_cone_deg")):
+            for name, key in (
+                ("theta", "nutation_deg"),
+                ("mu", "body_cone_deg"),
+                ("lambda", "space_cone_deg"),
+            ):
                 assert text(page, name) == f"{float(expected[key]):z.4f}°"
             x, y, z = (float(expected[f"axis_{axis}"]) for axis in "xyz")
             across = math.hypot(x, y)
@@ -123,7 +133,13 @@ def test_one_cursor_moves_in_every_picture(browse: Browse, written: Any) -> None
         data = data_of(page)
         rows = data["rows"]
         fired = set()
-        for now in (0, 40, 200, next(r for r, on in enumerate(rows["firing"]) if on), len(rows["t"]) - 1):
+        for now in (
+            0,
+            40,
+            200,
+            next(r for r, on in enumerate(rows["firing"]) if on),
+            len(rows["t"]) - 1,
+        ):
             part(page, "slider").fill(str(now))
             assert place(page, "pole") == (rows["pole1"][now], rows["pole2"][now])
             assert place(page, "sky") == (rows["sky1"][now], rows["sky2"][now])
@@ -150,10 +166,15 @@ def test_the_thumb_of_the_slider_stays_below_the_cursor(browse: Browse, written:
 
 def test_what_an_impulse_at_t_zero_changes_is_drawn_before_it(browse: Browse, written: Any) -> None:
     """Its curve begins at the left edge, level to t = 0; that of other flights begins at t = 0."""
-    for text_, level in (((CONFIGS / "magnus-a03.yaml").read_text(encoding="utf-8"), True), (EXAMPLE, False)):
+    for text_, level in (
+        ((CONFIGS / "magnus-a03.yaml").read_text(encoding="utf-8"), True),
+        (EXAMPLE, False),
+    ):
         with browse(written(text_)) as page:
             path = page.locator(".moving .angles path.theta").get_attribute("d")
-            (x, y), (x_next, y_next) = (map(float, place.split()) for place in path[1:].split("L")[:2])
+            (x, y), (x_next, y_next) = (
+                map(float, place.split()) for place in path[1:].split("L")[:2]
+            )
             assert x == (0.0 if level else 2000.0 * LEAD)
             assert (x_next == 2000.0 * LEAD and y_next == y) == level
 
@@ -180,7 +201,9 @@ def test_pointing_at_a_curve_moves_the_cursor_there(browse: Browse, written: Any
             assert rows["t"][row(page)] == pytest.approx(expected, abs=0.005 * rows["t"][-1])
 
 
-def test_pointing_at_the_globe_moves_the_cursor_and_dragging_turns_it(browse: Browse, written: Any) -> None:
+def test_pointing_at_the_globe_moves_the_cursor_and_dragging_turns_it(
+    browse: Browse, written: Any
+) -> None:
     with browse(written(TARGET)) as page:
         part(page, "globe").scroll_into_view_if_needed()
         last = int(part(page, "slider").get_attribute("max"))
@@ -192,7 +215,8 @@ def test_pointing_at_the_globe_moves_the_cursor_and_dragging_turns_it(browse: Br
         page.mouse.move(*on_screen(page, "globe", *spot))
         assert math.dist(spot, place(page, "globe")) < 40
         page.mouse.move(*on_screen(page, "globe", 1000, 1000))
-        before, moment = place(page, "globe"), row(page)
+        before = place(page, "globe")
+        moment = row(page)
         page.mouse.down()
         page.mouse.move(*on_screen(page, "globe", 1200, 1000), steps=4)
         page.mouse.up()
@@ -203,7 +227,9 @@ def test_pointing_at_the_globe_moves_the_cursor_and_dragging_turns_it(browse: Br
 
 
 @spread("name", ["ace", "single-thruster", "communications-spinner"], quick=1)
-def test_no_mark_of_the_motion_lies_over_a_name_on_the_globe(browse: Browse, written: Any, name: str) -> None:
+def test_no_mark_of_the_motion_lies_over_a_name_on_the_globe(
+    browse: Browse, written: Any, name: str
+) -> None:
     """ACE flies close to the Sun; the others point to where the equator has its numbers."""
     sun = "" if name == "ace" else "sun: [100 deg, 10 deg]\n"  # else there is no globe
     with browse(written((CONFIGS / f"{name}.yaml").read_text(encoding="utf-8") + sun)) as page:
@@ -220,12 +246,15 @@ def test_no_mark_of_the_motion_lies_over_a_name_on_the_globe(browse: Browse, wri
 
 
 @pytest.mark.parametrize(("key", "other"), [("ArrowLeft", "ArrowRight"), ("ArrowUp", "ArrowDown")])
-def test_arrow_keys_turn_the_globe_and_home_turns_it_back(browse: Browse, written: Any, key: str, other: str) -> None:
+def test_arrow_keys_turn_the_globe_and_home_turns_it_back(
+    browse: Browse, written: Any, key: str, other: str
+) -> None:
     with browse(written(TARGET)) as page:
         globe = part(page, "globe")
         globe.focus()
         drawn = "(svg) => svg.querySelector('.grid path').getAttribute('d')"
-        first, moment = globe.evaluate(drawn), row(page)
+        first = globe.evaluate(drawn)
+        moment = row(page)
         page.keyboard.press(key)
         assert globe.evaluate(drawn) != first
         page.keyboard.press(other)
@@ -243,7 +272,13 @@ def test_keys_move_the_slider(browse: Browse, written: Any) -> None:
         slider.focus()
         assert slider.evaluate("(one) => getComputedStyle(one).outlineStyle") == "solid"
         times = [text(page, "t")]
-        for key, expected in (("ArrowRight", 1), ("ArrowRight", 2), ("ArrowLeft", 1), ("End", None), ("Home", 0)):
+        for key, expected in (
+            ("ArrowRight", 1),
+            ("ArrowRight", 2),
+            ("ArrowLeft", 1),
+            ("End", None),
+            ("Home", 0),
+        ):
             page.keyboard.press(key)
             assert row(page) == (int(slider.get_attribute("max")) if expected is None else expected)
             times.append(text(page, "t"))
@@ -268,7 +303,9 @@ def until(page: Any, happened: Callable[[], bool]) -> None:
 
 
 @pytest.mark.parametrize("motion", ["no-preference", "reduce"])
-def test_it_plays_when_it_is_told_to_and_not_before(browse: Browse, written: Any, motion: str) -> None:
+def test_it_plays_when_it_is_told_to_and_not_before(
+    browse: Browse, written: Any, motion: str
+) -> None:
     with browse(written(EXAMPLE), reduced_motion=motion) as page:
         page.locator(".moving").scroll_into_view_if_needed()
         page.wait_for_timeout(300)
@@ -312,12 +349,16 @@ def test_no_pulse_is_passed_over_while_it_plays(browse: Browse, written: Any) ->
 
 UNUSUAL = {
     "no-nutation": "inertia: {A: 120, C: 80}\nomega0: [0, 0, 3]\n",
-    "single-pulse-spin-reversed": "inertia: {A: 80, C: 120}\nstate: {spin: -30 rpm, nutation: 3 deg}\n"
+    "single-pulse-spin-reversed": "inertia: {A: 80, C: 120}\nstate: {spin: -30 rpm, nutation: "
+    "3 deg}\n"
     "thrusters: [{name: T1, torque: [0, 12, 0]}]\nlimits: {max_pulses: 1}\n",
     "three-moments": "inertia: {tensor: [[120, 3, 0], [3, 100, 0], [0, 0, 60]]}\n"
     "state: {spin: 6 rpm, nutation: 20 deg}\n",
     "very-small": "inertia: {A: 120, C: 80}\nstate: {spin: 30 rpm, nutation: 4e-7 deg}\n",
-    "dots": "inertia: {A: 120, C: 80}\nomega0: [0.1, 0, 3]\nlimits: {earliest: 3000 s, horizon: 3600 s}\n",
+    "dots": (
+        "inertia: {A: 120, C: 80}\nomega0: [0.1, 0, 3]\nlimits: {earliest: 3000 s, horizon: "
+        "3600 s}\n"
+    ),
     "sphere": "inertia: {A: 100, C: 100}\nomega0: [0.1, 0, 3]\n",
 }
 
@@ -326,7 +367,10 @@ UNUSUAL = {
 def test_unusual_motions_are_shown_too(browse: Browse, written: Any, name: str) -> None:
     with browse(written(f"name: {name}\n{UNUSUAL[name]}"), 800) as page:
         assert page.locator(".moving").is_visible()
-        shapes = "[...document.querySelectorAll('.moving [d], .moving [transform]')].map((one) => one.outerHTML).join()"
+        shapes = (
+            "[...document.querySelectorAll('.moving [d], .moving [transform]')].map((one) => "
+            "one.outerHTML).join()"
+        )
         for key in ("End", "Home", "PageUp", "End"):
             part(page, "slider").focus()
             page.keyboard.press(key)
@@ -364,7 +408,8 @@ def test_without_script_and_in_print_the_pictures_remain(browse: Browse, written
 def test_on_a_phone_the_buttons_stand_in_one_line(browse: Browse, written: Any, width: int) -> None:
     with browse(written(EXAMPLE), width) as page:
         tops = page.eval_on_selector_all(
-            ".controls button, .controls select", "all => all.map((one) => one.getBoundingClientRect().y)"
+            ".controls button, .controls select",
+            "all => all.map((one) => one.getBoundingClientRect().y)",
         )
         assert len(tops) == 4
         assert max(tops) - min(tops) < 3.0
@@ -393,7 +438,8 @@ def test_nothing_of_it_is_cut(browse: Browse, written: Any, width: int) -> None:
         )
         assert covered == []
         height = page.evaluate(
-            "[...document.querySelectorAll('.moving .panel text')].map((one) => one.getBoundingClientRect().height)"
+            "[...document.querySelectorAll('.moving .panel text')].map((one) => "
+            "one.getBoundingClientRect().height)"
         )
         assert min(height) > 9
 
@@ -424,8 +470,13 @@ BEYOND = """(selector) => [...document.querySelectorAll(selector)]
 
 def made(name: str) -> Page:
     """The page of a configuration."""
-    source = next((path.read_text(encoding="utf-8") for path in CONFIG_FILES if path.stem == name), example_text())
-    source = {LONG: source.replace("max_on_time: 2 s", "max_on_time: 0.14 s"), UNPLANNED: BARE}.get(name, source)
+    source = next(
+        (path.read_text(encoding="utf-8") for path in CONFIG_FILES if path.stem == name),
+        example_text(),
+    )
+    source = {LONG: source.replace("max_on_time: 2 s", "max_on_time: 0.14 s"), UNPLANNED: BARE}.get(
+        name, source
+    )
     schemes = {LONG: ("four-pulse",), UNPLANNED: ("four-pulse",)}.get(name, ())
     compared = compare(read_spacecraft(source, f"{name}.yaml"), schemes)
     return report_page(compared, Repeat(f"nutdamp report {name}.yaml", f"{name}.yaml", source))
@@ -454,9 +505,13 @@ def tab(browse: Browse, pages: Callable[[str], Path]) -> Browse:
 def everywhere() -> list[Any]:
     """All configurations; those not in `QUICK` are slow."""
     names = dict.fromkeys((*QUICK, *(path.stem for path in CONFIG_FILES)))
-    groups = {name: pytest.mark.xdist_group(name) for name in names}  # the page is made by one process
+    groups = {
+        name: pytest.mark.xdist_group(name) for name in names
+    }  # the page is made by one process
     return [
-        pytest.param(name, marks=groups[name] if name in QUICK else (groups[name], pytest.mark.deep), id=name)
+        pytest.param(
+            name, marks=groups[name] if name in QUICK else (groups[name], pytest.mark.deep), id=name
+        )
         for name in names
     ]
 
@@ -469,11 +524,18 @@ def test_it_is_five_screens_at_most_and_fits_phones(tab: Browse, name: str) -> N
             for scheme in ("light", "dark"):
                 page.emulate_media(color_scheme=scheme)
                 assert page.evaluate(OVERFLOW) <= 0
-                assert page.evaluate(BEYOND, "h1, h2, h3, p, dl, ul, .facts, .margins, .wide, figcaption") == []
+                assert (
+                    page.evaluate(
+                        BEYOND, "h1, h2, h3, p, dl, ul, .facts, .margins, .wide, figcaption"
+                    )
+                    == []
+                )
 
 
 @pytest.mark.parametrize("name", everywhere())
-def test_it_fits_paper_and_prints_to_four_pages_of_a4_besides_the_sheet(tab: Browse, name: str) -> None:
+def test_it_fits_paper_and_prints_to_four_pages_of_a4_besides_the_sheet(
+    tab: Browse, name: str
+) -> None:
     with tab(name, round(A4)) as page:
         page.emulate_media(media="print")
         assert page.evaluate(BEYOND, "table, svg, pre") == []
@@ -484,7 +546,9 @@ def test_it_fits_paper_and_prints_to_four_pages_of_a4_besides_the_sheet(tab: Bro
     pages, besides = (len(re.findall(rb"/Type\s*/Page\b", text)) for text in (printed, rest))
     assert besides <= 4
     assert pages == besides + fires
-    boxes = {tuple(map(float, box.split())) for box in re.findall(rb"/MediaBox\s*\[(.*?)\]", printed)}
+    boxes = {
+        tuple(map(float, box.split())) for box in re.findall(rb"/MediaBox\s*\[(.*?)\]", printed)
+    }
     for box in boxes:
         assert box == pytest.approx((0, 0, 210 / 25.4 * 72, 297 / 25.4 * 72), abs=0.5)
 
@@ -502,7 +566,11 @@ def test_the_input_file_is_saved_from_the_page_without_a_network(tab: Browse) ->
 def test_the_sheet_has_a_row_for_each_of_twenty_pulses(tab: Browse) -> None:
     with tab(LONG, 1280) as page:
         assert (
-            page.evaluate("document.querySelectorAll('#manoeuvre .wide')[0].querySelectorAll('tbody tr').length") == 20
+            page.evaluate(
+                "document.querySelectorAll('#manoeuvre .wide')[0].querySelectorAll('tbody "
+                "tr').length"
+            )
+            == 20
         )
 
 
@@ -510,27 +578,39 @@ def test_the_sheet_has_a_row_for_each_of_twenty_pulses(tab: Browse) -> None:
 def test_an_accessibility_checker_finds_nothing(tab: Browse, name: str) -> None:
     axe = pytest.importorskip(
         "axe_playwright_python.sync_playwright",
-        reason="NOT CHECKED for accessibility: axe is not installed: pip install 'nutdamp[browser]'",
+        reason=(
+            "NOT CHECKED for accessibility: axe is not installed: pip install 'nutdamp[browser]'"
+        ),
     ).Axe()
 
     def found(page: Any, *rules: str) -> list[tuple[str, str]]:
         response = axe.run(
             page, options={"resultTypes": ["violations"], **({"runOnly": rules} if rules else {})}
         ).response
-        return [(one["id"], node["html"][:200]) for one in response["violations"] for node in one["nodes"]]
+        return [
+            (one["id"], node["html"][:200])
+            for one in response["violations"]
+            for node in one["nodes"]
+        ]
 
     for width in (1280, 400):
         with tab(name, width) as page:
-            page.evaluate("document.querySelectorAll('details').forEach((one) => { one.open = true; })")
+            page.evaluate(
+                "document.querySelectorAll('details').forEach((one) => { one.open = true; })"
+            )
             assert found(page) == []
             page.emulate_media(color_scheme="dark")
             assert found(page, "color-contrast") == []
             page.evaluate("document.querySelector('html').removeAttribute('lang')")
-            assert [rule for rule, _ in found(page, "html-has-lang")] == ["html-has-lang"]  # it does look
+            assert [rule for rule, _ in found(page, "html-has-lang")] == [
+                "html-has-lang"
+            ]  # it does look
 
 
 def test_no_stop_of_the_keyboard_does_nothing(tab: Browse) -> None:
-    """At 1280 px no table or picture scrolls, and none is a stop; on a phone those that scroll are."""
+    """At 1280 px no table or picture scrolls, and none is a stop;
+    on a phone those that scroll are.
+    """
     stops = """[...document.querySelectorAll("[tabindex='0'], summary, button, input, select, a")]
       .filter((one) => one.checkVisibility() && !one.closest(".moving")).map((one) => one.className || one.tagName)"""
     with tab(BUILT_IN, 1280) as page:
@@ -538,7 +618,8 @@ def test_no_stop_of_the_keyboard_does_nothing(tab: Browse) -> None:
     with tab(BUILT_IN, 400) as page:
         page.wait_for_function("document.querySelectorAll('.wide[tabindex]').length > 0")
         assert page.evaluate(
-            "[...document.querySelectorAll('.wide[tabindex]')].every((one) => one.scrollWidth > one.clientWidth)"
+            "[...document.querySelectorAll('.wide[tabindex]')].every((one) => one.scrollWidth > "
+            "one.clientWidth)"
         )
         box = page.locator("#schemes .wide").first
         assert box.get_attribute("aria-label")
@@ -553,7 +634,9 @@ def test_no_stop_of_the_keyboard_does_nothing(tab: Browse) -> None:
 
 @pytest.mark.parametrize("name", [BUILT_IN, "ace"])
 def test_without_a_script_and_on_paper_there_is_a_still_picture(tab: Browse, name: str) -> None:
-    shown = "[...document.querySelectorAll('.still svg')].filter((one) => one.checkVisibility()).length"
+    shown = (
+        "[...document.querySelectorAll('.still svg')].filter((one) => one.checkVisibility()).length"
+    )
     with tab(name, 1280, "light", java_script_enabled=False) as page:
         assert page.locator(".still svg").first.is_visible()
         assert not page.locator(".moving").first.is_visible()
@@ -561,18 +644,29 @@ def test_without_a_script_and_on_paper_there_is_a_still_picture(tab: Browse, nam
         assert page.evaluate(shown) == 0
         page.emulate_media(media="print")
         assert page.evaluate(shown) >= 2
-        assert page.evaluate("[...document.querySelectorAll('details')].some((one) => one.checkVisibility())") is False
+        assert (
+            page.evaluate(
+                "[...document.querySelectorAll('details')].some((one) => one.checkVisibility())"
+            )
+            is False
+        )
 
 
-@pytest.mark.parametrize(("name", "state"), [(BUILT_IN, "met"), ("ace", "caution"), (UNPLANNED, "missed")])
+@pytest.mark.parametrize(
+    ("name", "state"), [(BUILT_IN, "met"), ("ace", "caution"), (UNPLANNED, "missed")]
+)
 def test_the_frame_of_the_decision_says_it_in_colour(tab: Browse, name: str, state: str) -> None:
     """Red where it is not met and nowhere else, amber where tolerances were not checked."""
     with tab(name, 1280) as page:
-        frame = page.evaluate("getComputedStyle(document.querySelector('#decision')).borderTopColor")
+        frame = page.evaluate(
+            "getComputedStyle(document.querySelector('#decision')).borderTopColor"
+        )
         text = page.evaluate("document.querySelector('#decision').className")
     assert (text, frame) == (
         state,
-        {"met": "rgb(0, 114, 178)", "caution": "rgb(138, 90, 0)", "missed": "rgb(180, 35, 24)"}[state],
+        {"met": "rgb(0, 114, 178)", "caution": "rgb(138, 90, 0)", "missed": "rgb(180, 35, 24)"}[
+            state
+        ],
     )
 
 
@@ -608,7 +702,11 @@ CONTRAST = """(selector) => {
 def test_text_is_read_on_either_ground(tab: Browse, scheme: str) -> None:
     """Contrast by WCAG 2: 4.5 for text."""
     with tab(BUILT_IN, 1280, scheme) as page:
-        dark = page.evaluate("getComputedStyle(document.body).backgroundColor") != "rgb(255, 255, 255)"
+        dark = (
+            page.evaluate("getComputedStyle(document.body).backgroundColor") != "rgb(255, 255, 255)"
+        )
         assert dark == (scheme == "dark")
-        texts = page.evaluate(CONTRAST, "h1, h2, h3, p, li, summary, th, td, caption, figcaption, pre, .unit")
+        texts = page.evaluate(
+            CONTRAST, "h1, h2, h3, p, li, summary, th, td, caption, figcaption, pre, .unit"
+        )
         assert min(texts)[0] >= 4.5, min(texts)

@@ -1,4 +1,6 @@
-"""The workbench in a real browser: what it computes is what `flown` does; drag, keys, limits and copies."""
+"""The workbench in a real browser: what it computes is what `flown` does; drag, keys, limits and
+copies.
+"""
 
 import csv
 import io
@@ -84,7 +86,8 @@ def chosen(text: str) -> Plan:
 @pytest.fixture(scope="module")
 def paged(tmp_path_factory: pytest.TempPathFactory) -> Callable[[Moving], Path]:
     """The file of a page with nothing but a moving view, which is quickly made."""
-    folder, bare = tmp_path_factory.mktemp("workbench"), plain_page(compared_text(EXAMPLE))
+    folder = tmp_path_factory.mktemp("workbench")
+    bare = plain_page(compared_text(EXAMPLE))
 
     def page(view: Moving) -> Path:
         made = replace(bare, motion=(view,), sections=())
@@ -101,17 +104,25 @@ def written(paged: Callable[[Moving], Path]) -> Callable[[str], Path]:
     return cache(lambda text: paged(moving_of(chosen(text))))
 
 
-def changed(plan: Plan, times: Times, ratio: float = 0.0, thrust: float = 0.0) -> propagation.Flight:
+def changed(
+    plan: Plan, times: Times, ratio: float = 0.0, thrust: float = 0.0
+) -> propagation.Flight:
     """The flight through real widths with other times, C/A and thrust; the latter in per cent."""
-    body, factor, pulses = plan.spacecraft, 1.0 + thrust / 100.0, []
+    body = plan.spacecraft
+    factor = 1.0 + thrust / 100.0
+    pulses = []
     first, second, third = body.inertia.moments
-    body = replace(body, inertia=replace(body.inertia, moments=(first, second, third * (1.0 + ratio / 100.0))))
+    body = replace(
+        body, inertia=replace(body.inertia, moments=(first, second, third * (1.0 + ratio / 100.0)))
+    )
     for number, pulse in enumerate(plan.pulses):
         _, on_time = times.get(number, (pulse.start, pulse.on_time))
         scale = factor * (on_time / pulse.on_time if pulse.on_time else 1.0)
         torque = None if pulse.torque is None else pulse.torque * factor
         t = times[number][0] + 0.5 * on_time if number in times else pulse.t
-        pulses.append(replace(pulse, t=t, on_time=on_time, impulse=pulse.impulse * scale, torque=torque))
+        pulses.append(
+            replace(pulse, t=t, on_time=on_time, impulse=pulse.impulse * scale, torque=torque)
+        )
     return propagation.flown(body, Schedule(tuple(pulses)), 1.2 * plan.pulses.end + 10.0)
 
 
@@ -127,19 +138,24 @@ def settle(page: Any) -> None:
 def shown(page: Any, column: str = "now") -> dict[str, float]:
     """Angles at the end as numbers, rad."""
     settle(page)
-    keys = page.eval_on_selector_all(".bench [data-row]", "rows => rows.map((row) => row.dataset.row)")
+    keys = page.eval_on_selector_all(
+        ".bench [data-row]", "rows => rows.map((row) => row.dataset.row)"
+    )
     return {key: float(part(page, f"{column}-{key}").get_attribute("value")) for key in keys}
 
 
 def expect(page: Any, flight: propagation.Flight) -> None:
-    values, left = shown(page), flight.residual
+    values = shown(page)
+    left = flight.residual
     assert {"nutation", "momentum_shift"} <= set(values)
     assert ("axis_error" in values) == (flight.spacecraft.goal.axis is not None)
     if flight.spacecraft.goal.spin is not None:
         error = abs(flight.settled.spin - flight.spacecraft.goal.spin)
         assert values.pop("spin") == pytest.approx(error, rel=0.0, abs=1e-12)
     for key, value in values.items():
-        assert math.degrees(value) == pytest.approx(math.degrees(getattr(left, key)), rel=0.0, abs=1e-6), key
+        assert math.degrees(value) == pytest.approx(
+            math.degrees(getattr(left, key)), rel=0.0, abs=1e-6
+        ), key
 
 
 def enter(page: Any, number: int, start: float, on_time: float) -> None:
@@ -152,7 +168,9 @@ def enter(page: Any, number: int, start: float, on_time: float) -> None:
 
 
 @spread("name", FILES, quick=5)
-def test_the_end_is_that_of_simulate_through_real_widths(browse: Browse, written: Any, name: str) -> None:
+def test_the_end_is_that_of_simulate_through_real_widths(
+    browse: Browse, written: Any, name: str
+) -> None:
     plan = chosen(FILES[name])
     times: dict[int, tuple[float, float]] = {}
     with browse(written(FILES[name])) as page:
@@ -198,7 +216,9 @@ def test_a_changed_motion_is_drawn_as_it_is_flown(browse: Browse, written: Any, 
                 "theta": [track.nutation[-1] for track in near],
                 "mu": [track.body_cone[-1] for track in near],
                 "lambda": [track.space_cone[-1] for track in near],
-                f"angle{1 + framed}": np.arctan2(z, np.hypot(x, y)) if framed else np.arctan2(np.hypot(x, y), z),
+                f"angle{1 + framed}": np.arctan2(z, np.hypot(x, y))
+                if framed
+                else np.arctan2(np.hypot(x, y), z),
             }
             for name_, values in angles.items():
                 angle = float(part(page, name_).text_content().removesuffix("°"))
@@ -214,7 +234,9 @@ def test_the_spin_has_its_limit_too(browse: Browse, paged: Callable[[Moving], Pa
     body = replace(plan.spacecraft, goal=Goal(spin=spin))
     with browse(paged(moving_of(replace(plan, spacecraft=body)))) as page:
         expect(page, propagation.flown(body, plan.pulses))
-        limit = float(part(page, "limit-spin").text_content().removeprefix("≤ ").removesuffix(" rad/s"))
+        limit = float(
+            part(page, "limit-spin").text_content().removeprefix("≤ ").removesuffix(" rad/s")
+        )
         assert limit == pytest.approx(1e-2 * spin, rel=1e-3)  # the default of requirement.spin
 
 
@@ -229,7 +251,9 @@ def drag(page: Any, index: int, grip: str, by: float) -> None:
 
 
 @spread("name", ["example", "target", "steerable-stage"], quick=1)
-def test_dragging_a_bar_moves_the_firing_and_its_edge_the_on_time(browse: Browse, written: Any, name: str) -> None:
+def test_dragging_a_bar_moves_the_firing_and_its_edge_the_on_time(
+    browse: Browse, written: Any, name: str
+) -> None:
     plan = chosen(FILES[name])
     with browse(written(FILES[name])) as page:
         page.locator(".desk").scroll_into_view_if_needed()
@@ -238,11 +262,14 @@ def test_dragging_a_bar_moves_the_firing_and_its_edge_the_on_time(browse: Browse
         second = (1.0 - data["lead"]) * box["width"] / data["until"]  # px
         pulse, step = plan.pulses.pulses[0], data["bench"]["step"]
         drag(page, 0, "middle", 40.0)
-        start, on_time = float(part(page, "begin").input_value()), pulse.on_time
+        start = float(part(page, "begin").input_value())
+        on_time = pulse.on_time
         assert start == pytest.approx(pulse.start + 40.0 / second, abs=step)
         expect(page, changed(plan, {0: (start, on_time)}))
         bar = page.locator(".firing").first.bounding_box()
-        assert bar["x"] == pytest.approx(box["x"] + data["lead"] * box["width"] + second * start, abs=1.5)
+        assert bar["x"] == pytest.approx(
+            box["x"] + data["lead"] * box["width"] + second * start, abs=1.5
+        )
         if pulse.on_time == 0.0:
             assert page.locator(".firing .last").count() == 0
             return
@@ -258,7 +285,9 @@ def test_dragging_a_bar_moves_the_firing_and_its_edge_the_on_time(browse: Browse
         expect(page, changed(plan, {0: (begin, width)}))
 
 
-def test_values_stand_beside_their_limits_and_nothing_is_judged(browse: Browse, written: Any) -> None:
+def test_values_stand_beside_their_limits_and_nothing_is_judged(
+    browse: Browse, written: Any
+) -> None:
     with browse(written(EXAMPLE)) as page:
         colour = "(one) => getComputedStyle(one).color"
         plain = part(page, "now-nutation").evaluate(colour)
@@ -268,7 +297,9 @@ def test_values_stand_beside_their_limits_and_nothing_is_judged(browse: Browse, 
             said = part(page, "thrust").get_attribute("aria-valuetext")
             assert f"nutation {part(page, 'now-nutation').text_content()}, limit ≤ 0.5°" in said
             assert part(page, "now-nutation").evaluate(colour) == plain
-            assert not re.search(r"\bmet\b", page.locator(".moving").inner_text() + said, re.IGNORECASE)
+            assert not re.search(
+                r"\bmet\b", page.locator(".moving").inner_text() + said, re.IGNORECASE
+            )
         enter(page, 0, 0.5, 2.5)
         part(page, "width").blur()
         summary = part(page, "summary").text_content()
@@ -300,11 +331,16 @@ def test_an_edited_page_says_so_until_it_is_reset(browse: Browse, written: Any) 
         assert banners.all_text_contents() == [words, words]
         for media in ("screen", "print"):
             page.emulate_media(media=media)
-            assert status.locator(".edited").bounding_box() == pytest.approx(status.bounding_box(), abs=0.5)
+            assert status.locator(".edited").bounding_box() == pytest.approx(
+                status.bounding_box(), abs=0.5
+            )
             page.evaluate("document.querySelector('#decision').scrollIntoView()")
             box = status.locator(".edited").bounding_box()
             middle = [box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"]]
-            assert page.evaluate("([x, y]) => document.elementFromPoint(x, y).className", middle) == "edited"
+            assert (
+                page.evaluate("([x, y]) => document.elementFromPoint(x, y).className", middle)
+                == "edited"
+            )
         page.emulate_media(media="screen")
         assert page.locator(".moving .edited").is_visible()
         part(page, "reset").click()
@@ -314,7 +350,10 @@ def test_an_edited_page_says_so_until_it_is_reset(browse: Browse, written: Any) 
 
 def test_the_view_is_titled_by_its_plan(browse: Browse, written: Any) -> None:
     with browse(written(EXAMPLE)) as page:
-        assert page.locator(".moving h3").first.text_content().strip() == f"Motion: {chosen(EXAMPLE).scheme}"
+        assert (
+            page.locator(".moving h3").first.text_content().strip()
+            == f"Motion: {chosen(EXAMPLE).scheme}"
+        )
 
 
 @pytest.mark.parametrize(
@@ -342,7 +381,10 @@ def test_on_times_and_gaps_have_limits_too(browse: Browse, written: Any) -> None
     plan = chosen(EXAMPLE)  # from 20 ms to 2 s
     second = plan.pulses.pulses[1]
     with browse(written(EXAMPLE)) as page:
-        for on_time, text in ((0.01, "on-time 0.01 s, minimum 0.02 s"), (2.5, "on-time 2.5 s, maximum 2 s")):
+        for on_time, text in (
+            (0.01, "on-time 0.01 s, minimum 0.02 s"),
+            (2.5, "on-time 2.5 s, maximum 2 s"),
+        ):
             enter(page, 0, 0.5, on_time)
             settle(page)
             assert f"pulse 1: {text}" in part(page, "broken").text_content()
@@ -371,13 +413,17 @@ def test_the_copied_command_flies_to_the_same_end(
         settle(page)
         assert part(page, "copied").text_content() == "Copied."
         assert f"Save the CSV as {EDITED}" in page.locator(".bench").inner_text()
-        (tmp_path / EDITED).write_text(page.evaluate("navigator.clipboard.readText()"), encoding="utf-8")
+        (tmp_path / EDITED).write_text(
+            page.evaluate("navigator.clipboard.readText()"), encoding="utf-8"
+        )
         part(page, "copy-command").click()
         settle(page)
         command = page.evaluate("navigator.clipboard.readText()")
     rows = list(csv.DictReader(io.StringIO((tmp_path / EDITED).read_text(encoding="utf-8"))))
     assert [row["channel"] for row in rows] == [entry.channel for entry in plan.pulses]
-    assert [float(row["start_s"]) for row in rows[1:]] == [entry.start for entry in plan.pulses.pulses[1:]]
+    assert [float(row["start_s"]) for row in rows[1:]] == [
+        entry.start for entry in plan.pulses.pulses[1:]
+    ]
     assert command == f"nutdamp simulate 'my sounder.yaml' --schedule {EDITED} --flown"
     done = run(*shlex.split(command)[1:], "-q", "--json", "-", status=(0, 4))
     ended = json.loads(done.stdout)["flown"]
@@ -391,7 +437,9 @@ def test_the_keyboard_does_everything(browse: Browse, written: Any) -> None:
     with browse(written(EXAMPLE)) as page:
         part(page, "pulse").focus()
         page.keyboard.press("ArrowDown")
-        assert float(part(page, "begin").input_value()) == pytest.approx(plan.pulses.pulses[1].start, abs=1e-8)
+        assert float(part(page, "begin").input_value()) == pytest.approx(
+            plan.pulses.pulses[1].start, abs=1e-8
+        )
         stops = []
         for _ in range(6):
             page.keyboard.press("Tab")
@@ -426,7 +474,10 @@ def test_the_cones_roll_on_each_other(browse: Browse, written: Any) -> None:
                 )
                 between = math.dist(body[:2], space[:2])
                 assert between == pytest.approx(body[2] + side * space[2], abs=0.5)
-                mu, theta = (float(part(page, name).text_content().removesuffix("°")) for name in ("mu", "theta"))
+                mu, theta = (
+                    float(part(page, name).text_content().removesuffix("°"))
+                    for name in ("mu", "theta")
+                )
                 assert body[2] / between == pytest.approx(mu / theta, rel=1e-3)
 
 
@@ -439,19 +490,30 @@ def test_it_fits_one_screen_and_a_phone(browse: Browse, written: Any, name: str)
         )
         assert bottom - top <= 800.0
     with browse(written(FILES[name]), 400) as page:
-        wide = "[...document.querySelectorAll('.bench, .bench *')].filter((one) => one.checkVisibility())"
-        assert page.evaluate(f"{wide}.every((one) => one.getBoundingClientRect().right <= innerWidth)")
+        wide = (
+            "[...document.querySelectorAll('.bench, .bench *')].filter((one) => "
+            "one.checkVisibility())"
+        )
+        assert page.evaluate(
+            f"{wide}.every((one) => one.getBoundingClientRect().right <= innerWidth)"
+        )
 
 
-def test_an_accessibility_checker_finds_nothing_in_a_changed_workbench(browse: Browse, written: Any) -> None:
-    axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="NOT CHECKED for accessibility").Axe()
+def test_an_accessibility_checker_finds_nothing_in_a_changed_workbench(
+    browse: Browse, written: Any
+) -> None:
+    axe = pytest.importorskip(
+        "axe_playwright_python.sync_playwright", reason="NOT CHECKED for accessibility"
+    ).Axe()
     for scheme in ("light", "dark"):
         with browse(written(EXAMPLE), 1280, scheme) as page:
             enter(page, 0, 0.5, 0.01)
             settle(page)
             assert part(page, "broken").text_content() != ""
             violations = axe.run(page).response["violations"]
-            assert [(one["id"], node["html"][:200]) for one in violations for node in one["nodes"]] == []
+            assert [
+                (one["id"], node["html"][:200]) for one in violations for node in one["nodes"]
+            ] == []
 
 
 @pytest.mark.parametrize(
@@ -461,7 +523,9 @@ def test_an_accessibility_checker_finds_nothing_in_a_changed_workbench(browse: B
         ("disturbances: [{torque: [20 mN m, 0, 0]}]", "disturbance torques"),
     ],
 )
-def test_elsewhere_the_page_says_why_there_is_none(browse: Browse, written: Any, more: str, reason: str) -> None:
+def test_elsewhere_the_page_says_why_there_is_none(
+    browse: Browse, written: Any, more: str, reason: str
+) -> None:
     with browse(written(f"{EXAMPLE}\n{more}\n")) as page:
         assert page.locator(".bench, .firing").count() == 0
         assert part(page, "cones").count() == 0

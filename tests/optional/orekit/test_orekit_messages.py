@@ -1,4 +1,6 @@
-"""Messages read back by Orekit and by ccsds-ndm-py, and where the Sun is seen: every number that goes in comes out."""
+"""Messages read back by Orekit and by ccsds-ndm-py, and where the Sun is seen: every number that
+goes in comes out.
+"""
 
 import math
 import re
@@ -29,7 +31,9 @@ MID_ARC = 1e-5
 """deg; how far an interpolated attitude may be off: 0.01 is promised, some 1e-7 is found."""
 
 ROUNDED = 4e-12
-"""rad; rounding of the angles in a message, which a rate that is interpolated has in it over the step."""
+"""rad; rounding of the angles in a message, which a rate that is interpolated has in it over the
+step.
+"""
 
 
 @pytest.fixture
@@ -59,21 +63,28 @@ def test_parameters(case: str, xml: bool) -> None:
     data = data_of("apm", export_text(plan, "apm", xml=xml))
     state = data.getAttitude(None, None)
     frame = (present(body.attitude).frame or "").replace("J2000", "EME2000")
-    assert str(state.getReferenceFrame().getName()).replace("J2000", "EME2000") == frame.replace("J2000", "EME2000")
+    assert str(state.getReferenceFrame().getName()).replace("J2000", "EME2000") == frame.replace(
+        "J2000", "EME2000"
+    )
     rates = messages.in_file_axes(body, body.initial.rates)
     assert orekit.components(state.getSpin()) == pytest.approx(rates, rel=1e-12, abs=1e-14)
     axes = messages.columns(body, body.initial.quaternion)
     assert orekit.body_axes(state.getRotation()) == pytest.approx(axes, abs=1e-14)
-    # Orekit hands on the products as they stand in the message; by annex F6 the matrix has minus them.
+    # Orekit hands on the products as they stand in the message; by annex F6 the matrix has minus
+    # them.
     matrix = np.array(data.getInertiaBlock().getInertiaMatrix().getData())
     assert matrix * (2.0 * np.eye(3) - 1.0) == pytest.approx(body.inertia.tensor, rel=1e-15)
     written = list(data.getManeuvers())
     assert len(written) == len(plan.pulses) > 0
     for manoeuvre, pulse in zip(written, plan.pulses, strict=True):
-        assert manoeuvre.getEpochStart().durationFrom(data.getEpoch()) == pytest.approx(pulse.start, abs=0.51e-9)
+        assert manoeuvre.getEpochStart().durationFrom(data.getEpoch()) == pytest.approx(
+            pulse.start, abs=0.51e-9
+        )
         assert manoeuvre.getDuration() == pytest.approx(pulse.on_time, rel=1e-15)
         torque = messages.in_file_axes(body, present(pulse.torque))
-        assert orekit.components(manoeuvre.getTorque()) == pytest.approx(torque, rel=1e-14, abs=1e-14)
+        assert orekit.components(manoeuvre.getTorque()) == pytest.approx(
+            torque, rel=1e-14, abs=1e-14
+        )
         if pulse.propellant is not None:
             assert manoeuvre.getDeltaMass() == pytest.approx(-pulse.propellant, rel=1e-15)
 
@@ -94,19 +105,33 @@ def test_spin_and_nutation_alone_give_the_motion(case: str, xml: bool) -> None:
     momentum = np.array([A * omega1, A * omega2, C * omega3])
     size = np.linalg.norm(momentum)
     assert spin.getNutation() == pytest.approx(math.acos(momentum[2] / size), abs=1e-8)
-    assert spin.getNutation() == pytest.approx(body.nutation if omega3 > 0 else math.pi - body.nutation, rel=1e-14)
+    assert spin.getNutation() == pytest.approx(
+        body.nutation if omega3 > 0 else math.pi - body.nutation, rel=1e-14
+    )
     assert spin.getNutationPeriod() == pytest.approx(2 * math.pi * A / size, rel=1e-14)
-    side, phase = math.sin(spin.getNutation()), spin.getNutationPhase()
-    assert side * np.array([math.cos(phase), -math.sin(phase)]) * size == pytest.approx(momentum[:2], rel=1e-12)
+    side = math.sin(spin.getNutation())
+    phase = spin.getNutationPhase()
+    assert side * np.array([math.cos(phase), -math.sin(phase)]) * size == pytest.approx(
+        momentum[:2], rel=1e-12
+    )
     # φ̇ about H and ψ̇ about the third axis make up the rates.
-    assert size / A * math.cos(spin.getNutation()) + spin.getSpinAngleVel() == pytest.approx(omega3, rel=1e-14)
-    for block in ("<quaternionState>.*?</quaternionState>", "<angularVelocity>.*?</angularVelocity>"):
+    assert size / A * math.cos(spin.getNutation()) + spin.getSpinAngleVel() == pytest.approx(
+        omega3, rel=1e-14
+    )
+    for block in (
+        "<quaternionState>.*?</quaternionState>",
+        "<angularVelocity>.*?</angularVelocity>",
+    ):
         text = re.sub(block, "", text, flags=re.DOTALL)
     text = re.sub(r"(QUAT|ANGVEL)_START.*?\1_STOP", "", text, flags=re.DOTALL)
     state = data_of("apm", text).getAttitude(None, None)
-    assert orekit.components(state.getSpin()) == pytest.approx(body.initial.rates, rel=1e-10, abs=1e-12)
+    assert orekit.components(state.getSpin()) == pytest.approx(
+        body.initial.rates, rel=1e-10, abs=1e-12
+    )
     expected = messages.columns(body, body.initial.quaternion)
-    assert messages.turned(orekit.body_axes(state.getRotation()), expected) == pytest.approx(0.0, abs=1e-10)
+    assert messages.turned(orekit.body_axes(state.getRotation()), expected) == pytest.approx(
+        0.0, abs=1e-10
+    )
 
 
 @pytest.mark.usefixtures("_orekit")
@@ -143,21 +168,28 @@ def motion(flown: propagation.Flight, t: float) -> tuple[np.ndarray, np.ndarray]
 @NOTATIONS
 @pytest.mark.parametrize("form", ["aem", "aem-spin"])
 def test_attitude_history(case: str, xml: bool, form: str) -> None:
-    """Attitude and rates that come back are those flown, whether as quaternions or as spin, nutation and momentum.
+    """Attitude and rates that come back are those flown, whether as quaternions or as spin,
+    nutation and momentum.
 
     The spin alone, of bodies that are not symmetric, has no transverse rates.
     """
     alone = form == "aem-spin" and not messages.spacecraft(case).inertia.symmetric
     flown, epoch, segments = ephemeris(case, xml, form)
     frames = orekit.java("org.orekit.frames.FramesFactory")
-    frame = frames.getGCRF() if present(flown.spacecraft.attitude).frame == "GCRF" else frames.getEME2000()
+    frame = (
+        frames.getGCRF()
+        if present(flown.spacecraft.attitude).frame == "GCRF"
+        else frames.getEME2000()
+    )
     worst_turn = worst_rate = 0.0
     for segment in segments:
         provider = segment.getAttitudeProvider()
         given = list(segment.getAngularCoordinates())
         times = [float(record.getDate().durationFrom(epoch)) for record in given]
         records = zip(times, given, strict=True)
-        seen = [(t, math.inf, record.getRotation(), record.getRotationRate()) for t, record in records]
+        seen = [
+            (t, math.inf, record.getRotation(), record.getRotationRate()) for t, record in records
+        ]
         for one, two in pairwise(times):
             t = 0.5 * (one + two)
             between = provider.getAttitude(None, epoch.shiftedBy(t), frame)
@@ -165,7 +197,11 @@ def test_attitude_history(case: str, xml: bool, form: str) -> None:
         for t, step, rotation, spin in seen:
             rates, axes = motion(flown, min(max(t, 0.0), flown.legs[-1].end))
             worst_turn = max(worst_turn, messages.turned(orekit.body_axes(rotation), axes))
-            off = 0.0 if alone else float(np.linalg.norm(orekit.components(spin) - rates)) - ROUNDED / step
+            off = (
+                0.0
+                if alone
+                else float(np.linalg.norm(orekit.components(spin) - rates)) - ROUNDED / step
+            )
             worst_rate = max(worst_rate, off / float(np.linalg.norm(rates)))
     assert worst_turn <= (WITHOUT_RATES if alone else MID_ARC)
     assert worst_rate <= 1e-6
@@ -187,9 +223,13 @@ def test_segments_end_at_the_edges_of_pulses(case: str) -> None:
         middle, step = 0.5 * (start + stop), 1e-3 * (stop - start)
         before, now, after = (motion(flown, middle + shift)[0] for shift in (-step, 0.0, step))
         requested = tensor @ (after - before) / (2 * step) + np.cross(now, tensor @ now)
-        torques = (p.torque for p in flown.schedule if p.torque is not None and p.start < middle < p.end)
+        torques = (
+            p.torque for p in flown.schedule if p.torque is not None and p.start < middle < p.end
+        )
         given = messages.in_file_axes(flown.spacecraft, sum(torques, np.zeros(3)))
-        assert requested == pytest.approx(given, abs=1e-5 * max(float(np.linalg.norm(tensor @ now)), 1.0))
+        assert requested == pytest.approx(
+            given, abs=1e-5 * max(float(np.linalg.norm(tensor @ now)), 1.0)
+        )
         assert len(list(segment.getAngularCoordinates())) >= 4
 
 
@@ -212,11 +252,18 @@ def test_orbit_messages(name: str, xml: bool) -> None:
     plan = pushing(name)
     (segment,) = orekit.parse("opm", export_text(plan, "opm", xml=xml)).getSegments()
     data = segment.getData()
-    assert str(segment.getMetadata().getReferenceFrame().getName()) == present(plan.spacecraft.attitude).frame
+    assert (
+        str(segment.getMetadata().getReferenceFrame().getName())
+        == present(plan.spacecraft.attitude).frame
+    )
     state = data.getStateVectorBlock()
     coordinates = state.toTimeStampedPVCoordinates()
-    assert orekit.components(coordinates.getPosition()) == pytest.approx([7e6, -12e3, 3.5e3], rel=1e-15)
-    assert orekit.components(coordinates.getVelocity()) == pytest.approx([100.0, 7400.0, 120.0], rel=1e-15)
+    assert orekit.components(coordinates.getPosition()) == pytest.approx(
+        [7e6, -12e3, 3.5e3], rel=1e-15
+    )
+    assert orekit.components(coordinates.getVelocity()) == pytest.approx(
+        [100.0, 7400.0, 120.0], rel=1e-15
+    )
     assert data.getMass() == plan.spacecraft.mass
     for manoeuvre, pulse in zip(data.getManeuvers(), plan.pulses, strict=True):
         ignition = manoeuvre.getEpochIgnition().durationFrom(state.getEpoch())
@@ -224,7 +271,9 @@ def test_orbit_messages(name: str, xml: bool) -> None:
         assert manoeuvre.getDuration() == pytest.approx(pulse.on_time, rel=1e-15)
         change = velocity_change(plan, pulse)
         assert orekit.components(manoeuvre.getDV()) == pytest.approx(change, rel=1e-7, abs=1e-12)
-        assert str(manoeuvre.getReferenceFrame().getName()) == present(plan.spacecraft.attitude).frame
+        assert (
+            str(manoeuvre.getReferenceFrame().getName()) == present(plan.spacecraft.attitude).frame
+        )
         assert manoeuvre.getDeltaMass() == pytest.approx(-(pulse.propellant or 0.0), rel=1e-15)
 
 
@@ -236,7 +285,9 @@ def test_pulses_through_valves(xml: bool) -> None:
         written = list(data_of(form, export_text(plan, form, xml=xml)).getManeuvers())
         durations = [manoeuvre.getDuration() for manoeuvre in written]
         assert durations == pytest.approx([pulse.on_time for pulse in plan.pulses], rel=1e-15)
-        assert all("Commanded" in " ".join(map(str, manoeuvre.getComments())) for manoeuvre in written)
+        assert all(
+            "Commanded" in " ".join(map(str, manoeuvre.getComments())) for manoeuvre in written
+        )
 
 
 @CASES
@@ -245,18 +296,23 @@ def test_the_second_reader(reader: Any, case: str, notation: str) -> None:
     plan = messages.planned(case)
 
     def parsed(kind: str, form: str) -> Any:
-        message = getattr(reader, kind).from_str(export_text(plan, form, xml=notation == "xml"), notation)
+        message = getattr(reader, kind).from_str(
+            export_text(plan, form, xml=notation == "xml"), notation
+        )
         message.validate()
         return message
 
     data = parsed("Apm", "apm").segment.data
     (block, *_), tensor = data.inertia, plan.spacecraft.inertia.tensor
     assert [block.ixx, block.iyy, block.izz] == pytest.approx(np.diag(tensor).tolist(), rel=1e-15)
-    assert [block.ixy, block.ixz, block.iyz] == pytest.approx([-tensor[0, 1], -tensor[0, 2], -tensor[1, 2]], rel=1e-15)
+    assert [block.ixy, block.ixz, block.iyz] == pytest.approx(
+        [-tensor[0, 1], -tensor[0, 2], -tensor[1, 2]], rel=1e-15
+    )
     durations = [manoeuvre.man_duration for manoeuvre in data.maneuver_parameters]
     assert durations == pytest.approx([pulse.on_time for pulse in plan.pulses], rel=1e-15)
     for form in ("aem", "aem-spin"):
-        text, segments = export_text(plan, form), parsed("Aem", form).segments
+        text = export_text(plan, form)
+        segments = parsed("Aem", form).segments
         assert len(segments) == text.count("META_START")
         rows = len(re.findall(r"^[0-9]{4}-\S+ ", text, re.MULTILINE))
         assert sum(len(segment.data.attitude_states) for segment in segments) == rows
@@ -271,9 +327,13 @@ def test_the_second_reader_of_orbit_messages(reader: Any, notation: str) -> None
 
 
 @pytest.mark.orekit
-@pytest.mark.parametrize("text", ["1998-01-07T02:28:44", "2026-03-20T12:00:00", "2026-09-11T06:30:00"])
+@pytest.mark.parametrize(
+    "text", ["1998-01-07T02:28:44", "2026-03-20T12:00:00", "2026-09-11T06:30:00"]
+)
 def test_orekit_sees_it_there(text: str) -> None:
-    """Its analytical Sun needs no ephemeris, and errs by up to 0.1 deg itself: a check of frame and time."""
+    """Its analytical Sun needs no ephemeris, and errs by up to 0.1 deg itself: a check of frame and
+    time.
+    """
     orekit.start_or_skip()
     provider = orekit.java("org.orekit.bodies.AnalyticalSolarPositionProvider")()
     frame = orekit.java("org.orekit.frames.FramesFactory").getEME2000()

@@ -1,4 +1,6 @@
-"""Searches are bounded by counted work: they end with the best found so far, and say so; instants of time."""
+"""Searches are bounded by counted work: they end with the best found so far, and say so; instants
+of time.
+"""
 
 import datetime
 import math
@@ -71,7 +73,9 @@ def test_work_counts_for_all_budgets_around_it_and_who_watches_sees_the_innermos
 
 
 def test_flights_count_by_legs_and_steps() -> None:
-    driven = replace(spinner(moments=(100.0, 120.0, 80.0)), disturbances=(Disturbance(1e-3 + 0.0j),))
+    driven = replace(
+        spinner(moments=(100.0, 120.0, 80.0)), disturbances=(Disturbance(1e-3 + 0.0j),)
+    )
     for body, until in ((spinner(channels=cross(8.0)), 10.0), (driven, 100.0)):
         with work.budget("flight", 1e9) as spent:
             flown = propagation.flown(body, Schedule(), until)
@@ -82,7 +86,9 @@ def test_flights_count_by_legs_and_steps() -> None:
 
 
 @pytest.mark.parametrize("most", [20.0, deep(500.0)])
-def test_a_search_that_is_cut_ends_soon_with_what_it_has(most: float, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_search_that_is_cut_ends_soon_with_what_it_has(
+    most: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """A comparison shares one budget."""
     body = load_spacecraft(places.case("slow-optimal.yaml"))
     monkeypatch.setattr(work, "SCHEME", most)
@@ -95,7 +101,10 @@ def test_a_search_that_is_cut_ends_soon_with_what_it_has(most: float, monkeypatc
     with work.budget("test", 1e9) as spent:
         compared = compare(body, ("one-pulse", "optimal"))
     assert compared.plans[-1].cut
-    for other in (compared, compare(replace(body, goal=Goal(), requirement=None), ("one-pulse", "optimal"))):
+    for other in (
+        compared,
+        compare(replace(body, goal=Goal(), requirement=None), ("one-pulse", "optimal")),
+    ):
         missed = other.recommendation.standing is not planning.Standing.COMPLIES
         assert (missed, other.plans[-1].cut) == (other is compared, True)
         assert ("search-incomplete" in codes(comparison_warnings(other))) is missed
@@ -108,7 +117,9 @@ def test_what_is_not_cut_is_the_same_with_any_budget(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(work, "SCHEME", 1e9)
     after = planning.plan(body, "optimal")
     assert (before.cut, before.feasible) == (False, True)
-    assert [(one.t, one.on_time) for one in before.pulses] == [(one.t, one.on_time) for one in after.pulses]
+    assert [(one.t, one.on_time) for one in before.pulses] == [
+        (one.t, one.on_time) for one in after.pulses
+    ]
     assert "search-ended" not in codes(plan_notes(before))
 
 
@@ -117,8 +128,12 @@ def test_what_is_not_cut_is_the_same_with_any_budget(monkeypatch: pytest.MonkeyP
 def test_damping_of_thousands_of_turns_before_a_turn_of_the_axis_is_cut_too(
     scheme: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Each of its pulses takes a thousand steps of integration, and neither it nor a longer horizon is tried twice."""
-    body = replace(spinner(200.0, 250.0, -0.44, degrees=89.9, channels=cross(30.0)), dissipation=1e4)
+    """Each of its pulses takes a thousand steps of integration, and neither it nor a longer horizon
+    is tried twice.
+    """
+    body = replace(
+        spinner(200.0, 250.0, -0.44, degrees=89.9, channels=cross(30.0)), dissipation=1e4
+    )
     monkeypatch.setattr(work, "SCHEME", 300.0)
     with work.budget("test", 1e9) as spent:
         plan = planning.plan(aimed(body, 40.0, 10.0), scheme)
@@ -128,7 +143,9 @@ def test_damping_of_thousands_of_turns_before_a_turn_of_the_axis_is_cut_too(
 
 def test_a_longer_horizon_is_sought_within_bounds(monkeypatch: pytest.MonkeyPatch) -> None:
     """What only names a cure leaves the other schemes of a comparison their search."""
-    body = aimed(spinner(150.0, 100.0, 0.3, channels=cross(1.0), limits=Limits(horizon=60.0)), 40.0, 10.0)
+    body = aimed(
+        spinner(150.0, 100.0, 0.3, channels=cross(1.0), limits=Limits(horizon=60.0)), 40.0, 10.0
+    )
     units, named = [], []
     for most in (0.0, 50.0, work.CURE):
         monkeypatch.setattr(work, "CURE", most)
@@ -137,12 +154,18 @@ def test_a_longer_horizon_is_sought_within_bounds(monkeypatch: pytest.MonkeyPatc
         units.append(spent.done)
         named.append("limits.horizon" in infeasibility(plan))
     assert named == [False, True, True]
-    assert units[0] < units[1] < units[0] + 2.0 * 50.0 < units[2]  # the try under way when it is spent is finished
+    assert (
+        units[0] < units[1] < units[0] + 2.0 * 50.0 < units[2]
+    )  # the try under way when it is spent is finished
 
 
 def test_linear_programs_count_by_their_size(monkeypatch: pytest.MonkeyPatch) -> None:
-    """On a sphere pulses of every turn do alike, and all slots of a long horizon get into the program."""
-    body = spinner(7500.0, 7500.0, 0.018, degrees=0.5, channels=cross(3e-4), limits=Limits(horizon=2e5))
+    """On a sphere pulses of every turn do alike, and all slots of a long horizon get into the
+    program.
+    """
+    body = spinner(
+        7500.0, 7500.0, 0.018, degrees=0.5, channels=cross(3e-4), limits=Limits(horizon=2e5)
+    )
     monkeypatch.setattr(work, "SCHEME", 300.0)
     sizes: list[int] = []
     optimum = linear_program.GrowingProgram.optimum
@@ -206,14 +229,23 @@ def test_texts_that_are_none() -> None:
 def test_seconds_pass_a_leap_second_one_by_one() -> None:
     start = Epoch.parse("2016-12-31T23:59:58.5")
     texts = [start.plus(step).text for step in range(4)]
-    assert [text[11:21] for text in texts] == ["23:59:58.5", "23:59:59.5", "23:59:60.5", "00:00:00.5"]
+    assert [text[11:21] for text in texts] == [
+        "23:59:58.5",
+        "23:59:59.5",
+        "23:59:60.5",
+        "00:00:00.5",
+    ]
     assert Epoch.parse(texts[3]).since(start) == 3.0
 
 
 @given(
-    st.datetimes(datetime.datetime(1972, 1, 1), datetime.datetime(2100, 1, 1)), st.floats(0.0, 1e6), st.integers(1, 9)
+    st.datetimes(datetime.datetime(1972, 1, 1), datetime.datetime(2100, 1, 1)),
+    st.floats(0.0, 1e6),
+    st.integers(1, 9),
 )
-def test_nothing_is_lost_but_the_last_digit(moment: datetime.datetime, seconds: float, digits: int) -> None:
+def test_nothing_is_lost_but_the_last_digit(
+    moment: datetime.datetime, seconds: float, digits: int
+) -> None:
     epoch = Epoch.parse(moment.isoformat())
     later = epoch.plus(seconds)
     assert later.elapsed - epoch.elapsed == Fraction(seconds)
@@ -226,15 +258,23 @@ def test_nothing_is_lost_but_the_last_digit(moment: datetime.datetime, seconds: 
 @given(st.datetimes(datetime.datetime(2017, 1, 1), datetime.datetime(2100, 1, 1)))
 def test_without_leap_seconds_it_is_the_calendar(moment: datetime.datetime) -> None:
     since = Epoch.parse(moment.isoformat()).elapsed - Epoch.parse("2017-01-01T00:00:00").elapsed
-    assert since == Fraction((moment - datetime.datetime(2017, 1, 1)) // datetime.timedelta(microseconds=1), 10**6)
+    assert since == Fraction(
+        (moment - datetime.datetime(2017, 1, 1)) // datetime.timedelta(microseconds=1), 10**6
+    )
 
 
 @pytest.mark.parametrize(
     ("text", "system"),
-    [("2017-01-01T00:00:37", "TAI"), ("2017-01-01T00:00:18", "GPS"), ("2017-01-01T00:01:09.184", "TT")],
+    [
+        ("2017-01-01T00:00:37", "TAI"),
+        ("2017-01-01T00:00:18", "GPS"),
+        ("2017-01-01T00:01:09.184", "TT"),
+    ],
 )
 def test_clocks_without_leap_seconds(text: str, system: str) -> None:
-    """TAI - UTC is 37 s from 2017 on (IERS, Bulletin C 52); GPS is TAI - 19 s, TT is TAI + 32.184 s."""
+    """TAI - UTC is 37 s from 2017 on (IERS, Bulletin C 52); GPS is TAI - 19 s, TT is TAI + 32.184
+    s.
+    """
     assert Epoch.parse(text, system) == Epoch.parse("2017-01-01T00:00:00Z")
     with pytest.raises(ValueError, match="zone"):
         Epoch.parse(f"{text}Z", system)
@@ -242,18 +282,26 @@ def test_clocks_without_leap_seconds(text: str, system: str) -> None:
 
 
 def test_days_count_from_j2000_in_terrestrial_time_and_barycentric_time_swings() -> None:
-    """In 2000 TAI was UTC + 32 s; TDB - TT follows the anomaly of the Earth, 0 at perihelion and 1.66 ms at most."""
+    """In 2000 TAI was UTC + 32 s; TDB - TT follows the anomaly of the Earth, 0 at perihelion and
+    1.66 ms at most.
+    """
     for text, days in (("2000-01-01T11:58:55.816Z", 0.0), ("2000-01-02T11:58:55.816Z", 1.0)):
         assert Epoch.parse(text).days_of_j2000 == days
-    assert Epoch.parse("1972-01-01T00:00:00Z").days_of_j2000 == pytest.approx(-10227.4995118, abs=1e-6)
+    assert Epoch.parse("1972-01-01T00:00:00Z").days_of_j2000 == pytest.approx(
+        -10227.4995118, abs=1e-6
+    )
     for day, ahead in (("2026-04-04", 1.6e-3), ("2026-10-05", -1.6e-3), ("2026-01-04", 0.0)):
-        difference = Epoch.parse(f"{day}T00:00:00", "TT").since(Epoch.parse(f"{day}T00:00:00", "TDB"))
+        difference = Epoch.parse(f"{day}T00:00:00", "TT").since(
+            Epoch.parse(f"{day}T00:00:00", "TDB")
+        )
         assert difference == pytest.approx(ahead, abs=1e-4)
 
 
 def test_the_direction_of_the_sun_is_right_to_a_hundredth_of_a_degree_from_1972_to_2100() -> None:
     """Against ERFA (golden/make_sun.py)."""
     rows = np.loadtxt(places.GOLDEN / "sun.csv", delimiter=",", skiprows=1)
-    errors = [float(attitude.angle_between(sky.direction(days), row)) for days, *row in rows.tolist()]
+    errors = [
+        float(attitude.angle_between(sky.direction(days), row)) for days, *row in rows.tolist()
+    ]
     assert len(errors) == 100
     assert math.degrees(max(errors)) < 0.01

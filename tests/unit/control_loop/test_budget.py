@@ -1,4 +1,6 @@
-"""The budget of a loop: against long closed-loop flights, against what limits say, and what it refuses."""
+"""The budget of a loop: against long closed-loop flights, against what limits say, and what it
+refuses.
+"""
 
 import cmath
 import math
@@ -16,7 +18,16 @@ from support.loops import fired_by, fires, follow_few_cycles, four, rad, turned
 
 import nutdamp
 from nutdamp.common import work
-from nutdamp.control_loop.budget import DAY, YEAR, Budget, Cycle, HeldNutation, Map, Thresholds, budget
+from nutdamp.control_loop.budget import (
+    DAY,
+    YEAR,
+    Budget,
+    Cycle,
+    HeldNutation,
+    Map,
+    Thresholds,
+    budget,
+)
 from nutdamp.control_loop.evaluation import loop_of
 from nutdamp.control_loop.law import Ending, Law
 from nutdamp.control_loop.sensor import Estimator, Signal
@@ -32,7 +43,9 @@ from nutdamp.spacecraft.requirements import reached
 from nutdamp.views.loop import _budget_notes
 
 
-def thrusters(torque: float = 6.0, least: float = 0.002, isp: float | None = 220.0) -> tuple[Channel, ...]:
+def thrusters(
+    torque: float = 6.0, least: float = 0.002, isp: float | None = 220.0
+) -> tuple[Channel, ...]:
     return four(torque, least, isp=isp, thrust=torque)
 
 
@@ -77,7 +90,9 @@ LONG = {
 
 
 def flown(body: Spacecraft, made: Loop, cycles: int, seeds: int) -> tuple[float, float, int]:
-    """Pulses and impulse (N m s) a second between the first pauses and the last, and how many cycles that are."""
+    """Pulses and impulse (N m s) a second between the first pauses and the last, and how many
+    cycles that are.
+    """
     until = (cycles / seeds + 4) / Map(body, made).cycle(8, 4).cycles
     sums = np.zeros(4)
     for seed in range(1, seeds + 1):
@@ -104,18 +119,25 @@ def test_a_budget_is_that_of_a_long_flight(name: str) -> None:
 @pytest.mark.weekly
 @pytest.mark.parametrize("name", LONG)
 def test_with_noise_a_budget_is_that_of_many_long_flights(name: str) -> None:
-    """With noise the length of a cycle scatters by about 15 %: over 600 of them the mean is known to 0.6 %."""
+    """With noise the length of a cycle scatters by about 15 %: over 600 of them the mean is known
+    to 0.6 %.
+    """
     check_budget(*LONG[name], 600, 8, 400)
 
 
 @pytest.mark.deep
 def test_on_ticks_a_budget_is_that_of_flights_from_many_phases() -> None:
-    """On ticks the length of a cycle scatters by 15 %, one by one: the mean of 12 times 40 is known to 0.7 %."""
-    body, made = craft(spin=-3.0, limits=Limits(tick=0.004)), loop(gyro(noise=0.0))
+    """On ticks the length of a cycle scatters by 15 %, one by one: the mean of 12 times 40 is known
+    to 0.7 %.
+    """
+    body = craft(spin=-3.0, limits=Limits(tick=0.004))
+    made = loop(gyro(noise=0.0))
     rates = []
     for number in range(12):
         turned = complex(*body.omega0[:2]) * cmath.exp(2j * math.pi * number / 12)
-        pulses, _, count = flown(body.replace(omega0=[turned.real, turned.imag, body.spin]), made, 40, 1)
+        pulses, _, count = flown(
+            body.replace(omega0=[turned.real, turned.imag, body.spin]), made, 40, 1
+        )
         assert count >= 20
         rates.append(pulses)
     assert Map(body, made).cycle().pulses == pytest.approx(np.mean(rates), rel=0.02)
@@ -123,7 +145,8 @@ def test_on_ticks_a_budget_is_that_of_flights_from_many_phases() -> None:
 
 @pytest.mark.weekly
 def test_a_loop_below_the_noise_fires_without_end_as_often_as_one_that_is_flown() -> None:
-    body, made = craft(), loop(gyro(noise=rad(0.6)))
+    body = craft()
+    made = loop(gyro(noise=rad(0.6)))
     cycle = Map(body, made).cycle()
     assert cycle.pulses == pytest.approx(len(fly(body, made, 600.0).fired) / 600.0, rel=0.03)
     assert cycle.pulses * DAY > 1e5
@@ -137,8 +160,12 @@ def test_without_a_stop_the_smallest_pulse_sets_the_limit_cycle() -> None:
 
 @pytest.mark.weekly
 @pytest.mark.parametrize(("degrees", "pauses"), [(2.0, True), (2.07, False)])
-def test_of_two_limit_cycles_the_budget_is_of_the_one_that_the_loop_falls_into(degrees: float, pauses: bool) -> None:
-    """Pulses all alike, half of each above stop: what is left of the first nutation decides whether it ever pauses."""
+def test_of_two_limit_cycles_the_budget_is_of_the_one_that_the_loop_falls_into(
+    degrees: float, pauses: bool
+) -> None:
+    """Pulses all alike, half of each above stop: what is left of the first nutation decides whether
+    it ever pauses.
+    """
     made = loop(gyro(noise=rad(0.002)), 1.0, 0.02, law=BANG, on_time=0.1)
     body = craft(tau=1000.0, channels=thrusters(least=0.1), degrees=degrees, loop=made)
     (held,) = budget(body).held
@@ -156,15 +183,23 @@ CASES = Path(__file__).parents[2] / "cases"
 
 
 @pytest.mark.deep
-@pytest.mark.parametrize(("name", "pulses"), [("budget-bistable", 3340.0), ("budget-never-quiet", 2151.0)])
+@pytest.mark.parametrize(
+    ("name", "pulses"), [("budget-bistable", 3340.0), ("budget-never-quiet", 2151.0)]
+)
 def test_a_budget_is_of_the_state_in_which_the_loop_of_the_file_ends(
     monkeypatch: pytest.MonkeyPatch, name: str, pulses: float
 ) -> None:
-    """Never quiet, though loops at less nutation fall quiet: pulses a day of loops flown for 60,000 s and 40,000 s."""
+    """Never quiet, though loops at less nutation fall quiet: pulses a day of loops flown for 60,000
+    s and 40,000 s.
+    """
     follow_few_cycles(monkeypatch)
     made = nutdamp.budget(nutdamp.load(CASES / f"{name}.yaml"))
     (held,) = made.held
-    assert (present(held.cycle).cycles, present(held.other).cycles > 0.0, held.share) == (0.0, True, 1.0)
+    assert (present(held.cycle).cycles, present(held.other).cycles > 0.0, held.share) == (
+        0.0,
+        True,
+        1.0,
+    )
     assert present(held.cycle).pulses * DAY == pytest.approx(pulses, rel=0.05)
     assert made.status is Status.NOT_ENOUGH
     assert loop_of(made.spacecraft, 2000.0).verdict.status is Status.NOT_ENOUGH
@@ -172,7 +207,9 @@ def test_a_budget_is_of_the_state_in_which_the_loop_of_the_file_ends(
 
 @pytest.mark.deep
 def test_chains_that_change_over_are_told_by_their_share() -> None:
-    """Most fall quiet; one firing in a hundred leaves what no pulse lowers, and they never do again."""
+    """Most fall quiet; one firing in a hundred leaves what no pulse lowers, and they never do
+    again.
+    """
     body = nutdamp.load(CASES / "budget-bistable.yaml")
     (quiet, most), (never, least) = Map(body, present(body.loop)).attractors()
     assert (quiet.cycles > 0.0, never.cycles) == (True, 0.0)
@@ -182,7 +219,8 @@ def test_chains_that_change_over_are_told_by_their_share() -> None:
 
 @pytest.mark.deep
 def test_dissipation_slows_the_spin_as_in_flight() -> None:
-    body, made = craft(), loop(Sensor(delay=0.05), 5.0, 1.0, predict=False)
+    body = craft()
+    made = loop(Sensor(delay=0.05), 5.0, 1.0, predict=False)
     cycle = Map(body, made).cycle()
     run = fly(body, made, 6.0 / cycle.cycles)
     assert len(run.quiet) > 3
@@ -208,7 +246,8 @@ def test_what_is_seen_is_what_the_estimator_makes_of_samples(sensor: Sensor, pre
     seen = transfer(law, body.spin)
     times = np.asarray(np.arange(400) * seen.step, dtype=np.float64)
     rates = fly(body, loop(sensor, 80.0), float(times[-1])).flight.motion(times)[0]
-    estimator, shown = Estimator(law, sensor, 0.0), Signal(body, sensor, (1,)).shown(rates)
+    estimator = Estimator(law, sensor, 0.0)
+    shown = Signal(body, sensor, (1,)).shown(rates)
     true = rates[:, 0] + 1j * rates[:, 1]
     board = estimator.on_board(estimator.feed(times, shown, rates[:, 2]), rates[:, 2])
     first = int(np.argmax(~np.isnan(board)))
@@ -218,17 +257,26 @@ def test_what_is_seen_is_what_the_estimator_makes_of_samples(sensor: Sensor, pre
 
 @pytest.mark.parametrize("sensor", [gyro(low_pass=0.3), SEEN, FILTERED])
 def test_noise_is_what_the_estimator_makes_of_noise(sensor: Sensor) -> None:
-    body, numbers = body_of(sensor), np.arange(20_000)
-    law, spin = Law(body, loop(sensor)), np.full(len(numbers), body.spin)
-    seen, estimator = transfer(law, body.spin), Estimator(law, sensor, 0.0)
+    body = body_of(sensor)
+    numbers = np.arange(20_000)
+    law = Law(body, loop(sensor))
+    spin = np.full(len(numbers), body.spin)
+    seen = transfer(law, body.spin)
+    estimator = Estimator(law, sensor, 0.0)
     still = np.zeros((len(numbers), 1 if sensor.kind == "accelerometer" else 2))
     values = Signal(body, sensor, (1,)).sampled(numbers, still)
-    estimated = estimator.on_board(estimator.feed(np.asarray(numbers * seen.step), values, spin), spin)[200:]
+    estimated = estimator.on_board(
+        estimator.feed(np.asarray(numbers * seen.step), values, spin), spin
+    )[200:]
     drawn = seen.noise(seen.drawn(np.random.default_rng(2), 1, len(numbers) + len(seen.weights)))[0]
     turn = np.exp(1j * float(law.rate(body.spin)) * seen.step)
     for noise in (estimated, drawn):
-        assert math.sqrt(float((np.abs(noise) ** 2).mean()) / 2.0) == pytest.approx(seen.sigma, rel=0.05)
-        lasting = complex((noise[1:] * noise[:-1].conj()).mean() * turn / (np.abs(noise) ** 2).mean())
+        assert math.sqrt(float((np.abs(noise) ** 2).mean()) / 2.0) == pytest.approx(
+            seen.sigma, rel=0.05
+        )
+        lasting = complex(
+            (noise[1:] * noise[:-1].conj()).mean() * turn / (np.abs(noise) ** 2).mean()
+        )
         assert 1.0 - lasting.real == pytest.approx(seen.fresh, rel=0.1)
     size = math.sqrt(float((np.abs(estimated) ** 2).mean()))
     # Of an accelerometer it counts the axis in which the sensor shows least.
@@ -239,25 +287,39 @@ def test_noise_is_what_the_estimator_makes_of_noise(sensor: Sensor) -> None:
 @pytest.mark.parametrize(("sigma", "offset"), [deep(0.05, 0j), (0.3, 0j), (0.05, 0.2 + 0.1j)])
 def test_the_odds_of_a_threshold_are_those_of_samples_drawn(sigma: float, offset: complex) -> None:
     """Growing z seen in white noise, sample by sample, until it first shows 1."""
-    growth, rng = 0.01, np.random.default_rng(5)
-    seen = Transfer(0.1, np.ones(1, complex), 1.0 + 0j, 0j, offset, sigma, 1.0, (sigma, sigma), (0.0, 0.0), 0.0)
+    growth = 0.01
+    rng = np.random.default_rng(5)
+    seen = Transfer(
+        0.1, np.ones(1, complex), 1.0 + 0j, 0j, offset, sigma, 1.0, (sigma, sigma), (0.0, 0.0), 0.0
+    )
     sizes = 0.2 * np.exp(growth * seen.step * np.arange(3000))
     crossed = []
     for _ in range(400):
         noise = rng.normal(scale=sigma, size=(2, 3000))
-        shown = sizes * np.exp(1j * (0.3 * np.arange(3000) + rng.uniform(0.0, 7.0))) + offset + noise[0] + 1j * noise[1]
+        shown = (
+            sizes * np.exp(1j * (0.3 * np.arange(3000) + rng.uniform(0.0, 7.0)))
+            + offset
+            + noise[0]
+            + 1j * noise[1]
+        )
         crossed.append(sizes[np.argmax(np.abs(shown) >= 1.0)])
-    expected = Odds(seen, 1.0, growth, below=False).size(np.full(20_000, 0.2), rng.exponential(size=20_000))
+    expected = Odds(seen, 1.0, growth, below=False).size(
+        np.full(20_000, 0.2), rng.exponential(size=20_000)
+    )
     assert np.mean(crossed) == pytest.approx(float(expected.mean()), rel=0.01)
     assert np.std(crossed) == pytest.approx(float(expected.std()), rel=0.15)
 
 
 def test_when_damping_must_begin_is_that_of_the_course_example() -> None:
-    stage = replace(spinner(A=2000.0, C=1000.0), omega0=np.array([0.1, 0.0, 2.0 * math.pi]), dissipation=100.0)
+    stage = replace(
+        spinner(A=2000.0, C=1000.0), omega0=np.array([0.1, 0.0, 2.0 * math.pi]), dissipation=100.0
+    )
     assert reached(stage, rad(32.59)) == pytest.approx(300.0, abs=0.05)
     assert reached(stage, stage.nutation) == 0.0
     oblate = replace(spinner(A=80.0, C=120.0, degrees=5.0), dissipation=100.0)
-    assert reached(oblate, rad(1.0)) == pytest.approx(100.0 * math.log(math.tan(rad(5.0)) / math.tan(rad(1.0))))
+    assert reached(oblate, rad(1.0)) == pytest.approx(
+        100.0 * math.log(math.tan(rad(5.0)) / math.tan(rad(1.0)))
+    )
     assert reached(oblate, rad(6.0)) == 0.0
     assert reached(replace(stage, omega0=np.array([0.0, 0.0, 1.0])), 0.1) == math.inf
 
@@ -270,7 +332,9 @@ def held_by(body: Spacecraft) -> tuple[HeldNutation, Cycle]:
 def test_propellant_follows_from_impulse_and_isp(monkeypatch: pytest.MonkeyPatch) -> None:
     follow_few_cycles(monkeypatch)
     cycle = held_by(craft(loop=loop(gyro())))[1]
-    assert cycle.propellant == pytest.approx(cycle.impulse / (220.0 * 9.80665), rel=1e-9)  # 1 m arms
+    assert cycle.propellant == pytest.approx(
+        cycle.impulse / (220.0 * 9.80665), rel=1e-9
+    )  # 1 m arms
     assert held_by(craft(channels=thrusters(isp=None), loop=loop(gyro())))[1].propellant is None
 
 
@@ -280,10 +344,14 @@ def test_a_tank_lasts_as_long_as_its_propellant() -> None:
     held, cycle = held_by(steady)
     assert held.lasts == pytest.approx(2.0 / present(cycle.propellant), rel=1e-9)
     falling = held_by(replace(steady, tank=Tank(2.0, 22e5, 8e5, 1.0)))[0]
-    # Weaker than the law believes, a pulse leaves a good part of the nutation: more pulses for the same impulse.
+    # Weaker than the law believes, a pulse leaves a good part of the nutation: more pulses for the
+    # same impulse.
     assert present(falling.lasts) == pytest.approx(held.lasts, rel=0.6)
     assert present(falling.lasts) != pytest.approx(held.lasts, rel=0.01)
-    assert Map(steady, loop(gyro()), used=1.0).cycle().pulses == Map(steady, loop(gyro())).cycle().pulses
+    assert (
+        Map(steady, loop(gyro()), used=1.0).cycle().pulses
+        == Map(steady, loop(gyro())).cycle().pulses
+    )
 
 
 def spent(*_: object) -> float:
@@ -305,7 +373,9 @@ def test_a_search_for_cycles_ends_with_its_budget_of_work(monkeypatch: pytest.Mo
 
 
 @pytest.mark.weekly
-def test_a_tank_whose_pressure_falls_lasts_as_long_as_a_loop_that_is_flown_until_it_is_empty() -> None:
+def test_a_tank_whose_pressure_falls_lasts_as_long_as_a_loop_that_is_flown_until_it_is_empty() -> (
+    None
+):
     body = replace(craft(degrees=0.4, loop=loop(gyro())), tank=Tank(0.15, 22e5, 8e5, 1.0))
     lasts = present(held_by(body)[0].lasts)
     run = fly(body, loop(gyro()), 1.2 * lasts, seed=3)
@@ -331,11 +401,15 @@ def test_pairs_of_thresholds_are_rows(monkeypatch: pytest.MonkeyPatch) -> None:
     assert [held.meets_requirement for held in both.held] == [True, False]
     assert both.meets_requirement is True
     assert both.largest == rad(0.6)
-    assert both.until_largest == pytest.approx(100.0 * math.log(math.tan(rad(0.6)) / math.tan(rad(0.5))))
+    assert both.until_largest == pytest.approx(
+        100.0 * math.log(math.tan(rad(0.6)) / math.tan(rad(0.5)))
+    )
     wide = budget(body, [Thresholds(rad(1.0), rad(0.05))])
     assert wide.held[0].cycle == both.held[1].cycle
     assert wide.meets_requirement is False
-    assert wide.held[0].begins == pytest.approx(100.0 * math.log(math.tan(rad(1.0)) / math.tan(rad(0.5))))
+    assert wide.held[0].begins == pytest.approx(
+        100.0 * math.log(math.tan(rad(1.0)) / math.tan(rad(0.5)))
+    )
 
 
 def test_what_cannot_be_held_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -389,14 +463,19 @@ def test_the_table_says_what_its_columns_are(monkeypatch: pytest.MonkeyPatch) ->
     named = codes(_budget_notes(Budget(body, None, held)))
     assert "cycle-angles" in named
     assert "tank-days" not in named
-    assert "tank-days" in codes(_budget_notes(Budget(replace(body, tank=Tank(0.15, 22e5, 8e5, 1.0)), None, held)))
+    assert "tank-days" in codes(
+        _budget_notes(Budget(replace(body, tank=Tank(0.15, 22e5, 8e5, 1.0)), None, held))
+    )
     assert not codes(_budget_notes(Budget(body, None, ())))
 
 
 def test_the_picture_shows_what_is_held() -> None:
     """Hand-made cycles: the sawtooth rises from low to high at the growth of the body."""
     body = craft(requirement=Requirement(nutation=rad(2.0)), loop=loop(gyro()))
-    cycles = [Cycle(each, 1e-3, 0.01, None, 0.0, 0.01, rad(0.5), rad(0.05), rad(0.6)) for each in (1e-4, 1e-4)]
+    cycles = [
+        Cycle(each, 1e-3, 0.01, None, 0.0, 0.01, rad(0.5), rad(0.05), rad(0.6))
+        for each in (1e-4, 1e-4)
+    ]
     held = tuple(
         HeldNutation(body, Thresholds(rad(start), rad(0.1)), 100.0 * start, cycle=cycle)
         for start, cycle in zip((0.5, 1.0), cycles, strict=True)
@@ -415,7 +494,9 @@ def test_the_picture_shows_what_is_held() -> None:
     assert first[:3, 1] == pytest.approx([0.05, 0.05, 0.5])
     assert first[0, 0] * hours == pytest.approx(50.0)
     ratio = math.tan(rad(0.5)) / math.tan(rad(0.05))
-    assert second[:3, 0] * hours == pytest.approx([100.0, 1100.0 - math.log(ratio) / body.growth, 1100.0])
+    assert second[:3, 0] * hours == pytest.approx(
+        [100.0, 1100.0 - math.log(ratio) / body.growth, 1100.0]
+    )
     (alone,) = budget_figure(Budget(replace(body, loop=None), None, ())).axes
     assert len(alone.lines) == 1
 
@@ -423,4 +504,6 @@ def test_the_picture_shows_what_is_held() -> None:
 @pytest.mark.parametrize("limit", [0.1, 1.0, 4.0, 11.0, 20.0, 35.0])
 def test_a_size_with_noise_exceeds_a_limit_by_the_distribution_of_rice(limit: float) -> None:
     shown = np.linspace(0.0, 11.99, 300)
-    assert exceeds(limit, shown) == pytest.approx(1.0 - chndtr(limit * limit, 2.0, shown**2), abs=1e-14)
+    assert exceeds(limit, shown) == pytest.approx(
+        1.0 - chndtr(limit * limit, 2.0, shown**2), abs=1e-14
+    )

@@ -1,4 +1,6 @@
-"""What is wired backwards is named, whatever sensor and law; loops flown together fire as each flown alone."""
+"""What is wired backwards is named, whatever sensor and law; loops flown together fire as each
+flown alone.
+"""
 
 import cmath
 import math
@@ -30,7 +32,9 @@ LAWS = (FOUR_PULSE, ONE_PULSE, BANG)
 
 def wrong(loop: Loop) -> tuple[Loop, Loop]:
     """The loop with its first channel wired backwards, and with its sensor reversed."""
-    return replace(loop, reversed=("T0",)), replace(loop, sensor=replace(loop.sensor, scale=-loop.sensor.scale))
+    return replace(loop, reversed=("T0",)), replace(
+        loop, sensor=replace(loop.sensor, scale=-loop.sensor.scale)
+    )
 
 
 def check_named(loop: Loop, until: float) -> LoopRun:
@@ -55,15 +59,22 @@ def check_named(loop: Loop, until: float) -> LoopRun:
         deep(BANG, 5, 0),
     ],
 )
-def test_after_five_periods_it_is_named_by_as_many_firings_as_at_once(law: str, delay: int, settle: int) -> None:
+def test_after_five_periods_it_is_named_by_as_many_firings_as_at_once(
+    law: str, delay: int, settle: int
+) -> None:
     sensor = Sensor(rate=20.0 / PERIOD, noise=rad(0.002), delay=delay * PERIOD)
     late = (delay + settle + 1.0) * PERIOD
-    run = check_named(fires(sensor, law=law, settle=settle * PERIOD, on_time=0.05 if law == BANG else None), 40 * late)
+    run = check_named(
+        fires(sensor, law=law, settle=settle * PERIOD, on_time=0.05 if law == BANG else None),
+        40 * late,
+    )
     assert len(run.fired) == 2
     assert run.fired[1].pulse.start - run.fired[0].pulse.start < late
 
 
-@pytest.mark.parametrize("sensor", [deep(Sensor()), Sensor(rate=20.0, noise=rad(0.02))], ids=["continuous", "noisy"])
+@pytest.mark.parametrize(
+    "sensor", [deep(Sensor()), Sensor(rate=20.0, noise=rad(0.02))], ids=["continuous", "noisy"]
+)
 def test_a_bias_as_large_as_half_of_start_hides_no_channel(sensor: Sensor) -> None:
     """Firings of 0.1 deg in a bias of 0.25 deg, every quarter of a period."""
     bias = Law(CRAFT, fires(sensor, 0.5)).size(rad(0.25), 3.0) / math.sqrt(2.0)
@@ -77,11 +88,15 @@ def test_a_bias_as_large_as_half_of_start_hides_no_channel(sensor: Sensor) -> No
 @spread("law", LAWS, quick=1)
 @spread("share", [1.0, 3.0], quick=1)
 @spread("stop", [0.0, 0.1], quick=1)
-def test_a_healthy_loop_in_more_noise_than_start_is_not_accused(law: str, share: float, stop: float) -> None:
+def test_a_healthy_loop_in_more_noise_than_start_is_not_accused(
+    law: str, share: float, stop: float
+) -> None:
     noise = share * Law(CRAFT, fires()).size(rad(0.3), 3.0)
     for rate, settle in ((5.0, 0.0), (20.0, 1.0)):
         sensor = Sensor(rate=rate, noise=noise, bias=0.2 * noise, low_pass=0.3 * settle)
-        loop = fires(sensor, 0.3, stop, law=law, settle=settle, on_time=0.02 if law == BANG else None)
+        loop = fires(
+            sensor, 0.3, stop, law=law, settle=settle, on_time=0.02 if law == BANG else None
+        )
         run = fly(CRAFT, loop, 150.0, seed=7)
         assert (run.stop, run.channel) == (Ending.END, None)
         assert len(run.fired) > 20
@@ -97,20 +112,33 @@ def test_a_body_that_is_not_as_known_makes_no_fault_of_a_healthy_loop() -> None:
     run = fly(truth, loop, 300.0, law=Law(known, loop))
     assert run.stop is Ending.END
     assert len(run.fired) > 25
-    assert fly(truth, wrong(loop)[1], 3000.0, law=Law(known, loop)).stop in (Ending.SENSOR, Ending.FED)
+    assert fly(truth, wrong(loop)[1], 3000.0, law=Law(known, loop)).stop in (
+        Ending.SENSOR,
+        Ending.FED,
+    )
 
 
 def some(rng: np.random.Generator) -> tuple[Spacecraft, Loop]:
-    """Any shape and sense of spin, sensor, law, delay, settling and bias; noise that leaves a firing to be seen."""
+    """Any shape and sense of spin, sensor, law, delay, settling and bias; noise that leaves a
+    firing to be seen.
+    """
     C = 120.0 * (rng.uniform(0.3, 0.85) if rng.random() < 0.5 else rng.uniform(1.15, 1.9))
     channels = around(
-        int(rng.integers(2, 5)), rng.choice([6.0, 20.0]), rng.uniform(0.0, 6.0), rng.choice([0.002, 0.02])
+        int(rng.integers(2, 5)),
+        rng.choice([6.0, 20.0]),
+        rng.uniform(0.0, 6.0),
+        rng.choice([0.002, 0.02]),
     )
-    craft = spinner(C=C, spin=rng.choice([-3.0, 3.0]), degrees=rng.uniform(1.0, 4.0), channels=channels)
+    craft = spinner(
+        C=C, spin=rng.choice([-3.0, 3.0]), degrees=rng.uniform(1.0, 4.0), channels=channels
+    )
     if rng.random() < 0.3:
         craft = replace(craft, dissipation=30.0 * craft.body_period)
-    period, start, law = craft.body_period, rad(rng.uniform(0.3, 1.0)), str(rng.choice(LAWS))
-    kind, at = Sensor().kind, np.array([1.0, 0.3, 0.2])
+    period = craft.body_period
+    start = rad(rng.uniform(0.3, 1.0))
+    law = str(rng.choice(LAWS))
+    kind = Sensor().kind
+    at = np.array([1.0, 0.3, 0.2])
     size = craft.inertia.C * 3.0 / craft.inertia.A * math.tan(start)
     if rng.random() < 0.35:
         kind = ACCELEROMETER
@@ -127,12 +155,17 @@ def some(rng: np.random.Generator) -> tuple[Spacecraft, Loop]:
         position=at,
     )
     stop, settle = start * rng.choice([0.1, 0.5]), period * rng.choice([0.0, 0.3, 5.0])
-    pause, predict = period * rng.choice([0.0, 1.5]), bool(rng.random() < 0.7)
-    return craft, Loop(sensor, law, start, stop, settle, pause, predict, 0.05 * period if law == BANG else None)
+    pause = period * rng.choice([0.0, 1.5])
+    predict = bool(rng.random() < 0.7)
+    return craft, Loop(
+        sensor, law, start, stop, settle, pause, predict, 0.05 * period if law == BANG else None
+    )
 
 
 def fed_for(craft: Spacecraft, run: LoopRun, names: set[str]) -> float:
-    """Periods from the first firing of ``names`` to the last, beyond what it takes to see what a firing did."""
+    """Periods from the first firing of ``names`` to the last, beyond what it takes to see what a
+    firing did.
+    """
     loop, sensor = run.loop, run.loop.sensor
     latency = sensor.delay + loop.settle + 5.0 * sensor.low_pass + loop.min_interval
     latency += craft.body_period if sensor.kind == ACCELEROMETER else 0.0
@@ -142,15 +175,20 @@ def fed_for(craft: Spacecraft, run: LoopRun, names: set[str]) -> float:
 
 @pytest.mark.weekly
 def test_random_loops_are_accused_of_what_is_wrong_with_them_and_of_nothing_else() -> None:
-    rng, judged = np.random.default_rng(15), 0
+    rng = np.random.default_rng(15)
+    judged = 0
     for _ in range(60):
         craft, loop = some(rng)
         law = Law(craft, loop)
-        act = law.firing(law.actuators[0], complex(law.size(craft.nutation, craft.spin)), craft.spin)
+        act = law.firing(
+            law.actuators[0], complex(law.size(craft.nutation, craft.spin)), craft.spin
+        )
         doubts = Estimator(law, loop.sensor, 0.0).doubts
         if feeding(craft, loop) is not None or act is None:
             continue
-        span = (30.0 * (3.0 + 2.0 * loop.settle / craft.body_period)) * craft.body_period + 30.0 * loop.sensor.delay
+        span = (
+            30.0 * (3.0 + 2.0 * loop.settle / craft.body_period)
+        ) * craft.body_period + 30.0 * loop.sensor.delay
         try:
             assert fly(craft, loop, span).stop is Ending.END
             if abs(act.acts) < 12.0 * math.hypot(doubts.noise, doubts.steps):
@@ -159,10 +197,13 @@ def test_random_loops_are_accused_of_what_is_wrong_with_them_and_of_nothing_else
         except Infeasible:
             continue
         every = {each.name for each in craft.channels}
-        for run, stop, names in zip(runs, (Ending.CHANNEL, Ending.SENSOR), ({"T0"}, every), strict=True):
+        for run, stop, names in zip(
+            runs, (Ending.CHANNEL, Ending.SENSOR), ({"T0"}, every), strict=True
+        ):
             if any(pulse.channel in names for pulse in run.schedule):
                 assert run.stop is stop, loop
-                # A bias larger than what a firing changes is first to be told from it, by another coast.
+                # A bias larger than what a firing changes is first to be told from it, by another
+                # coast.
                 assert fed_for(craft, run, names) <= 1.05 or doubts.bias > abs(act.acts)
                 judged += 1
         assert runs[0].channel in ("T0", None)
@@ -185,23 +226,42 @@ class Off(Scatter):
 
 
 def random_loop(rng: np.random.Generator, law: str) -> tuple[Spacecraft, Loop]:
-    """Any shape, sense of spin, sensor; three or four channels with axial parts; sometimes valves, limits, a sink."""
+    """Any shape, sense of spin, sensor; three or four channels with axial parts; sometimes valves,
+    limits, a sink.
+    """
     C = 120.0 * (rng.uniform(0.3, 0.8) if rng.random() < 0.5 else rng.uniform(1.2, 1.8))
     valve = Trapezoid(*rng.uniform(0.0, 0.03, 4).tolist()) if rng.random() < 0.5 else None
     channels = tuple(
-        each.of(valve=valve, torque=each.torque + UP * (rng.uniform(-0.5, 0.5) if rng.random() < 0.3 else 0.0))
+        each.of(
+            valve=valve,
+            torque=each.torque + UP * (rng.uniform(-0.5, 0.5) if rng.random() < 0.3 else 0.0),
+        )
         for each in around(int(rng.integers(3, 5)), 6.0, rng.uniform(0.0, 6.0), 0.02)
     )
-    limits = Limits(tick=0.01, gap=0.1, earliest=1.0, blackout=((8.0, 11.0),)) if rng.random() < 0.3 else Limits()
+    limits = (
+        Limits(tick=0.01, gap=0.1, earliest=1.0, blackout=((8.0, 11.0),))
+        if rng.random() < 0.3
+        else Limits()
+    )
     craft = fired_by(channels=channels, C=C, spin=rng.choice([-3.0, 3.0]), limits=limits)
     cold = Cold(0.9, 3.0) if rng.random() < 0.3 else None
     craft = replace(craft, cold=cold, dissipation=150.0 if rng.random() < 0.5 else None)
     rate = 2.0 ** rng.uniform(3.0, 5.0) / craft.body_period
-    sensor: dict[str, Any] = {"rate": rate, "delay": rng.uniform(0.0, 0.1), "noise": 4e-4, "bias": 2e-4}
+    sensor: dict[str, Any] = {
+        "rate": rate,
+        "delay": rng.uniform(0.0, 0.1),
+        "noise": 4e-4,
+        "bias": 2e-4,
+    }
     if rng.random() < 0.4:
         sensor |= {"low_pass": rng.uniform(0.5, 4.0) / rate}
     if rng.random() < 0.4:
-        sensor |= {"kind": ACCELEROMETER, "position": np.array([1.0, 0.3, 0.2]), "noise": 2e-3, "bias": 0.0}
+        sensor |= {
+            "kind": ACCELEROMETER,
+            "position": np.array([1.0, 0.3, 0.2]),
+            "noise": 2e-3,
+            "bias": 0.0,
+        }
     sensor["quantisation"] = 0.5 * sensor["noise"]
     given: dict[str, Any] = {"predict": bool(rng.random() < 0.7), "settle": rng.choice([0.0, 0.3])}
     given |= {"min_interval": 0.2, "on_time": None if law == ONE_PULSE else 0.15, "law": law}
@@ -212,8 +272,14 @@ def truths(rng: np.random.Generator, craft: Spacecraft, loop: Loop, count: int) 
     """Cases that differ in moments, motion, thrust and sensor from what the law knows."""
     cases = []
     for number in range(count):
-        turn = cmath.exp(2j * math.pi * rng.random()) * complex(*craft.omega0[:2]) * rng.uniform(0.5, 1.5)
-        A, C = (moment * (1.0 + 0.02 * rng.normal()) for moment in (craft.inertia.A, craft.inertia.C))
+        turn = (
+            cmath.exp(2j * math.pi * rng.random())
+            * complex(*craft.omega0[:2])
+            * rng.uniform(0.5, 1.5)
+        )
+        A, C = (
+            moment * (1.0 + 0.02 * rng.normal()) for moment in (craft.inertia.A, craft.inertia.C)
+        )
         sensor = replace(
             loop.sensor,
             scale=1.0 + 0.02 * rng.normal(),
@@ -249,24 +315,41 @@ def nutation(moments: tuple[float, float, float], rates: Vector) -> Vector:
 def test_loops_flown_together_fire_as_each_alone(seed: int, law: str) -> None:
     rng = np.random.default_rng((seed, LAWS.index(law)))
     craft, loop = random_loop(rng, law)
-    known, until = Law(craft, loop), 30.0 * craft.body_period
+    known = Law(craft, loop)
+    until = 30.0 * craft.body_period
     cases = truths(rng, craft, loop, 6)
     assert not expects_alone(known, craft)
     together = Fleet(known, cases, until).fly()
     for row, (case, pilot) in enumerate(zip(cases, together.pilots, strict=True)):
-        run = fly(case.truth, present(case.truth.loop), until, seed=case.key, law=known, scatter=case.scatter)
-        assert [each.pulse.channel for each in pilot.fired] == [each.pulse.channel for each in run.fired]
+        run = fly(
+            case.truth,
+            present(case.truth.loop),
+            until,
+            seed=case.key,
+            law=known,
+            scatter=case.scatter,
+        )
+        assert [each.pulse.channel for each in pilot.fired] == [
+            each.pulse.channel for each in run.fired
+        ]
         for mine, other in zip(pilot.fired, run.fired, strict=True):
             assert mine.pulse.loaded == pytest.approx(other.pulse.loaded, abs=1e-9)
             assert mine.decided == pytest.approx(other.decided, abs=1e-9)
             assert mine.true_nutation == pytest.approx(other.true_nutation, abs=1e-11)
             assert mine.pulse.impulse == pytest.approx(other.pulse.impulse, abs=1e-9)
         assert pilot.quiet == pytest.approx(list(run.quiet), abs=1e-9)
-        assert (pilot.ending[0], pilot.ending[1] or None, pilot.looked_at) == (run.stop, run.channel, run.looked_at)
+        assert (pilot.ending[0], pilot.ending[1] or None, pilot.looked_at) == (
+            run.stop,
+            run.channel,
+            run.looked_at,
+        )
         (rates,), _ = run.flight.motion(np.array([max(until, run.flight.legs[-1].end)]))
         assert together.rates[:, row] == pytest.approx(rates, abs=1e-11)
         if run.settled is not None:
-            angles = nutation(case.truth.inertia.moments, run.flight.motion(np.linspace(run.settled, until, 4000))[0])
+            angles = nutation(
+                case.truth.inertia.moments,
+                run.flight.motion(np.linspace(run.settled, until, 4000))[0],
+            )
             assert together.quiet[row] == pytest.approx(angles[0], abs=1e-10)
             # In a pulse it may be more for a moment.
             later = any(each.pulse.start > run.settled for each in run.fired)
@@ -278,7 +361,8 @@ def test_a_case_does_not_depend_on_those_beside_it(monkeypatch: pytest.MonkeyPat
     rng = np.random.default_rng(4)
     craft, loop = random_loop(rng, FOUR_PULSE)
     craft = replace(craft, dissipation=200.0)
-    known, cases = Law(craft, loop), truths(rng, craft, loop, 9)
+    known = Law(craft, loop)
+    cases = truths(rng, craft, loop, 9)
     whole = Fleet(known, cases, 40.0).fly()
     monkeypatch.setattr("nutdamp.control_loop.simulation.TOGETHER", 100)
     parts, alone = Fleet(known, cases, 40.0).fly(), Fleet(known, cases[7:8], 40.0).fly()
@@ -288,7 +372,8 @@ def test_a_case_does_not_depend_on_those_beside_it(monkeypatch: pytest.MonkeyPat
 
 
 def test_what_cannot_go_together_is_named() -> None:
-    craft, sampled = fired_by(), fires(Sensor(rate=20.0))
+    craft = fired_by()
+    sampled = fires(Sensor(rate=20.0))
     tensor = spinner(moments=(120.0, 100.0, 80.0)).inertia
     for body, loop, why in (
         (craft, fires(), "a continuous signal"),
@@ -300,8 +385,11 @@ def test_what_cannot_go_together_is_named() -> None:
 
 def test_a_loop_without_end_is_over_and_the_others_go_on(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("nutdamp.control_loop.controller.MOST_FIRINGS", 3)
-    craft, loop = fired_by(3.0, FOUR[:2]), fires(Sensor(rate=20.0), 0.57, 0.29, on_time=0.2)
+    craft = fired_by(3.0, FOUR[:2])
+    loop = fires(Sensor(rate=20.0), 0.57, 0.29, on_time=0.2)
     still = replace(craft, omega0=np.array([0.021, 0.0, 3.0]))
-    fleet = Fleet(Law(craft, loop), [Case(replace(each, loop=loop), (1,)) for each in (craft, still)], 60.0).fly()
+    fleet = Fleet(
+        Law(craft, loop), [Case(replace(each, loop=loop), (1,)) for each in (craft, still)], 60.0
+    ).fly()
     assert [len(pilot.fired) for pilot in fleet.pilots] == [3, 2]
     assert [pilot.ending[0] for pilot in fleet.pilots] == [Ending.FULL, Ending.END]

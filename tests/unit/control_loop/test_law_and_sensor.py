@@ -1,4 +1,6 @@
-"""What the sensors show, and when the law fires by it: Magnus' sign table, closed forms, motions by DOP853."""
+"""What the sensors show, and when the law fires by it: Magnus' sign table, closed forms, motions by
+DOP853.
+"""
 
 import cmath
 import math
@@ -22,17 +24,27 @@ from nutdamp.spacecraft.model import Spacecraft, Vector
 
 FOUR = four(least=0.01, most=1.0)
 TABLE = {"+M1": (1, 1), "-M1": (1, -1), "+M2": (0, -1), "-M2": (0, 1)}
-"""Magnus 1970, section 4, for a ω3 > 0: which of ω1, ω2 is zero as a channel fires, and how it then changes."""
+"""Magnus 1970, section 4, for a ω3 > 0: which of ω1, ω2 is zero as a channel fires, and how it then
+changes.
+"""
 
 
 def first_firing(law: Law, z: complex, spin: float = 3.0) -> Firing:
     return present(law.firing(law.actuators[0], z, spin))
 
 
-def after(moments: tuple[float, float, float], rates: Vector, torque: Vector, start: float, width: float) -> Vector:
-    """Rates after a coast from ``rates`` and a pulse, by DOP853; then rates along an arc of 7.5 s: (n, 3)."""
+def after(
+    moments: tuple[float, float, float], rates: Vector, torque: Vector, start: float, width: float
+) -> Vector:
+    """Rates after a coast from ``rates`` and a pulse, by DOP853; then rates along an arc of 7.5 s:
+    (n, 3).
+    """
     motion = reference.Motion(rates, np.eye(3))
-    for push, times in ((np.zeros(3), [start]), (torque, [width]), (np.zeros(3), np.linspace(0.02, 7.5, 350))):
+    for push, times in (
+        (np.zeros(3), [start]),
+        (torque, [width]),
+        (np.zeros(3), np.linspace(0.02, 7.5, 350)),
+    ):
         path = reference.coast(moments, motion, push, np.array(times))
         motion = path[-1]
     return np.array([each.rates for each in path])
@@ -40,7 +52,8 @@ def after(moments: tuple[float, float, float], rates: Vector, torque: Vector, st
 
 @pytest.mark.parametrize(("C", "spin"), [(80.0, 3.0), (80.0, -3.0), (160.0, 3.0), (160.0, -3.0)])
 def test_sign_table_of_magnus_and_its_mirror_image(C: float, spin: float) -> None:
-    law, rate = Law(fired_by(5.0, FOUR, C=C, spin=spin), Loop(Sensor(), start=0.01)), (120.0 - C) / 120.0 * spin
+    law = Law(fired_by(5.0, FOUR, C=C, spin=spin), Loop(Sensor(), start=0.01))
+    rate = (120.0 - C) / 120.0 * spin
     for actuator in law.actuators:
         z = 0.1 * cmath.exp(0.3j)
         firing = present(law.firing(actuator, z, spin))
@@ -48,13 +61,21 @@ def test_sign_table_of_magnus_and_its_mirror_image(C: float, spin: float) -> Non
         change = -1j * rate * then
         zero, sign = TABLE[actuator.channel.name]
         assert (then.real, then.imag)[zero] == pytest.approx(0.0, abs=1e-14)
-        assert math.copysign(1.0, (change.real, change.imag)[zero]) == sign * (-1 if rate < 0.0 else 1)
+        assert math.copysign(1.0, (change.real, change.imag)[zero]) == sign * (
+            -1 if rate < 0.0 else 1
+        )
         assert (then * actuator.kick.conjugate()).real < 0.0  # whatever the table: against ω
 
 
-@spread("moments", [(120.0, 120.0, 80.0), (80.0, 80.0, 120.0), (120.0, 95.0, 80.0), (70.0, 90.0, 130.0)], quick=1)
+@spread(
+    "moments",
+    [(120.0, 120.0, 80.0), (80.0, 80.0, 120.0), (120.0, 95.0, 80.0), (70.0, 90.0, 130.0)],
+    quick=1,
+)
 @spread("spin", [2.0, -2.0], quick=1)
-def test_a_firing_lowers_the_nutation_as_much_as_can_be(moments: tuple[float, float, float], spin: float) -> None:
+def test_a_firing_lowers_the_nutation_as_much_as_can_be(
+    moments: tuple[float, float, float], spin: float
+) -> None:
     """Moved by a few degrees to either side it lowers less: by DOP853, small angles."""
     for degrees in (10.0, 205.0):
         push = 0.5 * cmath.exp(1j * math.radians(degrees))
@@ -65,48 +86,82 @@ def test_a_firing_lowers_the_nutation_as_much_as_can_be(moments: tuple[float, fl
         start = firing.wait % craft.body_period + craft.body_period
 
         def widest(
-            at: float, push: Vector = torque, of: Spacecraft = craft, sense: float = math.copysign(1.0, spin)
+            at: float,
+            push: Vector = torque,
+            of: Spacecraft = craft,
+            sense: float = math.copysign(1.0, spin),
         ) -> float:
             rates = after(moments, of.omega0, push, at, 0.4)
             return max(reference.nutation(moments, each, sense) for each in rates)
 
-        assert widest(start) < min(widest(start - 0.3), widest(start + 0.3), widest(start, np.zeros(3)))
+        assert widest(start) < min(
+            widest(start - 0.3), widest(start + 0.3), widest(start, np.zeros(3))
+        )
 
 
 @pytest.mark.parametrize("kind", ["four-pulse", ONE_PULSE, BANG])
 @pytest.mark.parametrize("predict", [True, False])
 def test_waits_of_many_moments_are_those_of_each(kind: str, predict: bool) -> None:
     rng = np.random.default_rng(3)
-    channels = (*FOUR, channel("slanted", 2.0, 3.0, 0.0, min_on_time=0.02), channel("axial", 2.0, -1.0, 0.9))
+    channels = (
+        *FOUR,
+        channel("slanted", 2.0, 3.0, 0.0, min_on_time=0.02),
+        channel("axial", 2.0, -1.0, 0.9),
+    )
     on_time = 0.05 if kind != ONE_PULSE else None
-    law = Law(spinner(channels=channels), Loop(Sensor(), kind, start=0.01, predict=predict, on_time=on_time))
-    z = rng.normal(size=200) * np.exp(rng.uniform(-9.0, 0.0, size=200)) * np.exp(1j * rng.uniform(0, 7, size=200))
+    law = Law(
+        spinner(channels=channels),
+        Loop(Sensor(), kind, start=0.01, predict=predict, on_time=on_time),
+    )
+    z = (
+        rng.normal(size=200)
+        * np.exp(rng.uniform(-9.0, 0.0, size=200))
+        * np.exp(1j * rng.uniform(0, 7, size=200))
+    )
     spin = rng.uniform(2.5, 3.5, size=200)
     for actuator in law.actuators:
-        single = [law.firing(actuator, complex(each), float(turn)) for each, turn in zip(z, spin, strict=True)]
+        single = [
+            law.firing(actuator, complex(each), float(turn))
+            for each, turn in zip(z, spin, strict=True)
+        ]
         wanted = np.array([math.nan if each is None else each.wait for each in single])
         off = 1e-12 if actuator.spin_rate == 0.0 else 0.03
-        assert np.allclose(law.waits(actuator, z, spin), wanted, rtol=1e-12, atol=off, equal_nan=True)
+        assert np.allclose(
+            law.waits(actuator, z, spin), wanted, rtol=1e-12, atol=off, equal_nan=True
+        )
 
 
 def test_on_time_is_the_exact_one_for_what_is_left() -> None:
     """τ = (2/(aω3)) asin(aω3 A|ω|/(2M)), flown by DOP853: nothing is left."""
     craft = fired_by(0.4, FOUR)
-    firing = first_firing(Law(craft, Loop(Sensor(), ONE_PULSE, start=1e-4)), complex(*craft.omega0[:2]))
-    rate, left = 3.0 / 3.0, 120.0 * transverse_size(craft.omega0)
-    assert firing.on_time == pytest.approx(2.0 / rate * math.asin(rate * left / (2.0 * 6.0)), rel=1e-13)
-    start, torque = firing.wait % craft.body_period, np.array([6.0, 0.0, 0.0])
-    assert transverse_size(after((120, 120, 80), craft.omega0, torque, start, firing.on_time)[0]) < 1e-11
+    firing = first_firing(
+        Law(craft, Loop(Sensor(), ONE_PULSE, start=1e-4)), complex(*craft.omega0[:2])
+    )
+    rate = 3.0 / 3.0
+    left = 120.0 * transverse_size(craft.omega0)
+    assert firing.on_time == pytest.approx(
+        2.0 / rate * math.asin(rate * left / (2.0 * 6.0)), rel=1e-13
+    )
+    start = firing.wait % craft.body_period
+    torque = np.array([6.0, 0.0, 0.0])
+    assert (
+        transverse_size(after((120, 120, 80), craft.omega0, torque, start, firing.on_time)[0])
+        < 1e-11
+    )
 
 
 def test_a_pulse_that_would_leave_more_than_it_finds_is_not_fired() -> None:
-    law, smallest = Law(fired_by(5.0, FOUR), Loop(Sensor(), start=1e-4)), 0.01 * 6.0 / 120.0
+    law = Law(fired_by(5.0, FOUR), Loop(Sensor(), start=1e-4))
+    smallest = 0.01 * 6.0 / 120.0
     assert law.firing(law.actuators[0], complex(0.499 * smallest), 3.0) is None
     assert law.firing(law.actuators[0], complex(0.501 * smallest), 3.0) is not None
 
 
 def test_no_law_for_a_sphere_or_without_channels() -> None:
-    for key, body in (("sphere", fired_by(5.0, FOUR, A=100.0, C=100.0)), ("no-channels", spinner())):
+    for key, body in (
+        ("sphere", fired_by(5.0, FOUR, A=100.0, C=100.0)),
+        ("no-channels", spinner()),
+    ):
         with refused(Infeasible, f"loop.{key}"):
             Law(body, fires())
 
@@ -126,37 +181,60 @@ AT, ALONG = np.array([0.9, -0.4, 0.7]), np.array([0.36, 0.48, 0.8])
 FELT = Sensor(ACCELEROMETER, 100.0, position=AT, axis=ALONG)
 
 
-def body(moments: tuple[float, float, float] = BODIES[0], spin: float = 3.0, degrees: float = 0.5) -> Spacecraft:
-    return spinner(moments=moments, spin=spin, degrees=degrees, channels=(channel("+M1", 5.0, 0.0, 0.0),))
+def body(
+    moments: tuple[float, float, float] = BODIES[0], spin: float = 3.0, degrees: float = 0.5
+) -> Spacecraft:
+    return spinner(
+        moments=moments, spin=spin, degrees=degrees, channels=(channel("+M1", 5.0, 0.0, 0.0),)
+    )
 
 
 @pytest.mark.parametrize(("moments", "spin"), [*zip(BODIES, (3.0, -3.0, -3.0, 3.0), strict=True)])
-def test_accelerometer_shows_what_a_point_of_the_body_does(moments: tuple[float, float, float], spin: float) -> None:
+def test_accelerometer_shows_what_a_point_of_the_body_does(
+    moments: tuple[float, float, float], spin: float
+) -> None:
     """Its gain is the part that is linear in the transverse rate."""
-    craft, step, small = body(moments, spin, 6.0), 1e-3, 1e-6
+    craft = body(moments, spin, 6.0)
+    step = 1e-3
+    small = 1e-6
     start = reference.Motion(craft.omega0, np.eye(3))
     places = reference.coast(moments, start, np.zeros(3), np.linspace(step, 5.0 * step, 5))
     points = np.array([each.rotation @ AT for each in places])
-    acceleration = (-points[0] + 16 * points[1] - 30 * points[2] + 16 * points[3] - points[4]) / (12 * step * step)
-    middle, signal = places[2], Signal(craft, FELT, (1,))
+    acceleration = (-points[0] + 16 * points[1] - 30 * points[2] + 16 * points[3] - points[4]) / (
+        12 * step * step
+    )
+    middle = places[2]
+    signal = Signal(craft, FELT, (1,))
     shown = signal.shown(middle.rates[None, :])[0, 0]
     assert shown == pytest.approx(ALONG @ middle.rotation.T @ acceleration, abs=2e-8)
-    rates = np.array([[small, 0.0, spin], [-small, 0.0, spin], [0.0, small, spin], [0.0, -small, spin]])
+    rates = np.array(
+        [[small, 0.0, spin], [-small, 0.0, spin], [0.0, small, spin], [0.0, -small, spin]]
+    )
     slopes = (signal.shown(rates)[::2, 0] - signal.shown(rates)[1::2, 0]) / (2 * small)
     assert np.array(gain(moments, AT, ALONG)) * spin == pytest.approx(slopes, rel=1e-8)
 
 
 def test_accelerometer_along_axis_3_is_blind_for_a_flat_disc_alone() -> None:
     for C in (60.0, 150.0, 199.0):
-        assert gain((100.0, 100.0, C), np.array([2.0, 0.0, 0.3]), UP)[0] == pytest.approx(2.0 * (2.0 - C / 100.0))
-    for C, at, along, blind in ((200, SIDE, UP, True), (200, SIDE, SIDE + UP, False), (199, SIDE, UP, False)):
+        assert gain((100.0, 100.0, C), np.array([2.0, 0.0, 0.3]), UP)[0] == pytest.approx(
+            2.0 * (2.0 - C / 100.0)
+        )
+    for C, at, along, blind in (
+        (200, SIDE, UP, True),
+        (200, SIDE, SIDE + UP, False),
+        (199, SIDE, UP, False),
+    ):
         assert is_blind((100.0, 100.0, C), 2.0 * at + 0.3 * UP, along) is blind
     assert is_blind((100.0, 100.0, 150.0), UP, UP)
 
 
 def test_a_torque_is_felt() -> None:
-    craft, sensor = body(), Sensor(ACCELEROMETER, 100.0, position=SIDE)
-    quiet, pushed = (felt(sensor, craft.inertia.moments, craft.omega0, torque)[0] for torque in (None, (0.0, 6.0, 0.0)))
+    craft = body()
+    sensor = Sensor(ACCELEROMETER, 100.0, position=SIDE)
+    quiet, pushed = (
+        felt(sensor, craft.inertia.moments, craft.omega0, torque)[0]
+        for torque in (None, (0.0, 6.0, 0.0))
+    )
     assert pushed - quiet == pytest.approx(-6.0 / 120.0)
 
 
@@ -165,7 +243,8 @@ def test_noise_of_a_sample_is_the_same_however_it_is_come_by() -> None:
         signal = Signal(body(), Sensor(rate=100.0, noise=0.1), (seed,))
         return signal.sampled(numbers, np.zeros((len(numbers), 2)))
 
-    whole, numbers = noise(np.arange(9000)), np.arange(4000, 8500)
+    whole = noise(np.arange(9000))
+    numbers = np.arange(4000, 8500)
     assert whole.std() == pytest.approx(0.1, rel=0.02)
     assert np.array_equal(noise(numbers), whole[numbers])
     assert np.array_equal(noise(numbers[::7]), whole[numbers[::7]])
@@ -180,12 +259,18 @@ def test_steps_scale_and_bias() -> None:
 
 
 def test_gyros_measure_about_axes_of_the_file() -> None:
-    """What they show of ω3 is no nutation; turned about axis 3 alone they show what those of principal axes do."""
-    axes, rates = turned(0.02, -0.03, 0.5), np.array([[0.1, -0.2, 3.0], [0.0, 0.0, -2.0]])
-    assert Signal(body(), Sensor(axes=axes[:2]), (1,)).shown(rates) == pytest.approx((rates @ axes.T)[:, :2])
+    """What they show of ω3 is no nutation; turned about axis 3 alone they show what those of
+    principal axes do.
+    """
+    axes = turned(0.02, -0.03, 0.5)
+    rates = np.array([[0.1, -0.2, 3.0], [0.0, 0.0, -2.0]])
+    assert Signal(body(), Sensor(axes=axes[:2]), (1,)).shown(rates) == pytest.approx(
+        (rates @ axes.T)[:, :2]
+    )
     for craft in (body(), body((120.0, 95.0, 80.0))):
         of_principal, turned_alone, tilted = (
-            estimates(craft, Sensor(rate=50.0, axes=each[:2])) for each in (np.eye(3), turned(0.0, 0.0, 0.5), axes)
+            estimates(craft, Sensor(rate=50.0, axes=each[:2]))
+            for each in (np.eye(3), turned(0.0, 0.0, 0.5), axes)
         )
         assert turned_alone[1] == pytest.approx(of_principal[1], abs=1e-14)
         first, second = Law(craft, Loop(Sensor(), start=0.01)).gauge
@@ -197,13 +282,17 @@ def test_gyros_measure_about_axes_of_the_file() -> None:
 def estimates(
     craft: Spacecraft, sensor: Sensor, cuts: tuple[int, ...] = ()
 ) -> tuple[Vector, ComplexArray, ComplexArray]:
-    """Times, estimates of z with the filter taken out, and z itself, along a coast; fed in pieces at ``cuts``."""
+    """Times, estimates of z with the filter taken out, and z itself, along a coast; fed in pieces
+    at ``cuts``.
+    """
     law = Law(craft, Loop(sensor, start=0.01))
-    signal, path = Signal(craft, sensor, (1,)), make_dynamics(craft).path(craft.initial, 0.0, 40.0, most=9999)[0]
+    signal = Signal(craft, sensor, (1,))
+    path = make_dynamics(craft).path(craft.initial, 0.0, 40.0, most=9999)[0]
     numbers = np.arange(int(40.0 * present(sensor.rate)))
     times = numbers / present(sensor.rate)
     rates = path.motion(times)[0]
-    estimator, values = Estimator(law, sensor, 0.0), signal.sampled(numbers, signal.shown(rates))
+    estimator = Estimator(law, sensor, 0.0)
+    values = signal.sampled(numbers, signal.shown(rates))
     pieces = [
         estimator.best(estimator.feed(times[i], values[i], rates[i, 2]), rates[i, 2])
         for i in np.split(np.arange(len(times)), cuts)
@@ -212,7 +301,9 @@ def estimates(
 
 
 @pytest.mark.parametrize("moments", [BODIES[0], deep(BODIES[1]), deep(BODIES[2]), BODIES[3]])
-def test_accelerometer_gives_the_rate_by_the_sine_of_a_period(moments: tuple[float, float, float]) -> None:
+def test_accelerometer_gives_the_rate_by_the_sine_of_a_period(
+    moments: tuple[float, float, float],
+) -> None:
     for at, along in (((1.0, 0.3, 0.2), UP), ((0.1, 0.3, 0.8), SIDE)):
         craft = body(moments, degrees=0.01 if moments[0] != moments[1] else 3.0)
         sensor = Sensor(ACCELEROMETER, 50.0, bias=0.3, position=np.array(at), axis=along)
@@ -223,15 +314,21 @@ def test_accelerometer_gives_the_rate_by_the_sine_of_a_period(moments: tuple[flo
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_an_accelerometer_overestimates_a_body_that_the_law_does_not_know_by_no_more_than_said(seed: int) -> None:
+def test_an_accelerometer_overestimates_a_body_that_the_law_does_not_know_by_no_more_than_said(
+    seed: int,
+) -> None:
     draw = np.random.default_rng(seed)
     known = np.array([100.0, 100.0, draw.choice([40.0, 80.0, 150.0])])
     A, C = known[0] * draw.uniform(0.7, 1.4), known[2] * draw.uniform(0.8, 1.2)
-    on_board, truth = body(tuple(known), degrees=3.0), body((A, A, min(C, 1.95 * A)), degrees=draw.uniform(0.1, 10.0))
+    on_board, truth = (
+        body(tuple(known), degrees=3.0),
+        body((A, A, min(C, 1.95 * A)), degrees=draw.uniform(0.1, 10.0)),
+    )
     place, along = draw.normal(size=3), draw.normal(size=3)
     sensor = Sensor(ACCELEROMETER, 20.0, position=place, axis=along / np.linalg.norm(along))
     law = Law(on_board, Loop(sensor, start=0.01))
-    estimator, times = Estimator(law, sensor, 0.0), np.arange(800) / 20.0
+    estimator = Estimator(law, sensor, 0.0)
+    times = np.arange(800) / 20.0
     rates = make_dynamics(truth).path(truth.initial, 0.0, 40.0, most=9999)[0].motion(times)[0]
     shown = np.abs(estimator.feed(times, Signal(truth, sensor, (1,)).shown(rates), rates[:, 2]))
     size = abs(complex(*truth.omega0[:2]))
@@ -248,17 +345,22 @@ def test_estimates_do_not_depend_on_the_pieces_in_which_samples_come() -> None:
         assert np.allclose(whole, parts, rtol=1e-9, atol=1e-12, equal_nan=True)
 
 
-def test_an_accelerometer_with_too_many_samples_in_a_period_is_refused_before_they_are_held() -> None:
+def test_an_accelerometer_with_too_many_samples_in_a_period_is_refused_before_they_are_held() -> (
+    None
+):
     with pytest.raises(Infeasible, match="lower loop"):
         estimates(body(), Sensor(ACCELEROMETER, 1e6, position=SIDE))
 
 
 @pytest.mark.parametrize("spin", [3.0, -3.0])
 def test_low_pass_filter_is_the_recursion_and_its_lag_is_known(spin: float) -> None:
-    craft, sensor = body(spin=spin), Sensor(rate=20.0, low_pass=0.4, delay=0.05)
+    craft = body(spin=spin)
+    sensor = Sensor(rate=20.0, low_pass=0.4, delay=0.05)
     law = Law(craft, Loop(sensor, start=0.01))
-    values, beta = np.random.default_rng(5).normal(size=(500, 2)), math.exp(-0.05 / 0.4)
-    level, wanted = values[0].copy(), []
+    values = np.random.default_rng(5).normal(size=(500, 2))
+    beta = math.exp(-0.05 / 0.4)
+    level = values[0].copy()
+    wanted = []
     for row in values:
         level = beta * level + (1.0 - beta) * row
         wanted.append(complex(*level))

@@ -14,7 +14,14 @@ from support.dispersed import jet, normal
 from support.golden import refused
 from support.loops import fired_by, fires, rad
 
-from nutdamp.control_loop.dispersion import OUTPUTS, LoopDispersion, LoopResults, LoopStudy, loop_study, run
+from nutdamp.control_loop.dispersion import (
+    OUTPUTS,
+    LoopDispersion,
+    LoopResults,
+    LoopStudy,
+    loop_study,
+    run,
+)
 from nutdamp.control_loop.evaluation import loop_of
 from nutdamp.control_loop.law import Ending
 from nutdamp.control_loop.simulation import fly
@@ -31,9 +38,21 @@ from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
 from nutdamp.views.loop_cases import LoopCasesWriter
 
 VALVE = Trapezoid(0.01, 0.02, 0.01, 0.01)
-FORCES = {"+M1": (0.0, -9.0, 0.0), "-M1": (0.0, 9.0, 0.0), "+M2": (9.0, 0.0, 0.0), "-M2": (-9.0, 0.0, 0.0)}
+FORCES = {
+    "+M1": (0.0, -9.0, 0.0),
+    "-M1": (0.0, 9.0, 0.0),
+    "+M2": (9.0, 0.0, 0.0),
+    "-M2": (-9.0, 0.0, 0.0),
+}
 JETS = tuple(
-    Channel(name, (replace(jet(name, (0.0, 0.0, 0.8), force), min_on_time=0.02, max_on_time=0.3, valve=VALVE),))
+    Channel(
+        name,
+        (
+            replace(
+                jet(name, (0.0, 0.0, 0.8), force), min_on_time=0.02, max_on_time=0.3, valve=VALVE
+            ),
+        ),
+    )
     for name, force in FORCES.items()
 )
 GYRO = Sensor(rate=20.0, noise=rad(0.02), bias=rad(0.01), delay=0.05)
@@ -83,16 +102,24 @@ def output(results: LoopResults, name: str) -> Any:
 
 
 def test_every_case_has_its_own_body_thrusters_and_sensor() -> None:
-    body, dispersed = craft(), study(craft())
-    draws, case = dispersed.draws_of(40), dispersed.case(40)
+    body = craft()
+    dispersed = study(craft())
+    draws = dispersed.draws_of(40)
+    case = dispersed.case(40)
     truth = case.truth
     assert {entry.name for entry in dispersed.model.inputs.drawn} == set(draws)
     assert pytest.approx(body.inertia.A + draws["A"]) == truth.inertia.A
     assert pytest.approx(body.inertia.C + draws["C"]) == truth.inertia.C
-    assert truth.omega0 == pytest.approx(body.omega0 + [draws[f"omega0_{axis}"] for axis in (1, 2, 3)])
+    assert truth.omega0 == pytest.approx(
+        body.omega0 + [draws[f"omega0_{axis}"] for axis in (1, 2, 3)]
+    )
     sensor = present(truth.loop).sensor
-    assert sensor.scales == pytest.approx([1.0 + draws["sensor scale 1"], 1.0 + draws["sensor scale 2"]])
-    assert sensor.biases == pytest.approx([GYRO.bias + draws["sensor bias 1"], GYRO.bias + draws["sensor bias 2"]])
+    assert sensor.scales == pytest.approx(
+        [1.0 + draws["sensor scale 1"], 1.0 + draws["sensor scale 2"]]
+    )
+    assert sensor.biases == pytest.approx(
+        [GYRO.bias + draws["sensor bias 1"], GYRO.bias + draws["sensor bias 2"]]
+    )
     assert sensor.noise == pytest.approx(GYRO.noise * (1.0 + draws["sensor noise"]))
     assert sensor.delay == pytest.approx(GYRO.delay + draws["sensor delay"])
     valve = truth.channels[2].valve
@@ -107,10 +134,15 @@ def test_every_case_has_its_own_body_thrusters_and_sensor() -> None:
 def test_torques_are_those_of_a_dispersed_schedule() -> None:
     still = replace(ALL, thrust_per_pulse=None, open_delay={}, close_delay={})
     body = replace(craft(dispersions=still), cold=None)
-    schedule = Schedule(tuple(channel_pulse(each, 2.0 + number, 0.1) for number, each in enumerate(body.channels)))
-    fixed, looped = study_of(body, schedule, seed=3), study(body)
+    schedule = Schedule(
+        tuple(channel_pulse(each, 2.0 + number, 0.1) for number, each in enumerate(body.channels))
+    )
+    fixed = study_of(body, schedule, seed=3)
+    looped = study(body)
     draws, alike = fixed.draws_of(17), looped.draws_of(17)
-    assert all(draws.get(name) == draw for name, draw in alike.items() if not name.startswith("sensor "))
+    assert all(
+        draws.get(name) == draw for name, draw in alike.items() if not name.startswith("sensor ")
+    )
     impulses = fixed.model.cases(draws).impulses
     for channel, impulse in zip(looped.case(17).truth.channels, impulses, strict=True):
         assert channel.torque * 0.1 == pytest.approx(impulse, abs=1e-12)
@@ -119,7 +151,9 @@ def test_torques_are_those_of_a_dispersed_schedule() -> None:
 def test_what_a_loop_draws_is_correlated_as_the_file_says() -> None:
     scaled = replace(ALL, sensor_scale=relative(0.05, "uniform"))
     pairs = (("A", "C", 0.9), ("sensor scale 1", "sensor scale 2", 0.7))
-    studies = (loop_study(craft(dispersions=replace(scaled, correlation=some))) for some in (pairs, ()))
+    studies = (
+        loop_study(craft(dispersions=replace(scaled, correlation=some))) for some in (pairs, ())
+    )
     draws, plain = (study.draws_of_all(np.arange(4_000)) for study in studies)
     assert np.corrcoef(draws["A"], draws["C"])[0, 1] == pytest.approx(0.9, abs=0.02)
     measured = np.corrcoef(draws["sensor scale 1"], draws["sensor scale 2"])[0, 1]
@@ -135,7 +169,9 @@ def test_tolerances_of_zero_fly_the_file_itself_but_for_the_noise() -> None:
     assert np.allclose(results.values, results.study.nominal[:, None], rtol=1e-12, atol=1e-15)
 
 
-def test_a_case_is_the_same_in_a_study_of_any_size_and_flown_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_case_is_the_same_in_a_study_of_any_size_and_flown_alone(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     small, large = (results_of(craft(), count, 30.0) for count in (6, 12))
     assert np.allclose(small.values, large.values[:, :6], rtol=1e-12, atol=1e-15, equal_nan=True)
     assert small.done == 6
@@ -146,21 +182,31 @@ def test_a_case_is_the_same_in_a_study_of_any_size_and_flown_alone(monkeypatch: 
         assert len(plan.flown_run.fired) == outputs["firings"]
         assert plan.propellant == pytest.approx(outputs["propellant"], rel=1e-9)
         assert plan.flown_run.case == case + 1
-        assert plan.flight.residual.momentum_shift == pytest.approx(outputs["momentum_shift"], abs=1e-9)
+        assert plan.flight.residual.momentum_shift == pytest.approx(
+            outputs["momentum_shift"], abs=1e-9
+        )
     monkeypatch.setattr("nutdamp.control_loop.dispersion.PORTION", 6)
     seen: list[int] = []
-    stopped = run(LoopResults(study(craft(), 30.0), 12), watch=seen.append, stopped=lambda: bool(seen) and seen[-1] > 8)
+    stopped = run(
+        LoopResults(study(craft(), 30.0), 12),
+        watch=seen.append,
+        stopped=lambda: bool(seen) and seen[-1] > 8,
+    )
     assert stopped.done == 6
     assert np.array_equal(stopped.values[:, :6], small.values, equal_nan=True)
     monkeypatch.setattr("nutdamp.control_loop.dispersion.expects_alone", lambda *_: "a test")
     each = results_of(craft(), 2, 30.0).values
-    rows = [row for row, name in enumerate(OUTPUTS) if name != "nutation"]  # alone it is looked for in pulses too
+    rows = [
+        row for row, name in enumerate(OUTPUTS) if name != "nutation"
+    ]  # alone it is looked for in pulses too
     assert np.allclose(small.values[rows, :2], each[rows], rtol=1e-9, atol=1e-12)
     assert np.all(each >= small.values[:, :2] - 1e-9 * np.abs(each))
 
 
 ALONE: dict[str, Callable[[], Spacecraft]] = {
-    "tensor": lambda: replace(craft(), inertia=replace(craft().inertia, moments=(120.0, 112.0, 80.0))),
+    "tensor": lambda: replace(
+        craft(), inertia=replace(craft().inertia, moments=(120.0, 112.0, 80.0))
+    ),
     "disturbed": lambda: replace(craft(), disturbances=(Disturbance(0.001 + 0.001j),)),
     "continuous": lambda: craft(replace(GYRO, rate=None, noise=0.0)),
 }
@@ -219,7 +265,9 @@ def test_a_loop_that_is_stopped_is_no_plan_and_one_that_never_settles_is_not_eno
 
 
 def test_what_never_settles_is_worst_and_does_not_comply() -> None:
-    results = results_of(craft(dispersions=Dispersions(omega0=(normal(0.02), normal(0.02), None))), 60, until=8.0)
+    results = results_of(
+        craft(dispersions=Dispersions(omega0=(normal(0.02), normal(0.02), None))), 60, until=8.0
+    )
     never = np.isnan(results.values[0]) & (output(results, "firings") > 0)
     assert 0 < never.sum() < 60
     assert results.met <= results.settled == 60 - never.sum()
@@ -234,7 +282,9 @@ def test_a_loop_whose_tank_is_empty_fires_no_more_and_does_not_comply() -> None:
     assert 12 < empty < 28
     assert results.met == results.settled == 40 - empty
     used = output(results, "propellant")
-    tanks = np.broadcast_to(needs + results.study.draws_of_all(np.arange(40))["tank propellant"], 40)
+    tanks = np.broadcast_to(
+        needs + results.study.draws_of_all(np.arange(40))["tank propellant"], 40
+    )
     assert used[results.lost] == pytest.approx(tanks[results.lost], rel=1e-9)
     assert np.all(used <= tanks)
 
@@ -242,7 +292,9 @@ def test_a_loop_whose_tank_is_empty_fires_no_more_and_does_not_comply() -> None:
 def test_faults_stop_each_case_on_its_own() -> None:
     results = results_of(craft(reversed=("+M1",)), 20)
     assert results.stops[Ending.CHANNEL] >= 18
-    assert results.settled == 20 - sum(count for stop, count in results.stops.items() if stop is not Ending.END)
+    assert results.settled == 20 - sum(
+        count for stop, count in results.stops.items() if stop is not Ending.END
+    )
 
 
 def test_what_a_study_needs(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -262,7 +314,9 @@ def test_what_a_study_needs(monkeypatch: pytest.MonkeyPatch) -> None:
 
 NOISY = {
     "noise": Sensor(rate=20.0, noise=rad(0.03)),
-    "noise, bias, steps": Sensor(rate=20.0, noise=rad(0.02), bias=rad(0.02), quantisation=rad(0.01), delay=0.05),
+    "noise, bias, steps": Sensor(
+        rate=20.0, noise=rad(0.02), bias=rad(0.02), quantisation=rad(0.01), delay=0.05
+    ),
     "accelerometer": Sensor(ACCELEROMETER, 20.0, noise=2e-3, position=np.array([1.0, 0.0, 0.0])),
 }
 BANGS = {"law": BANG, "on_time": 0.1}
@@ -289,7 +343,9 @@ def check_dead_band(name: str, count: int) -> None:
     assert results.settled >= 0.999 * count
     assert set(results.stops) == {Ending.END}
     quiet = results.of("quiet")
-    assert 0.9 * count < len(quiet) == results.settled - results.idle  # some begin below the start threshold
+    assert (
+        0.9 * count < len(quiet) == results.settled - results.idle
+    )  # some begin below the start threshold
     assert results.within >= 0.99 * len(quiet)
     # Pulses all alike leave anything up to it.
     assert not law or results.study.band.most < 2.0 * np.quantile(quiet, 0.99)
@@ -307,12 +363,17 @@ def test_ten_thousand_noisy_loops_fall_quiet_within_the_dead_band(name: str) -> 
     check_dead_band(name, 10_000)
 
 
-# An accelerometer's sine is fitted at the rate at which the looking begins: at another spin, as the nutation grows.
-@pytest.mark.parametrize(("sensor", "alike"), [("noise, bias, steps", 1e-9), ("accelerometer", 5e-3)])
+# An accelerometer's sine is fitted at the rate at which the looking begins: at another spin, as the
+# nutation grows.
+@pytest.mark.parametrize(
+    ("sensor", "alike"), [("noise, bias, steps", 1e-9), ("accelerometer", 5e-3)]
+)
 def test_loops_fire_alike_whether_they_look_while_nothing_can_show_or_not(
     sensor: str, alike: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    body = replace(fired_by(1.0, loop=fires(NOISY[sensor], settle=1.0)), dissipation=60.0, dispersions=STARTS)
+    body = replace(
+        fired_by(1.0, loop=fires(NOISY[sensor], settle=1.0)), dissipation=60.0, dispersions=STARTS
+    )
     asleep = results_of(body, 20, 400.0)
     looked = [fly(body, present(body.loop), 400.0).looked_at]
     monkeypatch.setattr("nutdamp.control_loop.controller.Pilot._idle_until", lambda *_: None)
@@ -327,7 +388,9 @@ def test_loops_fire_alike_whether_they_look_while_nothing_can_show_or_not(
 def test_as_many_cases_are_flown_as_show_the_share_required_where_one_of_them_fails() -> None:
     for share, least in ((0.9, 2000), (0.997, 2000), (0.999, 5000), (0.99999, 20_000)):
         body = replace(
-            fired_by(1.0, loop=fires(GYRO)), dispersions=STARTS, requirement=Requirement(1.0, probability=share)
+            fired_by(1.0, loop=fires(GYRO)),
+            dispersions=STARTS,
+            requirement=Requirement(1.0, probability=share),
         )
         cases = loop_study(body).enough
         assert least <= cases < 2 * least
@@ -337,9 +400,13 @@ def test_as_many_cases_are_flown_as_show_the_share_required_where_one_of_them_fa
 @pytest.mark.weekly
 @spread("dissipation", [None, 200.0], quick=1, deep=1)
 def test_cases_that_break_a_cone_do_not_comply(dissipation: float | None) -> None:
-    body = replace(craft(), dissipation=dissipation, attitude=Attitude(np.array([0.8, 0.0, 0.6, 0.0])))
+    body = replace(
+        craft(), dissipation=dissipation, attitude=Attitude(np.array([0.8, 0.0, 0.6, 0.0]))
+    )
     at = body.direction_in_n(rad(3.0), 0.4)
-    watched = replace(body, keep=(Keep("star", at, most=rad(5.0)), Keep("Sun", -at, least=rad(174.0))))
+    watched = replace(
+        body, keep=(Keep("star", at, most=rad(5.0)), Keep("Sun", -at, least=rad(174.0)))
+    )
     free, kept = (results_of(each, 40) for each in (body, watched))
     assert kept.values == pytest.approx(free.values, nan_ok=True)
     alone = []
@@ -353,7 +420,10 @@ def test_cases_that_break_a_cone_do_not_comply(dissipation: float | None) -> Non
     assert 0 < np.count_nonzero(broken) < 40
     assert kept.met == np.count_nonzero(~broken) - (free.done - free.met)
     assert alone == [not each for each in broken[:12]]
-    assert kept.broken.tolist() == [np.count_nonzero(kept.angles[0, 1] > rad(5.0)), int(kept.broken[1])]
+    assert kept.broken.tolist() == [
+        np.count_nonzero(kept.angles[0, 1] > rad(5.0)),
+        int(kept.broken[1]),
+    ]
     assert kept.aspects[0] == pytest.approx([kept.angles[0, 0].min(), kept.angles[0, 1].max()])
     only = results_of(replace(watched, requirement=None), 40)
     assert only.met_fraction == pytest.approx(np.mean(~broken))

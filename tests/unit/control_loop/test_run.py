@@ -1,4 +1,6 @@
-"""The loop flown: equal to the open-loop schedule where it sees all, to simulations by DOP853 where it samples."""
+"""The loop flown: equal to the open-loop schedule where it sees all, to simulations by DOP853 where
+it samples.
+"""
 
 import cmath
 import itertools
@@ -37,12 +39,18 @@ CRAFTS = {
     "reversed": fired_by(3.0, spin=-3.0),
     "oblate, reversed": fired_by(3.0, A=80.0, C=120.0, spin=-3.0),
     "axial parts": fired_by(3.0, AXIAL),
-    "gaps, blackout": fired_by(3.0, limits=Limits(earliest=2.0, gap=0.4, horizon=200.0, blackout=((4.0, 9.0),))),
+    "gaps, blackout": fired_by(
+        3.0, limits=Limits(earliest=2.0, gap=0.4, horizon=200.0, blackout=((4.0, 9.0),))
+    ),
 }
 
 
-@pytest.mark.parametrize(("name", "delay"), [*zip(CRAFTS, itertools.cycle([0.0, 0.02]), strict=False)])
-def test_a_continuous_gyro_and_prediction_give_the_four_pulse_schedule(name: str, delay: float) -> None:
+@pytest.mark.parametrize(
+    ("name", "delay"), [*zip(CRAFTS, itertools.cycle([0.0, 0.02]), strict=False)]
+)
+def test_a_continuous_gyro_and_prediction_give_the_four_pulse_schedule(
+    name: str, delay: float
+) -> None:
     craft = CRAFTS[name]
     planned = nutdamp.plan(craft, "four-pulse").pulses
     run = fly(craft, ideal(sensor=Sensor(delay=delay)))
@@ -59,7 +67,9 @@ def test_a_continuous_gyro_and_prediction_give_the_four_pulse_schedule(name: str
 TILTED = Path(__file__).parents[2] / "cases" / "loop-tilted-axes.yaml"
 
 
-@pytest.mark.parametrize(("axes", "fired", "left", "warned"), [("file", 0, 0.5, True), ("principal", 2, 0.0, False)])
+@pytest.mark.parametrize(
+    ("axes", "fired", "left", "warned"), [("file", 0, 0.5, True), ("principal", 2, 0.0, False)]
+)
 def test_a_tilted_axis_3_shows_as_nutation_to_gyros_about_axes_of_the_file(
     axes: str, fired: int, left: float, warned: bool
 ) -> None:
@@ -72,22 +82,33 @@ def test_a_tilted_axis_3_shows_as_nutation_to_gyros_about_axes_of_the_file(
 
 
 def brute(craft: Spacecraft, predict: bool, until: float) -> list[tuple[float, float, str]]:
-    """(start, on-time, channel) of the four-pulse law with a sampled gyro, sample by sample with DOP853.
+    """(start, on-time, channel) of the four-pulse law with a sampled gyro, sample by sample with
+    DOP853.
 
-    Its own reading of the law: a channel fires as the rate that is seen passes the direction against its torque, for
-    as long as takes that rate away at that moment, found by halving. Thresholds 0.5 and 0.2 deg, 9 Hz, 70 ms late.
+    Its own reading of the law: a channel fires as the rate that is seen passes the direction
+    against its torque, for as long as takes that rate away at that moment, found by halving.
+    Thresholds 0.5 and 0.2 deg, 9 Hz, 70 ms late.
     """
-    moments, step, delay = craft.inertia.moments, 1.0 / 9.0, 0.07
-    A, rate, full = moments[0], (moments[0] - moments[2]) / moments[0], min(0.3, craft.body_period / 8)
-    motion, now, fired, still = reference.Motion(craft.omega0, np.eye(3)), 0.0, [], np.zeros(3)
+    moments = craft.inertia.moments
+    step = 1.0 / 9.0
+    delay = 0.07
+    A = moments[0]
+    rate = (moments[0] - moments[2]) / moments[0]
+    full = min(0.3, craft.body_period / 8)
+    motion = reference.Motion(craft.omega0, np.eye(3))
+    now = 0.0
+    fired = []
+    still = np.zeros(3)
     before: dict[str, float] = {}
     active = False
     for time in np.arange(math.ceil((until - delay) / step)) * step:
         if time < now:
             continue
         if time > now:
-            motion, now = reference.coast(moments, motion, still, np.array([time - now]))[-1], time
-        omega, turn = complex(*motion.rates[:2]), rate * motion.rates[2]
+            motion = reference.coast(moments, motion, still, np.array([time - now]))[-1]
+            now = time
+        omega = complex(*motion.rates[:2])
+        turn = rate * motion.rates[2]
         if predict:
             omega *= cmath.exp(-1j * turn * delay)
         angle = math.atan2(A * abs(omega), moments[2] * abs(motion.rates[2]))
@@ -95,7 +116,9 @@ def brute(craft: Spacecraft, predict: bool, until: float) -> list[tuple[float, f
         chosen: list[tuple[float, float, str]] = []
         waits = {}
         for each in craft.channels:
-            push, low, high = abs(each.transverse), 0.0, full
+            push = abs(each.transverse)
+            low = 0.0
+            high = full
             while high - low > 1e-14:
                 middle = 0.5 * (low + high)
                 does = 2.0 * push * math.sin(abs(turn) * middle / 2.0) / abs(turn)
@@ -103,17 +126,21 @@ def brute(craft: Spacecraft, predict: bool, until: float) -> list[tuple[float, f
             on_time = max(high, each.min_on_time)
             ahead = (cmath.phase(-omega / each.transverse)) / turn  # s until ω opposes the torque
             waits[each.name] = wait = ahead - 0.5 * on_time if predict else ahead
-            reach, last = step if predict else 0.0, before.get(each.name)
+            reach = step if predict else 0.0
+            last = before.get(each.name)
             passes = last is not None and last >= reach > wait and last - wait < 3.0
             if active and (passes or (last is None and 0.0 <= wait < reach)):
-                chosen.append((time + delay + (max(wait, 0.0) if predict else 0.0), on_time, each.name))
+                chosen.append(
+                    (time + delay + (max(wait, 0.0) if predict else 0.0), on_time, each.name)
+                )
         before = waits
         if chosen:
             start, on_time, name = min(chosen)
             torque = next(each.torque for each in craft.channels if each.name == name)
             if start > now:
                 motion = reference.coast(moments, motion, still, np.array([start - now]))[-1]
-            motion, now = reference.coast(moments, motion, torque, np.array([on_time]))[-1], start + on_time
+            motion = reference.coast(moments, motion, torque, np.array([on_time]))[-1]
+            now = start + on_time
             fired.append((start, on_time, name))
             before = {}
     return fired
@@ -123,7 +150,9 @@ def brute(craft: Spacecraft, predict: bool, until: float) -> list[tuple[float, f
     ("C", "spin", "predict"),
     [(80.0, 3.0, True), (160.0, -3.0, False), deep(80.0, 3.0, False), deep(160.0, -3.0, True)],
 )
-def test_a_sampled_loop_is_that_of_a_simulation_sample_by_sample(C: float, spin: float, predict: bool) -> None:
+def test_a_sampled_loop_is_that_of_a_simulation_sample_by_sample(
+    C: float, spin: float, predict: bool
+) -> None:
     craft = fired_by(C=C, spin=spin)
     run = fly(craft, fires(Sensor(rate=9.0, delay=0.07), 0.5, 0.2, predict=predict), 25.0)
     wanted = brute(craft, predict, 25.0)
@@ -134,11 +163,14 @@ def test_a_sampled_loop_is_that_of_a_simulation_sample_by_sample(C: float, spin:
 
 
 def test_without_prediction_firings_begin_late_by_delay_and_half_their_width() -> None:
-    craft, loop = fired_by(), ideal(sensor=Sensor(delay=0.11), predict=False, start=rad(0.1))
+    craft = fired_by()
+    loop = ideal(sensor=Sensor(delay=0.11), predict=False, start=rad(0.1))
     run = fly(craft, loop)
     first, centred = run.schedule.pulses[0], fly(craft, ideal()).schedule.pulses[0]
     assert first.start - centred.t == pytest.approx(0.11, abs=1e-9)
-    (margin,) = (each for each in margins(craft, loop, craft.nutation) if each.channel == first.channel)
+    (margin,) = (
+        each for each in margins(craft, loop, craft.nutation) if each.channel == first.channel
+    )
     assert margin.late == pytest.approx((0.11 + 0.5 * first.on_time) * craft.inertia.a * 3.0)
     before, after = run.flight.around_pulses()
     left = transverse_size(after.rates[0]) / transverse_size(before.rates[0])
@@ -155,7 +187,9 @@ def test_three_different_moments_are_damped() -> None:
 
 
 def test_interval_and_settling_are_kept() -> None:
-    run = fly(fired_by(3.0), fires(Sensor(rate=40.0), 0.2, 0.02, settle=0.3, min_interval=2.5), 120.0)
+    run = fly(
+        fired_by(3.0), fires(Sensor(rate=40.0), 0.2, 0.02, settle=0.3, min_interval=2.5), 120.0
+    )
     assert len(run.fired) > 4
     for fired, later in itertools.pairwise(run.fired):
         assert later.pulse.start - fired.pulse.end >= 2.5
@@ -165,7 +199,9 @@ def test_interval_and_settling_are_kept() -> None:
 FELT = Sensor(ACCELEROMETER, 20.0, noise=1e-4, position=np.array([1.0, 0.2, 0.0]))
 NOISY = Sensor(rate=50.0, noise=rad(0.02), bias=rad(0.01), delay=0.03)
 STEPS = fires(Sensor(rate=20.0, quantisation=0.02, scale=-1.0), 0.5, law=BANG, on_time=0.01)
-SETTLING = fires(Sensor(rate=20.0, noise=1e-4, scale=-1.0), stop=0.0, settle=2.2 * fired_by().body_period)
+SETTLING = fires(
+    Sensor(rate=20.0, noise=1e-4, scale=-1.0), stop=0.0, settle=2.2 * fired_by().body_period
+)
 
 
 @pytest.mark.parametrize(
@@ -178,19 +214,25 @@ SETTLING = fires(Sensor(rate=20.0, noise=1e-4, scale=-1.0), stop=0.0, settle=2.2
         (fires(replace(FELT, rate=50.0, scale=-1.0)), Ending.SENSOR, None),
     ],
 )
-def test_what_is_wired_backwards_is_named_within_a_period(loop: Loop, stop: Ending, channel: str | None) -> None:
+def test_what_is_wired_backwards_is_named_within_a_period(
+    loop: Loop, stop: Ending, channel: str | None
+) -> None:
     craft = fired_by()
     run = fly(craft, loop)
     assert run.stop is stop
     assert channel in (None, run.channel)
     fed = [pulse for pulse in run.schedule if channel in (None, pulse.channel)]
     assert len(fed) == (1 if channel else len(run.fired)) <= 2
-    latency = craft.body_period if loop.sensor.kind == ACCELEROMETER else loop.sensor.delay  # to see what a firing did
+    latency = (
+        craft.body_period if loop.sensor.kind == ACCELEROMETER else loop.sensor.delay
+    )  # to see what a firing did
     assert run.fired[-1].pulse.start - fed[0].start <= craft.body_period + latency
 
 
 def test_faults_that_hide_are_stopped_as_what_they_show_themselves() -> None:
-    """After long settling; steps hide which one it is; a single channel cannot tell itself from the sensor."""
+    """After long settling; steps hide which one it is; a single channel cannot tell itself from the
+    sensor.
+    """
     craft, single = fired_by(), fired_by(channels=FOUR[:1])
     assert fly(craft, SETTLING, 200.0).stop is Ending.SENSOR
     run = fly(craft, STEPS, 400.0)
@@ -203,10 +245,13 @@ def test_faults_that_hide_are_stopped_as_what_they_show_themselves() -> None:
 
 
 def test_faults_are_named_by_the_static_check() -> None:
-    craft, reverse = fired_by(), Sensor(scale=-1.0)
+    craft = fired_by()
+    reverse = Sensor(scale=-1.0)
 
     def turned(sensor: Sensor | None, *wrong: str) -> set[str]:
-        return {each.channel for each in margins(craft, fires(sensor, reversed=wrong)) if each.turned}
+        return {
+            each.channel for each in margins(craft, fires(sensor, reversed=wrong)) if each.turned
+        }
 
     assert turned(None, "+M2") == {"+M2"}
     assert turned(reverse) == {each.name for each in FOUR}
@@ -228,7 +273,9 @@ def test_firings_that_come_too_late_are_refused_before_the_flight_and_stopped_in
     assert (run.stop, len(run.fired)) == (Ending.FEEDS, 1)
 
 
-GROWING = fired_by(0.1, dissipation=100.0, loop=fires(Sensor(rate=40.0, noise=rad(0.004)), 0.3, 0.03))
+GROWING = fired_by(
+    0.1, dissipation=100.0, loop=fires(Sensor(rate=40.0, noise=rad(0.004)), 0.3, 0.03)
+)
 
 
 def test_growing_nutation_is_kept_between_the_thresholds() -> None:
@@ -241,22 +288,28 @@ def test_growing_nutation_is_kept_between_the_thresholds() -> None:
     assert run.flight.residual.nutation < rad(0.05)  # just after the last firing
 
 
-def test_samples_are_few_while_the_nutation_cannot_show_and_never_too_many(monkeypatch: pytest.MonkeyPatch) -> None:
-    slow, loop = replace(GROWING, dissipation=20_000.0), present(GROWING.loop)
+def test_samples_are_few_while_the_nutation_cannot_show_and_never_too_many(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    slow = replace(GROWING, dissipation=20_000.0)
+    loop = present(GROWING.loop)
     run = fly(slow, loop, 300_000.0)
     assert len(run.quiet) >= 3
     assert run.looked_at < 300_000.0 * 40.0 / 10.0
     monkeypatch.setattr("nutdamp.control_loop.controller.MOST", 100_000)
     with refused(Infeasible, "loop.too-many-samples"):
         fly(GROWING, fires(Sensor(rate=1e6, noise=rad(0.25)), 80.0), 1e4)
-    monkeypatch.setattr("nutdamp.control_loop.controller.Coast.look", None)  # refused before a sample is looked at
+    monkeypatch.setattr(
+        "nutdamp.control_loop.controller.Coast.look", None
+    )  # refused before a sample is looked at
     with refused(Infeasible, "loop.samples-known"):
         fly(GROWING, fires(Sensor(rate=100.0, noise=rad(3.0)), 0.5), 1e15)
 
 
 def check_flown_again(craft: Spacecraft, run: LoopRun) -> None:
     """The schedule flown open-loop is the flight of the loop."""
-    again, times = propagation.flown(craft, run.schedule, 60.0), np.linspace(0.0, 60.0, 150)
+    again = propagation.flown(craft, run.schedule, 60.0)
+    times = np.linspace(0.0, 60.0, 150)
     for mine, other in zip(run.flight.motion(times), again.motion(times), strict=True):
         assert mine == pytest.approx(other, abs=1e-12)
     assert run.flight.residual.nutation == pytest.approx(again.residual.nutation, abs=1e-14)
@@ -272,7 +325,9 @@ def test_the_schedule_flown_again_is_the_flight_of_the_loop() -> None:
 
 @spread("predict", [True, False], quick=1)
 def test_valves_and_cold_nozzles_are_fired_through(predict: bool) -> None:
-    """The law knows the valves; with prediction what they do to time and impulse is reckoned with."""
+    """The law knows the valves; with prediction what they do to time
+    and impulse is reckoned with.
+    """
     valve = Trapezoid(open_delay=0.03, close_delay=0.05, rise_time=0.02, fall_time=0.04)
     loop = ideal(start=rad(0.3), stop=rad(0.002), predict=predict)
     craft = fired_by(channels=tuple(each.of(valve=valve) for each in four(least=0.03)), loop=loop)
@@ -286,7 +341,9 @@ def test_valves_and_cold_nozzles_are_fired_through(predict: bool) -> None:
         assert run.settled is not None
         assert run.flight.residual.nutation < rad(0.01)
     colder = fly(replace(craft, cold=Cold(0.6, 2.0)), loop, 60.0).schedule
-    assert np.linalg.norm(colder.pulses[0].impulse) / colder.pulses[0].on_time == pytest.approx(0.6 * 6.0)
+    assert np.linalg.norm(colder.pulses[0].impulse) / colder.pulses[0].on_time == pytest.approx(
+        0.6 * 6.0
+    )
     assert colder.total_impulse == pytest.approx(run.schedule.total_impulse, rel=0.2)
     assert verify_loop(documented(craft), 5.0).agree
 
@@ -299,13 +356,18 @@ def verified(sensor: Sensor, **given: Any) -> Spacecraft:
 
 
 CONTINUOUS = verified(Sensor(bias=2e-4, delay=0.05))
-STRONG = tuple(replace(each, thrusters=(replace(each.thrusters[0], max_on_time=2.0),)) for each in SLANTED)
+STRONG = tuple(
+    replace(each, thrusters=(replace(each.thrusters[0], max_on_time=2.0),)) for each in SLANTED
+)
 CASES = {
     "continuous": (CONTINUOUS, 40.0),
     "sampled": (verified(Sensor(rate=20.0, noise=3e-4, delay=0.05, low_pass=0.1)), 40.0),
     "accelerometer": (verified(FELT), 40.0),
     "growing": (verified(Sensor(rate=20.0), dissipation=40.0), 40.0),
-    "disturbed": (verified(Sensor(rate=20.0), disturbances=(Disturbance(0.02 + 0.01j, 0.03),)), 40.0),
+    "disturbed": (
+        verified(Sensor(rate=20.0), disturbances=(Disturbance(0.02 + 0.01j, 0.03),)),
+        40.0,
+    ),
     "three moments": (verified(Sensor(), inertia=Inertia((120.0, 100.0, 80.0))), 40.0),
     "a long wait, while the spin falls": (verified(FELT, dissipation=20.0, channels=STRONG), 100.0),
 }
@@ -314,7 +376,9 @@ CASES = {
 @pytest.mark.weekly
 @pytest.mark.parametrize("name", CASES)
 def test_dop853_fires_alike(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("nutdamp.flight.verification.EVALUATIONS", 1000)  # of schedules, which loops need not keep
+    monkeypatch.setattr(
+        "nutdamp.flight.verification.EVALUATIONS", 1000
+    )  # of schedules, which loops need not keep
     craft, until = CASES[name]
     verdict = verify_loop(documented(craft), until)
     assert len(verdict.pairs) >= 3
@@ -323,7 +387,9 @@ def test_dop853_fires_alike(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     assert until == 40.0 or max(np.diff([each.pulse.start for each in verdict.run.fired])) > 20.0
 
 
-def test_a_loop_is_not_confirmed_by_another_body_or_where_it_is_too_long(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_loop_is_not_confirmed_by_another_body_or_where_it_is_too_long(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     heavier = documented(replace(CONTINUOUS, inertia=Inertia((120.0, 120.0, 80.002))))
     verdict = verify_loop(replace(CONTINUOUS, document=heavier.document), 5.0)
     assert (verdict.same, verdict.agree) == (True, False)
@@ -337,7 +403,9 @@ def test_a_loop_is_not_confirmed_by_another_body_or_where_it_is_too_long(monkeyp
 def test_the_command_verify(run: Process, tmp_path: Path) -> None:
     run("init", "--from", "magnus-a03", "craft.yaml")
     craft = tmp_path / "craft.yaml"
-    craft.write_text(craft.read_text() + "loop: {sensor: {kind: gyro}, start: 0.5 deg, stop: 0.05 deg}\n")
+    craft.write_text(
+        craft.read_text() + "loop: {sensor: {kind: gyro}, start: 0.5 deg, stop: 0.05 deg}\n"
+    )
     shown = run("verify", "craft.yaml", "--loop", "--json", "v.json", "--set", "limits.horizon=5 s")
     assert shown.returncode == 0, shown.stderr
     assert "fires alike: 3 firings" in " ".join(shown.stdout.split())

@@ -1,4 +1,6 @@
-"""Other values of C/A that equal sampling allows, and what is said of the body, for fits that are given."""
+"""Other values of C/A that equal sampling allows, and what is said of the body, for fits that are
+given.
+"""
 
 import math
 
@@ -36,14 +38,23 @@ def test_values_of_the_ratio_that_look_alike_the_nearest_to_the_file_first(
         assert np.array_equal(np.delete(one, at or 0), np.delete(fit.values, at or 0))
 
 
-def test_one_transverse_signal_leaves_the_sense_of_the_nutation_open_however_fast_it_is_sampled() -> None:
+def test_one_transverse_signal_leaves_the_sense_of_the_nutation_open_however_fast_it_is_sampled() -> (
+    None
+):
     fit = told(BODY, silent("omega_2", "omega_3", until=6.0, count=61), {"C/A": 0.75}, {})
-    assert [one[fit.index("C/A")] for one in neighbours(fit.model, fit.values)] == pytest.approx([1.25])
+    assert [one[fit.index("C/A")] for one in neighbours(fit.model, fit.values)] == pytest.approx(
+        [1.25]
+    )
 
 
 def test_ratio_and_moments_are_told_with_their_sigmas_and_those_of_the_file() -> None:
     """C = A·(C/A); what the file says of C/A is both moments together."""
-    fit = told(BODY, silent("omega_1", "omega_2", "omega_3"), {"A": 118.0, "C/A": 0.68}, {"A": 2.0, "C/A": 1e-3})
+    fit = told(
+        BODY,
+        silent("omega_1", "omega_2", "omega_3"),
+        {"A": 118.0, "C/A": 0.68},
+        {"A": 2.0, "C/A": 1e-3},
+    )
     rows = {one.key: one for one in estimates(fit, 0.0)}
     both = 2.0 / 3.0 * math.hypot(0.3, 0.3)
     assert {key: rows[key].value for key in ("C/A", "a", "A", "C")} == pytest.approx(

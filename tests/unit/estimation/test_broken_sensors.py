@@ -1,4 +1,6 @@
-"""Sensors that are broken: no estimate is accepted that is far off, but where no record could tell."""
+"""Sensors that are broken: no estimate is accepted that is far off,
+but where no record could tell.
+"""
 
 from dataclasses import replace
 from pathlib import Path
@@ -26,14 +28,19 @@ def expect_sound(folder: Path, number: int, fault: str) -> None:
     quick=2,
     deep=40,
 )
-def test_ten_kinds_of_broken_sensors_lead_to_no_wrong_estimate(tmp_path: Path, fault: str, number: int) -> None:
+def test_ten_kinds_of_broken_sensors_lead_to_no_wrong_estimate(
+    tmp_path: Path, fault: str, number: int
+) -> None:
     expect_sound(tmp_path, number, fault)
 
 
 @pytest.mark.parametrize(
-    ("fault", "number"), [weekly(fault, number) for fault in list(FAULTS)[IN_CI:] for number in range(RECORDS)]
+    ("fault", "number"),
+    [weekly(fault, number) for fault in list(FAULTS)[IN_CI:] for number in range(RECORDS)],
 )
-def test_other_kinds_of_broken_sensors_lead_to_no_wrong_estimate(tmp_path: Path, fault: str, number: int) -> None:
+def test_other_kinds_of_broken_sensors_lead_to_no_wrong_estimate(
+    tmp_path: Path, fault: str, number: int
+) -> None:
     expect_sound(tmp_path, number, fault)
 
 
@@ -48,7 +55,9 @@ def test_other_kinds_of_broken_sensors_lead_to_no_wrong_estimate(tmp_path: Path,
         ("signs", 31),
     ],
 )
-def test_no_opposite_direction_and_no_mirrored_motion_is_accepted(tmp_path: Path, fault: str, number: int) -> None:
+def test_no_opposite_direction_and_no_mirrored_motion_is_accepted(
+    tmp_path: Path, fault: str, number: int
+) -> None:
     assert outcome(tmp_path, number, fault)[0] == "refused"
 
 
@@ -56,7 +65,10 @@ def test_what_neither_data_nor_file_tell_is_named() -> None:
     fitted = fit(*(getattr(gyro_case(1), name) for name in ("spacecraft", "record")))
     expect_told(fitted)
     slopes = fitted.jacobian.copy()
-    for lost in (0.0, 3.0 * slopes[:, fitted.index("omega_2")]):  # nothing, or not apart from another
+    for lost in (
+        0.0,
+        3.0 * slopes[:, fitted.index("omega_2")],
+    ):  # nothing, or not apart from another
         slopes[:, fitted.index("omega_1")] = lost
         with pytest.raises(Infeasible, match="does not tell all of omega_1, omega_2, omega_3"):
             expect_told(replace(fitted, jacobian=slopes))
@@ -66,5 +78,10 @@ def test_a_signal_of_which_much_would_be_left_out_is_named() -> None:
     case = gyro_case(2)
     values = np.array(case.record.signals["omega_1"])
     values[::4] += 300.0 * case.noise * np.random.default_rng(1).normal(size=len(values[::4]))
-    with pytest.raises(Infeasible, match=r"does not explain omega_1: 2\d % of it would be left out"):
-        fit(case.spacecraft, replace(case.record, signals={**case.record.signals, "omega_1": values}))
+    with pytest.raises(
+        Infeasible, match=r"does not explain omega_1: 2\d % of it would be left out"
+    ):
+        fit(
+            case.spacecraft,
+            replace(case.record, signals={**case.record.signals, "omega_1": values}),
+        )

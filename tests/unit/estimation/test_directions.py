@@ -1,4 +1,6 @@
-"""Directions seen from the body, and attitudes: what DOP853 flew is estimated, each within what its sigma says."""
+"""Directions seen from the body, and attitudes: what DOP853 flew is estimated, each within what its
+sigma says.
+"""
 
 import math
 from collections.abc import Mapping
@@ -26,14 +28,26 @@ FILE: dict[str, object] = {
     "name": "directions",
     "inertia": {"A": 120.0, "C": 84.0},
     "state": {"spin": 3.0, "nutation": "4 deg", "phase": "20 deg"},
-    "attitude": {"quaternion": [1, 0.1, 0.2, 0.3], "epoch": "2026-03-01T12:00:00Z", "frame": "EME2000"},
+    "attitude": {
+        "quaternion": [1, 0.1, 0.2, 0.3],
+        "epoch": "2026-03-01T12:00:00Z",
+        "frame": "EME2000",
+    },
     "sun": "epoch",
     "sun_sensor": {"azimuth": "35 deg"},
     "thrusters": [{"name": "T1", "torque": [8, 0, 0]}, {"name": "T2", "torque": [0, 8, 0]}],
-    "dispersions": {"A": {"normal": "0.5 %"}, "C": {"normal": "0.5 %"}, "attitude": {"normal": "0.3 deg"}},
+    "dispersions": {
+        "A": {"normal": "0.5 %"},
+        "C": {"normal": "0.5 %"},
+        "attitude": {"normal": "0.3 deg"},
+    },
 }
-NOISE, SLIT, EARLY = math.radians(0.05), 1.0, 2e-4
-"""One sigma of directions, rad; azimuth of the slit of the star sensor, rad; one sigma of Sun pulses, s."""
+NOISE = math.radians(0.05)
+SLIT = 1.0
+EARLY = 2e-4
+"""One sigma of directions, rad; azimuth of the slit of the star sensor, rad; one sigma of Sun
+pulses, s.
+"""
 
 TOLD = ("C/A", "omega_1", "omega_2", "omega_3", "growth", "attitude_3")
 """Parameters of which the file says little or nothing."""
@@ -42,7 +56,9 @@ KINDS = ("aspect", "sun crossings", "one star", "three stars", "quaternions")
 
 
 class Flown(NamedTuple):
-    """A file, the telemetry of a body that differs from it, true values of parameters, and the rotation at the end."""
+    """A file, the telemetry of a body that differs from it, true values of parameters, and the
+    rotation at the end.
+    """
 
     spacecraft: nutdamp.Spacecraft
     record: Record
@@ -51,14 +67,26 @@ class Flown(NamedTuple):
 
 
 def fly(seed: int, kind: str, length: float = 40.0) -> Flown:
-    """A symmetric body whose sensors are tilted; by rotation matrices of DOP853 and a spline through them."""
+    """A symmetric body whose sensors are tilted; by rotation matrices of DOP853 and a spline
+    through them.
+    """
     draw = np.random.default_rng([53, seed])
     C = 120.0 * (draw.uniform(0.5, 0.85) if seed % 2 else draw.uniform(1.15, 1.6))
-    keys: dict[str, object] = {"inertia.C": C, "state.spin": float(draw.choice([-1.0, 1.0]) * draw.uniform(1.5, 4.0))}
-    keys |= {"state.nutation": f"{draw.uniform(1.0, 10.0)} deg", "state.phase": f"{draw.uniform(-180, 180)} deg"}
+    keys: dict[str, object] = {
+        "inertia.C": C,
+        "state.spin": float(draw.choice([-1.0, 1.0]) * draw.uniform(1.5, 4.0)),
+    }
+    keys |= {
+        "state.nutation": f"{draw.uniform(1.0, 10.0)} deg",
+        "state.phase": f"{draw.uniform(-180, 180)} deg",
+    }
     body = nutdamp.load(FILE, set=keys)
     begin = Rotation.random(random_state=seed)
-    while not 30.0 < math.degrees(math.acos(float(begin.as_matrix()[:, 2] @ present(body.sun)))) < 150.0:
+    while (
+        not 30.0
+        < math.degrees(math.acos(float(begin.as_matrix()[:, 2] @ present(body.sun))))
+        < 150.0
+    ):
         begin = Rotation.random(random_state=int(draw.integers(1 << 30)))
     body = body.with_(attitude={"quaternion": scalar_first(begin).tolist()})
     moments = 120.0 * (1.0 + 0.005 * draw.normal()), C * (1.0 + 0.005 * draw.normal())
@@ -85,7 +113,9 @@ def scalar_first(rotation: Rotation) -> Array:
 
 
 def _turned(body: nutdamp.Spacecraft, record: Record, rotation: Array) -> dict[str, float]:
-    """The true attitude, by what the file has at the start of a record: the tilt of axis 3, then the turn about it."""
+    """The true attitude, by what the file has at the start of a record: the tilt of axis 3, then
+    the turn about it.
+    """
     of_file = Rotation.from_quat(np.roll(Model(body, record).reference.quaternion, -1))
     apart = of_file.inv() * Rotation.from_matrix(rotation)
     turn = 2.0 * math.atan2(*apart.as_quat()[2:])
@@ -94,7 +124,12 @@ def _turned(body: nutdamp.Spacecraft, record: Record, rotation: Array) -> dict[s
 
 
 def _record(
-    draw: np.random.Generator, kind: str, body: nutdamp.Spacecraft, grid: Array, true: Rotation, shown: Rotation
+    draw: np.random.Generator,
+    kind: str,
+    body: nutdamp.Spacecraft,
+    grid: Array,
+    true: Rotation,
+    shown: Rotation,
 ) -> Record:
     if kind == "quaternions":
         times = np.arange(0.0, grid[-1], 0.5)
@@ -106,20 +141,31 @@ def _record(
         times = passing(grid, true.inv().apply(sun), math.radians(35.0))
         x, y, z = at(grid, shown.inv().apply(sun), times).T
         aspect = np.arctan2(np.hypot(x, y), z) + NOISE * draw.normal(size=len(times))
-        return Record(times, {SUN_ASPECT: aspect}, np.sort(np.abs(times + EARLY * draw.normal(size=len(times)))))
+        return Record(
+            times,
+            {SUN_ASPECT: aspect},
+            np.sort(np.abs(times + EARLY * draw.normal(size=len(times)))),
+        )
     crossings = []
     for _ in range({"sun crossings": 1, "one star": 1, "three stars": 3}[kind]):
         star = sun
-        while kind != "sun crossings" and (star is sun or abs(float(star @ true[0].as_matrix()[:, 2])) > 0.7):
+        while kind != "sun crossings" and (
+            star is sun or abs(float(star @ true[0].as_matrix()[:, 2])) > 0.7
+        ):
             star = unit(draw.normal(size=3))
         there = shown.inv().apply(star)
         times = passing(grid, there, SLIT)
-        crossings += [(time, to, star) for time, to in zip(times, at(grid, there, times), strict=True)]
+        crossings += [
+            (time, to, star) for time, to in zip(times, at(grid, there, times), strict=True)
+        ]
     crossings.sort(key=lambda one: float(one[0]))
     directions = np.array([one[1] for one in crossings])
     directions = unit(directions + NOISE * draw.normal(size=directions.shape))
     columns = np.column_stack([directions, [one[2] for one in crossings]])
-    return Record(np.array([one[0] for one in crossings]), dict(zip((*SEEN, *DIRECTION), columns.T, strict=True)))
+    return Record(
+        np.array([one[0] for one in crossings]),
+        dict(zip((*SEEN, *DIRECTION), columns.T, strict=True)),
+    )
 
 
 def unit(vectors: Array) -> Array:
@@ -143,7 +189,9 @@ def passing(grid: Array, seen: Array, azimuth: float) -> Array:
 def off(flown: Flown, fitted: Fit) -> dict[str, float]:
     """Estimates less true values, in their sigmas."""
     sigmas = dict(zip((one.name for one in fitted.model.parameters), fitted.sigmas, strict=True))
-    apart = {name: fitted.named[name] - value for name, value in flown.truth.items() if name in sigmas}
+    apart = {
+        name: fitted.named[name] - value for name, value in flown.truth.items() if name in sigmas
+    }
     apart["attitude_3"] = math.remainder(apart["attitude_3"], 2.0 * math.pi)
     return {name: value / sigmas[name] for name, value in apart.items()}
 
@@ -169,10 +217,15 @@ def test_what_flew_is_estimated_within_the_sigmas(kind: str, seed: int) -> None:
 
 @pytest.mark.parametrize("kind", [weekly(kind) for kind in KINDS])
 def test_estimates_are_off_as_often_as_their_sigmas_say(kind: str) -> None:
-    """Of 24 records, each parameter; the rms of so many is within 0.45 of 1 in all but 1 of 1000."""
+    """Of 24 records, each parameter; the rms of so many is within
+    0.45 of 1 in all but 1 of 1000.
+    """
     flights = [fly(100 + seed, kind) for seed in range(24)]
     apart = [off(flown, fit(flown.spacecraft, flown.record)) for flown in flights]
-    sizes = {name: math.sqrt(float(np.mean([one[name] ** 2 for one in apart if name in one]))) for name in TOLD}
+    sizes = {
+        name: math.sqrt(float(np.mean([one[name] ** 2 for one in apart if name in one])))
+        for name in TOLD
+    }
     assert not {name: size for name, size in sizes.items() if not abs(size - 1.0) < 0.45}
 
 
@@ -186,7 +239,9 @@ def test_a_quaternion_tells_what_the_axis_alone_does_not() -> None:
 
 def test_the_attitude_about_one_direction_is_that_of_the_file() -> None:
     """Of two it is told; without a tolerance of the file, one leaves it as it is there."""
-    one, three = (Model(each.spacecraft, each.record) for each in (fly(0, "one star"), fly(0, "three stars")))
+    one, three = (
+        Model(each.spacecraft, each.record) for each in (fly(0, "one star"), fly(0, "three stars"))
+    )
     for model, finite in ((one, True), (three, False)):
         assert math.isfinite(present(model.parameter("attitude_1")).prior) == finite
     body = one.spacecraft.replace(dispersions=None)

@@ -1,4 +1,6 @@
-"""Estimates against bodies that are known, by records that DOP853 made: what is claimed holds as often as it should."""
+"""Estimates against bodies that are known, by records that DOP853 made: what is claimed holds as
+often as it should.
+"""
 
 import math
 from collections.abc import Iterable
@@ -24,9 +26,13 @@ from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
 
 @pytest.mark.parametrize("rho", [0.0, 0.8, -0.5])
 def test_the_prior_is_the_covariance_of_the_file(rho: float) -> None:
-    """In A and C/A, to first order that of A and C with its correlation; its centre is that of the file."""
+    """In A and C/A, to first order that of A and C with its correlation; its centre is that of the
+    file.
+    """
     given = Dispersions(
-        A=Tolerance("normal", 0.02, True), C=Tolerance("normal", 0.01, True), correlation=(("A", "C", rho),)
+        A=Tolerance("normal", 0.02, True),
+        C=Tolerance("normal", 0.01, True),
+        correlation=(("A", "C", rho),),
     )
     body = replace(spinner(A=120.0, C=80.0), dispersions=given)
     made = list(moments(body))
@@ -37,7 +43,9 @@ def test_the_prior_is_the_covariance_of_the_file(rho: float) -> None:
     covariance = of_moments @ np.linalg.inv(rows.T @ rows) @ of_moments.T
     expected = np.array([[2.4**2, rho * 2.4 * 0.8], [rho * 2.4 * 0.8, 0.8**2]])
     assert covariance == pytest.approx(expected, rel=1e-9, abs=1e-12)
-    assert made[1].prior == pytest.approx(80 / 120 * math.sqrt(0.02**2 + 0.01**2 - 2 * rho * 0.02 * 0.01), rel=1e-12)
+    assert made[1].prior == pytest.approx(
+        80 / 120 * math.sqrt(0.02**2 + 0.01**2 - 2 * rho * 0.02 * 0.01), rel=1e-12
+    )
 
 
 def off_by(fitted: Fit, truth: dict[str, float]) -> Vector:
@@ -47,15 +55,19 @@ def off_by(fitted: Fit, truth: dict[str, float]) -> Vector:
 
 
 def of_gyros(seed: int) -> tuple[bool, float, float]:
-    """Of one record: whether the true values are in the 95 % region; C/A off, over its sigma and over the bound."""
+    """Of one record: whether the true values are in the 95 % region; C/A off, over its sigma and
+    over the bound.
+    """
     case = gyro_case(seed)
     fitted = fit(case.spacecraft, case.record)
     assert not fitted.model.unequal
-    off, at = off_by(fitted, case.truth), present(fitted.index("C/A"))
+    off = off_by(fitted, case.truth)
+    at = present(fitted.index("C/A"))
     inside = off @ np.linalg.solve(fitted.covariance, off) < chi2.ppf(0.95, len(off))
     # The Cramér-Rao bound at the true values, with the true noise, steps included.
     noise = np.hypot(
-        case.noise, np.array([quantisation(case.record.signals[name]) for name in GYROS]) / math.sqrt(12.0)
+        case.noise,
+        np.array([quantisation(case.record.signals[name]) for name in GYROS]) / math.sqrt(12.0),
     )
     slopes = derivatives(fitted, fitted.values - off) / noise[fitted.model.signal][:, None]
     rows = np.concatenate([slopes, fitted.model.prior[0]])
@@ -65,12 +77,16 @@ def of_gyros(seed: int) -> tuple[bool, float, float]:
 
 
 def predicted(fitted: Fit, values: Vector) -> Vector:
-    return fitted.model.predicted(dict(zip((one.name for one in fitted.model.parameters), values, strict=True)))
+    return fitted.model.predicted(
+        dict(zip((one.name for one in fitted.model.parameters), values, strict=True))
+    )
 
 
 def derivatives(fitted: Fit, values: Vector) -> Vector:
     steps = np.diag([one.step for one in fitted.model.parameters])
-    columns = [predicted(fitted, values + step) - predicted(fitted, values - step) for step in steps]
+    columns = [
+        predicted(fitted, values + step) - predicted(fitted, values - step) for step in steps
+    ]
     return np.column_stack(columns) / (2.0 * np.diag(steps))
 
 
@@ -82,7 +98,9 @@ def derivatives(fitted: Fit, values: Vector) -> Vector:
         weekly(range(1000, 2000), 930, 970),
     ],
 )
-def test_the_true_values_are_in_the_95_percent_region_and_attain_the_bound(seeds: range, least: int, most: int) -> None:
+def test_the_true_values_are_in_the_95_percent_region_and_attain_the_bound(
+    seeds: range, least: int, most: int
+) -> None:
     inside, off, over_bound = np.array([of_gyros(seed) for seed in seeds]).T
     assert least <= np.sum(inside) <= most
     if len(seeds) >= 40:
@@ -99,24 +117,30 @@ def cost(fitted: Fit, values: Vector) -> float:
 
 
 def of_kind(folder: Path, seed: int) -> tuple[bool, float, float]:
-    """Whether the true values are in the 95 % region of the likelihood; two values over their sigmas.
+    """Whether the true values are in the 95 % region of the likelihood; two values over their
+    sigmas.
 
-    Not the ellipsoid of the covariance: where the spin is known from the file alone, only (1 - C/A) ω3 is told, and
-    its region is a thin curved one.
+    Not the ellipsoid of the covariance: where the spin is known from the file alone, only (1 - C/A)
+    ω3 is told, and its region is a thin curved one.
     """
     case = telemetry(folder, seed)
     fitted = fit(case.spacecraft, case.record)  # raises where it refuses
     assert not fitted.model.unequal, (seed, case.kind)
-    off, at = off_by(fitted, case.truth), fitted.index("attitude_3")
+    off = off_by(fitted, case.truth)
+    at = fitted.index("attitude_3")
     if at is not None:
         off[at] = math.remainder(off[at], 2.0 * math.pi)
-    within = cost(fitted, fitted.values - off) - cost(fitted, fitted.values) < chi2.ppf(0.95, len(off))
+    within = cost(fitted, fitted.values - off) - cost(fitted, fitted.values) < chi2.ppf(
+        0.95, len(off)
+    )
     off = off / fitted.sigmas
     return within, float(off[fitted.index("C/A") or 0]), float(off[fitted.index("omega_1") or 0])
 
 
 def of_kinds(folder: Path, seeds: Iterable[int]) -> tuple[float, Vector]:
-    """Share of the records whose region holds the true values, and the errors (n, 2) over their sigmas."""
+    """Share of the records whose region holds the true values, and the errors (n, 2) over their
+    sigmas.
+    """
     scores = np.array([of_kind(folder, seed) for seed in seeds], dtype=float)
     return float(np.mean(scores[:, 0])), scores[:, 1:]
 
@@ -139,8 +163,12 @@ def test_two_hundred_records_of_every_kind_are_in_their_regions(tmp_path: Path) 
 
 @pytest.mark.weekly
 @pytest.mark.parametrize("seed", [1311, 1323, 12, 220])
-def test_records_with_sun_pulses_converge_whatever_the_body_is_turned_by(tmp_path: Path, seed: int) -> None:
-    """Turned by whole turns besides, or from far off: the search must reach the least cost there is."""
+def test_records_with_sun_pulses_converge_whatever_the_body_is_turned_by(
+    tmp_path: Path, seed: int
+) -> None:
+    """Turned by whole turns besides, or from far off: the search must reach the least cost there
+    is.
+    """
     within, ratio, omega = of_kind(tmp_path, seed)
     assert within
     assert max(abs(ratio), abs(omega)) < 4.0
@@ -153,23 +181,34 @@ def test_the_tail_of_a_sum_of_squares_is_that_of_chi_square(count: int) -> None:
 
 
 @pytest.mark.parametrize(
-    ("seed", "robust", "near"), [(1, True, True), (4, True, False), (7, False, True), (10, False, False)]
+    ("seed", "robust", "near"),
+    [(1, True, True), (4, True, False), (7, False, True), (10, False, False)],
 )
 def test_a_search_ends_where_least_squares_of_scipy_do(seed: int, robust: bool, near: bool) -> None:
     case = gyro_case(seed)
     model = Model(case.spacecraft, case.record)
-    units, every = units_of(model), np.ones(len(model.measured), dtype=bool)
+    units = units_of(model)
+    every = np.ones(len(model.measured), dtype=bool)
     begin = fit(case.spacecraft, case.record)
     named = {each.name: each.file for each in model.parameters} | begin.named
     start = np.array([named[each.name] for each in model.parameters])
-    start += 3.0 * np.random.default_rng(seed).normal(size=len(start)) * np.where(units < math.inf, 1e-2 * units, 0.0)
-    bound, nominal = model.prior[0] * units, model.prior[1]
+    start += (
+        3.0
+        * np.random.default_rng(seed).normal(size=len(start))
+        * np.where(units < math.inf, 1e-2 * units, 0.0)
+    )
+    bound = model.prior[0] * units
+    nominal = model.prior[1]
 
     def errors(scaled: Vector) -> Vector:
         left = residuals(model, scaled * units) / begin.noise[model.signal]
         return np.concatenate([left, bound @ scaled - nominal])
 
     values, cost = search(model, start, begin.noise, every, robust=robust, near=near)
-    other = least_squares(errors, start / units, loss="soft_l1" if robust else "linear", xtol=1e-10, ftol=1e-10)
+    other = least_squares(
+        errors, start / units, loss="soft_l1" if robust else "linear", xtol=1e-10, ftol=1e-10
+    )
     assert cost <= other.cost * (1.0 + 1e-6)
-    assert errors(values / units) @ errors(values / units) < errors(start / units) @ errors(start / units)
+    assert errors(values / units) @ errors(values / units) < errors(start / units) @ errors(
+        start / units
+    )

@@ -21,7 +21,8 @@ from nutdamp.estimation.results import Estimate, Fitted
 from nutdamp.views.fit import ESTIMATES, fit_screen
 from nutdamp.views.tables import DataTable
 
-SPIN, LENGTH = math.pi, 30.0
+SPIN = math.pi
+LENGTH = 30.0
 
 
 @pytest.fixture(scope="module")
@@ -45,7 +46,8 @@ def shown(renderable: object) -> str:
 def test_estimates_file_and_json_are_one(fitted: Fitted, tmp_path: Path) -> None:
     assert fitted.warnings == ()
     at = 45.0
-    rows, data = {one.key: one for one in fitted.estimates(at)}, fitted.to_dict(at)
+    rows = {one.key: one for one in fitted.estimates(at)}
+    data = fitted.to_dict(at)
     ratio = rows["C/A"]
     assert ratio.value == pytest.approx(0.67, abs=4.0 * ratio.sigma)
     written = {one["quantity"]: one for one in data["estimates"]}
@@ -71,17 +73,23 @@ def test_only_a_spacecraft_of_a_file_makes_one(fitted: Fitted) -> None:
 
 def test_the_screen_says_how_many_periods_the_record_has(fitted: Fitted) -> None:
     values = fitted.core.named
-    periods = present(re.search(r"0 s to 30 s, nutation periods: (\S+)", shown(fit_screen(fitted.core, 0.0))))
+    periods = present(
+        re.search(r"0 s to 30 s, nutation periods: (\S+)", shown(fit_screen(fitted.core, 0.0)))
+    )
     expected = LENGTH * (1.0 - values["C/A"]) * values["omega_3"] / (2.0 * math.pi)
     assert float(periods[1]) == pytest.approx(expected, rel=5e-3)
 
 
 def test_the_default_screen_is_short(fitted: Fitted) -> None:
-    brief, full = (shown(fit_screen(fitted.core, 0.0, verbose=verbose)) for verbose in (False, True))
+    brief, full = (
+        shown(fit_screen(fitted.core, 0.0, verbose=verbose)) for verbose in (False, True)
+    )
     lines = brief.splitlines()
     assert len(lines) <= 40
     assert lines[-1].startswith("-v all values")
-    ratio, same = ([row for row in text.splitlines() if row.startswith("C/A")] for text in (brief, full))
+    ratio, same = (
+        [row for row in text.splitlines() if row.startswith("C/A")] for text in (brief, full)
+    )
     assert ratio == same
     assert "samples" in full
     assert "samples" not in brief
@@ -94,7 +102,14 @@ def test_values_are_shown_to_what_their_sigmas_leave() -> None:
     def screen(*rows: Estimate) -> str:
         return shown(DataTable("Estimates", ESTIMATES, rows).screen("screen"))
 
-    pairs = ((1.23456789, 1e-4), (1.23456789, 2.0), (1.23456789, 1.2), (0.0, 0.1), (1e-9, 1.0), (1.0, math.inf))
+    pairs = (
+        (1.23456789, 1e-4),
+        (1.23456789, 2.0),
+        (1.23456789, 1.2),
+        (0.0, 0.1),
+        (1e-9, 1.0),
+        (1.0, math.inf),
+    )
     check_text("estimation.digits", screen(*(row(*pair) for pair in pairs)))
     (scaled,) = screen(Estimate("x", "x", "mm", 1e3, 0.0123, 1e-4, 0.012, 1e-3)).splitlines()[-1:]
     assert scaled.split()[:6] == ["x", "12.3", "0.1", "mm", "12", "+0.3"]

@@ -1,4 +1,6 @@
-"""Regions of 95 % where the spin is that of the file: ω3 and C/A lie on the curve of one nutation rate."""
+"""Regions of 95 % where the spin is that of the file: ω3 and C/A lie on the curve of one nutation
+rate.
+"""
 
 from pathlib import Path
 
@@ -22,10 +24,14 @@ TRUTH = {"A": 245.46318647216307, "C/A": 0.6375167123394947, "omega_1": 0.050087
 
 
 def within(fitted: Fit, truth: dict[str, float]) -> tuple[bool, bool]:
-    """Whether true values are in the 95 % ellipsoid of the region, and in that of the covariance at the minimum."""
+    """Whether true values are in the 95 % ellipsoid of the region, and in that of the covariance at
+    the minimum.
+    """
     off = fitted.values - [truth[one.name] for one in fitted.model.parameters]
     least = chi2.ppf(0.95, len(off))
-    inside, plain = (bool(off @ np.linalg.solve(one, off) < least) for one in (fitted.region, fitted.covariance))
+    inside, plain = (
+        bool(off @ np.linalg.solve(one, off) < least) for one in (fitted.region, fitted.covariance)
+    )
     return inside, plain
 
 
@@ -34,10 +40,16 @@ def test_the_region_of_an_accelerometer_alone_is_as_wide_as_its_curve() -> None:
     fitted = fit(body, read_telemetry(case("accelerometer.csv"), body)[0])
     assert within(fitted, TRUTH) == (True, False)
     (rate,) = (one for one in estimates(fitted, 0.0) if one.key == "rate")
-    assert abs(rate.value - (1.0 - TRUTH["C/A"]) * TRUTH["omega_3"]) < 3.0 * rate.sigma < 1e-3 * rate.value
+    assert (
+        abs(rate.value - (1.0 - TRUTH["C/A"]) * TRUTH["omega_3"])
+        < 3.0 * rate.sigma
+        < 1e-3 * rate.value
+    )
 
 
-@pytest.mark.parametrize("kind", [weekly(kind) for kind in (("omega_12",), ("omega_1",), ("acceleration",))])
+@pytest.mark.parametrize(
+    "kind", [weekly(kind) for kind in (("omega_12",), ("omega_1",), ("acceleration",))]
+)
 def test_regions_hold_as_often_as_they_say(kind: tuple[str, ...], tmp_path: Path) -> None:
     """Of 60 records 57 are expected; fewer than 51 come once in 500 sets."""
     first = KINDS.index(kind)

@@ -1,4 +1,6 @@
-"""Each kind of signal, and pulses fired within a record: what is estimated is what DOP853 flew; what is refused."""
+"""Each kind of signal, and pulses fired within a record: what is estimated is what DOP853 flew;
+what is refused.
+"""
 
 import math
 from collections.abc import Mapping
@@ -36,7 +38,11 @@ FILE: dict[str, object] = {
     "name": "signals",
     "inertia": {"A": 120.0, "C": 84.0},
     "state": {"spin": 3.0, "nutation": "4 deg", "phase": "20 deg"},
-    "attitude": {"quaternion": [1, 0.1, 0.2, 0.3], "epoch": "2026-03-01T12:00:00Z", "frame": "EME2000"},
+    "attitude": {
+        "quaternion": [1, 0.1, 0.2, 0.3],
+        "epoch": "2026-03-01T12:00:00Z",
+        "frame": "EME2000",
+    },
     "sun": "epoch",
     "sun_sensor": {"azimuth": "35 deg"},
     "thrusters": [{"name": "T1", "torque": [8, 0, 0]}, {"name": "T2", "torque": [0, 8, 0]}],
@@ -49,18 +55,26 @@ FILE: dict[str, object] = {
 }
 PLAIN = {name: FILE[name] for name in ("name", "inertia", "state")}
 ACCELEROMETER = {
-    "sensor": {"kind": "accelerometer", "rate": "10 Hz", "position": ["0.8 m", 0, 0], "axis": [0, 0, 1]},
+    "sensor": {
+        "kind": "accelerometer",
+        "rate": "10 Hz",
+        "position": ["0.8 m", 0, 0],
+        "axis": [0, 0, 1],
+    },
     "law": "four-pulse",
     "start": "0.5 deg",
     "stop": "0.05 deg",
 }
-BODY, EXAMPLE = nutdamp.load(FILE), nutdamp.example()
+BODY = nutdamp.load(FILE)
+EXAMPLE = nutdamp.example()
 LOOSE = EXAMPLE.with_(dispersions={"A": {"normal": "30 %"}, "C": {"normal": "30 %"}})
 
 
 def turning(angle: float) -> Array:
     """By ``angle`` about axis 3."""
-    return np.array([[math.cos(angle), -math.sin(angle), 0], [math.sin(angle), math.cos(angle), 0], [0, 0, 1.0]])
+    return np.array(
+        [[math.cos(angle), -math.sin(angle), 0], [math.sin(angle), math.cos(angle), 0], [0, 0, 1.0]]
+    )
 
 
 def noisy(times: Array, rates: Array, seed: int = 16, names: tuple[str, ...] = GYROS) -> Record:
@@ -74,13 +88,19 @@ def of_body(body: nutdamp.Spacecraft, times: Array) -> Record:
     return noisy(times, motion((A, A, C), body.omega0, times), 8)
 
 
-def of_example(times: Array, C: float = 80.4, names: tuple[str, ...] = GYROS, spin: float = SPIN) -> Record:
+def of_example(
+    times: Array, C: float = 80.4, names: tuple[str, ...] = GYROS, spin: float = SPIN
+) -> Record:
     """Gyros of the example with another C."""
     return noisy(times, motion((120.0, 120.0, C), np.array([0.14, 0.12, spin]), times), names=names)
 
 
-def flown(times: Array, body: nutdamp.Spacecraft, events: tuple[reference.Push, ...] = ()) -> list[reference.Motion]:
-    """The motion of a body that differs from its file, at rising times > 0; turned about its axis by 0.3 rad."""
+def flown(
+    times: Array, body: nutdamp.Spacecraft, events: tuple[reference.Push, ...] = ()
+) -> list[reference.Motion]:
+    """The motion of a body that differs from its file, at rising times > 0; turned about its axis
+    by 0.3 rad.
+    """
     rates = body.omega0 * np.array([1.2, 0.7, 1.001]) + np.array([0.01, 0.02, 0.0])
     start = reference.Motion(rates, attitude.matrix(body.initial.quaternion) @ turning(0.3))
     if not events:
@@ -102,13 +122,19 @@ def axes(
 
 
 def felt(times: Array, growth: float = 0.0, body: nutdamp.Spacecraft = BODY) -> Array:
-    """Acceleration along axis 3 at 0.8 m on axis 1, by differences of the rates that DOP853 flies."""
-    step, arm = 1e-5, np.array([0.8, 0.0, 0.0])
+    """Acceleration along axis 3 at 0.8 m on axis 1,
+    by differences of the rates that DOP853 flies.
+    """
+    step = 1e-5
+    arm = np.array([0.8, 0.0, 0.0])
     near = np.sort(np.concatenate([times - step, times + step]))
     around = (
-        motion((A, A, C), body.omega0, near, growth) if growth else np.array([one.rates for one in flown(near, body)])
+        motion((A, A, C), body.omega0, near, growth)
+        if growth
+        else np.array([one.rates for one in flown(near, body)])
     )
-    rates, change = 0.5 * (around[1::2] + around[::2]), (around[1::2] - around[::2]) / (2.0 * step)
+    rates = 0.5 * (around[1::2] + around[::2])
+    change = (around[1::2] - around[::2]) / (2.0 * step)
     return np.asarray((np.cross(change, arm) + np.cross(rates, np.cross(rates, arm)))[:, 2])
 
 
@@ -123,17 +149,25 @@ def expect_close(fitted: Fit, truth: Mapping[str, float]) -> None:
     assert not {name: value for name, value in off.items() if not abs(value) < 4.0}
 
 
-@pytest.mark.parametrize(("spin", "nutation"), [(3.0, 4.0), (-2.7, 41.0), deep(-2.0, 4.0), deep(3.0, 65.0)])
-def test_the_axis_tells_its_cone_and_the_ratio_as_well_as_the_spin_is_known(spin: float, nutation: float) -> None:
+@pytest.mark.parametrize(
+    ("spin", "nutation"), [(3.0, 4.0), (-2.7, 41.0), deep(-2.0, 4.0), deep(3.0, 65.0)]
+)
+def test_the_axis_tells_its_cone_and_the_ratio_as_well_as_the_spin_is_known(
+    spin: float, nutation: float
+) -> None:
     """However wide the cone is."""
     change = {"state.spin": spin, "state.nutation": f"{nutation} deg"}
-    body, times = nutdamp.load(FILE, set=change), np.linspace(0.05, 60.0, 200)
-    motions, up = flown(times, body), np.array([0.0, 0.0, math.copysign(1.0, spin)])
+    body = nutdamp.load(FILE, set=change)
+    times = np.linspace(0.05, 60.0, 200)
+    motions = flown(times, body)
+    up = np.array([0.0, 0.0, math.copysign(1.0, spin)])
     fitted = fit(body, Record(times, axes(motions, up[2], np.random.default_rng(1))))
     size = math.hypot(fitted.named["omega_1"], fitted.named["omega_2"])
     assert size == pytest.approx(float(np.hypot(*motions[0].rates[:2])), rel=3e-3)
     expect_close(fitted, {"A": A, "C/A": C / A, "omega_3": float(motions[0].rates[2])})
-    assert fitted.sigmas[fitted.index("omega_3") or 0] > 0.8 * math.radians(0.3)  # no signal shows the spin
+    assert fitted.sigmas[fitted.index("omega_3") or 0] > 0.8 * math.radians(
+        0.3
+    )  # no signal shows the spin
     axis = attitude.rotate(carried(fitted, float(times[-1])).state.quaternion, up)
     assert reference.angle(axis, motions[-1].rotation @ up) < 5e-5
 
@@ -154,26 +188,29 @@ def test_the_phase_of_the_axis_alone_is_that_of_the_file() -> None:
 
 def test_an_accelerometer_feels_dissipation_and_tells_what_it_feels_by_its_kinematics() -> None:
     """dω/dt has the part that dissipation gives it."""
-    body, times = (
-        nutdamp.load(FILE, set={"loop": ACCELEROMETER, "state.nutation": "12 deg"}),
-        np.linspace(0.05, 60, 150),
-    )
+    body = nutdamp.load(FILE, set={"loop": ACCELEROMETER, "state.nutation": "12 deg"})
+    times = np.linspace(0.05, 60, 150)
     shown = felt(times, growth=0.003, body=body)
     start = motion((A, A, C), body.omega0, times[:1], 0.003)[0]
-    truth = {"A": A, "C/A": C / A, "growth": 0.003} | {f"omega_{at + 1}": float(one) for at, one in enumerate(start)}
+    truth = {"A": A, "C/A": C / A, "growth": 0.003} | {
+        f"omega_{at + 1}": float(one) for at, one in enumerate(start)
+    }
     predicted = Model(body, Record(times, {ACCELERATION: shown})).predicted(truth)
     assert np.abs(predicted - shown).max() < 1e-5 * np.abs(shown).max()
     body = nutdamp.load(FILE, set={"loop": ACCELEROMETER})
     noise = 0.002 + 1e-4 * np.random.default_rng(3).normal(size=150)
     fitted = fit(body, Record(times, {ACCELERATION: felt(times) + noise}))
-    truth = {f"omega_{at + 1}": float(one) for at, one in enumerate(flown(times[:1], body)[0].rates)}
+    truth = {
+        f"omega_{at + 1}": float(one) for at, one in enumerate(flown(times[:1], body)[0].rates)
+    }
     expect_close(fitted, truth | {"C/A": C / A, "bias_acceleration": 0.002})
 
 
 def test_gyros_and_axis_are_turned_by_rotation_vectors_not_by_their_first_order() -> None:
     """Of 2 deg the second order is 6e-4 of the spin, which gyros tell much better."""
     gyros_off, axis_off = [0.035, -0.02, 0.0], [-0.03, 0.01, 0.0]
-    times, truth = np.linspace(0.0, 20.0, 30), {"C/A": C / A, "omega_1": 0.1, "omega_2": 0.05, "omega_3": 3.0}
+    times = np.linspace(0.0, 20.0, 30)
+    truth = {"C/A": C / A, "omega_1": 0.1, "omega_2": 0.05, "omega_3": 3.0}
     truth |= {
         f"{kind}_{at + 1}": off[at]
         for kind, off in (("misalignment", gyros_off), ("wobble", axis_off))
@@ -182,8 +219,13 @@ def test_gyros_and_axis_are_turned_by_rotation_vectors_not_by_their_first_order(
     flat = Record(times, dict.fromkeys((*GYROS, *AXIS), np.ones(30)))
     rates, quaternion = Model(BODY, flat).motion(truth, times)
     shown = Rotation.from_rotvec(gyros_off).apply(rates, inverse=True)
-    axis = attitude.rotate(quaternion, Rotation.from_rotvec(axis_off).apply(np.array([0.0, 0.0, 1.0])))
-    model = Model(BODY, Record(times, dict(zip((*GYROS, *AXIS), np.column_stack([shown, axis]).T, strict=True))))
+    axis = attitude.rotate(
+        quaternion, Rotation.from_rotvec(axis_off).apply(np.array([0.0, 0.0, 1.0]))
+    )
+    model = Model(
+        BODY,
+        Record(times, dict(zip((*GYROS, *AXIS), np.column_stack([shown, axis]).T, strict=True))),
+    )
     assert np.abs(model.predicted(truth) - model.measured).max() < 1e-14
 
 
@@ -204,16 +246,25 @@ def test_gyros_and_axis_together_tell_bias_misalignment_and_wobble_apart() -> No
     wobble = np.array([[1, 0, 0.002], [0, 1, -0.001], [0, 0, 1]])
     wobbling = [one._replace(rotation=one.rotation @ wobble) for one in motions]
     fitted = fit(BODY, Record(times, signals | axes(wobbling, 1.0, np.random.default_rng(3))))
-    truth = {"misalignment_1": 0.034, "misalignment_2": -0.026, "wobble_1": 0.001, "wobble_2": 0.002}
+    truth = {
+        "misalignment_1": 0.034,
+        "misalignment_2": -0.026,
+        "wobble_1": 0.001,
+        "wobble_2": 0.002,
+    }
     truth |= {f"bias_{name}": float(one) for name, one in zip(GYROS, bias, strict=True)}
     expect_close(fitted, truth | {"C/A": C / A, "omega_3": float(rates[0, 2])})
-    assert fitted.sigmas[fitted.index("bias_omega_3") or 0] < 0.1 * math.radians(0.02)  # which gyros alone do not tell
+    assert fitted.sigmas[fitted.index("bias_omega_3") or 0] < 0.1 * math.radians(
+        0.02
+    )  # which gyros alone do not tell
 
 
 @pytest.mark.deep
 def test_sun_pulses_tell_the_spin_and_so_the_bias_of_the_third_gyro() -> None:
     """The Sun passes the sensor by the rotations of DOP853 on a fine grid."""
-    times, grid, draw = np.linspace(0.05, 100.0, 500), np.linspace(0.0, 100.0, 20_001)[1:], np.random.default_rng(4)
+    times = np.linspace(0.05, 100.0, 500)
+    grid = np.linspace(0.0, 100.0, 20_001)[1:]
+    draw = np.random.default_rng(4)
     seen = np.array([one.rotation.T @ present(BODY.sun) for one in flown(grid, BODY)])
     turns = -(np.unwrap(np.arctan2(seen[:, 1], seen[:, 0])) - math.radians(35.0)) / (2.0 * math.pi)
     passed = np.interp(np.arange(math.ceil(turns[0]), turns[-1]), turns, grid)
@@ -226,18 +277,34 @@ def test_sun_pulses_tell_the_spin_and_so_the_bias_of_the_third_gyro() -> None:
 
 @pytest.mark.weekly
 def test_pulses_in_a_record_tell_thrust_and_delay_of_their_channels() -> None:
-    times, factors, late = np.linspace(0.05, 40.0, 200), {"T1": 0.96, "T2": 1.03}, {"T1": 0.02, "T2": 0.035}
-    fired = Schedule(tuple(channel_pulse(one, at, 0.5) for one, at in zip(BODY.channels, (12.0, 25.0), strict=True)))
+    times = np.linspace(0.05, 40.0, 200)
+    factors = {"T1": 0.96, "T2": 1.03}
+    late = {"T1": 0.02, "T2": 0.035}
+    fired = Schedule(
+        tuple(
+            channel_pulse(one, at, 0.5) for one, at in zip(BODY.channels, (12.0, 25.0), strict=True)
+        )
+    )
     events = tuple(
-        reference.Push(one.start + late[one.channel], one.end + late[one.channel], factors[one.channel] * one.torque)
+        reference.Push(
+            one.start + late[one.channel],
+            one.end + late[one.channel],
+            factors[one.channel] * one.torque,
+        )
         for one in fired
         if one.torque is not None
     )
     fitted = fit(BODY, Record(times, gyros(flown(times, BODY, events), 5), schedule=fired))
     of_A = fitted.index("A") or 0
-    for name, factor in factors.items():  # a pulse shows thrust over A, so that the factor is as uncertain as A
+    for (
+        name,
+        factor,
+    ) in factors.items():  # a pulse shows thrust over A, so that the factor is as uncertain as A
         at = present(fitted.index(f"thrust {name}"))
-        apart = math.sqrt(fitted.covariance[at, at] - fitted.covariance[at, of_A] ** 2 / fitted.covariance[of_A, of_A])
+        apart = math.sqrt(
+            fitted.covariance[at, at]
+            - fitted.covariance[at, of_A] ** 2 / fitted.covariance[of_A, of_A]
+        )
         assert abs(fitted.values[at] / fitted.named["A"] * A - factor) < 4.0 * apart
         assert apart < 0.002
     expect_close(fitted, {"A": A, "C/A": C / A, **{f"delay {name}": late[name] for name in late}})
@@ -246,11 +313,20 @@ def test_pulses_in_a_record_tell_thrust_and_delay_of_their_channels() -> None:
 
 
 def test_of_unequal_moments_pulses_and_disturbances_push_in_the_axes_of_the_file() -> None:
-    """The principal axes that are estimated are turned against those of the file: by 90 deg where I1 < I2."""
+    """The principal axes that are estimated are turned against those of the file: by 90 deg where
+    I1 < I2.
+    """
     tensor = {"tensor": [[118.0, 1.0, 0], [1.0, 123.0, 0], [0, 0, 84.0]]}
-    leak = [{"name": "leak", "torque": [0.05, 0.02, 0.01]}, {"name": "drag", "torque": [0.03, 0, 0], "rate": 0.4}]
+    leak = [
+        {"name": "leak", "torque": [0.05, 0.02, 0.01]},
+        {"name": "drag", "torque": [0.03, 0, 0], "rate": 0.4},
+    ]
     body = nutdamp.load(FILE | {"inertia": tensor, "disturbances": leak})
-    pulses = Schedule(tuple(channel_pulse(one, at, 0.5) for one, at in zip(body.channels, (4.0, 9.0), strict=True)))
+    pulses = Schedule(
+        tuple(
+            channel_pulse(one, at, 0.5) for one, at in zip(body.channels, (4.0, 9.0), strict=True)
+        )
+    )
     times = np.linspace(0.0, 20.0, 50)
     model = Model(body, Record(times, {name: np.zeros(50) for name in GYROS}, schedule=pulses))
     assert model.unequal
@@ -262,32 +338,45 @@ def test_of_unequal_moments_pulses_and_disturbances_push_in_the_axes_of_the_file
 
 
 @pytest.mark.deep
-def test_unequal_transverse_moments_are_seen_and_their_axes_and_equal_ones_not_taken_for_them() -> None:
-    times, turn, size = np.linspace(0.0, 60.0, 300), math.radians(25.0), 1.5 / 120.0
+def test_unequal_transverse_moments_are_seen_and_their_axes_and_equal_ones_not_taken_for_them() -> (
+    None
+):
+    times = np.linspace(0.0, 60.0, 300)
+    turn = math.radians(25.0)
+    size = 1.5 / 120.0
     about = turning(turn)
-    fitted = fit(BODY, noisy(times, motion((121.5, 118.5, 84.2), about.T @ BODY.omega0, times) @ about.T, 6))
+    fitted = fit(
+        BODY, noisy(times, motion((121.5, 118.5, 84.2), about.T @ BODY.omega0, times) @ about.T, 6)
+    )
     assert fitted.model.unequal
     two = {"unequal_1": size * math.cos(2 * turn), "unequal_2": size * math.sin(2 * turn)}
     expect_close(fitted, two | {"C/A": 84.2 / 120.0})
     for seed in range(5):
-        assert not fit(BODY, noisy(times, motion((A, A, C), BODY.omega0, times), seed)).model.unequal
+        assert not fit(
+            BODY, noisy(times, motion((A, A, C), BODY.omega0, times), seed)
+        ).model.unequal
 
 
 @pytest.mark.deep
 def test_of_three_moments_the_largest_nutation_is_named_so() -> None:
     tensor = np.diag([120.0, 110.0, 80.0]).tolist()
-    body = nutdamp.load({"name": "three", "inertia": {"tensor": tensor}, "omega0": [0.1, 0.1, SPIN]})
+    body = nutdamp.load(
+        {"name": "three", "inertia": {"tensor": tensor}, "omega0": [0.1, 0.1, SPIN]}
+    )
     times = np.linspace(0.0, 60.0, 601)
     record = noisy(times, motion((120.0, 110.0, 80.0), np.array([0.14, 0.12, SPIN]), times))
     nutation = estimate(fit(body, record), "nutation")
-    x, y, z = np.array([120.0, 110.0, 80.0])[:, None] * np.array([record.signals[name] for name in GYROS])
+    x, y, z = np.array([120.0, 110.0, 80.0])[:, None] * np.array(
+        [record.signals[name] for name in GYROS]
+    )
     assert nutation.label == "largest nutation"
     assert nutation.value == pytest.approx(np.arctan2(np.hypot(x, y), z).max(), abs=1e-3)
 
 
 @pytest.mark.deep
 def test_fast_growth_over_many_periods_is_followed() -> None:
-    body, times = nutdamp.load(FILE, set={"state.nutation": "2 deg"}), np.linspace(0.0, 150.0, 700)
+    body = nutdamp.load(FILE, set={"state.nutation": "2 deg"})
+    times = np.linspace(0.0, 150.0, 700)
     rates = motion((A, A, C), body.omega0, times, 0.025)
     assert math.atan2(A * float(np.hypot(*rates[-1, :2])), C * rates[-1, 2]) > math.radians(50.0)
     expect_close(fit(body, noisy(times, rates, 7)), {"growth": 0.025, "C/A": C / A})
@@ -295,7 +384,9 @@ def test_fast_growth_over_many_periods_is_followed() -> None:
 
 @pytest.mark.parametrize(("tolerances", "fixed"), [(("A",), "C"), deep(("C",), "A"), deep((), "A")])
 def test_a_moment_without_tolerance_stays_as_it_is(tolerances: tuple[str, ...], fixed: str) -> None:
-    given = {"dispersions": {name: {"normal": "0.5 %"} for name in tolerances}} if tolerances else {}
+    given = (
+        {"dispersions": {name: {"normal": "0.5 %"} for name in tolerances}} if tolerances else {}
+    )
     body = nutdamp.load(PLAIN | given)
     known = carried(fit(body, of_body(body, np.linspace(0.0, 60.0, 61))), 0.0)
     at = known.names.index(fixed)
@@ -321,11 +412,15 @@ def test_noise_for_rates_ends_and_is_no_nutation() -> None:
     rates = 0.3 * np.random.default_rng(1).normal(size=(200, 3)) + np.array([0.0, 0.0, 3.0])
     body = nutdamp.load(PLAIN | {"inertia": {"tensor": np.diag([122.0, 118.0, 84.0]).tolist()}})
     with work.budget("test", math.inf) as spent:
-        assert "no nutation is seen" in refusal(Infeasible, body, noisy(np.linspace(0.0, 60.0, 200), rates))
+        assert "no nutation is seen" in refusal(
+            Infeasible, body, noisy(np.linspace(0.0, 60.0, 200), rates)
+        )
     assert spent.done < 1.3 * work.FIT
 
 
-def test_a_spin_the_other_way_than_in_the_file_is_doubted_and_its_nutation_counts_from_its_own_sense() -> None:
+def test_a_spin_the_other_way_than_in_the_file_is_doubted_and_its_nutation_counts_from_its_own_sense() -> (
+    None
+):
     fitted = fit(EXAMPLE, of_example(np.linspace(0.0, 60.0, 121), spin=-SPIN))
     nutation = estimate(fitted, "nutation")
     expected = math.atan2(120.0 * math.hypot(0.14, 0.12), 80.4 * SPIN)
@@ -352,13 +447,19 @@ def test_sampling_above_the_rate_leaves_no_doubt() -> None:
 
 def pushed(thrust: float, rate: int) -> Record:
     """A minute of gyros of the example that +M2 pushes for 0.5 s at 20 s, with ``thrust`` N m."""
-    start, times = reference.Motion(np.array([0.14, 0.12, SPIN]), np.eye(3)), np.arange(60 * rate + 1) / rate
+    start = reference.Motion(np.array([0.14, 0.12, SPIN]), np.eye(3))
+    times = np.arange(60 * rate + 1) / rate
     push = reference.Push(20.0, 20.5, np.array([0.0, thrust, 0.0]))
-    rates, now = [start.rates], start
-    for begin, end, torque in ((0, 20 * rate, 0.0 * push.torque), (20 * rate, 20 * rate + rate // 2, push.torque),
-                               (20 * rate + rate // 2, 60 * rate, 0.0 * push.torque)):  # fmt: skip
+    rates = [start.rates]
+    now = start
+    for begin, end, torque in (
+        (0, 20 * rate, 0.0 * push.torque),
+        (20 * rate, 20 * rate + rate // 2, push.torque),
+        (20 * rate + rate // 2, 60 * rate, 0.0 * push.torque),
+    ):
         motions = reference.coast((120.0, 120.0, 80.4), now, torque, times[1 : end - begin + 1])
-        rates, now = rates + [one.rates for one in motions], motions[-1]
+        rates = rates + [one.rates for one in motions]
+        now = motions[-1]
     return noisy(times, np.array(rates))
 
 
@@ -370,14 +471,18 @@ def test_a_pulse_that_no_schedule_names_is_found_and_nothing_is_estimated(thrust
 
 @pytest.mark.deep
 def test_of_a_pulse_that_hides_in_the_noise_the_time_is_said() -> None:
-    assert one_of(doubts(fit(EXAMPLE, pushed(0.06, 10))), "fit-steps")["at_s"] == pytest.approx(20.25, abs=1.5)
+    assert one_of(doubts(fit(EXAMPLE, pushed(0.06, 10))), "fit-steps")["at_s"] == pytest.approx(
+        20.25, abs=1.5
+    )
 
 
 def test_sensors_that_are_stuck_are_named() -> None:
     """From the start or later, beside others or alone; not a third gyro without noise."""
     times = np.linspace(0.05, 60.0, 120)
-    motions, later = flown(times, BODY), np.arange(120) >= 60
-    seen, axis = gyros(motions, 2), axes(motions, 1.0, np.random.default_rng(1))
+    motions = flown(times, BODY)
+    later = np.arange(120) >= 60
+    seen = gyros(motions, 2)
+    axis = axes(motions, 1.0, np.random.default_rng(1))
     told = nutdamp.load(FILE, set={"loop": ACCELEROMETER})
     stuck = {
         name: np.where(later, values[60], values)
@@ -390,17 +495,24 @@ def test_sensors_that_are_stuck_are_named() -> None:
         (BODY, seen | {"omega_3": stuck["omega_3"]}),
         (BODY, seen | {"omega_2": np.zeros(120)}),
     ]
-    check_text("estimation.stuck", "\n".join(refusal(Infeasible, body, Record(times, one)) for body, one in records))
+    check_text(
+        "estimation.stuck",
+        "\n".join(refusal(Infeasible, body, Record(times, one)) for body, one in records),
+    )
     fit(BODY, Record(times, seen | {"omega_3": np.full(120, 3.0)}))
 
 
 def test_signals_of_zeros_are_sensors_that_are_off() -> None:
     """They have no digits that would say how exact they are."""
-    times, zeros = np.linspace(0.0, 60.0, 240), np.zeros(240)
+    times = np.linspace(0.0, 60.0, 240)
+    zeros = np.zeros(240)
     axis = dict(zip(AXIS, np.tile([[0.6], [0.0], [0.8]], 240), strict=True))
     for signals, named in (
         (dict.fromkeys(GYROS, zeros), GYROS),
-        (dict(noisy(times, 1e-290 * np.ones((240, 3))).signals) | {GYROS[2]: 1e-300 * times}, GYROS[2:]),
+        (
+            dict(noisy(times, 1e-290 * np.ones((240, 3))).signals) | {GYROS[2]: 1e-300 * times},
+            GYROS[2:],
+        ),
         (dict.fromkeys(GYROS[:2], zeros), GYROS[:2]),
         (axis, ["axis"]),
         (axis | {GYROS[2]: zeros + 3.0}, ["axis"]),
@@ -412,11 +524,14 @@ def test_signals_of_zeros_are_sensors_that_are_off() -> None:
 @spread("share", [0.82, 0.86, 0.9], quick=0, deep=1)
 def test_a_small_pulse_in_the_last_fifth_that_the_axis_shows_is_told(share: float) -> None:
     """It moves the axis by no more than its noise; what is estimated would be some sigmas off."""
-    times, at = np.linspace(0.05, 90.0, 300), share * 90.0
+    times = np.linspace(0.05, 90.0, 300)
+    at = share * 90.0
     start = reference.Motion(BODY.omega0, attitude.matrix(BODY.initial.quaternion))
     before = reference.coast((A, A, C), start, np.zeros(3), np.append(times[times < at], at))
     kicked = before[-1]._replace(rates=before[-1].rates + np.array([math.radians(0.2), 0.0, 0.0]))
-    motions = before[:-1] + reference.coast((A, A, C), kicked, np.zeros(3), times[times >= at] - at + 1e-9)
+    motions = before[:-1] + reference.coast(
+        (A, A, C), kicked, np.zeros(3), times[times >= at] - at + 1e-9
+    )
     fitted = fit(BODY, Record(times, axes(motions, 1.0, np.random.default_rng(5), 5e-4)))
     assert one_of(doubts(fitted), "fit-steps")["at_s"] == pytest.approx(at, abs=2.5)
 
@@ -428,7 +543,8 @@ def refusal(error: type[NutdampError], body: nutdamp.Spacecraft, record: Record)
 
 
 def test_records_that_tell_nothing_say_what_would_help() -> None:
-    minute, bare = np.linspace(0.0, 60.0, 61), nutdamp.load(PLAIN)
+    minute = np.linspace(0.0, 60.0, 61)
+    bare = nutdamp.load(PLAIN)
     sun = 2.0944 * np.arange(1.0, 60.0)
     fired = Schedule((channel_pulse(BODY.channels[0], 10.0, 1.0),))
     begun = of_body(BODY, minute)
@@ -453,19 +569,28 @@ def test_records_that_tell_nothing_say_what_would_help() -> None:
 def test_nutation_rates_that_sampling_cannot_tell_apart_are_all_named(
     body: nutdamp.Spacecraft, names: tuple[str, ...], request: pytest.FixtureRequest
 ) -> None:
-    """C/A 0.775 sampled every 10 s looks like any that differs by a multiple of 0.2, as its rate does by 2π/10 s."""
+    """C/A 0.775 sampled every 10 s looks like any that differs by a multiple of 0.2, as its rate
+    does by 2π/10 s.
+    """
     record = of_example(np.linspace(0.0, 600.0, 61), 93.0, names)
-    check_text(f"estimation.rates-alike, {request.node.callspec.id}", refusal(Infeasible, body, record))
+    check_text(
+        f"estimation.rates-alike, {request.node.callspec.id}", refusal(Infeasible, body, record)
+    )
 
 
 @pytest.mark.deep
 def test_a_nutation_below_the_noise_is_none() -> None:
     still = nutdamp.load(FILE, set={"state.nutation": "0.001 deg"})
-    check_text("estimation.no-nutation", refusal(Infeasible, still, of_body(still, np.linspace(0.0, 60.0, 200))))
+    check_text(
+        "estimation.no-nutation",
+        refusal(Infeasible, still, of_body(still, np.linspace(0.0, 60.0, 200))),
+    )
 
 
 def test_the_spin_of_sun_pulses_in_a_column_is_no_surer_than_its_samples_allow() -> None:
-    """Of n even turns T the line through times of variance s²/12 has the sigma of its slope s/√(12 Σ(k - mean)²)."""
+    """Of n even turns T the line through times of variance s²/12 has the sigma of its slope s/√(12
+    Σ(k - mean)²).
+    """
     slope = 0.1 / math.sqrt(12.0 * float(np.sum((np.arange(20.0) - 9.5) ** 2)))
     assert spin_of(2.0 * np.arange(20.0), 0.1)[1] == pytest.approx(2.0 * math.pi * slope / 2.0**2)
 

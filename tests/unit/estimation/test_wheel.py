@@ -1,4 +1,6 @@
-"""Fits of bodies with a wheel: coasts and firings of DOP853, each estimate within what its sigma says."""
+"""Fits of bodies with a wheel: coasts and firings of DOP853, each estimate within what its sigma
+says.
+"""
 
 import io
 import math
@@ -32,7 +34,12 @@ MOTIONS = [("0 rpm", 60.0), ("2 rpm", 60.0), ("-2 rpm", 150.0), ("-3 rpm", 30.0)
 
 
 def record(
-    body: nutdamp.Spacecraft, moments: tuple[float, float, float], wheel: float, *, growth: float = 0.0, seed: int = 1
+    body: nutdamp.Spacecraft,
+    moments: tuple[float, float, float],
+    wheel: float,
+    *,
+    growth: float = 0.0,
+    seed: int = 1,
 ) -> tuple[Record, np.ndarray]:
     """Gyros of a coast of 200 s at 4 Hz with noise, and the true rates at t = 0."""
     draw = np.random.default_rng([59, seed])
@@ -51,9 +58,13 @@ def record(
 
 @spread("motion", MOTIONS, quick=3)
 def test_a_coast_tells_the_moment_that_the_wheel_does_not_know(motion: tuple[str, float]) -> None:
-    """A 1 % off: ω turns at ω3 - H3/A. Rates come out too, and the file written from them flies the same."""
+    """A 1 % off: ω turns at ω3 - H3/A. Rates come out too, and the file written from them flies the
+    same.
+    """
     spin, wheel = motion
-    body = nutdamp.load({**FILE, "state": {**FILE["state"], "spin": spin}, "wheel": {"momentum": wheel}})
+    body = nutdamp.load(
+        {**FILE, "state": {**FILE["state"], "spin": spin}, "wheel": {"momentum": wheel}}
+    )
     true = (303.0, 303.0, 199.0)
     seen, rates = record(body, true, wheel)
     known = carried(fit(body, seen), 0.0)
@@ -105,7 +116,9 @@ dispersions: {A: {normal: 0.05 %}, C: {normal: 0.05 %}, wheel_momentum: {normal:
     written = nutdamp.read(fitted_text(fitted, carried(fitted, 0.0)))
     assert written.inertia.wheel == pytest.approx(float(fitted.values[at]), rel=1e-9)
     assert written.dispersions is not None
-    assert present(written.dispersions.wheel_momentum).size == pytest.approx(float(fitted.sigmas[at]), rel=1e-5)
+    assert present(written.dispersions.wheel_momentum).size == pytest.approx(
+        float(fitted.sigmas[at]), rel=1e-5
+    )
 
 
 @pytest.mark.deep

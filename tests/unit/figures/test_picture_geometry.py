@@ -1,4 +1,6 @@
-"""What pictures are made of: cones that touch and roll, angles on the sky, stretches of the track."""
+"""What pictures are made of: cones that touch and roll, angles on the sky,
+stretches of the track.
+"""
 
 import math
 from itertools import pairwise
@@ -64,21 +66,31 @@ def test_the_cones_touch_along_the_rotation_vector_at_every_moment(body: Spacecr
 @pytest.mark.parametrize(
     "name", ["prolate", "prolate, reversed", "needle", "tiny", "oblate", "oblate, reversed", "disc"]
 )
-def test_a_body_cone_rolls_outside_the_space_cone_of_a_prolate_body_and_about_that_of_an_oblate_one(name: str) -> None:
+def test_a_body_cone_rolls_outside_the_space_cone_of_a_prolate_body_and_about_that_of_an_oblate_one(
+    name: str,
+) -> None:
     made, track = flown(BODIES[name])
     cones = geometry.cones(made, track.rates[0], track.quaternion[0])
     if made.spacecraft.inertia.A > made.spacecraft.inertia.C:
-        assert (attitude.angle_between(cones.body, cones.momentum) >= track.space_cone[0] - 1e-12).all()
+        assert (
+            attitude.angle_between(cones.body, cones.momentum) >= track.space_cone[0] - 1e-12
+        ).all()
         assert attitude.angle_between(cones.axis, cones.momentum) > abs(track.space_cone[0])
     else:
         assert (attitude.angle_between(cones.space, cones.axis) <= track.body_cone[0] + 1e-12).all()
         assert track.body_cone[0] > track.nutation[0]
 
 
-@pytest.mark.parametrize("moments", [(120.0, 120.0, 80.0), (120.0, 100.0, 80.0), (80.0, 90.0, 120.0)])
+@pytest.mark.parametrize(
+    "moments", [(120.0, 120.0, 80.0), (120.0, 100.0, 80.0), (80.0, 90.0, 120.0)]
+)
 @pytest.mark.parametrize("spin", [3.0, -3.0])
-def test_the_cones_at_one_moment_foretell_the_motion(moments: tuple[float, float, float], spin: float) -> None:
-    """The reference integrator's ω runs along the space cone in space, and along the body cone in the body."""
+def test_the_cones_at_one_moment_foretell_the_motion(
+    moments: tuple[float, float, float], spin: float
+) -> None:
+    """The reference integrator's ω runs along the space cone in space, and along the body cone in
+    the body.
+    """
     body = spinner(moments=moments, spin=spin, degrees=25.0)
     made = propagation.flown(body, Schedule(), 1.0)
     start = body.initial
@@ -92,12 +104,15 @@ def test_the_cones_at_one_moment_foretell_the_motion(moments: tuple[float, float
         assert attitude.angle_between(found.body @ back.T, unit).min() < spacing * 0.5
 
 
-@pytest.mark.parametrize("body", [BODIES["prolate"], BODIES["oblate, reversed"], spinner(moments=(120, 100, 80))])
+@pytest.mark.parametrize(
+    "body", [BODIES["prolate"], BODIES["oblate, reversed"], spinner(moments=(120, 100, 80))]
+)
 def test_the_mark_stays_where_it_is_in_the_body(body: Spacecraft) -> None:
     made = propagation.flown(body, Schedule(), 4.0)
     track = made.sampled(20, 4.0)
     marks = [
-        attitude.matrix(quaternion).T @ geometry.body_mark(geometry.cones(made, rates, quaternion), quaternion)
+        attitude.matrix(quaternion).T
+        @ geometry.body_mark(geometry.cones(made, rates, quaternion), quaternion)
         for rates, quaternion in zip(track.rates, track.quaternion, strict=True)
     ]
     assert np.ptp(marks, axis=0) == pytest.approx(0.0, abs=1e-3)
@@ -107,7 +122,9 @@ def test_the_mark_stays_where_it_is_in_the_body(body: Spacecraft) -> None:
 
 def test_without_nutation_there_are_no_cones() -> None:
     body = spinner(degrees=0.0)
-    found = geometry.cones(propagation.flown(body, Schedule(), 1.0), body.omega0, body.initial.quaternion)
+    found = geometry.cones(
+        propagation.flown(body, Schedule(), 1.0), body.omega0, body.initial.quaternion
+    )
     assert len(found.body) == len(found.space) == 0
     assert np.isnan(geometry.body_mark(found, body.initial.quaternion)).all()
 
@@ -115,13 +132,18 @@ def test_without_nutation_there_are_no_cones() -> None:
 def test_a_despun_body_at_rest_has_no_cones() -> None:
     """H is that of its wheel, and there is no ω to have a direction."""
     state = {"spin": 0.0, "nutation": 0.0}
-    body = nutdamp.load({"name": "still", "inertia": {"A": 120, "C": 80}, "wheel": {"momentum": 42}, "state": state})
-    found = geometry.cones(propagation.flown(body, Schedule(), 1.0), body.omega0, body.initial.quaternion)
+    body = nutdamp.load(
+        {"name": "still", "inertia": {"A": 120, "C": 80}, "wheel": {"momentum": 42}, "state": state}
+    )
+    found = geometry.cones(
+        propagation.flown(body, Schedule(), 1.0), body.omega0, body.initial.quaternion
+    )
     assert len(found.body) == len(found.space) == 0
     assert found.rotation == pytest.approx(found.momentum)
 
 
-# --- the sky ---------------------------------------------------------------------------------------------------------
+# --- the sky
+# --------------------------------------------------------------------------------------------------
 
 
 def test_in_n_the_spin_axis_begins_to_the_right_and_turns_as_seen_against_h() -> None:
@@ -144,7 +166,9 @@ def test_in_a_celestial_frame_east_is_right_and_north_is_up() -> None:
     check_text("pictures.sky", "\n".join(geometry.sky_names(made)))
 
 
-@pytest.mark.parametrize("momentum", [(0.0, 0.0, 1.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0), (0.3, -0.5, 0.2)])
+@pytest.mark.parametrize(
+    "momentum", [(0.0, 0.0, 1.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0), (0.3, -0.5, 0.2)]
+)
 def test_the_sky_is_right_handed_everywhere(momentum: tuple[float, float, float]) -> None:
     made = propagation.flown(spinner(attitude=Attitude(np.array([1.0, 0, 0, 0]))), Schedule(), 1.0)
     plane = geometry.sky_plane(made, np.array(momentum))
@@ -160,7 +184,8 @@ def test_distances_from_h_are_angles() -> None:
     )
 
 
-# --- rows ------------------------------------------------------------------------------------------------------------
+# --- rows
+# --------------------------------------------------------------------------------------------------
 
 
 def turned(points: Vector) -> float:
@@ -179,7 +204,9 @@ def test_a_coarse_track_is_drawn_finely(samples: int) -> None:
 
 
 def test_of_a_very_long_time_the_first_part_is_drawn_and_all_pulses() -> None:
-    made = propagation.flown(spinner(), Schedule((Pulse(5000.0, 0.0, "x", np.array([1.0, 0, 0])),)), 1e6)
+    made = propagation.flown(
+        spinner(), Schedule((Pulse(5000.0, 0.0, "x", np.array([1.0, 0, 0])),)), 1e6
+    )
     fine = geometry.drawn(made, made.sampled(1000, 1e6))
     assert len(fine.t) < geometry.MOST_ROWS + 10
     assert 5000.0 <= fine.t[-1] < 1e6
@@ -187,15 +214,24 @@ def test_of_a_very_long_time_the_first_part_is_drawn_and_all_pulses() -> None:
 
 SCHEDULES = {
     "none": (),
-    "impulse at once": (Pulse(0.0, 0.0, "x", np.array([5.0, 0, 0])), Pulse(2.0, 0.0, "x", np.array([5.0, 0, 0]))),
-    "widths": tuple(Pulse(t, 0.5, "x", np.array([5.0, 0, 0]), np.array([10.0, 0, 0])) for t in (0.25, 2.0, 3.0)),
-    "side by side": tuple(Pulse(t, 1.0, "x", np.array([5.0, 0, 0]), np.array([5.0, 0, 0])) for t in (1.5, 2.5)),
+    "impulse at once": (
+        Pulse(0.0, 0.0, "x", np.array([5.0, 0, 0])),
+        Pulse(2.0, 0.0, "x", np.array([5.0, 0, 0])),
+    ),
+    "widths": tuple(
+        Pulse(t, 0.5, "x", np.array([5.0, 0, 0]), np.array([10.0, 0, 0])) for t in (0.25, 2.0, 3.0)
+    ),
+    "side by side": tuple(
+        Pulse(t, 1.0, "x", np.array([5.0, 0, 0]), np.array([5.0, 0, 0])) for t in (1.5, 2.5)
+    ),
 }
 
 
 @pytest.mark.parametrize("pulses", SCHEDULES.values(), ids=SCHEDULES)
 @pytest.mark.parametrize("fly", [propagation.flown, propagation.by_impulses])
-def test_stretches_cover_the_track_and_name_every_pulse_once(pulses: tuple[Pulse, ...], fly: type) -> None:
+def test_stretches_cover_the_track_and_name_every_pulse_once(
+    pulses: tuple[Pulse, ...], fly: type
+) -> None:
     made: propagation.Flight = fly(spinner(), Schedule(pulses), 6.0)
     track = made.sampled(50, 6.0)
     found = list(geometry.stretches(made, track))
@@ -214,18 +250,24 @@ def test_pulses_after_the_end_of_the_track_are_left_out() -> None:
 
 
 def test_a_herpolhode_that_never_closes_fills_the_circle_about_it() -> None:
-    """The space cone of I1 ≠ I2 over a long time reaches as far as it does in one period, all around."""
+    """The space cone of I1 ≠ I2 over a long time reaches as far as it does in one period, all
+    around.
+    """
     body = spinner(moments=(120.0, 100.0, 80.0), degrees=25.0)
     made = propagation.flown(body, Schedule(), 600.0)
     found = geometry.cones(made, body.initial.rates, body.initial.quaternion)
     away = attitude.angle_between(found.swept, found.momentum)
     assert np.ptp(away) < 1e-9
     assert attitude.angle_between(found.space, found.momentum).max() == pytest.approx(away[0])
-    motion = reference.fly((120.0, 100.0, 80.0), body.omega0, [], 97.3, attitude.matrix(body.initial.quaternion))
+    motion = reference.fly(
+        (120.0, 100.0, 80.0), body.omega0, [], 97.3, attitude.matrix(body.initial.quaternion)
+    )
     unit = motion.rotation @ (motion.rates / np.linalg.norm(motion.rates))
     assert attitude.angle_between(unit, found.momentum) <= away[0] + 1e-9
     still = BODIES["oblate"]
-    cones = geometry.cones(propagation.flown(still, Schedule(), 1.0), still.initial.rates, still.initial.quaternion)
+    cones = geometry.cones(
+        propagation.flown(still, Schedule(), 1.0), still.initial.rates, still.initial.quaternion
+    )
     assert np.array_equal(cones.swept, cones.space)
 
 
@@ -241,7 +283,9 @@ def test_a_hull_is_that_of_scipy() -> None:
     assert geometry.hull(np.zeros((4, 2))).shape == (1, 2)
 
 
-@pytest.mark.parametrize(("low", "high"), [(-1.0, 1.0), (0.0, 1e-7), (-3e5, 4.1e5), (38.99, 41.01), (-1e-9, 2e-9)])
+@pytest.mark.parametrize(
+    ("low", "high"), [(-1.0, 1.0), (0.0, 1e-7), (-3e5, 4.1e5), (38.99, 41.01), (-1e-9, 2e-9)]
+)
 @pytest.mark.parametrize("most", [2, 5, 9])
 def test_ticks_are_round_and_few(low: float, high: float, most: int) -> None:
     found = geometry.ticks(low, high, most)
@@ -256,10 +300,18 @@ def test_ticks_are_round_and_few(low: float, high: float, most: int) -> None:
 
 @pytest.mark.parametrize("turned", [False, True])
 def test_the_pole_curve_says_where_its_axes_are_not_those_of_the_file(turned: bool) -> None:
-    tensor = [[100.0, 1.0, 0.0], [1.0, 120.0, 0.0], [0.0, 0.0, 80.0]] if turned else np.diag([100.0, 120.0, 80.0])
+    tensor = (
+        [[100.0, 1.0, 0.0], [1.0, 120.0, 0.0], [0.0, 0.0, 80.0]]
+        if turned
+        else np.diag([100.0, 120.0, 80.0])
+    )
     state = {"spin": 3.0, "nutation": "5 deg"}
-    body = nutdamp.load({"name": "turned", "inertia": {"tensor": np.asarray(tensor).tolist()}, "state": state})
-    assert geometry.pole_note(propagation.flown(body, Schedule(), 1.0)) == ", principal axes" * turned
+    body = nutdamp.load(
+        {"name": "turned", "inertia": {"tensor": np.asarray(tensor).tolist()}, "state": state}
+    )
+    assert (
+        geometry.pole_note(propagation.flown(body, Schedule(), 1.0)) == ", principal axes" * turned
+    )
 
 
 def test_the_pole_curve_says_that_the_spin_is_reversed() -> None:

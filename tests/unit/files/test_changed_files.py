@@ -1,4 +1,6 @@
-"""Spacecraft files with other values: set beside them, carried on by a flight, estimated by a fit; their attitudes."""
+"""Spacecraft files with other values: set beside them, carried on by a flight, estimated by a fit;
+their attitudes.
+"""
 
 import copy
 import dataclasses
@@ -52,7 +54,13 @@ def faults_of(text: str, *settings: str) -> list[Fault]:
 
 def leaves(value: Any, path: KeyPath = ()) -> Iterator[tuple[KeyPath, Any]]:
     """Every value of a file that holds no others."""
-    steps = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    steps = (
+        value.items()
+        if isinstance(value, dict)
+        else enumerate(value)
+        if isinstance(value, list)
+        else ()
+    )
     for step, child in steps:
         yield from leaves(child, (*path, step))
     if not isinstance(value, dict | list):
@@ -79,17 +87,24 @@ LEAVES = list(leaves(PLAIN))
 @pytest.mark.deep
 @spread("value", ["rubbish", 1e9, {"x": 1}, "-1 min", True, None, [1, 2], ""], quick=1)
 def test_what_is_set_is_checked_as_the_file_is(value: object) -> None:
-    """Each value of the example replaced in turn: the same faults, whether in the file or beside it."""
+    """Each value of the example replaced in turn: the same faults, whether in the file or beside
+    it.
+    """
     placed: set[bool] = set()
     for path, _ in LEAVES:
-        text, setting = changed(PLAIN, path, value), f"{dotted(path)}={json.dumps(value)}"
+        text = changed(PLAIN, path, value)
+        setting = f"{dotted(path)}={json.dumps(value)}"
         inside, beside = faults_of(text), faults_of(EXAMPLE, setting)
-        pairs = [sorted((fault.where, fault.problem) for fault in faults) for faults in (inside, beside)]
+        pairs = [
+            sorted((fault.where, fault.problem) for fault in faults) for faults in (inside, beside)
+        ]
         assert pairs[0] == pairs[1], setting
         if beside:
             placed.add(any(fault.file.startswith("--set ") and fault.line == 0 for fault in beside))
         else:
-            assert contents(with_settings(EXAMPLE, setting)) == contents(read_spacecraft(text, "f.yaml"))
+            assert contents(with_settings(EXAMPLE, setting)) == contents(
+                read_spacecraft(text, "f.yaml")
+            )
     assert placed == {True}
 
 
@@ -100,30 +115,60 @@ def test_setting_every_value_to_itself_changes_nothing() -> None:
 
 
 def test_entries_of_lists_sections_that_are_not_there_and_the_later_of_two_settings() -> None:
-    for key in ("thrusters[1].torque", "thrusters.T2.torque", "thrusters[T2].torque", "thrusters.'T2'.torque"):
+    for key in (
+        "thrusters[1].torque",
+        "thrusters.T2.torque",
+        "thrusters[T2].torque",
+        "thrusters.'T2'.torque",
+    ):
         craft = with_settings(THRUSTERS, f"{key}=[0, -3, 0]")
         assert tuple(craft.channels[1].thrusters[0].torque) == (0, -3, 0)
-    craft = with_settings(BASE, "limits.blackout=[[10 s, 0.5 min], [40, 41]]", "limits.max_pulses=3", "omega0[1]=0.5")
+    craft = with_settings(
+        BASE, "limits.blackout=[[10 s, 0.5 min], [40, 41]]", "limits.max_pulses=3", "omega0[1]=0.5"
+    )
     assert (craft.limits.blackout, craft.limits.max_pulses) == (((10.0, 30.0), (40.0, 41.0)), 3)
     assert tuple(craft.omega0) == (0.1, 0.5, 3.0)
     assert with_settings(BASE, "mass=2", "mass=3 kg").mass == 3.0
 
 
 def test_values_that_aliases_share_change_only_where_they_are_set() -> None:
-    text = BASE + "thrusters:\n  - &t {name: T1, torque: &v [8, 0, 0]}\n  - {name: T2, torque: *v}\n"
+    text = (
+        BASE + "thrusters:\n  - &t {name: T1, torque: &v [8, 0, 0]}\n  - {name: T2, torque: *v}\n"
+    )
     craft = with_settings(text, "thrusters.T2.torque[0]=-1")
     assert [channel.thrusters[0].torque[0] for channel in craft.channels] == [8.0, -1.0]
 
 
-# fmt: off
 FAULTY = (
-    "limits.horizon=-3 s", "limits.horizn=300s", "limits.earlist=300s", "thrusters.T11.torque=[1, 0, 0]",
-    "thrusters.Z.torque=[1, 0, 0]", "thrusters[3].torque=[1, 0, 0]", "omega0.x=1", "limits.blackout[0]=[1, 2]",
-    "name.x=1", "limits.blackout=[[1, 2]", "mass=", "limits.tick={a: 1, a: 2}", "name=!!python/object:os.system x",
-    f"{'x.' * 40}y=1", "mass=\x1b[31m",
+    "limits.horizon=-3 s",
+    "limits.horizn=300s",
+    "limits.earlist=300s",
+    ("thrusters.T11.torque=[1, 0, 0]"),
+    "thrusters.Z.torque=[1, 0, 0]",
+    "thrusters[3].torque=[1, 0, 0]",
+    "omega0.x=1",
+    "limits.blackout[0]=[1, 2]",
+    "name.x=1",
+    "limits.blackout=[[1, 2]",
+    "mass=",
+    "limits.tick={a: 1, a: 2}",
+    "name=!!python/object:os.system x",
+    f"{'x.' * 40}y=1",
+    "mass=\x1b[31m",
 )
-NO_SETTINGS = ("", "mass", "=3", "a..b=1", ".a=1", "a[=1", "a[1=2", "a]=1", "'a=1", "a.'\\x=1", "[]=1")
-# fmt: on
+NO_SETTINGS = (
+    "",
+    "mass",
+    "=3",
+    "a..b=1",
+    ".a=1",
+    "a[=1",
+    "a[1=2",
+    "a]=1",
+    "'a=1",
+    "a.'\\x=1",
+    "[]=1",
+)
 
 
 def test_a_fault_names_the_setting_as_its_place() -> None:
@@ -131,7 +176,10 @@ def test_a_fault_names_the_setting_as_its_place() -> None:
     for setting in FAULTY:
         faults = faults_of(THRUSTERS + "limits: {horizon: 120 s}\n", setting)
         assert faults
-        assert all(fault.file.startswith("--set ") and not fault.line and str(fault).isprintable() for fault in faults)
+        assert all(
+            fault.file.startswith("--set ") and not fault.line and str(fault).isprintable()
+            for fault in faults
+        )
         lines += map(str, faults)
     lines += map(str, faults_of(THRUSTERS, "thrusters[0].name=T2"))  # a name that another entry has
     check_text("files.settings", "\n".join(lines))
@@ -149,36 +197,57 @@ def test_faults_of_file_and_settings_come_together_and_are_the_same() -> None:
     assert places == [("limits.gap", "--set"), ("limits.tick", "--set"), ("mass", "f.yam")]
 
 
-CHARACTERS = st.text("aZ09_+-. []{}'\"\\=:#,\t\n\x00\x1b\x85\u2028\ud83dé漢😀", min_size=1, max_size=12)
+CHARACTERS = st.text(
+    "aZ09_+-. []{}'\"\\=:#,\t\n\x00\x1b\x85\u2028\ud83dé漢😀", min_size=1, max_size=12
+)
 STEPS = st.one_of(st.integers(0, 99), CHARACTERS.filter(lambda text: text.strip() == text))
 
 
-@given(st.lists(STEPS, min_size=1, max_size=5).filter(lambda path: isinstance(path[0], str)), CHARACTERS)
+@given(
+    st.lists(STEPS, min_size=1, max_size=5).filter(lambda path: isinstance(path[0], str)),
+    CHARACTERS,
+)
 def test_a_key_as_messages_write_it_can_be_set(path: list[str | int], value: str) -> None:
     setting = parse_setting(f"{dotted(tuple(path))}={value}")
     assert (setting.path, setting.value) == (tuple(path), value)
     assert setting.label.isprintable()
 
 
-KEYS = st.sampled_from([dotted(path) for path, _ in LEAVES] + ["thrusters", "limits", "goal.spin", "x.y[0]", "limits"])
+KEYS = st.sampled_from(
+    [dotted(path) for path, _ in LEAVES] + ["thrusters", "limits", "goal.spin", "x.y[0]", "limits"]
+)
 VALUES = st.one_of(st.text(max_size=12), st.text("[]{}:,&*!'\"#-1e9 .xmNd\n\t|>%@", max_size=24))
 
 
 @pytest.mark.deep
 @settings(max_examples=200)
 @given(st.lists(st.tuples(KEYS, VALUES), min_size=1, max_size=3))
-def test_whatever_is_set_is_a_spacecraft_or_faults_on_one_line_each(chosen: list[tuple[str, str]]) -> None:
-    assert all(str(fault).isprintable() for fault in faults_of(EXAMPLE, *(f"{key}={value}" for key, value in chosen)))
+def test_whatever_is_set_is_a_spacecraft_or_faults_on_one_line_each(
+    chosen: list[tuple[str, str]],
+) -> None:
+    assert all(
+        str(fault).isprintable()
+        for fault in faults_of(EXAMPLE, *(f"{key}={value}" for key, value in chosen))
+    )
 
 
 def test_the_library_sets_too(tmp_path: Path) -> None:
     file = tmp_path / "f.yaml"
     file.write_text(THRUSTERS, encoding="utf-8")
-    values = {"limits.horizon": "300 s", "thrusters.T1.torque": (9, 0, 0), "limits.blackout": [["1 s", 2]], "mass": 50}
+    values = {
+        "limits.horizon": "300 s",
+        "thrusters.T1.torque": (9, 0, 0),
+        "limits.blackout": [["1 s", 2]],
+        "mass": 50,
+    }
     craft = nutdamp.load(file, set=values)
     assert (craft.limits.horizon, craft.limits.blackout, craft.mass) == (300.0, ((1.0, 2.0),), 50.0)
     assert craft.channels[0].thrusters[0].torque[0] == 9.0
-    wrong = (({"limits.tick": -1.5}, FaultyFile), ({"a=b": 1}, BadRequest), ({"mass": object}, BadRequest))
+    wrong = (
+        ({"limits.tick": -1.5}, FaultyFile),
+        ({"a=b": 1}, BadRequest),
+        ({"mass": object}, BadRequest),
+    )
     said = (refusal(error, nutdamp.load, file, set=setting) for setting, error in wrong)
     check_text("files.settings-library", "\n".join(said))
 
@@ -193,17 +262,22 @@ thrusters:
   - {name: P, torque: [8, 0, 0], isp: 220 s, lever_arm: 0.8 m, max_on_time: 1 s}
   - {name: N, torque: [-8, 0, 0], isp: 220 s, lever_arm: 0.8 m, max_on_time: 1 s}
 """
-ATTITUDE = "attitude: {quaternion: [0.9, 0.1, -0.2, 0.3], epoch: 2026-03-01T12:00:00Z, frame: EME2000}\n"
+ATTITUDE = (
+    "attitude: {quaternion: [0.9, 0.1, -0.2, 0.3], epoch: 2026-03-01T12:00:00Z, frame: EME2000}\n"
+)
 TENSOR = "{tensor: [[120, 2, 1], [2, 110, 0.5], [1, 0.5, 80]]}"
 TANK = (
-    "tank: {propellant: 0.5 kg, pressure: 22 bar, final_pressure: 8 bar, inertia_per_kg: {A: 3, C: 5}}\nmass: 250 kg\n"
+    "tank: {propellant: 0.5 kg, pressure: 22 bar, final_pressure: 8 bar, inertia_per_kg: {A: 3, "
+    "C: 5}}\nmass: 250 kg\n"
 )
 LEAK = "disturbances: [{name: leak, torque: [5 mN m, 2 mN m, 0], rate: -1.3 rad/s}]\n"
 
 TEXTS = {
     "symmetric": SOUNDER + ATTITUDE,
     "tensor": SOUNDER.replace("{A: 120 kg m^2, C: 80 kg m^2}", TENSOR) + ATTITUDE,
-    "rates": SOUNDER.replace("state: {spin: 30 rpm, nutation: 5 deg, phase: 20 deg}", "omega0: [0.2, 5 deg/s, 3]")
+    "rates": SOUNDER.replace(
+        "state: {spin: 30 rpm, nutation: 5 deg, phase: 20 deg}", "omega0: [0.2, 5 deg/s, 3]"
+    )
     + ATTITUDE,
     "tank": SOUNDER + ATTITUDE + TANK,
     "turning torque": SOUNDER + ATTITUDE + LEAK,
@@ -231,17 +305,24 @@ def test_the_file_carried_on_flies_as_the_plan_does(text: str) -> None:
 
 def test_tank_and_mass_are_those_left() -> None:
     plan = planned(TEXTS["tank"])
-    used, carried = plan.propellant or 0.0, plan.carried()
+    used = plan.propellant or 0.0
+    carried = plan.carried()
     before, after = present(plan.spacecraft.tank), present(carried.tank)
     assert (after.propellant, carried.mass) == pytest.approx((0.5 - used, 250.0 - used))
     assert after.pressure == pytest.approx(before.pressure_after(used))
     # What is left acts as the rest of the same tank.
-    assert after.thrust_factor(0.1) * after.pressure == pytest.approx(before.pressure_after(used + 0.1))
-    assert carried.inertia.moments == pytest.approx((120.0 - 3.0 * used, 120.0 - 3.0 * used, 80.0 - 5.0 * used))
+    assert after.thrust_factor(0.1) * after.pressure == pytest.approx(
+        before.pressure_after(used + 0.1)
+    )
+    assert carried.inertia.moments == pytest.approx(
+        (120.0 - 3.0 * used, 120.0 - 3.0 * used, 80.0 - 5.0 * used)
+    )
 
 
 def test_a_target_stays_where_it_is_in_space() -> None:
-    """Without an attitude a file knows space by the motion at t = 0, which is another one in the file carried on."""
+    """Without an attitude a file knows space by the motion at t = 0, which is another one in the
+    file carried on.
+    """
     plan = nutdamp.plan(nutdamp.read(SOUNDER + "goal: {tilt: 10 deg, azimuth: 45 deg}\n"), "none")
     moved_on = later(plan.reaching(33.0), 33.0)
     carried = plan.carried(33.0)
@@ -264,7 +345,8 @@ def test_comments_and_units_are_kept() -> None:
 
 def test_a_chain_of_files_is_one_flight() -> None:
     body = nutdamp.read(TEXTS["symmetric"])
-    once, many = nutdamp.plan(body, "none").carried(60.0), body
+    once = nutdamp.plan(body, "none").carried(60.0)
+    many = body
     for _ in range(6):
         many = nutdamp.plan(many, "none").carried(10.0)
     assert many.omega0 == pytest.approx(once.omega0, abs=1e-10)
@@ -277,7 +359,9 @@ def test_what_no_file_can_hold_is_refused() -> None:
     with pytest.raises(BadRequest, match="is on at"):
         plan.carried(first.t)
     body = nutdamp.read(SOUNDER + TANK.replace("0.5 kg", "1 g"))
-    empty = nutdamp.Plan(body, "by hand", Schedule(supplied(body, [channel_pulse(body.channels[0], 3.0, 5.0)])))
+    empty = nutdamp.Plan(
+        body, "by hand", Schedule(supplied(body, [channel_pulse(body.channels[0], 3.0, 5.0)]))
+    )
     with pytest.raises(BadRequest, match="no propellant"):
         empty.carried()
     for time in (-3.0, float("nan"), float("inf")):
@@ -292,7 +376,9 @@ def test_what_no_file_can_hold_is_refused() -> None:
     (("plan", "--nominal", "--scheme", "two-pulse"), 3.0),
     (("simulate", "--scheme", "two-pulse", "--until", "20s"), 20.0),
 ])  # fmt: skip
-def test_commands_write_it(run: Run, tmp_path: Path, command: tuple[str, ...], lasts: float) -> None:
+def test_commands_write_it(
+    run: Run, tmp_path: Path, command: tuple[str, ...], lasts: float
+) -> None:
     (tmp_path / "now.yaml").write_text(TEXTS["symmetric"])
     run(*command, "now.yaml", "-o", "next.yaml", status=0)
     carried = nutdamp.load(tmp_path / "next.yaml")
@@ -330,20 +416,39 @@ loop:
 dispersions:
   {A: {normal: 0.5 %}, C: {normal: 0.5 %}, thrust: {T1: {normal: 3 %}, T 2: {normal: 3 %}, T3: {normal: 2 %}}}
 """
-# fmt: off
 EVERYTHING = {
-    "A": 121.0, "C/A": 0.7, "omega_1": 0.1, "omega_2": -0.2, "omega_3": 3.1, "attitude_1": 0.01, "attitude_2": -0.02,
-    "attitude_3": 0.3, "bias_omega_1": 1e-3, "wobble_2": 2e-3, "bias_acceleration": 0.03, "thrust T1": 0.96,
-    "thrust T 2": 1.05, "delay T1": 0.005, "delay T 2": -0.015,
+    "A": 121.0,
+    "C/A": 0.7,
+    "omega_1": 0.1,
+    "omega_2": -0.2,
+    "omega_3": 3.1,
+    "attitude_1": 0.01,
+    "attitude_2": -0.02,
+    "attitude_3": 0.3,
+    "bias_omega_1": 1e-3,
+    "wobble_2": 2e-3,
+    "bias_acceleration": 0.03,
+    "thrust T1": 0.96,
+    "thrust T 2": 1.05,
+    "delay T1": 0.005,
+    "delay T 2": -0.015,
 }
-# fmt: on
-SIGMAS = {"A": 0.4, "C/A": 1e-3, "omega_1": 1e-3, "thrust T1": 0.01, "attitude_1": 2e-3, "attitude_2": 2e-3}
+SIGMAS = {
+    "A": 0.4,
+    "C/A": 1e-3,
+    "omega_1": 1e-3,
+    "thrust T1": 0.01,
+    "attitude_1": 2e-3,
+    "attitude_2": 2e-3,
+}
 
 
 def test_the_file_holds_all_that_is_known_now() -> None:
     settings = (parse_setting("thrusters.T3.torque[1]=-9"), parse_setting("mass=200 kg"))
     body = Source(FILE, "f.yaml", settings).read()
-    fired = Schedule(tuple(channel_pulse(one, t, 0.5) for one, t in zip(body.channels, (3.0, 6.0), strict=False)))
+    fired = Schedule(
+        tuple(channel_pulse(one, t, 0.5) for one, t in zip(body.channels, (3.0, 6.0), strict=False))
+    )
     record = silent(*GYROS, "axis_x", "axis_y", "axis_z", "acceleration", schedule=fired)
     fit = told(body, record, EVERYTHING, SIGMAS)
     known = carried(fit, 7.5)
@@ -353,8 +458,12 @@ def test_the_file_holds_all_that_is_known_now() -> None:
     assert now.inertia.moments == pytest.approx((121.0, 121.0, 84.7))
     assert now.omega0 == pytest.approx(expected.omega0, rel=1e-9)
     assert (now.attitude is not None, now.mass) == (True, 200.0)
-    assert abs(now.initial.quaternion @ expected.initial.quaternion) == pytest.approx(1.0, abs=1e-12)
-    assert now.target_axis == pytest.approx(body.target_axis, abs=1e-9)  # though t = 0 is another now
+    assert abs(now.initial.quaternion @ expected.initial.quaternion) == pytest.approx(
+        1.0, abs=1e-12
+    )
+    assert now.target_axis == pytest.approx(
+        body.target_axis, abs=1e-9
+    )  # though t = 0 is another now
     assert (present(now.attitude).epoch or "").startswith("2026-03-01T12:00:07.5")
     thrusters = [one.thrusters[0] for one in now.channels]
     assert [one.torque[1] for one in thrusters[1:]] == pytest.approx([8.0 * 1.05, -9.0])
@@ -364,7 +473,8 @@ def test_the_file_holds_all_that_is_known_now() -> None:
     delays = [(one.open_delay, one.close_delay) for one in valves if isinstance(one, Trapezoid)]
     assert np.ravel(delays) == pytest.approx([0.015, 0.017, 0.005, 0.005, 0.01, 0.012])
     assert present(now.loop).sensor.bias == pytest.approx(0.03)
-    spread, sigmas = present(now.dispersions), dict(zip(known.names, known.sigmas, strict=True))
+    spread = present(now.dispersions)
+    sigmas = dict(zip(known.names, known.sigmas, strict=True))
     assert present(spread.A).size == pytest.approx(0.4 / 121.0, rel=1e-5)
     sizes = [tolerance and tolerance.size for tolerance in (*spread.omega0, spread.attitude)]
     rates = [sigmas[f"omega0_{axis}"] for axis in (1, 2, 3)]
@@ -380,9 +490,21 @@ def test_the_file_holds_all_that_is_known_now() -> None:
 
 
 CASES: dict[str, tuple[str, Mapping[str, float], bool]] = {
-    "three moments, other axes": ("inertia: {A: 120, C: 80}\nstate: {spin: 3, nutation: 5 deg}\n", {}, True),
-    "tensor": ("inertia: {tensor: [[120, 0, 1], [0, 110, 2], [1, 2, 80]]}\nomega0: [0.1, 10 deg/s, 3]\n", {}, True),
-    "decay": ("inertia: {A: 80, C: 120}\nomega0: [0.1, 0.2, 3]\ndissipation: {time_constant: 5 min}\n", {}, False),
+    "three moments, other axes": (
+        "inertia: {A: 120, C: 80}\nstate: {spin: 3, nutation: 5 deg}\n",
+        {},
+        True,
+    ),
+    "tensor": (
+        "inertia: {tensor: [[120, 0, 1], [0, 110, 2], [1, 2, 80]]}\nomega0: [0.1, 10 deg/s, 3]\n",
+        {},
+        True,
+    ),
+    "decay": (
+        "inertia: {A: 80, C: 120}\nomega0: [0.1, 0.2, 3]\ndissipation: {time_constant: 5 min}\n",
+        {},
+        False,
+    ),
     "odd": ("inertia: {A: 80, C: 120}\nomega0: [0.1, 0.2, 3]\n", {"growth": 0.002}, False),
     "not seen": ("inertia: {A: 80, C: 120}\nomega0: [0.1, 0.2, 3]\n", {"growth": 1e-8}, False),
 }
@@ -390,7 +512,9 @@ CASES: dict[str, tuple[str, Mapping[str, float], bool]] = {
 
 @pytest.mark.parametrize("name", CASES)
 def test_bodies_of_any_kind_are_written_as_the_file_has_them(name: str) -> None:
-    """Tensors and rates where A, C and angles do not tell it; a growth that dissipation would not cause is said."""
+    """Tensors and rates where A, C and angles do not tell it; a growth that dissipation would not
+    cause is said.
+    """
     text, given, unequal = CASES[name]
     text = "name: x\n" + text
     body = Source(text, "f.yaml").read()
@@ -412,7 +536,12 @@ def test_bodies_of_any_kind_are_written_as_the_file_has_them(name: str) -> None:
 
 def test_thrusters_that_did_not_fire_and_delays_that_no_valve_has_are_said() -> None:
     body = Source(FILE, "f.yaml").read()
-    fired = Schedule(tuple(channel_pulse(one, t, 0.5) for one, t in zip(body.channels, (2.0, 4.0, 6.0), strict=True)))
+    fired = Schedule(
+        tuple(
+            channel_pulse(one, t, 0.5)
+            for one, t in zip(body.channels, (2.0, 4.0, 6.0), strict=True)
+        )
+    )
     values = {"thrust T1": 0.01, "thrust T 2": -0.9, "delay T1": -0.5, "delay T3": -0.02}
     fit = told(body, silent(*GYROS, schedule=fired), values, {})
     known = carried(fit, 0.0)
@@ -436,10 +565,14 @@ attitude: {quaternion: [0.9, 0.1, -0.2, 0.3], epoch: 2026-03-01T12:00:00Z, frame
 thrusters:
   - {name: P, torque: [8, 0, 0], max_on_time: 1 s}
 """
-SKEW = SPACECRAFT.replace("{A: 120 kg m^2, C: 80 kg m^2}", "{tensor: [[120, 2, 1], [2, 110, 0.5], [1, 0.5, 80]]}")
+SKEW = SPACECRAFT.replace(
+    "{A: 120 kg m^2, C: 80 kg m^2}", "{tensor: [[120, 2, 1], [2, 110, 0.5], [1, 0.5, 80]]}"
+)
 
 
-def exported(tmp_path: Path, text: str, form: str, until: float = 20.0) -> tuple[Path, nutdamp.Plan]:
+def exported(
+    tmp_path: Path, text: str, form: str, until: float = 20.0
+) -> tuple[Path, nutdamp.Plan]:
     plan = nutdamp.plan(nutdamp.read(text), "none")
     path = tmp_path / f"message.{form}"
     nutdamp.export(plan, form, path, until=until if form == "aem" else None)
@@ -454,7 +587,9 @@ def quaternion(spacecraft: nutdamp.Spacecraft) -> np.ndarray:
 def test_a_history_is_read_as_it_was_written(tmp_path: Path, text: str) -> None:
     path, plan = exported(tmp_path, text, "aem")
     history = read_history(str(path))
-    rates, quaternions = plan.spacecraft.inertia.in_file_axes(*plan.reaching(20.0).motion(history.times))
+    rates, quaternions = plan.spacecraft.inertia.in_file_axes(
+        *plan.reaching(20.0).motion(history.times)
+    )
     assert np.allclose(present(history.rates), rates, rtol=0.0, atol=1e-9)
     assert max(turned(*pair) for pair in zip(history.quaternions, quaternions, strict=True)) < 1e-9
     assert history.times[-1] == pytest.approx(20.0, abs=1e-6)
@@ -462,17 +597,23 @@ def test_a_history_is_read_as_it_was_written(tmp_path: Path, text: str) -> None:
 
 @pytest.mark.parametrize(("form", "at"), [("apm", None), ("aem", None), ("aem", "7s")])
 @pytest.mark.parametrize("text", [SPACECRAFT, SKEW], ids=["symmetric", "tensor"])
-def test_a_message_is_merged_into_a_file(run: Run, tmp_path: Path, text: str, form: str, at: str | None) -> None:
+def test_a_message_is_merged_into_a_file(
+    run: Run, tmp_path: Path, text: str, form: str, at: str | None
+) -> None:
     """Into a file with another motion: then it moves as the one that the message is of."""
     path, plan = exported(tmp_path, text, form)
-    other = text.replace("[0.2 rad/s, 5 deg/s, 30 rpm]", "[0.1 rad/s, 2 deg/s, 29 rpm]").replace("[0.9, 0.1,", "[1, 0,")
+    other = text.replace("[0.2 rad/s, 5 deg/s, 30 rpm]", "[0.1 rad/s, 2 deg/s, 29 rpm]").replace(
+        "[0.9, 0.1,", "[1, 0,"
+    )
     (tmp_path / "other.yaml").write_text(other)
     more = () if at is None else ("--at", at)
     run("import", path.name, "--into", "other.yaml", "-o", "merged.yaml", *more, status=0)
     merged = nutdamp.load(tmp_path / "merged.yaml")
     since = float(present(present(merged.attitude).epoch).removesuffix("Z")[17:])
     assert since >= (0.0 if at is None else 7.0)
-    rates, quaternions = plan.spacecraft.inertia.in_file_axes(*plan.reaching(20.0).motion(np.array([since])))
+    rates, quaternions = plan.spacecraft.inertia.in_file_axes(
+        *plan.reaching(20.0).motion(np.array([since]))
+    )
     assert np.allclose(merged.rates, rates[0], rtol=0.0, atol=1e-9)
     assert turned(quaternion(merged), quaternions[0]) < 1e-8
     lines = (tmp_path / "merged.yaml").read_text().splitlines()
@@ -488,23 +629,40 @@ def test_inertia_is_merged_only_where_it_is_asked_for(run: Run, tmp_path: Path) 
         assert nutdamp.load(tmp_path / "merged.yaml").inertia.tensor[1, 1] == pytest.approx(moment)
 
 
-def test_the_nutation_of_a_message_stays_whatever_the_ratio_of_the_file(run: Run, tmp_path: Path) -> None:
-    """NUTATION = 5 became 4.62 deg at exit 0; spin, nutation and period of the message are those of C/A = 1.2009."""
+def test_the_nutation_of_a_message_stays_whatever_the_ratio_of_the_file(
+    run: Run, tmp_path: Path
+) -> None:
+    """NUTATION = 5 became 4.62 deg at exit 0; spin, nutation and period of the message are those of
+    C/A = 1.2009.
+    """
     text = case("apm-into.yaml").read_text()
     for moment, doubt in (("1300", "C/A = 1.201, and the file has 1.3:"), ("1200.9", "")):
         (tmp_path / "other.yaml").write_text(text.replace("1300", moment))
-        result = run("import", str(case("spin-nutation.apm.txt")), "--into", "other.yaml", "-o", "merged.yaml")
+        result = run(
+            "import",
+            str(case("spin-nutation.apm.txt")),
+            "--into",
+            "other.yaml",
+            "-o",
+            "merged.yaml",
+        )
         assert (result.returncode, "warning" in result.stderr) == (0, bool(doubt))
         assert doubt in result.stderr
         merged = nutdamp.load(tmp_path / "merged.yaml")
         assert math.degrees(merged.nutation) == pytest.approx(5.0, rel=1e-12)
-        assert merged.spin == pytest.approx(-math.pi / 10.0 + 2.0 * math.pi / 3.3333333 * math.cos(math.radians(5.0)))
+        assert merged.spin == pytest.approx(
+            -math.pi / 10.0 + 2.0 * math.pi / 3.3333333 * math.cos(math.radians(5.0))
+        )
 
 
 def test_an_attitude_is_written_as_the_message_has_it(tmp_path: Path) -> None:
     """Without the rounding of a turn to the principal axes and back."""
-    path, _ = exported(tmp_path, SPACECRAFT.replace("[0.9, 0.1, -0.2, 0.3]", "[0.8, 0, 0.6, 0]"), "apm")
-    assert "quaternion: [0.8, 0, 0.6, 0]," in merged_text(Source(SKEW, "f.yaml"), read_apm(str(path)), inertia=True)
+    path, _ = exported(
+        tmp_path, SPACECRAFT.replace("[0.9, 0.1, -0.2, 0.3]", "[0.8, 0, 0.6, 0]"), "apm"
+    )
+    assert "quaternion: [0.8, 0, 0.6, 0]," in merged_text(
+        Source(SKEW, "f.yaml"), read_apm(str(path)), inertia=True
+    )
 
 
 def test_a_file_without_attitude_gets_one(run: Run, tmp_path: Path) -> None:
@@ -512,7 +670,10 @@ def test_a_file_without_attitude_gets_one(run: Run, tmp_path: Path) -> None:
     lines = [line for line in SPACECRAFT.splitlines() if not line.startswith("attitude")]
     (tmp_path / "other.yaml").write_text("\n".join(lines))
     assert run("import", path.name, "--into", "other.yaml", "-o", "merged.yaml").returncode == 0
-    assert turned(quaternion(nutdamp.load(tmp_path / "merged.yaml")), quaternion(plan.spacecraft)) < 1e-8
+    assert (
+        turned(quaternion(nutdamp.load(tmp_path / "merged.yaml")), quaternion(plan.spacecraft))
+        < 1e-8
+    )
 
 
 def test_a_history_is_telemetry(tmp_path: Path) -> None:
@@ -557,13 +718,20 @@ def test_records_out_of_order_and_of_wrong_length_are_faults_with_lines(tmp_path
         assert [fault.line for fault in wrong.value.faults] == [first + 2, first + 4]
 
 
-@pytest.mark.parametrize(("arguments", "status"), [
-    (("import", "m.aem"), 2), (("import", "m.aem", "--at", "3s"), 2), (("import", "m.aem", "--inertia"), 2),
-    (("import", "m.aem", "--into", "s.yaml", "--inertia"), 2),
-    (("import", "m.aem", "--into", "s.yaml", "--at", "99s"), 2),
-    (("import", "m.aem", "--into", "s.yaml", "--schedule", "p.csv"), 2),
-])  # fmt: skip
-def test_what_cannot_be_merged_is_refused(run: Run, tmp_path: Path, arguments: tuple[str, ...], status: int) -> None:
+@pytest.mark.parametrize(
+    ("arguments", "status"),
+    [
+        (("import", "m.aem"), 2),
+        (("import", "m.aem", "--at", "3s"), 2),
+        (("import", "m.aem", "--inertia"), 2),
+        (("import", "m.aem", "--into", "s.yaml", "--inertia"), 2),
+        (("import", "m.aem", "--into", "s.yaml", "--at", "99s"), 2),
+        (("import", "m.aem", "--into", "s.yaml", "--schedule", "p.csv"), 2),
+    ],
+)
+def test_what_cannot_be_merged_is_refused(
+    run: Run, tmp_path: Path, arguments: tuple[str, ...], status: int
+) -> None:
     path, _ = exported(tmp_path, SPACECRAFT, "aem")
     path.rename(tmp_path / "m.aem")
     (tmp_path / "s.yaml").write_text(SPACECRAFT)
@@ -578,8 +746,12 @@ DECLINATIONS = st.floats(-89.0, 89.0)
 SYMMETRIC = "{A: 120, C: 80}"
 
 
-def body(given: str, *, spin: float = 3.0, inertia: str = SYMMETRIC, more: str = "") -> nutdamp.Spacecraft:
-    return nutdamp.read(f"name: b\ninertia: {inertia}\nomega0: [0.1, -0.2, {spin}]\nattitude: {{{given}}}\n{more}")
+def body(
+    given: str, *, spin: float = 3.0, inertia: str = SYMMETRIC, more: str = ""
+) -> nutdamp.Spacecraft:
+    return nutdamp.read(
+        f"name: b\ninertia: {inertia}\nomega0: [0.1, -0.2, {spin}]\nattitude: {{{given}}}\n{more}"
+    )
 
 
 def direction(right_ascension: float, declination: float) -> np.ndarray:
@@ -597,11 +769,15 @@ def same_angle(first: float, second: float) -> bool:
     return abs((first - second + 180.0) % 360.0 - 180.0) < 1e-7
 
 
-@given(ANGLES, DECLINATIONS, ANGLES, st.sampled_from([3.0, -3.0]), st.sampled_from([SYMMETRIC, TENSOR]))
+@given(
+    ANGLES, DECLINATIONS, ANGLES, st.sampled_from([3.0, -3.0]), st.sampled_from([SYMMETRIC, TENSOR])
+)
 def test_the_phase_counts_from_the_ascending_node_to_body_axis_1(
     ra: float, dec: float, phase: float, spin: float, inertia: str
 ) -> None:
-    spacecraft = body(f"spin_axis: [{ra} deg, {dec} deg], phase: {phase} deg", spin=spin, inertia=inertia)
+    spacecraft = body(
+        f"spin_axis: [{ra} deg, {dec} deg], phase: {phase} deg", spin=spin, inertia=inertia
+    )
     axis = direction(ra, dec)
     assert np.allclose(spacecraft.axis, axis, rtol=0.0, atol=1e-12)
     first = attitude.rotate(quaternion(spacecraft), np.array([1.0, 0.0, 0.0]))
@@ -609,7 +785,9 @@ def test_the_phase_counts_from_the_ascending_node_to_body_axis_1(
 
 
 @given(ANGLES, DECLINATIONS, st.sampled_from([3.0, -3.0]), st.sampled_from([SYMMETRIC, TENSOR]))
-def test_it_may_be_that_of_the_angular_momentum(ra: float, dec: float, spin: float, inertia: str) -> None:
+def test_it_may_be_that_of_the_angular_momentum(
+    ra: float, dec: float, spin: float, inertia: str
+) -> None:
     spacecraft = body(f"spin_axis: [{ra} deg, {dec} deg], of: momentum", spin=spin, inertia=inertia)
     momentum = spacecraft.momentum / np.linalg.norm(spacecraft.momentum)
     assert np.allclose(momentum, direction(ra, dec), rtol=0.0, atol=1e-12)
@@ -629,7 +807,10 @@ def test_at_a_pole_the_phase_counts_from_x(dec: float) -> None:
     spacecraft = body(f"spin_axis: [10 deg, {dec} deg], phase: 30 deg")
     first = attitude.rotate(quaternion(spacecraft), np.array([1.0, 0.0, 0.0]))
     assert same_angle(
-        angle_about(np.array([0.0, 0.0, math.copysign(1.0, dec)]), np.array([1.0, 0.0, 0.0]), first), 30.0
+        angle_about(
+            np.array([0.0, 0.0, math.copysign(1.0, dec)]), np.array([1.0, 0.0, 0.0]), first
+        ),
+        30.0,
     )
 
 

@@ -1,4 +1,6 @@
-"""YAML text -> plain values that know their places -> sections as classes; and files written whole or not at all."""
+"""YAML text -> plain values that know their places -> sections as classes; and files written whole
+or not at all.
+"""
 
 import json
 import math
@@ -18,7 +20,17 @@ from nutdamp.files.editing import edited
 from nutdamp.files.fields import Field, Length, Problems, Quantity, Section, Within
 from nutdamp.files.reader import example_text, section_schema
 from nutdamp.files.tabular import json_text, make_folder, whole_file, write_whole
-from nutdamp.files.yaml import MAX_BYTES, MAX_DEPTH, MAX_NODES, Place, decode, dotted, read_text, read_tree, resolve
+from nutdamp.files.yaml import (
+    MAX_BYTES,
+    MAX_DEPTH,
+    MAX_NODES,
+    Place,
+    decode,
+    dotted,
+    read_text,
+    read_tree,
+    resolve,
+)
 
 
 def plain(text: str) -> object:
@@ -33,17 +45,48 @@ def refusal(text: str | bytes) -> str:
     return str(caught.value)
 
 
-# fmt: off
 NUMBERS: dict[str, float | None] = {
-    "1e-3": 0.001, "1E3": 1000.0, "+.5": 0.5, "5.": 5.0, "-7": -7, "010": 10, "0x10": 16, "0o17": 15, "1e400": math.inf,
-    ".inf": math.inf, "-.INF": -math.inf, "9" * 5000: math.inf, "0x" + "f" * 5000: math.inf, "true": True,
-    "FALSE": False, "~": None, "null": None, "": None,
+    "1e-3": 0.001,
+    "1E3": 1000.0,
+    "+.5": 0.5,
+    "5.": 5.0,
+    "-7": -7,
+    "010": 10,
+    "0x10": 16,
+    "0o17": 15,
+    "1e400": math.inf,
+    ".inf": math.inf,
+    "-.INF": -math.inf,
+    "9" * 5000: math.inf,
+    "0x" + "f" * 5000: math.inf,
+    "true": True,
+    "FALSE": False,
+    "~": None,
+    "null": None,
+    "": None,
 }
 TEXTS = [
-    "yes", "no", "on", "off", "y", "n", "1_000", "12:30:00", "2026-03-01", "+M1", "0b1", "1e", "e3", ".", "tRue", "<<",
-    "=", "-", "+.nan", "1.2.3",
+    "yes",
+    "no",
+    "on",
+    "off",
+    "y",
+    "n",
+    "1_000",
+    "12:30:00",
+    "2026-03-01",
+    "+M1",
+    "0b1",
+    "1e",
+    "e3",
+    ".",
+    "tRue",
+    "<<",
+    "=",
+    "-",
+    "+.nan",
+    "1.2.3",
 ]
-# fmt: on
 
 
 def test_plain_scalars_follow_the_core_schema() -> None:
@@ -57,17 +100,44 @@ def test_plain_scalars_follow_the_core_schema() -> None:
     ("text", "value"),
     [
         (
-            "{a: '5', b: \"5\", c: !!str 5, d: ! 5, e: !!float 5, f: !!int 5, g: !!null ~, h: !!seq [1], i: !!map {}}",
-            {"a": "5", "b": "5", "c": "5", "d": "5", "e": 5.0, "f": 5, "g": None, "h": [1], "i": {}},
+            (
+                "{a: '5', b: \"5\", c: !!str 5, d: ! 5, e: !!float 5, f: !!int 5, g: !!null ~, h: "
+                "!!seq [1], i: !!map {}}"
+            ),
+            {
+                "a": "5",
+                "b": "5",
+                "c": "5",
+                "d": "5",
+                "e": 5.0,
+                "f": 5,
+                "g": None,
+                "h": [1],
+                "i": {},
+            },
         ),
-        ("{1: 0, +M1: 0, yes: 0, 1e3: 0, '': 0, ~: 0}", dict.fromkeys(["1", "+M1", "yes", "1e3", "", "~"], 0)),
-        ('{\n\t"a": [1,\t2.5e-1],\t"b": {"c":"\\u00e4\\/\\ud83d\\ude00"}\n}\n', {"a": [1, 0.25], "b": {"c": "ä/😀"}}),
+        (
+            "{1: 0, +M1: 0, yes: 0, 1e3: 0, '': 0, ~: 0}",
+            dict.fromkeys(["1", "+M1", "yes", "1e3", "", "~"], 0),
+        ),
+        (
+            '{\n\t"a": [1,\t2.5e-1],\t"b": {"c":"\\u00e4\\/\\ud83d\\ude00"}\n}\n',
+            {"a": [1, 0.25], "b": {"c": "ä/😀"}},
+        ),
         ("a:\t5\t# five\nb: 6\n", {"a": 5, "b": 6}),
         ("{a: &x [1, 2], &k b: *x, c: *k }", {"a": [1, 2], "b": [1, 2], "c": "b"}),
         ("a: " + "[" * MAX_DEPTH + "]" * MAX_DEPTH, None),
         ("a: [" + "1," * (MAX_NODES - 3) + "1]", None),
     ],
-    ids=["quotes and tags", "keys as written", "JSON with tabs", "tabs that are space", "aliases", "depth", "number"],
+    ids=[
+        "quotes and tags",
+        "keys as written",
+        "JSON with tabs",
+        "tabs that are space",
+        "aliases",
+        "depth",
+        "number",
+    ],
 )
 def test_what_is_read(text: str, value: object) -> None:
     """The limits themselves are allowed."""
@@ -86,28 +156,63 @@ def test_places_count_from_one_and_leave_out_byte_order_marks() -> None:
     assert decode(b"\xef\xbb\xbfa: 1", "f.yaml") == "a: 1"
 
 
-# fmt: off
 REFUSED: list[str | bytes] = [
-    "", "  \n\n", "# only\n# words\n", "---\n", "5\n", "- a\n- b\n", "a: 1\n---\nb: 2\n", "a:\n\tb: 1\n", "a: b: c\n",
-    "a: 1\nb\nc: 2\n", "a: 'x\nb: 3\n", "a: [1, 2\nb: 3\n", "a: {b: 1]\n", "a: [1,,2]\n", "a: 1\n b: 2\n",
-    "a:\n  b: 1\n c: 2\n", "a: 5 - 3\nb: - 4\n", "a: @b\n", 'a: "\\q"\n', 'a: "\\UFFFFFFFF"\n', 'a: "\\ud83d"\n',
-    "{a: 1} x\n", "%YAML 2.0\n---\na: 1\n", "a: !x!y z\n", "a: x\0y\n", "a: 1\nb: \x1b[0m\n", "? [1]\n: 2\n", "a: *x\n",
-    "a: &x [1, *x]\n", "a: !!python/object/apply:os.system [id]\n", "a: !!python/name:os.system ''\n",
-    "!!python/dict {a: 1}\n", "!thing a: 1\n", "a: !!binary aGk=\n", "a: !!int x\n", "a: !!str [1]\n",
+    "",
+    "  \n\n",
+    "# only\n# words\n",
+    "---\n",
+    "5\n",
+    "- a\n- b\n",
+    "a: 1\n---\nb: 2\n",
+    "a:\n\tb: 1\n",
+    "a: b: c\n",
+    "a: 1\nb\nc: 2\n",
+    "a: 'x\nb: 3\n",
+    "a: [1, 2\nb: 3\n",
+    "a: {b: 1]\n",
+    "a: [1,,2]\n",
+    "a: 1\n b: 2\n",
+    "a:\n  b: 1\n c: 2\n",
+    "a: 5 - 3\nb: - 4\n",
+    "a: @b\n",
+    'a: "\\q"\n',
+    'a: "\\UFFFFFFFF"\n',
+    'a: "\\ud83d"\n',
+    "{a: 1} x\n",
+    "%YAML 2.0\n---\na: 1\n",
+    "a: !x!y z\n",
+    "a: x\0y\n",
+    "a: 1\nb: \x1b[0m\n",
+    "? [1]\n: 2\n",
+    "a: *x\n",
+    "a: &x [1, *x]\n",
+    "a: !!python/object/apply:os.system [id]\n",
+    ("a: !!python/name:os.system ''\n"),
+    "!!python/dict {a: 1}\n",
+    "!thing a: 1\n",
+    "a: !!binary aGk=\n",
+    "a: !!int x\n",
+    "a: !!str [1]\n",
     "a: 1\na: 2\nb: 'x\n",  # duplicates that were found before
-    b"\xff\xfea\x00", b"a: 1\nb: \xe4\n", b"\xef\xbb\xbfa: \xc3", b"\x89PNG\r\n\x1a\n\0\0",
+    b"\xff\xfea\x00",
+    b"a: 1\nb: \xe4\n",
+    b"\xef\xbb\xbfa: \xc3",
+    b"\x89PNG\r\n\x1a\n\0\0",
 ]
-# fmt: on
 
 
 def test_what_is_no_plain_yaml_mapping_is_refused_in_one_line_a_fault() -> None:
-    check_text("files.yaml-refused", "\n".join(f"{text!r}\n    {refusal(text)}" for text in REFUSED))
+    check_text(
+        "files.yaml-refused", "\n".join(f"{text!r}\n    {refusal(text)}" for text in REFUSED)
+    )
     assert refusal(b"#" * (MAX_BYTES + 1)).startswith("f.yaml: too large: more than 1 MiB")
 
 
 def test_duplicate_keys_are_all_reported_with_the_first_place() -> None:
     root, faults = read_tree("a: 1\nb: {c: 1, c: 2}\na: 3\na: 4\n", "f.yaml")
-    check_text("files.yaml-duplicates", "\n".join(map(str, sorted(faults, key=lambda fault: fault.line))))
+    check_text(
+        "files.yaml-duplicates", "\n".join(map(str, sorted(faults, key=lambda fault: fault.line)))
+    )
     assert root.plain() == {"a": 1, "b": {"c": 1}}
 
 
@@ -138,7 +243,11 @@ def test_bombs_are_refused_at_once(text: str, message: str) -> None:
 
 def test_files_that_cannot_be_read(tmp_path: Path) -> None:
     folder = "permission denied" if sys.platform == "win32" else "is a directory"
-    for path, reason in [(tmp_path, folder), (tmp_path / "none", "no such file"), (Path("a\0b"), "null")]:
+    for path, reason in [
+        (tmp_path, folder),
+        (tmp_path / "none", "no such file"),
+        (Path("a\0b"), "null"),
+    ]:
         with pytest.raises(CannotRead, match=reason):
             read_text(path)
     (tmp_path / "large.yaml").write_bytes(b"#" * (MAX_BYTES + 10))
@@ -148,7 +257,12 @@ def test_files_that_cannot_be_read(tmp_path: Path) -> None:
 
 def test_paths_as_messages_write_them() -> None:
     paths = ("thrusters", 1, "force"), ("channels", "+M1", 0), ("channels", "a b\n"), ()
-    assert [dotted(path) for path in paths] == ["thrusters[1].force", "channels.+M1[0]", "channels.'a b\\n'", ""]
+    assert [dotted(path) for path in paths] == [
+        "thrusters[1].force",
+        "channels.+M1[0]",
+        "channels.'a b\\n'",
+        "",
+    ]
 
 
 TEXT = """\
@@ -168,15 +282,30 @@ list:
 
 
 def test_values_change_new_keys_go_to_the_end_of_their_mapping_and_comments_stay() -> None:
-    made = edited(TEXT, {("inertia", "A"): "121 kg m^2", ("state", "nutation"): "6 deg", ("list", 1, "x"): "7"})
-    assert made == TEXT.replace("120 kg", "121 kg").replace("5 deg", "6 deg").replace("x: 2", "x: 7")
-    more = edited(
-        TEXT, {("inertia", "B"): "5", ("state", "phase"): "1 deg", ("new", "deep"): "2", ("list", 0, "z"): "9"}
+    made = edited(
+        TEXT,
+        {("inertia", "A"): "121 kg m^2", ("state", "nutation"): "6 deg", ("list", 1, "x"): "7"},
     )
-    expected = TEXT.replace("C: 80}", "C: 80, B: 5}").replace("# angle\n", "# angle\n  phase: 1 deg\n")
+    assert made == TEXT.replace("120 kg", "121 kg").replace("5 deg", "6 deg").replace(
+        "x: 2", "x: 7"
+    )
+    more = edited(
+        TEXT,
+        {
+            ("inertia", "B"): "5",
+            ("state", "phase"): "1 deg",
+            ("new", "deep"): "2",
+            ("list", 0, "z"): "9",
+        },
+    )
+    expected = TEXT.replace("C: 80}", "C: 80, B: 5}").replace(
+        "# angle\n", "# angle\n  phase: 1 deg\n"
+    )
     assert more == expected.replace("{x: 1}", "{x: 1, z: 9}") + "new: {deep: 2}\n"
     example = example_text()
-    assert edited(example, {("inertia", "A"): "121 kg m^2"}) == example.replace("{A: 120 kg", "{A: 121 kg")
+    assert edited(example, {("inertia", "A"): "121 kg m^2"}) == example.replace(
+        "{A: 120 kg", "{A: 121 kg"
+    )
 
 
 def test_a_whole_block_gives_way_to_a_flow_value_and_a_key_to_another_name() -> None:
@@ -240,7 +369,12 @@ GOOD: dict[str, tuple[Any, object]] = {
     "pair": (["20 ms", 3], [0.02, 3]),
     "either": (["1 min"], [60.0]),
 }
-SECTIONS = {"named": {"a": {"t": 1}}, "either": {"t": 2}, "inner": {"t": 3}, "inners": [{"t": 4}, {"t": "5 s"}]}
+SECTIONS = {
+    "named": {"a": {"t": 1}},
+    "either": {"t": 2},
+    "inner": {"t": 3},
+    "inners": [{"t": 4}, {"t": "5 s"}],
+}
 BAD: dict[str, tuple[Any, ...]] = {
     "text": ("", 3, [3]),
     "whole": (10, 0, True, 2.0),
@@ -278,7 +412,12 @@ def test_what_is_wrong_is_said_where_it_is_and_all_of_it_at_once() -> None:
     check_text("files.sections", "\n".join(lines))
     problems = []
     Outer.read({"whole": 0, "times": [-1, "x"], "inner": {}}, problems)
-    assert [where for where, _ in problems] == [("whole",), ("times", 0), ("times", 1), ("inner", "t")]
+    assert [where for where, _ in problems] == [
+        ("whole",),
+        ("times", 0),
+        ("times", 1),
+        ("inner", "t"),
+    ]
 
 
 def test_the_schema_allows_what_is_read_and_nothing_else() -> None:
@@ -286,8 +425,16 @@ def test_the_schema_allows_what_is_read_and_nothing_else() -> None:
     schema = {**section_schema(Outer, parts), "$defs": parts}
     Draft202012Validator.check_schema(schema)
     judge = Draft202012Validator(schema)
-    assert all(judge.is_valid(right) for right in ({}, SECTIONS, *({name: given} for name, (given, _) in GOOD.items())))
-    allowed = [(name, value) for name, values in BAD.items() for value in values if judge.is_valid({name: value})]
+    assert all(
+        judge.is_valid(right)
+        for right in ({}, SECTIONS, *({name: given} for name, (given, _) in GOOD.items()))
+    )
+    allowed = [
+        (name, value)
+        for name, values in BAD.items()
+        for value in values
+        if judge.is_valid({name: value})
+    ]
     assert allowed == [("whole", 2.0)]  # JSON knows no other 2
 
 
@@ -299,7 +446,10 @@ def test_what_another_run_is_writing_is_left_alone(tmp_path: Path) -> None:
         stream.write(b"slow")
         write_whole(str(tmp_path / "quick.csv"), "quick")
         assert len([path for path in tmp_path.iterdir() if path.name.startswith(".")]) == 1
-    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"slow.csv": "slow", "quick.csv": "quick"}
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {
+        "slow.csv": "slow",
+        "quick.csv": "quick",
+    }
 
 
 def test_a_failure_leaves_what_was_there_and_nothing_else(tmp_path: Path) -> None:
@@ -319,7 +469,9 @@ def test_a_failure_leaves_what_was_there_and_nothing_else(tmp_path: Path) -> Non
         make_folder("a\0b")
 
 
-def test_modes_stay_names_may_be_as_long_as_the_system_allows_and_need_not_be_utf_8_in_json(tmp_path: Path) -> None:
+def test_modes_stay_names_may_be_as_long_as_the_system_allows_and_need_not_be_utf_8_in_json(
+    tmp_path: Path,
+) -> None:
     path = tmp_path / ("x" * 251 + ".csv")
     path.write_text("before")
     path.chmod(0o640)

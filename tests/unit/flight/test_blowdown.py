@@ -1,4 +1,6 @@
-"""A tank in blowdown, thrust that falls during a pulse; moments of inertia that fall with the propellant: by DOP853."""
+"""A tank in blowdown, thrust that falls during a pulse; moments of inertia that fall with the
+propellant: by DOP853.
+"""
 
 import itertools
 import math
@@ -50,25 +52,38 @@ TANKS = {
 ISP = 220.0
 
 
-def carrier(tank: Tank, spin: float = 3.0, moments: tuple[float, float, float] = (120.0, 120.0, 80.0)) -> Spacecraft:
+def carrier(
+    tank: Tank, spin: float = 3.0, moments: tuple[float, float, float] = (120.0, 120.0, 80.0)
+) -> Spacecraft:
     """A spinner whose jets take 10 N each from the tank."""
     jets = tuple(one.of(thrust=10.0, isp=ISP) for one in cross(8.0))
     return replace(spinner(moments=moments, spin=spin, degrees=5.0, channels=jets), tank=tank)
 
 
-def by_reference(body: Spacecraft, starts: list[tuple[str, float, float]], until: float) -> tuple[Array, Array, float]:
-    """Rates, the matrix body -> inertial and the propellant used, kg, after rectangles of commands."""
-    tank, moments = present(body.tank), np.array(body.inertia.moments)
+def by_reference(
+    body: Spacecraft, starts: list[tuple[str, float, float]], until: float
+) -> tuple[Array, Array, float]:
+    """Rates, the matrix body -> inertial and the propellant used, kg,
+    after rectangles of commands.
+    """
+    tank = present(body.tank)
+    moments = np.array(body.inertia.moments)
     channels = {one.name: one for one in body.channels}
 
     def slope(t: float, y: Array, firing: list[str]) -> Array:
-        omega, turned, used = y[:3], y[3:12].reshape(3, 3), y[12]
-        pressure = tank.pressure / (1.0 + (tank.pressure / tank.final_pressure - 1.0) * used / tank.propellant)
+        omega = y[:3]
+        turned = y[3:12].reshape(3, 3)
+        used = y[12]
+        pressure = tank.pressure / (
+            1.0 + (tank.pressure / tank.final_pressure - 1.0) * used / tank.propellant
+        )
         factor = (pressure / tank.pressure) ** tank.exponent
         isp = ISP if tank.isp is None else float(np.interp(pressure, *np.array(tank.isp).T))
         torque = sum((channels[name].torque * factor for name in firing), np.zeros(3))
         flow = sum(10.0 * factor / (isp * STANDARD_GRAVITY) for _ in firing)
-        across = np.array([[0, -omega[2], omega[1]], [omega[2], 0, -omega[0]], [-omega[1], omega[0], 0]])
+        across = np.array(
+            [[0, -omega[2], omega[1]], [omega[2], 0, -omega[0]], [-omega[1], omega[0], 0]]
+        )
         rates = (torque - np.cross(omega, moments * omega)) / moments
         return np.concatenate([rates, (turned @ across).ravel(), [flow]])
 
@@ -86,10 +101,18 @@ COMMANDS = [("+1", 0.4, 1.5), ("-2", 2.6, 0.9), ("-1", 4.0, 1.2)]
 
 @spread("name", TANKS, quick=2, deep=3)
 def test_pulses_are_flown_as_the_pressure_falls(name: str) -> None:
-    for spin, moments in ((3.0, (120.0, 120.0, 80.0)), (-2.0, (90.0, 90.0, 140.0)), (2.0, (110.0, 98.0, 150.0))):
+    for spin, moments in (
+        (3.0, (120.0, 120.0, 80.0)),
+        (-2.0, (90.0, 90.0, 140.0)),
+        (2.0, (110.0, 98.0, 150.0)),
+    ):
         body = carrier(TANKS[name], spin, moments)
         channels = {one.name: one for one in body.channels}
-        made = Schedule(supplied(body, [on_command(channels[one], start, lasts) for one, start, lasts in COMMANDS]))
+        made = Schedule(
+            supplied(
+                body, [on_command(channels[one], start, lasts) for one, start, lasts in COMMANDS]
+            )
+        )
         rates, _, used = by_reference(body, COMMANDS, made.end)
         assert flown(body, made).settled.rates == pytest.approx(rates, abs=1e-8)
         assert made.propellant == pytest.approx(used, rel=1e-9)
@@ -97,7 +120,9 @@ def test_pulses_are_flown_as_the_pressure_falls(name: str) -> None:
 
 @pytest.mark.parametrize("exponent", [1.0, 0.7, deep(0.0), deep(2.0)])
 def test_limits_of_the_closed_form(exponent: float) -> None:
-    """Nothing falls at one pressure, with an exponent of 0 only the flow lasts, and short pulses see one thrust."""
+    """Nothing falls at one pressure, with an exponent of 0 only the flow lasts, and short pulses
+    see one thrust.
+    """
     tank = replace(SMALL, exponent=exponent)
     gone, mean = tank.burn(0.02, 0.01, 1e-9)
     assert gone == pytest.approx(1e-11 * tank.thrust_factor(0.02), rel=1e-7)
@@ -107,13 +132,19 @@ def test_limits_of_the_closed_form(exponent: float) -> None:
     gone, mean = tank.burn(0.02, 0.01, np.array([0.0, 3.0]))
     assert gone[0] == 0.0
     assert mean[0] == pytest.approx(tank.thrust_factor(0.02))
-    assert gone[1] == pytest.approx(mean[1] * 0.03)  # with one specific impulse the flow goes as the thrust
+    assert gone[1] == pytest.approx(
+        mean[1] * 0.03
+    )  # with one specific impulse the flow goes as the thrust
     if exponent == 0.0:
         assert mean[1] == pytest.approx(1.0)
 
 
-@pytest.mark.parametrize(("time", "within"), [(0.0, 1e-15), (0.3, 1e-12), (60.0, 1e-12), (900.0, 1e-4)])
-def test_a_burn_with_a_table_is_that_of_its_differential_equation(time: float, within: float) -> None:
+@pytest.mark.parametrize(
+    ("time", "within"), [(0.0, 1e-15), (0.3, 1e-12), (60.0, 1e-12), (900.0, 1e-4)]
+)
+def test_a_burn_with_a_table_is_that_of_its_differential_equation(
+    time: float, within: float
+) -> None:
     """Up to a row of the table to rounding; across some of them nearly."""
     tank = Tank(3.0, 22e5, 5.5e5, 0.8, ((5e5, 180.0), (1e6, 205.0), (22e5, 220.0)))
     flow, used = 0.8, 0.3
@@ -123,9 +154,19 @@ def test_a_burn_with_a_table_is_that_of_its_differential_equation(time: float, w
         return np.array([flow * thrust / tank.isp_after(used + y[0]), thrust])
 
     gone, mean = tank.burn(used, flow, time)
-    solved = solve_ivp(slope, (0.0, time), np.zeros(2), "DOP853", rtol=1e-13, atol=1e-16, max_step=max(time, 1.0) / 100)
+    solved = solve_ivp(
+        slope,
+        (0.0, time),
+        np.zeros(2),
+        "DOP853",
+        rtol=1e-13,
+        atol=1e-16,
+        max_step=max(time, 1.0) / 100,
+    )
     assert gone == pytest.approx(solved.y[0, -1], rel=within)
-    assert mean == pytest.approx(solved.y[1, -1] / time if time else tank.thrust_factor(used), rel=within)
+    assert mean == pytest.approx(
+        solved.y[1, -1] / time if time else tank.thrust_factor(used), rel=within
+    )
     each = tank.burn(np.array([used, 1.0]), flow, np.array([[time], [1.0]]))
     for many, one in zip(each, (gone, mean), strict=True):
         assert many.shape == (2, 2)
@@ -136,11 +177,14 @@ def test_a_burn_with_a_table_is_that_of_its_differential_equation(time: float, w
 @pytest.mark.parametrize("cold", [None, Cold(0.8, 3.0, {"+1": 2})])
 def test_a_train_is_its_pulses(name: str, cold: Cold | None) -> None:
     """One after another, up to the last of the propellant."""
-    body, on_times = replace(carrier(TANKS[name]), cold=cold), np.array([0.4, 2.0])
-    jet, count = body.channels[0], 30 if name == "small" else 9
+    body = replace(carrier(TANKS[name]), cold=cold)
+    on_times = np.array([0.4, 2.0])
+    jet = body.channels[0]
+    count = 30 if name == "small" else 9
     levels, used = Supply(body).train(jet, on_times, count)
     for row, on_time in enumerate(on_times.tolist()):
-        supply, total = Supply(body), 0.0
+        supply = Supply(body)
+        total = 0.0
         for number in range(count):
             total += supply.take(jet, on_time)[0]
             assert levels[row, number] == pytest.approx(total, rel=1e-12)
@@ -155,7 +199,9 @@ def test_an_on_time_is_found_for_each_impulse() -> None:
     for effective in (0.05, 0.5, 2.0):
         supply = Supply(body, used=0.03)
         on_time = supply.on_time_for(body.channels[0], effective)
-        assert supply.take(body.channels[0], on_time)[0] * on_time == pytest.approx(effective, rel=1e-12)
+        assert supply.take(body.channels[0], on_time)[0] * on_time == pytest.approx(
+            effective, rel=1e-12
+        )
 
 
 @spread("scheme", ["two-pulse", "one-pulse", "four-pulse", "optimal"], quick=2, deep=2)
@@ -171,7 +217,9 @@ def test_a_plan_takes_out_the_nutation_as_the_pressure_falls(scheme: str) -> Non
 
 
 def test_valves_open_and_close_while_the_pressure_falls() -> None:
-    """Commands there and back: the impulse that a plan asks for is what the thrust gives, with its centroid."""
+    """Commands there and back: the impulse that a plan asks for is what the thrust gives, with its
+    centroid.
+    """
     valve = Trapezoid(open_delay=0.02, close_delay=0.05, rise_time=0.04, fall_time=0.06)
     body = carrier(SMALL)
     body = replace(body, channels=tuple(one.of(valve=valve) for one in body.channels))
@@ -179,7 +227,9 @@ def test_valves_open_and_close_while_the_pressure_falls() -> None:
     assert present(pulse.command).valve
     given = moment = 0.0
     for ramp in present(pulse.command).ramps:
-        length, even, lean = ramp.end - ramp.begin, 0.5 * (ramp.first + ramp.last), 0.5 * (ramp.last - ramp.first)
+        length = ramp.end - ramp.begin
+        even = 0.5 * (ramp.first + ramp.last)
+        lean = 0.5 * (ramp.last - ramp.first)
         given += even * length
         moment += 0.5 * (ramp.begin + ramp.end) * even * length + lean * length**2 / 6.0
     assert given == pytest.approx(pulse.on_time, rel=1e-9)
@@ -200,7 +250,9 @@ def test_cases_without_deviations_are_the_flight_itself() -> None:
 
 
 def test_cases_of_another_valve_fall_as_well() -> None:
-    """A valve that is a little off leaves little more than the nominal one; without the fall it would be a degree."""
+    """A valve that is a little off leaves little more than the nominal one; without the fall it
+    would be a degree.
+    """
     valve = Trapezoid(open_delay=0.02, close_delay=0.03, rise_time=0.02, fall_time=0.02)
     body = carrier(SMALL)
     names = [one.name for one in body.channels]
@@ -216,7 +268,8 @@ def test_cases_of_another_valve_fall_as_well() -> None:
     assert study.outputs_of({name: 0.0})[0] == pytest.approx(0.0, abs=math.radians(0.01))
 
 
-# --- moments of inertia that fall with the propellant used: against Euler's equations with I(t) written out
+# --- moments of inertia that fall with the propellant used: against Euler's equations with I(t)
+# written out
 
 Shed = tuple[float, float, float]
 
@@ -230,53 +283,89 @@ AXIAL, THREE = (6000.0, 6000.0, 3500.0), (6000.0, 5000.0, 3500.0)
 
 def craft(shed: Shed | None, valve: Trapezoid | None = SLOW, axial: float = 0.3) -> Spacecraft:
     channels = [
-        channel(f"C{at}", *one.torque[:2], axial, min_on_time=0.005, max_on_time=0.06, isp=220.0, thrust=10.0)
+        channel(
+            f"C{at}",
+            *one.torque[:2],
+            axial,
+            min_on_time=0.005,
+            max_on_time=0.06,
+            isp=220.0,
+            thrust=10.0,
+        )
         for at, one in enumerate(cross(8.0))
     ]
-    body = spinner(spin=math.pi, degrees=0.4, channels=tuple(one.of(valve=valve) for one in channels))
-    return replace(body, tank=replace(TANK, inertia_per_kg=shed), limits=replace(body.limits, horizon=200.0))
+    body = spinner(
+        spin=math.pi, degrees=0.4, channels=tuple(one.of(valve=valve) for one in channels)
+    )
+    return replace(
+        body, tank=replace(TANK, inertia_per_kg=shed), limits=replace(body.limits, horizon=200.0)
+    )
 
 
 def fires(body: Spacecraft, *numbers: int, on_time: float = 0.05) -> Schedule:
     """Commands of the channels with these numbers, one every 1.3 s."""
-    commands = (on_command(body.channels[one], 0.7 + 1.3 * at, on_time) for at, one in enumerate(numbers))
+    commands = (
+        on_command(body.channels[one], 0.7 + 1.3 * at, on_time) for at, one in enumerate(numbers)
+    )
     return Schedule(supplied(body, list(commands)))
 
 
-def independent(body: Spacecraft, made: Schedule, until: float = math.inf) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Rates (3,), rotation (3, 3), moments (3,) at ``until`` s or the last pulse's end, from commands and pressure."""
+def independent(
+    body: Spacecraft, made: Schedule, until: float = math.inf
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Rates (3,), rotation (3, 3), moments (3,) at ``until`` s or the last pulse's end, from
+    commands and pressure.
+    """
     start, per_kg = np.asarray(body.inertia.moments), np.asarray(present(body.tank).inertia_per_kg)
-    channels, swells = {one.name: one for one in body.channels}, []
+    channels = {one.name: one for one in body.channels}
+    swells = []
     for pulse in sorted(made, key=lambda one: one.loaded[0]):
         one = channels[pulse.channel]
-        slow = dict(zip(("opening", "closing", "rise", "fall"), (0.015, 0.012, 0.005, 0.010), strict=True))
+        slow = dict(
+            zip(("opening", "closing", "rise", "fall"), (0.015, 0.012, 0.005, 0.010), strict=True)
+        )
         times = slow if isinstance(one.valve, Trapezoid) else dict.fromkeys(slow, 0.0)
         swells += reference.through_valve(*pulse.loaded, one.torque, **times)
 
     def slope(t: float, y: np.ndarray, firing: list[reference.Swell]) -> np.ndarray:
-        moments, rotation, w = start - y[12] * per_kg, y[3:12].reshape(3, 3), y[:3]
+        moments = start - y[12] * per_kg
+        rotation = y[3:12].reshape(3, 3)
+        w = y[:3]
         level = 1.0 / (1.0 + (22.0 / 16.0 - 1.0) * y[12] / 0.002)
         torque = level * sum((one.at(t) for one in firing), np.zeros(3))
-        thrust = level * sum(float(np.linalg.norm(one.at(t))) for one in firing) / math.hypot(8.0, 0.3)
+        thrust = (
+            level * sum(float(np.linalg.norm(one.at(t))) for one in firing) / math.hypot(8.0, 0.3)
+        )
         flow = thrust * 10.0 / (220.0 * 9.80665)
         spins = np.array([[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]])
-        return np.concatenate([(torque - spins @ (moments * w)) / moments, (rotation @ spins).ravel(), [flow]])
+        return np.concatenate(
+            [(torque - spins @ (moments * w)) / moments, (rotation @ spins).ravel(), [flow]]
+        )
 
-    y = np.concatenate([body.omega0, reference.frame_n(body.inertia.moments, body.omega0).ravel(), [0.0]])
+    y = np.concatenate(
+        [body.omega0, reference.frame_n(body.inertia.moments, body.omega0).ravel(), [0.0]]
+    )
     until = min(until, made.end)
     edges = sorted({0.0, until, *(edge for one in swells for edge in one[:2] if edge < until)})
     for now, end in itertools.pairwise(edges):
         firing = [one for one in swells if one.start <= 0.5 * (now + end) <= one.end]
-        y = solve_ivp(slope, (now, end), y, "DOP853", rtol=1e-13, atol=1e-15, args=(firing,)).y[:, -1]
+        y = solve_ivp(slope, (now, end), y, "DOP853", rtol=1e-13, atol=1e-15, args=(firing,)).y[
+            :, -1
+        ]
     return y[:3], y[3:12].reshape(3, 3), start - y[12] * per_kg
 
 
-@pytest.mark.parametrize(("shed", "valve"), [(AXIAL, None), (THREE, SLOW), deep(AXIAL, SLOW), deep(THREE, None)])
-def test_the_flight_is_that_of_eulers_equations_with_falling_moments(shed: Shed, valve: Trapezoid | None) -> None:
+@pytest.mark.parametrize(
+    ("shed", "valve"), [(AXIAL, None), (THREE, SLOW), deep(AXIAL, SLOW), deep(THREE, None)]
+)
+def test_the_flight_is_that_of_eulers_equations_with_falling_moments(
+    shed: Shed, valve: Trapezoid | None
+) -> None:
     body = craft(shed, valve)
     made = fires(body, 0, 2, 1, 3, 0)
     rates, rotation, moments = independent(body, made)
-    by_flight, momentum = flown(body, made), rotation @ (moments * rates)
+    by_flight = flown(body, made)
+    momentum = rotation @ (moments * rates)
     assert moments[0] < 0.98 * 120.0
     assert by_flight.last_moments == pytest.approx(moments, rel=1e-12)
     assert by_flight.settled.rates == pytest.approx(rates, abs=1e-12)
@@ -284,11 +373,16 @@ def test_the_flight_is_that_of_eulers_equations_with_falling_moments(shed: Shed,
     assert by_flight.final.momentum == pytest.approx(momentum / np.linalg.norm(momentum), abs=1e-11)
     assert by_flight.sampled(50, made.end).momentum[-1] == pytest.approx(momentum, abs=1e-9)
     # The impulse sum takes each pulse at its centre: what it leaves out is of second order.
-    summed, amid = by_impulses(body, made), made.pulses[2].t
+    summed = by_impulses(body, made)
+    amid = made.pulses[2].t
     assert summed.motion(np.array([made.end]))[0][0] == pytest.approx(rates, abs=2e-6)
-    assert by_flight.moments_at(np.array([amid]))[0] == pytest.approx(independent(body, made, amid)[2], rel=1e-6)
+    assert by_flight.moments_at(np.array([amid]))[0] == pytest.approx(
+        independent(body, made, amid)[2], rel=1e-6
+    )
     before, after = (independent(body, made, one)[2] for one in (amid - 0.3, amid + 0.3))
-    assert summed.moments_at(np.array([amid - 1e-6, amid])) == pytest.approx(np.array([before, after]), rel=1e-9)
+    assert summed.moments_at(np.array([amid - 1e-6, amid])) == pytest.approx(
+        np.array([before, after]), rel=1e-9
+    )
 
 
 @pytest.mark.parametrize(("growth", "numbers"), [(None, (0, 2)), deep(40.0, (0, 1, 2, 3))])
@@ -306,22 +400,33 @@ def test_verify_confirms_it_with_and_without_dissipation(
 
 
 def missed_by_impulses(body: Spacecraft, made: Schedule) -> float:
-    ends = (one.motion(np.array([made.end]))[0][0] for one in (by_impulses(body, made), flown(body, made)))
+    ends = (
+        one.motion(np.array([made.end]))[0][0]
+        for one in (by_impulses(body, made), flown(body, made))
+    )
     return float(np.abs(np.subtract(*ends)).max())
 
 
 def missed_by_cases(body: Spacecraft, made: Schedule) -> float:
     """They take half off as a pulse begins and half as it ends."""
-    model, here = DispersedModel(body, made), flown(body, made)
+    model = DispersedModel(body, made)
+    here = flown(body, made)
     x, y, _ = RealWidths(model)(model.cases({"timing pulse 1": np.zeros(1)})).momentum
-    return abs(float(np.hypot(x, y)[0]) - math.hypot(*(here.settled.rates * np.asarray(here.last_moments))[:2]))
+    return abs(
+        float(np.hypot(x, y)[0])
+        - math.hypot(*(here.settled.rates * np.asarray(here.last_moments))[:2])
+    )
 
 
 @pytest.mark.parametrize("missed", [missed_by_impulses, missed_by_cases])
-def test_what_is_left_out_is_of_second_order(missed: Callable[[Spacecraft, Schedule], float]) -> None:
+def test_what_is_left_out_is_of_second_order(
+    missed: Callable[[Spacecraft, Schedule], float],
+) -> None:
     """Pulses of half the length: each errs by a quarter of what whole ones do, or less."""
     body = craft(AXIAL, None, axial=0.0)
-    body = replace(body, tank=replace(present(body.tank), final_pressure=present(body.tank).pressure))  # rectangles
+    body = replace(
+        body, tank=replace(present(body.tank), final_pressure=present(body.tank).pressure)
+    )  # rectangles
     long, short = (missed(body, fires(body, 0, on_time=on_time)) for on_time in (0.05, 0.025))
     assert long > 1e-9
     assert short < 0.3 * long
@@ -329,7 +434,8 @@ def test_what_is_left_out_is_of_second_order(missed: Callable[[Spacecraft, Sched
 
 @pytest.mark.parametrize("shed", [AXIAL, deep(THREE)])
 def test_a_further_leg_begins_where_the_one_before_ends(shed: Shed) -> None:
-    body, legs = craft(shed), Legs(craft(shed))
+    body = craft(shed)
+    legs = Legs(craft(shed))
     made = fires(body, 0, 2, 1, 3, 0)
     legs.fire(made)
     flight = flown(body, made)
@@ -369,7 +475,9 @@ def test_what_a_file_says_of_it() -> None:
     assert lightened(three, 0.5).moments == pytest.approx((119.8, 119.85, 79.9))
     # Without it, or with nothing shed, all is the same to the last bit.
     without, zero = of_file(""), of_file("{A: 0, C: 0}")
-    plans = [[repr(one) for one in planning.plan(body, "four-pulse").pulses] for body in (without, zero)]
+    plans = [
+        [repr(one) for one in planning.plan(body, "four-pulse").pulses] for body in (without, zero)
+    ]
     assert plans[0] == plans[1]
     assert lightened(without, 0.001) is without.inertia
     faults = []
@@ -390,7 +498,10 @@ def test_what_a_file_says_of_it() -> None:
 
 
 def test_what_cannot_have_falling_moments_says_so() -> None:
-    loop = "loop: {sensor: {kind: gyro, rate: 100 Hz}, law: four-pulse, start: 0.3 deg, stop: 0.1 deg}\n"
+    loop = (
+        "loop: {sensor: {kind: gyro, rate: 100 Hz}, law: four-pulse, start: 0.3 deg, stop: "
+        "0.1 deg}\n"
+    )
     body = of_file("{A: 1, C: 1}", loop)
     with pytest.raises(Unsuitable, match="inertia_per_kg"):
         fly(body, present(body.loop))
@@ -399,15 +510,24 @@ def test_what_cannot_have_falling_moments_says_so() -> None:
     within = Requirement(nutation=1e-9)
     nutating = np.array([0.01, 0.0, blocks.spin])
     bodies = [replace(body, omega0=nutating, requirement=within) for body in (blocks, lighter)]
-    cures = [command_block.schedule(body, CommandBlockOptions(max_blocks=1)).notes[1:] for body in bodies]
+    cures = [
+        command_block.schedule(body, CommandBlockOptions(max_blocks=1)).notes[1:] for body in bodies
+    ]
     check_text("flight.cures-of-blocks", "\n".join(map(noted, cures)))
 
 
 @pytest.mark.parametrize("per_kg", [weekly((900.0, 900.0, 600.0)), weekly(None)])
 def test_without_blowdown_the_tank_is_empty_sooner(per_kg: Shed | None) -> None:
-    """At full pressure the commands take more than there is; what comes after that does not fire."""
-    jets = tuple(channel(name, *torque, thrust=10.0, isp=220.0) for name, *torque in (("a", 8, 0, 0), ("b", 0, 8, 0)))
-    body = replace(spinner(degrees=2.0, channels=jets), tank=Tank(0.1, 22e5, 8e5, 1.0, inertia_per_kg=per_kg))
+    """At full pressure the commands take more than there is;
+    what comes after that does not fire.
+    """
+    jets = tuple(
+        channel(name, *torque, thrust=10.0, isp=220.0)
+        for name, *torque in (("a", 8, 0, 0), ("b", 0, 8, 0))
+    )
+    body = replace(
+        spinner(degrees=2.0, channels=jets), tank=Tank(0.1, 22e5, 8e5, 1.0, inertia_per_kg=per_kg)
+    )
     wide = [channel_pulse(jets[at % 2], 5.0 * at + 5.0, 1.0) for at in range(40)]
     full = wide[0].propellant or math.nan
     made = Schedule(supplied(body, wide[:32]))
@@ -415,19 +535,30 @@ def test_without_blowdown_the_tank_is_empty_sooner(per_kg: Shed | None) -> None:
     (row,) = (one for one in verify(body, made).budget if one.name == "without blowdown")
     steady = replace(body, tank=Tank(1.0, 22e5, 22e5, 0.0, inertia_per_kg=per_kg))
     whole, part = divmod(0.1, full)
-    last, share = wide[int(whole)], part / full
-    weak = replace(last, impulse=share * last.impulse, torque=share * present(last.torque), propellant=part)
+    last = wide[int(whole)]
+    share = part / full
+    weak = replace(
+        last, impulse=share * last.impulse, torque=share * present(last.torque), propellant=part
+    )
     expected = flown(steady, Schedule((*wide[: int(whole)], weak))).residual
-    assert (row.nutation, row.momentum_shift) == pytest.approx((expected.nutation, expected.momentum_shift), rel=1e-6)
+    assert (row.nutation, row.momentum_shift) == pytest.approx(
+        (expected.nutation, expected.momentum_shift), rel=1e-6
+    )
 
 
 def test_how_far_cases_of_falling_moments_err_is_said() -> None:
     """A study says nothing where they err by less than what is shown."""
     for shed, said in ((None, False), ((1.0, 1.0, 0.5), False), (AXIAL, True)):
-        body = replace(craft(shed), dispersions=Dispersions(A=Tolerance("normal", 0.01, relative=True)))
+        body = replace(
+            craft(shed), dispersions=Dispersions(A=Tolerance("normal", 0.01, relative=True))
+        )
         jets = tuple(one.of(valve=None, max_on_time=2.0) for one in body.channels)
-        body = replace(body, channels=jets, tank=replace(TANK, inertia_per_kg=shed, propellant=0.02))
-        made = Schedule(supplied(body, [on_command(one, 0.7 + 3.0 * at, 1.2) for at, one in enumerate(jets)]))
+        body = replace(
+            body, channels=jets, tank=replace(TANK, inertia_per_kg=shed, propellant=0.02)
+        )
+        made = Schedule(
+            supplied(body, [on_command(one, 0.7 + 3.0 * at, 1.2) for at, one in enumerate(jets)])
+        )
         error = study_of(body, made).lightening_error
         assert ("in the nominal one that errs by " in error) == said
         assert said == bool(error)

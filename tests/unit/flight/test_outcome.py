@@ -1,4 +1,6 @@
-"""What has become of a body by a given time; how near its axis comes to directions in space, plans that keep cones."""
+"""What has become of a body by a given time; how near its axis comes to directions in space, plans
+that keep cones.
+"""
 
 import csv
 import itertools
@@ -41,7 +43,9 @@ FLIES = (propagation.flown, propagation.by_impulses)
 
 
 @pytest.mark.parametrize("when", ["before the first", "within the second", "between", "long after"])
-def test_it_is_the_motion_of_the_reference_integrator_at_that_time(planned: Planner, when: str) -> None:
+def test_it_is_the_motion_of_the_reference_integrator_at_that_time(
+    planned: Planner, when: str
+) -> None:
     pulses = planned(BODY, "four-pulse").pulses
     first, second, third, *_ = pulses.pulses
     time, begun = {
@@ -51,11 +55,16 @@ def test_it_is_the_motion_of_the_reference_integrator_at_that_time(planned: Plan
         "long after": (pulses.end + 7.0, len(pulses)),
     }[when]
     seen = seen_at(propagation.flown(BODY, pulses, time), time)
-    moments, start = BODY.inertia.moments, reference.frame_n(BODY.inertia.moments, BODY.omega0)
+    moments = BODY.inertia.moments
+    start = reference.frame_n(BODY.inertia.moments, BODY.omega0)
     motion = reference.fly(moments, BODY.omega0, events(pulses), time, start)
-    before, after = (reference.momentum(moments, one) for one in (reference.Motion(BODY.omega0, start), motion))
+    before, after = (
+        reference.momentum(moments, one) for one in (reference.Motion(BODY.omega0, start), motion)
+    )
     assert len(seen.schedule) == len(seen.spans) == begun
-    assert seen.residual.nutation == pytest.approx(reference.nutation(moments, motion.rates, 1.0), abs=1e-9)
+    assert seen.residual.nutation == pytest.approx(
+        reference.nutation(moments, motion.rates, 1.0), abs=1e-9
+    )
     assert seen.residual.momentum_shift == pytest.approx(reference.angle(before, after), abs=1e-9)
     assert seen.final.axis == pytest.approx(motion.rotation[:, 2], abs=1e-9)
     assert seen.final.spin == pytest.approx(motion.rates[2], abs=1e-9)
@@ -96,7 +105,10 @@ def test_models_may_differ_by_a_tenth_of_what_is_required(planned: Planner) -> N
 
 
 def test_a_library_flight_ends_where_its_track_does() -> None:
-    body = nutdamp.read("name: X\ninertia: {A: 120, C: 80}\nomega0: [0.2, 0, 3]\ndissipation: {time_constant: 100 s}\n")
+    body = nutdamp.read(
+        "name: X\ninertia: {A: 120, C: 80}\nomega0: [0.2, 0, 3]\ndissipation: {time_constant: "
+        "100 s}\n"
+    )
     flown = nutdamp.plan(body, "none").fly(until=60.0)
     assert flown.residual.nutation == pytest.approx(flown.track.nutation[-1], rel=1e-12)
     assert flown.residual.nutation > 1.5 * body.nutation
@@ -114,7 +126,12 @@ def nutations(screen: str) -> list[str]:
 CHANGES = ("", "dissipation={time_constant: 50 s}", "disturbances=[{torque: [0, 0, 0.4 N m]}]")
 
 
-@spread(("options", "change", "until"), itertools.product([(), ("--flown",)], CHANGES, (2, 0.2, 60)), quick=4, deep=14)
+@spread(
+    ("options", "change", "until"),
+    itertools.product([(), ("--flown",)], CHANGES, (2, 0.2, 60)),
+    quick=4,
+    deep=14,
+)
 def test_screen_json_and_last_row_of_the_track_are_one(
     run: Run, tmp_path: Path, options: tuple[str, ...], change: str, until: float
 ) -> None:
@@ -141,20 +158,31 @@ def test_screen_json_and_last_row_of_the_track_are_one(
 
 
 def test_what_a_screen_says_of_the_end(run: Run) -> None:
-    grows = run("simulate", "--scheme", "none", "--until", "60 s", "--set", "dissipation={time_constant: 60 s}")
+    grows = run(
+        "simulate",
+        "--scheme",
+        "none",
+        "--until",
+        "60 s",
+        "--set",
+        "dissipation={time_constant: 60 s}",
+    )
     assert nutations(grows.stdout) == ["13.38", "13.38"]  # e-fold in the time constant
     ends = run("simulate", "--scheme", "four-pulse", "--until", "2 s", "--flown").stdout
     (line,) = (line for line in ends.splitlines() if "begun" in line)
     check_text("flight.pulses-begun", line)
     assert "3.6667" not in ends  # nor is any pulse after that shown
-    # Where dissipation goes on after the last pulse, a plan reports the time for which its end holds.
+    # Where dissipation goes on after the last pulse, a plan reports the time for which its end
+    # holds.
     words = " ".join(run("plan", "--scheme", "four-pulse", "--set", CHANGES[1]).stdout.split())
     assert re.search(r"at [0-9.]+ s; then changing by dissipation", words)
     assert "then changing" not in run("plan", "--scheme", "four-pulse").stdout
 
 
 @pytest.mark.deep
-def test_where_the_models_end_apart_is_shown_for_each_and_warned_of(run: Run, tmp_path: Path) -> None:
+def test_where_the_models_end_apart_is_shown_for_each_and_warned_of(
+    run: Run, tmp_path: Path
+) -> None:
     """The target is met through real widths; the impulse sum ends nearly 2 deg from it."""
     options = ("simulate", "--scheme", "half-cone", "--target", "10deg,45deg")
     screen = run(*options, "--json", "flight.json").stdout
@@ -162,7 +190,10 @@ def test_where_the_models_end_apart_is_shown_for_each_and_warned_of(run: Run, tm
     assert table["spin axis: tilt"] == ["11.7469", "deg", "10.0000", "deg"]
     assert table["spin axis: azimuth"] == ["48.9566", "deg", "45.0000", "deg"]
     for text in (" ".join(screen.split()), run(*options, "--json", "-").stderr):
-        assert "warning[models-differ]: impulse sum (17) and flown motion differ by 1.899 deg of" in text
+        assert (
+            "warning[models-differ]: impulse sum (17) and flown motion differ by 1.899 deg of"
+            in text
+        )
     data = json.loads((tmp_path / "flight.json").read_text())
     assert data["differ"] == ["axis_error"]
     assert data["final"]["axis"]["tilt_deg"] == pytest.approx(10.0, abs=1e-6)
@@ -179,7 +210,8 @@ def test_widths_are_named_where_any_pulse_has_one() -> None:
     assert propagation.model_name([kicks, Schedule()]) == propagation.IDEAL_IMPULSES
 
 
-# --- how near the spin axis comes to directions in space, against the reference integrator; plans that keep cones
+# --- how near the spin axis comes to directions in space, against the reference integrator; plans
+# that keep cones
 
 Array = NDArray[np.float64]
 
@@ -190,7 +222,9 @@ def unit(vector: Array) -> Array:
 
 @pytest.mark.parametrize("shape", [(120.0, 80.0), (80.0, 120.0), (100.0, 100.0), (80.0, 160.0)])
 def test_in_free_motion_the_axis_stays_within_its_cone_about_H(shape: tuple[float, float]) -> None:
-    """Seen from a direction β away from H: from |β - θ| to β + θ, since by default it goes round once."""
+    """Seen from a direction β away from H: from |β - θ| to β + θ, since by default it goes round
+    once.
+    """
     for spin in (3.0, -3.0):
         body = spinner(*shape, spin=spin, degrees=7.0)
         for beta in (0.0, 3.0, 7.0, 50.0, 120.0, 180.0):
@@ -201,50 +235,85 @@ def test_in_free_motion_the_axis_stays_within_its_cone_about_H(shape: tuple[floa
     assert aspects(flown(spinner(), Schedule())) == ()  # nothing is watched unless the file says so
 
 
-@spread("moments", [(120.0, 120.0, 80.0), (90.0, 90.0, 140.0), (120.0, 100.0, 70.0)], quick=1, deep=2)
-def test_with_pulses_they_are_those_of_the_reference_integrator(moments: tuple[float, float, float]) -> None:
+@spread(
+    "moments", [(120.0, 120.0, 80.0), (90.0, 90.0, 140.0), (120.0, 100.0, 70.0)], quick=1, deep=2
+)
+def test_with_pulses_they_are_those_of_the_reference_integrator(
+    moments: tuple[float, float, float],
+) -> None:
     rng = np.random.default_rng(5)
     for sense in (-1.0, 1.0):
         body = spinner(moments=moments, spin=2.0 * sense, degrees=rng.uniform(1.0, 12.0))
-        body = replace(body, keep=tuple(Keep(name, unit(rng.normal(size=3))) for name in ("one", "two")))
-        pushes = (pulse(4.0 * k + 2.0, rng.uniform(0.1, 2.0), rng.normal(size=3) * 6.0) for k in range(3))
-        made, start = Schedule(tuple(pushes)), attitude.matrix(body.initial.quaternion)
+        body = replace(
+            body, keep=tuple(Keep(name, unit(rng.normal(size=3))) for name in ("one", "two"))
+        )
+        pushes = (
+            pulse(4.0 * k + 2.0, rng.uniform(0.1, 2.0), rng.normal(size=3) * 6.0) for k in range(3)
+        )
+        made = Schedule(tuple(pushes))
+        start = attitude.matrix(body.initial.quaternion)
         path = axis_path(body, made, 14.0, 400)
         for seen in aspects(flown(body, made), 14.0):
             apart = attitude.angle_between(path, np.asarray(seen.keep.direction))
             assert (seen.least, seen.largest) == pytest.approx((apart.min(), apart.max()), abs=1e-4)
             assert seen.least < apart.min() + 1e-6  # the reference is asked at other moments
             assert seen.largest > apart.max() - 1e-6
-            for at, way in ((seen.least_at, 1.0), (seen.largest_at, -1.0)):  # none about it is nearer or farther
-                about = flown(body, made, 14.0).axis(np.clip(at + np.linspace(-0.1, 0.1, 20_001), 0.0, 14.0))
+            for at, way in (
+                (seen.least_at, 1.0),
+                (seen.largest_at, -1.0),
+            ):  # none about it is nearer or farther
+                about = flown(body, made, 14.0).axis(
+                    np.clip(at + np.linspace(-0.1, 0.1, 20_001), 0.0, 14.0)
+                )
                 best = np.min(way * attitude.angle_between(about, np.asarray(seen.keep.direction)))
-                assert way * best == pytest.approx(seen.least if way > 0.0 else seen.largest, abs=math.radians(1e-6))
+                assert way * best == pytest.approx(
+                    seen.least if way > 0.0 else seen.largest, abs=math.radians(1e-6)
+                )
             there = reference.fly(moments, body.omega0, events(made), seen.least_at, start)
             angle = reference.angle(sense * there.rotation[:, 2], np.asarray(seen.keep.direction))
             assert angle == pytest.approx(seen.least, abs=1e-6)
 
 
-@spread("moments", [(120.0, 120.0, 80.0), (90.0, 90.0, 140.0), (120.0, 100.0, 70.0)], quick=1, deep=2)
-def test_the_nutation_on_the_way_is_that_of_the_reference_integrator(moments: tuple[float, float, float]) -> None:
+@spread(
+    "moments", [(120.0, 120.0, 80.0), (90.0, 90.0, 140.0), (120.0, 100.0, 70.0)], quick=1, deep=2
+)
+def test_the_nutation_on_the_way_is_that_of_the_reference_integrator(
+    moments: tuple[float, float, float],
+) -> None:
     rng = np.random.default_rng(6)
     for sense in (-1.0, 1.0):
         body = spinner(moments=moments, spin=2.0 * sense, degrees=rng.uniform(1.0, 12.0))
         body = replace(body, keep=(Keep("H", None, 0.0, 0.1),))
-        made = Schedule(tuple(pulse(4.0 * k + 2.0, rng.uniform(0.1, 2.0), rng.normal(size=3) * 6.0) for k in range(3)))
+        made = Schedule(
+            tuple(
+                pulse(4.0 * k + 2.0, rng.uniform(0.1, 2.0), rng.normal(size=3) * 6.0)
+                for k in range(3)
+            )
+        )
         (seen,) = aspects(flown(body, made), 14.0)
-        start, pushes = attitude.matrix(body.initial.quaternion), events(made)
-        there = [reference.fly(moments, body.omega0, pushes, at, start) for at in np.linspace(0.0, 14.0, 150)]
+        start = attitude.matrix(body.initial.quaternion)
+        pushes = events(made)
+        there = [
+            reference.fly(moments, body.omega0, pushes, at, start)
+            for at in np.linspace(0.0, 14.0, 150)
+        ]
         angles = [reference.nutation(moments, motion.rates, sense) for motion in there]
         assert seen.least < min(angles) + 1e-7
         assert seen.largest > max(angles) - 1e-7
         assert (seen.least, seen.largest) == pytest.approx((min(angles), max(angles)), abs=2e-3)
         for at, value in ((seen.least_at, seen.least), (seen.largest_at, seen.largest)):
             motion = reference.fly(moments, body.omega0, pushes, at, start)
-            assert reference.nutation(moments, motion.rates, sense) == pytest.approx(value, abs=1e-7)
+            assert reference.nutation(moments, motion.rates, sense) == pytest.approx(
+                value, abs=1e-7
+            )
 
 
-def test_schemes_that_point_keep_a_bound_of_the_nutation_on_the_way(run: Run, tmp_path: Path) -> None:
-    """One half-cone leans the spin axis by half of the turn; within the bound it takes more of them."""
+def test_schemes_that_point_keep_a_bound_of_the_nutation_on_the_way(
+    run: Run, tmp_path: Path
+) -> None:
+    """One half-cone leans the spin axis by half of the turn; within the bound it takes more of
+    them.
+    """
     text = """name: b
 inertia: {A: 80, C: 120}
 omega0: [0, 0, 3]
@@ -269,13 +338,17 @@ requirement: {nutation: 2 deg, nutation_during: %s}
 
 
 def test_a_jump_of_the_rates_is_no_peak() -> None:
-    """Under ideal impulses the axis turns a corner, where a parabola through three rows would miss."""
+    """Under ideal impulses the axis turns a corner,
+    where a parabola through three rows would miss.
+    """
     body = spinner(degrees=2.0)
     body = replace(body, keep=(Keep("beacon", body.direction_in_n(0.3, 1.0)),))
     made = Schedule((pulse(1.0, 0.0, np.array([30.0, 5.0, 0.0])),))
     (seen,) = aspects(by_impulses(body, made), 5.0)
     for model in (by_impulses(body, made, 5.0), flown(body, made, 5.0)):
-        apart = attitude.angle_between(model.sampled(20_001, 5.0).axis, np.asarray(seen.keep.direction))
+        apart = attitude.angle_between(
+            model.sampled(20_001, 5.0).axis, np.asarray(seen.keep.direction)
+        )
         assert (seen.least, seen.largest) == pytest.approx((apart.min(), apart.max()), abs=1e-6)
 
 
@@ -329,7 +402,9 @@ def test_a_target_within_a_cone_is_refused_and_damping_into_one_warned_of() -> N
 
 
 def check_kept(plan: planning.Plan) -> None:
-    """That the axis comes into no cone by the reference integrator, half a turn after the plan included."""
+    """That the axis comes into no cone by the reference integrator, half a turn after the plan
+    included.
+    """
     path = axis_path(plan.spacecraft, plan.pulses, plan.end + plan.spacecraft.inertial_period)
     for keep in plan.spacecraft.keep:
         assert attitude.angle_between(path, np.asarray(keep.direction)).min() >= keep.least - 1e-6
@@ -341,11 +416,14 @@ def some_case(seed: int, *, near: bool = False) -> Spacecraft:
     ``near``: by 2 to 12 deg past one, with strong channels.
     """
     rng = np.random.default_rng(seed)
-    A, spin = 10 ** rng.uniform(1, 3), rng.choice([-1.0, 1.0]) * rng.uniform(0.5, 4.0)
+    A = 10 ** rng.uniform(1, 3)
+    spin = rng.choice([-1.0, 1.0]) * rng.uniform(0.5, 4.0)
     C = A * rng.choice([rng.uniform(0.3, 0.8), rng.uniform(1.2, 1.8)])
-    turn, torque = rng.uniform(2.0, 12.0) if near else rng.uniform(5.0, 60.0), C * spin**2
+    turn = rng.uniform(2.0, 12.0) if near else rng.uniform(5.0, 60.0)
+    torque = C * spin**2
     torque *= 1.0 if near else rng.uniform(0.02, 0.2)
-    channels, degrees = cross(torque, max_on_time=0.3 / abs(spin)), 0.2 if near else rng.uniform(0.0, 1.0)
+    channels = cross(torque, max_on_time=0.3 / abs(spin))
+    degrees = 0.2 if near else rng.uniform(0.0, 1.0)
     body = spinner(A, C, spin, degrees, rng.uniform(0.0, 6.0), channels=channels)
     body = aimed(body, turn, rng.uniform(0.0, 360.0))
     aside = np.cross(between(body, 0.0), body.target_axis) / math.sin(math.radians(turn))
@@ -353,16 +431,25 @@ def some_case(seed: int, *, near: bool = False) -> Spacecraft:
     for number in range(1 if near else rng.integers(1, 3)):
         off = math.radians(turn) * rng.uniform(-0.4, 0.4)
         centre = unit(between(body, rng.uniform(0.2, 0.8)) + off * aside)
-        clear = min(float(attitude.angle_between(centre, end)) for end in (between(body, 0.0), body.target_axis))
+        clear = min(
+            float(attitude.angle_between(centre, end))
+            for end in (between(body, 0.0), body.target_axis)
+        )
         keeps.append(Keep(f"cone {number}", centre, least=clear * rng.uniform(0.2, 0.8)))
-    return replace(body, keep=tuple(keeps), limits=Limits(horizon=(600.0 if near else 2000.0) / abs(spin)))
+    return replace(
+        body, keep=tuple(keeps), limits=Limits(horizon=(600.0 if near else 2000.0) / abs(spin))
+    )
 
 
 @pytest.mark.parametrize(
     ("scheme", "seeds"),
     [
         *(weekly("rhumb-line", range(first, first + 10)) for first in range(0, 160, 10)),
-        *(weekly(scheme, range(first, first + 2)) for first in range(0, 20, 2) for scheme in ("half-cone", "optimal")),
+        *(
+            weekly(scheme, range(first, first + 2))
+            for first in range(0, 20, 2)
+            for scheme in ("half-cone", "optimal")
+        ),
         weekly("command-block", range(1)),
     ],
     ids=str,
@@ -427,10 +514,19 @@ def test_no_screen_calls_the_requirement_met_where_a_cone_is_broken(run: Run) ->
         shown = run("plan", "-v", "-", "--nominal", "--scheme", scheme, stdin=BROKEN)
         assert shown.returncode == 4
         rows = [line.split() for line in shown.stdout.splitlines()]
-        assert [row[-2:] == ["NOT", "met"] for row in rows if row[-1:] == ["met"]] == [False, True, False]
+        assert [row[-2:] == ["NOT", "met"] for row in rows if row[-1:] == ["met"]] == [
+            False,
+            True,
+            False,
+        ]
         assert any(row[:7] == ["axis", "from", "Star", "≥", "4", "deg", "✗"] for row in rows)
-        assert any(row[:6] == ["axis", "from", "Star", "≤", "60", "deg"] and "✗" not in row for row in rows)
-    assert "axis from Star" in run("simulate", "-", "--scheme", "none", "--until", "5s", stdin=BROKEN).stdout
+        assert any(
+            row[:6] == ["axis", "from", "Star", "≤", "60", "deg"] and "✗" not in row for row in rows
+        )
+    assert (
+        "axis from Star"
+        in run("simulate", "-", "--scheme", "none", "--until", "5s", stdin=BROKEN).stdout
+    )
 
 
 def test_no_dispersed_case_complies_where_a_cone_is_broken() -> None:
@@ -439,7 +535,9 @@ def test_no_dispersed_case_complies_where_a_cone_is_broken() -> None:
     compared = nutdamp.compare(read_spacecraft(text, "broken.yaml"), ("one-pulse",), samples=100)
     verdict = compared.verdict
     assert (verdict.status, present(verdict.cases).complying) == (Status.NOT_ENOUGH, 0.0)
-    assert [(line.bound.part, line.bound.inner, line.share, line.met) for line in verdict.lines] == [
+    assert [
+        (line.bound.part, line.bound.inner, line.share, line.met) for line in verdict.lines
+    ] == [
         (Part.NUTATION, False, 1.0, True),
         (Part.CONE, True, 0.0, False),
         (Part.CONE, False, 1.0, True),

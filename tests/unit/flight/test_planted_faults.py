@@ -1,4 +1,6 @@
-"""Faults planted in the planner's physics: `verify` reports each, since it flies by the file alone."""
+"""Faults planted in the planner's physics: `verify` reports each,
+since it flies by the file alone.
+"""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -26,7 +28,9 @@ thrusters:
   - {name: +M2, position: [0, 0, 0.9], direction: [1, 0, 0], force: 10 N, isp: 220 s}
   - {name: -M2, position: [0, 0, 0.9], direction: [-1, 0, 0], force: 10 N, isp: 220 s}
 """
-VALVE = f"{JETS}valve: {{open_delay: 8 ms, close_delay: 12 ms, rise_time: 5 ms, fall_time: 10 ms}}\n"
+VALVE = (
+    f"{JETS}valve: {{open_delay: 8 ms, close_delay: 12 ms, rise_time: 5 ms, fall_time: 10 ms}}\n"
+)
 WHEEL = f"{JETS}wheel: {{momentum: 40 N m s}}\n"
 DAMPER = f"{JETS}dissipation: {{time_constant: 600 s}}\n"
 LEAK = f"{JETS}disturbances: [{{torque: [20 mN m, 0, 0], fixed_in: inertial}}]\n"
@@ -41,7 +45,9 @@ def thruster(changed: Callable[[Thruster], Thruster]) -> Plant:
 
 def off_center(patch: pytest.MonkeyPatch) -> None:
     read = reader._thruster
-    patch.setattr(reader, "_thruster", lambda entry, axes, valve, center: read(entry, axes, valve, -center))
+    patch.setattr(
+        reader, "_thruster", lambda entry, axes, valve, center: read(entry, axes, valve, -center)
+    )
 
 
 def valve(changed: Callable[[Trapezoid], Trapezoid], late: float = 0.0) -> Plant:
@@ -49,7 +55,9 @@ def valve(changed: Callable[[Trapezoid], Trapezoid], late: float = 0.0) -> Plant
 
     def thrust(self: Trapezoid, on_time: float) -> Any:
         usual = responds(changed(self), on_time)
-        ramps = tuple(ramp._replace(begin=ramp.begin + late, end=ramp.end + late) for ramp in usual.ramps)
+        ramps = tuple(
+            ramp._replace(begin=ramp.begin + late, end=ramp.end + late) for ramp in usual.ramps
+        )
         return usual._replace(centroid=usual.centroid + late, ramps=ramps)
 
     return lambda patch: patch.setattr(Trapezoid, "thrust", thrust)
@@ -69,7 +77,9 @@ def inertia(first: float, wheel: float) -> Plant:
 
 def against(patch: pytest.MonkeyPatch) -> None:
     read = reader._disturbance
-    patch.setattr(reader, "_disturbance", lambda *parts: replace(read(*parts), rate=-read(*parts).rate))
+    patch.setattr(
+        reader, "_disturbance", lambda *parts: replace(read(*parts), rate=-read(*parts).rate)
+    )
 
 
 def narrower(patch: pytest.MonkeyPatch) -> None:
@@ -130,4 +140,6 @@ def test_a_planted_fault_is_reported(name: str, monkeypatch: pytest.MonkeyPatch)
     faulty = verified(text)
     assert "DOP853" in faulty.checks
     assert not faulty.agree
-    assert faulty.disagreeing == (("impulse sum (17)",) if name == "width factor 1" else ("DOP853",))
+    assert faulty.disagreeing == (
+        ("impulse sum (17)",) if name == "width factor 1" else ("DOP853",)
+    )

@@ -1,4 +1,6 @@
-"""The motion as arrays: rows round each pulse, tracks in pieces and as CSV, and how far the spin axis strays."""
+"""The motion as arrays: rows round each pulse, tracks in pieces and as CSV, and how far the spin
+axis strays.
+"""
 
 import csv
 import io
@@ -48,14 +50,20 @@ UNTIL, FEW = 40.0, 7
 def some_flight() -> propagation.Flight:
     """A flight with coasts and wide pulses, the first of them at once."""
     push = channel("T", 4.0, 1.0, 0.5)
-    made = Schedule(tuple(channel_pulse(push, t, on_time) for t, on_time in ((0.25, 0.5), (4.0, 0.7), (20.0, 3.0))))
+    made = Schedule(
+        tuple(
+            channel_pulse(push, t, on_time) for t, on_time in ((0.25, 0.5), (4.0, 0.7), (20.0, 3.0))
+        )
+    )
     return propagation.flown(spinner(degrees=12.0, channels=(push,)), made, UNTIL)
 
 
 def cut(whole: propagation.Track, edges: Iterable[int]) -> list[propagation.Track]:
     """The rows between ``edges``, as tracks of their own."""
     return [
-        propagation.Track(**{one.name: getattr(whole, one.name)[begin:end] for one in fields(propagation.Track)})
+        propagation.Track(
+            **{one.name: getattr(whole, one.name)[begin:end] for one in fields(propagation.Track)}
+        )
         for begin, end in pairwise([0, *edges, len(whole.t)])
         if end > begin
     ]
@@ -124,13 +132,20 @@ def test_motion_around_pulses(fly: object) -> None:
 def test_cone_angles_are_those_of_the_rates_axis_and_momentum_those_of_the_attitude() -> None:
     body = spinner(spin=-3.0, degrees=20.0)
     rows = propagation.flown(body, WIDE, 10.0).sampled(20, 10.0)
-    omega, spin = np.hypot(rows.rates[:, 0], rows.rates[:, 1]), -rows.rates[:, 2]
-    assert rows.nutation == pytest.approx(rigid_body.nutation_angle(120.0, 80.0, omega, spin), abs=4 * EPS)
+    omega = np.hypot(rows.rates[:, 0], rows.rates[:, 1])
+    spin = -rows.rates[:, 2]
+    assert rows.nutation == pytest.approx(
+        rigid_body.nutation_angle(120.0, 80.0, omega, spin), abs=4 * EPS
+    )
     assert rows.body_cone == pytest.approx(rigid_body.body_cone(omega, spin), abs=4 * EPS)
-    assert rows.space_cone == pytest.approx(rigid_body.space_cone(120.0, 80.0, omega, spin), abs=8 * EPS)
+    assert rows.space_cone == pytest.approx(
+        rigid_body.space_cone(120.0, 80.0, omega, spin), abs=8 * EPS
+    )
     between = [reference.angle(h, axis) for h, axis in zip(rows.momentum, rows.axis, strict=True)]
     assert rows.nutation == pytest.approx(between, abs=1e-13)
-    for quaternion, rates, axis, h in zip(rows.quaternion, rows.rates, rows.axis, rows.momentum, strict=True):
+    for quaternion, rates, axis, h in zip(
+        rows.quaternion, rows.rates, rows.axis, rows.momentum, strict=True
+    ):
         rotation = attitude.matrix(quaternion)
         assert axis == pytest.approx(rotation @ [0, 0, -1.0], abs=4 * EPS)
         expected = reference.momentum(body.inertia.moments, reference.Motion(rates, rotation))
@@ -139,9 +154,13 @@ def test_cone_angles_are_those_of_the_rates_axis_and_momentum_those_of_the_attit
 
 def pointing(axes: np.ndarray) -> propagation.Track:
     """Rows whose spin axis is ``axes`` (n, 3), at whole seconds; H at the start along z."""
-    nothing, up = np.zeros(len(axes)), np.tile([0.0, 0.0, 2.0], (len(axes), 1))
-    t, pulses = np.arange(float(len(axes))), np.zeros(len(axes), dtype=np.int64)
-    return propagation.Track(t, up, np.zeros((len(axes), 4)), axes, up, nothing, nothing, nothing, pulses)
+    nothing = np.zeros(len(axes))
+    up = np.tile([0.0, 0.0, 2.0], (len(axes), 1))
+    t = np.arange(float(len(axes)))
+    pulses = np.zeros(len(axes), dtype=np.int64)
+    return propagation.Track(
+        t, up, np.zeros((len(axes), 4)), axes, up, nothing, nothing, nothing, pulses
+    )
 
 
 TILTS = [(0, 80), (90, 70), (180, 60), (270, 85)]
@@ -152,15 +171,22 @@ TILTS = [(0, 80), (90, 70), (180, 60), (270, 85)]
     ("places", "expected"),
     [
         ([(10, 5), (50, -20), (30, 40)], {"right_ascension": (10, 50), "declination": (-20, 40)}),
-        ([(350, 0), (355, 1), (5, 2), (20, 0)], {"right_ascension": (350, 380)}),  # the short way round
+        (
+            [(350, 0), (355, 1), (5, 2), (20, 0)],
+            {"right_ascension": (350, 380)},
+        ),  # the short way round
         ([(200, 10), (200, 10)], {"right_ascension": (200, 200)}),
         (TILTS, {"x": (-30, 10), "y": (-5, 20)}),
     ],
 )
-def test_ranges_of_the_spin_axis(places: list[tuple[float, float]], expected: dict[str, tuple[float, float]]) -> None:
+def test_ranges_of_the_spin_axis(
+    places: list[tuple[float, float]], expected: dict[str, tuple[float, float]]
+) -> None:
     """By right ascensions and declinations, deg."""
     r, d = np.radians(places).T
-    found = propagation.extremes([pointing(np.column_stack([np.cos(d) * np.cos(r), np.cos(d) * np.sin(r), np.sin(d)]))])
+    found = propagation.extremes(
+        [pointing(np.column_stack([np.cos(d) * np.cos(r), np.cos(d) * np.sin(r), np.sin(d)]))]
+    )
     assert {name: np.degrees(getattr(found, name)) for name in expected} == {
         name: pytest.approx(ends, abs=1e-12) for name, ends in expected.items()
     }
@@ -175,14 +201,21 @@ def test_free_nutation_circles_h_at_the_nutation_angle(spin: float) -> None:
     until = body.inertial_period
     found = propagation.extremes([propagation.flown(body, Schedule(), until).sampled(4001, until)])
     for ends in (found.x, found.y):
-        assert np.degrees(ends) == pytest.approx([-12, 12], abs=1e-4)  # samples 0.09° apart on the circle
-    assert np.degrees([found.farthest[0], found.nearest[0]]) == pytest.approx([12.0, 12.0], abs=1e-12)
+        assert np.degrees(ends) == pytest.approx(
+            [-12, 12], abs=1e-4
+        )  # samples 0.09° apart on the circle
+    assert np.degrees([found.farthest[0], found.nearest[0]]) == pytest.approx(
+        [12.0, 12.0], abs=1e-12
+    )
 
 
 @pytest.mark.parametrize("right_ascension", [0.0, 90.0, 358.0])
 def test_extremes_in_the_frame_of_the_file(right_ascension: float) -> None:
-    """H towards a place on the equator: the axis circles it at 12°, across the zero of right ascension or not."""
-    r, until = math.radians(right_ascension), spinner().inertial_period
+    """H towards a place on the equator: the axis circles it at 12°, across the zero of right
+    ascension or not.
+    """
+    r = math.radians(right_ascension)
+    until = spinner().inertial_period
     # Rows: z of N to the equator at r, x of N to the pole.
     place = np.array([[0, math.sin(r), math.cos(r)], [0, -math.cos(r), math.sin(r)], [1, 0, 0]])
     facing = attitude.from_matrix(place @ attitude.matrix(spinner(degrees=12.0).initial.quaternion))
@@ -194,11 +227,17 @@ def test_extremes_in_the_frame_of_the_file(right_ascension: float) -> None:
 
 
 @given(st.integers(1, 60), st.floats(0.0, 10.0), st.floats(0.0, 10.0), st.floats(0.1, 10.0))
-def test_even_times_are_those_of_linspace(samples: int, first: float, second: float, until: float) -> None:
-    start, end = min(first, second), max(first, second)
+def test_even_times_are_those_of_linspace(
+    samples: int, first: float, second: float, until: float
+) -> None:
+    start = min(first, second)
+    end = max(first, second)
     even = np.linspace(0.0, until, samples)
     parts = list(propagation.even_times(samples, until, start, end))
-    assert np.concatenate([times for times, _, _ in parts]).tolist() == even[(even > start) & (even < end)].tolist()
+    assert (
+        np.concatenate([times for times, _, _ in parts]).tolist()
+        == even[(even > start) & (even < end)].tolist()
+    )
     assert [begins for _, begins, _ in parts] == [True] + [False] * (len(parts) - 1)
     assert [ends for _, _, ends in parts] == [False] * (len(parts) - 1) + [True]
 
@@ -217,11 +256,17 @@ def test_the_pieces_of_a_track_are_its_rows(samples: int, monkeypatch: pytest.Mo
 
 
 def test_extremes_of_pieces_are_those_of_the_whole() -> None:
-    made, generator = some_flight(), np.random.default_rng(4)
+    made = some_flight()
+    generator = np.random.default_rng(4)
     for count in (1, 5, 40, 500):
         whole = made.sampled(count, UNTIL)
         found = propagation.extremes([whole])
-        assert propagation.extremes(cut(whole, np.sort(generator.integers(0, len(whole.t), 3)).tolist())) == found
+        assert (
+            propagation.extremes(
+                cut(whole, np.sort(generator.integers(0, len(whole.t), 3)).tolist())
+            )
+            == found
+        )
         assert (found.rows, found.until) == (len(whole.t), UNTIL)
     # Of what is equal but for rounding the first time counts.
     angles = np.array([0.1, 0.3, 0.2, 0.3 + 0.4 * SAME_ANGLE, 0.25, 0.3 + 0.9 * SAME_ANGLE, 0.1])
@@ -233,7 +278,8 @@ def test_extremes_of_pieces_are_those_of_the_whole() -> None:
 
 
 def test_a_track_is_written_as_it_was_by_numbers() -> None:
-    made, stream = some_flight(), io.BytesIO()
+    made = some_flight()
+    stream = io.BytesIO()
     whole = made.sampled(100, UNTIL)
     write_track(cut(whole, [50]), made.spacecraft.inertia, stream)
     header, *lines, last = stream.getvalue().decode().split("\r\n")
@@ -244,8 +290,11 @@ def test_a_track_is_written_as_it_was_by_numbers() -> None:
 
 @pytest.mark.weekly
 def test_memory_does_not_grow_with_the_rows() -> None:
-    """What 4.5e5 rows of 18 columns take as one array alone is 65 MB; several of those stood side by side."""
-    made, peaks = some_flight(), []
+    """What 4.5e5 rows of 18 columns take as one array alone is 65 MB; several of those stood side
+    by side.
+    """
+    made = some_flight()
+    peaks = []
     for samples in (150_000, 450_000):
         tracemalloc.start()
         try:
@@ -261,7 +310,17 @@ def test_memory_does_not_grow_with_the_rows() -> None:
 
 @pytest.mark.deep
 def test_the_command_writes_every_row(run: Run, tmp_path: Path) -> None:
-    ended = run("simulate", "--scheme", "two-pulse", "--samples", "45000", "--csv", "track.csv", "-v", "--quiet")
+    ended = run(
+        "simulate",
+        "--scheme",
+        "two-pulse",
+        "--samples",
+        "45000",
+        "--csv",
+        "track.csv",
+        "-v",
+        "--quiet",
+    )
     assert ended.returncode == 0, ended.stderr
     with (tmp_path / "track.csv").open(newline="") as stream:
         times = [float(row["t_s"]) for row in csv.DictReader(stream)]
@@ -270,20 +329,27 @@ def test_the_command_writes_every_row(run: Run, tmp_path: Path) -> None:
     assert "45004 rows" in ended.stdout
 
 
-# --- flights of trial schedules: flown anew from the first pulse that has changed, and the same to the last bit
+# --- flights of trial schedules: flown anew from the first pulse that has changed, and the same to
+# the last bit
 
 THREE = spinner(moments=(100.0, 120.0, 80.0))
 
 
 def bits(flown: propagation.Flight) -> list[bytes]:
     """All that a flight gives: legs, motion along them and how it ends."""
-    legs = [repr((one.start, one.end, one.completed, one.jump, one.completed_at_end)).encode() for one in flown.legs]
-    motion, settled = flown.motion(np.linspace(0.0, flown.legs[-1].end, 50)), flown.settled
+    legs = [
+        repr((one.start, one.end, one.completed, one.jump, one.completed_at_end)).encode()
+        for one in flown.legs
+    ]
+    motion = flown.motion(np.linspace(0.0, flown.legs[-1].end, 50))
+    settled = flown.settled
     return [*legs, *(part.tobytes() for part in (*motion, settled.rates, settled.quaternion))]
 
 
 def train(count: int, moved: int | None = None) -> Schedule:
-    """So many pulses, one every 4 s; the one with the number ``moved`` comes later and is longer."""
+    """So many pulses, one every 4 s; the one with the number
+    ``moved`` comes later and is longer.
+    """
     pulses = [(4.0 * n + 1.0, 0.5) if n != moved else (4.0 * n + 1.2, 0.7) for n in range(count)]
     return Schedule(tuple(pulse(t, on, on * np.array([3.0, -2.0, 0.5])) for t, on in pulses))
 
@@ -294,12 +360,16 @@ def train(count: int, moved: int | None = None) -> Schedule:
     st.sampled_from([0.0, 200.0]),
     st.lists(st.one_of(schedules(), schedules(ideal=True)), min_size=2, max_size=3),
 )
-def test_what_is_remembered_changes_no_bit(body: Spacecraft, constant: float, every: list[Schedule]) -> None:
+def test_what_is_remembered_changes_no_bit(
+    body: Spacecraft, constant: float, every: list[Schedule]
+) -> None:
     body = replace(body, dissipation=constant) if constant else body
     remembering = motion.make_dynamics(body).remembering()
     mixed = [Schedule((*one.pulses, *other.pulses)) for one in every for other in every]
     for made in (*every, *mixed, *every):
-        assert bits(propagation.flown(body, made, dynamics=remembering)) == bits(propagation.flown(body, made))
+        assert bits(propagation.flown(body, made, dynamics=remembering)) == bits(
+            propagation.flown(body, made)
+        )
 
 
 @pytest.mark.parametrize("moved", [0, 3, 7])
@@ -309,7 +379,9 @@ def test_a_trial_costs_what_comes_after_the_pulse_that_has_changed(moved: int) -
     with work.budget("trial", 1e9) as trial:
         flown = propagation.flown(THREE, train(8, moved), dynamics=remembering)
     assert bits(flown) == bits(propagation.flown(THREE, train(8, moved)))
-    changed = [leg for leg in flown.legs if leg.end > 4.0 * moved + 0.75]  # a leg for each coast, pulse, and the end
+    changed = [
+        leg for leg in flown.legs if leg.end > 4.0 * moved + 0.75
+    ]  # a leg for each coast, pulse, and the end
     assert len(changed) == 2 * (8 - moved) + 1
     integrated = [leg for leg in changed if leg.end > leg.start]
     steps = sum(leg.path.steps for leg in integrated)
@@ -330,7 +402,9 @@ def test_a_flight_that_is_remembered_keeps_its_limit_of_steps() -> None:
 def test_a_long_coast_in_closed_form_is_that_of_taylor_series(body: Spacecraft) -> None:
     end = 3.0 * motion.LONG / float(np.linalg.norm(body.omega0))
     path, after = motion.make_dynamics(body).path(body.initial, 0.0, end, most=1000)
-    pieces = taylor.integrate(body.inertia.moments, np.zeros(3), body.omega0, body.initial.quaternion, 0.0, end)
+    pieces = taylor.integrate(
+        body.inertia.moments, np.zeros(3), body.omega0, body.initial.quaternion, 0.0, end
+    )
     rates, quaternion = pieces[-1].final
     assert path.steps == 0
     assert np.allclose(after.rates, rates, rtol=0.0, atol=1e-10 * np.linalg.norm(rates))
@@ -342,7 +416,9 @@ def test_legs_are_forgotten_before_they_are_too_many(monkeypatch: pytest.MonkeyP
     body = spinner()
     remembering = motion.make_dynamics(body).remembering()
     for made in (train(2), train(2, 1), train(2, 0)):
-        assert bits(propagation.flown(body, made, dynamics=remembering)) == bits(propagation.flown(body, made))
+        assert bits(propagation.flown(body, made, dynamics=remembering)) == bits(
+            propagation.flown(body, made)
+        )
     assert 0 < len(remembering.known or ()) <= 3
 
 

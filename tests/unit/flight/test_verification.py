@@ -1,4 +1,6 @@
-"""``verify``: independent flights agree, differences are seen, the error budget names what costs."""
+"""``verify``: independent flights agree, differences are seen,
+the error budget names what costs.
+"""
 
 import json
 import math
@@ -44,17 +46,25 @@ from nutdamp.views.simulation import conservation, verdict
 
 EXAMPLE = read_spacecraft(example_text(), "example.yaml")
 HEAVIER = replace(EXAMPLE, inertia=Inertia((120.00012, 120.00012, 80.0)))  # by 1 ppm
-AXES = np.array([[math.cos(0.1), 0.0, math.sin(0.1)], [0.0, 1.0, 0.0], [-math.sin(0.1), 0.0, math.cos(0.1)]])
+AXES = np.array(
+    [[math.cos(0.1), 0.0, math.sin(0.1)], [0.0, 1.0, 0.0], [-math.sin(0.1), 0.0, math.cos(0.1)]]
+)
 TILTED = documented(
     replace(
         EXAMPLE,
         inertia=Inertia((122.0, 118.0, 80.0), AXES),
-        disturbances=(Disturbance(0.02 + 0.01j), Disturbance(0.01j, rate=-1.0), Disturbance(0j, axial=0.01)),
+        disturbances=(
+            Disturbance(0.02 + 0.01j),
+            Disturbance(0.01j, rate=-1.0),
+            Disturbance(0j, axial=0.01),
+        ),
         dissipation=900.0,
         limits=Limits(tick=0.001),
     )
 )
-"""Three different moments, principal axes tilted from those of the file, and everything that can disturb."""
+"""Three different moments, principal axes tilted from those of the file, and everything that can
+disturb.
+"""
 
 
 @pytest.fixture(autouse=True)
@@ -77,14 +87,20 @@ def test_dop853_confirms_the_flight(planned: Planner) -> None:
     verified = verify(EXAMPLE, planned(EXAMPLE, "two-pulse").pulses)
     assert confirmed(verified, 1e-11)
     assert list(left_in(verified)) == [IDEAL, "pulse width", AS_FLOWN]
-    assert (verified.methods[0].rate or 1.0) < 1e-14  # the impulse sum agrees outside the pulses in its rates
-    assert (verified.methods[0].axis or 0.0) > 1e-4  # H is off by the widths, which is what flown is for
+    assert (
+        verified.methods[0].rate or 1.0
+    ) < 1e-14  # the impulse sum agrees outside the pulses in its rates
+    assert (
+        verified.methods[0].axis or 0.0
+    ) > 1e-4  # H is off by the widths, which is what flown is for
     ideal = planned(documented(spinner(steerable=Steerable())), "one-pulse")
     assert list(left_in(verify(ideal.spacecraft, ideal.pulses))) == [IDEAL, AS_FLOWN]
 
 
 @pytest.mark.deep
-def test_in_the_axes_of_the_file_too_and_the_budget_names_each_imperfection(planned: Planner) -> None:
+def test_in_the_axes_of_the_file_too_and_the_budget_names_each_imperfection(
+    planned: Planner,
+) -> None:
     plan = planned(TILTED, "two-pulse")
     verified = verify(TILTED, plan.pulses, planning.unrounded(plan))
     assert confirmed(verified, 1e-11)
@@ -93,14 +109,17 @@ def test_in_the_axes_of_the_file_too_and_the_budget_names_each_imperfection(plan
 
 
 def test_a_flight_of_another_body_does_not_agree(planned: Planner) -> None:
-    """The comparison can fail: a body 1 ppm heavier than its file says differs by more than AGREE."""
+    """The comparison can fail: a body 1 ppm heavier than its file
+    says differs by more than AGREE.
+    """
     verified = verify(HEAVIER, planned(EXAMPLE, "two-pulse").pulses)
     assert verified.disagreeing == ("DOP853",)
     assert not verified.agree
 
 
 def test_a_spacecraft_with_fields_replaced_has_no_file_to_be_flown_by(planned: Planner) -> None:
-    made, read = planned(EXAMPLE, "two-pulse").pulses, Source(example_text(), "example.yaml").read()
+    made = planned(EXAMPLE, "two-pulse").pulses
+    read = Source(example_text(), "example.yaml").read()
     verified = verify(read.replace(mass=210.0), made)
     assert verified.checks == verified.disagreeing == ()
     assert "with_" in verified.methods[2].missing
@@ -116,7 +135,9 @@ def test_basilisk_has_its_say_in_the_verdict(
     def of(body: Spacecraft) -> Callable[[Spacecraft, Schedule, float], basilisk.BasiliskFlight]:
         def fly(_: Spacecraft, made: Schedule, until: float) -> basilisk.BasiliskFlight:
             times = np.unique([*np.linspace(0.0, until, 50), *(pulse.end for pulse in made)])
-            return basilisk.BasiliskFlight(times, *propagation.flown(body, made, until).motion(times), 0.01)
+            return basilisk.BasiliskFlight(
+                times, *propagation.flown(body, made, until).motion(times), 0.01
+            )
 
         return fly
 
@@ -142,16 +163,21 @@ def test_momentum_and_energy_keep_on_coasts_of_a_free_body_alone() -> None:
     assert verified.energy.kept
     assert max(verified.momentum.drift, verified.energy.drift) < 1e-13
     # A pure spin under a torque about axis 3: |H| grows by M t, the energy as its square.
-    turned = replace(EXAMPLE, omega0=np.array([0.0, 0.0, 3.0]), disturbances=(Disturbance(0j, axial=0.5),))
+    turned = replace(
+        EXAMPLE, omega0=np.array([0.0, 0.0, 3.0]), disturbances=(Disturbance(0j, axial=0.5),)
+    )
     body = documented(turned)
-    verified, share = verify(body, Schedule()), 240.0 / (240.0 + 0.5 * body.inertial_period)
+    verified = verify(body, Schedule())
+    share = 240.0 / (240.0 + 0.5 * body.inertial_period)
     assert verified.momentum.kept is verified.energy.kept is None
     assert verified.momentum.drift == pytest.approx(1.0 - share, rel=1e-9)
     assert verified.energy.drift == pytest.approx(1.0 - share**2, rel=1e-9)
     # Dissipation is internal: it takes energy and leaves the momentum.
     body = replace(EXAMPLE, dissipation=20.0)
     verified = verify(body, Schedule())
-    rates, _ = propagation.flown(body, Schedule(), body.inertial_period).motion(np.array([0.0, body.inertial_period]))
+    rates, _ = propagation.flown(body, Schedule(), body.inertial_period).motion(
+        np.array([0.0, body.inertial_period])
+    )
     before, after = (reference.energy(body.inertia.moments, one) for one in rates)
     assert verified.momentum.kept
     assert verified.momentum.drift < 1e-12
@@ -168,8 +194,12 @@ def test_a_body_at_rest_keeps_its_energy_of_nothing() -> None:
 
 
 def test_what_a_budget_row_says_is_what_that_imperfection_does(planned: Planner) -> None:
-    """On a plan that is exact for ideal impulses, each row alone is the flight with that imperfection alone."""
-    ideal = read_spacecraft("name: X\ninertia: {A: 120, C: 80}\nstate: {spin: 3, nutation: 5 deg}\n", "x")
+    """On a plan that is exact for ideal impulses, each row alone is the flight with that
+    imperfection alone.
+    """
+    ideal = read_spacecraft(
+        "name: X\ninertia: {A: 120, C: 80}\nstate: {spin: 3, nutation: 5 deg}\n", "x"
+    )
     body = replace(ideal, disturbances=(Disturbance(0.5 + 0j),), dissipation=300.0)
     made = planned(ideal, "two-pulse").pulses
     rows, calm = left_in(verify(body, made)), left_in(verify(replace(body, dissipation=None), made))
@@ -196,9 +226,15 @@ def test_what_a_budget_row_says_is_what_that_imperfection_does(planned: Planner)
     deep=2,
 )
 def test_the_budget_of_a_plan_does_not_read_backwards(changes: dict[str, Any], scheme: str) -> None:
-    """What the plan includes is in the ideal flight, which leaves next to nothing; without it the pulses miss."""
+    """What the plan includes is in the ideal flight, which leaves next to nothing; without it the
+    pulses miss.
+    """
     body = replace(EXAMPLE, **changes)
-    left = left_in(verify(body, planning.plan(body, scheme, Options(with_disturbances=True)).pulses, expected=True))
+    left = left_in(
+        verify(
+            body, planning.plan(body, scheme, Options(with_disturbances=True)).pulses, expected=True
+        )
+    )
     (missed,) = (nutation for name, nutation in left.items() if name.startswith("without"))
     assert missed > 100.0 * max(left[IDEAL], left[AS_FLOWN])
     assert "disturbances" not in left
@@ -243,30 +279,53 @@ def test_a_damper_of_a_body_with_a_wheel_keeps_h_and_takes_the_energy_of_its_ang
 
 @spread(
     ("moments", "spin"),
-    [((123.0, 117.0, 80.0), 3.0), ((80.0, 80.0, 120.0), -3.0), ((120.0, 120.0, 80.0), 3.0), ((80.0, 80.0, 120.0), 3.0)],
+    [
+        ((123.0, 117.0, 80.0), 3.0),
+        ((80.0, 80.0, 120.0), -3.0),
+        ((120.0, 120.0, 80.0), 3.0),
+        ((80.0, 80.0, 120.0), 3.0),
+    ],
     quick=0,
     deep=2,
 )
 def test_dop853_by_the_torque_law_confirms_flights_with_dissipation(
     moments: tuple[float, float, float], spin: float
 ) -> None:
-    """At 40 degrees of nutation, through real widths: exact arcs and series against the torque law."""
-    body = replace(spinner(moments=moments, spin=spin, degrees=40.0), channels=EXAMPLE.channels, dissipation=60.0)
-    pulses = [channel_pulse(EXAMPLE.channels[index], t, 0.8) for index, t in ((0, 2.0), (2, 21.0), (1, 50.0))]
+    """At 40 degrees of nutation, through real widths:
+    exact arcs and series against the torque law.
+    """
+    body = replace(
+        spinner(moments=moments, spin=spin, degrees=40.0),
+        channels=EXAMPLE.channels,
+        dissipation=60.0,
+    )
+    pulses = [
+        channel_pulse(EXAMPLE.channels[index], t, 0.8)
+        for index, t in ((0, 2.0), (2, 21.0), (1, 50.0))
+    ]
     assert confirmed(verify(documented(body), Schedule(tuple(pulses))), 1e-10)
 
 
 @pytest.mark.weekly
 def test_the_course_example_of_dissipation() -> None:
-    """C = 1000, A = 2000 kg m², 60 rpm, ω_t = 0.10 rad/s, τ = 100 s: one law in both flights and in DOP853."""
-    body = Spacecraft("x", Inertia((2000.0, 2000.0, 1000.0)), np.array([0.1, 0.0, 2 * math.pi]), dissipation=100.0)
+    """C = 1000, A = 2000 kg m², 60 rpm, ω_t = 0.10 rad/s, τ = 100 s: one law in both flights and in
+    DOP853.
+    """
+    body = Spacecraft(
+        "x", Inertia((2000.0, 2000.0, 1000.0)), np.array([0.1, 0.0, 2 * math.pi]), dissipation=100.0
+    )
     times = np.array([0.0, 50.0, 100.0, 200.0, 300.0, 345.0, 600.0])
     _, states = states_of(documented(body), *times)
-    motions = ((states[:3].T, None), *(
-        fly(body, Schedule(), 600.0).motion(times) for fly in (propagation.flown, propagation.by_impulses)
-    ))  # fmt: skip
+    motions = (
+        (states[:3].T, None),
+        *(
+            fly(body, Schedule(), 600.0).motion(times)
+            for fly in (propagation.flown, propagation.by_impulses)
+        ),
+    )
     by_torque, *others = (
-        np.degrees(np.arctan2(2.0 * np.hypot(rates[:, 0], rates[:, 1]), rates[:, 2])) for rates, _ in motions
+        np.degrees(np.arctan2(2.0 * np.hypot(rates[:, 0], rates[:, 1]), rates[:, 2]))
+        for rates, _ in motions
     )
     assert by_torque[:-2] == pytest.approx([1.82, 3.00, 4.95, 13.24, 32.59], abs=0.005)
     assert by_torque[-2:] == pytest.approx([45.0, 85.5], abs=0.1)
@@ -286,7 +345,12 @@ def test_the_command_takes_a_schedule_file(run: Run) -> None:
     run("plan", "--scheme", "one-pulse", "--csv", "pulses.csv")
     data = json.loads(run("verify", "--schedule", "pulses.csv", "--json", "-").stdout)
     assert data["agree"] is True
-    assert [method["name"][:6] for method in data["methods"]] == ["impuls", "flown ", "DOP853", "Basili"]
+    assert [method["name"][:6] for method in data["methods"]] == [
+        "impuls",
+        "flown ",
+        "DOP853",
+        "Basili",
+    ]
     assert data["budget"][0]["imperfection"].startswith("none")
     assert run("verify", "--scheme", "two-pulse", "--schedule", "x.csv").returncode == 2
     assert run("verify", "--schedule", "missing.csv").returncode == 1
@@ -305,18 +369,36 @@ tank: {propellant: 2 kg, pressure: 20 bar, final_pressure: 10 bar, inertia_per_k
 """
 
 
-def test_thrusters_whose_torques_cancel_use_propellant_and_leave_no_imperfection(run: Run, tmp_path: Path) -> None:
-    """Moments fall with it; what remains is the nutation at t = 0, which is no fault of the pulse."""
+def test_thrusters_whose_torques_cancel_use_propellant_and_leave_no_imperfection(
+    run: Run, tmp_path: Path
+) -> None:
+    """Moments fall with it; what remains is the nutation at t = 0,
+    which is no fault of the pulse.
+    """
     (tmp_path / "pair.yaml").write_text(PAIR, encoding="utf-8")
     (tmp_path / "burn.csv").write_text("start_s,on_time_s,channel\n0,43.5,DV\n", encoding="utf-8")
-    assert json.loads(run("verify", "pair.yaml", "--schedule", "burn.csv", "--json", "-").stdout)["agree"] is True
-    rigid = ("verify", "pair.yaml", "--schedule", "burn.csv", "--set", "tank.inertia_per_kg={A: 0, C: 0}")
+    assert (
+        json.loads(run("verify", "pair.yaml", "--schedule", "burn.csv", "--json", "-").stdout)[
+            "agree"
+        ]
+        is True
+    )
+    rigid = (
+        "verify",
+        "pair.yaml",
+        "--schedule",
+        "burn.csv",
+        "--set",
+        "tank.inertia_per_kg={A: 0, C: 0}",
+    )
     assert "imperfection" not in run(*rigid).stdout
 
 
 @pytest.mark.deep
 def test_with_a_target_the_budget_is_of_the_distance_from_it(run: Run) -> None:
-    screen = run("verify", "--scheme", "half-cone", "--target", "10deg,45deg", "--quiet", "-v").stdout
+    screen = run(
+        "verify", "--scheme", "half-cone", "--target", "10deg,45deg", "--quiet", "-v"
+    ).stdout
     budget = screen[screen.index("Error budget") :]
     assert re.search("^ +nutation +axis error$", budget, re.MULTILINE)
     assert re.search("^all: as flown +< 1e-9 +< 1e-9$", budget, re.MULTILINE)
@@ -347,7 +429,9 @@ def test_verify_of_what_cannot_be_confirmed_is_no_success(run: Run, tmp_path: Pa
     verified = run("verify", "-", "--scheme", "one-pulse", "--json", "v.json", stdin=text)
     data = json.loads((tmp_path / "v.json").read_text())
     assert data["agree"] is None
-    assert all(one["missing"] for one in data["methods"] if one["name"].startswith(("DOP853", "Basilisk")))
+    assert all(
+        one["missing"] for one in data["methods"] if one["name"].startswith(("DOP853", "Basilisk"))
+    )
     assert verified.returncode == 3
     assert "not confirmed" in verified.stderr
     assert "NOT CONFIRMED" in verified.stdout
@@ -362,22 +446,36 @@ def test_what_is_conserved_is_no_number_of_noughts() -> None:
         (3.1e-9, 0.0, ()),
         (2e-13, 2e-4, ("dissipation",)),
     ):
-        verified = Verification((), Conservation("|H|", momentum), Conservation("energy", energy, changed), ())
+        verified = Verification(
+            (), Conservation("|H|", momentum), Conservation("energy", energy, changed), ()
+        )
         assert verified.drifting == (("|H|",) if momentum > AGREE else ())
         said.append(words.text(conservation(verified)))
     check_text("flight.conserved", "\n".join(said))
 
 
 def test_dissipation_with_a_wheel_whatever_pushes_and_falls() -> None:
-    """Wide pulses of a tank that takes moments along, an axial part among them, to both sides of θ0."""
+    """Wide pulses of a tank that takes moments along, an axial part among them, to both sides of
+    θ0.
+    """
     thrusters = "[{name: P, torque: [90, 30, 3], JET}, {name: N, torque: [-90, 20, -8], JET}]"
     thrusters = thrusters.replace("JET", "isp: 220, lever_arm: 1")
-    tank = "{propellant: 5 kg, pressure: 20 bar, final_pressure: 8 bar, inertia_per_kg: {A: 2 m^2, C: 1 m^2}}"
+    tank = (
+        "{propellant: 5 kg, pressure: 20 bar, final_pressure: 8 bar, inertia_per_kg: {A: 2 m^2, "
+        "C: 1 m^2}}"
+    )
     text = case("wheel-growth.yaml").read_text().replace("2 deg", "14 deg")
     for sign in ("", "-"):
-        turned = text.replace("{momentum: ", f"{{momentum: {sign}").replace("{spin: ", f"{{spin: {sign}")
-        body = read_spacecraft(f"{turned}mass: 300 kg\nthrusters: {thrusters}\ntank: {tank}\n", "growth.yaml")
-        pulses = [channel_pulse(channel, t, 4.0) for channel, t in zip(body.channels, (30.0, 50.0), strict=True)]
+        turned = text.replace("{momentum: ", f"{{momentum: {sign}").replace(
+            "{spin: ", f"{{spin: {sign}"
+        )
+        body = read_spacecraft(
+            f"{turned}mass: 300 kg\nthrusters: {thrusters}\ntank: {tank}\n", "growth.yaml"
+        )
+        pulses = [
+            channel_pulse(channel, t, 4.0)
+            for channel, t in zip(body.channels, (30.0, 50.0), strict=True)
+        ]
         checked = verify(body, Schedule(supplied(body, pulses)))
         assert checked.agree
         assert checked.checks

@@ -1,4 +1,6 @@
-"""Dispersed cases against an independent integrator and single flights: ends, cones kept, derivatives."""
+"""Dispersed cases against an independent integrator and single flights: ends, cones kept,
+derivatives.
+"""
 
 import csv
 import json
@@ -52,25 +54,39 @@ SYMMETRIC = {
     "prolate, dissipation": dispersed.sinking(PROLATE),
     "oblate, dissipation": dispersed.sinking(STEERED, 4.0),
     "despun, a wheel": dispersed.wheeled(PROLATE, 180.0, spin=0.0),
-    "a wheel against the spin, dissipation": dispersed.wheeled(dispersed.sinking(STEERED, 20.0), 700.0),
+    "a wheel against the spin, dissipation": dispersed.wheeled(
+        dispersed.sinking(STEERED, 20.0), 700.0
+    ),
 }
 THREE = {
     "three moments": dispersed.with_jets(moments=(120.0, 105.0, 80.0)),
-    "three moments, oblate, spin reversed": dispersed.with_jets(moments=(80.0, 95.0, 120.0), spin=-2.0),
-    "middle moment, a wheel": dispersed.wheeled(dispersed.with_jets(moments=(80.0, 120.0, 95.0)), 400.0),
+    "three moments, oblate, spin reversed": dispersed.with_jets(
+        moments=(80.0, 95.0, 120.0), spin=-2.0
+    ),
+    "middle moment, a wheel": dispersed.wheeled(
+        dispersed.with_jets(moments=(80.0, 120.0, 95.0)), 400.0
+    ),
 }
 LEAKS = (Disturbance(0.02 + 0.01j, 0.05), Disturbance(0.03 + 0.0j, rate=-3.0))
-LEAKING = DispersedModel(replace(PROLATE.spacecraft, disturbances=LEAKS, dissipation=400.0), PROLATE.schedule)
+LEAKING = DispersedModel(
+    replace(PROLATE.spacecraft, disturbances=LEAKS, dissipation=400.0), PROLATE.schedule
+)
 
 
-def outputs(fly: type[ClosedForm | RealWidths], model: DispersedModel, draws: Mapping[str, Any]) -> NDArray[np.float64]:
+def outputs(
+    fly: type[ClosedForm | RealWidths], model: DispersedModel, draws: Mapping[str, Any]
+) -> NDArray[np.float64]:
     """Of all cases, (5, n)."""
-    return measure(model, fly(model)(model.cases(draws)), max(map(np.size, draws.values()), default=1))
+    return measure(
+        model, fly(model)(model.cases(draws)), max(map(np.size, draws.values()), default=1)
+    )
 
 
 @spread("name", SYMMETRIC, quick=4, deep=3)
 def test_the_impulse_sum_agrees_with_an_independent_integrator(name: str) -> None:
-    """Kicks at the pulse centres; the body is flown by DOP853, with dissipation by H in space and the attitude."""
+    """Kicks at the pulse centres; the body is flown by DOP853, with dissipation by H in space and
+    the attitude.
+    """
     model = SYMMETRIC[name]
     draws = dispersed.first_cases(Study(model), CASES)
     by_sum = outputs(ClosedForm, model, draws)
@@ -82,11 +98,14 @@ def test_the_impulse_sum_agrees_with_an_independent_integrator(name: str) -> Non
             reference.Kick(pulse.t, np.array([acting.real, acting.imag, pulse.impulse[2]]))
             for pulse, acting in zip(made, propagation.effective_impulses(true, made), strict=True)
         ]
-        moments, until, wheel = true.inertia.moments, max(pulse.t for pulse in made), true.inertia.wheel
+        moments = true.inertia.moments
+        until = max(pulse.t for pulse in made)
+        wheel = true.inertia.wheel
         end = reference.fly(moments, true.omega0, kicks, until, np.eye(3), true.growth, wheel)
         momentum = reference.momentum(moments, end, wheel)
         begun = reference.momentum(moments, reference.Motion(true.omega0, np.eye(3)), wheel)
-        # The axis error: H in the estimated body axes, from the true ones by the tilt, against H of the estimate.
+        # The axis error: H in the estimated body axes, from the true ones by the tilt, against H of
+        # the estimate.
         pointed = Rotation.from_rotvec([one["attitude x"], one["attitude y"], 0.0]).apply(momentum)
         expected = [
             reference.nutation(moments, end.rates, math.copysign(1.0, begun[2]), wheel),
@@ -106,19 +125,22 @@ def test_the_impulse_sum_of_each_case_is_that_of_its_own_spacecraft(name: str) -
     for case in range(0, CASES, 4):
         left = propagation.by_impulses(*realised(model, dispersed.one_of(draws, case))).residual
         assert by_sum[:2, case] == pytest.approx([left.nutation, left.momentum_shift], abs=1e-12)
-    left, nominal = (
-        propagation.by_impulses(model.spacecraft, model.schedule).residual,
-        outputs(ClosedForm, model, {})[:, 0],
+    left = propagation.by_impulses(model.spacecraft, model.schedule).residual
+    nominal = outputs(ClosedForm, model, {})[:, 0]
+    assert nominal[:3] == pytest.approx(
+        [left.nutation, left.momentum_shift, left.axis_error], abs=1e-13
     )
-    assert nominal[:3] == pytest.approx([left.nutation, left.momentum_shift, left.axis_error], abs=1e-13)
     assert nominal[4] == pytest.approx(model.schedule.propellant or math.nan, nan_ok=True)
 
 
 def test_the_impulse_sum_of_three_moments_has_their_H_and_the_body_of_their_mean() -> None:
     model = THREE["three moments"]
-    body, A = model.spacecraft, 0.5 * (120.0 + 105.0)
+    body = model.spacecraft
+    A = 0.5 * (120.0 + 105.0)
     mean = replace(
-        body, inertia=Inertia((A, A, 80.0)), omega0=np.array([120.0, 105.0, 80.0]) * body.omega0 / [A, A, 80.0]
+        body,
+        inertia=Inertia((A, A, 80.0)),
+        omega0=np.array([120.0, 105.0, 80.0]) * body.omega0 / [A, A, 80.0],
     )
     left = propagation.by_impulses(mean, model.schedule).residual
     nominal = outputs(ClosedForm, model, {})[:2, 0]
@@ -127,15 +149,26 @@ def test_the_impulse_sum_of_three_moments_has_their_H_and_the_body_of_their_mean
 
 def test_pulses_that_change_places_act_in_their_own_order() -> None:
     """Impulses 20 ms apart, of which a fixed error of 50 ms makes the second the first."""
-    pulses = [steerable_pulse(Steerable(), t, angle, impulse=4.0) for t, angle in ((1.0, 0.3), (1.02, 2.0))]
+    pulses = [
+        steerable_pulse(Steerable(), t, angle, impulse=4.0)
+        for t, angle in ((1.0, 0.3), (1.02, 2.0))
+    ]
     body = replace(spinner(), dispersions=Dispersions(timing=Tolerance("uniform", 0.05)))
-    model, draws = DispersedModel(body, Schedule(tuple(pulses))), {"timing pulse 1": 0.05, "timing pulse 2": 0.0}
+    model = DispersedModel(body, Schedule(tuple(pulses)))
+    draws = {"timing pulse 1": 0.05, "timing pulse 2": 0.0}
     left = propagation.by_impulses(*realised(model, draws)).residual
     by_sum = outputs(ClosedForm, model, draws)[:2, 0]
     assert by_sum == pytest.approx([left.nutation, left.momentum_shift], abs=1e-12)
-    body = replace(spinner(steerable=Steerable(20.0)), dispersions=Dispersions(timing_offset=Tolerance("bias", -5.0)))
-    model = DispersedModel(body, Schedule((steerable_pulse(Steerable(20.0), 0.4, 0.3, on_time=0.4),)))
-    assert model.cases({"timing offset": -5.0}).starts == (0.0,)  # one shifted before t = 0 fires at 0
+    body = replace(
+        spinner(steerable=Steerable(20.0)),
+        dispersions=Dispersions(timing_offset=Tolerance("bias", -5.0)),
+    )
+    model = DispersedModel(
+        body, Schedule((steerable_pulse(Steerable(20.0), 0.4, 0.3, on_time=0.4),))
+    )
+    assert model.cases({"timing offset": -5.0}).starts == (
+        0.0,
+    )  # one shifted before t = 0 fires at 0
 
 
 def test_a_schedule_without_pulses_leaves_what_is_there() -> None:
@@ -177,22 +210,34 @@ def test_through_real_widths_each_case_is_the_flight_of_its_own_spacecraft(name:
         assert flown[:, case] == pytest.approx(flown_outputs(model, one), abs=1e-10, nan_ok=True)
 
 
-def test_a_case_that_coasts_while_others_fire_takes_no_steps(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Shifts of 100 s change the order of pulses of 0.4 s: only these are integrated, some radians each."""
+def test_a_case_that_coasts_while_others_fire_takes_no_steps(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Shifts of 100 s change the order of pulses of 0.4 s: only these are integrated, some radians
+    each.
+    """
     body = nutdamp.load(places.case("slow-timing.yaml"))
     pulses = [channel_pulse(body.channels[number], 1.0 + number, 0.4) for number in range(3)]
-    model, spans = DispersedModel(body, Schedule(tuple(pulses))), list[float]()
+    model = DispersedModel(body, Schedule(tuple(pulses)))
+    spans = list[float]()
     monkeypatch.setattr(batch, "_expect_short", spans.append)
     draws = dispersed.first_cases(Study(model), CASES)
     flown = outputs(RealWidths, model, draws)
     assert max(spans) < 5.0
     for case in range(0, CASES, 6):
-        assert flown[:, case] == pytest.approx(flown_outputs(model, dispersed.one_of(draws, case)), abs=1e-10)
+        assert flown[:, case] == pytest.approx(
+            flown_outputs(model, dispersed.one_of(draws, case)), abs=1e-10
+        )
 
 
 def test_the_price_of_cases_that_are_integrated_grows_with_their_coasts() -> None:
-    bodies = [replace(THREE["three moments"].spacecraft, dispersions=Dispersions(timing=dispersed.normal(late)))
-              for late in (1e-3, 100.0)]  # fmt: skip
+    bodies = [
+        replace(
+            THREE["three moments"].spacecraft,
+            dispersions=Dispersions(timing=dispersed.normal(late)),
+        )
+        for late in (1e-3, 100.0)
+    ]
     soon, late = (RealWidths(DispersedModel(body, PROLATE.schedule)).effort for body in bodies)
     assert late > 10.0 * soon
 
@@ -210,7 +255,8 @@ BLOCKS = {
 def test_each_case_fires_its_blocks_as_its_own_body_alone(name: str) -> None:
     model = BLOCKS[name]
     draws = dispersed.first_cases(study_of(model.spacecraft, model.schedule), 15)
-    own, flown = timed(model, model.cases(draws)), outputs(RealWidths, model, draws)
+    own = timed(model, model.cases(draws))
+    flown = outputs(RealWidths, model, draws)
     planned = np.array([pulse.start for pulse in model.schedule])
     for case in (0, 7, 14):
         one = dispersed.one_of(draws, case)
@@ -229,11 +275,14 @@ def test_blocks_fire_what_their_valves_give(number: int) -> None:
     whole = by_blocks(cold=Cold(0.7, 3.0), tank=Tank(1.0, 2e6, 1e6, 1.0), channels=channels)
     model = DispersedModel(whole.spacecraft, fired(whole.spacecraft, whole.schedule.blocks[:2]))
     draws = dispersed.first_cases(study_of(model.spacecraft, model.schedule), 12)
-    own, flown = timed(model, model.cases(draws)), outputs(RealWidths, model, draws)
+    own = timed(model, model.cases(draws))
+    flown = outputs(RealWidths, model, draws)
     one = dispersed.one_of(draws, number)
     true, _ = realised(model, one)
     made = fired(true, model.schedule.blocks)
-    middles = [start[number] + 0.5 * width for start, width in zip(own.starts, model.on_times, strict=True)]
+    middles = [
+        start[number] + 0.5 * width for start, width in zip(own.starts, model.on_times, strict=True)
+    ]
     assert middles == pytest.approx([pulse.t for pulse in made], abs=1e-9)
     assert np.abs(np.array(middles) - [pulse.t for pulse in model.schedule]).max() > 0.05
     assert flown[:, number] == pytest.approx(flown_outputs(model, one), abs=1e-9, nan_ok=True)
@@ -266,25 +315,40 @@ def test_blocks_begin_as_the_reference_has_it(number: int) -> None:
 
 
 def test_errors_of_timing_and_of_the_attitude_are_those_of_the_case() -> None:
-    """A tilt of the truth moves its Sun pulses; an offset, a timing error and jitter come on top."""
+    """A tilt of the truth moves its Sun pulses; an offset,
+    a timing error and jitter come on top.
+    """
     given = Dispersions(attitude=dispersed.normal(0.03), timing=Tolerance("uniform", 0.01))
-    model = by_blocks(replace(given, timing_offset=dispersed.normal(0.02)), sun_sensor=SunSensor(0.4, jitter=2e-3))
+    model = by_blocks(
+        replace(given, timing_offset=dispersed.normal(0.02)), sun_sensor=SunSensor(0.4, jitter=2e-3)
+    )
     jitters = [entry.name for entry in model.inputs.drawn if entry.name.startswith("Sun pulse")]
     assert len(jitters) == len(set(jitters)) == len(model.schedule)
     draws = dispersed.first_cases(study_of(model.spacecraft, model.schedule), 6)
-    own, one = timed(model, model.cases(draws)), dispersed.one_of(draws, 5)
-    true, _ = realised(model, {name: draw for name, draw in one.items() if name.startswith("attitude")})
+    own = timed(model, model.cases(draws))
+    one = dispersed.one_of(draws, 5)
+    true, _ = realised(
+        model, {name: draw for name, draw in one.items() if name.startswith("attitude")}
+    )
     late = one["timing offset"] + one["timing pulse 1"] + one["Sun pulse 1"]
     first = fired(replace(true, sun_sensor=SunSensor(0.4)), model.schedule.blocks[:1]).pulses[0]
     assert own.starts[0][5] == pytest.approx(first.start + late, abs=1e-9)
 
 
 def test_an_error_of_the_spin_turns_no_heading() -> None:
-    """From its own Sun pulses a train keeps its phase against the Sun; at planned times it would be smeared."""
-    body = commanded(spinner(120.0, 170.0, 1.2, 0.0, channels=cross(3.0)), np.array([1.0, 0.2, 0.1]))
-    body = replace(body, dispersions=Dispersions(omega0=(None, None, dispersed.normal(0.01, relative=True))))
+    """From its own Sun pulses a train keeps its phase against the Sun; at planned times it would be
+    smeared.
+    """
+    body = commanded(
+        spinner(120.0, 170.0, 1.2, 0.0, channels=cross(3.0)), np.array([1.0, 0.2, 0.1])
+    )
+    body = replace(
+        body, dispersions=Dispersions(omega0=(None, None, dispersed.normal(0.01, relative=True)))
+    )
     made = fired(body, (Block("+1", 1, 1.0, 0.2, 40),))
-    own, fixed = (run(Results(study_of(body, one), 128)).values for one in (made, replace(made, blocks=())))
+    own, fixed = (
+        run(Results(study_of(body, one), 128)).values for one in (made, replace(made, blocks=()))
+    )
     assert 5.0 * np.std(present(own)[1]) < np.std(present(fixed)[1])
 
 
@@ -300,30 +364,45 @@ def test_a_sensor_that_loses_the_sun_fires_nothing() -> None:
 
 
 def test_sensitivities_are_those_of_pulses_fired_by_the_sun() -> None:
-    model, at = BLOCKS["spin reversed"], OUTPUTS.index("spin_change")
+    model = BLOCKS["spin reversed"]
+    at = OUTPUTS.index("spin_change")
     first = study_of(model.spacecraft, model.schedule).first_order
     for index, entry in enumerate(first.inputs):
         if entry.name in ("A", "C", "omega0_3"):
             step = 1e-3 * entry.size
-            plus, minus = (flown_outputs(model, {entry.name: sign * step})[at] for sign in (1.0, -1.0))
-            assert first.jacobian[8, index] == pytest.approx((plus - minus) / (2.0 * step), rel=1e-4, abs=1e-9)
+            plus, minus = (
+                flown_outputs(model, {entry.name: sign * step})[at] for sign in (1.0, -1.0)
+            )
+            assert first.jacobian[8, index] == pytest.approx(
+                (plus - minus) / (2.0 * step), rel=1e-4, abs=1e-9
+            )
 
 
 # --- cones that the spin axis keeps: the angles of each case are those of its own flight
 
 
 def with_directions(model: DispersedModel, **fields: object) -> DispersedModel:
-    """The model with directions all over the sky, and one on the spin axis, where angles are near zero."""
+    """The model with directions all over the sky, and one on the spin axis, where angles are near
+    zero.
+    """
     body = replace(model.spacecraft, **fields)  # type: ignore[arg-type]
     sky = np.random.default_rng(1).normal(size=(3, 3))
-    ways = (*(way / np.linalg.norm(way) for way in sky), body.axis, None)  # the last: H, wherever it points
-    return DispersedModel(replace(body, keep=tuple(Keep(str(k), way) for k, way in enumerate(ways))), model.schedule)
+    ways = (
+        *(way / np.linalg.norm(way) for way in sky),
+        body.axis,
+        None,
+    )  # the last: H, wherever it points
+    return DispersedModel(
+        replace(body, keep=tuple(Keep(str(k), way) for k, way in enumerate(ways))), model.schedule
+    )
 
 
 JETS = dispersed.with_jets()
 MODELS = {
     "prolate": with_directions(JETS),
-    "oblate, spin reversed": with_directions(dispersed.steered(moments=(70.0, 70.0, 110.0), spin=-3.0)),
+    "oblate, spin reversed": with_directions(
+        dispersed.steered(moments=(70.0, 70.0, 110.0), spin=-3.0)
+    ),
     "dissipation": with_directions(dispersed.sinking(JETS)),
     "three moments": with_directions(dispersed.with_jets(moments=(120.0, 105.0, 80.0))),
     "disturbances": with_directions(JETS, disturbances=LEAKS, dissipation=400.0),
@@ -350,7 +429,9 @@ def test_angles_of_each_case_are_those_of_its_own_flight(name: str) -> None:
     for case in range(0, 16, 5):
         true, made = realised(model, dispersed.one_of(draws, case))
         alone = propagation.flown(true, made)
-        for one, ends in zip(aspects(alone, end_of(alone)), angles[:, :, case], strict=False):  # a Sun besides
+        for one, ends in zip(
+            aspects(alone, end_of(alone)), angles[:, :, case], strict=False
+        ):  # a Sun besides
             within = 2e-8  # near the direction of the axis itself
             assert ends == pytest.approx((one.least, one.largest), abs=within)
 
@@ -370,7 +451,9 @@ COUNT = 100
 
 
 def kept(least: float, **fields: object) -> Results:
-    """A study of pulses that leave a nutation, with a cone of ``least`` rad; all cases meet the loose requirement."""
+    """A study of pulses that leave a nutation, with a cone of ``least`` rad; all cases meet the
+    loose requirement.
+    """
     axis = JETS.spacecraft.direction_in_n(math.radians(20.0), 0.4)
     loose = Requirement(math.radians(60.0), math.radians(60.0), 0.9)
     given = {"keep": (Keep("beacon", axis, least),), "requirement": loose, **fields}
@@ -418,13 +501,17 @@ def test_disperse_says_how_many_cases_break_the_cone(run: Run) -> None:
     study = json.loads(counted.stdout)
     (cone,) = study["aspects"]
     assert 0.3 < cone["broken_fraction"] < 0.6
-    assert study["requirement"]["met_fraction"] == pytest.approx(1.0 - cone["broken_fraction"], abs=0.02)
+    assert study["requirement"]["met_fraction"] == pytest.approx(
+        1.0 - cone["broken_fraction"], abs=0.02
+    )
     assert cone["least_deg"] < 5.0 < cone["nominal_least_deg"] < 5.1
     assert all(one["aspects"][0]["least_deg"] < 5.0 for one in study["worst"])
     screen = run(*options, "--samples", "2000", "-v", stdin=FILE).stdout
     assert f"broken in {100 * cone['broken_fraction']:.1f} % of cases" in " ".join(screen.split())
     worst = study["worst"][0]
-    row = next(line.split() for line in screen.splitlines() if line.split()[:1] == [str(worst["case"])])
+    row = next(
+        line.split() for line in screen.splitlines() if line.split()[:1] == [str(worst["case"])]
+    )
     assert row[4] == f"{worst['aspects'][0]['least_deg']:.4g}"
     assert "least from Sun, deg" in run(*options, "--case", "1", stdin=FILE).stdout
 
@@ -440,15 +527,22 @@ def test_the_csv_has_the_angles_of_each_case(run: Run, tmp_path: Path) -> None:
     study, content = csv_of("keep: [{name: Sun, direction: sun, min: 5 deg}]")
     rows = list(csv.DictReader(content.splitlines()))
     assert list(rows[0])[-3:] == ["propellant_kg", "Sun_least_deg", "Sun_largest_deg"]
-    least, largest = np.array([[float(row[f"Sun_{end}_deg"]) for row in rows] for end in ("least", "largest")])
+    least, largest = np.array(
+        [[float(row[f"Sun_{end}_deg"]) for row in rows] for end in ("least", "largest")]
+    )
     (cone,) = study["aspects"]
     assert (len(rows), least.min(), largest.max()) == (300, cone["least_deg"], cone["largest_deg"])
     assert np.mean(least < 5.0) == cone["broken_fraction"]
     for worst in study["worst"]:
         (angles,), at = worst["aspects"], worst["case"] - 1
-        assert (least[at], largest[at]) == pytest.approx((angles["least_deg"], angles["largest_deg"]), abs=1e-9)
+        assert (least[at], largest[at]) == pytest.approx(
+            (angles["least_deg"], angles["largest_deg"]), abs=1e-9
+        )
     # A cone so far away that nothing is routed changes nothing else.
-    (_, kept_csv), (_, free_csv) = csv_of("keep: [{name: Sun, direction: sun, min: 1 deg}]"), csv_of("")
+    (_, kept_csv), (_, free_csv) = (
+        csv_of("keep: [{name: Sun, direction: sun, min: 1 deg}]"),
+        csv_of(""),
+    )
     assert free_csv.splitlines() == [line.rsplit(",", 2)[0] for line in kept_csv.splitlines()]
 
 
@@ -458,7 +552,9 @@ def test_a_robust_plan_keeps_the_cone_in_most_cases(tmp_path: Path) -> None:
     body: Spacecraft = nutdamp.load(tmp_path / "keeper.yaml")
     names = "rhumb-line", "half-cone"
     compared, counted = (decision.compare(body, names, samples=samples) for samples in (0, 1000))
-    assert [one.recommended and one.recommended.scheme for one in (compared, counted)] == list(names)
+    assert [one.recommended and one.recommended.scheme for one in (compared, counted)] == list(
+        names
+    )
     trials = robust.variations_of(compared)
     judged = robust.compare(compared, trials[:1] + trials[-2:])
     shares = {one.plan.scheme: one.cases.complying for one in judged.candidates}
@@ -468,14 +564,19 @@ def test_a_robust_plan_keeps_the_cone_in_most_cases(tmp_path: Path) -> None:
 
 
 def test_the_budget_of_h_is_that_of_real_widths() -> None:
-    """A ΔV of 45 s: by impulses each thrust error turns H by 0.003°, through the widths by a ten-thousandth of it."""
+    """A ΔV of 45 s: by impulses each thrust error turns H by 0.003°, through the widths by a
+    ten-thousandth of it.
+    """
     body = nutdamp.load(places.case("lp71b.yaml"))
     study = study_of(body, read_plan(str(places.case("dv45.csv")), body)[0].pulses)
-    flown, closed = study.first_order, first_order(study.model)
+    flown = study.first_order
+    closed = first_order(study.model)
     assert math.degrees(closed.sigma("momentum_shift")) > 0.003
     assert math.degrees(flown.sigma("momentum_shift")) < 2e-6
     assert flown.sigma("nutation") == pytest.approx(closed.sigma("nutation"), rel=0.01)
     step = 1e-4 * flown.inputs[0].size
     draw = np.array([step, -step])
     ends = vectors(study.model, study.flies(study.model.cases({flown.inputs[0].name: draw})), 2)
-    assert flown.jacobian[:8, 0] == pytest.approx((ends[:8, 0] - ends[:8, 1]) / (2.0 * step), rel=0.02, abs=1e-9)
+    assert flown.jacobian[:8, 0] == pytest.approx(
+        (ends[:8, 0] - ends[:8, 1]) / (2.0 * step), rel=0.02, abs=1e-9
+    )

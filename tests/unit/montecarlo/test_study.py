@@ -1,4 +1,6 @@
-"""Studies: what is counted, whatever threads and interruptions; percentiles, intervals; sensitivities and shares."""
+"""Studies: what is counted, whatever threads and interruptions; percentiles, intervals;
+sensitivities and shares.
+"""
 
 import itertools
 import math
@@ -114,11 +116,15 @@ def test_a_stopped_run_keeps_the_first_cases_and_goes_on(plain: Results) -> None
 
 def test_cases_of_three_moments_do_not_depend_on_threads_or_interruptions() -> None:
     model = dispersed.with_jets(moments=(120.0, 110.0, 80.0))
-    whole, parts = (Results(study_of(model.spacecraft, model.schedule), count) for count in (1_500, 700))
+    whole, parts = (
+        Results(study_of(model.spacecraft, model.schedule), count) for count in (1_500, 700)
+    )
     same(run(whole), run(run(parts, threads=2).extended(1_500), threads=2))
 
 
-def test_beyond_what_is_kept_singly_all_is_counted(plain: Results, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_beyond_what_is_kept_singly_all_is_counted(
+    plain: Results, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """As if 10,000 were the most: percentiles to 0.1 %, the same counts."""
     monkeypatch.setattr(dispersion, "EXACT_CASES", 10_000)
     counted = run(Results(a_study(), MANY), threads=2)
@@ -135,11 +141,15 @@ def test_beyond_what_is_kept_singly_all_is_counted(plain: Results, monkeypatch: 
 
 
 def test_a_case_is_the_same_alone(plain: Results) -> None:
-    study, values = plain.study, values_of(plain)
+    study = plain.study
+    values = values_of(plain)
     for case in (0, BLOCK - 1, BLOCK, MANY - 1, int(plain.worst.cases[0])):
-        assert study.outputs_of(study.draws_of(case)) == pytest.approx(values[:, case], rel=1e-12, abs=1e-14)
+        assert study.outputs_of(study.draws_of(case)) == pytest.approx(
+            values[:, case], rel=1e-12, abs=1e-14
+        )
         assert {
-            name: float(np.ravel(draw)[0]) for name, draw in study.draws_of_all(np.array([case])).items()
+            name: float(np.ravel(draw)[0])
+            for name, draw in study.draws_of_all(np.array([case])).items()
         } == study.draws_of(case)
 
 
@@ -156,7 +166,9 @@ def test_the_worst_miss_the_requirement_most(plain: Results) -> None:
     assert free.worst.cases[0] == np.argmax(values_of(free)[0])
 
 
-def test_a_share_is_shown_beyond_its_interval_at_first_of_all_but_a_millionth_at_last_of_95_percent() -> None:
+def test_a_share_is_shown_beyond_its_interval_at_first_of_all_but_a_millionth_at_last_of_95_percent() -> (
+    None
+):
     for met, early, last in (
         (950, True, True),
         (880, None, True),
@@ -170,7 +182,12 @@ def test_a_share_is_shown_beyond_its_interval_at_first_of_all_but_a_millionth_at
 
 # Cases asked for, share of them that complies where 0.85 must, units a case; the stages flown.
 STAGED: list[tuple[int | None, float, float, list[int]]] = [
-    (None, 0.5, 1e-9, [2_048, 8_192, 20_000]),  # one share is shown, of as many cases, however early it is decided
+    (
+        None,
+        0.5,
+        1e-9,
+        [2_048, 8_192, 20_000],
+    ),  # one share is shown, of as many cases, however early it is decided
     (None, 0.85, 1e-9, [2_048, 8_192, 20_000, 40_000, 80_000, 160_000]),
     (None, 0.85, 0.2, [2_048, 8_192, 20_000, 40_000]),  # within the budget for more cases
     (None, 0.86, 1e-9, [2_048, 8_192, 20_000, 40_000]),
@@ -184,11 +201,16 @@ STAGED: list[tuple[int | None, float, float, list[int]]] = [
 
 @pytest.mark.parametrize(("samples", "share", "effort", "stages"), STAGED)
 def test_cases_are_flown_in_stages_until_the_share_is_shown(
-    samples: int | None, share: float, effort: float, stages: list[int], monkeypatch: pytest.MonkeyPatch
+    samples: int | None,
+    share: float,
+    effort: float,
+    stages: list[int],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     if samples == 60_000:
         monkeypatch.setattr(dispersion, "EXACT_CASES", 50_000)
-    study, seen = a_study(), list[int]()
+    study = a_study()
+    seen = list[int]()
     vars(study)["flies"] = SimpleNamespace(effort=effort)
 
     def fly(results: Results) -> None:
@@ -205,7 +227,9 @@ def test_with_a_target_the_distance_from_it_counts_and_not_the_shift() -> None:
     """H shifts by 0.027 rad, and ends 0.098 to 0.105 rad from the target."""
     goal = Goal(axis=np.array([math.sin(0.1), 0.0, math.cos(0.1)]))
     results = run(Results(a_study(goal=goal, requirement=Requirement(momentum_shift=0.1)), 1_000))
-    shift, distance = (values_of(results)[OUTPUTS.index(name)] for name in ("momentum_shift", "axis_error"))
+    shift, distance = (
+        values_of(results)[OUTPUTS.index(name)] for name in ("momentum_shift", "axis_error")
+    )
     assert results.worst.cases[0] == np.argmax(distance) != np.argmax(shift)
     assert results.worst.severities[0] == pytest.approx(np.max(distance) / 0.1, rel=1e-12)
     assert results.met == np.count_nonzero(distance <= 0.1) < np.count_nonzero(shift <= 0.1)
@@ -214,7 +238,9 @@ def test_with_a_target_the_distance_from_it_counts_and_not_the_shift() -> None:
 def test_unphysical_draws_are_counted() -> None:
     """C > 200 = 2A lies 10/9.5 sigmas off: 14.6 % are drawn again, of those as many again."""
     body = dispersed.with_jets(moments=(100.0, 100.0, 190.0)).spacecraft
-    study = study_of(replace(body, dispersions=Dispersions(C=Tolerance("normal", 0.05, True))), JETS.schedule)
+    study = study_of(
+        replace(body, dispersions=Dispersions(C=Tolerance("normal", 0.05, True))), JETS.schedule
+    )
     expected = MANY * 0.1463 / (1 - 0.1463)
     assert run(Results(study, MANY), threads=2).redrawn == pytest.approx(expected, rel=0.05)
 
@@ -231,7 +257,9 @@ def test_a_failure_in_a_thread_is_a_failure_of_the_run() -> None:
 
 def test_an_interrupt_does_not_wait_for_the_cases_that_are_in_work() -> None:
     """The flight of the first portion goes on until the interrupt has come out."""
-    study, begun, over = a_study(), threading.Event(), threading.Event()
+    study = a_study()
+    begun = threading.Event()
+    over = threading.Event()
     real = study.flies
 
     def fly(cases: DispersedCases) -> Ends:
@@ -258,7 +286,10 @@ def test_biases_alone_no_dispersions_and_unknown_propellant() -> None:
     with refused(BadRequest, "montecarlo.no-dispersions"):
         study_of(replace(body, dispersions=None), JETS.schedule)
     pulses = Schedule(tuple(replace(pulse, propellant=None) for pulse in JETS.schedule))
-    assert run(Results(Study(DispersedModel(JETS.spacecraft, pulses)), 10)).distribution("propellant") is None
+    assert (
+        run(Results(Study(DispersedModel(JETS.spacecraft, pulses)), 10)).distribution("propellant")
+        is None
+    )
 
 
 PROBABILITIES = np.array([0.0, 0.003, 0.5, 0.9, 0.95, 0.99, 0.997, 1.0])
@@ -274,18 +305,29 @@ def sketched(values: np.ndarray, portions: int = 1) -> Sketch:
 def test_exact_percentiles_are_those_of_numpy_and_leave_the_order_of_cases() -> None:
     values = np.random.default_rng(1).normal(size=1001)
     before = values.copy()
-    assert np.array_equal(Exact(values).quantiles(PROBABILITIES), np.quantile(before, PROBABILITIES))
+    assert np.array_equal(
+        Exact(values).quantiles(PROBABILITIES), np.quantile(before, PROBABILITIES)
+    )
     assert np.array_equal(values, before)
 
 
 @pytest.mark.parametrize("scale", [1e-9, 1.0, 1e6])
-def test_sketched_percentiles_are_right_to_a_thousandth_whatever_the_portions_and_order(scale: float) -> None:
-    generator, size = np.random.default_rng(2), 50_000
-    draws = (generator.lognormal(sigma=2.0, size=size), generator.normal(size=size), -generator.rayleigh(size=size))
+def test_sketched_percentiles_are_right_to_a_thousandth_whatever_the_portions_and_order(
+    scale: float,
+) -> None:
+    generator = np.random.default_rng(2)
+    size = 50_000
+    draws = (
+        generator.lognormal(sigma=2.0, size=size),
+        generator.normal(size=size),
+        -generator.rayleigh(size=size),
+    )
     for values in (scale * one for one in draws):
         whole = sketched(values)
         rough = whole.quantiles(PROBABILITIES)
-        assert rough == pytest.approx(np.quantile(values, PROBABILITIES, method="lower"), rel=0.0005)
+        assert rough == pytest.approx(
+            np.quantile(values, PROBABILITIES, method="lower"), rel=0.0005
+        )
         assert (rough[0], rough[-1]) == (values.min(), values.max())
         for other in (sketched(values, 7), sketched(values[::-1].copy(), 3)):
             assert np.array_equal(whole.counts, other.counts)
@@ -297,11 +339,16 @@ def test_sketched_percentiles_are_right_to_a_thousandth_whatever_the_portions_an
 
 @pytest.mark.parametrize("shift", [-9.0, 0.3, 9.0])
 def test_sizes_are_those_of_the_values(shift: float) -> None:
-    """Of a sketch as exact as its other percentiles; of both signs, of losses alone, of gains alone."""
+    """Of a sketch as exact as its other percentiles; of both signs, of losses alone, of gains
+    alone.
+    """
     values = np.random.default_rng(6).normal(size=50_001) + shift
     assert np.array_equal(Exact(values).sizes().values, np.abs(values))
-    rough, upper = sketched(values).sizes(), PROBABILITIES[PROBABILITIES > 0.4]
-    assert rough.quantiles(upper) == pytest.approx(np.quantile(np.abs(values), upper, method="lower"), rel=0.0005)
+    rough = sketched(values).sizes()
+    upper = PROBABILITIES[PROBABILITIES > 0.4]
+    assert rough.quantiles(upper) == pytest.approx(
+        np.quantile(np.abs(values), upper, method="lower"), rel=0.0005
+    )
     assert int(rough.counts.sum()) == len(values)
     assert rough.maximum == np.abs(values).max()
     assert 0.0 <= rough.minimum <= np.abs(values).min()
@@ -312,9 +359,15 @@ def test_the_interval_is_that_of_scipy(trials: int) -> None:
     """Wilson's, and all where nothing was tried; as many good cases as it takes show a share."""
     some = np.random.default_rng(trials).integers(trials + 1, size=4).tolist()
     for seen in {0, 1, trials // 2, round(0.997 * trials), trials - 1, trials, *some}:
-        for sigmas, confidence in ((SHOWN, 0.95), (CERTAIN, 1.0 - 1e-6), (1.0, norm.cdf(1.0) - norm.cdf(-1.0))):
+        for sigmas, confidence in (
+            (SHOWN, 0.95),
+            (CERTAIN, 1.0 - 1e-6),
+            (1.0, norm.cdf(1.0) - norm.cdf(-1.0)),
+        ):
             expected = binomtest(seen, trials).proportion_ci(confidence, method="wilson")
-            assert share_interval(seen, trials, sigmas) == pytest.approx(expected, rel=1e-9, abs=1e-15)
+            assert share_interval(seen, trials, sigmas) == pytest.approx(
+                expected, rel=1e-9, abs=1e-15
+            )
     assert share_interval(0, 0) == (0.0, 1.0)
     few = cases_to_show(0.997)
     assert share_interval(few, few)[0] >= 0.997 > share_interval(few - 1, few - 1)[0]
@@ -332,15 +385,24 @@ def test_the_worst_cases_are_found_whatever_the_portions() -> None:
 
 
 def outcomes(
-    model: DispersedModel, draws: dict[str, np.ndarray], fly: Callable[[DispersedCases], Ends] | None = None
+    model: DispersedModel,
+    draws: dict[str, np.ndarray],
+    fly: Callable[[DispersedCases], Ends] | None = None,
 ) -> np.ndarray:
     """What the closed form leaves, or what ``fly`` flies."""
-    return vectors(model, (fly or ClosedForm(model))(model.cases(draws)), len(next(iter(draws.values()))))
+    return vectors(
+        model, (fly or ClosedForm(model))(model.cases(draws)), len(next(iter(draws.values())))
+    )
 
 
 @pytest.mark.parametrize(
     "model",
-    [JETS, dispersed.steered(spin=-3.0), dispersed.sinking(JETS), dispersed.with_jets(moments=(120.0, 105.0, 80.0))],
+    [
+        JETS,
+        dispersed.steered(spin=-3.0),
+        dispersed.sinking(JETS),
+        dispersed.with_jets(moments=(120.0, 105.0, 80.0)),
+    ],
     ids=["jets", "steered", "jets, dissipation", "three moments"],
 )
 def test_derivatives_agree_with_central_differences(model: DispersedModel) -> None:
@@ -349,7 +411,9 @@ def test_derivatives_agree_with_central_differences(model: DispersedModel) -> No
         step = 1e-4 * entry.size
         ends = outcomes(model, {entry.name: np.array([-step, step])})
         scale = np.abs(first.jacobian[:, column]).max()
-        assert scale > 0.0 or entry.name == "position T1 y", entry.name  # which moves the force along itself
+        assert scale > 0.0 or entry.name == "position T1 y", (
+            entry.name
+        )  # which moves the force along itself
         slope = (ends[:, 1] - ends[:, 0]) / (2.0 * step)
         assert first.jacobian[:, column] == pytest.approx(slope, abs=1e-6 * scale), entry.name
 
@@ -359,9 +423,15 @@ def covariance_of(first: FirstOrder, output: str) -> np.ndarray:
     return np.asarray(first.independent(output) @ first.independent(output).T)
 
 
-@pytest.mark.parametrize("study", [dispersed.exact_two_pulse(0.02), Study(dispersed.with_jets(scale=0.02))])
-def test_covariances_of_the_cases_agree_within_3_percent_for_small_dispersions(study: Study) -> None:
-    """Of those flown through real widths with the budget of the study, of the closed form with its own derivatives."""
+@pytest.mark.parametrize(
+    "study", [dispersed.exact_two_pulse(0.02), Study(dispersed.with_jets(scale=0.02))]
+)
+def test_covariances_of_the_cases_agree_within_3_percent_for_small_dispersions(
+    study: Study,
+) -> None:
+    """Of those flown through real widths with the budget of the study, of the closed form with its
+    own derivatives.
+    """
     draws = dispersed.first_cases(study, BLOCK)
     for first, fly in ((study.first_order, study.flies), (first_order(study.model), None)):
         flown = outcomes(study.model, draws, fly)
@@ -383,7 +453,9 @@ def test_the_percentile_of_a_small_nutation_follows_from_the_covariance() -> Non
     assert nutation.quantiles(np.array([0.99]))[0] == pytest.approx(expected, rel=0.03)
 
 
-def test_shares_sum_to_one_a_bias_has_none_and_the_attitude_moves_only_where_the_axis_points() -> None:
+def test_shares_sum_to_one_a_bias_has_none_and_the_attitude_moves_only_where_the_axis_points() -> (
+    None
+):
     biased = replace(present(JETS.spacecraft.dispersions), C=Tolerance("bias", 0.8))
     first = first_order(DispersedModel(replace(JETS.spacecraft, dispersions=biased), JETS.schedule))
     names = [entry.name for entry in first.inputs]
@@ -401,12 +473,19 @@ def test_shares_sum_to_one_a_bias_has_none_and_the_attitude_moves_only_where_the
 @pytest.mark.parametrize(
     ("row", "output", "expected", "within"),
     [
-        (0, "nutation", [9 / 14, 4 / 14, 1 / 14, 0.0], 0.015),  # a linear sum has its shares, what does nothing none
+        (
+            0,
+            "nutation",
+            [9 / 14, 4 / 14, 1 / 14, 0.0],
+            0.015,
+        ),  # a linear sum has its shares, what does nothing none
         (8, "spin_change", [2 / 3, 0.0, 0.0, 0.0], 0.03),  # curvature counts, interplay does not
         ((0, 1), "nutation", [0.8, 0.2, 0.0, 0.0], 0.015),  # a plane vector counts as one outcome
     ],
 )
-def test_sampled_shares(row: int | tuple[int, int], output: str, expected: list[float], within: float) -> None:
+def test_sampled_shares(
+    row: int | tuple[int, int], output: str, expected: list[float], within: float
+) -> None:
     draws = dict(zip("xyzn", np.random.default_rng(7).normal(size=(4, EARLY)), strict=True))
     x, y, z, _ = draws.values()
     made = {"nutation": 3.0 * x + 2.0 * y + z, "spin_change": x**2 + y * z}[output]
@@ -421,7 +500,9 @@ def test_sampled_shares(row: int | tuple[int, int], output: str, expected: list[
 
 
 @pytest.mark.parametrize(("scale", "within"), [deep(0.02, 0.02), (0.3, 0.05)])
-def test_the_first_order_shares_are_those_of_the_cases_as_far_as_it_is_linear(scale: float, within: float) -> None:
+def test_the_first_order_shares_are_those_of_the_cases_as_far_as_it_is_linear(
+    scale: float, within: float
+) -> None:
     results = run(Results(dispersed.exact_two_pulse(scale), EARLY))
     first = results.study.first_order
     for output in ("nutation", "momentum_shift", "axis_error"):
@@ -429,29 +510,40 @@ def test_the_first_order_shares_are_those_of_the_cases_as_far_as_it_is_linear(sc
         assert sampled == pytest.approx(first.shares(output), abs=within)
 
 
-# --- what a dispersed case is, against vector algebra for single cases; draws, their distributions and correlations
+# --- what a dispersed case is, against vector algebra for single cases; draws, their distributions
+# and correlations
 
 
 def test_a_tilted_and_moved_force_gives_its_torque() -> None:
-    """(r + δr) × (Rot(tilt) F) times both factors and the on-time, each thruster of the channel with its own."""
+    """(r + δr) × (Rot(tilt) F) times both factors and the on-time, each thruster of the channel
+    with its own.
+    """
     model = dispersed.with_jets()
     draws = {
         "thrust T1": 0.1, "thrust T2": -0.05, "thrust pulse 3": 0.02,
         "direction T1 a": 0.2, "direction T1 b": -0.1, "direction T2 b": 0.3,
         "position T1 x": 0.01, "position T1 z": -0.02, "position T2 y": 0.03,
     }  # fmt: skip
-    torque, flow = np.zeros(3), 0.0
+    torque = np.zeros(3)
+    flow = 0.0
     for jet in dispersed.JETS:
         sizes = (draws.get(f"direction {jet.name} {axis}", 0.0) for axis in "ab")
-        tilt = sum((size * axis for size, axis in zip(sizes, tilt_axes(present(jet.force)), strict=True)), np.zeros(3))
-        arm = present(jet.position) + [draws.get(f"position {jet.name} {axis}", 0.0) for axis in "xyz"]
+        tilt = sum(
+            (size * axis for size, axis in zip(sizes, tilt_axes(present(jet.force)), strict=True)),
+            np.zeros(3),
+        )
+        arm = present(jet.position) + [
+            draws.get(f"position {jet.name} {axis}", 0.0) for axis in "xyz"
+        ]
         factor = (1.0 + draws[f"thrust {jet.name}"]) * 1.02
         torque += factor * np.cross(arm, Rotation.from_rotvec(tilt).apply(present(jet.force)))
         flow += factor * present(jet.mass_flow)
     *others, both = model.schedule
     cases = model.cases(draws)
     assert np.array(cases.impulses[2]) == pytest.approx(torque * both.on_time, rel=1e-13)
-    used = sum((one.propellant or np.nan) * (1.0 + draws[f"thrust {one.channel}"]) for one in others)
+    used = sum(
+        (one.propellant or np.nan) * (1.0 + draws[f"thrust {one.channel}"]) for one in others
+    )
     assert cases.propellant == pytest.approx(flow * both.on_time + used, rel=1e-13)
 
 
@@ -459,9 +551,14 @@ def test_rotations_of_forces_and_of_the_attitude() -> None:
     for force in (np.array([0.0, 0.0, 5.0]), np.array([3.0, -4.0, 12.0])):
         axes = np.array([*tilt_axes(force), force / np.linalg.norm(force)])
         assert axes @ axes.T == pytest.approx(np.eye(3), abs=1e-15)
-    vector, tilt = np.array([[1.0, 0.2], [-0.3, 0.5], [2.0, 3.0]]), np.array([[0.3, 0.0], [-0.4, 0.7]])
+    vector, tilt = (
+        np.array([[1.0, 0.2], [-0.3, 0.5], [2.0, 3.0]]),
+        np.array([[0.3, 0.0], [-0.4, 0.7]]),
+    )
     expected = Rotation.from_rotvec(np.column_stack([*tilt, np.zeros(2)])).apply(vector.T)
-    assert np.column_stack(rotated(tuple(vector), tuple(tilt))) == pytest.approx(expected, abs=1e-14)
+    assert np.column_stack(rotated(tuple(vector), tuple(tilt))) == pytest.approx(
+        expected, abs=1e-14
+    )
 
 
 def test_a_steerable_pulse_is_turned_in_the_1_2_plane() -> None:
@@ -471,12 +568,16 @@ def test_a_steerable_pulse_is_turned_in_the_1_2_plane() -> None:
         {"thrust steerable": 0.1, "thrust pulse 1": 0.01, "direction steerable": 0.3}
     )
     size = 10.0 * 1.1 * 1.01
-    assert np.array(cases.impulses[0]) == pytest.approx([size * np.cos(0.7), size * np.sin(0.7), 0.0])
+    assert np.array(cases.impulses[0]) == pytest.approx(
+        [size * np.cos(0.7), size * np.sin(0.7), 0.0]
+    )
     assert cases.propellant == pytest.approx(present(made.propellant) * 1.1 * 1.01)
 
 
 def test_a_pulse_that_the_file_does_not_explain_keeps_its_impulse() -> None:
-    """A schedule file may give a channel another torque: thrust scales what it gives, tilts come on top."""
+    """A schedule file may give a channel another torque: thrust scales what it gives, tilts come on
+    top.
+    """
     body = spinner(channels=(channel("T1", 8.0, 0.0, 0.0, isp=200.0, thrust=10.0),))
     pulse = replace(channel_pulse(body.channels[0], 1.0, 0.5), impulse=np.array([3.0, 1.0, 0.0]))
     unknown = replace(pulse, channel="elsewhere", propellant=None)
@@ -487,16 +588,24 @@ def test_a_pulse_that_the_file_does_not_explain_keeps_its_impulse() -> None:
 
 
 def test_rates_and_positions_are_in_the_axes_of_the_file() -> None:
-    moments, axes = principal_axes(np.array([[120.0, 3.0, 0.0], [3.0, 110.0, 2.0], [0.0, 2.0, 80.0]]))
+    moments, axes = principal_axes(
+        np.array([[120.0, 3.0, 0.0], [3.0, 110.0, 2.0], [0.0, 2.0, 80.0]])
+    )
     jet = dispersed.jet("T1", (0.1, 0.3, 0.8), (0.0, -10.0, 1.0))  # in principal axes
-    body = replace(spinner(moments=moments, channels=(Channel("T1", (jet,)),)), inertia=Inertia(moments, axes))
+    body = replace(
+        spinner(moments=moments, channels=(Channel("T1", (jet,)),)), inertia=Inertia(moments, axes)
+    )
     model = DispersedModel(body, Schedule((channel_pulse(body.channels[0], 1.0, 0.5),)))
-    cases = model.cases({"omega0_1": 0.01, "omega0_3": 0.02, "position T1 y": 0.05, "A": 0.01 * body.inertia.A})
+    cases = model.cases(
+        {"omega0_1": 0.01, "omega0_3": 0.02, "position T1 y": 0.05, "A": 0.01 * body.inertia.A}
+    )
     assert np.array(cases.omega0) == pytest.approx(body.omega0 + axes.T @ [0.01, 0.0, 0.02])
     more = 0.5 * np.cross(axes.T @ [0.0, 0.05, 0.0], [0.0, -10.0, 1.0])
     assert np.array(cases.impulses[0]) == pytest.approx(0.5 * jet.torque + more)
     # A scales both transverse moments, and is their mean.
-    assert np.array(cases.moments) == pytest.approx([1.01 * moments[0], 1.01 * moments[1], moments[2]])
+    assert np.array(cases.moments) == pytest.approx(
+        [1.01 * moments[0], 1.01 * moments[1], moments[2]]
+    )
     assert float(cases.A) == pytest.approx(0.505 * (moments[0] + moments[1]))
 
 
@@ -513,7 +622,10 @@ def test_rates_and_positions_are_in_the_axes_of_the_file() -> None:
 def test_bodies_and_thrusts_that_cannot_be_are_told(
     moments: tuple[float, float, float], name: str, off: list[float], physical: object
 ) -> None:
-    assert np.asarray(dispersed.with_jets(moments=moments).physical({name: np.array(off)})).tolist() == physical
+    assert (
+        np.asarray(dispersed.with_jets(moments=moments).physical({name: np.array(off)})).tolist()
+        == physical
+    )
 
 
 def test_every_tolerance_is_drawn_or_listed_as_unused() -> None:
@@ -521,14 +633,26 @@ def test_every_tolerance_is_drawn_or_listed_as_unused() -> None:
     names = {entry.name for entry in inputs.drawn}
     assert len(names) == len(inputs.drawn) == 5 + 2 + 3 + 4 + 6 + 3 + 1 + 2
     assert not inputs.unused
-    assert {"A", "omega0_1", "thrust T1", "thrust pulse 2", "direction T1 a", "position T1 x"} < names
+    assert {
+        "A",
+        "omega0_1",
+        "thrust T1",
+        "thrust pulse 2",
+        "direction T1 a",
+        "position T1 x",
+    } < names
     assert {"timing pulse 1", "timing offset", "attitude x"} < names
 
 
 def test_what_touches_nothing_is_unused_with_its_reason() -> None:
-    """Idle thrusters, thrusters known by torque, sizes of zero, a torquer that gives a torque wherever it sits."""
-    tolerance, torquer = Tolerance("normal", 0.01), Steerable(20.0)
-    by_torque = spinner(degrees=0.0, channels=(channel("T1", 8.0, 0.0, 0.0), channel("T2", 0.0, 8.0, 0.0)))
+    """Idle thrusters, thrusters known by torque, sizes of zero, a torquer that gives a torque
+    wherever it sits.
+    """
+    tolerance = Tolerance("normal", 0.01)
+    torquer = Steerable(20.0)
+    by_torque = spinner(
+        degrees=0.0, channels=(channel("T1", 8.0, 0.0, 0.0), channel("T2", 0.0, 8.0, 0.0))
+    )
     of_jets = Dispersions(
         C=Tolerance("normal", 0.0),
         omega0=(Tolerance("normal", 0.1, True), None, None),
@@ -537,9 +661,12 @@ def test_what_touches_nothing_is_unused_with_its_reason() -> None:
         position={"T1": tolerance},
         timing=tolerance,
     )
-    of_torquer = Dispersions(thrust_direction={"steerable": tolerance}, position={"steerable": tolerance})
+    of_torquer = Dispersions(
+        thrust_direction={"steerable": tolerance}, position={"steerable": tolerance}
+    )
     late = replace(of_torquer, timing=tolerance, timing_offset=tolerance)
-    by_jet, by_torquer = channel_pulse(by_torque.channels[0], 1.0, 0.5), steerable_pulse(torquer, 1.0, 0.3, on_time=0.2)
+    by_jet = channel_pulse(by_torque.channels[0], 1.0, 0.5)
+    by_torquer = steerable_pulse(torquer, 1.0, 0.3, on_time=0.2)
     reasons = []
     for body, requested, pulses, expected in (
         (by_torque, of_jets, (by_jet,), ["thrust T1", "timing pulse 1"]),
@@ -551,13 +678,19 @@ def test_what_touches_nothing_is_unused_with_its_reason() -> None:
         reasons += [f"{name}: {reason}" for name, reason in inputs.unused]
     check_text("montecarlo.unused-inputs", "\n".join(reasons))
     # Relative sizes are shares of the nominal value.
-    relative = Dispersions(A=Tolerance("normal", 0.02, True), omega0=(None, None, Tolerance("bias", 0.01, True)))
+    relative = Dispersions(
+        A=Tolerance("normal", 0.02, True), omega0=(None, None, Tolerance("bias", 0.01, True))
+    )
     inputs = list_inputs(replace(spinner(A=120.0, spin=-3.0), dispersions=relative), Schedule())
     sizes = {entry.name: (entry.size, entry.sigma) for entry in inputs.drawn}
     assert sizes == {"A": pytest.approx((2.4, 2.4)), "omega0_3": pytest.approx((-0.03, 0.0))}
 
 
-LAWS = {"normal": norm(scale=2.0), "uniform": uniform(-2.0, 4.0), "triangular": triang(0.5, -2.0, 4.0)}
+LAWS = {
+    "normal": norm(scale=2.0),
+    "uniform": uniform(-2.0, 4.0),
+    "triangular": triang(0.5, -2.0, 4.0),
+}
 """Of inputs of size 2."""
 
 Pair = tuple[str, str, float]
@@ -574,7 +707,9 @@ def drawn(
     return {name: np.asarray(draw) for name, draw in draws.items()}
 
 
-@pytest.mark.parametrize(("kind", "excess"), [("normal", 0.0), ("uniform", -1.2), ("triangular", -0.6)])
+@pytest.mark.parametrize(
+    ("kind", "excess"), [("normal", 0.0), ("uniform", -1.2), ("triangular", -0.6)]
+)
 def test_draws_have_the_moments_of_their_kind(kind: str, excess: float) -> None:
     entry = an_input(kind=kind, size=2.0)
     values = np.concatenate([drawn(entry, block=block)["A"] for block in range(12)])
@@ -583,11 +718,15 @@ def test_draws_have_the_moments_of_their_kind(kind: str, excess: float) -> None:
     assert ((values / entry.sigma) ** 3).mean() == pytest.approx(0.0, abs=0.03)
     assert ((values / entry.sigma) ** 4).mean() - 3.0 == pytest.approx(excess, abs=0.06)
     assert kind == "normal" or 1.9 < np.abs(values).max() <= 2.0
-    assert DrawSource((an_input(kind="bias", size=-0.3),), 1, lambda _: True).block(0)[0] == {"A": -0.3}
+    assert DrawSource((an_input(kind="bias", size=-0.3),), 1, lambda _: True).block(0)[0] == {
+        "A": -0.3
+    }
 
 
 def test_neighbours_are_independent() -> None:
-    """Inputs, blocks and seeds: correlations of 16,384 numbers stay within four times their scatter."""
+    """Inputs, blocks and seeds: correlations of 16,384 numbers stay within four times their
+    scatter.
+    """
     both = an_input("A"), an_input("C")
     rows = [*drawn(*both).values(), drawn(*both, block=1)["A"], drawn(*both, seed=2)["A"]]
     assert np.abs(np.corrcoef(rows) - np.eye(4)).max() < 4.0 / np.sqrt(BLOCK)
@@ -600,9 +739,14 @@ def test_other_tolerances_do_not_change_the_draws_of_one() -> None:
 
 
 def test_what_cannot_be_is_drawn_again_and_reported() -> None:
-    """Values above one sigma are refused: 15.87 % are drawn again, of those again 15.87 % and so on."""
-    draws, redrawn = DrawSource([an_input()], 1, lambda draws: np.asarray(draws["A"]) <= 1.0).block(0)
-    values, free = np.array(draws["A"]), drawn(an_input())["A"]
+    """Values above one sigma are refused: 15.87 % are drawn again, of those again 15.87 % and so
+    on.
+    """
+    draws, redrawn = DrawSource([an_input()], 1, lambda draws: np.asarray(draws["A"]) <= 1.0).block(
+        0
+    )
+    values = np.array(draws["A"])
+    free = drawn(an_input())["A"]
     kept = free <= 1.0
     assert values.max() <= 1.0
     assert len(redrawn) == pytest.approx(BLOCK * 0.15866 / (1.0 - 0.15866), rel=0.05)
@@ -613,17 +757,28 @@ def test_what_cannot_be_is_drawn_again_and_reported() -> None:
     again = DrawSource([an_input()], 1, lambda draws: np.asarray(draws["A"]) <= 1.0)
     again.block(5)
     assert np.array_equal(values, again.block(0)[0]["A"])
-    nothing = DrawSource([an_input()], 1, lambda draws: np.zeros(len(np.asarray(draws["A"])), dtype=bool))
+    nothing = DrawSource(
+        [an_input()], 1, lambda draws: np.zeros(len(np.asarray(draws["A"])), dtype=bool)
+    )
     with refused(BadRequest, "montecarlo.nothing-possible"):
         nothing.block(0)
 
 
 def test_normal_draws_have_the_correlation_and_the_others_stay_to_the_last_bit() -> None:
-    inputs = [an_input(name, size=size) for name, size in zip("ABCD", (1.0, 2.0, 0.1, 3.0), strict=True)]
+    inputs = [
+        an_input(name, size=size) for name, size in zip("ABCD", (1.0, 2.0, 0.1, 3.0), strict=True)
+    ]
     plain = drawn(*inputs)
     correlated = drawn(*inputs, pairs=(("A", "B", 0.9), ("B", "C", -0.4)))
-    expected = [[1.0, 0.9, 0.0, 0.0], [0.9, 1.0, -0.4, 0.0], [0.0, -0.4, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]]
-    assert np.corrcoef(list(correlated.values())) == pytest.approx(np.array(expected), abs=4.0 / math.sqrt(BLOCK))
+    expected = [
+        [1.0, 0.9, 0.0, 0.0],
+        [0.9, 1.0, -0.4, 0.0],
+        [0.0, -0.4, 1.0, 0.0],
+        [0.0, 0.0, 0.0, 1.0],
+    ]
+    assert np.corrcoef(list(correlated.values())) == pytest.approx(
+        np.array(expected), abs=4.0 / math.sqrt(BLOCK)
+    )
     for name in "AD":  # the first of a group, and what is in none
         assert np.array_equal(correlated[name], plain[name])
     for entry in inputs:
@@ -631,11 +786,17 @@ def test_normal_draws_have_the_correlation_and_the_others_stay_to_the_last_bit()
 
 
 @pytest.mark.parametrize("kinds", list(itertools.combinations_with_replacement(LAWS, 2)))
-def test_each_keeps_its_distribution_and_the_correlation_of_values_is_known(kinds: tuple[str, str]) -> None:
-    """The share of cases with both above a level is that of the bivariate normal law, which the copula is."""
+def test_each_keeps_its_distribution_and_the_correlation_of_values_is_known(
+    kinds: tuple[str, str],
+) -> None:
+    """The share of cases with both above a level is that of the bivariate normal law, which the
+    copula is.
+    """
     inputs = [an_input(name, kind, 2.0) for name, kind in zip("AB", kinds, strict=True)]
     pairs = (("A", "B", 0.8),)
-    values = np.hstack([list(drawn(*inputs, pairs=pairs, seed=seed).values()) for seed in range(1, 9)])
+    values = np.hstack(
+        [list(drawn(*inputs, pairs=pairs, seed=seed).values()) for seed in range(1, 9)]
+    )
     laws = [LAWS[kind] for kind in kinds]
     for law, value in zip(laws, values, strict=True):
         assert kstest(value, law.cdf).pvalue > 1e-3
@@ -646,9 +807,12 @@ def test_each_keeps_its_distribution_and_the_correlation_of_values_is_known(kind
     assert (matrix @ matrix.T)[0, 1] == pytest.approx(np.corrcoef(values)[0, 1], abs=0.01)
 
 
-@pytest.mark.parametrize("kinds", [("uniform", "uniform"), ("normal", "uniform"), ("uniform", "triangular")])
+@pytest.mark.parametrize(
+    "kinds", [("uniform", "uniform"), ("normal", "uniform"), ("uniform", "triangular")]
+)
 def test_the_correlation_of_values_is_the_integral_over_both(kinds: tuple[str, str]) -> None:
-    inputs, rho = [an_input(name, kind) for name, kind in zip("AB", kinds, strict=True)], -0.6
+    inputs = [an_input(name, kind) for name, kind in zip("AB", kinds, strict=True)]
+    rho = -0.6
     for entry in inputs:  # normals and values are inverse
         normals = np.linspace(-5.0, 5.0, 101)
         assert normal_of(entry, value_of(entry, normals)) == pytest.approx(normals, abs=1e-9)
@@ -660,7 +824,9 @@ def test_the_correlation_of_values_is_the_integral_over_both(kinds: tuple[str, s
 
     integral, _ = dblquad(integrand, -7.0, 7.0, -7.0, 7.0, epsabs=1e-6, epsrel=1e-6)
     matrix = mixing(inputs, grouped([("A", "B", rho)]))
-    assert (matrix @ matrix.T)[0, 1] == pytest.approx(integral / (inputs[0].sigma * inputs[1].sigma), abs=1e-4)
+    assert (matrix @ matrix.T)[0, 1] == pytest.approx(
+        integral / (inputs[0].sigma * inputs[1].sigma), abs=1e-4
+    )
 
 
 def test_which_others_are_drawn_makes_no_difference() -> None:
@@ -673,7 +839,9 @@ def test_which_others_are_drawn_makes_no_difference() -> None:
 
 def test_a_case_drawn_again_is_correlated_too() -> None:
     groups = groups_of([("A", "B", 0.95)])
-    source = DrawSource([an_input("A"), an_input("B")], 1, lambda draws: np.asarray(draws["A"]) > 0.0, groups)
+    source = DrawSource(
+        [an_input("A"), an_input("B")], 1, lambda draws: np.asarray(draws["A"]) > 0.0, groups
+    )
     draws, redrawn = source.block(0)
     assert len(redrawn) > BLOCK // 2
     residual = np.asarray(draws["B"]) - 0.95 * np.asarray(draws["A"])
@@ -682,23 +850,35 @@ def test_a_case_drawn_again_is_correlated_too() -> None:
 
 
 def test_correlations_make_groups_or_are_refused() -> None:
-    assert [group.names for group in groups_of([("A", "B", 0.9), ("D", "E", 0.1)])] == [("A", "B"), ("D", "E")]
+    assert [group.names for group in groups_of([("A", "B", 0.9), ("D", "E", 0.1)])] == [
+        ("A", "B"),
+        ("D", "E"),
+    ]
     with refused(BadRequest, "montecarlo.impossible-correlation"):
         groups_of((("A", "B", 0.9), ("B", "C", 0.9), ("A", "C", -0.5)))
 
 
 @pytest.mark.parametrize("rho", [0.95, deep(-0.95), deep(0.0)])
 def test_the_budget_of_a_pair_is_the_variance_of_what_both_do_together(rho: float) -> None:
-    """Of A and C with one relative size, most cancels where they are correlated: the motion knows only C/A."""
+    """Of A and C with one relative size, most cancels where they are correlated: the motion knows
+    only C/A.
+    """
     model = dispersed.exact_two_pulse(0.02).model
     tolerances = replace(present(model.spacecraft.dispersions), correlation=(("C", "A", rho),))
-    study = Study(DispersedModel(replace(model.spacecraft, dispersions=tolerances), model.schedule), seed=3)
-    results, first = run(Results(study, BLOCK)), study.first_order
+    study = Study(
+        DispersedModel(replace(model.spacecraft, dispersions=tolerances), model.schedule), seed=3
+    )
+    results = run(Results(study, BLOCK))
+    first = study.first_order
     names = [entry.name for entry in first.inputs]
     pair = [names.index(name) for name in "AC"]
-    effects = first.jacobian[:2, pair] * first.sigmas[pair]  # what one sigma of each does to the nutation
+    effects = (
+        first.jacobian[:2, pair] * first.sigmas[pair]
+    )  # what one sigma of each does to the nutation
     variance = (effects**2).sum() + 2.0 * rho * (effects[:, 0] @ effects[:, 1])
-    others = (first.effects("nutation")[[row for row in range(len(names)) if row not in pair]] ** 2).sum()
+    others = (
+        first.effects("nutation")[[row for row in range(len(names)) if row not in pair]] ** 2
+    ).sum()
     share = variance / (variance + others)
     assert first.shares("nutation")[pair].sum() == pytest.approx(share, rel=1e-9)
     assert first.shares("nutation").sum() == pytest.approx(1.0, rel=1e-12)
@@ -719,7 +899,9 @@ COLD = Cold(0.9, 4.0)
 TORQUES = {"a": (8.0, 0.0, 0.1), "b": (-8.0, 0.0, 0.1), "c": (0.0, 8.0, 0.1)}
 
 
-def through(valve: Valve, other: Valve | None = None, cold: Cold | None = None, tank: Tank | None = None) -> Spacecraft:
+def through(
+    valve: Valve, other: Valve | None = None, cold: Cold | None = None, tank: Tank | None = None
+) -> Spacecraft:
     """A body with this valve on its thrusters, and an ``other`` on the first of them."""
     channels = tuple(
         channel(name, *torque, min_on_time=0.02, max_on_time=0.09, isp=220.0, thrust=10.0).of(
@@ -738,21 +920,29 @@ def commands(body: Spacecraft, on_time: float = 0.06) -> list[Pulse]:
 def fires(body: Spacecraft, pulses: Iterable[Pulse]) -> Schedule:
     """The same commands to a body that may not be as they were made for."""
     channels = {one.name: one for one in body.channels}
-    return Schedule(supplied(body, [on_command(channels[pulse.channel], *pulse.loaded) for pulse in pulses]))
+    return Schedule(
+        supplied(body, [on_command(channels[pulse.channel], *pulse.loaded) for pulse in pulses])
+    )
 
 
-def ends_of(fly: type[ClosedForm | RealWidths], model: DispersedModel, draws: Mapping[str, float]) -> Ends:
+def ends_of(
+    fly: type[ClosedForm | RealWidths], model: DispersedModel, draws: Mapping[str, float]
+) -> Ends:
     return fly(model)(model.cases({name: np.full(2, draw) for name, draw in draws.items()}))
 
 
-def nutation(fly: type[ClosedForm | RealWidths], model: DispersedModel, draws: Mapping[str, float]) -> float:
+def nutation(
+    fly: type[ClosedForm | RealWidths], model: DispersedModel, draws: Mapping[str, float]
+) -> float:
     """Of the case of these draws."""
     x, y, z = ends_of(fly, model, draws).momentum
     return float(np.arctan2(np.hypot(x, y), z)[0])
 
 
 def table(valve: Measured, factor: float) -> Measured:
-    return Measured(tuple((on_time, factor * acts, centroid) for on_time, acts, centroid in valve.rows))
+    return Measured(
+        tuple((on_time, factor * acts, centroid) for on_time, acts, centroid in valve.rows)
+    )
 
 
 CHANGES: dict[str, tuple[dict[str, float], Valve, Valve, Cold]] = {
@@ -760,20 +950,35 @@ CHANGES: dict[str, tuple[dict[str, float], Valve, Valve, Cold]] = {
     "opens early": ({"open_delay a": -0.003}, SLOW, replace(SLOW, open_delay=0.005), COLD),
     "closes late": ({"close_delay a": 0.002}, SLOW, replace(SLOW, close_delay=0.014), COLD),
     "opens as much later as it closes": (
-        {"open_delay a": 0.004, "close_delay a": 0.004}, SLOW, replace(SLOW, open_delay=0.012, close_delay=0.016), COLD,
+        {"open_delay a": 0.004, "close_delay a": 0.004},
+        SLOW,
+        replace(SLOW, open_delay=0.012, close_delay=0.016),
+        COLD,
     ),
-    "opens later than it closes": ({"open_delay a": 0.012}, SLOW, replace(SLOW, open_delay=0.020), COLD),
+    "opens later than it closes": (
+        {"open_delay a": 0.012},
+        SLOW,
+        replace(SLOW, open_delay=0.020),
+        COLD,
+    ),
     "rises slowly": ({"rise_time a": 0.004}, SLOW, replace(SLOW, rise_time=0.009), COLD),
     "falls at once": ({"fall_time a": -0.010}, SLOW, replace(SLOW, fall_time=0.0), COLD),
     "all of it": (
-        {"open_delay a": 0.003, "close_delay a": -0.002, "rise_time a": 0.040, "fall_time a": 0.005},
-        SLOW, Trapezoid(0.011, 0.010, 0.045, 0.015), COLD,
+        {
+            "open_delay a": 0.003,
+            "close_delay a": -0.002,
+            "rise_time a": 0.040,
+            "fall_time a": 0.005,
+        },
+        SLOW,
+        Trapezoid(0.011, 0.010, 0.045, 0.015),
+        COLD,
     ),
     "larger bits": ({"impulse_bit a": 0.05}, TABLE, table(TABLE, 1.05), COLD),
     "half the bits again": ({"impulse_bit a": 0.5}, LATER, table(LATER, 1.5), COLD),
     "colder": ({"cold": -0.05}, SLOW, SLOW, Cold(0.85, 4.0)),
     "colder for longer": ({"cold": -0.05, "cold_pulses": 2.0}, SLOW, SLOW, Cold(0.85, 6.0)),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("change", CHANGES)
@@ -790,7 +995,9 @@ def test_a_case_is_the_flight_of_such_a_body(change: str) -> None:
 
 
 @pytest.mark.parametrize("late", [-0.01, 0.01, 0.03, 0.05, 0.2])
-def test_a_valve_that_opens_so_late_that_the_thrust_does_not_rise_or_there_is_none(late: float) -> None:
+def test_a_valve_that_opens_so_late_that_the_thrust_does_not_rise_or_there_is_none(
+    late: float,
+) -> None:
     slow = Trapezoid(0.02, 0.012, 0.05, 0.08)
     body = through(slow)
     model = DispersedModel(body, fires(body, commands(body)[:1]))
@@ -802,19 +1009,26 @@ def test_a_valve_that_opens_so_late_that_the_thrust_does_not_rise_or_there_is_no
     assert outputs[4] == pytest.approx(given.propellant, rel=1e-9, abs=1e-15)
 
 
-TANK = Tank(0.001, 22e5, 16e5, 1.0, ((8e5, 215.0), (30e5, 228.0)), inertia_per_kg=(3000.0, 3000.0, 1500.0))
+TANK = Tank(
+    0.001, 22e5, 16e5, 1.0, ((8e5, 215.0), (30e5, 228.0)), inertia_per_kg=(3000.0, 3000.0, 1500.0)
+)
 TANKS: dict[str, tuple[dict[str, float], Tank]] = {
     "more pressure": ({"tank pressure": 1e5}, replace(TANK, pressure=23e5)),
     "falls further": ({"tank final_pressure": -2e5}, replace(TANK, final_pressure=14e5)),
     "less in it": ({"tank propellant": -0.0002}, replace(TANK, propellant=0.0008)),
-    "other power": ({"tank exponent": 0.1, "tank pressure": -1e5}, replace(TANK, exponent=1.1, pressure=21e5)),
+    "other power": (
+        {"tank exponent": 0.1, "tank pressure": -1e5},
+        replace(TANK, exponent=1.1, pressure=21e5),
+    ),
     "sheds more": ({"inertia_per_kg": 0.2}, replace(TANK, inertia_per_kg=(3600.0, 3600.0, 1800.0))),
 }
 
 
 @pytest.mark.parametrize("change", TANKS)
 def test_a_case_of_another_tank_is_the_flight_of_such_a_body(change: str) -> None:
-    """The file gives the thrust at its own pressure: at another one all pulses are stronger or weaker."""
+    """The file gives the thrust at its own pressure: at another one all pulses are stronger or
+    weaker.
+    """
     draws, other = TANKS[change]
     body = through(SLOW, tank=TANK)
     model = DispersedModel(body, fires(body, commands(body)))
@@ -840,11 +1054,15 @@ STEADY = replace(TANK, exponent=0.0, isp=None, inertia_per_kg=None)
 
 @pytest.mark.parametrize("short", [0.3, 0.7, 1.2])
 def test_with_an_empty_tank_nothing_fires_any_more(short: float) -> None:
-    """A case is the flight of the pulses that the propellant goes round for, the last of them weakened."""
+    """A case is the flight of the pulses that the propellant goes round for, the last of them
+    weakened.
+    """
     body = through(SLOW)
     pulses = commands(body)
     each = pulses[0].propellant or math.nan
-    model = DispersedModel(replace(body, tank=replace(STEADY, propellant=3.0 * each)), Schedule(tuple(pulses)))
+    model = DispersedModel(
+        replace(body, tank=replace(STEADY, propellant=3.0 * each)), Schedule(tuple(pulses))
+    )
     draws, (whole, part) = {"tank propellant": -short * each}, divmod(3.0 - short, 1.0)
     weak = pulses[int(whole)]
     weak = replace(weak, torque=part * present(weak.torque), impulse=part * weak.impulse)
@@ -853,7 +1071,9 @@ def test_with_an_empty_tank_nothing_fires_any_more(short: float) -> None:
     assert nutation(RealWidths, model, draws) == pytest.approx(expected, rel=1e-9)
     assert nutation(ClosedForm, model, draws) == pytest.approx(expected, rel=1e-5)
     assert ends_of(ClosedForm, model, draws).drained == pytest.approx(3.0 / (3.0 - short), rel=1e-9)
-    assert flown_outputs(model, draws)[[0, 4]] == pytest.approx([expected, (3.0 - short) * each], rel=1e-9)
+    assert flown_outputs(model, draws)[[0, 4]] == pytest.approx(
+        [expected, (3.0 - short) * each], rel=1e-9
+    )
 
 
 def test_what_a_schedule_takes_beyond_the_tank_does_not_fire() -> None:
@@ -892,7 +1112,9 @@ def test_no_case_is_left_without_a_body_when_the_tank_is_empty() -> None:
     )
     model = study_of(body, fires(body, commands(body)[:1])).model
     draws, redrawn = DrawSource(model.inputs.drawn, 3, model.physical).block(0)
-    left = np.array([[120.0], [120.0], [80.0]]) - 0.01 * np.outer(shed, 1.0 + np.asarray(draws["inertia_per_kg"]))
+    left = np.array([[120.0], [120.0], [80.0]]) - 0.01 * np.outer(
+        shed, 1.0 + np.asarray(draws["inertia_per_kg"])
+    )
     assert len(redrawn) > 100
     assert np.all(left > 0.0)
     assert np.all(left[2] <= 2.0 * left[0])
@@ -909,7 +1131,8 @@ thrusters:
 valve: {open_delay: 8 ms, close_delay: 12 ms, rise_time: 5 ms, fall_time: 10 ms}
 """
 ALL_VALVES = (
-    "open_delay: {normal: 1 ms}, close_delay: {a: {uniform: 2 ms}, c: {normal: 1 ms}}, impulse_bit: {normal: 3 %}"
+    "open_delay: {normal: 1 ms}, close_delay: {a: {uniform: 2 ms}, c: {normal: 1 ms}}, "
+    "impulse_bit: {normal: 3 %}"
 )
 
 
@@ -936,12 +1159,17 @@ def test_what_is_drawn_and_what_touches_nothing() -> None:
 
 
 def test_a_study_spreads_as_its_valves_do() -> None:
-    """Of a single pulse along ω the nutation is off by the impulse: one sigma of it is that of the draws."""
+    """Of a single pulse along ω the nutation is off by the impulse: one sigma of it is that of the
+    draws.
+    """
     body = craft("close_delay: {a: {normal: 1 ms}}")
     made = fires(body, commands(body, 0.05)[:1])
     spread = run(Results(study_of(body, made, seed=3), 4000)).distribution("nutation")
     assert spread is not None
-    early, late = (nutation(RealWidths, DispersedModel(body, made), {"close_delay a": one}) for one in (-0.001, 0.001))
+    early, late = (
+        nutation(RealWidths, DispersedModel(body, made), {"close_delay a": one})
+        for one in (-0.001, 0.001)
+    )
     low, high = spread.quantiles(np.array([0.1587, 0.8413]))
     assert high - low == pytest.approx(abs(late - early), rel=0.05)
 

@@ -1,4 +1,6 @@
-"""The page of report, without a browser: what stands on it, its manoeuvre sheet, and what a board needs."""
+"""The page of report, without a browser: what stands on it, its manoeuvre sheet, and what a board
+needs.
+"""
 
 import base64
 import csv
@@ -39,7 +41,16 @@ from nutdamp.flight import propagation
 from nutdamp.flight.end_state import spin_phases
 from nutdamp.montecarlo.study import Results, run, study_of
 from nutdamp.page import moving
-from nutdamp.page.document import EDGES, Control, Moving, PageSection, Prose, Sheet, blocks_of, number_in
+from nutdamp.page.document import (
+    EDGES,
+    Control,
+    Moving,
+    PageSection,
+    Prose,
+    Sheet,
+    blocks_of,
+    number_in,
+)
 from nutdamp.page.report import CONDITIONS, Repeat, assumptions, block_html, page_html, report_page
 from nutdamp.physics import attitude
 from nutdamp.planning import plan as planning
@@ -78,8 +89,12 @@ requirement: {nutation: 0.5 deg}
 
 
 @cache
-def compared_text(text: str, schemes: tuple[str, ...] = CLASSIC, samples: int | None = 0) -> Comparison:
-    """The comparison of schemes for the text of a spacecraft file, with nominal values if not told otherwise."""
+def compared_text(
+    text: str, schemes: tuple[str, ...] = CLASSIC, samples: int | None = 0
+) -> Comparison:
+    """The comparison of schemes for the text of a spacecraft file, with nominal values if not told
+    otherwise.
+    """
     return compare(read_spacecraft(text, "craft.yaml"), schemes, samples=samples)
 
 
@@ -112,7 +127,8 @@ def test_commands_name_the_spacecraft_by_its_file_if_there_is_one(
     assert repeat.craft(built_in=True) == "'--set=limits.gap=1 s' --set=mass=210 --spin=keep"
 
 
-# --- form ------------------------------------------------------------------------------------------------------------
+# --- form
+# --------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -150,7 +166,9 @@ def test_it_is_well_formed_and_needs_no_network(text: str, scheme: str, pictured
             assert all(head.attributes["scope"] in ("col", "row") and head.text for head in heads)
         assert len({len(row) for row in cells(table)}) == 1
     digest = base64.b64encode(hashlib.sha256(scripts(shown)[0].text.encode()).digest()).decode()
-    (policy,) = (node.attributes["content"] for node in shown.all("meta") if "http-equiv" in node.attributes)
+    (policy,) = (
+        node.attributes["content"] for node in shown.all("meta") if "http-equiv" in node.attributes
+    )
     wanted = ["default-src 'none'", "style-src 'unsafe-inline'", f"script-src 'sha256-{digest}'"]
     assert policy.split("; ")[:3] == wanted
 
@@ -163,7 +181,9 @@ def test_what_a_file_says_stays_text(nasty: Node) -> None:
     for node in nasty.all("b"):
         assert node.text.rstrip(":") in (*CLASSIC, "warning", "FLY") or "Basilisk" in node.text
     assert len(scripts(nasty)) == 1
-    named = [row[0].text for table in section(nasty, "background").all("table") for row in cells(table)]
+    named = [
+        row[0].text for table in section(nasty, "background").all("table") for row in cells(table)
+    ]
     assert {'<i>"[x](y)', "<u>wind"} <= set(named)
     assert nasty.all("pre")[1].text == "nutdamp report 'a <b>.yaml'"
     (link,) = nasty.all("a")
@@ -175,7 +195,12 @@ def test_what_a_file_says_stays_text(nasty: Node) -> None:
 def test_the_same_input_gives_the_same_page(run: Run, tmp_path: Path) -> None:
     contents = []
     for _ in range(2):
-        assert run("report", "--disperse", "3e3", "--scheme", "two-pulse", "-o", "page.html").returncode == 0
+        assert (
+            run(
+                "report", "--disperse", "3e3", "--scheme", "two-pulse", "-o", "page.html"
+            ).returncode
+            == 0
+        )
         contents.append((tmp_path / "page.html").read_bytes())
     assert contents[0] == contents[1]
 
@@ -191,16 +216,41 @@ def test_pictures_are_inside_and_described() -> None:
 
 def test_dark_pages_lighten_the_colours_that_the_pictures_use() -> None:
     css = (places.ROOT / "nutdamp" / "page" / "page.css").read_text(encoding="utf-8")
-    used = (style.MOTION, style.PULSE, style.MOMENTUM, style.FIRED, style.TURNED, style.MISSED, style.UNCHECKED)
-    assert set(re.findall(r"(?:stroke|fill): (#\w+)\"\]", css)) == {colour.lower() for colour in used}
+    used = (
+        style.MOTION,
+        style.PULSE,
+        style.MOMENTUM,
+        style.FIRED,
+        style.TURNED,
+        style.MISSED,
+        style.UNCHECKED,
+    )
+    assert set(re.findall(r"(?:stroke|fill): (#\w+)\"\]", css)) == {
+        colour.lower() for colour in used
+    }
 
 
 def test_cells_are_numbers_and_options_and_relations_stay_in_one_line() -> None:
-    for text, value in (("5", 5.0), ("< 1e-9", 0.0), ("-0.25", -0.25), ("–", None), ("ideal", None), ("", None)):
+    for text, value in (
+        ("5", 5.0),
+        ("< 1e-9", 0.0),
+        ("-0.25", -0.25),
+        ("–", None),
+        ("ideal", None),
+        ("", None),
+    ):
         assert number_in(text) == value
-    made = Sheet("a", (Heading("b"), Heading("c", "s")), (("1", "4"), ("2", "1"), ("3", "–")), dots=("c",))
-    assert [[cell.dot for cell in row] for row in made.cells] == [[None, 100.0], [None, 25.0], [None, None]]
-    shares = Sheet("a", (Heading("b"), Heading("c", "%")), (("1", "40.4"), ("2", "bias")), bars=("c",))
+    made = Sheet(
+        "a", (Heading("b"), Heading("c", "s")), (("1", "4"), ("2", "1"), ("3", "–")), dots=("c",)
+    )
+    assert [[cell.dot for cell in row] for row in made.cells] == [
+        [None, 100.0],
+        [None, 25.0],
+        [None, None],
+    ]
+    shares = Sheet(
+        "a", (Heading("b"), Heading("c", "%")), (("1", "40.4"), ("2", "bias")), bars=("c",)
+    )
     assert [row[1].bar for row in shares.cells] == [40.4, None]
     assert block_html(shares).count('<b style="width:40.4%"></b>') == 1
     shown = block_html(Prose("report --disperse flies them; < 1e-9 deg is left, a-b breaks"))
@@ -208,15 +258,21 @@ def test_cells_are_numbers_and_options_and_relations_stay_in_one_line() -> None:
     assert '<span class="whole-word">&lt; 1e-9 deg</span> is left, a-b breaks' in shown
 
 
-# --- schemes and schedule --------------------------------------------------------------------------------------------
+# --- schemes and schedule
+# --------------------------------------------------------------------------------------------
 
 
 @pytest.mark.deep
 @pytest.mark.parametrize(("samples", "recommended"), [(0, "four-pulse"), (None, "two-pulse")])
-def test_comparison_and_schedule_say_what_the_json_says(samples: int | None, recommended: str) -> None:
+def test_comparison_and_schedule_say_what_the_json_says(
+    samples: int | None, recommended: str
+) -> None:
     both = compared_text(example_text(), CLASSIC, samples)
-    shown, data = tree(page(example_text(), samples=samples)), comparison_json(both)
-    for row, plan in zip(sheet(section(shown, "schemes"), "Cost and residuals"), data["plans"], strict=True):
+    shown = tree(page(example_text(), samples=samples))
+    data = comparison_json(both)
+    for row, plan in zip(
+        sheet(section(shown, "schemes"), "Cost and residuals"), data["plans"], strict=True
+    ):
         assert row["scheme"] == plan["scheme"]
         for head, expected in {
             "end s": plan["end_s"],
@@ -249,14 +305,19 @@ def test_only_assumptions_that_apply_are_told() -> None:
     assert len(texts) == len(guide.limits()) - len(CONDITIONS)
     assert [text for text in texts if text.startswith("Rigid body")]
     several = [*assumptions(compared_text(NASTY, ("two-pulse",)))]
-    assert [text.split()[0] for text in several if text not in texts] == ["Disturbances", "two-pulse"]
+    assert [text.split()[0] for text in several if text not in texts] == [
+        "Disturbances",
+        "two-pulse",
+    ]
     for begin in CONDITIONS:
         assert [text for text in guide.limits() if text.startswith(begin)], begin
 
 
 def test_with_a_wheel_the_page_says_what_its_equations_mean() -> None:
     for wheel in ("", "\nwheel: {momentum: 40 N m s}\n"):
-        made = report_page(compared_text(example_text() + wheel, ("one-pulse",)), Repeat("", "", ""))
+        made = report_page(
+            compared_text(example_text() + wheel, ("one-pulse",)), Repeat("", "", "")
+        )
         assert ("H3 = Cω3 + h" in section(tree(made), "background").text) == bool(wheel)
 
 
@@ -280,7 +341,10 @@ def test_what_an_earlier_end_costs_stands_on_the_page_with_the_recommended_plan_
     assert numbers == [str(n) for n in range(1, 1 + sum(len(front.points) for front in fronts))]
     words = {text.text for text in part.all("text")}
     other = "" if present(both.recommended).scheme == "optimal" else " (not traded)"
-    assert {f"recommended: {present(both.recommended).scheme}{other}", "H ends where it was"} <= words
+    assert {
+        f"recommended: {present(both.recommended).scheme}{other}",
+        "H ends where it was",
+    } <= words
     assert len([word for word in words if word.startswith("lower bound, ")]) == 1
     assert "H may end anywhere" in part.text
     assert 'id="trade"' not in page(example_text())
@@ -299,7 +363,9 @@ dispersions: {A: {normal: SIGMA}}
 def test_dispersions_enter_the_verdict(sigma: str, good: bool) -> None:
     both = compared_text(DISPERSED.replace("SIGMA", sigma), ("two-pulse",), 1000)
     assert present(both.recommended).meets_requirement
-    results = run(Results(study_of(both.spacecraft, present(both.recommended).pulses), 1000), threads=1)
+    results = run(
+        Results(study_of(both.spacecraft, present(both.recommended).pulses), 1000), threads=1
+    )
     distribution = results.distribution("nutation")
     assert distribution is not None
     made = (report_page if good else plain_page)(both, Repeat("", "", ""))
@@ -309,7 +375,9 @@ def test_dispersions_enter_the_verdict(sigma: str, good: bool) -> None:
     part = section(tree(made), "dispersion")
     first = sheet(part, "What is left")[0]
     assert first["quantity"] == "nutation, deg"
-    assert float(first["90 %"]) == pytest.approx(math.degrees(distribution.quantiles(np.array([0.9]))[0]), rel=2e-3)
+    assert float(first["90 %"]) == pytest.approx(
+        math.degrees(distribution.quantiles(np.array([0.9]))[0]), rel=2e-3
+    )
     assert float(first["max"]) == pytest.approx(math.degrees(distribution.maximum), rel=1e-3)
     assert bool(part.all("svg")) == good  # of the good one pictures are made
     assert "A" in {row["input"] for row in sheet(part, "Tolerance budget")}
@@ -319,7 +387,9 @@ def test_dispersions_enter_the_verdict(sigma: str, good: bool) -> None:
 def test_of_several_lines_above_a_table_the_last_is_its_title() -> None:
     table = Table("name", "value")
     table.add_row("nutation", "1")
-    first, sheet_, last = blocks_of("usual", Group(Text("a line"), Text("a title"), table, Text("below")))
+    first, sheet_, last = blocks_of(
+        "usual", Group(Text("a line"), Text("a title"), table, Text("below"))
+    )
     assert (first, last) == (Prose("a line"), Prose("below"))
     assert isinstance(sheet_, Sheet)
     assert sheet_.title == "a title"
@@ -338,7 +408,9 @@ def manoeuvre(body: Spacecraft, scheme: str, cases: int = 0) -> Node:
     """The section of a page, without pictures."""
     control = Control(document="ND-014", issue="2")
     compared = nutdamp.compare(body, [scheme], samples=cases)
-    return section(tree(plain_page(compared, Repeat("", "f.yaml", "name: X"), control=control)), "manoeuvre")
+    return section(
+        tree(plain_page(compared, Repeat("", "f.yaml", "name: X"), control=control)), "manoeuvre"
+    )
 
 
 @cache
@@ -354,11 +426,16 @@ def numbers(text: str) -> list[float]:
 
 @pytest.mark.deep
 def test_rows_are_the_pulses_as_they_are_loaded() -> None:
-    body, chosen = nutdamp.example(), planning.plan(nutdamp.example(), "two-pulse")
+    body = nutdamp.example()
+    chosen = planning.plan(nutdamp.example(), "two-pulse")
     _, after = chosen.flight.around_pulses()
-    for row, pulse, left in zip(sheet(example(), "Fire"), chosen.pulses, np.degrees(after.nutation), strict=True):
+    for row, pulse, left in zip(
+        sheet(example(), "Fire"), chosen.pulses, np.degrees(after.nutation), strict=True
+    ):
         assert (row["start s"], row["on-time s"]) == (f"{pulse.start:.3f}", f"{pulse.on_time:.3f}")
-        assert float(row["spin phase deg"]) == pytest.approx(math.degrees(body.spin * pulse.start) % 360.0, abs=0.06)
+        assert float(row["spin phase deg"]) == pytest.approx(
+            math.degrees(body.spin * pulse.start) % 360.0, abs=0.06
+        )
         assert (row["thrusters"], row["done"]) == (pulse.channel, "☐")
         assert float(row["nutation after deg"]) == pytest.approx(left, abs=5e-3)
     given = facts(example(), "Document")
@@ -372,15 +449,24 @@ def test_rows_are_the_pulses_as_they_are_loaded() -> None:
 
 @pytest.mark.deep
 def test_conditions_and_ranges_are_those_of_flown_cases() -> None:
-    """The same draws through the study itself: of the motion at t = 0, of the end, and of a schedule that is late."""
-    body, pulses = nutdamp.example(), planning.plan(nutdamp.example(), "two-pulse").pulses
+    """The same draws through the study itself: of the motion at t = 0, of the end, and of a
+    schedule that is late.
+    """
+    body = nutdamp.example()
+    pulses = planning.plan(nutdamp.example(), "two-pulse").pulses
     study = study_of(body, pulses)
     go = facts(example(), "GO at t = 0")
     draws, _ = study.source().block(0)
-    cases = study.model.cases({name: draw if isinstance(draw, float) else draw[:CASES] for name, draw in draws.items()})
-    momentum = np.array([np.broadcast_to(i * w, CASES) for i, w in zip(cases.moments, cases.omega0, strict=True)])
+    cases = study.model.cases(
+        {name: draw if isinstance(draw, float) else draw[:CASES] for name, draw in draws.items()}
+    )
+    momentum = np.array(
+        [np.broadcast_to(i * w, CASES) for i, w in zip(cases.moments, cases.omega0, strict=True)]
+    )
     nutation = np.degrees(np.arccos(momentum[2] / np.linalg.norm(momentum, axis=0)))
-    assert numbers(go["nutation"])[:2] == pytest.approx(np.quantile(nutation, [0.0015, 0.9985]), rel=5e-3)
+    assert numbers(go["nutation"])[:2] == pytest.approx(
+        np.quantile(nutation, [0.0015, 0.9985]), rel=5e-3
+    )
     spins = np.broadcast_to(cases.omega0[2], CASES) * 30.0 / math.pi
     assert numbers(go["spin"])[:2] == pytest.approx(np.quantile(spins, [0.0015, 0.9985]), rel=1e-4)
     early, late, *_ = numbers(go["phase window"].partition("(")[2].replace("to ", ""))
@@ -396,7 +482,9 @@ def flown(body: Spacecraft, schedule: Schedule) -> NDArray[np.float64]:
 
 
 @pytest.mark.deep
-def test_limits_to_hold_are_those_of_cases_that_end_well_and_the_last_row_accepts_what_is_required() -> None:
+def test_limits_to_hold_are_those_of_cases_that_end_well_and_the_last_row_accepts_what_is_required() -> (
+    None
+):
     """Of this body two in three cases end well, of which half are required."""
     limits = {"nutation": "0.5 deg", "momentum_shift": "0.2 deg", "probability": 0.5}
     body = nutdamp.example().with_(
@@ -407,7 +495,9 @@ def test_limits_to_hold_are_those_of_cases_that_end_well_and_the_last_row_accept
     well = (nutation <= 0.5) & (shift <= 0.2)
     assert 0.5 < well.mean() < 0.8
     after = np.degrees(flown(body, first_pulses(plan.pulses, 1))[0][well])
-    first, last = (row["hold if outside deg"] for row in sheet(manoeuvre(body, "two-pulse", 3000), "Fire"))
+    first, last = (
+        row["hold if outside deg"] for row in sheet(manoeuvre(body, "two-pulse", 3000), "Fire")
+    )
     assert numbers(first) == pytest.approx([after.min(), after.max()], abs=5.1e-3)
     assert last == "accept ≤ 0.5"
 
@@ -415,14 +505,21 @@ def test_limits_to_hold_are_those_of_cases_that_end_well_and_the_last_row_accept
 @pytest.mark.deep
 def test_rows_of_command_blocks_are_blocks_with_counts_and_the_sun_phase() -> None:
     body = turning(FILE, 9.0)
-    shown, fired = manoeuvre(body, "command-block"), planning.plan(body, "command-block").pulses
+    shown = manoeuvre(body, "command-block")
+    fired = planning.plan(body, "command-block").pulses
     (row,) = sheet(shown, "Fire")
     (block,) = fired.blocks
-    assert (row["block"], row["pulses"], row["first Sun pulse"]) == ("1", str(block.count), str(block.first))
+    assert (row["block"], row["pulses"], row["first Sun pulse"]) == (
+        "1",
+        str(block.count),
+        str(block.first),
+    )
     delay, counts = numbers(row["delay s (counts)"])
     assert (delay, counts) == (block.delay, present(body.commands).counts("delay", block.delay))
     # Without nutation the Sun phase is the delay times the spin.
-    assert float(row["Sun phase deg"]) == pytest.approx(math.degrees(block.delay * body.spin) % 360.0, abs=0.3)
+    assert float(row["Sun phase deg"]) == pytest.approx(
+        math.degrees(block.delay * body.spin) % 360.0, abs=0.3
+    )
     assert f"T{row['start UTC']}Z" in (body.utc(fired.pulses[0].loaded[0], 3) or "")
 
 
@@ -438,7 +535,11 @@ STRICT, LOOSE = Requirement(nutation=1e-4), Requirement(nutation=0.2, probabilit
         (Status.NOT_SHOWN, {}, 100),
         (Status.NOT_SHOWN, {"dispersions": None, "requirement": LOOSE}, 0),
         (Status.NOT_ENOUGH, {"requirement": STRICT}, 100),
-        (Status.NO_PULSE, {"dispersions": None, "requirement": replace(LOOSE, probability=None)}, 0),
+        (
+            Status.NO_PULSE,
+            {"dispersions": None, "requirement": replace(LOOSE, probability=None)},
+            0,
+        ),
         (Status.NOT_COMMANDABLE, None, 0),
     ],
 )
@@ -446,13 +547,18 @@ def test_only_a_sheet_to_fly_has_conditions_limits_to_hold_boxes_and_signatures(
     status: Status, change: dict[str, Any] | None, cases: int
 ) -> None:
     body = turning(FILE, 3.0) if change is None else nutdamp.example().replace(**change)
-    scheme = "rhumb-line" if change is None else "none" if status is Status.NO_PULSE else "two-pulse"
+    scheme = (
+        "rhumb-line" if change is None else "none" if status is Status.NO_PULSE else "two-pulse"
+    )
     compared = nutdamp.compare(body, [scheme], samples=cases)
     page = tree(plain_page(compared))
     assert compared.verdict.status is status
     told = page.all("main")[0].text
-    assert {words for words in HEADLINES.values() if re.search(rf"\b{words}\b", told)} == {HEADLINES[status]}
-    shown, flies = section(page, "manoeuvre"), status is Status.FLY
+    assert {words for words in HEADLINES.values() if re.search(rf"\b{words}\b", told)} == {
+        HEADLINES[status]
+    }
+    shown = section(page, "manoeuvre")
+    flies = status is Status.FLY
     captions = {caption.text for caption in shown.all("caption")}
     heads = {head.text for head in shown.all("th")}
     alarms = [one.text for one in shown.all("p") if one.attributes.get("class") == "alarm"]
@@ -463,12 +569,18 @@ def test_only_a_sheet_to_fly_has_conditions_limits_to_hold_boxes_and_signatures(
         assert (head in heads) is flies
 
 
-DATED = {"attitude": {"quaternion": [1, 0, 0, 0], "epoch": "2026-03-01T12:00:00Z", "frame": "EME2000"}}
+DATED = {
+    "attitude": {"quaternion": [1, 0, 0, 0], "epoch": "2026-03-01T12:00:00Z", "frame": "EME2000"}
+}
 
 
 @pytest.mark.parametrize(("gap", "more"), [("1 s", {}), ("12 s", {}), ("12 s", DATED)])
-def test_a_row_says_when_to_decide_unless_the_coast_is_too_short(gap: str, more: dict[str, Any]) -> None:
-    first, last = sheet(manoeuvre(nutdamp.example().with_(limits={"gap": gap}, **more), "two-pulse"), "Fire")
+def test_a_row_says_when_to_decide_unless_the_coast_is_too_short(
+    gap: str, more: dict[str, Any]
+) -> None:
+    first, last = sheet(
+        manoeuvre(nutdamp.example().with_(limits={"gap": gap}, **more), "two-pulse"), "Fire"
+    )
     assert last["decide before"] == "–"
     decided = first["decide before"]
     if gap == "1 s":
@@ -482,7 +594,11 @@ def test_a_row_says_when_to_decide_unless_the_coast_is_too_short(gap: str, more:
 @pytest.mark.deep
 @pytest.mark.parametrize(
     ("settings", "shown"),
-    [({"limits": {"tick": "2.5 ms"}}, 4), ({"dispersions": {"timing": {"uniform": "20 ms"}}}, 2), ({}, 3)],
+    [
+        ({"limits": {"tick": "2.5 ms"}}, 4),
+        ({"dispersions": {"timing": {"uniform": "20 ms"}}}, 2),
+        ({}, 3),
+    ],
 )
 def test_times_are_no_finer_than_the_file_can_tell(settings: dict[str, object], shown: int) -> None:
     row, *_ = sheet(manoeuvre(nutdamp.example().with_(**settings), "two-pulse"), "Fire")
@@ -495,13 +611,20 @@ def test_the_nutation_after_each_pulse_is_that_of_the_reference() -> None:
     plan = planning.plan(body, "rhumb-line")
     _, after = plan.flight.around_pulses()
     motion = reference.Motion(body.omega0, attitude.matrix(body.initial.quaternion))
-    now, moments = 0.0, np.asarray(body.inertia.moments)
+    now = 0.0
+    moments = np.asarray(body.inertia.moments)
     for index, pulse in enumerate(plan.pulses):
-        (motion,) = reference.coast(body.inertia.moments, motion, np.zeros(3), np.array([pulse.start - now]))
-        (motion,) = reference.coast(body.inertia.moments, motion, present(pulse.torque), np.array([pulse.on_time]))
+        (motion,) = reference.coast(
+            body.inertia.moments, motion, np.zeros(3), np.array([pulse.start - now])
+        )
+        (motion,) = reference.coast(
+            body.inertia.moments, motion, present(pulse.torque), np.array([pulse.on_time])
+        )
         now = pulse.end
         momentum = motion.rotation @ (moments * motion.rates)
-        assert float(after.nutation[index]) == pytest.approx(reference.angle(momentum, motion.rotation[:, 2]), abs=1e-7)
+        assert float(after.nutation[index]) == pytest.approx(
+            reference.angle(momentum, motion.rotation[:, 2]), abs=1e-7
+        )
         seen = float(attitude.angle_between(after.momentum[index], present(body.sun)))
         assert seen == pytest.approx(reference.angle(momentum, present(body.sun)), abs=1e-7)
 
@@ -513,7 +636,8 @@ def test_a_window_ends_at_half_a_turn_or_where_the_first_pulse_would_come_before
     assert points.window(1.0 + 1e-9) is None
     assert present(points.window(0.0)) == pytest.approx((-math.pi / body.spin, math.pi / body.spin))
     soon = replace(
-        points.study.model.schedule, pulses=tuple(pulse.moved(-0.6) for pulse in points.study.model.schedule)
+        points.study.model.schedule,
+        pulses=tuple(pulse.moved(-0.6) for pulse in points.study.model.schedule),
     )
     early = present(Checkpoints(study_of(body, soon)).window(0.0))
     assert early.least == pytest.approx(-soon.pulses[0].start)
@@ -553,19 +677,27 @@ def test_what_the_board_asks_for_is_on_the_page() -> None:
     wanted = {"width": "in steps of 30 ms, 60 ms to 0.48 s"}
     assert wanted == {key: start[key] for key in wanted}
     assert start["Sun sensor"].startswith("at azimuth 0 deg")
-    # With three moments the file's 0.6° is that of t = 0; pulses are measured by the largest on the arc.
+    # With three moments the file's 0.6° is that of t = 0; pulses are measured by the largest on the
+    # arc.
     assert ace().all("h1")[0].text == "ACE · damp 0.6° nutation"
     assert [row["channel"] for row in sheet(ace(), "Pulses of")]
 
 
 @pytest.mark.deep
 def test_pulses_have_date_phase_and_cones() -> None:
-    body, chosen = compared_ace().spacecraft, present(compared_ace().recommended)
+    body = compared_ace().spacecraft
+    chosen = present(compared_ace().recommended)
     around = dict(zip(("before", "after"), chosen.flight.around_pulses(), strict=True))
-    for index, (pulse, row) in enumerate(zip(chosen.pulses, sheet(ace(), "Pulses of"), strict=True)):
+    for index, (pulse, row) in enumerate(
+        zip(chosen.pulses, sheet(ace(), "Pulses of"), strict=True)
+    ):
         assert f"T{row['start UTC']}Z" in (body.utc(pulse.start, 3) or "")
-        x, y, _ = attitude.matrix(chosen.flight.motion(np.array([pulse.start]))[1][0]).T @ present(body.sun)
-        assert float(row["Sun phase deg"]) == pytest.approx(-math.degrees(math.atan2(y, x)) % 360.0, abs=0.051)
+        x, y, _ = attitude.matrix(chosen.flight.motion(np.array([pulse.start]))[1][0]).T @ present(
+            body.sun
+        )
+        assert float(row["Sun phase deg"]) == pytest.approx(
+            -math.degrees(math.atan2(y, x)) % 360.0, abs=0.051
+        )
         for cone in ("nutation", "body_cone", "space_cone"):
             for when, track in around.items():
                 shown = float(row[f"{cone.replace('_', ' ')} {when} deg"])
@@ -577,11 +709,15 @@ def test_the_spin_phase_is_the_integral_of_the_spin() -> None:
     body = nutdamp.example().replace(disturbances=(Disturbance(0.0, 0.4),), dispersions=None)
     times = np.array([0.0, 3.0, 11.0, 40.0])
     phases = spin_phases(propagation.flown(body, nutdamp.plan(body, "none").pulses, 41.0), times)
-    assert phases == pytest.approx(body.spin * times + 0.5 * 0.4 / body.inertia.C * times**2, rel=1e-12)
+    assert phases == pytest.approx(
+        body.spin * times + 0.5 * 0.4 / body.inertia.C * times**2, rel=1e-12
+    )
     uneven = nutdamp.load(ACE)
     made = propagation.flown(uneven, nutdamp.plan(uneven, "none").pulses, 61.0)
     grid = np.linspace(0.0, 60.0, 6001)
-    motions = reference.coast(made.moments, reference.Motion(uneven.omega0, np.eye(3)), np.zeros(3), grid[1:])
+    motions = reference.coast(
+        made.moments, reference.Motion(uneven.omega0, np.eye(3)), np.zeros(3), grid[1:]
+    )
     spins = np.array([uneven.spin, *(one.rates[2] for one in motions)])
     assert spin_phases(made, grid[[-1]])[0] == pytest.approx(np.trapezoid(spins, grid), rel=1e-7)
 
@@ -589,7 +725,9 @@ def test_the_spin_phase_is_the_integral_of_the_spin() -> None:
 @pytest.mark.deep
 def test_the_verification_is_a_line_and_the_equations_are_those_of_the_guide() -> None:
     verified = section(ace(), "verification")
-    assert re.search(r"DOP853( and Basilisk)? agree \(within 1e-09 rad\)", verified.all("p")[0].text)
+    assert re.search(
+        r"DOP853( and Basilisk)? agree \(within 1e-09 rad\)", verified.all("p")[0].text
+    )
     checks = {row["method"]: row for row in sheet(verified, "Maximum differences")}
     assert float(checks["DOP853, the file alone"]["Δaxis rad"].removeprefix("< ")) <= 1e-9
     (listing,) = (one.text for one in ace().all("pre") if "M(17)" in one.text)
@@ -621,7 +759,16 @@ def test_input_is_known_by_its_digest_and_the_date_is_that_of_the_build_where_no
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "1772366400")
     digest = hashlib.sha256((tmp_path / "craft.yaml").read_bytes()).hexdigest()
     for more, said in (((), "2026-03-01"), (("--date", "1 May 2026"), "1 May 2026")):
-        asked = ("report", "craft.yaml", "--nominal", "--scheme", "two-pulse", "-o", "page.html", *more)
+        asked = (
+            "report",
+            "craft.yaml",
+            "--nominal",
+            "--scheme",
+            "two-pulse",
+            "-o",
+            "page.html",
+            *more,
+        )
         assert run(*asked).returncode == 0
         content = (tmp_path / "page.html").read_text("utf-8")
         assert f'<p class="control">{said} · input {digest[:8]}</p>' in content
@@ -632,11 +779,15 @@ def test_input_is_known_by_its_digest_and_the_date_is_that_of_the_build_where_no
 
 @pytest.mark.deep
 @pytest.mark.usefixtures("plain_pages")
-@pytest.mark.parametrize(("tolerances", "state"), [((), "met"), (("--set", "dispersions.A={normal: 1 %}"), "missed")])
+@pytest.mark.parametrize(
+    ("tolerances", "state"), [((), "met"), (("--set", "dispersions.A={normal: 1 %}"), "missed")]
+)
 def test_the_top_of_the_page_has_the_bounds_of_the_screen(
     run: Run, tmp_path: Path, tolerances: tuple[str, ...], state: str
 ) -> None:
-    """With the tolerances of the file enough cases comply with one scheme; with A known to 1 % with none."""
+    """With the tolerances of the file enough cases comply with one scheme; with A known to 1 % with
+    none.
+    """
     schemes = [part for name in CLASSIC for part in ("--scheme", name)]
     run("report", *schemes, *tolerances, "-o", "page.html")
     lines = run("plan", *schemes, *tolerances, columns=120).stdout.splitlines()
@@ -647,7 +798,12 @@ def test_the_top_of_the_page_has_the_bounds_of_the_screen(
     rows = {row[0].text: [cell.text for cell in row[2:]] for row in cells(decision.all("table")[0])}
     for line in (line for line in lines if line.partition("  ")[0] in rows):
         label, limit, nominal, level, alone, margin, word = re.split(r"  +", line)
-        bounds = [f"nominal {nominal}", f"99.7 % within {level}", f"limit {limit}", f"margin {margin}"]
+        bounds = [
+            f"nominal {nominal}",
+            f"99.7 % within {level}",
+            f"limit {limit}",
+            f"margin {margin}",
+        ]
         assert rows.pop(label) == [*bounds, f"{alone} keep it", word]
     assert rows == {}
     (chosen,) = (one.text for one in page.all("li") if one.attributes.get("class") == "mark")
@@ -656,18 +812,27 @@ def test_the_top_of_the_page_has_the_bounds_of_the_screen(
 
 @pytest.mark.weekly
 @pytest.mark.parametrize("name", ["lunar-prospector", "magnus-a03"])
-def test_the_notes_name_the_plan_that_can_be_sent_or_fired_as_it_stands(run: Run, tmp_path: Path, name: str) -> None:
+def test_the_notes_name_the_plan_that_can_be_sent_or_fired_as_it_stands(
+    run: Run, tmp_path: Path, name: str
+) -> None:
     assert run("init", "--from", name, "craft.yaml").returncode == 0
     assert run("report", "craft.yaml", "-o", "page.html").returncode == 0
     shown = section(tree((tmp_path / "page.html").read_text("utf-8")), "decision")
-    told = {"lunar-prospector": "FLY command-block: ", "magnus-a03": "two-pulse fires ideal impulses"}
+    told = {
+        "lunar-prospector": "FLY command-block: ",
+        "magnus-a03": "two-pulse fires ideal impulses",
+    }
     assert told[name] in shown.text
 
 
 @pytest.mark.deep
 def test_a_turn_is_in_the_title() -> None:
-    """A body that is to turn to a target 10° away; within 9 s there is no plan, and the page says so."""
-    body = nutdamp.example().with_(goal={"tilt": "10 deg", "azimuth": "45 deg"}, limits={"horizon": "100 s"})
+    """A body that is to turn to a target 10° away; within 9 s there is no plan, and the page says
+    so.
+    """
+    body = nutdamp.example().with_(
+        goal={"tilt": "10 deg", "azimuth": "45 deg"}, limits={"horizon": "100 s"}
+    )
     shown = tree(plain_page(compare(body, ["rhumb-line"], samples=0)))
     assert shown.all("h1")[0].text == "Sounder-1 · damp 5° nutation, turn by 10°"
     late = plain_page(compare(body.with_(limits={"horizon": "9 s"}), ["rhumb-line"]))
@@ -723,14 +888,22 @@ def test_the_command_in_the_caption_gives_the_rows_of_the_view(
 ) -> None:
     """It names the file that the plan came from, whatever its name."""
     monkeypatch.chdir(tmp_path)
-    text = places.case("cb1015.yaml").read_text(encoding="utf-8") if name == "blocks" else TEXTS["example"]
+    text = (
+        places.case("cb1015.yaml").read_text(encoding="utf-8")
+        if name == "blocks"
+        else TEXTS["example"]
+    )
     text += "disturbances: [{torque: [20 mN m, 0, 0]}]\n" * (name == "disturbances")
     Path("my craft.yaml").write_text(text, encoding="utf-8")
     body = read_spacecraft(text, "my craft.yaml")
     if name == "blocks":
         header = "block,channel,first_sun_pulse,count,every,delay_s,width_s"
-        Path("b 2.csv").write_text(f"{header}\n1,J2,6,1,1,0.972287825122,0.487394\n", encoding="utf-8")
-        plan = planning.Plan(body, "b 2.csv", fired(body, read_blocks("b 2.csv", body)[0]), from_file=True)
+        Path("b 2.csv").write_text(
+            f"{header}\n1,J2,6,1,1,0.972287825122,0.487394\n", encoding="utf-8"
+        )
+        plan = planning.Plan(
+            body, "b 2.csv", fired(body, read_blocks("b 2.csv", body)[0]), from_file=True
+        )
     elif name == "schedule":
         planning.plan(body, "two-pulse").to_csv("p 2.csv")
         plan, _ = read_plan("p 2.csv", body)
@@ -741,7 +914,8 @@ def test_the_command_in_the_caption_gives_the_rows_of_the_view(
     *words, file = shlex.split(" ".join(made.command))
     assert file == "FILE"
     done = run(*words[1:], "-", "-q", status=(0, 4))
-    rows, data = list(csv.DictReader(io.StringIO(done.stdout))), json.loads(made.data)
+    rows = list(csv.DictReader(io.StringIO(done.stdout)))
+    data = json.loads(made.data)
     digits = data["digits"]["cone"]
     shown = [f"{value / 10**digits:.{digits}f}" for value in accumulate(data["columns"]["theta"])]
     assert shown == [f"{float(row['nutation_deg']):z.{digits}f}" for row in rows]
@@ -765,7 +939,12 @@ def test_each_row_is_that_of_simulate(run: Run, name: str) -> None:
     _, data, rows = view(TEXTS[name])
     track = simulated(run, TEXTS[name])
     assert {len(numbers) for numbers in rows.values()} == {len(track)}
-    for what, key in (("t", "t_s"), ("theta", "nutation_deg"), ("mu", "body_cone_deg"), ("lambda", "space_cone_deg")):
+    for what, key in (
+        ("t", "t_s"),
+        ("theta", "nutation_deg"),
+        ("mu", "body_cone_deg"),
+        ("lambda", "space_cone_deg"),
+    ):
         digits = data["digits"]["t" if what == "t" else "cone"]
         shown = [f"{value / 10**digits:.{digits}f}" for value in rows[what]]
         assert shown == [f"{float(row[key]):z.{digits}f}" for row in track]
@@ -777,7 +956,9 @@ def test_each_row_is_that_of_simulate(run: Run, name: str) -> None:
         on_sphere = np.array([rows[f"{prefix}{number}"] for number in (1, 2, 3)]).T / moving.SPHERE
         assert on_sphere == pytest.approx(expected, abs=0.51 / moving.SPHERE)
     framed = read_spacecraft(TEXTS[name], "craft.yaml").attitude is not None
-    longitude, latitude = (rows["angle1"], rows["angle2"]) if framed else (rows["angle2"], rows["angle1"])
+    longitude, latitude = (
+        (rows["angle1"], rows["angle2"]) if framed else (rows["angle2"], rows["angle1"])
+    )
     for (x, y, z), along, above in zip(axis.tolist(), longitude, latitude, strict=True):
         across = math.hypot(x, y)
         height = math.atan2(z, across) if framed else math.atan2(across, z)
@@ -786,7 +967,9 @@ def test_each_row_is_that_of_simulate(run: Run, name: str) -> None:
             assert across < 1e-10
         else:
             way = math.radians(along / 1e4)
-            assert (math.cos(way), math.sin(way)) == pytest.approx((x / across, y / across), abs=2e-6)
+            assert (math.cos(way), math.sin(way)) == pytest.approx(
+                (x / across, y / across), abs=2e-6
+            )
             assert 0 <= along < 360 * 10**4
 
 
@@ -795,7 +978,9 @@ def test_the_pole_curve_lies_where_its_scale_says(run: Run, name: str) -> None:
     made, _, rows = view(TEXTS[name])
     panel = made.panels[0]
     rates = column(simulated(run, TEXTS[name]), "omega_1_rad_s", "omega_2_rad_s", "omega_3_rad_s")
-    axes = read_spacecraft(TEXTS[name], "craft.yaml").inertia.axes  # principal axes, which the panel names
+    axes = read_spacecraft(
+        TEXTS[name], "craft.yaml"
+    ).inertia.axes  # principal axes, which the panel names
     unit = {"deg/s": 1.0, "mdeg/s": 1e3}[panel.y.name.removeprefix("ω2, ")]
     for place, scale in enumerate((panel.x, panel.y)):
         numbers = [float(text.replace("−", "-")) / unit for _, text in scale.marks]
@@ -810,7 +995,9 @@ def test_square_panels_have_one_scale_for_both_axes() -> None:
     for panel in view(TEXTS["target"])[0].panels:
         spans = []
         for scale in (panel.x, panel.y):
-            (first, low), *_, (last, high) = ((at, float(text.replace("−", "-"))) for at, text in scale.marks)
+            (first, low), *_, (last, high) = (
+                (at, float(text.replace("−", "-"))) for at, text in scale.marks
+            )
             spans.append(abs((last - first) / (high - low)))
         assert spans[0] == pytest.approx(spans[1], rel=5e-3)
 
@@ -820,7 +1007,8 @@ def test_a_row_says_what_fires(name: str) -> None:
     _, data, rows = view(TEXTS[name])
     pulses = list(enumerate(chosen(TEXTS[name]).pulses, 1))
     scale = 10 ** data["digits"]["t"]
-    half, fired = 0.51 / scale, set()
+    half = 0.51 / scale
+    fired = set()
     for time, which in zip(rows["t"], rows["firing"], strict=True):
         text = data["firings"][which]
         named = {int(number) for number in re.findall(r"(\d+): ", text)}
@@ -833,13 +1021,19 @@ def test_a_row_says_what_fires(name: str) -> None:
 
 
 def test_dates_are_exact_through_a_leap_second_and_without_an_epoch_there_are_none() -> None:
-    _, data, rows = view(TEXTS["leap"])  # its epoch is ten seconds before the end of 2016, which has a 61st
+    _, data, rows = view(
+        TEXTS["leap"]
+    )  # its epoch is ten seconds before the end of 2016, which has a 61st
     digits = data["digits"]["t"]
     dates = [data["utc"]["head"] + tail for tail in data["utc"]["tails"]]
     assert dates[0] == "2016-12-31T23:59:50." + digits * "0" + "Z"
     for time, date in zip(rows["t"], dates, strict=True):
         seconds, part = divmod(time, 10**digits)
-        clock = f"2016-12-31T23:59:{50 + seconds}" if seconds <= 10 else f"2017-01-01T00:00:{seconds - 11:02d}"
+        clock = (
+            f"2016-12-31T23:59:{50 + seconds}"
+            if seconds <= 10
+            else f"2017-01-01T00:00:{seconds - 11:02d}"
+        )
         off = abs(int(date[-1 - digits : -1]) - part)
         assert date == f"{clock}.{part:0{digits}d}Z" or off in (1, 10**digits - 1)
     assert any(":60." in date for date in dates)
@@ -851,24 +1045,32 @@ def test_dates_are_exact_through_a_leap_second_and_without_an_epoch_there_are_no
 def test_a_page_has_the_view_and_its_script_where_it_has_pictures() -> None:
     plain = plain_page(compared_text(TEXTS["single"], samples=None))
     assert "requestAnimationFrame" not in page_html(plain)
-    page = tree(replace(plain, sections=(PageSection("pictures", "Pictures", (view(TEXTS["single"])[0],)),)))
+    page = tree(
+        replace(plain, sections=(PageSection("pictures", "Pictures", (view(TEXTS["single"])[0],)),))
+    )
     (shown,) = (node for node in page if "moving" in node.attributes.get("class", "").split())
     assert "UTC" not in shown.text
 
 
 def test_a_steep_track_has_rows_enough_and_the_data_stay_small() -> None:
     made, data, rows = view(TEXTS["steep"])
-    assert len(rows["t"]) >= 24 * data["until"] / read_spacecraft(TEXTS["steep"], "a.yaml").body_period
+    assert (
+        len(rows["t"]) >= 24 * data["until"] / read_spacecraft(TEXTS["steep"], "a.yaml").body_period
+    )
     assert not data["dots"]
     assert len(made.data) < 160_000
     # From row to row the pole curve turns by no more than a corner that the eye takes for round.
     up, right = np.array(rows["pole2"]) - 955, np.array(rows["pole1"]) - 1155
-    way, big = np.unwrap(np.arctan2(up, right)), np.hypot(up, right) > 400
+    way = np.unwrap(np.arctan2(up, right))
+    big = np.hypot(up, right) > 400
     assert np.abs(np.diff(way))[big[1:] & big[:-1]].max() < math.radians(16)
 
 
 def test_a_track_of_too_many_turns_is_drawn_as_dots() -> None:
-    text = AT_REST.replace("[0, 0, 3]", "[0.1, 0, 3]") + "limits: {earliest: 3000 s, horizon: 3600 s}\n"
+    text = (
+        AT_REST.replace("[0, 0, 3]", "[0.1, 0, 3]")
+        + "limits: {earliest: 3000 s, horizon: 3600 s}\n"
+    )
     made, data, rows = view(text)
     assert data["dots"]
     assert len(rows["t"]) < moving.MOST_ROWS + 20
@@ -880,7 +1082,10 @@ def test_without_nutation_everything_stands_still() -> None:
     assert made.strip.bars == ()
     assert data["firings"] == ["none"]
     assert {number for name in ("theta", "mu", "lambda", "firing") for number in rows[name]} == {0}
-    assert {len(set(rows[name])) for name in ("pole1", "pole2", "sky1", "sky2", "momentum1", "momentum2")} == {1}
+    assert {
+        len(set(rows[name]))
+        for name in ("pole1", "pole2", "sky1", "sky2", "momentum1", "momentum2")
+    } == {1}
 
 
 def test_the_target_is_a_mark_and_a_circle_and_further_circles_are_taken_as_data() -> None:
@@ -889,13 +1094,20 @@ def test_the_target_is_a_mark_and_a_circle_and_further_circles_are_taken_as_data
     assert (named["name"], named["kind"]) == ("target", "target")
     assert named["circles"] == [{"radius": pytest.approx(math.radians(4)), "kind": "target"}]
     x, y, z = named["axis"]
-    assert (math.degrees(math.atan2(y, x)), math.degrees(math.asin(z))) == pytest.approx((-90, -30), abs=1e-3)
+    assert (math.degrees(math.atan2(y, x)), math.degrees(math.asin(z))) == pytest.approx(
+        (-90, -30), abs=1e-3
+    )
     assert data["target"] is not None
     plan = chosen(TEXTS["target"])
     star = replace(plan.spacecraft, keep=(Keep("star", np.array([0.0, 0.6, 0.8]), 0.2),))
     assert json.loads(moving.moving_of(replace(plan, spacecraft=star)).data)["named"] == [
         named,
-        {"name": "star", "kind": "watched", "axis": [0.0, 0.6, 0.8], "circles": [{"radius": 0.2, "kind": "keep-out"}]},
+        {
+            "name": "star",
+            "kind": "watched",
+            "axis": [0.0, 0.6, 0.8],
+            "circles": [{"radius": 0.2, "kind": "keep-out"}],
+        },
     ]
 
 
@@ -915,7 +1127,9 @@ def test_sun_and_cones_of_the_file_are_on_the_globe(run: Run) -> None:
     assert pole["axis"] == [0.0, 0.0, 1.0]
     axis = column(simulated(run, only + cones), "axis_x", "axis_y", "axis_z")
     for name, direction in (("aspect1", sun["axis"]), ("aspect2", pole["axis"])):
-        assert np.cos(np.radians(np.array(rows[name]) / 1e4)) == pytest.approx(axis @ direction, abs=4e-6)
+        assert np.cos(np.radians(np.array(rows[name]) / 1e4)) == pytest.approx(
+            axis @ direction, abs=4e-6
+        )
 
 
 @pytest.mark.parametrize("degrees", [0.5, 50.0])
@@ -928,10 +1142,15 @@ def test_the_strip_says_where_the_required_nutation_is(degrees: float) -> None:
 
 
 def test_the_strip_has_the_times_without_firings() -> None:
-    body = replace(WIDE, limits=Limits(earliest=2.0, blackout=((5.0, 7.0), (19.0, 25.0)), horizon=60.0))
+    body = replace(
+        WIDE, limits=Limits(earliest=2.0, blackout=((5.0, 7.0), (19.0, 25.0)), horizon=60.0)
+    )
     made = propagation.flown(body, Schedule(), 20.0)
     strip, _ = moving.strip_of(made, made.sampled(200, 20.0), 20.0)
-    ends = [2000.0 * (moving.LEAD + (1.0 - moving.LEAD) * time / 20.0) for time in (0.0, 2.0, 5.0, 7.0, 19.0, 20.0)]
+    ends = [
+        2000.0 * (moving.LEAD + (1.0 - moving.LEAD) * time / 20.0)
+        for time in (0.0, 2.0, 5.0, 7.0, 19.0, 20.0)
+    ]
     for shown, first, last in zip(strip.closed, ends[::2], ends[1::2], strict=True):
         assert shown == pytest.approx((first, last - first), abs=0.06)
 
@@ -950,7 +1169,8 @@ def test_the_scripts_are_small(name: str) -> None:
     assert (Path(moving.__file__).parent / name).stat().st_size <= 25_000
 
 
-# --- workbench: what its script computes is tested in a browser -------------------------------------------------------
+# --- workbench: what its script computes is tested in a browser
+# -------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -960,7 +1180,10 @@ def test_the_scripts_are_small(name: str) -> None:
         ("disturbances: [{torque: [20 mN m, 0, 0]}]", "disturbance torques"),
         deep("tank: {propellant: 30 kg, pressure: 22 bar, final_pressure: 8 bar}", "blowdown"),
         deep("cold: {first: 90 %, pulses: 4}", "cold pulses"),
-        deep("valve: {open_delay: 8 ms, close_delay: 12 ms, rise_time: 5 ms, fall_time: 10 ms}", "valves"),
+        deep(
+            "valve: {open_delay: 8 ms, close_delay: 12 ms, rise_time: 5 ms, fall_time: 10 ms}",
+            "valves",
+        ),
     ],
 )
 def test_other_bodies_have_none_and_the_view_has_the_reason(more: str, reason: str) -> None:
@@ -985,17 +1208,27 @@ def test_cones_roll_on_a_symmetric_body_alone() -> None:
 
 
 def test_its_data_are_the_plan_and_the_limits_of_the_file() -> None:
-    text = (
-        TEXTS["example"] + "limits: {horizon: 60 s, earliest: 1 s, gap: 0.2 s, tick: 1 ms, blackout: [[30 s, 31 s]]}\n"
+    text = TEXTS["example"] + (
+        "limits: {horizon: 60 s, earliest: 1 s, gap: 0.2 s, tick: 1 ms, blackout: [[30 s, 31 s]]}\n"
     )
     made, data, _ = view(text)
-    bench, pulses = data["bench"], chosen(text).pulses.pulses
+    bench = data["bench"]
+    pulses = chosen(text).pulses.pulses
     assert [(entry["start"], entry["on"], entry["channel"]) for entry in bench["pulses"]] == [
         (pulse.start, pulse.on_time, pulse.channel) for pulse in pulses
     ]
-    assert [entry["impulse"] for entry in bench["pulses"]] == [pulse.impulse.tolist() for pulse in pulses]
+    assert [entry["impulse"] for entry in bench["pulses"]] == [
+        pulse.impulse.tolist() for pulse in pulses
+    ]
     assert {(entry["least"], entry["most"]) for entry in bench["pulses"]} == {(0.02, 2.0)}
-    limits = {"earliest": 1.0, "horizon": 60.0, "gap": 0.2, "tick": 1e-3, "blackout": [[30.0, 31.0]], "most": None}
+    limits = {
+        "earliest": 1.0,
+        "horizon": 60.0,
+        "gap": 0.2,
+        "tick": 1e-3,
+        "blackout": [[30.0, 31.0]],
+        "most": None,
+    }
     assert bench["limits"] == limits
     assert [(key, limit) for key, _, limit in present(made.workbench).rows] == [
         ("nutation", "≤ 0.5°"),
@@ -1008,4 +1241,6 @@ def test_with_a_target_the_axis_error_is_bounded_and_ideal_impulses_have_no_on_t
     rows = [(key, limit) for key, _, limit in present(made.workbench).rows]
     assert rows == [("nutation", ""), ("momentum_shift", ""), ("axis_error", "≤ 4°")]
     pulses = data["bench"]["pulses"]
-    assert {(entry["on"], entry["torque"], entry["most"]) for entry in pulses} == {(0.0, None, None)}
+    assert {(entry["on"], entry["torque"], entry["most"]) for entry in pulses} == {
+        (0.0, None, None)
+    }

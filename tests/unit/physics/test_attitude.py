@@ -1,4 +1,6 @@
-"""Rotation, cones, the impulse sum, finite pulses, Magnus 1970 (12) and (17)-(22), by DOP853 and quadrature."""
+"""Rotation, cones, the impulse sum, finite pulses, Magnus 1970 (12) and (17)-(22), by DOP853 and
+quadrature.
+"""
 
 import cmath
 import math
@@ -40,16 +42,22 @@ def quaternion_of(axis: reference.Array, angle: float) -> reference.Array:
 def start_of(A: float, C: float, theta: float, spin: float) -> tuple[complex, reference.Motion]:
     """A motion with nutation θ, in a frame that is not N."""
     omega = cmath.rect(rigid_body.transverse_rate(A, C, theta, spin), 2.1)
-    return omega, reference.Motion(reference.vector(omega.real, omega.imag, spin), about((1, -2, 0.5), 1.2))
+    return omega, reference.Motion(
+        reference.vector(omega.real, omega.imag, spin), about((1, -2, 0.5), 1.2)
+    )
 
 
 @given(axes, angles, axes, angles, vectors)
 def test_quaternions_are_rodrigues_formula(
     axis: reference.Array, angle: float, other: reference.Array, by: float, vector: reference.Array
 ) -> None:
-    """Scalar first, body to inertial; a product turns by the right one first; `from_matrix` is the inverse."""
+    """Scalar first, body to inertial; a product turns by the right one first; `from_matrix` is the
+    inverse.
+    """
     left, right = quaternion_of(axis, angle), quaternion_of(other, by)
-    assert attitude.rotate(left, vector) == pytest.approx(about(axis, angle) @ vector, abs=100 * EPS)
+    assert attitude.rotate(left, vector) == pytest.approx(
+        about(axis, angle) @ vector, abs=100 * EPS
+    )
     assert attitude.matrix(left) == pytest.approx(about(axis, angle), abs=10 * EPS)
     both = attitude.rotate(attitude.multiply(left, right), vector)
     assert both == pytest.approx(about(axis, angle) @ about(other, by) @ vector, abs=200 * EPS)
@@ -58,7 +66,11 @@ def test_quaternions_are_rodrigues_formula(
 
 
 def test_from_matrix_in_all_its_branches() -> None:
-    near, half, e1, e2, e3 = math.pi - 0.01, math.pi, (1, 0, 0), (0, 1, 0), (0, 0, 1)
+    near = math.pi - 0.01
+    half = math.pi
+    e1 = (1, 0, 0)
+    e2 = (0, 1, 0)
+    e3 = (0, 0, 1)
     for direction, angle in [
         *[
             ((1, 1, 1), 0.3),
@@ -66,7 +78,14 @@ def test_from_matrix_in_all_its_branches() -> None:
             ((0.1, 1, 0.1), near),
             ((0.1, -0.1, 1), near),
         ],  # w, x, y, z largest
-        *[(e1, half), (e2, half), (e3, half), ((1, 1, 1), 2 * math.pi / 3), ((3, 2, 1), 0.0), ((3, 2, 1), 1e-9)],
+        *[
+            (e1, half),
+            (e2, half),
+            (e3, half),
+            ((1, 1, 1), 2 * math.pi / 3),
+            ((3, 2, 1), 0.0),
+            ((3, 2, 1), 1e-9),
+        ],
     ]:
         quaternion = attitude.from_matrix(about(direction, angle))
         assert quaternion[0] >= 0.0
@@ -80,9 +99,14 @@ def test_angle_between_keeps_small_angles_whole_and_those_near_a_half_turn() -> 
     """π - angle is kept to the rounding of π."""
     for angle in (0.0, 1e-300, 1e-12, 1e-9, 1e-4, 0.5 * math.pi, 3.0):
         first, second = np.array([1.0, 0.0, 0.0]), np.array([math.cos(angle), math.sin(angle), 0.0])
-        assert float(attitude.angle_between(first, 5.0 * second)) == pytest.approx(angle, rel=4 * EPS)
+        assert float(attitude.angle_between(first, 5.0 * second)) == pytest.approx(
+            angle, rel=4 * EPS
+        )
     for short in (0.0, 1e-12, 1e-9, 1e-4):
-        first, second = np.array([0.0, 2.0, 0.0]), np.array([math.sin(short), -math.cos(short), 0.0])
+        first, second = (
+            np.array([0.0, 2.0, 0.0]),
+            np.array([math.sin(short), -math.cos(short), 0.0]),
+        )
         rest = math.pi - float(attitude.angle_between(first, second))
         assert rest == pytest.approx(short, abs=2 * EPS * math.pi)
 
@@ -90,26 +114,35 @@ def test_angle_between_keeps_small_angles_whole_and_those_near_a_half_turn() -> 
 @spread("spin", [2.0, -2.0], quick=1)
 @spread("theta", [0.0, 1e-9, math.radians(10), math.radians(60), math.radians(89)], quick=2, deep=3)
 @pytest.mark.parametrize(("A", "C"), SHAPES.values(), ids=SHAPES)
-def test_arc_is_the_motion_of_the_integrated_body(A: float, C: float, theta: float, spin: float) -> None:
+def test_arc_is_the_motion_of_the_integrated_body(
+    A: float, C: float, theta: float, spin: float
+) -> None:
     """An arc begun where another ended is the rest of it, and the end of an arc is its last row."""
     omega, start = start_of(A, C, theta, spin)
     begin = attitude.from_matrix(start.rotation)
-    # Two radians of the fastest of the turns at a time: a needle near θ = 89° goes slowly about itself, a disc fast.
+    # Two radians of the fastest of the turns at a time: a needle near θ = 89° goes slowly about
+    # itself, a disc fast.
     times = np.array([2.0, 5.0, 11.0]) / float(np.linalg.norm(start.rates))
     quaternions = attitude.arc(A, C, begin, omega, spin, times)
-    for quaternion, motion in zip(quaternions, reference.coast((A, A, C), start, np.zeros(3), times), strict=True):
+    for quaternion, motion in zip(
+        quaternions, reference.coast((A, A, C), start, np.zeros(3), times), strict=True
+    ):
         assert float(np.linalg.norm(quaternion)) == pytest.approx(1.0, abs=8 * EPS)
         assert reference.turned(attitude.matrix(quaternion), motion.rotation) < FLOWN
     turned = complex(omega * np.exp(-1j * (A - C) / A * spin * times[0]))
     rest = attitude.arc(A, C, quaternions[0], turned, spin, times[2:] - times[0])
     assert rest[0] == pytest.approx(quaternions[2], abs=50 * EPS)
-    assert attitude.arc_end(A, C, begin, omega, spin, float(times[2])) == pytest.approx(quaternions[2], abs=50 * EPS)
+    assert attitude.arc_end(A, C, begin, omega, spin, float(times[2])) == pytest.approx(
+        quaternions[2], abs=50 * EPS
+    )
 
 
 @pytest.mark.parametrize("spin", [3.0, -3.0])
 @pytest.mark.parametrize(("A", "C"), [(120.0, 80.0), (80.0, 120.0)])
 def test_frame_n(A: float, C: float, spin: float) -> None:
-    """z along H, the spin axis at θ from it in the half plane x >= 0, to every digit at small angles too."""
+    """z along H, the spin axis at θ from it in the half plane x >= 0, to every digit at small
+    angles too.
+    """
     sense = np.array([0.0, 0.0, math.copysign(1.0, spin)])
     for theta in (1e-12, 1e-9, 0.2, math.radians(89)):
         for phase in (0.0, 0.7, -2.0, math.pi):
@@ -120,7 +153,10 @@ def test_frame_n(A: float, C: float, spin: float) -> None:
             assert h / np.linalg.norm(h) == pytest.approx([0, 0, 1], abs=4 * EPS)
             axis = attitude.rotate(quaternion, sense)
             assert axis == pytest.approx([math.sin(theta), 0.0, math.cos(theta)], abs=4 * EPS)
-            assert reference.turned(attitude.matrix(quaternion), reference.frame_n((A, A, C), rates)) < 10 * EPS
+            assert (
+                reference.turned(attitude.matrix(quaternion), reference.frame_n((A, A, C), rates))
+                < 10 * EPS
+            )
     # Without nutation x lies along body axis 1.
     rotation = attitude.matrix(attitude.frame_n(A, C, 0j, spin))
     assert rotation @ [1.0, 0.0, 0.0] == pytest.approx([1, 0, 0], abs=2 * EPS)
@@ -129,11 +165,16 @@ def test_frame_n(A: float, C: float, spin: float) -> None:
 
 def test_angular_momentum_in_body_axes_and_rest() -> None:
     quaternion = np.array([0.5, 0.5, 0.5, 0.5])
-    assert np.array_equal(attitude.arc(3.0, 2.0, quaternion, 0j, 0.0, np.array([7.0])), [quaternion])
-    assert np.array_equal(attitude.angular_momentum(120.0, 80.0, 0.5 - 0.25j, -3.0), [60.0, -30.0, -240.0])
+    assert np.array_equal(
+        attitude.arc(3.0, 2.0, quaternion, 0j, 0.0, np.array([7.0])), [quaternion]
+    )
+    assert np.array_equal(
+        attitude.angular_momentum(120.0, 80.0, 0.5 - 0.25j, -3.0), [60.0, -30.0, -240.0]
+    )
 
 
-# --- cones and periods -----------------------------------------------------------------------------------------------
+# --- cones and periods
+# -----------------------------------------------------------------------------------------------
 
 nutations = st.floats(1e-12, 1.55) | st.sampled_from([1e-300, 0.5 * math.pi * (1 - 1e-9)])
 shapes = st.floats(-1.0, 0.95).map(lambda a: (100.0, 100.0 * (1 - a)))
@@ -144,17 +185,22 @@ spins = st.floats(0.01, 100.0) | st.floats(-100.0, -0.01)
 def test_magnus_18_19_20_are_the_angles_between_the_vectors(
     body: tuple[float, float], spin: float, theta: float, phase: float
 ) -> None:
-    """And λ = θ - μ, with its sign: negative for oblate bodies; relatively exact at small angles too."""
+    """And λ = θ - μ, with its sign: negative for oblate bodies; relatively exact at small angles
+    too.
+    """
     A, C = body
     size = rigid_body.transverse_rate(A, C, theta, spin)
     omega = cmath.rect(size, phase)
-    rates, axis = reference.vector(omega.real, omega.imag, spin), reference.vector(0, 0, math.copysign(1, spin))
-    h, body_cone, space_cone = (
-        np.array([A, A, C]) * rates,
-        rigid_body.body_cone(size, spin),
-        rigid_body.space_cone(A, C, size, spin),
+    rates, axis = (
+        reference.vector(omega.real, omega.imag, spin),
+        reference.vector(0, 0, math.copysign(1, spin)),
     )
-    assert rigid_body.nutation_angle(A, C, size, spin) == pytest.approx(reference.angle(h, axis), abs=4 * EPS)
+    h = np.array([A, A, C]) * rates
+    body_cone = rigid_body.body_cone(size, spin)
+    space_cone = rigid_body.space_cone(A, C, size, spin)
+    assert rigid_body.nutation_angle(A, C, size, spin) == pytest.approx(
+        reference.angle(h, axis), abs=4 * EPS
+    )
     assert body_cone == pytest.approx(reference.angle(rates, axis), abs=4 * EPS)
     assert space_cone == pytest.approx(math.copysign(reference.angle(rates, h), A - C), abs=4 * EPS)
     assert space_cone + body_cone == pytest.approx(theta, rel=8 * EPS)
@@ -164,19 +210,29 @@ def test_magnus_18_19_20_are_the_angles_between_the_vectors(
 
 def test_limits_of_the_cones_and_of_arrays() -> None:
     for spin in (3.0, -3.0):
-        assert rigid_body.nutation_angle(120.0, 80.0, 0.0, spin) == rigid_body.space_cone(120.0, 80.0, 0.0, spin) == 0.0
+        assert (
+            rigid_body.nutation_angle(120.0, 80.0, 0.0, spin)
+            == rigid_body.space_cone(120.0, 80.0, 0.0, spin)
+            == 0.0
+        )
         assert rigid_body.nutation_angle(120.0, 80.0, 1.0, 0.0) == 0.5 * math.pi
         assert rigid_body.space_cone(100.0, 100.0, 1.0, spin) == 0.0  # a sphere: ω along H
     omega, spins = np.array([0.0, 0.1, 2.0]), np.array([3.0, -3.0, 0.5])
     pairs = list(zip(omega.tolist(), spins.tolist(), strict=True))
-    assert rigid_body.body_cone(omega, spins).tolist() == [rigid_body.body_cone(*pair) for pair in pairs]
+    assert rigid_body.body_cone(omega, spins).tolist() == [
+        rigid_body.body_cone(*pair) for pair in pairs
+    ]
     for cone in (rigid_body.nutation_angle, rigid_body.space_cone):
-        assert cone(120.0, 80.0, omega, spins).tolist() == [cone(120.0, 80.0, *pair) for pair in pairs]
+        assert cone(120.0, 80.0, omega, spins).tolist() == [
+            cone(120.0, 80.0, *pair) for pair in pairs
+        ]
 
 
 @spinners
 def test_magnus_12_omega_is_back_in_the_body_after_t_omega(A: float, C: float, spin: float) -> None:
-    """And has gone a quarter turn, against the sign of aω3, after T_ω/4; a sphere has no such period."""
+    """And has gone a quarter turn, against the sign of aω3, after T_ω/4; a sphere has no such
+    period.
+    """
     period = rigid_body.body_period(A, C, spin)
     if A == C:
         assert period == math.inf
@@ -189,10 +245,14 @@ def test_magnus_12_omega_is_back_in_the_body_after_t_omega(A: float, C: float, s
 
 
 @spinners
-def test_magnus_22_the_spin_axis_is_opposite_after_half_an_inertial_period(A: float, C: float, spin: float) -> None:
+def test_magnus_22_the_spin_axis_is_opposite_after_half_an_inertial_period(
+    A: float, C: float, spin: float
+) -> None:
     """On its cone about H: half a turn after π/ω_n, back after 2π/ω_n."""
-    size, sense = rigid_body.transverse_rate(A, C, math.radians(40), spin), math.copysign(1, spin)
-    moments, rates = (A, A, C), reference.vector(size, 0.0, spin)
+    size = rigid_body.transverse_rate(A, C, math.radians(40), spin)
+    sense = math.copysign(1, spin)
+    moments = (A, A, C)
+    rates = reference.vector(size, 0.0, spin)
     start = reference.Motion(rates, reference.frame_n(moments, rates))
     half = 0.5 * rigid_body.inertial_period(A, C, size, spin)
     assert rigid_body.inertial_period(A, C, size, spin) == pytest.approx(2 * half, rel=2 * EPS)
@@ -204,28 +264,48 @@ def test_magnus_22_the_spin_axis_is_opposite_after_half_an_inertial_period(A: fl
     assert sense * back.rotation[:, 2] == pytest.approx([x, y, z], abs=1e-11)
 
 
-# --- the impulse sum, Magnus 1970 (17), finite pulses, and what to fire when, (21), (22), by DOP853 and quadrature
+# --- the impulse sum, Magnus 1970 (17), finite pulses, and what to fire when, (21), (22), by DOP853
+# and quadrature
 
-"""rad/s, and half of it in rad; what DOP853 at 1e-13 a step adds up over the flights here, at rates of a few rad/s."""
+"""rad/s, and half of it in rad; what DOP853 at 1e-13 a step adds up over the flights here, at rates
+of a few rad/s.
+"""
 
 
-def summed(A: float, C: float, start: reference.Array, kicks: list[reference.Kick], *until: float) -> reference.Array:
+def summed(
+    A: float, C: float, start: reference.Array, kicks: list[reference.Kick], *until: float
+) -> reference.Array:
     """Rates (n, 3) by the impulse sum."""
     impulses = np.array([kick.impulse for kick in kicks]).reshape(-1, 3)
-    fired, across = np.array([kick.t for kick in kicks]), impulses[:, 0] + 1j * impulses[:, 1]
+    fired = np.array([kick.t for kick in kicks])
+    across = impulses[:, 0] + 1j * impulses[:, 1]
     omega, spin = response.impulse_sum(
-        np.array(until), complex(start[0], start[1]), float(start[2]), A, C, fired, across, impulses[:, 2]
+        np.array(until),
+        complex(start[0], start[1]),
+        float(start[2]),
+        A,
+        C,
+        fired,
+        across,
+        impulses[:, 2],
     )
     return np.column_stack([omega.real, omega.imag, spin])
 
 
 @spinners
 def test_magnus_17_is_the_motion(A: float, C: float, spin: float) -> None:
-    """Transverse impulses; axial ones too, by which ω3 goes from 3 over 1, 0 and -2 to -4 rad/s (or mirrored)."""
+    """Transverse impulses; axial ones too, by which ω3 goes from 3 over 1, 0 and -2 to -4 rad/s (or
+    mirrored).
+    """
     start = reference.vector(0.9, -0.4, spin)
-    across = [reference.Kick(t, reference.vector(40 - 20 * t, 15 * t, 0)) for t in (0.0, 0.7, 2.5, 2.9)]
+    across = [
+        reference.Kick(t, reference.vector(40 - 20 * t, 15 * t, 0)) for t in (0.0, 0.7, 2.5, 2.9)
+    ]
     steps = [(0.5, -2), (1.5, -1), (2.2, -2), (4.0, -2)]
-    axial = [reference.Kick(t, reference.vector(10 * t, -5, math.copysign(C, spin) * step)) for t, step in steps]
+    axial = [
+        reference.Kick(t, reference.vector(10 * t, -5, math.copysign(C, spin) * step))
+        for t, step in steps
+    ]
     for kicks, ends in ((across, spin), (axial, -4 * math.copysign(1, spin))):
         (found,) = summed(A, C, start, kicks, 4.5)
         assert found == pytest.approx(reference.fly((A, A, C), start, kicks, 4.5).rates, abs=FLOWN)
@@ -235,41 +315,60 @@ def test_magnus_17_is_the_motion(A: float, C: float, spin: float) -> None:
 def test_magnus_17_steps_at_the_moment_of_an_impulse_and_turns_at_minus_a_omega3() -> None:
     times = np.linspace(0.0, 20.0, 7)
     free = summed(120.0, 80.0, reference.vector(0.3, 0.4, -2), [], *times)
-    assert free[:, 0] + 1j * free[:, 1] == pytest.approx((0.3 + 0.4j) * np.exp(2j * times / 3), abs=20 * EPS)
+    assert free[:, 0] + 1j * free[:, 1] == pytest.approx(
+        (0.3 + 0.4j) * np.exp(2j * times / 3), abs=20 * EPS
+    )
     assert np.array_equal(free[:, 2], np.full(7, -2.0))
     kick = reference.Kick(1.0, reference.vector(100, 0, 25))
-    before_and_after = summed(50.0, 50.0, reference.vector(0, 0, 1), [kick], math.nextafter(1.0, 0.0), 1.0)
+    before_and_after = summed(
+        50.0, 50.0, reference.vector(0, 0, 1), [kick], math.nextafter(1.0, 0.0), 1.0
+    )
     assert np.array_equal(before_and_after, [[0, 0, 1.0], [2.0, 0, 1.5]])
 
 
-@spread(("on_time", "spin_rate"), [(1e-3, 0), (0.4, 0), (9, 0), (4, 0.006), (4, -0.05), (4, 0.75), (4, -1.5)], quick=3)
+@spread(
+    ("on_time", "spin_rate"),
+    [(1e-3, 0), (0.4, 0), (9, 0), (4, 0.006), (4, -0.05), (4, 0.75), (4, -1.5)],
+    quick=3,
+)
 @spinners
 def test_a_pulse_acts_as_its_impulse_times_the_width_factor_at_its_centre(
     A: float, C: float, spin: float, on_time: float, spin_rate: float
 ) -> None:
-    """M τ sinc(aω3τ/2) at any width and angle; with axial torque half the width is turned at the new spin."""
+    """M τ sinc(aω3τ/2) at any width and angle; with axial torque half the width is turned at the
+    new spin.
+    """
     start, torque = reference.vector(0.3, -0.2, spin), reference.vector(6.0, 9.0, C * spin_rate)
     factor = response.width_factor((A - C) / A * spin, (A - C) / A * spin_rate, on_time)
     if not spin_rate:
         half = 0.5 * (A - C) / A * spin * on_time
         assert factor == pytest.approx(math.sin(half) / half if half else 1.0, abs=2 * EPS)
     pushed = factor * complex(torque[0], torque[1]) * on_time
-    kick = reference.Kick(1.0 + 0.5 * on_time, reference.vector(pushed.real, pushed.imag, torque[2] * on_time))
+    kick = reference.Kick(
+        1.0 + 0.5 * on_time, reference.vector(pushed.real, pushed.imag, torque[2] * on_time)
+    )
     end = 1.0 + on_time
     flown = reference.fly((A, A, C), start, [reference.Push(1.0, end, torque)], end)
     assert summed(A, C, start, [kick], end)[0] == pytest.approx(flown.rates, abs=FLOWN)
 
 
 @given(st.floats(-1.0, 1.0), st.floats(-10.0, 10.0), st.floats(-5.0, 5.0), st.floats(1e-3, 5.0))
-def test_width_factor_by_quadrature(a: float, spin: float, spin_rate: float, on_time: float) -> None:
-    """F = (1/τ) ∫ exp(i a (spin s + spin_rate (s + τ/2)²/2)) ds over |s| <= τ/2, of which width only loses."""
+def test_width_factor_by_quadrature(
+    a: float, spin: float, spin_rate: float, on_time: float
+) -> None:
+    """F = (1/τ) ∫ exp(i a (spin s + spin_rate (s + τ/2)²/2)) ds over |s| <= τ/2, of which width
+    only loses.
+    """
     half = 0.5 * on_time
 
     def phase(s: float) -> float:
         return a * (spin * s + 0.5 * spin_rate * (s + half) ** 2)
 
     real, imaginary = (
-        quad(lambda s, part=part: part(phase(s)), -half, half, epsabs=1e-13, epsrel=1e-13, limit=500)[0] / on_time
+        quad(
+            lambda s, part=part: part(phase(s)), -half, half, epsabs=1e-13, epsrel=1e-13, limit=500
+        )[0]
+        / on_time
         for part in (math.cos, math.sin)
     )
     factor = response.width_factor(a * spin, a * spin_rate, on_time)
@@ -291,30 +390,41 @@ def test_width_factor_of_long_pulses_and_where_the_axial_torque_vanishes() -> No
     assert response.width_factor(1.5, 1e-14, 1.5) == pytest.approx(plain, abs=1e-13)
 
 
-# --- on-time of one pulse --------------------------------------------------------------------------------------------
+# --- on-time of one pulse
+# --------------------------------------------------------------------------------------------
 
 
 @spinners
-def test_one_pulse_of_the_on_time_of_the_formula_leaves_no_omega(A: float, C: float, spin: float) -> None:
+def test_one_pulse_of_the_on_time_of_the_formula_leaves_no_omega(
+    A: float, C: float, spin: float
+) -> None:
     """τ = (2/(aω3)) asin(aω3 A|ω|/(2M)), centred where ω opposes the torque (US patent 4504032)."""
-    a, size, torque = (A - C) / A, 0.2, 40.0
+    a = (A - C) / A
+    size = 0.2
+    torque = 40.0
     on_time = present(response.on_time_for(A * size, torque, a * spin, 0.0, math.inf))
     if a:
-        assert on_time == pytest.approx(2 / (a * spin) * math.asin(a * spin * A * size / (2 * torque)), rel=4 * EPS)
+        assert on_time == pytest.approx(
+            2 / (a * spin) * math.asin(a * spin * A * size / (2 * torque)), rel=4 * EPS
+        )
     # ω0 such that ω = -|ω| at the centre of the pulse along +1.
     omega0 = -size * cmath.exp(0.5j * a * spin * on_time)
     push = reference.Push(0.0, on_time, reference.vector(torque, 0, 0))
-    end = reference.fly((A, A, C), reference.vector(omega0.real, omega0.imag, spin), [push], on_time)
+    end = reference.fly(
+        (A, A, C), reference.vector(omega0.real, omega0.imag, spin), [push], on_time
+    )
     assert np.abs(end.rates[:2]).max() < FLOWN
 
 
 def test_limits_of_on_times() -> None:
-    """One pulse does at most 2M/|aω3| = 6 N m s, in half a period; none is longer than allowed; nothing takes none.
+    """One pulse does at most 2M/|aω3| = 6 N m s, in half a period; none is longer than allowed;
+    nothing takes none.
 
     For a to zero it is impulse over torque, and asin x / x = 1 + x²/6 …: nothing cancels.
     """
     for a in (1e-3, -1e-6, 1e-9, -1e-12, 1e-300, 0.0):
-        on_time, x = response.on_time_for(12.0, 4.0, a * 2.0, 0.0, math.inf), 0.5 * a * 2.0 * 3.0
+        on_time = response.on_time_for(12.0, 4.0, a * 2.0, 0.0, math.inf)
+        x = 0.5 * a * 2.0 * 3.0
         assert on_time == pytest.approx(3.0 * (1 + x * x / 6), rel=max(x**4, 4 * EPS))
     most = (3.0, -1.0, 0.0, math.inf)
     assert response.on_time_for(6.0 * (1 - 1e-12), *most) == pytest.approx(math.pi, rel=1e-5)
@@ -346,13 +456,25 @@ def test_on_time_with_axial_torque_gives_the_impulse_requested(
 
 
 def test_on_time_where_the_curve_bends() -> None:
-    """Spin through zero within the pulse; less reached after half a period than before (the first crossing counts)."""
-    assert_gives(2.665260255191444, 1.0, 0.847171258807392, -0.8766341758481142, 0.47537038364894224)
-    assert_gives(21.796764904268404, 2.947761893524505, 0.21068867019307735, -0.5783760751564644, 0.208649381851118)
+    """Spin through zero within the pulse; less reached after half a period than before (the first
+    crossing counts).
+    """
+    assert_gives(
+        2.665260255191444, 1.0, 0.847171258807392, -0.8766341758481142, 0.47537038364894224
+    )
+    assert_gives(
+        21.796764904268404,
+        2.947761893524505,
+        0.21068867019307735,
+        -0.5783760751564644,
+        0.208649381851118,
+    )
 
 
 def test_on_time_of_a_near_sphere_with_axial_torque_takes_no_time_to_find() -> None:
-    """The search begins with the pulse without axial torque, not with one of 10⁹ turns of the body."""
+    """The search begins with the pulse without axial torque,
+    not with one of 10⁹ turns of the body.
+    """
     with within(100_000):
         on_time = response.on_time_for(10.0, 5.0, 3e-9, 1e-11, math.inf)
     assert on_time == pytest.approx(2.0, rel=1e-12)
@@ -367,13 +489,18 @@ def test_on_time_of_a_near_sphere_with_axial_torque_takes_no_time_to_find() -> N
 def test_the_search_for_an_on_time_ends(
     impulse: float, torque: float, longest: float, a: float, spin: float, spin_rate: float
 ) -> None:
-    """Also where the on-time without axial torque is too small for a number: it was then stretched for ever."""
+    """Also where the on-time without axial torque is too small for a number: it was then stretched
+    for ever.
+    """
     with within(3_000_000):
-        on_time = response.on_time_for(impulse, torque or 1.0, a * spin, a * spin_rate, longest or math.inf)
+        on_time = response.on_time_for(
+            impulse, torque or 1.0, a * spin, a * spin_rate, longest or math.inf
+        )
     assert on_time is None or 0.0 <= on_time <= (longest or math.inf)
 
 
-# --- what to fire, and when ------------------------------------------------------------------------------------------
+# --- what to fire, and when
+# ------------------------------------------------------------------------------------------
 
 every_angle = spread("degrees", [1e-6, 2.0, 10.0, 30.0, 60.0, 85.0], quick=2, deep=4)
 
@@ -381,20 +508,29 @@ every_angle = spread("degrees", [1e-6, 2.0, 10.0, 30.0, 60.0, 85.0], quick=2, de
 def after(
     A: float, C: float, spin: float, omega0: complex, *kicks: tuple[float, complex]
 ) -> tuple[float, float, complex]:
-    """Nutation angle, shift of H (rad) and ω (rad/s) just after the last of the impulses (s, N m s)."""
-    moments, rates = (A, A, C), reference.vector(omega0.real, omega0.imag, spin)
+    """Nutation angle, shift of H (rad) and ω (rad/s) just after the last of the impulses (s, N m
+    s).
+    """
+    moments = (A, A, C)
+    rates = reference.vector(omega0.real, omega0.imag, spin)
     fired = [reference.Kick(t, reference.vector(J.real, J.imag, 0)) for t, J in kicks]
     rotation = reference.frame_n(moments, rates)
     end = reference.fly(moments, rates, fired, kicks[-1][0], rotation)
     before = reference.momentum(moments, reference.Motion(rates, rotation))
     nutation = reference.nutation(moments, end.rates, math.copysign(1, spin))
-    return nutation, reference.angle(before, reference.momentum(moments, end)), complex(end.rates[0], end.rates[1])
+    return (
+        nutation,
+        reference.angle(before, reference.momentum(moments, end)),
+        complex(end.rates[0], end.rates[1]),
+    )
 
 
 def after_two(
     A: float, C: float, spin: float, omega: complex, first: float, second: float, wait: float
 ) -> tuple[float, float]:
-    """Nutation and shift of H, rad, after two impulses against ω, which turns at -aω3 in between."""
+    """Nutation and shift of H, rad, after two impulses against ω,
+    which turns at -aω3 in between.
+    """
     left = omega * (1 - first / (A * abs(omega))) * cmath.exp(-1j * (A - C) / A * spin * wait)
     kicks = (0.0, -first * omega / abs(omega)), (wait, -second * left / abs(left))
     return after(A, C, spin, omega, *kicks)[:2]
@@ -403,7 +539,9 @@ def after_two(
 @every_angle
 @spinners
 def test_magnus_21_and_22_made_exact(A: float, C: float, spin: float, degrees: float) -> None:
-    """One impulse against ω takes out all and moves H by θ; two leave H where it was, for not a gram more."""
+    """One impulse against ω takes out all and moves H by θ; two leave H where it was, for not a
+    gram more.
+    """
     theta = math.radians(degrees)
     size = rigid_body.transverse_rate(A, C, theta, spin)
     omega = cmath.rect(size, 0.7)
@@ -418,21 +556,33 @@ def test_magnus_21_and_22_made_exact(A: float, C: float, spin: float, degrees: f
 
 @pytest.mark.parametrize("half_turns", [3, 9])
 @pytest.mark.parametrize(("A", "C"), BODIES[:2])
-def test_the_second_pulse_may_come_any_odd_number_of_half_turns_later(A: float, C: float, half_turns: int) -> None:
+def test_the_second_pulse_may_come_any_odd_number_of_half_turns_later(
+    A: float, C: float, half_turns: int
+) -> None:
     size = rigid_body.transverse_rate(A, C, math.radians(25), -2.0)
     first, second, wait = rigid_body.half_pulses(A, C, size, -2.0)
     assert max(after_two(A, C, -2.0, size + 0j, first, second, half_turns * wait)) < 2 * FLOWN
 
 
-@pytest.mark.parametrize(("A", "C", "spin"), [(120.0, 80.0, 3.0), (80.0, 120.0, -3.0), (100.0, 190.0, 3.0)])
+@pytest.mark.parametrize(
+    ("A", "C", "spin"), [(120.0, 80.0, 3.0), (80.0, 120.0, -3.0), (100.0, 190.0, 3.0)]
+)
 @pytest.mark.parametrize(
     ("degrees", "before", "after_first", "approximation"),
     [(2.0, 0.0016, 0.0006, 0.0008), (10.0, 0.19, 0.077, 0.098), (30.0, 5.1, 2.2, 2.9)],
 )
 def test_magnus_22_as_printed_displaces_h_by_the_figures_of_the_physics_sheet(
-    A: float, C: float, spin: float, degrees: float, before: float, after_first: float, approximation: float
+    A: float,
+    C: float,
+    spin: float,
+    degrees: float,
+    before: float,
+    after_first: float,
+    approximation: float,
 ) -> None:
-    """Equal halves, with Δt from the ω before or after the first, or πA/(Cω3): to the last digit, for every body."""
+    """Equal halves, with Δt from the ω before or after the first, or πA/(Cω3): to the last digit,
+    for every body.
+    """
     size = rigid_body.transverse_rate(A, C, math.radians(degrees), spin)
     printed = rigid_body.half_pulses_as_printed(A, C, size, spin)
     assert printed.first == printed.second == 0.5 * A * size
@@ -446,23 +596,34 @@ def test_magnus_22_as_printed_displaces_h_by_the_figures_of_the_physics_sheet(
 
 @every_angle
 @spinners
-def test_two_actuators_at_the_mounting_angle_give_both_pulses(A: float, C: float, spin: float, degrees: float) -> None:
-    """The second actuator stands along ω, either way, as the axis has gone half a turn; at small angles -σπA/C."""
+def test_two_actuators_at_the_mounting_angle_give_both_pulses(
+    A: float, C: float, spin: float, degrees: float
+) -> None:
+    """The second actuator stands along ω, either way, as the axis has gone half a turn; at small
+    angles -σπA/C.
+    """
     size = rigid_body.transverse_rate(A, C, math.radians(degrees), spin)
-    halves, angle = rigid_body.half_pulses(A, C, size, spin), rigid_body.mounting_angle(A, C, size, spin)
+    halves = rigid_body.half_pulses(A, C, size, spin)
+    angle = rigid_body.mounting_angle(A, C, size, spin)
     assert 0.0 <= angle < math.pi
     _, _, omega = after(A, C, spin, complex(size), (0.0, complex(-halves.first)), (halves.wait, 0j))
     assert abs((omega * cmath.exp(-1j * angle)).imag) < 2 * FLOWN * max(size, 1.0)
     if degrees < 1e-3:
-        assert cmath.exp(2j * angle) == pytest.approx(cmath.exp(-2j * math.copysign(math.pi, spin) * A / C), abs=1e-11)
+        assert cmath.exp(2j * angle) == pytest.approx(
+            cmath.exp(-2j * math.copysign(math.pi, spin) * A / C), abs=1e-11
+        )
 
 
 TABLE = {+1: ("omega2", +1), -1: ("omega2", -1), +2: ("omega1", -1), -2: ("omega1", +1)}
-"""Magnus 1970 before fig. 5: thruster -> the component that passes zero, and the sign of its rate of change."""
+"""Magnus 1970 before fig. 5: thruster -> the component that passes zero, and the sign of its rate
+of change.
+"""
 
 
 def moment(A: float, C: float, spin: float, thruster: int, mirrored: bool) -> complex:
-    """ω of size 1/5 at the moment at which the table fires a thruster, by the rates of change of Euler's equations."""
+    """ω of size 1/5 at the moment at which the table fires a thruster, by the rates of change of
+    Euler's equations.
+    """
     passing, sign = TABLE[thruster]
     rate = (A - C) / A * spin
     for omega in (0.2 + 0j, -0.2 + 0j, 0.2j, -0.2j):
@@ -476,9 +637,13 @@ def moment(A: float, C: float, spin: float, thruster: int, mirrored: bool) -> co
 @pytest.mark.parametrize("thruster", TABLE)
 @plain_spinners
 def test_sign_table_of_magnus(A: float, C: float, spin: float, thruster: int) -> None:
-    """The rule "ω against the torque" is the table for aω3 > 0, else its mirror image; the other one pumps."""
+    """The rule "ω against the torque" is the table for aω3 > 0, else its mirror image; the other
+    one pumps.
+    """
     direction = complex(math.copysign(1, thruster)) * (1 if abs(thruster) == 1 else 1j)
-    damps, pumps = (moment(A, C, spin, thruster, wrong == ((A - C) * spin > 0)) for wrong in (False, True))
+    damps, pumps = (
+        moment(A, C, spin, thruster, wrong == ((A - C) * spin > 0)) for wrong in (False, True)
+    )
     for omega, phase, change in ((damps, 0.0, -3.0 / A), (pumps, math.pi, 3.0 / A)):
         assert abs(rigid_body.phase_to_oppose(omega, direction)) == phase
         _, _, left = after(A, C, spin, omega, (0.0, 3.0 * direction))
@@ -487,7 +652,9 @@ def test_sign_table_of_magnus(A: float, C: float, spin: float, thruster: int) ->
 
 @pytest.mark.parametrize("phase", [0.0, 0.4, -1.7, 3.0])
 @pytest.mark.parametrize("torque", [5.0 + 0j, -2.0 + 1j, 0.3j])
-def test_phase_to_oppose_is_the_turn_left_to_the_opposite_of_the_torque(phase: float, torque: complex) -> None:
+def test_phase_to_oppose_is_the_turn_left_to_the_opposite_of_the_torque(
+    phase: float, torque: complex
+) -> None:
     """ω turns at -aω3: after the time phase/(aω3) it stands against the torque."""
     omega = cmath.rect(0.3, phase)
     then = omega * cmath.exp(-1j * rigid_body.phase_to_oppose(omega, torque))

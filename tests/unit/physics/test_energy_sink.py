@@ -1,4 +1,6 @@
-"""The energy sink: its closed form against DOP853 on angles and on the attitude, its limits, its two forms."""
+"""The energy sink: its closed form against DOP853 on angles and on the attitude, its limits, its
+two forms.
+"""
 
 import math
 from typing import NamedTuple
@@ -31,7 +33,9 @@ class Body(NamedTuple):
         omega, spin, turned = energy_sink.arc(
             self.A, self.C, self.growth, QUATERNION, self.omega, self.spin, np.array(times)
         )
-        return np.column_stack([omega.real, omega.imag, spin]), np.array([attitude.matrix(one) for one in turned])
+        return np.column_stack([omega.real, omega.imag, spin]), np.array(
+            [attitude.matrix(one) for one in turned]
+        )
 
     @property
     def moments(self) -> Triple:
@@ -39,14 +43,23 @@ class Body(NamedTuple):
 
     @property
     def start(self) -> reference.Motion:
-        return reference.Motion(reference.vector(self.omega.real, self.omega.imag, self.spin), START)
+        return reference.Motion(
+            reference.vector(self.omega.real, self.omega.imag, self.spin), START
+        )
 
 
 def body(A: float, C: float, spin: float, degrees: float, tau: float, phase: float = 0.7) -> Body:
     """With |H| of the pure spin C ``spin``; beyond 90 degrees it spins about -e3."""
-    theta, size = math.radians(degrees), C * abs(spin)
+    theta = math.radians(degrees)
+    size = C * abs(spin)
     omega = size / A * math.sin(theta) * complex(math.cos(phase), math.sin(phase))
-    return Body(A, C, math.copysign(1 / tau, A - C), omega, size / C * math.cos(theta) * math.copysign(1.0, spin))
+    return Body(
+        A,
+        C,
+        math.copysign(1 / tau, A - C),
+        omega,
+        size / C * math.cos(theta) * math.copysign(1.0, spin),
+    )
 
 
 BODIES = {
@@ -81,7 +94,9 @@ def test_the_example_of_the_course() -> None:
     """C = 1000, A = 2000 kg m², 60 rpm, ω_t = 0.10 rad/s, τ = 100 s."""
     halfway = 100.0 * math.log(1000 * 2 * math.pi / (2000 * 0.1))
     assert halfway == pytest.approx(345.0, abs=0.5)
-    rates, _ = Body(2000.0, 1000.0, 0.01, 0.1 + 0j, 2 * math.pi).arc(0.0, 50, 100, 200, 300, 600, halfway, 3e4)
+    rates, _ = Body(2000.0, 1000.0, 0.01, 0.1 + 0j, 2 * math.pi).arc(
+        0.0, 50, 100, 200, 300, 600, halfway, 3e4
+    )
     across = np.hypot(rates[:, 0], rates[:, 1])
     degrees = np.degrees(np.arctan2(2000 * across, 1000 * rates[:, 2]))
     assert degrees[:5] == pytest.approx([1.82, 3.00, 4.95, 13.24, 32.59], abs=0.005)
@@ -105,14 +120,17 @@ def test_one_moment_and_many_agree(one: Body) -> None:
         assert float(np.linalg.norm(end)) == pytest.approx(1.0, abs=20 * EPS)
 
 
-# --- limits ----------------------------------------------------------------------------------------------------------
+# --- limits
+# --------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("growth", [0.0, 1e-300, -1e-300, 1e-18, -1e-18])
 def test_no_dissipation_is_the_free_arc(growth: float) -> None:
     times = np.array([0.0, 1.0, 50.0])
     for one in BODIES.values():
-        omega, spin, turned = energy_sink.arc(one.A, one.C, growth, QUATERNION, one.omega, one.spin, times)
+        omega, spin, turned = energy_sink.arc(
+            one.A, one.C, growth, QUATERNION, one.omega, one.spin, times
+        )
         free = attitude.arc(one.A, one.C, QUATERNION, one.omega, one.spin, times)
         assert turned == pytest.approx(free, abs=200 * EPS)
         assert spin == pytest.approx(np.full(3, one.spin), rel=8 * EPS)
@@ -126,21 +144,28 @@ def test_pure_spin_flat_spin_and_rest_stay(growth: float, omega: complex, spin: 
     transverse, spins, turned = energy_sink.arc(120.0, 80.0, growth, QUATERNION, omega, spin, times)
     assert np.array_equal(transverse, np.full(3, omega))
     assert np.array_equal(spins, np.full(3, spin))
-    assert turned == pytest.approx(attitude.arc(120.0, 80.0, QUATERNION, omega, spin, times), abs=1e-10)
+    assert turned == pytest.approx(
+        attitude.arc(120.0, 80.0, QUATERNION, omega, spin, times), abs=1e-10
+    )
     assert energy_sink.arc(120.0, 80.0, growth, QUATERNION, omega, spin, 10.0)[:2] == (omega, spin)
 
 
 def test_small_angles_from_spin_grow_and_from_flat_shrink_by_the_exponential() -> None:
     rates, _ = Body(120.0, 80.0, 0.01, 1e-12 + 0j, 3.0).arc(0.0, 100.0, 1000.0)
-    assert np.hypot(rates[:, 0], rates[:, 1]) == pytest.approx(1e-12 * np.exp([0.0, 1.0, 10.0]), rel=1e-12)
+    assert np.hypot(rates[:, 0], rates[:, 1]) == pytest.approx(
+        1e-12 * np.exp([0.0, 1.0, 10.0]), rel=1e-12
+    )
     assert rates[:, 2] == pytest.approx([3.0, 3.0, 3.0], rel=1e-14)
     one = body(120, 80, 3.0, 90.0 - 1e-7, 50.0)
-    assert one.arc(0.0, 50.0, 500.0)[0][:, 2] == pytest.approx(one.spin * np.exp([0.0, -1.0, -10.0]), rel=1e-9)
+    assert one.arc(0.0, 50.0, 500.0)[0][:, 2] == pytest.approx(
+        one.spin * np.exp([0.0, -1.0, -10.0]), rel=1e-9
+    )
 
 
 @given(st.floats(-1e3, 1e3), st.floats(0.0, 180.0), st.floats(0.0, 1e15))
 def test_no_time_is_too_long(growth: float, degrees: float, time: float) -> None:
-    cosine, sine = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+    cosine = math.cos(math.radians(degrees))
+    sine = math.sin(math.radians(degrees))
     course = energy_sink.course(growth, cosine, sine * sine, time)
     assert math.hypot(course.along, sine * course.transverse) == pytest.approx(1.0, abs=20 * EPS)
     # Squares of times below 1e-150 s are denormal numbers.
@@ -150,14 +175,17 @@ def test_no_time_is_too_long(growth: float, degrees: float, time: float) -> None
 
 def test_a_complex_step_gives_the_derivative_by_time() -> None:
     theta = math.radians(30.0)
-    course = energy_sink.courses(0.02, math.cos(theta), math.sin(theta) ** 2, np.array([20.0 + 1e-30j]))
+    course = energy_sink.courses(
+        0.02, math.cos(theta), math.sin(theta) ** 2, np.array([20.0 + 1e-30j])
+    )
     tilt = math.atan2(math.sin(theta) * course.transverse[0].real, course.along[0].real)
     assert course.travel[0].imag / 1e-30 == pytest.approx(math.cos(tilt), rel=1e-13)
     rise = math.sin(theta) * course.transverse[0].imag / 1e-30
     assert rise == pytest.approx(0.02 * math.sin(tilt) * math.cos(tilt) ** 2, rel=1e-12)
 
 
-# --- torques, and three different moments: the series of `rigid` -----------------------------------------------------
+# --- torques, and three different moments: the series of `rigid`
+# -----------------------------------------------------
 
 
 @pytest.mark.parametrize("torque", [(9.0, -5.0, 3.0), (0.0, 0.0, 0.0)])
@@ -172,9 +200,16 @@ def test_a_complex_step_gives_the_derivative_by_time() -> None:
 )
 def test_powered_arcs_agree_with_dop853(moments: Triple, spin: float, torque: Triple) -> None:
     """And those without torque with the closed form, which has two equal moments."""
-    rates0, growth = reference.vector(0.5, -0.3, spin), math.copysign(0.05, moments[0] - 100)
+    rates0 = reference.vector(0.5, -0.3, spin)
+    growth = math.copysign(0.05, moments[0] - 100)
     pieces = taylor.integrate(
-        moments, reference.vector(*torque), rates0, QUATERNION, 0.0, 6.0, taylor.Forcing(growth=growth)
+        moments,
+        reference.vector(*torque),
+        rates0,
+        QUATERNION,
+        0.0,
+        6.0,
+        taylor.Forcing(growth=growth),
     )
     rates, turned = pieces[-1].final
     (expected,) = reference.sinking(
@@ -188,10 +223,18 @@ def test_powered_arcs_agree_with_dop853(moments: Triple, spin: float, torque: Tr
         assert reference.turned(rotation, attitude.matrix(turned)) < 2e-12
 
 
-@pytest.mark.parametrize(("moments", "growth"), [((120.0, 100.0, 80.0), 1 / 15), deep((80.0, 90.0, 130.0), -1 / 15)])
-def test_three_moments_lose_energy_and_end_about_the_largest(moments: Triple, growth: float) -> None:
-    """Also beyond the separatrix: about axis 1 (prolate) or axis 3 (oblate) in the end; H stays in space."""
-    rates, turned, energies = reference.vector(0.4, 0.3, 2.0), QUATERNION, []
+@pytest.mark.parametrize(
+    ("moments", "growth"), [((120.0, 100.0, 80.0), 1 / 15), deep((80.0, 90.0, 130.0), -1 / 15)]
+)
+def test_three_moments_lose_energy_and_end_about_the_largest(
+    moments: Triple, growth: float
+) -> None:
+    """Also beyond the separatrix: about axis 1 (prolate) or axis 3 (oblate) in the end; H stays in
+    space.
+    """
+    rates = reference.vector(0.4, 0.3, 2.0)
+    turned = QUATERNION
+    energies = []
     h = attitude.rotate(turned, rates * moments)
     for start in np.arange(0.0, 200.0, 10.0).tolist():
         pieces = taylor.integrate(
@@ -206,8 +249,12 @@ def test_three_moments_lose_energy_and_end_about_the_largest(moments: Triple, gr
 
 @pytest.mark.parametrize("aside", [0.0, 1e-12, 1e-6])
 def test_a_torque_through_rest_takes_few_steps(aside: float) -> None:
-    """H passes zero, or nearly: the direction of H turns about at once there, and the series must not stop."""
-    torque, rates, forcing = reference.vector(aside, 0, -8), reference.vector(0, 0, 1), taylor.Forcing(growth=0.05)
+    """H passes zero, or nearly: the direction of H turns about at once there, and the series must
+    not stop.
+    """
+    torque = reference.vector(aside, 0, -8)
+    rates = reference.vector(0, 0, 1)
+    forcing = taylor.Forcing(growth=0.05)
     pieces = taylor.integrate((120.0, 120.0, 80.0), torque, rates, QUATERNION, 0.0, 20.0, forcing)
     assert len(pieces) < 200
     assert pieces[-1].final[0][2] == pytest.approx(-1.0, abs=1e-9)

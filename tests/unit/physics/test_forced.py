@@ -1,4 +1,6 @@
-"""Lasting torques, Magnus 1970 (8)-(14), (23)-(27), Kreisel K(14), K(15), against DOP853 on Euler's equations."""
+"""Lasting torques, Magnus 1970 (8)-(14), (23)-(27), Kreisel K(14), K(15), against DOP853 on Euler's
+equations.
+"""
 
 import cmath
 import itertools
@@ -23,10 +25,17 @@ def start_of(omega: complex, spin: float) -> reference.Motion:
 
 
 def rotating(
-    times: list[float] | np.ndarray, omega0: complex, A: float, C: float, spin: float, *torques: tuple[complex, float]
+    times: list[float] | np.ndarray,
+    omega0: complex,
+    A: float,
+    C: float,
+    spin: float,
+    *torques: tuple[complex, float],
 ) -> np.ndarray:
     sizes, rates = (np.array(part) for part in zip(*torques, strict=True))
-    return response.rotating_torques(np.array(times), omega0, (A - C) / A * spin, A, sizes.astype(complex), rates)
+    return response.rotating_torques(
+        np.array(times), omega0, (A - C) / A * spin, A, sizes.astype(complex), rates
+    )
 
 
 @pytest.mark.parametrize("spin", [3.0, -3.0, 0.0])
@@ -37,14 +46,20 @@ def test_stepwise_torques_8_9_10(A: float, C: float, spin: float) -> None:
     torques = np.random.default_rng(8).normal(size=(4, 3)) * (10, 10, 0.25 * C)
     motions, times = [start_of(0.1 - 0.2j, spin)], [0.0]
     for (begin, end), torque in zip(itertools.pairwise(edges.tolist()), torques, strict=True):
-        motions += reference.coast((A, A, C), motions[-1], torque, np.array([0.5, 1.0]) * (end - begin))
+        motions += reference.coast(
+            (A, A, C), motions[-1], torque, np.array([0.5, 1.0]) * (end - begin)
+        )
         times += [0.5 * (begin + end), end]
     omega, spins = response.stepwise_torque(np.array(times), 0.1 - 0.2j, spin, A, C, edges, torques)
     expected = np.array([motion.rates for motion in motions])
     assert np.abs(np.column_stack([omega.real, omega.imag, spins]) - expected).max() < 1e-11
 
 
-@given(st.floats(-30, 30), st.floats(-5, 5) | st.sampled_from([0.0, 1e-9, -1e-6, 1e-3]), st.floats(0.01, 15))
+@given(
+    st.floats(-30, 30),
+    st.floats(-5, 5) | st.sampled_from([0.0, 1e-9, -1e-6, 1e-3]),
+    st.floats(0.01, 15),
+)
 def test_phase_integral_by_quadrature(slope: float, bend: float, length: float) -> None:
     integral = response.phase_integral(np.array([slope]), np.array([bend]), np.array([length]))[0]
     edges = np.linspace(0.0, length, 400)
@@ -53,31 +68,44 @@ def test_phase_integral_by_quadrature(slope: float, bend: float, length: float) 
     s = (0.5 * (edges[1:] + edges[:-1]))[:, None] + half * nodes
     expected = half * np.sum(np.exp(1j * (slope + bend * s) * s) * weights)
     # The phase itself is only known to its rounding.
-    assert abs(integral - expected) <= 1e-14 * length * (10 + abs(slope) * length + abs(bend) * length**2)
+    assert abs(integral - expected) <= 1e-14 * length * (
+        10 + abs(slope) * length + abs(bend) * length**2
+    )
 
 
 def test_constant_torque_11_circles_the_centre_of_its_pole_cone() -> None:
     A, C, spin = PROLATE
-    omega0, torque = 0.05 + 0.1j, 5.0 - 2.0j
+    omega0 = 0.05 + 0.1j
+    torque = 5.0 - 2.0j
     centre = response.steady_response(A, (A - C) / A * spin, torque)
     # Magnus' centre: ω1P = M2/((A-C)ω3), ω2P = -M1/((A-C)ω3)
     assert centre == pytest.approx(complex(torque.imag, -torque.real) / ((A - C) * spin), rel=1e-14)
     times = np.linspace(0.0, 12.0, 40)
     omega, _ = response.stepwise_torque(
-        times, omega0, spin, A, C, np.array([0.0, 12.0]), np.array([[torque.real, torque.imag, 0.0]])
+        times,
+        omega0,
+        spin,
+        A,
+        C,
+        np.array([0.0, 12.0]),
+        np.array([[torque.real, torque.imag, 0.0]]),
     )
     assert np.abs(omega - centre) == pytest.approx(abs(omega0 - centre), rel=1e-12)
     assert np.abs(omega - rotating(times, omega0, A, C, spin, (torque, 0.0))).max() < 1e-14
 
 
 @plain_spinners
-def test_permanent_rotation_13_stays_and_has_the_euler_angles_14(A: float, C: float, spin: float) -> None:
+def test_permanent_rotation_13_stays_and_has_the_euler_angles_14(
+    A: float, C: float, spin: float
+) -> None:
     torque = 5.0 - 2.0j
     omega, rate, theta, phi = response.permanent_rotation(A, C, spin, torque)
     start = start_of(omega, spin)
     (later,) = reference.coast((A, A, C), start, reference.vector(5.0, -2.0, 0.0), np.array([7.0]))
     assert later.rates == pytest.approx(start.rates, abs=1e-13)
-    assert math.tan(theta) == pytest.approx(abs(torque) / (abs(A - C) * spin * abs(spin)), rel=1e-13)
+    assert math.tan(theta) == pytest.approx(
+        abs(torque) / (abs(A - C) * spin * abs(spin)), rel=1e-13
+    )
     across = rate * math.sin(theta)
     angles = across * math.sin(phi), across * math.cos(phi), rate * math.cos(theta)
     assert angles == pytest.approx(start.rates.tolist(), rel=1e-13)
@@ -87,7 +115,8 @@ def test_permanent_rotation_13_stays_and_has_the_euler_angles_14(A: float, C: fl
 
 @spinners
 def test_rotating_torques_23_24(A: float, C: float, spin: float) -> None:
-    torques, times = ((2.0 + 1.0j, 0.4), (-0.5j, -3.0), (3.0 + 0j, 7.0)), [0.0, 1.0, 6.0]
+    torques = ((2.0 + 1.0j, 0.4), (-0.5j, -3.0), (3.0 + 0j, 7.0))
+    times = [0.0, 1.0, 6.0]
     motions = driven((A, A, C), start_of(0.2 - 0.1j, spin), turning(*torques), times)
     expected = [complex(motion.rates[0], motion.rates[1]) for motion in motions]
     omega = rotating(times, 0.2 - 0.1j, A, C, spin, *torques)
@@ -97,11 +126,15 @@ def test_rotating_torques_23_24(A: float, C: float, spin: float) -> None:
 
 @pytest.mark.parametrize("detuning", [0.0, 1e-15, 1e-12, 1e-9, 1e-6, 1e-3])
 def test_resonance_25_without_cancellation(detuning: float) -> None:
-    start, torque, times = 0.01 + 0.02j, 0.5 + 0.2j, np.linspace(0.0, 60.0, 31)
+    start = 0.01 + 0.02j
+    torque = 0.5 + 0.2j
+    times = np.linspace(0.0, 60.0, 31)
     omega = rotating(times, start, *PROLATE, (torque, -RATE + detuning))
     resonant = (start + torque / 120.0 * times) * np.exp(-1j * RATE * times)
     # To first order the detuning turns what is added by δt/2.
-    assert np.abs(omega - resonant).max() <= abs(torque) / 120.0 * 60.0 * 0.5 * detuning * 60.0 + 1e-14
+    assert (
+        np.abs(omega - resonant).max() <= abs(torque) / 120.0 * 60.0 * 0.5 * detuning * 60.0 + 1e-14
+    )
 
 
 def test_the_resonant_torque_reaches_a_cone_when_it_says() -> None:
@@ -116,10 +149,16 @@ def test_the_resonant_torque_reaches_a_cone_when_it_says() -> None:
 
 @pytest.mark.parametrize("turn", [0.0, 1.0, 2.5])
 def test_26_opposite_rotation_and_its_straight_pole_curves(turn: float) -> None:
-    """b = +a: as printed with its own constant; pole curves are straight whenever |ω0| = |m0/2a|."""
+    """b = +a: as printed with its own constant;
+    pole curves are straight whenever |ω0| = |m0/2a|.
+    """
     A, C, spin = PROLATE
-    a, m0, alpha = (A - C) / A, 0.05 + 0.02j, np.linspace(0.0, 20.0, 60)
-    constant, shift = abs(m0 / (2 * a)) * cmath.exp(1j * turn), 1j * m0 / (2 * a)  # the print's ω0
+    a = (A - C) / A
+    m0 = 0.05 + 0.02j
+    alpha = np.linspace(0.0, 20.0, 60)
+    # the print's ω0
+    constant = abs(m0 / (2 * a)) * cmath.exp(1j * turn)
+    shift = 1j * m0 / (2 * a)
     omega = rotating(alpha / spin, constant - shift, A, C, spin, (m0 * A * spin, a * spin))
     printed = (constant - shift) * np.cos(a * alpha) - 1j * (constant + shift) * np.sin(a * alpha)
     assert np.abs(omega - printed).max() < 1e-14
@@ -130,7 +169,9 @@ def test_26_opposite_rotation_and_its_straight_pole_curves(turn: float) -> None:
 def test_27_nearly_space_fixed_torque_and_its_beat() -> None:
     A, C, spin, torque = 100.0, 10.0, 3.0, 0.4
     forced_term = 1j * torque / (A * spin) * A / C
-    assert response.steady_response(A, (A - C) / A * spin, torque, -spin) == pytest.approx(forced_term, rel=1e-13)
+    assert response.steady_response(A, (A - C) / A * spin, torque, -spin) == pytest.approx(
+        forced_term, rel=1e-13
+    )
     largest, period = response.beat(A, (A - C) / A * spin, torque, -spin)
     omega = rotating(np.linspace(0.0, period, 2001), 0.0, A, C, spin, (torque, -spin))
     assert np.abs(omega).max() == pytest.approx(largest, rel=1e-6)
@@ -147,8 +188,12 @@ def test_a_sphere_and_a_resonance_have_no_steady_response() -> None:
 @pytest.mark.parametrize("torque", [2.0 + 0.0j, -1.0 + 3.0j])
 @plain_spinners
 def test_precession_k14_k15_is_steady(A: float, C: float, spin: float, torque: complex) -> None:
-    """Fixed in the despun frame (turning at -ω3 in the body) or in the body: there ω stands still, once steady."""
-    despun, body = (response.steady_response(A, (A - C) / A * spin, torque, rate) for rate in (-spin, 0.0))
+    """Fixed in the despun frame (turning at -ω3 in the body) or in the body: there ω stands still,
+    once steady.
+    """
+    despun, body = (
+        response.steady_response(A, (A - C) / A * spin, torque, rate) for rate in (-spin, 0.0)
+    )
     assert despun == pytest.approx(1j * torque / (C * spin))
     assert body == pytest.approx(-1j * torque / ((A - C) * spin))
     times = np.linspace(0.0, 5.0, 11)
@@ -159,6 +204,11 @@ def test_precession_k14_k15_is_steady(A: float, C: float, spin: float, torque: c
         assert still == pytest.approx(np.full(10, steady), abs=1e-12)
         assert rates[:, 2] == pytest.approx(np.full(10, spin), rel=1e-12)
         if turn:  # In space the spin axis goes straight on towards σM, about the axis that ω names.
-            towards, angle = math.copysign(1, spin) * torque / abs(torque), abs(steady) * 5.0
-            expected = [math.sin(angle) * towards.real, math.sin(angle) * towards.imag, math.cos(angle)]
+            towards = math.copysign(1, spin) * torque / abs(torque)
+            angle = abs(steady) * 5.0
+            expected = [
+                math.sin(angle) * towards.real,
+                math.sin(angle) * towards.imag,
+                math.cos(angle),
+            ]
             assert motions[-1].rotation[:, 2] == pytest.approx(expected, abs=1e-12)

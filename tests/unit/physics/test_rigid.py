@@ -1,4 +1,6 @@
-"""Euler's equations by series, torques fixed or turning, against DOP853, conservation laws and closed forms."""
+"""Euler's equations by series, torques fixed or turning, against DOP853, conservation laws and
+closed forms.
+"""
 
 import itertools
 import math
@@ -24,7 +26,13 @@ FLOWN = 1e-11
 START = attitude.from_matrix(np.eye(3))
 TURNING = ((2.0 - 1.5j, -1.7), (0.4 + 0.1j, 5.0))
 BODY = (90.0, 120.0, 70.0)
-MOMENTS = [BODY, (120.0, 120.0, 80.0), (80.0, 80.0, 120.0), (100.0, 100.0, 100.0), (30.0, 50.0, 80.0)]
+MOMENTS = [
+    BODY,
+    (120.0, 120.0, 80.0),
+    (80.0, 80.0, 120.0),
+    (100.0, 100.0, 100.0),
+    (30.0, 50.0, 80.0),
+]
 CASES = {
     "three moments": (BODY, (20.0, -10.0, 0.0), (0.6, -0.3, 2.0)),
     "three moments, free": (BODY, (0.0, 0.0, 0.0), (0.6, -0.3, 2.0)),
@@ -46,11 +54,20 @@ def last(
 
 @spread("turns", [False, True], quick=2, ids=["fixed", "turning"])
 @spread(("moments", "torque", "rates"), CASES.values(), quick=3, ids=CASES)
-def test_motion_under_fixed_and_turning_torques(moments: Triple, torque: Triple, rates: Triple, turns: bool) -> None:
+def test_motion_under_fixed_and_turning_torques(
+    moments: Triple, torque: Triple, rates: Triple, turns: bool
+) -> None:
     """At the ends of the pieces, which join without gap or jump, and within them."""
-    times, acting = np.linspace(1.3, 10.0, 11), turning(*TURNING) if turns else lambda _: (0.0, 0.0, 0.0)
+    times = np.linspace(1.3, 10.0, 11)
+    acting = turning(*TURNING) if turns else lambda _: (0.0, 0.0, 0.0)
     pieces = taylor.integrate(
-        moments, np.array(torque), np.array(rates), START, 1.3, 10.0, taylor.Forcing(TURNING if turns else ())
+        moments,
+        np.array(torque),
+        np.array(rates),
+        START,
+        1.3,
+        10.0,
+        taylor.Forcing(TURNING if turns else ()),
     )
     assert (len(pieces) > 3, pieces[0].start) == (True, 1.3)
     assert pieces[-1].start + pieces[-1].duration == pytest.approx(10.0, rel=EPS)
@@ -58,7 +75,10 @@ def test_motion_under_fixed_and_turning_torques(moments: Triple, torque: Triple,
         assert one.start + one.duration == pytest.approx(two.start, rel=EPS)
         assert one.final[0] == pytest.approx(two.at(np.array([two.start]))[0][0], abs=1e-15)
     expected = driven(
-        moments, reference.Motion(np.array(rates), np.eye(3)), lambda t: np.add(torque, acting(t)).tolist(), times
+        moments,
+        reference.Motion(np.array(rates), np.eye(3)),
+        lambda t: np.add(torque, acting(t)).tolist(),
+        times,
     )
     for time, motion in zip(times[1:].tolist(), expected, strict=True):
         piece = next(one for one in pieces if time <= one.start + one.duration)
@@ -66,7 +86,9 @@ def test_motion_under_fixed_and_turning_torques(moments: Triple, torque: Triple,
         size = float(np.linalg.norm(motion.rates))
         assert omega == pytest.approx(motion.rates, abs=FLOWN * max(1.0, size))
         # A torque of 500 N m turns the body through some hundred radians.
-        assert reference.turned(attitude.matrix(quaternion), motion.rotation) < FLOWN * max(1.0, 0.5 * size)
+        assert reference.turned(attitude.matrix(quaternion), motion.rotation) < FLOWN * max(
+            1.0, 0.5 * size
+        )
 
 
 @pytest.mark.parametrize("moments", MOMENTS)
@@ -74,14 +96,18 @@ def test_energy_and_momentum_stay_without_torque(moments: Triple) -> None:
     rates = reference.vector(0.6, -0.3, 2.0)
     later, quaternion = last(moments, np.zeros(3), rates, 0.0, 100.0)
     # One rounding in each of about a hundred steps.
-    assert reference.energy(moments, later) == pytest.approx(reference.energy(moments, rates), rel=200 * EPS)
+    assert reference.energy(moments, later) == pytest.approx(
+        reference.energy(moments, rates), rel=200 * EPS
+    )
     h = attitude.rotate(quaternion, later * np.array(moments))
     assert h == pytest.approx(rates * np.array(moments), abs=400 * EPS * float(np.linalg.norm(h)))
 
 
 def test_a_spin_up_about_a_principal_axis_and_rest() -> None:
     """ω = Mt/I, angle Mt²/(2I): seven and a half turns."""
-    body, still, angle = (2.0, 3.0, 4.0), np.zeros(3), 9.7**2 / 2
+    body = (2.0, 3.0, 4.0)
+    still = np.zeros(3)
+    angle = 9.7**2 / 2
     rates, quaternion = last(body, reference.vector(0, 0, 4), still, 0.0, 9.7)
     assert rates == pytest.approx([0, 0, 9.7], abs=100 * EPS)
     assert attitude.matrix(quaternion) == pytest.approx(about((0, 0, 1), angle), abs=1000 * EPS)
@@ -91,7 +117,11 @@ def test_a_spin_up_about_a_principal_axis_and_rest() -> None:
 @pytest.mark.parametrize(("mass", "time"), [(1e-12, 1.0), (1e12, 1.0), (1.0, 1e-9), (1.0, 1e6)])
 def test_units_do_not_matter(mass: float, time: float) -> None:
     """Rates × s, torques × s², times / s: the same path through space."""
-    torque, rates, (first, second, third) = reference.vector(5, 2, 1), reference.vector(1, 2, 3), BODY
+    torque, rates, (first, second, third) = (
+        reference.vector(5, 2, 1),
+        reference.vector(1, 2, 3),
+        BODY,
+    )
     plain = last(BODY, torque, rates, 0.0, 5.0)
     moments = first * mass, second * mass, third * mass
     scaled = last(moments, torque * mass * time**2, rates * time, 0.0, 5.0 / time)
@@ -100,18 +130,26 @@ def test_units_do_not_matter(mass: float, time: float) -> None:
 
 
 def test_a_late_clock_that_cannot_tell_the_steps_does_not_stop_them() -> None:
-    """At 1e17 s a second is less than a rounding; the motion over the 64 s is that of any other time."""
+    """At 1e17 s a second is less than a rounding; the motion over the 64 s is that of any other
+    time.
+    """
     torque, start = reference.vector(0.3, -0.2, 0.1), reference.vector(0.2, 0.1, 3.0)
-    late, early = (taylor.integrate((120.0, 100.0, 80.0), torque, start, START, t, t + 64.0) for t in (1e17, 0.0))
+    late, early = (
+        taylor.integrate((120.0, 100.0, 80.0), torque, start, START, t, t + 64.0)
+        for t in (1e17, 0.0)
+    )
     assert len(late) == len(early)
-    assert np.concatenate(late[-1].final) == pytest.approx(np.concatenate(early[-1].final), abs=1e-12)
+    assert np.concatenate(late[-1].final) == pytest.approx(
+        np.concatenate(early[-1].final), abs=1e-12
+    )
 
 
 def test_what_cannot_be_integrated_is_refused() -> None:
     for torque in (math.nan, math.inf, 1e200, 1e300):
         with np.errstate(all="ignore"), pytest.raises(Infeasible, match="integrated"):
             last((120.0, 100.0, 80.0), reference.vector(torque, 0, 0), np.ones(3), 0.0, 1e9)
-    body, rates = (120.0, 120.0, 80.0), reference.vector(0.1, 0.0, 3.0)
+    body = (120.0, 120.0, 80.0)
+    rates = reference.vector(0.1, 0.0, 3.0)
     with refused(Infeasible, "physics.too-many-steps"):
         taylor.integrate(body, reference.vector(1, 0, 0), rates, START, 0.0, 100.0, most=20)
     with refused(Infeasible, "physics.too-long"):
@@ -125,13 +163,16 @@ def test_what_cannot_be_integrated_is_refused() -> None:
 )
 def test_few_cases_fly_as_each_alone_does(forcing: taylor.Forcing, alike: tuple[int, int]) -> None:
     """Bodies, motions, torques, begins and durations of their own."""
-    rng, count = np.random.default_rng(12), 7
+    rng = np.random.default_rng(12)
+    count = 7
     A = 100.0 * (1.0 + 0.2 * rng.normal(size=count))
     moments = np.tile(80.0 * (1.0 + 0.2 * rng.normal(size=count)), (3, 1))
     moments[[*alike]] = A
-    rates, torque = rng.normal(size=(3, count)), 20.0 * rng.normal(size=(3, count))
+    rates = rng.normal(size=(3, count))
+    torque = 20.0 * rng.normal(size=(3, count))
     now, duration = 2.0 * rng.random(count), 40.0 * rng.random(count)
-    omega, quaternion = rates.copy(), np.repeat(START[:, None], count, axis=1)
+    omega = rates.copy()
+    quaternion = np.repeat(START[:, None], count, axis=1)
     bodies = batch.Bodies(moments, np.zeros(3), forcing)
     batch.advance(batch.MotionStretch(bodies, now, omega, quaternion, torque), duration)
     for case, (first, second, third) in enumerate(moments.T.tolist()):
@@ -139,7 +180,9 @@ def test_few_cases_fly_as_each_alone_does(forcing: taylor.Forcing, alike: tuple[
         body = first, second, third
         pieces = taylor.integrate(body, torque[:, case], rates[:, case], START, begin, end, forcing)
         alone = np.concatenate(pieces[-1].final)
-        assert np.concatenate([omega[:, case], quaternion[:, case]]) == pytest.approx(alone, abs=1e-12)
+        assert np.concatenate([omega[:, case], quaternion[:, case]]) == pytest.approx(
+            alone, abs=1e-12
+        )
 
 
 def test_the_pace_bounds_what_turns_with_a_torque_too() -> None:
@@ -151,7 +194,9 @@ def test_the_pace_bounds_what_turns_with_a_torque_too() -> None:
 def test_steps_are_halved_where_the_torque_changes_faster_than_promised() -> None:
     """A sphere at rest, spun up by so much that its last turns are much faster than the first."""
     drive = taylor.Drive(np.array([0.0]), np.array([0.3 + 0.1j]), np.array([0.0]))
-    rest, none, duration = np.zeros(1, dtype=complex), np.zeros(1), np.array([40.0])
+    rest = np.zeros(1, dtype=complex)
+    none = np.zeros(1)
+    duration = np.array([40.0])
     steps = list(taylor.steps(drive, rest, none, none, duration, 1))
     assert steps[0].duration[0] < 40.0 / taylor.count_for(drive, rest, none, duration)
     assert sum(len(one.starts) * one.duration[0] for one in steps) == pytest.approx(40.0)
@@ -160,7 +205,8 @@ def test_steps_are_halved_where_the_torque_changes_faster_than_promised() -> Non
     assert turn[0, 0] == pytest.approx(math.cos(0.5 * angle), abs=1e-11)
 
 
-# --- many cases at once against the independent integrator, case by case; their spin axes over long arcs
+# --- many cases at once against the independent integrator, case by case; their spin axes over long
+# arcs
 
 STILL = np.zeros(3)
 
@@ -181,7 +227,12 @@ class Case(NamedTuple):
         return batch.fly(*self)
 
     def some(self, which: Any) -> "Case":
-        return Case(self.bodies.some(which), self.rates[:, which], self.quaternion[:, which], self.pulses.some(which))
+        return Case(
+            self.bodies.some(which),
+            self.rates[:, which],
+            self.quaternion[:, which],
+            self.pulses.some(which),
+        )
 
     def start(self, number: int) -> reference.Motion:
         return reference.Motion(self.rates[:, number], attitude.matrix(self.quaternion[:, number]))
@@ -189,8 +240,12 @@ class Case(NamedTuple):
     def events(self, number: int) -> list[reference.Push | reference.Kick]:
         starts, impulses = self.pulses.starts[:, number], self.pulses.impulses[:, :, number]
         return [
-            reference.Push(start, start + width, impulse / width) if width else reference.Kick(start, impulse)
-            for start, width, impulse in zip(starts, self.pulses.on_times[:, 0], impulses, strict=True)
+            reference.Push(start, start + width, impulse / width)
+            if width
+            else reference.Kick(start, impulse)
+            for start, width, impulse in zip(
+                starts, self.pulses.on_times[:, 0], impulses, strict=True
+            )
         ]
 
 
@@ -204,7 +259,9 @@ def cases(
     constant: reference.Array = STILL,
     forcing: Forcing = NOTHING,
 ) -> Case:
-    """Dispersed cases: moments by 2 %, rates, attitude at random, torques with an axial part, edges by ``jitter`` s."""
+    """Dispersed cases: moments by 2 %, rates, attitude at random, torques with an axial part, edges
+    by ``jitter`` s.
+    """
     draw = np.random.default_rng(7)
     bodies = np.array(moments)[:, None] * (1 + 0.02 * draw.standard_normal((3, count)))
     if moments[0] == moments[1]:
@@ -212,17 +269,27 @@ def cases(
     rates = np.array([0.3, 0.2, spin])[:, None] + 0.01 * draw.standard_normal((3, count))
     quaternion = draw.standard_normal((4, count))
     quaternion /= np.linalg.norm(quaternion, axis=0)
-    times = np.maximum(np.array(starts)[:, None] + jitter * draw.uniform(-1, 1, (len(starts), count)), 0.0)
-    torque = np.array([12.0, -9.0, 1.5])[None, :, None] * (1 + 0.1 * draw.standard_normal((len(starts), 3, count)))
+    times = np.maximum(
+        np.array(starts)[:, None] + jitter * draw.uniform(-1, 1, (len(starts), count)), 0.0
+    )
+    torque = np.array([12.0, -9.0, 1.5])[None, :, None] * (
+        1 + 0.1 * draw.standard_normal((len(starts), 3, count))
+    )
     widths = np.array(on_times, dtype=float)
     impulses = torque * np.where(widths == 0.0, 0.5, widths)[:, None, None]
     return Case(
-        batch.Bodies(bodies, constant, forcing), rates, quaternion, batch.Pulses(times, widths[:, None], impulses)
+        batch.Bodies(bodies, constant, forcing),
+        rates,
+        quaternion,
+        batch.Pulses(times, widths[:, None], impulses),
     )
 
 
 def assert_is(
-    flown: tuple[reference.Array, reference.Array], number: int, motion: reference.Motion, tolerance: float
+    flown: tuple[reference.Array, reference.Array],
+    number: int,
+    motion: reference.Motion,
+    tolerance: float,
 ) -> None:
     assert_allclose(flown[0][:, number], motion.rates, atol=tolerance, rtol=0)
     assert reference.turned(motion.rotation, attitude.matrix(flown[1][:, number])) < tolerance
@@ -233,9 +300,12 @@ def assert_flown_alike(case: Case, numbers: Iterable[int], tolerance: float = 2e
     assert_allclose(np.linalg.norm(flown[1], axis=0), 1.0, atol=1e-15)
     for number in numbers:
         until = float((case.pulses.starts[:, number] + case.pulses.on_times[:, 0]).max())
-        moments, start = case.bodies.moments[:, number].tolist(), case.start(number)
+        moments = case.bodies.moments[:, number].tolist()
+        start = case.start(number)
         growth = case.bodies.forcing.growth
-        motion = reference.fly(moments, start.rates, case.events(number), until, start.rotation, growth)
+        motion = reference.fly(
+            moments, start.rates, case.events(number), until, start.rotation, growth
+        )
         assert_is(flown, number, motion, tolerance)
 
 
@@ -252,7 +322,11 @@ MIXED = {"starts": (0.0, 0.9, 1.0, 1.8), "on_times": (0.0, 0.4, 0.0, 0.0)}
         ],
         # Longer than a turn and far apart.
         ({"count": 2, "starts": (0.0, 25.0), "on_times": (4.0, 6.0)}, (1,), 1e-11),
-        deep({"count": 2, "moments": TENSOR, "starts": (0.0, 25.0), "on_times": (4.0, 6.0)}, (1,), 1e-11),
+        deep(
+            {"count": 2, "moments": TENSOR, "starts": (0.0, 25.0), "on_times": (4.0, 6.0)},
+            (1,),
+            1e-11,
+        ),
         # Overlapping; ideal impulses among pulses, also at the beginning.
         ({"count": 5, "starts": (0.5, 0.8, 2.0), "on_times": (0.6, 0.2, 0.4)}, (0, 4), 2e-12),
         ({"count": 5, **MIXED, "jitter": 0.0}, (0, 4), 2e-12),
@@ -296,18 +370,18 @@ def test_blocks_hold_what_single_cases_give_and_the_same_block_the_same_bits() -
     for number in (0, batch.BLOCK - 1, batch.BLOCK, batch.BLOCK + 2):
         for alone, of_many in zip(case.some([number]).fly(), flown, strict=True):
             assert_allclose(alone[:, 0], of_many[:, number], atol=1e-14)
-    case, half = cases(2 * batch.BLOCK), slice(batch.BLOCK, None)
+    case = cases(2 * batch.BLOCK)
+    half = slice(batch.BLOCK, None)
     for alone, of_many in zip(case.some(half).fly(), case.fly(), strict=True):
         assert_array_equal(alone, of_many[:, half])
 
 
 def forced(case: Case, number: int) -> reference.Motion:
     """The motion at the end, by DOP853 on the equations with all that acts."""
-    forcing, motion = case.bodies.forcing, case.start(number)
-    pushes, turned = (
-        [event for event in case.events(number) if isinstance(event, reference.Push)],
-        turning(*forcing.turning),
-    )
+    forcing = case.bodies.forcing
+    motion = case.start(number)
+    pushes = [event for event in case.events(number) if isinstance(event, reference.Push)]
+    turned = turning(*forcing.turning)
     edges = sorted({0.0, *(edge for push in pushes for edge in (push.start, push.end))})
     for begin, end in itertools.pairwise(edges):
         on = [push.torque for push in pushes if push.start < 0.5 * (begin + end) < push.end]
@@ -316,7 +390,9 @@ def forced(case: Case, number: int) -> reference.Motion:
         def torque(t: float, steady: reference.Array = steady) -> reference.Array:
             return np.asarray(steady + turned(t))
 
-        (motion,) = driven(case.bodies.moments[:, number].tolist(), motion, torque, [begin, end], forcing.growth)
+        (motion,) = driven(
+            case.bodies.moments[:, number].tolist(), motion, torque, [begin, end], forcing.growth
+        )
     return motion
 
 
@@ -332,7 +408,9 @@ def forced(case: Case, number: int) -> reference.Motion:
     quick=1,
     ids=["constant", "turning", "growing", "all"],
 )
-def test_disturbances_and_dissipation(moments: Triple, constant: reference.Array, forcing: Forcing) -> None:
+def test_disturbances_and_dissipation(
+    moments: Triple, constant: reference.Array, forcing: Forcing
+) -> None:
     case = cases(4, moments, constant=constant, forcing=forcing)
     for number in (0, 3):
         assert_is(case.fly(), number, forced(case, number), 1e-11)
@@ -342,7 +420,9 @@ def test_disturbances_and_dissipation(moments: Triple, constant: reference.Array
 @spread("moments", [SYMMETRIC, OBLATE], quick=1)
 def test_coasts_under_dissipation_end_in_flat_or_in_pure_spin(moments: Triple) -> None:
     growth = math.copysign(1 / 40, moments[0] - moments[2])
-    case = cases(6, moments, starts=(0.5, 200.0), on_times=(0.5, 0.0), forcing=Forcing(growth=growth))
+    case = cases(
+        6, moments, starts=(0.5, 200.0), on_times=(0.5, 0.0), forcing=Forcing(growth=growth)
+    )
     case.rates[:2, 0] = 3.0  # far out already
     case.pulses.impulses[1] *= 1e-3
     assert_flown_alike(case, (0, 3), 1e-10)
@@ -358,32 +438,53 @@ def test_a_long_free_coast_is_exact_and_motions_too_long_to_integrate_are_refuse
     for number in range(4):
         A, _, C = case.bodies.moments[:, number].tolist()
         first, second, spin = case.rates[:, number].tolist()
-        (after,) = attitude.arc(A, C, case.quaternion[:, number], complex(first, second), spin, np.array([1e4]))
-        assert reference.turned(attitude.matrix(after), attitude.matrix(quaternion[:, number])) < 1e-10
+        (after,) = attitude.arc(
+            A, C, case.quaternion[:, number], complex(first, second), spin, np.array([1e4])
+        )
+        assert (
+            reference.turned(attitude.matrix(after), attitude.matrix(quaternion[:, number])) < 1e-10
+        )
         assert math.hypot(*rates[:2, number]) == pytest.approx(math.hypot(first, second), rel=1e-13)
     with refused(Infeasible, "physics.cases-too-long"):
         cases(2, TENSOR, starts=(2e5,), on_times=(1.0,)).fly()
 
 
 def test_cosine_and_sine_by_the_half_angle() -> None:
-    angles = np.concatenate([np.linspace(-400.0, 400.0, 2001), [0.0, 1e-300, math.pi, math.pi / 2, 1e-9]])
+    angles = np.concatenate(
+        [np.linspace(-400.0, 400.0, 2001), [0.0, 1e-300, math.pi, math.pi / 2, 1e-9]]
+    )
     assert_allclose(cos_sin(angles), (np.cos(angles), np.sin(angles)), atol=1e-15)
 
 
 @pytest.mark.weekly
 @pytest.mark.parametrize(("sense", "growth"), [(1.0, 3e-3), (-1.0, 3e-3), (1.0, -6e-3)])
-def test_few_turns_show_what_all_show(sense: float, growth: float, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Arcs of some 20 to 40 turns with dissipation, directions near the spin axis and away from it."""
-    rng, count = np.random.default_rng(5), 60
+def test_few_turns_show_what_all_show(
+    sense: float, growth: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Arcs of some 20 to 40 turns with dissipation,
+    directions near the spin axis and away from it.
+    """
+    rng = np.random.default_rng(5)
+    count = 60
     first = rng.uniform(80.0, 120.0, count)
     moments = np.array([first, first, first * rng.uniform(0.5, 1.6, count)])
     tilt = rng.uniform(0.02, 0.1, count)
-    rates = np.array([np.sin(tilt), 0.3 * np.sin(tilt), sense * np.cos(tilt)]) * rng.uniform(1.0, 2.0, count)
+    rates = np.array([np.sin(tilt), 0.3 * np.sin(tilt), sense * np.cos(tilt)]) * rng.uniform(
+        1.0, 2.0, count
+    )
     upright = np.repeat([[1.0], [0.0], [0.0], [0.0]], count, axis=1)
     away = np.array([rng.uniform(0.0, 0.3, count), rng.uniform(math.pi - 0.3, math.pi, count)])
     round_ = rng.uniform(0.0, 2.0 * math.pi, (2, count))
-    directions = np.stack([np.sin(away) * np.cos(round_), np.sin(away) * np.sin(round_), np.cos(away)], axis=1)
-    lasts = rng.uniform(20.0, 40.0, count) * 2.0 * math.pi * first / np.linalg.norm(moments * rates, axis=0)
+    directions = np.stack(
+        [np.sin(away) * np.cos(round_), np.sin(away) * np.sin(round_), np.cos(away)], axis=1
+    )
+    lasts = (
+        rng.uniform(20.0, 40.0, count)
+        * 2.0
+        * math.pi
+        * first
+        / np.linalg.norm(moments * rates, axis=0)
+    )
     here = batch.MotionStretch(
         batch.Bodies(moments, np.zeros(3), Forcing(growth=growth)), np.zeros(count), rates, upright
     )

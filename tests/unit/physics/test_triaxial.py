@@ -1,4 +1,6 @@
-"""Torque-free motion of triaxial bodies, against two integrators; bodies with a wheel, with H3 = Cω3 + h, by DOP853."""
+"""Torque-free motion of triaxial bodies, against two integrators; bodies with a wheel, with H3 =
+Cω3 + h, by DOP853.
+"""
 
 import cmath
 import math
@@ -26,20 +28,28 @@ from nutdamp.spacecraft import requirements
 START = np.array([0.5, -0.5, 0.5, 0.5])
 
 part = st.floats(0.05, 1.0)
-# I1 = y² + z² and round of a mass distribution: the triangle inequality holds, flat discs and equal moments included.
-bodies = st.tuples(part, part, part | st.just(0.0)).map(lambda p: np.array([p[1] + p[2], p[2] + p[0], p[0] + p[1]]))
+# I1 = y² + z² and round of a mass distribution: the triangle inequality holds, flat discs and equal
+# moments included.
+bodies = st.tuples(part, part, part | st.just(0.0)).map(
+    lambda p: np.array([p[1] + p[2], p[2] + p[0], p[0] + p[1]])
+)
 # Squares of the smallest rates must not vanish, or the tests could not tell how large |ω| is.
 rate = st.floats(-3.0, 3.0).map(lambda x: x if abs(x) > 1e-100 else 0.0)
 turns = st.lists(rate, min_size=3, max_size=3).map(np.array)
 
 
-def forty_digits(moments: Sequence[float], rates0: Sequence[float], times: reference.Array) -> reference.Array:
-    """Rates (n, 3) by Taylor series of Euler's equations in decimal numbers of 40 digits, half a radian a step."""
+def forty_digits(
+    moments: Sequence[float], rates0: Sequence[float], times: reference.Array
+) -> reference.Array:
+    """Rates (n, 3) by Taylor series of Euler's equations in decimal numbers of 40 digits, half a
+    radian a step.
+    """
     track = []
     with localcontext() as context:
         context.prec = 40
         i1, i2, i3 = (Decimal(moment) for moment in moments)
-        state, now = [Decimal(float(rate)) for rate in rates0], Decimal(0)
+        state = [Decimal(float(rate)) for rate in rates0]
+        now = Decimal(0)
         for time in times.tolist():
             steps = math.ceil((time - float(now)) * math.hypot(*rates0) / 0.5)
             step = (Decimal(time) - now) / steps
@@ -47,10 +57,14 @@ def forty_digits(moments: Sequence[float], rates0: Sequence[float], times: refer
                 one, two, three = series = [[value] for value in state]
                 for k in range(1, 31):
                     products = [
-                        sum(map(mul, u, reversed(v)), Decimal(0)) for u, v in ((two, three), (three, one), (one, two))
+                        sum(map(mul, u, reversed(v)), Decimal(0))
+                        for u, v in ((two, three), (three, one), (one, two))
                     ]
                     for terms, coupling, product in zip(
-                        series, ((i2 - i3) / i1, (i3 - i1) / i2, (i1 - i2) / i3), products, strict=True
+                        series,
+                        ((i2 - i3) / i1, (i3 - i1) / i2, (i1 - i2) / i3),
+                        products,
+                        strict=True,
                     ):
                         terms.append(step / k * coupling * product)
                 state = [sum(terms, Decimal(0)) for terms in series]
@@ -61,7 +75,11 @@ def forty_digits(moments: Sequence[float], rates0: Sequence[float], times: refer
 
 def turned(first: reference.Array, second: reference.Array) -> float:
     """Largest angle between two tracks of unit quaternions, rad."""
-    return 2 * float(np.min([np.linalg.norm(first - second, axis=1), np.linalg.norm(first + second, axis=1)], 0).max())
+    return 2 * float(
+        np.min(
+            [np.linalg.norm(first - second, axis=1), np.linalg.norm(first + second, axis=1)], 0
+        ).max()
+    )
 
 
 def extremes(
@@ -69,33 +87,49 @@ def extremes(
 ) -> tuple[float, float]:
     """Least and largest nutation angle."""
     sense = math.copysign(1.0, rates0[2])
-    least, largest = (triaxial.arc_cones(moments, rates0, end * sense).nutation for end in (-1.0, 1.0))
+    least, largest = (
+        triaxial.arc_cones(moments, rates0, end * sense).nutation for end in (-1.0, 1.0)
+    )
     return math.pi - least, largest
 
 
 def flown(
-    moments: Sequence[float] | reference.Array, rates0: Sequence[float] | reference.Array, times: reference.Array
+    moments: Sequence[float] | reference.Array,
+    rates0: Sequence[float] | reference.Array,
+    times: reference.Array,
 ) -> tuple[reference.Array, reference.Array]:
     """Rates and attitudes by the closed form."""
-    return triaxial.free_rates(moments, rates0, times), triaxial.free_attitude(moments, rates0, START, times)
+    return triaxial.free_rates(moments, rates0, times), triaxial.free_attitude(
+        moments, rates0, START, times
+    )
 
 
 def off(first: reference.Array, second: reference.Array) -> float:
     """Largest distance of two tracks of rates, as a part of |ω|."""
-    return float(np.linalg.norm(first - second, axis=1).max() / np.linalg.norm(second, axis=1).max())
+    return float(
+        np.linalg.norm(first - second, axis=1).max() / np.linalg.norm(second, axis=1).max()
+    )
 
 
 def test_jacobi_functions_are_those_of_scipy() -> None:
     u = np.linspace(-20.0, 20.0, 401)
     for m in (0.0, 1e-12, 0.1, 0.5, 0.9, 0.999):
-        assert np.array(triaxial._jacobi(u, 1.0 - m)) == pytest.approx(np.array(ellipj(u, m)[:3]), abs=5e-14)
-        assert 0.5 * math.pi / triaxial._means(1.0 - m)[1] == pytest.approx(float(ellipk(m)), rel=1e-14)
+        assert np.array(triaxial._jacobi(u, 1.0 - m)) == pytest.approx(
+            np.array(ellipj(u, m)[:3]), abs=5e-14
+        )
+        assert 0.5 * math.pi / triaxial._means(1.0 - m)[1] == pytest.approx(
+            float(ellipk(m)), rel=1e-14
+        )
 
 
 def assert_obeys(
-    moments: Sequence[float] | reference.Array, rates0: Sequence[float] | reference.Array, late: float
+    moments: Sequence[float] | reference.Array,
+    rates0: Sequence[float] | reference.Array,
+    late: float,
 ) -> None:
-    """From a point of the track a radian on by DOP853: so short that no separatrix magnifies its errors."""
+    """From a point of the track a radian on by DOP853: so short that no separatrix magnifies its
+    errors.
+    """
     size = max(float(np.linalg.norm(rates0)), 1e-3)
     times = np.array([late, late + 1.0]) / size
     track, attitudes = flown(moments, rates0, times)
@@ -105,7 +139,13 @@ def assert_obeys(
     assert reference.turned(end.rotation, attitude.matrix(attitudes[1])) < 2e-12
 
 
-ON_SEPARATRIX = [[0.5, 0.375, 0.25], [-0.5, 0.375, 0.25], [0.5, -0.375, -0.25], [-0.5, -0.375, 0.25], [0.5, 0.0, -0.25]]
+ON_SEPARATRIX = [
+    [0.5, 0.375, 0.25],
+    [-0.5, 0.375, 0.25],
+    [0.5, -0.375, -0.25],
+    [-0.5, -0.375, 0.25],
+    [0.5, 0.0, -0.25],
+]
 """Rates of 1.5, 2, 3 kg m²: 3·1·ω3² = 1.5·0.5·ω1²."""
 NUDGES = [2.0**-52, 1e-2, -1e-4, 1e-8, -1e-12, -(2.0**-52)]
 NEARLY = {
@@ -124,15 +164,26 @@ NEARLY = {
         deep([1.0, 1.5, 2.375], [0.5, -0.25, 0.75], 1300.0, 2e-13),  # a hundred periods
         *[([1.5, 2.0, 3.0], rates0, 40.0, 1e-14) for rates0 in ON_SEPARATRIX[::2]],
         *[deep([1.5, 2.0, 3.0], rates0, 40.0, 1e-14) for rates0 in ON_SEPARATRIX[1::2]],
-        *[([1.5, 2.0, 3.0], [0.5, 0.375, 0.25 * (1.0 + nudge)], 100.0, 1e-12) for nudge in NUDGES[:2]],
-        *[deep([1.5, 2.0, 3.0], [0.5, 0.375, 0.25 * (1.0 + nudge)], 300.0, 1e-12) for nudge in NUDGES[2:]],
+        *[
+            ([1.5, 2.0, 3.0], [0.5, 0.375, 0.25 * (1.0 + nudge)], 100.0, 1e-12)
+            for nudge in NUDGES[:2]
+        ],
+        *[
+            deep([1.5, 2.0, 3.0], [0.5, 0.375, 0.25 * (1.0 + nudge)], 300.0, 1e-12)
+            for nudge in NUDGES[2:]
+        ],
         *NEARLY[2.0**-52],
         *[deep(*row) for apart in (1e-3, 1e-6, 1e-12) for row in NEARLY[apart]],
     ],
 )
-def test_rates_to_every_digit(moments: list[float], rates0: list[float], until: float, close: float) -> None:
+def test_rates_to_every_digit(
+    moments: list[float], rates0: list[float], until: float, close: float
+) -> None:
     times = np.linspace(0.0, until, 11)[1:]
-    assert off(triaxial.free_rates(moments, rates0, times), forty_digits(moments, rates0, times)) < close
+    assert (
+        off(triaxial.free_rates(moments, rates0, times), forty_digits(moments, rates0, times))
+        < close
+    )
     for time in (0.0, 0.4 * until, until):
         assert_obeys(moments, rates0, time * math.hypot(*rates0))
 
@@ -145,33 +196,48 @@ def test_on_the_separatrix_it_ends_in_a_spin_about_the_middle_axis(rates0: list[
     assert extremes(moments, rates0)[1] == pytest.approx(math.pi / 2, abs=2e-8)
     (end,) = triaxial.free_rates(moments, rates0, [1e4])
     assert abs(end[[0, 2]]).max() < 1e-300
-    assert moments[1] * abs(end[1]) == pytest.approx(np.linalg.norm(np.multiply(moments, rates0)), rel=1e-14)
+    assert moments[1] * abs(end[1]) == pytest.approx(
+        np.linalg.norm(np.multiply(moments, rates0)), rel=1e-14
+    )
 
 
 @given(moments=bodies, rates0=turns, late=st.floats(0.0, 300.0))
-def test_any_motion_obeys_eulers_equations(moments: reference.Array, rates0: reference.Array, late: float) -> None:
+def test_any_motion_obeys_eulers_equations(
+    moments: reference.Array, rates0: reference.Array, late: float
+) -> None:
     assert_obeys(moments, rates0, late)
 
 
 @settings(max_examples=80)
 @given(moments=bodies, rates0=turns)
-def test_energy_and_momentum_stay_and_the_period_is_one(moments: reference.Array, rates0: reference.Array) -> None:
+def test_energy_and_momentum_stay_and_the_period_is_one(
+    moments: reference.Array, rates0: reference.Array
+) -> None:
     """After half of it the transverse rates have changed sign, after the whole nothing differs."""
     size = float(np.linalg.norm(rates0))
     track, attitudes = flown(moments, rates0, np.linspace(0.0, 1000.0, 41) / max(size, 1e-3))
     assert track[0] == pytest.approx(rates0, abs=1e-15 * size)
-    assert np.square(track) @ moments == pytest.approx(np.square(rates0) @ moments, rel=1e-13, abs=1e-290)
-    momentum, expected = attitude.rotate(attitudes, track * moments), attitude.rotate(START, rates0 * moments)
+    assert np.square(track) @ moments == pytest.approx(
+        np.square(rates0) @ moments, rel=1e-13, abs=1e-290
+    )
+    momentum, expected = (
+        attitude.rotate(attitudes, track * moments),
+        attitude.rotate(START, rates0 * moments),
+    )
     assert np.linalg.norm(momentum - expected, axis=1).max() <= 1e-13 * np.linalg.norm(expected)
     assert turned(attitudes[:1], START[None, :]) < 1e-15
     assert np.linalg.norm(attitudes, axis=1) == pytest.approx(1.0, abs=1e-15)
     if size:
         least, largest = extremes(moments, rates0)
-        angles = attitude.angle_between(track * moments, np.array([0.0, 0.0, math.copysign(1.0, rates0[2])]))
+        angles = attitude.angle_between(
+            track * moments, np.array([0.0, 0.0, math.copysign(1.0, rates0[2])])
+        )
         assert least - 1e-7 <= angles.min() <= angles.max() <= largest + 1e-7
     period = triaxial.nutation_period(moments, rates0)
     if math.isfinite(period):
-        half, whole, many = triaxial.free_rates(moments, rates0, np.array([0.5, 1.0, 50.0]) * period)
+        half, whole, many = triaxial.free_rates(
+            moments, rates0, np.array([0.5, 1.0, 50.0]) * period
+        )
         assert whole == pytest.approx(rates0, abs=1e-13 * size)
         assert many == pytest.approx(rates0, abs=1e-12 * size)
         assert np.abs(half) == pytest.approx(np.abs(rates0), abs=1e-13 * size)
@@ -180,11 +246,15 @@ def test_energy_and_momentum_stay_and_the_period_is_one(moments: reference.Array
 
 
 def test_extremes_where_they_are_reached() -> None:
-    """With ω1 = 0 and with ω2 = 0 the motion about axis 3 is at an extreme; small angles keep all digits."""
+    """With ω1 = 0 and with ω2 = 0 the motion about axis 3 is at an extreme; small angles keep all
+    digits.
+    """
     for moments in ([2.0, 3.0, 4.0], [4.0, 3.0, 2.0]):
         for scale in (0.1, 1e-9):
             rates0 = [scale, 0.0, -1.0]
-            later = triaxial.free_rates(moments, rates0, [0.25 * triaxial.nutation_period(moments, rates0)])[0]
+            later = triaxial.free_rates(
+                moments, rates0, [0.25 * triaxial.nutation_period(moments, rates0)]
+            )[0]
             assert abs(later[0]) < 1e-15
             h = np.abs([rates0, later]) * moments
             ends = sorted(np.arctan2(np.hypot(h[:, 0], h[:, 1]), h[:, 2]))
@@ -197,11 +267,16 @@ def test_extremes_where_they_are_reached() -> None:
 @pytest.mark.parametrize("spin", [3.0, -3.0])
 @pytest.mark.parametrize("axial", [80.0, 160.0, 239.0])
 def test_symmetric_limit_is_continuous(axial: float, spin: float) -> None:
-    first, omega0, times = 120.0, 0.3 - 0.2j, np.linspace(0.0, 50.0, 51)
-    ideal, _ = response.impulse_sum(times, omega0, spin, first, axial, np.zeros(0), np.zeros(0, complex), np.zeros(0))
+    first = 120.0
+    omega0 = 0.3 - 0.2j
+    times = np.linspace(0.0, 50.0, 51)
+    ideal, _ = response.impulse_sum(
+        times, omega0, spin, first, axial, np.zeros(0), np.zeros(0, complex), np.zeros(0)
+    )
     arc = attitude.arc(first, axial, START, omega0, spin, times)
     for apart in (1e-6, 1e-9, 1e-12, 0.0):
-        moments, rates0 = (first, first * (1.0 + apart), axial), [omega0.real, omega0.imag, spin]
+        moments = (first, first * (1.0 + apart), axial)
+        rates0 = [omega0.real, omega0.imag, spin]
         track, attitudes = flown(moments, rates0, times)
         assert np.abs(track[:, 0] + 1j * track[:, 1] - ideal).max() < 1e-12 + 100 * apart
         assert np.abs(track[:, 2] - spin).max() < 1e-14 + 10 * apart
@@ -216,15 +291,27 @@ def test_symmetric_limit_is_continuous(axial: float, spin: float) -> None:
 
 def test_rates_that_stay() -> None:
     """About each principal axis, at rest, and wherever moments are equal."""
-    times, body = np.linspace(0.0, 100.0, 11), (2.0, 3.0, 4.0)
+    times = np.linspace(0.0, 100.0, 11)
+    body = (2.0, 3.0, 4.0)
     for moments, rates0 in (
-        *[(body, (0.0, 0.0, -2.0)), (body, (0.0, 2.0, 0.0)), (body, (-2.0, 0.0, 0.0)), (body, (0.0, 0.0, 0.0))],
-        *[((3.0,) * 3, (1.0, 2.0, -3.0)), ((2.0, 2.0, 3.0), (1.0, 2.0, 0.0)), ((2.0, 3.0, 3.0), (0.0, 1.0, 2.0))],
+        *[
+            (body, (0.0, 0.0, -2.0)),
+            (body, (0.0, 2.0, 0.0)),
+            (body, (-2.0, 0.0, 0.0)),
+            (body, (0.0, 0.0, 0.0)),
+        ],
+        *[
+            ((3.0,) * 3, (1.0, 2.0, -3.0)),
+            ((2.0, 2.0, 3.0), (1.0, 2.0, 0.0)),
+            ((2.0, 3.0, 3.0), (0.0, 1.0, 2.0)),
+        ],
     ):
         size, (track, attitudes) = math.hypot(*rates0), flown(moments, rates0, times)
         assert track == pytest.approx(np.tile(rates0, (11, 1)), rel=1e-15)
         half = 0.5 * size * times[:, None]
-        by_spin = attitude.multiply(START, np.hstack([np.cos(half), np.sin(half) * np.array(rates0) / (size or 1.0)]))
+        by_spin = attitude.multiply(
+            START, np.hstack([np.cos(half), np.sin(half) * np.array(rates0) / (size or 1.0)])
+        )
         assert turned(attitudes, by_spin) < 2e-13
         least, largest = extremes(moments, rates0)
         assert least == pytest.approx(largest, rel=1e-15)
@@ -247,7 +334,8 @@ def test_period_has_its_limits() -> None:
 
 def test_body_nutation_rate_of_unequal_transverse_moments() -> None:
     """Not that of the mean, 0.818 rad/s; and backwards for a ω3 > 0: ω2 falls first."""
-    moments, spin = (120.0, 100.0, 80.0), 3.0
+    moments = (120.0, 100.0, 80.0)
+    spin = 3.0
     rate = triaxial.body_nutation_rate(moments, spin)
     assert rate == pytest.approx(0.775, abs=5e-4)
     times = np.linspace(0.0, 20 * math.pi / rate, 2001)
@@ -264,16 +352,24 @@ def test_body_nutation_rate_of_unequal_transverse_moments() -> None:
 
 def test_units_do_not_matter() -> None:
     """Powers of two only shift exponents, even far out of the usual range."""
-    moments, rates0, times = np.array([2.0, 3.0, 4.0]), np.array([0.3, 0.2, 1.0]), np.linspace(0.0, 50.0, 6)
+    moments = np.array([2.0, 3.0, 4.0])
+    rates0 = np.array([0.3, 0.2, 1.0])
+    times = np.linspace(0.0, 50.0, 6)
     heavy, slow = 2.0**600, 2.0**-400
-    plain, scaled = flown(moments, rates0, times), flown(moments * heavy, rates0 * slow, times / slow)
+    plain, scaled = (
+        flown(moments, rates0, times),
+        flown(moments * heavy, rates0 * slow, times / slow),
+    )
     assert np.array_equal(scaled[0], plain[0] * slow)
     assert np.array_equal(scaled[1], plain[1])
-    assert triaxial.nutation_period(moments, rates0 * slow) * slow == triaxial.nutation_period(moments, rates0)
+    assert triaxial.nutation_period(moments, rates0 * slow) * slow == triaxial.nutation_period(
+        moments, rates0
+    )
     assert [part.shape for part in flown(moments, rates0, np.zeros(0))] == [(0, 3), (0, 4)]
 
 
-# --- bodies with a wheel: closed forms, series and cones against DOP853, with H3 = Cω3 + h in the place of Cω3
+# --- bodies with a wheel: closed forms, series and cones against DOP853, with H3 = Cω3 + h in the
+# place of Cω3
 
 Array = NDArray[np.float64]
 
@@ -282,7 +378,9 @@ MOTIONS = [(3.0, 90.0), (0.0, 60.0), (0.0, -60.0), (-2.0, 250.0), (1.0, -300.0),
 """ω3 in rad/s and h in N m s: both senses, at rest about axis 3, and H3 against the spin."""
 
 gyrostats = spread(
-    ("A", "C", "spin", "wheel"), [(*moments, *motion) for moments in MOMENTS for motion in MOTIONS], quick=8
+    ("A", "C", "spin", "wheel"),
+    [(*moments, *motion) for moments in MOMENTS for motion in MOTIONS],
+    quick=8,
 )
 
 OMEGA = 0.25 - 0.4j
@@ -298,7 +396,10 @@ def start(A: float, C: float, spin: float, wheel: float) -> tuple[reference.Moti
 
 def apart(quaternions: Array, motions: list[reference.Motion]) -> float:
     """Largest difference of attitudes."""
-    return max(float(np.abs(attitude.matrix(q) - m.rotation).max()) for q, m in zip(quaternions, motions, strict=True))
+    return max(
+        float(np.abs(attitude.matrix(q) - m.rotation).max())
+        for q, m in zip(quaternions, motions, strict=True)
+    )
 
 
 @gyrostats
@@ -311,7 +412,9 @@ def test_arcs(A: float, C: float, spin: float, wheel: float) -> None:
     assert apart(arc, flown) < 1e-10
     assert np.array(ends) == pytest.approx(arc, abs=1e-12)
     none = np.zeros(0)
-    omega, _ = response.impulse_sum(TIMES, OMEGA, spin, A, C, none, none.astype(complex), none, wheel)
+    omega, _ = response.impulse_sum(
+        TIMES, OMEGA, spin, A, C, none, none.astype(complex), none, wheel
+    )
     assert omega == pytest.approx([complex(*m.rates[:2]) for m in flown], abs=1e-10)
 
 
@@ -322,7 +425,9 @@ def test_arcs_with_dissipation(A: float, C: float, spin: float, wheel: float) ->
     sense = math.copysign(1.0, C * spin + wheel)
     for growth in (0.05, -0.04):
         flown = reference.sinking((A, A, C), motion, np.zeros(3), TIMES, growth, wheel)
-        omega, spins, turned = energy_sink.arc(A, C, growth, quaternion, OMEGA, spin, TIMES, wheel, sense)
+        omega, spins, turned = energy_sink.arc(
+            A, C, growth, quaternion, OMEGA, spin, TIMES, wheel, sense
+        )
         assert np.column_stack([omega.real, omega.imag, spins]) == pytest.approx(
             np.array([m.rates for m in flown]), abs=1e-10
         )
@@ -339,34 +444,49 @@ def test_arcs_with_dissipation(A: float, C: float, spin: float, wheel: float) ->
     ("time", "degrees", "spin"),
     [(120.0, 8.372, None), (240.0, 22.237, None), (400.0, 27.431, 2.7927), (1e6, 27.606, None)],
 )
-def test_growth_ends_where_omega_stands_still_in_the_body(time: float, degrees: float, spin: float | None) -> None:
+def test_growth_ends_where_omega_stands_still_in_the_body(
+    time: float, degrees: float, spin: float | None
+) -> None:
     """By DOP853 of E(θ); with tan θ e^{κt} it was 8.72, 34.0 and 78.3 deg, and -8.63 rad/s."""
     body = load_spacecraft(case("wheel-growth.yaml"))
     end = make_dynamics(body).path(body.initial, 0.0, time, most=1)[1]
     moments, rates = body.inertia.moments, end.rates
-    assert math.degrees(reference.nutation(moments, rates, 1.0, 1800.0)) == pytest.approx(degrees, abs=6e-4)
+    assert math.degrees(reference.nutation(moments, rates, 1.0, 1800.0)) == pytest.approx(
+        degrees, abs=6e-4
+    )
     assert spin is None or end.spin == pytest.approx(spin, abs=1e-4)
-    assert requirements.idle(body, time) == pytest.approx(reference.nutation(moments, rates, 1.0, 1800.0), abs=1e-11)
+    assert requirements.idle(body, time) == pytest.approx(
+        reference.nutation(moments, rates, 1.0, 1800.0), abs=1e-11
+    )
     if time < 1e3:
         assert requirements.reached(body, math.radians(degrees)) == pytest.approx(time, abs=0.1)
         assert requirements.reached(body, math.radians(28.0)) == math.inf
 
 
 def test_a_complex_step_gives_the_derivative_with_a_wheel() -> None:
-    """As dispersed cases take it, and by any share of the wheel: toward an angle at rest, and past 90 deg."""
+    """As dispersed cases take it, and by any share of the wheel: toward an angle at rest, and past
+    90 deg.
+    """
     for shares in ((8.8, -7.8), (0.4, 0.6), (-1.5, 2.5)):
-        theta, time = math.radians(30.0), np.array([40.0 + 1e-30j])
+        theta = math.radians(30.0)
+        time = np.array([40.0 + 1e-30j])
         course = energy_sink.courses(0.02, math.cos(theta), math.sin(theta) ** 2, time, shares)
         tilt = math.atan2(math.sin(theta) * course.transverse[0].real, course.along[0].real)
         rise = 0.02 * math.sin(tilt) * (shares[0] * math.cos(tilt) + shares[1])
         assert course.travel[0].imag / 1e-30 == pytest.approx(math.cos(tilt), rel=1e-12)
-        assert course.along[0].imag / 1e-30 == pytest.approx(-math.sin(tilt) * rise, rel=1e-9, abs=1e-12)
-        assert math.hypot(course.cosine[0].real, math.sin(theta) * course.sine[0].real) == pytest.approx(1.0, rel=1e-13)
+        assert course.along[0].imag / 1e-30 == pytest.approx(
+            -math.sin(tilt) * rise, rel=1e-9, abs=1e-12
+        )
+        assert math.hypot(
+            course.cosine[0].real, math.sin(theta) * course.sine[0].real
+        ) == pytest.approx(1.0, rel=1e-13)
 
 
 @gyrostats
 def test_half_pulses(A: float, C: float, spin: float, wheel: float) -> None:
-    """(22) at every angle, its wait and the turn of ω in between: no nutation left, and H where it was."""
+    """(22) at every angle, its wait and the turn of ω in between: no nutation left, and H where it
+    was.
+    """
     motion, _ = start(A, C, spin, wheel)
     axial = C * spin + wheel
     halves = rigid_body.half_pulses(A, C, abs(OMEGA), axial / C)
@@ -378,20 +498,28 @@ def test_half_pulses(A: float, C: float, spin: float, wheel: float) -> None:
     ]
     end = reference.fly((A, A, C), motion.rates, kicks, halves.wait, motion.rotation, wheel=wheel)
     assert np.abs(end.rates[:2]).max() < 1e-10
-    shift = reference.angle(reference.momentum((A, A, C), end, wheel), reference.momentum((A, A, C), motion, wheel))
+    shift = reference.angle(
+        reference.momentum((A, A, C), end, wheel), reference.momentum((A, A, C), motion, wheel)
+    )
     assert shift < 1e-10
     assert halves.first + halves.second == pytest.approx(A * abs(OMEGA), rel=1e-14)
 
 
 @gyrostats
-def test_a_wide_pulse_acts_by_its_width_factor(A: float, C: float, spin: float, wheel: float) -> None:
+def test_a_wide_pulse_acts_by_its_width_factor(
+    A: float, C: float, spin: float, wheel: float
+) -> None:
     motion, _ = start(A, C, spin, wheel)
-    on_time, torque, axial = 1.3, 4.0 + 3.0j, 6.0
+    on_time = 1.3
+    torque = 4.0 + 3.0j
+    axial = 6.0
     nutation = ((A - C) * spin - wheel) / A
     factor = response.width_factor(nutation, (A - C) / A * axial / C, on_time)
     kick = torque * on_time * factor / A
     after = ((A - C) * (spin + axial * on_time / C) - wheel) / A
-    omega = (OMEGA * cmath.exp(-0.5j * nutation * on_time) + kick) * cmath.exp(-0.5j * after * on_time)
+    omega = (OMEGA * cmath.exp(-0.5j * nutation * on_time) + kick) * cmath.exp(
+        -0.5j * after * on_time
+    )
     push = reference.Push(0.0, on_time, reference.vector(torque.real, torque.imag, axial))
     end = reference.fly((A, A, C), motion.rates, [push], on_time, motion.rotation, wheel=wheel)
     assert complex(*end.rates[:2]) == pytest.approx(omega, abs=1e-10)
@@ -406,30 +534,46 @@ THREE = [(120.0, 100.0, 80.0), (90.0, 120.0, 160.0), (80.0, 120.0, 100.0)]
     for spin, wheel in [(2.0, 90.0), (0.0, -60.0), (-1.0, 400.0)]
     for growth in (0.0, 0.03)
 ], quick=6)  # fmt: skip
-def test_series_under_a_torque(moments: tuple[float, float, float], spin: float, wheel: float, growth: float) -> None:
-    """One body and many at once, with and without dissipation, on a short stretch and on a long one."""
+def test_series_under_a_torque(
+    moments: tuple[float, float, float], spin: float, wheel: float, growth: float
+) -> None:
+    """One body and many at once, with and without dissipation, on a short stretch and on a long
+    one.
+    """
     rates, torque = reference.vector(0.2, -0.1, spin), reference.vector(5.0, -2.0, 3.0)
     rotation = reference.frame_n(moments, rates, wheel)
-    begin, quaternion = reference.Motion(rates, rotation), attitude.from_matrix(rotation)
+    begin = reference.Motion(rates, rotation)
+    quaternion = attitude.from_matrix(rotation)
     for time in (0.7, 12.0):
-        sense, span = math.copysign(1.0, moments[2] * spin + wheel), np.array([time])
+        sense = math.copysign(1.0, moments[2] * spin + wheel)
+        span = np.array([time])
         forcing = taylor.Forcing(growth=growth, wheel=wheel, sense=sense)
         flown = (
             reference.sinking(moments, begin, torque, span, growth, wheel)
             if growth
             else reference.coast(moments, begin, torque, span, wheel=wheel)
         )
-        body, turned = taylor.integrate(moments, torque, rates, quaternion, 0.0, time, forcing)[-1].final
+        body, turned = taylor.integrate(moments, torque, rates, quaternion, 0.0, time, forcing)[
+            -1
+        ].final
         assert body == pytest.approx(flown[0].rates, abs=1e-10)
         assert apart(turned[None], flown) < 1e-10
-        many = batch.Bodies(np.tile(moments, (3, 1)).T, np.zeros(3), forcing._replace(wheel=np.full(3, wheel)))
+        many = batch.Bodies(
+            np.tile(moments, (3, 1)).T, np.zeros(3), forcing._replace(wheel=np.full(3, wheel))
+        )
         here = batch.MotionStretch(
-            many, np.zeros(3), np.tile(rates, (3, 1)).T, np.tile(quaternion, (3, 1)).T, np.tile(torque, (3, 1)).T
+            many,
+            np.zeros(3),
+            np.tile(rates, (3, 1)).T,
+            np.tile(quaternion, (3, 1)).T,
+            np.tile(torque, (3, 1)).T,
         )
         batch.advance(here, np.array([time, 0.5 * time, time]))
         assert here.rates[:, 2] == pytest.approx(flown[0].rates, abs=1e-10)
         assert apart(here.quaternion[:, 2][None], flown) < 1e-10
-        begun = batch.MotionStretch(many, np.zeros(3), np.tile(rates, (3, 1)).T, np.tile(quaternion, (3, 1)).T)
+        begun = batch.MotionStretch(
+            many, np.zeros(3), np.tile(rates, (3, 1)).T, np.tile(quaternion, (3, 1)).T
+        )
         batch.advance(begun, np.full(3, time))
         free = (
             reference.sinking(moments, begin, np.zeros(3), span, growth, wheel)
@@ -441,7 +585,9 @@ def test_series_under_a_torque(moments: tuple[float, float, float], spin: float,
 
 @spread("seed", range(24), quick=4)
 def test_widest_cones_of_many_bodies_are_those_that_they_reach(seed: int) -> None:
-    """Any moments, wheels and motions, over the separatrix and reversed: against the motion sampled densely."""
+    """Any moments, wheels and motions, over the separatrix and reversed: against the motion sampled
+    densely.
+    """
     draws = np.random.default_rng(seed)
     moments = np.sort(draws.uniform(60.0, 110.0, 3))[draws.permutation(3)]
     rates = draws.normal(size=3) * [0.5, 0.5, 2.0]
@@ -452,10 +598,20 @@ def test_widest_cones_of_many_bodies_are_those_that_they_reach(seed: int) -> Non
     rates[2] = 0.0 if seed % 7 == 0 else rates[2]
     sense = math.copysign(1.0, moments[2] * rates[2] + wheel)
     series = taylor.integrate(
-        (moments[0], moments[1], moments[2]), np.zeros(3), rates, np.array([1.0, 0, 0, 0]), 0.0, 60.0,
+        (moments[0], moments[1], moments[2]),
+        np.zeros(3),
+        rates,
+        np.array([1.0, 0, 0, 0]),
+        0.0,
+        60.0,
         taylor.Forcing(wheel=wheel),
-    )  # fmt: skip
-    body = np.concatenate([piece.at(np.linspace(piece.start, piece.start + piece.duration, 60))[0] for piece in series])
+    )
+    body = np.concatenate(
+        [
+            piece.at(np.linspace(piece.start, piece.start + piece.duration, 60))[0]
+            for piece in series
+        ]
+    )
     momentum = body * moments + [0.0, 0.0, wheel]
     angles = np.arctan2(np.hypot(momentum[:, 0], momentum[:, 1]), sense * momentum[:, 2])
     nutation, cone = (float(angle) for angle in triaxial.widest_cones(moments, rates, sense, wheel))
@@ -468,24 +624,37 @@ def test_widest_cones_of_many_bodies_are_those_that_they_reach(seed: int) -> Non
 
 @pytest.mark.parametrize("spin", [2.0, 0.0, -1.5])
 def test_stability_and_rate_of_a_small_nutation(spin: float) -> None:
-    """The middle axis can be stabilised, and any other be made unstable: p² = -(H3 - I1ω3)(H3 - I2ω3)/(I1 I2)."""
+    """The middle axis can be stabilised, and any other be made unstable: p² = -(H3 - I1ω3)(H3 -
+    I2ω3)/(I1 I2).
+    """
     for moments in THREE:
         for wheel in (-400.0, -31.0, 5.0, 61.0, 400.0):
             grows = rigid_body.growth(moments, spin, wheel)
             small = np.array([1e-7, 0.0, spin])
             until = min(15.0 * grows.growth_time, 300.0) if grows.squared_exponent > 0.0 else 40.0
             series = taylor.integrate(
-                moments, np.zeros(3), small, np.array([1.0, 0, 0, 0]), 0.0, until, taylor.Forcing(wheel=wheel)
+                moments,
+                np.zeros(3),
+                small,
+                np.array([1.0, 0, 0, 0]),
+                0.0,
+                until,
+                taylor.Forcing(wheel=wheel),
             )
-            sizes = np.abs(np.concatenate([piece.at(np.array([piece.start]))[0] for piece in series])[:, :2]).max()
+            sizes = np.abs(
+                np.concatenate([piece.at(np.array([piece.start]))[0] for piece in series])[:, :2]
+            ).max()
             assert grows.stable is bool(sizes < 1e-5)
             if grows.stable:
                 rate = triaxial.body_nutation_rate(moments, spin, wheel)
                 assert rate * rate == pytest.approx(-grows.squared_exponent, rel=1e-12)
                 turn = reference.coast(
-                    moments, reference.Motion(small, np.eye(3)), np.zeros(3), np.array([2.0 * math.pi / abs(rate)]),
+                    moments,
+                    reference.Motion(small, np.eye(3)),
+                    np.zeros(3),
+                    np.array([2.0 * math.pi / abs(rate)]),
                     wheel=wheel,
-                )[0]  # fmt: skip
+                )[0]
                 assert turn.rates[:2] == pytest.approx(small[:2], abs=1e-11)
             else:
                 with pytest.raises(ValueError, match="no nutation rate"):

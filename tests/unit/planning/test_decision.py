@@ -1,4 +1,6 @@
-"""Comparisons: the rule of the recommendation on plans whose figures are given, its notes, and why none is cheaper."""
+"""Comparisons: the rule of the recommendation on plans whose figures are given, its notes, and why
+none is cheaper.
+"""
 
 import math
 from dataclasses import dataclass, replace
@@ -51,8 +53,9 @@ GIVEN: dict[str, dict[str, Any]] = {
     "still": {"required": Requirement(math.radians(1e-13), math.radians(0.1))},
 }
 
-# What is tested | what is given: the requirement or goal | the best, what decided | plans: name, nutation left in deg,
-# propellant, shift of H in deg, end, spin, pulses, ΔV; ! breaks a cone, ? is infeasible.
+# What is tested | what is given: the requirement or goal | the best, what decided | plans: name,
+# nutation left in deg, propellant, shift of H in deg, end, spin, pulses, ΔV; ! breaks a cone, ? is
+# infeasible.
 RULE = """
 infeasible plans are passed over                |        | a ONLY        | ? 0; a 3
 one per cent of the 5° is as good as nothing    |        | thrifty COST  | thrifty 0.0495 0.1; clean 1e-12 0.2
@@ -122,7 +125,12 @@ class Given(Judged):
 
 
 def made(
-    name: str, nutation: float, cost: float | None = None, shift: float = 0.0, end: float = 1.0, **more: Any
+    name: str,
+    nutation: float,
+    cost: float | None = None,
+    shift: float = 0.0,
+    end: float = 1.0,
+    **more: Any,
 ) -> planning.Plan:
     degrees, speed = more.pop("degrees", 5.0), more.pop("speed", None)
     one = judged(name, nutation, propellant=cost, shift=shift, end=end, **more)
@@ -131,7 +139,9 @@ def made(
     if name.startswith("!") or speed is not None:
         assert isinstance(one, Judged)
         strays = name.startswith("!")
-        return Given(one.spacecraft, name, one.schedule, ended=one.ended, strays=strays, speed=speed)
+        return Given(
+            one.spacecraft, name, one.schedule, ended=one.ended, strays=strays, speed=speed
+        )
     return INFEASIBLE if name == "?" else one
 
 
@@ -155,14 +165,20 @@ def test_the_plan_to_fly_what_decided_and_the_notes_on_it_and_on_what_is_missed(
         assert (found.plan.scheme, found.ground) == (best, Ground[ground]), what
         assert found.standing is found.plan.standing
         equals = [
-            one for one in plans if one.feasible and (one.standing, one.kept) == (found.standing, found.plan.kept)
+            one
+            for one in plans
+            if one.feasible and (one.standing, one.kept) == (found.standing, found.plan.kept)
         ]
         assert found.count == len(equals), what
         if ground != "COST" or what.startswith(("of what", "where")):
             lines.append(recommended(what, Comparison(plans[0].spacecraft, tuple(plans))))
     check_text("plan.reasons", "\n".join(lines))
     for none in ([INFEASIBLE], []):
-        assert (recommend(none).plan, recommend(none).standing, recommend(none).ground) == (None, None, None)
+        assert (recommend(none).plan, recommend(none).standing, recommend(none).ground) == (
+            None,
+            None,
+            None,
+        )
     # Of equal costs the plan for nominal values stays.
     for share, why, name in (
         (1.0, Ground.NOMINAL, "late"),
@@ -173,8 +189,9 @@ def test_the_plan_to_fly_what_decided_and_the_notes_on_it_and_on_what_is_missed(
         assert cheapest([early, late], late) == ({"late": late, "early": early}[name], why)
 
 
-# What is tested | what is given | the best, what decided, its standing, of how many | plans | of the cases those that
-# comply with each; of 0.997 that must. What lies between two is not known more closely.
+# What is tested | what is given | the best, what decided, its standing, of how many | plans | of
+# the cases those that comply with each; of 0.997 that must. What lies between two is not known more
+# closely.
 BY_CASES = """
 enough must comply               | half | dear ONLY COMPLIES 1    | cheap 0.4 0.1; dear 0 0.2         | 0.996; 0.998
 then the cheapest                | half | cheap COST COMPLIES 2   | cheap 0.4 0.1; dear 0 0.2         | 0.997; 1
@@ -195,11 +212,15 @@ or else enough comply            | keep | idle ONLY MEETS 1       | idle 4.9 0; 
 
 
 def with_shares(plans: list[planning.Plan], text: str) -> Comparison:
-    """The comparison of plans that flew so many cases that the share that complies is known so closely."""
+    """The comparison of plans that flew so many cases that the share that complies is known so
+    closely.
+    """
     flown: dict[planning.Plan, FlownPlan] = {}
     for plan, bounds in zip(plans, text.split(";"), strict=True):
         low, high = (float(bound) for bound in (bounds.split("-") * 2)[:2])
-        flown[plan] = FlownPlan(plan, None, cases=Cases(2_048, 1, 0.997, low, low, high, final=low == high))
+        flown[plan] = FlownPlan(
+            plan, None, cases=Cases(2_048, 1, 0.997, low, low, high, final=low == high)
+        )
     return Comparison(plans[0].spacecraft, tuple(plans), flown)
 
 
@@ -210,17 +231,24 @@ def test_plans_with_which_too_few_dispersed_cases_comply_miss_the_requirement() 
     ):
         best, ground, standing, count = decided.split()
         compared = with_shares(plans_of(given, text), shares)
-        found, cases = compared.recommendation, compared.cases[compared[best]]
+        found = compared.recommendation
+        cases = compared.cases[compared[best]]
         assert found.plan is compared.recommended is compared[best], what
         assert (found.ground, found.standing, found.count) == (
             Ground[ground],
             planning.Standing[standing],
             int(count),
         ), what
-        enough = {each: each.meets_requirement and compared.cases[each].low >= 0.997 for each in compared}
+        enough = {
+            each: each.meets_requirement and compared.cases[each].low >= 0.997 for each in compared
+        }
         assert {each: verdict.met for each, verdict in compared.verdicts.items()} == enough
         # Undecided where the budget of work ended too early.
-        missed = Status.NOT_SHOWN if cases.enough is None and found.plan.meets_requirement else Status.NOT_ENOUGH
+        missed = (
+            Status.NOT_SHOWN
+            if cases.enough is None and found.plan.meets_requirement
+            else Status.NOT_ENOUGH
+        )
         expected = Status.FLY if enough[found.plan] else missed
         assert compared.verdict.status is expected, what
         lines.append(recommended(what, compared))
@@ -249,7 +277,9 @@ half   | cheap 0.4 0.1; dear 0.6 0.2; dearer 0 0.3 | 1; 1; 1
 def test_why_a_plan_that_costs_less_is_not_recommended() -> None:
     """By what it leaves, or by the cases that comply; costs within a thousandth are equal."""
     lines = []
-    for given, text, shares in ([cell.strip() for cell in line.split("|")] for line in WHY.strip().splitlines()):
+    for given, text, shares in (
+        [cell.strip() for cell in line.split("|")] for line in WHY.strip().splitlines()
+    ):
         compared = with_shares(plans_of(given, text), shares)
         cheaper = compared.verdict.cheaper
         lines.append(f"{given}: {noted(each.why for each in cheaper)}")
@@ -271,22 +301,37 @@ def test_why_a_plan_that_costs_less_is_not_recommended() -> None:
 def test_what_is_to_be_saved_decides_on_the_plan() -> None:
     """Of equal ends, impulses or numbers of pulses, the one that costs less propellant."""
     plans = plans_of(
-        "half", "frugal 0.1 0.1 0 9 - 4; late 0.1 0.3 0 5.0001 - 2; soon 0.1 0.2 0 5 - 3; off 0.6 0.1 0 1 - 1"
+        "half",
+        (
+            "frugal 0.1 0.1 0 9 - 4; late 0.1 0.3 0 5.0001 - 2; soon 0.1 0.2 0 5 - 3; "
+            "off 0.6 0.1 0 1 - 1"
+        ),
     )
     for least, best in (("propellant", "frugal"), ("time", "soon"), ("pulses", "late")):
         found = recommend(plans, least=least)
-        assert (present(found.plan).scheme, found.ground, found.least, found.count) == (best, Ground.COST, least, 3)
+        assert (present(found.plan).scheme, found.ground, found.least, found.count) == (
+            best,
+            Ground.COST,
+            least,
+            3,
+        )
         compared = Comparison(plans[0].spacecraft, tuple(plans), least=least)
-        assert [each.why.code for each in compared.verdict.cheaper] == ["why-nutation"] * (least != "propellant")
+        assert [each.why.code for each in compared.verdict.cheaper] == ["why-nutation"] * (
+            least != "propellant"
+        )
 
 
 @pytest.mark.deep
 def test_the_plan_that_ends_first_is_recommended_where_time_is_to_be_saved() -> None:
     """One-pulse costs least and ends at 27 s; two-pulse, at 4.2 s, leaves 0.8°."""
-    compared = compare(nutdamp.load(case("rim.yaml")), options=catalogue.Options(least="time"), samples=0)
+    compared = compare(
+        nutdamp.load(case("rim.yaml")), options=catalogue.Options(least="time"), samples=0
+    )
     assert (compared.verdict.status, compared.verdict.scheme) == (Status.FLY, "optimal")
     assert compared.verdict.schedule.end == pytest.approx(3.356, abs=5e-4)
-    assert compared.verdict.schedule.end == min(each.end for each in compared if compared.verdicts[each].met)
+    assert compared.verdict.schedule.end == min(
+        each.end for each in compared if compared.verdicts[each].met
+    )
     assert compare(compared.spacecraft, catalogue.CLASSIC, samples=0).verdict.scheme == "one-pulse"
 
 
@@ -295,18 +340,28 @@ def test_where_thrusters_are_too_weak_the_plan_that_leaves_least(degrees: int) -
     text = case("nothing-damps.yaml").read_text(encoding="utf-8").replace("8 deg", f"{degrees} deg")
     compared = compare(read_spacecraft(text, "nothing-damps.yaml"), catalogue.CLASSIC)
     left = {one.scheme: one.flown.nutation for one in compared.plans if one.flown is not None}
-    assert present(compared.recommended).scheme == min(left, key=lambda name: left[name]) == "four-pulse"
+    assert (
+        present(compared.recommended).scheme
+        == min(left, key=lambda name: left[name])
+        == "four-pulse"
+    )
     check_text(f"plan.weak-{degrees}", recommended("weak", compared))
 
 
-def test_a_scheme_that_cannot_set_the_spin_says_so_and_one_that_is_kept_by_itself_takes_no_channel() -> None:
+def test_a_scheme_that_cannot_set_the_spin_says_so_and_one_that_is_kept_by_itself_takes_no_channel() -> (
+    None
+):
     body = replace(spinner(channels=cross(20.0)), goal=Goal(spin=3.3))
     compared = compare(body, (*catalogue.CLASSIC, "half-cone"))
     assert {one.feasible for one in compared.plans} == {False}
-    check_text("plan.spin-not-set", "\n".join(sorted({one.refusal or "" for one in compared.plans})))
+    check_text(
+        "plan.spin-not-set", "\n".join(sorted({one.refusal or "" for one in compared.plans}))
+    )
     assert "optimal" in usual(body)
     assert planning.plan(body, "none").meets_requirement is False
-    assert not planning.plan(replace(body, omega0=body.omega0 * [0, 0, 1]), "four-pulse").feasible  # without nutation
+    assert not planning.plan(
+        replace(body, omega0=body.omega0 * [0, 0, 1]), "four-pulse"
+    ).feasible  # without nutation
     kept = replace(body, goal=SPIN)
     assert planning.plan(kept, "two-pulse").meets_requirement is True
     assert usual(kept) == (*catalogue.CLASSIC, "optimal")
@@ -331,22 +386,42 @@ GAINS: list[tuple[planning.Plan, tuple[planning.Plan, ...], Gain, str | None]] =
     (SHIFTED, (made("still", 0.0, 13.3, 0.35),), Gain.STEADIER, None),
     (SHIFTED, (made("idle", 4.0, 12.5),), Gain.STEADIER, None),
     (SHIFTED, (made("dear", 0.0, 13.0, 0.1), made("fair", 0.0, 12.5, 0.1)), Gain.STEADIER, "fair"),
-    (ALONE, (made("still", 0.0, 12.5, goal=POINTING),), Gain.STEADIER, None),  # with a target H shall not stay
+    (
+        ALONE,
+        (made("still", 0.0, 12.5, goal=POINTING),),
+        Gain.STEADIER,
+        None,
+    ),  # with a target H shall not stay
     (MANY, (FEW,), Gain.SIMPLER, "few"),
     (MANY, (made("few", 0.0, 0.1049, pulses=6),), Gain.SIMPLER, None),
     (MANY, (made("few", 0.0, 0.1051, pulses=5),), Gain.SIMPLER, None),
     (MANY, (FEW, made("one", 0.0, 0.101)), Gain.SIMPLER, "one"),
     (made("a", 0.0, pulses=0), (made("b", 0.0, pulses=0),), Gain.SIMPLER, None),
-    (SLOW, (made("soon", 0.0, 0.1045, 0.2, 50.0),), Gain.SOONER, "soon"),  # half the time, and a period at least
+    (
+        SLOW,
+        (made("soon", 0.0, 0.1045, 0.2, 50.0),),
+        Gain.SOONER,
+        "soon",
+    ),  # half the time, and a period at least
     (SLOW, (made("soon", 0.0, 0.1045, end=51.0),), Gain.SOONER, None),
     (SLOW, (made("soon", 0.0, 0.1055, end=50.0),), Gain.SOONER, None),
     (BOUND, (fired(0.109),), Gain.REAL, "real"),
     (BOUND, (fired(0.111),), Gain.REAL, None),
     (fired(0.1), (fired(0.11),), Gain.REAL, None),
-    (BOUND, (fired(9.0, BLOCK),), Gain.COMMANDED, "real"),  # whatever it costs: it may be all that can be sent
+    (
+        BOUND,
+        (fired(9.0, BLOCK),),
+        Gain.COMMANDED,
+        "real",
+    ),  # whatever it costs: it may be all that can be sent
     (BOUND, (fired(0.2),), Gain.COMMANDED, None),
     (fired(0.1, BLOCK), (fired(0.2, BLOCK),), Gain.COMMANDED, None),
-    (made("early", 0.0, 0.1, end=PERIOD), (made("soon", 0.0, 0.1045, end=0.4 * PERIOD),), Gain.SOONER, None),
+    (
+        made("early", 0.0, 0.1, end=PERIOD),
+        (made("soon", 0.0, 0.1045, end=0.4 * PERIOD),),
+        Gain.SOONER,
+        None,
+    ),
 ]
 
 
@@ -381,8 +456,11 @@ def test_only_what_the_spacecraft_can_fire_is_recommended_unless_named_or_timed(
     ):
         compared = Comparison(bodies[1], plans, named=named, timed=free)
         assert compared.eligible == eligible
-        assert compared.recommended is (min(eligible, key=lambda one: one.pulses.cost) if eligible else None)
-    # A plan that would comply, were it one that can be fired, is not among those of which too few cases do.
+        assert compared.recommended is (
+            min(eligible, key=lambda one: one.pulses.cost) if eligible else None
+        )
+    # A plan that would comply, were it one that can be fired, is not among those of which too few
+    # cases do.
     few = with_shares([timed, replace(block, scheme="block")], "1; 0.5")
     warnings = {each.code: each.values["schemes"] for each in comparison_warnings(few)}
     assert warnings == {"too-few-cases": "block", "blocks-cannot": "real"}
@@ -420,10 +498,17 @@ def test_the_notes_on_what_a_plan_gains_and_what_it_is_worse_in() -> None:
 
 @pytest.mark.deep
 def test_optimal_keeps_a_spin_without_a_channel_for_it() -> None:
-    assert planning.plan(replace(spinner(channels=cross(20.0)), goal=SPIN), "optimal").meets_requirement is True
+    assert (
+        planning.plan(
+            replace(spinner(channels=cross(20.0)), goal=SPIN), "optimal"
+        ).meets_requirement
+        is True
+    )
 
 
-@pytest.mark.parametrize(("name", "gain"), [deep("magnus-a03", Gain.REAL), weekly("lunar-prospector", Gain.COMMANDED)])
+@pytest.mark.parametrize(
+    ("name", "gain"), [deep("magnus-a03", Gain.REAL), weekly("lunar-prospector", Gain.COMMANDED)]
+)
 def test_examples_have_such_alternatives(name: str, gain: Gain) -> None:
     body = nutdamp.example(name)
     found = compare(body, usual(body), timed=gain is Gain.COMMANDED)

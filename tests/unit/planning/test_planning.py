@@ -12,7 +12,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import simpson
 from support import reference
-from support.builders import BOTH, HALF_A_DEGREE, aimed, channel, codes, cross, events, judged, noted, present, spinner
+from support.builders import (
+    BOTH,
+    HALF_A_DEGREE,
+    aimed,
+    channel,
+    codes,
+    cross,
+    events,
+    judged,
+    noted,
+    present,
+    spinner,
+)
 from support.cases import deep, weekly
 from support.golden import check_text
 
@@ -59,14 +71,21 @@ def test_a_requirement_is_met_where_every_part_of_it_is_by_the_flown_motion() ->
     ):
         assert judged("a", nutation, shift=shift, required=required).meets_requirement is meets
     # The printed two pulses leave no nutation, but 5.1° of shift.
-    made = plan(spinner(degrees=30.0, requirement=BOTH), "two-pulse", catalogue.Options(literal=True))
+    made = plan(
+        spinner(degrees=30.0, requirement=BOTH), "two-pulse", catalogue.Options(literal=True)
+    )
     assert made.meets_requirement is False
 
 
 def test_an_infeasible_plan_has_nulls_and_says_why_and_an_unknown_scheme_is_a_key_error() -> None:
     none = plan(spinner(mass=100.0, requirement=BOTH), "four-pulse")
     figures = (none.residual, none.flown, none.spin_change, none.delta_v, none.meets_requirement)
-    assert (none.feasible, bool(infeasibility(none)), len(none.pulses), *figures) == (False, True, 0, *[None] * 5)
+    assert (none.feasible, bool(infeasibility(none)), len(none.pulses), *figures) == (
+        False,
+        True,
+        0,
+        *[None] * 5,
+    )
     with pytest.raises(KeyError):
         plan(spinner(), "five-pulse")
     with pytest.raises(KeyError):  # what a user can cure is no bug
@@ -106,19 +125,26 @@ def test_a_scheme_with_a_bug_leaves_the_others_also_where_it_shows_only_when_the
         assert (failed.scheme, type(failed.failure)) == ("two-pulse", error)
         assert error.__name__ in infeasibility(failed)
         for one, other in zip(compared.plans, whole.plans, strict=True):
-            assert one.scheme == "two-pulse" or one.pulses.total_impulse == other.pulses.total_impulse
+            assert (
+                one.scheme == "two-pulse" or one.pulses.total_impulse == other.pulses.total_impulse
+            )
         assert compared.recommended is not None
     monkeypatch.setattr(end_state, "momentum_gained", raising(IndexError))
     jet = channel("T", 0.0, 8.0, 0.0, isp=220.0, thrust=10.0, force=(10.0, 0.0, 0.0))
     compared = compare(spinner(channels=(jet,), mass=100.0), ("one-pulse",))
-    assert ([type(one.failure) for one in compared.failed], compared.recommended) == ([IndexError], None)
+    assert ([type(one.failure) for one in compared.failed], compared.recommended) == (
+        [IndexError],
+        None,
+    )
 
 
 def test_a_plan_that_would_not_lower_the_nutation_is_infeasible() -> None:
     """A push along the transverse rate, and one against it."""
     body = spinner(channels=cross(40.0), phase=0.0)
     along, against = (
-        planning.judged(body, "one-pulse", Schedule((channel_pulse(one, 0.05, 0.1),)), catalogue.SchemeOptions())
+        planning.judged(
+            body, "one-pulse", Schedule((channel_pulse(one, 0.05, 0.1),)), catalogue.SchemeOptions()
+        )
         for one in body.channels[:2]
     )
     assert (along.feasible, against.feasible) == (False, True)
@@ -126,7 +152,10 @@ def test_a_plan_that_would_not_lower_the_nutation_is_infeasible() -> None:
 
 
 def weak(least: float = 0.01) -> tuple[Channel, ...]:
-    return (channel("A1", 0.0, -0.5, 0.0, min_on_time=least), channel("A2", 0.0, 0.5, 0.0, min_on_time=least))
+    return (
+        channel("A1", 0.0, -0.5, 0.0, min_on_time=least),
+        channel("A2", 0.0, 0.5, 0.0, min_on_time=least),
+    )
 
 
 SELF_DAMPING = replace(
@@ -148,8 +177,12 @@ def test_a_plan_that_leaves_more_than_decay_alone_by_its_end_is_infeasible_and_s
     assert present(made.worse) < 0.01 * SELF_DAMPING.nutation  # it does damp
     assert idle(SELF_DAMPING, made.worse_at) < present(made.worse)
     check_text("plan.worse-than-decay", f"{infeasibility(made)}\n{noted(reasons(compared))}")
-    assert math.degrees(idle(SELF_DAMPING, 81.91)) == pytest.approx(0.05, rel=1e-3)  # the time that the text names
-    late = plan(replace(SELF_DAMPING, limits=Limits(earliest=300.0)), "one-pulse")  # the default horizon is 240 s
+    assert math.degrees(idle(SELF_DAMPING, 81.91)) == pytest.approx(
+        0.05, rel=1e-3
+    )  # the time that the text names
+    late = plan(
+        replace(SELF_DAMPING, limits=Limits(earliest=300.0)), "one-pulse"
+    )  # the default horizon is 240 s
     check_text("plan.earliest-after-horizon", infeasibility(late))
 
 
@@ -187,7 +220,9 @@ def test_too_few_pulses_for_the_least_impulse_are_named_with_how_many_it_takes()
     check_text("plan.too-few-pulses", said)
     assert f"{100.0 * 3 * 4.0 / body.least_impulse:.4g} %" in said
     assert f"{enough} pulses" in said
-    assert plan(replace(body, limits=replace(body.limits, max_pulses=2 * enough)), "optimal", KEPT).feasible
+    assert plan(
+        replace(body, limits=replace(body.limits, max_pulses=2 * enough)), "optimal", KEPT
+    ).feasible
 
 
 THREE_MOMENTS = """
@@ -205,7 +240,9 @@ limits: {horizon: 120 s, tick: 1 ms, max_pulses: 6}
 @pytest.mark.weekly
 @pytest.mark.parametrize("horizon", [90.0, 120.0, 150.0])
 def test_a_longer_horizon_has_a_schedule_too_and_no_dearer_one(horizon: float) -> None:
-    """Within 90 s the search itself found one of 16.9 g, within 120 s none; one of 15.5 g ends at 64 s."""
+    """Within 90 s the search itself found one of 16.9 g, within 120 s none; one of 15.5 g ends at
+    64 s.
+    """
     body = read_spacecraft(THREE_MOMENTS, "f.yaml", ())
     made = plan(replace(body, limits=replace(body.limits, horizon=horizon)), "optimal")
     assert made.meets_requirement
@@ -215,8 +252,16 @@ def test_a_longer_horizon_has_a_schedule_too_and_no_dearer_one(horizon: float) -
 @pytest.mark.parametrize(
     ("channels", "horizon", "freed"),
     [
-        *(weekly(cross(2.0), 2.0, False), weekly(cross(2.0), 6.0, False), weekly(cross(2.0)[:1], 2.0, False)),
-        *(weekly(cross(15.0)[:2], 2.0, False), weekly(cross(15.0), 1.4, False), deep(cross(15.0), 1.6, True)),
+        *(
+            weekly(cross(2.0), 2.0, False),
+            weekly(cross(2.0), 6.0, False),
+            weekly(cross(2.0)[:1], 2.0, False),
+        ),
+        *(
+            weekly(cross(15.0)[:2], 2.0, False),
+            weekly(cross(15.0), 1.4, False),
+            deep(cross(15.0), 1.6, True),
+        ),
     ],
 )
 def test_the_horizon_that_is_named_as_long_enough_is(
@@ -226,7 +271,9 @@ def test_the_horizon_that_is_named_as_long_enough_is(
     said = infeasibility(plan(body, "optimal", KEPT))
     named = re.search(r"limits\.horizon = (\S+) s", said)
     assert named
-    assert plan(replace(body, limits=Limits(horizon=float(named[1]))), "optimal", KEPT).feasible, said
+    assert plan(replace(body, limits=Limits(horizon=float(named[1]))), "optimal", KEPT).feasible, (
+        said
+    )
     assert ("--free-axis" in said) is freed
     assert plan(body, "optimal", catalogue.OptimalOptions(free_axis=True)).feasible is freed
 
@@ -267,23 +314,36 @@ def test_schemes_and_judge_go_by_the_same_limits(
     limits: Limits, pulses: list[tuple[float, float]], broken: Limit | None
 ) -> None:
     """What the judge would refuse no scheme may take for good."""
-    assert [one.limit for one in breaches(within(limits), fired(*pulses))] == ([] if broken is None else [broken])
+    assert [one.limit for one in breaches(within(limits), fired(*pulses))] == (
+        [] if broken is None else [broken]
+    )
     assert keeps_limits(within(limits), fired(*pulses)) is (broken is None)
 
 
-def test_breaches_say_which_limit_which_pulse_and_by_how_much_and_each_limit_is_named_once() -> None:
-    body, made = within(replace(TIGHT, tick=0.05)), fired((0.5, 0.1), (6.5, 0.2), (6.98, 0.3), (25.0, 9.0))
-    lines = [f"{one.limit.name} {one.number} {one.bound:g} {one.by:.9g}" for one in breaches(body, made)]
+def test_breaches_say_which_limit_which_pulse_and_by_how_much_and_each_limit_is_named_once() -> (
+    None
+):
+    body = within(replace(TIGHT, tick=0.05))
+    made = fired((0.5, 0.1), (6.5, 0.2), (6.98, 0.3), (25.0, 9.0))
+    lines = [
+        f"{one.limit.name} {one.number} {one.bound:g} {one.by:.9g}" for one in breaches(body, made)
+    ]
     check_text("plan.breaches", "\n".join([*lines, *broken_limits(body, made)]))
     many = fired(*((21.0 + number, 0.5) for number in range(222)))
     check_text("plan.breaches-many", "\n".join(broken_limits(within(Limits(horizon=20.0)), many)))
 
 
-@given(st.integers(0, 40), st.sampled_from([-4.0, -2.0, -0.5, 0.0, 0.5, 2.0, 4.0]), st.integers(0, 3))
+@given(
+    st.integers(0, 40), st.sampled_from([-4.0, -2.0, -0.5, 0.0, 0.5, 2.0, 4.0]), st.integers(0, 3)
+)
 def test_one_slack_for_windows_and_breaches(exponent: int, off: float, which: int) -> None:
-    """A pulse that `Windows` allows breaks nothing, however late: both let times err by their resolution."""
+    """A pulse that `Windows` allows breaks nothing, however late: both let times err by their
+    resolution.
+    """
     late = 2.0**exponent
-    limits = Limits(horizon=4.0 * late, earliest=late, gap=0.5, blackout=((2.0 * late, 3.0 * late),))
+    limits = Limits(
+        horizon=4.0 * late, earliest=late, gap=0.5, blackout=((2.0 * late, 3.0 * late),)
+    )
     body = spinner(channels=cross(20.0), limits=limits)
     pulse = fired((0.0, 2.0**-10 * late)).pulses[0]
     edge = (late, 2.0 * late - pulse.on_time, 3.0 * late, 4.0 * late - pulse.on_time)[which]
@@ -291,14 +351,24 @@ def test_one_slack_for_windows_and_breaches(exponent: int, off: float, which: in
     windows = Windows(body)
     allowed = windows.allows(pulse.start, pulse.on_time, late)
     assert keeps_limits(body, (pulse,)) == allowed
-    assert windows.allowed(np.array([pulse.start]), np.array([pulse.on_time]), late).tolist() == [allowed]
+    assert windows.allowed(np.array([pulse.start]), np.array([pulse.on_time]), late).tolist() == [
+        allowed
+    ]
 
 
 # --- Δv, spin change, propellant and impulse, against the reference integrator and by hand
 
 
-def jet(name: str, position: tuple[float, float, float], force: tuple[float, float, float]) -> Channel:
-    return channel(name, *np.cross(position, force), isp=220.0, thrust=float(np.linalg.norm(force)), force=force)
+def jet(
+    name: str, position: tuple[float, float, float], force: tuple[float, float, float]
+) -> Channel:
+    return channel(
+        name,
+        *np.cross(position, force),
+        isp=220.0,
+        thrust=float(np.linalg.norm(force)),
+        force=force,
+    )
 
 
 JETS = (
@@ -310,11 +380,13 @@ BODY, REVERSED = spinner(channels=JETS, mass=250.0), spinner(spin=-3.0, channels
 
 
 def flown_force(body: Spacecraft, made: Schedule) -> Vector:
-    """∫ R(t) F dt by Simpson's rule on the reference motion, from each moment that a pulse begins or ends to the next.
+    """∫ R(t) F dt by Simpson's rule on the reference motion, from each moment that a pulse begins
+    or ends to the next.
 
     Pulses may overlap: forces add.
     """
-    moments, gained = body.inertia.moments, np.zeros(3)
+    moments = body.inertia.moments
+    gained = np.zeros(3)
     rotation = reference.frame_n(moments, body.omega0)
     edges = sorted({edge for pulse in made for edge in (pulse.start, pulse.end)})
     for begin, end in itertools.pairwise(edges):
@@ -322,9 +394,13 @@ def flown_force(body: Spacecraft, made: Schedule) -> Vector:
         if pushing:
             start = reference.fly(moments, body.omega0, events(made), begin, rotation)
             times = np.linspace(0.0, end - begin, 2001)
-            torque, force = (np.sum([getattr(one, of) for one in pushing], axis=0) for of in ("torque", "force"))
+            torque, force = (
+                np.sum([getattr(one, of) for one in pushing], axis=0) for of in ("torque", "force")
+            )
             motions = [start, *reference.coast(moments, start, torque, times[1:])]
-            gained += simpson(np.array([motion.rotation @ force for motion in motions]), x=times, axis=0)
+            gained += simpson(
+                np.array([motion.rotation @ force for motion in motions]), x=times, axis=0
+            )
     return gained
 
 
@@ -334,7 +410,10 @@ def flown_force(body: Spacecraft, made: Schedule) -> Vector:
         *((BODY, "one-pulse"), deep(BODY, "two-pulse"), deep(BODY, "four-pulse")),
         *(deep(REVERSED, "one-pulse"), deep(REVERSED, "two-pulse"), (REVERSED, "four-pulse")),
         # Stretches are cut by how fast the body turns at either end of the pulse, not as it begins.
-        (spinner(2.0, 1.0, 0.1, mass=10.0), [(channel("up", 0.0, 1.2, 1.0, force=(1.0, 0.0, 0.5)), 5.0, 10.0)]),
+        (
+            spinner(2.0, 1.0, 0.1, mass=10.0),
+            [(channel("up", 0.0, 1.2, 1.0, force=(1.0, 0.0, 0.5)), 5.0, 10.0)],
+        ),
         (BODY, [(JETS[0], 2.0, 1.0), (JETS[1], 2.4, 1.0)]),  # overlapping
         (BODY, [(channel("couple", 0.0, 20.0, 0.0, force=(0.0, 0.0, 0.0)), 2.0, 1.0)]),
     ],
@@ -343,9 +422,15 @@ def test_delta_v_is_the_force_turned_into_the_inertial_frame_over_the_mass(
     body: Spacecraft, fired: str | list[tuple[Channel, float, float]]
 ) -> None:
     by_hand = isinstance(fired, list)
-    made = Plan(body, "", Schedule(tuple(channel_pulse(*one) for one in fired))) if by_hand else plan(body, str(fired))
+    made = (
+        Plan(body, "", Schedule(tuple(channel_pulse(*one) for one in fired)))
+        if by_hand
+        else plan(body, str(fired))
+    )
     expected = flown_force(made.spacecraft, made.pulses) / (body.mass or 0.0)
-    assert made.delta_v == pytest.approx(expected, abs=(1e-9 if by_hand else 1e-10) * float(np.linalg.norm(expected)))
+    assert made.delta_v == pytest.approx(
+        expected, abs=(1e-9 if by_hand else 1e-10) * float(np.linalg.norm(expected))
+    )
     assert replace(made, spacecraft=replace(body, mass=None)).delta_v is None
     unknown = replace(made.pulses.pulses[0], force=None)
     assert replace(made, schedule=Schedule((unknown, *made.pulses.pulses[1:]))).delta_v is None
@@ -357,14 +442,20 @@ def test_spin_change_and_propellant(scheme: str) -> None:
     made = plan(BODY, scheme)
     end = reference.fly(BODY.inertia.moments, BODY.omega0, events(made.pulses), made.pulses.end)
     assert made.spin_change == pytest.approx(end.rates[2] - 3.0, abs=1e-11)
-    assert made.spin_change == pytest.approx(math.fsum(one.impulse[2] for one in made.pulses) / 80.0, abs=1e-13)
+    assert made.spin_change == pytest.approx(
+        math.fsum(one.impulse[2] for one in made.pulses) / 80.0, abs=1e-13
+    )
     thrust = {one.name: one.thrusters[0].thrust or 0.0 for one in JETS}
-    expected = math.fsum(thrust[pulse.channel] * pulse.on_time / (220.0 * 9.80665) for pulse in made.pulses)
+    expected = math.fsum(
+        thrust[pulse.channel] * pulse.on_time / (220.0 * 9.80665) for pulse in made.pulses
+    )
     assert made.pulses.propellant == pytest.approx(expected, rel=1e-14)
     assert STANDARD_GRAVITY == 9.80665
 
 
-def test_propellant_of_all_thrusters_of_a_channel_and_by_lever_arms_and_one_unknown_makes_the_sum_unknown() -> None:
+def test_propellant_of_all_thrusters_of_a_channel_and_by_lever_arms_and_one_unknown_makes_the_sum_unknown() -> (
+    None
+):
     pulse = channel_pulse(Channel("both", tuple(one.thrusters[0] for one in JETS[:2])), 3.0, 2.0)
     thrust = math.hypot(10.0, 1.0) + math.hypot(8.0, 2.0)
     assert pulse.propellant == pytest.approx(thrust * 2.0 / (220.0 * 9.80665), rel=1e-15)
@@ -373,7 +464,9 @@ def test_propellant_of_all_thrusters_of_a_channel_and_by_lever_arms_and_one_unkn
     unknown = channel_pulse(cross(20.0)[0], 6.0, 1.0)
     known = [Schedule(some).propellant is not None for some in ((), (pulse,), (pulse, unknown))]
     assert known == [True, True, False]
-    made = plan(spinner(steerable=Steerable(torque=20.0, isp=220.0, lever_arm=0.8)), "two-pulse").pulses
+    made = plan(
+        spinner(steerable=Steerable(torque=20.0, isp=220.0, lever_arm=0.8)), "two-pulse"
+    ).pulses
     assert made.propellant == pytest.approx(made.total_impulse / 0.8 / (220.0 * 9.80665), rel=1e-14)
     assert plan(spinner(steerable=Steerable(20.0)), "two-pulse").pulses.propellant is None
 
@@ -391,7 +484,9 @@ def test_impulses_and_the_end_of_a_schedule_in_the_order_of_its_centres() -> Non
 
 SUN = math.radians(3.0)
 TURNED = replace(
-    aimed(spinner(80.0, 120.0, degrees=0.2), 12.0, 30.0), steerable=Steerable(), limits=Limits(horizon=900.0)
+    aimed(spinner(80.0, 120.0, degrees=0.2), 12.0, 30.0),
+    steerable=Steerable(),
+    limits=Limits(horizon=900.0),
 )
 """A turn of 12 deg."""
 START = TURNED.momentum / np.linalg.norm(TURNED.momentum)
@@ -405,8 +500,12 @@ def length(route: tuple[Vector, ...]) -> float:
     return sum(float(attitude.angle_between(*leg)) for leg in itertools.pairwise((START, *route)))
 
 
-def test_routes_lead_to_the_target_clear_of_the_cone_the_shortest_first(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Two legs that touch a circle of 3 deg and its margin of 0.5 deg about the middle of 12 deg, as in a plane."""
+def test_routes_lead_to_the_target_clear_of_the_cone_the_shortest_first(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Two legs that touch a circle of 3 deg and its margin of 0.5 deg about the middle of 12 deg,
+    as in a plane.
+    """
     monkeypatch.setattr(planning, "MARGINS", planning.MARGINS[:2])
     body = watched(START + TURNED.target_axis)
     found = planning.routes(body)
@@ -415,7 +514,9 @@ def test_routes_lead_to_the_target_clear_of_the_cone_the_shortest_first(monkeypa
         assert np.allclose(route[-1], body.target_axis)
         for one, two in itertools.pairwise((START, *route)):
             shares = np.linspace(0.0, 1.0, 50)[:, None]
-            points = (1.0 - shares) * one + shares * two  # chords of short legs lie next to their great circles
+            points = (
+                1.0 - shares
+            ) * one + shares * two  # chords of short legs lie next to their great circles
             assert attitude.angle_between(points, np.asarray(body.keep[0].direction)).min() > SUN
     lengths = list(map(length, found))
     assert np.all(np.diff(lengths) > -2e-3)
@@ -423,11 +524,15 @@ def test_routes_lead_to_the_target_clear_of_the_cone_the_shortest_first(monkeypa
     bend = clear / math.sqrt(1.0 - (clear / 6.0) ** 2)
     assert 1.0 < lengths[0] / math.radians(2.0 * math.hypot(6.0, bend)) < 1.03
     assert not any(len(route) < 2 for route in found)
-    for route in planning.routes(watched(-body.target_axis)):  # without a cone in the way they are next to straight
+    for route in planning.routes(
+        watched(-body.target_axis)
+    ):  # without a cone in the way they are next to straight
         assert length(route) == pytest.approx(math.radians(12.0), rel=1e-3)
 
 
-def test_a_plan_goes_round_where_the_straight_way_breaks_the_cone(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_plan_goes_round_where_the_straight_way_breaks_the_cone(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """The Sun stands where the axis would be half-way on its half cone."""
     monkeypatch.setattr(planning, "MARGINS", planning.MARGINS[:1])
     free = planning.plan(TURNED, "half-cone")

@@ -1,4 +1,6 @@
-"""The verdict: status, bounds and causes follow from the numbers of plan and cases; notes on plans and comparisons."""
+"""The verdict: status, bounds and causes follow from the numbers of plan and cases; notes on plans
+and comparisons.
+"""
 
 import csv
 import io
@@ -48,11 +50,26 @@ from nutdamp.montecarlo.study import Results, run, study_of
 from nutdamp.planning import plan as planning
 from nutdamp.planning import tradeoff
 from nutdamp.planning.decision import Comparison, compare
-from nutdamp.planning.notes import comparison_warnings, hindrances, plan_notes, reasons, remaining, verdict_notes
+from nutdamp.planning.notes import (
+    comparison_warnings,
+    hindrances,
+    plan_notes,
+    reasons,
+    remaining,
+    verdict_notes,
+)
 from nutdamp.planning.verdict import Cases, Light, Status, cases_of
 from nutdamp.schemes import catalogue
 from nutdamp.spacecraft.equipment import Steerable
-from nutdamp.spacecraft.model import Disturbance, Goal, Inertia, Keep, Limits, Requirement, Spacecraft
+from nutdamp.spacecraft.model import (
+    Disturbance,
+    Goal,
+    Inertia,
+    Keep,
+    Limits,
+    Requirement,
+    Spacecraft,
+)
 from nutdamp.spacecraft.requirements import SAME_COST, Part, bounds
 from nutdamp.spacecraft.schedule import Bounds, Pulse, Schedule, channel_pulse
 from nutdamp.spacecraft.tolerances import Dispersions
@@ -69,19 +86,37 @@ EXITS = {
 PROBABLE = Requirement(nutation=math.radians(0.5), probability=0.99)
 SPREAD = Dispersions(A=normal(0.5))
 
-# Requirement, dispersions, nutation left in deg, from where to where the share of all cases lies of which 99.7 % must
-# comply; status, colour, whether all that is required is met.
-VERDICTS: list[tuple[Requirement | None, bool, float, tuple[float, float] | None, Status, Light, bool | None]] = [
+# Requirement, dispersions, nutation left in deg, from where to where the share of all cases lies of
+# which 99.7 % must comply; status, colour, whether all that is required is met.
+VERDICTS: list[
+    tuple[Requirement | None, bool, float, tuple[float, float] | None, Status, Light, bool | None]
+] = [
     (HALF_A_DEGREE, False, 0.4, None, Status.FLY, Light.AMBER, True),
     (HALF_A_DEGREE, False, 0.6, None, Status.NOT_ENOUGH, Light.RED, False),
-    (PROBABLE, False, 0.4, None, Status.NOT_SHOWN, Light.RED, False),  # a probability, and nothing to draw from
+    (
+        PROBABLE,
+        False,
+        0.4,
+        None,
+        Status.NOT_SHOWN,
+        Light.RED,
+        False,
+    ),  # a probability, and nothing to draw from
     (PROBABLE, False, 0.6, None, Status.NOT_ENOUGH, Light.RED, False),
     (HALF_A_DEGREE, True, 0.4, None, Status.NOT_SHOWN, Light.RED, False),  # no case was flown
     (HALF_A_DEGREE, True, 0.4, (0.998, 0.9995), Status.FLY, Light.GREEN, True),
     (HALF_A_DEGREE, True, 0.4, (0.997, 1.0), Status.FLY, Light.GREEN, True),
     (HALF_A_DEGREE, True, 0.4, (0.9969, 1.0), Status.NOT_SHOWN, Light.RED, False),
     (HALF_A_DEGREE, True, 0.4, (0.99, 0.9969), Status.NOT_ENOUGH, Light.RED, False),
-    (HALF_A_DEGREE, True, 0.6, (0.998, 0.9995), Status.NOT_ENOUGH, Light.RED, False),  # it misses with nominal values
+    (
+        HALF_A_DEGREE,
+        True,
+        0.6,
+        (0.998, 0.9995),
+        Status.NOT_ENOUGH,
+        Light.RED,
+        False,
+    ),  # it misses with nominal values
     (None, False, 3.0, None, Status.FLY, Light.AMBER, None),
     (None, True, 3.0, None, Status.FLY, Light.AMBER, None),
 ]
@@ -95,9 +130,16 @@ def test_the_status_goes_by_nominal_values_and_by_the_interval_of_the_share() ->
     assert {status: status.exit_status for status in Status} == EXITS
     for required, dispersed, left, share, *expected in VERDICTS:
         made = judged("a", left, required=required)
-        made = replace(made, spacecraft=replace(made.spacecraft, dispersions=SPREAD if dispersed else None))
+        made = replace(
+            made, spacecraft=replace(made.spacecraft, dispersions=SPREAD if dispersed else None)
+        )
         verdict = planning.judge(made, None if share is None else within(*share))
-        assert [verdict.status, verdict.light, verdict.met] == expected, (required, dispersed, left, share)
+        assert [verdict.status, verdict.light, verdict.met] == expected, (
+            required,
+            dispersed,
+            left,
+            share,
+        )
     alone = planning.judge(made, nominal=True)  # cases are left out on request
     assert (alone.status, alone.light) == (Status.FLY, Light.AMBER)
 
@@ -116,7 +158,13 @@ def test_where_nothing_fires_nothing_is_to_be_sent() -> None:
         made = replace(made, spacecraft=replace(made.spacecraft, commands=commands))
         assert planning.judge(made, timed=timed).status is status
     none = planning.judge(INFEASIBLE)
-    assert (none.status, none.light, none.met, none.why, none.lines) == (Status.NO_PLAN, Light.RED, None, "because", ())
+    assert (none.status, none.light, none.met, none.why, none.lines) == (
+        Status.NO_PLAN,
+        Light.RED,
+        None,
+        "because",
+        (),
+    )
 
 
 NINE_TENTHS = {"requirement": {"nutation": "0.5 deg", "probability": 0.9}}
@@ -130,7 +178,13 @@ NINE_TENTHS = {"requirement": {"nutation": "0.5 deg", "probability": 0.9}}
         (NINE_TENTHS, "two-pulse", False, Status.NOT_SHOWN, Light.RED),
         ({}, "two-pulse", True, Status.NOT_SHOWN, Light.RED),  # to show 99.7 % takes 1,277 cases
         ({}, "four-pulse", True, Status.NOT_ENOUGH, Light.RED),
-        ({"state": {"spin": "30 rpm", "nutation": "0.3 deg"}}, "none", False, Status.NO_PULSE, Light.AMBER),
+        (
+            {"state": {"spin": "30 rpm", "nutation": "0.3 deg"}},
+            "none",
+            False,
+            Status.NO_PULSE,
+            Light.AMBER,
+        ),
         ({"limits": {"horizon": "1 ms"}}, "two-pulse", True, Status.NO_PLAN, Light.RED),
     ],
 )
@@ -140,7 +194,11 @@ def test_every_status_of_the_built_in_example(
     body = nutdamp.example().with_(**changes)
     body = body if dispersed else replace(body, dispersions=None)
     verdict = compare(body, [scheme], samples=500).verdict
-    assert (verdict.status, verdict.light, verdict.status.exit_status) == (status, light, EXITS[status])
+    assert (verdict.status, verdict.light, verdict.status.exit_status) == (
+        status,
+        light,
+        EXITS[status],
+    )
 
 
 def test_pulses_that_cannot_be_sent_to_a_spacecraft_that_takes_commands() -> None:
@@ -165,7 +223,9 @@ def test_a_schedule_read_from_a_file_keeps_the_limits_or_cannot_be_commanded(
 # --- lines
 
 
-def cases_with(nutation: tuple[float, float], shift: tuple[float, float], made: planning.Plan) -> Cases:
+def cases_with(
+    nutation: tuple[float, float], shift: tuple[float, float], made: planning.Plan
+) -> Cases:
     """Cases by the share that keeps each bound of `BOTH`, and the degrees that 99.7 % keep."""
     both = list(zip(bounds(made.spacecraft), (nutation, shift), strict=True))
     shares = {bound: share for bound, (share, _) in both}
@@ -178,17 +238,41 @@ def test_a_line_has_the_margin_of_what_is_judged_and_counts_the_cases_that_keep_
     made = judged("a", 0.4, shift=0.15, required=BOTH)
     for cases, tightest, *expected in (
         (None, Part.NUTATION, (0.4, None, None, 0.1, True), (0.15, None, None, 0.05, True)),
-        (((0.7, 0.9), (0.998, 0.16)), Part.NUTATION, (0.4, 0.9, 0.7, -0.4, False), (0.15, 0.16, 0.998, 0.04, True)),
-        (((0.997, 0.5), (0.9969, 0.2)), Part.SHIFT, (0.4, 0.5, 0.997, 0.0, True), (0.15, 0.2, 0.9969, 0.0, False)),
+        (
+            ((0.7, 0.9), (0.998, 0.16)),
+            Part.NUTATION,
+            (0.4, 0.9, 0.7, -0.4, False),
+            (0.15, 0.16, 0.998, 0.04, True),
+        ),
+        (
+            ((0.997, 0.5), (0.9969, 0.2)),
+            Part.SHIFT,
+            (0.4, 0.5, 0.997, 0.0, True),
+            (0.15, 0.2, 0.9969, 0.0, False),
+        ),
     ):
         verdict = planning.judge(made, None if cases is None else cases_with(*cases, made))
         for line, cells in zip(verdict.lines, expected, strict=True):
-            values = [None if value is None else math.degrees(value) for value in (line.nominal, line.dispersed)]
-            assert [*values, line.share, math.degrees(line.margin), line.met] == pytest.approx(cells, abs=1e-12)
+            values = [
+                None if value is None else math.degrees(value)
+                for value in (line.nominal, line.dispersed)
+            ]
+            assert [*values, line.share, math.degrees(line.margin), line.met] == pytest.approx(
+                cells, abs=1e-12
+            )
         assert present(verdict.tightest).bound.part is tightest
-        assert verdict.good is (verdict.status is Status.FLY) is all(line.met for line in verdict.lines)
+        assert (
+            verdict.good
+            is (verdict.status is Status.FLY)
+            is all(line.met for line in verdict.lines)
+        )
     free = planning.judge(judged("a", 3.0))
-    assert ([line.met for line in free.lines], free.required, free.tightest, free.good) == ([False], (), None, False)
+    assert ([line.met for line in free.lines], free.required, free.tightest, free.good) == (
+        [False],
+        (),
+        None,
+        False,
+    )
 
 
 @cache
@@ -202,14 +286,22 @@ def test_levels_shares_and_interval_are_those_of_the_cases() -> None:
     for final in (True, False):
         cases = cases_of(results, final=final)
         kept = present(results.values)[:2] <= np.radians([0.5, 0.2])[:, None]
-        assert [*cases.levels.values()] == [np.quantile(row, 0.997) for row in present(results.values)[:2]]
+        assert [*cases.levels.values()] == [
+            np.quantile(row, 0.997) for row in present(results.values)[:2]
+        ]
         assert [*cases.shares.values()] == [*kept.mean(axis=1)]
-        assert (cases.complying, cases.samples, cases.final) == (kept.all(axis=0).mean(), 500, final)
+        assert (cases.complying, cases.samples, cases.final) == (
+            kept.all(axis=0).mean(),
+            500,
+            final,
+        )
         assert (cases.low, cases.high) == results.interval(certain=not final)
     verdict = planning.judge(one, cases_of(results), results)
     assert [line.share for line in verdict.lines] == [*kept.mean(axis=1)]
     assert verdict.causes
-    assert {cause.input for cause in verdict.causes} <= {entry.tolerance for entry in results.study.model.inputs.drawn}
+    assert {cause.input for cause in verdict.causes} <= {
+        entry.tolerance for entry in results.study.model.inputs.drawn
+    }
 
 
 def test_main_causes_are_at_most_three_that_matter_of_the_tightest_bound() -> None:
@@ -221,7 +313,9 @@ def test_main_causes_are_at_most_three_that_matter_of_the_tightest_bound() -> No
         ({"a": 0.04, "b": 0.05}, ["b"]),
         ({}, []),
     ):
-        told = SimpleNamespace(contributions=lambda bound, shares=shares: shares if bound.part is Part.SHIFT else {})
+        told = SimpleNamespace(
+            contributions=lambda bound, shares=shares: shares if bound.part is Part.SHIFT else {}
+        )
         verdict = planning.judge(made, cases_with((0.99, 0.6), (0.9, 0.3), made), told)
         assert [cause.input for cause in verdict.causes] == named
     assert planning.judge(made).causes == ()
@@ -231,31 +325,48 @@ def test_main_causes_are_at_most_three_that_matter_of_the_tightest_bound() -> No
 
 
 def watched(least: float, tilt: float = 20.0, azimuth: float = math.degrees(1.0)) -> Spacecraft:
-    """The example, whose spin axis must stay ``least`` degrees from a star that is ``tilt`` from H."""
+    """The example, whose spin axis must stay ``least`` degrees from a
+    star that is ``tilt`` from H.
+    """
     body = nutdamp.example()
     star = body.direction_in_n(math.radians(tilt), math.radians(azimuth))
     return replace(body, keep=(Keep("star", star, math.radians(least)),))
 
 
 def test_a_cone_is_a_bound_like_any_other_whatever_is_left_at_the_end() -> None:
-    kept, broken = (planning.judge(planning.plan(watched(least), "four-pulse"), nominal=True) for least in (10.0, 16.0))
+    kept, broken = (
+        planning.judge(planning.plan(watched(least), "four-pulse"), nominal=True)
+        for least in (10.0, 16.0)
+    )
     assert [verdict.status for verdict in (kept, broken)] == [Status.FLY, Status.NOT_ENOUGH]
     (aspect,), line = broken.aspects, broken.lines[-1]
-    assert (line.bound.part, line.bound.keep, line.bound.inner, line.met) == (Part.CONE, aspect.keep, True, False)
+    assert (line.bound.part, line.bound.keep, line.bound.inner, line.met) == (
+        Part.CONE,
+        aspect.keep,
+        True,
+        False,
+    )
     assert (line.nominal, line.margin) == (aspect.least, aspect.least - math.radians(16.0))
     four = planning.plan(watched(16.0), "four-pulse")
     assert (four.meets_requirement, four.ends_well, broken.tightest) == (False, True, line)
     assert (
-        planning.judge(replace(four, spacecraft=replace(watched(16.0), requirement=None))).status is Status.NOT_ENOUGH
+        planning.judge(replace(four, spacecraft=replace(watched(16.0), requirement=None))).status
+        is Status.NOT_ENOUGH
     )
 
 
 def test_the_cone_about_h_bounds_the_nutation_on_the_way() -> None:
     for most, status in ((5.5, Status.FLY), (4.5, Status.NOT_ENOUGH)):  # it begins with 5°
-        body = replace(nutdamp.example(), keep=(Keep("H", None, most=math.radians(most)),), dispersions=None)
+        body = replace(
+            nutdamp.example(), keep=(Keep("H", None, most=math.radians(most)),), dispersions=None
+        )
         verdict = planning.plan(body, "two-pulse").verdict
         line = verdict.lines[-1]
-        assert (verdict.status, line.bound.part, line.bound.limit) == (status, Part.DURING, math.radians(most))
+        assert (verdict.status, line.bound.part, line.bound.limit) == (
+            status,
+            Part.DURING,
+            math.radians(most),
+        )
         assert math.degrees(line.nominal) == pytest.approx(5.0, abs=0.1)
 
 
@@ -263,7 +374,9 @@ def test_the_cone_about_h_bounds_the_nutation_on_the_way() -> None:
 
 
 @pytest.mark.deep
-@pytest.mark.parametrize(("tolerance", "rpm", "complying"), [(None, 0.2, 0.377), ("0.1 %", 0.02, 0.156)])
+@pytest.mark.parametrize(
+    ("tolerance", "rpm", "complying"), [(None, 0.2, 0.377), ("0.1 %", 0.02, 0.156)]
+)
 def test_spin_is_a_bound_like_any_other_within_one_percent_of_the_goal_unless_required_otherwise(
     tolerance: str | None, rpm: float, complying: float
 ) -> None:
@@ -271,7 +384,8 @@ def test_spin_is_a_bound_like_any_other_within_one_percent_of_the_goal_unless_re
     body = nutdamp.load(places.case("rim-spin-up.yaml")).with_(goal={"spin": "20 rpm"})
     body = body if tolerance is None else body.with_(requirement={"spin": tolerance})
     verdict = compare(body, ["optimal"], samples=8_192).verdict
-    cases, lines = verdict.cases, {line.bound.part: line for line in verdict.lines}
+    cases = verdict.cases
+    lines = {line.bound.part: line for line in verdict.lines}
     assert (verdict.status, verdict.tightest) == (Status.NOT_ENOUGH, lines[Part.NUTATION])
     assert cases is not None
     assert cases.low < complying < cases.high
@@ -305,7 +419,10 @@ def test_a_broken_cone_is_in_every_file(run: Run) -> None:
         told = [(line["part"], line.get("edge"), line["met"]) for line in decision["requirement"]]
         assert (done.returncode, decision["status"], decision["met"]) == (4, "not-enough", False)
         assert told == [("nutation", None, True), ("cone", "min", False), ("cone", "max", True)]
-        assert [each["kept"] for each in decision["aspects"]] == [False, True]  # that of the Sun is any
+        assert [each["kept"] for each in decision["aspects"]] == [
+            False,
+            True,
+        ]  # that of the Sun is any
 
 
 def csv_rows(text: str) -> Iterator[dict[str, str]]:
@@ -313,31 +430,54 @@ def csv_rows(text: str) -> Iterator[dict[str, str]]:
 
 
 def test_json_and_the_table_of_schemes_have_the_verdict_of_each(run: Run, tmp_path: Path) -> None:
-    done = run(*BOTH_SCHEMES, "--nominal", "--table", "schemes.csv", "--json", "plan.json", columns=80)
+    done = run(
+        *BOTH_SCHEMES, "--nominal", "--table", "schemes.csv", "--json", "plan.json", columns=80
+    )
     content = json.loads((tmp_path / "plan.json").read_text("utf-8"))
     decision, shift = content["decision"], content["decision"]["requirement"][1]
-    told = (decision["scheme"], decision["status"], decision["met"], decision["cases"], decision["cheaper"])
+    told = (
+        decision["scheme"],
+        decision["status"],
+        decision["met"],
+        decision["cases"],
+        decision["cheaper"],
+    )
     assert (done.returncode, *told) == (0, "four-pulse", "fly", True, None, [])
     assert max(map(len, done.stdout.splitlines())) <= 80
     assert shift["margin_deg"] == pytest.approx(shift["limit_deg"] - shift["nominal_deg"])
     assert decision["final"]["spin_rad_s"] == pytest.approx(math.pi)
     rows = csv_rows((tmp_path / "schemes.csv").read_text("utf-8"))
     for row, one in zip(rows, content["plans"], strict=True):
-        yes = [str(value).lower() for value in (one["scheme"] == "four-pulse", one["meets_requirement"])]
+        yes = [
+            str(value).lower()
+            for value in (one["scheme"] == "four-pulse", one["meets_requirement"])
+        ]
         columns = ("scheme", "recommended", "meets_requirement", "met_fraction")
         assert [row[name] for name in columns] == [one["scheme"], *yes, ""]
-        assert (int(row["pulses"]), float(row["propellant_kg"])) == (len(one["pulses"]), one["propellant_kg"])
+        assert (int(row["pulses"]), float(row["propellant_kg"])) == (
+            len(one["pulses"]),
+            one["propellant_kg"],
+        )
         assert float(row["momentum_shift_deg"]) == one["flown"]["momentum_shift_deg"]
         assert float(row["axis_tilt_deg"]) == one["final"]["axis"]["tilt_deg"]
 
 
 @pytest.mark.deep
-def test_the_table_of_schemes_goes_by_cases_has_the_share_where_all_have_flown_and_what_is_infeasible(run: Run) -> None:
+def test_the_table_of_schemes_goes_by_cases_has_the_share_where_all_have_flown_and_what_is_infeasible(
+    run: Run,
+) -> None:
     two, four = csv_rows(run(*BOTH_SCHEMES, "--table", "-").stdout)
-    assert [(row["recommended"], row["meets_requirement"]) for row in (two, four)] == [("true", "true"), ("false",) * 2]
+    assert [(row["recommended"], row["meets_requirement"]) for row in (two, four)] == [
+        ("true", "true"),
+        ("false",) * 2,
+    ]
     assert float(two["met_fraction"]) == pytest.approx(0.99995, abs=1e-4)
     assert four["met_fraction"] == ""
-    rows = list(csv_rows(run(*BOTH_SCHEMES, "--robust", "--table", "-", "--set", "limits.horizon=4s").stdout))
+    rows = list(
+        csv_rows(
+            run(*BOTH_SCHEMES, "--robust", "--table", "-", "--set", "limits.horizon=4s").stdout
+        )
+    )
     assert {row["feasible"] for row in rows} == {"true", "false"}
     for row in rows:
         assert bool(row["why"]) == (not row["end_s"]) == (row["feasible"] == "false")
@@ -349,7 +489,10 @@ FIRED = spinner(channels=cross(8.0))
 
 
 def test_reasons_and_warnings_are_of_what_decided_and_what_is_missed() -> None:
-    damped, far = judged("a", 0.0, propellant=0.1), judged("far", 1e-12, shift=3.5, impulse=20.0, required=BOTH)
+    damped, far = (
+        judged("a", 0.0, propellant=0.1),
+        judged("far", 1e-12, shift=3.5, impulse=20.0, required=BOTH),
+    )
     firing = replace(far, spacecraft=replace(far.spacecraft, channels=cross(20.0)))
     short = replace(FIRED, limits=Limits(horizon=0.01))
     plans: dict[str, tuple[planning.Plan, ...]] = {
@@ -367,7 +510,11 @@ def test_reasons_and_warnings_are_of_what_decided_and_what_is_missed() -> None:
         "shift missed, without channels": (far,),
         "shift missed, optimal compared": (firing, replace(INFEASIBLE, scheme="optimal")),
     }
-    bodies = (short, replace(short, goal=Goal(spin=3.1)), spinner(channels=(channel("A", 0.0, 0.0, 8.0),)))
+    bodies = (
+        short,
+        replace(short, goal=Goal(spin=3.1)),
+        spinner(channels=(channel("A", 0.0, 0.0, 8.0),)),
+    )
     texts = [
         *(recommended(name, Comparison(each[0].spacecraft, each)) for name, each in plans.items()),
         *(noted(reasons(compare(body, catalogue.CLASSIC))) for body in bodies),
@@ -388,12 +535,20 @@ BALL = replace(
 
 
 def cut(limits: Limits, disturbances: tuple[Disturbance, ...] = ()) -> Spacecraft:
-    return replace(spinner(channels=cross(8.0, max_on_time=0.6), limits=limits), disturbances=disturbances)
+    return replace(
+        spinner(channels=cross(8.0, max_on_time=0.6), limits=limits), disturbances=disturbances
+    )
 
 
 HINDERED: dict[str, tuple[Spacecraft, str]] = {
-    "weak": (spinner(channels=cross(0.1, max_on_time=0.5), limits=Limits(horizon=30.0)), "four-pulse"),
-    "no shorter": (spinner(channels=cross(8.0, min_on_time=5.0), requirement=Requirement(nutation=1e-4)), "two-pulse"),
+    "weak": (
+        spinner(channels=cross(0.1, max_on_time=0.5), limits=Limits(horizon=30.0)),
+        "four-pulse",
+    ),
+    "no shorter": (
+        spinner(channels=cross(8.0, min_on_time=5.0), requirement=Requirement(nutation=1e-4)),
+        "two-pulse",
+    ),
     "suspected": (BALL, "four-pulse"),
     "no other limits in the file": (SINGLE, "one-pulse"),
     "dark": (replace(SINGLE, limits=Limits(horizon=7.0, blackout=((0.0, 1.0),))), "one-pulse"),
@@ -408,7 +563,9 @@ HINDERED: dict[str, tuple[Spacecraft, str]] = {
 def test_what_stands_in_the_way_is_named_and_nothing_else() -> None:
     texts = []
     for name, (body, scheme) in HINDERED.items():
-        compared = compare(body, (scheme,), catalogue.Options(with_disturbances=name == "steady tilt"))
+        compared = compare(
+            body, (scheme,), catalogue.Options(with_disturbances=name == "steady tilt")
+        )
         (plan,) = compared.plans
         certain, possible = hindrances(plan)
         texts += [
@@ -419,33 +576,49 @@ def test_what_stands_in_the_way_is_named_and_nothing_else() -> None:
 
 
 def test_a_blackout_is_not_said_to_limit_what_it_may_not_touch() -> None:
-    """It is over before the first pulse: without it the plan is the same, so it must not be called the limit."""
-    dark = planning.plan(replace(SINGLE, limits=Limits(horizon=7.0, blackout=((0.0, 0.1),))), "one-pulse")
+    """It is over before the first pulse: without it the plan is the same, so it must not be called
+    the limit.
+    """
+    dark = planning.plan(
+        replace(SINGLE, limits=Limits(horizon=7.0, blackout=((0.0, 0.1),))), "one-pulse"
+    )
     assert dark.pulses.end == planning.plan(SINGLE, "one-pulse").pulses.end
     assert hindrances(dark) == (("limits.horizon",), ("limits.blackout",))
 
 
 @pytest.mark.deep
 def test_no_scheme_is_said_to_leave_the_least_where_another_leaves_less() -> None:
-    """ACE: all of them end on ticks, one leaves least; each names what rounding can leave, which is more."""
-    compared = compare(nutdamp.load(places.CONFIGS / "ace.yaml"), ("two-pulse", "four-pulse", "optimal"))
+    """ACE: all of them end on ticks, one leaves least; each names what rounding can leave, which is
+    more.
+    """
+    compared = compare(
+        nutdamp.load(places.CONFIGS / "ace.yaml"), ("two-pulse", "four-pulse", "optimal")
+    )
     left = {plan.scheme: plan.flight.residual.nutation for plan in compared if plan.feasible}
     assert max(left.values()) > 1.2 * min(left.values())
     for plan in compared:
         assert remaining(plan).code == "remains-rounding"
-        assert math.degrees(left[plan.scheme]) <= float(remaining(plan).values["rounding_deg"] or 0.0)
+        assert math.degrees(left[plan.scheme]) <= float(
+            remaining(plan).values["rounding_deg"] or 0.0
+        )
         assert "remains-rounding" in codes(plan_notes(plan))
 
 
 def test_ticks_explain_what_rounding_to_them_can_leave() -> None:
-    """8 N m for 0.1 s: 0.04 N m s by the on-time, 0.004 N m s × ω3 by the start, at worst √(1 + 1.5²) of both."""
+    """8 N m for 0.1 s: 0.04 N m s by the on-time, 0.004 N m s × ω3 by the start, at worst √(1 +
+    1.5²) of both.
+    """
     for tick, share, obstacle, suspected in (
         (0.01, 0.9, "remains-rounding", ("limits.tick",)),
         (0.01, 1.1, "remains-limits", ("limits.tick",)),
         (None, 0.9, "remains-scheme", ()),
     ):
         body = replace(FIRED, limits=Limits(tick=tick))
-        most = math.hypot(1.0, 1.5) * math.hypot(0.04, 0.004 * body.spin) / (body.inertia.C * body.spin)
+        most = (
+            math.hypot(1.0, 1.5)
+            * math.hypot(0.04, 0.004 * body.spin)
+            / (body.inertia.C * body.spin)
+        )
         made = Schedule((channel_pulse(body.channels[0], 1.0, 0.1),))
         plan = planning.Plan(body, "four-pulse", made)
         left = replace(plan.flight.residual, nutation=share * most)
@@ -456,11 +629,18 @@ def test_ticks_explain_what_rounding_to_them_can_leave() -> None:
 def test_the_least_on_time_binds_where_a_pulse_is_no_longer() -> None:
     body = spinner(channels=cross(8.0, min_on_time=0.1))
     for on_time, binding in ((0.1, ("min_on_time",)), (0.11, ())):
-        made = Schedule((channel_pulse(body.channels[0], 1.0, 0.5), channel_pulse(body.channels[1], 3.0, on_time)))
+        made = Schedule(
+            (
+                channel_pulse(body.channels[0], 1.0, 0.5),
+                channel_pulse(body.channels[1], 3.0, on_time),
+            )
+        )
         assert hindrances(planning.Plan(body, "four-pulse", made))[0] == binding
 
 
-SHAKEN = replace(FIRED, disturbances=(Disturbance(0.02 + 0j, rate=-FIRED.spin),), limits=Limits(horizon=20.0))
+SHAKEN = replace(
+    FIRED, disturbances=(Disturbance(0.02 + 0j, rate=-FIRED.spin),), limits=Limits(horizon=20.0)
+)
 AWARE = catalogue.Options(with_disturbances=True)
 
 
@@ -468,7 +648,9 @@ def test_planning_with_the_disturbances_is_the_first_cure_where_it_helps() -> No
     body = replace(SHAKEN, requirement=Requirement(math.radians(0.1), math.radians(0.01)))
     assert present(compare(body, ("two-pulse",), AWARE).recommended).meets_requirement
     hopeless = replace(body, requirement=Requirement(nutation=math.radians(1e-6)))
-    warned = [codes(comparison_warnings(compare(each, ("two-pulse",)))) for each in (body, hopeless)]
+    warned = [
+        codes(comparison_warnings(compare(each, ("two-pulse",)))) for each in (body, hopeless)
+    ]
     assert [entry[:2] for entry in warned] == [
         ["requirement-missed", "disturbances-helped"],
         ["requirement-missed", "disturbances-not-helped"],
@@ -480,16 +662,24 @@ def test_planning_with_disturbances_is_tried_only_where_it_was_not_done() -> Non
     assert compare(SHAKEN, ("two-pulse",)).with_disturbances is not None
     assert compare(SHAKEN, ("two-pulse",), AWARE).with_disturbances is None
     nothing_fits = replace(SHAKEN, limits=Limits(horizon=1e-6))
-    assert compare(nothing_fits, ("two-pulse",)).with_disturbances is None  # and no recommended plan to compare with
+    assert (
+        compare(nothing_fits, ("two-pulse",)).with_disturbances is None
+    )  # and no recommended plan to compare with
 
 
-def noted_beside(made: planning.Plan, cases: Cases | None = None, *, looped: bool = False) -> list[Note]:
+def noted_beside(
+    made: planning.Plan, cases: Cases | None = None, *, looped: bool = False
+) -> list[Note]:
     """The notes beside the verdict on a plan, by nominal values or by cases."""
-    return list(verdict_notes(planning.judge(made, cases, nominal=cases is None), made, looped=looped))
+    return list(
+        verdict_notes(planning.judge(made, cases, nominal=cases is None), made, looped=looped)
+    )
 
 
 def test_what_a_plan_does_to_axis_and_spin_that_nothing_asks_for_is_noted() -> None:
-    """Beyond 0.1° and a digit of the spin shown; not where the shift is limited, or target or spin are asked for."""
+    """Beyond 0.1° and a digit of the spin shown; not where the shift is limited, or target or spin
+    are asked for.
+    """
     free = nutdamp.example().replace(requirement=Requirement(nutation=math.radians(0.5)))
     turning, steady = (planning.plan(free, scheme) for scheme in ("one-pulse", "two-pulse"))
     turned = turning.flight.residual.momentum_shift
@@ -498,7 +688,9 @@ def test_what_a_plan_does_to_axis_and_spin_that_nothing_asks_for_is_noted() -> N
     limited = planning.plan(nutdamp.example(), "one-pulse")
     plans = (turning, steady, goal, limited)
     assert [made for made in plans if "momentum-shift" in codes(noted_beside(made))] == [turning]
-    assert one_of(noted_beside(turning), "momentum-shift")["momentum_shift_deg"] == math.degrees(turned)
+    assert one_of(noted_beside(turning), "momentum-shift")["momentum_shift_deg"] == math.degrees(
+        turned
+    )
     up = nutdamp.load(places.case("genesis-spinup.yaml"))
     for share, change in ((5e-5, False), (8e-5, True), (-8e-5, True)):
         fired = Pulse(1.0, 0.0, "T", np.array([0.0, 0.0, share * up.spin * up.inertia.C]))
@@ -524,19 +716,31 @@ def idle(body: Spacecraft, degrees: float, t: float) -> float:
     return math.degrees(seen_at(by_impulses(left, Schedule(()), t), t).final.nutation)
 
 
-def test_nutation_that_grows_or_decays_is_said_to_keep_the_requirement_for_a_while_or_from_when_on() -> None:
-    """Before any pulse and again after the last one; the times end where a flight without pulses says."""
+def test_nutation_that_grows_or_decays_is_said_to_keep_the_requirement_for_a_while_or_from_when_on() -> (
+    None
+):
+    """Before any pulse and again after the last one; the times end where a flight without pulses
+    says.
+    """
     made = planning.plan(STAGE, "two-pulse")
     levels = {bound: math.radians(0.54) for bound in bounds(STAGE)}
     wide = noted_beside(made, Cases(20_000, 1, 0.99, 1.0, 1.0, 1.0, levels=levels))
-    after, before = (one_of(wide, code) for code in ("grows-again-in-cases", "met-without-pulse-until"))
-    assert codes(noted_beside(made)) == ["tolerances-not-checked", "met-without-pulse-until", "loop-not-judged"]
+    after, before = (
+        one_of(wide, code) for code in ("grows-again-in-cases", "met-without-pulse-until")
+    )
+    assert codes(noted_beside(made)) == [
+        "tolerances-not-checked",
+        "met-without-pulse-until",
+        "loop-not-judged",
+    ]
     assert codes(noted_beside(made, looped=True)) == ["tolerances-not-checked"]
     assert [after["left_deg"], after["after_s"]] == pytest.approx([0.54, made.end])
     for start, lasting in ((1.0, before["until_s"]), (0.54, after["lasting_s"])):
         assert isinstance(lasting, float)
         assert idle(STAGE, start, lasting) == pytest.approx(2.0, rel=1e-4)
-    body = replace(STAGE, inertia=OBLATE, omega0=np.array([5.0, 5.0, 1.0]) * STAGE.omega0, loop=None)
+    body = replace(
+        STAGE, inertia=OBLATE, omega0=np.array([5.0, 5.0, 1.0]) * STAGE.omega0, loop=None
+    )
     body = replace(body, requirement=Requirement(nutation=math.radians(0.5)))
     decays = one_of(noted_beside(planning.plan(body, "two-pulse")), "met-without-pulse-from")
     assert isinstance(decays["from_s"], float)
@@ -554,9 +758,14 @@ def test_nutation_that_grows_or_decays_is_said_to_keep_the_requirement_for_a_whi
         {"keep": (Keep("star", np.array([1.0, 0.0, 0.0]), 0.1),)},
     ],
 )
-def test_where_nothing_grows_beyond_what_is_required_nothing_is_said(change: dict[str, Any]) -> None:
+def test_where_nothing_grows_beyond_what_is_required_nothing_is_said(
+    change: dict[str, Any],
+) -> None:
     body = replace(STAGE, loop=None, dispersions=None, **change)
-    assert set(codes(noted_beside(planning.plan(body, "two-pulse")))) <= {"no-tolerances", "pulses-unneeded"}
+    assert set(codes(noted_beside(planning.plan(body, "two-pulse")))) <= {
+        "no-tolerances",
+        "pulses-unneeded",
+    }
 
 
 def test_what_is_not_shown_and_what_decides_the_failing_cases_is_said() -> None:
@@ -570,22 +779,33 @@ def test_what_is_not_shown_and_what_decides_the_failing_cases_is_said() -> None:
     ):
         verdict = planning.judge(made, replace(cases, probability=probability), results)
         assert codes(verdict_notes(verdict, made)) == expected
-    certain = replace(made.spacecraft, requirement=Requirement(0.01, probability=0.9), dispersions=None)
+    certain = replace(
+        made.spacecraft, requirement=Requirement(0.01, probability=0.9), dispersions=None
+    )
     made = replace(made, spacecraft=certain)
-    assert codes(verdict_notes(planning.judge(made), made))[:2] == ["probability-without-tolerances", "no-tolerances"]
+    assert codes(verdict_notes(planning.judge(made), made))[:2] == [
+        "probability-without-tolerances",
+        "no-tolerances",
+    ]
 
 
 def test_plans_that_keep_the_cones_are_named_where_the_recommended_one_does_not() -> None:
-    """One-pulse leaves the axis where it no longer passes the star, but shifts H by more than is required."""
+    """One-pulse leaves the axis where it no longer passes the star, but shifts H by more than is
+    required.
+    """
     body = nutdamp.example()
-    star = Keep("star", body.direction_in_n(math.radians(8.0), math.radians(210.0)), math.radians(5.2))
+    star = Keep(
+        "star", body.direction_in_n(math.radians(8.0), math.radians(210.0)), math.radians(5.2)
+    )
     compared = compare(replace(body, keep=(star,)), catalogue.CLASSIC, samples=0)
     assert [plan.kept for plan in compared] == [True, False, False]
     alone = Comparison(compared.spacecraft, (compared["two-pulse"],))
     assert one_of(comparison_warnings(compared), "plans-keep-cones")["schemes"] == "one-pulse"
     assert "plans-keep-cones" not in codes(comparison_warnings(alone))
     for tabulated in (False, True):
-        assert ("cone-broken" in codes(comparison_warnings(compared, tabulated=tabulated))) is not tabulated
+        assert (
+            "cone-broken" in codes(comparison_warnings(compared, tabulated=tabulated))
+        ) is not tabulated
     assert codes(reasons(compared)) == ["cheapest-at-end"]
 
 
@@ -606,10 +826,15 @@ class Given(planning.Plan):
         return SimpleNamespace(residual=SimpleNamespace(axis_error=self.off))
 
 
-def given(end: float, cost: float, degrees: float = 0.0, least: float = 0.1, within: float = 40.0) -> Given:
+def given(
+    end: float, cost: float, degrees: float = 0.0, least: float = 0.1, within: float = 40.0
+) -> Given:
     pulse = Pulse(end, 0.0, "+1", np.array([1.0, 0.0, 0.0]), propellant=cost)
     return Given(
-        BODY, "optimal", Schedule((pulse,), bounds=Bounds(least, None, "kg", within)), off=math.radians(degrees)
+        BODY,
+        "optimal",
+        Schedule((pulse,), bounds=Bounds(least, None, "kg", within)),
+        off=math.radians(degrees),
     )
 
 
@@ -624,11 +849,18 @@ def figures(points: tuple[tradeoff.Point, ...]) -> list[tuple[float, float]]:
 def test_each_front_has_what_any_search_found_that_keeps_its_shift_and_none_beats(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Searches: the whole horizon, the fastest, horizons evenly between their ends by ratios; from strict to free."""
+    """Searches: the whole horizon, the fastest, horizons evenly between their ends by ratios; from
+    strict to free.
+    """
     results = iter(
         [
             *(given(30.0, 1.0), given(10.0, 3.0), given(16.0, 2.0), given(25.0, 2.1)),
-            *(given(28.0, 0.9, 5.0), given(8.0, 2.5), given(18.0, 1.5, 2.0), given(20.0, 1.4995, 2.0)),
+            *(
+                given(28.0, 0.9, 5.0),
+                given(8.0, 2.5),
+                given(18.0, 1.5, 2.0),
+                given(20.0, 1.4995, 2.0),
+            ),
         ]
     )
     asked, done = list[tuple[str, bool | None, float]](), list[int]()
@@ -640,16 +872,25 @@ def test_each_front_has_what_any_search_found_that_keeps_its_shift_and_none_beat
 
     monkeypatch.setattr(tradeoff, "plan", search)
     with work.steps(8, hook=lambda count, _: done.append(count)):
-        made = tradeoff.fronts(BODY, nutdamp.OptimalOptions(), count=4, shifts=(math.inf, 0.0, math.inf))
+        made = tradeoff.fronts(
+            BODY, nutdamp.OptimalOptions(), count=4, shifts=(math.inf, 0.0, math.inf)
+        )
     assert [front.shift for front in made] == [0.0, math.inf]
     # The fastest of the free front keeps H too; what saves less than a thousandth is no point.
     assert figures(made[0].points) == [(8.0, 2.5), (16.0, 2.0), (30.0, 1.0)]
     assert figures(made[1].points) == [(8.0, 2.5), (16.0, 2.0), (18.0, 1.5), (28.0, 0.9)]
     for free, first, last in ((False, 10.0, 30.0), (True, 8.0, 28.0)):
-        horizons = [40.0, 40.0, first * (last / first) ** (1 / 3), first * (last / first) ** (2 / 3)]
+        horizons = [
+            40.0,
+            40.0,
+            first * (last / first) ** (1 / 3),
+            first * (last / first) ** (2 / 3),
+        ]
         leasts = ["propellant", "time", "propellant", "propellant"]
         searches = asked[4 * free : 4 * free + 4]
-        assert [(least, freed) for least, freed, _ in searches] == [(least, free) for least in leasts]
+        assert [(least, freed) for least, freed, _ in searches] == [
+            (least, free) for least in leasts
+        ]
         assert [horizon for *_, horizon in searches] == pytest.approx(horizons)
     assert done == list(range(1, 9))
     numbers = [(number, front.shift) for number, front, _ in tradeoff.numbered(made)]
@@ -657,18 +898,29 @@ def test_each_front_has_what_any_search_found_that_keeps_its_shift_and_none_beat
 
 
 def test_the_first_order_least_of_a_front_never_rises_with_time() -> None:
-    """A schedule that a stricter front found has the least of that one, which may be more than this front needs."""
-    plans = [given(10.0, 3.0, 0.0, 2.0, 10.0), given(20.0, 2.0, 0.0, 2.2, 20.0), given(30.0, 1.0, 0.0, 0.7, 40.0)]
+    """A schedule that a stricter front found has the least of that one, which may be more than this
+    front needs.
+    """
+    plans = [
+        given(10.0, 3.0, 0.0, 2.0, 10.0),
+        given(20.0, 2.0, 0.0, 2.2, 20.0),
+        given(30.0, 1.0, 0.0, 0.7, 40.0),
+    ]
     front = tradeoff.Front(0.0, tuple(points(plans)))
     assert [front.least(point) for point in front.points] == [2.0, 2.0, 0.7]
 
 
 def test_no_point_is_beaten_by_one_of_a_stricter_front() -> None:
-    """Random clouds: what allows more is nowhere dearer, and no front has two points that cost the same."""
+    """Random clouds: what allows more is nowhere dearer, and no front has two points that cost the
+    same.
+    """
     draw = np.random.default_rng(5)
     for _ in range(50):
         strict, more = (
-            points([given(*one) for one in (1.0 + draw.uniform(0.0, [10.0, 0.01], (8, 2))).tolist()]) for _ in range(2)
+            points(
+                [given(*one) for one in (1.0 + draw.uniform(0.0, [10.0, 0.01], (8, 2))).tolist()]
+            )
+            for _ in range(2)
         )
         first = tradeoff.undominated(strict)
         second = tradeoff.undominated([*strict, *more], first)
@@ -677,17 +929,24 @@ def test_no_point_is_beaten_by_one_of_a_stricter_front() -> None:
             assert one[1] > two[1]
         for end, cost in figures(first):
             assert min(other for ended, other in figures(second) if ended <= end) <= cost
-        assert all(one.cost > two.cost * (1.0 + SAME_COST) for one, two in itertools.pairwise(first))
+        assert all(
+            one.cost > two.cost * (1.0 + SAME_COST) for one, two in itertools.pairwise(first)
+        )
         assert first[-1].cost <= min(point.cost for point in strict) / (1.0 - SAME_COST)
 
 
 @pytest.mark.deep
-def test_a_point_is_judged_by_all_cases_as_any_schedule_is_or_by_nominal_values_on_request() -> None:
+def test_a_point_is_judged_by_all_cases_as_any_schedule_is_or_by_nominal_values_on_request() -> (
+    None
+):
     """One of four-pulse: 90 % of cases comply."""
     made = planning.plan(nutdamp.example(), "four-pulse")
     point = tradeoff.Point(made, 40.0, "kg")
     assert point.verdict is made.verdict
-    assert (point.verdict.status, point._replace(nominal=True).verdict.status) == (Status.NOT_ENOUGH, Status.FLY)
+    assert (point.verdict.status, point._replace(nominal=True).verdict.status) == (
+        Status.NOT_ENOUGH,
+        Status.FLY,
+    )
 
 
 @pytest.mark.weekly
@@ -697,7 +956,10 @@ def test_fronts_that_are_searched_fly() -> None:
     assert [front.shift for front in made] == [0.0, half, math.inf]
     for front in made:
         assert len(front.points) >= 2
-        leasts = [front.least(point) or 0.0 for point in sorted(front.points, key=lambda one: one.bounds.within)]
+        leasts = [
+            front.least(point) or 0.0
+            for point in sorted(front.points, key=lambda one: one.bounds.within)
+        ]
         assert leasts == sorted(leasts, reverse=True)
         for point in front.points:
             assert violations(BODY, point.plan.pulses) == []
@@ -707,28 +969,43 @@ def test_fronts_that_are_searched_fly() -> None:
             assert present(point.bounds.rigorous) <= point.cost * (1 + 1e-9)
     for strict, free in itertools.pairwise(made):
         for point in strict.points:
-            sooner = [other for other in free.points if other.plan.pulses.end <= point.plan.pulses.end]
+            sooner = [
+                other for other in free.points if other.plan.pulses.end <= point.plan.pulses.end
+            ]
             assert min(other.cost for other in sooner) <= point.cost
 
 
 @pytest.mark.weekly
 def test_impulse_is_traded_in_one_unit_also_where_the_propellant_is_known() -> None:
-    """The fastest schedule, looked for by time, once counted in kg beside N m s, and beat all others."""
+    """The fastest schedule, looked for by time, once counted in kg beside N m s, and beat all
+    others.
+    """
     body = replace(BODY, channels=tuple(one.of(isp=220.0, thrust=10.0) for one in BODY.channels))
-    (front,) = tradeoff.fronts(body, nutdamp.OptimalOptions(least="impulse"), count=3, shifts=(0.0,))
+    (front,) = tradeoff.fronts(
+        body, nutdamp.OptimalOptions(least="impulse"), count=3, shifts=(0.0,)
+    )
     (known,) = tradeoff.fronts(body, nutdamp.OptimalOptions(), count=3, shifts=(0.0,))
-    assert [{point.bounds.unit for point in one.points} for one in (front, known)] == [{"N m s"}, {"kg"}]
+    assert [{point.bounds.unit for point in one.points} for one in (front, known)] == [
+        {"N m s"},
+        {"kg"},
+    ]
     assert len(front.points) == len(known.points) >= 2
-    for by_impulse, by_propellant in zip(front.points, known.points, strict=True):  # all thrusters are alike
+    for by_impulse, by_propellant in zip(
+        front.points, known.points, strict=True
+    ):  # all thrusters are alike
         assert by_impulse.cost == pytest.approx(by_propellant.plan.pulses.total_impulse, rel=1e-6)
 
 
 @pytest.mark.weekly
 def test_no_front_holds_what_a_schedule_of_another_front_beats_in_everything() -> None:
-    """On ticks no schedule leaves H just where it was: one that leaves it as near, as soon and as cheaply counts."""
+    """On ticks no schedule leaves H just where it was: one that leaves it as near, as soon and as
+    cheaply counts.
+    """
     body = nutdamp.load(places.CONFIGS / "couples-minisat.yaml")
     made = tradeoff.fronts(body, nutdamp.OptimalOptions(), count=6, shifts=(0.0, math.inf))
-    for point, other in itertools.product([point for front in made for point in front.points], repeat=2):
+    for point, other in itertools.product(
+        [point for front in made for point in front.points], repeat=2
+    ):
         same = math.isclose(point.cost, other.cost, rel_tol=SAME_COST)
         sooner = other.plan.end < 0.999 * point.plan.end
         near = other.plan.flight.residual.axis_error <= point.plan.flight.residual.axis_error
@@ -736,7 +1013,9 @@ def test_no_front_holds_what_a_schedule_of_another_front_beats_in_everything() -
 
 
 @pytest.mark.weekly
-def test_what_plan_finds_is_traded_where_the_fastest_is_not_found(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_plan_finds_is_traded_where_the_fastest_is_not_found(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """120 short pulses; the search for the fastest tries thousands, and ends without any."""
     body = nutdamp.load(places.case("nothing-damps.yaml"))
     made = planning.plan(body, "optimal", nutdamp.OptimalOptions(free_axis=False))
@@ -754,7 +1033,9 @@ def test_where_optimal_cannot_fire_the_other_schemes_are_traded(run: Run, tmp_pa
     expected = [("two-pulse", "true"), ("one-pulse", "false"), ("two-pulse", "true")]
     assert [(row["scheme"], row["meets_requirement"]) for row in rows] == expected
     assert float(rows[0]["end_s"]) == planning.plan(nutdamp.load(STEERED), "two-pulse").end
-    (front,) = tradeoff.fronts(nutdamp.load(STEERED), nutdamp.OptimalOptions(), count=2, shifts=(0.0,))
+    (front,) = tradeoff.fronts(
+        nutdamp.load(STEERED), nutdamp.OptimalOptions(), count=2, shifts=(0.0,)
+    )
     check_text("plan.trade-others", front.why or "")
 
 
@@ -777,12 +1058,17 @@ def test_nothing_feasible_ends_with_status_3_and_a_reason(run: Run) -> None:
         "thrusters: [{name: T, torque: [1, 0, 0], min_on_time: 1 s}]\nlimits: {horizon: 0.1}\n"
     )
     done = run("trade", "-", "--points", "1", "--allow", "any", stdin=text, columns=200, status=3)
-    check_text("plan.trade-none", "\n".join(line.strip() for line in done.stdout.splitlines() if "none" in line))
+    check_text(
+        "plan.trade-none",
+        "\n".join(line.strip() for line in done.stdout.splitlines() if "none" in line),
+    )
     assert run("trade", "--allow", "-1deg").returncode == 2
 
 
 @pytest.mark.deep
-def test_the_searches_of_all_points_share_a_limit_of_work(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_searches_of_all_points_share_a_limit_of_work(
+    run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """But that of the whole horizon, as `plan` finds it; the others would take 490 units."""
     with work.budget("test", 1e9) as whole:
         planning.plan(nutdamp.example(), "optimal", nutdamp.OptimalOptions(free_axis=False))
@@ -792,11 +1078,16 @@ def test_the_searches_of_all_points_share_a_limit_of_work(run: Run, monkeypatch:
     assert spent.done < whole.done + work.FRONTS + 150.0  # with bounds
     command = ("trade", "--points", "3", "--allow", "0deg")
     done = run(*command, status=0)
-    check_text("plan.trade-cut", "\n".join(line for line in done.stderr.splitlines() if "point" in line))
+    check_text(
+        "plan.trade-cut", "\n".join(line for line in done.stderr.splitlines() if "point" in line)
+    )
     monkeypatch.setattr(work, "FRONTS", 5.0)
     monkeypatch.setattr(work, "SCHEME", 5.0)
     none = run(*command, "--csv", "-", status=0)
-    assert {row["scheme"] for row in csv.DictReader(io.StringIO(none.stdout))} <= {"two-pulse", "four-pulse"}
+    assert {row["scheme"] for row in csv.DictReader(io.StringIO(none.stdout))} <= {
+        "two-pulse",
+        "four-pulse",
+    }
 
 
 # --- certificates, checked from the file alone by certificate_checker
@@ -804,7 +1095,11 @@ def test_the_searches_of_all_points_share_a_limit_of_work(run: Run, monkeypatch:
 WEAK, STRONG = cross(8.0), cross(4_000.0)
 PLAIN, IMPULSE = nutdamp.OptimalOptions(), nutdamp.OptimalOptions(least="impulse")
 WINDOWS = Limits(earliest=3.0, horizon=70.0, blackout=((10.0, 22.5), (40.0, 41.0)))
-ONE_WAY = (channel("T1", 8.0, 0.0, 0.0), channel("T2", -3.0, 5.0, 0.0), channel("T3", 1.0, -9.0, 0.0))
+ONE_WAY = (
+    channel("T1", 8.0, 0.0, 0.0),
+    channel("T2", -3.0, 5.0, 0.0),
+    channel("T3", 1.0, -9.0, 0.0),
+)
 BRIEF = Limits(horizon=40.0)
 PROLATE = spinner(channels=WEAK, limits=Limits(horizon=60.0))
 OBLATE_BODY = spinner(100.0, 150.0, channels=WEAK, limits=BRIEF)
@@ -819,7 +1114,10 @@ BODIES: dict[str, tuple[Spacecraft, nutdamp.OptimalOptions]] = {
     "strong in windows": (spinner(channels=STRONG, limits=WINDOWS), IMPULSE),
     "one way only": (spinner(channels=ONE_WAY, limits=Limits(horizon=90.0)), IMPULSE),
     "free axis": (spinner(channels=ONE_WAY), nutdamp.OptimalOptions(free_axis=True)),
-    "shift": (spinner(channels=STRONG, limits=Limits(horizon=5.0)), nutdamp.OptimalOptions(shift=math.radians(0.3))),
+    "shift": (
+        spinner(channels=STRONG, limits=Limits(horizon=5.0)),
+        nutdamp.OptimalOptions(shift=math.radians(0.3)),
+    ),
     "steerable beside": (spinner(channels=WEAK, steerable=Steerable(20.0)), PLAIN),
     "turned": (replace(PROLATE, goal=TURNED), PLAIN),
     "spun up": (replace(spinner(channels=(*WEAK, ROLL), limits=BRIEF), goal=FASTER), IMPULSE),
@@ -855,7 +1153,9 @@ TAMPERED: list[Callable[[dict[str, Any]], None]] = [
     halved("equations", 0, "goal_Nms"),
     lambda c: c.update(bound=1.001 * c["bound"]),
     halved("channels", 0, "cost_per_s"),
-    lambda c: c["channels"][0].update(torque_Nm=[1.1 * one for one in c["channels"][0]["torque_Nm"]]),
+    lambda c: c["channels"][0].update(
+        torque_Nm=[1.1 * one for one in c["channels"][0]["torque_Nm"]]
+    ),
     halved("burns", 0, "on_time_s"),
     lambda c: c["burns"][0].update(t_s=c["burns"][0]["t_s"] + 0.4),
     halved("primer", 0, "q", "+1", 7),
@@ -877,7 +1177,8 @@ def refutes(text: str, *tampers: Callable[[dict[str, Any]], None]) -> None:
 def test_the_file_alone_proves_the_bound_and_a_tampered_one_does_not(name: str) -> None:
     body, options = BODIES[name]
     made = tradeoff.certificate(planning.plan(body, "optimal", options))
-    text, bounds = json_text(certificate_json(made)), present(made.plan.pulses.bounds)
+    text = json_text(certificate_json(made))
+    bounds = present(made.plan.pulses.bounds)
     assert check(text) == bounds.first_order == made.proof.bound > 0.0
     if "windows" in name:
         refutes(text, *TAMPERED)
@@ -885,11 +1186,15 @@ def test_the_file_alone_proves_the_bound_and_a_tampered_one_does_not(name: str) 
 
 @pytest.mark.deep
 def test_firing_in_the_dark_would_be_worth_more() -> None:
-    """The prices know of the windows: where they end, q goes above the price of a channel that acts at once."""
+    """The prices know of the windows: where they end, q goes above the price of a channel that acts
+    at once.
+    """
     two = channel("T", 4_000.0, 0.0, 0.0), channel("U", 0.0, -4_000.0, 0.0)
     options = nutdamp.OptimalOptions(least="impulse", free_axis=True)
     content = certificate_json(
-        tradeoff.certificate(planning.plan(spinner(channels=two, limits=Limits(horizon=2.0)), "optimal", options))
+        tradeoff.certificate(
+            planning.plan(spinner(channels=two, limits=Limits(horizon=2.0)), "optimal", options)
+        )
     )
     check(json_text(content))
     content["windows_s"] = [[0.0, 90.0]]
@@ -897,8 +1202,12 @@ def test_firing_in_the_dark_would_be_worth_more() -> None:
         check(json_text(content))
 
 
-def test_what_has_no_certificate_says_why_and_the_command_what_to_name(run: Run, tmp_path: Path) -> None:
-    """Optimal is infeasible within a millisecond, which only planning shows: the screen is shown too."""
+def test_what_has_no_certificate_says_why_and_the_command_what_to_name(
+    run: Run, tmp_path: Path
+) -> None:
+    """Optimal is infeasible within a millisecond, which only planning shows: the screen is shown
+    too.
+    """
     with refused(BadRequest, "plan.certificate-of-other"):
         tradeoff.certificate(planning.plan(PROLATE, "four-pulse"))
     for status, scheme in ((2, ("two-pulse",)), (1, ("optimal", "--set", "limits.horizon=1 ms"))):
@@ -910,7 +1219,17 @@ def test_what_has_no_certificate_says_why_and_the_command_what_to_name(run: Run,
 
 def test_the_command_writes_the_file_and_says_what_it_proves(run: Run, tmp_path: Path) -> None:
     limits = ("--nominal", "--set", "limits.horizon=30 s")
-    result = run("plan", "-v", "--scheme", "optimal", "--certificate", "proof.json", *limits, columns=200, status=0)
+    result = run(
+        "plan",
+        "-v",
+        "--scheme",
+        "optimal",
+        "--certificate",
+        "proof.json",
+        *limits,
+        columns=200,
+        status=0,
+    )
     text = (tmp_path / "proof.json").read_text()
     assert json.loads(text)["unit"] == "kg"
     assert f"small-angle bound within 30 s: {1e3 * check(text):.4g} g" in result.stdout
@@ -918,8 +1237,20 @@ def test_the_command_writes_the_file_and_says_what_it_proves(run: Run, tmp_path:
 
 
 @pytest.mark.deep
-def test_where_another_plan_is_recommended_the_command_says_whose_certificate_it_writes(run: Run) -> None:
-    command = ("plan", "--scheme", "optimal", "--scheme", "two-pulse", "--certificate", "proof.json", "--json", "-")
+def test_where_another_plan_is_recommended_the_command_says_whose_certificate_it_writes(
+    run: Run,
+) -> None:
+    command = (
+        "plan",
+        "--scheme",
+        "optimal",
+        "--scheme",
+        "two-pulse",
+        "--certificate",
+        "proof.json",
+        "--json",
+        "-",
+    )
     nominal, dispersed = (run(*command, *each, columns=200) for each in (["--nominal"], []))
     schemes = [json.loads(one.stdout)["decision"]["scheme"] for one in (nominal, dispersed)]
     assert schemes == ["optimal", "two-pulse"]

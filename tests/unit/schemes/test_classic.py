@@ -1,4 +1,6 @@
-"""One pulse (21), two pulses (22) and pulses at every alignment, Magnus 1970: torquers and body-fixed thrusters."""
+"""One pulse (21), two pulses (22) and pulses at every alignment, Magnus 1970: torquers and
+body-fixed thrusters.
+"""
 
 import cmath
 import itertools
@@ -50,12 +52,20 @@ NANODEGREE = math.radians(1e-9)
 BODIES = [(120.0, 80.0), (80.0, 120.0), (100.0, 190.0), (100.0, 10.0)]
 SPINS = [3.0, -3.0]
 SPHERE = (100.0, 100.0)
-each_body = spread(("A", "C", "spin"), [(*body, spin) for body in BODIES for spin in SPINS], quick=4, deep=4)
-each_shape = pytest.mark.parametrize(("A", "C", "spin"), [(*body, s) for body in [*BODIES, SPHERE] for s in SPINS])
+each_body = spread(
+    ("A", "C", "spin"), [(*body, spin) for body in BODIES for spin in SPINS], quick=4, deep=4
+)
+each_shape = pytest.mark.parametrize(
+    ("A", "C", "spin"), [(*body, s) for body in [*BODIES, SPHERE] for s in SPINS]
+)
 
 
-def check_exact(spacecraft: Spacecraft, scheme: str, count: int, *, by_reference: bool = True) -> planning.Plan:
-    """No nutation is left, and of two pulses no shift of H, flown and by the reference integrator."""
+def check_exact(
+    spacecraft: Spacecraft, scheme: str, count: int, *, by_reference: bool = True
+) -> planning.Plan:
+    """No nutation is left, and of two pulses no shift of H,
+    flown and by the reference integrator.
+    """
     plan = feasible_by(scheme, spacecraft)
     assert len(plan.pulses) == count
     ends = [(left(plan).nutation, left(plan).momentum_shift)]
@@ -88,21 +98,33 @@ def why_not(*cases: tuple[str, Spacecraft] | tuple[str, Spacecraft, Options]) ->
 
 def test_what_cannot_be_has_a_reason() -> None:
     axial = channel("spin-up", 1.0, 0.0, 5.0)
-    soon, narrow = Limits(horizon=0.5), cross(5.0, min_on_time=0.1, max_on_time=0.5)
+    soon = Limits(horizon=0.5)
+    narrow = cross(5.0, min_on_time=0.1, max_on_time=0.5)
     early: dict[str, Any] = {"channels": cross(20.0), "limits": Limits(earliest=1e6)}
-    first = [spinner(channels=cross(20.0, min_on_time=least)[:1], limits=soon) for least in (0.02, 0.0)]
+    first = [
+        spinner(channels=cross(20.0, min_on_time=least)[:1], limits=soon) for least in (0.02, 0.0)
+    ]
     check_text(
         "classic.why-not",
         why_not(
-            *((scheme, spinner(*SPHERE, channels=cross(8.0)[:1])) for scheme in ("one-pulse", "two-pulse")),
+            *(
+                (scheme, spinner(*SPHERE, channels=cross(8.0)[:1]))
+                for scheme in ("one-pulse", "two-pulse")
+            ),
             *((scheme, spinner(channels=(axial,))) for scheme in ("one-pulse", "two-pulse")),
             *((scheme, body) for scheme in ("one-pulse", "four-pulse") for body in first),
             ("one-pulse", spinner(degrees=0.1, channels=cross(20.0, min_on_time=1.0))),
-            *(("one-pulse", spinner(steerable=torquer, **early)) for torquer in (None, Steerable(20.0))),
+            *(
+                ("one-pulse", spinner(steerable=torquer, **early))
+                for torquer in (None, Steerable(20.0))
+            ),
             ("two-pulse", spinner(degrees=30.0, steerable=Steerable(1.0))),
             ("two-pulse", spinner(limits=Limits(max_pulses=1))),
             ("four-pulse", spinner()),
-            *(("four-pulse", spinner(channels=narrow), Options(on_time=on_time)) for on_time in (0.05, 0.6)),
+            *(
+                ("four-pulse", spinner(channels=narrow), Options(on_time=on_time))
+                for on_time in (0.05, 0.6)
+            ),
         ),
     )
     plan = feasible_by("two-pulse", spinner(channels=(*cross(40.0), axial)))
@@ -115,26 +137,45 @@ def test_the_horizon_that_is_named_is_long_enough(scheme: str) -> None:
     for torque, shortest in itertools.product((3.0, 30.0, 300.0), (0.0, 0.02)):
         jet = (channel("T", torque, 0.0, 0.0, min_on_time=shortest),)
         why = why_not((scheme, spinner(channels=jet, limits=Limits(horizon=0.3))))
-        named = present(re.search(r"would end at (\S+) s: set limits.horizon beyond that", why), why)
-        feasible_by(scheme, spinner(channels=jet, limits=Limits(horizon=float(named[1]) * (1.0 + 1e-5))))
+        named = present(
+            re.search(r"would end at (\S+) s: set limits.horizon beyond that", why), why
+        )
+        feasible_by(
+            scheme, spinner(channels=jet, limits=Limits(horizon=float(named[1]) * (1.0 + 1e-5)))
+        )
 
 
-@pytest.mark.parametrize(("scheme", "size"), [("one-pulse", 6.0), ("two-pulse", 5.0), ("four-pulse", 1.0)])
-def test_skew_channels_change_the_spin_by_their_axial_impulse_over_c(scheme: str, size: float) -> None:
-    """The on-times count the changing spin, so that one-pulse and four-pulse still leave nothing."""
+@pytest.mark.parametrize(
+    ("scheme", "size"), [("one-pulse", 6.0), ("two-pulse", 5.0), ("four-pulse", 1.0)]
+)
+def test_skew_channels_change_the_spin_by_their_axial_impulse_over_c(
+    scheme: str, size: float
+) -> None:
+    """The on-times count the changing spin,
+    so that one-pulse and four-pulse still leave nothing.
+    """
     torques = {"a": (6.0, 0.0, 0.5), "b": (-6.0, 1.0, 0.2), "c": (0.0, -5.0, -0.4)}
-    spacecraft = spinner(channels=tuple(channel(name, *(size * one for one in T)) for name, T in torques.items()))
+    spacecraft = spinner(
+        channels=tuple(channel(name, *(size * one for one in T)) for name, T in torques.items())
+    )
     plan = feasible_by(scheme, spacecraft)
-    axial, outcome = math.fsum(pulse.impulse[2] for pulse in plan.pulses), Outcome(spacecraft, plan.pulses)
+    axial = math.fsum(pulse.impulse[2] for pulse in plan.pulses)
+    outcome = Outcome(spacecraft, plan.pulses)
     assert axial != 0.0
     assert plan.spin_change == pytest.approx(axial / 80.0, rel=1e-9)
     assert outcome.spin - 3.0 == pytest.approx(axial / 80.0, abs=1e-11)
-    assert outcome.nutation == pytest.approx(left(plan).nutation if scheme == "two-pulse" else 0.0, abs=1e-10)
+    assert outcome.nutation == pytest.approx(
+        left(plan).nutation if scheme == "two-pulse" else 0.0, abs=1e-10
+    )
 
 
 @pytest.mark.parametrize("scheme", ["one-pulse", "two-pulse"])
 def test_on_a_sphere_a_channel_opposite_to_omega_works(scheme: str) -> None:
-    plan = check_exact(spinner(*SPHERE, phase=-0.5 * math.pi, channels=cross(8.0)), scheme, 1 + (scheme == "two-pulse"))
+    plan = check_exact(
+        spinner(*SPHERE, phase=-0.5 * math.pi, channels=cross(8.0)),
+        scheme,
+        1 + (scheme == "two-pulse"),
+    )
     assert {pulse.channel for pulse in plan.pulses} == {"+2"}
 
 
@@ -154,7 +195,9 @@ def test_one_ideal_steerable_impulse_at_once(A: float, C: float, spin: float) ->
 def test_one_steerable_pulse_of_real_width_or_a_train_where_the_torquer_is_too_weak(
     A: float, C: float, spin: float
 ) -> None:
-    """Up to nine tenths of what one pulse can do at all, 2M/|aω3|; the last of a train stands against what is left."""
+    """Up to nine tenths of what one pulse can do at all, 2M/|aω3|; the last of a train stands
+    against what is left.
+    """
     plain = spinner(A, C, spin, 8.0)
     rate = max(abs(plain.inertia.a * spin), 0.3)
     for share in (0.1, 0.9):
@@ -167,13 +210,22 @@ def test_one_steerable_pulse_of_real_width_or_a_train_where_the_torquer_is_too_w
         plan = feasible_by("one-pulse", weak)
         check_exact(weak, "one-pulse", len(plan.pulses))
         assert len(plan.pulses) > 5
-        assert max(pulse.on_time for pulse in plan.pulses) <= 0.25 * plain.body_period * (1 + 1e-9)  # 10 % lost
+        assert max(pulse.on_time for pulse in plan.pulses) <= 0.25 * plain.body_period * (
+            1 + 1e-9
+        )  # 10 % lost
 
 
 def test_a_steerable_pulse_starts_no_sooner_than_it_may() -> None:
-    """Not at -1e-17 s by rounding of impulse over torque; one of 1.06 s fits neither before nor between windows."""
+    """Not at -1e-17 s by rounding of impulse over torque; one of 1.06 s fits neither before nor
+    between windows.
+    """
     for torque in range(5, 105):
-        assert planning.plan(spinner(steerable=Steerable(torque / 0.7)), "one-pulse").pulses.pulses[0].start >= 0.0
+        assert (
+            planning.plan(spinner(steerable=Steerable(torque / 0.7)), "one-pulse")
+            .pulses.pulses[0]
+            .start
+            >= 0.0
+        )
     limits = Limits(earliest=1.0, blackout=((1.2, 4.0), (4.5, 5.0)))
     (only,) = feasible_by("one-pulse", spinner(steerable=Steerable(20.0), limits=limits)).pulses
     assert only.start == 5.0
@@ -183,35 +235,48 @@ def test_a_steerable_pulse_starts_no_sooner_than_it_may() -> None:
 def test_a_fixed_pulse_waits_until_it_opposes_omega_and_short_ones_make_a_train(
     A: float, C: float, spin: float
 ) -> None:
-    """Pulses of real width that leave nothing; equal ones come at successive alignments, one body period apart."""
+    """Pulses of real width that leave nothing; equal ones come at successive alignments, one body
+    period apart.
+    """
     for channels in (cross(60.0)[:1], cross(60.0), fan(3, 50.0), fan(6, 80.0)):
         spacecraft = spinner(A, C, spin, 2.0, channels=channels)
         check_opposed(spacecraft, check_exact(spacecraft, "one-pulse", 1).pulses)
     plain = spinner(A, C, spin, 6.0)
-    period, longest = plain.body_period, plain.least_impulse / 30.0 / 5.5
+    period = plain.body_period
+    longest = plain.least_impulse / 30.0 / 5.5
     jet = (channel("+2", 0.0, 30.0, 0.0, max_on_time=longest),)
-    plan = feasible_by("one-pulse", spinner(A, C, spin, 6.0, channels=jet, limits=Limits(horizon=30 * period)))
+    plan = feasible_by(
+        "one-pulse", spinner(A, C, spin, 6.0, channels=jet, limits=Limits(horizon=30 * period))
+    )
     count = len(plan.pulses)
     assert count >= 6
-    assert np.diff([one.t for one in plan.pulses]) == pytest.approx([period] * (count - 1), rel=1e-12)
+    assert np.diff([one.t for one in plan.pulses]) == pytest.approx(
+        [period] * (count - 1), rel=1e-12
+    )
     assert len({round(one.on_time / longest, 12) for one in plan.pulses}) == 1
     assert left(plan).nutation < NANODEGREE
 
 
 def test_what_one_pulse_is_chosen_and_what_ticks_and_max_pulses_leave() -> None:
-    """Half a tick of on-time in about a second, half a tick of turning at 1 rad/s, of 5° are left."""
+    """Half a tick of on-time in about a second, half a tick of turning at 1 rad/s,
+    of 5° are left.
+    """
     channels = (
         channel("weak", 0.0, 5.0, 0.0, max_on_time=0.2, isp=300.0, thrust=1.0),
         channel("thirsty", 40.0, 0.0, 0.0, isp=100.0, thrust=20.0),
         channel("thrifty", -40.0, 0.0, 0.0, isp=300.0, thrust=20.0),
     )
-    assert [one.channel for one in feasible_by("one-pulse", spinner(channels=channels)).pulses] == ["thrifty"]
+    assert [one.channel for one in feasible_by("one-pulse", spinner(channels=channels)).pulses] == [
+        "thrifty"
+    ]
     plan = feasible_by("one-pulse", spinner(channels=cross(20.0), limits=Limits(tick=0.01)))
     assert NANODEGREE < left(plan).nutation < math.radians(5.0) * 0.02
     jet = (channel("+2", 0.0, 30.0, 0.0, max_on_time=0.1),)
     plan = feasible_by("one-pulse", spinner(degrees=6.0, channels=jet, limits=Limits(max_pulses=3)))
     assert len(plan.pulses) == 3
-    assert 120.0 * rate_after(plan) == pytest.approx(plan.spacecraft.least_impulse - 3 * 30.0 * 0.1, rel=1e-3)
+    assert 120.0 * rate_after(plan) == pytest.approx(
+        plan.spacecraft.least_impulse - 3 * 30.0 * 0.1, rel=1e-3
+    )
     check_text("classic.max-pulses", noted(plan_notes(plan)))
 
 
@@ -220,11 +285,21 @@ def test_one_pulse_allowed_where_more_are_needed_does_what_one_can() -> None:
 
     With some torques rounding puts the most a pulse can do beyond itself; the on-time stays finite.
     """
-    torques = 31.45693363119974, 7.351789651391229, 4.901146515066305, 0.8803215669495988, 22.257278416867518
+    torques = (
+        31.45693363119974,
+        7.351789651391229,
+        4.901146515066305,
+        0.8803215669495988,
+        22.257278416867518,
+    )
     A = 111.32708414993223
-    for torque, ratio, phase, axial in itertools.product(torques, (0.8, 2.0, 1.25, 1 / 3), (0.1, 1.0, 2.0), (0.0, 9.0)):
+    for torque, ratio, phase, axial in itertools.product(
+        torques, (0.8, 2.0, 1.25, 1 / 3), (0.1, 1.0, 2.0), (0.0, 9.0)
+    ):
         jet = (channel("+1", torque, 0.0, axial if torque > 10 else 0.0),)
-        body = spinner(A, A * ratio, 1.0648047448322029, 50.0, phase, channels=jet, limits=Limits(max_pulses=1))
+        body = spinner(
+            A, A * ratio, 1.0648047448322029, 50.0, phase, channels=jet, limits=Limits(max_pulses=1)
+        )
         made = planning.plan(body, "one-pulse").pulses
         assert 0.0 < made.pulses[0].on_time <= 0.5 * body.body_period * (1 + 1e-9)
         assert len(made) == 1
@@ -232,30 +307,45 @@ def test_one_pulse_allowed_where_more_are_needed_does_what_one_can() -> None:
 
 @pytest.mark.parametrize("spin", SPINS)
 @spread("a", [round(0.1 * tenth, 1) for tenth in range(-9, 10)], quick=7, deep=12)
-def test_two_ideal_pulses_are_exact_at_every_angle_for_the_impulse_of_the_floor(a: float, spin: float) -> None:
+def test_two_ideal_pulses_are_exact_at_every_angle_for_the_impulse_of_the_floor(
+    a: float, spin: float
+) -> None:
     """Nutation and shift of H below 1e-9 deg by (17) for θ0 = 2…60°; Σ|J| = A|ω0| to 1e-12."""
     for degrees in (2.0, 5.0, 10.0, 20.0, 30.0, 45.0, 60.0):
         by_reference = degrees in (2.0, 60.0) and a in (-0.9, 0.0, 0.3)
-        spacecraft = spinner(100.0, 100.0 * (1 - a), spin, degrees)  # no actuator named: an ideal steerable impulse
+        spacecraft = spinner(
+            100.0, 100.0 * (1 - a), spin, degrees
+        )  # no actuator named: an ideal steerable impulse
         plan = check_exact(spacecraft, "two-pulse", 2, by_reference=by_reference)
-        assert max(present(plan.residual).nutation, present(plan.residual).momentum_shift) < NANODEGREE
+        assert (
+            max(present(plan.residual).nutation, present(plan.residual).momentum_shift) < NANODEGREE
+        )
         assert plan.pulses.total_impulse == pytest.approx(spacecraft.least_impulse, rel=1e-12)
 
 
 @pytest.mark.parametrize("spin", SPINS)
 @pytest.mark.parametrize(("A", "C"), [*BODIES[:2], SPHERE])
 def test_two_pulses_of_real_width_are_exact(A: float, C: float, spin: float) -> None:
-    """Directions, on-times and moments are trimmed: pulses as long as half the wait leave nothing."""
+    """Directions, on-times and moments are trimmed:
+    pulses as long as half the wait leave nothing.
+    """
     for torque in (200.0, 30.0):
         check_exact(spinner(A, C, spin, degrees=10.0, steerable=Steerable(torque)), "two-pulse", 2)
 
 
 @spread("spin", SPINS, quick=2)
 @spread(("A", "C"), [*BODIES[:3], (100.0, 80.0), (100.0, 133.0), (100.0, 35.0)], quick=1, deep=5)
-def test_two_pulses_of_fixed_channels_are_exact_after_trimming(A: float, C: float, spin: float) -> None:
+def test_two_pulses_of_fixed_channels_are_exact_after_trimming(
+    A: float, C: float, spin: float
+) -> None:
     """No nutation and H back where it was, on the real widths, with ±1, ±2 or five directions."""
     for degrees in (0.5, 5.0, 15.0):
-        check_exact(spinner(A, C, spin, degrees, channels=cross(150.0)), "two-pulse", 2, by_reference=degrees == 5.0)
+        check_exact(
+            spinner(A, C, spin, degrees, channels=cross(150.0)),
+            "two-pulse",
+            2,
+            by_reference=degrees == 5.0,
+        )
     check_exact(spinner(A, C, spin, channels=fan(5, 150.0)), "two-pulse", 2, by_reference=False)
 
 
@@ -265,14 +355,19 @@ def test_literal_reproduces_the_printed_scheme(spin: float) -> None:
     for degrees, displaced, digit in ((2.0, 0.0016, 5e-5), (10.0, 0.19, 5e-3), (30.0, 5.1, 0.05)):
         plan = feasible_by("two-pulse", spinner(120.0, 80.0, spin, degrees), Options(literal=True))
         first, second = plan.pulses
-        half, omega = 0.5 * plan.spacecraft.least_impulse, plan.spacecraft.transverse_rate
+        half = 0.5 * plan.spacecraft.least_impulse
+        omega = plan.spacecraft.transverse_rate
         assert (first.magnitude, second.magnitude) == pytest.approx((half, half), rel=1e-15)
-        assert second.t - first.t == pytest.approx(math.pi / math.hypot(omega, 80.0 / 120.0 * spin), rel=1e-14)
+        assert second.t - first.t == pytest.approx(
+            math.pi / math.hypot(omega, 80.0 / 120.0 * spin), rel=1e-14
+        )
         assert left(plan).nutation < NANODEGREE
         assert math.degrees(left(plan).momentum_shift) == pytest.approx(displaced, abs=digit)
 
 
-def test_the_second_waits_for_a_later_half_turn_where_a_window_or_a_gap_rules_out_the_first() -> None:
+def test_the_second_waits_for_a_later_half_turn_where_a_window_or_a_gap_rules_out_the_first() -> (
+    None
+):
     half = rigid_body.half_pulses(120.0, 80.0, spinner().transverse_rate, 3.0).wait
     assert check_exact(spinner(), "two-pulse", 2).pulses.end == pytest.approx(half, rel=1e-12)
     covered = spinner(limits=Limits(blackout=((0.5 * half, 2.0 * half),), earliest=0.0))
@@ -284,17 +379,26 @@ def test_the_second_waits_for_a_later_half_turn_where_a_window_or_a_gap_rules_ou
 
 
 @pytest.mark.parametrize("spin", SPINS)
-def test_where_fixed_channels_never_line_up_the_cost_is_that_of_the_physics_sheet(spin: float) -> None:
-    """A/C = 1.25 with ±1, ±2 costs 1/cos 18° = 1.051 × A|ω0| at any horizon: small angle, pulses short."""
+def test_where_fixed_channels_never_line_up_the_cost_is_that_of_the_physics_sheet(
+    spin: float,
+) -> None:
+    """A/C = 1.25 with ±1, ±2 costs 1/cos 18° = 1.051 × A|ω0| at any horizon: small angle, pulses
+    short.
+    """
     for horizon in (None, 500.0):
-        body = spinner(100.0, 80.0, spin, 0.1, channels=cross(1000.0), limits=Limits(horizon=horizon))
+        body = spinner(
+            100.0, 80.0, spin, 0.1, channels=cross(1000.0), limits=Limits(horizon=horizon)
+        )
         cost = check_exact(body, "two-pulse", 2, by_reference=False).pulses.total_impulse
         assert cost / body.least_impulse == pytest.approx(1 / math.cos(math.radians(18)), rel=1e-4)
 
 
 def test_channels_at_the_mounting_angle_need_no_more_than_the_floor() -> None:
     """Two fixed actuators that push both ways: half a turn apart, for A|ω0| and the width."""
-    omega, wait = spinner().transverse_rate, rigid_body.half_pulses(120.0, 80.0, spinner().transverse_rate, 3.0).wait
+    omega, wait = (
+        spinner().transverse_rate,
+        rigid_body.half_pulses(120.0, 80.0, spinner().transverse_rate, 3.0).wait,
+    )
     angle = rigid_body.mounting_angle(120.0, 80.0, omega, 3.0)
     turns = 2000.0 * np.exp(1j * np.array([0.0, math.pi, angle, angle + math.pi]))
     pair = tuple(channel(f"T{number}", one.real, one.imag, 0.0) for number, one in enumerate(turns))
@@ -311,20 +415,34 @@ def test_on_times_too_short_leave_a_remainder_and_say_so() -> None:
     check_text("classic.too-short", noted(plan_notes(plan)))
 
 
-@spread("channels", [fan(3, 8.0), fan(5, 8.0), cross(8.0, max_on_time=2.0)], deep=2, ids=["3", "5", "±1±2"])
-def test_of_pairs_that_cost_about_the_same_the_first_to_end_is_taken(channels: tuple[Channel, ...]) -> None:
-    """With three channels the cheapest pair saves 0.04 % and ends 2.4 s later than the first exact one."""
+@spread(
+    "channels",
+    [fan(3, 8.0), fan(5, 8.0), cross(8.0, max_on_time=2.0)],
+    deep=2,
+    ids=["3", "5", "±1±2"],
+)
+def test_of_pairs_that_cost_about_the_same_the_first_to_end_is_taken(
+    channels: tuple[Channel, ...],
+) -> None:
+    """With three channels the cheapest pair saves 0.04 % and ends 2.4 s later than the first exact
+    one.
+    """
     spacecraft = spinner(channels=channels)
-    weighed, taken = planning.alternatives(spacecraft, "two-pulse"), feasible_by("two-pulse", spacecraft).pulses
+    weighed = planning.alternatives(spacecraft, "two-pulse")
+    taken = feasible_by("two-pulse", spacecraft).pulses
     assert len(weighed) > 2
     for plan in weighed:
         assert violations(spacecraft, plan.pulses) == []
         assert len(plan.pulses) == 2
         assert left(plan).nutation < spacecraft.nutation
-    assert any(np.allclose([one.t for one in plan.pulses], [one.t for one in taken]) for plan in weighed)
+    assert any(
+        np.allclose([one.t for one in plan.pulses], [one.t for one in taken]) for plan in weighed
+    )
     if len(channels) % 2:
         cheapest = min(weighed, key=lambda plan: plan.pulses.total_impulse).pulses
-        ends = [one.end for one in weighed if one.pulses.total_impulse <= 1.01 * cheapest.total_impulse]
+        ends = [
+            one.end for one in weighed if one.pulses.total_impulse <= 1.01 * cheapest.total_impulse
+        ]
         assert len(ends) > 2
         assert ends == sorted(ends)
         assert taken.end == ends[0] != cheapest.end
@@ -338,14 +456,23 @@ def test_of_pairs_that_cost_about_the_same_the_first_to_end_is_taken(channels: t
 def test_pulses_come_a_quarter_of_the_body_period_apart(A: float, C: float, spin: float) -> None:
     """To 1e-12 relative, with ±1, ±2 in the order in which ω passes them: mirrored for aω3 < 0."""
     plain = spinner(A, C, spin, 8.0)
-    spacecraft = spinner(A, C, spin, 8.0, channels=cross(plain.least_impulse / plain.body_period * 4))
-    made = feasible_by("four-pulse", spacecraft, Options(on_time=plain.body_period / 100, coarse=True)).pulses
+    spacecraft = spinner(
+        A, C, spin, 8.0, channels=cross(plain.least_impulse / plain.body_period * 4)
+    )
+    made = feasible_by(
+        "four-pulse", spacecraft, Options(on_time=plain.body_period / 100, coarse=True)
+    ).pulses
     assert len(made) > 10
     gaps = np.diff([one.t for one in made])
     assert gaps == pytest.approx([plain.body_period / 4] * len(gaps), rel=1e-12)
     turn = ["+1", "-2", "-1", "+2"] if (A - C) * spin > 0 else ["+1", "+2", "-1", "-2"]
     order = [pulse.channel for pulse in made]
-    assert order == list(itertools.islice(itertools.cycle(turn), 4 + len(order)))[turn.index(order[0]) :][: len(order)]
+    assert (
+        order
+        == list(itertools.islice(itertools.cycle(turn), 4 + len(order)))[turn.index(order[0]) :][
+            : len(order)
+        ]
+    )
 
 
 @spread(("A", "C", "spin"), [(*body, spin) for body in BODIES for spin in SPINS], quick=1, deep=2)
@@ -353,7 +480,8 @@ def test_coarse_pulses_leave_at_most_half_a_pulse(A: float, C: float, spin: floa
     """|ω| <= J/(2A), and each pulse before takes |ω| down by J/A (times its width factor)."""
     for share in (0.013, 0.03, 0.1, 0.4):
         plain = spinner(A, C, spin, 8.0)
-        on_time, least = plain.body_period / 50, plain.least_impulse
+        on_time = plain.body_period / 50
+        least = plain.least_impulse
         impulse = share * least
         spacecraft = spinner(A, C, spin, 8.0, channels=cross(impulse / on_time))
         plan = feasible_by("four-pulse", spacecraft, Options(on_time=on_time, coarse=True))
@@ -362,7 +490,9 @@ def test_coarse_pulses_leave_at_most_half_a_pulse(A: float, C: float, spin: floa
         half = 0.5 * abs(spacecraft.inertia.a * spin) * on_time
         expected = abs(least - len(plan.pulses) * impulse * math.sin(half) / half)
         assert A * rate_after(plan) == pytest.approx(expected, abs=1e-10 * least)
-        assert Outcome(spacecraft, plan.pulses).nutation == pytest.approx(left(plan).nutation, abs=1e-9)
+        assert Outcome(spacecraft, plan.pulses).nutation == pytest.approx(
+            left(plan).nutation, abs=1e-9
+        )
 
 
 @each_body
@@ -375,11 +505,16 @@ def test_fine_damping_leaves_nothing(A: float, C: float, spin: float) -> None:
             assert any(code.startswith("remains-") for code in codes(plan_notes(plan)))
         else:
             assert left(plan).nutation < NANODEGREE
-            assert len(plan.pulses) == 1 or plan.pulses.pulses[-1].on_time < plan.pulses.pulses[0].on_time
+            assert (
+                len(plan.pulses) == 1
+                or plan.pulses.pulses[-1].on_time < plan.pulses.pulses[0].on_time
+            )
 
 
 @each_body
-def test_fine_damping_with_a_shortest_pulse_leaves_nothing_or_half_of_it(A: float, C: float, spin: float) -> None:
+def test_fine_damping_with_a_shortest_pulse_leaves_nothing_or_half_of_it(
+    A: float, C: float, spin: float
+) -> None:
     """Zero, or <= J_min/(2A) where the rest is below the smallest pulse."""
     plain = spinner(A, C, spin, 4.0)
     shortest, longest = plain.body_period / 40, plain.body_period / 20
@@ -387,12 +522,18 @@ def test_fine_damping_with_a_shortest_pulse_leaves_nothing_or_half_of_it(A: floa
     channels = cross(torque, min_on_time=shortest, max_on_time=longest)
     for degrees in (3.0, 3.3, 3.7, 4.1):
         plan = feasible_by("four-pulse", spinner(A, C, spin, degrees, channels=channels))
-        assert left(plan).nutation < NANODEGREE or rate_after(plan) <= torque * shortest / (2 * A) * (1 + 1e-12)
-    assert Outcome(plan.spacecraft, plan.pulses).nutation == pytest.approx(left(plan).nutation, abs=2e-11)
+        assert left(plan).nutation < NANODEGREE or rate_after(plan) <= torque * shortest / (
+            2 * A
+        ) * (1 + 1e-12)
+    assert Outcome(plan.spacecraft, plan.pulses).nutation == pytest.approx(
+        left(plan).nutation, abs=2e-11
+    )
 
 
 def test_on_times_of_four_pulse() -> None:
-    """An eighth of the body period or the longest allowed; |ω| below J/(2A) from the start: no pulse."""
+    """An eighth of the body period or the longest allowed; |ω| below J/(2A) from the start: no
+    pulse.
+    """
     for longest, expected in ((math.inf, spinner().body_period / 8), (0.3, 0.3)):
         made = feasible_by("four-pulse", spinner(channels=cross(1.0, max_on_time=longest))).pulses
         assert made.pulses[0].on_time == pytest.approx(expected, rel=1e-15)
@@ -400,13 +541,17 @@ def test_on_times_of_four_pulse() -> None:
         with refused(SenselessOption, f"classic.senseless{senseless:g}"):
             FourPulseOptions(on_time=senseless)
     body = spinner(degrees=1.0, channels=cross(100.0))
-    too_long, useful = (Options(on_time=share * body.least_impulse / 100.0, coarse=True) for share in (2.1, 1.9))
+    too_long, useful = (
+        Options(on_time=share * body.least_impulse / 100.0, coarse=True) for share in (2.1, 1.9)
+    )
     assert why_not(("four-pulse", body, too_long))
     assert len(feasible_by("four-pulse", body, useful).pulses) == 1
 
 
 def test_with_a_wheel_at_no_spin_a_pair_closes_that_stands_still_in_space() -> None:
-    """No two channels were found from 3 deg on; -M2 for 1.1492 s and +M2 for 1.1478 s leave 0.002 deg of shift."""
+    """No two channels were found from 3 deg on; -M2 for 1.1492 s and +M2 for 1.1478 s leave 0.002
+    deg of shift.
+    """
     body = load_spacecraft(case("two-pulse-despun.yaml"))
     for omega3 in (0.0, 0.003, -0.003):
         plan = feasible_by("two-pulse", replace(body, omega0=np.array([*body.omega0[:2], omega3])))
@@ -415,16 +560,22 @@ def test_with_a_wheel_at_no_spin_a_pair_closes_that_stands_still_in_space() -> N
         assert math.degrees(left(plan).momentum_shift) < (0.02 if omega3 else 0.003)
 
 
-@pytest.mark.parametrize(("scheme", "count"), [("one-pulse", 2), ("two-pulse", 4), ("four-pulse", 2)])
+@pytest.mark.parametrize(
+    ("scheme", "count"), [("one-pulse", 2), ("two-pulse", 4), ("four-pulse", 2)]
+)
 def test_where_omega_stands_still_channels_take_its_components(scheme: str, count: int) -> None:
-    """A wheel may leave ν = 0 but for rounding, which made a period of 2 Gyr, and "would leave 90 deg"."""
+    """A wheel may leave ν = 0 but for rounding, which made a period of 2 Gyr, and "would leave 90
+    deg".
+    """
     body = load_spacecraft(case("standing-gyrostat.yaml"))
     assert (body.nutation_rate, body.body_period) == (0.0, math.inf)
     for craft in (body, spinner(*SPHERE, 2.0, 5.0, 0.6, channels=cross(8.0))):
         plan, (first, second) = feasible_by(scheme, craft), craft.omega0[:2]
         assert (len(plan.pulses), left(plan).nutation < NANODEGREE) == (count, True)
         assert left(plan).momentum_shift < NANODEGREE or scheme != "two-pulse"
-        assert plan.pulses.total_impulse == pytest.approx(craft.inertia.A * (abs(first) + abs(second)), rel=1e-3)
+        assert plan.pulses.total_impulse == pytest.approx(
+            craft.inertia.A * (abs(first) + abs(second)), rel=1e-3
+        )
 
 
 def test_on_a_sphere_channels_share_the_nutation() -> None:
@@ -434,7 +585,9 @@ def test_on_a_sphere_channels_share_the_nutation() -> None:
         spacecraft = spinner(*SPHERE, 2.0, 5.0, phase, channels=channels)
         plan = feasible_by("four-pulse", spacecraft)
         outcome = math.atan(rate_after(plan) / 2.0)
-        assert outcome == pytest.approx(math.atan(expected.get("left", 0.0) / 2.0), rel=1e-12, abs=NANODEGREE)
+        assert outcome == pytest.approx(
+            math.atan(expected.get("left", 0.0) / 2.0), rel=1e-12, abs=NANODEGREE
+        )
         assert Outcome(spacecraft, plan.pulses).nutation == pytest.approx(outcome, abs=NANODEGREE)
         return plan
 
@@ -446,17 +599,25 @@ def test_on_a_sphere_channels_share_the_nutation() -> None:
     assert {pulse.channel for pulse in on_a_sphere(0.7, fan(7, 8.0)).pulses} == {"T3", "T4"}
     assert max(one.on_time for one in on_a_sphere(0.3, cross(8.0, max_on_time=0.25)).pulses) <= 0.25
     # One channel alone takes out the component along it.
-    on_a_sphere(math.pi - 0.4, cross(8.0)[:1], left=math.sin(0.4) * spinner(*SPHERE, 2.0, 5.0).transverse_rate)
+    on_a_sphere(
+        math.pi - 0.4,
+        cross(8.0)[:1],
+        left=math.sin(0.4) * spinner(*SPHERE, 2.0, 5.0).transverse_rate,
+    )
 
 
 def test_what_a_tick_leaves_does_not_make_another_thruster_dearer() -> None:
-    """The alignment of the dear one is on a tick, so that it leaves nothing; the cheap one leaves some 0.1 %."""
+    """The alignment of the dear one is on a tick, so that it leaves nothing; the cheap one leaves
+    some 0.1 %.
+    """
     channels = tuple(
         channel(name, *torque, 0.0, thrust=8.0, isp=isp)
         for name, torque, isp in (("dear", (8.0, 0.0), 100.0), ("cheap", (0.0, 8.0), 220.0))
     )
     body = spinner(channels=channels, limits=Limits(horizon=60.0, tick=0.01))
-    assert body.inertia.a * body.spin == pytest.approx(1.0)  # rad/s: the pulse from 2 to 2.5 s has its centre at 2.25 s
+    assert body.inertia.a * body.spin == pytest.approx(
+        1.0
+    )  # rad/s: the pulse from 2 to 2.5 s has its centre at 2.25 s
     aligned = -16.0 * math.sin(0.25) / 120.0 * cmath.exp(2.25j)
     body = replace(body, omega0=np.array([aligned.real, aligned.imag, 3.0]))
     alone = planning.plan(replace(body, channels=channels[:1]), "one-pulse").pulses
@@ -465,7 +626,8 @@ def test_what_a_tick_leaves_does_not_make_another_thruster_dearer() -> None:
     assert pulse.channel == "cheap"
 
 
-# --- bodies that are not as the schemes' model has them: unequal moments, disturbances, dissipation, nearly spheres
+# --- bodies that are not as the schemes' model has them: unequal moments, disturbances,
+# dissipation, nearly spheres
 
 EXAMPLE = read_spacecraft(example_text(), "example.yaml")
 DISTURBED = Options(with_disturbances=True)
@@ -474,7 +636,11 @@ NEARLY_NOTHING = math.radians(1e-7)
 
 def body(*moments: float, steerable: bool = False) -> Spacecraft:
     changed = replace(EXAMPLE, inertia=Inertia((moments[0], moments[1], moments[2])))
-    return replace(changed, channels=(), steerable=Steerable(20.0, 220.0, 1.0)) if steerable else changed
+    return (
+        replace(changed, channels=(), steerable=Steerable(20.0, 220.0, 1.0))
+        if steerable
+        else changed
+    )
 
 
 def under(*disturbances: Disturbance) -> Spacecraft:
@@ -486,7 +652,9 @@ def left_by(spacecraft: Spacecraft, scheme: str, options: Options | None = None)
 
 
 def test_the_model_turns_at_the_true_nutation_rate() -> None:
-    """0.775 rad/s for 120, 100, 80 kg m² and 3 rad/s, which the mean (0.818) misses; of a symmetric body it is that."""
+    """0.775 rad/s for 120, 100, 80 kg m² and 3 rad/s, which the mean (0.818) misses; of a symmetric
+    body it is that.
+    """
     spacecraft = replace(body(120.0, 100.0, 80.0), omega0=np.array([0.1, 0.05, 3.0]))
     assert model_of(spacecraft).body.inertia.a * 3.0 == pytest.approx(0.775, abs=5e-4)
     assert spacecraft.inertia.a * 3.0 == pytest.approx(0.818, abs=5e-4)
@@ -494,7 +662,9 @@ def test_the_model_turns_at_the_true_nutation_rate() -> None:
     assert model_of(EXAMPLE).exact
 
 
-@spread("moments", [(123.0, 117.0, 80.0), (80.0, 84.0, 120.0), (120.0, 100.0, 80.0)], quick=1, deep=2)
+@spread(
+    "moments", [(123.0, 117.0, 80.0), (80.0, 84.0, 120.0), (120.0, 100.0, 80.0)], quick=1, deep=2
+)
 @pytest.mark.parametrize("scheme", ["one-pulse", "two-pulse"])
 def test_unequal_moments_are_trimmed_away(moments: tuple[float, ...], scheme: str) -> None:
     for steerable in (False, True):
@@ -509,29 +679,46 @@ def test_dissipation_is_planned_for(moments: tuple[float, ...]) -> None:
         damping = replace(body(*moments, steerable=True), dissipation=120.0)
         assert left_by(damping, scheme) < NEARLY_NOTHING
     for scheme in ("two-pulse", "half-cone"):  # a target on the spin axis takes one impulse
-        facing = planning.plan(aimed(replace(spinner(steerable=Steerable()), dissipation=1000.0), 5.0, 0.0), scheme)
+        facing = planning.plan(
+            aimed(replace(spinner(steerable=Steerable()), dissipation=1000.0), 5.0, 0.0), scheme
+        )
         assert len(facing.pulses) == 1
         assert max(left(facing).nutation, left(facing).axis_error) < 1e-12
-    growing = planning.plan(replace(EXAMPLE, dissipation=60.0), "one-pulse")  # a train fires once more
+    growing = planning.plan(
+        replace(EXAMPLE, dissipation=60.0), "one-pulse"
+    )  # a train fires once more
     assert len(growing.pulses) > len(planning.plan(EXAMPLE, "one-pulse").pulses)
     assert left(growing).nutation < NEARLY_NOTHING
 
 
 @spread(
     "disturbance",
-    [Disturbance(0.3 + 0.1j), Disturbance(0.2j, rate=-EXAMPLE.spin), Disturbance(0.05 + 0j, rate=2.0)],
+    [
+        Disturbance(0.3 + 0.1j),
+        Disturbance(0.2j, rate=-EXAMPLE.spin),
+        Disturbance(0.05 + 0j, rate=2.0),
+    ],
     deep=2,
     ids=["constant", "space-fixed", "turning"],
 )
 def test_with_disturbances_only_their_steady_tilt_is_left(disturbance: Disturbance) -> None:
     spacecraft = under(disturbance)
-    tilt = spacecraft.inertia.A * abs(steady_omega(spacecraft, 0.0)) / (spacecraft.inertia.C * spacecraft.spin)
+    tilt = (
+        spacecraft.inertia.A
+        * abs(steady_omega(spacecraft, 0.0))
+        / (spacecraft.inertia.C * spacecraft.spin)
+    )
     for scheme in CLASSIC:
-        made, nominal = planning.plan(spacecraft, scheme, DISTURBED), planning.plan(spacecraft, scheme)
+        made, nominal = (
+            planning.plan(spacecraft, scheme, DISTURBED),
+            planning.plan(spacecraft, scheme),
+        )
         assert left(made).nutation == pytest.approx(math.atan(tilt), rel=2e-3, abs=1e-9)
         assert "remains-steady-tilt" in codes(plan_notes(made))
         # Plans stay nominal unless disturbances are asked for.
-        assert [pulse.t for pulse in nominal.pulses] == [pulse.t for pulse in planning.plan(EXAMPLE, scheme).pulses]
+        assert [pulse.t for pulse in nominal.pulses] == [
+            pulse.t for pulse in planning.plan(EXAMPLE, scheme).pulses
+        ]
         assert "remains-unplanned" in codes(plan_notes(nominal))
 
 
@@ -549,11 +736,17 @@ def test_an_axial_or_a_resonant_disturbance_is_fought() -> None:
 
 
 def test_steady_omega_is_the_forced_term_where_the_disturbance_beats_within_the_horizon() -> None:
-    spacecraft, times = under(Disturbance(0.3 + 0.1j, rate=2.0)), np.linspace(0.0, 5.0, 7)
-    shape, start = spacecraft.inertia, steady_omega(spacecraft, 0.0)
+    spacecraft = under(Disturbance(0.3 + 0.1j, rate=2.0))
+    times = np.linspace(0.0, 5.0, 7)
+    shape = spacecraft.inertia
+    start = steady_omega(spacecraft, 0.0)
     torque = np.array([0.3 + 0.1j]), np.array([2.0])
-    moved = response.rotating_torques(times, start, shape.nutation_rate(spacecraft.spin), shape.A, *torque)
-    assert moved == pytest.approx(np.array([steady_omega(spacecraft, time) for time in times]), rel=1e-12)
+    moved = response.rotating_torques(
+        times, start, shape.nutation_rate(spacecraft.spin), shape.A, *torque
+    )
+    assert moved == pytest.approx(
+        np.array([steady_omega(spacecraft, time) for time in times]), rel=1e-12
+    )
     for beats, settles in ((0.9, False), (1.1, True)):
         rate = 2.0 * math.pi * beats / EXAMPLE.horizon - EXAMPLE.inertia.a * EXAMPLE.spin
         assert (steady_omega(under(Disturbance(0.1 + 0j, rate=rate)), 0.0) != 0.0) is settles
@@ -561,14 +754,25 @@ def test_steady_omega_is_the_forced_term_where_the_disturbance_beats_within_the_
 
 @pytest.mark.parametrize("spin", [3.0, -3.0])
 def test_a_walk_goes_on_while_the_spin_drifts(spin: float) -> None:
-    """A pulse of half a second at 12 s; 2 N m about axis 3 change the spin by a quarter and ω's phase by 3.75 rad."""
-    axial, jet = np.array([0.0, 0.0, 2.0]), channel("T", 8.0, 3.0, 0.0)
-    drifting = replace(spinner(spin=spin, channels=(jet,)), disturbances=(Disturbance(0j, axial=2.0),))
-    builder, pulse = ImpulseBuilder(drifting), channel_pulse(jet, 12.0, 0.5)
+    """A pulse of half a second at 12 s; 2 N m about axis 3 change the spin by a quarter and ω's
+    phase by 3.75 rad.
+    """
+    axial = np.array([0.0, 0.0, 2.0])
+    jet = channel("T", 8.0, 3.0, 0.0)
+    drifting = replace(
+        spinner(spin=spin, channels=(jet,)), disturbances=(Disturbance(0j, axial=2.0),)
+    )
+    builder = ImpulseBuilder(drifting)
+    pulse = channel_pulse(jet, 12.0, 0.5)
 
     def flown(end: float) -> complex:
-        pushes = [reference.Push(0.0, 30.0, axial), reference.Push(pulse.start, pulse.end, jet.torque)]
-        return transverse(reference.fly(drifting.inertia.moments, drifting.omega0, pushes, end).rates)
+        pushes = [
+            reference.Push(0.0, 30.0, axial),
+            reference.Push(pulse.start, pulse.end, jet.torque),
+        ]
+        return transverse(
+            reference.fly(drifting.inertia.moments, drifting.omega0, pushes, end).rates
+        )
 
     assert builder.omega_at(10.0) == pytest.approx(flown(10.0), rel=1e-10)
     builder.fire(pulse)
@@ -579,12 +783,17 @@ def test_a_walk_goes_on_while_the_spin_drifts(spin: float) -> None:
 
 def test_within_rounding_of_a_sphere_plan_and_check_agree_that_it_is_one() -> None:
     """Whatever moment is the odd one."""
-    text, off = case("near-sphere-2.yaml").read_text(), 3e-8
+    text = case("near-sphere-2.yaml").read_text()
+    off = 3e-8
     line = next(one for one in text.splitlines() if one.startswith("inertia"))
     for odd in ((1, 0, 0), (0, 1, 0), (0, 0, 1), (0, 2, 1)):
         rows = np.diag([100.0 + off * one for one in odd]).tolist()
         sphere = read_spacecraft(text.replace(line, f"inertia: {{tensor: {rows}}}"), "near.yaml")
-        assert (sphere.inertia.a, sphere.inertia.symmetric, sphere.inertia.shape) == (0.0, True, "sphere")
+        assert (sphere.inertia.a, sphere.inertia.symmetric, sphere.inertia.shape) == (
+            0.0,
+            True,
+            "sphere",
+        )
         assert math.isinf(sphere.body_period)
         assert checked_json("near.yaml", sphere)["spin_axis"]["class"] == "sphere"
         for scheme in CLASSIC:
@@ -612,23 +821,32 @@ def test_on_either_side_of_the_tolerance_every_scheme_answers(off: float, scheme
                     residual = made.flown
                 assert (residual is None) == (infeasibility(made) != "")
                 if residual is not None:
-                    assert np.isfinite([residual.nutation, residual.momentum_shift, residual.axis_error]).all()
+                    assert np.isfinite(
+                        [residual.nutation, residual.momentum_shift, residual.axis_error]
+                    ).all()
 
 
 def jets(torque: float, count: int = 4, longest: float = math.inf) -> tuple[Channel, ...]:
     """+1, -1, +2, -2, or the first of these."""
     along = [(torque, 0.0), (-torque, 0.0), (0.0, torque), (0.0, -torque)]
-    return tuple(channel(f"M{n}", *one, 0.0, max_on_time=longest) for n, one in enumerate(along[:count]))
+    return tuple(
+        channel(f"M{n}", *one, 0.0, max_on_time=longest) for n, one in enumerate(along[:count])
+    )
 
 
 def random_body(seed: int) -> Spacecraft:
-    """Prolate or oblate, 1 to 50 degrees, one to four channels, time constants of 1 to 1000 inertial periods."""
+    """Prolate or oblate, 1 to 50 degrees, one to four channels, time constants of 1 to 1000
+    inertial periods.
+    """
     draw = np.random.default_rng(seed)
     C = 100.0 * (draw.uniform(0.2, 0.85) if draw.random() < 0.5 else draw.uniform(1.15, 1.95))
-    spin, degrees = draw.choice([-1.0, 1.0]) * draw.uniform(0.5, 5.0), float(draw.choice([1.0, 3.0, 10.0, 30.0, 50.0]))
+    spin = draw.choice([-1.0, 1.0]) * draw.uniform(0.5, 5.0)
+    degrees = float(draw.choice([1.0, 3.0, 10.0, 30.0, 50.0]))
     size = C * abs(spin) * math.tan(math.radians(degrees)) * draw.uniform(0.5, 2.0) * abs(spin)
     channels = jets(size, int(draw.integers(1, 5)))
-    body = spinner(A=100.0, C=C, spin=spin, degrees=degrees, phase=draw.uniform(0.0, 6.28), channels=channels)
+    body = spinner(
+        A=100.0, C=C, spin=spin, degrees=degrees, phase=draw.uniform(0.0, 6.28), channels=channels
+    )
     return replace(body, dissipation=body.inertial_period * 10.0 ** draw.uniform(0.0, 3.0))
 
 
@@ -636,12 +854,18 @@ def left_by_reference(one: planning.Plan) -> tuple[float, float]:
     """Nutation and shift of H, rad, by DOP853 on H in space and the attitude."""
     body, moments = one.spacecraft, one.spacecraft.inertia.moments
     start = reference.frame_n(moments, body.omega0)
-    end = reference.fly(moments, body.omega0, events(one.pulses), one.pulses.end, start, body.growth)
-    shift = reference.angle(start @ (np.asarray(moments) * body.omega0), reference.momentum(moments, end))
+    end = reference.fly(
+        moments, body.omega0, events(one.pulses), one.pulses.end, start, body.growth
+    )
+    shift = reference.angle(
+        start @ (np.asarray(moments) * body.omega0), reference.momentum(moments, end)
+    )
     return reference.nutation(moments, end.rates, math.copysign(1.0, body.spin)), shift
 
 
-@pytest.mark.parametrize("scheme", ["one-pulse", deep("four-pulse"), weekly("two-pulse"), weekly("optimal")])
+@pytest.mark.parametrize(
+    "scheme", ["one-pulse", deep("four-pulse"), weekly("two-pulse"), weekly("optimal")]
+)
 def test_random_bodies_are_damped_and_the_flight_is_true(scheme: str) -> None:
     damped = 0
     for seed in range(8):
@@ -649,10 +873,15 @@ def test_random_bodies_are_damped_and_the_flight_is_true(scheme: str) -> None:
         if one.flown is None:
             continue
         nutation, shift = left_by_reference(one)
-        assert (one.flown.nutation, one.flown.momentum_shift) == pytest.approx((nutation, shift), abs=1e-9)
-        # What the impulse sum misses of a width is of the order of what dissipation does within one turn.
+        assert (one.flown.nutation, one.flown.momentum_shift) == pytest.approx(
+            (nutation, shift), abs=1e-9
+        )
+        # What the impulse sum misses of a width is of the order of what dissipation does within one
+        # turn.
         slow = abs(one.spacecraft.growth) * one.spacecraft.inertial_period
-        assert present(one.residual).nutation == pytest.approx(nutation, abs=0.03 * slow * one.spacecraft.nutation)
+        assert present(one.residual).nutation == pytest.approx(
+            nutation, abs=0.03 * slow * one.spacecraft.nutation
+        )
         damped += one.flown.nutation < NEARLY_NOTHING
     assert damped >= 7
 
@@ -660,7 +889,8 @@ def test_random_bodies_are_damped_and_the_flight_is_true(scheme: str) -> None:
 @pytest.mark.parametrize("C", [40.0, 80.0, 150.0])
 @pytest.mark.parametrize("spin", [2.0, -2.0])
 def test_a_walk_coasts_as_the_flight_does(C: float, spin: float) -> None:
-    body, times = replace(spinner(100.0, C, spin, degrees=50.0), dissipation=12.0), np.linspace(0.0, 40.0, 9)
+    body = replace(spinner(100.0, C, spin, degrees=50.0), dissipation=12.0)
+    times = np.linspace(0.0, 40.0, 9)
     rates, _ = propagation.flown(body, Schedule(), 40.0).motion(times)
     omegas = [ImpulseBuilder(body).omega_at(float(time)) for time in times]
     assert omegas == pytest.approx(rates[:, 0] + 1j * rates[:, 1], abs=1e-12)
@@ -673,11 +903,15 @@ def test_a_walk_coasts_as_the_flight_does(C: float, spin: float) -> None:
 
 
 def test_alignments_are_found_while_the_spin_falls_and_none_in_flat_spin() -> None:
-    """At 50 degrees, τ = 12 s: the turns of ω in the body get longer, and after some there are no more."""
+    """At 50 degrees, τ = 12 s: the turns of ω in the body get longer, and after some there are no
+    more.
+    """
     (jet,), moments = jets(5.0, 1), list[float]()
     for earliest in np.arange(0.0, 60.0, 2.0):
         limits = Limits(horizon=1e5, earliest=float(earliest))
-        body = replace(spinner(100.0, 40.0, 3.0, 50.0, channels=(jet,), limits=limits), dissipation=12.0)
+        body = replace(
+            spinner(100.0, 40.0, 3.0, 50.0, channels=(jet,), limits=limits), dissipation=12.0
+        )
         builder = ImpulseBuilder(body)
         pulse = builder.align(jet, 0.01)
         if pulse is None:
@@ -693,7 +927,8 @@ def test_alignments_are_found_while_the_spin_falls_and_none_in_flat_spin() -> No
 @pytest.mark.parametrize("scheme", ["one-pulse", "two-pulse", "four-pulse", deep("optimal")])
 def test_coasts_take_no_steps(scheme: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """With dissipation, only the pulses are integrated: a long wait between them costs nothing."""
-    spans, integrate = list[float](), taylor.integrate
+    spans = list[float]()
+    integrate = taylor.integrate
 
     def counted(*args: object, **named: object) -> object:
         spans.append(float(args[5]) - float(args[4]))  # type: ignore[arg-type]
@@ -711,7 +946,10 @@ def test_no_bound_is_claimed_under_dissipation(run: Run, plans_shared: None) -> 
     """An oblate body damps itself: there are schedules below A|ω0|, and they are found."""
     command = "plan", "-v", str(case("oblate-dissipation.yaml")), "--scheme", "optimal"
     shown = run(*command).stdout
-    check_text("dissipation.no-bound", "\n".join(line for line in shown.splitlines() if "least impulse" in line))
+    check_text(
+        "dissipation.no-bound",
+        "\n".join(line for line in shown.splitlines() if "least impulse" in line),
+    )
     (planned,) = json.loads(run(*command, "--json", "-").stdout)["plans"]
     assert planned["total_impulse_Nms"] < 0.65 * planned["least_impulse_Nms"]
 
@@ -719,7 +957,9 @@ def test_no_bound_is_claimed_under_dissipation(run: Run, plans_shared: None) -> 
 @pytest.mark.deep
 @pytest.mark.parametrize(("A", "C"), [(80.0, 120.0), (120.0, 80.0)], ids=["oblate", "prolate"])
 def test_the_first_order_least_knows_dissipation(A: float, C: float) -> None:
-    """Small angles: with κ the optimum waits (oblate) or hurries (prolate), and costs what the program says."""
+    """Small angles: with κ the optimum waits (oblate) or hurries (prolate), and costs what the
+    program says.
+    """
     body = spinner(A, C, degrees=0.5, channels=jets(5.0, longest=0.5), limits=Limits(horizon=60.0))
     one = planning.plan(replace(body, dissipation=100.0), "optimal")
     bounds = present(one.pulses.bounds)
@@ -732,8 +972,13 @@ def test_the_first_order_least_knows_dissipation(A: float, C: float) -> None:
 
 @pytest.mark.weekly
 def test_what_dissipation_takes_out_alone_leaves_pulses_that_can_be_commanded() -> None:
-    """An oblate body, 30 time constants of horizon: the longer it waits, the less it costs, without end."""
-    body = replace(spinner(80.0, 120.0, channels=jets(400.0, 3), limits=Limits(horizon=600.0)), dissipation=20.0)
+    """An oblate body, 30 time constants of horizon: the longer it waits, the less it costs, without
+    end.
+    """
+    body = replace(
+        spinner(80.0, 120.0, channels=jets(400.0, 3), limits=Limits(horizon=600.0)),
+        dissipation=20.0,
+    )
     one = planning.plan(body, "optimal")
     assert present(one.flown, infeasibility(one)).nutation < NEARLY_NOTHING
     assert all(pulse.resolved for pulse in one.pulses)
@@ -744,7 +989,12 @@ def test_what_dissipation_takes_out_alone_leaves_pulses_that_can_be_commanded() 
 @spread(
     ("name", "options", "status", "said"),
     [
-        ("crash-hang-near-sphere-dissipation", (), 3, r"dissipation takes the nutation out before the channels.*? it"),
+        (
+            "crash-hang-near-sphere-dissipation",
+            (),
+            3,
+            r"dissipation takes the nutation out before the channels.*? it",
+        ),
         ("crash-dissipation-near-sphere-overflow", (), 3, ""),
         ("crash-halfcone-trim-crash", (), 0, ""),
         ("crash-target-ideal-torquer-dissipation", ("--target", "5deg,0deg"), 0, ""),
@@ -752,7 +1002,9 @@ def test_what_dissipation_takes_out_alone_leaves_pulses_that_can_be_commanded() 
     ],
     quick=2,
 )
-def test_files_that_went_wrong(run: Run, name: str, options: tuple[str, ...], status: int, said: str) -> None:
+def test_files_that_went_wrong(
+    run: Run, name: str, options: tuple[str, ...], status: int, said: str
+) -> None:
     """Near a sphere ω takes days to turn in the body, and dissipation minutes to take it out."""
     done = run("plan", "-v", str(case(f"{name}.yaml")), *options)
     assert done.returncode == status, done.stderr

@@ -1,4 +1,6 @@
-"""Command blocks: the search against the whole grid, limits, flights by an independent integrator; spin and turn."""
+"""Command blocks: the search against the whole grid, limits, flights by an independent integrator;
+spin and turn.
+"""
 
 import itertools
 import math
@@ -31,7 +33,15 @@ from nutdamp.planning import plan as planning
 from nutdamp.planning.decision import usual
 from nutdamp.planning.notes import infeasibility
 from nutdamp.schemes.block_model import BlockModel, BlockState, Trial, fired, sun_clock, sun_pulses
-from nutdamp.schemes.block_search import BLOCKS, FLOWN, LONGEST, BlockFlights, BlockSearch, BlockSequence, FlownSequence
+from nutdamp.schemes.block_search import (
+    BLOCKS,
+    FLOWN,
+    LONGEST,
+    BlockFlights,
+    BlockSearch,
+    BlockSequence,
+    FlownSequence,
+)
 from nutdamp.schemes.catalogue import CommandBlockOptions, Options
 from nutdamp.schemes.command_block import LEGS, schedule, scope_note
 from nutdamp.spacecraft import requirements
@@ -58,39 +68,58 @@ def planned(body: Spacecraft, options: Options | None = None, *, met: bool = Tru
 
 def a_turn(**limits: Any) -> Spacecraft:
     """A spinner at rest that is to turn by 8 deg, with the Sun square to its axis."""
-    body = aimed(spinner(120.0, 165.0, 1.2, 0.0, channels=(channel("T", 5.0, 0.0, 0.0),)), 8.0, 40.0)
+    body = aimed(
+        spinner(120.0, 165.0, 1.2, 0.0, channels=(channel("T", 5.0, 0.0, 0.0),)), 8.0, 40.0
+    )
     body = replace(commanded(body, np.array([1.0, -0.3, 0.1])), requirement=within(0.5, 0.2))
     return replace(body, limits=replace(body.limits, **limits))
 
 
 def scanned(body: Spacecraft) -> tuple[float, float]:
-    """How good the best single block of the whole grid is in closed form: share of a bound used up, then cost.
+    """How good the best single block of the whole grid is in closed form: share of a bound used up,
+    then cost.
 
     Of those that carry H the shorter way round the Sun.
     """
-    model, bounds, commands = BlockModel(body), requirements.bounds(body), present(body.commands)
-    delays = (commands.delay_step * np.arange(round(commands.delay_max / commands.delay_step) + 1))[:, None, None]
-    widths, counts = commands.widths[:, None], np.arange(1, commands.max_count + 1)
-    ranks, ahead = [(math.inf, math.inf)], math.atan2(model.goal[1], model.goal[0])
-    for one, every, wait in itertools.product(body.channels, commands.every, range(24 if body.transverse_rate else 1)):
+    model = BlockModel(body)
+    bounds = requirements.bounds(body)
+    commands = present(body.commands)
+    delays = (commands.delay_step * np.arange(round(commands.delay_max / commands.delay_step) + 1))[
+        :, None, None
+    ]
+    widths = commands.widths[:, None]
+    counts = np.arange(1, commands.max_count + 1)
+    ranks = [(math.inf, math.inf)]
+    ahead = math.atan2(model.goal[1], model.goal[0])
+    for one, every, wait in itertools.product(
+        body.channels, commands.every, range(24 if body.transverse_rate else 1)
+    ):
         after = model.after(model.start, one, Trial(wait, delays, widths, counts, every))
         left = model.left(after)
-        shares = np.max([bound.used(requirements.left_of(bound, left, body)) for bound in bounds], axis=0)
+        shares = np.max(
+            [bound.used(requirements.left_of(bound, left, body)) for bound in bounds], axis=0
+        )
         longer = False if body.goal.axis is None else np.abs(after.longitude - ahead) > math.pi
         shares = np.where(np.isnan(shares) | longer, np.inf, shares)
-        cost, failed = np.broadcast_to(widths * counts * one.strength, shares.shape), np.where(shares <= 1, 0.0, shares)
+        cost = np.broadcast_to(widths * counts * one.strength, shares.shape)
+        failed = np.where(shares <= 1, 0.0, shares)
         index = np.lexsort((cost.ravel(), failed.ravel()))[0]
         ranks.append((float(failed.ravel()[index]), float(cost.ravel()[index])))
     return min(ranks)
 
 
-@spread("seed", [*(seed for seed in range(133) if seed % 4 != 3), *range(3, 132, 16)], quick=1, deep=2)
+@spread(
+    "seed", [*(seed for seed in range(133) if seed % 4 != 3), *range(3, 132, 16)], quick=1, deep=2
+)
 def test_no_single_block_of_the_whole_grid_is_better_in_closed_form(seed: int) -> None:
-    """In 100 cases with a target 1 to 60 deg away, and 9 of damping alone; one in three of the former nutates."""
+    """In 100 cases with a target 1 to 60 deg away, and 9 of damping alone; one in three of the
+    former nutates.
+    """
     aim = seed % 4 != 3
     body = some_body(seed, target=aim)
     assert body.commands is not None
-    turn, commands = 2.0 * math.pi / abs(body.spin), body.commands
+    turn = 2.0 * math.pi / abs(body.spin)
+    commands = body.commands
     body = replace(
         body,
         omega0=body.omega0 if aim else np.array([0.02, 0.01, 1.0]) * body.spin,
@@ -109,9 +138,12 @@ def test_the_best_blocks_flown_by_the_reference_end_where_the_plan_says(seed: in
     assert 1 <= len(plan.pulses.blocks) <= 3
     motion, starts = flown_by_reference(body, plan.pulses.blocks)
     assert [one.start for one in plan.pulses] == pytest.approx(starts, abs=1e-7)
-    momentum, near = reference.momentum(moments, motion), 1e-3 * body.to_turn
+    momentum = reference.momentum(moments, motion)
+    near = 1e-3 * body.to_turn
     assert reference.angle(momentum, plan.flight.final.momentum) < near
-    assert reference.angle(momentum, body.target_axis) == pytest.approx(float(present(plan.left).aim), abs=near)
+    assert reference.angle(momentum, body.target_axis) == pytest.approx(
+        float(present(plan.left).aim), abs=near
+    )
     nutation = reference.nutation(moments, motion.rates, math.copysign(1.0, body.spin))
     assert nutation == pytest.approx(float(present(plan.left).nutation), abs=near)
 
@@ -127,23 +159,33 @@ def test_two_blocks_damp_where_a_single_one_that_complies_costs_much_more(seed: 
 
 @pytest.mark.deep
 def test_blocks_behind_cheap_first_ones_are_looked_for_too() -> None:
-    """Three blocks of two pulses each meet the requirement; a first block of 73 that leaves a little less is no better.
+    """Three blocks of two pulses each meet the requirement; a first block of 73 that leaves a
+    little less is no better.
 
-    Their delays were found one block after the other, by flying each channel at delays from 0 to 5 s in steps of 50 ms.
+    Their delays were found one block after the other, by flying each channel at delays from 0 to 5
+    s in steps of 50 ms.
     """
     body = load(places.CONFIGS / "lunar-prospector.yaml")
     delays = ((1, "-M2", 2.45), (3, "+M2", 2.15), (5, "-M2", 1.85))
-    known = fired(body, tuple(Block(name, first, delay, 0.2, 2, 1) for first, name, delay in delays))
+    known = fired(
+        body, tuple(Block(name, first, delay, 0.2, 2, 1) for first, name, delay in delays)
+    )
     assert left_by(propagation.flown(body, known)).nutation < math.radians(0.2)
     assert planned(body).pulses.cost <= known.cost
 
 
 @pytest.mark.weekly
-@pytest.mark.parametrize(("seed", "nutation", "shift"), [(9, 0.1, 0.05), (11, 0.1, 0.05), (12, 0.3, 0.02)])
-def test_nutation_on_the_way_is_reckoned_with_where_blocks_would_miss(seed: int, nutation: float, shift: float) -> None:
-    """Of hundreds of blocks that are about as good in closed form, none leaves much less when flown than the plan.
+@pytest.mark.parametrize(
+    ("seed", "nutation", "shift"), [(9, 0.1, 0.05), (11, 0.1, 0.05), (12, 0.3, 0.02)]
+)
+def test_nutation_on_the_way_is_reckoned_with_where_blocks_would_miss(
+    seed: int, nutation: float, shift: float
+) -> None:
+    """Of hundreds of blocks that are about as good in closed form, none leaves much less when flown
+    than the plan.
 
-    That form leaves the nutation out: its best ones left up to nine times as much as others of the same search.
+    That form leaves the nutation out: its best ones left up to nine times as much as others of the
+    same search.
     """
     body = replace(some_body(seed), requirement=within(nutation, shift))
     search = BlockSearch(body, usable(body), present(body.commands))
@@ -157,17 +199,21 @@ def test_nutation_on_the_way_is_reckoned_with_where_blocks_would_miss(seed: int,
 
 
 @pytest.mark.weekly
-def test_more_blocks_and_smaller_pulses_are_tried_where_one_block_does_not_do(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_more_blocks_and_smaller_pulses_are_tried_where_one_block_does_not_do(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """Two or three do better, and --max-blocks keeps to one.
 
-    The best in closed form fly badly: 4.5 times the bound without sequences of smaller pulses, now less than half.
+    The best in closed form fly badly: 4.5 times the bound without sequences of smaller pulses, now
+    less than half.
     """
     tight = replace(some_body(2), requirement=within(0.05, 0.05))
     plan, single = planned(tight, met=False), planned(tight, ONE, met=False)
     assert len(single.pulses.blocks) == 1
     assert len(plan.pulses.blocks) > 1 or plan.meets_requirement
     assert plan.severity <= single.severity
-    severities, flown = list[float](), BlockFlights.flown
+    severities = list[float]()
+    flown = BlockFlights.flown
 
     def counted(self: BlockFlights, found: BlockSequence) -> FlownSequence:
         severities.append(flown(self, found).rank[1])
@@ -185,7 +231,9 @@ def test_a_looser_requirement_is_met_as_well() -> None:
     """Damping: blocks lower the nutation, though it is no more than is required already."""
     body = spinner(120.0, 180.0, 1.2, 0.5, channels=(channel("T", 5.0, 0.0, 0.0),))
     for most in (0.4, 0.51, 1.0):
-        plan = planned(replace(commanded(body, np.array([1.0, -0.3, 0.1])), requirement=within(most)))
+        plan = planned(
+            replace(commanded(body, np.array([1.0, -0.3, 0.1])), requirement=within(most))
+        )
         assert present(plan.left).nutation < min(math.radians(most), body.nutation)
 
 
@@ -204,12 +252,17 @@ def test_with_disturbances_the_sun_pulses_are_those_of_the_disturbed_motion() ->
 
 @pytest.mark.parametrize("tight", [deep(False), weekly(True)], ids=["wide window", "short horizon"])
 def test_blocks_keep_out_of_blackout_windows(tight: bool) -> None:
-    """A window in the middle of the way: one block ends before it or begins after it, or two leave it out."""
+    """A window in the middle of the way: one block ends before it or begins after it, or two leave
+    it out.
+    """
     free = planned(a_turn()).pulses
-    begins, ends = free.pulses[8].start - 1.0, free.pulses[8].start + (1.0 if tight else 21.0)
+    begins = free.pulses[8].start - 1.0
+    ends = free.pulses[8].start + (1.0 if tight else 21.0)
     body = a_turn(blackout=((begins, ends),), **({"horizon": free.end + 12.0} if tight else {}))
     if tight:  # with the same width there is room for two blocks alone, which come near
-        body = replace(body, commands=replace(present(body.commands), widths=np.array([free.blocks[0].width])))
+        body = replace(
+            body, commands=replace(present(body.commands), widths=np.array([free.blocks[0].width]))
+        )
     plan = planned(body, met=not tight)
     assert any(pulse.end > begins and pulse.start < ends for pulse in free)
     assert not any(pulse.end > begins and pulse.start < ends for pulse in plan.pulses)
@@ -219,7 +272,9 @@ def test_blocks_keep_out_of_blackout_windows(tight: bool) -> None:
 
 @pytest.mark.weekly
 def test_a_forbidden_cone_is_passed_in_blocks_by_way_points() -> None:
-    """The blocks of all legs count their Sun pulses from t = 0: fired anew they are the same pulses."""
+    """The blocks of all legs count their Sun pulses from t = 0: fired anew they are the same
+    pulses.
+    """
     straight = a_turn()
     middle = straight.momentum / np.linalg.norm(straight.momentum) + straight.target_axis
     keep = Keep("Earth", middle / np.linalg.norm(middle), least=math.radians(1.5))
@@ -235,22 +290,33 @@ def test_a_forbidden_cone_is_passed_in_blocks_by_way_points() -> None:
 @pytest.mark.parametrize("seed", range(6))
 def test_in_random_cases_blocks_never_bring_the_axis_into_a_cone(seed: int) -> None:
     """FlownSequence by the reference, nutation included, with a cone near the way."""
-    body, rng = some_body(seed), np.random.default_rng(seed)
-    start, end = body.momentum / np.linalg.norm(body.momentum), body.target_axis
+    body = some_body(seed)
+    rng = np.random.default_rng(seed)
+    start = body.momentum / np.linalg.norm(body.momentum)
+    end = body.target_axis
     centre = start + end + rng.uniform(-0.5, 0.5) * np.cross(start, end)
     centre /= np.linalg.norm(centre)
-    keep = Keep("cone", centre, least=0.4 * min(float(attitude.angle_between(centre, one)) for one in (start, end)))
+    keep = Keep(
+        "cone",
+        centre,
+        least=0.4 * min(float(attitude.angle_between(centre, one)) for one in (start, end)),
+    )
     plan = planning.plan(replace(body, keep=(keep,), requirement=within(1.0, 0.5)), "command-block")
     if not plan.feasible:
         assert "from cone" in infeasibility(plan)
         return
-    motion, nearest, now = reference.Motion(body.omega0, attitude.matrix(body.initial.quaternion)), math.inf, 0.0
+    motion = reference.Motion(body.omega0, attitude.matrix(body.initial.quaternion))
+    nearest = math.inf
+    now = 0.0
     for pulse in plan.pulses:
         for torque, until in ((np.zeros(3), pulse.start), (present(pulse.torque), pulse.end)):
-            path = reference.coast(body.inertia.moments, motion, torque, np.linspace(0.0, until - now, 20)[1:])
+            path = reference.coast(
+                body.inertia.moments, motion, torque, np.linspace(0.0, until - now, 20)[1:]
+            )
             axes = [math.copysign(1.0, body.spin) * one.rotation[:, 2] for one in path]
             nearest = min(nearest, *(reference.angle(axis, centre) for axis in axes))
-            motion, now = path[-1], until
+            motion = path[-1]
+            now = until
     assert nearest > keep.least - 1e-4
 
 
@@ -268,8 +334,13 @@ def test_a_channel_without_a_commandable_width_is_left_out() -> None:
 def test_where_there_are_no_blocks_the_reason_is_said() -> None:
     """Of a sensor that never sees the Sun a longer horizon would be no cure."""
     body = a_turn()
-    ends = [float(attitude.angle_between(present(body.sun), axis)) for axis in (body.momentum, body.target_axis)]
-    sensor = SunSensor(0.4, elevation=0.5 * math.pi - ends[0], half_width=0.3 * abs(ends[1] - ends[0]))
+    ends = [
+        float(attitude.angle_between(present(body.sun), axis))
+        for axis in (body.momentum, body.target_axis)
+    ]
+    sensor = SunSensor(
+        0.4, elevation=0.5 * math.pi - ends[0], half_width=0.3 * abs(ends[1] - ends[0])
+    )
     sensor = replace(sensor, elevation=sensor.elevation + 3.0 * sensor.half_width)
     cases = {
         "no keys": aimed(spinner(channels=cross(8.0)), 5.0, 0.0),
@@ -279,10 +350,17 @@ def test_where_there_are_no_blocks_the_reason_is_said() -> None:
     }
     plans = {name: planning.plan(each, "command-block") for name, each in cases.items()}
     assert all(plan.failure is None for plan in plans.values())
-    for name, aim in (("no keys", False), ("out of view", True), ("dark", True)):  # it is compared where there are keys
+    for name, aim in (
+        ("no keys", False),
+        ("out of view", True),
+        ("dark", True),
+    ):  # it is compared where there are keys
         assert ("command-block" in usual(cases[name])) is aim
     assert "command-block" in usual(replace(body, goal=replace(body.goal, axis=None)))
-    check_text("blocks.why-not", "\n".join(f"{name}: {infeasibility(plan)}" for name, plan in plans.items()))
+    check_text(
+        "blocks.why-not",
+        "\n".join(f"{name}: {infeasibility(plan)}" for name, plan in plans.items()),
+    )
 
 
 def test_a_delay_just_below_none_is_none_without_a_sign() -> None:
@@ -296,24 +374,33 @@ def test_a_delay_just_below_none_is_none_without_a_sign() -> None:
 
 @pytest.mark.weekly
 def test_no_other_block_is_better_is_said_of_the_best_one_alone() -> None:
-    """Where another was taken because it does better when flown, the note says no more than that."""
+    """Where another was taken because it does better when flown,
+    the note says no more than that.
+    """
     for body in (a_turn(), replace(a_turn(), requirement=within(0.5, 0.02))):
         search = BlockSearch(body, body.channels, present(body.commands))
-        best, plan = search.best(1), planned(body, ONE, met=False)
+        best = search.best(1)
+        plan = planned(body, ONE, met=False)
         flights = [search.flights.flown(found) for found in best]
         assert scope_note(search, flights[0], first=True).code == "blocks-compared"
         assert scope_note(search, flights[-1], first=False).code == "blocks-flown"
         assert plan.pulses.blocks == min(flights, key=lambda flight: flight.rank).sequence.blocks
-        assert (plan.pulses.blocks == best[0].blocks) <= (plan.pulses.notes[0].code == "blocks-compared")
+        assert (plan.pulses.blocks == best[0].blocks) <= (
+            plan.pulses.notes[0].code == "blocks-compared"
+        )
 
 
 @pytest.mark.weekly
-def test_ticks_are_superseded_by_the_steps_of_commands_and_a_note_says_so_where_they_differ() -> None:
+def test_ticks_are_superseded_by_the_steps_of_commands_and_a_note_says_so_where_they_differ() -> (
+    None
+):
     free, ticked = planned(a_turn()), planned(a_turn(tick=0.0173))
     assert ticked.pulses.blocks == free.pulses.blocks
     assert one_of(ticked.pulses.notes, "tick-not-kept")["tick_s"] == 0.0173
     body = a_turn(tick=0.01)
-    alike = replace(body, commands=replace(present(body.commands), delay_step=0.02, widths=np.array([0.2, 0.3])))
+    alike = replace(
+        body, commands=replace(present(body.commands), delay_step=0.02, widths=np.array([0.2, 0.3]))
+    )
     assert "tick-not-kept" not in codes(planned(alike, met=False).pulses.notes)
 
 
@@ -340,8 +427,12 @@ COARSE = read_spacecraft(
     ("key", "most", "horizon"),
     [deep("steps", (0.03, 0.01), None), deep("time", (0.03, 0.01), 110.0), ("", (1.0, 2.0), None)],
 )
-def test_blocks_that_miss_say_what_would_help(key: str, most: tuple[float, float], horizon: float | None) -> None:
-    """A step of the delay is 0.2 s × 12 rpm = 14.4° of heading, on a way of 8° a move of 2°; others comply."""
+def test_blocks_that_miss_say_what_would_help(
+    key: str, most: tuple[float, float], horizon: float | None
+) -> None:
+    """A step of the delay is 0.2 s × 12 rpm = 14.4° of heading, on a way of 8° a move of 2°; others
+    comply.
+    """
     body = replace(COARSE, requirement=within(*most))
     plan = planned(replace(body, limits=Limits(horizon=horizon or 1200.0)), ONE, met=not key)
     cures = [entry for entry in plan.pulses.notes if entry.code in CURES]
@@ -352,7 +443,9 @@ def test_blocks_that_miss_say_what_would_help(key: str, most: tuple[float, float
 
 @pytest.mark.parametrize("step", ["10 ms", "1e-9 s", "1e-13 s"])
 def test_fine_steps_are_never_listed_and_neighbours_of_the_best_are_looked_at(step: str) -> None:
-    """10 ms from 100 to 500 ms: 41 widths, all of them; else some that lie on the grid, with both ends."""
+    """10 ms from 100 to 500 ms: 41 widths, all of them; else some that lie on the grid, with both
+    ends.
+    """
     body = read_spacecraft(FILE.replace("width: {step: 10 ms", f"width: {{step: {step}"), "f.yaml")
     assert body.commands is not None
     widths = commandable_widths(body.commands, body.channels[0])
@@ -362,11 +455,15 @@ def test_fine_steps_are_never_listed_and_neighbours_of_the_best_are_looked_at(st
     assert np.abs(steps - np.rint(steps)).max() <= 1e-12 * steps[-1]
     close = commandable_widths(body.commands, body.channels[0], 0.3 - 1e-12, 0.31 + 1e-12, count=7)
     assert len(close) == (2 if step == "10 ms" else 7)
-    assert body.commands.nearest_width(0.3049) == pytest.approx(0.3 if step == "10 ms" else 0.3049, rel=1e-9)
+    assert body.commands.nearest_width(0.3049) == pytest.approx(
+        0.3 if step == "10 ms" else 0.3049, rel=1e-9
+    )
 
 
 def test_blocks_too_long_to_be_fired_end_with_the_budget_of_work() -> None:
-    """One of a million pulses in 1e7 s: neither the closed form lists them nor a flight fires them all."""
+    """One of a million pulses in 1e7 s: neither the closed form lists them nor a flight fires them
+    all.
+    """
     body = a_turn(horizon=1e7)
     assert body.commands is not None
     body = replace(body, commands=replace(body.commands, max_count=1_000_000))
@@ -374,10 +471,14 @@ def test_blocks_too_long_to_be_fired_end_with_the_budget_of_work() -> None:
     assert search.allowed == LONGEST
     with work.budget("blocks", 10.0), pytest.raises(Infeasible, match="budget of work is spent"):
         fired(body, [Block("T", 1, 0.0, 0.1, 1_000_000)])
-    slow = replace(spinner(120.0, 165.0, 1.2, 0.0, channels=(channel("S", 0.0, 0.0, -0.1),)), goal=Goal(spin=0.6))
+    slow = replace(
+        spinner(120.0, 165.0, 1.2, 0.0, channels=(channel("S", 0.0, 0.0, -0.1),)),
+        goal=Goal(spin=0.6),
+    )
     with work.budget("blocks", 0.0), pytest.raises(Infeasible, match="budget of work is spent"):
         schedule(
-            replace(commanded(slow, np.array([1.0, -0.3, 0.1])), limits=Limits(horizon=1e7)), CommandBlockOptions()
+            replace(commanded(slow, np.array([1.0, -0.3, 0.1])), limits=Limits(horizon=1e7)),
+            CommandBlockOptions(),
         )
 
 
@@ -407,32 +508,44 @@ def named(body: nutdamp.Spacecraft, name: str) -> Channel:
 
 def in_form(body: nutdamp.Spacecraft, *blocks: Block) -> tuple[BlockModel, BlockState]:
     model = BlockModel(body)
-    state, number = model.start, 1
+    state = model.start
+    number = 1
     for block in blocks:
         trial = Trial(block.first - number, block.delay, block.width, block.count, block.every)
-        state, number = model.after(state, named(body, block.channel), trial), block.sun_pulses[-1] + 1
+        state = model.after(state, named(body, block.channel), trial)
+        number = block.sun_pulses[-1] + 1
     return model, state
 
 
 def turns(body: nutdamp.Spacecraft, *blocks: Block) -> np.ndarray:
     """By how much blocks turn H, rad: in closed form, and flown."""
     model, state = in_form(body, *blocks)
-    return np.array([float(model.left(state).aim), left_by(propagation.flown(body, fired(body, blocks))).aim])
+    return np.array(
+        [float(model.left(state).aim), left_by(propagation.flown(body, fired(body, blocks))).aim]
+    )
 
 
 def blocks_of(turn: float, late: float = 0.96) -> tuple[Block, Block]:
     """The first is still on when the next Sun pulse comes."""
-    return Block("+1", 2, late * turn, 0.07 * turn, 4, 1), Block("-2", 9, 0.3 * turn, 0.02 * turn, 3, 2)
+    return Block("+1", 2, late * turn, 0.07 * turn, 4, 1), Block(
+        "-2", 9, 0.3 * turn, 0.02 * turn, 3, 2
+    )
 
 
-TRIAXIAL = spinner(moments=(110.0, 95.0, 150.0), spin=-2.0, degrees=1.0, channels=(channel("T", 8.0, 3.0, 2.0),))
+TRIAXIAL = spinner(
+    moments=(110.0, 95.0, 150.0), spin=-2.0, degrees=1.0, channels=(channel("T", 8.0, 3.0, 2.0),)
+)
 
 
 @spread("seed", [0, 1, 3, 5, None], quick=2, deep=3)
 def test_blocks_fire_from_the_sun_pulses_of_the_nutating_body(seed: int | None) -> None:
     """Of three moments and with an axial torque too."""
     body = commanded(TRIAXIAL, SUN) if seed is None else some_body(seed)
-    blocks = (Block("T", 1, 0.5, 0.2, 6, 1),) if seed is None else blocks_of(2.0 * math.pi / abs(body.spin))
+    blocks = (
+        (Block("T", 1, 0.5, 0.2, 6, 1),)
+        if seed is None
+        else blocks_of(2.0 * math.pi / abs(body.spin))
+    )
     made, (motion, starts) = fired(body, blocks), flown_by_reference(body, blocks)
     assert [one.start for one in made] == pytest.approx(starts, abs=1e-8)
     settled = propagation.flown(body, made).settled
@@ -441,7 +554,9 @@ def test_blocks_fire_from_the_sun_pulses_of_the_nutating_body(seed: int | None) 
 
 
 def test_without_nutation_a_sun_pulse_comes_every_turn_and_in_no_view_none() -> None:
-    """A Sun within the nutation cone does not go round in the body; one out of view, or no sensor, gives none."""
+    """A Sun within the nutation cone does not go round in the body; one out of view, or no sensor,
+    gives none.
+    """
     clock = sun_clock(commanded(spinner(degrees=0.0, spin=-2.0), SUN, azimuth=2.0))
     moments = [float(clock.sun_pulse(number).since[0]) for number in (1, 2, 3, 7, 40)]
     assert 0.0 <= moments[0] < TURN
@@ -449,7 +564,9 @@ def test_without_nutation_a_sun_pulse_comes_every_turn_and_in_no_view_none() -> 
     inside = commanded(spinner(degrees=8.0, channels=cross(8.0)), np.array([0.02, 0.0, 1.0]))
     still = commanded(spinner(degrees=0.0, channels=cross(8.0)), np.array([1.0, 0.0, 0.2]))
     blind = replace(still, sun_sensor=SunSensor(0.0, elevation=1.2, half_width=0.3))
-    beyond = replace(still, sun_sensor=SunSensor(0.0, elevation=-1.5))  # half the sky is seen, not this half
+    beyond = replace(
+        still, sun_sensor=SunSensor(0.0, elevation=-1.5)
+    )  # half the sky is seen, not this half
     without = replace(inside, sun_sensor=None)
     cases = (("cone", inside, 30), ("sensor", without, 1), ("view", blind, 2), ("view", beyond, 2))
     for key, body, count in cases:
@@ -459,39 +576,64 @@ def test_without_nutation_a_sun_pulse_comes_every_turn_and_in_no_view_none() -> 
 
 @pytest.mark.parametrize("heading", [0.4, math.pi / 2, math.pi / 2 + 1e-7, 3.0, -2.0, 0.0])
 def test_a_rhumb_line_is_the_solution_of_its_equations(heading: float) -> None:
-    """dγ/ds = cos χ, dλ/ds = sin χ/sin γ, and its meridian turns by cos γ dλ; past the Sun it ends nowhere."""
+    """dγ/ds = cos χ, dλ/ds = sin χ/sin γ, and its meridian turns by cos γ dλ; past the Sun it ends
+    nowhere.
+    """
 
     def slope(_: float, y: NDArray[np.float64]) -> list[float]:
-        return [math.cos(heading), math.sin(heading) / math.sin(y[0]), math.sin(heading) / math.tan(y[0])]
+        return [
+            math.cos(heading),
+            math.sin(heading) / math.sin(y[0]),
+            math.sin(heading) / math.tan(y[0]),
+        ]
 
-    expected = solve_ivp(slope, (0.0, 0.7), [1.2, 0.0, 0.0], method="DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
-    assert [float(one) for one in precession.rhumb_end(1.2, heading, 0.7)] == pytest.approx(expected, abs=1e-10)
+    expected = solve_ivp(
+        slope, (0.0, 0.7), [1.2, 0.0, 0.0], method="DOP853", rtol=1e-12, atol=1e-13
+    ).y[:, -1]
+    assert [float(one) for one in precession.rhumb_end(1.2, heading, 0.7)] == pytest.approx(
+        expected, abs=1e-10
+    )
     assert math.isnan(float(precession.rhumb_end(0.3, math.pi, 0.4)[0]))
 
 
 def test_phasors_of_a_train_add_up() -> None:
     steps = (0.3, 0.0, 2 * math.pi, 4 * math.pi, -2 * math.pi, math.pi, 7.1)
     for step, count in itertools.product(steps, (1, 2, 5, 8)):
-        assert abs(precession.phasor_sum(count, step) - np.exp(1j * step * np.arange(count)).sum()) < 1e-9
+        assert (
+            abs(precession.phasor_sum(count, step) - np.exp(1j * step * np.arange(count)).sum())
+            < 1e-9
+        )
 
 
 @pytest.mark.parametrize("seed", range(6))
 def test_the_closed_form_is_the_flight_but_for_small_terms(seed: int) -> None:
-    """And what it is off by, added to it, makes it the flight: H in both directions, the nutation and the spin."""
+    """And what it is off by, added to it, makes it the flight: H in both directions, the nutation
+    and the spin.
+    """
     rng = np.random.default_rng(seed)
-    body, blocks, number = some_body(seed), list[Block](), 1
+    body = some_body(seed)
+    blocks = list[Block]()
+    number = 1
     turn = 2.0 * math.pi / abs(body.spin)
     width = 0.02 * turn
-    width *= math.radians(0.3) / float(BlockModel(body).turned_by(body.channels[0], width, body.spin))
+    width *= math.radians(0.3) / float(
+        BlockModel(body).turned_by(body.channels[0], width, body.spin)
+    )
     for _ in range(2):
-        name, wait, delay = body.channels[rng.integers(4)].name, int(rng.integers(3)), rng.uniform(0, 0.8) * turn
+        name = body.channels[rng.integers(4)].name
+        wait = int(rng.integers(3))
+        delay = rng.uniform(0, 0.8) * turn
         blocks.append(Block(name, number + wait, delay, width, int(rng.integers(1, 12)), 1))
         number = blocks[-1].sun_pulses[-1] + 1
     model, state = in_form(body, *blocks)
     flown = propagation.flown(body, fired(body, blocks))
-    form, off, left = model.left(state), model.apart(state, flown), left_by(flown)
+    form = model.left(state)
+    off = model.apart(state, flown)
+    left = left_by(flown)
     # Pulses turn H by 0.3 deg or less: what is left out is of second order in that.
-    assert (float(form.nutation), float(form.aim)) == pytest.approx((left.nutation, left.aim), abs=math.radians(0.03))
+    assert (float(form.nutation), float(form.aim)) == pytest.approx(
+        (left.nutation, left.aim), abs=math.radians(0.03)
+    )
     assert abs(off.longitude) < math.radians(0.1)
     corrected = model.left(state.shifted(off))
     assert float(corrected.aim) == pytest.approx(left.aim, abs=1e-9)
@@ -502,10 +644,16 @@ def test_the_closed_form_is_the_flight_but_for_small_terms(seed: int) -> None:
 @spread("valve", [SLOW, UNEVEN, Trapezoid(0.015, 0.005, 0.004, 0.02)], quick=1)
 @spread("width", [0.05, 0.1, 0.2], quick=1)
 @spread(("name", "thruster"), [("lunar-prospector", "+M2"), ("ace", "N1")], quick=1)
-def test_the_closed_form_of_slow_valves_is_the_flight(name: str, thruster: str, width: float, valve: Valve) -> None:
+def test_the_closed_form_of_slow_valves_is_the_flight(
+    name: str, thruster: str, width: float, valve: Valve
+) -> None:
     """As near as without them, and by the share of impulse that the valve gives more or less."""
-    body, block = at_rest(name), Block(thruster, 1, 1.0, width, 20)
-    (form, flown), share = turns(through(body, valve), block), turns(through(body, valve), block) / turns(body, block)
+    body = at_rest(name)
+    block = Block(thruster, 1, 1.0, width, 20)
+    (form, flown), share = (
+        turns(through(body, valve), block),
+        turns(through(body, valve), block) / turns(body, block),
+    )
     assert form == pytest.approx(flown, rel=1e-3)
     assert share[0] == pytest.approx(share[1], rel=1e-5)
     assert share[1] == pytest.approx(valve.thrust(width).on_time / width, rel=2e-3)
@@ -513,8 +661,11 @@ def test_the_closed_form_of_slow_valves_is_the_flight(name: str, thruster: str, 
 
 @pytest.mark.parametrize("valve", [SLOW, UNEVEN])
 def test_a_late_centroid_turns_the_heading(valve: Valve) -> None:
-    """The block of a slow valve ends where one of a fast valve does that is commanded later by as much."""
-    body, given = at_rest(), valve.thrust(0.15)
+    """The block of a slow valve ends where one of a fast valve does that is commanded later by as
+    much.
+    """
+    body = at_rest()
+    given = valve.thrust(0.15)
     late = 1.0 + given.centroid - 0.5 * given.on_time
     flights = [
         propagation.flown(each, fired(each, (Block("+M2", 1, delay, width, 20),))).final.momentum
@@ -533,12 +684,15 @@ def test_commands_begin_at_the_delay_after_the_sun_pulses_of_the_motion_that_the
     """Of a nutating body, through ramps that are on as the next Sun pulse comes."""
     valve = Trapezoid(0.02 * TURN, 0.03 * TURN, 0.01 * TURN, 0.02 * TURN)
     body = through(commanded(spinner(degrees=2.0, spin=-2.0, channels=cross(8.0)), SUN), valve)
-    body, blocks = replace(body, cold=Cold(0.7, 3.0)), blocks_of(TURN, 0.93)
+    body = replace(body, cold=Cold(0.7, 3.0))
+    blocks = blocks_of(TURN, 0.93)
     made = fired(body, blocks)
     moments = sun_pulses(propagation.flown(body, made, made.end + TURN), made.end)
     due = [moments[number - 1] + block.delay for block in blocks for number in block.sun_pulses]
     assert [pulse.loaded[0] for pulse in made] == pytest.approx(due, abs=1e-8)
-    assert any(begins < one < ends for one in moments for begins, ends in (pulse.thrust for pulse in made))
+    assert any(
+        begins < one < ends for one in moments for begins, ends in (pulse.thrust for pulse in made)
+    )
 
 
 def one_block(body: nutdamp.Spacecraft) -> planning.Plan:
@@ -549,11 +703,15 @@ def one_block(body: nutdamp.Spacecraft) -> planning.Plan:
 
 @pytest.mark.weekly
 def test_a_valve_without_delays_changes_no_block_and_a_late_one_the_delay_alone() -> None:
-    """Thrust as long as the command, 15 ms late: the delay is that much less, on its steps of 5 ms."""
+    """Thrust as long as the command, 15 ms late: the delay is that much less,
+    on its steps of 5 ms.
+    """
     body = aimed(at_rest(), 8.5, 40.0)
     plain, valved, slow = map(one_block, (body, through(body, Trapezoid()), through(body, SLOW)))
     assert plain.pulses.blocks == valved.pulses.blocks
-    assert [pulse.t for pulse in plain.pulses] == pytest.approx([pulse.t for pulse in valved.pulses], abs=1e-10)
+    assert [pulse.t for pulse in plain.pulses] == pytest.approx(
+        [pulse.t for pulse in valved.pulses], abs=1e-10
+    )
     (block,), (before,) = slow.pulses.blocks, plain.pulses.blocks
     assert (block.count, block.width) == (before.count, before.width)
     assert block.delay == pytest.approx(before.delay - 0.015, abs=1e-9)
@@ -568,24 +726,34 @@ def missed(body: nutdamp.Spacecraft, made: Schedule) -> float:
         assert isinstance(jet.valve, Trapezoid)
         times: dict[str, Any] = {"opening": jet.valve.open_delay, "closing": jet.valve.close_delay}
         ramps: dict[str, Any] = {"rise": jet.valve.rise_time, "fall": jet.valve.fall_time}
-        swells += reference.through_valve(pulse.loaded[0], pulse.loaded[1], jet.torque, **times, **ramps)
-    moments, start = body.inertia.moments, attitude.matrix(body.initial.quaternion)
+        swells += reference.through_valve(
+            pulse.loaded[0], pulse.loaded[1], jet.torque, **times, **ramps
+        )
+    moments = body.inertia.moments
+    start = attitude.matrix(body.initial.quaternion)
     motion = reference.fly(moments, body.omega0, swells, made.end + 0.1, start)
     return reference.angle(reference.momentum(moments, motion), body.target_axis)
 
 
 @pytest.mark.weekly
 @pytest.mark.parametrize("valve", [SLOW, UNEVEN])
-def test_planned_with_valves_blocks_leave_what_the_grid_allows_and_without_them_much(valve: Valve) -> None:
-    """Pulses of about 50 ms, valves 15 ms late. No train of equal pulses on a grid ends on the target to 1e-6 deg.
+def test_planned_with_valves_blocks_leave_what_the_grid_allows_and_without_them_much(
+    valve: Valve,
+) -> None:
+    """Pulses of about 50 ms, valves 15 ms late. No train of equal pulses on a grid ends on the
+    target to 1e-6 deg.
 
-    Half a step of the delay (5 ms) turns the heading by half a step of the spin, and half a pulse may be missing or too
-    much: within these the end of H lies, and blocks planned without the valves miss it by the delay and by what their
-    thrust lacks.
+    Half a step of the delay (5 ms) turns the heading by half a step of the spin, and half a pulse
+    may be missing or too much: within these the end of H lies, and blocks planned without the
+    valves miss it by the delay and by what their thrust lacks.
     """
-    body, way = aimed(at_rest(), 3.0, 40.0), math.radians(3.0)
-    body = replace(body, commands=replace(present(body.commands), widths=np.arange(0.046, 0.0541, 0.001)))
-    slow, spin = through(body, valve), abs(body.spin)
+    body = aimed(at_rest(), 3.0, 40.0)
+    way = math.radians(3.0)
+    body = replace(
+        body, commands=replace(present(body.commands), widths=np.arange(0.046, 0.0541, 0.001))
+    )
+    slow = through(body, valve)
+    spin = abs(body.spin)
     aware, unaware = one_block(slow), one_block(body)
     (block,), step = aware.pulses.blocks, way / aware.pulses.blocks[0].count
     assert 0.045 < block.width < 0.055
@@ -594,18 +762,22 @@ def test_planned_with_valves_blocks_leave_what_the_grid_allows_and_without_them_
     assert aware.flown.axis_error < 0.5 * spin * 0.005 * way + 0.5 * step
     assert aware.flown.nutation < 2.0 * step
     off = missed(slow, fired(slow, unaware.pulses.blocks))
-    assert off > max(0.9 * abs(way * spin * 0.015), 1.9 * aware.flown.axis_error)  # the heading, by 15 ms of the spin
+    assert off > max(
+        0.9 * abs(way * spin * 0.015), 1.9 * aware.flown.axis_error
+    )  # the heading, by 15 ms of the spin
 
 
 TANK = Tank(propellant=0.3, pressure=22e5, final_pressure=8e5, exponent=1.0)
 
 
 def levels(count: int, *, each: float = 0.0, cold: Cold | None = None) -> list[float]:
-    """Levels of pulses, added up here: 1 - (1 - first) exp(-k/n), p = p0/(1 + (p0/p1 - 1) used/propellant).
+    """Levels of pulses, added up here: 1 - (1 - first) exp(-k/n), p = p0/(1 + (p0/p1 - 1)
+    used/propellant).
 
     The pressure is that of the middle of a pulse.
     """
-    used, found = 0.0, []
+    used = 0.0
+    found = []
     for number in range(count):
         warmth = 1.0 if cold is None else 1.0 - (1.0 - cold.first) * math.exp(-number / cold.pulses)
         half = 0.5 * each * warmth / (1.0 + (22.0 / 8.0 - 1.0) * used / 0.3)
@@ -627,10 +799,13 @@ def test_cold_pulses_and_falling_pressure_turn_less_pulse_by_pulse(
     name: str, thruster: str, feed: dict[str, Any], counts: tuple[int, ...], near: float
 ) -> None:
     """The next block of the channel goes on where the nozzle was."""
-    body, first, blocks = at_rest(name), 1, list[Block]()
+    body = at_rest(name)
+    first = 1
+    blocks = list[Block]()
     each = 0.0 if "cold" in feed else (named(body, thruster).mass_flow or 0.0) * 0.2
     for count in counts:
-        blocks, first = [*blocks, Block(thruster, first, 1.0, 0.2, count)], first + count
+        blocks = [*blocks, Block(thruster, first, 1.0, 0.2, count)]
+        first = first + count
         mean = np.mean(levels(first - 1, each=each, cold=feed.get("cold")))
         share = turns(replace(body, **feed), *blocks) / turns(body, *blocks)
         assert share == pytest.approx([mean, mean], rel=near)
@@ -649,25 +824,34 @@ def test_what_cannot_give_thrust_is_neither_fired_nor_planned() -> None:
 
 
 def test_cold_pulses_leave_the_nutation_of_the_closed_form() -> None:
-    """It is not the mean that counts: the first kicks are missing, and fewer after pulses fired before."""
+    """It is not the mean that counts: the first kicks are missing, and fewer after pulses fired
+    before.
+    """
     name = at_rest().channels[0].name
     for count, before in ((2, 0), (3, 0), (4, 0), (6, 0), (11, 0), (4, 2), (8, 5)):
         body = replace(at_rest(), cold=Cold(0.3, 3.0, {name: before}))
         block = Block(name, 1, 1.0, 0.2, count)
         model, state = in_form(body, block)
         flown = left_by(propagation.flown(body, fired(body, (block,))))
-        assert float(model.left(state).nutation) == pytest.approx(flown.nutation, abs=math.radians(2e-3))
+        assert float(model.left(state).nutation) == pytest.approx(
+            flown.nutation, abs=math.radians(2e-3)
+        )
 
 
 @pytest.mark.parametrize("phase", [0.3, 1.8, 3.4, 5.0])
 def test_the_damping_delay_is_the_one_of_a_nutation_period_that_leaves_least(phase: float) -> None:
     body = commanded(spinner(degrees=3.0, phase=phase, channels=cross(8.0)), SUN)
-    model, jet, period = BlockModel(body), body.channels[0], body.body_period
+    model = BlockModel(body)
+    jet = body.channels[0]
+    period = body.body_period
     trial = Trial(0, 0.0, 0.05, 1, 1)
     delay = float(model.damping_delay(model.start, jet, trial))
     assert 0.0 <= delay < period
     delays = delay + period * np.linspace(-0.5, 0.5, 21)
-    left = [float(model.left(model.after(model.start, jet, trial._replace(delay=one))).nutation) for one in delays]
+    left = [
+        float(model.left(model.after(model.start, jet, trial._replace(delay=one))).nutation)
+        for one in delays
+    ]
     assert int(np.argmin(left)) == 10
 
 
@@ -687,15 +871,22 @@ def test_what_was_fired_before_counts_in_the_search_and_in_the_flight() -> None:
     assert (sum(supply.fired.values()), supply.used) == (0, 0.0)
     supply.count(whole[:12])
     later = supply.behind(FED)
-    alone, rest = fired(later, (replace(second, first=1),)).pulses, [one.magnitude for one in whole[12:]]
+    alone = fired(later, (replace(second, first=1),)).pulses
+    rest = [one.magnitude for one in whole[12:]]
     assert [one.magnitude for one in alone] == pytest.approx(rest, rel=1e-12)
     assert rest[0] != pytest.approx(whole[0].magnitude, rel=0.01)
-    jet, model, widths = FED.channels[0], BlockModel(later), np.array([0.3])
+    jet = FED.channels[0]
+    model = BlockModel(later)
+    widths = np.array([0.3])
     full, used = model.full_pulses(model.start, jet, widths, np.array([10]))
-    assert float(full[0]) == pytest.approx(sum(rest) / (float(np.linalg.norm(jet.torque)) * 0.3), rel=1e-9)
+    assert float(full[0]) == pytest.approx(
+        sum(rest) / (float(np.linalg.norm(jet.torque)) * 0.3), rel=1e-9
+    )
     assert float(used[0]) == pytest.approx(sum(one.propellant or 0.0 for one in whole), rel=1e-9)
-    # 12 pulses of a body whose pressure has fallen to half: without that the form would be off by half the way.
-    block, worn = Block("T1", 1, 1.0, 0.3, 12), replace(FED, cold=Cold(0.7, 4.0, {"T1": 40}))
+    # 12 pulses of a body whose pressure has fallen to half: without that the form would be off by
+    # half the way.
+    block = Block("T1", 1, 1.0, 0.3, 12)
+    worn = replace(FED, cold=Cold(0.7, 4.0, {"T1": 40}))
     worn = replace(worn, tank=replace(present(FED.tank), used=0.6))
     form, flown = turns(worn, block)
     assert form == pytest.approx(flown, abs=2e-3 * FED.to_turn)
@@ -710,26 +901,37 @@ NUTATION, SHIFT = math.radians(1.0), math.radians(0.5)
 def body_of(seed: int, change: float | None = None) -> Spacecraft:
     """A spinner that is to turn, and to spin at 0.7 to 1.4 times its rate.
 
-    Of three kinds: channels of pure torques; turning ones with up to 5 % about axis 3; spinning ones with some across.
+    Of three kinds: channels of pure torques; turning ones with up to 5 % about axis 3; spinning
+    ones with some across.
     """
-    body, rng = some_body(seed), np.random.default_rng(1000 + seed)
+    body = some_body(seed)
+    rng = np.random.default_rng(1000 + seed)
     change = rng.uniform(0.7, 1.4) if change is None else change
     axial = abs(body.axial) * 0.3 / (40.0 * float(present(body.commands).widths[-1]))
-    turning, across = list(body.channels), (0.0, 0.0)
+    turning = list(body.channels)
+    across = (0.0, 0.0)
     if seed % 3 == 1:
-        turning = [channel(each.name, *each.torque[:2], rng.uniform(-0.05, 0.05) * each.strength) for each in turning]
+        turning = [
+            channel(each.name, *each.torque[:2], rng.uniform(-0.05, 0.05) * each.strength)
+            for each in turning
+        ]
     if seed % 3 == 2:
         across = rng.uniform(-0.1, 0.1, 2).tolist()
     spinning = [
-        channel(name, *(axial * each for each in across), sense * axial) for name, sense in (("U", 1), ("D", -1))
+        channel(name, *(axial * each for each in across), sense * axial)
+        for name, sense in (("U", 1), ("D", -1))
     ]
     goal = replace(body.goal, spin=body.spin * change)
-    return replace(body, channels=(*turning, *spinning), goal=goal, requirement=Requirement(NUTATION, SHIFT))
+    return replace(
+        body, channels=(*turning, *spinning), goal=goal, requirement=Requirement(NUTATION, SHIFT)
+    )
 
 
 @spread("seed", range(24), quick=3, deep=4)
 def test_spin_and_turn_end_as_required_when_flown_by_the_reference(seed: int) -> None:
-    """Euler's equations by DOP853, Sun pulses as their roots: nutation, axis and spin, and the moment of each pulse."""
+    """Euler's equations by DOP853, Sun pulses as their roots: nutation, axis and spin, and the
+    moment of each pulse.
+    """
     plan = planned(body_of(seed), met=False)
     body, moments = plan.spacecraft, plan.spacecraft.inertia.moments
     assert plan.meets_requirement
@@ -737,14 +939,21 @@ def test_spin_and_turn_end_as_required_when_flown_by_the_reference(seed: int) ->
     assert 2 <= len(plan.pulses.blocks) <= LEGS * BLOCKS
     motion, starts = flown_by_reference(body, plan.pulses.blocks)
     assert [pulse.start for pulse in plan.pulses] == pytest.approx(starts, abs=1e-7)
-    assert reference.nutation(moments, motion.rates, math.copysign(1.0, body.spin)) <= NUTATION + 1e-7
+    assert (
+        reference.nutation(moments, motion.rates, math.copysign(1.0, body.spin)) <= NUTATION + 1e-7
+    )
     assert reference.angle(reference.momentum(moments, motion), body.target_axis) <= SHIFT + 1e-7
-    assert abs(motion.rates[2] - present(body.goal.spin)) <= spin_tolerance(body, present(body.goal.spin)) + 1e-9
+    assert (
+        abs(motion.rates[2] - present(body.goal.spin))
+        <= spin_tolerance(body, present(body.goal.spin)) + 1e-9
+    )
 
 
 @spread("seed", [0, 3, 6, 12, 15, 18], quick=1, deep=2)
 def test_h_is_turned_while_it_is_small(seed: int) -> None:
-    """Before the spin is raised, after it is lowered; pure torques add nothing else, so the first order does."""
+    """Before the spin is raised, after it is lowered; pure torques add nothing else, so the first
+    order does.
+    """
     for change, last in ((1.3, True), (0.77, False)):
         blocks = planned(body_of(seed, change), met=False).pulses.blocks
         spinning = {"U", "D"}
@@ -766,8 +975,12 @@ def test_nutation_is_damped_and_the_spin_set_without_a_target() -> None:
 def test_the_spin_that_a_turn_spoils_is_mended_by_a_last_leg() -> None:
     """The goal is the spin of today; the turning channel takes it off by more than is allowed."""
     body = body_of(0)
-    skew = [channel(each.name, *each.torque[:2], 0.05 * each.strength) for each in body.channels[:4]]
-    body = replace(body, channels=(*skew, *body.channels[4:]), goal=replace(body.goal, spin=body.spin))
+    skew = [
+        channel(each.name, *each.torque[:2], 0.05 * each.strength) for each in body.channels[:4]
+    ]
+    body = replace(
+        body, channels=(*skew, *body.channels[4:]), goal=replace(body.goal, spin=body.spin)
+    )
     plan = planned(body, met=False)
     assert plan.meets_requirement
     assert plan.pulses.blocks[-1].channel in {"U", "D"}
@@ -792,4 +1005,7 @@ def test_where_the_spin_cannot_be_set_the_reason_is_said() -> None:
     }
     plans = {name: planning.plan(each, "command-block") for name, each in cases.items()}
     assert all(plan.failure is None and not plan.feasible for plan in plans.values())
-    check_text("blocks.no-spin", "\n".join(f"{name}: {infeasibility(plan)}" for name, plan in plans.items()))
+    check_text(
+        "blocks.no-spin",
+        "\n".join(f"{name}: {infeasibility(plan)}" for name, plan in plans.items()),
+    )

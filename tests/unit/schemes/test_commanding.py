@@ -1,4 +1,6 @@
-"""Plans through valves: what is commanded, flown by an integrator that knows nothing but the level of the thrust."""
+"""Plans through valves: what is commanded, flown by an integrator that knows nothing but the level
+of the thrust.
+"""
 
 import math
 from collections import Counter
@@ -35,28 +37,39 @@ MICRODEGREE = math.radians(1e-6)
 LATE = Trapezoid(0.015, 0.015)
 SLOW = Trapezoid(0.015, 0.012, 0.005, 0.010)
 EFFECTIVE = replace(SLOW, effective=True)
-MEASURED = Measured(((0.005, 0.003, 0.009), (0.02, 0.017, 0.02), (0.05, 0.049, 0.037), (0.9, 0.902, 0.465)))
+MEASURED = Measured(
+    ((0.005, 0.003, 0.009), (0.02, 0.017, 0.02), (0.05, 0.049, 0.037), (0.9, 0.902, 0.465))
+)
 VALVES = {"late": LATE, "slow": SLOW, "effective": EFFECTIVE, "measured": MEASURED}
 
 
 def through(valve: Valve | None, body: Spacecraft) -> Spacecraft:
     """The body with this valve on all its thrusters."""
-    return body if valve is None else replace(body, channels=tuple(one.of(valve=valve) for one in body.channels))
+    return (
+        body
+        if valve is None
+        else replace(body, channels=tuple(one.of(valve=valve) for one in body.channels))
+    )
 
 
 def short_pulses(degrees: float = 0.4, *, axial: float = 0.0) -> Spacecraft:
     """Pulses of about 50 ms across a body at 30 rpm."""
     torques = ((8.0, 0.0), (-8.0, 0.0), (0.0, 8.0), (0.0, -8.0))
     jet: dict[str, Any] = {"min_on_time": 0.005, "max_on_time": 0.05, "isp": 220.0, "thrust": 10.0}
-    channels = tuple(channel(f"C{number}", *torque, axial, **jet) for number, torque in enumerate(torques))
+    channels = tuple(
+        channel(f"C{number}", *torque, axial, **jet) for number, torque in enumerate(torques)
+    )
     return spinner(spin=math.pi, degrees=degrees, channels=channels, limits=Limits(horizon=200.0))
 
 
-SHORT, TO_TURN = short_pulses(), aimed(short_pulses(0.0), 1.0, 40.0)
+SHORT = short_pulses()
+TO_TURN = aimed(short_pulses(0.0), 1.0, 40.0)
 CASES = {
     "one-pulse": SHORT,
     "one-pulse, axial torque": short_pulses(axial=0.3),
-    "two-pulse": spinner(degrees=2.0, channels=cross(8.0, max_on_time=0.9), limits=Limits(horizon=200.0)),
+    "two-pulse": spinner(
+        degrees=2.0, channels=cross(8.0, max_on_time=0.9), limits=Limits(horizon=200.0)
+    ),
     "four-pulse": SHORT,
     "rhumb-line": TO_TURN,
     "half-cone": aimed(short_pulses(0.0), 0.5, 40.0),
@@ -66,22 +79,30 @@ CASES = {
 
 
 def levels(made: Schedule, body: Spacecraft) -> Iterable[reference.Swell]:
-    """The thrust of commands through the valves of `Trapezoid`, from start and on-time as loaded alone."""
+    """The thrust of commands through the valves of `Trapezoid`, from start and on-time as loaded
+    alone.
+    """
     valves = {one.name: one.valve for one in body.channels}
     for pulse in made:
         valve = valves[pulse.channel]
         assert isinstance(valve, Trapezoid)
         times: dict[str, Any] = {"opening": valve.open_delay, "closing": valve.close_delay}
         ramps: dict[str, Any] = {"rise": valve.rise_time, "fall": valve.fall_time}
-        yield from reference.through_valve(pulse.loaded[0], pulse.loaded[1], present(pulse.torque), **times, **ramps)
+        yield from reference.through_valve(
+            pulse.loaded[0], pulse.loaded[1], present(pulse.torque), **times, **ramps
+        )
 
 
 def left(made: Schedule, body: Spacecraft) -> float:
-    """What commands leave, rad, by the reference: nutation, or with a target the way to it, whichever is more."""
+    """What commands leave, rad, by the reference: nutation, or with a target the way to it,
+    whichever is more.
+    """
     moments = body.inertia.moments
     motion = reference.fly(moments, body.omega0, levels(made, body), made.end + 0.01)
     nutation = reference.nutation(moments, motion.rates, 1.0)
-    to_go = body.goal.axis is not None and reference.angle(reference.momentum(moments, motion), body.target_axis)
+    to_go = body.goal.axis is not None and reference.angle(
+        reference.momentum(moments, motion), body.target_axis
+    )
     return max(nutation, float(to_go))
 
 
@@ -99,11 +120,15 @@ def cases(*quick: str) -> list[Any]:
 
 @spread("valve", [LATE, SLOW], quick=1, ids=["late", "slow"])
 @pytest.mark.parametrize("scheme", cases("one-pulse"))
-def test_planned_with_valves_nothing_is_left_and_without_them_much(scheme: str, valve: Trapezoid) -> None:
+def test_planned_with_valves_nothing_is_left_and_without_them_much(
+    scheme: str, valve: Trapezoid
+) -> None:
     late = through(valve, CASES[scheme])
     assert left(made_by(scheme, late), late) < MICRODEGREE
     channels = {one.name: one for one in late.channels}
-    unaware = Schedule(tuple(on_command(channels[p.channel], *p.loaded) for p in made_by(scheme, CASES[scheme])))
+    unaware = Schedule(
+        tuple(on_command(channels[p.channel], *p.loaded) for p in made_by(scheme, CASES[scheme]))
+    )
     assert left(unaware, late) > 1000.0 * MICRODEGREE
 
 
@@ -114,12 +139,15 @@ def test_the_flight_the_impulse_sum_and_the_cases_agree(scheme: str, valve: Valv
     made = made_by(scheme, body)
     assert by_impulses(body, made).residual.nutation < MICRODEGREE
     some = Schedule(made.pulses[:-1])  # so that much is left to compare
-    nominal, model = flown(body, some).residual.nutation, DispersedModel(body, some)
+    nominal = flown(body, some).residual.nutation
+    model = DispersedModel(body, some)
     assert nominal > 100.0 * MICRODEGREE
     assert by_impulses(body, some).residual.nutation == pytest.approx(nominal, abs=1e-13)
     for fly, allowed in ((RealWidths(model), 1e-13), (ClosedForm(model), 1e-8)):
         ends = fly(model.cases({"timing pulse 1": np.zeros(3)})).momentum
-        assert np.arctan2(np.hypot(ends[0], ends[1]), ends[2]) == pytest.approx(nominal, abs=allowed)
+        assert np.arctan2(np.hypot(ends[0], ends[1]), ends[2]) == pytest.approx(
+            nominal, abs=allowed
+        )
 
 
 @pytest.mark.deep
@@ -127,7 +155,9 @@ def test_the_flight_the_impulse_sum_and_the_cases_agree(scheme: str, valve: Valv
 def test_commands_are_those_of_the_valve_and_effective_ones_of_the_impulse(valve: Valve) -> None:
     for pulse in made_by("optimal", through(valve, SHORT)):
         (start, on_time), given = pulse.loaded, valve.thrust(pulse.loaded[1])
-        assert (pulse.on_time, pulse.t) == pytest.approx((given.on_time, start + given.centroid), rel=1e-12)
+        assert (pulse.on_time, pulse.t) == pytest.approx(
+            (given.on_time, start + given.centroid), rel=1e-12
+        )
         assert 0.005 <= on_time <= 0.05
         assert pulse.impulse == pytest.approx(present(pulse.torque) * pulse.on_time)
 
@@ -169,7 +199,9 @@ def test_a_requested_on_time_is_a_command() -> None:
 def test_cold_pulses_are_planned_for(scheme: str, valve: Valve | None) -> None:
     cold = Cold(0.9, 4.0)
     body = replace(through(valve, CASES[scheme]), cold=cold)
-    made, fired, channels = made_by(scheme, body), Counter[str](), {one.name: one for one in body.channels}
+    made = made_by(scheme, body)
+    fired = Counter[str]()
+    channels = {one.name: one for one in body.channels}
     for pulse in made:
         full = channels[pulse.channel].torque
         assert pulse.torque == pytest.approx(cold.factor(fired[pulse.channel]) * full, rel=1e-12)
@@ -191,9 +223,13 @@ def test_the_budget_says_what_valves_and_cold_pulses_cost() -> None:
 
 
 @pytest.mark.parametrize("scheme", ["one-pulse", "four-pulse", weekly("optimal")])
-def test_the_shortest_command_of_a_valve_that_closes_late_is_what_plans_reckon_with(scheme: str) -> None:
+def test_the_shortest_command_of_a_valve_that_closes_late_is_what_plans_reckon_with(
+    scheme: str,
+) -> None:
     jet = channel("C", 8.0, 0.0, 0.0)
-    body = through(Trapezoid(open_delay=0.005, close_delay=0.105), spinner(degrees=0.1, channels=(jet,)))
+    body = through(
+        Trapezoid(open_delay=0.005, close_delay=0.105), spinner(degrees=0.1, channels=(jet,))
+    )
     assert effective_on_times(jet)[0] == 0.0
     assert effective_on_times(body.channels[0])[0] == pytest.approx(0.1, abs=1e-8)
     made = planning.plan(body, scheme)
@@ -202,14 +238,24 @@ def test_the_shortest_command_of_a_valve_that_closes_late_is_what_plans_reckon_w
 
 @pytest.mark.weekly
 def test_no_pulse_of_a_plan_is_without_thrust() -> None:
-    """Oblate, strong thrusters, and a valve that closes so late that a tick already gives 141 ms of thrust."""
+    """Oblate, strong thrusters, and a valve that closes so late that a tick already gives 141 ms of
+    thrust.
+    """
     M, tick = 1072.4242912066034, 0.05652980755265212
     torques = {"+M1": (M, 0.0), "-M1": (-M, 0.0), "+M2": (0.0, M), "-M2": (0.0, -M)}
-    channels = tuple(channel(name, *one, 0.1 * M, isp=172.0, thrust=1580.0) for name, one in torques.items())
-    limits = Limits(earliest=0.80377, tick=tick, blackout=((2.766427, 16.756058), (56.5298, 62.182788)))
+    channels = tuple(
+        channel(name, *one, 0.1 * M, isp=172.0, thrust=1580.0) for name, one in torques.items()
+    )
+    limits = Limits(
+        earliest=0.80377, tick=tick, blackout=((2.766427, 16.756058), (56.5298, 62.182788))
+    )
     body = spinner(A=696.2014640787293, C=1290.5142511514878, channels=channels, limits=limits)
-    body = replace(body, omega0=np.array([0.02924650877807938, 0.3621071224872865, -1.1114818144971392]))
-    late = Trapezoid(0.012435118149339648, 0.09611290163212675, 0.010065350950248513, 0.01181259076686132)
+    body = replace(
+        body, omega0=np.array([0.02924650877807938, 0.3621071224872865, -1.1114818144971392])
+    )
+    late = Trapezoid(
+        0.012435118149339648, 0.09611290163212675, 0.010065350950248513, 0.01181259076686132
+    )
     made = planning.plan(through(late, body), "optimal")
     assert made.pulses
     assert all(pulse.magnitude > 0.0 for pulse in made.pulses)
@@ -222,11 +268,20 @@ def test_a_train_of_requested_length_closes_on_a_body_of_three_moments(
     moments: tuple[float, float, float], degrees: float, on_time: float
 ) -> None:
     limits = Limits(horizon=200.0)
-    body = spinner(spin=math.pi, degrees=degrees, moments=moments, channels=SHORT.channels, limits=limits)
+    body = spinner(
+        spin=math.pi, degrees=degrees, moments=moments, channels=SHORT.channels, limits=limits
+    )
     plan = planning.plan(aimed(body, 1.0, 40.0), "rhumb-line", RhumbLineOptions(on_time=on_time))
-    allowed = MICRODEGREE if degrees == 0.0 else math.radians(0.005)  # of 1 degree to turn, where nutation is left
-    assert max(present(plan.flown, infeasibility(plan)).nutation, present(plan.flown).axis_error) < allowed
-    assert [pulse.on_time for pulse in plan.pulses.pulses[-15:]] == pytest.approx([on_time] * 15)  # the train
+    allowed = (
+        MICRODEGREE if degrees == 0.0 else math.radians(0.005)
+    )  # of 1 degree to turn, where nutation is left
+    assert (
+        max(present(plan.flown, infeasibility(plan)).nutation, present(plan.flown).axis_error)
+        < allowed
+    )
+    assert [pulse.on_time for pulse in plan.pulses.pulses[-15:]] == pytest.approx(
+        [on_time] * 15
+    )  # the train
 
 
 def unequal(made: Schedule) -> list[Value]:
@@ -235,7 +290,12 @@ def unequal(made: Schedule) -> list[Value]:
     return [values["shortest_s"], values["longest_s"]]
 
 
-@spread("feed", [{"cold": Cold(0.8, 4.0)}, {"tank": Tank(0.02, 22e5, 8e5, 1.0)}], deep=1, ids=["cold", "tank"])
+@spread(
+    "feed",
+    [{"cold": Cold(0.8, 4.0)}, {"tank": Tank(0.02, 22e5, 8e5, 1.0)}],
+    deep=1,
+    ids=["cold", "tank"],
+)
 def test_a_train_says_where_equal_impulses_are_not_equal_commands(feed: dict[str, Any]) -> None:
     made = planning.plan(replace(TO_TURN, **feed), "rhumb-line").pulses
     lengths = [pulse.loaded[1] for pulse in made]
@@ -258,9 +318,14 @@ class Silencing(Correction):
 
 @pytest.mark.parametrize("silenced", [2, 5])
 def test_of_a_train_that_lost_a_pulse_the_rest_is_compared(silenced: int) -> None:
-    """Two pulses of other lengths come before the train of four; they are no part of what is equal."""
-    body, on_times = replace(SHORT, cold=Cold(0.8, 4.0)), [0.4, 0.3, 0.03, 0.03, 0.03, 0.03]
-    pulses = (channel_pulse(body.channels[0], 2.0 * n, on_time) for n, on_time in enumerate(on_times))
+    """Two pulses of other lengths come before the train of four;
+    they are no part of what is equal.
+    """
+    body = replace(SHORT, cold=Cold(0.8, 4.0))
+    on_times = [0.4, 0.3, 0.03, 0.03, 0.03, 0.03]
+    pulses = (
+        channel_pulse(body.channels[0], 2.0 * n, on_time) for n, on_time in enumerate(on_times)
+    )
     silencing = Silencing(RHUMB_LINE, RhumbLineOptions(), silenced)
     made = valve_commands.as_commands(body, Schedule(tuple(pulses)), silencing)
     train = [pulse.loaded[1] for pulse in made.pulses[2:]]

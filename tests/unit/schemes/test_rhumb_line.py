@@ -8,7 +8,19 @@ from typing import Any
 import numpy as np
 import pytest
 from support import reference
-from support.builders import Outcome, aimed, channel, codes, cross, events, fan, off_target, one_of, present, spinner
+from support.builders import (
+    Outcome,
+    aimed,
+    channel,
+    codes,
+    cross,
+    events,
+    fan,
+    off_target,
+    one_of,
+    present,
+    spinner,
+)
 from support.cases import deep, spread
 from support.feasible import feasible_by, left
 from support.golden import check_text
@@ -29,13 +41,17 @@ TURN = 2.0 * math.pi / 3.0
 """s of the bodies here."""
 
 
-def still(A: float = 120.0, C: float = 80.0, tilt: float = 20.0, azimuth: float = 0.0, **parts: Any) -> Spacecraft:
+def still(
+    A: float = 120.0, C: float = 80.0, tilt: float = 20.0, azimuth: float = 0.0, **parts: Any
+) -> Spacecraft:
     """A pure spin to be turned."""
     return aimed(spinner(A, C, degrees=0.0, **parts), tilt, azimuth)
 
 
 def train(spacecraft: Spacecraft, *, near: float = 1e-9, **options: Any) -> planning.Plan:
-    """The plan, which by the reference ends on the target with equal pulses behind what damps the nutation."""
+    """The plan, which by the reference ends on the target with equal pulses behind what damps the
+    nutation.
+    """
     plan = feasible_by("rhumb-line", spacecraft, Options(**options))
     sizes = np.array([pulse.on_time or pulse.magnitude for pulse in equal(plan)])
     assert sizes == pytest.approx(sizes[:1].repeat(len(sizes)), rel=1e-12)
@@ -78,9 +94,16 @@ def test_ends_on_the_target(per_turn: int, A: float, C: float, spin: float) -> N
         spinner(
             degrees=1.0,
             channels=cross(40.0),
-            limits=Limits(earliest=2.0, gap=3.0, blackout=((8.0, 15.0), (20.0, 21.0)), horizon=200.0),
+            limits=Limits(
+                earliest=2.0, gap=3.0, blackout=((8.0, 15.0), (20.0, 21.0)), horizon=200.0
+            ),
         ),
-        spinner(moments=(100.0, 116.0, 140.0), degrees=0.0, channels=cross(20.0), limits=Limits(horizon=400.0)),
+        spinner(
+            moments=(100.0, 116.0, 140.0),
+            degrees=0.0,
+            channels=cross(20.0),
+            limits=Limits(horizon=400.0),
+        ),
     ],
     quick=1,
     deep=3,
@@ -95,7 +118,8 @@ def test_a_nutation_limits_and_unequal_moments_are_no_hindrance(body: Spacecraft
 @spread("on_time", [0.1, 0.3, 0.6], quick=1, deep=2)
 @spread("torque", [40.0, 10.0], quick=1, deep=2)
 def test_arc_efficiency(torque: float, on_time: float) -> None:
-    """Along the great circle equal pulses cost C|ω3|β over sinc(ω3τ/2), and what is left of a pulse and two to spare.
+    """Along the great circle equal pulses cost C|ω3|β over sinc(ω3τ/2), and what is left of a pulse
+    and two to spare.
 
     Their phases alone bring the nutation to nothing, which takes the pulses to spare.
     """
@@ -112,17 +136,28 @@ def test_an_on_time_is_kept_exactly_or_the_nearest_that_works_is_named() -> None
     kept, named = 0, 0
     for seed in range(16):
         rng = np.random.default_rng(seed)
-        spin, C, degrees = float(rng.choice([3.0, -3.0])), rng.uniform(30.0, 190.0), float(rng.choice([0.0, 1.0, 5.0]))
+        spin = float(rng.choice([3.0, -3.0]))
+        C = rng.uniform(30.0, 190.0)
+        degrees = float(rng.choice([0.0, 1.0, 5.0]))
         channels = cross(float(rng.uniform(5.0, 20.0)), max_on_time=1.0)
         body = spinner(100.0, C, spin, degrees, channels=channels, limits=Limits(horizon=400.0))
-        on_time, per_turn = float(rng.uniform(0.05, 0.6)), int(rng.integers(1, 3))
+        on_time = float(rng.uniform(0.05, 0.6))
+        per_turn = int(rng.integers(1, 3))
         body = aimed(body, float(rng.uniform(5.0, 40.0)), float(rng.uniform(-180.0, 180.0)))
-        plan = planning.plan(body, "rhumb-line", RhumbLineOptions(on_time=on_time, per_turn=per_turn))
+        plan = planning.plan(
+            body, "rhumb-line", RhumbLineOptions(on_time=on_time, per_turn=per_turn)
+        )
         if not plan.feasible:
-            said = re.search(r"--on-time ([0-9.]+)s works, with ([0-9]+) pulses in all$", infeasibility(plan))
-            assert said or infeasibility(plan).endswith("no other length was found that works"), infeasibility(plan)
+            said = re.search(
+                r"--on-time ([0-9.]+)s works, with ([0-9]+) pulses in all$", infeasibility(plan)
+            )
+            assert said or infeasibility(plan).endswith("no other length was found that works"), (
+                infeasibility(plan)
+            )
             if said:
-                plan = feasible_by("rhumb-line", body, Options(on_time=float(said[1]), per_turn=per_turn))
+                plan = feasible_by(
+                    "rhumb-line", body, Options(on_time=float(said[1]), per_turn=per_turn)
+                )
                 assert len(plan.pulses) == int(said[2])
                 named += 1
         else:
@@ -143,8 +178,12 @@ def test_fewer_pulses_than_close_by_themselves_are_trimmed_to_close() -> None:
 
 @pytest.mark.deep
 def test_on_ticks_the_width_is_one_of_them_and_starts_leave_little() -> None:
-    """What is left is the rounding of starts: by 10 ms a pulse is turned by 1.7 deg, of its 0.7 deg."""
-    body = still(tilt=12.0, azimuth=45.0, channels=cross(20.0), limits=Limits(horizon=400.0, tick=0.01))
+    """What is left is the rounding of starts: by 10 ms a pulse is turned by 1.7 deg, of its 0.7
+    deg.
+    """
+    body = still(
+        tilt=12.0, azimuth=45.0, channels=cross(20.0), limits=Limits(horizon=400.0, tick=0.01)
+    )
     for on_time in (None, 0.15):
         plan = train(body, on_time=on_time, near=math.radians(0.05))
         ticks = np.array([pulse.on_time for pulse in equal(plan)]) / 0.01
@@ -154,13 +193,28 @@ def test_on_ticks_the_width_is_one_of_them_and_starts_leave_little() -> None:
 
 
 @pytest.mark.weekly
-@spread(("degrees", "turn", "on_time"), [(0.5, 4.0, 0.2), (2.0, 6.0, 0.3), (1.0, 3.0, 0.1)], quick=1, deep=2)
+@spread(
+    ("degrees", "turn", "on_time"),
+    [(0.5, 4.0, 0.2), (2.0, 6.0, 0.3), (1.0, 3.0, 0.1)],
+    quick=1,
+    deep=2,
+)
 def test_pulses_that_damp_make_up_for_unequal_moments_where_the_width_is_given(
     degrees: float, turn: float, on_time: float
 ) -> None:
-    """By the starts of the last eight pulses alone the end was off by up to 0.2 deg; what is left is said."""
-    channels = tuple(channel(name, torque, 0.0, 0.0, max_on_time=0.4) for name, torque in (("P", 8.0), ("N", -8.0)))
-    body = spinner(moments=(105.0, 135.0, 180.0), degrees=degrees, channels=channels, limits=Limits(horizon=600.0))
+    """By the starts of the last eight pulses alone the end was off by up to 0.2 deg; what is left
+    is said.
+    """
+    channels = tuple(
+        channel(name, torque, 0.0, 0.0, max_on_time=0.4)
+        for name, torque in (("P", 8.0), ("N", -8.0))
+    )
+    body = spinner(
+        moments=(105.0, 135.0, 180.0),
+        degrees=degrees,
+        channels=channels,
+        limits=Limits(horizon=600.0),
+    )
     plan = train(aimed(body, turn, 45.0), on_time=on_time)
     assert {pulse.on_time for pulse in equal(plan)} == {on_time}
     assert "fixed-length" not in codes(plan_notes(plan))
@@ -179,20 +233,29 @@ def test_pulses_come_once_or_more_in_each_turn(per_turn: int) -> None:
 
 @spread(("A", "C"), [(120.0, 80.0), (80.0, 120.0), (100.0, 93.0)], quick=1)
 def test_equal_pulses_once_a_turn_leave_no_more_nutation_than_the_bound(A: float, C: float) -> None:
-    """(angle per pulse)/|sin πa|, and the count chosen closes: flown by the reference integrator."""
+    """(angle per pulse)/|sin πa|, and the count chosen closes:
+    flown by the reference integrator.
+    """
     body = still(A, C, 10.0, channels=cross(20.0), limits=Limits(horizon=400.0))
     pulses = feasible_by("rhumb-line", body).pulses.pulses
     bound = pulses[0].magnitude / (C * 3.0) / abs(math.sin(math.pi * (1 - C / A)))
     nutations = []
     for number in range(1, len(pulses)):
-        moving = reference.fly((A, A, C), body.omega0, events(pulses[:number]), pulses[number].start)
+        moving = reference.fly(
+            (A, A, C), body.omega0, events(pulses[:number]), pulses[number].start
+        )
         nutations.append(reference.nutation((A, A, C), moving.rates, 1.0))
     assert 0.7 * bound < max(nutations) < 1.02 * bound  # it is reached, so the bound is no idle one
 
 
 def test_where_there_is_no_train_the_reason_is_said() -> None:
-    """Where every pulse meets the nutation in the same phase, of too little time, and of lengths no pulse can have."""
-    short: dict[str, Any] = {"channels": cross(60.0), "limits": Limits(horizon=60.0)}  # in 400 s C = 0.995 A closes
+    """Where every pulse meets the nutation in the same phase, of too little time, and of lengths no
+    pulse can have.
+    """
+    short: dict[str, Any] = {
+        "channels": cross(60.0),
+        "limits": Limits(horizon=60.0),
+    }  # in 400 s C = 0.995 A closes
     whole = [still(100.0, C, 10.0, **short) for C in (100.0, 99.5, 200.0, 199.0)]
     facing = still(tilt=50.0, channels=cross(60.0))
     reasons = [
@@ -213,10 +276,15 @@ def test_where_there_is_no_train_the_reason_is_said() -> None:
 @pytest.mark.deep
 @spread("seed", range(20), quick=1)
 def test_course_and_way_of_a_rhumb_line(seed: int) -> None:
-    """Small steps on the course as it is at each point end on the target after the way reported at first."""
-    here, target, sun = (axis / np.linalg.norm(axis) for axis in np.random.default_rng(seed).normal(size=(3, 3)))
+    """Small steps on the course as it is at each point end on the target after the way reported at
+    first.
+    """
+    here, target, sun = (
+        axis / np.linalg.norm(axis) for axis in np.random.default_rng(seed).normal(size=(3, 3))
+    )
     _, way = precession.course(here, target, sun)
-    steps, courses = 4000, []
+    steps = 4000
+    courses = []
     for number in range(steps):
         ahead, left = precession.course(here, target, sun)
         assert left == pytest.approx(way * (1 - number / steps), abs=2e-3 * way + 1e-6)
@@ -238,7 +306,11 @@ def test_a_fixed_sun_phase_is_longer_and_arrives_too() -> None:
     assert [codes(plan_notes(plan))[0] for plan in (direct, rhumb)] == [*TRAINS]
 
 
-@spread(("turns", "pulses", "torque", "fixed"), [(2, 2, 15, False), (3, 2, 15, True), (8, 6, 5, True)], deep=2)
+@spread(
+    ("turns", "pulses", "torque", "fixed"),
+    [(2, 2, 15, False), (3, 2, 15, True), (8, 6, 5, True)],
+    deep=2,
+)
 def test_in_a_short_horizon_pulses_are_long_but_less_than_half_a_turn(
     turns: int, pulses: int, torque: float, fixed: bool
 ) -> None:
@@ -246,22 +318,33 @@ def test_in_a_short_horizon_pulses_are_long_but_less_than_half_a_turn(
 
     What a pulse adds in its second half of a turn it takes away from the first.
     """
-    actuators: dict[str, Any] = {"channels": cross(torque)} if fixed else {"steerable": Steerable(torque)}
-    made = train(still(80.0, 120.0, 3.0, 45.0, limits=Limits(horizon=turns * TURN), **actuators)).pulses
+    actuators: dict[str, Any] = (
+        {"channels": cross(torque)} if fixed else {"steerable": Steerable(torque)}
+    )
+    made = train(
+        still(80.0, 120.0, 3.0, 45.0, limits=Limits(horizon=turns * TURN), **actuators)
+    ).pulses
     assert len(made) == pulses
     assert all(0.35 * TURN < pulse.on_time < 0.5 * TURN for pulse in made)
 
 
 def test_a_train_keeps_the_narrowest_bounds_of_its_channels() -> None:
     jets = cross(8.0)
-    bounded = (jets[0].of(min_on_time=0.02, max_on_time=0.9), jets[1].of(min_on_time=0.05, max_on_time=1.0), *jets[2:])
+    bounded = (
+        jets[0].of(min_on_time=0.02, max_on_time=0.9),
+        jets[1].of(min_on_time=0.05, max_on_time=1.0),
+        *jets[2:],
+    )
     train = Train(aimed(spinner(channels=bounded), 5.0, 0.0), RhumbLineOptions(per_turn=len(jets)))
     assert (train.shortest, train.longest) == (0.05, 0.9)
 
 
 def test_a_shortest_pulse_next_to_nothing_bounds_the_number_of_pulses_as_none_does() -> None:
     """More of them would be needed than a float can hold."""
-    plans = [train(still(channels=(channel("T", 8.0, 0.0, 0.0, min_on_time=least),))) for least in (0.0, 1e-320)]
+    plans = [
+        train(still(channels=(channel("T", 8.0, 0.0, 0.0, min_on_time=least),)))
+        for least in (0.0, 1e-320)
+    ]
     any_length, shortest = ([(pulse.t, pulse.on_time) for pulse in plan.pulses] for plan in plans)
     assert any_length == shortest
 
@@ -269,12 +352,15 @@ def test_a_shortest_pulse_next_to_nothing_bounds_the_number_of_pulses_as_none_do
 def test_ideal_impulses_turn_a_few_degrees_each_where_there_are_too_few_moments() -> None:
     """Of a heavy body as of a light one."""
     for size in (1.0, 300.0):
-        body = still(120.0 * size, 80.0 * size, 30.0, steerable=Steerable(), limits=Limits(horizon=0.5))
+        body = still(
+            120.0 * size, 80.0 * size, 30.0, steerable=Steerable(), limits=Limits(horizon=0.5)
+        )
         said = infeasibility(planning.plan(body, "rhumb-line"))
         assert re.search(r"takes 15 pulses", said), said
 
 
-# --- two pulses and half cones to a target axis: exact from any motion, the free numbers for least impulse
+# --- two pulses and half cones to a target axis: exact from any motion, the free numbers for least
+# impulse
 
 BODIES = [(120.0, 80.0), (80.0, 120.0), (100.0, 100.0), (60.0, 119.0)]
 TARGETS = [(1.0, 10.0), (10.0, 45.0), (60.0, -120.0), (120.0, 200.0)]
@@ -285,7 +371,11 @@ def floor(spacecraft: Spacecraft) -> float:
 
 
 def acquired(
-    spacecraft: Spacecraft, scheme: str = "two-pulse", *, cones: int | None = None, by_reference: bool = True
+    spacecraft: Spacecraft,
+    scheme: str = "two-pulse",
+    *,
+    cones: int | None = None,
+    by_reference: bool = True,
 ) -> Schedule:
     """What ends on the target without nutation, as flown and by the reference."""
     plan = feasible_by(scheme, spacecraft, Options(cones=cones) if cones else None)
@@ -300,7 +390,9 @@ def acquired(
 @spread("spin", [3.0, -3.0], quick=1)
 @spread(("A", "C"), BODIES, quick=1)
 @spread(("tilt", "azimuth"), TARGETS, quick=12)
-def test_any_axis_from_any_nutation(tilt: float, azimuth: float, A: float, C: float, spin: float) -> None:
+def test_any_axis_from_any_nutation(
+    tilt: float, azimuth: float, A: float, C: float, spin: float
+) -> None:
     for degrees in (0.0, 1.0, 5.0, 20.0, 60.0):
         spacecraft = aimed(spinner(A, C, spin, degrees), tilt, azimuth)
         made = acquired(spacecraft, by_reference=degrees in (0.0, 5.0, 60.0))
@@ -312,32 +404,49 @@ def test_back_to_h_is_the_damping_without_drift(A: float, C: float) -> None:
     """A target along H: half the nutation, half a turn, A|ω0| in all."""
     for degrees in (1.0, 10.0, 45.0):
         plain = spinner(A, C, degrees=degrees)
-        (first, second), made = planning.plan(plain, "two-pulse").pulses, acquired(aimed(plain, 0.0, 0.0))
+        (first, second), made = (
+            planning.plan(plain, "two-pulse").pulses,
+            acquired(aimed(plain, 0.0, 0.0)),
+        )
         assert made.total_impulse == pytest.approx(plain.least_impulse, rel=1e-12)
         assert made.pulses[1].t - made.pulses[0].t == pytest.approx(second.t - first.t, rel=1e-12)
-        assert [one.magnitude for one in made] == pytest.approx([first.magnitude, second.magnitude], rel=1e-9)
+        assert [one.magnitude for one in made] == pytest.approx(
+            [first.magnitude, second.magnitude], rel=1e-9
+        )
 
 
 @spread("spin", [3.0, -3.0], quick=1)
 @spread(("A", "C"), BODIES[:3], quick=1)
 @spread("cones", [1, 3, 2, 5, 8], quick=2, deep=1)
-def test_from_a_pure_spin_cones_cost_the_closed_form(cones: int, A: float, C: float, spin: float) -> None:
-    """2n C|ω3| tan(β/2n) in n + 1 pulses, half an inertial turn of the small cone apart; two pulses are one of them."""
+def test_from_a_pure_spin_cones_cost_the_closed_form(
+    cones: int, A: float, C: float, spin: float
+) -> None:
+    """2n C|ω3| tan(β/2n) in n + 1 pulses, half an inertial turn of the small cone apart; two pulses
+    are one of them.
+    """
     for tilt in (0.1, 1.0, 30.0, 100.0):
         half = math.radians(tilt) / (2 * cones)
         wait = math.pi * A * math.cos(half) / (C * 3.0)
         for scheme in ("half-cone", "two-pulse") if cones == 1 else ("half-cone",):
             spacecraft = aimed(spinner(A, C, spin, 0.0), tilt, 45.0)
-            made = acquired(spacecraft, scheme, cones=cones if scheme == "half-cone" else None, by_reference=tilt > 30)
+            made = acquired(
+                spacecraft,
+                scheme,
+                cones=cones if scheme == "half-cone" else None,
+                by_reference=tilt > 30,
+            )
             assert len(made) == cones + 1
             assert made.pulses[0].t == 0.0
-            assert made.total_impulse == pytest.approx(2 * cones * C * 3.0 * math.tan(half), rel=1e-10)
+            assert made.total_impulse == pytest.approx(
+                2 * cones * C * 3.0 * math.tan(half), rel=1e-10
+            )
             assert np.diff([one.t for one in made]) == pytest.approx([wait] * cones, rel=1e-5)
 
 
 def test_more_cones_cost_less_down_to_the_floor_and_as_many_are_taken_as_are_worth_it() -> None:
     """One more would save less than 1 %."""
-    h, angle = 240.0, math.radians(60.0)
+    h = 240.0
+    angle = math.radians(60.0)
     costs = [precession.half_cones_impulse(h, angle, cones) for cones in range(1, 200)]
     assert costs == sorted(costs, reverse=True)
     assert costs[0] == pytest.approx(2 * h * math.tan(math.radians(30.0)), rel=1e-15)
@@ -347,7 +456,10 @@ def test_more_cones_cost_less_down_to_the_floor_and_as_many_are_taken_as_are_wor
             precession.half_cones_impulse(h, math.radians(tilt), max(number, 1))
             for number in range(cones - 1, cones + 2)
         )
-        assert len(feasible_by("half-cone", aimed(spinner(degrees=0.0), tilt, 0.0)).pulses) == cones + 1
+        assert (
+            len(feasible_by("half-cone", aimed(spinner(degrees=0.0), tilt, 0.0)).pulses)
+            == cones + 1
+        )
         assert more > 0.99 * taken
         assert cones == 1 or taken <= 0.99 * fewer
 
@@ -355,7 +467,14 @@ def test_more_cones_cost_less_down_to_the_floor_and_as_many_are_taken_as_are_wor
 @spread(
     ("A", "C", "spin", "torque", "tilt", "cones"),
     [
-        (100.0, 150.0, -1.0, 18.0, 60.0, (6, 8, 12, 20)),  # of half-cone-many.yaml: 8 cones take 85.3 g, 12 take 82.8 g
+        (
+            100.0,
+            150.0,
+            -1.0,
+            18.0,
+            60.0,
+            (6, 8, 12, 20),
+        ),  # of half-cone-many.yaml: 8 cones take 85.3 g, 12 take 82.8 g
         (100.0, 150.0, -1.0, 36.0, 60.0, (4, 6, 10, 20)),
         (120.0, 80.0, 3.0, 60.0, 40.0, (5, 9)),
         (100.0, 100.0, 2.0, 50.0, 100.0, (10, 14)),
@@ -366,9 +485,17 @@ def test_more_cones_cost_less_down_to_the_floor_and_as_many_are_taken_as_are_wor
 def test_cones_of_a_torquer_near_its_reach_are_alike(
     A: float, C: float, spin: float, torque: float, tilt: float, cones: tuple[int, ...]
 ) -> None:
-    """2J of the first, the last, and of each half between, J = 2M/ω asin(ωh tan δ/2M): no more than equal ones."""
-    h, rate, taken = C * abs(spin), 0.5 * abs(spin), []
-    body = aimed(spinner(A, C, spin, 0.0, steerable=Steerable(torque), limits=Limits(horizon=2000.0)), tilt, 40.0)
+    """2J of the first, the last, and of each half between, J = 2M/ω asin(ωh tan δ/2M): no more than
+    equal ones.
+    """
+    h = C * abs(spin)
+    rate = 0.5 * abs(spin)
+    taken = []
+    body = aimed(
+        spinner(A, C, spin, 0.0, steerable=Steerable(torque), limits=Limits(horizon=2000.0)),
+        tilt,
+        40.0,
+    )
     for number in cones:
         jump = h * math.tan(math.radians(tilt) / (2 * number))
         one, two = (torque / rate * math.asin(rate * turn / torque) for turn in (jump, 2.0 * jump))
@@ -380,7 +507,9 @@ def test_cones_of_a_torquer_near_its_reach_are_alike(
 @spread("degrees", [1.0, 5.0, 20.0], quick=1)
 @spread(("tilt", "azimuth"), [(10.0, 45.0), (60.0, -120.0)], quick=1)
 def test_cones_take_a_nutation_along(degrees: float, tilt: float, azimuth: float) -> None:
-    """The first pulse jumps straight onto the first cone: no more than damping first and turning then."""
+    """The first pulse jumps straight onto the first cone: no more than damping first and turning
+    then.
+    """
     spacecraft = aimed(spinner(degrees=degrees), tilt, azimuth)
     for cones in (1, 2, 4):
         cost = acquired(spacecraft, "half-cone", cones=cones).total_impulse
@@ -388,30 +517,48 @@ def test_cones_take_a_nutation_along(degrees: float, tilt: float, azimuth: float
         assert floor(spacecraft) <= cost <= spacecraft.least_impulse + farthest
 
 
-@pytest.mark.parametrize(("degrees", "tilt", "azimuth"), [(5.0, 10.0, 45.0), (20.0, 60.0, 200.0), (40.0, 15.0, -90.0)])
-def test_both_free_numbers_are_the_best_on_a_grid(degrees: float, tilt: float, azimuth: float) -> None:
-    """Start anywhere on the cone, H anywhere on the line of equal distance: written out here once more."""
+@pytest.mark.parametrize(
+    ("degrees", "tilt", "azimuth"), [(5.0, 10.0, 45.0), (20.0, 60.0, 200.0), (40.0, 15.0, -90.0)]
+)
+def test_both_free_numbers_are_the_best_on_a_grid(
+    degrees: float, tilt: float, azimuth: float
+) -> None:
+    """Start anywhere on the cone, H anywhere on the line of equal distance: written out here once
+    more.
+    """
     spacecraft = aimed(spinner(degrees=degrees), tilt, azimuth)
-    h, target, momentum = 80.0 * 3.0, spacecraft.target_axis, spacecraft.momentum
-    pole, east = momentum / np.linalg.norm(momentum), np.array([0.0, 1.0, 0.0])
-    theta, best = math.radians(degrees), math.inf
+    h = 80.0 * 3.0
+    target = spacecraft.target_axis
+    momentum = spacecraft.momentum
+    pole = momentum / np.linalg.norm(momentum)
+    east = np.array([0.0, 1.0, 0.0])
+    theta = math.radians(degrees)
+    best = math.inf
     for phase in np.linspace(0.0, 2 * math.pi, 721):
         across = math.cos(phase) * np.cross(east, pole) + math.sin(phase) * east
         spin_axis = math.cos(theta) * pole + math.sin(theta) * across
         line = np.cross(spin_axis, target)
         foot = np.linalg.lstsq(np.vstack([spin_axis, target]), np.array([h, h]), rcond=None)[0]
         places = np.linspace(-2.0, 2.0, 801)[:, None] * h * line / np.linalg.norm(line) + foot
-        cost = np.linalg.norm(places - momentum, axis=1) + np.linalg.norm(places - h * target, axis=1)
+        cost = np.linalg.norm(places - momentum, axis=1) + np.linalg.norm(
+            places - h * target, axis=1
+        )
         best = min(best, float(cost.min()))
-    assert best * (1 - 1e-4) <= acquired(spacecraft).total_impulse <= best * (1 + 1e-12)  # the grid comes near
+    assert (
+        best * (1 - 1e-4) <= acquired(spacecraft).total_impulse <= best * (1 + 1e-12)
+    )  # the grid comes near
     if degrees == 5.0:  # literally the target is left alone
         literal = planning.plan(spacecraft, "two-pulse", Options(literal=True))
         assert left(literal).axis_error == pytest.approx(math.radians(tilt), abs=1e-2)
 
 
 def test_within_a_short_horizon_h_goes_beside_its_shortest_way_for_as_little_as_it_saves() -> None:
-    """By the shortest way at each start the two pulses would take 83.0204 N m s, 0.025 % more than the best found."""
-    body = spinner(120.0, 60.0, 3.0, 19.544470631881207, steerable=Steerable(), limits=Limits(horizon=3.0))
+    """By the shortest way at each start the two pulses would take 83.0204 N m s, 0.025 % more than
+    the best found.
+    """
+    body = spinner(
+        120.0, 60.0, 3.0, 19.544470631881207, steerable=Steerable(), limits=Limits(horizon=3.0)
+    )
     made = acquired(aimed(body, 25.385197892189165, 249.70422049304946))
     assert made.end == pytest.approx(3.0, abs=1e-8)
     assert made.total_impulse < 83.001
@@ -442,7 +589,10 @@ def test_real_widths_are_trimmed(degrees: float, A: float, C: float) -> None:
 )
 def test_limits_are_kept_and_the_end_stays_exact(limits: Limits) -> None:
     cones = limits.max_pulses is not None
-    acquired(aimed(spinner(limits=limits), 40.0 if cones else 10.0, 45.0), "half-cone" if cones else "two-pulse")
+    acquired(
+        aimed(spinner(limits=limits), 40.0 if cones else 10.0, 45.0),
+        "half-cone" if cones else "two-pulse",
+    )
 
 
 def test_ticks_leave_no_more_than_their_resolution() -> None:
@@ -454,7 +604,11 @@ def test_ticks_leave_no_more_than_their_resolution() -> None:
 
 @spread("spin", [3.0, -3.0], quick=1)
 @spread(("A", "C"), BODIES[:2], quick=1)
-@spread(("degrees", "tilt", "azimuth"), [(0.0, 5.0, 70.0), (5.0, 10.0, 45.0), (20.0, 40.0, -120.0)], quick=1)
+@spread(
+    ("degrees", "tilt", "azimuth"),
+    [(0.0, 5.0, 70.0), (5.0, 10.0, 45.0), (20.0, 40.0, -120.0)],
+    quick=1,
+)
 def test_body_fixed_channels_are_exact(
     degrees: float, tilt: float, azimuth: float, A: float, C: float, spin: float
 ) -> None:
@@ -481,7 +635,8 @@ def test_channels_of_cones_wait_for_their_phase(degrees: float, cones: int) -> N
         deep("two-pulse", spinner(channels=cross(500.0)), 5.0),
         # On a sphere ω stands still in the body, but from a pure spin nothing has to be waited for.
         deep("two-pulse", spinner(100.0, 100.0, degrees=0.0, channels=cross(500.0)), 10.0),
-        # 8 N m take 5° of nutation out within half a body period; they turn H by next to nothing meanwhile.
+        # 8 N m take 5° of nutation out within half a body period; they turn H by next to nothing
+        # meanwhile.
         ("two-pulse", spinner(channels=cross(8.0)), 0.0),
         deep("two-pulse", spinner(channels=cross(8.0)), 0.5),
         # Or by 1.3° at most in one pulse: 5° of nutation are 21 N m s, and damped first.
@@ -493,7 +648,9 @@ def test_other_targets_that_are_reached(scheme: str, body: Spacecraft, tilt: flo
 
 
 def test_why_not() -> None:
-    """What one pulse can do is said: 2M/|ω3|; and that what damps first ends so late that no time is left."""
+    """What one pulse can do is said: 2M/|ω3|; and that what damps first ends so late that no time
+    is left.
+    """
     weak = channel("+1", 1.0, 0.0, 0.0)
     late: dict[str, Any] = {
         "channels": (
@@ -502,33 +659,51 @@ def test_why_not() -> None:
         ),
         "limits": Limits(horizon=8.41668748101266, gap=0.6011919629294757),
     }
-    no_time = spinner(2.373744652338654, 2.6800748046618628, -0.462832262592392, 0.05, 0.3283535213204525, **late)
+    no_time = spinner(
+        2.373744652338654, 2.6800748046618628, -0.462832262592392, 0.05, 0.3283535213204525, **late
+    )
     torquer = spinner(degrees=0.0, steerable=Steerable(10.0))
     plans = [
         planning.plan(body, scheme, Options(cones=cones))
         for scheme, cones, body in (
             ("two-pulse", None, aimed(torquer, 40.0, 0.0)),
             ("two-pulse", None, aimed(spinner(degrees=0.0, channels=(weak,)), 10.0, 45.0)),
-            ("two-pulse", None, aimed(spinner(degrees=0.0, channels=cross(500.0, max_on_time=0.002)), 10.0, 45.0)),
-            ("two-pulse", None, aimed(spinner(channels=(channel("spin", 1.0, 0.0, 5.0),)), 10.0, 45.0)),
+            (
+                "two-pulse",
+                None,
+                aimed(spinner(degrees=0.0, channels=cross(500.0, max_on_time=0.002)), 10.0, 45.0),
+            ),
+            (
+                "two-pulse",
+                None,
+                aimed(spinner(channels=(channel("spin", 1.0, 0.0, 5.0),)), 10.0, 45.0),
+            ),
             ("half-cone", None, spinner()),
             ("half-cone", 3, aimed(spinner(limits=Limits(max_pulses=3)), 40.0, 10.0)),
             ("half-cone", None, aimed(spinner(limits=Limits(horizon=1.0)), 40.0, 10.0)),
             ("half-cone", None, aimed(no_time, 0.05, 197.04)),
         )
     ]
-    assert f"{math.degrees(math.atan(2.0 * 10.0 / 3.0 / 240.0)):.4g} deg at most" in infeasibility(plans[0])
+    assert f"{math.degrees(math.atan(2.0 * 10.0 / 3.0 / 240.0)):.4g} deg at most" in infeasibility(
+        plans[0]
+    )
     check_text("pointing.why-not", "\n".join(infeasibility(plan) for plan in plans))
 
 
-@pytest.mark.parametrize("moments", [(120.0, 110.0, 80.0), (80.0, 85.0, 120.0)], ids=["prolate", "oblate"])
+@pytest.mark.parametrize(
+    "moments", [(120.0, 110.0, 80.0), (80.0, 85.0, 120.0)], ids=["prolate", "oblate"]
+)
 def test_three_different_moments(moments: tuple[float, float, float]) -> None:
     for actuators in ({"steerable": Steerable(500.0)}, {"channels": cross(500.0)}):
         acquired(aimed(spinner(moments=moments, degrees=4.0, **actuators), 6.0, 45.0))
-    truth = aimed(spinner(moments=(120.0, 100.0, 80.0)), 10.0, 45.0)  # the model has the turn that the body has
+    truth = aimed(
+        spinner(moments=(120.0, 100.0, 80.0)), 10.0, 45.0
+    )  # the model has the turn that the body has
     model = model_of(truth).body
     assert model.to_turn == pytest.approx(truth.to_turn, rel=1e-12)
-    shifts = [one.target_axis - one.momentum / np.linalg.norm(one.momentum) for one in (model, truth)]
+    shifts = [
+        one.target_axis - one.momentum / np.linalg.norm(one.momentum) for one in (model, truth)
+    ]
     assert reference.angle(*shifts) < 0.05
     assert model.initial.quaternion == pytest.approx(truth.initial.quaternion, abs=1e-12)
 
@@ -537,8 +712,13 @@ def test_a_target_by_right_ascension_in_a_given_attitude() -> None:
     """The same body seen from another frame: the same pulses."""
     plain = aimed(spinner(), 10.0, 45.0)
     turned = replace(plain, attitude=Attitude(np.array([0.5, 0.5, -0.5, 0.5])))
-    turned = replace(turned, goal=replace(plain.goal, axis=turned.direction_in_n(math.radians(10), math.radians(45))))
-    pairs = zip(feasible_by("two-pulse", plain).pulses, feasible_by("two-pulse", turned).pulses, strict=True)
+    turned = replace(
+        turned,
+        goal=replace(plain.goal, axis=turned.direction_in_n(math.radians(10), math.radians(45))),
+    )
+    pairs = zip(
+        feasible_by("two-pulse", plain).pulses, feasible_by("two-pulse", turned).pulses, strict=True
+    )
     for one, other in pairs:
         assert other.t == pytest.approx(one.t, abs=1e-6)
         assert other.impulse == pytest.approx(one.impulse, abs=1e-4)
@@ -555,16 +735,25 @@ def test_arc_efficiency_is_the_mean_of_the_turning_torque_and_on_time_its_invers
 
 @pytest.mark.parametrize("name", ["crash-target-is-spin-axis", "crash-tilt-equals-nutation"])
 @pytest.mark.parametrize("scheme", ["two-pulse", "half-cone", "rhumb-line"])
-def test_a_target_that_the_spin_axis_meets_by_itself_takes_one_impulse_when_it_is_there(name: str, scheme: str) -> None:
-    """Where the spin axis is at t = 0, or on its way about H a quarter turn later: damped then and there, at A|ω0|."""
-    body, quarters = load_spacecraft(case(f"{name}.yaml")), float("tilt" in name)
-    made, moments = planning.plan(body, scheme).pulses, np.asarray(body.inertia.moments)
+def test_a_target_that_the_spin_axis_meets_by_itself_takes_one_impulse_when_it_is_there(
+    name: str, scheme: str
+) -> None:
+    """Where the spin axis is at t = 0, or on its way about H a quarter turn later: damped then and
+    there, at A|ω0|.
+    """
+    body = load_spacecraft(case(f"{name}.yaml"))
+    quarters = float("tilt" in name)
+    made = planning.plan(body, scheme).pulses
+    moments = np.asarray(body.inertia.moments)
     (pulse,) = made
     round_h = 2.0 * math.pi * moments[0] / float(np.linalg.norm(moments * body.omega0))
     assert pulse.t == pytest.approx(0.25 * quarters * round_h, abs=1e-9)
     assert pulse.magnitude == pytest.approx(body.least_impulse, rel=1e-9)
     after = reference.fly(body.inertia.moments, body.omega0, events(made), made.end + 1.0)
-    tilt, azimuth = math.radians(5.0), 0.5 * math.pi * quarters
-    target = np.array([math.sin(tilt) * math.cos(azimuth), math.sin(tilt) * math.sin(azimuth), math.cos(tilt)])
+    tilt = math.radians(5.0)
+    azimuth = 0.5 * math.pi * quarters
+    target = np.array(
+        [math.sin(tilt) * math.cos(azimuth), math.sin(tilt) * math.sin(azimuth), math.cos(tilt)]
+    )
     assert reference.angle(after.rotation[:, 2], target) < 1e-8
     assert reference.angle(reference.momentum(body.inertia.moments, after), target) < 1e-8

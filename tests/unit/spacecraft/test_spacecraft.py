@@ -16,10 +16,25 @@ from nutdamp.files.carried import later
 from nutdamp.flight.dynamics import Supply
 from nutdamp.flight.propagation import flown
 from nutdamp.montecarlo.cases import DispersedModel
-from nutdamp.spacecraft.constraints import Windows, commandable, for_pairs, free_windows, longest_on_time, rooms
+from nutdamp.spacecraft.constraints import (
+    Windows,
+    commandable,
+    for_pairs,
+    free_windows,
+    longest_on_time,
+    rooms,
+)
 from nutdamp.spacecraft.equipment import Steerable
 from nutdamp.spacecraft.model import SLACK, Goal, Keep, Limits, Requirement
-from nutdamp.spacecraft.requirements import AIMED_SPIN, Bound, Part, cones, required, spin_tolerance, spins_at
+from nutdamp.spacecraft.requirements import (
+    AIMED_SPIN,
+    Bound,
+    Part,
+    cones,
+    required,
+    spin_tolerance,
+    spins_at,
+)
 from nutdamp.spacecraft.schedule import TOUCHING, Schedule, channel_pulse, steerable_pulse
 from nutdamp.spacecraft.tolerances import SpinTolerance
 
@@ -31,7 +46,9 @@ def windows(**limits: object) -> Windows:
 
 
 def test_where_a_pulse_is_allowed() -> None:
-    """Within the horizon, once the actuators are ready; it may touch a blackout window by its edges only."""
+    """Within the horizon, once the actuators are ready; it may touch a blackout window by its edges
+    only.
+    """
     free, dark = windows(), windows(blackout=((10.0, 20.0),))
     endless = Windows(spinner(limits=Limits(horizon=10.0, blackout=((20.0, 30.0),))), endless=True)
     for within, start, on_time, ready, allowed in [
@@ -47,7 +64,9 @@ def test_where_a_pulse_is_allowed() -> None:
 
 
 def test_earliest_start() -> None:
-    """Out of one blackout into no other, overlapping, out of order, with a hole too short for the pulse; on ticks."""
+    """Out of one blackout into no other, overlapping, out of order, with a hole too short for the
+    pulse; on ticks.
+    """
     dark = windows(blackout=((8.0, 12.0), (1.0, 5.0), (4.0, 7.5)))
     ticking = windows(tick=0.25, blackout=((1.1, 2.1),))
     for within, on_time, ready, start in [
@@ -60,7 +79,11 @@ def test_earliest_start() -> None:
         *[(ticking, 0.25, 0.3, 0.5), (ticking, 0.25, 1.0, 2.25)],
     ]:
         assert within.earliest_start(on_time, ready) == start
-    assert [ticking.nearest_tick(0.62), ticking.tick_after(0.51), ticking.tick_after(0.5)] == [0.5, 0.75, 0.5]
+    assert [ticking.nearest_tick(0.62), ticking.tick_after(0.51), ticking.tick_after(0.5)] == [
+        0.5,
+        0.75,
+        0.5,
+    ]
 
 
 def test_on_times_lie_within_the_bounds_on_ticks_and_are_never_nothing() -> None:
@@ -70,7 +93,11 @@ def test_on_times_lie_within_the_bounds_on_ticks_and_are_never_nothing() -> None
         *[(ticking, 0.34, 0.38, math.inf, 0.4), (ticking, 0.9, 0.0, 0.57, 0.5)],
         # Bounds that are multiples themselves, but for rounding: 3 × 0.1 > 0.3.
         *[(ticking, 0.9, 0.0, 0.3, 0.3), (ticking, 0.1, 0.3, 5.0, 0.3)],
-        *[(free, 0.3456, 0.0, math.inf, 0.3456), (free, 0.3, 0.5, 2.0, 0.5), (free, 3.0, 0.5, 2.0, 2.0)],
+        *[
+            (free, 0.3456, 0.0, math.inf, 0.3456),
+            (free, 0.3, 0.5, 2.0, 0.5),
+            (free, 3.0, 0.5, 2.0, 2.0),
+        ],
     ]:
         assert within.on_time(wanted, shortest, longest) == pytest.approx(on_time, rel=1e-15)
 
@@ -90,7 +117,8 @@ def test_earliest_start_is_allowed_and_nothing_before_it_is(
         assert start >= ready - TOUCHING
         assert dark.allows(start, on_time, ready)
         assert tick is None or abs(start / tick - round(start / tick)) < 1e-9
-    step, last = tick or 0.05, 100.0 - on_time if start is None else start
+    step = tick or 0.05
+    last = 100.0 - on_time if start is None else start
     for index in range(math.ceil(ready / step), math.floor(last / step)):
         if ready <= index * step < last - 10 * TOUCHING:
             assert not dark.allows(index * step, on_time, ready)
@@ -99,14 +127,22 @@ def test_earliest_start_is_allowed_and_nothing_before_it_is(
 def test_of_very_many_channels_pairs_are_made_of_the_cheapest_about_each_direction() -> None:
     some = for_pairs(spinner(channels=fan(200, 5.0)))
     assert len(some) == 24
-    assert max(np.diff(sorted(cmath.phase(channel.transverse) for channel in some))) < 2 * math.tau / 24
+    assert (
+        max(np.diff(sorted(cmath.phase(channel.transverse) for channel in some)))
+        < 2 * math.tau / 24
+    )
     few = spinner(channels=fan(9, 5.0))
     assert for_pairs(few) == list(few.channels)
 
 
 def test_a_pulse_across_the_spin_axis_is_useful_for_half_a_nutation_period() -> None:
     """π/|aω3| with a = 1/3 and ω3 = 3 rad/s; about the spin axis only max_on_time bounds it."""
-    for axis, longest, useful in ((0, math.inf, math.pi), (0, 2.0, 2.0), (2, math.inf, math.inf), (2, 9.0, 9.0)):
+    for axis, longest, useful in (
+        (0, math.inf, math.pi),
+        (0, 2.0, 2.0),
+        (2, math.inf, math.inf),
+        (2, 9.0, 9.0),
+    ):
         thruster = channel("T", *(8.0 * np.eye(3)[axis]).tolist(), max_on_time=longest)
         assert longest_on_time(spinner(), thruster) == pytest.approx(useful, rel=1e-12)
 
@@ -123,7 +159,9 @@ def test_pulses_of_a_torquer_are_put_on_ticks_with_the_impulse_of_their_on_time(
 
 def test_pulses_share_the_time_between_them_but_for_the_gap() -> None:
     """From 10 to 11 s and from 20 to 22 s: 8 of the 9 s between them are shared, 1 s is the gap."""
-    body = spinner(limits=Limits(horizon=100.0, earliest=0.5, gap=1.0, blackout=((2.0, 3.0), (30.0, 40.0))))
+    body = spinner(
+        limits=Limits(horizon=100.0, earliest=0.5, gap=1.0, blackout=((2.0, 3.0), (30.0, 40.0)))
+    )
     pulses = (channel_pulse(THRUSTER, 10.5, 1.0), channel_pulse(THRUSTER, 21.0, 2.0))
     assert rooms(body, pulses) == [(3.0, pytest.approx(15.0)), (pytest.approx(16.0), 30.0)]
     assert rooms(spinner(limits=Limits(horizon=100.0, earliest=0.5)), pulses[:1]) == [(0.5, 100.0)]
@@ -134,7 +172,8 @@ def test_pulses_share_the_time_between_them_but_for_the_gap() -> None:
 
 
 def test_rooms_and_blocked_slots_are_found_among_many_windows_as_by_looking_at_each() -> None:
-    rng, free = np.random.default_rng(5), 0
+    rng = np.random.default_rng(5)
+    free = 0
     begins = np.sort(rng.uniform(0.0, 100.0, 60))
     dark = list(zip(begins.tolist(), (begins + rng.uniform(0.0, 1.5, 60)).tolist(), strict=True))
     shuffled = tuple((begin, end) for begin, end in rng.permutation(dark).tolist())
@@ -148,7 +187,10 @@ def test_rooms_and_blocked_slots_are_found_among_many_windows_as_by_looking_at_e
             assert rooms(body, (pulse,)) == [(begin, end)]
     assert free > 30
     edges = np.linspace(0.0, 110.0, 400)
-    each = [any(low < end and high > begin for begin, end in dark) for low, high in itertools.pairwise(edges)]
+    each = [
+        any(low < end and high > begin for begin, end in dark)
+        for low, high in itertools.pairwise(edges)
+    ]
     assert Windows(body).blocked(edges[:-1], edges[1:]).tolist() == each
     assert 50 < sum(each) < 350
     assert not Windows(spinner()).blocked(edges[:-1], edges[1:]).any()
@@ -160,7 +202,8 @@ def test_windows_behind_the_horizon_leave_no_empty_window_at_its_end() -> None:
     assert free_windows(body, 107.0) == [(0.0, 10.0), (100.0, 105.0)]
 
 
-# --- center of mass: arms of the thrusters, its travel with the propellant, and how far it may be off
+# --- center of mass: arms of the thrusters, its travel with the propellant, and how far it may be
+# off
 
 TEXT = """
 name: b
@@ -189,7 +232,10 @@ def test_a_force_through_the_center_of_mass_turns_nothing() -> None:
 
 
 def test_an_accelerometer_counts_from_it_too() -> None:
-    loop = "loop: {sensor: {kind: accelerometer, rate: 10 Hz, position: [0.9, 0, 0.4]}, start: 1 deg, stop: 0.1 deg}\n"
+    loop = (
+        "loop: {sensor: {kind: accelerometer, rate: 10 Hz, position: [0.9, 0, 0.4]}, start: "
+        "1 deg, stop: 0.1 deg}\n"
+    )
     assert present(nutdamp.read(TEXT + loop).loop).sensor.position == pytest.approx([0.8, 0.0, 0.0])
 
 
@@ -197,7 +243,8 @@ def test_an_accelerometer_counts_from_it_too() -> None:
 def test_it_moves_with_the_propellant_used(inertia: str) -> None:
     """By the moment of force about where it is in the middle of the pulse."""
     body = nutdamp.read(MOVING.replace("{A: 120, C: 80}", inertia))
-    supply, channel = Supply(body), body.channels[0]
+    supply = Supply(body)
+    channel = body.channels[0]
     supply.draw(3.0)
     fired = supply.fire(channel_pulse(channel, 10.0, 1.0), channel)
     used = 3.0 + 0.5 * (channel.mass_flow or 0.0)
@@ -211,38 +258,59 @@ def test_plans_are_corrected_for_its_travel() -> None:
     body = nutdamp.read(MOVING.replace("isp: 220 s", "isp: 0.5 s"))
     plan = nutdamp.plan(body, "four-pulse")
     assert present(plan.flown).nutation < 1e-6
-    sizes = {round(float(np.linalg.norm(pulse.torque)), 6) for pulse in plan.pulses if pulse.torque is not None}
+    sizes = {
+        round(float(np.linalg.norm(pulse.torque)), 6)
+        for pulse in plan.pulses
+        if pulse.torque is not None
+    }
     assert len(sizes) == len(plan.pulses)
-    fixed = flown(body, Schedule(tuple(channel_pulse(body.channels[int(pulse.channel == "N")], pulse.t, pulse.on_time)
-                                       for pulse in plan.pulses)))  # fmt: skip
+    fixed = flown(
+        body,
+        Schedule(
+            tuple(
+                channel_pulse(body.channels[int(pulse.channel == "N")], pulse.t, pulse.on_time)
+                for pulse in plan.pulses
+            )
+        ),
+    )
     assert fixed.residual.nutation > 1e-4
 
 
 def test_a_file_carried_on_has_it_where_it_is_then() -> None:
     plan = nutdamp.plan(nutdamp.read(MOVING), "four-pulse")
-    used, carried = plan.propellant or 0.0, plan.carried()
+    used = plan.propellant or 0.0
+    carried = plan.carried()
     assert used > 0.0
     assert carried.center_of_mass == pytest.approx([0.1, 0.0, 0.4 - 0.05 * used], abs=1e-12)
-    assert later(plan.flight, plan.end).after.center_of_mass == pytest.approx([0.1, 0.0, 0.4 - 0.05 * used])
+    assert later(plan.flight, plan.end).after.center_of_mass == pytest.approx(
+        [0.1, 0.0, 0.4 - 0.05 * used]
+    )
 
 
 def test_dispersed_it_moves_all_arms_alike() -> None:
     body = nutdamp.read(TEXT + "dispersions: {center_of_mass: {normal: 2 mm}}\n")
     plan = nutdamp.plan(body, "four-pulse")
     model = DispersedModel(body, plan.pulses)
-    assert [entry.name for entry in model.inputs.drawn] == [f"center of mass {axis}" for axis in "xyz"]
+    assert [entry.name for entry in model.inputs.drawn] == [
+        f"center of mass {axis}" for axis in "xyz"
+    ]
     off = np.array([0.01, -0.02, 0.03])
-    draws = {f"center of mass {axis}": np.array([value]) for axis, value in zip("xyz", off, strict=True)}
+    draws = {
+        f"center of mass {axis}": np.array([value]) for axis, value in zip("xyz", off, strict=True)
+    }
     cases = model.cases(draws)
     for pulse, impulse in zip(plan.pulses, cases.impulses, strict=True):
-        shifted = nutdamp.read(TEXT.replace("[0.1 m, 0, 40 cm]", f"[{0.1 + off[0]}, {off[1]}, {0.4 + off[2]}]"))
+        shifted = nutdamp.read(
+            TEXT.replace("[0.1 m, 0, 40 cm]", f"[{0.1 + off[0]}, {off[1]}, {0.4 + off[2]}]")
+        )
         channel = next(each for each in shifted.channels if each.name == pulse.channel)
         assert np.concatenate([np.atleast_1d(part) for part in impulse]) == pytest.approx(
             channel.torque * pulse.on_time
         )
 
 
-# --- bounds: what keeps them and how much of them is used, and the tolerance of a spin that is required
+# --- bounds: what keeps them and how much of them is used, and the tolerance of a spin that is
+# required
 
 CONE = Keep("star", np.array([1.0, 0.0, 0.0]), 0.1, 0.5)
 
@@ -258,7 +326,9 @@ def test_no_more_than_all_of_a_bound_that_is_kept_is_used() -> None:
     ):
         values = np.array([*kept, *broken])
         expected = [True] * len(kept) + [False] * len(broken)
-        assert bound.met(values).tolist() == expected == [bool(bound.met(value)) for value in values]
+        assert (
+            bound.met(values).tolist() == expected == [bool(bound.met(value)) for value in values]
+        )
         assert (bound.used(values) <= 1.0).tolist() == expected
         assert (bound.margin(values) >= -SLACK).tolist() == expected
     assert (inner.part, inner.inner, outer.inner) == (Part.CONE, True, False)

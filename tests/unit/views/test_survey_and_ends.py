@@ -1,4 +1,6 @@
-"""``check``: what actuators and disturbances do; where spin axis and H end, when pulses start, what is shown as 0."""
+"""``check``: what actuators and disturbances do; where spin axis and H end, when pulses start, what
+is shown as 0.
+"""
 
 import csv
 import io
@@ -56,7 +58,9 @@ SUN_BODY = read_spacecraft(SUNNY, "sunny.yaml")
 
 def fired(body: Spacecraft, on_time: float) -> propagation.Residual:
     """What one pulse of the first channel leaves."""
-    return propagation.flown(body, Schedule((channel_pulse(body.channels[0], 5.0, on_time),))).residual
+    return propagation.flown(
+        body, Schedule((channel_pulse(body.channels[0], 5.0, on_time),))
+    ).residual
 
 
 HALF = 0.5 * CALM.body_period
@@ -77,7 +81,9 @@ def test_steps_are_what_the_shortest_and_the_longest_pulse_do_to_a_pure_spin(
     given: dict[str, Any], tick: float | None, shortest: float, longest: float
 ) -> None:
     channel = CALM.channels[0]
-    channel = replace(channel, thrusters=tuple(replace(each, **given) for each in channel.thrusters))
+    channel = replace(
+        channel, thrusters=tuple(replace(each, **given) for each in channel.thrusters)
+    )
     body = replace(CALM, channels=(channel,), limits=replace(CALM.limits, tick=tick))
     (steps,) = capability.channel_steps(body)
     assert steps.smallest == pytest.approx(fired(body, shortest).nutation, rel=1e-9)
@@ -85,11 +91,14 @@ def test_steps_are_what_the_shortest_and_the_longest_pulse_do_to_a_pure_spin(
 
 
 def test_a_channel_that_spins_up_does_most_by_a_shorter_pulse() -> None:
-    """Over half a nutation period the spin rises by so much that such a pulse does nothing across the axis.
+    """Over half a nutation period the spin rises by so much that such a pulse does nothing across
+    the axis.
 
     By impulses: 5.42 s of T1 oppose all of ω, and no reason names a horizon that is far off.
     """
-    body = read_spacecraft((CASES / "slow-89-deg.yaml").read_text(encoding="utf-8"), "slow-89-deg.yaml")
+    body = read_spacecraft(
+        (CASES / "slow-89-deg.yaml").read_text(encoding="utf-8"), "slow-89-deg.yaml"
+    )
     (steps,) = capability.channel_steps(replace(body, channels=body.channels[:1]))
     assert steps.largest > math.radians(80.0)
     planned = one_pulse.schedule(body, SchemeOptions())
@@ -109,22 +118,30 @@ def test_the_nearest_pair_is_the_least_off_the_turn_between_halves() -> None:
 def test_a_beat_over_three_horizons_is_a_resonance(periods: float) -> None:
     """The beat has the period 2π/|aω3 + r|."""
     rate = 2.0 * math.pi / (periods * EXAMPLE.horizon) - EXAMPLE.inertia.a * EXAMPLE.spin
-    (effect,) = capability.consequences(replace(EXAMPLE, disturbances=(Disturbance(1e-3 + 0j, rate=rate),)))
+    (effect,) = capability.consequences(
+        replace(EXAMPLE, disturbances=(Disturbance(1e-3 + 0j, rate=rate),))
+    )
     assert effect.beat_period == pytest.approx(periods * EXAMPLE.horizon, rel=1e-9)
     assert (effect.tilt is None) is bool(effect.resonant) is (periods > 3.0)
 
 
 def test_a_resonant_torque_drives_the_nutation_to_the_marks_when_reported() -> None:
-    body = replace(EXAMPLE, disturbances=(Disturbance(0.4 + 0j, rate=-EXAMPLE.inertia.a * EXAMPLE.spin),))
+    body = replace(
+        EXAMPLE, disturbances=(Disturbance(0.4 + 0j, rate=-EXAMPLE.inertia.a * EXAMPLE.spin),)
+    )
     (effect,) = capability.consequences(body)
     assert effect.tilt is None
     mark, time = effect.resonant[0]
     assert mark == pytest.approx(math.radians(10.0))
-    assert propagation.flown(body, Schedule(), time).sampled(2, time).nutation[-1] == pytest.approx(mark, rel=1e-9)
+    assert propagation.flown(body, Schedule(), time).sampled(2, time).nutation[-1] == pytest.approx(
+        mark, rel=1e-9
+    )
 
 
 def test_the_forced_tilt_stays_and_the_beat_swells_from_rest() -> None:
-    """Flown for a beat period: from the steady rate the nutation keeps the tilt, from rest it swells to the beat."""
+    """Flown for a beat period: from the steady rate the nutation keeps the tilt, from rest it
+    swells to the beat.
+    """
     A, C = CALM.inertia.A, CALM.inertia.C
     for torque, rate, forced in (  # equations K14, K15
         (0.4 - 0.3j, 0.0, 0.5 / (abs(A - C) * 3.0)),
@@ -133,7 +150,11 @@ def test_the_forced_tilt_stays_and_the_beat_swells_from_rest() -> None:
     ):
         body = replace(CALM, disturbances=(Disturbance(torque, rate=rate),))
         (effect,) = capability.consequences(body)
-        swollen = propagation.flown(body, Schedule(), effect.beat_period).sampled(401, effect.beat_period).nutation
+        swollen = (
+            propagation.flown(body, Schedule(), effect.beat_period)
+            .sampled(401, effect.beat_period)
+            .nutation
+        )
         assert swollen.max() == pytest.approx(present(effect.beat), rel=1e-4)
         assert swollen[-1] < 1e-12
         steady = response.steady_response(A, (A - C) / A * 3.0, torque, rate)
@@ -151,22 +172,30 @@ def test_the_forced_tilt_stays_and_the_beat_swells_from_rest() -> None:
 
 
 def test_a_torque_fixed_in_the_body_is_no_precession() -> None:
-    """H never leaves its start by more than 0.0151 deg in 1,800 s, and ω settles about 0.007758 rad/s: not H."""
+    """H never leaves its start by more than 0.0151 deg in 1,800 s, and ω settles about 0.007758
+    rad/s: not H.
+    """
     body = load_spacecraft(case("body-fixed-torque.yaml"))
     (effect,) = capability.consequences(body)
     assert effect.forced == pytest.approx(0.007758, abs=5e-7)
     assert effect.precession is None
     turns = propagation.flown(body, Schedule(), 1800.0).sampled(20_001, 1800.0).momentum
-    aside = np.degrees(np.linalg.norm(np.cross(turns, turns[0]), axis=1) / np.linalg.norm(turns[0]) ** 2)
+    aside = np.degrees(
+        np.linalg.norm(np.cross(turns, turns[0]), axis=1) / np.linalg.norm(turns[0]) ** 2
+    )
     assert math.degrees(present(effect.swing)) == pytest.approx(aside.max(), rel=2e-3)
     assert math.degrees(present(effect.swing)) == pytest.approx(0.0151, abs=5e-5)
 
 
 def test_sun_pulses_are_those_of_the_motion() -> None:
-    """The first is a root of the Sun's azimuth in the body by the reference integrator; on average they are a turn."""
+    """The first is a root of the Sun's azimuth in the body by the reference integrator; on average
+    they are a turn.
+    """
     clock = present(capability.sun_clock(SUN_BODY))
     start = reference.Motion(SUN_BODY.omega0, attitude.matrix(SUN_BODY.initial.quaternion))
-    (then,) = reference.coast(SUN_BODY.inertia.moments, start, np.zeros(3), np.array([present(clock.first)]))
+    (then,) = reference.coast(
+        SUN_BODY.inertia.moments, start, np.zeros(3), np.array([present(clock.first)])
+    )
     seen = then.rotation.T @ present(SUN_BODY.sun)
     assert math.degrees(math.atan2(seen[1], seen[0])) == pytest.approx(35.0, abs=1e-5)
     times = block_model.sun_pulses(propagation.flown(SUN_BODY, Schedule(), 900.0), 900.0)
@@ -188,21 +217,30 @@ def test_check_shows_disturbances_sun_cones_and_commands(run: Run, tmp_path: Pat
         "[{name: leak, torque: [20 mN m, 0, 0]}, {kind: axial, torque: 1 mN m},"
         " {name: tune, kind: rotating, torque: [1 mN m, 0, 0], rate: -1}]"
     )
-    text = f"name: X\ninertia: {{A: 120, C: 80}}\nomega0: [0.1, 0, 3]\ndisturbances: {disturbances}\n"
+    text = (
+        f"name: X\ninertia: {{A: 120, C: 80}}\nomega0: [0.1, 0, 3]\ndisturbances: {disturbances}\n"
+    )
     shown = run("check", "-", "-v", "--json", "d.json", stdin=text).stdout
     (file,) = json.loads((tmp_path / "d.json").read_text())["files"]
     assert file["disturbances"][0]["forced_rate_rad_s"] > 0.0
     assert file["disturbances"][2]["reaches"][0]["nutation_deg"] == pytest.approx(10.0)
     check_text("capability.disturbances", shown)
-    check_text("capability.sun", run("check", "-", "-v", "--json", "d.json", stdin=SUNNY, columns=120).stdout)
+    check_text(
+        "capability.sun",
+        run("check", "-", "-v", "--json", "d.json", stdin=SUNNY, columns=120).stdout,
+    )
     (file,) = json.loads((tmp_path / "d.json").read_text())["files"]
     assert file["sun_pulses"]["delay_step_deg"] == pytest.approx(0.36)
     assert [each["name"] for each in file["aspects"]] == ["pole", "Sun"]
-    blind = SUNNY.replace("azimuth: 35 deg", "azimuth: 35 deg, elevation: -25 deg, half_width: 7 deg")
+    blind = SUNNY.replace(
+        "azimuth: 35 deg", "azimuth: 35 deg, elevation: -25 deg, half_width: 7 deg"
+    )
     shown = " ".join(run("check", "-", "-v", stdin=blind).stdout.split())
     seen = block_model.first_sun_pulse(read_spacecraft(blind, "blind.yaml"))
     first = block_model.first_sun_pulse(SUN_BODY)
-    assert seen == pytest.approx(first + block_model.spin_turn(SUN_BODY), rel=0.02)  # it does not see the Sun at first
+    assert seen == pytest.approx(
+        first + block_model.spin_turn(SUN_BODY), rel=0.02
+    )  # it does not see the Sun at first
     assert f"Sun pulses one every 1.998 s on average; the first at {seen:.4g} s" in shown
 
 
@@ -213,7 +251,9 @@ state: {spin: 3 rad/s, nutation: 6 deg}
 attitude: {quaternion: [0.809017, 0.081804, 0.582065, 0], epoch: 2016-12-31T23:59:59Z, frame: EME2000}
 steerable: {torque: 60 N m}
 """
-"""Its axis is 2 or 3 deg from right ascension 350 deg, declination 20 deg, and dated a second before a leap second."""
+"""Its axis is 2 or 3 deg from right ascension 350 deg, declination 20 deg, and dated a second
+before a leap second.
+"""
 
 part = st.floats(-1.0, 1.0, allow_subnormal=False)
 
@@ -239,23 +279,35 @@ def test_angles_of_a_direction_name_it(parts: tuple[float, float, float]) -> Non
 def test_the_smallest_negative_angle_is_no_full_turn() -> None:
     assert attitude.full_turn(-1e-20) == 0.0
     assert attitude.full_turn(-0.25) == pytest.approx(2 * math.pi - 0.25)
-    shown = [longitude(math.radians(359.99999)), longitude(math.radians(-1.5)), longitude(None), steering([1.0, -1e-9])]
+    shown = [
+        longitude(math.radians(359.99999)),
+        longitude(math.radians(-1.5)),
+        longitude(None),
+        steering([1.0, -1e-9]),
+    ]
     assert shown == ["0.0000 deg", "358.5000 deg", "–", "0.00°"]
 
 
 def test_final_is_where_the_reference_integrator_ends() -> None:
-    """Without an attitude: tilt and azimuth in the frame N, which the integrator builds by itself."""
+    """Without an attitude: tilt and azimuth in the frame N,
+    which the integrator builds by itself.
+    """
     body = aimed(spinner(degrees=6.0, spin=-3.0, steerable=Steerable(60.0)), 3.0, 200.0)
     plan = planning.plan(body, "two-pulse")
     assert plan.feasible
-    outcome, final = Outcome(body, plan.pulses), final_json(plan.flight)
+    outcome = Outcome(body, plan.pulses)
+    final = final_json(plan.flight)
     ends = {
         "axis": outcome.motion.rotation @ np.array([0.0, 0.0, -1.0]),
         "momentum": reference.momentum(body.inertia.moments, outcome.motion),
     }
     for name, (x, y, z) in ends.items():
-        assert final[name]["tilt_deg"] == pytest.approx(math.degrees(math.atan2(math.hypot(x, y), z)), abs=1e-7)
-        assert final[name]["azimuth_deg"] == pytest.approx(math.degrees(math.atan2(y, x)) % 360.0, abs=1e-5)
+        assert final[name]["tilt_deg"] == pytest.approx(
+            math.degrees(math.atan2(math.hypot(x, y), z)), abs=1e-7
+        )
+        assert final[name]["azimuth_deg"] == pytest.approx(
+            math.degrees(math.atan2(y, x)) % 360.0, abs=1e-5
+        )
     assert final["spin_rad_s"] == pytest.approx(outcome.spin, rel=1e-10)
     assert final["nutation_deg"] == pytest.approx(math.degrees(outcome.nutation), abs=1e-7)
     target = present(target_json(body))
@@ -272,7 +324,9 @@ def test_a_plan_that_keeps_h_has_no_azimuth_and_one_that_fails_no_end() -> None:
 
 
 def test_the_plan_of_a_watched_axis_has_its_angles_and_one_that_fails_none() -> None:
-    watched = read_spacecraft(POINTED + "keep: [{name: star, direction: [90 deg, 0 deg], min: 1 deg}]\n", "f.yaml")
+    watched = read_spacecraft(
+        POINTED + "keep: [{name: star, direction: [90 deg, 0 deg], min: 1 deg}]\n", "f.yaml"
+    )
     (aspect,) = plan_json(planning.plan(watched, "two-pulse"))["aspects"]
     assert (aspect["name"], aspect["min_deg"]) == ("star", pytest.approx(1.0))
     assert "aspects" not in plan_json(planning.Plan(watched, "two-pulse", None, "why"))
@@ -285,39 +339,79 @@ def test_every_json_and_screen_says_where_it_ends(run: Run, tmp_path: Path, comm
     screen = run(command, "-", *options, *["-v"] * (command != "verify"), stdin=POINTED).stdout
     written = json.loads((tmp_path / "end.json").read_text())
     written = written["plans"][0] if command == "plan" else written
-    assert written["target"]["axis"] == pytest.approx({"right_ascension_deg": 350.0, "declination_deg": 20.0})
+    assert written["target"]["axis"] == pytest.approx(
+        {"right_ascension_deg": 350.0, "declination_deg": 20.0}
+    )
     final = written["final"]
-    assert set(final) == {"axis", "momentum", "spin_rad_s", "nutation_deg", "omega_rad_s", "quaternion"}
+    assert set(final) == {
+        "axis",
+        "momentum",
+        "spin_rad_s",
+        "nutation_deg",
+        "omega_rad_s",
+        "quaternion",
+    }
     assert final["spin_rad_s"] == pytest.approx(3.0, abs=0.01)
     for end, name in (("axis", "spin axis"), ("momentum", "H")):
         angles = [final[end]["right_ascension_deg"], final[end]["declination_deg"]]
         assert angles == pytest.approx([350.0, 20.0], abs=0.5)
         if command == "plan":
             line = next(line for line in screen.splitlines() if line.startswith(f"{name} ends at"))
-            assert [float(number) for number in re.findall(r"[0-9]+\.[0-9]{4}", line)] == pytest.approx(
-                angles, abs=1e-4
-            )
+            assert [
+                float(number) for number in re.findall(r"[0-9]+\.[0-9]{4}", line)
+            ] == pytest.approx(angles, abs=1e-4)
         elif command == "simulate":
             for angle in ("right ascension", "declination"):
-                row = present(re.search(rf"^{name}: {angle} +([0-9.]+) deg +([0-9.]+) deg$", screen, re.MULTILINE))
+                row = present(
+                    re.search(
+                        rf"^{name}: {angle} +([0-9.]+) deg +([0-9.]+) deg$", screen, re.MULTILINE
+                    )
+                )
                 assert float(row[1]) == pytest.approx(angles.pop(0), abs=0.5)
     if command != "verify":
-        assert re.search(r"^target +right ascension 350\.0000 deg, declination 20\.0000 deg$", screen, re.MULTILINE)
+        assert re.search(
+            r"^target +right ascension 350\.0000 deg, declination 20\.0000 deg$",
+            screen,
+            re.MULTILINE,
+        )
 
 
 def test_the_range_of_right_ascension_goes_through_zero(run: Run) -> None:
-    shown = run("simulate", "-", "--scheme", "none", "--json", "-", "-q", stdin=POINTED.replace("6 deg", "20 deg"))
+    shown = run(
+        "simulate",
+        "-",
+        "--scheme",
+        "none",
+        "--json",
+        "-",
+        "-q",
+        stdin=POINTED.replace("6 deg", "20 deg"),
+    )
     west, east = json.loads(shown.stdout)["axis_track"]["right_ascension_deg"]
     assert 300.0 < west < 360.0
     assert 0.0 <= east < 60.0
 
 
-@pytest.mark.parametrize(("epoch", "last"), [(59.6, "2017-01-01T00:00:00"), (58.8, "2016-12-31T23:59:60")])
-def test_pulses_say_when_they_start_in_utc(run: Run, tmp_path: Path, epoch: float, last: str) -> None:
+@pytest.mark.parametrize(
+    ("epoch", "last"), [(59.6, "2017-01-01T00:00:00"), (58.8, "2016-12-31T23:59:60")]
+)
+def test_pulses_say_when_they_start_in_utc(
+    run: Run, tmp_path: Path, epoch: float, last: str
+) -> None:
     """Across a leap second, which a clock that adds seconds to a date would miss."""
     (tmp_path / "leap.yaml").write_text(POINTED.replace("23:59:59Z", f"23:59:{epoch}Z"))
     run(
-        "plan", "-v", "leap.yaml", "--scheme", "two-pulse", "--csv", "pulses.csv", "--json", "plan.json", "-q", status=0
+        "plan",
+        "-v",
+        "leap.yaml",
+        "--scheme",
+        "two-pulse",
+        "--csv",
+        "pulses.csv",
+        "--json",
+        "plan.json",
+        "-q",
+        status=0,
     )
     rows = list(csv.DictReader(io.StringIO((tmp_path / "pulses.csv").read_text())))
     pulses = json.loads((tmp_path / "plan.json").read_text())["plans"][0]["pulses"]
@@ -329,11 +423,17 @@ def test_pulses_say_when_they_start_in_utc(run: Run, tmp_path: Path, epoch: floa
     assert rows[-1]["utc"].startswith(last)
     # What was written is read again, and the times of a file without an epoch stay as they are.
     assert run("simulate", "leap.yaml", "--schedule", "pulses.csv").stderr == ""
-    assert "utc" not in run("plan", "-", "--scheme", "two-pulse", "--csv", "-", stdin=example_text()).stdout
+    assert (
+        "utc"
+        not in run("plan", "-", "--scheme", "two-pulse", "--csv", "-", stdin=example_text()).stdout
+    )
 
 
 def dated(epoch: str | None) -> Spacecraft:
-    return replace(spinner(steerable=Steerable(5.0)), attitude=Attitude(np.array([1.0, 0.0, 0.0, 0.0]), epoch, "GCRF"))
+    return replace(
+        spinner(steerable=Steerable(5.0)),
+        attitude=Attitude(np.array([1.0, 0.0, 0.0, 0.0]), epoch, "GCRF"),
+    )
 
 
 def steered(start: float, angle: float = 0.0) -> Pulse:
@@ -341,12 +441,15 @@ def steered(start: float, angle: float = 0.0) -> Pulse:
 
 
 def test_a_screen_rounds_a_date_to_the_millisecond() -> None:
-    """The start of each pulse is at most half a millisecond from the date shown, and the day is that of what is shown.
+    """The start of each pulse is at most half a millisecond from the date shown, and the day is
+    that of what is shown.
 
     The first pulse starts 0.3 ms before midnight: it is shown at midnight, on the next day.
     """
     pulses = Schedule(tuple(map(steered, (1.0, 2.0009, 3.0004))))
-    table = pulse_table(planning.Plan(dated("2026-03-01T23:59:58.9997Z"), "x", pulses).flight).screen("full")
+    table = pulse_table(
+        planning.Plan(dated("2026-03-01T23:59:58.9997Z"), "x", pulses).flight
+    ).screen("full")
     column = next(column for column in table.columns if str(column.header).endswith("UTC"))
     assert list(map(str, column.cells)) == [
         f"03-02 {clock}" for clock in ("00:00:00.000", "00:00:01.001", "00:00:02.000")
@@ -359,7 +462,8 @@ def test_dates_that_no_calendar_has_are_left_out() -> None:
 
 
 def test_a_steering_angle_is_the_same_everywhere() -> None:
-    body, pulse = spinner(steerable=Steerable(5.0)), steered(0.75, math.radians(-70.123))
+    body = spinner(steerable=Steerable(5.0))
+    pulse = steered(0.75, math.radians(-70.123))
     assert channel_text(pulse, body) == "steerable 289.88°"
     figure = overview.history_figure(*overview.shown(planning.Plan(body, "x", Schedule((pulse,)))))
     assert any("289.88°" in text.get_text() for text in figure.axes[1].texts)
@@ -374,17 +478,28 @@ def test_what_is_rounding_beside_its_neighbours_is_zero(run: Run) -> None:
     assert vector([4.484e-18, -0.0, 8.0]) == "(0, 0, 8)"
     assert [numerics.cleaned([change, 3.0])[0] for change in (4e-16, -4e-12)] == [0.0, -4e-12]
     tilted = str(case("tensor-microsat.yaml"))
-    rows = list(csv.reader(io.StringIO(run("simulate", tilted, "--scheme", "none", "--csv", "-").stdout)))
+    rows = list(
+        csv.reader(io.StringIO(run("simulate", tilted, "--scheme", "none", "--csv", "-").stdout))
+    )
     file = json.loads(run("check", tilted, "--json", "-").stdout)["files"][0]
-    vectors = [channel["torque_Nm"] for channel in file["channels"]] + file["spacecraft"]["principal_axes"]
-    parts = [float(cell) for row in rows[1:] for cell in row[4:8]] + [value for each in vectors for value in each]
+    vectors = [channel["torque_Nm"] for channel in file["channels"]] + file["spacecraft"][
+        "principal_axes"
+    ]
+    parts = [float(cell) for row in rows[1:] for cell in row[4:8]] + [
+        value for each in vectors for value in each
+    ]
     assert not [value for value in parts if 0.0 < abs(value) < 1e-14]
 
 
 @pytest.mark.parametrize("nutation", ["grows", "decays"])
-def test_with_a_wheel_dissipation_does_what_the_file_says(run: Run, tmp_path: Path, nutation: str) -> None:
+def test_with_a_wheel_dissipation_does_what_the_file_says(
+    run: Run, tmp_path: Path, nutation: str
+) -> None:
     """The long body of the example; without a wheel its shape tells."""
-    more = f"\nwheel: {{momentum: 40 N m s}}\ndissipation: {{time_constant: 600 s, nutation: {nutation}}}\n"
+    more = (
+        f"\nwheel: {{momentum: 40 N m s}}\ndissipation: {{time_constant: 600 s, nutation: "
+        f"{nutation}}}\n"
+    )
     (tmp_path / "wheel.yaml").write_text(example_text() + more, "utf-8")
     shown = " ".join(run("check", "wheel.yaml", "-v").stdout.split())
     assert ("not under dissipation" in shown) == (nutation == "grows")

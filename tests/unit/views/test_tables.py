@@ -1,4 +1,6 @@
-"""One declaration of a table gives screens, pages, CSV, JSON and arrays that agree; the default screen of plan."""
+"""One declaration of a table gives screens, pages, CSV, JSON and arrays that agree; the default
+screen of plan.
+"""
 
 import csv
 import io
@@ -33,15 +35,41 @@ TABLE = DataTable(
         Column("name", "name", "", lambda row: row[0], where="screen csv json", kind=TEXT),
         Column("count", "count", "", lambda row: row[1], where="screen csv json", kind=WHOLE),
         Column("axis#_m", "", "", lambda row: row[2], where="csv json"),
-        Column("size_m", "size", "mm", lambda row: row[3], lambda size: f"{1e3 * size:.1f}", "screen csv json"),
-        Column("good", "verdict", "", lambda row: row[4], lambda good: "met" if good else "NOT met", "screen csv json",
-               kind=YES_NO, met=lambda row: row[4]),
-        Column("never", "never", "", lambda row: row[99], where="screen csv", when=lambda source: source == "other"),
+        Column(
+            "size_m",
+            "size",
+            "mm",
+            lambda row: row[3],
+            lambda size: f"{1e3 * size:.1f}",
+            "screen csv json",
+        ),
+        Column(
+            "good",
+            "verdict",
+            "",
+            lambda row: row[4],
+            lambda good: "met" if good else "NOT met",
+            "screen csv json",
+            kind=YES_NO,
+            met=lambda row: row[4],
+        ),
+        Column(
+            "never",
+            "never",
+            "",
+            lambda row: row[99],
+            where="screen csv",
+            when=lambda source: source == "other",
+        ),
         Column("page", "page", "", lambda row: row[0], where="page", kind=REAL),
     ),
-    [("one", 1, np.array([1.0, 2.0, 3.0]), 0.5, True), ("two", 2, None, None, None), ("three", 3, None, 0.25, False)],
+    [
+        ("one", 1, np.array([1.0, 2.0, 3.0]), 0.5, True),
+        ("two", 2, None, None, None),
+        ("three", 3, None, 0.25, False),
+    ],
     "this",
-)  # fmt: skip
+)
 
 
 def screen(table: DataTable, first: int | None = None, width: int = 80) -> list[list[str]]:
@@ -57,13 +85,27 @@ def test_a_file_has_vectors_in_three_columns_and_unknown_values_empty() -> None:
 
 def test_json_has_vectors_as_lists_and_unknown_values_null() -> None:
     first, second, _ = TABLE.json()
-    assert first == {"name": "one", "count": 1, "axis_m": [1.0, 2.0, 3.0], "size_m": 0.5, "good": True}
+    assert first == {
+        "name": "one",
+        "count": 1,
+        "axis_m": [1.0, 2.0, 3.0],
+        "size_m": 0.5,
+        "good": True,
+    }
     assert second == {"name": "two", "count": 2, "axis_m": None, "size_m": None, "good": None}
 
 
 def test_an_array_has_the_fields_of_the_file() -> None:
     array = TABLE.array()
-    assert array.dtype.names == ("name", "count", "axis_1_m", "axis_2_m", "axis_3_m", "size_m", "good")
+    assert array.dtype.names == (
+        "name",
+        "count",
+        "axis_1_m",
+        "axis_2_m",
+        "axis_3_m",
+        "size_m",
+        "good",
+    )
     assert array["name"].tolist() == ["one", "two", "three"]
     assert math.isnan(array["size_m"][1])
 
@@ -71,12 +113,24 @@ def test_an_array_has_the_fields_of_the_file() -> None:
 def test_a_screen_shows_texts_and_a_dash_for_the_unknown() -> None:
     heads, units, *rows = screen(TABLE)
     assert [heads, units] == [["size"], ["name", "count", "mm", "verdict"]]
-    assert rows == [["one", "1", "500.0", "met"], ["two", "2", "–", "–"], ["three", "3", "250.0", "NOT", "met"]]
+    assert rows == [
+        ["one", "1", "500.0", "met"],
+        ["two", "2", "–", "–"],
+        ["three", "3", "250.0", "NOT", "met"],
+    ]
 
 
 def test_below_60_columns_each_row_is_a_block_of_what_is_known() -> None:
-    name, values = TABLE.screen("screen").columns[0].header, ["count", "size,", "verdict"]
-    assert [line[0] for line in screen(TABLE, width=59)] == [name, *values, name, "count", name, *values]
+    name = TABLE.screen("screen").columns[0].header
+    values = ["count", "size,", "verdict"]
+    assert [line[0] for line in screen(TABLE, width=59)] == [
+        name,
+        *values,
+        name,
+        "count",
+        name,
+        *values,
+    ]
 
 
 def test_of_many_rows_the_first_ones_and_the_last_are_shown_where_that_saves_room() -> None:
@@ -99,7 +153,8 @@ def test_files_of_pulses_and_blocks_have_the_names_that_are_read_again(name: str
     if not plan.feasible:
         pytest.skip("optimal is infeasible here")
     names = pulse_table(plan.flight).array().dtype.names or ()
-    dated, valves = plan.spacecraft.utc(0.0) is not None, any(pulse.through_valve for pulse in plan.pulses)
+    dated = plan.spacecraft.utc(0.0) is not None
+    valves = any(pulse.through_valve for pulse in plan.pulses)
     assert names == (*PULSES_HEADER, *(EFFECTIVE * valves), *(("utc",) * dated))
     assert tuple(next(csv.reader(io.StringIO(block_table(plan.flight).csv())))) == BLOCKS_HEADER
 
@@ -113,14 +168,30 @@ def test_an_angle_of_a_row_is_in_degrees_and_unknown_where_a_step_to_it_is() -> 
 def test_a_screen_has_the_units_requested_and_files_are_si() -> None:
     """One pound of mass, foot pounds of a vector; a value that is not known stays so."""
     columns = (
-        Column("mass_kg", "mass", "kg", lambda row: row[0], lambda size: f"{size:.4f}", "screen csv json"),
-        Column("torque#_Nm", "torque", "N m", lambda row: row[1], vector, "screen csv json", kind=TEXT),
+        Column(
+            "mass_kg",
+            "mass",
+            "kg",
+            lambda row: row[0],
+            lambda size: f"{size:.4f}",
+            "screen csv json",
+        ),
+        Column(
+            "torque#_Nm", "torque", "N m", lambda row: row[1], vector, "screen csv json", kind=TEXT
+        ),
     )
     table = DataTable(
-        "Units", columns, [(0.45359237, np.array([1.3558179483314004, 0.0, -2.7116358966628])), (None, None)]
+        "Units",
+        columns,
+        [(0.45359237, np.array([1.3558179483314004, 0.0, -2.7116358966628])), (None, None)],
     )
     files = table.csv(), table.json()
-    assert screen(table) == [["mass", "torque"], ["kg", "N", "m"], ["0.4536", "(1.356,", "0,", "-2.712)"], ["–", "–"]]
+    assert screen(table) == [
+        ["mass", "torque"],
+        ["kg", "N", "m"],
+        ["0.4536", "(1.356,", "0,", "-2.712)"],
+        ["–", "–"],
+    ]
     with screen_units(US):
         assert screen(table)[1:3] == [["lbm", "ft", "lbf"], ["1.0000", "(1,", "0,", "-2)"]]
         assert [heading.unit for heading in table.headings("screen")] == ["lbm", "ft lbf"]
@@ -167,17 +238,25 @@ def test_the_screen_of_the_example() -> None:
 
 
 def test_a_requirement_that_is_missed_is_never_dropped() -> None:
-    weak = replace(spinner(degrees=5.0), requirement=Requirement(nutation=math.radians(1e-7), momentum_shift=1e-9))
+    weak = replace(
+        spinner(degrees=5.0),
+        requirement=Requirement(nutation=math.radians(1e-7), momentum_shift=1e-9),
+    )
     lines = glance_lines(compared(weak, "one-pulse"))
     assert lines[2].startswith("NOT met")
     assert any(line.startswith("momentum shift") and line.endswith("NOT met") for line in lines)
 
 
 def test_of_many_pulses_the_first_ones_and_the_last_are_shown() -> None:
-    body = nutdamp.load({
-        "name": "weak", "inertia": {"A": 100, "C": 80}, "state": {"spin": 3.0, "nutation": "5 deg"},
-        "thrusters": [{"name": "T", "torque": [2.0, 0, 0], "max_on_time": "0.3 s"}], "limits": {"horizon": "200 s"},
-    })  # fmt: skip
+    body = nutdamp.load(
+        {
+            "name": "weak",
+            "inertia": {"A": 100, "C": 80},
+            "state": {"spin": 3.0, "nutation": "5 deg"},
+            "thrusters": [{"name": "T", "torque": [2.0, 0, 0], "max_on_time": "0.3 s"}],
+            "limits": {"horizon": "200 s"},
+        }
+    )
     plan = compared(body, "optimal")
     count = len(plan["optimal"].pulses)
     most, _ = SIZES[0]
@@ -200,12 +279,18 @@ def test_of_many_pulses_the_first_ones_and_the_last_are_shown() -> None:
         (0.0, 1.0, "0"),
     ],
 )
-def test_zero_is_written_one_way_below_what_matters(degrees: float, largest: float, text: str) -> None:
+def test_zero_is_written_one_way_below_what_matters(
+    degrees: float, largest: float, text: str
+) -> None:
     assert short_angle(math.radians(degrees), math.radians(largest)) == text
 
 
-def test_a_plan_that_misses_is_no_headline_to_fly_and_digits_stand_on_their_side_of_the_limit() -> None:
-    body = nutdamp.example().with_(requirement={"nutation": "0.5 deg", "momentum_shift": "0.16836 deg"})
+def test_a_plan_that_misses_is_no_headline_to_fly_and_digits_stand_on_their_side_of_the_limit() -> (
+    None
+):
+    body = nutdamp.example().with_(
+        requirement={"nutation": "0.5 deg", "momentum_shift": "0.16836 deg"}
+    )
     lines = glance_lines(compared(body, "four-pulse"))
     assert lines[1].startswith("NOT ENOUGH: four-pulse")
     (row,) = (line for line in lines if line.startswith("momentum shift"))

@@ -1,4 +1,6 @@
-"""Verdicts in words and what they go by; each code of a note has a sentence, whose values are given."""
+"""Verdicts in words and what they go by; each code of a note has a sentence, whose values are
+given.
+"""
 
 import ast
 import json
@@ -9,7 +11,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support import reference
-from support.builders import BOTH, HALF_A_DEGREE, POINTING, aimed, cross, judged, off_target, present, pulse, spinner
+from support.builders import (
+    BOTH,
+    HALF_A_DEGREE,
+    POINTING,
+    aimed,
+    cross,
+    judged,
+    off_target,
+    present,
+    pulse,
+    spinner,
+)
 from support.golden import check_text
 from support.process import Run
 
@@ -54,20 +67,33 @@ def test_the_requirement_is_on_one_line() -> None:
     check_text("verdicts.required", required(replace(spinner(requirement=BOTH), goal=WIDE)))
 
 
-@pytest.mark.parametrize(("share", "of", "shown"), [
-    (0.9991, 0.997, "99.9 %"), (0.8562, 0.997, "85.6 %"), (0.99696, 0.997, "99.696 %"), (0.99704, 0.997, "99.704 %"),
-    (0.997, 0.997, "99.7 %"), (1.0, 0.997, "100.0 %"), (0.00004, 0.997, "0.004 %"), (0.99999, 1e-9, "99.999 %"),
-    (0.99996, 0.9973, "99.996 %"), (0.9999999, 0.999999, "99.99999 %"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("share", "of", "shown"),
+    [
+        (0.9991, 0.997, "99.9 %"),
+        (0.8562, 0.997, "85.6 %"),
+        (0.99696, 0.997, "99.696 %"),
+        (0.99704, 0.997, "99.704 %"),
+        (0.997, 0.997, "99.7 %"),
+        (1.0, 0.997, "100.0 %"),
+        (0.00004, 0.997, "0.004 %"),
+        (0.99999, 1e-9, "99.999 %"),
+        (0.99996, 0.9973, "99.996 %"),
+        (0.9999999, 0.999999, "99.99999 %"),
+    ],
+)
 def test_a_share_is_never_rounded_to_what_it_is_not(share: float, of: float, shown: str) -> None:
     assert verdict.percent(share, of) == shown
 
 
 @pytest.mark.parametrize(
-    ("part", "unit"), [(requirements.Part.NUTATION, math.radians(1.0)), (requirements.Part.SPIN, math.pi / 30.0)]
+    ("part", "unit"),
+    [(requirements.Part.NUTATION, math.radians(1.0)), (requirements.Part.SPIN, math.pi / 30.0)],
 )
 @pytest.mark.parametrize("size", [0.5, 0.1684, 0.003491])
-def test_a_value_is_shown_on_its_side_of_its_limit(part: requirements.Part, unit: float, size: float) -> None:
+def test_a_value_is_shown_on_its_side_of_its_limit(
+    part: requirements.Part, unit: float, size: float
+) -> None:
     bound = requirements.Bound(part, size * unit, True)
     for off in (0.1, 1e-3, 1e-5, 1e-6, -1e-6, -1e-4, -0.3):
         texts = verdict.value(bound, bound.limit * (1.0 + off)), verdict.limit(bound)
@@ -78,7 +104,8 @@ def test_a_value_is_shown_on_its_side_of_its_limit(part: requirements.Part, unit
 
 def test_pulses_at_even_distances_are_a_train() -> None:
     even, other = (
-        Schedule(tuple(pulse(t, 0.1, np.ones(3)) for t in times)) for times in ((1, 3, 5, 7, 9), (1, 3, 4, 9))
+        Schedule(tuple(pulse(t, 0.1, np.ones(3)) for t in times))
+        for times in ((1, 3, 5, 7, 9), (1, 3, 4, 9))
     )
     single = Schedule((*even.pulses, pulse(30.0, 0.1, np.ones(3), "U")))
     assert [verdict.fired(made).partition(", ")[0] for made in (even, other, single)] == [
@@ -101,17 +128,22 @@ def test_the_parts_that_are_missed_and_by_how_much() -> None:
 
 
 def test_with_a_target_the_severity_goes_by_the_distance_from_it() -> None:
-    """One pulse takes the nutation out and leaves H 11.7° from its target, having shifted it by 2.1°."""
+    """One pulse takes the nutation out and leaves H 11.7° from its target, having shifted it by
+    2.1°.
+    """
     body = aimed(replace(FIRED, requirement=Requirement(None, math.radians(1.0))), 10.0, 40.0)
     plan = planning.plan(body, "one-pulse")
-    assert plan.severity == pytest.approx(off_target(body, plan.pulses) / math.radians(1.0), rel=1e-9)
+    assert plan.severity == pytest.approx(
+        off_target(body, plan.pulses) / math.radians(1.0), rel=1e-9
+    )
     assert present(plan.flown).momentum_shift < 0.9 * present(plan.flown).axis_error
     free = replace(plan, spacecraft=replace(body, requirement=None))
     assert free.severity == pytest.approx(off_target(body, plan.pulses), rel=1e-9)
 
 
 def test_the_severity_of_many_is_that_of_each() -> None:
-    body, generator = replace(spinner(requirement=BOTH), goal=WIDE), np.random.default_rng(1)
+    body = replace(spinner(requirement=BOTH), goal=WIDE)
+    generator = np.random.default_rng(1)
     nutation, aim = generator.uniform(0.0, 0.02, (2, 50))
     spin = 3.0 + generator.normal(size=50) * 0.03
     many = requirements.severity(body, requirements.Left(nutation, aim, spin))
@@ -126,7 +158,12 @@ def test_where_no_pulse_is_needed_it_says_so() -> None:
     rows: list[tuple[float, Requirement | None, Goal, bool]] = [
         (0.3, HALF_A_DEGREE, Goal(), True),
         (0.6, HALF_A_DEGREE, Goal(), False),
-        (0.3, Requirement(momentum_shift=0.01), Goal(), False),  # the nutation is not bounded: it is to be damped
+        (
+            0.3,
+            Requirement(momentum_shift=0.01),
+            Goal(),
+            False,
+        ),  # the nutation is not bounded: it is to be damped
         (0.9e-3, None, Goal(), True),
         (1.1e-3, None, Goal(), False),
         (0.3, HALF_A_DEGREE, POINTING, False),
@@ -138,13 +175,16 @@ def test_where_no_pulse_is_needed_it_says_so() -> None:
         body = replace(spinner(degrees=degrees, channels=cross(8.0), requirement=limit), goal=goal)
         assert requirements.unaided(body) is needless
         assert (planning.plan(body, "none").standing is planning.Standing.COMPLIES) is needless
-        assert (nutdamp.compare(body, ("none", "four-pulse")).verdict.status is Status.NO_PULSE) is needless
+        assert (
+            nutdamp.compare(body, ("none", "four-pulse")).verdict.status is Status.NO_PULSE
+        ) is needless
 
 
 def test_with_unequal_moments_the_largest_nutation_counts() -> None:
     """By the reference integrator too: it is least at t = 0, and passes 0.3 deg within a period."""
     body = spinner(moments=(125.0, 110.0, 80.0), degrees=0.3, channels=cross(8.0))
-    times, start = np.linspace(0.0, 2.0 * body.body_period, 400), reference.Motion(body.omega0, np.eye(3))
+    times = np.linspace(0.0, 2.0 * body.body_period, 400)
+    start = reference.Motion(body.omega0, np.eye(3))
     path = reference.coast(body.inertia.moments, start, np.zeros(3), times[1:])
     angles = [reference.nutation(body.inertia.moments, motion.rates, 1.0) for motion in path]
     largest = max(angles)
@@ -152,7 +192,9 @@ def test_with_unequal_moments_the_largest_nutation_counts() -> None:
     for share, kept in ((1.001, True), (0.999, False)):
         needed = replace(body, requirement=Requirement(nutation=share * largest))
         assert requirements.unaided(needed) is kept
-        assert (nutdamp.compare(needed, ("none", "four-pulse")).verdict.status is Status.NO_PULSE) is kept
+        assert (
+            nutdamp.compare(needed, ("none", "four-pulse")).verdict.status is Status.NO_PULSE
+        ) is kept
     easy = replace(body, requirement=Requirement(nutation=1.0))
     assert not requirements.unaided(replace(easy, dissipation=40.0))
     assert not requirements.unaided(replace(easy, goal=Goal(spin=body.spin)))
@@ -160,12 +202,16 @@ def test_with_unequal_moments_the_largest_nutation_counts() -> None:
 
 def test_what_dissipation_makes_of_it_counts() -> None:
     """0.3 deg grow e-fold in 40 s: past 0.5 deg after 20.4 s."""
-    calm = spinner(degrees=0.3, channels=cross(8.0), requirement=HALF_A_DEGREE, limits=Limits(horizon=20.0))
+    calm = spinner(
+        degrees=0.3, channels=cross(8.0), requirement=HALF_A_DEGREE, limits=Limits(horizon=20.0)
+    )
     growing = replace(calm, dissipation=40.0)
     assert growing.growth > 0.0
     assert requirements.unaided(growing)
     assert not requirements.unaided(replace(growing, limits=Limits(horizon=21.0)))
-    assert not requirements.unaided(replace(calm, dissipation=0.01))  # e-fold 2,000 times: beyond any float
+    assert not requirements.unaided(
+        replace(calm, dissipation=0.01)
+    )  # e-fold 2,000 times: beyond any float
     assert "horizon of 20 s" in verdict.idle(nutdamp.compare(growing, ("none",)).verdict)
     assert "horizon" not in verdict.idle(nutdamp.compare(calm, ("none",)).verdict)
     assert not requirements.unaided(replace(calm, disturbances=TILTING))
@@ -173,9 +219,15 @@ def test_what_dissipation_makes_of_it_counts() -> None:
 
 @pytest.mark.parametrize(
     ("A", "C", "degrees", "horizon", "kept"),
-    [(120.0, 80.0, 2.0, 30.0, False), (120.0, 80.0, 2.0, 2.0, True), (80.0, 120.0, 20.0, 20.0, False)],
+    [
+        (120.0, 80.0, 2.0, 30.0, False),
+        (120.0, 80.0, 2.0, 2.0, True),
+        (80.0, 120.0, 20.0, 20.0, False),
+    ],
 )
-def test_changes_of_spin_count(A: float, C: float, degrees: float, horizon: float, kept: bool) -> None:
+def test_changes_of_spin_count(
+    A: float, C: float, degrees: float, horizon: float, kept: bool
+) -> None:
     """H stays, so the spin falls with cos θ: by the reference integrator too, for either shape."""
     limit = Requirement(nutation=math.radians(30), spin=SpinTolerance(1e-3))
     body = spinner(A, C, degrees=degrees, requirement=limit)
@@ -194,8 +246,15 @@ def calls() -> list[tuple[str, str, set[str]]]:
     result = []
     for path in sorted(SOURCE.rglob("*.py")):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "note" and node.args:
-                codes = [part.value for part in ast.walk(node.args[0]) if isinstance(part, ast.Constant)]
+            if (
+                isinstance(node, ast.Call)
+                and isinstance(node.func, ast.Name)
+                and node.func.id == "note"
+                and node.args
+            ):
+                codes = [
+                    part.value for part in ast.walk(node.args[0]) if isinstance(part, ast.Constant)
+                ]
                 names = {keyword.arg or "" for keyword in node.keywords}
                 result += [(path.name, code, names) for code in codes if isinstance(code, str)]
     return result
@@ -217,7 +276,12 @@ def test_every_entry_is_used_and_says_what_it_means() -> None:
         *(code for _, code, _ in CALLS),
         *(gain.value for gain in Gain),
         *(tie.value for tie in TIES),
-        *("cone-broken-at-start", "ideal-impulses", "ideal-torquer-assumed", "ideal-torque-missing"),
+        *(
+            "cone-broken-at-start",
+            "ideal-impulses",
+            "ideal-torquer-assumed",
+            "ideal-torque-missing",
+        ),
         *("least-propellant", *STOPS.values(), *WHY.values(), *LEAST_CODES.values()),
     }
     assert set(note_entries()) == used
@@ -258,12 +322,20 @@ def test_a_note_for_people_has_severity_and_code_and_for_programs_the_values_too
 
 def test_warnings_come_first_and_nothing_twice() -> None:
     shift = note("momentum-shift", scheme="x", momentum_shift_deg=1.0)
-    assert [entry.code for entry in ordered([shift, note("try-trade"), shift])] == ["try-trade", "momentum-shift"]
+    assert [entry.code for entry in ordered([shift, note("try-trade"), shift])] == [
+        "try-trade",
+        "momentum-shift",
+    ]
 
 
 def test_the_json_of_a_plan_has_notes_as_data(run: Run) -> None:
-    content = json.loads(run("plan", "--nominal", "--set", "requirement={nutation: 1e-9 deg}", "--json", "-").stdout)
-    for entry in (*content["notes"], *(entry for plan in content["plans"] for entry in plan["notes"])):
+    content = json.loads(
+        run("plan", "--nominal", "--set", "requirement={nutation: 1e-9 deg}", "--json", "-").stdout
+    )
+    for entry in (
+        *content["notes"],
+        *(entry for plan in content["plans"] for entry in plan["notes"]),
+    ):
         assert set(entry) == {"code", "severity", "values", "text"}
         assert entry["code"] in note_entries()
         numbers = [value for value in entry["values"].values() if isinstance(value, float)]
@@ -274,7 +346,9 @@ def test_notes_of_the_example_are_those_of_its_decision() -> None:
     compared = nutdamp.compare(nutdamp.example(), samples=0)
     assert [entry.code for entry in reasons(compared)] == ["least-propellant"]
     assert not [*comparison_warnings(compared)]
-    assert {entry.code for plan in compared.plans for entry in plan_notes(plan)} >= {"half-turns-apart"}
+    assert {entry.code for plan in compared.plans for entry in plan_notes(plan)} >= {
+        "half-turns-apart"
+    }
     assert {entry.code for entry in alternatives(compared)} <= {gain.value for gain in Gain}
     codes = [entry.code for entry in verdict_notes(compared.verdict, present(compared.recommended))]
     assert "tolerances-not-checked" in codes

@@ -1,4 +1,6 @@
-"""Bounds that no schedule may go below: against independent linear programs, and against what all schemes plan."""
+"""Bounds that no schedule may go below: against independent linear programs, and against what all
+schemes plan.
+"""
 
 import math
 from dataclasses import replace
@@ -33,7 +35,11 @@ def prices(spacecraft: Spacecraft) -> dict[str, float]:
 
 
 def proved(
-    spacecraft: Spacecraft, left: bounds.Allowed = NOTHING, *, shift: bool = False, cost: float = math.inf
+    spacecraft: Spacecraft,
+    left: bounds.Allowed = NOTHING,
+    *,
+    shift: bool = False,
+    cost: float = math.inf,
 ) -> float:
     """The bound; ``cost`` is that of a schedule known, which counts where torques are axial."""
     if not math.isfinite(cost):
@@ -42,14 +48,21 @@ def proved(
 
 
 def grid_optimum(
-    spacecraft: Spacecraft, points: int, rates: tuple[float, ...] | None = None, *, lasting: bool = False
+    spacecraft: Spacecraft,
+    points: int,
+    rates: tuple[float, ...] | None = None,
+    *,
+    lasting: bool = False,
 ) -> float:
-    """Least cost on a grid of some ``points`` of time that takes the nutation out, by HiGHS and no line of nutdamp's.
+    """Least cost on a grid of some ``points`` of time that takes the nutation out, by HiGHS and no
+    line of nutdamp's.
 
-    ``rates``: also those at which the equations turn, as the four of small angles; ``lasting``: each channel is on for
-    at most the time from one moment to the next, as the torque there is, else there are impulses.
+    ``rates``: also those at which the equations turn, as the four of small angles; ``lasting``:
+    each channel is on for at most the time from one moment to the next, as the torque there is,
+    else there are impulses.
     """
-    inertia, omega = spacecraft.inertia, complex(spacecraft.omega0[0], spacecraft.omega0[1])
+    inertia = spacecraft.inertia
+    omega = complex(spacecraft.omega0[0], spacecraft.omega0[1])
     spans = free_windows(spacecraft)
     total = sum(end - begin for begin, end in spans)
     parts = [np.linspace(b, e, max(int(points * (e - b) / total), 2) + 1) for b, e in spans]
@@ -60,9 +73,12 @@ def grid_optimum(
         mean = np.exp(1j * rate * times) * (np.sinc(rate * step / (2 * np.pi)) if lasting else 1.0)
         acts = np.concatenate([one.transverse * mean for one in spacecraft.channels])
         rows += [acts.real, acts.imag]
-    matrix, size = np.array(rows), float(np.abs(rows).max())
+    matrix = np.array(rows)
+    size = float(np.abs(rows).max())
     costs = np.repeat([prices(spacecraft)[one.name] for one in spacecraft.channels], len(times))
-    most = np.tile(step, len(spacecraft.channels)) * size if lasting else np.full(len(costs), np.inf)
+    most = (
+        np.tile(step, len(spacecraft.channels)) * size if lasting else np.full(len(costs), np.inf)
+    )
     limit = np.column_stack([np.zeros(len(most)), most / spacecraft.least_impulse])
     goal = -np.array([omega.real, omega.imag, *(0.0 for _ in rows[2:])]) / abs(omega)
     found = linprog(costs / size, A_eq=matrix / size, b_eq=goal, bounds=limit)  # type: ignore[call-overload]
@@ -70,7 +86,9 @@ def grid_optimum(
 
 
 def layout(rng: np.random.Generator, *, axial: float = 0.0, count: int | None = None) -> Spacecraft:
-    """Some skew channels about a random body; short and long horizons, some with blackout windows."""
+    """Some skew channels about a random body; short and long horizons,
+    some with blackout windows.
+    """
     A = rng.uniform(60, 200)
     C = A * float(rng.choice([rng.uniform(0.3, 0.95), rng.uniform(1.05, 1.95), 1.0]))
     spin = float(rng.uniform(0.5, 6) * rng.choice([-1, 1]))
@@ -87,12 +105,16 @@ def layout(rng: np.random.Generator, *, axial: float = 0.0, count: int | None = 
     begin, end = sorted(rng.uniform(0, horizon, 2).tolist()) if rng.random() < 0.4 else (0.0, 0.0)
     earliest = float(rng.uniform(0, 0.3) * horizon) if rng.random() < 0.4 else 0.0
     limits = Limits(horizon=horizon, earliest=earliest, blackout=((begin, end),) if end else ())
-    return spinner(A, C, spin, degrees, float(rng.uniform(0, 6.28)), channels=tuple(made), limits=limits)
+    return spinner(
+        A, C, spin, degrees, float(rng.uniform(0, 6.28)), channels=tuple(made), limits=limits
+    )
 
 
 @pytest.mark.parametrize(("first", "last"), [(0, 5), deep(5, 15), weekly(15, 200)])
 def test_the_bound_is_the_optimum_of_a_dense_grid_and_never_above_it(first: int, last: int) -> None:
-    """Times on the grid are some of all times, so its optimum lies above the bound; hardly, where the grid is fine."""
+    """Times on the grid are some of all times, so its optimum lies above the bound; hardly, where
+    the grid is fine.
+    """
     solved = 0
     for seed in range(first, last):
         body = layout(np.random.default_rng(seed))
@@ -111,28 +133,40 @@ def test_no_plan_of_any_scheme_is_below_its_bound_for_what_it_leaves(first: int,
         body = layout(rng, axial=(0.0, 0.0, 0.05, 0.4)[seed % 4])
         schemes = "one-pulse two-pulse four-pulse"
         if seed % 3 == 0:
-            axis = body.direction_in_n(math.radians(rng.uniform(1, 120)), float(rng.uniform(0, 6.28)))
-            body, schemes = replace(body, goal=Goal(axis)), "two-pulse half-cone rhumb-line four-pulse"
+            axis = body.direction_in_n(
+                math.radians(rng.uniform(1, 120)), float(rng.uniform(0, 6.28))
+            )
+            body = replace(body, goal=Goal(axis))
+            schemes = "two-pulse half-cone rhumb-line four-pulse"
         for made in (plan(body, scheme) for scheme in schemes.split()):
             if made.flown is None:
                 continue
             feasible += 1
-            cost, left = made.pulses.total_impulse, bounds.Allowed(made.flown.nutation, made.flown.axis_error)
+            cost = made.pulses.total_impulse
+            left = bounds.Allowed(made.flown.nutation, made.flown.axis_error)
             for shift in (False, body.goal.axis is not None):
-                assert cost >= proved(body, left, shift=shift, cost=cost) * (1.0 - TIGHT), (seed, made.scheme)
+                assert cost >= proved(body, left, shift=shift, cost=cost) * (1.0 - TIGHT), (
+                    seed,
+                    made.scheme,
+                )
     assert feasible > last - first
 
 
 @pytest.mark.deep
 def test_one_pulse_attains_the_bound_of_the_file_where_it_was_above() -> None:
-    """The primal cost on the grid of the column generation was 208.84693 N m s, one pulse takes 208.84384."""
+    """The primal cost on the grid of the column generation was 208.84693 N m s, one pulse takes
+    208.84384.
+    """
     body = load_spacecraft(case("bound-grid.yaml"))
-    cost, best = plan(body, "one-pulse").pulses.total_impulse, present(plan(body, "optimal").pulses.bounds)
+    cost = plan(body, "one-pulse").pulses.total_impulse
+    best = present(plan(body, "optimal").pulses.bounds)
     assert cost * (1.0 - 1e-6) <= present(best.rigorous) <= cost
 
 
 def test_a_bound_is_never_told_rounded_up_and_none_of_nothing() -> None:
-    """Where the nutation damps itself schedules may cost next to nothing; a share of nothing is no number."""
+    """Where the nutation damps itself schedules may cost next to nothing; a share of nothing is no
+    number.
+    """
     one = plan(spinner(channels=cross(8.0)), "one-pulse")
     cost = one.pulses.total_impulse
 
@@ -145,23 +179,37 @@ def test_a_bound_is_never_told_rounded_up_and_none_of_nothing() -> None:
         assert isinstance(proven, float)
         assert bound * (1.0 - 1e-3) < float(f"{proven:.4g}") <= bound  # as texts round
     first = {"above": 1.01 * cost, "equal": cost, "below": 0.5 * cost, "nothing": 0.0}
-    check_text("plan.bounds", "\n".join(f"{name}: {noted(told(bound, 0.1 * bound))}" for name, bound in first.items()))
+    check_text(
+        "plan.bounds",
+        "\n".join(f"{name}: {noted(told(bound, 0.1 * bound))}" for name, bound in first.items()),
+    )
 
 
 def test_a_change_of_spin_that_brings_the_phase_sooner_is_allowed_for() -> None:
-    """Within the horizon +1 opposes ω only if the body spins faster; the bound of fixed phases would forbid it.
+    """Within the horizon +1 opposes ω only if the body spins faster; the bound of fixed phases
+    would forbid it.
 
     Flown: the spin thruster at t = 0 by 0.1 rad/s, then +1 where it opposes ω.
     """
     spin_up, push = channel("up", 0.0, 0.0, 1e9), channel("+1", 1e9, 0.0, 0.0)
-    body = spinner(120.0, 80.0, 3.0, 5.0, math.pi + 1.6, channels=(spin_up, push), limits=Limits(horizon=1.58))
-    wait = ((math.atan2(body.omega0[1], body.omega0[0]) - math.pi) % (2 * math.pi)) / (body.inertia.a * 3.1)
+    body = spinner(
+        120.0, 80.0, 3.0, 5.0, math.pi + 1.6, channels=(spin_up, push), limits=Limits(horizon=1.58)
+    )
+    wait = ((math.atan2(body.omega0[1], body.omega0[0]) - math.pi) % (2 * math.pi)) / (
+        body.inertia.a * 3.1
+    )
     first = channel_pulse(spin_up, 0.0, 80.0 * 0.1 / 1e9)
-    made = Schedule((replace(first, t=0.5 * first.on_time), channel_pulse(push, wait, body.least_impulse / 1e9)))
+    made = Schedule(
+        (replace(first, t=0.5 * first.on_time), channel_pulse(push, wait, body.least_impulse / 1e9))
+    )
     assert made.end <= body.horizon
     cost, left = made.total_impulse, propagation.flown(body, made).residual.nutation
     assert left < 1e-7
-    assert body.least_impulse * (1.0 - 1e-6) <= proved(body, bounds.Allowed(left), cost=cost) <= cost * (1.0 + TIGHT)
+    assert (
+        body.least_impulse * (1.0 - 1e-6)
+        <= proved(body, bounds.Allowed(left), cost=cost)
+        <= cost * (1.0 + TIGHT)
+    )
     fixed, with_plenty = replace(body, channels=(push,)), replace(body, limits=Limits(horizon=60.0))
     assert bounds.rigorous(fixed, prices(fixed), cost, bounds.Allowed(left), shift=False) in (
         None,
@@ -173,9 +221,13 @@ def test_a_change_of_spin_that_brings_the_phase_sooner_is_allowed_for() -> None:
 @pytest.mark.parametrize("seed", range(8))
 def test_axial_torque_lowers_the_bound_no_further_than_free_phases(seed: int) -> None:
     body = layout(np.random.default_rng(seed), axial=0.3)
-    still = replace(body, channels=tuple(channel(one.name, *one.torque[:2], 0.0) for one in body.channels))
+    still = replace(
+        body, channels=tuple(channel(one.name, *one.torque[:2], 0.0) for one in body.channels)
+    )
     fixed = bounds.rigorous(still, prices(body), 1.0, bounds.Allowed(), shift=False)
-    free = body.least_impulse / max(abs(one.transverse) / prices(body)[one.name] for one in body.channels)
+    free = body.least_impulse / max(
+        abs(one.transverse) / prices(body)[one.name] for one in body.channels
+    )
     for share in (0.0, 1.0, 100.0):
         if fixed is None:  # there is no solution for this layout
             return
@@ -183,13 +235,19 @@ def test_axial_torque_lowers_the_bound_no_further_than_free_phases(seed: int) ->
 
 
 @pytest.mark.parametrize(
-    ("degrees", "turn"), [(0.0, 40.0), deep(10.0, 5.0), deep(10.0, 60.0), deep(45.0, 30.0), deep(45.0, 160.0)]
+    ("degrees", "turn"),
+    [(0.0, 40.0), deep(10.0, 5.0), deep(10.0, 60.0), deep(45.0, 30.0), deep(45.0, 160.0)],
 )
 def test_the_way_of_h_is_the_shortest_round_its_sphere(degrees: float, turn: float) -> None:
     """A broken line of 40 corners outside the sphere of radius C|ω3|, shortened by an optimiser."""
-    body, beta = spinner(degrees=degrees, channels=cross(8.0)), math.radians(turn)
-    body, r = replace(body, goal=Goal(body.direction_in_n(beta, 1.0))), body.inertia.C * abs(body.spin)
-    begin, corners = np.linalg.norm(body.momentum), np.exp(1j * np.linspace(0.0, beta, 41))
+    body = spinner(degrees=degrees, channels=cross(8.0))
+    beta = math.radians(turn)
+    body, r = (
+        replace(body, goal=Goal(body.direction_in_n(beta, 1.0))),
+        body.inertia.C * abs(body.spin),
+    )
+    begin = np.linalg.norm(body.momentum)
+    corners = np.exp(1j * np.linspace(0.0, beta, 41))
 
     def length(radii: Vector) -> float:
         return float(np.abs(np.diff(np.concatenate([[begin], radii]) * corners)).sum())
@@ -210,7 +268,9 @@ ROLL = channel("roll", 0.0, 0.0, 80.0)
     "other",
     [
         replace(SPINNER, disturbances=(Disturbance(1e-3 + 0.0j),)),
-        replace(SPINNER, channels=(*cross(80.0), ROLL), goal=Goal(spin=3.1), limits=Limits(horizon=15.0)),
+        replace(
+            SPINNER, channels=(*cross(80.0), ROLL), goal=Goal(spin=3.1), limits=Limits(horizon=15.0)
+        ),
         deep(replace(SPINNER, dissipation=300.0)),
         deep(replace(SPINNER, inertia=replace(SPINNER.inertia, moments=(118.0, 122.0, 80.0)))),
     ],
@@ -228,7 +288,8 @@ def test_ticks_count_what_they_leave() -> None:
     made = plan(body, "four-pulse")
     assert made.flown is not None
     assert made.flown.nutation > 1e-6
-    cost, less = made.pulses.total_impulse, body.inertia.C * body.spin * math.tan(made.flown.nutation)
+    cost = made.pulses.total_impulse
+    less = body.inertia.C * body.spin * math.tan(made.flown.nutation)
     bound = proved(body, bounds.Allowed(made.flown.nutation), cost=cost)
     assert bound <= cost
     assert proved(body, cost=cost) - bound == pytest.approx(less, rel=1e-6)
@@ -236,19 +297,27 @@ def test_ticks_count_what_they_leave() -> None:
 
 @pytest.mark.deep
 @pytest.mark.parametrize(
-    ("first", "lasting"), [(0, False), (0, True), *(weekly(at, one) for at in (8, 16, 24) for one in (False, True))]
+    ("first", "lasting"),
+    [(0, False), (0, True), *(weekly(at, one) for at in (8, 16, 24) for one in (False, True))],
 )
-def test_the_first_order_bound_is_not_above_the_program_on_a_dense_grid(first: int, lasting: bool) -> None:
-    """Impulses at moments of a grid for strong torques; for weak ones, on-times in cells of a grid."""
+def test_the_first_order_bound_is_not_above_the_program_on_a_dense_grid(
+    first: int, lasting: bool
+) -> None:
+    """Impulses at moments of a grid for strong torques; for weak ones,
+    on-times in cells of a grid.
+    """
     solved = 0
     for seed in range(first, first + 8):
         body = layout(np.random.default_rng(seed), count=6)
         factor = 10.0 ** np.random.default_rng(seed).uniform(-2.5, -1.0) if lasting else 1e6
-        body = replace(body, channels=tuple(channel(one.name, *(factor * one.torque)) for one in body.channels))
+        body = replace(
+            body, channels=tuple(channel(one.name, *(factor * one.torque)) for one in body.channels)
+        )
         program, solution = solved_program(body)
         if solution.unmet > 1e-9:
             continue
-        found, solved = bounds.first_order(program, solution.prices).bound, solved + 1
+        found = bounds.first_order(program, solution.prices).bound
+        solved = solved + 1
         assert found <= grid_optimum(body, 1500, (body.spin,), lasting=lasting) * (1.0 + TIGHT)
         assert solution.cost * (1.0 - 5e-3) <= found <= solution.cost * (1.0 + TIGHT)
     assert solved >= 2
@@ -261,7 +330,9 @@ def solved_program(body: Spacecraft) -> tuple[Program, Solution]:
 
 @spread("seed", range(10), quick=2)
 def test_any_prices_give_a_bound(seed: int) -> None:
-    """Not only those of the solver, which may have stopped anywhere: the dual is checked at every time."""
+    """Not only those of the solver, which may have stopped anywhere: the dual is checked at every
+    time.
+    """
     rng = np.random.default_rng(seed)
     program, solution = solved_program(layout(rng, count=6))
     if solution.unmet > 1e-9:  # no solution for this layout
@@ -274,16 +345,22 @@ def test_any_prices_give_a_bound(seed: int) -> None:
 
 @pytest.mark.deep
 def test_dissipation_is_in_the_first_order_bound() -> None:
-    """An oblate body damps itself while it waits; 39.68 g was the least of a body without dissipation."""
+    """An oblate body damps itself while it waits; 39.68 g was the least of a body without
+    dissipation.
+    """
     made = plan(load_spacecraft(case("oblate-dissipation.yaml")), "optimal")
     assert present(made.flown).nutation < math.radians(1e-6)
-    assert present(made.pulses.bounds).first_order == pytest.approx(made.pulses.cost_in("kg"), rel=0.01)
+    assert present(made.pulses.bounds).first_order == pytest.approx(
+        made.pulses.cost_in("kg"), rel=0.01
+    )
     assert made.pulses.cost_in("kg") < 0.03251
 
 
 @pytest.mark.deep
 def test_very_many_alignments_do_not_loosen_the_first_order_bound() -> None:
-    """Slots leave prices a little too high in each of some hundred alignments: that once added up to 8 %."""
+    """Slots leave prices a little too high in each of some hundred alignments: that once added up
+    to 8 %.
+    """
     body = aimed(load_spacecraft(case("optimal-far-target.yaml")), 120.0, 87.29)
     program, solution = solved_program(body)
     found = bounds.first_order(program, solution.prices).bound
@@ -291,9 +368,13 @@ def test_very_many_alignments_do_not_loosen_the_first_order_bound() -> None:
 
 
 @pytest.mark.parametrize(("degrees", "known"), [(80.0, True), (100.0, False)])
-def test_nothing_is_known_of_schedules_that_turn_the_spin_axis_over(degrees: float, known: bool) -> None:
+def test_nothing_is_known_of_schedules_that_turn_the_spin_axis_over(
+    degrees: float, known: bool
+) -> None:
     body = spinner(channels=cross(8.0), limits=Limits(horizon=60.0))
-    found = bounds.rigorous(body, prices(body), 100.0, bounds.Allowed(nutation=math.radians(degrees)), shift=True)
+    found = bounds.rigorous(
+        body, prices(body), 100.0, bounds.Allowed(nutation=math.radians(degrees)), shift=True
+    )
     assert (found is not None) is known
 
 
@@ -302,6 +383,8 @@ def test_the_highest_of_a_curve_is_found_however_loosely_its_bend_is_known() -> 
     curve = bounds.SmallAngles(program, solution.prices)
     every = np.ones(len(program.channels), dtype=bool)
     known = bounds._highest(curve, every)
-    assert known == pytest.approx(curve.at(np.linspace(curve.begins[0], program.end, 20_000)).max(), rel=1e-5)
+    assert known == pytest.approx(
+        curve.at(np.linspace(curve.begins[0], program.end, 20_000)).max(), rel=1e-5
+    )
     curve.bends = 1e9 * curve.bends  # so that no quartering rules a stretch out
     assert known * (1.0 - 1e-9) <= bounds._highest(curve, every) < 10.0 * known

@@ -20,8 +20,13 @@ def test_all_stretches_at_once_are_those_in_turn(channels: tuple[Channel, ...], 
     task = Task(spinner(channels=channels), EndEquations(), channels, np.ones(len(channels)))
     draw = np.random.default_rng(1)
     which = draw.integers(len(channels), size=(9, 5))
-    x = np.hstack([3.0 * np.arange(5) + draw.uniform(0.0, 1.0, (9, 5)), draw.uniform(0.0, 1.8, (9, 5))])
-    (momentum, turn), (expected, turned) = task._together(which, x, kicks), task._in_turn(which, x, kicks)
+    x = np.hstack(
+        [3.0 * np.arange(5) + draw.uniform(0.0, 1.0, (9, 5)), draw.uniform(0.0, 1.8, (9, 5))]
+    )
+    (momentum, turn), (expected, turned) = (
+        task._together(which, x, kicks),
+        task._in_turn(which, x, kicks),
+    )
     size = np.abs(expected).max()
     assert np.abs(momentum - expected).max() < 1e-13 * size
     there, here = (attitude.rotate(q.T, h.T) for q, h in ((turn, momentum), (turned, expected)))

@@ -1,4 +1,6 @@
-"""The linear program: its equations, its solver, what it can reach, and what it says where it cannot."""
+"""The linear program: its equations, its solver, what it can reach, and what it says where it
+cannot.
+"""
 
 import math
 import re
@@ -37,7 +39,9 @@ class Failing:
         self.calls, self.failed = 0, 0
         plain = linear_program.GrowingProgram._solved
 
-        def tried(program: linear_program.GrowingProgram, method: str, presolve: bool) -> linear_program.Optimum | None:
+        def tried(
+            program: linear_program.GrowingProgram, method: str, presolve: bool
+        ) -> linear_program.Optimum | None:
             self.calls += 1
             failed = fails(self.calls, method)
             self.failed += failed
@@ -49,7 +53,11 @@ class Failing:
 @pytest.mark.deep
 @pytest.mark.parametrize(
     ("name", "least"),
-    [("optimal-highs-1", "propellant"), ("optimal-highs-3", "time"), ("optimal-beaten-107", "pulses")],
+    [
+        ("optimal-highs-1", "propellant"),
+        ("optimal-highs-3", "time"),
+        ("optimal-beaten-107", "pulses"),
+    ],
 )
 def test_what_the_solver_gave_up_on_is_planned(name: str, least: str) -> None:
     flies(load_spacecraft(case(f"{name}.yaml")), least=least)
@@ -78,9 +86,13 @@ def test_a_solver_that_fails_late_keeps_what_was_found(monkeypatch: pytest.Monke
     assert made.flown is not None  # the last failure comes after all that mattered
 
 
-def test_a_solver_that_always_fails_leaves_other_schemes_and_a_plain_reason(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_solver_that_always_fails_leaves_other_schemes_and_a_plain_reason(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     Failing(monkeypatch, lambda *_: True)
-    check_text("plan.no-solver", infeasibility(plan(replace(BODY, limits=Limits(horizon=1.0)), "optimal")))
+    check_text(
+        "plan.no-solver", infeasibility(plan(replace(BODY, limits=Limits(horizon=1.0)), "optimal"))
+    )
     made = plan(spinner(channels=cross(400.0), limits=Limits(horizon=60.0)), "optimal")
     assert made.flown is not None, infeasibility(made)  # two-pulse finds it
     assert made.pulses.bounds is not None
@@ -98,20 +110,33 @@ class Small:
     below: Vector
     limits: Vector
 
-    def grown(self, *parts: int, level: float = 1.0, step: Vector | float = 0.0) -> linear_program.GrowingProgram:
+    def grown(
+        self, *parts: int, level: float = 1.0, step: Vector | float = 0.0
+    ) -> linear_program.GrowingProgram:
         """With the columns added in ``parts``, solved after each but the last."""
         program = linear_program.GrowingProgram(self.right + step, self.limits, np.full(3, level))
         for count, part in enumerate(np.split(np.arange(12), parts)):
             if count:
                 program.optimum()
-            program.add(self.cost[part], np.vstack([self.equal, self.below])[:, part], np.full(len(part), 0.8))
+            program.add(
+                self.cost[part],
+                np.vstack([self.equal, self.below])[:, part],
+                np.full(len(part), 0.8),
+            )
         return program
 
 
 def small(seed: int) -> Small:
     rng = np.random.default_rng(seed)
-    equal, below = rng.normal(size=(3, 12)), rng.uniform(0.1, 1.0, size=(2, 12))
-    return Small(rng.uniform(1.0, 2.0, 12), equal, equal @ rng.uniform(0.1, 0.4, 12), below, rng.uniform(2.0, 3.0, 2))
+    equal = rng.normal(size=(3, 12))
+    below = rng.uniform(0.1, 1.0, size=(2, 12))
+    return Small(
+        rng.uniform(1.0, 2.0, 12),
+        equal,
+        equal @ rng.uniform(0.1, 0.4, 12),
+        below,
+        rng.uniform(2.0, 3.0, 2),
+    )
 
 
 def solved(program: linear_program.GrowingProgram) -> linear_program.Optimum:
@@ -125,22 +150,30 @@ def check_same(found: linear_program.Optimum, other: linear_program.Optimum) -> 
 
 @pytest.mark.parametrize("seed", range(8))
 def test_the_optimum_and_its_prices(seed: int) -> None:
-    """Prices are the slopes of the least cost by the right-hand sides; and columns may come later, on any scale."""
+    """Prices are the slopes of the least cost by the right-hand sides; and columns may come later,
+    on any scale.
+    """
     program = small(seed)
     found = solved(program.grown())
     assert program.equal @ found.x == pytest.approx(program.right)
     assert (program.below @ found.x < program.limits + 1e-7).all()
-    equal, below, bounds = (program.equal, program.right), (program.below, program.limits), [(0.0, 0.8)] * 12
+    equal = (program.equal, program.right)
+    below = (program.below, program.limits)
+    bounds = [(0.0, 0.8)] * 12
     by_scipy = scipy.optimize.linprog(program.cost, *below, *equal, bounds, method="highs-ds")
     assert program.cost @ found.x == pytest.approx(by_scipy.fun, rel=1e-7)
     for index in range(3):
         other = solved(program.grown(step=1e-6 * np.eye(3)[index]))
-        assert program.cost @ (other.x - found.x) / 1e-6 == pytest.approx(found.prices[index], rel=1e-3, abs=1e-6)
+        assert program.cost @ (other.x - found.x) / 1e-6 == pytest.approx(
+            found.prices[index], rel=1e-3, abs=1e-6
+        )
     for level in (1.0, 1e-4):
         check_same(found, solved(program.grown(5, 8, level=level)))
 
 
-def test_where_one_way_of_solving_fails_the_other_finds_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_where_one_way_of_solving_fails_the_other_finds_the_same(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     usual = solved(small(1).grown())
     Failing(monkeypatch, lambda call, _: call <= 1)
     check_same(usual, solved(small(1).grown()))
@@ -174,7 +207,9 @@ def test_no_burns_are_left_out_once_the_work_is_spent() -> None:
 
 
 def test_the_basis_is_kept() -> None:
-    """From the last basis, columns that change nothing take no step; from none they take several."""
+    """From the last basis, columns that change nothing take no step;
+    from none they take several.
+    """
     program = small(2).grown()
     solved(program)
     assert program._highs.getInfo().simplex_iteration_count > 0
@@ -215,7 +250,8 @@ assert found is not None and found.x.tolist() == [0.0, 1.0] and found.prices.tol
 def test_the_solver_prints_nothing_whoever_used_it_before(caller: str) -> None:
     """Not even the banner that HiGHS 1.16 prints once in a process: CSV and JSON may go to stdout.
 
-    How many threads HiGHS has is settled once in a process: a caller may have chosen another number.
+    How many threads HiGHS has is settled once in a process: a caller may have chosen another
+    number.
     """
     of_the_caller, both = (
         subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, text=True)
@@ -234,13 +270,20 @@ def test_the_solver_prints_nothing_whoever_used_it_before(caller: str) -> None:
     ],
 )
 def test_what_is_out_of_reach_has_a_reason_without_a_word_of_the_solver(name: str) -> None:
-    check_text(f"plan.{name}", infeasibility(plan(load_spacecraft(case(f"{name}.yaml")), "optimal")))
+    check_text(
+        f"plan.{name}", infeasibility(plan(load_spacecraft(case(f"{name}.yaml")), "optimal"))
+    )
 
 
 @pytest.mark.deep
-def test_a_far_target_with_weak_thrusters_is_not_called_out_of_reach(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Columns taken in a few at a time ended before they supplied the goal; 64 times the horizon seemed too short."""
-    body, down = load_spacecraft(case("geo-target.yaml")), math.radians(-20.0)
+def test_a_far_target_with_weak_thrusters_is_not_called_out_of_reach(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Columns taken in a few at a time ended before they supplied the goal; 64 times the horizon
+    seemed too short.
+    """
+    body = load_spacecraft(case("geo-target.yaml"))
+    down = math.radians(-20.0)
     body = replace(body, goal=Goal(axis=np.array([0.0, math.cos(down), math.sin(down)])))
     solver = Failing(monkeypatch, lambda *_: False)
     named = re.search(r"at least (\S+) s", infeasibility(plan(body, "optimal")))
@@ -252,13 +295,21 @@ def test_a_far_target_with_weak_thrusters_is_not_called_out_of_reach(monkeypatch
 
 
 def unmet_by_all_slots(program: linear_program.Program) -> float:
-    """What all slots together cannot supply, by one program of least slack over every one of them."""
+    """What all slots together cannot supply,
+    by one program of least slack over every one of them.
+    """
     size = float(np.linalg.norm(program.influence.goal))
-    most = np.repeat([program.width * one.strength / size for one in program.channels], len(program.centres))
-    rows, lost = program.influence.rows(program.centres), program.influence.widths(np.array([program.width]))[0]
-    matrix = np.concatenate([rows @ (np.asarray(one.torque) / one.strength) * lost for one in program.channels]).T
+    most = np.repeat(
+        [program.width * one.strength / size for one in program.channels], len(program.centres)
+    )
+    rows = program.influence.rows(program.centres)
+    lost = program.influence.widths(np.array([program.width]))[0]
+    matrix = np.concatenate(
+        [rows @ (np.asarray(one.torque) / one.strength) * lost for one in program.channels]
+    ).T
     count = len(matrix)
-    cost, slack = np.repeat([0.0, 1.0], [len(most), 2 * count]), np.hstack([np.eye(count), -np.eye(count)])
+    cost = np.repeat([0.0, 1.0], [len(most), 2 * count])
+    slack = np.hstack([np.eye(count), -np.eye(count)])
     bounds = [*((0.0, one) for one in most), *((0.0, None),) * (2 * count)]
     goal = program.influence.goal / size
     found = scipy.optimize.linprog(cost, A_eq=np.hstack([matrix, slack]), b_eq=goal, bounds=bounds)
@@ -268,29 +319,44 @@ def unmet_by_all_slots(program: linear_program.Program) -> float:
 @pytest.mark.parametrize("rows", [2, 4, 5])
 @pytest.mark.parametrize("seed", range(4))
 def test_goals_within_and_beyond_reach_are_told_apart(seed: int, rows: int) -> None:
-    """Goals just within and just beyond the farthest multiple that a program of another make reaches."""
+    """Goals just within and just beyond the farthest multiple that a program of another make
+    reaches.
+    """
     rng = np.random.default_rng(seed)
     most = rng.normal(size=(rows, 300)) * rng.uniform(0.0, 0.02, 300)
     goal = rng.normal(size=rows)
     goal /= np.linalg.norm(goal)
     # The largest s with most @ x = s goal, 0 <= x <= 1.
-    equal, bounds = np.hstack([most, -goal[:, None]]), [(0, 1)] * 300 + [(0, None)]
-    found = scipy.optimize.linprog([*np.zeros(300), -1.0], A_eq=equal, b_eq=np.zeros(rows), bounds=bounds)
+    equal = np.hstack([most, -goal[:, None]])
+    bounds = [(0, 1)] * 300 + [(0, None)]
+    found = scipy.optimize.linprog(
+        [*np.zeros(300), -1.0], A_eq=equal, b_eq=np.zeros(rows), bounds=bounds
+    )
     size = float(present(found.x)[-1])
     assert size > 0.01
-    told = [linear_program.supplies(most / size, share * goal) for share in (0.3, 0.99, 0.9999, 1.0001, 1.01, 3.0)]
+    told = [
+        linear_program.supplies(most / size, share * goal)
+        for share in (0.3, 0.99, 0.9999, 1.0001, 1.01, 3.0)
+    ]
     assert [one is not False for one in told] == [True] * 3 + [False] * 3
     assert all(told[:3])
 
 
 def test_by_so_much_the_goal_may_be_missed() -> None:
-    most, goal = np.eye(4) * 0.5, np.array([0.5, 0.5, 0.9, 0.5])
-    assert [linear_program.supplies(most, goal, off) for off in (0.0, 0.39, 0.41)] == [False, False, True]
+    most = np.eye(4) * 0.5
+    goal = np.array([0.5, 0.5, 0.9, 0.5])
+    assert [linear_program.supplies(most, goal, off) for off in (0.0, 0.39, 0.41)] == [
+        False,
+        False,
+        True,
+    ]
 
 
 @pytest.mark.weekly
 @pytest.mark.parametrize("torque", [0.05, 0.02])
-def test_the_shortest_horizon_is_that_of_the_program(torque: float, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_shortest_horizon_is_that_of_the_program(
+    torque: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """By bisection with the linear program alone, and with what is known without it."""
     body = spinner(channels=cross(torque), limits=Limits(horizon=3000.0))
     quick = Problem(body, OptimalOptions())
@@ -305,19 +371,25 @@ def test_the_shortest_horizon_is_that_of_the_program(torque: float, monkeypatch:
 def test_the_equations_along_a_flight_say_what_a_short_firing_adds(
     spin: float, dissipation: float | None, first: float
 ) -> None:
-    """Differences of flights: with a short firing more, at true angles and with the spin that dissipation changes.
+    """Differences of flights: with a short firing more, at true angles and with the spin that
+    dissipation changes.
 
-    Of an oblate body, whose spin the wheels of its nutation speed up while that decays; one with three moments.
+    Of an oblate body, whose spin the wheels of its nutation speed up while that decays; one with
+    three moments.
     """
     jets = channel("T", 3.0, 1.0, 0.4), *cross(4.0)
     body = spinner(100.0, 150.0, spin, 25.0, moments=(first, 100.0, 150.0), channels=jets)
     body = replace(body, dissipation=dissipation)
     last = channel_pulse(body.channels[1], 9.0, 0.5)
-    influence = refinement.along(propagation.flown(body, Schedule((last,))), refinement.EndEquations(), 0.05)
+    influence = refinement.along(
+        propagation.flown(body, Schedule((last,))), refinement.EndEquations(), 0.05
+    )
     for at in (2.0, 6.0):
         added = channel_pulse(body.channels[0], at, 1e-3)
         without, more = (
-            refinement.misses(propagation.flown(body, Schedule(made)), refinement.EndEquations(shift=False))
+            refinement.misses(
+                propagation.flown(body, Schedule(made)), refinement.EndEquations(shift=False)
+            )
             for made in ((last,), (added, last))
         )
         expected = np.hypot(*(influence.rows(np.array([at]))[0] @ added.impulse)[:2])

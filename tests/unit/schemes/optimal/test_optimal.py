@@ -1,4 +1,6 @@
-"""The scheme optimal: optima of small angles, and schedules that fly at that cost, whatever the goal and the limits."""
+"""The scheme optimal: optima of small angles, and schedules that fly at that cost, whatever the
+goal and the limits.
+"""
 
 import math
 from dataclasses import replace
@@ -26,9 +28,14 @@ STRONG = 1e7
 """N m that make practically ideal impulses: they need a microsecond."""
 
 REAL = cross(8.0, min_on_time=0.02, max_on_time=2.0)
-SPIN_JETS = tuple(channel(f"spin {sign}", 0.0, 0.0, 6.0 * sign, min_on_time=0.02) for sign in (1, -1))
+SPIN_JETS = tuple(
+    channel(f"spin {sign}", 0.0, 0.0, 6.0 * sign, min_on_time=0.02) for sign in (1, -1)
+)
 SKEW = tuple(
-    channel(f"T{k}", 8 * math.cos(0.4 + k), 8 * math.sin(0.4 + k), 0.8 * (-1) ** k, min_on_time=0.02) for k in range(6)
+    channel(
+        f"T{k}", 8 * math.cos(0.4 + k), 8 * math.sin(0.4 + k), 0.8 * (-1) ** k, min_on_time=0.02
+    )
+    for k in range(6)
 )
 """Six channels that push the spin a little each, up or down by turns."""
 
@@ -56,10 +63,16 @@ def within(horizon: float, channels: tuple[Channel, ...] = REAL, **parts: Any) -
     return spinner(channels=channels, limits=Limits(horizon=horizon), **parts)
 
 
-def small_angle_optimum(spacecraft: Spacecraft, per_impulse: np.ndarray | float = 1.0) -> tuple[float, float, int]:
-    """What the program leaves, what it costs at these costs of one N m s in each channel, and its burns."""
+def small_angle_optimum(
+    spacecraft: Spacecraft, per_impulse: np.ndarray | float = 1.0
+) -> tuple[float, float, int]:
+    """What the program leaves, what it costs at these costs of one N m s in each channel, and its
+    burns.
+    """
     costs = np.array([np.linalg.norm(one.torque) for one in spacecraft.channels]) * per_impulse
-    found = Program(spacecraft, spacecraft.channels, costs, small_angles(spacecraft, EndEquations())).solve()
+    found = Program(
+        spacecraft, spacecraft.channels, costs, small_angles(spacecraft, EndEquations())
+    ).solve()
     return found.unmet, found.cost, len(found.burns)
 
 
@@ -84,12 +97,18 @@ def test_flown_schedules_leave_nothing_at_that_cost(row: tuple[Any, ...]) -> Non
 @spread("seed", range(12), quick=1, deep=2)
 def test_the_optimum_is_that_of_a_dense_grid(seed: int) -> None:
     """One large grid of impulses, without any of the program's code."""
-    rng, points = np.random.default_rng(seed), 3000
+    rng = np.random.default_rng(seed)
+    points = 3000
     angles = rng.uniform(0, 2 * math.pi, 5)
-    five = tuple(channel(f"c{i}", STRONG * math.cos(x), STRONG * math.sin(x), 0.0) for i, x in enumerate(angles))
+    five = tuple(
+        channel(f"c{i}", STRONG * math.cos(x), STRONG * math.sin(x), 0.0)
+        for i, x in enumerate(angles)
+    )
     C, spin = rng.choice([50.0, 90.0, 150.0, 220.0]), rng.choice([-2.0, 3.0])
     spacecraft = spinner(120.0, C, spin, 2.0, channels=five, limits=Limits(horizon=8.0))
-    costs, times, rows = rng.uniform(1.0, 3.0, 5), np.linspace(0.0, 8.0, points), list[np.ndarray]()
+    costs = rng.uniform(1.0, 3.0, 5)
+    times = np.linspace(0.0, 8.0, points)
+    rows = list[np.ndarray]()
     for rate in (spacecraft.inertia.a * spin, spin):
         acts = np.exp(1j * (angles[:, None] + rate * times)).ravel()
         rows += [acts.real, acts.imag]
@@ -110,21 +129,29 @@ def test_the_optimum_is_that_of_a_dense_grid(seed: int) -> None:
         weekly(120.0, 80.0, -3.0, 5.0),
     ],
 )
-def test_real_thrusters_keep_their_limits_and_leave_nothing(A: float, C: float, spin: float, degrees: float) -> None:
+def test_real_thrusters_keep_their_limits_and_leave_nothing(
+    A: float, C: float, spin: float, degrees: float
+) -> None:
     limits = Limits(blackout=((3.0, 9.0),), earliest=1.0)
     flies(spinner(A, C, spin, degrees, channels=REAL, limits=limits), dearest=1.02)
 
 
-def test_few_pulses_are_preferred_to_the_last_tenth_of_a_percent_and_the_plan_carries_its_proof() -> None:
+def test_few_pulses_are_preferred_to_the_last_tenth_of_a_percent_and_the_plan_carries_its_proof() -> (
+    None
+):
     made = flies(spinner(channels=REAL))
     assert len(made.pulses) <= 12
     check_text("plan.proof", noted(plan_notes(made)))
 
 
 @pytest.mark.deep
-@pytest.mark.parametrize(("horizon", "names", "key"), [(0.4, "+1 +2", "deadline-h"), (0.05, "+1", "deadline")])
+@pytest.mark.parametrize(
+    ("horizon", "names", "key"), [(0.4, "+1 +2", "deadline-h"), (0.05, "+1", "deadline")]
+)
 def test_an_impossible_deadline_says_what_to_relax(horizon: float, names: str, key: str) -> None:
-    check_text(f"plan.{key}", infeasibility(plan(ideal(120.0, 80.0, 3.0, horizon, names), "optimal")))
+    check_text(
+        f"plan.{key}", infeasibility(plan(ideal(120.0, 80.0, 3.0, horizon, names), "optimal"))
+    )
 
 
 @spread("seed", range(200), quick=1, deep=2)
@@ -135,10 +162,17 @@ def test_random_layouts_are_planned(seed: int) -> None:
 @pytest.mark.deep
 @pytest.mark.parametrize(
     ("seed", "shift"),
-    [(9, math.inf), *(weekly(seed, math.inf) for seed in (1, *range(10, 40))), weekly(14, 1.0), weekly(0, 0.05)],
+    [
+        (9, math.inf),
+        *(weekly(seed, math.inf) for seed in (1, *range(10, 40))),
+        weekly(14, 1.0),
+        weekly(0, 0.05),
+    ],
 )
 def test_more_freedom_never_costs_more(seed: int, shift: float) -> None:
-    """The search alone was up to 0.7 % dearer with it; of what ends earlier that counts as equal which is."""
+    """The search alone was up to 0.7 % dearer with it; of what ends earlier that counts as equal
+    which is.
+    """
     freedom = {"free_axis": True} if math.isinf(shift) else {"shift": math.radians(shift)}
     with as_found():
         kept, free = (flies(random_layout(seed), left=1e-5, **options) for options in ({}, freedom))
@@ -157,7 +191,9 @@ def test_more_freedom_never_costs_more(seed: int, shift: float) -> None:
     ids=["ideal", "real", "strong"],
 )
 def test_h_may_end_off_its_target_and_that_saves(body: Spacecraft, saved: float) -> None:
-    kept, free = (plan(body, "optimal", OptimalOptions(free_axis=flag)).pulses.cost for flag in (False, True))
+    kept, free = (
+        plan(body, "optimal", OptimalOptions(free_axis=flag)).pulses.cost for flag in (False, True)
+    )
     loose = flies(body, shift=math.radians(0.5)).pulses.cost
     assert free * (1.0 - 1e-6) <= loose < kept / (1.0 + saved)
     assert free < kept
@@ -184,8 +220,12 @@ def test_the_axis_ends_on_its_target(
     body = spinner(A, C, spin, degrees, channels=REAL, limits=Limits(horizon=80.0))
     body = replace(body, goal=Goal(body.direction_in_n(math.radians(tilt), math.radians(azimuth))))
     made = flies(body, dearest=1.03)
-    axis = Outcome(body, made.pulses).motion.rotation @ np.array([0.0, 0.0, math.copysign(1.0, spin)])
-    assert reference.angle(axis, body.target_axis) < 1e-8  # the spin axis itself points there, not H alone
+    axis = Outcome(body, made.pulses).motion.rotation @ np.array(
+        [0.0, 0.0, math.copysign(1.0, spin)]
+    )
+    assert (
+        reference.angle(axis, body.target_axis) < 1e-8
+    )  # the spin axis itself points there, not H alone
     # |dH/dt| <= |M|: no schedule turns H with less
     assert made.pulses.total_impulse >= max(body.least_impulse, body.turning_impulse) * (1 - 1e-9)
 
@@ -193,15 +233,26 @@ def test_the_axis_ends_on_its_target(
 @pytest.mark.parametrize(
     "body",
     [
-        *(weekly(with_spin(within(90.0, (*REAL, *SPIN_JETS)), 3.0 * factor)) for factor in (0.7, 1.02, 1.4)),
+        *(
+            weekly(with_spin(within(90.0, (*REAL, *SPIN_JETS)), 3.0 * factor))
+            for factor in (0.7, 1.02, 1.4)
+        ),
         deep(with_spin(within(90.0, (*REAL, *SPIN_JETS), spin=-3.0), -3.0)),
         weekly(with_spin(within(90.0, (*REAL, *SPIN_JETS), spin=-3.0), -4.2)),
-        # The model that is planned on is symmetric; the last trim on the true body knows of the spin.
+        # The model that is planned on is symmetric; the last trim on the true body knows of the
+        # spin.
         deep(with_spin(within(90.0, (*SKEW, *SPIN_JETS), moments=(120.0, 110.0, 80.0)), 3.1)),
         # Left to themselves skew thrusters change it.
         deep(with_spin(within(60.0, SKEW), 3.0)),
         # Set by torques a ten-thousandth of the transverse ones.
-        deep(with_spin(within(60.0, tuple(channel(c.name, *c.torque[:2], 1e-3 * c.torque[2]) for c in SKEW)), 3.0)),
+        deep(
+            with_spin(
+                within(
+                    60.0, tuple(channel(c.name, *c.torque[:2], 1e-3 * c.torque[2]) for c in SKEW)
+                ),
+                3.0,
+            )
+        ),
     ],
     ids=["0.7", "1.02", "1.4", "-1", "-1.4", "three moments", "skew", "weak"],
 )
@@ -210,7 +261,10 @@ def test_the_spin_ends_as_asked(body: Spacecraft) -> None:
 
 
 def test_without_axial_torque_a_spin_is_refused_with_its_reason() -> None:
-    check_text("plan.no-axial-torque", infeasibility(plan(with_spin(spinner(channels=REAL), 3.5), "optimal")))
+    check_text(
+        "plan.no-axial-torque",
+        infeasibility(plan(with_spin(spinner(channels=REAL), 3.5), "optimal")),
+    )
 
 
 @pytest.mark.deep
@@ -228,7 +282,9 @@ def test_least_pulses_fires_as_seldom_as_the_equations_allow(free: bool, pulses:
 
 @pytest.mark.deep
 def test_ticks_together_leave_no_more_than_half_a_tick_of_one_pulse() -> None:
-    """At their best moments all pulses change the nutation by the same steps, so that half a step may stay."""
+    """At their best moments all pulses change the nutation by the same steps, so that half a step
+    may stay.
+    """
     body = spinner(channels=REAL, limits=Limits(horizon=60.0, tick=0.01))
     assert len(flies(body, left=1.1 * math.degrees(0.5 * 0.01 * 8.0 / (80.0 * 3.0))).pulses) > 4
 
@@ -236,8 +292,11 @@ def test_ticks_together_leave_no_more_than_half_a_tick_of_one_pulse() -> None:
 @pytest.mark.weekly
 @pytest.mark.parametrize("seed", range(8))
 def test_on_ticks_only_rounding_stays(seed: int) -> None:
-    """Half a tick of every start and on-time, as independent errors, by the reference integrator."""
-    body, rng = random_layout(seed), np.random.default_rng(seed)
+    """Half a tick of every start and on-time, as independent errors,
+    by the reference integrator.
+    """
+    body = random_layout(seed)
+    rng = np.random.default_rng(seed)
     tick, gap = float(rng.choice([1e-3, 5e-3])), float(rng.choice([0.0, 0.3]))
     body = replace(body, limits=replace(body.limits, tick=tick, gap=gap))
     made = plan(body, "optimal")
@@ -245,7 +304,11 @@ def test_on_ticks_only_rounding_stays(seed: int) -> None:
         assert f"ticks of {tick:.4g} s" in infeasibility(made)
         return
     rate = max(abs(body.spin), abs(body.inertia.a * body.spin))
-    errors = [0.5 * tick * p for one in made.pulses for p in one.magnitude * np.array([rate, 1.0 / one.on_time])]
+    errors = [
+        0.5 * tick * p
+        for one in made.pulses
+        for p in one.magnitude * np.array([rate, 1.0 / one.on_time])
+    ]
     flies(body, left=math.degrees(math.hypot(*errors) / (body.inertia.C * abs(body.spin))))
 
 
@@ -256,5 +319,7 @@ def test_with_three_moments_impulse_is_that_of_the_true_thrusters() -> None:
     ratios = []
     for channels in (body.channels, tuple(one.of(isp=220.0, thrust=8.0) for one in body.channels)):
         made = flies(replace(body, channels=channels)).pulses
-        ratios.append(made.cost_in(present(made.bounds).unit) / (present(made.bounds).first_order or 0.0))
+        ratios.append(
+            made.cost_in(present(made.bounds).unit) / (present(made.bounds).first_order or 0.0)
+        )
     assert ratios[0] == pytest.approx(ratios[1], rel=1e-9)

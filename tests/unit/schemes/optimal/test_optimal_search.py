@@ -1,4 +1,6 @@
-"""What optimal tries beside its linear program: other horizons, ends and schemes, short horizons, divided pulses."""
+"""What optimal tries beside its linear program: other horizons, ends and schemes, short horizons,
+divided pulses.
+"""
 
 import csv
 import itertools
@@ -22,7 +24,13 @@ from nutdamp.files.reader import load_spacecraft, read_spacecraft
 from nutdamp.planning.notes import infeasibility
 from nutdamp.planning.plan import plan
 from nutdamp.schemes import correction, two_pulse
-from nutdamp.schemes.catalogue import SCHEMES, OptimalOptions, Options, SchemeOptions, TwoPulseOptions
+from nutdamp.schemes.catalogue import (
+    SCHEMES,
+    OptimalOptions,
+    Options,
+    SchemeOptions,
+    TwoPulseOptions,
+)
 from nutdamp.schemes.optimal import alternatives, multistart, problem
 from nutdamp.schemes.optimal.descent import Descent, Task
 from nutdamp.schemes.optimal.linear_program import Burn
@@ -41,7 +49,9 @@ PLAIN = OptimalOptions()
 
 
 def settle(monkeypatch: pytest.MonkeyPatch, schedules: dict[float, Schedule]) -> list[float]:
-    """Let the program lead to ``schedules`` within each horizon, else to nothing; the horizons that were looked at."""
+    """Let the program lead to ``schedules`` within each horizon, else to nothing; the horizons that
+    were looked at.
+    """
     tried: list[float] = []
 
     def settled(self: _LeastCostSearch, _: float) -> Schedule | None:
@@ -53,7 +63,11 @@ def settle(monkeypatch: pytest.MonkeyPatch, schedules: dict[float, Schedule]) ->
 
 
 def dearer(made: Schedule, share: float) -> Schedule:
-    return Schedule(tuple(replace(one, on_time=one.on_time * share, impulse=one.impulse * share) for one in made))
+    return Schedule(
+        tuple(
+            replace(one, on_time=one.on_time * share, impulse=one.impulse * share) for one in made
+        )
+    )
 
 
 @pytest.mark.deep
@@ -61,12 +75,15 @@ def test_other_horizons_and_schemes_are_tried_where_the_program_leads_nowhere_or
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Halved down to a period; where what is found is dear, three times or until one is not."""
-    search, pair = _LeastCostSearch(BODY, PLAIN), two_pulse.schedule(BODY, TwoPulseOptions())
+    search = _LeastCostSearch(BODY, PLAIN)
+    pair = two_pulse.schedule(BODY, TwoPulseOptions())
     first = search.program().solve()
     for known in ({400.0: dearer(pair, 2.0)}, {}):
         tried = settle(monkeypatch, known)
         made = present(search.programmed(first))
-        assert search.price(made) <= search.price(pair) * (1.0 + 1e-9)  # another scheme was the start
+        assert search.price(made) <= search.price(pair) * (
+            1.0 + 1e-9
+        )  # another scheme was the start
     halves = int(math.log2(400.0 / BODY.inertial_period))
     assert tried == [400.0 * 0.5**turn for turn in range(halves + 1)]
     assert halves > HALVINGS
@@ -82,7 +99,9 @@ def test_other_horizons_and_schemes_are_tried_where_the_program_leads_nowhere_or
 
 
 @pytest.mark.parametrize(("tick", "named"), [(None, False), (0.01, True)])
-def test_ticks_are_among_the_limits_named_where_the_file_sets_them(tick: float | None, named: bool) -> None:
+def test_ticks_are_among_the_limits_named_where_the_file_sets_them(
+    tick: float | None, named: bool
+) -> None:
     body = replace(BODY, limits=replace(BODY.limits, tick=tick))
     brief = replace(body, channels=cross(8.0, min_on_time=500.0))
     with pytest.raises(Infeasible) as none:
@@ -93,10 +112,19 @@ def test_ticks_are_among_the_limits_named_where_the_file_sets_them(tick: float |
 
 @pytest.mark.parametrize(
     ("name", "latest"),
-    [deep("lunar-prospector", 19.0), weekly("magnus-a09", 12.0), weekly("single-thruster", 68.0), deep("", math.inf)],
+    [
+        deep("lunar-prospector", 19.0),
+        weekly("magnus-a09", 12.0),
+        weekly("single-thruster", 68.0),
+        deep("", math.inf),
+    ],
 )
-def test_an_earlier_end_costs_and_leaves_as_much_and_takes_no_more_pulses(name: str, latest: float) -> None:
-    """80 % of the end of what the whole horizon gives; the example takes one more linear program and no flights."""
+def test_an_earlier_end_costs_and_leaves_as_much_and_takes_no_more_pulses(
+    name: str, latest: float
+) -> None:
+    """80 % of the end of what the whole horizon gives; the example takes one more linear program
+    and no flights.
+    """
     body = nutdamp.load(places.CONFIGS / f"{name}.yaml") if name else nutdamp.example()
     with work.budget("with", 1e9) as spent:
         made = plan(body, "optimal")
@@ -119,9 +147,17 @@ def test_a_far_target_costs_no_more_than_a_train_that_the_user_finds() -> None:
 
 @pytest.mark.weekly
 def test_trains_are_tried_without_the_sun_and_within_on_times() -> None:
-    body = aimed(spinner(channels=cross(20.0, min_on_time=0.05, max_on_time=0.4), limits=Limits(horizon=150.0)), 60, 10)
+    body = aimed(
+        spinner(
+            channels=cross(20.0, min_on_time=0.05, max_on_time=0.4), limits=Limits(horizon=150.0)
+        ),
+        60,
+        10,
+    )
     sunny = replace(body, goal=replace(body.goal, sun=np.array([1.0, 0.0, 0.0])))
-    for one, other in zip(*(alternatives.by_other_schemes(each, shift=True) for each in (body, sunny)), strict=True):
+    for one, other in zip(
+        *(alternatives.by_other_schemes(each, shift=True) for each in (body, sunny)), strict=True
+    ):
         assert [pulse.t for pulse in one] == [pulse.t for pulse in other]
         assert violations(body, one) == []
 
@@ -136,26 +172,47 @@ def test_trains_are_tried_without_the_sun_and_within_on_times() -> None:
         weekly(8, "limits: {tick: 1 ms}\n", 1.03),
     ],
 )
-def test_several_short_pulses_in_each_half_turn_damp(degrees: int, changed: str, most: float) -> None:
-    """Pulses of 0.2 s, where 0.4 s are needed in each half turn of 8 deg: one at a time leaves 4 of them."""
-    body = read_spacecraft(NOTHING_DAMPS.replace("8 deg", f"{degrees} deg") + changed, "nothing-damps.yaml")
+def test_several_short_pulses_in_each_half_turn_damp(
+    degrees: int, changed: str, most: float
+) -> None:
+    """Pulses of 0.2 s, where 0.4 s are needed in each half turn of 8 deg: one at a time leaves 4 of
+    them.
+    """
+    body = read_spacecraft(
+        NOTHING_DAMPS.replace("8 deg", f"{degrees} deg") + changed, "nothing-damps.yaml"
+    )
     made = flies(body, left=1e-4 if body.limits.tick else 1e-8, dearest=most).pulses
     each = ([one for one in made if one.channel == name] for name in {one.channel for one in made})
-    pauses = [after.start - before.end for pulses in each for before, after in itertools.pairwise(pulses)]
-    assert min(pauses) > max(0.9 * max(one.min_on_time for one in body.channels), body.limits.gap - 1e-9)
+    pauses = [
+        after.start - before.end for pulses in each for before, after in itertools.pairwise(pulses)
+    ]
+    assert min(pauses) > max(
+        0.9 * max(one.min_on_time for one in body.channels), body.limits.gap - 1e-9
+    )
     assert plan(body, "four-pulse").severity > math.radians(degrees - 4.2)
 
 
-@pytest.mark.parametrize(("longest", "gap", "shortest"), [(0.3, 0.0, 0.0), (0.21, 0.1, 0.0), (0.5, 0.02, 0.13)])
-def test_no_slots_are_left_that_join_to_more_than_a_pulse_may_last(longest: float, gap: float, shortest: float) -> None:
-    body = spinner(channels=cross(8.0, min_on_time=shortest, max_on_time=longest), limits=Limits(horizon=30.0, gap=gap))
+@pytest.mark.parametrize(
+    ("longest", "gap", "shortest"), [(0.3, 0.0, 0.0), (0.21, 0.1, 0.0), (0.5, 0.02, 0.13)]
+)
+def test_no_slots_are_left_that_join_to_more_than_a_pulse_may_last(
+    longest: float, gap: float, shortest: float
+) -> None:
+    body = spinner(
+        channels=cross(8.0, min_on_time=shortest, max_on_time=longest),
+        limits=Limits(horizon=30.0, gap=gap),
+    )
     program = problem.Problem(body, PLAIN).program()
     long = tuple(Burn(body.channels[1], t, on) for t, on in ((2.0, 1.1), (5.3, 0.7), (17.0, 2.0)))
     assert problem._divide(program, (*long, Burn(body.channels[0], 9.0, 0.9 * longest)))
     assert not program.forbidden[[0, 2, 3]].any()  # nothing is too long there
-    runs = [(key, len(list(group))) for key, group in itertools.groupby(program.forbidden[1].tolist())]
+    runs = [
+        (key, len(list(group))) for key, group in itertools.groupby(program.forbidden[1].tolist())
+    ]
     assert max(count for key, count in runs if not key) * program.width <= longest + 1e-12
-    assert min(count for key, count in runs[1:-1] if key) * program.width >= max(gap, shortest) - 1e-12
+    assert (
+        min(count for key, count in runs[1:-1] if key) * program.width >= max(gap, shortest) - 1e-12
+    )
     for burn in long:  # time is left for it from its begin to its end, and a half of it beside it
         near = np.abs(program.centres - burn.t) <= 0.75 * burn.on_time
         assert np.count_nonzero(~program.forbidden[1] & near) * program.width >= 0.6 * burn.on_time
@@ -185,10 +242,16 @@ def test_a_schedule_is_taken_down_on_the_true_motion_and_leaves_nothing() -> Non
     ],
 )
 def test_the_last_pulses_are_corrected_and_for_a_spin_the_one_that_gives_most_to_it(
-    scheme: str, spin: float | None, free: int, corrected: tuple[int, ...], monkeypatch: pytest.MonkeyPatch
+    scheme: str,
+    spin: float | None,
+    free: int,
+    corrected: tuple[int, ...],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     chosen: list[tuple[int, ...]] = []
-    monkeypatch.setattr(correction, "correct", lambda *_, **options: chosen.append(options["chosen"]))
+    monkeypatch.setattr(
+        correction, "correct", lambda *_, **options: chosen.append(options["chosen"])
+    )
     axial = (0.0, 0.7, 0.1, 0.0, 0.0, 0.2)
     made = tuple(pulse(5.0 * at, 0.1, np.array([1.0, 0.0, one])) for at, one in enumerate(axial))
     body = replace(BODY, goal=Goal(None, spin))
@@ -198,21 +261,28 @@ def test_the_last_pulses_are_corrected_and_for_a_spin_the_one_that_gives_most_to
 
 @pytest.mark.deep
 def test_what_is_not_to_be_had_is_said() -> None:
-    """What the gap forbids is not told as rounding: two pulses that left 4.47° of 5°, where four-pulse leaves 2.16°.
+    """What the gap forbids is not told as rounding: two pulses that left 4.47° of 5°, where
+    four-pulse leaves 2.16°.
 
-    At 25 deg channels cannot do it at all: divided pulses are no way round the program. And one of 1 µs at most is left
-    out beside one without a limit; alone, its limit is named.
+    At 25 deg channels cannot do it at all: divided pulses are no way round the program. And one of
+    1 µs at most is left out beside one without a limit; alone, its limit is named.
     """
     made = plan(load_spacecraft(places.case("optimal-tick.yaml")), "optimal")
     assert made.schedule is None
     check_text("plan.gap-forbids", infeasibility(made))
     far = read_spacecraft(NOTHING_DAMPS.replace("8 deg", "25 deg"), "nothing-damps.yaml")
-    check_text("plan.no-pulses-can", infeasibility(plan(replace(far, limits=Limits(max_pulses=20)), "optimal")))
+    check_text(
+        "plan.no-pulses-can",
+        infeasibility(plan(replace(far, limits=Limits(max_pulses=20)), "optimal")),
+    )
     body = load_spacecraft(places.case("optimal-longer-than-inf.yaml"))
     made = plan(body, "optimal")
     assert {pulse.channel for pulse in made.pulses} == {"T1"}
     assert made.pulses.bounds is not None
-    check_text("optimal.too-short", infeasibility(plan(replace(body, channels=body.channels[1:]), "optimal")))
+    check_text(
+        "optimal.too-short",
+        infeasibility(plan(replace(body, channels=body.channels[1:]), "optimal")),
+    )
 
 
 EXACT = 1e-8
@@ -220,7 +290,9 @@ EXACT = 1e-8
 
 
 def strong(degrees: float = 20.0, horizon: float = 2.0, **limits: Any) -> Spacecraft:
-    """Five directions that do all there is to do within milliseconds, in less than one inertial period."""
+    """Five directions that do all there is to do within milliseconds, in less than one inertial
+    period.
+    """
     return spinner(degrees=degrees, channels=fan(5, 2e4), limits=Limits(horizon=horizon, **limits))
 
 
@@ -230,7 +302,9 @@ def task_of(spacecraft: Spacecraft, equations: EndEquations | None = None) -> Ta
 
 
 @pytest.mark.deep
-@spread("name", sorted(path.stem for path in places.CASES.glob("optimal-beaten-*.csv")), quick=1, deep=0)
+@spread(
+    "name", sorted(path.stem for path in places.CASES.glob("optimal-beaten-*.csv")), quick=1, deep=0
+)
 def test_no_schedule_found_without_it_is_cheaper(name: str) -> None:
     check_not_beaten(name, 1.001)
 
@@ -243,10 +317,16 @@ def test_pulses_of_two_channels_may_stand_side_by_side() -> None:
 def check_not_beaten(name: str, most: float, **options: Any) -> None:
     """By the schedule beside the file."""
     with places.case(f"{name}.csv").open(encoding="utf-8") as stream:
-        impulses = [[float(row[f"impulse_{axis}_Nms"]) for axis in (1, 2, 3)] for row in csv.DictReader(stream)]
+        impulses = [
+            [float(row[f"impulse_{axis}_Nms"]) for axis in (1, 2, 3)]
+            for row in csv.DictReader(stream)
+        ]
     known = math.fsum(math.hypot(*impulse) for impulse in impulses)
     assert (
-        flies(load_spacecraft(places.case(f"{name}.yaml")), left=EXACT, **options).pulses.total_impulse <= most * known
+        flies(
+            load_spacecraft(places.case(f"{name}.yaml")), left=EXACT, **options
+        ).pulses.total_impulse
+        <= most * known
     )
 
 
@@ -268,7 +348,12 @@ def test_two_spin_jets_that_one_burn_does_not_suffice_for(rpm: float) -> None:
     ids=["gap", "blackout", "max_pulses", "tick"],
 )
 def test_every_limit_is_kept(body: Spacecraft) -> None:
-    flies(body, left=EXACT if body.limits.tick is None else 1.1 * math.degrees(0.5 * 1e-4 * 2e4 / (80.0 * 3.0)))
+    flies(
+        body,
+        left=EXACT
+        if body.limits.tick is None
+        else 1.1 * math.degrees(0.5 * 1e-4 * 2e4 / (80.0 * 3.0)),
+    )
 
 
 @pytest.mark.weekly
@@ -277,20 +362,27 @@ def test_on_times_are_none_or_at_least_the_least() -> None:
     made = plan(free, "optimal").pulses
     least = 3.0 * min(pulse.on_time for pulse in made)
     bounded = tuple(channel(one.name, *one.torque, min_on_time=least) for one in free.channels)
-    assert flies(replace(free, channels=bounded), left=EXACT).pulses.cost >= made.cost * (1.0 - 1e-6)
+    assert flies(replace(free, channels=bounded), left=EXACT).pulses.cost >= made.cost * (
+        1.0 - 1e-6
+    )
 
 
 @pytest.mark.deep
 def test_the_same_plan_every_time() -> None:
     one, two = (multistart.schedules(task_of(strong()))[0] for _ in range(2))
-    assert [(pulse.start, pulse.on_time) for pulse in one] == [(pulse.start, pulse.on_time) for pulse in two]
+    assert [(pulse.start, pulse.on_time) for pulse in one] == [
+        (pulse.start, pulse.on_time) for pulse in two
+    ]
 
 
 @pytest.mark.deep
 @pytest.mark.parametrize(("horizon", "count"), [(1.0, 2), (400.0, 40)])
 def test_the_work_is_bounded(horizon: float, count: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """However long the horizon, however many the channels: flights at a time are counted, not seconds."""
-    calls, flown = list[int](), Task.misses
+    """However long the horizon, however many the channels: flights at a time are counted, not
+    seconds.
+    """
+    calls = list[int]()
+    flown = Task.misses
 
     def counted(self: Task, which: np.ndarray, x: np.ndarray, kicks: int) -> np.ndarray:
         calls.append(len(x))
@@ -312,18 +404,25 @@ def test_misses_are_those_of_the_reference_integrator(seed: int) -> None:
     pulses = (channel_pulse(body.channels[one], start + 0.5 * on, on) for one, start, on in fired)
     flown = Outcome(body, Schedule(tuple(pulses)))
     momentum = np.asarray(body.inertia.moments) * flown.motion.rates
-    size, after = float(np.linalg.norm(body.momentum)), flown.motion.rotation @ momentum
+    size = float(np.linalg.norm(body.momentum))
+    after = flown.motion.rotation @ momentum
     misses = task.misses(sequences.which, x, 0)[0]
     assert misses[:2] == pytest.approx(momentum[:2] / size, abs=1e-11)
     assert np.linalg.norm(misses[2:]) == pytest.approx(np.linalg.norm(after[:2]) / size, abs=1e-11)
-    # Kicks close in on it as the square of their number; they end half a kick earlier, which turns ω in the body.
-    sizes = [np.linalg.norm(task.misses(sequences.which, x, kicks)[0].reshape(2, 2), axis=1) for kicks in (0, 4, 8, 16)]
+    # Kicks close in on it as the square of their number; they end half a kick earlier, which turns
+    # ω in the body.
+    sizes = [
+        np.linalg.norm(task.misses(sequences.which, x, kicks)[0].reshape(2, 2), axis=1)
+        for kicks in (0, 4, 8, 16)
+    ]
     away = [float(np.abs(one - sizes[0]).max()) for one in sizes[1:]]
     assert away[0] / away[1] == pytest.approx(4.0, rel=0.2)
     assert away[1] / away[2] == pytest.approx(4.0, rel=0.1)
 
 
-@pytest.mark.parametrize(("starts", "runs", "looked_at", "tries"), [(24, 16, 2, 5), deep(64, 30, 8, 20)])
+@pytest.mark.parametrize(
+    ("starts", "runs", "looked_at", "tries"), [(24, 16, 2, 5), deep(64, 30, 8, 20)]
+)
 def test_a_descent_keeps_its_bounds_and_ends_where_no_step_saves(
     starts: int, runs: int, looked_at: int, tries: int
 ) -> None:
@@ -338,15 +437,20 @@ def test_a_descent_keeps_its_bounds_and_ends_where_no_step_saves(
     assert len(met) >= looked_at
     rng = np.random.default_rng(6)
     for row in met[:looked_at]:
-        sequences, x = begun.of([row]), descent.state.x[[row]]
+        sequences = begun.of([row])
+        x = descent.state.x[[row]]
         scale = descent.scale[[row]]
         for _ in range(tries):  # other sequences near it that leave nothing either cost no less
             beside = x + 0.02 * scale * rng.normal(size=scale.shape)
-            while not np.all(beside @ rows.T > levels[[row]]):  # drawn back until it keeps its bounds
+            while not np.all(
+                beside @ rows.T > levels[[row]]
+            ):  # drawn back until it keeps its bounds
                 beside = 0.5 * (beside + x)
             other = Descent(task, sequences, beside, kicks=1)
             other.close(20)
-            assert other.left[0] >= 1e-9 or float(other.cost[0]) > float(descent.cost[row]) * (1.0 - 1e-4)
+            assert other.left[0] >= 1e-9 or float(other.cost[0]) > float(descent.cost[row]) * (
+                1.0 - 1e-4
+            )
 
 
 @pytest.mark.parametrize(
@@ -357,7 +461,11 @@ def test_a_descent_keeps_its_bounds_and_ends_where_no_step_saves(
     ],
     ids=["one", "two"],
 )
-def test_it_costs_no_more_than_a_omega_where_that_can_be_had(body: Spacecraft, shift: bool, near: float) -> None:
-    """By one pulse against ω where H is free, by the two exact ones once channels stand in every direction."""
+def test_it_costs_no_more_than_a_omega_where_that_can_be_had(
+    body: Spacecraft, shift: bool, near: float
+) -> None:
+    """By one pulse against ω where H is free, by the two exact ones once channels stand in every
+    direction.
+    """
     made = multistart.schedules(task_of(body, EndEquations(shift=shift)))[0]
     assert made.total_impulse == pytest.approx(body.least_impulse, rel=near)
