@@ -165,8 +165,8 @@ class Dispersions:
     correlation: tuple[tuple[str, str, float], ...] = ()
 
 
-DISPERSIONS = """the spacecraft file has no dispersions: it does not say how far its values may be off. \
-For example:
+DISPERSIONS = """\
+the spacecraft file has no dispersions: it does not say how far its values may be off. For example:
 
 dispersions:
   A: {normal: 2 %}
