@@ -159,12 +159,12 @@ def plan(
     """
     from nutdamp.planning import plan as planning
 
-    body = _expected(spacecraft)
+    spacecraft = _expected(spacecraft)
     named = None if scheme is None else expect_names([scheme])[0]
     settled = expect_options(options, chosen, named)
     if named is not None:
-        return planning.plan(body, named, settled)
-    compared = compare(body, options=settled)
+        return planning.plan(spacecraft, named, settled)
+    compared = compare(spacecraft, options=settled)
     if compared.recommended is None:
         raise Infeasible(compared.reason)
     return compared.recommended
@@ -201,11 +201,11 @@ def compare(
     """
     from nutdamp.planning import decision
 
-    body = _expected(spacecraft)
+    spacecraft = _expected(spacecraft)
     schemes = expect_names(names)
     count = samples if samples in (None, 0) else units.count("samples", samples)
     return decision.compare(
-        body, schemes, expect_options(options, chosen), samples=count, timed=timed
+        spacecraft, schemes, expect_options(options, chosen), samples=count, timed=timed
     )
 
 
@@ -291,9 +291,9 @@ def simulate(
     from nutdamp.planning.decision import Simulation
     from nutdamp.planning.plan import feasible
 
-    body, pulses = feasible(plan).spacecraft, plan.pulses
-    end = units.end_of_flight(pulses.end + body.inertial_period if until is None else until)
-    drawn_to = shown_until(body, pulses) if until is None else end
+    spacecraft, pulses = feasible(plan).spacecraft, plan.pulses
+    end = units.end_of_flight(pulses.end + spacecraft.inertial_period if until is None else until)
+    drawn_to = shown_until(spacecraft, pulses) if until is None else end
     return Simulation(plan, end, flown, units.count("samples", samples, 2), drawn_to)
 
 
@@ -327,14 +327,14 @@ def trade(
     """
     from nutdamp.planning import tradeoff
 
-    body = _expected(spacecraft)
+    spacecraft = _expected(spacecraft)
     count = units.count("points", points)
     shifts = units.shifts(allow)
     options = OptimalOptions(
         least=units.one_of("least", least, LEAST[:2]), with_disturbances=with_disturbances
     )
     with work.steps(count * len({*shifts}), hook=progress):
-        return tradeoff.trade(body, options, count=count, shifts=shifts, nominal=nominal)
+        return tradeoff.trade(spacecraft, options, count=count, shifts=shifts, nominal=nominal)
 
 
 def disperse(
@@ -471,8 +471,8 @@ def verify(plan: Plan) -> Verified:
     from nutdamp.flight import verification
     from nutdamp.planning import plan as planning
 
-    body, known = planning.feasible(plan).spacecraft, plan.options.with_disturbances
-    core = verification.verify(body, plan.pulses, planning.unrounded(plan), expected=known)
+    spacecraft, known = planning.feasible(plan).spacecraft, plan.options.with_disturbances
+    core = verification.verify(spacecraft, plan.pulses, planning.unrounded(plan), expected=known)
     return planning.Verified(core, plan)
 
 
@@ -518,14 +518,14 @@ def budget(
     from nutdamp.control_loop import budget as holding
     from nutdamp.spacecraft.requirements import expect_loop
 
-    body = _expected(spacecraft)
+    spacecraft = _expected(spacecraft)
     rows = [holding.Thresholds(*pair) for pair in units.thresholds(thresholds)]
     if largest is not None:
         units.tilt(largest)
     if rows:
-        expect_loop(body)
+        expect_loop(spacecraft)
     with work.steps(max(len(rows), 1), hook=progress):
-        return holding.budget(body, rows, largest, seed=units.seed(seed))
+        return holding.budget(spacecraft, rows, largest, seed=units.seed(seed))
 
 
 def export(
@@ -593,20 +593,20 @@ def fit(
     from nutdamp.planning.plan import Plan
     from nutdamp.views.text import text
 
-    body = _expected(spacecraft)
+    spacecraft = _expected(spacecraft)
     name = units.path("telemetry", telemetry)
     odd = list[str]()
     if schedule is None or isinstance(schedule, Plan):
         fired = None if schedule is None else schedule.pulses
     else:
         fired, odd = read_pulses(
-            units.path("schedule", schedule, "a Plan or the name of a file"), body
+            units.path("schedule", schedule, "a Plan or the name of a file"), spacecraft
         )
     times = None if sun_pulses is None else units.path("sun_pulses", sun_pulses)
-    record, remarks = read_telemetry(name, body, times, fired)
+    record, remarks = read_telemetry(name, spacecraft, times, fired)
     for remark in (*odd, *remarks):
         (ignored or warn)(remark)
-    estimate = compared(body, record)
+    estimate = compared(spacecraft, record)
     for entry in doubts(estimate) if ignored is None else ():
         warn(text(entry))
     return Fitted(estimate, tuple(remarks))
@@ -649,15 +649,15 @@ def report(
     name = units.path("output", output)
     kept = controlled(**control)
     expect_html(name)
-    body = spacecraft if isinstance(spacecraft, Spacecraft) else load(spacecraft)
+    read = spacecraft if isinstance(spacecraft, Spacecraft) else load(spacecraft)
     samples = disperse if disperse in (None, 0) else units.count("disperse", disperse)
-    compared = compare(body, names, options, samples=samples)
+    compared = compare(read, names, options, samples=samples)
     known = isinstance(options, Options) and options.with_disturbances
-    fronts = () if points is None else trade(body, points, with_disturbances=known).fronts
+    fronts = () if points is None else trade(read, points, with_disturbances=known).fronts
     given = {"options": options and f"nutdamp.{options!r}", "disperse": disperse, "points": points}
     given |= {key: repr(value) for key, value in control.items()}
     keyed = (f"{key}={value}" for key, value in given.items() if value is not None)
     how = ", ".join([repr(name), *[repr(list(names))] * bool(names), *keyed])
-    page = made_of(compared, called(body, how), kept, fronts)
+    page = made_of(compared, called(read, how), kept, fronts)
     write_whole(name, page.content)
     return page

@@ -479,7 +479,7 @@ def report_command(
         raise click.UsageError(
             "a report is of the schemes compared, of --schedule, or of --blocks: name one of them"
         )
-    body = job.begin()
+    spacecraft = job.begin()
 
     from nutdamp.page.report import repeated
     from nutdamp.planning.decision import compare_plans
@@ -487,7 +487,7 @@ def report_command(
 
     kept = controlled(**{name: value for name, value in control.items() if value is not None})
     if disperse is not None or robust:
-        expect_dispersions(body.dispersions)
+        expect_dispersions(spacecraft.dispersions)
         if nominal:
             raise click.UsageError(
                 "--disperse and --robust fly dispersed cases, which --nominal leaves out"

@@ -280,11 +280,11 @@ class Job:
         elif self.figure != self.usual:
             raise click.UsageError("--figure says what --plot draws: name a file with --plot")
         self.source = self.given.source(self.remark, self.doubt)
-        body = self.source.read(lambda doubt: say(doubt.as_warning))
+        spacecraft = self.source.read(lambda doubt: say(doubt.as_warning))
         self.spacecraft = (
-            self.aim.applied(body, self.doubt)
+            self.aim.applied(spacecraft, self.doubt)
             if any(given is not None for given in self.aim)
-            else body
+            else spacecraft
         )
         from nutdamp.files.tabular import check_place
 

@@ -344,7 +344,7 @@ def _direction(spacecraft: Spacecraft, angles: Angles, option: str) -> Vector:
 
 
 def expect_read(
-    names: Sequence[str], options: Options, body: Spacecraft, doubt: Callable[[str], None]
+    names: Sequence[str], options: Options, spacecraft: Spacecraft, doubt: Callable[[str], None]
 ) -> None:
     """Warn of options that none of the schemes ``names`` reads; a usage error where that is the
     goal itself.
@@ -356,7 +356,7 @@ def expect_read(
     for option in unread:
         readers = [name for name, scheme in SCHEMES.items() if option in names_of(scheme.options)]
         doubt(f"--{option.replace('_', '-')} ignored: it is for {' and '.join(readers)}")
-    if body.goal.sun is not None:
+    if spacecraft.goal.sun is not None:
         without = [scheme.name for scheme in planned if not scheme.reads_sun]
         if len(without) == len(planned):
             raise click.UsageError(NO_SUN)
@@ -365,7 +365,7 @@ def expect_read(
                 f"--sun is read by {' and '.join(SUNLIT)} alone: {', '.join(without)} plan without "
                 "it"
             )
-    if planned and body.goal.axis is None and all(scheme.only_points for scheme in planned):
+    if planned and spacecraft.goal.axis is None and all(scheme.only_points for scheme in planned):
         raise click.UsageError(
             f"no target of the spin axis for {' and '.join(names)}: --target, or goal in the file"
         )

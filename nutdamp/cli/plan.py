@@ -166,12 +166,12 @@ def _fired(job: Job, path: str) -> Plan:
     from nutdamp.planning.plan import Plan
     from nutdamp.schemes.block_model import fired
 
-    body = job.spacecraft
-    blocks, warnings = read_blocks(path, body)
-    pulses = fired(body, blocks)
-    job.doubt(*warnings, *broken_limits(body, pulses))
+    spacecraft = job.spacecraft
+    blocks, warnings = read_blocks(path, spacecraft)
+    pulses = fired(spacecraft, blocks)
+    job.doubt(*warnings, *broken_limits(spacecraft, pulses))
     return Plan(
-        body, printable(path), pulses, options=job.options.of(SchemeOptions), from_file=True
+        spacecraft, printable(path), pulses, options=job.options.of(SchemeOptions), from_file=True
     )
 
 
@@ -214,7 +214,7 @@ def plan_command(
         if path is not None and len(set(names)) > 1:
             cure = "name one --scheme, or none for the recommended one"
             raise click.UsageError(f"--{option} writes one schedule: {cure}")
-    body = job.begin()
+    spacecraft = job.begin()
     if robust and nominal:
         raise click.UsageError(
             "--robust goes by dispersed cases, which --nominal leaves out: name one of them"
@@ -227,13 +227,13 @@ def plan_command(
     from nutdamp.views.parts import pulse_table
 
     if robust:
-        expect_dispersions(body.dispersions)
+        expect_dispersions(spacecraft.dispersions)
     if certificate is not None:
-        if OPTIMAL.name not in (names or usual(body)):
+        if OPTIMAL.name not in (names or usual(spacecraft)):
             raise BadRequest(
                 f"a certificate is of {OPTIMAL.name}, which is not planned: name it with --scheme"
             )
-        if not body.channels:
+        if not spacecraft.channels:
             raise BadRequest(
                 f"a certificate is of {OPTIMAL.name}, which fires channels, "
                 "and the spacecraft has none"
@@ -345,13 +345,13 @@ def animate_command(
 
     output = job.written["output"] or ""
     image.film_format(output)
-    body = job.begin()
+    spacecraft = job.begin()
     plan = plan_or_read(job)
 
     from nutdamp.figures.geometry import shown_until
 
-    end = shown_until(body, plan.pulses) if until is None else until
-    timed = image.timing(body, end, fps, seconds)
+    end = shown_until(spacecraft, plan.pulses) if until is None else until
+    timed = image.timing(spacecraft, end, fps, seconds)
     if not timed.smooth:
         job.remark(
             f"only {timed.frames / timed.turns:.1f} frames show a nutation turn, "

@@ -172,7 +172,7 @@ def loop_command(
     by the first firings that can be judged: exit status 3. SPACECRAFT and FILE are as for `nutdamp
     plan`.
     """
-    body = job.begin()
+    spacecraft = job.begin()
 
     from nutdamp.api import loop
     from nutdamp.files.tabular import write_track
@@ -180,10 +180,10 @@ def loop_command(
     from nutdamp.views.text import text
 
     with job.working("flying"):
-        plan = loop(body, until, seed=seed, case=case)
+        plan = loop(spacecraft, until, seed=seed, case=case)
     run = plan.flown_run
     if job.silent:
-        job.note(warnings(body))
+        job.note(warnings(spacecraft))
     pieces = partial(run.flight.pieces, samples, run.until)
     track: Files = {"track": lambda: partial(write_track, pieces(), run.flight.spacecraft.inertia)}
     job.deliver(
@@ -229,7 +229,7 @@ def budget_command(
     damping must begin. A body whose nutation decays needs none. SPACECRAFT and FILE are as for
     `nutdamp plan`.
     """
-    body = job.begin()
+    spacecraft = job.begin()
     for reading in (text for pair in pairs for text in pair.readings):
         job.doubt(f"--thresholds: {reading}")
 
@@ -237,7 +237,7 @@ def budget_command(
     from nutdamp.views.loop import budget_screen
 
     with job.working("following cycles"):
-        result = budget(body, pairs, largest=largest, seed=seed)
+        result = budget(spacecraft, pairs, largest=largest, seed=seed)
     job.deliver(result, partial(budget_screen, result, verbose=verbose))
     leave(result.status)
 
@@ -297,7 +297,7 @@ def fit_command(
     are no noise, as with a pulse that --schedule does not have, or the estimate is far from the
     file: then -o needs --accept. SPACECRAFT and FILE are as for `nutdamp plan`.
     """
-    body = job.begin()
+    spacecraft = job.begin()
 
     from nutdamp.api import fit
     from nutdamp.estimation.results import carried, refused
@@ -306,7 +306,11 @@ def fit_command(
 
     with job.working("fitting"):
         fitted = fit(
-            telemetry, body, schedule=job.flown.schedule, sun_pulses=sun_pulses, ignored=job.doubt
+            telemetry,
+            spacecraft,
+            schedule=job.flown.schedule,
+            sun_pulses=sun_pulses,
+            ignored=job.doubt,
         )
     job.note(notes(fitted.core, carried(fitted.core, at)))
     files: Files = {"output": partial(fitted.text, at), "json": partial(fitted.to_dict, at)}
@@ -387,7 +391,7 @@ def disperse_command(
         raise click.UsageError(
             f"--loop flies the loop of the file, all in one way: leave --{name} out"
         )
-    body = job.begin()
+    spacecraft = job.begin()
 
     from nutdamp import api
     from nutdamp.spacecraft.requirements import expect_loop
@@ -396,9 +400,9 @@ def disperse_command(
     from nutdamp.views.loop_cases import loop_cases_brief
 
     if looped:
-        expect_loop(body)
+        expect_loop(spacecraft)
         job.figure = None
-    expect_dispersions(body.dispersions)
+    expect_dispersions(spacecraft.dispersions)
     plan = None if looped else plan_or_read(job)
     if case is not None:
         deliver_case(job, plan, case - 1, seed=seed, until=until)
@@ -407,7 +411,7 @@ def disperse_command(
     with stoppable() as stopped, job.working("flying"):
         hooks: dict[str, Any] = {"seed": seed, "csv": job.written["csv"], "stopped": stopped}
         if plan is None:
-            loops = api.disperse_loop(body, samples, until=until, remark=job.remark, **hooks)
+            loops = api.disperse_loop(spacecraft, samples, until=until, remark=job.remark, **hooks)
             flown: LoopDispersion | Dispersion = loops
             brief = partial(loop_cases_brief, loops)
         else:

@@ -40,6 +40,7 @@ from nutdamp.spacecraft.constraints import commandable
 from nutdamp.spacecraft.equipment import Loop
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.requirements import Part
+from nutdamp.spacecraft.roles import with_limits
 from nutdamp.spacecraft.schedule import Pulse, channel_pulse
 
 Rows = NDArray[np.int64]
@@ -200,11 +201,11 @@ class Map:
         loop = self.law.loop
         entries = list[Entry]()
         looked = 0
-        body = replace(spacecraft, limits=replace(spacecraft.limits, max_pulses=None))
+        limited = with_limits(spacecraft, max_pulses=None)
         each = 3.0 * (self.law.period + self.seen.first + loop.min_interval) + loop.sensor.delay
         until = spacecraft.limits.earliest + each * self.firings * abs(z) / self.start
         for number in range(ENTRIES):
-            run = fly(body, loop, until, seed=seed + number, down_to=self.start)
+            run = fly(limited, loop, until, seed=seed + number, down_to=self.start)
             if not run.fired:
                 return [now]
             z = complex(self.law.seen(run.flight.settled.omega))
@@ -715,27 +716,27 @@ def budget(
 
 
 def _held(spacecraft: Spacecraft, loop: Loop, seed: int) -> HeldNutation:
-    body = replace(spacecraft, loop=loop)
+    truth = replace(spacecraft, loop=loop)
     band = None
     result = HeldNutation(
-        body, Thresholds(loop.start, loop.stop), requirements.reached(body, loop.start)
+        truth, Thresholds(loop.start, loop.stop), requirements.reached(truth, loop.start)
     )
     try:
-        band = dead_band(body, loop)
-        turned = [margin.channel for margin in margins(body, loop) if margin.turned]
+        band = dead_band(truth, loop)
+        turned = [margin.channel for margin in margins(truth, loop) if margin.turned]
         if turned:
             raise Infeasible(
                 f"firings of {' and '.join(turned)} feed the nutation: "
                 "wired backwards against the sensor"
             )
-        expect_in_time(body, loop)
-        cycles = Map(body, loop, seed=seed)
-        entries = cycles.entries(body, seed)
+        expect_in_time(truth, loop)
+        cycles = Map(truth, loop, seed=seed)
+        entries = cycles.entries(truth, seed)
         ends = list(cycles.attractors(entries))
         # There may be others where a firing can leave more than the stop threshold that no smaller
         # pulse lowers.
         if 0.5 * band.step > loop.stop > 0.0:
-            half = complex(cycles.law.size(0.5 * band.step, body.spin))
+            half = complex(cycles.law.size(0.5 * band.step, truth.spin))
             ends += [
                 *cycles.attractors(),
                 *cycles.attractors([Entry(half, 0.0, active=True, ready=0.0)]),
@@ -748,25 +749,25 @@ def _held(spacecraft: Spacecraft, loop: Loop, seed: int) -> HeldNutation:
         if noisy:
             cycle = cycle._replace(doubt=max(cycle.doubt, WIDENED))
         result = replace(result, noisy=noisy, cycle=cycle, share=share, other=next(others, None))
-        return replace(result, band=band, lasts=_lasts(body, loop, seed, entries))
+        return replace(result, band=band, lasts=_lasts(truth, loop, seed, entries))
     except Infeasible as reason:
         rate = None if result.cycle is None else result.cycle.propellant
-        if work.exhausted() and body.tank is not None and rate:
+        if work.exhausted() and truth.tank is not None and rate:
             return replace(
-                result, band=band, lasts=body.tank.propellant / rate
+                result, band=band, lasts=truth.tank.propellant / rate
             )  # as if the pressure stayed
         return replace(result, band=band, why=SPENT if work.exhausted() else str(reason))
 
 
-def _lasts(body: Spacecraft, loop: Loop, seed: int, entries: Sequence[Entry]) -> float | None:
+def _lasts(spacecraft: Spacecraft, loop: Loop, seed: int, entries: Sequence[Entry]) -> float | None:
     """Lifetime of the limit cycle, s: ∫ dm over the flow, as the pressure in the tank falls."""
-    if body.tank is None:
+    if spacecraft.tank is None:
         return None
-    mass = body.tank.propellant
+    mass = spacecraft.tank.propellant
     total = 0.0
     for done, (share, weight) in enumerate(STAGES, start=1):
         work.reach(done)
-        cycles = Map(body, loop, used=share * mass, seed=seed)
+        cycles = Map(spacecraft, loop, used=share * mass, seed=seed)
         rate = cycles.attractors(entries)[0][0].propellant
         if rate is None:
             return None

@@ -78,11 +78,11 @@ class LoopModel(DispersedModel):
         """Cases of a study with these ``numbers``, from 0, and their ``draws``, (n,) or one for
         all.
         """
-        body = self.spacecraft
+        spacecraft = self.spacecraft
         loop = self.law.loop
         given = self.spacecraft.dispersions
         count = len(numbers)
-        draws = _at_pressure(body, draws)
+        draws = _at_pressure(spacecraft, draws)
 
         def rows(*parts: Any) -> Vector:
             return np.array([np.broadcast_to(part, count) for part in parts]).T
@@ -90,11 +90,11 @@ class LoopModel(DispersedModel):
         model = self.cases(draws)
         moments, wheels = rows(*model.moments).tolist(), rows(model.wheel)[:, 0].tolist()
         rates, tilts = rows(*model.omega0), rows(*model.tilt)
-        attitudes = None if body.attitude is None else self._attitudes(tilts)
+        attitudes = None if spacecraft.attitude is None else self._attitudes(tilts)
         torques = {
             thruster.name: rows(*self.thruster_torque(thruster, draws))
             * (1.0 + rows(draws.get(f"thrust {thruster.name}", 0.0)))
-            for channel in body.channels
+            for channel in spacecraft.channels
             for thruster in channel.thrusters
         }
         each_firing = (None, None) if given is None else (given.thrust_per_pulse, given.timing)
@@ -104,16 +104,16 @@ class LoopModel(DispersedModel):
             draw = {name: values[row] for name, values in whole.items()}
             key = (seed, number + 1)
             truth = replace(
-                body,
-                inertia=Inertia(triple(moments[row]), body.inertia.axes, wheels[row]),
+                spacecraft,
+                inertia=Inertia(triple(moments[row]), spacecraft.inertia.axes, wheels[row]),
                 omega0=rates[row],
                 attitude=None if attitudes is None else Attitude(attitudes[row]),
                 channels=self._channels(
                     draw, {name: torque[row] for name, torque in torques.items()}
                 ),
                 loop=replace(loop, sensor=_sensor(loop.sensor, draw)),
-                cold=cold_of(body, draw),
-                tank=tank_of(body, draw),
+                cold=cold_of(spacecraft, draw),
+                tank=tank_of(spacecraft, draw),
             )
             scatter = Scatter(key, *each_firing, draw.get("timing offset", 0.0))
             cases.append(Case(truth, key, scatter, (float(tilts[row, 0]), float(tilts[row, 1]))))
@@ -123,24 +123,26 @@ class LoopModel(DispersedModel):
         """Attitudes (n, 4) of the file's axes, where that of the principal axes is turned by
         ``tilts`` (n, 2) rad.
         """
-        body = self.spacecraft
+        spacecraft = self.spacecraft
         angles = np.hypot(*tilts.T)
         turns = np.zeros((len(tilts), 4))
         turns[:, 0], turns[:, 1:3] = (
             np.cos(0.5 * angles),
             (0.5 * np.sinc(0.5 * angles / math.pi))[:, None] * tilts,
         )
-        turned = attitude.multiply(body.initial.quaternion, turns)
-        return attitude.multiply(turned, attitude.from_matrix(body.inertia.axes.T))
+        turned = attitude.multiply(spacecraft.initial.quaternion, turns)
+        return attitude.multiply(turned, attitude.from_matrix(spacecraft.inertia.axes.T))
 
     def _channels(self, draw: dict[str, float], torques: dict[str, Vector]) -> tuple[Channel, ...]:
         """Channels of a case; undispersed ones are those of the file."""
-        body = self.spacecraft
+        spacecraft = self.spacecraft
         names = {name.split()[1] for name in draw if name.split()[0] in OF_THRUSTERS}
         if any(name.startswith("center of mass ") for name in draw):
-            names = {thruster.name for channel in body.channels for thruster in channel.thrusters}
+            names = {
+                thruster.name for channel in spacecraft.channels for thruster in channel.thrusters
+            }
         channels = []
-        for channel in body.channels:
+        for channel in spacecraft.channels:
             if not names & {thruster.name for thruster in channel.thrusters}:
                 channels.append(channel)
                 continue
@@ -166,14 +168,20 @@ OF_THRUSTERS = (
 )  # first words of the inputs that make a thruster another
 
 
-def _at_pressure(body: Spacecraft, draws: Draws) -> Draws:
+def _at_pressure(spacecraft: Spacecraft, draws: Draws) -> Draws:
     """Draws with the thrust at another tank pressure folded into that of the thrusters."""
-    tank = tank_of(body, draws)
-    if body.tank is None or tank is None or not {"tank pressure", "tank exponent"} & set(draws):
+    tank = tank_of(spacecraft, draws)
+    if (
+        spacecraft.tank is None
+        or tank is None
+        or not {"tank pressure", "tank exponent"} & set(draws)
+    ):
         return draws
-    higher = (tank.pressure / body.tank.pressure) ** tank.exponent
+    higher = (tank.pressure / spacecraft.tank.pressure) ** tank.exponent
     names = {
-        f"thrust {thruster.name}" for channel in body.channels for thruster in channel.thrusters
+        f"thrust {thruster.name}"
+        for channel in spacecraft.channels
+        for thruster in channel.thrusters
     }
     return {**draws, **{name: (1.0 + draws.get(name, 0.0)) * higher - 1.0 for name in names}}
 
@@ -341,7 +349,7 @@ class LoopStudy(DrawnCases):
         """Outputs (8, n) of loops, their residuals, and their severity (n,): infinite where a loop
         is `lost`.
         """
-        cases, pilots, body = flown.cases, flown.pilots, self.spacecraft
+        cases, pilots, spacecraft = flown.cases, flown.pilots, self.spacecraft
         before = np.array([case.truth.omega0 for case in cases]).T
         start, end = triple(flown.momentum(before)), triple(flown.momentum(flown.rates))
         momentum = tuple(carried(tuple(flown.quaternion), end))
@@ -357,10 +365,10 @@ class LoopStudy(DrawnCases):
         used = [[firing.pulse.propellant for firing in pilot.fired] for pilot in pilots]
         out[6] = [math.fsum(math.nan if kg is None else kg for kg in pulses) for pulses in used]
         out[7] = [len(pilot.fired) for pilot in pilots]
-        aim = out[3] if body.goal.axis is None else out[4]
-        left = Left(out[2], aim, flown.rates[2], flown.aspects if body.keep else None)
+        aim = out[3] if spacecraft.goal.axis is None else out[4]
+        left = Left(out[2], aim, flown.rates[2], flown.aspects if spacecraft.keep else None)
         lost = np.array([pilot.lost for pilot in pilots])
-        return out, left, np.where(lost, math.inf, requirements.severity(body, left))
+        return out, left, np.where(lost, math.inf, requirements.severity(spacecraft, left))
 
 
 def loop_study(spacecraft: Spacecraft, until: float | None = None, *, seed: int = 1) -> LoopStudy:
@@ -489,14 +497,16 @@ class LoopDispersion(Dispersed):
         """Judgement of the loop by these cases,
         and by nominal values with the noise of the seed.
         """
-        study, body = self.core.study, self.core.study.spacecraft
+        study, spacecraft = self.core.study, self.core.study.spacecraft
         cases, (_, left, severity) = cases_of(self.core), study.nominal_measured
         nutation, aim, spin = (
             float(np.ravel(part)[0]) for part in (left.nutation, left.aim, left.spin)
         )
         alone = Left(nutation, aim, spin, None if left.angles is None else left.angles[:, :, 0])
         lost = math.isinf(severity[0])
-        return judge_loop(body, requirements.held(body, alone), cases, self.core, lost=lost)
+        return judge_loop(
+            spacecraft, requirements.held(spacecraft, alone), cases, self.core, lost=lost
+        )
 
 
 def run(

@@ -341,20 +341,22 @@ class Estimator:
     @property
     def doubts(self) -> Doubt:
         """Uncertainties of the estimates."""
-        sensor, body, memory = self.sensor, self.law.spacecraft, self._memory
-        off = known_to(body)
+        sensor, spacecraft, memory = self.sensor, self.law.spacecraft, self._memory
+        off = known_to(spacecraft)
         lift = max(
-            abs(complex(self.best(1.0, body.spin))), 1.0
+            abs(complex(self.best(1.0, spacecraft.spin))), 1.0
         )  # of a constant, as `best` inverts the filter for z
         if sensor.kind == ACCELEROMETER:
-            least = abs(self.seen_gain) * abs(body.spin)
+            least = abs(self.seen_gain) * abs(spacecraft.spin)
             noise = 2.0 * sensor.noise * lift / (math.sqrt(self.window) * least)
             return Doubt(noise, noise, noise, lift, 0.0, sensor.quantisation * lift / least, *off)
         widest = max(self.law.gauge)
         white = sensor.noise * math.sqrt(2.0) * widest
         noise = white * (lift * math.sqrt((1.0 - memory) / (1.0 + memory)))
         steps = sensor.quantisation / math.sqrt(2.0) * lift * widest
-        return Doubt(noise, white, 0.0, lift, abs(self.standing(body.spin)) * lift, steps, *off)
+        return Doubt(
+            noise, white, 0.0, lift, abs(self.standing(spacecraft.spin)) * lift, steps, *off
+        )
 
 
 def _fit(rate: Vector, step: float, size: int) -> tuple[Vector, ComplexArray]:

@@ -199,12 +199,17 @@ def largest_since(run: LoopRun) -> tuple[float, float]:
     """Largest nutation since a loop first settled, rad, and its time, s; at the end where it never
     did.
     """
-    flight, body = run.flight, run.flight.spacecraft
+    flight, spacecraft = run.flight, run.flight.spacecraft
     if run.settled is None:
         rates = flight.motion(np.array([run.until]))[0][0]
-        return arc_cones(flight.moments, rates, body.sense, body.inertia.wheel).nutation, run.until
+        return arc_cones(
+            flight.moments, rates, spacecraft.sense, spacecraft.inertia.wheel
+        ).nutation, run.until
     track = widest(
-        flight.sampled(ROWS, run.until), np.asarray(flight.moments), body.sense, body.inertia.wheel
+        flight.sampled(ROWS, run.until),
+        np.asarray(flight.moments),
+        spacecraft.sense,
+        spacecraft.inertia.wheel,
     )
     later = track.t >= run.settled
     most = float(track.nutation[later].max())

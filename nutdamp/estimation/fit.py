@@ -147,10 +147,12 @@ def expect_enough(model: Model) -> None:
             "unknowns; a longer record, "
             "or more samples, helps"
         )
-    body, length = model.spacecraft, model.record.length
-    period = rigid_body.body_period(body.inertia.A, body.inertia.C, body.spin, body.inertia.wheel)
+    spacecraft, length = model.spacecraft, model.record.length
+    period = rigid_body.body_period(
+        spacecraft.inertia.A, spacecraft.inertia.C, spacecraft.spin, spacecraft.inertia.wheel
+    )
     if not any(KIND[name].nutation == BODY for name in model.signals):
-        period = body.inertial_period
+        period = spacecraft.inertial_period
     if length < 0.5 * period:
         raise Infeasible(
             f"the record is too short: {length:.3g} s are {length / period:.2g} of a nutation "

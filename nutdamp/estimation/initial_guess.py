@@ -195,9 +195,9 @@ def once_a_turn(record: Record) -> str:
 
 def _peak(model: Model, spin: float, share: float) -> float | None:
     """The rate aω3 at which a nutation turns in the body, rad/s; None where no signal shows it."""
-    record, body = model.record, model.spacecraft
-    expected = body.inertia.nutation_rate(spin)
-    most = abs(spin) if body.inertia.wheel == 0.0 else max(abs(spin), 2.0 * abs(expected))
+    record, spacecraft = model.record, model.spacecraft
+    expected = spacecraft.inertia.nutation_rate(spin)
+    most = abs(spin) if spacecraft.inertia.wheel == 0.0 else max(abs(spin), 2.0 * abs(expected))
     count = _count(record, share)
     times = record.times[:count]
     signals = {name: values[:count] for name, values in record.signals.items()}
@@ -208,7 +208,7 @@ def _peak(model: Model, spin: float, share: float) -> float | None:
             turning = _strongest(times, signals[name], None, expected, most, 1.0)
             return None if turning is None else math.copysign(turning, expected)
     cone = _cone(model, share)
-    return None if cone is None else spin - body.sense * cone.rate * cone.cosine
+    return None if cone is None else spin - spacecraft.sense * cone.rate * cone.cosine
 
 
 class _Cone(NamedTuple):
@@ -239,7 +239,7 @@ def _cone(model: Model, share: float) -> _Cone | None:
     """The cone that the axis describes in space, of any angle; None where no axis is measured or
     shows none.
     """
-    record, body = model.record, model.spacecraft
+    record, spacecraft = model.record, model.spacecraft
     if not record.has(*AXIS):
         return None
     count = _count(record, share)
@@ -259,8 +259,10 @@ def _cone(model: Model, share: float) -> _Cone | None:
     x, y = axis @ first, axis @ second
     # In the sense of H, with |H|/A = H3/(A cos θ).
     height = float(momentum @ mean)
-    pace = abs(body.axial) / body.inertia.C / max(height, FLAT)
-    rate = _strongest(times, x, y, body.inertia.C / body.inertia.A * pace, MOST_TURNED * pace, 1.0)
+    pace = abs(spacecraft.axial) / spacecraft.inertia.C / max(height, FLAT)
+    rate = _strongest(
+        times, x, y, spacecraft.inertia.C / spacecraft.inertia.A * pace, MOST_TURNED * pace, 1.0
+    )
     if rate is None:
         return None
     begin = np.mean((x + 1j * y)[there] * np.exp(-1j * rate * (times[there] - model.start)))

@@ -263,15 +263,15 @@ def _sun_aspect(seen: Sighting) -> Vector:
 
 def _sun_late(seen: Sighting) -> Vector:
     """Times by which Sun pulses should have come later than they came, s."""
-    body, sensor = seen.spacecraft, seen.spacecraft.sun_sensor
+    spacecraft, sensor = seen.spacecraft, seen.spacecraft.sun_sensor
     assert sensor is not None
-    assert body.sun is not None
+    assert spacecraft.sun is not None
     of_body = attitude.multiply(seen.quaternion, seen.axes)
-    sun = np.broadcast_to(body.sun[:, None], (3, len(seen.rates)))
+    sun = np.broadcast_to(spacecraft.sun[:, None], (3, len(seen.rates)))
     ahead, rate = sky.ahead(
-        (seen.rates @ body.inertia.axes).T, of_body.T, sun, sensor.azimuth, body.sense
+        (seen.rates @ spacecraft.inertia.axes).T, of_body.T, sun, sensor.azimuth, spacecraft.sense
     )
-    return np.asarray(wrapped(ahead) / np.where(rate > 0.0, rate, abs(body.spin)))
+    return np.asarray(wrapped(ahead) / np.where(rate > 0.0, rate, abs(spacecraft.spin)))
 
 
 def _off(measured: Vector, there: Vector) -> Vector:

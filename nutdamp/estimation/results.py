@@ -659,8 +659,8 @@ class Fitted(results.Data, results.Drawn):
 
     def spacecraft(self, at: float = 0.0) -> Spacecraft:
         """Spacecraft of that file."""
-        body: Spacecraft = results.view(self, "spacecraft", self.text(at))
-        return body
+        spacecraft: Spacecraft = results.view(self, "spacecraft", self.text(at))
+        return spacecraft
 
     def write(self, path: str | PathLike[str], at: float = 0.0) -> None:
         """Write `text` to a file, as ``fit -o`` does; raises BadRequest or CannotWrite."""

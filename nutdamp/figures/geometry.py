@@ -208,8 +208,10 @@ def pole_note(flight: Flight) -> str:
     """Words behind the names of the axes of the pole curve;
     empty where they are those of the file.
     """
-    body = flight.spacecraft
-    return ", principal axes" * (not body.inertia.aligned) + ", spin about −3" * (body.spin < 0.0)
+    spacecraft = flight.spacecraft
+    return ", principal axes" * (not spacecraft.inertia.aligned) + ", spin about −3" * (
+        spacecraft.spin < 0.0
+    )
 
 
 def sky_paths(flight: Flight, track: Track) -> tuple[Vector, Vector]:

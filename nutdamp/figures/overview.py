@@ -91,25 +91,27 @@ def title(flight: Flight) -> str:
     """Heading of every sheet after the spacecraft's name: scheme, model and result."""
     left = flight.residual
     count = len(flight.schedule)
-    body = flight.spacecraft
+    spacecraft = flight.spacecraft
     how = " ".join(
         filter(None, (flight.scheme, f"by {model_name([flight.schedule], flight.model)}"))
     )
     fired = (
         f"firings: {count} until {style.number(flight.schedule.end)} s" if count else "no firing"
     )
-    swings = "" if body.inertia.symmetric else "at most "  # between two angles, H standing still
-    goal = body.goal.axis
+    swings = (
+        "" if spacecraft.inertia.symmetric else "at most "
+    )  # between two angles, H standing still
+    goal = spacecraft.goal.axis
     turn = ""
     if goal is not None:
-        angles = zip(angle_names(body), angle_texts(body, goal), strict=True)
+        angles = zip(angle_names(spacecraft), angle_texts(spacecraft, goal), strict=True)
         target = ", ".join(
             f"{name} {text.removesuffix(' deg').rstrip('0').rstrip('.')}°" for name, text in angles
         )
-        turn = f"H turned {style.angle(body.to_turn)} to the target, {target}\n"
-    result = f"nutation {swings}{style.angle(body.nutation)} → {style.angle(left.nutation)}"
+        turn = f"H turned {style.angle(spacecraft.to_turn)} to the target, {target}\n"
+    result = f"nutation {swings}{style.angle(spacecraft.nutation)} → {style.angle(left.nutation)}"
     return (
-        f"{how}, {fired}\n{turn}{result}, {requirements.aim(body).label} "
+        f"{how}, {fired}\n{turn}{result}, {requirements.aim(spacecraft).label} "
         f"{style.angle(left.axis_error)}"
     )
 

@@ -147,7 +147,7 @@ def _nutation(axes: Axes, plan: LoopPlan, until: float) -> None:
 @style.styled()
 def budget_figure(budget: Budget) -> Figure:
     """Nutation over time: without firing, and the sawtooth of each limit cycle by its means."""
-    body, growth, until = budget.spacecraft, budget.spacecraft.growth, budget.until_largest
+    spacecraft, growth, until = budget.spacecraft, budget.spacecraft.growth, budget.until_largest
     # Cycles, or pulses of a loop that never pauses; with no nutation from the first that could grow
     # at once.
     held = [
@@ -170,12 +170,12 @@ def budget_figure(budget: Budget) -> Figure:
     figure = style.sheet(7.4, 4.0)
     axes = figure.subplots()
     times = np.linspace(0.0, size, ROWS)
-    free = np.degrees(requirements.idle(body, times))
+    free = np.degrees(requirements.idle(spacecraft, times))
     axes.plot(times / seconds, free, color=INK, label="no firing")
     for (thresholds, cycle, period, begins), (colour, line) in zip(held, LINES, strict=False):
         low, high = math.degrees(cycle.low), math.degrees(cycle.high)
         rises = (
-            min(requirements.reached(body, cycle.high, cycle.low), period)
+            min(requirements.reached(spacecraft, cycle.high, cycle.low), period)
             if high > low > 0.0
             else period
         )
@@ -193,7 +193,7 @@ def budget_figure(budget: Budget) -> Figure:
     axes.set(xlabel=f"time, {unit}", xlim=(0.0, size / seconds))
     style.legend(figure, [axes])
     how = "held by the limit cycle of the loop" if held else "without firing"
-    style.heading(figure, body, f"nutation under dissipation, {how}")
+    style.heading(figure, spacecraft, f"nutation under dissipation, {how}")
     return figure
 
 

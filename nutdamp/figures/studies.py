@@ -76,7 +76,7 @@ def loop_cases_figure(flown: LoopDispersion) -> Figure:
 @style.styled()
 def _figure(results: Results | LoopResults, judged: Verdict, name: str, how: str) -> Figure:
     panels = PANELS[name]
-    body = results.study.model.spacecraft
+    spacecraft = results.study.model.spacecraft
     figure = style.sheet((4.1, 7.4, 10.8)[panels - 1], 4.4 if panels != 2 else 3.9)
     axes = list(figure.subplots(1, panels, squeeze=False)[0])
     if name != "momentum":
@@ -84,17 +84,17 @@ def _figure(results: Results | LoopResults, judged: Verdict, name: str, how: str
     if isinstance(results, Results) and name != "cases":
         _momentum(axes[-1], results)
     style.legend(figure, axes, 2 if name == "momentum" else 8)
-    style.heading(figure, body, f"{how}, {results.done:,} dispersed cases", stated(judged))
+    style.heading(figure, spacecraft, f"{how}, {results.done:,} dispersed cases", stated(judged))
     return figure
 
 
 def _cases(panels: list[Axes], results: Results | LoopResults, judged: Verdict) -> None:
     """Share of the cases within each value of nutation and momentum shift."""
-    body = results.study.model.spacecraft
+    spacecraft = results.study.model.spacecraft
     lines = {line.bound.part: line for line in judged.required}
-    for axes, part in zip(panels, (Part.NUTATION, requirements.aim(body)), strict=True):
+    for axes, part in zip(panels, (Part.NUTATION, requirements.aim(spacecraft)), strict=True):
         distribution = results.distribution(part.value)
-        limit = style.limit_of(body, part)
+        limit = style.limit_of(spacecraft, part)
         nutation = "nutation left" if isinstance(results, Results) else "largest nutation"
         name = nutation if part is Part.NUTATION else part.label
         required = "" if limit is None else f", required {style.number(limit)}°"
@@ -192,10 +192,10 @@ def _momentum(axes: Axes, results: Results) -> None:
     from matplotlib.patches import PathPatch
     from matplotlib.path import Path
 
-    body = results.study.model.spacecraft
-    aim = requirements.aim(body)
+    spacecraft = results.study.model.spacecraft
+    aim = requirements.aim(spacecraft)
     points = momentum_cases(results)
-    limit = style.limit_of(body, aim)
+    limit = style.limit_of(spacecraft, aim)
     # A case has an H(0) of its own: the momentum shift is counted from there, so that it is the
     # centre in each.
     centre, about = (

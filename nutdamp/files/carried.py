@@ -207,7 +207,7 @@ def fitted_spacecraft(_: object, text: str) -> Spacecraft:
 
 def notes(fit: Fit, carried: Carried) -> Iterator[Note]:
     """Estimates that the file cannot hold, and entries that still count from the old t = 0."""
-    body = fit.model.spacecraft
+    spacecraft = fit.model.spacecraft
     large = _seen(fit)
     growth = large.get("growth")
     if growth is not None and not (carried.body.inertia.wheel or _grows_so(carried, growth)):
@@ -235,8 +235,8 @@ def notes(fit: Fit, carried: Carried) -> Iterator[Note]:
                 thrust_percent=given,
             )
     if carried.time != 0.0:
-        yield from _limits_anew(body, carried.time)
-    if body.tank is not None and len(fit.model.record.schedule):
+        yield from _limits_anew(spacecraft, carried.time)
+    if spacecraft.tank is not None and len(fit.model.record.schedule):
         yield note("fit-tank")
 
 

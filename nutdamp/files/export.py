@@ -36,17 +36,17 @@ LONGEST_STEP = 0.1  # rad; the body turns by no more in one step of the script
 
 def basilisk_script(plan: Plan) -> str:
     """The text of the script; raises BadRequest for dissipation, a wheel, or moments that fall."""
-    body = plan.spacecraft
-    if body.dissipation is not None:
+    spacecraft = plan.spacecraft
+    if spacecraft.dissipation is not None:
         raise BadRequest(
             "a Basilisk script flies a rigid body: leave dissipation out of the spacecraft file"
         )
-    if body.inertia.wheel != 0.0:
+    if spacecraft.inertia.wheel != 0.0:
         raise BadRequest(
             "a Basilisk script flies one rigid body: it has no wheel, "
             "and the spacecraft file has one"
         )
-    if shed(body) is not None:
+    if shed(spacecraft) is not None:
         problem = (
             "a Basilisk script flies constant moments of inertia: "
             "leave tank.inertia_per_kg out of the spacecraft"
@@ -54,28 +54,30 @@ def basilisk_script(plan: Plan) -> str:
         raise BadRequest(
             f"{problem} file, and plan without it, if the moments may count as constant"
         )
-    rates, quaternion = body.inertia.in_file_axes(body.initial.rates, body.initial.quaternion)
-    about = f"{plan.scheme} schedule for {body.name}, status {plan.verdict.status.value}"
+    rates, quaternion = spacecraft.inertia.in_file_axes(
+        spacecraft.initial.rates, spacecraft.initial.quaternion
+    )
+    about = f"{plan.scheme} schedule for {spacecraft.name}, status {plan.verdict.status.value}"
     title = " ".join(about.split()).replace("\\", "/").replace('"', "'")
     return SCRIPT.read_text(encoding="utf-8").format(
         title=title,
         version=__version__,
-        tensor=f"[{', '.join(map(_vector, body.inertia.tensor))}]",
-        moments=_vector(body.inertia.moments),
-        axes=f"[{', '.join(map(_vector, body.inertia.axes))}]",
+        tensor=f"[{', '.join(map(_vector, spacecraft.inertia.tensor))}]",
+        moments=_vector(spacecraft.inertia.moments),
+        axes=f"[{', '.join(map(_vector, spacecraft.inertia.axes))}]",
         rates=_vector(rates),
         quaternion=_vector(quaternion),
         turn=LONGEST_STEP,
-        steps="\n".join(f"    {step}," for step in _steps(plan, body)),
+        steps="\n".join(f"    {step}," for step in _steps(plan, spacecraft)),
     )
 
 
-def _steps(plan: Plan, body: Spacecraft) -> Iterable[str]:
+def _steps(plan: Plan, spacecraft: Spacecraft) -> Iterable[str]:
     """Rows of the schedule: channel, duration, torque; an ideal impulse lasts no time and gives its
     impulse.
     """
-    pulses, axes = plan.pulses, body.inertia.axes
-    longest = default_step(body, pulses, pulses.end)
+    pulses, axes = plan.pulses, spacecraft.inertia.axes
+    longest = default_step(spacecraft, pulses, pulses.end)
     edges = sorted({0.0, pulses.end, *(edge for pulse in pulses for edge in pulse.edges)})
     for now, end in zip(edges, [*edges[1:], pulses.end], strict=True):
         for pulse in pulses:
@@ -83,7 +85,7 @@ def _steps(plan: Plan, body: Spacecraft) -> Iterable[str]:
                 yield f"({pulse.channel!r}, 0.0, {_vector(axes @ pulse.impulse)})"
         firing = [pulse.channel for pulse in pulses if pulse.push(now, end) is not None]
         if end > now:
-            for duration, torque in stretches(body, pulses, now, end, longest):
+            for duration, torque in stretches(spacecraft, pulses, now, end, longest):
                 yield (
                     f"({' + '.join(firing) or 'coast'!r}, {float(duration)!r}, "
                     f"{_vector(axes @ torque)})"
@@ -268,11 +270,11 @@ class SamplesWriter:
         self._stream = stream
         self._study = study
         self._inputs = study.model.inputs.drawn
-        body = study.model.spacecraft
+        spacecraft = study.model.spacecraft
         self._outputs = [
             *OUTPUT_COLUMNS,
-            *cone_columns(body),
-            *["spin_error_rad_s"] * (body.goal.spin is not None),
+            *cone_columns(spacecraft),
+            *["spin_error_rad_s"] * (spacecraft.goal.spin is not None),
         ]
         header = ["case", *(column(entry) for entry in self._inputs), *self._outputs]
         stream.write(csv_text(header, []).encode())

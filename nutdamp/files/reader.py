@@ -301,14 +301,14 @@ class Source(NamedTuple):
         FaultyFile.
         """
         doubts: list[Fault] = []
-        body = read_spacecraft(self.text, self.name, self.settings, doubts.append)
-        object.__setattr__(body, "built_in", self.built_in)
+        spacecraft = read_spacecraft(self.text, self.name, self.settings, doubts.append)
+        object.__setattr__(spacecraft, "built_in", self.built_in)
         for each in doubts:
             doubt(each)
         object.__setattr__(
-            body, "source", self
+            spacecraft, "source", self
         )  # not a field, so that `dataclasses.replace` drops it
-        return body
+        return spacecraft
 
     def changed(self, keys: Mapping[str, object]) -> Spacecraft:
         """See `Spacecraft.with_`."""

@@ -373,13 +373,11 @@ class Supply:
         """True if every pulse is as strong as the file says."""
         self._begun = self.used
 
-    def behind(self, later: Spacecraft) -> Spacecraft:
-        """Spacecraft ``later``, with the moments that it then has, and all firings so far before
-        its t = 0.
-        """
-        cold, tank = later.cold, later.tank
+    def behind(self, at_leg: Spacecraft) -> Spacecraft:
+        """Spacecraft ``at_leg`` with all firings so far before its t = 0."""
+        cold, tank = at_leg.cold, at_leg.tank
         return replace(
-            later,
+            at_leg,
             cold=None if cold is None else replace(cold, fired=dict(self.fired)),
             tank=None if tank is None else replace(tank, used=self.used),
         )
@@ -584,24 +582,24 @@ def lacking(spacecraft: Spacecraft, schedule: Schedule, law: str) -> tuple[Space
     ``schedule``.
     """
     if law == VALVES:
-        body = replace(
+        without = replace(
             spacecraft, channels=tuple(channel.of(valve=None) for channel in spacecraft.channels)
         )
     elif law == LIGHTER and spacecraft.tank is not None:
-        body = replace(spacecraft, tank=replace(spacecraft.tank, inertia_per_kg=None))
+        without = replace(spacecraft, tank=replace(spacecraft.tank, inertia_per_kg=None))
     elif law == TRAVEL:
-        body = replace(spacecraft, center_of_mass_per_kg=None)
+        without = replace(spacecraft, center_of_mass_per_kg=None)
     elif (
         law == BLOWDOWN and spacecraft.tank is not None
     ):  # once it is empty nothing fires, at full pressure too
-        body = replace(
+        without = replace(
             spacecraft, tank=replace(spacecraft.tank, final_pressure=spacecraft.tank.pressure)
         )
     else:
-        body = replace(spacecraft, cold=None)
-    known = {channel.name: channel for channel in body.channels}
+        without = replace(spacecraft, cold=None)
+    known = {channel.name: channel for channel in without.channels}
     fired = []
     for pulse in schedule:
         commanded = pulse.channel in known and pulse.torque is not None
         fired.append(on_command(known[pulse.channel], *pulse.loaded) if commanded else pulse)
-    return body, Schedule(supplied(body, fired))
+    return without, Schedule(supplied(without, fired))

@@ -205,19 +205,23 @@ def aspects(flown: Flight, until: float | None = None) -> tuple[Aspect, ...]:
     Default: one inertial nutation period after the last pulse. Raises Infeasible as
     `propagation.flown` does.
     """
-    body = flown.spacecraft
-    if not body.watched:
+    spacecraft = flown.spacecraft
+    if not spacecraft.watched:
         return ()
-    end = flown.schedule.end + body.inertial_period if until is None else until
+    end = flown.schedule.end + spacecraft.inertial_period if until is None else until
     if flown.legs[-1].end < end:
         fly = (
             propagation.by_impulses if flown.model == propagation.IMPULSE_SUM else propagation.flown
         )
-        flown = fly(body, flown.schedule, end)
+        flown = fly(spacecraft, flown.schedule, end)
     symmetric = (
-        body.inertia.symmetric
+        spacecraft.inertia.symmetric
     )  # else the axis wobbles on its way round H as the body turns, too
-    period = body.inertial_period if symmetric else min(body.inertial_period, body.body_period)
+    period = (
+        spacecraft.inertial_period
+        if symmetric
+        else min(spacecraft.inertial_period, spacecraft.body_period)
+    )
     pieces = flown.pieces(max(int(ROWS * end / period), ROWS), end)
     rows = [
         (piece.t, piece.axis, piece.momentum) for piece in pieces
@@ -226,7 +230,7 @@ def aspects(flown: Flight, until: float | None = None) -> tuple[Aspect, ...]:
     del rows
     momentum /= np.linalg.norm(momentum, axis=-1, keepdims=True)
     observed = []
-    for keep in body.watched:
+    for keep in spacecraft.watched:
         towards = (
             momentum if keep.direction is None else np.broadcast_to(keep.direction, axis.shape)
         )

@@ -265,10 +265,12 @@ class Flight(Tabled):
     @property
     def residual(self) -> Residual:
         """Cone angles after the last pulse, and where H went."""
-        body, target = self.spacecraft, self.spacecraft.goal.axis
+        spacecraft, target = self.spacecraft, self.spacecraft.goal.axis
         after = self.last_momentum
-        shift = float(attitude.angle_between(body.momentum, after))
-        left = arc_cones(self.last_moments, self.settled.rates, body.sense, body.inertia.wheel)
+        shift = float(attitude.angle_between(spacecraft.momentum, after))
+        left = arc_cones(
+            self.last_moments, self.settled.rates, spacecraft.sense, spacecraft.inertia.wheel
+        )
         error = shift if target is None else float(attitude.angle_between(target, after))
         return Residual(left.nutation, left.body, left.space, shift, error, self.model)
 
@@ -398,8 +400,8 @@ class Flight(Tabled):
 
     def _widest(self, motions: Iterable[Motion]) -> Track:
         track = self._track(motions)
-        body = self.spacecraft
-        return widest(track, self.moments_at(track.t), body.sense, body.inertia.wheel)
+        spacecraft = self.spacecraft
+        return widest(track, self.moments_at(track.t), spacecraft.sense, spacecraft.inertia.wheel)
 
 
 def by_impulses(spacecraft: Spacecraft, schedule: Schedule, until: float = 0.0) -> Flight:

@@ -328,11 +328,11 @@ def _vectors(
     """Rates in the axes of the file, inertial spin axis and H, (n, 3) each, of a motion of the
     flown spacecraft.
     """
-    body = judge.spacecraft
-    momentum = rates * judge.moments_at(times) + np.array([0.0, 0.0, body.inertia.wheel])
-    axis = attitude.rotate(quaternion, np.array([0.0, 0.0, body.sense]))
+    spacecraft = judge.spacecraft
+    momentum = rates * judge.moments_at(times) + np.array([0.0, 0.0, spacecraft.inertia.wheel])
+    axis = attitude.rotate(quaternion, np.array([0.0, 0.0, spacecraft.sense]))
     return (
-        body.inertia.in_file_axes(rates, quaternion)[0],
+        spacecraft.inertia.in_file_axes(rates, quaternion)[0],
         axis,
         attitude.rotate(quaternion, momentum),
     )
@@ -378,10 +378,10 @@ def _conserved(flown: Flight) -> tuple[Conservation, Conservation]:
         for index, value in enumerate((size, turning**2 @ moments)):
             whole = float(np.max(value)) or 1.0  # the energy of a despun body at rest is zero
             worst[index] = max(worst[index], float(np.ptp(value)) / whole)
-    body = flown.spacecraft
+    spacecraft = flown.spacecraft
     outside, inside = (
-        ("disturbances",) * bool(body.disturbances),
-        ("dissipation",) * (body.growth != 0.0),
+        ("disturbances",) * bool(spacecraft.disturbances),
+        ("dissipation",) * (spacecraft.growth != 0.0),
     )
     return Conservation("|H|", worst[0], outside), Conservation(
         "energy", worst[1], (*outside, *inside)

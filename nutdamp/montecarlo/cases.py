@@ -118,27 +118,27 @@ def turned(matrix: Vector, vector: Sequence[Cases]) -> Triple:
     return triple(reduce(plus, map(times, row, vector)) for row in matrix.tolist())
 
 
-def tank_of(body: Spacecraft, draws: Draws) -> Tank | None:
+def tank_of(spacecraft: Spacecraft, draws: Draws) -> Tank | None:
     """Tank of the cases."""
-    if body.tank is None:
+    if spacecraft.tank is None:
         return None
     names = ("propellant", "pressure", "final_pressure", "exponent")
     changed = {
-        name: plus(getattr(body.tank, name), draws.get(f"tank {name}", 0.0)) for name in names
+        name: plus(getattr(spacecraft.tank, name), draws.get(f"tank {name}", 0.0)) for name in names
     }
-    return replace(body.tank, **changed)
+    return replace(spacecraft.tank, **changed)
 
 
-def cold_of(body: Spacecraft, draws: Draws) -> Cold | None:
+def cold_of(spacecraft: Spacecraft, draws: Draws) -> Cold | None:
     """Cold nozzles of the cases."""
-    cold = body.cold
+    cold = spacecraft.cold
     first = draws.get("cold", 0.0)
     pulses = draws.get("cold_pulses", 0.0)
     return cold and replace(cold, first=plus(cold.first, first), pulses=plus(cold.pulses, pulses))
 
 
 def supplied(
-    body: Spacecraft, schedule: Schedule, draws: Draws, flows: Sequence[Cases]
+    spacecraft: Spacecraft, schedule: Schedule, draws: Draws, flows: Sequence[Cases]
 ) -> tuple[list[Cases], tuple[Cases, ...] | None, Cases]:
     """Strength of each pulse of cases over the planned one, zero once the tank is empty; its
     propellant, kg, or None.
@@ -147,7 +147,7 @@ def supplied(
     the share of the tank that all would take, above 1 where it does not last; 0 without a tank, or
     where it is not known what they take.
     """
-    tank = tank_of(body, draws)
+    tank = tank_of(spacecraft, draws)
     known = all(pulse.propellant is not None for pulse in schedule)
     taken: list[Cases] = [
         (pulse.propellant or 0.0) * flow for pulse, flow in zip(schedule, flows, strict=True)
@@ -155,11 +155,14 @@ def supplied(
     levels: list[Cases] = [1.0] * len(flows)
     if tank is None and not ("cold" in draws or "cold_pulses" in draws):
         return levels, tuple(taken) if known else None, 0.0
-    nominal, case = Supply(body), Supply(replace(body, cold=cold_of(body, draws), tank=tank))
-    channels = {channel.name: channel for channel in body.channels}
+    nominal, case = (
+        Supply(spacecraft),
+        Supply(replace(spacecraft, cold=cold_of(spacecraft, draws), tank=tank)),
+    )
+    channels = {channel.name: channel for channel in spacecraft.channels}
     higher: Cases = 1.0  # the file gives the thrust at its own pressure
-    if tank is not None and body.tank is not None:
-        higher = (tank.pressure / body.tank.pressure) ** tank.exponent
+    if tank is not None and spacecraft.tank is not None:
+        higher = (tank.pressure / spacecraft.tank.pressure) ** tank.exponent
     for number in sorted(range(len(flows)), key=lambda at: schedule.pulses[at].loaded[0]):
         pulse = schedule.pulses[number]
         channel = channels.get(pulse.channel)
@@ -300,11 +303,11 @@ class DispersedModel:
         """Goal of H, or H at t = 0 of the estimate, as a unit vector (3,) in the estimated body
         axes at t = 0.
         """
-        body = self.spacecraft
-        axis = body.inertia.momentum(body.omega0)
-        if body.goal.axis is not None:
+        spacecraft = self.spacecraft
+        axis = spacecraft.inertia.momentum(spacecraft.omega0)
+        if spacecraft.goal.axis is not None:
             axis = attitude.rotate(
-                attitude.conjugate(body.initial.quaternion), np.asarray(body.goal.axis)
+                attitude.conjugate(spacecraft.initial.quaternion), np.asarray(spacecraft.goal.axis)
             )
         return np.asarray(axis / np.linalg.norm(axis), dtype=np.float64)
 
@@ -528,25 +531,27 @@ def _not_before(start: Cases) -> Cases:
     return np.where(start.real > 0.0, start, np.where(start.real == 0.0, 0.5j * start.imag, 0.0))
 
 
-def watch_over(body: Spacecraft, tilt: tuple[Any, Any], count: int) -> AxisWatch:
+def watch_over(spacecraft: Spacecraft, tilt: tuple[Any, Any], count: int) -> AxisWatch:
     """Observer of ``count`` cases of a ``body`` with axes off by a ``tilt``, rad, about its 1 and
     2.
     """
-    inertial = [np.zeros(3) if cone.direction is None else cone.direction for cone in body.keep]
-    directions = np.array([in_body(body, tilt, count, direction) for direction in inertial])
+    inertial = [
+        np.zeros(3) if cone.direction is None else cone.direction for cone in spacecraft.keep
+    ]
+    directions = np.array([in_body(spacecraft, tilt, count, direction) for direction in inertial])
     momentum = next(
-        (number for number, cone in enumerate(body.keep) if cone.direction is None), None
+        (number for number, cone in enumerate(spacecraft.keep) if cone.direction is None), None
     )
-    return AxisWatch.of(directions.reshape(-1, 3, count), body.sense, momentum)
+    return AxisWatch.of(directions.reshape(-1, 3, count), spacecraft.sense, momentum)
 
 
 def in_body(
-    body: Spacecraft, tilt: tuple[Any, Any], count: int, direction: Vector
+    spacecraft: Spacecraft, tilt: tuple[Any, Any], count: int, direction: Vector
 ) -> NDArray[np.float64]:
     """An inertial ``direction`` (3,) in the true axes of t = 0 of bodies off by a ``tilt``, (3,
     n).
     """
-    x, y, z = attitude.rotate(attitude.conjugate(body.initial.quaternion), direction).tolist()
+    x, y, z = attitude.rotate(attitude.conjugate(spacecraft.initial.quaternion), direction).tolist()
     return np.array(
         [np.broadcast_to(part, count) for part in rotated((x, y, z), (-tilt[0], -tilt[1]))]
     )

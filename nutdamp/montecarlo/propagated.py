@@ -159,10 +159,10 @@ class ClosedForm:
     @cached_property
     def _nodes(self) -> tuple[int, ...]:
         """Quadrature nodes of each pulse, from the largest phase it may span."""
-        body = self.model.spacecraft
-        A = body.inertia.A
-        C = body.inertia.C
-        spin = abs(body.spin)
+        spacecraft = self.model.spacecraft
+        A = spacecraft.inertia.A
+        C = spacecraft.inertia.C
+        spin = abs(spacecraft.spin)
         off = {entry.name: FAR * entry.sigma + abs(entry.size) for entry in self.model.inputs.drawn}
         off_A, off_C = off.get("A", 0.0), off.get("C", 0.0)
         ratio = max(
@@ -170,7 +170,7 @@ class ClosedForm:
         )
         added = math.fsum(float(np.linalg.norm(pulse.impulse)) for pulse in self.model.schedule) / C
         rate = ratio * (spin + max(off.get(f"omega0_{axis}", 0.0) for axis in (1, 2, 3)) + added)
-        rate += (abs(body.inertia.wheel) + off.get("wheel momentum", 0.0)) / max(
+        rate += (abs(spacecraft.inertia.wheel) + off.get("wheel momentum", 0.0)) / max(
             A - off_A, 0.25 * A
         )
         return tuple(nodes_for(0.5 * on_time * rate) for on_time in self.model.on_times)
@@ -328,9 +328,9 @@ def fly(
     (n,), s.
     """
     count = rates.shape[1]
-    body = model.spacecraft
-    assert body.sun_sensor is not None
-    assert body.sun is not None
+    spacecraft = model.spacecraft
+    assert spacecraft.sun_sensor is not None
+    assert spacecraft.sun is not None
     starts, seen = (
         np.empty((len(model.schedule), count)),
         np.empty((len(model.schedule), count), dtype=bool),
@@ -338,7 +338,7 @@ def fly(
     over = np.zeros(count)
     rates = rates.copy()
     quaternion = quaternion.copy()
-    sun = in_body(body, cases.tilt, count, body.sun)
+    sun = in_body(spacecraft, cases.tilt, count, spacecraft.sun)
     passages = np.flatnonzero(nominal) + 1  # those that the sensor sees of the passages of the Sun
     pulses = model.schedule.pulses
     begins = zip(model.schedule, cases.starts, cases.leads, strict=True)
@@ -353,7 +353,7 @@ def fly(
             bodies.some(rows), np.zeros(len(starts[0, rows])), rates[:, rows], quaternion[:, rows]
         )
         clock = SunPulseClock(
-            start, sun[:, rows], math.copysign(1.0, body.spin), body.sun_sensor.azimuth
+            start, sun[:, rows], math.copysign(1.0, spacecraft.spin), spacecraft.sun_sensor.azimuth
         )
         commanded = (
             (block, number) for block in model.schedule.blocks for number in block.sun_pulses
@@ -366,12 +366,12 @@ def fly(
             passage = int(passages[number - 1]) if number <= len(passages) else before + 1
             for between in () if sees_all else range(before + 1, passage):
                 alike &= (
-                    body.sun_sensor.sees(clock.angle(clock.sun_pulse(between)))
+                    spacecraft.sun_sensor.sees(clock.angle(clock.sun_pulse(between)))
                     == nominal[between - 1]
                 )
             sun_pulse = clock.sun_pulse(passage)
             before = passage
-            alike &= body.sun_sensor.sees(clock.angle(sun_pulse)) & ~clock.lost
+            alike &= spacecraft.sun_sensor.sees(clock.angle(sun_pulse)) & ~clock.lost
             seen[index, rows] = alike
             impulse = np.where(
                 seen[index, rows],
@@ -445,13 +445,13 @@ class RealWidths:
         """Flags of the Sun passages seen in the nominal flight;
         empty where that cannot be fired.
         """
-        body, blocks = self.model.spacecraft, self.model.schedule.blocks
-        if body.sun_sensor is not None and body.sun_sensor.sees_all:
+        spacecraft, blocks = self.model.spacecraft, self.model.schedule.blocks
+        if spacecraft.sun_sensor is not None and spacecraft.sun_sensor.sees_all:
             return [True] * max(
                 (number for block in blocks for number in block.sun_pulses), default=0
             )
         try:
-            (schedule,), seen = fire_all(body, [blocks])
+            (schedule,), seen = fire_all(spacecraft, [blocks])
         except Infeasible:
             return [False]
         return [False] if isinstance(schedule, Infeasible) else [bool(sees[0]) for sees in seen]
@@ -479,9 +479,9 @@ class RealWidths:
     def __call__(self, cases: DispersedCases) -> Ends:
         """End states of the ``cases``. Raises Infeasible for motions too long to be integrated."""
         count = number_of(cases)
-        body = self.model.spacecraft
+        spacecraft = self.model.spacecraft
         sheds = None
-        watch = watch_over(body, cases.tilt, count) if body.keep else None
+        watch = watch_over(spacecraft, cases.tilt, count) if spacecraft.keep else None
         rates = _whole(cases.omega0, count)
         propellant = cases.propellant
         bodies = self._bodies(_whole(cases.moments, count), cases.wheel)
@@ -520,7 +520,7 @@ class RealWidths:
         after = carried(tuple(turned), momentum)
         nutation = None
         if not np.array_equal(last.moments[0], last.moments[1]):
-            nutation = widest_cones(last.moments, settled, body.sense, last.forcing.wheel)[0]
+            nutation = widest_cones(last.moments, settled, spacecraft.sense, last.forcing.wheel)[0]
         return Ends(
             momentum=momentum,
             before=triple(bodies.momentum(rates)),

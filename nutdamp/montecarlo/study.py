@@ -254,25 +254,25 @@ class Study(DrawnCases):
         """Rows of `Results.values` of ``count`` cases: `OUTPUTS`, angles to the cones, error of a
         spin required.
         """
-        body = self.model.spacecraft
+        spacecraft = self.model.spacecraft
         rows = [measure(self.model, ends, count)]
         if ends.aspects is not None:
             rows.append(
                 np.broadcast_to(ends.aspects, (*ends.aspects.shape[:2], count)).reshape(-1, count)
             )
-        if body.goal.spin is not None:
-            rows.append(np.broadcast_to(abs(ends.spin - body.goal.spin), (1, count)))
+        if spacecraft.goal.spin is not None:
+            rows.append(np.broadcast_to(abs(ends.spin - spacecraft.goal.spin), (1, count)))
         return np.concatenate(rows)
 
     def left(self, values: Array) -> Left:
         """Residual of cases by their `values`, whose spin is as far off the goal, above it."""
-        body = self.model.spacecraft
+        spacecraft = self.model.spacecraft
         aim = OUTPUTS.index(requirements.aim(self.model.spacecraft).value)
-        cones = len(body.keep)
+        cones = len(spacecraft.keep)
         angles = (
             values[len(OUTPUTS) : len(OUTPUTS) + 2 * cones].reshape(cones, 2, -1) if cones else None
         )
-        spin = math.nan if body.goal.spin is None else body.goal.spin + values[-1]
+        spin = math.nan if spacecraft.goal.spin is None else spacecraft.goal.spin + values[-1]
         return Left(values[0], values[aim], spin, angles)
 
     def outputs_of(self, draws: Draws) -> Array:
@@ -345,28 +345,30 @@ class Counted(ABC):
     aspects: Array = field(init=False)  # least and largest angle to it in all cases, (m, 2) rad
 
     def __post_init__(self) -> None:
-        body = self.study.model.spacecraft
-        self.bounds = (*requirements.bounds(body), *requirements.cones(body))
+        spacecraft = self.study.model.spacecraft
+        self.bounds = (*requirements.bounds(spacecraft), *requirements.cones(spacecraft))
         self.kept = np.zeros(len(self.bounds), dtype=np.int64)
         self.broken, self.aspects = (
-            np.zeros(len(body.keep), dtype=np.int64),
-            np.tile([math.pi, 0.0], (len(body.keep), 1)),
+            np.zeros(len(spacecraft.keep), dtype=np.int64),
+            np.tile([math.pi, 0.0], (len(spacecraft.keep), 1)),
         )
 
     def count(self, severity: Array, left: Left, able: NDArray[np.bool_]) -> None:
         """Count cases from ``done`` on: their `Study.severity` (n,), residual, and who may comply
         at all.
         """
-        body = self.study.model.spacecraft
+        spacecraft = self.study.model.spacecraft
         complies = able.copy()
-        astray = np.zeros((len(body.keep), len(severity)), dtype=bool)
+        astray = np.zeros((len(spacecraft.keep), len(severity)), dtype=bool)
         for row, bound in enumerate(self.bounds):
-            met = np.broadcast_to(bound.met(requirements.left_of(bound, left, body)), len(severity))
+            met = np.broadcast_to(
+                bound.met(requirements.left_of(bound, left, spacecraft)), len(severity)
+            )
             self.kept[row] += np.count_nonzero(met)
             if bound.required:
                 complies &= met
             if bound.keep is not None:
-                astray[body.keep.index(bound.keep)] |= ~met
+                astray[spacecraft.keep.index(bound.keep)] |= ~met
         self.met += int(np.count_nonzero(complies))
         self.broken += astray.sum(axis=1)
         if left.angles is not None:
@@ -449,8 +451,8 @@ class Results(Counted):
     @property
     def rows(self) -> int:
         """Rows of ``values``: see `Study.values`."""
-        body = self.study.model.spacecraft
-        return len(OUTPUTS) + 2 * len(body.keep) + (body.goal.spin is not None)
+        spacecraft = self.study.model.spacecraft
+        return len(OUTPUTS) + 2 * len(spacecraft.keep) + (spacecraft.goal.spin is not None)
 
     @property
     def exact(self) -> bool:

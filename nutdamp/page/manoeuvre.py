@@ -56,7 +56,7 @@ def manoeuvre_blocks(
     Only a plan to fly has conditions to begin, limits to hold, boxes and signatures; ideal impulses
     have none either.
     """
-    body = plan.spacecraft
+    spacecraft = plan.spacecraft
     ideal = ideal_code(plan)
     if not plan.pulses.pulses:
         yield Prose(summary, alarm=bool(judged.status.exit_status))
@@ -64,7 +64,7 @@ def manoeuvre_blocks(
     flies = judged.flies and not ideal
     if not judged.flies:
         yield Prose("NOT FOR FLIGHT", alarm=True)
-    zero = body.utc(0.0, MILLISECONDS) or "no epoch in the file; times count from t = 0"
+    zero = spacecraft.utc(0.0, MILLISECONDS) or "no epoch in the file; times count from t = 0"
     yield FactList("Document and time", (*identity, ("UTC of t = 0", zero)))
     yield Prose(summary, alarm=not judged.flies)
     if ideal:
@@ -78,10 +78,11 @@ def manoeuvre_blocks(
         yield Prose("Tolerances not checked.")
     if flies:
         yield FactList(
-            f"GO at t = 0 with{' (nominal)' * (points is None)}", tuple(_conditions(body, points))
+            f"GO at t = 0 with{' (nominal)' * (points is None)}",
+            tuple(_conditions(spacecraft, points)),
         )
     yield _fired(plan, judged, points, flies=flies)
-    totals = [("totals", _totals(plan)), ("phase", _phase_note(body))]
+    totals = [("totals", _totals(plan)), ("phase", _phase_note(spacecraft))]
     if not flies:
         yield FactList("Totals", tuple(totals))
         return
@@ -93,10 +94,10 @@ def manoeuvre_blocks(
     )
 
 
-def _conditions(body: Spacecraft, points: Checkpoints | None) -> Iterator[tuple[str, str]]:
+def _conditions(spacecraft: Spacecraft, points: Checkpoints | None) -> Iterator[tuple[str, str]]:
     """Spin, nutation and phase at which the first row may be fired."""
-    spin = f"{body.spin * RPM:.5g}"
-    nutation = short_angle(body.tilt)
+    spin = f"{spacecraft.spin * RPM:.5g}"
+    nutation = short_angle(spacecraft.tilt)
     if points is None:
         yield "spin", f"{spin} rpm"
         yield "nutation", f"{nutation} deg"
@@ -106,22 +107,22 @@ def _conditions(body: Spacecraft, points: Checkpoints | None) -> Iterator[tuple[
     angles = f"{short_angle(points.nutation.least)} to {short_angle(points.nutation.most)} deg"
     yield "spin", f"{spins} (nominal {spin})"
     yield "nutation", f"{angles} (nominal {nutation})"
-    yield "phase window", _window(body, points)
+    yield "phase window", _window(spacecraft, points)
 
 
-def _window(body: Spacecraft, points: Checkpoints) -> str:
+def _window(spacecraft: Spacecraft, points: Checkpoints) -> str:
     """Shift of all pulses in phase and in time with which enough cases comply; rounded towards
     none.
     """
-    probability = required_share(body.requirement)
+    probability = required_share(spacecraft.requirement)
     share = exact_percent(probability)
-    if not requirements.judged(body):
+    if not requirements.judged(spacecraft):
         return "not known: nothing is required"
     window = points.window(probability)
     if window is None:
         return f"none: fewer than {share} of the cases comply at the phases below"
-    turn = abs(body.spin)
-    digits = _decimals(body)
+    turn = abs(spacecraft.spin)
+    digits = _decimals(spacecraft)
     phases = [_inwards(math.degrees(turn * shift), 1) for shift in window]
     times = [_inwards(shift, digits) for shift in window]
     return (
@@ -154,7 +155,7 @@ class SheetRow(NamedTuple):
 
 def _fired(plan: Plan, judged: Verdict, points: Checkpoints | None, *, flies: bool) -> Sheet:
     """One row a pulse or block, as it is commanded, with the nutation after it."""
-    flown, body, pulses = plan.flight, plan.spacecraft, plan.pulses.pulses
+    flown, spacecraft, pulses = plan.flight, plan.spacecraft, plan.pulses.pulses
     blocks: Sequence[Block | None] = plan.pulses.blocks or [None] * len(pulses)
     counts = [*accumulate(1 if block is None else block.count for block in blocks)]
     firsts = [pulses[count] for count in (0, *counts[:-1])]
@@ -163,7 +164,8 @@ def _fired(plan: Plan, judged: Verdict, points: Checkpoints | None, *, flies: bo
     angles = flown.around_pulses()[1].nutation[np.array(counts) - 1].tolist()
     ends = [pulses[count - 1].over for count in counts]
     decide = [
-        _deadline(body, end, start) for end, start in zip(ends, starts[1:].tolist(), strict=False)
+        _deadline(spacecraft, end, start)
+        for end, start in zip(ends, starts[1:].tolist(), strict=False)
     ]
     holds = ["not set"] * len(counts) if points is None else _ranges(points, counts, angles)
     limit = next(
@@ -179,18 +181,18 @@ def _fired(plan: Plan, judged: Verdict, points: Checkpoints | None, *, flies: bo
     )
 
 
-def _deadline(body: Spacecraft, end: float, start: float) -> str:
+def _deadline(spacecraft: Spacecraft, end: float, start: float) -> str:
     """Time by which it must be known whether the next row is fired: its start; a short coast leaves
     no time.
     """
     if start - end < DECIDED:
         return "automatic"
-    return clock(body, start) or f"{math.floor(10.0 * start) / 10.0:.1f} s"
+    return clock(spacecraft, start) or f"{math.floor(10.0 * start) / 10.0:.1f} s"
 
 
 def _columns(plan: Plan, rows: Sequence[SheetRow]) -> Iterator[Column]:
     """Columns of pulses or of blocks; starts in UTC where there is an epoch, else from t = 0."""
-    body = plan.spacecraft
+    spacecraft = plan.spacecraft
     digits = _decimals(plan.spacecraft)
     blocks = plan.pulses.blocks
 
@@ -203,29 +205,31 @@ def _columns(plan: Plan, rows: Sequence[SheetRow]) -> Iterator[Column]:
         return f"{time:.{digits}f}"
 
     def start(row: SheetRow) -> str | None:
-        return clock(body, row.pulse.loaded[0], min(digits, MILLISECONDS))
+        return clock(spacecraft, row.pulse.loaded[0], min(digits, MILLISECONDS))
 
     yield column("block" if blocks else "pulse", "", lambda row: row.at + 1)
     if all(map(start, rows)):
         yield column(Shared.START, "UTC", start)._replace(kind=TEXT)
     else:
         yield column(Shared.START, "s", lambda row: row.pulse.loaded[0], seconds)
-    phase = "Sun phase" if sun_phased(body) else "spin phase"
+    phase = "Sun phase" if sun_phased(spacecraft) else "spin phase"
     yield column(
         phase,
         "deg",
         lambda row: math.degrees(row.phase) % 360.0,
         lambda angle: fixed(angle, 1, 360.0),
     )
-    yield column(Shared.THRUSTERS, "", lambda row: _thrusters(row.pulse, body))._replace(kind=TEXT)
+    yield column(Shared.THRUSTERS, "", lambda row: _thrusters(row.pulse, spacecraft))._replace(
+        kind=TEXT
+    )
     if blocks:
-        counts = " (counts)" * (body.commands is not None)
+        counts = " (counts)" * (spacecraft.commands is not None)
         yield column(Shared.FIRST_SUN_PULSE, "", lambda row: row.block.first)
         yield column(
-            Shared.DELAY, f"s{counts}", lambda row: _counted(body, "delay", row.block.delay)
+            Shared.DELAY, f"s{counts}", lambda row: _counted(spacecraft, "delay", row.block.delay)
         )
         yield column(
-            Shared.ON_TIME, f"s{counts}", lambda row: _counted(body, "width", row.block.width)
+            Shared.ON_TIME, f"s{counts}", lambda row: _counted(spacecraft, "width", row.block.width)
         )
         yield column(Shared.PULSES, "", lambda row: row.block.count)
         yield column(Shared.EVERY, "spin", lambda row: row.block.every)
@@ -235,7 +239,7 @@ def _columns(plan: Plan, rows: Sequence[SheetRow]) -> Iterator[Column]:
         )
     else:
         yield column(Shared.ON_TIME, "s", lambda row: row.pulse.loaded[1], seconds)
-    least, _ = limits(body)
+    least, _ = limits(spacecraft)
     yield column(
         Shared.NUTATION_AFTER,
         "deg",
@@ -247,11 +251,13 @@ def _columns(plan: Plan, rows: Sequence[SheetRow]) -> Iterator[Column]:
     yield column("done", "", lambda _: "☐")._replace(kind=TEXT, when=bool)
 
 
-def _counted(body: Spacecraft, which: str, value: float) -> str:
+def _counted(spacecraft: Spacecraft, which: str, value: float) -> str:
     """A ``delay`` or ``width`` in s, and in counts of the steps of the commands, where the file has
     them.
     """
-    counts = f" ({body.commands.counts(which, value)})" if body.commands is not None else ""
+    counts = (
+        f" ({spacecraft.commands.counts(which, value)})" if spacecraft.commands is not None else ""
+    )
     return f"{value:.6g}{counts}"
 
 
@@ -272,11 +278,11 @@ def _ranges(points: Checkpoints, counts: Sequence[int], expected: Sequence[float
     return texts
 
 
-def _thrusters(pulse: Pulse, body: Spacecraft) -> str:
+def _thrusters(pulse: Pulse, spacecraft: Spacecraft) -> str:
     """Channel of a pulse, with its thrusters where they have other names."""
     if pulse.channel == STEERABLE:
-        return channel_text(pulse, body)
-    channel = channel_of(body, pulse)
+        return channel_text(pulse, spacecraft)
+    channel = channel_of(spacecraft, pulse)
     members = [] if channel is None else [thruster.name for thruster in channel.thrusters]
     return (
         pulse.channel
@@ -285,13 +291,13 @@ def _thrusters(pulse: Pulse, body: Spacecraft) -> str:
     )
 
 
-def _phase_note(body: Spacecraft) -> str:
-    if sun_phased(body):
+def _phase_note(spacecraft: Spacecraft) -> str:
+    if sun_phased(spacecraft):
         return (
             "Sun phase: angle from the Sun sensor to the Sun about axis 3, against the spin, "
             "at the commanded start."
         )
-    falls = ", positive about +3, so that it falls with this spin" * (body.spin < 0.0)
+    falls = ", positive about +3, so that it falls with this spin" * (spacecraft.spin < 0.0)
     return (
         f"Spin phase: angle by which the body has turned about axis 3 since t = 0{falls}, "
         "at the commanded start."
@@ -300,10 +306,10 @@ def _phase_note(body: Spacecraft) -> str:
 
 def _totals(plan: Plan) -> str:
     pulses = plan.pulses
-    body = plan.spacecraft
+    spacecraft = plan.spacecraft
     digits = _decimals(plan.spacecraft)
     on = math.fsum(pulse.loaded[1] for pulse in pulses)
-    date = body.utc(pulses.end, min(digits, MILLISECONDS))
+    date = spacecraft.utc(pulses.end, min(digits, MILLISECONDS))
     ends = f"{pulses.end:.{digits}f} s" + (f" ({date})" if date else "")
     return (
         f"pulses: {len(pulses)}; on-time {on:.{digits}f} s; {spent(pulses)}; "
@@ -311,11 +317,11 @@ def _totals(plan: Plan) -> str:
     )
 
 
-def _decimals(body: Spacecraft) -> int:
+def _decimals(spacecraft: Spacecraft) -> int:
     """Decimals of times in s: as many as the steps of commands need, else no finer than the
     tolerance of timing.
     """
-    tick, given = body.limits.tick, body.dispersions
+    tick, given = spacecraft.limits.tick, spacecraft.dispersions
     if tick is not None:
         fine = (
             digits

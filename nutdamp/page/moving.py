@@ -59,20 +59,20 @@ QUICK, UNHURRIED, SLOW = (
 )  # seconds that playing takes at the quickest, at first, and at the slowest
 
 
-def named_directions(body: Spacecraft) -> tuple[NamedDirection, ...]:
+def named_directions(spacecraft: Spacecraft) -> tuple[NamedDirection, ...]:
     """Directions of the globe besides the track: the target, the Sun, the cones that the spin axis
     keeps.
     """
     directions = []
-    if body.goal.axis is not None:
-        shift = None if body.requirement is None else body.requirement.momentum_shift
+    if spacecraft.goal.axis is not None:
+        shift = None if spacecraft.requirement is None else spacecraft.requirement.momentum_shift
         circles = (
             []
             if shift is None
             else [Circle(f"H at most {most(shift)} from target", shift, "target")]
         )
-        directions.append(NamedDirection("target", body.goal.axis, "target", tuple(circles)))
-    for keep in body.watched:
+        directions.append(NamedDirection("target", spacecraft.goal.axis, "target", tuple(circles)))
+    for keep in spacecraft.watched:
         if keep.direction is not None:
             bounds = [("least", keep.least, "keep-out")] * (keep.least > 0.0)
             bounds += [("most", keep.most, "keep-in")] * (keep.most < math.pi)
@@ -90,11 +90,11 @@ def moving_of(plan: Plan, craft: str = "SPACECRAFT") -> Moving:
     """The view of a plan flown through the real pulse widths; ``craft``: words of a command for the
     spacecraft.
     """
-    body = plan.spacecraft
+    spacecraft = plan.spacecraft
     named = named_directions(plan.spacecraft)
     # To the millisecond, so that the same rows can be had from ``simulate`` by a short number.
-    until = math.ceil(1e3 * geometry.shown_until(body, plan.pulses)) / 1e3
-    flown = propagation.flown(body, plan.pulses, until)
+    until = math.ceil(1e3 * geometry.shown_until(spacecraft, plan.pulses)) / 1e3
+    flown = propagation.flown(spacecraft, plan.pulses, until)
     turns = until / geometry.quickest(flown)
     samples = min(max(math.ceil(ROWS_A_TURN * turns), LEAST_ROWS), MOST_ROWS) + 1
     track = flown.sampled(samples, until)
@@ -124,7 +124,7 @@ def moving_of(plan: Plan, craft: str = "SPACECRAFT") -> Moving:
             NONE if text == MISSING else round(float(text.removesuffix(" deg")) * 10**ANGLE_DIGITS)
             for text in column
         ]
-        for column in zip(*(angle_texts(body, axis) for axis in track.axis), strict=True)
+        for column in zip(*(angle_texts(spacecraft, axis) for axis in track.axis), strict=True)
     ]
     columns |= {
         "t": _whole(track.t, clock),
@@ -142,8 +142,8 @@ def moving_of(plan: Plan, craft: str = "SPACECRAFT") -> Moving:
         np.degrees(attitude.angle_between(track.axis, each.axis)) for each in named if each.watched
     )
     columns |= _numbered("aspect", [_whole(angles, ANGLE_DIGITS) for angles in watched])
-    utc = _dates(body, track, clock)
-    absent = absence(body, flown.schedule)
+    utc = _dates(spacecraft, track, clock)
+    absent = absence(spacecraft, flown.schedule)
     data: dict[str, Any] = {
         "digits": {"t": clock, "cone": cone, "angle": ANGLE_DIGITS},
         "until": until,
@@ -177,10 +177,10 @@ def moving_of(plan: Plan, craft: str = "SPACECRAFT") -> Moving:
         panels,
         strip,
         *_speeds(until),
-        angle_names(body),
+        angle_names(spacecraft),
         named,
         utc is not None,
-        "azimuths" if body.attitude is None else "right ascensions",
+        "azimuths" if spacecraft.attitude is None else "right ascensions",
         turns > STEEP,
         propagation.model_name([flown.schedule]),
         None if absent else workbench_of(flown, craft),
@@ -253,9 +253,11 @@ def _whole(values: Vector, digits: int) -> list[int]:
     return [round(round(value, digits) * 10**digits) for value in values.tolist()]
 
 
-def _dates(body: Spacecraft, track: Track, digits: int) -> dict[str, Any] | None:
+def _dates(spacecraft: Spacecraft, track: Track, digits: int) -> dict[str, Any] | None:
     """UTC of each row: their common beginning, and the rest of each; None without an epoch."""
-    dates = [date for time in track.t.tolist() if (date := body.utc(time, digits)) is not None]
+    dates = [
+        date for time in track.t.tolist() if (date := spacecraft.utc(time, digits)) is not None
+    ]
     if len(dates) < len(track.t):
         return None
     # Dates are in order, so that the common beginning of the first and the last is that of all.
@@ -360,7 +362,7 @@ def _scale(name: str, places: Iterable[float], values: Iterable[float]) -> Scale
 
 def strip_of(flown: Flight, track: Track, until: float) -> tuple[Strip, list[float]]:
     """Angles and firings over time, and the lowest and highest angle of the scale, deg."""
-    body = flown.spacecraft
+    spacecraft = flown.spacecraft
     angles = np.degrees(np.concatenate([track.nutation, track.body_cone, track.space_cone, [0.0]]))
     low, high = float(angles.min()), float(angles.max())
     margin = 0.06 * (high - low) if high - low > geometry.LEAST else 1.0
@@ -377,7 +379,7 @@ def strip_of(flown: Flight, track: Track, until: float) -> tuple[Strip, list[flo
     def spread(begins: float, ends: float) -> tuple[float, float]:
         return round(width * across(begins), 1), round(width * (across(ends) - across(begins)), 1)
 
-    required = None if body.requirement is None else body.requirement.nutation
+    required = None if spacecraft.requirement is None else spacecraft.requirement.nutation
     level = math.inf if required is None else math.degrees(required)
     channels = tuple(geometry.channels_fired(flown))
     prefix, factor = _prefix(high - low)
@@ -398,20 +400,23 @@ def strip_of(flown: Flight, track: Track, until: float) -> tuple[Strip, list[flo
             (channels.index(pulse.channel), *spread(*span))
             for pulse, span in zip(flown.schedule, flown.spans, strict=True)
         ),
-        closed=tuple(spread(begins, ends) for begins, ends in geometry.closed(body, until)),
+        closed=tuple(spread(begins, ends) for begins, ends in geometry.closed(spacecraft, until)),
     )
     return strip, [low, high]
 
 
-def absence(body: Spacecraft, schedule: Schedule) -> str:
+def absence(spacecraft: Spacecraft, schedule: Schedule) -> str:
     """Reason for which there is no workbench, a few words; empty where there is one."""
     kinds = (
         (not len(schedule), "no pulses"),
         (bool(schedule.blocks), "command blocks"),
-        (body.inertia.wheel != 0.0, "a wheel"),
-        (body.growth != 0.0, "energy dissipation"),
-        (bool(body.disturbances), "disturbance torques"),
-        (bool(body.thrust_laws) or schedule.shaped, ", ".join(body.thrust_laws) or "shaped pulses"),
+        (spacecraft.inertia.wheel != 0.0, "a wheel"),
+        (spacecraft.growth != 0.0, "energy dissipation"),
+        (bool(spacecraft.disturbances), "disturbance torques"),
+        (
+            bool(spacecraft.thrust_laws) or schedule.shaped,
+            ", ".join(spacecraft.thrust_laws) or "shaped pulses",
+        ),
     )
     return next((reason for holds, reason in kinds if holds), "")
 
@@ -421,9 +426,9 @@ EDITED = "edited.csv"  # file that the command of the workbench flies
 
 def workbench_of(flown: Flight, craft: str) -> Workbench:
     """The workbench of a flight, which must have one by `absence`; ``craft`` as in `moving_of`."""
-    body = flown.spacecraft
-    limits = {bound.part: bound.limit for bound in requirements.required(body)}
-    parts = [Part.NUTATION, Part.SHIFT, *[Part.DISTANCE] * (body.goal.axis is not None)]
+    spacecraft = flown.spacecraft
+    limits = {bound.part: bound.limit for bound in requirements.required(spacecraft)}
+    parts = [Part.NUTATION, Part.SHIFT, *[Part.DISTANCE] * (spacecraft.goal.axis is not None)]
     rows = [
         (
             part.value,
@@ -435,7 +440,9 @@ def workbench_of(flown: Flight, craft: str) -> Workbench:
     if Part.SPIN in limits:
         rows.append((Part.SPIN.value, Part.SPIN.label, f"≤ {quantity(limits[Part.SPIN], 'rad/s')}"))
     command = " ".join(filter(None, ("nutdamp simulate", craft, f"--schedule {EDITED} --flown")))
-    return Workbench(tuple(rows), _pulse_names(flown), body.inertia.symmetric, EDITED, command)
+    return Workbench(
+        tuple(rows), _pulse_names(flown), spacecraft.inertia.symmetric, EDITED, command
+    )
 
 
 def workbench_data(
@@ -447,25 +454,25 @@ def workbench_data(
     ``pole`` and ``sky`` are the rooms of the panels, deg/s and deg; ``track`` is shown to ``until``
     s.
     """
-    body, limits = flown.spacecraft, flown.spacecraft.limits
-    target = body.goal.axis
+    spacecraft, limits = flown.spacecraft, flown.spacecraft.limits
+    target = spacecraft.goal.axis
     channels = geometry.channels_fired(flown)
     return {
         "body": {
-            "moments": body.inertia.moments,
-            "sense": math.copysign(1.0, body.spin),
+            "moments": spacecraft.inertia.moments,
+            "sense": math.copysign(1.0, spacecraft.spin),
             "target": None if target is None else target.tolist(),
         },
-        "start": [*body.omega0.tolist(), *body.initial.quaternion.tolist()],
-        "framed": body.attitude is not None,
-        "axes": None if body.inertia.aligned else body.inertia.axes.tolist(),
+        "start": [*spacecraft.omega0.tolist(), *spacecraft.initial.quaternion.tolist()],
+        "framed": spacecraft.attitude is not None,
+        "axes": None if spacecraft.inertia.aligned else spacecraft.inertia.axes.tolist(),
         "pulses": [
             {
                 "start": pulse.start,
                 "on": pulse.on_time,
                 "channel": pulse.channel,
                 "row": channels.index(pulse.channel),
-                "text": channel_text(pulse, body),
+                "text": channel_text(pulse, spacecraft),
                 "impulse": pulse.impulse.tolist(),
                 "torque": None if pulse.torque is None else pulse.torque.tolist(),
                 "least": 0.0 if channel is None else channel.min_on_time,
@@ -473,17 +480,19 @@ def workbench_data(
                 if channel is None or math.isinf(channel.max_on_time)
                 else channel.max_on_time,
             }
-            for pulse, channel in ((pulse, channel_of(body, pulse)) for pulse in flown.schedule)
+            for pulse, channel in (
+                (pulse, channel_of(spacecraft, pulse)) for pulse in flown.schedule
+            )
         ],
         "limits": {
             "earliest": limits.earliest,
-            "horizon": body.horizon,
+            "horizon": spacecraft.horizon,
             "gap": limits.gap,
             "tick": limits.tick,
             "blackout": limits.blackout,
             "most": limits.max_pulses,
         },
-        "spin": body.goal.spin,
+        "spin": spacecraft.goal.spin,
         "frame": EDGES,
         "plane": geometry.sky_plane(flown, track.momentum[0]).tolist(),
         "pole": [*pole[0].tolist(), pole[1]],

@@ -239,12 +239,12 @@ class Repeat(NamedTuple):
         return hashlib.sha256(self.text.encode()).hexdigest() if self.text else ""
 
 
-def called(body: Spacecraft, how: str) -> Repeat:
+def called(spacecraft: Spacecraft, how: str) -> Repeat:
     """The call in Python that makes a page again; where fields were replaced, no file stands for
     the spacecraft.
     """
-    if isinstance(body.source, Source):
-        return repeated(f"nutdamp.report({body.source.name!r}, {how})", body.source)
+    if isinstance(spacecraft.source, Source):
+        return repeated(f"nutdamp.report({spacecraft.source.name!r}, {how})", spacecraft.source)
     return Repeat(f"nutdamp.report(spacecraft, {how})", "", "")
 
 
@@ -262,14 +262,14 @@ def report_page(
     control: Control = document.UNCONTROLLED,
 ) -> Page:
     """The page; raises MissingExtra without matplotlib. ``traded``: fronts of time against cost."""
-    body, judged, chosen = compared.spacecraft, compared.verdict, compared.recommended
+    spacecraft, judged, chosen = compared.spacecraft, compared.verdict, compared.recommended
     lead, about = verdicts.headline(judged, compared)
     remarks = glance.notes(compared)
     notes = [text(note) for note in remarks if severity(note) != WARNING]
     warnings = [text(note) for note in remarks if severity(note) == WARNING]
     with work.steps(2.0) as task:  # pictures, and the flights of the verification
         page = Page(
-            title=control.title or _title(body),
+            title=control.title or _title(spacecraft),
             control=control,
             source=f"input {repeat.digest[:8]}" * bool(repeat.digest),
             state=judged.light.value,
@@ -292,7 +292,7 @@ def report_page(
         )
         if chosen is not None:
             broken = (
-                broken_limits(body, chosen.pulses) if chosen.from_file else []
+                broken_limits(spacecraft, chosen.pulses) if chosen.from_file else []
             )  # schemes break none
             page = replace(
                 page,
@@ -378,12 +378,16 @@ def _cases_of(compared: Comparison) -> Dispersion | None:
     return dispersion
 
 
-def _title(body: Spacecraft) -> str:
-    aims = [f"damp {math.degrees(body.tilt):.4g}° nutation"] * (body.tilt > NO_NUTATION)
-    aims += [f"turn by {math.degrees(body.to_turn):.4g}°"] * (body.goal.axis is not None)
-    aims += [] if body.goal.spin is None else [f"spin at {RPM * body.goal.spin:.4g} rpm"]
-    aims += ["built-in example"] * body.built_in
-    return " · ".join([body.name, ", ".join(aims)]) if aims else body.name
+def _title(spacecraft: Spacecraft) -> str:
+    aims = [f"damp {math.degrees(spacecraft.tilt):.4g}° nutation"] * (spacecraft.tilt > NO_NUTATION)
+    aims += [f"turn by {math.degrees(spacecraft.to_turn):.4g}°"] * (
+        spacecraft.goal.axis is not None
+    )
+    aims += (
+        [] if spacecraft.goal.spin is None else [f"spin at {RPM * spacecraft.goal.spin:.4g} rpm"]
+    )
+    aims += ["built-in example"] * spacecraft.built_in
+    return " · ".join([spacecraft.name, ", ".join(aims)]) if aims else spacecraft.name
 
 
 def _dispersion(dispersed: Dispersion) -> Iterator[Block]:
@@ -437,9 +441,9 @@ def _trade(compared: Comparison, traded: Sequence[Front]) -> Iterator[Block]:
 
 
 def _verification(chosen: Plan) -> Iterator[Block]:
-    body = chosen.spacecraft
+    spacecraft = chosen.spacecraft
     verified = verify(
-        body, chosen.pulses, unrounded(chosen), expected=chosen.options.with_disturbances
+        spacecraft, chosen.pulses, unrounded(chosen), expected=chosen.options.with_disturbances
     )
     yield Prose(f"{verdict(verified)} {sentence(text(conservation(verified)))}")
     missing = tuple(
@@ -450,7 +454,7 @@ def _verification(chosen: Plan) -> Iterator[Block]:
     flights = document.sheet_of(
         "Maximum differences from the flown motion", methods_table(verified)
     )
-    budget = document.sheet_of(BUDGET, budget_table(body, verified)), Prose(BUDGET_NOTE)
+    budget = document.sheet_of(BUDGET, budget_table(spacecraft, verified)), Prose(BUDGET_NOTE)
     yield Details(
         "Independent flights and error budget",
         (flights, *[Points(missing)] * bool(missing), *budget),
@@ -458,10 +462,10 @@ def _verification(chosen: Plan) -> Iterator[Block]:
 
 
 def _background(compared: Comparison, judged: Verdict, repeat: Repeat) -> Iterator[Block]:
-    body = compared.spacecraft
+    spacecraft = compared.spacecraft
     yield Details(
         "Spacecraft",
-        tuple(document.blocks_of("What actuators and tolerances do", check_screen(body))),
+        tuple(document.blocks_of("What actuators and tolerances do", check_screen(spacecraft))),
     )
     chosen = compared.recommended
     if chosen is not None:

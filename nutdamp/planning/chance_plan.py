@@ -37,6 +37,7 @@ from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import keeps_limits
 from nutdamp.spacecraft.model import Spacecraft, Vector, required_share
 from nutdamp.spacecraft.requirements import Part
+from nutdamp.spacecraft.roles import as_known
 from nutdamp.spacecraft.schedule import TOUCHING, Schedule, channel_pulse
 from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
 
@@ -81,13 +82,13 @@ def tightening(plan: Plan, probability: float) -> Tightening | None:
     """Fewest dominant tolerances, and their reduction, for enough complying cases; None if none
     suffice.
     """
-    body, given = plan.spacecraft, plan.spacecraft.dispersions
-    if given is None or not requirements.required(body):
+    spacecraft, given = plan.spacecraft, plan.spacecraft.dispersions
+    if given is None or not requirements.required(spacecraft):
         return None
-    study = study_of(body, plan.pulses)
+    study = study_of(spacecraft, plan.pulses)
 
     def tried(names: Iterable[str], factor: float, cases: int = CASES, seed: int = SEED) -> Results:
-        changed = replace(body, dispersions=scaled(given, names, factor))
+        changed = replace(spacecraft, dispersions=scaled(given, names, factor))
         return run(
             Results(study_of(changed, plan.pulses, seed=seed), cases), threads=threads_here()
         )
@@ -97,7 +98,9 @@ def tightening(plan: Plan, probability: float) -> Tightening | None:
 
     shares: dict[str, float] = {}  # of the required bound, by tolerance
     parts = [
-        bound.part.value for bound in requirements.required(body) if bound.part is not Part.SPIN
+        bound.part.value
+        for bound in requirements.required(spacecraft)
+        if bound.part is not Part.SPIN
     ]
     for output in parts or ["spin_change"]:
         for entry, share in zip(
@@ -211,7 +214,7 @@ plan is sought.
 """
 
 
-def uncertain(body: Spacecraft, on_times: Vector, goal: Vector, stretch: Vector) -> Uncertain:
+def uncertain(spacecraft: Spacecraft, on_times: Vector, goal: Vector, stretch: Vector) -> Uncertain:
     """First-order effect of dispersions on pulses of ``on_times`` (K,) s, per second of them, by
     complex steps.
 
@@ -219,9 +222,9 @@ def uncertain(body: Spacecraft, on_times: Vector, goal: Vector, stretch: Vector)
     """
     pulses = [
         channel_pulse(channel, 100.0 + 1e3 * at, on)
-        for at, (channel, on) in enumerate(zip(body.channels, on_times, strict=True))
+        for at, (channel, on) in enumerate(zip(spacecraft.channels, on_times, strict=True))
     ]
-    model = DispersedModel(body, Schedule(tuple(pulses)))
+    model = DispersedModel(spacecraft, Schedule(tuple(pulses)))
     drawn = [entry for entry in model.inputs.drawn if entry.kind != "bias"]
     biases = (entry for entry in model.inputs.drawn if entry.kind == "bias")
     draws = {entry.name: np.full(len(drawn) + 1, entry.size, dtype=complex) for entry in biases}
@@ -246,7 +249,7 @@ def uncertain(body: Spacecraft, on_times: Vector, goal: Vector, stretch: Vector)
     tilt = parts(cases.tilt[0])[1], parts(cases.tilt[1])[1]
     pointed = (
         start + axial * (tilt[1] - 1j * tilt[0])
-        if body.goal.axis is not None
+        if spacecraft.goal.axis is not None
         else np.zeros(len(drawn))
     )
     impulses = [[parts(part) for part in impulse] for impulse in cases.impulses]
@@ -262,7 +265,7 @@ def uncertain(body: Spacecraft, on_times: Vector, goal: Vector, stretch: Vector)
     to_do = goal[:4:2] + 1j * goal[1:4:2]
     in_space = effect.real / stretch[0] + 1j * effect.imag / stretch[1]
     turning = torque.real / stretch[0] + 1j * torque.imag / stretch[1]
-    each = (torque, effect, body.nutation_rate), (turning, in_space, body.spin)
+    each = (torque, effect, spacecraft.nutation_rate), (turning, in_space, spacecraft.spin)
     turned = [one + (1j * pace * late - less) * whole[:, None] for one, whole, pace in each]
     return Uncertain(
         effects=np.array([effect, in_space, nominal[:, 2] / on]),
@@ -281,11 +284,17 @@ def plans(spacecraft: Spacecraft, options: Options | None = None) -> Iterator[tu
     """Plans that keep the requirement with margins, each with a label; none where nothing is
     required.
     """
-    body = planning.known(spacecraft, planner.settled(OPTIMAL, options, spacecraft))
-    if not requirements.required(spacecraft) or not spacecraft.channels or body.dispersions is None:
+    known = as_known(
+        spacecraft, disturbed=planner.settled(OPTIMAL, options, spacecraft).with_disturbances
+    )
+    if (
+        not requirements.required(spacecraft)
+        or not spacecraft.channels
+        or known.dispersions is None
+    ):
         return
     try:
-        search = _MarginSearch(spacecraft, body)
+        search = _MarginSearch(spacecraft, known)
     except Infeasible:
         return
     yield from search.plans()
@@ -305,19 +314,21 @@ def level(results: Results) -> float:
 class _MarginSearch:
     """Search for one spacecraft."""
 
-    def __init__(self, spacecraft: Spacecraft, body: Spacecraft) -> None:
-        self.spacecraft, self.body = spacecraft, body
-        self.plain = valve_commands.plain(body) if body.thrust_laws else body
-        self.model = model_of(self.plain)
+    def __init__(self, spacecraft: Spacecraft, as_known: Spacecraft) -> None:
+        self.spacecraft, self.as_known = spacecraft, as_known
+        self.without_valves = (
+            valve_commands.without_valves(as_known) if as_known.thrust_laws else as_known
+        )
+        self.model = model_of(self.without_valves)
         parts = {bound.part: bound.limit for bound in requirements.required(spacecraft)}
         aim = requirements.aim(spacecraft)
-        aimed = aim in parts or body.goal.axis is not None
-        self.equations = EndEquations(shift=aimed, spin=body.goal.spin is not None)
+        aimed = aim in parts or as_known.goal.axis is not None
+        self.equations = EndEquations(shift=aimed, spin=as_known.goal.spin is not None)
         self.options = OptimalOptions(free_axis=not aimed)
-        self.program = Problem(self.model.body, self.options).program()
+        self.program = Problem(self.model.symmetric, self.options).program()
         if self.program.forbidden.size > LARGEST:
             raise Infeasible("too many slots")
-        flat = self.model.body
+        flat = self.model.symmetric
         axial = abs(flat.inertia.axial(flat.spin if flat.goal.spin is None else flat.goal.spin))
         limits = []
         if Part.NUTATION in parts:
@@ -335,7 +346,7 @@ class _MarginSearch:
                 for channel in channels
             ]
         )
-        flat = replace(flat, channels=channels, dispersions=body.dispersions)
+        flat = replace(flat, channels=channels, dispersions=as_known.dispersions)
         every = EndEquations(True, True)
         goal = np.zeros(5)
         goal[every.chosen] = small_angles(flat, every).goal
@@ -470,13 +481,13 @@ class _MarginSearch:
                 return None
         finally:
             program.forbidden = allowed
-        schedule = self.model.translate(as_pulses(self.model.body, solution.burns))
+        schedule = self.model.translate(as_pulses(self.model.symmetric, solution.burns))
         aside = solution.left[self.equations.chosen]
-        fly = partial(propagation.flown, self.plain)
+        fly = partial(propagation.flown, self.without_valves)
         schedule = Refinement(fly(schedule), self.equations, aside, fly).refined()
-        if not self.body.thrust_laws:
+        if not self.as_known.thrust_laws:
             return schedule
         try:
-            return planner.as_commands(OPTIMAL.name, self.body, schedule, self.options)
+            return planner.as_commands(OPTIMAL.name, self.as_known, schedule, self.options)
         except Infeasible:
             return None

@@ -18,7 +18,7 @@ from nutdamp.errors import NutdampError
 from nutdamp.flight import propagation
 from nutdamp.flight.end_state import seen_at
 from nutdamp.flight.propagation import Extremes, Flight, Track, extremes
-from nutdamp.planning.plan import Plan, Standing, judge, plan, reaches_spin, spinning, unflown
+from nutdamp.planning.plan import Plan, Standing, judge, plan, spinning, unflown
 from nutdamp.planning.verdict import Cases, Cheaper, Line, Verdict, no_plan
 from nutdamp.schemes import catalogue, planner
 from nutdamp.spacecraft import requirements
@@ -201,10 +201,10 @@ def nearest(plans: Sequence[Plan]) -> tuple[Plan, Ground]:
     as_little = [plan for plan in plans if _missed(plan) <= least + DAMPED_ANGLE]
     if len(as_little) == 1:
         return as_little[0], Ground.LEFT
-    body = as_little[0].spacecraft
+    spacecraft = as_little[0].spacecraft
     least = min(plan.severity for plan in as_little)
     rounding = NEGLIGIBLE / min(
-        (bound.limit for bound in required(body) if bound.part is not Part.SPIN), default=1.0
+        (bound.limit for bound in required(spacecraft) if bound.part is not Part.SPIN), default=1.0
     )
     near = [plan for plan in as_little if plan.severity <= least * (1.0 + SAME_COST) + rounding]
     return (near[0], Ground.NEAREST) if len(near) == 1 else cheapest(near)
@@ -215,14 +215,14 @@ def _alternatives(best: Plan, plans: Sequence[Plan]) -> dict[Gain, Plan]:
     at any cost.
     """
     unit = _unit(plans)
-    body = best.spacecraft
+    spacecraft = best.spacecraft
     turned = (
         0.0
-        if body.goal.axis is not None or _off(best) <= DAMPED_ANGLE
+        if spacecraft.goal.axis is not None or _off(best) <= DAMPED_ANGLE
         else STEADIER_SHIFT * _off(best)
     )
     few = FEWER_PULSES * len(best.pulses)
-    soon = min(SOONER_END * best.pulses.end, best.pulses.end - body.inertial_period)
+    soon = min(SOONER_END * best.pulses.end, best.pulses.end - spacecraft.inertial_period)
     gains_of: dict[Gain, Plan] = {}
     for gain, ratio, gains in (
         (Gain.STEADIER, STEADIER_COST, lambda plan: _off(plan) < turned),
@@ -433,8 +433,8 @@ class Comparison(results.Data, results.Tabled):
 
         A scheme that is slow is planned only where no other one complies.
         """
-        chosen, body = self.recommended, self.spacecraft
-        if chosen is None or not body.disturbances or chosen.options.with_disturbances:
+        chosen, spacecraft = self.recommended, self.spacecraft
+        if chosen is None or not spacecraft.disturbances or chosen.options.with_disturbances:
             return None
         others: tuple[Plan, ...] = ()
         try:
@@ -445,7 +445,7 @@ class Comparison(results.Data, results.Tabled):
                         and catalogue.SCHEMES[plan.scheme].slow == slow
                     ):
                         aware = replace(plan.options, with_disturbances=True)
-                        others = (*others, attempt(body, plan.scheme, aware))
+                        others = (*others, attempt(spacecraft, plan.scheme, aware))
                 best = replace(self, plans=others, flown=None).recommended
                 if best is not None and best.standing is Standing.COMPLIES:
                     break
@@ -472,7 +472,9 @@ def usual(spacecraft: Spacecraft) -> tuple[str, ...]:
         slow = [name for name in names if catalogue.SCHEMES[name].slow]
         names = (*(name for name in names if name not in slow), *catalogue.COMMANDED, *slow)
     return (
-        names if reaches_spin(spacecraft) else tuple(dict.fromkeys((*names, *spinning(spacecraft))))
+        names
+        if requirements.reaches_spin(spacecraft)
+        else tuple(dict.fromkeys((*names, *spinning(spacecraft))))
     )
 
 
@@ -610,9 +612,9 @@ class Simulation(results.Data, results.Tabled):
 
     @cached_property
     def _both(self) -> tuple[Flight, Flight]:
-        body, pulses = self.plan.spacecraft, self.plan.pulses
-        return propagation.by_impulses(body, pulses, self.until), propagation.flown(
-            body, pulses, self.until
+        spacecraft, pulses = self.plan.spacecraft, self.plan.pulses
+        return propagation.by_impulses(spacecraft, pulses, self.until), propagation.flown(
+            spacecraft, pulses, self.until
         )
 
     @cached_property

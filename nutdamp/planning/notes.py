@@ -149,16 +149,21 @@ def _bounds(plan: Plan) -> Iterator[Note]:
 
 def _left(plan: Plan) -> Iterator[Note]:
     """Reasons for remaining nutation, equal pulses of a given length among them."""
-    body, options, left, inertia = plan.spacecraft, plan.options, plan.left, plan.spacecraft.inertia
+    spacecraft, options, left, inertia = (
+        plan.spacecraft,
+        plan.options,
+        plan.left,
+        plan.spacecraft.inertia,
+    )
     nutation = plan.flight.residual.nutation
     if nutation >= TELLING and not options.uncorrected:
-        allowed = body.goal.spin is not None and plan.meets_requirement
+        allowed = spacecraft.goal.spin is not None and plan.meets_requirement
         yield (
             note("remains-allowed", nutation_deg=math.degrees(nutation))
             if allowed
             else remaining(plan)
         )
-    simple = inertia.symmetric and not body.disturbances and body.growth == 0.0
+    simple = inertia.symmetric and not spacecraft.disturbances and spacecraft.growth == 0.0
     if (
         left is not None
         and not simple
@@ -166,7 +171,7 @@ def _left(plan: Plan) -> Iterator[Note]:
         and not options.resizable
         and not options.uncorrected
     ):
-        off = float(requirements.missed(body, left.nutation, left.aim))
+        off = float(requirements.missed(spacecraft, left.nutation, left.aim))
         if off >= TELLING:
             yield note("fixed-length", off_deg=math.degrees(off))
 
@@ -177,8 +182,8 @@ def hindrances(plan: Plan) -> tuple[tuple[str, ...], tuple[str, ...]]:
     Certainty of the latter takes a plan without them. The horizon ends it where less than a
     nutation period is left.
     """
-    body, limits = plan.spacecraft, plan.spacecraft.limits
-    channels = {channel.name: channel for channel in body.channels}
+    spacecraft, limits = plan.spacecraft, plan.spacecraft.limits
+    channels = {channel.name: channel for channel in spacecraft.channels}
     fired = [
         (channels[pulse.channel], pulse.loaded[1])
         for pulse in plan.pulses
@@ -187,7 +192,7 @@ def hindrances(plan: Plan) -> tuple[tuple[str, ...], tuple[str, ...]]:
     full = 0 < len(fired) == len(plan.pulses) and all(
         on >= each.max_on_time * (1.0 - 1e-9) for each, on in fired
     )
-    late = body.horizon - plan.pulses.end < body.nutation_period
+    late = spacecraft.horizon - plan.pulses.end < spacecraft.nutation_period
     ended = full or late
     least = not ended and any(
         0.0 < on <= channel.min_on_time * (1.0 + 1e-9) for channel, on in fired
@@ -204,27 +209,31 @@ def hindrances(plan: Plan) -> tuple[tuple[str, ...], tuple[str, ...]]:
 
 def remaining(plan: Plan) -> Note:
     """Nutation that remains, and the dominant obstacle to less of it."""
-    body, nutation, (certain, possible) = (
+    spacecraft, nutation, (certain, possible) = (
         plan.spacecraft,
         plan.flight.residual.nutation,
         hindrances(plan),
     )
     left = math.degrees(nutation)
     if not {"max_on_time", "limits.horizon"} <= {*certain}:
-        if body.disturbances and not plan.options.with_disturbances:
+        if spacecraft.disturbances and not plan.options.with_disturbances:
             return note("remains-unplanned", nutation_deg=left)
-        if body.disturbances:
+        if spacecraft.disturbances:
             tilt = math.atan(
-                body.inertia.A * abs(steady_omega(body, plan.pulses.end)) / abs(body.axial)
+                spacecraft.inertia.A
+                * abs(steady_omega(spacecraft, plan.pulses.end))
+                / abs(spacecraft.axial)
             )
             return note("remains-steady-tilt", nutation_deg=left, tilt_deg=math.degrees(tilt))
         # Worst over root mean square: the centre is off by half the on-time's error and the
         # start's.
-        rounding = math.hypot(1.0, 1.5) * math.fsum(rounded_off(body, plan.pulses))
+        rounding = math.hypot(1.0, 1.5) * math.fsum(rounded_off(spacecraft, plan.pulses))
         if nutation <= rounding:
             return note("remains-rounding", nutation_deg=left, rounding_deg=math.degrees(rounding))
-        if len(plan.pulses) == body.limits.max_pulses:
-            return note("remains-max-pulses", nutation_deg=left, pulses=body.limits.max_pulses)
+        if len(plan.pulses) == spacecraft.limits.max_pulses:
+            return note(
+                "remains-max-pulses", nutation_deg=left, pulses=spacecraft.limits.max_pulses
+            )
     if not certain and not possible:
         return note("remains-scheme", nutation_deg=left)
     sure, unsure = (", ".join(keys) or "none" for keys in (certain, possible))
@@ -245,19 +254,21 @@ def verdict_notes(verdict: Verdict, plan: Plan, *, looped: bool = False) -> Iter
     """Notes beside the verdict on a plan; ``looped``: it is that of a closed loop, which goes on
     firing.
     """
-    body = plan.spacecraft
+    spacecraft = plan.spacecraft
     flight = verdict.flight or plan.flight
     final = flight.residual
     if verdict.unshown:
         yield note(
-            "probability-without-tolerances" if body.dispersions is None else "undecided-cases"
+            "probability-without-tolerances"
+            if spacecraft.dispersions is None
+            else "undecided-cases"
         )
-    if verdict.cases is None and requirements.judged(body):
-        yield note("no-tolerances" if body.dispersions is None else "tolerances-not-checked")
+    if verdict.cases is None and requirements.judged(spacecraft):
+        yield note("no-tolerances" if spacecraft.dispersions is None else "tolerances-not-checked")
     if (
-        body.goal.spin is None
-        and body.requirement is not None
-        and body.requirement.spin is not None
+        spacecraft.goal.spin is None
+        and spacecraft.requirement is not None
+        and spacecraft.requirement.spin is not None
     ):
         yield note("spin-required-without-goal")
     if verdict.empties:
@@ -269,15 +280,15 @@ def verdict_notes(verdict: Verdict, plan: Plan, *, looped: bool = False) -> Iter
     if looped:
         return
     if verdict.status.barred:
-        single = body.commands is not None and not plan.pulses.blocks
+        single = spacecraft.commands is not None and not plan.pulses.blocks
         yield note("not-commandable" if single else "breaks-limits", scheme=plan.scheme)
-    now = body.nutation
-    limit = _limit_of(body, Part.NUTATION)
-    if requirements.only_nutation(body):
+    now = spacecraft.nutation
+    limit = _limit_of(spacecraft, Part.NUTATION)
+    if requirements.only_nutation(spacecraft):
         idle, damped = (
-            requirements.to_required(body, now, growing=growing) for growing in (True, False)
+            requirements.to_required(spacecraft, now, growing=growing) for growing in (True, False)
         )
-        if damped is not None and damped < body.horizon:
+        if damped is not None and damped < spacecraft.horizon:
             yield note(
                 "met-without-pulse-from",
                 from_s=damped,
@@ -292,7 +303,7 @@ def verdict_notes(verdict: Verdict, plan: Plan, *, looped: bool = False) -> Iter
                 limit_deg=limit,
             )
     if len(plan.pulses):
-        if verdict.required and requirements.unaided(body):
+        if verdict.required and requirements.unaided(spacecraft):
             yield note("pulses-unneeded", scheme=plan.scheme)
         # Nutation that grows keeps the requirement for a time after the last pulse.
         values = (line.value for line in verdict.lines if line.bound.part is Part.NUTATION)
@@ -314,7 +325,7 @@ def verdict_notes(verdict: Verdict, plan: Plan, *, looped: bool = False) -> Iter
                     share=f"{100.0 * verdict.cases.probability:.10g}",
                     **figures_,
                 )
-    limited = body.goal.axis is not None or _limit_of(body, Part.SHIFT) is not None
+    limited = spacecraft.goal.axis is not None or _limit_of(spacecraft, Part.SHIFT) is not None
     if not limited and final.momentum_shift > TURNED:
         yield note(
             "momentum-shift",
@@ -322,7 +333,7 @@ def verdict_notes(verdict: Verdict, plan: Plan, *, looped: bool = False) -> Iter
             momentum_shift_deg=math.degrees(final.momentum_shift),
         )
     yield from _spin_change(plan, flight)
-    if body.loop is not None:
+    if spacecraft.loop is not None:
         yield note("loop-not-judged")
 
 
@@ -343,26 +354,26 @@ def _spin_change(plan: Plan, flight: Flight) -> Iterator[Note]:
     """Change of the spin that nobody asked for, and its causes: axial impulses of channels, then
     what else acts.
     """
-    body = plan.spacecraft
-    before, after = RPM * body.spin, RPM * flight.final.spin
+    spacecraft = plan.spacecraft
+    before, after = RPM * spacecraft.spin, RPM * flight.final.spin
     # One of five digits has to change.
     resolution = 10.0 ** (math.floor(math.log10(max(abs(before), abs(after), 1e-9))) - 4)
-    if body.goal.spin is not None or abs(after - before) <= resolution:
+    if spacecraft.goal.spin is not None or abs(after - before) <= resolution:
         return
     pulses = flight.schedule
     causes = list[str]()
     explained = 0.0
     for name in dict.fromkeys(pulse.channel for pulse in pulses):
         impulse = math.fsum(float(pulse.impulse[2]) for pulse in pulses if pulse.channel == name)
-        explained += RPM * impulse / body.inertia.C
+        explained += RPM * impulse / spacecraft.inertia.C
         if impulse:
-            causes.append(f"{name} {RPM * impulse / body.inertia.C:+.3g} rpm")
+            causes.append(f"{name} {RPM * impulse / spacecraft.inertia.C:+.3g} rpm")
     if abs(after - before - explained) > resolution:
         others = {
-            "dissipation": body.growth != 0.0,
-            "disturbances": bool(body.disturbances),
-            LIGHTER: LIGHTER in body.thrust_laws,
-            "I1 ≠ I2": not body.inertia.symmetric,
+            "dissipation": spacecraft.growth != 0.0,
+            "disturbances": bool(spacecraft.disturbances),
+            LIGHTER: LIGHTER in spacecraft.thrust_laws,
+            "I1 ≠ I2": not spacecraft.inertia.symmetric,
         }
         causes += [cause for cause, acts in others.items() if acts]
     yield note(
@@ -388,8 +399,10 @@ def ideal_code(plan: Plan) -> str:
     )
 
 
-def _limit_of(body: Spacecraft, part: Part) -> float | None:
-    most = next((bound.limit for bound in requirements.required(body) if bound.part is part), None)
+def _limit_of(spacecraft: Spacecraft, part: Part) -> float | None:
+    most = next(
+        (bound.limit for bound in requirements.required(spacecraft) if bound.part is part), None
+    )
     return None if most is None else math.degrees(most)
 
 
@@ -465,9 +478,9 @@ def _missed(chosen: Plan, compared: Comparison, *, tabulated: bool) -> Iterator[
             part=bound.label,
             limit_deg=math.degrees(bound.limit),
         )
-    body = chosen.spacecraft
+    spacecraft = chosen.spacecraft
     parts = {bound.part for bound in chosen.shortfalls}
-    if body.disturbances and not chosen.options.with_disturbances:
+    if spacecraft.disturbances and not chosen.options.with_disturbances:
         aware = compared.with_disturbances
         if aware is None:
             yield note("unplanned-disturbances")
@@ -478,15 +491,16 @@ def _missed(chosen: Plan, compared: Comparison, *, tabulated: bool) -> Iterator[
     if Part.NUTATION in parts and (cause := remaining(chosen)).code != "remains-unplanned":
         reached = [limit for limits in hindrances(chosen) for limit in limits]
         short = (
-            chosen.pulses.total_impulse < body.least_impulse and cause.code != "remains-max-pulses"
+            chosen.pulses.total_impulse < spacecraft.least_impulse
+            and cause.code != "remains-max-pulses"
         )
         if reached and short:
             yield note(
                 "pulses-at-limits",
                 given_Nms=chosen.pulses.total_impulse,
-                needed_Nms=body.least_impulse,
+                needed_Nms=spacecraft.least_impulse,
                 end_s=chosen.pulses.end,
-                horizon_s=body.horizon,
+                horizon_s=spacecraft.horizon,
                 limits=", ".join(reached),
             )
         else:
@@ -495,10 +509,10 @@ def _missed(chosen: Plan, compared: Comparison, *, tabulated: bool) -> Iterator[
         yield note(
             "scheme-does-not-turn", scheme=chosen.scheme, schemes=", ".join(catalogue.POINTING)
         )
-    if parts != {Part.SPIN} and any(channel.damps for channel in body.channels):
+    if parts != {Part.SPIN} and any(channel.damps for channel in spacecraft.channels):
         if OPTIMAL.name not in {plan.scheme for plan in compared.plans}:
             yield note("optimal-not-compared")
-        elif requirements.required(body):
+        elif requirements.required(spacecraft):
             yield note("try-trade")
 
 
@@ -551,17 +565,23 @@ LEAST_CODES = {"impulse": "least-impulse", "time": "least-time", "pulses": "leas
 
 def reasons(compared: Comparison) -> Iterator[Note]:
     """Reason for the recommended plan, or for none."""
-    recommendation, body = compared.recommendation, compared.spacecraft
+    recommendation, spacecraft = compared.recommendation, compared.spacecraft
     ground, count = recommendation.ground, recommendation.count
     if recommendation.plan is None:
         if any(plan.feasible for plan in compared.plans):
             yield note("no-blocks")
             return
-        waiting = requirements.only_nutation(body)
-        damped = requirements.to_required(body, body.nutation, growing=False) if waiting else None
+        waiting = requirements.only_nutation(spacecraft)
+        damped = (
+            requirements.to_required(spacecraft, spacecraft.nutation, growing=False)
+            if waiting
+            else None
+        )
         yield note("none-feasible") if damped is None else note("none-needed-from", from_s=damped)
-        able = any(channel.damps for channel in body.channels)
-        able = able and (body.goal.spin is None or any(channel.axial for channel in body.channels))
+        able = any(channel.damps for channel in spacecraft.channels)
+        able = able and (
+            spacecraft.goal.spin is None or any(channel.axial for channel in spacecraft.channels)
+        )
         if able and OPTIMAL.name not in {plan.scheme for plan in compared.plans}:
             yield note("optimal-not-tried")
         return
@@ -577,7 +597,7 @@ def reasons(compared: Comparison) -> Iterator[Note]:
         yield note("nearest" if ground is Ground.NEAREST else "least-left", count=count)
     elif recommendation.plan.kept is False:
         yield note("cheapest-at-end", count=count)
-    elif not requirements.required(body):
+    elif not requirements.required(spacecraft):
         yield note("damps-at-least", count=count)
     else:
         usual = "least-propellant" if recommendation.by_propellant else "least-impulse"

@@ -33,6 +33,7 @@ from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import Breach, breaches, keeps_limits, misfits
 from nutdamp.spacecraft.model import Keep, Spacecraft, Vector, required_share
 from nutdamp.spacecraft.requirements import Bound, Held, Left
+from nutdamp.spacecraft.roles import as_known, with_limits
 from nutdamp.spacecraft.schedule import Schedule
 
 if TYPE_CHECKING:
@@ -68,20 +69,20 @@ def schedules(
     can fly.
     """
     as_it_is = not spacecraft.thrust_laws or catalogue.SCHEMES[scheme].on_true_body
-    body = spacecraft if as_it_is else valve_commands.plain(spacecraft)
+    flown_by = spacecraft if as_it_is else valve_commands.without_valves(spacecraft)
     for route in routes(spacecraft):
         if work.exhausted():
             return
         try:
-            legs = Legs(body)
-            goal = body.goal
+            legs = Legs(flown_by)
+            goal = spacecraft.goal
             for number, point in enumerate(route, start=1):  # each leg has its share of the horizon
-                here = legs.here
-                to_go = _length((here.momentum, point, *route[number:]))
-                share = _length((here.momentum, point)) / to_go if to_go > 0.0 else 1.0
+                at_leg = legs.at_leg
+                to_go = _length((at_leg.momentum, point, *route[number:]))
+                share = _length((at_leg.momentum, point)) / to_go if to_go > 0.0 else 1.0
                 spin = goal.spin if number == len(route) else None
-                limits = replace(here.limits, horizon=share * here.horizon)
-                leg = replace(here, goal=replace(goal, axis=point, spin=spin), limits=limits)
+                limits = replace(at_leg.limits, horizon=share * at_leg.horizon)
+                leg = replace(at_leg, goal=replace(goal, axis=point, spin=spin), limits=limits)
                 legs.fire(planner.schedule(scheme, leg, options))
             names = ", ".join(keep.name for keep in spacecraft.keep)
             whole = legs.schedule(note("goes-round", points=len(route) - 1, directions=names))
@@ -270,8 +271,8 @@ class Plan(results.Data, results.Tabled):
         that is none.
         """
         time = self.carried_at if at is None else units.end_of_flight(at)
-        body: Spacecraft = results.view(feasible(self), "carried", time)
-        return body
+        spacecraft: Spacecraft = results.view(feasible(self), "carried", time)
+        return spacecraft
 
     def reaching(self, time: float) -> Flight:
         """Flight through the real pulse widths as far as ``time`` s at least."""
@@ -308,12 +309,12 @@ class Plan(results.Data, results.Tabled):
 
         Pulses and blocks read from a file have to keep its limits and commands too.
         """
-        body, pulses = self.spacecraft, self.pulses
+        spacecraft, pulses = self.spacecraft, self.pulses
         if self.from_file:
-            off = any(misfits(body.commands, block) for block in pulses.blocks)
-            if off or not keeps_limits(body, pulses):
+            off = any(misfits(spacecraft.commands, block) for block in pulses.blocks)
+            if off or not keeps_limits(spacecraft, pulses):
                 return False
-        return body.commands is None or bool(pulses.blocks) or not pulses.pulses
+        return spacecraft.commands is None or bool(pulses.blocks) or not pulses.pulses
 
     @property
     def held(self) -> tuple[Held, ...]:
@@ -418,7 +419,7 @@ def plan(spacecraft: Spacecraft, scheme: str, options: planner.Choice = None) ->
     """Plan one scheme and judge it. Raises KeyError for a name not in `schemes.NAMES`."""
     if scheme not in catalogue.NAMES:
         raise KeyError(scheme)
-    spun = reaches_spin(spacecraft)
+    spun = requirements.reaches_spin(spacecraft)
     if spacecraft.nutation < NO_NUTATION and spacecraft.to_turn < NO_NUTATION and spun:
         return Plan(spacecraft, scheme, Schedule(notes=(note("no-nutation"),)))
     if not spun and scheme in catalogue.PLANNED and scheme not in catalogue.SPINNING:
@@ -429,27 +430,21 @@ def plan(spacecraft: Spacecraft, scheme: str, options: planner.Choice = None) ->
     if forbidden is not None:
         return Plan(spacecraft, scheme, None, astray=forbidden)
     chosen = planner.settled(catalogue.SCHEMES[scheme], options, spacecraft)
+    known = as_known(spacecraft, disturbed=chosen.with_disturbances)
     with work.budget(scheme, work.SCHEME) as spent:
         try:
-            body = (
-                spacecraft if catalogue.SCHEMES[scheme].on_true_body else known(spacecraft, chosen)
-            )
-            result = judged(spacecraft, scheme, planner.schedule(scheme, body, chosen), chosen)
+            planned_for = spacecraft if catalogue.SCHEMES[scheme].on_true_body else known
+            schedule = planner.schedule(scheme, planned_for, chosen)
+            result = judged(spacecraft, scheme, schedule, chosen)
         except Infeasible as reason:
             result = Plan(spacecraft, scheme, None, str(reason))
         if result.astray is not None and (
             catalogue.SCHEMES[scheme].points or catalogue.SCHEMES[scheme].reads_commands
         ):
-            rerouted = schedules(known(spacecraft, chosen), scheme, chosen)
+            rerouted = schedules(known, scheme, chosen)
             others = (judged(spacecraft, scheme, schedule, chosen) for schedule in rerouted)
             result = next((other for other in others if other.feasible), result)
     return replace(result, cut=True) if spent.exhausted else result
-
-
-def reaches_spin(spacecraft: Spacecraft) -> bool:
-    """True if the spin is that of the goal from the beginning."""
-    goal = spacecraft.goal.spin
-    return goal is None or requirements.spins_at(spacecraft, goal)
 
 
 def spinning(spacecraft: Spacecraft) -> tuple[str, ...]:
@@ -470,22 +465,13 @@ def alternatives(
     """
     chosen = planner.settled(catalogue.SCHEMES[scheme], options, spacecraft)
     try:
-        alternatives = planner.alternatives(scheme, known(spacecraft, chosen), chosen)
+        alternatives = planner.alternatives(
+            scheme, as_known(spacecraft, disturbed=chosen.with_disturbances), chosen
+        )
         plans = [judged(spacecraft, scheme, schedule, chosen) for schedule in alternatives]
     except Infeasible:
         return ()
     return tuple(plan for plan in plans if plan.feasible)
-
-
-def known(spacecraft: Spacecraft, options: catalogue.SchemeOptions) -> Spacecraft:
-    """Spacecraft as schemes know it: with disturbances if requested, no goal of a spin that is
-    there and stays.
-    """
-    body = spacecraft if options.with_disturbances else replace(spacecraft, disturbances=())
-    axial = any(channel.axial for channel in body.channels)
-    if body.goal.spin is not None and reaches_spin(body) and not body.spin_drift and not axial:
-        return replace(body, goal=replace(body.goal, spin=None))
-    return body
 
 
 def judged(
@@ -534,14 +520,14 @@ def judge(
     ``nominal``: cases are left out on request; ``timed``: pulses may be commanded one by one;
     ``seen``: the flight to be judged, default that of the plan.
     """
-    body = plan.spacecraft
+    spacecraft = plan.spacecraft
     if not plan.feasible:
-        return no_plan(body, plan.scheme, plan.why or "")
+        return no_plan(spacecraft, plan.scheme, plan.why or "")
     flight, observed, held = plan.flight, plan.aspects, plan.held
     if seen is not None:
         flight = seen
         observed = end_state.aspects(seen, seen.until)
-        held = requirements.held(body, left_on_the_way(flight, observed))
+        held = requirements.held(spacecraft, left_on_the_way(flight, observed))
     return judge_schedule(
         flight,
         observed,
@@ -592,11 +578,13 @@ def unrounded(plan_: Plan) -> Schedule | None:
     """Schedule with commands of any resolution; None without a tick, such a schedule, or a scheme
     that planned it.
     """
-    body = plan_.spacecraft
-    if body.limits.tick is None or plan_.from_file or plan_.scheme not in catalogue.SCHEMES:
+    spacecraft = plan_.spacecraft
+    if spacecraft.limits.tick is None or plan_.from_file or plan_.scheme not in catalogue.SCHEMES:
         return None
     return plan(
-        replace(body, limits=replace(body.limits, tick=None)), plan_.scheme, plan_.options
+        with_limits(spacecraft, tick=None),
+        plan_.scheme,
+        plan_.options,
     ).schedule
 
 

@@ -43,6 +43,7 @@ from nutdamp.schemes.catalogue import LEAST, OPTIMAL, SCHEMES, OptimalOptions, O
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import keeps_limits
 from nutdamp.spacecraft.model import Spacecraft, required_share
+from nutdamp.spacecraft.roles import with_limits
 
 # later starts that are tried, in nutation periods as seen in the body (inertial ones for a sphere)
 LATER = (0.25, 0.5, 0.75, 1.0, 2.0)
@@ -159,24 +160,24 @@ class Variation(NamedTuple):
 
 def variations_of(comparison: Comparison, options: Options | None = None) -> list[Variation]:
     """Variations of `compare`: the plans compared, and variants of each."""
-    body = comparison.spacecraft
+    spacecraft = comparison.spacecraft
     options = options or Options()
     tried = list[Variation]()
-    timed = body.commands is None or not comparison.only_commanded
+    timed = spacecraft.commands is None or not comparison.only_commanded
     for base in (plan for plan in comparison.plans if plan.failure is None):
         if not (timed or SCHEMES[base.scheme].reads_commands or not SCHEMES[base.scheme].fires):
             continue  # none of its variants may be chosen
         tried.append(Variation(partial(list, [("as planned", base)]), VariationKind.PLANNED))
-        tried.append(Variation(partial(_alignments, body, base.scheme, options)))
+        tried.append(Variation(partial(_alignments, spacecraft, base.scheme, options)))
         tried += [
             Variation(partial(_planned, *other, base.scheme, options))
-            for other in _others(body, base)
+            for other in _others(spacecraft, base)
         ]
         if base.scheme == OPTIMAL.name:
             tried.append(
-                Variation(partial(chance_plan.plans, body, options), VariationKind.MARGINS)
+                Variation(partial(chance_plan.plans, spacecraft, options), VariationKind.MARGINS)
             )
-            tried.append(Variation(partial(_early, body, options), VariationKind.EARLY))
+            tried.append(Variation(partial(_early, spacecraft, options), VariationKind.EARLY))
     return sorted(tried, key=attrgetter("kind"))
 
 
@@ -192,7 +193,7 @@ def compare(
     ``watch`` is called with how many variations are done. Raises BadRequest for a spacecraft
     without dispersions.
     """
-    body = comparison.spacecraft
+    spacecraft = comparison.spacecraft
     entries: dict[object, FlownPlan] = {}
     # No early end costs less than the plan of the whole horizon that leaves as little.
     least = min(
@@ -210,9 +211,15 @@ def compare(
                 kind = _kind(plan)
                 # Planned for other limits or channels, perhaps, but always flown by this
                 # spacecraft.
-                if not plan.feasible or kind in entries or not keeps_limits(body, plan.pulses):
+                if (
+                    not plan.feasible
+                    or kind in entries
+                    or not keeps_limits(spacecraft, plan.pulses)
+                ):
                     continue
-                own = plan if plan.spacecraft is body else replace(plan, spacecraft=body)
+                own = (
+                    plan if plan.spacecraft is spacecraft else replace(plan, spacecraft=spacecraft)
+                )
                 if comparison.only_commanded and not own.commandable:
                     continue
                 planned = True
@@ -246,10 +253,12 @@ def compare(
     chosen, ground, equals = _nearest(
         list(entries.values()), comparison.recommended, comparison.least
     )
-    if chosen is None or not requirements.judged(body):
+    if chosen is None or not requirements.judged(spacecraft):
         return _result(comparison, entries, chosen, ground, equals=equals)
     needed = (
-        None if chosen.cases.enough else tightening(chosen.plan, required_share(body.requirement))
+        None
+        if chosen.cases.enough
+        else tightening(chosen.plan, required_share(spacecraft.requirement))
     )
     return _result(comparison, entries, chosen, ground, _fresh(chosen), needed, equals)
 
@@ -376,53 +385,55 @@ def _kind(plan: Plan) -> object:
     )
 
 
-def _alignments(body: Spacecraft, scheme: str, options: Options) -> Iterator[tuple[str, Plan]]:
+def _alignments(
+    spacecraft: Spacecraft, scheme: str, options: Options
+) -> Iterator[tuple[str, Plan]]:
     """Plans by other alignments of a scheme, named by their channels."""
-    for plan in planning.alternatives(body, scheme, options):
+    for plan in planning.alternatives(spacecraft, scheme, options):
         yield " then ".join(dict.fromkeys(pulse.channel for pulse in plan.pulses)), plan
 
 
-def _others(body: Spacecraft, base: Plan) -> Iterator[tuple[str, Spacecraft]]:
+def _others(spacecraft: Spacecraft, base: Plan) -> Iterator[tuple[str, Spacecraft]]:
     """Spacecraft for which the scheme plans differently: later, or without one of its channels."""
     for periods in LATER:  # of the nutation as seen in the body, inertial ones for a sphere
-        earliest = body.limits.earliest + periods * body.nutation_period
-        if earliest < body.horizon:
+        earliest = spacecraft.limits.earliest + periods * spacecraft.nutation_period
+        if earliest < spacecraft.horizon:
             yield (
                 f"from {earliest:.4g} s on",
-                replace(body, limits=replace(body.limits, earliest=earliest)),
+                with_limits(spacecraft, earliest=earliest),
             )
     for name in dict.fromkeys(pulse.channel for pulse in base.pulses):
-        left = tuple(channel for channel in body.channels if channel.name != name)
-        if left and len(left) < len(body.channels):
-            yield f"without {name}", replace(body, channels=left)
+        left = tuple(channel for channel in spacecraft.channels if channel.name != name)
+        if left and len(left) < len(spacecraft.channels):
+            yield f"without {name}", replace(spacecraft, channels=left)
 
 
-def _early(body: Spacecraft, options: Options) -> Iterator[tuple[str, Plan]]:
+def _early(spacecraft: Spacecraft, options: Options) -> Iterator[tuple[str, Plan]]:
     """Earliest end of `optimal`, and its cheapest plans that end little later; the same with H kept
     where it is free.
 
     Free, the pulses on either side of a long axial one damp what the moments of inertia decide;
     spin-up.yaml: 73 % of its cases comply, and 99.98 % with H kept.
     """
-    settled = planner.settled(SCHEMES[OPTIMAL.name], options, body)
+    settled = planner.settled(SCHEMES[OPTIMAL.name], options, spacecraft)
     free = isinstance(settled, OptimalOptions) and settled.free_axis is True
     for label, choice in (("", {}), (", H kept", {"free_axis": False, "shift": 0.0}))[: 1 + free]:
         chosen = Options(**{**options.chosen, **choice})
-        first = attempt(body, OPTIMAL.name, Options(**{**chosen.chosen, "least": "time"}))
+        first = attempt(spacecraft, OPTIMAL.name, Options(**{**chosen.chosen, "least": "time"}))
         if not first.feasible:
             continue
         yield f"earliest end{label}", first
         for times in WITHIN:
             horizon = times * first.end
-            if horizon < body.horizon:
-                soon = replace(body, limits=replace(body.limits, horizon=horizon))
+            if horizon < spacecraft.horizon:
+                soon = with_limits(spacecraft, horizon=horizon)
                 yield f"by {horizon:.4g} s{label}", attempt(soon, OPTIMAL.name, chosen)
 
 
 def _planned(
-    variant: str, body: Spacecraft, scheme: str, options: Options
+    variant: str, spacecraft: Spacecraft, scheme: str, options: Options
 ) -> list[tuple[str, Plan]]:
-    return [(variant, attempt(body, scheme, options))]
+    return [(variant, attempt(spacecraft, scheme, options))]
 
 
 def robust_reasons(robust: RobustComparison) -> Iterator[Note]:

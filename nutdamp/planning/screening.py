@@ -94,13 +94,13 @@ class FlownPlan:
         """Residual, rad, that the share required keeps: nutation, or the distance from a target
         axis if larger.
         """
-        body = self.plan.spacecraft
+        spacecraft = self.plan.spacecraft
         levels = {bound.part: level for bound, level in self.cases.levels.items()}
         nutation, aim = (
-            levels.get(part) for part in (requirements.Part.NUTATION, requirements.aim(body))
+            levels.get(part) for part in (requirements.Part.NUTATION, requirements.aim(spacecraft))
         )
         return float(
-            requirements.missed(body, math.inf if nutation is None else nutation, aim or 0.0)
+            requirements.missed(spacecraft, math.inf if nutation is None else nutation, aim or 0.0)
         )
 
     def further(self, samples: int | None) -> None:
@@ -215,10 +215,10 @@ class Checkpoints:
         """Nutation, rad, after the first ``counts`` pulses, of the cases that comply after the last
         one.
         """
-        body, schedule = self.study.model.spacecraft, self.study.model.schedule
+        spacecraft, schedule = self.study.model.spacecraft, self.study.model.schedule
         well = requirements.complies(self._flown(self.study, self._draws)[1])
         for count in counts:
-            part = study_of(body, first_pulses(schedule, count), seed=self.study.seed)
+            part = study_of(spacecraft, first_pulses(schedule, count), seed=self.study.seed)
             angles = np.broadcast_to(self._flown(part, self._draws)[0][0], CASES)
             yield (
                 Range(float(angles[well].min()), float(angles[well].max()))

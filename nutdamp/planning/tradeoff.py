@@ -18,7 +18,6 @@ import numpy as np
 
 from nutdamp.common import results, work
 from nutdamp.errors import BadRequest, Infeasible
-from nutdamp.planning import plan as planning
 from nutdamp.planning.decision import by_propellant, compare, usual
 from nutdamp.planning.notes import infeasibility
 from nutdamp.planning.plan import Plan, judge, plan
@@ -34,6 +33,7 @@ from nutdamp.schemes.sequential import model_of
 from nutdamp.spacecraft.constraints import free_windows
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.requirements import SAME_COST, Part
+from nutdamp.spacecraft.roles import as_known, with_limits
 from nutdamp.spacecraft.schedule import Bounds
 
 SAME = 1e-9  # relative difference up to which a bound is that of the plan
@@ -100,8 +100,8 @@ class Certificate:
 
     def moments(self) -> list[Vector]:
         """Even moments (n,) s in each window, many in a turn unless there are too many turns."""
-        body, spans = self.spacecraft, self.windows
-        turns = body.fastest / (2.0 * math.pi)
+        spacecraft, spans = self.spacecraft, self.windows
+        turns = spacecraft.fastest / (2.0 * math.pi)
         total = sum(end - begin for begin, end in spans)
         pace = min(LOOKS * turns, MOST_LOOKS / max(total, 1e-9))
         return [
@@ -120,14 +120,14 @@ def certificate(plan: Plan) -> Certificate:
             f"{plan.refusal or 'there is no such plan'}"
         )
     chosen = planner.settled(OPTIMAL, plan.options, plan.spacecraft)
-    body = planning.known(plan.spacecraft, chosen)
-    if body.thrust_laws:
-        chosen = valve_commands.options(body, chosen)
-        body = valve_commands.plain(body)
-    body = model_of(body, three_moments=True).body
+    modelled = as_known(plan.spacecraft, disturbed=chosen.with_disturbances)
+    if modelled.thrust_laws:
+        chosen = valve_commands.options(modelled, chosen)
+        modelled = valve_commands.without_valves(modelled)
+    modelled = model_of(modelled, three_moments=True).symmetric
     assert isinstance(chosen, OptimalOptions)
     try:
-        problem = Problem(replace(body, limits=replace(body.limits, horizon=known.within)), chosen)
+        problem = Problem(with_limits(modelled, horizon=known.within), chosen)
         program = problem.program()
         solution = program.solve()
     except Infeasible as reason:
@@ -238,13 +238,13 @@ def fronts(
     entries: list[tuple[float, Plan, float]] = []
     why: dict[float, str] = {}
 
-    def search(body: Spacecraft, chosen: OptimalOptions) -> Plan:
+    def search(spacecraft: Spacecraft, chosen: OptimalOptions) -> Plan:
         # The fastest schedule, from which on the others lie, may cost what a scheme may; of what
         # is left, all searches to come have equal shares.
         nonlocal done
         share = 1 if chosen.least == "time" else count * len(ordered) - done
         with work.budget("a point", work.left() / share):
-            planned = plan(body, OPTIMAL.name, chosen)
+            planned = plan(spacecraft, OPTIMAL.name, chosen)
         done += 1
         work.reach(done)
         return planned
@@ -330,8 +330,7 @@ def _sooner(
     last = max(whole.pulses.end, fastest.pulses.end)
     for share in np.linspace(0.0, 1.0, count)[1:-1]:
         horizon = begin + (end - begin) * ((last - begin) / (end - begin)) ** float(share)
-        body = replace(spacecraft, limits=replace(spacecraft.limits, horizon=horizon))
-        planned = search(body, options)
+        planned = search(with_limits(spacecraft, horizon=horizon), options)
         if planned.schedule is not None and planned.schedule.bounds is not None:
             yield planned, horizon
 

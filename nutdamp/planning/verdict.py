@@ -323,24 +323,33 @@ def judge_schedule(
     """Judgement of a ``schedule`` by one flight, and by dispersed ``cases``; ``sendable``: it can
     be commanded.
     """
-    body = flight.spacecraft
-    status, lines = judged_bounds(body, held, cases, nominal=nominal)
+    spacecraft = flight.spacecraft
+    status, lines = judged_bounds(spacecraft, held, cases, nominal=nominal)
     if status in (Status.FLY, Status.NOT_SHOWN) and not sendable:
         status = Status.NOT_COMMANDABLE
     elif status is Status.FLY and not schedule.pulses:
         status = Status.NO_PULSE
     return Verdict(
-        status, body, scheme, schedule, lines, cases, results, flight, observed, nominal=nominal
+        status,
+        spacecraft,
+        scheme,
+        schedule,
+        lines,
+        cases,
+        results,
+        flight,
+        observed,
+        nominal=nominal,
     )
 
 
-def no_plan(body: Spacecraft, scheme: str = "", why: str = "") -> Verdict:
+def no_plan(spacecraft: Spacecraft, scheme: str = "", why: str = "") -> Verdict:
     """Verdict where there is no schedule."""
-    return Verdict(Status.NO_PLAN, body, scheme, why=why)
+    return Verdict(Status.NO_PLAN, spacecraft, scheme, why=why)
 
 
 def judge_loop(
-    body: Spacecraft,
+    spacecraft: Spacecraft,
     held: Sequence[Held],
     cases: Cases | None = None,
     results: JudgedCases | None = None,
@@ -353,12 +362,23 @@ def judge_loop(
     """Judgement of a closed loop by its bounds, in ``cases`` or in one ``flight``; ``lost``: it
     never falls quiet.
     """
-    status, lines = judged_bounds(body, held, cases, nominal=body.dispersions is not None)
+    status, lines = judged_bounds(
+        spacecraft, held, cases, nominal=spacecraft.dispersions is not None
+    )
     if not feasible or lost:
         status = status_of(met=False, feasible=feasible)
     schedule = Schedule() if flight is None else flight.schedule
     return Verdict(
-        status, body, LOOP, schedule, lines, cases, results, flight, observed, nominal=cases is None
+        status,
+        spacecraft,
+        LOOP,
+        schedule,
+        lines,
+        cases,
+        results,
+        flight,
+        observed,
+        nominal=cases is None,
     )
 
 
@@ -372,16 +392,16 @@ def status_of(*, met: bool | None, feasible: bool) -> Status:
 
 
 def judged_bounds(
-    body: Spacecraft, held: Sequence[Held], cases: Cases | None, *, nominal: bool = False
+    spacecraft: Spacecraft, held: Sequence[Held], cases: Cases | None, *, nominal: bool = False
 ) -> tuple[Status, tuple[Line, ...]]:
     """Status by the bounds of ``requirements`` alone: nominal values, and cases where they decide;
     and their lines.
     """
-    lines = lines_of(held, cases, required_share(body.requirement))
+    lines = lines_of(held, cases, required_share(spacecraft.requirement))
     met = all(bool(line.bound.met(line.nominal)) for line in lines if line.bound.required)
-    probable = body.requirement is not None and body.requirement.probability is not None
-    untold = probable if body.dispersions is None else not nominal
-    unknown = requirements.judged(body) and cases is None and untold
+    probable = spacecraft.requirement is not None and spacecraft.requirement.probability is not None
+    untold = probable if spacecraft.dispersions is None else not nominal
+    unknown = requirements.judged(spacecraft) and cases is None and untold
     enough = True if cases is None else cases.enough
     if not met or enough is False:
         return Status.NOT_ENOUGH, lines

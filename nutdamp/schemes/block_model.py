@@ -66,11 +66,11 @@ def sun_pulses(flown: Flight, until: float) -> Vector:
     """Times (n,) s up to ``until`` s of the Sun pulses of a flight; raises Infeasible where the
     sensor sees none.
     """
-    body = flown.spacecraft
-    sensor = body.sun_sensor
-    turn = spin_turn(body) * min(1.0, abs(body.spin / flown.settled.spin))
+    spacecraft = flown.spacecraft
+    sensor = spacecraft.sun_sensor
+    turn = spin_turn(spacecraft) * min(1.0, abs(spacecraft.spin / flown.settled.spin))
     assert sensor is not None
-    assert body.sun is not None
+    assert spacecraft.sun is not None
     times = np.linspace(0.0, until, max(int(SAMPLES * until / turn), 2) + 1)
     # The Sun goes round in the body against the spin: what is left to the sensor's azimuth falls to
     # zero.
@@ -85,7 +85,7 @@ def sun_pulses(flown: Flight, until: float) -> Vector:
         if not len(times_of) or np.abs(off).max() < 2.0 * math.pi * EXACT:
             break
     times_of = times_of[(times_of >= 0.0) & (times_of <= until)]
-    angles = attitude.angle_between(flown.axis(times_of), body.sun)
+    angles = attitude.angle_between(flown.axis(times_of), spacecraft.sun)
     seen = np.array([sensor.sees(angle) for angle in angles.tolist()], dtype=bool)
     if len(times_of) and not seen.any():
         raise _blind(float(times_of[0]), float(angles[0]))
@@ -105,14 +105,16 @@ def _blind(time: float, angle: float) -> Infeasible:
 
 def to_sun_pulse(flown: Flight, times: Vector) -> Vector:
     """Angle (n,) in [0, 2π) by which the body has to turn until the Sun passes the sensor."""
-    body = flown.spacecraft
-    assert body.sun_sensor is not None
-    assert body.sun is not None
+    spacecraft = flown.spacecraft
+    assert spacecraft.sun_sensor is not None
+    assert spacecraft.sun is not None
     _, quaternions = flown.motion(times)
-    seen = attitude.rotate(attitude.conjugate(quaternions), body.sun)
+    seen = attitude.rotate(attitude.conjugate(quaternions), spacecraft.sun)
     azimuth = np.arctan2(seen[:, 1], seen[:, 0])
     return np.asarray(
-        math.copysign(1.0, body.spin) * (azimuth - body.sun_sensor.azimuth) % (2.0 * math.pi)
+        math.copysign(1.0, spacecraft.spin)
+        * (azimuth - spacecraft.sun_sensor.azimuth)
+        % (2.0 * math.pi)
     )
 
 
@@ -391,7 +393,7 @@ class BlockModel:
             raise Infeasible(
                 "blocks are fired from the Sun pulse: the file needs sun and sun_sensor"
             )
-        self.body = spacecraft
+        self.spacecraft = spacecraft
         self.inertia = spacecraft.inertia
         self.sensor = sensor
         self.sense = math.copysign(1.0, spacecraft.spin)
@@ -451,7 +453,7 @@ class BlockModel:
         if key not in self._tables:
             if sum(full.size for full, _ in self._tables.values()) > KEPT:
                 self._tables.clear()
-            self._tables[key] = Supply(self.body, Counter({channel.name: fired}), used).train(
+            self._tables[key] = Supply(self.spacecraft, Counter({channel.name: fired}), used).train(
                 channel, on_times, most
             )
         at = index.reshape(np.shape(width)), np.asarray(count) - 1
@@ -468,7 +470,7 @@ class BlockModel:
         total = precession.phasor_sum(trial.count, -step if back else step)
         cold = self._cold(state, channel, trial, step)
         mean = full / (trial.count - np.real(self._cold(state, channel, trial, 0.0)))
-        if back and self.body.cold is not None:
+        if back and self.spacecraft.cold is not None:
             cold = cold * np.exp(-1j * (trial.count - 1) * step)
         return acts(channel, trial.width).on_time * mean * (total - cold)
 
@@ -476,7 +478,7 @@ class BlockModel:
         """Deficit of the sum of e^{ik step} by cold pulses: a geometric series, as the factor of
         the k-th decays.
         """
-        cold = self.body.cold
+        cold = self.spacecraft.cold
         if cold is None:
             return 0.0
         ratio = np.exp(-1.0 / cold.pulses + 1j * step)
@@ -491,7 +493,7 @@ class BlockModel:
         At the centroid of a pulse the Sun has turned in the body by -ω3 (delay + centroid) from the
         sensor.
         """
-        turned = self.body.spin * (delay + acts(channel, width).centroid)
+        turned = self.spacecraft.spin * (delay + acts(channel, width).centroid)
         from_sun = cmath.phase(channel.transverse) - self.sensor.azimuth + turned
         return self.sense * (from_sun - math.pi)
 
@@ -500,8 +502,8 @@ class BlockModel:
         azimuth = (
             self.sense * heading + math.pi - cmath.phase(channel.transverse) + self.sensor.azimuth
         )
-        return (azimuth / self.body.spin - acts(channel, width).centroid) % (
-            2.0 * math.pi / abs(self.body.spin)
+        return (azimuth / self.spacecraft.spin - acts(channel, width).centroid) % (
+            2.0 * math.pi / abs(self.spacecraft.spin)
         )
 
     def damping_delay(self, state: BlockState, channel: Channel, trial: Trial) -> Any:
@@ -511,7 +513,7 @@ class BlockModel:
         against it.
         """
         interval = trial.every * self.turn
-        rate = self.rate(self.body.spin)
+        rate = self.rate(self.spacecraft.spin)
         kicks = channel.transverse * self.kicks(state, channel, trial, rate * interval)
         to_go = np.angle(-kicks / (state.phasor * np.exp(-1j * rate * trial.wait * self.turn)))
         if rate == 0.0:
@@ -537,11 +539,11 @@ class BlockModel:
         step = self.turned_by(channel, trial.width, spin)
         heading = self.heading(channel, trial.delay, trial.width)
         sun_angle, longitude, turned = precession.rhumb_end(state.sun_angle, heading, full * step)
-        turn = self.turn * np.abs(self.body.spin / spin)
+        turn = self.turn * np.abs(self.spacecraft.spin / spin)
         # As H goes round the Sun, its meridian turns about H, and the Sun pulse comes later by as
         # much.
         interval = trial.every * turn + turned / trial.count * turn / (2.0 * math.pi)
-        first = state.sun_pulse + trial.wait * self.turn * np.abs(self.body.spin / state.spin)
+        first = state.sun_pulse + trial.wait * self.turn * np.abs(self.spacecraft.spin / state.spin)
         following = first + (trial.count - 1) * interval + turn
         rate = self.rate(spin)
         kick = channel.transverse * np.sinc(0.5 * rate * given.spread / np.pi)

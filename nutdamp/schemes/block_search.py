@@ -128,7 +128,7 @@ class BlockFlights:
     """
 
     def __init__(self, spacecraft: Spacecraft) -> None:
-        self.body = spacecraft
+        self.spacecraft = spacecraft
         self.known = math.inf
         self.damps = spacecraft.goal.axis is None and spacecraft.goal.spin is None
         lower = (
@@ -150,9 +150,10 @@ class BlockFlights:
 
     def shares(self, left: Left) -> dict[Part, NDArray[np.float64]]:
         """Share of each bound that is ``left``."""
-        left_of, body = requirements.left_of, self.body
+        left_of, spacecraft = requirements.left_of, self.spacecraft
         return {
-            bound.part: np.asarray(bound.used(left_of(bound, left, body))) for bound in self.bounds
+            bound.part: np.asarray(bound.used(left_of(bound, left, spacecraft)))
+            for bound in self.bounds
         }
 
     def fired(self, sequences: Sequence[BlockSequence]) -> Iterator[BlockSequence]:
@@ -173,7 +174,7 @@ class BlockFlights:
     def _together(self, some: Sequence[Blocks]) -> Sequence[Schedule | Infeasible]:
         """Pulses of sequences; one by one where the motion of one of them cannot be followed."""
         try:
-            return fire_all(self.body, some)[0]
+            return fire_all(self.spacecraft, some)[0]
         except Infeasible as reason:
             return [reason] if len(some) == 1 else [self._together([blocks])[0] for blocks in some]
 
@@ -185,11 +186,11 @@ class BlockFlights:
             schedule = self._fired[sequence.blocks]
             if isinstance(schedule, Infeasible):
                 raise schedule
-            share = float(self.share(left_by(propagation.flown(self.body, schedule))))
+            share = float(self.share(left_by(propagation.flown(self.spacecraft, schedule))))
             missed = (
                 0.0 if complies(share) else float(f"{share:.9g}")
             )  # rounding is no reason to wait for a Sun pulse
-            rank = not keeps_limits(self.body, schedule), missed, schedule.cost, schedule.end
+            rank = not keeps_limits(self.spacecraft, schedule), missed, schedule.cost, schedule.end
             self.of[sequence.blocks] = FlownSequence(rank, schedule, sequence)
             if rank[:2] == (False, 0.0):
                 self.known = min(self.known, sequence.rank[1])
@@ -228,7 +229,7 @@ class BlockSearch:
     def __init__(
         self, spacecraft: Spacecraft, channels: Sequence[Channel], commands: Commands
     ) -> None:
-        self.body, self.channels, self.commands = spacecraft, channels, commands
+        self.spacecraft, self.channels, self.commands = spacecraft, channels, commands
         self.model = BlockModel(spacecraft)
         self.flights = BlockFlights(spacecraft)
         self._most = {bound.part: bound.limit for bound in self.flights.bounds}
@@ -331,7 +332,7 @@ class BlockSearch:
         if self._waiting == WAITS:
             return False
         kicked = abs(self.model.start.phasor) - math.tan(self._most[Part.NUTATION]) * abs(
-            self.body.axial
+            self.spacecraft.axial
         )
         least = math.inf
         for channel in filter(lambda each: each.transverse, self.channels):
@@ -345,7 +346,7 @@ class BlockSearch:
     def _largest_pulse(self, sequence: BlockSequence) -> float:
         """The most by which one of its pulses turns H, rad."""
         pulses = ((self._named[block.channel], block.width) for block in sequence.blocks)
-        return max(float(self.model.turned_by(*pulse, self.body.spin)) for pulse in pulses)
+        return max(float(self.model.turned_by(*pulse, self.spacecraft.spin)) for pulse in pulses)
 
     def state(self, blocks: Blocks) -> BlockState:
         """Motion after blocks, in closed form."""
@@ -399,16 +400,18 @@ class BlockSearch:
             share = self.flights.share(
                 left
             )  # largest one of a bound; infinite for blocks that may not be
-            over = np.asarray(after.sun_pulse) > self.body.horizon + self.model.turn
+            over = np.asarray(after.sun_pulse) > self.spacecraft.horizon + self.model.turn
             over = over | self._dark(state, channel, trial, after)
             if (
-                self.body.goal.axis is not None
+                self.spacecraft.goal.axis is not None
             ):  # H has gone round the Sun the longer way to the target, or once more
                 over = over | (
                     np.abs(after.longitude - state.longitude - self.model.ahead(state)) > math.pi
                 )
             over = (
-                over if self.body.tank is None else over | (after.used > self.body.tank.propellant)
+                over
+                if self.spacecraft.tank is None
+                else over | (after.used > self.spacecraft.tank.propellant)
             )
             share = np.where(over | np.isnan(share) | (after.cost >= self.most), np.inf, share)
             table = shape[0] * shape[1], shape[2] * shape[3]
@@ -445,7 +448,10 @@ class BlockSearch:
     def _counts(self, state: BlockState, every: int) -> NDArray[np.int64]:
         """Numbers of pulses up to the horizon."""
         most = (
-            int((self.body.horizon - float(np.min(state.sun_pulse))) / (every * self.model.turn))
+            int(
+                (self.spacecraft.horizon - float(np.min(state.sun_pulse)))
+                / (every * self.model.turn)
+            )
             + 1
         )
         most = max(min(most, self.allowed), 0)
@@ -495,12 +501,12 @@ class BlockSearch:
         work.spend(LOOKED * widths.size * counts.size * np.size(state.phasor))
         if self._damps:
             return self._undamped(state, channel, every)
-        if self.body.goal.spin is not None:
+        if self.spacecraft.goal.spin is not None:
             gained = channel.axial * acts(channel, widths).on_time * counts / self.model.inertia.C
-            lacks = np.abs(self.body.goal.spin - state.spin - gained) / self._most[Part.SPIN]
+            lacks = np.abs(self.spacecraft.goal.spin - state.spin - gained) / self._most[Part.SPIN]
         else:
             full, _ = self.model.full_pulses(state, channel, widths, counts)
-            length = full * self.model.turned_by(channel, widths, self.body.spin)
+            length = full * self.model.turned_by(channel, widths, self.spacecraft.spin)
             lacks = np.abs(length - self.model.course(state)[1]) / self._most[Part.DISTANCE]
         return np.asarray(lacks).reshape(-1, len(widths) * len(counts))
 
@@ -509,11 +515,11 @@ class BlockSearch:
         widths = commandable_widths(self.commands, channel)[:, None]
         counts = self._counts(state, every)
         trial = Trial(0, 0.0, widths, counts, every)
-        step = self.model.rate(self.body.spin) * self.model.turn
+        step = self.model.rate(self.spacecraft.spin) * self.model.turn
         kicks = abs(channel.transverse) * np.abs(
             self.model.kicks(state, channel, trial, every * step)
         )
-        left = np.abs(np.abs(state.phasor) - kicks) / abs(self.body.axial)
+        left = np.abs(np.abs(state.phasor) - kicks) / abs(self.spacecraft.axial)
         return np.asarray(left / self._most.get(Part.NUTATION, math.inf)).reshape(
             -1, len(widths) * len(counts)
         )
@@ -560,7 +566,7 @@ class BlockSearch:
         start = self.model.start
         sequences = list[BlockSequence]()
         heading, way = self.model.course(start)
-        if self.body.goal.axis is None or not self._every:
+        if self.spacecraft.goal.axis is None or not self._every:
             return sequences
         every, shares = self._every[0], np.linspace(0.0, 1.0, 13)[1:]
         for channel in (channel for channel in self.channels if channel.transverse):
@@ -599,7 +605,7 @@ class BlockSearch:
         """
         after = np.floor((self.dark[1] - np.min(state.sun_pulse)) / self.model.turn)
         later = (
-            after[(after > least) & (self.dark[1] < self.body.horizon)][:WINDOWS]
+            after[(after > least) & (self.dark[1] < self.spacecraft.horizon)][:WINDOWS]
             .astype(int)
             .tolist()
         )
@@ -648,7 +654,7 @@ class BlockSearch:
         if self._few_delays:
             return trial
         best = list[Array]()
-        if self.body.goal.axis is not None:
+        if self.spacecraft.goal.axis is not None:
             best.append(self.model.delay(channel, self.model.course(state)[0], widths))
         if np.any(state.phasor):
             best.append(self.model.damping_delay(state, channel, trial._replace(delay=0.0)))
@@ -689,7 +695,8 @@ class BlockSearch:
             before = START._replace(blocks=tuple(earlier))
             state = self.state(tuple(earlier))
             off = self.model.apart(
-                self.state(flight.sequence.blocks), propagation.flown(self.body, flight.schedule)
+                self.state(flight.sequence.blocks),
+                propagation.flown(self.spacecraft, flight.schedule),
             )
             trials = [(self._named[last.channel], self._around(before, last))]
             sequences += self.behind([before], state, trials, off=off)

@@ -38,6 +38,7 @@ from nutdamp.spacecraft.constraints import OFF_TICK, commandable_widths, usable
 from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Requirement, Spacecraft
 from nutdamp.spacecraft.requirements import SAME_COST, Left, Part, left_of
+from nutdamp.spacecraft.roles import with_limits
 from nutdamp.spacecraft.schedule import Schedule
 
 SLOWEST = 0.01  # least share of |H3| that a spin leg is reckoned to leave
@@ -50,7 +51,7 @@ def scope_note(search: BlockSearch, chosen: FlownSequence, *, first: bool) -> No
     it is the best in that form.
     """
     form = search.model.left(search.state(chosen.sequence.blocks))
-    flown = left_by(propagation.flown(search.body, chosen.schedule))
+    flown = left_by(propagation.flown(search.spacecraft, chosen.schedule))
     nutation, end = (
         math.degrees(abs(float(a) - b)) for a, b in zip(form[:2], flown[:2], strict=True)
     )
@@ -61,7 +62,7 @@ def scope_note(search: BlockSearch, chosen: FlownSequence, *, first: bool) -> No
 
 def cures(search: BlockSearch, chosen: FlownSequence, most: int) -> list[Note]:
     """Keys of the file that keep the blocks ``chosen``, of up to ``most``, from leaving less."""
-    left = left_by(propagation.flown(search.body, chosen.schedule))
+    left = left_by(propagation.flown(search.spacecraft, chosen.schedule))
     shares = search.flights.shares(left)
     broken = [
         bound for bound in search.flights.bounds if not requirements.complies(shares[bound.part])
@@ -71,7 +72,7 @@ def cures(search: BlockSearch, chosen: FlownSequence, most: int) -> list[Note]:
     named = [
         *more,
         *too_coarse(search.model, search.channels, missed),
-        *used_up(search.body, chosen.schedule),
+        *used_up(search.spacecraft, chosen.schedule),
     ]
     return named or [note("finer-commands")]
 
@@ -82,18 +83,18 @@ def too_coarse(
     """Steps of the commands that may, half of each, cost more than the bounds that are ``missed``
     (rad) allow.
     """
-    body, commands = model.body, model.body.commands
+    spacecraft, commands = model.spacecraft, model.spacecraft.commands
     assert commands is not None
-    way = body.to_turn if body.goal.axis is not None else 0.0
+    way = spacecraft.to_turn if spacecraft.goal.axis is not None else 0.0
     half = 0.5 * commands.delay_step
-    spin, damped = abs(body.spin), abs(model.rate(body.spin))
+    spin, damped = abs(spacecraft.spin), abs(model.rate(spacecraft.spin))
     aside = {
         Part.DISTANCE: half * spin * way,
-        Part.NUTATION: half * damped * math.tan(body.nutation),
+        Part.NUTATION: half * damped * math.tan(spacecraft.nutation),
     }
     # The least by which pulses of neighbouring widths differ in turning H; none is a width too.
     turned = [
-        model.turned_by(channel, commandable_widths(commands, channel), body.spin)
+        model.turned_by(channel, commandable_widths(commands, channel), spacecraft.spin)
         for channel in channels
     ]
     along = 0.5 * min(float(np.diff(np.sort(turns), prepend=0.0).min()) for turns in turned)
@@ -110,12 +111,12 @@ def too_coarse(
         yield note("finer-widths", change_deg=math.degrees(2.0 * along))
 
 
-def used_up(body: Spacecraft, schedule: Schedule) -> Iterator[Note]:
+def used_up(spacecraft: Spacecraft, schedule: Schedule) -> Iterator[Note]:
     """Limits that the blocks of a schedule use up."""
-    commands, limits = body.commands, body.limits
+    commands, limits = spacecraft.commands, spacecraft.limits
     assert commands is not None
-    if body.horizon - schedule.end < 2.0 * spin_turn(body):
-        yield note("longer-horizon", end_s=schedule.end, horizon_s=body.horizon)
+    if spacecraft.horizon - schedule.end < 2.0 * spin_turn(spacecraft):
+        yield note("longer-horizon", end_s=schedule.end, horizon_s=spacecraft.horizon)
     if limits.max_pulses is not None and len(schedule) >= limits.max_pulses:
         yield note("more-pulses", pulses=limits.max_pulses)
     if any(block.count == commands.max_count for block in schedule.blocks):
@@ -136,7 +137,7 @@ def schedule(spacecraft: Spacecraft, options: CommandBlockOptions) -> Schedule:
             "sun_sensor and commands"
         )
     tick = spacecraft.limits.tick
-    spacecraft = replace(spacecraft, limits=replace(spacecraft.limits, tick=None))
+    spacecraft = with_limits(spacecraft, tick=None)
     goal, most = spacecraft.goal.spin, options.max_blocks
     nutation = next(
         bound for bound in requirements.bounds(spacecraft) if bound.part is Part.NUTATION
@@ -269,77 +270,85 @@ def spin_and_turn(spacecraft: Spacecraft, most: int | None) -> FlownSequence:
 
 
 def _flown(
-    body: Spacecraft, flights: BlockFlights, most: int | None, aim: float, *, turns_first: bool
+    spacecraft: Spacecraft,
+    flights: BlockFlights,
+    most: int | None,
+    aim: float,
+    *,
+    turns_first: bool,
 ) -> float:
     """Fly a row of legs, the first of the spin to ``aim`` rad/s; returns the change of the spin,
     rad/s, by a second leg that turned, where it takes the spin off its goal.
     """
-    legs = Legs(body)
-    goal = body.goal.spin
+    legs = Legs(spacecraft)
+    goal = spacecraft.goal.spin
     gained = 0.0
     assert goal is not None
-    ends = [bound for bound in requirements.bounds(body) if bound.part is not Part.SPIN]
+    ends = [bound for bound in requirements.bounds(spacecraft) if bound.part is not Part.SPIN]
     bounds = {bound.part: bound.limit for bound in ends}
     nutation = bounds[Part.NUTATION]
-    shift = bounds.get(requirements.aim(body))
+    shift = bounds.get(requirements.aim(spacecraft))
     for number in range(LEGS):
-        here = legs.here
+        at_leg = legs.at_leg
         turns = turns_first == (number % 2 == 0)
-        here = replace(
-            here, goal=replace(here.goal, axis=None if shift is None else here.goal.axis, spin=None)
+        at_leg = replace(
+            at_leg,
+            goal=replace(at_leg.goal, axis=None if shift is None else at_leg.goal.axis, spin=None),
         )
         slower = min(
-            max(abs(body.inertia.axial(goal) / here.axial), SLOWEST), 1.0
+            max(abs(spacecraft.inertia.axial(goal) / at_leg.axial), SLOWEST), 1.0
         )  # nutation opens by its inverse
-        there = requirements.spins_at(here, aim)
+        there = requirements.spins_at(at_leg, aim)
         if turns:
-            now = Left(here.nutation, here.to_turn, here.spin)
-            there = all(bool(bound.met(left_of(bound, now, body))) for bound in ends)
+            now = Left(at_leg.nutation, at_leg.to_turn, at_leg.spin)
+            there = all(bool(bound.met(left_of(bound, now, spacecraft))) for bound in ends)
         room = None if most is None else most - len(legs.blocks) - (number == 0)
-        if turns and not requirements.spins_at(here, goal):
+        if turns and not requirements.spins_at(at_leg, goal):
             allowed = MARGIN * slower * nutation, None if shift is None else MARGIN * shift
-            horizon = max(here.horizon - _least_time(here, goal), 0.5 * here.horizon)
+            horizon = max(at_leg.horizon - _least_time(at_leg, goal), 0.5 * at_leg.horizon)
         elif turns:
             allowed = (nutation, shift)
-            horizon = here.horizon
+            horizon = at_leg.horizon
         else:
-            opened, off = here.nutation / slower / MARGIN, here.to_turn / MARGIN
+            opened, off = at_leg.nutation / slower / MARGIN, at_leg.to_turn / MARGIN
             allowed = (max(opened, nutation), None if shift is None else max(off, shift))
-            horizon = here.horizon
-            spinning = tuple(channel for channel in here.channels if not channel.damps)
-            here = replace(here, goal=replace(here.goal, spin=aim), channels=spinning)
+            horizon = at_leg.horizon
+            spinning = tuple(channel for channel in at_leg.channels if not channel.damps)
+            at_leg = replace(at_leg, goal=replace(at_leg.goal, spin=aim), channels=spinning)
             aim = goal
         if there or (room is not None and room < 1):
             continue
         try:
             leg = replace(
-                here,
+                at_leg,
                 requirement=Requirement(*allowed),
-                limits=replace(here.limits, horizon=horizon),
+                limits=replace(at_leg.limits, horizon=horizon),
             )
             legs.fire(_searched(leg, room).schedule)
         except Infeasible:
             if number < 2:
                 raise
             break
-        if turns and number == 1 and not requirements.spins_at(legs.here, goal):
-            gained = legs.here.spin - here.spin
+        if turns and number == 1 and not requirements.spins_at(legs.at_leg, goal):
+            gained = legs.at_leg.spin - at_leg.spin
     if legs.blocks:
         flights.flown(BlockSequence(tuple(legs.blocks), (0.0, 0.0, 0.0)))
     return gained
 
 
-def _least_time(body: Spacecraft, spin: float) -> float:
+def _least_time(spacecraft: Spacecraft, spin: float) -> float:
     """Time, s, that a change to ``spin`` rad/s takes, with some to spare; 0 where no channel gives
     it.
     """
     most = 0.0
-    commands = body.commands
-    change = spin - body.spin
+    commands = spacecraft.commands
+    change = spin - spacecraft.spin
     assert commands is not None
-    for channel in body.channels:
+    for channel in spacecraft.channels:
         on_times = acts(channel, commandable_widths(commands, channel)).on_time
         most = max(most, channel.axial * math.copysign(np.max(on_times, initial=0.0), change))
     return (
-        (2.0 + AMPLE * abs(change) * body.inertia.C / most) * spin_turn(body) if most > 0.0 else 0.0
+        (2.0 + AMPLE * abs(change) * spacecraft.inertia.C / most) * spin_turn(spacecraft)
+        if most > 0.0
+        else 0.0
     )

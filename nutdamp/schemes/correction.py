@@ -372,12 +372,12 @@ ROUNDING = 1e-12  # rad; where the spin axis is that near the target already, no
 class FlownBuilder:
     """Pulses chosen so far, and the spacecraft after them.
 
-    ``here`` is the spacecraft at ``now`` s, the end of the last pulse, as if its time began there,
+    ``at_leg`` is the spacecraft at ``now`` s, the end of the last pulse, as if its time began there,
     with the goal of the whole. ``steps``: of integration that the flight took so far.
     """
 
     def __init__(self, spacecraft: Spacecraft) -> None:
-        self.here = replace(
+        self.at_leg = replace(
             spacecraft,
             goal=replace(spacecraft.goal, axis=spacecraft.target_axis),
             limits=replace(spacecraft.limits, horizon=spacecraft.horizon),
@@ -390,11 +390,11 @@ class FlownBuilder:
     @property
     def left(self) -> float:
         """Residual, rad: nutation or distance of H from the target, whichever is larger."""
-        return max(self.here.nutation, self.here.to_turn)
+        return max(self.at_leg.nutation, self.at_leg.to_turn)
 
     def fork(self) -> FlownBuilder:
         """Another builder that goes on from here."""
-        other = FlownBuilder(self.here)
+        other = FlownBuilder(self.at_leg)
         other.now, other.pulses, other._before = self.now, list(self.pulses), list(self._before)
         return other
 
@@ -406,17 +406,17 @@ class FlownBuilder:
         for pulse in pulses:
             if bounded and work.exhausted():
                 raise Infeasible("the flight of the pulses for that was not finished")
-            self._before.append((self.now, self.here))
+            self._before.append((self.now, self.at_leg))
             timed = pulse.moved(base)
-            here = self.here
+            at_leg = self.at_leg
             pulse_ = timed.moved(-self.now)
-            flown = propagation.flown(here, Schedule((pulse_,)))
-            settled, since, limits = flown.settled, pulse_.over, here.limits
-            to_principal = attitude.from_matrix(here.inertia.axes.T)
-            given = here.attitude or Attitude(settled.quaternion)
-            self.here = replace(
-                here,
-                inertia=lightened(here, pulse_.propellant or 0.0),
+            flown = propagation.flown(at_leg, Schedule((pulse_,)))
+            settled, since, limits = flown.settled, pulse_.over, at_leg.limits
+            to_principal = attitude.from_matrix(at_leg.inertia.axes.T)
+            given = at_leg.attitude or Attitude(settled.quaternion)
+            self.at_leg = replace(
+                at_leg,
+                inertia=lightened(at_leg, pulse_.propellant or 0.0),
                 omega0=settled.rates,
                 attitude=replace(
                     given,
@@ -429,11 +429,11 @@ class FlownBuilder:
                         transverse=disturbance.transverse
                         * cmath.exp(1j * disturbance.rate * since),
                     )
-                    for disturbance in here.disturbances
+                    for disturbance in at_leg.disturbances
                 ),
                 limits=replace(
                     limits,
-                    horizon=here.horizon - since,
+                    horizon=at_leg.horizon - since,
                     earliest=limits.gap,
                     max_pulses=None if limits.max_pulses is None else limits.max_pulses - 1,
                     blackout=tuple(
@@ -454,13 +454,13 @@ class FlownBuilder:
         taken = min(max(last, resized), len(self.pulses))
         if last == 0 or taken == 0:
             return
-        self.now, self.here = self._before[-taken]
+        self.now, self.at_leg = self._before[-taken]
         made = Schedule(tuple(pulse.moved(-self.now) for pulse in self.pulses[-taken:]))
         del self.pulses[-taken:], self._before[-taken:]
         chosen = range(max(taken - last, 0), taken)
         self.fire(
             correct(
-                self.here, made, chosen=chosen, momentum=True, equal=True, resizable=resized > 0
+                self.at_leg, made, chosen=chosen, momentum=True, equal=True, resizable=resized > 0
             )
         )
 

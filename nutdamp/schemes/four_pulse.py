@@ -77,28 +77,30 @@ def on_true_motion(spacecraft: Spacecraft, options: FourPulseOptions) -> Schedul
     channels = at_hand(spacecraft, usable(spacecraft))
     builder = FlownBuilder(spacecraft)
     most = spacecraft.limits.max_pulses or MOST_FLOWN
-    while len(builder.pulses) < most and builder.here.nutation > LEFT and not work.exhausted():
-        pulse = _best_pulse(builder.here, channels, options.on_time)
+    while len(builder.pulses) < most and builder.at_leg.nutation > LEFT and not work.exhausted():
+        pulse = _best_pulse(builder.at_leg, channels, options.on_time)
         after = builder.fork()
         if pulse is None:
             break
         after.fire([pulse])
-        if after.here.nutation >= builder.here.nutation:
+        if after.at_leg.nutation >= builder.at_leg.nutation:
             break
         builder = after
     return builder.schedule()
 
 
-def _best_pulse(here: Spacecraft, channels: list[Channel], requested: float | None) -> Pulse | None:
+def _best_pulse(
+    at_leg: Spacecraft, channels: list[Channel], requested: float | None
+) -> Pulse | None:
     """The pulse to fire next, within a period of the motion;
     None where none lowers the nutation.
     """
-    windows = Windows(here)
-    earliest = here.limits.earliest
-    period = min(here.motion_period, here.horizon)
+    windows = Windows(at_leg)
+    earliest = at_leg.limits.earliest
+    period = min(at_leg.motion_period, at_leg.horizon)
     times = earliest + np.linspace(0.0, period, LOOKS)
-    rates = propagation.flown(here, Schedule(), float(times[-1])).motion(times)[0].T
-    moments = np.tile(np.array(here.inertia.moments)[:, None], LOOKS)
+    rates = propagation.flown(at_leg, Schedule(), float(times[-1])).motion(times)[0].T
+    moments = np.tile(np.array(at_leg.inertia.moments)[:, None], LOOKS)
     best = list[tuple[float, Pulse]]()
     for channel in channels:
         full = _on_time(period, channel, requested)
@@ -107,13 +109,13 @@ def _best_pulse(here: Spacecraft, channels: list[Channel], requested: float | No
             windows.on_time(full * share, channel.min_on_time, full) for share in SHARES
         ):
             after = rates + channel.torque[:, None] * on_time / moments
-            left = widest_cones(moments, after, here.sense, here.inertia.wheel)[0]
+            left = widest_cones(moments, after, at_leg.sense, at_leg.inertia.wheel)[0]
             starts = times - 0.5 * on_time
             left[~windows.allowed(starts, np.full(LOOKS, on_time), earliest)] = math.inf
             at = int(np.argmin(left))
             tried.append((float(left[at]), float(times[at]), on_time))
         left_over, t, on_time = min(tried)
-        best.append((here.nutation - left_over, channel_pulse(channel, t, on_time)))
+        best.append((at_leg.nutation - left_over, channel_pulse(channel, t, on_time)))
     most = max(gain for gain, _ in best)
     good = [pulse for gain, pulse in best if gain >= LIKE * most]
     return min(good, key=lambda pulse: pulse.t) if most > 0.0 else None

@@ -57,21 +57,22 @@ def schedule(spacecraft: Spacecraft, options: HalfConeOptions) -> Schedule:
         return _row(builder, options.cones)
     best: Schedule | None = None
     reasons = list[Infeasible]()
-    here = builder.here
-    reach = _reach(here)
-    turn = max(here.to_turn - here.nutation, 0.0)
+    at_leg = builder.at_leg
+    reach = _reach(at_leg)
+    turn = max(at_leg.to_turn - at_leg.nutation, 0.0)
     pulses = (
         (cones, (1.0 if cones == 1 else 2.0) * math.tan(turn / (2 * cones)))
         for cones in range(1, MOST_CONES)
     )
     fewest = next(
-        (cones for cones, pulse in pulses if 0.0 <= pulse <= reach / abs(here.axial)), MOST_CONES
+        (cones for cones, pulse in pulses if 0.0 <= pulse <= reach / abs(at_leg.axial)), MOST_CONES
     )
     cones = fewest
-    allowed = here.limits.max_pulses
-    horizon = here.horizon
+    allowed = at_leg.limits.max_pulses
+    horizon = at_leg.horizon
     half_turns = int(
-        max(horizon - here.limits.earliest, 0.0) / (math.pi * here.inertia.A / abs(here.axial))
+        max(horizon - at_leg.limits.earliest, 0.0)
+        / (math.pi * at_leg.inertia.A / abs(at_leg.axial))
     )
     while cones <= min(MOST_CONES, half_turns + 1, MOST_CONES if allowed is None else allowed - 1):
         try:
@@ -97,7 +98,7 @@ def schedule(spacecraft: Spacecraft, options: HalfConeOptions) -> Schedule:
         )
     if fewest >= MOST_CONES:
         raise Infeasible(
-            f"one pulse turns H by {turn_of(here, reach)} at most, so more than {MOST_CONES} half "
+            f"one pulse turns H by {turn_of(at_leg, reach)} at most, so more than {MOST_CONES} half "
             "cones would be needed; rhumb-line takes many small pulses"
         )
     raise TooShort(
@@ -122,7 +123,7 @@ def _reach(spacecraft: Spacecraft) -> float:
 
 def _row(builder: FlownBuilder, cones: int) -> Schedule:
     """Row of half cones, each planned from the motion that the one before leaves."""
-    spacecraft = builder.here
+    spacecraft = builder.at_leg
     damped = len(builder.pulses)
     most = spacecraft.limits.max_pulses
     if most is not None and most < cones + 1:
@@ -130,10 +131,12 @@ def _row(builder: FlownBuilder, cones: int) -> Schedule:
             f"{cones} half cones take {cones + 1} pulses, and limits.max_pulses leaves {most}"
         )
     for remaining in range(cones, 1, -1):
-        here = builder.here
-        steered = None if here.torquer is None else SteerablePair(here, here.torquer).one(remaining)
-        builder.fire(steered or (_fixed(here, remaining),))
-    builder.fire(pulse_pairs.schedule(builder.here, straight=True))
+        at_leg = builder.at_leg
+        steered = (
+            None if at_leg.torquer is None else SteerablePair(at_leg, at_leg.torquer).one(remaining)
+        )
+        builder.fire(steered or (_fixed(at_leg, remaining),))
+    builder.fire(pulse_pairs.schedule(builder.at_leg, straight=True))
     angle = spacecraft.to_turn
     schedule = builder.schedule()
     if (
@@ -148,29 +151,29 @@ def _row(builder: FlownBuilder, cones: int) -> Schedule:
     return builder.schedule(note("half-cones", cones=cones, damping=damped))
 
 
-def _fixed(here: Spacecraft, cones: int) -> Pulse:
+def _fixed(at_leg: Spacecraft, cones: int) -> Pulse:
     """Earliest firing of a channel from which the row costs hardly more than from the best one."""
     # Seldom is one in phase at the far end of its cone: what it misses is made up for by the cones
     # that follow.
-    windows = Windows(here)
-    channels = usable(here)
-    step = 2.0 * math.pi / here.fastest / SAMPLES  # so many moments in each turn of the body
-    room = windows.horizon - here.limits.earliest
-    span = min(max(room / (cones + 1), here.inertial_period), room)
+    windows = Windows(at_leg)
+    channels = usable(at_leg)
+    step = 2.0 * math.pi / at_leg.fastest / SAMPLES  # so many moments in each turn of the body
+    room = windows.horizon - at_leg.limits.earliest
+    span = min(max(room / (cones + 1), at_leg.inertial_period), room)
     count = min(int(max(span, 0.0) / step) + 1, LONGEST_SEARCH)
-    times = np.asarray(here.limits.earliest + np.arange(count) * step, dtype=np.float64)
-    _, quaternions = Arc.of(here.inertia, here.initial).motion(times)
+    times = np.asarray(at_leg.limits.earliest + np.arange(count) * step, dtype=np.float64)
+    _, quaternions = Arc.of(at_leg.inertia, at_leg.initial).motion(times)
     # Half-angle, rad, of equal cones from the best point of the present one, and the pulse for it,
     # N m s.
-    equal = min((here.to_turn + here.nutation) / (2 * cones), 1.0)
-    nominal = abs(here.axial) * (math.tan(here.nutation) + math.tan(equal))
+    equal = min((at_leg.to_turn + at_leg.nutation) / (2 * cones), 1.0)
+    nominal = abs(at_leg.axial) * (math.tan(at_leg.nutation) + math.tan(equal))
     choices: list[tuple[Vector, Vector, Channel]] = []
     work.spend(PLACE * count * len(channels))
     for channel in channels:
         direction = channel.transverse / abs(channel.transverse)
         push = attitude.rotate(quaternions, np.array([direction.real, direction.imag, 0.0]))
-        costs, on_times = _costs(here, channel, push, cones, equal, nominal)
-        costs[~windows.allowed(times - 0.5 * on_times, on_times, here.limits.earliest)] = np.inf
+        costs, on_times = _costs(at_leg, channel, push, cones, equal, nominal)
+        costs[~windows.allowed(times - 0.5 * on_times, on_times, at_leg.limits.earliest)] = np.inf
         choices.append((costs, on_times, channel))
     least = min((float(costs.min(initial=np.inf)) for costs, _, _ in choices), default=math.inf)
     if not math.isfinite(least):
@@ -187,36 +190,36 @@ def _fixed(here: Spacecraft, cones: int) -> Pulse:
         for costs, on_times, channel in choices
         for row in np.flatnonzero(costs <= near)[:1]
     ]
-    return commandable(here, min(pulses, key=lambda choice: (choice[1].end, choice[0]))[1])
+    return commandable(at_leg, min(pulses, key=lambda choice: (choice[1].end, choice[0]))[1])
 
 
 def _costs(
-    here: Spacecraft, channel: Channel, push: Vector, cones: int, equal: float, nominal: float
+    at_leg: Spacecraft, channel: Channel, push: Vector, cones: int, equal: float, nominal: float
 ) -> tuple[Vector, Vector]:
     """Cost of the row, (n,) N m s, that begins with a push of H along ``push`` (n, 3), and the
     on-time of that, s.
     """
-    h = abs(here.axial)
-    reach = _reach(here)
+    h = abs(at_leg.axial)
+    reach = _reach(at_leg)
     best = np.full(len(push), np.inf)
     chosen = np.zeros(len(push))
     sizes = np.unique(np.minimum(nominal * SHARES, 0.999 * reach))
-    on_times = precession.on_times_to_turn(sizes, abs(channel.transverse), here.spin)
-    strongest = max(abs(each.transverse) for each in usable(here))
-    widest = 0.999 * precession.reach(strongest, here.spin, math.inf)
+    on_times = precession.on_times_to_turn(sizes, abs(channel.transverse), at_leg.spin)
+    strongest = max(abs(each.transverse) for each in usable(at_leg))
+    widest = 0.999 * precession.reach(strongest, at_leg.spin, math.inf)
 
     def spent(jumps: Vector) -> Vector:
         """Impulse (n,) N m s of later ``jumps`` (n,), with their widths as that of the first."""
         return strongest * precession.on_times_to_turn(
-            np.minimum(jumps, widest), strongest, here.spin
+            np.minimum(jumps, widest), strongest, at_leg.spin
         )
 
     for size, on_time in zip(sizes.tolist(), on_times.tolist(), strict=True):
         if not channel.min_on_time <= on_time <= channel.max_on_time:
             continue
-        momentum = here.momentum + size * push
+        momentum = at_leg.momentum + size * push
         half_angle = np.arccos(np.minimum(h / np.linalg.norm(momentum, axis=1), 1.0))
-        rest = np.abs(attitude.angle_between(momentum, here.target_axis) - half_angle) / (
+        rest = np.abs(attitude.angle_between(momentum, at_leg.target_axis) - half_angle) / (
             2 * (cones - 1)
         )
         ahead, last = h * np.tan(half_angle), h * np.tan(rest)

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 from nutdamp.common import work
 from nutdamp.errors import Infeasible, TooShort
@@ -16,6 +15,7 @@ from nutdamp.schemes.sequential import ImpulseBuilder, at_hand, fire_components,
 from nutdamp.spacecraft.constraints import longest_useful, usable
 from nutdamp.spacecraft.equipment import Channel, Steerable
 from nutdamp.spacecraft.model import Spacecraft
+from nutdamp.spacecraft.roles import with_limits
 from nutdamp.spacecraft.schedule import Schedule
 
 TRAIN_SHARE = (
@@ -129,26 +129,24 @@ def damped(start: FlownBuilder) -> FlownBuilder:
     that is left, C|ω3| times its angle, differs by the cone. Raises Infeasible where no channel can
     damp, or the budget ends before.
     """
-    here = start.here
+    at_leg = start.at_leg
     steps = 0
     # A torquer can fire at any point of the cone; channels at their alignments, which come by the
     # body period.
     span = (
-        here.inertial_period
-        if here.torquer is not None
-        else 4.0 * min(here.body_period, 0.1 * here.horizon)
+        at_leg.inertial_period
+        if at_leg.torquer is not None
+        else 4.0 * min(at_leg.body_period, 0.1 * at_leg.horizon)
     )
     best: tuple[float, FlownBuilder] | None = None
     reason: Infeasible | None = None
     moments = 16  # earliest starts that are tried
     for number in range(moments):
-        earliest = here.limits.earliest + number * span / moments
-        if number > 0 and earliest > IN_REACH * here.horizon:  # the rest is for the turn
+        earliest = at_leg.limits.earliest + number * span / moments
+        if number > 0 and earliest > IN_REACH * at_leg.horizon:  # the rest is for the turn
             break
         try:
-            damping = schedule(
-                replace(here, limits=replace(here.limits, earliest=earliest)), SchemeOptions()
-            )
+            damping = schedule(with_limits(at_leg, earliest=earliest), SchemeOptions())
         except Infeasible as why:
             reason = why
             continue
@@ -158,8 +156,8 @@ def damped(start: FlownBuilder) -> FlownBuilder:
         except Infeasible as why:
             reason = why
             break
-        cost = damping.total_impulse + abs(here.axial) * (
-            builder.here.to_turn + 2.0 * builder.here.nutation
+        cost = damping.total_impulse + abs(at_leg.axial) * (
+            builder.at_leg.to_turn + 2.0 * builder.at_leg.nutation
         )
         if best is None or cost < best[0]:
             best = cost, builder

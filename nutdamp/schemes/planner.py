@@ -17,6 +17,7 @@ from nutdamp.schemes.catalogue import POINTING, SCHEMES, Options, Scheme, Scheme
 from nutdamp.schemes.correction import Correction, left
 from nutdamp.schemes.sequential import SymmetricModel, model_of
 from nutdamp.spacecraft.model import Spacecraft
+from nutdamp.spacecraft.roles import with_limits
 from nutdamp.spacecraft.schedule import Schedule
 from nutdamp.units import as_given
 
@@ -73,14 +74,16 @@ def schedule(name: str, spacecraft: Spacecraft, options: Choice = None) -> Sched
         on_plain = valve_commands.options(spacecraft, chosen)
         correct = Correction(scheme, on_plain)
         return valve_commands.planned(
-            spacecraft, lambda body: schedule(name, body, on_plain), correct
+            spacecraft, lambda without_valves: schedule(name, without_valves, on_plain), correct
         )
     model = model_of(spacecraft, turning=chosen.equal, three_moments=scheme.three_moments)
     try:
-        whole = planned(model.body, chosen)
+        whole = planned(model.symmetric, chosen)
     except TooShort as short:
         with work.budget("a longer horizon", work.CURE):
-            cure = short.cure or _longer_horizon(model.body, lambda body: planned(body, chosen))
+            cure = short.cure or _longer_horizon(
+                model.symmetric, lambda limited: planned(limited, chosen)
+            )
         raise TooShort(short.why, cure) from None
     made = _corrected(scheme, model, whole, chosen)
     unlike = scheme.on_true_motion and not (spacecraft.inertia.symmetric or spacecraft.disturbances)
@@ -103,13 +106,11 @@ def _longer_horizon(spacecraft: Spacecraft, planned: Callable[[Spacecraft], Sche
     def end(horizon: float) -> float | None:
         """End of the schedule within a horizon; None where there is none."""
         try:
-            return planned(
-                replace(spacecraft, limits=replace(spacecraft.limits, horizon=horizon))
-            ).end
+            return planned(with_limits(spacecraft, horizon=horizon)).end
         except Infeasible:
             return None
 
-    usual = replace(spacecraft, limits=replace(spacecraft.limits, horizon=None)).horizon
+    usual = with_limits(spacecraft, horizon=None).horizon
     for horizon in sorted({usual, LONGER * max(usual, spacecraft.horizon)}):
         over = end(horizon) if horizon > spacecraft.horizon and not work.exhausted() else None
         if over:
@@ -132,18 +133,20 @@ def alternatives(name: str, spacecraft: Spacecraft, options: Choice = None) -> l
     chosen = settled(scheme, options, spacecraft)
     if spacecraft.thrust_laws:
         schedules = alternatives(
-            name, valve_commands.plain(spacecraft), valve_commands.options(spacecraft, chosen)
+            name,
+            valve_commands.without_valves(spacecraft),
+            valve_commands.options(spacecraft, chosen),
         )
         return [as_commands(name, spacecraft, schedule, chosen) for schedule in schedules]
     model = model_of(spacecraft)
-    schedules = import_module(scheme.module).alternatives(model.body, chosen)
+    schedules = import_module(scheme.module).alternatives(model.symmetric, chosen)
     return [_corrected(scheme, model, schedule, chosen) for schedule in schedules]
 
 
 def as_commands(
     name: str, spacecraft: Spacecraft, schedule: Schedule, options: Choice = None
 ) -> Schedule:
-    """A schedule ``schedule`` for the `plain` body of a ``spacecraft`` as its commands, corrected
+    """A schedule ``schedule`` for a ``spacecraft`` `without_valves` as its commands, corrected
     on its motion.
 
     Raises KeyError for a name not in `NAMES`.

@@ -467,8 +467,8 @@ class _PairSearch:
         crosses: NDArray[np.intp],
     ) -> list[PairCandidate]:
         """Pairs at the zeros of ``off`` behind the rows ``crosses``, within on-times and limits."""
-        here, there = off[crosses], off[crosses + 1]
-        share = np.where(here == there, 0.5, here / (here - there + (here == there)))
+        at_leg, there = off[crosses], off[crosses + 1]
+        share = np.where(at_leg == there, 0.5, at_leg / (at_leg - there + (at_leg == there)))
 
         def at(values: Vector) -> Vector:
             return np.asarray(values[crosses] + share * (values[crosses + 1] - values[crosses]))

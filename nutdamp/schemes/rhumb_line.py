@@ -81,14 +81,14 @@ class Attempt(NamedTuple):
 
 
 class Train:
-    """Trains from the motion of ``here``."""
+    """Trains from the motion of ``at_leg``."""
 
-    def __init__(self, here: Spacecraft, options: RhumbLineOptions) -> None:
-        self.here, self.options = here, options
-        self.windows = Windows(here)
-        self.turn = 2.0 * math.pi / abs(here.spin)
-        self.h = abs(here.axial)
-        torquer = here.torquer
+    def __init__(self, at_leg: Spacecraft, options: RhumbLineOptions) -> None:
+        self.at_leg, self.options = at_leg, options
+        self.windows = Windows(at_leg)
+        self.turn = 2.0 * math.pi / abs(at_leg.spin)
+        self.h = abs(at_leg.axial)
+        torquer = at_leg.torquer
         self.channels = list[Channel]()
         self.shortest = 0.0
         self.longest = math.inf
@@ -96,7 +96,7 @@ class Train:
             self.torque = math.inf if torquer.torque is None else torquer.torque
         else:
             # Of directions as different as can be, the one that costs least for its torque first.
-            channels = usable(here)
+            channels = usable(at_leg)
             count = options.per_turn
             if not channels:
                 raise Infeasible("once the nutation is taken out no time is left for the turn")
@@ -145,7 +145,7 @@ class Train:
                 allowed = span(self.shortest, self.longest, "s")
                 raise Infeasible(f"{name} is outside what the channels allow: {allowed}")
             if abs(self.windows.nearest_tick(given) - given) > TOUCHING:
-                tick = self.here.limits.tick
+                tick = self.at_leg.limits.tick
                 raise Infeasible(
                     f"an on-time of {given:.6g} s is no multiple of the tick of {tick:.4g} s"
                 )
@@ -155,12 +155,14 @@ class Train:
                 "after which a torque fixed in the "
                 "body undoes its work"
             )
-        self.ahead, self.way = precession.course(here.momentum, here.target_axis, here.goal.sun)
+        self.ahead, self.way = precession.course(
+            at_leg.momentum, at_leg.target_axis, at_leg.goal.sun
+        )
         self.needed = self.h * self.way  # turn of H, N m s
         self.strongest = self.turns_by(
             STEP * self.h if self.ideal else self.on_time
         )  # turn by a full pulse, N m s
-        most = here.limits.max_pulses
+        most = at_leg.limits.max_pulses
         self.most = (
             MOST_PULSES if most is None else most
         )  # pulses allowed, and not shorter than they can be
@@ -172,7 +174,7 @@ class Train:
         return (
             size
             if self.ideal
-            else self.torque * size * precession.arc_efficiency(self.here.spin, size)
+            else self.torque * size * precession.arc_efficiency(self.at_leg.spin, size)
         )
 
     def size(self, count: int, bent: float = 1.0) -> float:
@@ -183,7 +185,7 @@ class Train:
         if self.ideal:
             return share
         width = max(
-            float(precession.on_times_to_turn(np.array([share]), self.torque, self.here.spin)[0]),
+            float(precession.on_times_to_turn(np.array([share]), self.torque, self.at_leg.spin)[0]),
             self.shortest,
         )
         return self.windows.tick_after(width) if math.isfinite(width) else math.nan
@@ -194,7 +196,7 @@ class Train:
         A pulse moved by an angle of the spin turns its kick by ``a`` times that, and loses half of
         its square.
         """
-        ratio = abs(self.here.nutation_rate / self.here.spin)
+        ratio = abs(self.at_leg.nutation_rate / self.at_leg.spin)
         return SPARE + (float(self.left[count - 1]) / max(ratio, LEAST_RATIO)) ** 2 / min(
             count, LAST
         )
@@ -219,7 +221,7 @@ class Train:
         # Of the next few counts the one that closes best, or that ticks make least dear; at last
         # with room to bend.
         near = [count for count in closing if count <= 1.25 * closing[0] + 3]
-        free = self.here.limits.tick is None
+        free = self.at_leg.limits.tick is None
         tried = [Attempt(count, self.size(count), True, free) for count in near]
         tried.sort(
             key=lambda attempt: (
@@ -272,19 +274,19 @@ class Train:
         # Moments (s) of right phase within the limits, undisturbed, and the direction in the body
         # of each push.
         shots: list[tuple[float, complex]] = []
-        ready = self.here.limits.earliest
+        ready = self.at_leg.limits.earliest
         on_time = 0.0 if self.ideal else self.on_time
         firsts = [
-            (_aligned(self.here, channel, self.ahead, ready), channel.transverse)
+            (_aligned(self.at_leg, channel, self.ahead, ready), channel.transverse)
             for channel in self.channels
         ]
-        gap = max(self.here.limits.gap, 0.5 * self.turn / self.options.per_turn - on_time)
+        gap = max(self.at_leg.limits.gap, 0.5 * self.turn / self.options.per_turn - on_time)
 
         def after(first: float, time: float) -> float:
             """Moment of the phase of ``first`` from ``time`` s on."""
             return first + max(math.ceil((time - first) / self.turn - 1e-9), 0) * self.turn
 
-        for _ in range(MOST_PULSES + len(self.here.limits.blackout)):
+        for _ in range(MOST_PULSES + len(self.at_leg.limits.blackout)):
             start = self.windows.earliest_start(on_time, ready)
             if start is None or len(shots) == MOST_PULSES:
                 break
@@ -294,7 +296,7 @@ class Train:
                 t = after(first, centre)
             else:
                 t = centre
-                push = _in_body(self.here, self.ahead, centre)
+                push = _in_body(self.at_leg, self.ahead, centre)
             if t + 0.5 * on_time > self.windows.horizon:
                 break
             free = self.windows.blocked_until(t - 0.5 * on_time, on_time)
@@ -305,46 +307,46 @@ class Train:
             ready = t + 0.5 * on_time + gap
             if not firsts:
                 ready = max(t + self.turn / self.options.per_turn - 0.5 * on_time, ready)
-        turned = self.here.nutation_rate * np.array([t for t, _ in shots])
+        turned = self.at_leg.nutation_rate * np.array([t for t, _ in shots])
         sums = np.cumsum(np.exp(1j * (np.angle(np.array([push for _, push in shots])) + turned)))
         counts = np.arange(1, len(shots) + 1)
         return np.asarray(
-            np.abs(self.here.inertia.A * self.here.initial.omega * counts / self.needed + sums)
+            np.abs(self.at_leg.inertia.A * self.at_leg.initial.omega * counts / self.needed + sums)
         )
 
-    def next_pulse(self, here: Spacecraft, remaining: int, attempt: Attempt) -> Pulse | None:
-        """Next pulse of ``remaining`` ones from the motion of ``here``; None where the limits leave
+    def next_pulse(self, at_leg: Spacecraft, remaining: int, attempt: Attempt) -> Pulse | None:
+        """Next pulse of ``remaining`` ones from the motion of ``at_leg``; None where the limits leave
         no time.
         """
-        ahead, way = precession.course(here.momentum, here.target_axis, here.goal.sun)
+        ahead, way = precession.course(at_leg.momentum, at_leg.target_axis, at_leg.goal.sun)
         share = self.h * way / (remaining * self.turns_by(attempt.size))
         if share < 1.0:  # equal pulses would turn H too far: to one side of the target, a spiral
             bend = math.acos(max(share, math.cos(WIDEST_BEND)))
-            aside = np.cross(here.momentum / float(np.linalg.norm(here.momentum)), ahead)
+            aside = np.cross(at_leg.momentum / float(np.linalg.norm(at_leg.momentum)), ahead)
             ahead = np.asarray(math.cos(bend) * ahead + math.sin(bend) * aside)
-        ready = here.limits.earliest
+        ready = at_leg.limits.earliest
         on_time = 0.0 if self.ideal else attempt.size
-        if here is not self.here:  # no two in the same passage of the phase
+        if at_leg is not self.at_leg:  # no two in the same passage of the phase
             turn = self.turn / self.options.per_turn
             ready = max(ready, (0.5 * turn if self.channels else turn) - on_time)
         if self.channels:
-            return self._passing(here, ahead, on_time, ready)
-        start = Windows(here).earliest_start(on_time, ready)
+            return self._passing(at_leg, ahead, on_time, ready)
+        start = Windows(at_leg).earliest_start(on_time, ready)
         if start is None:
             return None
         centre = start + 0.5 * on_time
-        assert here.torquer is not None
-        angle = cmath.phase(_in_body(here, ahead, centre))
-        return steerable_pulse(here.torquer, centre, angle, impulse=attempt.size, on_time=on_time)
+        assert at_leg.torquer is not None
+        angle = cmath.phase(_in_body(at_leg, ahead, centre))
+        return steerable_pulse(at_leg.torquer, centre, angle, impulse=attempt.size, on_time=on_time)
 
     def _passing(
-        self, here: Spacecraft, ahead: Vector, on_time: float, ready: float
+        self, at_leg: Spacecraft, ahead: Vector, on_time: float, ready: float
     ) -> Pulse | None:
         """First firing of a channel at the required phase within the limits."""
-        windows = Windows(here)
+        windows = Windows(at_leg)
         for _ in range(MOST_PULSES):
             moments = [
-                (_aligned(here, channel, ahead, ready + 0.5 * on_time), channel)
+                (_aligned(at_leg, channel, ahead, ready + 0.5 * on_time), channel)
                 for channel in self.channels
             ]
             t, channel = min(moments, key=lambda passage: passage[0])
@@ -352,14 +354,16 @@ class Train:
             free = windows.blocked_until(start, on_time)
             if start + on_time > windows.horizon + 1e-9:
                 return None
-            if free is None and start >= here.limits.earliest - 1e-9:
+            if free is None and start >= at_leg.limits.earliest - 1e-9:
                 return channel_pulse(channel, start + 0.5 * on_time, on_time)
             ready = max(free or 0.0, start + 0.25 * self.turn)
         return None
 
     def _in_phase(self, fewest: int, most: int) -> Infeasible:
         """Error where trains of ``fewest`` to ``most`` pulses leave nutation."""
-        ratio = self.here.axial / (self.here.inertia.A * self.here.spin * self.options.per_turn)
+        ratio = self.at_leg.axial / (
+            self.at_leg.inertia.A * self.at_leg.spin * self.options.per_turn
+        )
         least = math.degrees(float(self.left[fewest - 1 : most].min()) * self.way / most)
         if abs(ratio - round(ratio)) * most >= 1.0:
             return Infeasible(
@@ -379,7 +383,7 @@ class Train:
 
     def _too_few(self, needed: int) -> Infeasible:
         """Message on limits that leave too few times or pulses."""
-        most = self.here.limits.max_pulses
+        most = self.at_leg.limits.max_pulses
         moments = len(self.left)
         if most is not None and most < needed:
             return Infeasible(
@@ -399,18 +403,18 @@ class Train:
         )
 
 
-def _aligned(here: Spacecraft, channel: Channel, ahead: Vector, ready: float) -> float:
+def _aligned(at_leg: Spacecraft, channel: Channel, ahead: Vector, ready: float) -> float:
     """First moment (s) from ``ready`` on at which the torque of ``channel`` points along ``ahead``
     (3,), inertial.
     """
     direction = channel.transverse / abs(channel.transverse)
-    turn = 2.0 * math.pi / abs(here.spin)
+    turn = 2.0 * math.pi / abs(at_leg.spin)
     t = ready
     for step in range(12):
         off = cmath.phase(
-            direction * _in_body(here, ahead, t).conjugate()
+            direction * _in_body(at_leg, ahead, t).conjugate()
         )  # the torque is so far ahead of it
-        change = -off / here.spin
+        change = -off / at_leg.spin
         if step == 0:
             change %= turn
         t += change
@@ -419,11 +423,11 @@ def _aligned(here: Spacecraft, channel: Channel, ahead: Vector, ready: float) ->
     return t if t >= ready - 1e-9 else t + turn
 
 
-def _in_body(here: Spacecraft, direction: Vector, t: float) -> complex:
+def _in_body(at_leg: Spacecraft, direction: Vector, t: float) -> complex:
     """Components of an inertial ``direction`` (3,) along axes 1 and 2 of the body at ``t`` s,
     undisturbed.
     """
-    _, quaternions = Arc.of(here.inertia, here.initial).motion(np.array([t]))
+    _, quaternions = Arc.of(at_leg.inertia, at_leg.initial).motion(np.array([t]))
     body = attitude.matrix(quaternions[0]).T @ direction
     return complex(body[0], body[1])
 
@@ -456,7 +460,7 @@ def _train(spacecraft: Spacecraft, options: RhumbLineOptions) -> Schedule:
     """
     builder = FlownBuilder(spacecraft)
     reason = Infeasible("")
-    train = Train(builder.here, options)
+    train = Train(builder.at_leg, options)
     if spacecraft.least_impulse <= 0.5 * train.strongest and train.way > ROUNDING:
         try:
             return _best(builder, train)
@@ -467,7 +471,7 @@ def _train(spacecraft: Spacecraft, options: RhumbLineOptions) -> Schedule:
     builder = one_pulse.damped(builder)
     if builder.left <= ROUNDING:
         return builder.schedule(note("no-train"))
-    return _best(builder, Train(builder.here, options))
+    return _best(builder, Train(builder.at_leg, options))
 
 
 def _another(spacecraft: Spacecraft, options: RhumbLineOptions) -> str:
@@ -478,7 +482,7 @@ def _another(spacecraft: Spacecraft, options: RhumbLineOptions) -> str:
     with suppress(Infeasible):
         if spacecraft.least_impulse > 1e-9 * abs(spacecraft.axial):
             builder = one_pulse.damped(builder)
-        train = Train(builder.here, replace(options, on_time=None))
+        train = Train(builder.at_leg, replace(options, on_time=None))
         counts = range(2, min(len(train.left), train.most) + 1)
         lengths = {train.size(count) for count in counts if train.left[count - 1] <= OPEN}
         if ticks:
@@ -510,15 +514,15 @@ def _best(builder: FlownBuilder, train: Train) -> Schedule:
     before = sum(pulse.magnitude for pulse in builder.pulses)
     requested = train.options.on_time
     floor = train.needed / precession.arc_efficiency(
-        train.here.spin, train.shortest if requested is None else requested
+        train.at_leg.spin, train.shortest if requested is None else requested
     )
     for attempt in train.free() if requested is None else train.held():
         # What the rounding of the start of one pulse to a tick leaves counts as nothing.
         rounding = (
             train.turns_by(attempt.size)
             / train.h
-            * abs(train.here.spin)
-            * (train.here.limits.tick or 0.0)
+            * abs(train.at_leg.spin)
+            * (train.at_leg.limits.tick or 0.0)
         )
         nothing = max(EXACT, rounding)
         if best[0] <= nothing and not attempt.closes:
@@ -532,7 +536,7 @@ def _best(builder: FlownBuilder, train: Train) -> Schedule:
         # Of pulses of a given length the trains come in the order of their cost.
         if work.exhausted() or (left <= nothing and (cheap or requested is not None)):
             break
-    if best[0] > tolerable(train.here):
+    if best[0] > tolerable(train.at_leg):
         held = "" if requested is None else f" of {requested:.4g} s"
         text = f"no train of equal pulses{held} was found that ends on the target within the limits"
         raise Infeasible(f"{text}; the best would leave {math.degrees(best[0]):.3g}°")
@@ -543,7 +547,7 @@ def _flown(builder: FlownBuilder, train: Train, attempt: Attempt) -> tuple[Sched
     """Train, each pulse aimed from the current H, the last ones moved; and its residual, rad."""
     count = attempt.pulses
     for remaining in range(count, 0, -1):
-        pulse = train.next_pulse(builder.here, remaining, attempt)
+        pulse = train.next_pulse(builder.at_leg, remaining, attempt)
         if pulse is None or work.exhausted():
             break
         builder.fire((pulse,))
@@ -556,18 +560,18 @@ def _flown(builder: FlownBuilder, train: Train, attempt: Attempt) -> tuple[Sched
         builder.correct(
             min(last, fired), resized=count if attempt.resizable and count <= SHORT else 0
         )
-        if train.here.limits.tick is not None and builder.left > 0.5 * before:
+        if train.at_leg.limits.tick is not None and builder.left > 0.5 * before:
             break  # what is left is the rounding of starts
     if not builder.pulses:
         return builder.schedule(), builder.left
     on_time = builder.pulses[-1].on_time
     description = note(
-        "great-circle-train" if train.here.goal.sun is None else "rhumb-line-train",
+        "great-circle-train" if train.at_leg.goal.sun is None else "rhumb-line-train",
         count=count,
         channels=", ".join(channel.name for channel in train.channels) or "the steerable torquer",
         on_time_s=on_time,
         way_deg=math.degrees(train.way),
-        efficiency=float(precession.arc_efficiency(train.here.spin, on_time)),
+        efficiency=float(precession.arc_efficiency(train.at_leg.spin, on_time)),
         damping=max(len(builder.pulses) - count, 0),
     )
     return builder.schedule(description), builder.left

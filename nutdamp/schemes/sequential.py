@@ -1,7 +1,7 @@
 """Schedules laid pulse by pulse on the equivalent symmetric body; reasons of infeasibility.
 
 Three different moments turn in the body at another rate than their mean, on an ellipse instead of a
-circle; lasting disturbances move the point about which ω turns. Both are taken out here, so that
+circle; lasting disturbances move the point about which ω turns. Both are taken out at_leg, so that
 every scheme plans free motion of a symmetric body, and put back in: the schedule is translated to
 the true actuators and corrected on the true motion.
 """
@@ -438,24 +438,24 @@ def turn_of(spacecraft: Spacecraft, impulse: float) -> str:
 
 @dataclass(frozen=True, eq=False)
 class SymmetricModel:
-    """``body`` is planned on for ``spacecraft``; ``stretch`` (2,) leads from the ellipse of (ω1,
+    """``symmetric`` is planned on for ``spacecraft``; ``stretch`` (2,) leads from the ellipse of (ω1,
     ω2) to the circle.
     """
 
     spacecraft: Spacecraft
-    body: Spacecraft
+    symmetric: Spacecraft
     stretch: Vector
 
     @property
     def exact(self) -> bool:
         """True if the model moves as the spacecraft does, so that nothing has to be corrected."""
         spacecraft = self.spacecraft
-        alike = self.body.inertia.moments == spacecraft.inertia.moments
+        alike = self.symmetric.inertia.moments == spacecraft.inertia.moments
         return alike and not spacecraft.disturbances and spacecraft.growth == 0.0
 
     def translate(self, schedule: Schedule) -> Schedule:
         """Schedule with the true actuators."""
-        if self.body.inertia.moments == self.spacecraft.inertia.moments:
+        if self.symmetric.inertia.moments == self.spacecraft.inertia.moments:
             return schedule
         torquer = self.spacecraft.torquer
         windows = Windows(self.spacecraft)
@@ -516,7 +516,7 @@ def model_of(
             replace(thruster, torque=thruster.torque * factors) for thruster in channel.thrusters
         )
         channels.append(replace(channel, thrusters=thrusters, spends=channel.strength))
-    body = replace(
+    symmetric = replace(
         undisturbed,
         inertia=Inertia((A, A, C), inertia.axes, inertia.wheel),
         omega0=np.array(
@@ -526,19 +526,19 @@ def model_of(
         steerable=torquer,
         limits=replace(spacecraft.limits, horizon=spacecraft.horizon),
     )
-    return SymmetricModel(spacecraft, _aimed(body, spacecraft), stretch)
+    return SymmetricModel(spacecraft, _aimed(symmetric, spacecraft), stretch)
 
 
-def _aimed(body: Spacecraft, spacecraft: Spacecraft) -> Spacecraft:
-    """Copy of the ``body``, which has another H, with the target axis at its distance from H of the
+def _aimed(symmetric: Spacecraft, spacecraft: Spacecraft) -> Spacecraft:
+    """Copy of the ``symmetric``, which has another H, with the target axis at its distance from H of the
     ``spacecraft``.
     """
-    if spacecraft.goal.axis is None or body is spacecraft:
-        return body
+    if spacecraft.goal.axis is None or symmetric is spacecraft:
+        return symmetric
     quaternion = spacecraft.initial.quaternion
     given = spacecraft.attitude or Attitude(quaternion)
     in_file_axes = attitude.multiply(quaternion, attitude.from_matrix(spacecraft.inertia.axes.T))
-    held = replace(body, attitude=replace(given, quaternion=in_file_axes))
+    held = replace(symmetric, attitude=replace(given, quaternion=in_file_axes))
     before, after = (
         momentum / float(np.linalg.norm(momentum))
         for momentum in (spacecraft.momentum, held.momentum)

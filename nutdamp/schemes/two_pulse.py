@@ -38,6 +38,7 @@ from nutdamp.schemes.sequential import (
 from nutdamp.spacecraft.constraints import Windows, for_pairs, keeps_limits, longest_useful
 from nutdamp.spacecraft.equipment import Channel, Steerable
 from nutdamp.spacecraft.model import Spacecraft, Vector
+from nutdamp.spacecraft.roles import with_limits
 from nutdamp.spacecraft.schedule import TOUCHING, Pulse, Schedule, channel_pulse
 
 # pairs that cost more than this times A|ω0| are not looked at: the second pulse would mostly undo
@@ -60,7 +61,7 @@ def schedule(spacecraft: Spacecraft, options: TwoPulseOptions) -> Schedule:
     if spacecraft.goal.axis is None or options.literal:
         return _damping(spacecraft, options)
     try:
-        from nutdamp.schemes import pulse_pairs  # here, because few plans have a target
+        from nutdamp.schemes import pulse_pairs  # at_leg, because few plans have a target
 
         return pulse_pairs.schedule(spacecraft)
     except Infeasible:
@@ -110,19 +111,19 @@ def _standing(spacecraft: Spacecraft, channels: list[Channel]) -> Schedule | Non
     back by itself.
     """
     wait = _halves(spacecraft).wait
-    here = spacecraft
+    at_leg = spacecraft
     pulses = list[Pulse]()
     A, (first, second, spin) = spacecraft.inertia.A, spacecraft.omega0.tolist()
     left = -A * complex(first, second)
     for channel, impulse in components(channels, left):
         share = impulse * channel.transverse / abs(channel.transverse)
-        here = replace(here, omega0=np.array([-share.real / A, -share.imag / A, spin]))
-        placed = _place(here, (channel, channel), wait, 0.0, literal=False)
+        at_leg = replace(at_leg, omega0=np.array([-share.real / A, -share.imag / A, spin]))
+        placed = _place(at_leg, (channel, channel), wait, 0.0, literal=False)
         if placed is None:
             return None
         pulses += placed.fired(spacecraft)
         earliest = pulses[-1].over + spacecraft.limits.gap
-        here = replace(here, limits=replace(here.limits, earliest=earliest))
+        at_leg = with_limits(at_leg, earliest=earliest)
         left = left - share
     if not pulses or abs(left) > ALIGNED * spacecraft.least_impulse:
         return None

@@ -2,7 +2,7 @@
 legs.
 
 A command is known by its effective on-time and the centroid of its thrust (`thruster`). Schemes
-plan for the *plain* body, which fires rectangles of full thrust within the effective bounds of its
+plan for the body *without valves*, which fires rectangles of full thrust within the effective bounds of its
 channels, and keeps limits that leave room for the delays. Each of its pulses becomes the command
 with the same impulse and centroid, cold and blowdown included; further effects of the shape of the
 thrust are corrected on the flown motion.
@@ -33,13 +33,14 @@ from nutdamp.spacecraft.constraints import (
 )
 from nutdamp.spacecraft.equipment import Block, Channel
 from nutdamp.spacecraft.model import Inertia, Limits, Spacecraft
+from nutdamp.spacecraft.roles import with_limits
 from nutdamp.spacecraft.schedule import Pulse, Schedule, channel_pulse
 
 ROUNDING = 1e-12  # share by which an on-time may pass its bounds
 # share of the longest pulse that the next plan leaves at either end of all, where there was too
 # little room
 ROOM = 0.02
-# times what the plan leaves on the plain body, that commands may leave without another plan
+# times what the plan leaves on the body without valves, that commands may leave without another plan
 NEARLY = 1.1
 EXACT = 1e-10  # rad, the same
 PLANS = (
@@ -52,7 +53,7 @@ EFFECTIVE = (
 """Addition to the reasons of schemes, which know nothing of valves."""
 
 
-def plain(
+def without_valves(
     spacecraft: Spacecraft,
     weakest: float = 1.0,
     strongest: float = 1.0,
@@ -100,7 +101,7 @@ def plain(
 
 
 def options(spacecraft: Spacecraft, chosen: SchemeOptions) -> SchemeOptions:
-    """Options of a scheme for the plain body: a requested on-time is a command.
+    """Options of a scheme for the body without valves: a requested on-time is a command.
 
     Raises Infeasible where the channels make different pulses of it.
     """
@@ -121,23 +122,23 @@ def options(spacecraft: Spacecraft, chosen: SchemeOptions) -> SchemeOptions:
 def planned(
     spacecraft: Spacecraft, plan: Callable[[Spacecraft], Schedule], correct: Correction
 ) -> Schedule:
-    """Schedule that ``plan`` gives for the plain body, as commands for the true one; see
+    """Schedule that ``plan`` gives for the body without valves, as commands for the true one; see
     `as_commands`.
     """
     weakest, strongest, room, used = 1.0, 1.0, 0.0, 0.0
     tried: list[tuple[bool, float, Schedule]] = []
     schedule: Schedule | None = None
     for _ in range(PLANS):
-        body = plain(spacecraft, weakest, strongest, room, 0.5 * used)
+        without = without_valves(spacecraft, weakest, strongest, room, 0.5 * used)
         try:
-            schedule = plan(body)
+            schedule = plan(without)
         except Infeasible as reason:
             if schedule is not None:
                 break
             if isinstance(reason, TooShort):
                 raise TooShort(reason.why + EFFECTIVE, reason.cure) from None
             raise Infeasible(f"{reason}{EFFECTIVE}") from None
-        too_weak, too_strong, longer = _outside(spacecraft, schedule, body.inertia, correct)
+        too_weak, too_strong, longer = _outside(spacecraft, schedule, without.inertia, correct)
         if too_weak or too_strong:
             weakest = min([weakest, *too_weak])
             strongest = max([strongest, *too_strong])
@@ -146,7 +147,7 @@ def planned(
             used = schedule.propellant  # once more with the moments half-way
             continue
         try:
-            commands = as_commands(spacecraft, schedule, correct, body.inertia)
+            commands = as_commands(spacecraft, schedule, correct, without.inertia)
         except Infeasible:
             if not tried:
                 raise
@@ -158,7 +159,7 @@ def planned(
             break
         if kept and (
             spacecraft.limits.tick is not None
-            or left <= NEARLY * _left(body, schedule, correct) + EXACT
+            or left <= NEARLY * _left(without, schedule, correct) + EXACT
         ):
             break
         # What is longer than planned, or has been moved, met its neighbour or a window: the next
@@ -166,7 +167,7 @@ def planned(
         room = max(2.0 * room, longer, ROOM * max(pulse.on_time for pulse in schedule))
     assert schedule is not None
     if not tried:
-        return as_commands(spacecraft, schedule, correct, body.inertia)
+        return as_commands(spacecraft, schedule, correct, without.inertia)
     return min(tried, key=lambda trial: trial[:2])[2]
 
 
@@ -178,10 +179,10 @@ def _left(spacecraft: Spacecraft, schedule: Schedule, correct: Correction) -> fl
 def as_commands(
     spacecraft: Spacecraft, schedule: Schedule, correct: Correction, inertia: Inertia | None = None
 ) -> Schedule:
-    """A schedule of the plain body as commands; ``correct`` brings them to what is left on the
+    """A schedule of the body without valves as commands; ``correct`` brings them to what is left on the
     flown motion.
 
-    ``inertia`` is that of the plain body, default that at t = 0. Commands that give no thrust are
+    ``inertia`` is that of the body without valves, default that at t = 0. Commands that give no thrust are
     left out. Raises Infeasible where the propellant does not last.
     """
     commands = _translated(spacecraft, schedule, inertia, correct)
@@ -318,7 +319,7 @@ def _on_ticks(spacecraft: Spacecraft, made: Schedule, correct: Correction) -> Sc
     """Schedule on the ticks of its commands: the better of rounding all at once, and the last
     pulses in turn.
     """
-    smooth = replace(spacecraft, limits=replace(spacecraft.limits, tick=None))
+    smooth = with_limits(spacecraft, tick=None)
     made = correct(smooth, made, TAIL)
 
     def rounded(schedule: Schedule, count: int) -> Schedule:
@@ -343,19 +344,21 @@ class Legs:
     """Schedules for a spacecraft, one after the other: pulses, or the ``blocks`` that fire them."""
 
     def __init__(self, spacecraft: Spacecraft) -> None:
-        self.body, self.blocks = spacecraft, list[Block]()
+        self.spacecraft, self.blocks = spacecraft, list[Block]()
         self._builder, self._supply = FlownBuilder(spacecraft), Supply(spacecraft)
 
     @property
-    def here(self) -> Spacecraft:
+    def at_leg(self) -> Spacecraft:
         """Spacecraft after the legs so far, its time from there."""
-        return self._supply.behind(self._builder.here)
+        return self._supply.behind(self._builder.at_leg)
 
     def fire(self, schedule: Schedule) -> None:
-        """Take the schedule of one more leg, with times and Sun pulses counted from `here`."""
+        """Take the schedule of one more leg, with times and Sun pulses counted from `at_leg`."""
         now, builder = self._builder.now, self._builder
         if schedule.blocks and now > 0.0:
-            passed = len(sun_pulses(propagation.flown(self.body, builder.schedule(), now), now))
+            passed = len(
+                sun_pulses(propagation.flown(self.spacecraft, builder.schedule(), now), now)
+            )
             later = tuple(replace(block, first=block.first + passed) for block in schedule.blocks)
             schedule = replace(schedule, blocks=later)
         self.blocks += schedule.blocks
@@ -364,5 +367,5 @@ class Legs:
 
     def schedule(self, *notes: Note) -> Schedule:
         """All of them in one, with the Sun pulses of the whole flight."""
-        whole = fired(self.body, self.blocks) if self.blocks else self._builder.schedule()
+        whole = fired(self.spacecraft, self.blocks) if self.blocks else self._builder.schedule()
         return replace(whole, notes=notes)

@@ -209,10 +209,9 @@ def rounded_off(spacecraft: Spacecraft, pulses: Iterable[Pulse]) -> list[float]:
     """Effect of half a tick in start and on-time of each pulse, rad, as a root sum of squares;
     without ticks 0.
     """
-    body = spacecraft
     half = 0.5 * (spacecraft.limits.tick or 0.0)
-    rate = body.fastest
-    size = abs(body.axial)
+    rate = spacecraft.fastest
+    size = abs(spacecraft.axial)
     lengths = (
         (pulse.magnitude, 1.0 / pulse.on_time if pulse.on_time > 0.0 else 0.0) for pulse in pulses
     )

@@ -158,6 +158,12 @@ def required(spacecraft: Spacecraft) -> tuple[Bound, ...]:
     return tuple(bounds)
 
 
+def reaches_spin(spacecraft: Spacecraft) -> bool:
+    """True if the spin is that of the goal from the beginning."""
+    goal = spacecraft.goal.spin
+    return goal is None or spins_at(spacecraft, goal)
+
+
 def spins_at(spacecraft: Spacecraft, spin: float) -> bool:
     """True where the body spins at ``spin`` rad/s as nearly as plans set it."""
     return abs(spacecraft.spin - spin) <= AIMED_SPIN * spin_tolerance(spacecraft, spin)

@@ -464,11 +464,11 @@ def checked(
 
     Derived quantities may be faulty, too. Raises FaultyFile.
     """
-    body = source.read(doubts.append)
+    spacecraft = source.read(doubts.append)
     for doubt in doubts:
         warn(doubt)
     try:
-        return CheckedFile(body, tuple(doubts), checked_json(name, body, doubts))
+        return CheckedFile(spacecraft, tuple(doubts), checked_json(name, spacecraft, doubts))
     except NutdampError as wrong:
         raise FaultyFile([Fault(name or source.name, 1, 1, "", str(wrong))]) from wrong
 

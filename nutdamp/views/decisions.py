@@ -71,28 +71,31 @@ def end_rows(flown: Flight, watched: Iterable[Aspect]) -> Iterator[tuple[str, st
     """Spin axis and H after the last pulse, beside the target and directions ``watched``, and the
     motion from there.
     """
-    body, final = flown.spacecraft, flown.final
-    yield "spin axis ends at", direction_text(body, final.axis)
-    yield "H ends at", direction_text(body, final.momentum)
-    if body.goal.axis is not None:
+    spacecraft, final = flown.spacecraft, flown.final
+    yield "spin axis ends at", direction_text(spacecraft, final.axis)
+    yield "H ends at", direction_text(spacecraft, final.momentum)
+    if spacecraft.goal.axis is not None:
         off = degrees(flown.residual.axis_error)
-        yield "target", f"{direction_text(body, body.goal.axis)}; H ends {off} off"
+        yield "target", f"{direction_text(spacecraft, spacecraft.goal.axis)}; H ends {off} off"
     yield "final state", f"spin {spin_text(final.spin)}, nutation {degrees(final.nutation)}"
     if lasting(flown):
         yield "", lasting(flown)
     yield from aspect_facts(watched)
-    if body.attitude is None:
+    if spacecraft.attitude is None:
         yield "", text(note("frame-n"))
-    elif body.attitude.frame is not None:
-        yield "frame", body.attitude.frame
+    elif spacecraft.attitude.frame is not None:
+        yield "frame", spacecraft.attitude.frame
 
 
 def lasting(flown: Flight) -> str:
     """Time of the end shown where the motion does not last, and the cause of its change; empty
     where it lasts.
     """
-    body = flown.spacecraft
-    causes = [*["dissipation"] * (body.growth != 0.0), *["disturbances"] * bool(body.disturbances)]
+    spacecraft = flown.spacecraft
+    causes = [
+        *["dissipation"] * (spacecraft.growth != 0.0),
+        *["disturbances"] * bool(spacecraft.disturbances),
+    ]
     end = moment(flown.schedule.end if flown.until is None else flown.until)
     return f"at {end}; then changing by {' and '.join(causes)}" if causes else ""
 
@@ -168,22 +171,22 @@ def spacecraft_json(spacecraft: Spacecraft) -> dict[str, Any]:
 
 def plan_json(plan: Plan) -> dict[str, Any]:
     """One plan; an infeasible one has no pulses, nulls, and the reason."""
-    schedule, body = plan.schedule, plan.spacecraft
+    schedule, spacecraft = plan.schedule, plan.spacecraft
     return {
         **values_of(plan, "scheme", "feasible"),
         "why": infeasibility(plan) or None,
         "meets_requirement": plan.meets_requirement,
         "requirement": [line_json(line) for line in lines_of(plan.held, None, 1.0)] or None,
-        "pulses": commanded(plan.pulses, body).json(),
+        "pulses": commanded(plan.pulses, spacecraft).json(),
         **values_of(schedule, "total_impulse_Nms"),
-        "least_impulse_Nms": None if schedule is None else body.least_impulse,
+        "least_impulse_Nms": None if schedule is None else spacecraft.least_impulse,
         **values_of(schedule, "propellant_kg", "end_s"),
         "delta_v_m_s": None if plan.delta_v is None else cleaned(plan.delta_v).tolist(),
         "spin_change_rad_s": plan.spin_change,
         "residual": residual_json(plan.residual),
         "flown": residual_json(plan.flown),
         "final": None if schedule is None else final_json(plan.flight),
-        "target": target_json(body),
+        "target": target_json(spacecraft),
         **aspects_json(plan.aspects if plan.feasible else ()),
         "bounds": None if plan.pulses.bounds is None else plan.pulses.bounds._asdict(),
         "notes": [note_json(note) for note in plan_notes(plan)] if plan.feasible else [],
@@ -192,23 +195,23 @@ def plan_json(plan: Plan) -> dict[str, Any]:
 
 def final_json(flown: Flight) -> dict[str, Any]:
     """Final spin axis and angular momentum, and the motion from then on."""
-    body, final, settled = flown.spacecraft, flown.final, flown.settled
-    rates, quaternion = body.inertia.in_file_axes(settled.rates, settled.quaternion)
+    spacecraft, final, settled = flown.spacecraft, flown.final, flown.settled
+    rates, quaternion = spacecraft.inertia.in_file_axes(settled.rates, settled.quaternion)
     return {
-        "axis": direction_json(body, final.axis),
-        "momentum": direction_json(body, final.momentum),
+        "axis": direction_json(spacecraft, final.axis),
+        "momentum": direction_json(spacecraft, final.momentum),
         **values_of(final, "spin_rad_s", "nutation_deg"),
         "omega_rad_s": rates.tolist(),
         "quaternion": quaternion.tolist(),
     }
 
 
-def target_json(body: Spacecraft) -> dict[str, Any] | None:
+def target_json(spacecraft: Spacecraft) -> dict[str, Any] | None:
     """The requirement on the end, in the form of `final_json`; None where nothing is required."""
-    axis, spin = body.goal.axis, body.goal.spin
+    axis, spin = spacecraft.goal.axis, spacecraft.goal.spin
     if axis is None and spin is None:
         return None
-    return {"axis": None if axis is None else direction_json(body, axis), "spin_rad_s": spin}
+    return {"axis": None if axis is None else direction_json(spacecraft, axis), "spin_rad_s": spin}
 
 
 def aspects_json(aspects: tuple[Aspect, ...]) -> dict[str, Any]:
@@ -221,15 +224,15 @@ def aspects_json(aspects: tuple[Aspect, ...]) -> dict[str, Any]:
     return {"aspects": entries} if entries else {}
 
 
-def direction_json(body: Spacecraft, direction: Vector) -> dict[str, float | None]:
+def direction_json(spacecraft: Spacecraft, direction: Vector) -> dict[str, float | None]:
     """The two angles that name an inertial direction (3,), as `Spacecraft.angles_of`."""
     around, other = (
-        None if angle is None else math.degrees(angle) for angle in body.angles_of(direction)
+        None if angle is None else math.degrees(angle) for angle in spacecraft.angles_of(direction)
     )
     named = {"tilt_deg": other, "azimuth_deg": around}
     return (
         named
-        if body.attitude is None
+        if spacecraft.attitude is None
         else {"right_ascension_deg": around, "declination_deg": other}
     )
 
@@ -293,7 +296,7 @@ def certificate_json(certificate: Certificate) -> dict[str, Any]:
     m3 to the equation spin. Of each equation the file has the goal and the price y, and q(t) of a
     channel is the sum of y times what it adds, over ``cost_per_s``.
     """
-    body = certificate.spacecraft
+    spacecraft = certificate.spacecraft
     program = certificate.program
     prices = certificate.proof.prices.tolist()
     equations = zip(certificate.rows, program.influence.goal.tolist(), prices, strict=True)
@@ -302,12 +305,14 @@ def certificate_json(certificate: Certificate) -> dict[str, Any]:
     return {
         "nutdamp": __version__,
         "certificate": 1,
-        "spacecraft": body.name,
+        "spacecraft": spacecraft.name,
         "proves": PROVES,
         "model": MODEL,
         "not_counted": NOT_COUNTED,
-        "circle": body.inertia.circle(body.spin).tolist(),
-        **values_of(body, "spin_rad_s", "nutation_rad_s=nutation_rate", "growth_per_s=growth"),
+        "circle": spacecraft.inertia.circle(spacecraft.spin).tolist(),
+        **values_of(
+            spacecraft, "spin_rad_s", "nutation_rad_s=nutation_rate", "growth_per_s=growth"
+        ),
         "last_s": certificate.last,
         "windows_s": [list(span) for span in certificate.windows],
         "unit": certificate.problem.unit,

@@ -115,10 +115,10 @@ def dispersion_brief(flown: Dispersion) -> RenderableType:
 
 def dispersion_screen(flown: Dispersion, *, worst: int) -> Group:
     """All tables of ``disperse``."""
-    results, study, body = flown.core, flown.core.study, flown.plan.spacecraft
+    results, study, spacecraft = flown.core, flown.core.study, flown.plan.spacecraft
     head = [_title(results, flown.plan.scheme), *verdict_lines(flown.verdict, results)]
     parts: list[RenderableType] = [*head, Text(), _percentiles(results).screen("full")]
-    parts.append(angles_note(body))
+    parts.append(angles_note(spacecraft))
     if not results.exact:
         parts.append(
             Text(
@@ -145,21 +145,21 @@ def dispersion_json(flown: Dispersion, *, worst: int) -> dict[str, Any]:
     the increment over those before it. ``effect_deg``: on the nutation, of one sigma of an input
     alone (or all of a bias).
     """
-    results, study, body = flown.core, flown.core.study, flown.plan.spacecraft
+    results, study, spacecraft = flown.core, flown.core.study, flown.plan.spacecraft
     return {
-        **decisions.heading(body),
+        **decisions.heading(spacecraft),
         "scheme": flown.plan.scheme,
         **counts_json(results),
         "final": decisions.final_json(study.nominal),
-        "target": decisions.target_json(body),
+        "target": decisions.target_json(spacecraft),
         "exact_percentiles": results.exact,
         "percentiles": percentiles_of(results, FLOWN_OUTPUTS, study.outputs_of({})),
         "requirement": requirement_of(flown.verdict),
         "decision": verdicts.verdict_json(flown.verdict),
         **cones_json(results),
-        **({"tank_empty_fraction": results.emptied / results.done} if body.tank else {}),
+        **({"tank_empty_fraction": results.emptied / results.done} if spacecraft.tank else {}),
         "shares": list(_shares(results)),
-        **tolerances.correlation_json(body),
+        **tolerances.correlation_json(spacecraft),
         "unused": [entry.name for entry in study.model.inputs.unused],
         "unused_because": dict(study.model.inputs.unused),
         "worst": [row_json(study, FLOWN_OUTPUTS, row) for row in _worst(results, worst)],
@@ -292,9 +292,9 @@ def beside(value: float, largest: float) -> str:
     return text if float(text) else text.lstrip("-")
 
 
-def angles_note(body: Spacecraft) -> Text:
+def angles_note(spacecraft: Spacecraft) -> Text:
     """Note on the reference of the angles of H in dispersed cases."""
-    aim = "H at t = 0 with nominal values" if body.goal.axis is None else "the target"
+    aim = "H at t = 0 with nominal values" if spacecraft.goal.axis is None else "the target"
     note = f"Momentum shift: from H at t = 0 of the same case; axis error: from {aim}."
     return Text(f"{note} The spin axis swings about H by the nutation.", style="dim")
 
@@ -351,11 +351,13 @@ def cones_json(results: Results | LoopResults) -> dict[str, Any]:
 
 def _cones(results: Results | LoopResults) -> Iterator[tuple[Keep, dict[str, Any]]]:
     """Each cone with its entry in files; none before the first case."""
-    body = results.study.model.spacecraft
+    spacecraft = results.study.model.spacecraft
     nominal = (
-        np.degrees(results.study.nominal_aspects).tolist() if results.done and body.keep else ()
+        np.degrees(results.study.nominal_aspects).tolist()
+        if results.done and spacecraft.keep
+        else ()
     )
-    for index, (keep, (least, largest)) in enumerate(zip(body.keep, nominal, strict=False)):
+    for index, (keep, (least, largest)) in enumerate(zip(spacecraft.keep, nominal, strict=False)):
         least_of_all, largest_of_all = np.degrees(results.aspects[index]).tolist()
         entry = values_of(keep, "name", "min_deg=least", "max_deg=most")
         entry |= {"broken_fraction": float(results.broken[index] / results.done)}

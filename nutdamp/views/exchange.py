@@ -111,21 +111,21 @@ def _dated(plan: Plan, row: Format, until: float, xml: bool) -> str:
     from nutdamp.flight.propagation import flown
 
     # refuses a file without epoch or frame
-    body = plan.spacecraft
+    spacecraft = plan.spacecraft
     place = reference(plan.spacecraft)
     last = until if row.track else plan.pulses.end
-    if body.utc(last) is None:
+    if spacecraft.utc(last) is None:
         cure = "an earlier --until" if row.track else "a shorter horizon"
         raise Unsuitable(
             ("attitude", "epoch"), f"{last:.4g} s after it the year 9999 is over; {cure} helps"
         )
     if not row.message:
         about = f"{plan.scheme}, status {plan.verdict.status.value}"
-        return stk_attitude(flown(body, plan.pulses, until), until, place, about)
+        return stk_attitude(flown(spacecraft, plan.pulses, until), until, place, about)
     now = Epoch.parse(datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%dT%H:%M:%SZ"))
     if row.track:
         form = message.SPIN_NUTATION_MOM if row.nutates else message.QUATERNION_ANGVEL
-        written = write.aem(plan, flown(body, plan.pulses, until), until, place, now, form)
+        written = write.aem(plan, flown(spacecraft, plan.pulses, until), until, place, now, form)
     else:
         written = (write.opm if row.needs_orbit else write.apm)(plan, place, now)
     return message.to_xml(written) if xml else message.to_kvn(written)

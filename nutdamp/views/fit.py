@@ -157,15 +157,15 @@ def fit_screen(fit: Fit, time: float, *, verbose: bool = True) -> RenderableType
     )
     if outliers := int((~fit.used).sum()):
         test += f"; outliers left out: {outliers}"
-    record, values, body = fit.model.record, fit.named, fit.model.spacecraft
-    wheel = values.get("wheel", body.inertia.wheel) / in_moments(body, values)[0]
+    record, values, spacecraft = fit.model.record, fit.named, fit.model.spacecraft
+    wheel = values.get("wheel", spacecraft.inertia.wheel) / in_moments(spacecraft, values)[0]
     # Of the nutation in the body, small angles.
-    rate = abs((1.0 - values["C/A"]) * values.get("omega_3", body.spin) - wheel)
+    rate = abs((1.0 - values["C/A"]) * values.get("omega_3", spacecraft.spin) - wheel)
     turns = f", nutation periods: {record.length * rate / (2.0 * math.pi):.3g}" if rate else ""
     fired = f", pulses fired meanwhile: {len(record.fired)}" if len(record.schedule) else ""
     what = f", {record.start:g} s to {record.end:g} s{turns}{fired}"
     headline = Text.assemble("FIT ", (", ".join(names), "bold"), what)
-    head = [*opening(body, verbose), headline, Text(test, "bold red" if colored else "green")]
+    head = [*opening(spacecraft, verbose), headline, Text(test, "bold red" if colored else "green")]
     table = DataTable("Estimates", ESTIMATES, rows)
     return summary(
         [*head, Text(f"motion at t = {time:g} s")],

@@ -70,9 +70,9 @@ def scheme_table(compared: Comparison, chosen: Plan | None) -> DataTable:
     return DataTable(subject, tuple(_columns(compared, chosen)), compared.plans, compared, mark)
 
 
-def limits(body: Spacecraft) -> tuple[float, float]:
+def limits(spacecraft: Spacecraft) -> tuple[float, float]:
     """Limits, rad, of the nutation and of the end of H, infinite where there are none."""
-    most = {bound.part: bound.limit for bound in requirements.required(body)}
+    most = {bound.part: bound.limit for bound in requirements.required(spacecraft)}
     ends = [most[part] for part in (Part.SHIFT, Part.DISTANCE) if part in most]
     return most.get(Part.NUTATION, math.inf), min(ends, default=math.inf)
 
@@ -93,11 +93,11 @@ def _four(value: float) -> str:
 
 
 def _columns(compared: Comparison, chosen: Plan | None) -> Iterator[Column]:
-    body = compared.spacecraft
+    spacecraft = compared.spacecraft
     least = limits(compared.spacecraft)
     feasible = [plan for plan in compared.plans if plan.feasible]
     fuelled = any(plan.pulses.propellant is not None for plan in feasible)
-    aimed = body.goal.axis is not None
+    aimed = spacecraft.goal.axis is not None
     everywhere = "screen full page"
 
     def met(plan: Plan) -> bool | None:
@@ -160,10 +160,10 @@ def _columns(compared: Comparison, chosen: Plan | None) -> Iterator[Column]:
         )
     keys = (
         ("tilt_deg", "azimuth_deg")
-        if body.attitude is None
+        if spacecraft.attitude is None
         else ("right_ascension_deg", "declination_deg")
     )
-    names = parts.angle_names(body) if body.attitude is None else SHORT_NAMES
+    names = parts.angle_names(spacecraft) if spacecraft.attitude is None else SHORT_NAMES
     for at, key in enumerate(keys):
         yield Column(
             f"axis_{key}", "", "", _feasible(partial(_direction, "axis", key)), where="csv"
@@ -180,7 +180,7 @@ def _columns(compared: Comparison, chosen: Plan | None) -> Iterator[Column]:
             f"momentum_{key}", "", "", _feasible(partial(_direction, "momentum", key)), where="csv"
         )
     yield Column("spin_rad_s", "", "", _feasible("flight.final.spin"), where="csv")
-    if body.goal.spin is not None:
+    if spacecraft.goal.spin is not None:
         yield Column(
             "", "final spin", "rad/s", _feasible("flight.settled.spin"), to_figures(6), "full"
         )
@@ -189,7 +189,7 @@ def _columns(compared: Comparison, chosen: Plan | None) -> Iterator[Column]:
         "spin_change_rad_s", "spin change", "rad/s", attrgetter("spin_change"), _four, where
     )
     yield Column("delta_v_m_s", "", "", speed, where="csv")
-    for bound in (*requirements.required(body), *requirements.cones(body)):
+    for bound in (*requirements.required(spacecraft), *requirements.cones(spacecraft)):
         name = f"{bound.label} {verdicts.limit(bound)}"
         yield Column("", name, "", _feasible(partial(_bound, bound)), where="full", kind=TEXT)
     yield Column(
@@ -279,12 +279,12 @@ def headline(compared: Comparison) -> Text:
 
 def ends(plan: Plan) -> Table:
     """End of the flight, flown and by the impulse sum (17), and where the spin axis points."""
-    flight, body = plan.flight, plan.spacecraft
+    flight, spacecraft = plan.flight, plan.spacecraft
     left = flight.residual
-    formula, (least, turn) = plan.residual, limits(body)
+    formula, (least, turn) = plan.residual, limits(spacecraft)
     angles = [f"nutation {short_angle(left.nutation, least)}"]
     if (
-        not body.inertia.wheel and left.body_cone < 0.5 * math.pi
+        not spacecraft.inertia.wheel and left.body_cone < 0.5 * math.pi
     ):  # where ω need not lie near H, cones tell nothing
         angles += [f"body cone {short_angle(left.body_cone, least)}"]
         angles += [f"space cone {short_angle(left.space_cone, least)}"]
@@ -294,14 +294,16 @@ def ends(plan: Plan) -> Table:
     ):
         angles[0] += f" (17: {by_impulses})"
     rows = [("after pulses, deg", "  ".join(angles))]
-    first, second = parts.angle_texts(body, flight.final.axis)
-    names = parts.angle_names(body) if body.attitude is None else SHORT_NAMES
+    first, second = parts.angle_texts(spacecraft, flight.final.axis)
+    names = parts.angle_names(spacecraft) if spacecraft.attitude is None else SHORT_NAMES
     turned = f"turned by {short_angle(left.momentum_shift, turn)} deg"
     turned = (
-        turned if body.goal.axis is None else f"{short_angle(left.axis_error, turn)} deg off target"
+        turned
+        if spacecraft.goal.axis is None
+        else f"{short_angle(left.axis_error, turn)} deg off target"
     )
     final = flight.final.spin
-    spin = f"; spin {final * RPM:.5g} rpm" * (not requirements.spins_at(body, final))
+    spin = f"; spin {final * RPM:.5g} rpm" * (not requirements.spins_at(spacecraft, final))
     rows.append(("axis", f"{names[0]} {first}, {names[1]} {second}; H {turned}{spin}"))
     if len(plan.pulses) and lasting(flight):
         rows.append(("", lasting(flight)))

@@ -367,11 +367,11 @@ def loop_json(plan: LoopPlan) -> dict[str, Any]:
     """Firings with the nutation seen, final motion, dead band, margin of each channel before it
     feeds, and notes.
     """
-    run, body = plan.flown_run, plan.spacecraft
+    run, spacecraft = plan.flown_run, plan.spacecraft
     pulses = zip(pulse_table(run.flight).json("flown"), firing_table(run).json(), strict=True)
     faults = [stopped(run)] if run.stop.fault else []
     return {
-        **heading(body),
+        **heading(spacecraft),
         **tables.values_of(run, "law=loop.law", "seed", "case", "until_s"),
         "stopped": run.stop.name.lower(),
         "channel": run.channel,
@@ -384,7 +384,7 @@ def loop_json(plan: LoopPlan) -> dict[str, Any]:
         **tables.values_of(plan, "total_impulse_Nms", "propellant_kg", "end_s"),
         "flown": decisions.residual_json(plan.flight.residual),
         "final": decisions.final_json(plan.flight),
-        "target": decisions.target_json(body),
+        "target": decisions.target_json(spacecraft),
         "margins": margin_table(plan.margins).json(),
         "notes": [note_json(entry) for entry in (*faults, *ordered(_notes(plan, plan.verdict)))],
     }
@@ -529,14 +529,14 @@ def budget_screen(budget: Budget, *, verbose: bool = True) -> RenderableType:
 
 
 def _outlook(budget: Budget) -> Iterator[Note]:
-    body = budget.spacecraft
+    spacecraft = budget.spacecraft
     limit = None if budget.largest is None else math.degrees(budget.largest)
-    now = math.degrees(body.nutation)
+    now = math.degrees(spacecraft.nutation)
     until = budget.until_largest
-    if body.growth == 0.0:
+    if spacecraft.growth == 0.0:
         yield note("nutation-stays", nutation_deg=now)
-    elif body.growth < 0.0:
-        decay = -1.0 / body.growth
+    elif spacecraft.growth < 0.0:
+        decay = -1.0 / spacecraft.growth
         if limit is None:
             yield note("nutation-decays", e_fold_lasting_s=decay)
         elif until == 0.0:
@@ -548,24 +548,24 @@ def _outlook(budget: Budget) -> Iterator[Note]:
                 limit_deg=limit,
                 until_lasting_s=until,
             )
-    elif body.nutation == 0.0:
+    elif spacecraft.nutation == 0.0:
         yield note("no-nutation-yet")
     elif limit is None:
         yield note("no-largest-nutation")
     elif until == 0.0:
         yield note("damping-due", nutation_deg=now, limit_deg=limit)
     elif until is not None and math.isinf(until):
-        end = math.degrees(float(requirements.idle(body, 1e3 / body.growth)))
+        end = math.degrees(float(requirements.idle(spacecraft, 1e3 / spacecraft.growth)))
         yield note("damping-never", nutation_deg=now, end_deg=end, limit_deg=limit)
     else:
         yield note("damping-within", until_lasting_s=until, nutation_deg=now, limit_deg=limit)
-    if body.growth > 0.0 and body.loop is None:
+    if spacecraft.growth > 0.0 and spacecraft.loop is None:
         yield note("budget-needs-loop")
 
 
 def _budget_notes(budget: Budget) -> Iterator[Note]:
     """Warnings of each pair of thresholds, then what the figures rest on; none without any pair."""
-    body = budget.spacecraft
+    spacecraft = budget.spacecraft
     if not budget.held:
         return
     for row in budget.held:
@@ -573,7 +573,7 @@ def _budget_notes(budget: Budget) -> Iterator[Note]:
     changes = [row.slows for row in budget.held if row.slows is not None]
     if changes and max(map(abs, changes)) > SLOW:
         yield note("spin-changes", change_percent=100.0 * max(changes, key=abs) * DAY / YEAR)
-    if body.disturbances:
+    if spacecraft.disturbances:
         yield note("disturbances-left-out")
     known = [row.cycle.doubt for row in budget.held if row.cycle is not None]
     if known:
@@ -595,23 +595,25 @@ def _budget_notes(budget: Budget) -> Iterator[Note]:
             yield note("first-firing", thresholds=starts, after_lasting_s=begins)
     if band is not None:
         yield note("sensor-noise", noise_deg=math.degrees(band.noise))
-    if body.tank is not None:
+    if spacecraft.tank is not None:
         yield note("tank-days")
-    if body.cold is not None:
+    if spacecraft.cold is not None:
         yield note("nozzles-warm")
-    if body.loop is not None:
-        yield note("loop-in-file", loop=described(body.loop, thresholds=False))
+    if spacecraft.loop is not None:
+        yield note("loop-in-file", loop=described(spacecraft.loop, thresholds=False))
 
 
 def _row_warnings(row: HeldNutation, budget: Budget) -> Iterator[Note]:
-    body, loop = budget.spacecraft, budget.spacecraft.loop
+    spacecraft, loop = budget.spacecraft, budget.spacecraft.loop
     assert loop is not None
     start, stop = math.degrees(row.thresholds.start), math.degrees(row.thresholds.stop)
     if row.why:
         yield note("no-limit-cycle", why=row.why, start_deg=start, stop_deg=stop)
     else:
         yield from warnings(
-            replace(body, loop=replace(loop, start=row.thresholds.start, stop=row.thresholds.stop))
+            replace(
+                spacecraft, loop=replace(loop, start=row.thresholds.start, stop=row.thresholds.stop)
+            )
         )
     if row.cycle is not None and row.cycle.cycles == 0.0:
         yield note("never-quiet", start_deg=start, stop_deg=stop)

@@ -63,23 +63,23 @@ MILLISECONDS = 3  # digits of a second that tables show of a date
 
 
 class PulseRow(NamedTuple):
-    """A pulse of ``body``, counted from 0; motion just before and after all pulses; spin phase at
+    """A pulse of the ``spacecraft``, counted from 0; motion just before and after all pulses; spin phase at
     its start, rad.
     """
 
     at: int
     pulse: Pulse
-    body: Spacecraft
+    spacecraft: Spacecraft
     before: Track | None = None
     after: Track | None = None
     phase: float = 0.0
 
 
-def channel_text(pulse: Pulse, body: Spacecraft) -> str:
+def channel_text(pulse: Pulse, spacecraft: Spacecraft) -> str:
     """The channel of a pulse; a steerable one is named by the angle of its torque too."""
     if pulse.channel != STEERABLE:
         return pulse.channel
-    return f"{STEERABLE} {steering(body.inertia.in_file(pulse.impulse).tolist())}"
+    return f"{STEERABLE} {steering(spacecraft.inertia.in_file(pulse.impulse).tolist())}"
 
 
 def seconds(value: float) -> str:
@@ -99,25 +99,25 @@ def _cone(name: str, when: str, where: str) -> Column:
 def _vector(name: str, unit: str) -> Column:
     def components(row: PulseRow) -> Any:
         vector = getattr(row.pulse, name)
-        return None if vector is None else row.body.inertia.in_file(vector)
+        return None if vector is None else row.spacecraft.inertia.in_file(vector)
 
     return Column(f"{name}#_{unit}", name, unit, components, where=FILES)
 
 
-def clock(body: Spacecraft, time: float, digits: int = MILLISECONDS) -> str | None:
+def clock(spacecraft: Spacecraft, time: float, digits: int = MILLISECONDS) -> str | None:
     """Time of day in UTC, with the day where it is another one than at t = 0; None without an
     epoch.
     """
-    zero, date = body.utc(0.0, digits), body.utc(time, digits)
+    zero, date = spacecraft.utc(0.0, digits), spacecraft.utc(time, digits)
     if date is None or zero is None:
         return None
     day, of_day = date.removesuffix("Z").split("T")
     return of_day if zero.startswith(day) else f"{day[5:]} {of_day}"
 
 
-def sun_phased(body: Spacecraft) -> bool:
+def sun_phased(spacecraft: Spacecraft) -> bool:
     """True where phases count from the Sun sensor, else from t = 0."""
-    return body.sun is not None and body.sun_sensor is not None
+    return spacecraft.sun is not None and spacecraft.sun_sensor is not None
 
 
 def phases(flown: Flight) -> Vector:
@@ -152,7 +152,7 @@ PULSES = (
         "",
         Shared.CHANNEL,
         "",
-        lambda row: channel_text(row.pulse, row.body),
+        lambda row: channel_text(row.pulse, row.spacecraft),
         where=PEOPLE,
         kind=TEXT,
     ),
@@ -176,14 +176,16 @@ PULSES = (
     _cone("space_cone", "after", "simulate page flown"),
     Column("effective_start_s", "", "", lambda row: row.pulse.start, where=FILES, when=_valves),
     Column("effective_on_time_s", "", "", lambda row: row.pulse.on_time, where=FILES, when=_valves),
-    Column("utc", "", "", lambda row: row.body.utc(row.pulse.loaded[0]), where=FILES, kind=TEXT),
+    Column(
+        "utc", "", "", lambda row: row.spacecraft.utc(row.pulse.loaded[0]), where=FILES, kind=TEXT
+    ),
 )
 
 
-def commanded(schedule: Schedule, body: Spacecraft) -> DataTable:
+def commanded(schedule: Schedule, spacecraft: Spacecraft) -> DataTable:
     """The pulses as they are commanded, without the motion that they cause."""
-    rows = [PulseRow(index, pulse, body) for index, pulse in enumerate(schedule)]
-    return DataTable("Pulses", _dated(body), rows, schedule)
+    rows = [PulseRow(index, pulse, spacecraft) for index, pulse in enumerate(schedule)]
+    return DataTable("Pulses", _dated(spacecraft), rows, schedule)
 
 
 def pulse_table(flown: Flight, *, scheme: str = "", least: float = math.inf) -> DataTable:
@@ -192,19 +194,21 @@ def pulse_table(flown: Flight, *, scheme: str = "", least: float = math.inf) -> 
     ``scheme``: its name, on pages; ``least``: limit of the nutation, rad, on default screens.
     """
     before, after = flown.around_pulses()
-    pulses, body = flown.schedule.pulses, flown.spacecraft
+    pulses, spacecraft = flown.schedule.pulses, flown.spacecraft
     phased = enumerate(zip(pulses, phases(flown).tolist(), strict=True))
-    rows = [PulseRow(index, pulse, body, before, after, phase) for index, (pulse, phase) in phased]
+    rows = [
+        PulseRow(index, pulse, spacecraft, before, after, phase) for index, (pulse, phase) in phased
+    ]
     left = Column("", Shared.NUTATION_AFTER, "deg", lambda row: float(row.after.nutation[row.at]),
                   lambda angle: short_angle(angle, least), "screen")  # fmt: skip
-    return DataTable(f"Pulses of {scheme}", (*_dated(body), left), rows, flown.schedule)
+    return DataTable(f"Pulses of {scheme}", (*_dated(spacecraft), left), rows, flown.schedule)
 
 
-def _dated(body: Spacecraft) -> tuple[Column, ...]:
+def _dated(spacecraft: Spacecraft) -> tuple[Column, ...]:
     """The columns for a spacecraft: one time of the start for people, UTC where there is an epoch,
     and one phase.
     """
-    if body.utc(0.0) is None:
+    if spacecraft.utc(0.0) is None:
         start = Column("", Shared.START, "s", lambda row: row.pulse.loaded[0], seconds, PEOPLE)
         columns = tuple(column for column in PULSES if column.key != "utc")
     else:
@@ -212,14 +216,14 @@ def _dated(body: Spacecraft) -> tuple[Column, ...]:
             "",
             Shared.START,
             "UTC",
-            lambda row: clock(row.body, row.pulse.loaded[0]),
+            lambda row: clock(row.spacecraft, row.pulse.loaded[0]),
             where=PEOPLE,
             kind=TEXT,
         )
         columns = PULSES
     phase = Column(
         "",
-        "Sun phase" if sun_phased(body) else "spin phase",
+        "Sun phase" if sun_phased(spacecraft) else "spin phase",
         "deg",
         lambda row: math.degrees(row.phase) % 360.0,
         lambda angle: f"{angle:.1f}",
@@ -229,17 +233,17 @@ def _dated(body: Spacecraft) -> tuple[Column, ...]:
 
 
 class BlockRow(NamedTuple):
-    """A command block of ``body``, from 0: its pulses, the nutation after the last of them, rad."""
+    """A command block of the ``spacecraft``, from 0: its pulses, the nutation after the last of them, rad."""
 
     at: int
     block: Block
-    body: Spacecraft
+    spacecraft: Spacecraft
     pulses: tuple[Pulse, ...]
     nutation: float
 
 
 def _counts(name: str, row: BlockRow) -> int | None:
-    commands = row.body.commands
+    commands = row.spacecraft.commands
     return None if commands is None else commands.counts(name, getattr(row.block, name))
 
 
@@ -266,7 +270,7 @@ BLOCKS = (
         "first_utc",
         "first pulse",
         "UTC",
-        lambda row: row.body.utc(row.pulses[0].loaded[0]),
+        lambda row: row.spacecraft.utc(row.pulses[0].loaded[0]),
         where="csv page",
         kind=TEXT,
     ),
@@ -283,7 +287,7 @@ BLOCKS = (
         "delay_deg",
         Shared.DELAY,
         "deg",
-        lambda row: _nine(math.degrees(row.block.delay * abs(row.body.spin))),
+        lambda row: _nine(math.degrees(row.block.delay * abs(row.spacecraft.spin))),
         lambda angle: f"{angle:.2f}",
         EVERYWHERE,
     ),
@@ -320,7 +324,7 @@ def block_table(flown: Flight) -> DataTable:
     """
     _, after = flown.around_pulses()
     pulses = flown.schedule.pulses
-    body = flown.spacecraft
+    spacecraft = flown.spacecraft
     rows = []
     lasts = accumulate(block.count for block in flown.schedule.blocks)
     for index, (block, last) in enumerate(zip(flown.schedule.blocks, lasts, strict=True)):
@@ -328,7 +332,7 @@ def block_table(flown: Flight) -> DataTable:
             BlockRow(
                 index,
                 block,
-                body,
+                spacecraft,
                 pulses[last - block.count : last],
                 float(after.nutation[last - 1]),
             )
@@ -365,9 +369,11 @@ SIZES = (
 )  # rows before the last one, and notes: the first that fits
 
 
-def opening(body: Spacecraft, verbose: bool) -> Iterator[RenderableType]:
+def opening(spacecraft: Spacecraft, verbose: bool) -> Iterator[RenderableType]:
     """Name and motion of a spacecraft at t = 0; ``verbose``: all its derived quantities."""
-    yield from (named(body), derived_table(body), Text()) if verbose else title(body)
+    yield from (
+        (named(spacecraft), derived_table(spacecraft), Text()) if verbose else title(spacecraft)
+    )
 
 
 def summary(
@@ -428,77 +434,84 @@ def blocks_screen(flown: Flight, velocity: Vector | None) -> RenderableType:
 
 
 def _effects(flown: Flight, velocity: Vector | None) -> Iterator[tuple[str, str]]:
-    body, schedule, final = flown.spacecraft, flown.schedule, flown.final
+    spacecraft, schedule, final = flown.spacecraft, flown.schedule, flown.final
     before, after = flown.around_pulses()
     for name, pulse in (("first pulse", schedule.pulses[0]), ("last pulse", schedule.pulses[-1])):
         start = pulse.loaded[0]
-        dated = body.utc(start, 3)
+        dated = spacecraft.utc(start, 3)
         yield name, f"starts at {moment(start)}" + (f", {dated}" if dated else "")
-    turned = (angle_texts(body, momentum) for momentum in (body.momentum, final.momentum))
-    for name, *ends in zip(angle_names(body), *turned, strict=True):
+    turned = (
+        angle_texts(spacecraft, momentum) for momentum in (spacecraft.momentum, final.momentum)
+    )
+    for name, *ends in zip(angle_names(spacecraft), *turned, strict=True):
         yield f"H: {name}", " to ".join(ends)
-    assert body.sun is not None
+    assert spacecraft.sun is not None
     aspects = (
-        attitude.angle_between(momentum, body.sun) for momentum in (body.momentum, final.momentum)
+        attitude.angle_between(momentum, spacecraft.sun)
+        for momentum in (spacecraft.momentum, final.momentum)
     )
     yield "Sun angle of H", " to ".join(degrees(float(angle)) for angle in aspects)
-    yield "spin", f"{spin_text(body.spin)} to {spin_text(final.spin)}"
+    yield "spin", f"{spin_text(spacecraft.spin)} to {spin_text(final.spin)}"
     largest = float(max(before.nutation.max(), after.nutation.max()))
     yield (
         "nutation",
-        f"{degrees(body.nutation)} to {degrees(final.nutation)}; largest {degrees(largest)}",
+        f"{degrees(spacecraft.nutation)} to {degrees(final.nutation)}; largest {degrees(largest)}",
     )
     used = schedule.propellant
-    tank = body.tank
+    tank = spacecraft.tank
     spent = mass(schedule.propellant)
     if used is not None and tank is not None:
         spent += f" of {mass(tank.propellant)}; {mass(tank.propellant - used)} left"
-    if used is not None and body.mass is not None:
-        spent += f"; mass {quantity(body.mass, 'kg', 6)} to {quantity(body.mass - used, 'kg', 6)}"
+    if used is not None and spacecraft.mass is not None:
+        spent += f"; mass {quantity(spacecraft.mass, 'kg', 6)} to {quantity(spacecraft.mass - used, 'kg', 6)}"
     yield "propellant", spent
     if velocity is not None:
         yield "|ΔV|", quantity(float(np.linalg.norm(velocity)), "m/s")
 
 
-def title(body: Spacecraft) -> list[Text]:
+def title(spacecraft: Spacecraft) -> list[Text]:
     """Name of a spacecraft and its motion at t = 0, on one line where they fit."""
     what = (
-        f"{body.inertia.shape}, {body.spin * RPM:.4g} rpm, "
-        f"nutation {short_angle(body.widest.nutation)} deg"
+        f"{spacecraft.inertia.shape}, {spacecraft.spin * RPM:.4g} rpm, "
+        f"nutation {short_angle(spacecraft.widest.nutation)} deg"
     )
-    name = named(body)
+    name = named(spacecraft)
     fits = len(name) + len(what) + 3 <= WIDTH
     return [Text.assemble(name, f"   {what}")] if fits else [name, Text(what)]
 
 
-def named(body: Spacecraft, *more: str | tuple[str, str]) -> Text:
+def named(spacecraft: Spacecraft, *more: str | tuple[str, str]) -> Text:
     """Name of a spacecraft, with a word where it is one that nobody asked for, and ``more`` text
     after it.
     """
-    return Text.assemble((body.name, "bold"), " (built-in example)" * body.built_in, *more)
+    return Text.assemble(
+        (spacecraft.name, "bold"), " (built-in example)" * spacecraft.built_in, *more
+    )
 
 
-def angle_names(body: Spacecraft) -> tuple[str, str]:
+def angle_names(spacecraft: Spacecraft) -> tuple[str, str]:
     """Names of the two angles of a direction: along and above the equator, or from H(0) and about
     it.
     """
-    return ("tilt", "azimuth") if body.attitude is None else ("right ascension", "declination")
+    return (
+        ("tilt", "azimuth") if spacecraft.attitude is None else ("right ascension", "declination")
+    )
 
 
-def angle_texts(body: Spacecraft, direction: Vector) -> tuple[str, str]:
+def angle_texts(spacecraft: Spacecraft, direction: Vector) -> tuple[str, str]:
     """The two angles of an inertial direction (3,), in the order of `angle_names`."""
-    around, other = body.angles_of(direction)
+    around, other = spacecraft.angles_of(direction)
     return (
         (pointing(other), longitude(around))
-        if body.attitude is None
+        if spacecraft.attitude is None
         else (longitude(around), pointing(other))
     )
 
 
-def direction_text(body: Spacecraft, direction: Vector) -> str:
+def direction_text(spacecraft: Spacecraft, direction: Vector) -> str:
     """An inertial direction (3,) by name and number of its angles."""
-    names = angle_names(body)
-    texts = angle_texts(body, direction)
+    names = angle_names(spacecraft)
+    texts = angle_texts(spacecraft, direction)
     return ", ".join(f"{name} {text}" for name, text in zip(names, texts, strict=True))
 
 
@@ -530,10 +543,10 @@ def bounds_text(keep: Keep) -> str:
     return " and ".join(filter(None, (least, largest)))
 
 
-def requested(body: Spacecraft) -> str:
+def requested(spacecraft: Spacecraft) -> str:
     """The requirement and the cones to keep, on one line; empty where there are none."""
-    cones = [f"axis {bounds_text(keep)} from {keep.name}" for keep in body.keep]
-    return listed([*filter(None, [required(body)]), *cones])
+    cones = [f"axis {bounds_text(keep)} from {keep.name}" for keep in spacecraft.keep]
+    return listed([*filter(None, [required(spacecraft)]), *cones])
 
 
 def required(spacecraft: Spacecraft) -> str:

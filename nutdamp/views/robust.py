@@ -130,7 +130,7 @@ def _columns(robust: RobustComparison) -> Iterator[Column]:
     """Columns of the candidates; ``full``: of the screen,
     with propellant only where all have it.
     """
-    body = robust.comparison.spacecraft
+    spacecraft = robust.comparison.spacecraft
     level = exact_percent(robust.probability)
     fuelled = all(candidate.plan.pulses.propellant is not None for candidate in robust.candidates)
     yield Column("scheme", "plan", "", attrgetter("plan.scheme"), where="full json", kind=TEXT)
@@ -174,7 +174,7 @@ def _columns(robust: RobustComparison) -> Iterator[Column]:
         "",
         attrgetter("cases"),
         share_text,
-        "full" * requirements.judged(body),
+        "full" * requirements.judged(spacecraft),
     )
     yield Column("final", "", "", lambda row: final_json(row.plan.flight), where="json")
 

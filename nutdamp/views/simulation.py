@@ -68,21 +68,21 @@ def _direction(name: str, at: int, flight: Flight) -> str:
 
 
 def _columns(simulation: Simulation) -> Iterator[Column]:
-    body = simulation.flown.spacecraft
+    spacecraft = simulation.flown.spacecraft
     yield Column("", "model", "", lambda flight: MODELS[flight.model], where="screen", kind=TEXT)
     names = [
         "nutation",
         "body_cone",
         "space_cone",
         "momentum_shift",
-        *["axis_error"] * (body.goal.axis is not None),
+        *["axis_error"] * (spacecraft.goal.axis is not None),
     ]
     for name in names:
         yield Column(
             "", name.replace("_", " "), "", attrgetter(f"residual.{name}"), degrees, "screen"
         )
     for heading, name in (("spin axis", "axis"), ("H", "momentum")):
-        for at, angle in enumerate(parts.angle_names(body)):
+        for at, angle in enumerate(parts.angle_names(spacecraft)):
             yield Column(
                 "", f"{heading}: {angle}", "", partial(_direction, name, at), where="screen"
             )
@@ -91,12 +91,20 @@ def _columns(simulation: Simulation) -> Iterator[Column]:
 
 def simulation_screen(simulation: Simulation, *, verbose: bool = True) -> RenderableType:
     """The screen of ``simulate``."""
-    judged, body, extremes = simulation.verdict, simulation.flown.spacecraft, simulation.extremes
+    judged, spacecraft, extremes = (
+        simulation.verdict,
+        simulation.flown.spacecraft,
+        simulation.extremes,
+    )
     pulses = simulation.flown.schedule
     fired = verdicts.fired(pulses) if len(pulses) else "no pulse"
     track = f"track by the {simulation.shown.model}, 0 to {moment(extremes.until)}"
     headline = Text.assemble("SIMULATED ", (simulation.plan.scheme, "bold"), f": {fired}; {track}")
-    head = [*parts.opening(body, verbose), headline, verdicts.coloured(*verdicts.stated(judged))]
+    head = [
+        *parts.opening(spacecraft, verbose),
+        headline,
+        verdicts.coloured(*verdicts.stated(judged)),
+    ]
     head += [verdicts.bound_table(judged).screen("screen")] if judged.lines else []
     ends = DataTable("", tuple(_columns(simulation)), (simulation.impulses, simulation.flown))
     return parts.summary(
@@ -148,13 +156,13 @@ def _fired(simulation: Simulation) -> Iterator[RenderableType]:
 
 
 def _extremes(simulation: Simulation) -> Iterator[tuple[str, str]]:
-    extremes, body = simulation.extremes, simulation.shown.spacecraft
+    extremes, spacecraft = simulation.extremes, simulation.shown.spacecraft
     yield (
         "spin axis in x, in y",
         f"{_range(extremes.x)}, {_range(extremes.y)} of the inertial frame",
     )
-    if body.attitude is not None:
-        frame = body.attitude.frame or "the frame of the file"
+    if spacecraft.attitude is not None:
+        frame = spacecraft.attitude.frame or "the frame of the file"
         west, east = map(longitude, extremes.right_ascension)
         yield (
             "right ascension",
@@ -266,7 +274,7 @@ SPINS = (
 )
 
 
-def spin_table(body: Spacecraft, schedule: Schedule, until: float) -> str:
+def spin_table(spacecraft: Spacecraft, schedule: Schedule, until: float) -> str:
     """The spins from t = 0 to ``until`` s as CSV, those after that to the last pulse too; the last
     one is whole.
 
@@ -275,11 +283,11 @@ def spin_table(body: Spacecraft, schedule: Schedule, until: float) -> str:
     `MOST_SPINS`, Infeasible where the sensor does not see the Sun.
     """
     last = max(until, max((pulse.loaded[0] for pulse in schedule), default=0.0))
-    if last * abs(body.spin) > 2.0 * math.pi * MOST_SPINS:
+    if last * abs(spacecraft.spin) > 2.0 * math.pi * MOST_SPINS:
         raise BadRequest(
             f"the table would have more than {MOST_SPINS} spins; choose an earlier end (until)"
         )
-    first, begins = _begins(body, schedule, last)
+    first, begins = _begins(spacecraft, schedule, last)
     fired: dict[int, list[Pulse]] = {}
     for pulse in sorted(schedule, key=lambda pulse: pulse.loaded[0]):
         fired.setdefault(
@@ -292,24 +300,24 @@ def spin_table(body: Spacecraft, schedule: Schedule, until: float) -> str:
         # Spin 0 is the rest of a spin: it ends a whole period after it began.
         period = end - begin if first + index > 0 else begins[2] - begins[1]
         rows.append(
-            SpinRow(first + index, body.utc(begin), begin, end, period, fired.get(index, []))
+            SpinRow(first + index, spacecraft.utc(begin), begin, end, period, fired.get(index, []))
         )
     return DataTable("Spins", SPINS, rows).csv()
 
 
-def _begins(body: Spacecraft, schedule: Schedule, last: float) -> tuple[int, Vector]:
+def _begins(spacecraft: Spacecraft, schedule: Schedule, last: float) -> tuple[int, Vector]:
     """Number of the first spin, and begins of it and those after it, s: to after ``last``, and
     three at least.
     """
     from nutdamp.schemes.block_model import spin_turn, sun_pulses
 
-    if body.spin == 0.0:
+    if spacecraft.spin == 0.0:
         raise BadRequest("a table of spins needs a body that spins")
-    turn = spin_turn(body)
+    turn = spin_turn(spacecraft)
     until = last + 3.0 * turn
     for _ in range(2):  # where the spin falls, turns get longer
-        flown = propagation.flown(body, schedule, until)
-        if body.sun is not None and body.sun_sensor is not None:
+        flown = propagation.flown(spacecraft, schedule, until)
+        if spacecraft.sun is not None and spacecraft.sun_sensor is not None:
             times = sun_pulses(flown, until)
             at_once = len(times) > 0 and times[0] < SAME * turn
             first, begins = (1, times) if at_once else (0, np.append(0.0, times))
@@ -318,7 +326,9 @@ def _begins(body: Spacecraft, schedule: Schedule, last: float) -> tuple[int, Vec
             begins = _turns(flown, until)
         if len(begins) > 2 and begins[-1] > last:
             return first, begins
-        until = last + 6.0 * 2.0 * math.pi / max(abs(flown.settled.spin), 1e-3 * abs(body.spin))
+        until = last + 6.0 * 2.0 * math.pi / max(
+            abs(flown.settled.spin), 1e-3 * abs(spacecraft.spin)
+        )
     raise BadRequest(f"no whole spin ends after {last:.4g} s: the spin comes to a halt")
 
 
@@ -399,8 +409,8 @@ def verification_brief(plan: Plan, verification: Verification) -> RenderableType
 
 def _head(plan: Plan, verification: Verification) -> Iterator[Text]:
     """Title, verdict, and the residual of the flown motion beside the requirement."""
-    body = plan.spacecraft
-    yield parts.named(body, f": {plan.scheme}; Δ: maximum difference from the flown motion")
+    spacecraft = plan.spacecraft
+    yield parts.named(spacecraft, f": {plan.scheme}; Δ: maximum difference from the flown motion")
     yield verdicts.coloured(verdict(verification), Light.GREEN if verification.agree else Light.RED)
     judged = plan.verdict
     lead, about = verdicts.headline(judged)
@@ -410,14 +420,14 @@ def _head(plan: Plan, verification: Verification) -> Iterator[Text]:
 
 def verification_screen(plan: Plan, verification: Verification) -> RenderableType:
     """All tables of ``verify``."""
-    body = plan.spacecraft
+    spacecraft = plan.spacecraft
     return Group(
         *_head(plan, verification),
-        *(Text(), parts.derived_table(body)),
+        *(Text(), parts.derived_table(spacecraft)),
         *(Text(), methods_table(verification)),
         *(Text(), *map(screen_line, (*_missing(verification), conservation(verification)))),
         *(Text(), Text(BUDGET, "bold")),
-        *(Text(), budget_table(body, verification), Text(BUDGET_NOTE, "dim")),
+        *(Text(), budget_table(spacecraft, verification), Text(BUDGET_NOTE, "dim")),
     )
 
 

@@ -108,12 +108,14 @@ def headline(verdict: Verdict, compared: Comparison | None = None) -> tuple[str,
 
 def idle(verdict: Verdict) -> str:
     """Clause on a motion that needs no pulse."""
-    body = verdict.spacecraft
-    there = f"nutation {degrees(body.nutation)} at t = 0"
-    if body.goal.axis is not None:
-        there += f", H {degrees(body.to_turn)} from the target"
+    spacecraft = verdict.spacecraft
+    there = f"nutation {degrees(spacecraft.nutation)} at t = 0"
+    if spacecraft.goal.axis is not None:
+        there += f", H {degrees(spacecraft.to_turn)} from the target"
     return there + (
-        f", kept up to the horizon of {duration(body.horizon)}" if body.growth > 0.0 else ""
+        f", kept up to the horizon of {duration(spacecraft.horizon)}"
+        if spacecraft.growth > 0.0
+        else ""
     )
 
 
@@ -121,7 +123,7 @@ def statement(verdict: Verdict) -> str:
     """Sentence on the requirement, in words that leave no doubt about its subject; without a full
     stop.
     """
-    cases, body = verdict.cases, verdict.spacecraft
+    cases, spacecraft = verdict.cases, verdict.spacecraft
     if verdict.status is Status.NO_PLAN:
         return verdict.why or "no plan is feasible"
     broken = " and ".join(strays(aspect) for aspect in verdict.aspects if not aspect.kept)
@@ -137,8 +139,8 @@ def statement(verdict: Verdict) -> str:
         return "; ".join(filter(None, (f"{MET[False]} with nominal values", broken, counted)))
     if cases is None or cases.complying is None:
         if verdict.unshown:
-            share = exact_percent(required_share(body.requirement))
-            untold = body.dispersions is None
+            share = exact_percent(required_share(spacecraft.requirement))
+            untold = spacecraft.dispersions is None
             lacks = "the file gives no dispersions" if untold else "cases could not be flown"
             return f"{share} of cases required, {lacks}; {MET[True]} with nominal values"
         return f"{MET[True]} with nominal values"

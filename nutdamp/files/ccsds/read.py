@@ -501,9 +501,9 @@ def imported(contents: ApmContents, path: str) -> tuple[str, Spacecraft, Schedul
         raise FaultyFile(faults) from None
 
 
-def contradictions(contents: ApmContents, body: Spacecraft) -> list[str]:
+def contradictions(contents: ApmContents, spacecraft: Spacecraft) -> list[str]:
     """Contradictions between the nutation stated in the message and that by inertia and period."""
-    stated, follows = contents.nutation, body.widest.nutation
+    stated, follows = contents.nutation, spacecraft.widest.nutation
     if stated is None or abs(follows - abs(stated)) <= ROUNDED + SAME_NUTATION * abs(stated):
         return []
     return [
@@ -513,15 +513,15 @@ def contradictions(contents: ApmContents, body: Spacecraft) -> list[str]:
     ]
 
 
-def ratio_doubts(contents: ApmContents, body: Spacecraft) -> list[str]:
+def ratio_doubts(contents: ApmContents, spacecraft: Spacecraft) -> list[str]:
     """Doubt where spin, nutation and period of SPIN are those of another C/A than that of the
     ``body`` merged into.
     """
-    if not contents.nutation or body.spin == 0.0:
+    if not contents.nutation or spacecraft.spin == 0.0:
         return []
     first, second, third = contents.rates.tolist()
     implied = math.hypot(first, second) / (abs(third) * math.tan(abs(contents.nutation)))
-    ratio = abs(body.axial / (body.inertia.A * body.spin))
+    ratio = abs(spacecraft.axial / (spacecraft.inertia.A * spacecraft.spin))
     if abs(implied - ratio) <= SAME_NUTATION * ratio:
         return []
     return [

@@ -94,27 +94,29 @@ def apm(plan: Plan, reference: Reference, created: Epoch) -> message.Message:
     """The message for a plan, made at ``created``; raises BadRequest for an ideal impulse, which
     has no duration.
     """
-    body = plan.spacecraft
+    spacecraft = plan.spacecraft
     frames = (reference.frame, BODY_FRAME)
-    motion = body.inertia.in_file_axes(body.initial.rates, body.initial.quaternion)
+    motion = spacecraft.inertia.in_file_axes(
+        spacecraft.initial.rates, spacecraft.initial.quaternion
+    )
     rates, quaternion = map(cleaned, motion)
     # The quaternion from A to B turns the axes of A into those of B (annex F2), as body -> inertial
     # turns vectors.
     scalar, *vector = quaternion.tolist()
     blocks = [
-        block("", (message.Keyword("EPOCH"),), [reference.epoch.text], *_unsaid(body)),
+        block("", (message.Keyword("EPOCH"),), [reference.epoch.text], *_unsaid(spacecraft)),
         _block("QUAT", [*frames, *vector, scalar]),
         _block("ANGVEL", [*frames, BODY_FRAME, *np.degrees(rates)]),
     ]
-    if spinning(body.inertia):
-        spin = spin_values(body.inertia, *(values[None] for values in motion))
+    if spinning(spacecraft.inertia):
+        spin = spin_values(spacecraft.inertia, *(values[None] for values in motion))
         values = [float(value[0]) for name, value in spin.items() if name not in message.MOMENTUM]
         blocks.append(_block("SPIN", [*frames, *values]))
     # The products are minus the entries off the diagonal (annex F6).
-    (xx, xy, xz), (_, yy, yz), (_, _, zz) = body.inertia.tensor.tolist()
+    (xx, xy, xz), (_, yy, yz), (_, _, zz) = spacecraft.inertia.tensor.tolist()
     blocks.append(_block("INERTIA", [BODY_FRAME, xx, yy, zz, -xy, -xz, -yz]))
     blocks += _manoeuvres("MAN", plan, reference)
-    about = block("", message.APM_METADATA, [*_identity(body), None, "UTC"])
+    about = block("", message.APM_METADATA, [*_identity(spacecraft), None, "UTC"])
     return message.Message("APM", _header(plan, created), (message.Segment(about, tuple(blocks)),))
 
 
@@ -129,20 +131,21 @@ def _header(plan: Plan, created: Epoch) -> message.MessageBlock:
     return block("", message.HEADER, values, about, f"status: {plan.verdict.status.value}")
 
 
-def _identity(body: Spacecraft) -> tuple[str, str]:
-    return label(body.name), label(body.object_id or "")
+def _identity(spacecraft: Spacecraft) -> tuple[str, str]:
+    return label(spacecraft.name), label(spacecraft.object_id or "")
 
 
-def _unsaid(body: Spacecraft) -> list[str]:
-    wheel = body.inertia.wheel
-    per_kg = shed(body)
+def _unsaid(spacecraft: Spacecraft) -> list[str]:
+    wheel = spacecraft.inertia.wheel
+    per_kg = shed(spacecraft)
     of_file = "of the spacecraft file"
-    spins = spinning(body.inertia)
+    spins = spinning(spacecraft.inertia)
     momentum = f"{wheel:.9g} N*m*s along principal axis 3"
     values = ", ".join(f"{moment:.9g}" for moment in (() if per_kg is None else per_kg))
     remarks = {
-        f"The disturbances {of_file} are not in this message.": body.disturbances,
-        f"The energy dissipation {of_file} is not in this message.": body.dissipation is not None,
+        f"The disturbances {of_file} are not in this message.": spacecraft.disturbances,
+        f"The energy dissipation {of_file} is not in this message.": spacecraft.dissipation
+        is not None,
         f"The wheel {of_file}, {momentum}, is in no keyword of this message.": wheel,
         (
             f"INERTIA is that at EPOCH: the principal moments fall by {values} kg*m**2 for each kg "
@@ -208,11 +211,11 @@ def aem(
 
     ``kind`` is the ATTITUDE_TYPE, SPIN where the body has not the nutation of SPIN/NUTATION_MOM.
     """
-    body = plan.spacecraft
-    if kind == SPIN_NUTATION_MOM and not spinning(body.inertia):
+    spacecraft = plan.spacecraft
+    if kind == SPIN_NUTATION_MOM and not spinning(spacecraft.inertia):
         kind = SPIN
     segments = tuple(
-        _segment(body, stretch, reference, kind) for stretch in interpolated(flown, until)
+        _segment(spacecraft, stretch, reference, kind) for stretch in interpolated(flown, until)
     )
     return message.Message("AEM", _header(plan, created), segments)
 
@@ -225,14 +228,14 @@ ALONE = (
 
 
 def _segment(
-    body: Spacecraft, stretch: AttitudeSegment, reference: Reference, kind: str
+    spacecraft: Spacecraft, stretch: AttitudeSegment, reference: Reference, kind: str
 ) -> message.Segment:
     times = [reference.epoch.plus(seconds).text for seconds in stretch.t.tolist()]
     useable = (times[0], None, None, times[-1])  # all of it
     axes = BODY_FRAME if kind == QUATERNION_ANGVEL else None
     method = "LAGRANGE" if kind == SPIN else "HERMITE"
     values = [
-        *_identity(body),
+        *_identity(spacecraft),
         None,
         reference.frame,
         BODY_FRAME,
@@ -247,7 +250,7 @@ def _segment(
     if kind == QUATERNION_ANGVEL:
         columns = np.column_stack([stretch.quaternion[:, [1, 2, 3, 0]], np.degrees(stretch.rates)])
     else:
-        spin = spin_values(body.inertia, stretch.rates, stretch.quaternion)
+        spin = spin_values(spacecraft.inertia, stretch.rates, stretch.quaternion)
         if kind == SPIN:
             spin["SPIN_ANGLE_VEL"] = np.degrees(stretch.rates[:, 2])
         columns = np.column_stack(
@@ -275,20 +278,20 @@ def opm(plan: Plan, reference: Reference, created: Epoch) -> message.Message:
     """The message for a plan, made at ``created``; raises BadRequest where mass, forces or
     propellant are unknown.
     """
-    body = plan.spacecraft
-    if body.mass is None:
+    spacecraft = plan.spacecraft
+    if spacecraft.mass is None:
         raise BadRequest(
             "an OPM needs the velocity change of each pulse; add the key mass to the spacecraft "
             "file"
         )
-    orbit = body.orbit
+    orbit = spacecraft.orbit
     blocks = []
     centre = None if orbit is None else orbit.center
-    about = [*_identity(body), centre, reference.frame, "UTC"]
+    about = [*_identity(spacecraft), centre, reference.frame, "UTC"]
     if orbit is not None:
         state = KILO * np.concatenate([orbit.position, orbit.velocity])
         blocks.append(_block("STATE", [reference.epoch.text, *state]))
-    blocks += [_block("SPACECRAFT", [body.mass]), *_manoeuvres("MANEUVER", plan, reference)]
+    blocks += [_block("SPACECRAFT", [spacecraft.mass]), *_manoeuvres("MANEUVER", plan, reference)]
     metadata = block("", message.OPM_METADATA, about, *(PART if orbit is None else ()))
     return message.Message(
         "OPM", _header(plan, created), (message.Segment(metadata, tuple(blocks)),)

@@ -203,26 +203,30 @@ def by_other_schemes(spacecraft: Spacecraft, *, shift: bool) -> Iterator[Schedul
     from nutdamp.schemes import four_pulse, half_cone, one_pulse, rhumb_line, two_pulse
 
     # The Sun keeps the phase of trains alone.
-    body = replace(spacecraft, steerable=None, goal=replace(spacecraft.goal, sun=None))
-    model = SymmetricModel(body, body, np.ones(2)) if body.inertia.symmetric else model_of(body)
+    without = replace(spacecraft, steerable=None, goal=replace(spacecraft.goal, sun=None))
+    model = (
+        SymmetricModel(without, without, np.ones(2))
+        if without.inertia.symmetric
+        else model_of(without)
+    )
     plans: list[
         tuple[Scheme, Callable[[Spacecraft, Any], Schedule | Iterable[Schedule]], SchemeOptions]
     ]
     if not shift:
         plans = [(ONE_PULSE, one_pulse.schedule, SchemeOptions())]
-        if not body.inertia.symmetric:
+        if not without.inertia.symmetric:
             plans.append(
                 (
                     FOUR_PULSE,
-                    lambda _, options: four_pulse.on_true_motion(body, options),
+                    lambda _, options: four_pulse.on_true_motion(without, options),
                     FourPulseOptions(),
                 )
             )
-    elif body.goal.axis is None:
+    elif without.goal.axis is None:
         plans = [(TWO_PULSE, two_pulse.alternatives, TwoPulseOptions())]
     else:
         plans = [(TWO_PULSE, two_pulse.schedule, TwoPulseOptions())]
-        if body.spin != 0.0:
+        if without.spin != 0.0:
             plans.append((RHUMB_LINE, rhumb_line.schedule, RhumbLineOptions()))
         plans += [
             (HALF_CONE, half_cone.schedule, HalfConeOptions(cones=cones))
@@ -232,13 +236,14 @@ def by_other_schemes(spacecraft: Spacecraft, *, shift: bool) -> Iterator[Schedul
         if work.exhausted():
             return
         try:
-            planned = plan(model.body, options)
+            planned = plan(model.symmetric, options)
             every = [planned] if isinstance(planned, Schedule) else list(planned)
         except Infeasible:
             continue
-        if not body.inertia.symmetric:
+        if not without.inertia.symmetric:
             every = [
-                Correction(scheme, options)(body, model.translate(schedule)) for schedule in every
+                Correction(scheme, options)(without, model.translate(schedule))
+                for schedule in every
             ]
         yield from (schedule for schedule in every if keeps_limits(spacecraft, schedule))
 
@@ -326,14 +331,14 @@ def _pieces(problem: Problem, influence: Influence, horizon: float) -> Pieces | 
     """The cheapest firing of one channel after another in time order; None where none is worth one,
     to first order.
     """
-    body, channels, limits = problem.spacecraft, problem.channels, problem.spacecraft.limits
+    spacecraft, channels, limits = problem.spacecraft, problem.channels, problem.spacecraft.limits
     if limits.gap > 0.0 or limits.tick is not None or limits.max_pulses is not None or not channels:
         # burns may not follow each other without a gap, begin at any time and be of any number
         return None
     begin = limits.earliest
     count = min(max(math.ceil((horizon - begin) / _slot(problem)), 2 * SLOTS // 3), MOST_SLOTS)
     edges = np.linspace(begin, horizon, count + 1)
-    free = np.flatnonzero(~Windows(body).blocked(edges[:-1], edges[1:]))
+    free = np.flatnonzero(~Windows(spacecraft).blocked(edges[:-1], edges[1:]))
     width = float(edges[1] - edges[0])
     if not len(free):
         return None
@@ -417,12 +422,14 @@ def _exact(problem: Problem, pieces: Pieces) -> Schedule:
     """
     which, times, off = pieces
     aside = np.array([0.0, 0.0, *off, 0.0])[problem.equations.chosen]
-    body = problem.spacecraft
+    spacecraft = problem.spacecraft
     size = float(np.linalg.norm(problem.spacecraft.momentum))
     scale = np.full(len(times), float(times.max(initial=1e-9)))
-    most = body.horizon - body.limits.earliest
+    most = spacecraft.horizon - spacecraft.limits.earliest
     task = (
-        Task(body, problem.equations, problem.channels, problem.costs) if problem.closed else None
+        Task(spacecraft, problem.equations, problem.channels, problem.costs)
+        if problem.closed
+        else None
     )
     firing = which >= 0
 
@@ -431,7 +438,7 @@ def _exact(problem: Problem, pieces: Pieces) -> Schedule:
         if task is None:
             flown = (problem.flown(_burns(problem, which, times)) for times in rows)
             return np.array([misses(flight, problem.equations) - aside for flight in flown]) / size
-        starts = body.limits.earliest + np.cumsum(rows, axis=1) - rows
+        starts = spacecraft.limits.earliest + np.cumsum(rows, axis=1) - rows
         settings = np.hstack([starts[:, firing], rows[:, firing]])
         return task.misses(np.tile(which[firing], (len(rows), 1)), settings, 0) - aside / size
 

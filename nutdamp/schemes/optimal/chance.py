@@ -131,8 +131,8 @@ class ChanceProgram:
         self.program = program
         self.limits = limits
         self.uncertain = uncertain
-        body = program.spacecraft
-        self.turn = 2.0 * np.pi / body.fastest
+        spacecraft = program.spacecraft
+        self.turn = 2.0 * np.pi / spacecraft.fastest
         self.slot_turns = self.turn_of(program.centres)
         self.effects, self.changes, self.rates = (
             uncertain.effects,
@@ -171,13 +171,13 @@ class ChanceProgram:
         """
         if kind == 2:
             return np.ones(len(columns.t), dtype=complex)
-        body = self.program.spacecraft
+        spacecraft = self.program.spacecraft
         late = self.uncertain.delay[columns.channel]
-        rate = (body.nutation_rate, body.spin)[kind]
+        rate = (spacecraft.nutation_rate, spacecraft.spin)[kind]
         turned = np.exp(1j * rate * (columns.t + late)) * np.sinc(
             rate * columns.width / (2.0 * np.pi)
         )
-        if kind == 0 and body.growth:
+        if kind == 0 and spacecraft.growth:
             rows = self.program.influence.rows(columns.t)[:, :2, 0]
             turned *= np.hypot(rows[:, 0], rows[:, 1])
         return np.asarray(turned)

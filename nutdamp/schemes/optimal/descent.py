@@ -72,37 +72,39 @@ class Task:
 
     def __init__(
         self,
-        body: Spacecraft,
+        spacecraft: Spacecraft,
         equations: EndEquations,
         channels: tuple[Channel, ...],
         costs: Vector,
         off: float = 0.0,
     ) -> None:
-        self.body, self.channels, self.costs = body, channels, costs
+        self.spacecraft, self.channels, self.costs = spacecraft, channels, costs
         self.chosen = equations.chosen
         self.torques = np.array([channel.torque for channel in channels])
         self.off = off if equations.shift else 0.0
         self.loose = 2 if self.off > 0.0 else 0
-        self.momentum = float(np.linalg.norm(body.momentum))
-        self.spin = body.spin if body.goal.spin is None else body.goal.spin
+        self.momentum = float(np.linalg.norm(spacecraft.momentum))
+        self.spin = spacecraft.spin if spacecraft.goal.spin is None else spacecraft.goal.spin
         size = max(
-            body.least_impulse, body.turning_impulse, body.inertia.C * abs(self.spin - body.spin)
+            spacecraft.least_impulse,
+            spacecraft.turning_impulse,
+            spacecraft.inertia.C * abs(self.spin - spacecraft.spin),
         )
         self.unit = size / np.linalg.norm(self.torques, axis=1)
         """s of each channel that are worth all there is to do"""
         self.least = float(np.min(costs * self.unit))
         self.shortest = np.array([channel.min_on_time for channel in channels])
-        self.pace = min(1.0 / body.fastest, body.inertial_period)
-        dynamics = make_dynamics(body)
-        start = body.initial
+        self.pace = min(1.0 / spacecraft.fastest, spacecraft.inertial_period)
+        dynamics = make_dynamics(spacecraft)
+        start = spacecraft.initial
         # External torques with and without disturbances, see `batch.Bodies`.
         self._forced = dynamics.constant, dynamics.forcing
         self._coasting = np.zeros(3), dynamics.forcing._replace(turning=())
         self._start = np.asarray(dynamics.moments, dtype=float), start.rates, start.quaternion
-        self._decays = body.growth != 0.0
+        self._decays = spacecraft.growth != 0.0
         self._free = dynamics.free and not self._decays
-        self._linear = None if body.inertia.symmetric else small_angles(body, equations)
-        self._across = square_to_target(body)
+        self._linear = None if spacecraft.inertia.symmetric else small_angles(spacecraft, equations)
+        self._across = square_to_target(spacecraft)
 
     def misses(self, which: Indices, x: Vector, kicks: int) -> Vector:
         """Misses of the flights of ``x`` (b, …), (b, equations), over |H|.
@@ -123,12 +125,12 @@ class Task:
         momentum, turn = flown(which, x, kicks)
         inertial = attitude.rotate(turn.T, momentum.T)
         shift = inertial @ self._across.T
-        shift[inertial @ self.body.target_axis < 0.0] += (
+        shift[inertial @ self.spacecraft.target_axis < 0.0] += (
             self.momentum
         )  # the other way round is no solution
         if self.loose:
             shift = shift - self.off * x[:, -2:]
-        spin = momentum[2] - self.body.inertia.axial(self.spin)
+        spin = momentum[2] - self.spacecraft.inertia.axial(self.spin)
         return np.asarray(
             np.column_stack([momentum[:2].T, shift, spin])[:, self.chosen] / self.momentum
         )
@@ -176,7 +178,7 @@ class Task:
         # then all turns are. A quaternion is a pair of complex numbers, w + iz and x + iy.
         count, n = which.shape
         (A, _, C), rates, turn = self._start
-        wheel = self.body.inertia.wheel
+        wheel = self.spacecraft.inertia.wheel
         parts = max(kicks, 1)
         starts = x[:, :n]
         widths = x[:, n : 2 * n]
@@ -228,7 +230,9 @@ class Task:
         count = which.size
         moments = np.repeat(self._start[0][:, None], count, axis=1)
         rates = (
-            np.array([across.real, across.imag, before - self.body.inertia.wheel]).reshape(3, -1)
+            np.array([across.real, across.imag, before - self.spacecraft.inertia.wheel]).reshape(
+                3, -1
+            )
             / moments
         )
         turns = np.repeat(np.array([[1.0], [0.0], [0.0], [0.0]]), count, axis=1)
@@ -272,7 +276,11 @@ class Task:
                 [zero, -identity],
             ]
         )[1:]
-        levels = [np.full((count, n - 1), self.body.limits.gap), sequences.begins, -sequences.ends]
+        levels = [
+            np.full((count, n - 1), self.spacecraft.limits.gap),
+            sequences.begins,
+            -sequences.ends,
+        ]
         levels += [sequences.shortest, -sequences.longest]
         if self.loose:
             # Within the polygon that touches the circle in all directions where H may end.

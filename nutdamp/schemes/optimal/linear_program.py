@@ -170,25 +170,25 @@ class Program:
 
     def __init__(
         self,
-        body: Spacecraft,
+        spacecraft: Spacecraft,
         channels: tuple[Channel, ...],
         costs: Vector,
         influence: Influence,
         off: float = 0.0,
     ) -> None:
-        self.spacecraft = body
+        self.spacecraft = spacecraft
         self.channels = channels
         self.costs = costs
         self.off = off
         self.haste = 0.0
-        begin = body.limits.earliest
-        slot = 2 * math.pi / body.fastest / SLOTS
-        self.end = min(body.horizon, begin + MOST_SLOTS // len(channels) * slot)
+        begin = spacecraft.limits.earliest
+        slot = 2 * math.pi / spacecraft.fastest / SLOTS
+        self.end = min(spacecraft.horizon, begin + MOST_SLOTS // len(channels) * slot)
         edges = np.linspace(begin, self.end, max(math.ceil((self.end - begin) / slot), 1) + 1)
         self.width = float(edges[1] - edges[0])
         self.centres: Vector = 0.5 * (edges[1:] + edges[:-1])
         self.forbidden: NDArray[np.bool_] = np.tile(
-            Windows(body).blocked(edges[:-1], edges[1:]), (len(channels), 1)
+            Windows(spacecraft).blocked(edges[:-1], edges[1:]), (len(channels), 1)
         )
         self._pool: ProgramColumns | None = None
         self._torques = np.array([channel.torque for channel in channels])

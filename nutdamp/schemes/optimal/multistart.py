@@ -139,7 +139,7 @@ def _pulses(task: Task, spare: int) -> int:
     """Pulses of a sequence: one for each equation, at least three so that there is a choice, and
     ``spare`` ones.
     """
-    most = task.body.limits.max_pulses
+    most = task.spacecraft.limits.max_pulses
     count = max(len(task.chosen), 3) + spare
     return count if most is None else min(count, most)
 
@@ -150,7 +150,7 @@ def random_starts(
     """Random channels and moments of ``count`` sequences;
     many begin or end with the time there is.
     """
-    limits, horizon = task.body.limits, task.body.horizon
+    limits, horizon = task.spacecraft.limits, task.spacecraft.horizon
     which = rng.integers(len(task.channels), size=(count, pulses))
     share = np.sort(rng.uniform(size=(count, pulses)), axis=1)
     share[rng.random(count) < 0.4, 0] = 0.0
@@ -167,8 +167,8 @@ def laid_out(task: Task, moments: Moments, *, bounded: bool = False) -> tuple[Se
     """
     which, t, on = moments.in_order()
     least = task.shortest[which] if bounded else np.zeros(which.shape)
-    limits = task.body.limits
-    free = [(begin, end) for begin, end in free_windows(task.body) if begin < end]
+    limits = task.spacecraft.limits
+    free = [(begin, end) for begin, end in free_windows(task.spacecraft) if begin < end]
     begins, ends = np.array(free or [(limits.earliest, limits.earliest)]).T
     # The windows without blackout in which the moments lie, or the nearest.
     nearest = np.argmin(np.maximum(begins - t[..., None], t[..., None] - ends), axis=-1)
@@ -176,7 +176,7 @@ def laid_out(task: Task, moments: Moments, *, bounded: bool = False) -> tuple[Se
     longest = np.minimum(
         np.array([channel.max_on_time for channel in task.channels])[which], ends - begins
     )
-    inside = 1e-4 * (task.body.horizon - limits.earliest) / which.shape[1]
+    inside = 1e-4 * (task.spacecraft.horizon - limits.earliest) / which.shape[1]
     edge = 1e-3 * np.minimum(task.unit[which], np.maximum(longest - least, 0.0))
     on = np.minimum(np.maximum(on, least + edge), longest - edge)
     start = t - 0.5 * on
@@ -212,7 +212,7 @@ def _best(descent: Descent) -> Descent:
 
 def _added(task: Task, best: Descent, pulses: int, rng: np.random.Generator) -> list[Moments]:
     """The best sequences with more pulses, where they are worth most; three choices of each."""
-    grid = np.linspace(task.body.limits.earliest, task.body.horizon, MOMENTS)
+    grid = np.linspace(task.spacecraft.limits.earliest, task.spacecraft.horizon, MOMENTS)
     every: list[Moments] = []
     for ideal, x, prices in zip(_every(best), best.state.x, best.state.prices, strict=True):
         worth = _worth(task, ideal, x, prices, grid)

@@ -225,14 +225,20 @@ class Problem:
     @property
     def off(self) -> float:
         """Distance from its target, N m s, at which H may end."""
-        body = self.spacecraft
+        spacecraft = self.spacecraft
         axial = float(
-            abs(body.inertia.axial(body.spin if body.goal.spin is None else body.goal.spin))
+            abs(
+                spacecraft.inertia.axial(
+                    spacecraft.spin if spacecraft.goal.spin is None else spacecraft.goal.spin
+                )
+            )
         )
         if (
-            not body.inertia.symmetric
+            not spacecraft.inertia.symmetric
         ):  # what is along axis 3 swings, and is to be enough at its least
-            axial = min(axial, float(np.linalg.norm(body.momentum)) * math.cos(body.nutation))
+            axial = min(
+                axial, float(np.linalg.norm(spacecraft.momentum)) * math.cos(spacecraft.nutation)
+            )
         return axial * math.sin(min(self.options.shift or 0.0, 0.5 * math.pi))
 
     def within(self, horizon: float) -> Spacecraft:
@@ -328,21 +334,21 @@ class Problem:
         """Reason for no schedule although the program has solutions: the limits that it does not
         know of.
         """
-        body, limits = self.spacecraft, self.spacecraft.limits
+        spacecraft, limits = self.spacecraft, self.spacecraft.limits
         if (
             limits.max_pulses is not None
-            and body.inertia.symmetric
-            and body.growth == 0.0
-            and not body.disturbances
+            and spacecraft.inertia.symmetric
+            and spacecraft.growth == 0.0
+            and not spacecraft.disturbances
         ):
             most = max(abs(channel.transverse) * channel.max_on_time for channel in self.channels)
-            if limits.max_pulses * most < body.least_impulse:
+            if limits.max_pulses * most < spacecraft.least_impulse:
                 return (
                     f"limits.max_pulses = {limits.max_pulses} is too few: "
                     "so many pulses give at most "
-                    f"{100.0 * limits.max_pulses * most / body.least_impulse:.4g} % of the impulse "
+                    f"{100.0 * limits.max_pulses * most / spacecraft.least_impulse:.4g} % of the impulse "
                     "that takes out the "
-                    f"nutation, {math.ceil(body.least_impulse / most)} pulses or more all of it"
+                    f"nutation, {math.ceil(spacecraft.least_impulse / most)} pulses or more all of it"
                 )
         shortest = max(channel.min_on_time for channel in self.channels)
         longest = min(channel.max_on_time for channel in self.channels)

@@ -154,9 +154,9 @@ def _nutation_rows(flight: Flight, times: Vector) -> Vector:
     """Effect (n, 2, …) on the nutation of one N m s about each body axis at ``times`` (n,) s of a
     flight.
     """
-    body = flight.spacecraft
-    circle = body.inertia.circle(body.spin)
-    if body.inertia.symmetric or body.growth != 0.0:
+    spacecraft = flight.spacecraft
+    circle = spacecraft.inertia.circle(spacecraft.spin)
+    if spacecraft.inertia.symmetric or spacecraft.growth != 0.0:
         return _complex_product(_turned_back(flight, times)) * circle
     knots, back, slopes = _variations(flight)
     every = np.append(times, flight.schedule.end)
@@ -176,10 +176,10 @@ def _variations(flight: Flight) -> tuple[Vector, Vector, Vector]:
     """Even knots (n,) s of a flight; what leads small changes of H in the body there back to t = 0,
     and its slopes.
     """
-    body = flight.spacecraft
+    spacecraft = flight.spacecraft
     last, pace = (
-        max(body.horizon, flight.schedule.end),
-        max(body.fastest, float(np.linalg.norm(body.omega0))),
+        max(spacecraft.horizon, flight.schedule.end),
+        max(spacecraft.fastest, float(np.linalg.norm(spacecraft.omega0))),
     )
     knots = np.linspace(
         0.0, last, min(math.ceil(last * pace / (2 * math.pi) * STEPS), MOST_VARIED) + 2
@@ -189,8 +189,8 @@ def _variations(flight: Flight) -> tuple[Vector, Vector, Vector]:
 
     def jacobian(times: Vector) -> Vector:
         rates = flight.motion(times)[0]
-        momentum = body.inertia.momentum(rates)[:, None, :]
-        turns = momentum / np.array(body.inertia.moments)[:, None] - rates[:, None, :]
+        momentum = spacecraft.inertia.momentum(rates)[:, None, :]
+        turns = momentum / np.array(spacecraft.inertia.moments)[:, None] - rates[:, None, :]
         return np.swapaxes(np.cross(turns, np.eye(3)), 1, 2)
 
     # Magnus' series of fourth order: exact where the rates are constant.
@@ -210,14 +210,14 @@ def _variations(flight: Flight) -> tuple[Vector, Vector, Vector]:
 
 def misses(flight: Flight, equations: EndEquations) -> Vector:
     """End errors of a flight, (equations,) N m s; zero where it ends as requested."""
-    body, end = flight.spacecraft, flight.settled
-    across = body.inertia.circle(body.spin) * body.inertia.momentum(end.rates)[:2]
+    spacecraft, end = flight.spacecraft, flight.settled
+    across = spacecraft.inertia.circle(spacecraft.spin) * spacecraft.inertia.momentum(end.rates)[:2]
     nutation = complex(*across) * _turned_back(flight, np.array([flight.schedule.end]))[0]
-    final = end.spin if body.goal.spin is None else body.goal.spin
-    shift = square_to_target(body) @ flight.last_momentum
-    return np.array([nutation.real, nutation.imag, *shift, body.inertia.C * (end.spin - final)])[
-        equations.chosen
-    ]
+    final = end.spin if spacecraft.goal.spin is None else spacecraft.goal.spin
+    shift = square_to_target(spacecraft) @ flight.last_momentum
+    return np.array(
+        [nutation.real, nutation.imag, *shift, spacecraft.inertia.C * (end.spin - final)]
+    )[equations.chosen]
 
 
 def _turning(spacecraft: Spacecraft) -> Vector:

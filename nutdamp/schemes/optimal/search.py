@@ -39,6 +39,7 @@ from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import keeps_limits, rounded_off, shortest_on_time
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.requirements import DAMPED_ANGLE, SAME_COST, Part
+from nutdamp.spacecraft.roles import with_limits
 from nutdamp.spacecraft.schedule import TOUCHING, Schedule
 
 # units that may be spent where H may move, so that some are left for schedules that keep it
@@ -117,9 +118,7 @@ def schedule(spacecraft: Spacecraft, options: OptimalOptions) -> Schedule:
     """
     if spacecraft.growth < 0.0:  # once a millionth of the nutation is left, waiting costs ever less
         faded = spacecraft.limits.earliest - MOST_GROWN / spacecraft.growth
-        spacecraft = replace(
-            spacecraft, limits=replace(spacecraft.limits, horizon=min(spacecraft.horizon, faded))
-        )
+        spacecraft = with_limits(spacecraft, horizon=min(spacecraft.horizon, faded))
     search = _LeastCostSearch(spacecraft, options)
     every = list(alternatives.spin_changes(search))
     searched = None
@@ -158,10 +157,10 @@ class _LeastCostSearch(Problem):
         if early is None:
             return self.sooner().schedule()
         begin = self.spacecraft.limits.earliest
-        body = self.within(early.end)
+        limited = self.within(early.end)
         if early.end - begin <= (1.0 + SHARP) * (self.least_horizon(begin, early.end) - begin):
             return self.with_bounds(early)
-        search = _LeastCostSearch(body, self.options).sooner()
+        search = _LeastCostSearch(limited, self.options).sooner()
         other = (
             alternatives.within(search, early.end)
             if search.spacecraft.horizon == early.end
@@ -180,17 +179,17 @@ class _LeastCostSearch(Problem):
         """
         from nutdamp.schemes import one_pulse, two_pulse
 
-        body = self.spacecraft
+        spacecraft = self.spacecraft
         schedule = Schedule()
-        if body.torquer is None and body.goal.spin is None:
+        if spacecraft.torquer is None and spacecraft.goal.spin is None:
             with suppress(Infeasible):
                 if self.options.free_axis:
-                    schedule = one_pulse.schedule(body, SchemeOptions())
+                    schedule = one_pulse.schedule(spacecraft, SchemeOptions())
                 else:
-                    schedule = two_pulse.schedule(body, TwoPulseOptions())
+                    schedule = two_pulse.schedule(spacecraft, TwoPulseOptions())
         good = (
             schedule.pulses
-            and keeps_limits(body, schedule)
+            and keeps_limits(spacecraft, schedule)
             and self.left(self.flown(schedule)) <= LEFT
         )
         return self.with_bounds(schedule) if good else self.schedule()
@@ -237,13 +236,15 @@ class _LeastCostSearch(Problem):
         """Reason for a program without solution, and its cure: each that is named was tried, or
         says that not.
         """
-        body, goal, horizon = self.spacecraft, self.spacecraft.goal, self.spacecraft.horizon
+        spacecraft, goal, horizon = self.spacecraft, self.spacecraft.goal, self.spacecraft.horizon
         free = replace(self.options, free_axis=True, shift=None)
         bound = self.equations.shift and goal.axis is None and goal.spin is None
         freed = (
-            bound and not work.exhausted() and _LeastCostSearch(body, free).has_schedule(horizon)
+            bound
+            and not work.exhausted()
+            and _LeastCostSearch(spacecraft, free).has_schedule(horizon)
         )
-        left = self.program(body, EndEquations(shift=False)).solve().unmet
+        left = self.program(spacecraft, EndEquations(shift=False)).solve().unmet
         if left > UNMET:
             names = ", ".join(channel.name for channel in self.channels)
             failing = (
@@ -257,23 +258,26 @@ class _LeastCostSearch(Problem):
                 else "H cannot be brought to the target"
             )
             without_spin = EndEquations(shift=self.equations.shift)
-            if self.equations.spin and self.program(body, without_spin).solve().unmet <= UNMET:
+            if (
+                self.equations.spin
+                and self.program(spacecraft, without_spin).solve().unmet <= UNMET
+            ):
                 failing = "the spin cannot be brought to the rate of the goal"
-            if body.transverse_rate > 0.0:
+            if spacecraft.transverse_rate > 0.0:
                 failing = f"the nutation can be taken out, but {failing}"
         return f"within {horizon:.4g} s {failing}; {self.relaxed()}{', or use --free-axis' * freed}"
 
     def relaxed(self) -> str:
         """The limit that has to be relaxed, and how far."""
-        body = self.spacecraft
-        horizon = later = body.horizon
+        spacecraft = self.spacecraft
+        horizon = later = spacecraft.horizon
         while later < LATEST * horizon:
             if work.exhausted():
                 return f"horizons of more than {later:.4g} s were not tried"
             later *= 2.0
             if self.feasible(later):
                 needed = self.least_horizon(0.5 * later, later, NAMED)
-                usual = replace(body, limits=replace(body.limits, horizon=None)).horizon
+                usual = with_limits(spacecraft, horizon=None).horizon
                 for margin in MARGINS[:TRIED] if needed <= LATER * usual else ():
                     end = float(f"{needed * (1.0 + margin):.4g}")
                     if not work.exhausted() and self.has_schedule(end):
@@ -283,8 +287,8 @@ class _LeastCostSearch(Problem):
                     "more; by small angles, "
                     f"without other limits)"
                 )
-        if body.limits.blackout:
-            free = replace(body, limits=replace(body.limits, blackout=()))
+        if spacecraft.limits.blackout:
+            free = with_limits(spacecraft, blackout=())
             if self.program(free).solve().unmet <= UNMET:
                 return "shorten the blackout windows (without any it can be done)"
         return (
@@ -495,9 +499,11 @@ class _LeastCostSearch(Problem):
         """True where a schedule may not be the cheapest, so that very many starts are worth their
         time.
         """
-        body = self.spacecraft
-        short = body.horizon - body.limits.earliest <= SHORT * body.inertial_period
-        strong = float(np.min(self.task().unit)) <= STRONG * body.inertial_period
+        spacecraft = self.spacecraft
+        short = (
+            spacecraft.horizon - spacecraft.limits.earliest <= SHORT * spacecraft.inertial_period
+        )
+        strong = float(np.min(self.task().unit)) <= STRONG * spacecraft.inertial_period
         if UNMET < first.unmet < math.inf:  # at large angles H may be brought there all the same
             return short
         if schedule is None:

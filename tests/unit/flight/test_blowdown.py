@@ -439,9 +439,9 @@ def test_a_further_leg_begins_where_the_one_before_ends(shed: Shed) -> None:
     made = fires(body, 0, 2, 1, 3, 0)
     legs.fire(made)
     flight = flown(body, made)
-    assert legs.here.inertia.moments == pytest.approx(flight.last_moments, rel=1e-12)
-    assert legs.here.omega0 == pytest.approx(flight.settled.rates, abs=1e-12)
-    assert legs.here.momentum == pytest.approx(flight.last_momentum, rel=1e-12, abs=1e-9)
+    assert legs.at_leg.inertia.moments == pytest.approx(flight.last_moments, rel=1e-12)
+    assert legs.at_leg.omega0 == pytest.approx(flight.settled.rates, abs=1e-12)
+    assert legs.at_leg.momentum == pytest.approx(flight.last_momentum, rel=1e-12, abs=1e-9)
 
 
 @pytest.mark.parametrize("scheme", ["one-pulse", deep("four-pulse"), weekly("optimal")])

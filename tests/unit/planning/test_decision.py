@@ -99,7 +99,7 @@ where a propellant is not known the impulse     |        | early END     | late 
 the spin is part of the requirement             | spin   | right ONLY    | cheap 0 0.1 0 1 3.04; right 0 0.2
 within 1 % of the goal                          | spin   | cheap COST    | cheap 0 0.1 0 1 3.02; right 0 0.2
 a missed spin                                   | spin   | cheap ONLY    | cheap 0 0.1 0 1 3.04
-"""  # noqa: E501
+"""
 CASES = [[cell.strip() for cell in line.split("|")] for line in RULE.strip().splitlines()]
 
 

@@ -699,7 +699,7 @@ def test_three_different_moments(moments: tuple[float, float, float]) -> None:
     truth = aimed(
         spinner(moments=(120.0, 100.0, 80.0)), 10.0, 45.0
     )  # the model has the turn that the body has
-    model = model_of(truth).body
+    model = model_of(truth).symmetric
     assert model.to_turn == pytest.approx(truth.to_turn, rel=1e-12)
     shifts = [
         one.target_axis - one.momentum / np.linalg.norm(one.momentum) for one in (model, truth)
