@@ -326,7 +326,7 @@ def _unit(table: Table, columns: Mapping[str, Vector], names: Sequence[str], wha
     _fault_first(
         table, wrong, names[0], f"the {what} has length {sizes[wrong.argmax()]:.4g}; expected 1"
     )
-    return np.asarray(vectors / sizes[:, None])
+    return np.asarray(vectors / np.where(wrong, 1.0, sizes)[:, None])
 
 
 def _expect_unit(table: Table, signals: Mapping[str, Vector], spin: float) -> None:

@@ -497,6 +497,7 @@ FAULTY_RECORDS = (
     "t_s,axis_x,axis_y\n1,1,0\n",
     "t_s,utc,omega_1_rad_s\n1,2,3\n",
     "t_s,axis_x,axis_y,axis_z\n0,1,0,0\n1,1,1,0\n",
+    "t_s,axis_x,axis_y,axis_z\n0,0,0,0\n",
     "t_s,axis_ra_deg,axis_dec_deg\n0,1,100\n",
     "t_s,omega_1_rad_s\n0,1\n2,1\n1,1\n1,2\n",
     "t_s,omega_1_rad_s,pulse\n0,1,0\n0,2,1\n",
