@@ -6,6 +6,7 @@ import re
 from collections import defaultdict
 from collections.abc import Iterator
 from functools import cache
+from importlib import import_module
 
 import pytest
 from support import places
@@ -327,3 +328,16 @@ def test_parameters_that_are_spacecraft_bear_the_name_of_a_role() -> None:
         and node.arg not in ROLES
     ]
     assert not strange
+
+
+def test_every_name_in_the_story_of_a_plan_exists_and_the_story_is_short() -> None:
+    text = (PACKAGE / "guide" / "contributing.md").read_text(encoding="utf-8")
+    story = text.partition("## How a two-pulse plan comes about")[2].partition("\n## ")[0]
+    assert len(story.splitlines()) <= 60
+    modules = re.findall(r"^\d+\. \*\*(.+?)\*\*", story, re.MULTILINE)
+    assert len(modules) == 14
+    for module, names in re.findall(r"\b([a-z_]+/[a-z_]+)\.(\w+(?:\.\w+)?)", story):
+        assert module in modules
+        owner: object = import_module(f"nutdamp.{module.replace('/', '.')}")
+        for name in names.split("."):
+            owner = getattr(owner, name)
