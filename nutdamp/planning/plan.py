@@ -1,21 +1,12 @@
-"""Planning: plan by a scheme, fly the schedule, judge it, route it round exclusion cones.
-
-A route is a row of great circles, a leg each: straight to the target in shorter legs, which swing
-the axis less, or by dog-legs. It is sought on the sphere, with a margin for nutation; the flight
-judges the cones.
-"""
+"""Planning: plan by a scheme, fly the schedule, judge it; see `Plan`."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import cached_property
-from itertools import pairwise, product
 from typing import TYPE_CHECKING
-
-import numpy as np
 
 from nutdamp import units
 from nutdamp.common import results, work
@@ -25,13 +16,11 @@ from nutdamp.errors import Infeasible
 from nutdamp.flight import end_state, propagation
 from nutdamp.flight.end_state import Aspect, left_on_the_way, seen_at
 from nutdamp.flight.propagation import Flight, Residual
-from nutdamp.physics import attitude, precession
 from nutdamp.planning.verdict import Cases, JudgedCases, Verdict, judge_schedule, no_plan
-from nutdamp.schemes import catalogue, planner, valve_commands
-from nutdamp.schemes.valve_commands import Legs
+from nutdamp.schemes import catalogue, planner
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import Breach, breaches, keeps_limits, misfits
-from nutdamp.spacecraft.model import Keep, Spacecraft, Vector, required_share
+from nutdamp.spacecraft.model import Spacecraft, Vector, required_share
 from nutdamp.spacecraft.requirements import Bound, Held, Left
 from nutdamp.spacecraft.roles import as_known, with_limits
 from nutdamp.spacecraft.schedule import Schedule
@@ -39,129 +28,9 @@ from nutdamp.spacecraft.schedule import Schedule
 if TYPE_CHECKING:
     from nutdamp.flight.verification import Verification
 
-MARGINS = tuple(math.radians(margin) for margin in (0.5, 2.0, 5.0, 10.0))
-"""rad by which a route keeps clear of the cones."""
 
-BENDS = tuple(sign * math.radians(0.1 * 1.1**step) for step in range(72) for sign in (1.0, -1.0))
-"""rad to either side of the great circle at which way points may lie, up to 87 deg, the smallest
-first.
-"""
-
-PLACES, PARTS = ((), (0.5,), (0.25, 0.75)), (1, 2, 4)
-"""Way points without, of one and of two dog-legs, as shares of the way to the target; numbers of
-parts of each leg.
-"""
-
-ROUTES, STEPS = (
-    16,
-    64,
-)  # routes that are tried, at most, and points of a leg at which the cones are looked at
-
-Route = tuple[Vector, ...]
-
-
-def schedules(
-    spacecraft: Spacecraft, scheme: str, options: catalogue.SchemeOptions
-) -> Iterator[Schedule]:
-    """Schedules of a ``scheme`` over routes that keep clear of the cones, the likeliest first.
-
-    Each is found when needed, as long as there is budget of `work`, of those routes that the scheme
-    can fly.
-    """
-    as_it_is = not spacecraft.thrust_laws or catalogue.SCHEMES[scheme].on_true_body
-    flown_by = spacecraft if as_it_is else valve_commands.without_valves(spacecraft)
-    for route in routes(spacecraft):
-        if work.exhausted():
-            return
-        try:
-            legs = Legs(flown_by)
-            goal = spacecraft.goal
-            for number, point in enumerate(route, start=1):  # each leg has its share of the horizon
-                at_leg = legs.at_leg
-                to_go = _length((at_leg.momentum, point, *route[number:]))
-                share = _length((at_leg.momentum, point)) / to_go if to_go > 0.0 else 1.0
-                spin = goal.spin if number == len(route) else None
-                limits = replace(at_leg.limits, horizon=share * at_leg.horizon)
-                leg = replace(at_leg, goal=replace(goal, axis=point, spin=spin), limits=limits)
-                legs.fire(planner.schedule(scheme, leg, options))
-            names = ", ".join(keep.name for keep in spacecraft.keep)
-            whole = legs.schedule(note("goes-round", points=len(route) - 1, directions=names))
-            yield whole if as_it_is else planner.as_commands(scheme, spacecraft, whole, options)
-        except Infeasible:
-            continue
-
-
-def routes(spacecraft: Spacecraft) -> list[Route]:
-    """Way points from H at t = 0, the target last, at most `ROUTES`; the shortest first."""
-    start = spacecraft.momentum / np.linalg.norm(spacecraft.momentum)
-    shortest: dict[tuple[float, ...], Route] = {}
-    for parts, margin, places in product(PARTS, MARGINS, PLACES):
-        bent = _bent(start, spacecraft.target_axis, places, spacecraft.keep, margin)
-        if bent is not None and len(bent) * parts > 1:
-            shares = np.arange(1, parts + 1) / parts
-            route = tuple(
-                point for leg in pairwise((start, *bent)) for point in _along(*leg, shares)
-            )
-            shortest.setdefault(tuple(np.concatenate(route).round(9).tolist()), route)
-    return sorted(
-        shortest.values(), key=lambda route: (round(_length((start, *route)), 3), len(route))
-    )[:ROUTES]
-
-
-def _length(corners: Route) -> float:
-    return math.fsum(float(attitude.angle_between(*leg)) for leg in pairwise(corners))
-
-
-def _bent(
-    start: Vector, target: Vector, places: tuple[float, ...], keeps: Sequence[Keep], margin: float
-) -> Route | None:
-    """Least bent route with way points at ``places`` that is clear by ``margin`` rad; None where
-    there is none.
-    """
-    on_the_way = [_along(start, target, np.array([place]))[0] for place in places]
-    normal = np.cross(start, target)
-    size = float(np.linalg.norm(normal))
-    left = normal / size if size > 0.0 else precession.square_to(start)
-    for bend in BENDS if places else BENDS[:1]:
-        route = (*(math.cos(bend) * point + math.sin(bend) * left for point in on_the_way), target)
-        if _clear((start, *route), keeps, margin):
-            return route
-    return None
-
-
-def _along(start: Vector, end: Vector, shares: Vector) -> Vector:
-    """Points (n, 3) at ``shares`` (n,) of the great circle between two unit vectors that are not
-    opposite.
-    """
-    angle = float(attitude.angle_between(start, end))
-    if angle == 0.0:
-        return np.tile(end, (len(shares), 1))
-    weights = np.column_stack([np.sin((1.0 - shares) * angle), np.sin(shares * angle)]) / math.sin(
-        angle
-    )
-    return np.asarray(weights @ np.array([start, end]))
-
-
-def _clear(corners: Route, keeps: Sequence[Keep], margin: float) -> bool:
-    """True if great circles between the ``corners`` keep the cones, by ``margin`` rad or as clearly
-    as their ends.
-    """
-    shares = np.linspace(0.0, 1.0, STEPS)
-    points = np.concatenate([_along(*leg, shares) for leg in pairwise(corners)])
-    for keep in keeps:
-        if keep.direction is None:
-            continue
-        apart = attitude.angle_between(points, keep.direction)
-        room = np.minimum(apart - keep.least, keep.most - apart)
-        if min(room[0], room[-1]) < 0.0 or room.min() < min(margin, room[0], room[-1]):
-            return False
-    return True
-
-
-NO_NUTATION, ROUNDING = 1e-12, 1e-11
-"""Nutation angle in rad below which there is nothing to plan; relative decrease of it that may be
-rounding.
-"""
+NO_NUTATION = 1e-12  # rad of nutation below which there is nothing to plan
+ROUNDING = 1e-11  # relative decrease of the nutation that may be rounding
 
 
 class Standing(Enum):
@@ -441,7 +310,9 @@ def plan(spacecraft: Spacecraft, scheme: str, options: planner.Choice = None) ->
         if result.astray is not None and (
             catalogue.SCHEMES[scheme].points or catalogue.SCHEMES[scheme].reads_commands
         ):
-            rerouted = schedules(known, scheme, chosen)
+            from nutdamp.schemes import routes  # here, because few plans have a cone in the way
+
+            rerouted = routes.schedules(known, scheme, chosen)
             others = (judged(spacecraft, scheme, schedule, chosen) for schedule in rerouted)
             result = next((other for other in others if other.feasible), result)
     return replace(result, cut=True) if spent.exhausted else result

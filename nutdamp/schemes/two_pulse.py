@@ -61,7 +61,7 @@ def schedule(spacecraft: Spacecraft, options: TwoPulseOptions) -> Schedule:
     if spacecraft.goal.axis is None or options.literal:
         return _damping(spacecraft, options)
     try:
-        from nutdamp.schemes import pulse_pairs  # at_leg, because few plans have a target
+        from nutdamp.schemes import pulse_pairs  # here, because few plans have a target
 
         return pulse_pairs.schedule(spacecraft)
     except Infeasible:

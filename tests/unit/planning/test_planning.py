@@ -36,7 +36,7 @@ from nutdamp.planning import plan as planning
 from nutdamp.planning.decision import Ground, compare
 from nutdamp.planning.notes import broken_limits, infeasibility, plan_notes, reasons
 from nutdamp.planning.plan import Plan, Standing, plan
-from nutdamp.schemes import catalogue, two_pulse
+from nutdamp.schemes import catalogue, routes, two_pulse
 from nutdamp.spacecraft.constraints import Limit, Windows, breaches, keeps_limits
 from nutdamp.spacecraft.equipment import Channel, Steerable
 from nutdamp.spacecraft.model import Keep, Limits, Requirement, Spacecraft, Vector
@@ -506,10 +506,10 @@ def test_routes_lead_to_the_target_clear_of_the_cone_the_shortest_first(
     """Two legs that touch a circle of 3 deg and its margin of 0.5 deg about the middle of 12 deg,
     as in a plane.
     """
-    monkeypatch.setattr(planning, "MARGINS", planning.MARGINS[:2])
+    monkeypatch.setattr(routes, "MARGINS", routes.MARGINS[:2])
     body = watched(START + TURNED.target_axis)
-    found = planning.routes(body)
-    assert 4 <= len(found) <= planning.ROUTES
+    found = routes.routes(body)
+    assert 4 <= len(found) <= routes.ROUTES
     for route in found:
         assert np.allclose(route[-1], body.target_axis)
         for one, two in itertools.pairwise((START, *route)):
@@ -520,11 +520,11 @@ def test_routes_lead_to_the_target_clear_of_the_cone_the_shortest_first(
             assert attitude.angle_between(points, np.asarray(body.keep[0].direction)).min() > SUN
     lengths = list(map(length, found))
     assert np.all(np.diff(lengths) > -2e-3)
-    clear = math.degrees(SUN + planning.MARGINS[0])
+    clear = math.degrees(SUN + routes.MARGINS[0])
     bend = clear / math.sqrt(1.0 - (clear / 6.0) ** 2)
     assert 1.0 < lengths[0] / math.radians(2.0 * math.hypot(6.0, bend)) < 1.03
     assert not any(len(route) < 2 for route in found)
-    for route in planning.routes(
+    for route in routes.routes(
         watched(-body.target_axis)
     ):  # without a cone in the way they are next to straight
         assert length(route) == pytest.approx(math.radians(12.0), rel=1e-3)
@@ -534,7 +534,7 @@ def test_a_plan_goes_round_where_the_straight_way_breaks_the_cone(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """The Sun stands where the axis would be half-way on its half cone."""
-    monkeypatch.setattr(planning, "MARGINS", planning.MARGINS[:1])
+    monkeypatch.setattr(routes, "MARGINS", routes.MARGINS[:1])
     free = planning.plan(TURNED, "half-cone")
     track = free.fly(free.end, samples=101).track
     body = watched(track.axis[len(track.t) // 2], math.radians(1.0))
