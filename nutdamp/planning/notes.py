@@ -54,8 +54,10 @@ def strays(aspect: Aspect) -> str:
     """Message on a broken cone."""
     assert aspect.broken_at is not None
     bound, angle, at = aspect.broken_at
-    limit = f"{'min' if bound.inner else 'max'} = {math.degrees(bound.limit):.6g}°"
-    seen = f"{math.degrees(angle) if angle > NEGLIGIBLE else 0.0:.4g}°"
+    edge = "min" if bound.inner else "max"
+    limit = f"{edge} = {math.degrees(bound.limit):.6g}°"
+    shown = math.degrees(angle) if angle > NEGLIGIBLE else 0.0
+    seen = f"{shown:.4g}°"
     if math.isinf(at):
         return f"the target is {seen} from {aspect.keep.name} ({limit})"
     return f"the spin axis comes to {seen} from {aspect.keep.name} at {at:.4g} s ({limit})"
@@ -69,7 +71,7 @@ def broken_limits(spacecraft: Spacecraft, schedule: Schedule) -> list[str]:
     for breach in breaches(spacecraft, schedule):
         grouped.setdefault((breach.limit, breach.window), []).append(breach)
     counts = [(_broken(broken[0]), len(broken) - 1) for broken in grouped.values()]
-    return [text + f"; further pulses alike: {more}" * (more > 0) for text, more in counts]
+    return [f"{text}; further pulses alike: {more}" if more else text for text, more in counts]
 
 
 def _broken(breach: Breach) -> str:
@@ -110,7 +112,9 @@ def plan_notes(plan: Plan, *, cones: bool = True) -> tuple[Note, ...]:
     """
     if not plan.feasible:
         return (note("infeasible", scheme=plan.scheme, why=infeasibility(plan)),)
-    notes = [*plan.pulses.notes, *[note("search-ended")] * plan.cut]
+    notes = list(plan.pulses.notes)
+    if plan.cut:
+        notes.append(note("search-ended"))
     if plan.flown is not None and len(plan.pulses):
         notes += [*_bounds(plan), *_left(plan)]
         notes += [broken_cone(aspect) for aspect in plan.aspects if cones and not aspect.kept]
@@ -488,7 +492,8 @@ def _missed(chosen: Plan, compared: Comparison, *, tabulated: bool) -> Iterator[
             yield note("disturbances-helped", scheme=aware.scheme)
         else:
             yield note("disturbances-not-helped")
-    if Part.NUTATION in parts and (cause := remaining(chosen)).code != "remains-unplanned":
+    cause = remaining(chosen) if Part.NUTATION in parts else None
+    if cause is not None and cause.code != "remains-unplanned":
         reached = [limit for limits in hindrances(chosen) for limit in limits]
         short = (
             chosen.pulses.total_impulse < spacecraft.least_impulse

@@ -429,10 +429,8 @@ class Verified(results.Data):
         return self.core.agree
 
     def __repr__(self) -> str:
-        return (
-            f"<Verified {self.plan.scheme}: "
-            f"agrees with {', '.join(self.core.checks) if self.agree else 'nothing'}>"
-        )
+        agreeing = ", ".join(self.core.checks) if self.agree else "nothing"
+        return f"<Verified {self.plan.scheme}: agrees with {agreeing}>"
 
 
 def feasible(plan: Plan) -> Plan:

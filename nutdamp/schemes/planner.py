@@ -87,11 +87,10 @@ def schedule(name: str, spacecraft: Spacecraft, options: Choice = None) -> Sched
         raise TooShort(short.why, cure) from None
     made = _corrected(scheme, model, whole, chosen)
     unlike = scheme.on_true_motion and not (spacecraft.inertia.symmetric or spacecraft.disturbances)
-    if (
-        not unlike
-        or chosen.uncorrected
-        or not (remains := left(spacecraft, made, momentum=False)) > MODELLED
-    ):
+    if not unlike or chosen.uncorrected:
+        return made
+    remains = left(spacecraft, made, momentum=False)
+    if not remains > MODELLED:
         return made
     on_true = import_module(scheme.module).on_true_motion(spacecraft, chosen)
     other = Correction(scheme, chosen)(spacecraft, on_true)

@@ -1,7 +1,7 @@
 """Schedules laid pulse by pulse on the equivalent symmetric body; reasons of infeasibility.
 
 Three different moments turn in the body at another rate than their mean, on an ellipse instead of a
-circle; lasting disturbances move the point about which ω turns. Both are taken out at_leg, so that
+circle; lasting disturbances move the point about which ω turns. Both are taken out here, so that
 every scheme plans free motion of a symmetric body, and put back in: the schedule is translated to
 the true actuators and corrected on the true motion.
 """
@@ -406,8 +406,12 @@ def no_alignment(spacecraft: Spacecraft, channels: list[Channel]) -> Infeasible:
             pulse = builder.align(channel, most if needed is None else min(needed, most))
             ends.append(shortest.end if pulse is None else max(pulse.end, shortest.end))
     if not pulses:
-        flat = ": dissipation brings the body into flat spin before, where ω does not turn in it"
-        return Infeasible(f"no channel ever opposes the nutation{flat * (spacecraft.growth > 0.0)}")
+        if spacecraft.growth <= 0.0:
+            return Infeasible("no channel ever opposes the nutation")
+        return Infeasible(
+            "no channel ever opposes the nutation: dissipation brings the body into flat spin "
+            "before, where ω does not turn in it"
+        )
     if not ends:
         best = min(pulses, key=builder.left_after)
         left = builder.A * abs(builder.omega_at(best.t))

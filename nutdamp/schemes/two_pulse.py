@@ -228,18 +228,19 @@ def _shortlist(
         if not options.literal:
             schedule = correction.correct(spacecraft, schedule, chosen=(0, 1), momentum=True)
         first, second = schedule.pulses
-        apart = note(
-            "half-turns-apart",
-            first=candidate.channels[0].name,
-            second=candidate.channels[1].name,
-            half_turns=f"{(second.t - first.t) / halves.wait:.2f}",
-            off_deg=abs(math.degrees(candidate.miss)),
-            ratio=f"{candidate.factor:.3f}",
-        )
-        missed = [note("on-times-miss", short_percent=100.0 * candidate.short)] * (
-            candidate.short > 1e-9
-        )
-        yield Schedule(schedule.pulses, (apart, *missed)), correction.left(spacecraft, schedule)
+        notes = [
+            note(
+                "half-turns-apart",
+                first=candidate.channels[0].name,
+                second=candidate.channels[1].name,
+                half_turns=f"{(second.t - first.t) / halves.wait:.2f}",
+                off_deg=abs(math.degrees(candidate.miss)),
+                ratio=f"{candidate.factor:.3f}",
+            )
+        ]
+        if candidate.short > 1e-9:
+            notes.append(note("on-times-miss", short_percent=100.0 * candidate.short))
+        yield Schedule(schedule.pulses, tuple(notes)), correction.left(spacecraft, schedule)
 
 
 def _candidates(

@@ -313,11 +313,10 @@ def misfits(commands: Commands | None, block: Block) -> list[tuple[str, str, str
         )
         if abs(value - near) > slack
     ]
-    off += [("count", str(block.count), f"{commands.max_count} is the most")] * (
-        block.count > commands.max_count
-    )
-    allowed = ", ".join(map(str, commands.every))
-    off += [("every", str(block.every), f"only {allowed}")] * (block.every not in commands.every)
+    if block.count > commands.max_count:
+        off.append(("count", str(block.count), f"{commands.max_count} is the most"))
+    if block.every not in commands.every:
+        off.append(("every", str(block.every), f"only {', '.join(map(str, commands.every))}"))
     return off
 
 
