@@ -137,9 +137,7 @@ def steps(
     *,
     hook: Callable[[Any, Any], object] = lambda _done, _all: None,
 ) -> Iterator[StepCount]:
-    """Count the steps of a task, which is ``size`` steps of the task around it; ``hook``: see
-    `StepCount`.
-    """
+    """Count the steps of a task of ``size`` steps of the task around it; ``hook``: `StepCount`."""
     around, watch = _steps.get(), _watch.get()
     task = StepCount(expected, size, hook)
     token = _steps.set(task)
