@@ -29,9 +29,8 @@ Table = NDArray[
 _home: list[str] = []  # module that has the table of `view`
 
 
-Value = (
-    str | int | float | None
-)  # a value of a note; its name ends in the unit: ``_deg``, ``_s``, ``_Nms`` …
+Value = str | int | float | None
+"""A value of a note; its name ends in the unit: ``_deg``, ``_s``, ``_Nms`` …"""
 
 
 class Note(NamedTuple):

@@ -51,9 +51,7 @@ LEAP_DAYS = tuple(
 FIRST_DAY = datetime.date(1972, 1, 1).toordinal()
 """Ordinal of the first day of UTC with whole leap seconds."""
 
-DIGITS = (
-    9  # digits of a second in texts: at 60 rpm a body turns by less than 1e-6 deg in a nanosecond
-)
+DIGITS = 9  # of a second in texts: at 60 rpm a body turns by less than 1e-6 deg in a nanosecond
 
 _J2000 = Fraction(883_655_957_816, 1000)
 """Seconds from 1972-01-01T00:00:00 UTC, which was 00:00:42.184 TT, to 2000-01-01T12:00:00 TT."""

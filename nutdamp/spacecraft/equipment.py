@@ -211,9 +211,7 @@ class Thruster:
         return self.thrust / (self.isp * STANDARD_GRAVITY)
 
 
-CANCELLED = (
-    1e-12  # share of the largest torque of its thrusters below which that of a channel is rounding
-)
+CANCELLED = 1e-12  # share of its largest thruster torque below which a channel's is rounding
 
 
 @dataclass(frozen=True, slots=True)
