@@ -1,6 +1,4 @@
-"""Exceptions, and faults with their place, as data; the command line turns them into messages and
-exit statuses.
-"""
+"""Exceptions, and faults with their place, as data; the command line makes messages of them."""
 
 from __future__ import annotations
 
@@ -61,9 +59,7 @@ class Fault(NamedTuple):
 
     @property
     def place(self) -> str:
-        """``FILE:LINE:COLUMN``; without a line it is a file as a whole, or a setting such as
-        ``--set KEY=VALUE``.
-        """
+        """``FILE:LINE:COLUMN``; without a line a file as a whole, or a ``--set KEY=VALUE``."""
         file = printable(self.file)
         return f"{file}:{self.line}:{self.column}" if self.line else file
 
@@ -115,9 +111,7 @@ class Unsuitable(BadRequest):
 
 
 class SenselessOption(BadRequest):
-    """An option of a scheme whose value makes no sense: its ``name``, the value as ``shown``, and
-    the ``problem``.
-    """
+    """An option of a scheme that makes no sense: ``name``, value as ``shown``, and ``problem``."""
 
     def __init__(self, name: str, shown: str, problem: str) -> None:
         super().__init__(name, shown, problem)
@@ -172,9 +166,7 @@ class Infeasible(NutdampError):
 
 
 class TooShort(Infeasible):
-    """A scheme that a longer horizon would make feasible: ``why``, and a ``cure`` that names the
-    horizon, if known.
-    """
+    """A scheme that a longer horizon would make feasible: ``why``, and a ``cure`` that names it."""
 
     def __init__(self, why: str, cure: str = "") -> None:
         self.why, self.cure = why, cure

@@ -1,6 +1,4 @@
-"""Commands on files: ``check``, ``init``, ``schema``, ``explain``, ``export``, ``import``,
-``report``, ``verify``.
-"""
+"""``check``, ``init``, ``schema``, ``explain``, ``export``, ``import``, ``report``, ``verify``."""
 
 from __future__ import annotations
 

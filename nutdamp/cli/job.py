@@ -82,9 +82,7 @@ def screen_options(command: Command) -> Command:
 
 
 class FileInput(NamedTuple):
-    """The spacecraft that a command line names: the ``path`` of a file, and the changes of
-    ``--set``.
-    """
+    """The spacecraft of a command line: the ``path`` of a file, and changes of ``--set``."""
 
     path: str | None
     settings: tuple[Setting, ...] = ()
@@ -95,9 +93,7 @@ class FileInput(NamedTuple):
         return DEFAULT_FILE if self.path is None and Path(DEFAULT_FILE).exists() else self.path
 
     def source(self, remark: Callable[[str], None], doubt: Callable[[str], None]) -> Source:
-        """The text of the file, else of the built-in example, which is a ``doubt``,
-        and its name.
-        """
+        """The text of the file, else of the built-in example (a ``doubt``), and its name."""
         from nutdamp.files.reader import Source, example_text
         from nutdamp.files.yaml import read_text
 
@@ -137,9 +133,7 @@ def spacecraft_argument(command: Command) -> Command:
 
 
 def placed(wrong: Unsuitable, given: FileInput) -> NutdampError:
-    """The error as a fault with the place of the value in the spacecraft file, where it comes from
-    one.
-    """
+    """The error as a fault with its place in the spacecraft file, where it comes from one."""
     if given.path == "-" or any(wrong.where[:1] == setting.path[:1] for setting in given.settings):
         return wrong
     from nutdamp.files.yaml import dotted, read_tree
@@ -204,9 +198,7 @@ def expect_outputs(*read: str | None, **written: str | Sequence[str] | None) -> 
 
 
 def _identity(path: str, standard: int) -> Hashable:
-    """Identity of a file, None for a terminal, /dev/null and the like; ``standard``: the descriptor
-    of ``-``.
-    """
+    """Identity of a file, None for a terminal or the like; ``standard``: descriptor of ``-``."""
     try:
         status = os.fstat(standard) if path == STANDARD else Path(path).stat()
     except OSError:
@@ -233,9 +225,7 @@ KINDS = (
 
 
 class FlownChoice(NamedTuple):
-    """Source of the pulses that a command flies: a scheme, a schedule file, a file of blocks, else
-    what is best.
-    """
+    """Source of the pulses of a command: scheme, schedule, file of blocks, else what is best."""
 
     scheme: str | None = None
     schedule: str | None = None
@@ -318,9 +308,7 @@ class Job:
         return working(what, quiet=self.quiet)
 
     def carried(self, plan: Plan | None, at: float | None, usual: float | None = None) -> Files:
-        """The file of ``-o``: the spacecraft ``at`` a time, s, of a plan (else ``usual``, else its
-        own); BadRequest.
-        """
+        """The file of ``-o``: the spacecraft ``at`` a time, s, else ``usual``; BadRequest."""
         path = self.written["output"]
         if path is None:
             if at is not None:
@@ -394,9 +382,7 @@ def job_of(command: click.Command, parameters: dict[str, Any]) -> Job:
 
 
 def write_infeasible(context: click.Context, reason: Exception) -> None:
-    """Write the JSON file of the job that has begun, if any: nothing is feasible,
-    and the reason.
-    """
+    """Write the JSON file of the job, if any: nothing is feasible, and the reason."""
     if UNDER_WAY not in context.meta:
         return
     from nutdamp.views.decisions import heading
@@ -450,14 +436,10 @@ def _file_of(content: Content, path: str) -> str | bytes | Callable[[IO[bytes]],
 
 
 class SessionCommand(click.Command):
-    """A command whose help page has headings; the parameters that commands share are gathered into
-    ``job``.
-    """
+    """A command whose help page has headings; shared parameters are gathered into ``job``."""
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Run the command; an unsuitable value of the spacecraft file is a fault with its place
-        there.
-        """
+        """Run the command; an unsuitable value of the spacecraft file is a fault there."""
         ctx.params = {"job": (job := job_of(self, ctx.params)), **ctx.params}
         try:
             return super().invoke(ctx)
@@ -477,9 +459,7 @@ class SessionCommand(click.Command):
                     formatter.write_dl(records, col_max=WIDEST if groups[GOAL] else 30)
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Parse as click does; the error for an option of a scheme that is not taken here says
-        where to give it.
-        """
+        """Parse as click does; an option of a scheme that is not taken has its own error."""
         try:
             return super().parse_args(ctx, args)
         except click.NoSuchOption as wrong:

@@ -87,9 +87,7 @@ def run(group: click.Group) -> None:
 
 
 def leave(judged: Status | None = None, *, failed: bool = False, infeasible: bool = False) -> None:
-    """End with the exit status of the first that holds: a bug or disagreement, no result, a verdict
-    that says so.
-    """
+    """End with the first exit status that holds: a bug, no result, or what a verdict says."""
     status = 0 if judged is None else judged.exit_status
     if failed or infeasible or status:
         sys.exit(INTERNAL if failed else INFEASIBLE if infeasible else status)
@@ -107,9 +105,7 @@ class Interruption:
 
 @contextmanager
 def stoppable() -> Iterator[Interruption]:
-    """An `Interruption` set by Ctrl-C or SIGTERM, so that a run ends in order; a second Ctrl-C
-    interrupts at once.
-    """
+    """An `Interruption` by Ctrl-C or SIGTERM ends a run in order; a second Ctrl-C at once."""
     stop = Interruption()
 
     def ask(number: int, _: FrameType | None) -> None:
@@ -133,16 +129,12 @@ def _terminate(number: int, frame: FrameType | None) -> None:  # noqa: ARG001 - 
 
 
 def _silence_stdout() -> None:
-    """Discard text still buffered for standard output, so that Python does not stumble over it at
-    exit.
-    """
+    """Discard text still buffered for standard output: Python would stumble over it at exit."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def tell(wrong: Exception) -> None:
-    """Print an error on standard error; faults of a file begin with its name, all others with that
-    of the program.
-    """
+    """Print an error on standard error, behind the name of its file or of the program."""
     from nutdamp.errors import FaultyFile
 
     say(str(wrong) if isinstance(wrong, FaultyFile) else f"nutdamp: {wrong}")
@@ -182,9 +174,7 @@ COMMANDS = {
 
 
 class _CommandGroup(click.Group):
-    """Group whose subcommands are loaded from their modules when they are used, and listed in their
-    order.
-    """
+    """Group whose subcommands are loaded when they are used, and listed in their order."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002 - signature of click
         return list(COMMANDS)
@@ -196,9 +186,7 @@ class _CommandGroup(click.Group):
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        """The command that a command line names; a usage error suggests the nearest name to a
-        misspelt one.
-        """
+        """The command that is named; a usage error suggests the nearest name."""
         name = args[0]
         if name not in COMMANDS and not name.startswith("-"):
             close = nearest(name, COMMANDS)
@@ -208,9 +196,7 @@ class _CommandGroup(click.Group):
         return super().resolve_command(ctx, args)
 
     def invoke(self, ctx: click.Context) -> object:
-        """Run the command; where nothing requested is feasible,
-        its JSON file says so all the same.
-        """
+        """Run the command; where nothing is feasible its JSON file says so all the same."""
         try:
             return super().invoke(ctx)
         except Infeasible as reason:
@@ -232,9 +218,8 @@ class _CommandGroup(click.Group):
     context_settings={"help_option_names": ["-h", "--help"]},
     epilog=(
         "Exit status: 0 done; 1 could not read or write; 2 bad command line or bad file; "
-        "3 no plan is feasible; 4 the "
-        "plan is not shown to meet the requirement, or cannot be commanded; 130 interrupted; "
-        "143 terminated."
+        "3 no plan is feasible; 4 the plan is not shown to meet the requirement, "
+        "or cannot be commanded; 130 interrupted; 143 terminated."
     ),
 )
 @click.version_option(__version__, prog_name="nutdamp")

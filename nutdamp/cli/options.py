@@ -27,9 +27,7 @@ if TYPE_CHECKING:
 else:
 
     class ParamType(click.ParamType):
-        """`click.ParamType`, which takes the type of its values in
-        brackets from click 8.4 on only.
-        """
+        """`click.ParamType`, which takes a type in brackets from click 8.4 on only."""
 
         def __class_getitem__(cls, _: object) -> type[ParamType]:
             return cls
@@ -86,9 +84,7 @@ FOLDER = click.Path(readable=False)
 
 
 class UnitType(ParamType[float]):
-    """A number in SI or a text with a unit, as in a spacecraft file, that passes a ``check``, or
-    one of ``words``.
-    """
+    """A number in SI, a text with a unit that passes a ``check``, or one of ``words``."""
 
     def __init__(
         self,
@@ -134,9 +130,7 @@ class Angles(NamedTuple):
 
     @property
     def readings(self) -> tuple[str, ...]:
-        """Readings of the numbers without unit that are more likely degrees: whole ones, and more
-        than a turn.
-        """
+        """Readings of unitless numbers that are likely degrees: whole, and more than a turn."""
         bare = [angle for angle in self if isinstance(angle, Bare)]
         doubtful = [
             angle for angle in bare if angle and (angle.is_integer() or abs(angle) > 2.0 * math.pi)
@@ -206,9 +200,7 @@ class Grouped(click.Option):
 
 
 def goal_options(command: Command, *, several: bool = True) -> Command:
-    """The goal, and the options of every scheme; ``several``: any may be planned, and one with a
-    bug is passed over.
-    """
+    """The goal, and the options of every scheme; with ``several`` one with a bug is passed over."""
     option = functools.partial(click.option, cls=Grouped, group=GOAL)
     angles = functools.partial(option, type=Direction(), metavar="ANGLE,ANGLE")
     command = debug_option(command) if several else command
@@ -252,9 +244,7 @@ def scheme_options(command: Command) -> Command:
 
 
 def options_in(command: click.Command, parameters: dict[str, Any]) -> Options:
-    """Options of the schemes among ``parameters``, from which they are taken; a usage error for a
-    senseless one.
-    """
+    """Options of the schemes, taken from ``parameters``; a usage error for a senseless one."""
     known = {*SHARED, *_fields()}
     names = [
         each.name for each in command.params if isinstance(each, Grouped) and each.name in known
@@ -272,9 +262,7 @@ def options_in(command: click.Command, parameters: dict[str, Any]) -> Options:
 
 
 def _fields() -> dict[str, tuple[dataclasses.Field[Any], list[str]]]:
-    """Each option that not all schemes have, by its name: its field,
-    and the schemes that have it.
-    """
+    """Each option that not all schemes have, by name: its field, and its schemes."""
     varying: dict[str, tuple[dataclasses.Field[Any], list[str]]] = {}
     for scheme in SCHEMES.values():
         for field in dataclasses.fields(scheme.options):
@@ -297,9 +285,7 @@ class Aim(NamedTuple):
 
     @property
     def words(self) -> tuple[str, ...]:
-        """Options that give target and spin to any command; ``--sun`` only goes with a scheme that
-        reads it.
-        """
+        """Options that give target and spin to any command; ``--sun`` where a scheme reads it."""
         words = []
         if self.target is not None:
             words.append(f"--target={self.target.first!r}rad,{self.target.second!r}rad")
@@ -308,9 +294,7 @@ class Aim(NamedTuple):
         return tuple(words)
 
     def applied(self, spacecraft: Spacecraft, doubt: Callable[[str], None]) -> Spacecraft:
-        """The spacecraft with this goal; a usage error where it cannot be one, a doubt where it is
-        hardly meant.
-        """
+        """The spacecraft with this goal; a usage error where it has none, a doubt if unlikely."""
         goal = spacecraft.goal
         if self.target is not None:
             goal = dataclasses.replace(goal, axis=_direction(spacecraft, self.target, "--target"))
@@ -346,9 +330,7 @@ def _direction(spacecraft: Spacecraft, angles: Angles, option: str) -> Vector:
 def expect_read(
     names: Sequence[str], options: Options, spacecraft: Spacecraft, doubt: Callable[[str], None]
 ) -> None:
-    """Warn of options that none of the schemes ``names`` reads; a usage error where that is the
-    goal itself.
-    """
+    """Warn of options that no scheme of ``names`` reads; a usage error for the goal itself."""
     planned = [SCHEMES[name] for name in names]
     unread = [*options.without_effect([scheme.options for scheme in planned])] if planned else []
     if len(planned) > 1 and "least" in unread:  # it chooses among them, whether they read it or not
@@ -362,8 +344,8 @@ def expect_read(
             raise click.UsageError(NO_SUN)
         if without:
             doubt(
-                f"--sun is read by {' and '.join(SUNLIT)} alone: {', '.join(without)} plan without "
-                "it"
+                f"--sun is read by {' and '.join(SUNLIT)} alone: "
+                f"{', '.join(without)} plan without it"
             )
     if planned and spacecraft.goal.axis is None and all(scheme.only_points for scheme in planned):
         raise click.UsageError(

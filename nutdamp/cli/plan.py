@@ -1,6 +1,4 @@
-"""``nutdamp plan``, ``simulate`` and ``animate``; and the pulses a command flies: of a scheme, a
-file, or blocks.
-"""
+"""``plan``, ``simulate`` and ``animate``; and the pulses that a command flies."""
 
 from __future__ import annotations
 
@@ -54,9 +52,7 @@ scheme_option = partial(
 
 
 def flown_options(verb: str, scheme: str | None = None) -> Callable[[Command], Command]:
-    """``--scheme`` (its help may be given), ``--schedule`` and ``--blocks``, one alone, of pulses
-    to ``verb``.
-    """
+    """``--scheme`` (its help may differ), ``--schedule`` and ``--blocks``: one alone."""
     default = f"{verb} this scheme with default options; without it the recommended one."
 
     def alone(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
@@ -84,9 +80,7 @@ def flown_options(verb: str, scheme: str | None = None) -> Callable[[Command], C
 def compared_with(
     job: Job, names: Sequence[str], samples: int | None = None, *, timed: bool = False
 ) -> Comparison:
-    """Comparison of the schemes named, else the usual ones; a remark names the options that none of
-    them reads.
-    """
+    """Comparison of the schemes named, else the usual ones; remarks on options that none reads."""
     from nutdamp.api import compare
     from nutdamp.planning.decision import usual
 
@@ -158,9 +152,7 @@ def plan_or_read(job: Job, *, judged: bool = False) -> Plan:
 
 
 def _fired(job: Job, path: str) -> Plan:
-    """The pulses that the command blocks of a file fire, as a plan; raises Infeasible where there
-    is no Sun pulse.
-    """
+    """The pulses that a file of command blocks fires, as a plan; Infeasible without Sun pulses."""
     from nutdamp.files.schedules import read_blocks
     from nutdamp.planning.notes import broken_limits
     from nutdamp.planning.plan import Plan
@@ -259,16 +251,14 @@ def plan_command(
 
 
 def _blocks_file(job: Job, compared: Comparison, chosen: Plan | None) -> Files:
-    """The file of command blocks, of the plan to fly or another; raises BadRequest where plans have
-    none.
-    """
+    """The file of command blocks of the plan to fly, or another; BadRequest without blocks."""
     plans: list[Plan] = [plan for plan in (chosen, *compared) if plan is not None and plan.feasible]
     source = next((plan for plan in plans if plan.pulses.blocks), None)
     if source is None:
         if plans:
             raise BadRequest(
-                "--blocks: no plan is made of command blocks; run --scheme command-block for the "
-                "reason"
+                "--blocks: no plan is made of command blocks; "
+                "run --scheme command-block for the reason"
             )
         return {}
     if source is not chosen:

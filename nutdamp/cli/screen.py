@@ -57,9 +57,7 @@ def show(renderable: RenderableType) -> None:
 
 
 def console() -> Console:
-    """Standard output as rich sees it, at least `NARROWEST` wide; names such as [red] or :rocket:
-    stay as they are.
-    """
+    """Standard output as rich sees it, at least `NARROWEST` wide; no markup and no emoji."""
     import os
     import shutil
 
@@ -93,9 +91,7 @@ QUIET = "nutdamp.quiet"  # key of ``--quiet`` in the context of a command line
 
 @contextmanager
 def look_of_screen() -> Iterator[None]:
-    """Context of texts for people: in the units of ``--units``, without notes where ``--quiet``
-    says so.
-    """
+    """Context of texts for people: the units of ``--units``, no notes with ``--quiet``."""
     from nutdamp.views.text import quietly
 
     context = click.get_current_context(silent=True)
@@ -121,9 +117,7 @@ debug_option = click.option(
 
 
 def show_failures(compared: Comparison) -> bool:
-    """Name on standard error the schemes that have a bug, with ``--debug`` their tracebacks; return
-    True if any has.
-    """
+    """Name the schemes that have a bug, with ``--debug`` their tracebacks; True if any has."""
     for plan in compared.failed:
         if click.get_current_context().meta.get(DEBUG):
             import traceback
@@ -139,9 +133,7 @@ BELIEVED = 0.1  # share of the steps that have to be done before a time left is 
 
 @contextmanager
 def working(what: str, *, quiet: bool = False) -> Iterator[None]:
-    """Show ``what`` is under way: on a terminal only, after `PATIENCE`, and it leaves nothing
-    behind.
-    """
+    """Show ``what`` is under way, on a terminal, after `PATIENCE`; it leaves nothing behind."""
     if quiet or not sys.stderr.isatty():
         yield
         return

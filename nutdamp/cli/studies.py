@@ -319,8 +319,8 @@ def fit_command(
     if doubtful and output is not None:
         del files["output"]
         say(
-            f"{printable(output)} was not written: the estimate is far from the file (--accept "
-            "writes it)"
+            f"{printable(output)} was not written: the estimate is far from the file "
+            "(--accept writes it)"
         )
     job.deliver(fitted, partial(fit_screen, fitted.core, at, verbose=verbose), more=files)
     leave(infeasible=doubtful)

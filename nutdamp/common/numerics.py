@@ -1,6 +1,4 @@
-"""Numerics: quadrature, zeros, tails of χ², rounding of bounds, and removal of rounding noise from
-shown numbers.
-"""
+"""Numerics: quadrature, zeros, tails of χ², rounding of bounds and of shown numbers."""
 
 from __future__ import annotations
 
@@ -68,9 +66,7 @@ def cos_sin(angle: Any) -> tuple[Any, Any]:
 
 
 def rising_zero(excess: Callable[[float], float], low: float, high: float) -> float:
-    """Rising zero of ``excess`` between ``low`` and ``high``: false position that halves a stale
-    end.
-    """
+    """Rising zero of ``excess`` from ``low`` to ``high`` by false position with halving."""
     below, above = excess(low), excess(high)
     for _ in range(100):
         if above == 0.0 or high - low <= 2e-16 * high:
@@ -91,9 +87,7 @@ def rising_zero(excess: Callable[[float], float], low: float, high: float) -> fl
 
 
 def chi_square_tail(count: int, value: float) -> float:
-    """Probability that the sum of ``count`` squares of standard normal numbers exceeds a ``value``
-    above 0.
-    """
+    """Probability that ``count`` squares of standard normal numbers exceed ``value`` > 0."""
     half = max(0.5 * value, 1e-300)
     powers = [0.5 * (count % 2) + index for index in range(count // 2)]
     series = math.fsum(

@@ -29,15 +29,12 @@ Table = NDArray[
 _home: list[str] = []  # module that has the table of `view`
 
 
-Value = (
-    str | int | float | None
-)  # a value of a note; its name ends in the unit: ``_deg``, ``_s``, ``_Nms`` …
+Value = str | int | float | None
+"""A value of a note; its name ends in the unit: ``_deg``, ``_s``, ``_Nms`` …"""
 
 
 class Note(NamedTuple):
-    """A statement about a result: the code of a sentence in ``guide/notes.md``, and the values that
-    it names.
-    """
+    """A statement about a result: the code of a sentence in ``guide/notes.md``, and its values."""
 
     code: str
     items: tuple[tuple[str, Value], ...] = ()
@@ -77,9 +74,7 @@ def _entry(result: object, what: str) -> str | None:
 
 
 def view(result: object, what: str, *arguments: Any, **options: Any) -> Any:
-    """Value of the function for a result and a subject; TypeError where its class and its bases
-    have none.
-    """
+    """Value of the function for a result and a subject; TypeError for another class."""
     entry = _entry(result, what)
     if entry is None:
         raise TypeError(f"expected a result with {what}, got a {type(result).__qualname__}")
@@ -112,9 +107,7 @@ class Data:
     """Mixin of results that are written as JSON."""
 
     def to_dict(self) -> dict[str, Any]:
-        """Contents of the file that the command of this result writes with ``--json``, or the part
-        that holds it.
-        """
+        """Contents of the command's ``--json`` file, or the part that holds this result."""
         return finite(view(self, "data"))
 
 

@@ -46,18 +46,12 @@ LEAP_DAYS = tuple(
         ),
     )
 )
-"""Ordinals of the days that ended with 23:59:60 (IERS, Bulletin C); none has been announced since
-2016.
-"""
+"""Ordinals of the days with a leap second (IERS, Bulletin C); none is announced since 2016."""
 
 FIRST_DAY = datetime.date(1972, 1, 1).toordinal()
-"""Ordinal of the first day of UTC with whole leap seconds; before it the UTC second had another
-length.
-"""
+"""Ordinal of the first day of UTC with whole leap seconds."""
 
-DIGITS = (
-    9  # digits of a second in texts: at 60 rpm a body turns by less than 1e-6 deg in a nanosecond
-)
+DIGITS = 9  # of a second in texts: at 60 rpm a body turns by less than 1e-6 deg in a nanosecond
 
 _J2000 = Fraction(883_655_957_816, 1000)
 """Seconds from 1972-01-01T00:00:00 UTC, which was 00:00:42.184 TT, to 2000-01-01T12:00:00 TT."""
@@ -75,9 +69,7 @@ UNIFORM = {
     "TT": Fraction(42_184, 1000),
     "TDB": Fraction(42_184, 1000),
 }
-"""Time systems without leap seconds, and their clock reading, s, at 1972-01-01T00:00:00 UTC; GPS
-extrapolated.
-"""
+"""Time systems without leap seconds: clock, s, at 1972-01-01T00:00:00 UTC; GPS extrapolated."""
 
 
 @dataclass(frozen=True, order=True, slots=True)

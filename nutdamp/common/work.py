@@ -28,9 +28,7 @@ CASES, SAMPLES = (
 MORE_CASES = 5_000.0
 FRONTS = 30_000.0  # units for all points of `trade` but those that `plan` finds
 LOOP = 20_000.0  # units for the flight of one closed loop
-CYCLES = (
-    30_000.0  # units for the limit cycles of one pair of thresholds, and the lifetime of the tank
-)
+CYCLES = 30_000.0  # units: limit cycles of one pair of thresholds, and lifetime of the tank
 FIT, FITTED = (
     4_500.0,
     600,
@@ -137,9 +135,7 @@ def steps(
     *,
     hook: Callable[[Any, Any], object] = lambda _done, _all: None,
 ) -> Iterator[StepCount]:
-    """Count the steps of a task, which is ``size`` steps of the task around it; ``hook``: see
-    `StepCount`.
-    """
+    """Count the steps of a task of ``size`` steps of the task around it; ``hook``: `StepCount`."""
     around, watch = _steps.get(), _watch.get()
     task = StepCount(expected, size, hook)
     token = _steps.set(task)

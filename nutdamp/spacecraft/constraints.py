@@ -39,9 +39,7 @@ class Windows:
     """Limits of one spacecraft, for one pulse at a time."""
 
     def __init__(self, spacecraft: Spacecraft, *, endless: bool = False) -> None:
-        """Windows of ``spacecraft``; ``endless`` drops the horizon, to show the effect of a longer
-        one.
-        """
+        """Windows of ``spacecraft``; ``endless`` drops the horizon."""
         self.limits = spacecraft.limits
         self.horizon = math.inf if endless else spacecraft.horizon
 
@@ -58,17 +56,13 @@ class Windows:
         return float(over[following]) if touched else None
 
     def allows(self, start: float, on_time: float, ready: float) -> bool:
-        """True if a pulse may be on from ``start`` for ``on_time`` s when the actuators are
-        ``ready`` (s).
-        """
+        """True if a pulse may be on from ``start`` for ``on_time`` s, actuators ``ready`` (s)."""
         slack = touching(start + on_time)
         within = ready - slack <= start and start + on_time <= self.horizon + slack
         return within and self.blocked_until(start, on_time) is None
 
     def allowed(self, starts: Vector, on_times: Vector, ready: Vector | float) -> NDArray[np.bool_]:
-        """`allows` for many pulses at once, (n,) each; a pulse whose on-time is not a number is not
-        allowed.
-        """
+        """`allows` for many pulses at once, (n,) each; an on-time of NaN is not allowed."""
         ends = starts + on_times
         with np.errstate(invalid="ignore"):
             slack = np.maximum(TOUCHING, np.spacing(ends))  # `touching`
@@ -91,9 +85,7 @@ class Windows:
     def blocked(
         self, starts: Vector, ends: Vector, slack: Vector | float = 0.0
     ) -> NDArray[np.bool_]:
-        """True where the time from ``starts`` to ``ends`` (n,) s is in a blackout window for more
-        than ``slack`` s.
-        """
+        """True where (``starts``, ``ends``) (n,) s is in blackouts for more than ``slack`` s."""
         begins, over = self.dark
         # The first window that is not over at the start is the only one that can be met first.
         following = np.searchsorted(over, starts + slack, side="right")
@@ -147,9 +139,7 @@ def free_windows(spacecraft: Spacecraft, horizon: float | None = None) -> list[t
 
 
 def rooms(spacecraft: Spacecraft, pulses: Sequence[Pulse]) -> list[tuple[float, float]]:
-    """(begin, end) s between which each of the ``pulses``, in order, may move; the room between two
-    is halved.
-    """
+    """(begin, end) s within which each of the ``pulses``, in order, may move; gaps are halved."""
     limits = spacecraft.limits
     ready = spacecraft.limits.earliest
     bounds = []
@@ -194,9 +184,7 @@ def commandable_widths(
     most: float = math.inf,
     count: int = SOME_WIDTHS,
 ) -> Vector:
-    """Widths (n,) s from ``least`` to ``most`` that a command block of a channel may have: those
-    that give thrust.
-    """
+    """Widths (n,) s from ``least`` to ``most`` that blocks may have and that give thrust."""
     least = max(least, channel.min_on_time - 1e-12)
     most = min(most, channel.max_on_time + 1e-12)
     widths = commands.some_widths(least, most, count)
@@ -206,9 +194,7 @@ def commandable_widths(
 
 
 def rounded_off(spacecraft: Spacecraft, pulses: Iterable[Pulse]) -> list[float]:
-    """Effect of half a tick in start and on-time of each pulse, rad, as a root sum of squares;
-    without ticks 0.
-    """
+    """Effect of half a tick in start and on-time of each pulse, rad, summed by squares."""
     half = 0.5 * (spacecraft.limits.tick or 0.0)
     rate = spacecraft.fastest
     size = abs(spacecraft.axial)
@@ -219,9 +205,7 @@ def rounded_off(spacecraft: Spacecraft, pulses: Iterable[Pulse]) -> list[float]:
 
 
 def shortest_on_time(spacecraft: Spacecraft, channel: Channel) -> float:
-    """Shortest on-time that can be commanded, s: min_on_time rounded up to ticks, at least one
-    tick.
-    """
+    """Shortest on-time that can be commanded, s: min_on_time rounded up to ticks, at least one."""
     tick = spacecraft.limits.tick
     return (
         channel.min_on_time
@@ -231,17 +215,13 @@ def shortest_on_time(spacecraft: Spacecraft, channel: Channel) -> float:
 
 
 def longest_on_time(spacecraft: Spacecraft, channel: Channel) -> float:
-    """Longest useful on-time of a channel, s: see `longest_useful`, which is for torques across the
-    spin axis.
-    """
+    """Longest useful on-time of a channel, s; see `longest_useful`."""
     longest = effective_on_times(channel)[1]
     return longest_useful(longest, spacecraft.body_period) if channel.damps else longest
 
 
 def effective_on_times(channel: Channel) -> tuple[float, float]:
-    """Bounds (s) of the pulses that a channel can give, in effective on-times: without a valve
-    those commanded.
-    """
+    """Bounds (s) of the pulses that a channel can give, in effective on-times."""
     return effective_on_time(channel, channel.min_on_time), effective_on_time(
         channel, channel.max_on_time
     )
@@ -275,9 +255,7 @@ PAIRED = 24  # directions about which channels are looked at in pairs
 
 
 def for_pairs(spacecraft: Spacecraft) -> list[Channel]:
-    """`usable`, but of very many channels only the cheapest about each of `PAIRED` directions:
-    pairs are many.
-    """
+    """`usable`, but of very many channels only the cheapest about each of `PAIRED` directions."""
     channels = usable(spacecraft)
     if len(channels) <= PAIRED:
         return channels
@@ -294,9 +272,7 @@ def channel_of(spacecraft: Spacecraft, pulse: Pulse) -> Channel | None:
 
 
 def misfits(commands: Commands | None, block: Block) -> list[tuple[str, str, str]]:
-    """Values of a block that are no command of the file: the column, the value, and what is nearest
-    or allowed.
-    """
+    """Values of a block that are no command of the file: column, value, what is near or allowed."""
     if commands is None:
         return []
     longest = (

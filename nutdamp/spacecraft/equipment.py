@@ -63,9 +63,7 @@ class Commands:
     width_step: float | None = None
 
     def some_widths(self, least: float, most: float, count: int) -> Vector:
-        """Widths from ``least`` to ``most`` s that can be commanded; of those in steps ``count``,
-        evenly spread.
-        """
+        """Widths from ``least`` to ``most`` s that can be commanded; ``count`` of steps."""
         if self.width_step is None:
             return np.asarray(self.widths[(self.widths >= least) & (self.widths <= most)])
         first, last = self.widths.tolist()
@@ -81,9 +79,7 @@ class Commands:
         return float(near[np.abs(near - width).argmin()])
 
     def counts(self, name: str, time: float) -> int:
-        """Steps of a ``delay`` or ``width``, s; in a list of widths the number of the nearest
-        entry, 1 the shortest.
-        """
+        """Steps of a ``delay`` or ``width``, s; in a list of widths the number of the nearest."""
         step = self.delay_step if name == "delay" else self.width_step
         return 1 + int(np.abs(self.widths - time).argmin()) if step is None else round(time / step)
 
@@ -215,9 +211,7 @@ class Thruster:
         return self.thrust / (self.isp * STANDARD_GRAVITY)
 
 
-CANCELLED = (
-    1e-12  # share of the largest torque of its thrusters below which that of a channel is rounding
-)
+CANCELLED = 1e-12  # share of its largest thruster torque below which a channel's is rounding
 
 
 @dataclass(frozen=True, slots=True)
@@ -240,9 +234,7 @@ class Channel:
 
     @property
     def torque(self) -> Vector:
-        """Sum of the torques, (3,) N m; zero where they cancel, as of a pair for velocity changes,
-        but for rounding.
-        """
+        """Sum of the torques, (3,) N m; zero where they cancel but for rounding."""
         torques = np.array([thruster.torque for thruster in self.thrusters], dtype=np.float64)
         total = torques.sum(axis=0)
         return np.asarray(np.where(np.abs(total) > CANCELLED * np.abs(torques).max(), total, 0.0))
@@ -270,9 +262,7 @@ class Channel:
 
     @property
     def damps(self) -> bool:
-        """True if the torque is more transverse than axial;
-        thrusters for the spin are left alone.
-        """
+        """True if the torque is more transverse than axial; others are for the spin."""
         return abs(self.transverse) > abs(self.axial)
 
     @property
@@ -294,9 +284,7 @@ class Channel:
 
     @property
     def price(self) -> float:
-        """Propellant, kg (impulse, N m s, where that is unknown),
-        per N m s of transverse impulse.
-        """
+        """Propellant, kg (else impulse, N m s), per N m s of transverse impulse."""
         return self.cost_rate(by_propellant=True) / abs(self.transverse)
 
     def cost_rate(self, *, by_propellant: bool) -> float:

@@ -144,9 +144,7 @@ class Inertia:
 
     @property
     def a(self) -> float:
-        """Inertia ratio (A - C)/A, Magnus (4): positive prolate, negative oblate, zero for a
-        sphere.
-        """
+        """Inertia ratio (A - C)/A, Magnus (4): positive prolate, negative oblate."""
         return rigid_body.ratio(self.A, self.C)
 
     def axial(self, spin: Any) -> Any:
@@ -204,9 +202,7 @@ class Inertia:
         )
 
     def circle(self, spin: float) -> Vector:
-        """Factors (2,) of H1 and H2, the larger one 1, with which a small nutation turns on a
-        circle.
-        """
+        """Factors (2,) of H1 and H2, at most 1, by which a small nutation turns on a circle."""
         if not self._swings(spin):
             return np.ones(2)
         (first, second, _), axial = self.moments, self.axial(spin)
@@ -214,9 +210,7 @@ class Inertia:
         return np.array([ratio, 1.0]) / max(ratio, 1.0)
 
     def nutating(self, spin: float) -> float:
-        """Transverse moment of the symmetric body whose small nutation turns as fast, kg m²: A
-        where I1 = I2.
-        """
+        """Transverse moment of the symmetric body whose small nutation turns as fast, kg m²."""
         return (
             self.A
             if self.symmetric
@@ -225,9 +219,7 @@ class Inertia:
 
     @property
     def shape(self) -> str:
-        """``prolate``, ``oblate`` or ``sphere``; ``gyrostat`` with a wheel, of which A and C alone
-        do not tell.
-        """
+        """``prolate``, ``oblate`` or ``sphere``; ``gyrostat`` with a wheel."""
         return "gyrostat" if self.wheel else rigid_body.shape(self.A, self.C)
 
     @property
@@ -237,9 +229,7 @@ class Inertia:
 
     @property
     def tensor(self) -> Vector:
-        """Inertia tensor in the axes of the file, (3, 3) kg m², to 14 digits: the accuracy of an
-        eigensolver.
-        """
+        """Inertia tensor in the axes of the file, (3, 3) kg m², to 14 digits."""
         if self.aligned:
             return np.diag(self.moments)
         tensor = self.axes @ np.diag(self.moments) @ self.axes.T
@@ -256,9 +246,7 @@ class Inertia:
         return cleaned(self.axes @ vector)
 
     def in_file_axes(self, rates: Vector, quaternion: Vector) -> tuple[Vector, Vector]:
-        """Rates (..., 3) and quaternions (..., 4) of the principal axes as those of the axes of the
-        file.
-        """
+        """Rates (..., 3) and quaternions (..., 4) of the principal axes, in those of the file."""
         if self.aligned:
             return rates, quaternion
         return rates @ self.axes.T, attitude.multiply(quaternion, attitude.from_matrix(self.axes.T))
@@ -481,9 +469,7 @@ class Spacecraft(results.Data, results.Shown):
 
     @cached_property
     def initial(self) -> SpinState:
-        """State at t = 0; without an attitude in the file the inertial frame N of
-        `attitude.frame_n`.
-        """
+        """State at t = 0; without an attitude in the file in the frame `attitude.frame_n`."""
         omega = complex(self.omega0[0], self.omega0[1])
         spin = float(self.omega0[2])
         if self.attitude is None:
@@ -509,9 +495,7 @@ class Spacecraft(results.Data, results.Shown):
 
     @cached_property
     def target_axis(self) -> Vector:
-        """Direction in which the angular momentum is to end, (3,) unit vector in the inertial
-        frame.
-        """
+        """Direction in which the angular momentum is to end, inertial unit vector (3,)."""
         if self.goal.axis is not None:
             return self.goal.axis
         momentum = self.momentum
@@ -519,9 +503,7 @@ class Spacecraft(results.Data, results.Shown):
 
     @property
     def to_turn(self) -> float:
-        """Angle from the angular momentum at t = 0 to the target axis, rad; exactly zero without a
-        target.
-        """
+        """Angle from H at t = 0 to the target axis, rad; exactly zero without a target."""
         return (
             0.0
             if self.goal.axis is None
@@ -574,23 +556,17 @@ class Spacecraft(results.Data, results.Shown):
 
     @cached_property
     def widest(self) -> ConeAngles:
-        """Cone angles at the largest nutation of the free motion from t = 0;
-        constant with I1 = I2.
-        """
+        """Cone angles at the largest nutation of the free motion; constant where I1 = I2."""
         return arc_cones(self.inertia.moments, self.omega0, self.sense, self.inertia.wheel)
 
     @property
     def nutation(self) -> float:
-        """Nutation angle θ of the free motion from t = 0, rad, Magnus (19); its largest where I1 ≠
-        I2.
-        """
+        """Largest nutation angle θ of the free motion from t = 0, rad, Magnus (19)."""
         return self.widest.nutation
 
     @property
     def tilt(self) -> float:
-        """Angle between H and the spin axis at t = 0 itself, rad: below `nutation` where I1 ≠ I2,
-        else equal.
-        """
+        """Angle between H and the spin axis at t = 0, rad; at most `nutation`."""
         return rigid_body.momentary(
             self.inertia.moments, self.omega0, self.sense, self.inertia.wheel
         ).nutation
@@ -612,9 +588,7 @@ class Spacecraft(results.Data, results.Shown):
 
     @property
     def sense(self) -> float:
-        """Sign σ of H3 at t = 0: the spin axis is σ·e3, and stays the same end of the body through
-        a reversal.
-        """
+        """Sign σ of H3 at t = 0: the spin axis is σ·e3, also through a reversal."""
         return math.copysign(1.0, self.axial)
 
     @property
@@ -635,9 +609,7 @@ class Spacecraft(results.Data, results.Shown):
 
     @property
     def motion_period(self) -> float:
-        """Period of ω in the body, s; with I1 ≠ I2 that of the motion at hand, where no wheel turns
-        in it.
-        """
+        """Period of ω in the body, s; with I1 ≠ I2 that of the motion at hand (no wheel)."""
         if self.inertia.symmetric or self.inertia.wheel:
             return self.body_period
         return nutation_period(self.inertia.moments, self.omega0)
@@ -653,9 +625,7 @@ class Spacecraft(results.Data, results.Shown):
 
     @property
     def nutation_period(self) -> float:
-        """Nutation period seen in the body, s; for a sphere, where that is infinite, seen
-        inertially.
-        """
+        """Nutation period seen in the body, s; of a sphere the inertial one."""
         return self.body_period if math.isfinite(self.body_period) else self.inertial_period
 
     @property

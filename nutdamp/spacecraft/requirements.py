@@ -20,18 +20,14 @@ from nutdamp.spacecraft.model import SLACK, Keep, Spacecraft
 from nutdamp.spacecraft.tolerances import SpinTolerance
 
 DAMPED_SHARE = 0.01
-"""Fraction of the initial nutation (of the turn to a target axis) below which it counts as damped
-(reached).
-"""
+"""Fraction of the initial nutation, or of the turn to a target, taken as damped or reached."""
 
 DAMPED_ANGLE = math.radians(1e-3)  # rad that may be left in any case
 SAME_COST = 1e-3  # costs that differ by less, relatively, are equal: then other things decide
 NEGLIGIBLE = math.radians(1e-9)  # rad below which angles are rounding, and shown as nothing
 
 AIMED_SPIN = 0.1
-"""Fraction of the tolerance of the spin to which plans set it: the rest is for what disperses. 0.1
-% by default.
-"""
+"""Fraction of the tolerance of the spin that plans use; the rest is for what disperses."""
 
 
 class Part(Enum):
@@ -131,9 +127,7 @@ def aim(spacecraft: Spacecraft) -> Part:
 
 
 def spin_tolerance(spacecraft: Spacecraft, spin: float) -> float:
-    """Tolerance, rad/s, about a ``spin`` that is required; of a halt it counts from the spin at t =
-    0.
-    """
+    """Tolerance, rad/s, about a required ``spin``; of a halt it counts from the initial spin."""
     requested = spacecraft.requirement
     tolerance = SpinTolerance() if requested is None or requested.spin is None else requested.spin
     return (
@@ -144,9 +138,7 @@ def spin_tolerance(spacecraft: Spacecraft, spin: float) -> float:
 
 
 def required(spacecraft: Spacecraft) -> tuple[Bound, ...]:
-    """Bounds at the end by the requirement, and of the spin where the goal names one; empty without
-    a requirement.
-    """
+    """Bounds at the end by the requirement, and of the spin of a goal; else empty."""
     requested, goal = spacecraft.requirement, spacecraft.goal
     bounds = []
     if requested is not None and requested.nutation is not None:
@@ -175,9 +167,7 @@ def judged(spacecraft: Spacecraft) -> bool:
 
 
 def bounds(spacecraft: Spacecraft) -> tuple[Bound, ...]:
-    """Bounds `required` at the end; for nutation and target axis without one, those that define
-    damped.
-    """
+    """Bounds `required` at the end, or for nutation and target axis those that define damped."""
     limits = required(spacecraft)
     limited = {bound.part for bound in limits}
     if Part.NUTATION not in limited:
@@ -192,9 +182,7 @@ def bounds(spacecraft: Spacecraft) -> tuple[Bound, ...]:
 
 
 def edges(keep: Keep) -> tuple[Bound, ...]:
-    """Bounds of a cone: its inner edge, then its outer one; of the cone about H that of the
-    nutation on the way.
-    """
+    """Inner and outer bound of a cone; about H that of the nutation on the way."""
     part = Part.DURING if keep.direction is None else Part.CONE
     inner = (Bound(part, keep.least, True, keep, inner=True),) if keep.least > 0.0 else ()
     outer = (Bound(part, keep.most, True, keep),) if keep.most < math.pi else ()
@@ -219,9 +207,7 @@ def left_of(bound: Bound, left: Left, spacecraft: Spacecraft) -> Any:
 
 
 def held(spacecraft: Spacecraft, left: Left) -> tuple[Held, ...]:
-    """Residual of one motion beside each of the `bounds` at the end, and the `cones` where they
-    were observed.
-    """
+    """Residual of a motion beside each of the `bounds`, and the `cones` that were observed."""
     way = () if left.angles is None else cones(spacecraft)
     return tuple(
         Held(bound, float(left_of(bound, left, spacecraft)))
@@ -266,9 +252,7 @@ def decayed(spacecraft: Spacecraft, t: float) -> float:
 
 
 def idle(spacecraft: Spacecraft, t: Any) -> Any:
-    """Nutation, rad, at ``t`` s without control, a number or an array, where I1 = I2 and there is
-    no disturbance.
-    """
+    """Nutation, rad, at ``t`` s without control or disturbance, where I1 = I2."""
     sine = math.sin(spacecraft.nutation)
     cosine = math.cos(spacecraft.nutation)
     effect = energy_sink.courses(spacecraft.growth, cosine, sine * sine, t, spacecraft.damper)
@@ -368,16 +352,12 @@ def severity(spacecraft: Spacecraft, left: Left, drained: Any = 0.0) -> Any:
 
 
 def complies(severity: Any) -> Any:
-    """True where a `severity`, or the used fraction of a bound, is kept: numbers, or arrays over
-    cases.
-    """
+    """True where a `severity`, or the used fraction of a bound, is kept; elementwise."""
     return severity <= 1.0
 
 
 def enough(low: float, high: float, probability: float) -> bool | None:
-    """True where a share of cases between ``low`` and ``high`` is as much as must comply, False for
-    less, else None.
-    """
+    """True if a share between ``low`` and ``high`` is enough, False for less, else None."""
     return True if low >= probability else False if high < probability else None
 
 
@@ -399,9 +379,7 @@ def expect_loop(spacecraft: Spacecraft) -> Loop:
 
 
 def expect_dissipation(spacecraft: Spacecraft) -> None:
-    """Raise BadRequest, with the keys to add, for a spacecraft whose nutation neither grows nor
-    decays.
-    """
+    """Raise BadRequest, with the keys to add, where the nutation neither grows nor decays."""
     if spacecraft.dissipation is None:
         raise BadRequest(
             "the spacecraft file has no dissipation: it does not say how fast the nutation grows. "

@@ -24,9 +24,7 @@ ROLES = ("spacecraft", "as_known", "at_leg", "symmetric", "without_valves", "tru
 
 
 def as_known(spacecraft: Spacecraft, *, disturbed: bool) -> Spacecraft:
-    """Spacecraft as schemes know it: with disturbances if ``disturbed``, and no goal of a spin that
-    is there and stays.
-    """
+    """Spacecraft as schemes know it: ``disturbed`` or not, without a goal of a spin that stays."""
     known = spacecraft if disturbed else replace(spacecraft, disturbances=())
     axial = any(channel.axial for channel in known.channels)
     if known.goal.spin is None or known.spin_drift or axial:

@@ -25,9 +25,7 @@ STEERABLE = "steerable"  # channel name of the pulses of a steerable torquer
 RESOLUTION = 1e-4
 
 TOUCHING = 1e-9
-"""s; pulses that overlap by less only touch, as do those that overlap by less than times can be
-distinguished.
-"""
+"""s; pulses that overlap by less, or by less than times can be told apart, only touch."""
 
 Label = TypeVar("Label")
 
@@ -122,9 +120,7 @@ class Pulse:
         return None
 
     def share(self, times: Vector) -> Vector:
-        """Fraction of the impulse given by each of the ``times`` (n,) s;
-        an ideal impulse at once.
-        """
+        """Fraction of the impulse given by each of the ``times`` (n,) s."""
         if self.on_time == 0.0:
             return np.where(times >= self.t, 1.0, 0.0)
         if self.command is None:
@@ -169,9 +165,7 @@ class Pulse:
 
 
 def overlapping(pulses: Iterable[tuple[Label, Pulse]]) -> list[tuple[Label, Label]]:
-    """Labels of pulses that begin while their channel still fires an earlier one, each with the
-    label of that.
-    """
+    """Labels of pulses that begin while their channel still fires, each with the earlier one's."""
     firing: dict[str, tuple[Label, float]] = {}
     overlaps = []
     for label, pulse in sorted(pulses, key=lambda entry: entry[1].loaded[0]):

@@ -49,9 +49,7 @@ ByThruster = Mapping[str, Tolerance]
 
 
 def tolerance(kind: str, text: str, size: str, by: str = "normal", each: Each = "") -> Any:
-    """Field of `Dispersions` for a quantity of ``kind``, with an example: ``size`` in its
-    distribution ``by``.
-    """
+    """Field of `Dispersions` for a quantity of ``kind``; its example has ``size`` in ``by``."""
     default = (None, None, None) if each == "axis" else None
     return field(
         default=default, metadata={"kind": kind, "each": each, "text": text, "example": {by: size}}

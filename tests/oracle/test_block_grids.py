@@ -1,6 +1,4 @@
-"""Command blocks of small grids: none of all sequences of one or two blocks, flown, complies for
-less.
-"""
+"""Command blocks of small grids: no sequence of one or two blocks complies for less."""
 
 import math
 from collections.abc import Iterator
@@ -80,9 +78,7 @@ def blocks_of(body: nutdamp.Spacecraft, first: int) -> Iterator[Block]:
 
 
 def cheapest(body: nutdamp.Spacecraft, most: float) -> float:
-    """The least propellant, kg, below ``most`` of one or two blocks that comply; ``most`` where
-    none does.
-    """
+    """The least propellant, kg, below ``most`` of one or two blocks that comply, else ``most``."""
     flow = {one.name: one.mass_flow or 0.0 for one in body.channels}
 
     def cost(block: Block) -> float:

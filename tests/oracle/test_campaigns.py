@@ -69,9 +69,7 @@ def test_pulses_of_lunar_prospector_turn_it_as_far_as_reported_or_a_little_more(
 
 @pytest.mark.deep
 def test_lunar_prospector_is_planned_as_it_was_flown(run: Run) -> None:
-    """The turn of report 30, 8.5 deg, as a user asks for it: the plan has its 40 pulses of 0.2 s,
-    in one block.
-    """
+    """The turn of report 30, 8.5 deg, as asked for: 40 pulses of 0.2 s, in one block."""
     goal = ("--target", "270deg,75.06deg", "--set", "state.nutation=0deg", "--max-blocks", "1")
     scheme = ("--scheme", "command-block", "--blocks", "-")
     screen = run("plan", "-", *goal, *scheme, stdin=example_text("lunar-prospector"))
@@ -85,9 +83,7 @@ def test_lunar_prospector_is_planned_as_it_was_flown(run: Run) -> None:
 
 
 class Campaign(NamedTuple):
-    """A campaign of ACE: pulses, s, rpm before and after, propellant lbm, Sun angle before and
-    after.
-    """
+    """A campaign of ACE: pulses, s; rpm, then Sun angle before and after; propellant lbm."""
 
     pulses: int
     took: float
@@ -169,9 +165,7 @@ def test_the_spin_of_ace_rises_as_reported(date: str) -> None:
 
 @pytest.mark.weekly
 def test_ace_is_planned_with_about_the_pulses_reported() -> None:
-    """The Sun angle of 13 November 2012, 6.37 to 11.81 deg, with a way of 16 deg past the Sun: 99
-    pulses were flown.
-    """
+    """The Sun angle of 13 November 2012, 6.37 to 11.81 deg, past the Sun: 99 pulses were flown."""
     body = at_rest("ace", 5.0832)
     sun = sun_of(body)
     start = body.momentum / np.linalg.norm(body.momentum)

@@ -296,9 +296,7 @@ def test_a_long_pulse_takes_all_the_nutation_for_more_than_the_floor_and_moves_h
     assert math.degrees(left.momentum_shift) == pytest.approx(2.1, abs=0.05)
 
 
-def test_residuals_without_pulses_after_spin_reversal_and_of_a_pulse_that_the_clock_can_hardly_tell() -> (
-    None
-):
+def test_residuals_without_pulses_after_reversal_and_of_a_pulse_the_clock_hardly_tells() -> None:
     left = propagation.flown(spinner(degrees=5.0), Schedule()).residual
     assert math.degrees(left.nutation) == pytest.approx(5.0, rel=4 * EPS)
     assert left.momentum_shift == 0.0

@@ -1,6 +1,4 @@
-"""Plans on three moments and with strong thrusters, against linear programs and searches of
-`support`; with a wheel.
-"""
+"""Plans on three moments and with strong thrusters, against linear programs and searches."""
 
 import csv
 import json
@@ -31,9 +29,7 @@ from nutdamp.spacecraft.schedule import Schedule
 from nutdamp.views.decisions import spacecraft_json
 
 DEAR, BEATEN = 1.005, 0.995
-"""Cost of a plan over that of the schedule known, at most; over the bound of small angles, at
-least.
-"""
+"""Cost over that of the schedule known, at most; over the bound of small angles, at least."""
 
 
 @spread("seed", range(90), quick=1, deep=30)
@@ -65,9 +61,7 @@ def test_no_bound_is_above_a_flown_schedule_and_no_plan_dear_or_missed(seed: int
     ],
 )
 def test_a_schedule_known_is_not_missed(name: str, shift: float, least: str) -> None:
-    """4.893 g at 3.535 s that missed the target, and 9.635 g that missed the bound on the shift;
-    16.41 g.
-    """
+    """4.893 g at 3.535 s missed the target, 9.635 g the bound on the shift; 16.41 g."""
     (beside,) = case(f"{name}.yaml").parent.glob(f"{name}-*.csv")
     with beside.open(encoding="utf-8") as stream:
         rows = [(float(row["start_s"]), float(row["on_time_s"])) for row in csv.DictReader(stream)]
@@ -83,9 +77,7 @@ def test_a_schedule_known_is_not_missed(name: str, shift: float, least: str) -> 
 
 
 def test_a_schedule_of_touching_pulses_is_taken_down_on_the_true_motion() -> None:
-    """10.838 g, where the four burns below, found by SLSQP, take 10.664 g: little more time than
-    the goal needs.
-    """
+    """10.838 g, where the four burns below, by SLSQP, take 10.664 g."""
     torques = np.array([[-5.302, -19.8, 0.0], [10.92, -2.006, 0.0], [11.74, 43.83, 0.0]])
     size = np.linalg.norm(torques, axis=1).tolist()
     off = 0.00404
@@ -137,9 +129,7 @@ def test_a_shift_allowed_is_used_by_channels_that_fire_one_after_the_other() -> 
 def test_a_large_nutation_of_three_moments_is_damped_on_the_true_motion(
     rate: float, schemes: tuple[str, ...]
 ) -> None:
-    """31.7° were left, and by optimal 14.1° where two-pulse left nothing; the ideal rate-gyro law
-    takes 74.2 N m s.
-    """
+    """31.7° were left, by optimal 14.1°; the ideal rate-gyro law takes 74.2 N m s."""
     body = load_spacecraft(case("three-moments-large.yaml")).replace(
         omega0=np.array([rate, 0.0, 1.0])
     )
@@ -157,9 +147,7 @@ def test_a_large_nutation_of_three_moments_is_damped_on_the_true_motion(
 
 
 def test_the_period_shown_is_that_of_the_motion_at_hand() -> None:
-    """4K/p = 42.94 s, of a small nutation 33.25 s; it is the time after which the rates are those
-    at t = 0.
-    """
+    """4K/p = 42.94 s, of a small nutation 33.25 s; after it the rates are those at t = 0."""
     body = load_spacecraft(case("three-moments-large.yaml"))
     assert body.motion_period == pytest.approx(42.94, abs=5e-3)
     assert spacecraft_json(body)["body_nutation_period_s"] == body.motion_period
@@ -283,9 +271,7 @@ def test_turns_to_a_target(scheme: str, motion: tuple[str, int]) -> None:
 
 @spread("horizon", ["60 s", "150 s", "300 s", "628 s"], quick=2)
 def test_thrusters_that_stand_still_in_space(horizon: str) -> None:
-    """Two pulses push H along one line alone: what they miss beside it must be small,
-    not nothing.
-    """
+    """Two pulses push H along one line alone: they miss little beside it, not nothing."""
     plan = planned(
         "optimal",
         dissipation={"time_constant": "2 hours", "nutation": "grows"},

@@ -76,9 +76,7 @@ def test_isee_3_is_spun_up_by_the_11_pulses_that_were_sent() -> None:
 
 
 def test_genesis_thrusters_move_it_as_reported(tmp_path: Path) -> None:
-    """10 December 2002 is the input of the cant; 1.4 m/s by half a kilogram (9 August 2004) is
-    predicted.
-    """
+    """10 December 2002 is the input of the cant; 1.4 m/s by half a kilogram is predicted."""
     body = nutdamp.example("genesis").with_(
         channels={"AX": ["S1", "S2", "D1", "D2"]}, state={"nutation": 0}
     )
@@ -88,9 +86,7 @@ def test_genesis_thrusters_move_it_as_reported(tmp_path: Path) -> None:
 
 
 def test_genesis_spins_up_from_1_6_to_10_rpm(tmp_path: Path) -> None:
-    """Nothing of it is published but the spins, and that it moves the spacecraft. The page shows
-    the plan.
-    """
+    """Only the spins are published, and that it moves the spacecraft. The page shows the plan."""
     body = nutdamp.example("genesis").with_(state={"nutation": "0.3 deg"})
     plan = given(tmp_path / "up.csv", body, "UP", 417.3716)
     nutation, spin = ends(plan)
@@ -114,9 +110,7 @@ def test_lunar_prospector_turns_by_4_7_deg_with_one_pulse_less_than_reported() -
 def test_lunar_prospector_trims_its_spin_less_than_a_valve_without_delay_would(
     tmp_path: Path,
 ) -> None:
-    """Report 79: 0.155 rpm in 0.63 s. C is that of 0.7 s for 0.2 rpm (report 30), with fuller
-    tanks.
-    """
+    """Report 79: 0.155 rpm in 0.63 s. C is that of 0.7 s for 0.2 rpm (report 30), tanks fuller."""
     plan = given(tmp_path / "trim.csv", prospector(channels={"T1": ["T1"]}), "T1", 0.63)
     change = (plan.spacecraft.spin - plan.flight.final.spin) / RPM
     assert change / 0.155 == pytest.approx(1.16, abs=0.01)
@@ -137,9 +131,7 @@ def test_two_burns_of_lunar_prospector_on_one_day(tmp_path: Path) -> None:
 
 
 def test_ulysses_regains_in_three_hours_what_a_firing_took() -> None:
-    """8 November 1990: firings took a fifth, which was back after a few hours; these are the
-    inputs.
-    """
+    """8 November 1990: firings took a fifth, which was back after hours; these are the inputs."""
     body = nutdamp.example("ulysses").with_(state={"nutation": "0.4 deg"})
     (thruster, _) = body.channels
     taken = thruster.max_on_time * float(np.linalg.norm(thruster.torque)) / body.inertia.A
@@ -305,12 +297,8 @@ def test_fig_5_pole_curve_steps_inwards_by_equal_amounts_each_quarter_turn(
     assert gaps == pytest.approx(np.full(len(gaps), spacecraft.body_period / 4), rel=1e-12)
 
 
-def test_fig_5_the_curve_of_an_oblate_body_is_the_mirror_image_and_each_faster_the_farther_a_is_from_zero() -> (
-    None
-):
-    """Mirrored on the axis of the first pulse it is that of the prolate one; the time for it goes
-    as 1/|a|.
-    """
+def test_fig_5_oblate_is_the_mirror_image_and_faster_the_farther_a_is_from_zero() -> None:
+    """Mirrored on the axis of the first pulse; the time for it goes as 1/|a|."""
     curves = []
     for name in ("a03", "oblate"):
         spacecraft = unbounded(BODIES[name])
@@ -333,9 +321,7 @@ def test_fig_5_the_curve_of_an_oblate_body_is_the_mirror_image_and_each_faster_t
     ("name", "arc_deg"), [("a09", 10.0), ("a03", 210.0)], ids=["fig 6", "fig 7"]
 )
 def test_fig_6_and_7_arcs_of_the_axis_track(name: str, arc_deg: float) -> None:
-    """Between pulses the spin axis runs ω_n T_ω/4 about H: 10° for a = 0.9, 210° for a = 0.3, at
-    small angles.
-    """
+    """Between pulses the spin axis runs ω_n T_ω/4 about H: 10° for a = 0.9, 210° for a = 0.3."""
     spacecraft = unbounded(BODIES[name])
     inertia = BODIES[name].inertia
     small = replace(spacecraft, omega0=spacecraft.omega0 * (1e-3, 1e-3, 1.0))
@@ -371,9 +357,7 @@ def test_fig_6_and_7_the_centre_of_each_arc_is_where_h_has_jumped_to(
 
 @every_body
 def test_fig_8_two_pulses_stop_the_axis_where_h_was(spacecraft: Spacecraft) -> None:
-    """D0 -> D1 at half the cone, half a turn on the smaller circle, and back to D0 with no nutation
-    left.
-    """
+    """D0 -> D1 at half the cone, half a turn on the smaller circle, and back without nutation."""
     before, after = propagation.by_impulses(
         spacecraft, two_pulse(spacecraft, TwoPulseOptions())
     ).around_pulses()

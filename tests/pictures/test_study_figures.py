@@ -153,7 +153,7 @@ def test_fronts_without_points_say_why() -> None:
 
 @pytest.mark.weekly
 @pytest.mark.parametrize("body", [BODY, spinner(phase=0.0)], ids=["channels", "at once"])
-def test_points_that_do_not_meet_the_requirement_are_crossed_out_and_all_have_their_place(
+def test_points_that_miss_the_requirement_are_crossed_out_and_all_have_a_place(
     body: Spacecraft,
 ) -> None:
     body = replace(
@@ -300,9 +300,7 @@ def test_a_recommended_plan_that_is_not_traded_and_costs_less_is_explained() -> 
     assert codes((front_of(WIDE, 1.0009),), dearer.points[0].plan) == ["trade-alike"]
 
 
-def test_a_table_says_why_h_ends_beside_where_it_was_and_how_costs_lie_below_their_first_order_least() -> (
-    None
-):
+def test_a_table_says_why_h_ends_beside_its_start_and_how_costs_lie_below_first_order() -> None:
     """The first of two pulses alone shifts H:
     on a front where H is not to move that is explained.
     """

@@ -1,6 +1,4 @@
-"""A campaign: ACE follows the Sun by a turn a week, each planned from the file that the one before
-led to.
-"""
+"""ACE follows the Sun by a turn a week, each planned from the file of the one before."""
 
 import math
 

@@ -1,6 +1,4 @@
-"""Valid spacecraft, ordinary and degenerate, through every command and scheme: no traceback, no
-NaN, a proper exit.
-"""
+"""Valid spacecraft through every command and scheme: no traceback, no NaN, a proper exit."""
 
 import json
 import math
@@ -148,9 +146,7 @@ OTHERS = (
     "plan CHOSEN; simulate CHOSEN --samples 20",
     "plan CHOSEN --robust --json -",
 )
-"""In rotation; their number has no common factor with that of the schemes, so that each command
-meets each scheme.
-"""
+"""In rotation; coprime with the schemes in number, so that each command meets each."""
 
 RARE = (
     (11, 0, "verify CHOSEN --json -"),

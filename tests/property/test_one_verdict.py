@@ -1,6 +1,4 @@
-"""All commands, the page, its sheet and the library give one verdict on a plan: status, share and
-bounds.
-"""
+"""All commands, the page, its sheet and the library give one verdict on a plan."""
 
 import json
 import re
@@ -35,9 +33,7 @@ BASES = (
 
 
 def random_file(seed: int) -> str:
-    """One of the examples with another nutation, requirement and tolerances: some plans comply,
-    others do not.
-    """
+    """An example with another nutation, requirement and tolerances: some plans comply."""
     rng = np.random.default_rng(seed)
     file = yaml.safe_load(example_text(str(rng.choice(BASES))))
     if "epoch" in file.get("attitude", {}):
@@ -70,9 +66,7 @@ def files() -> Iterator[Any]:
 
 
 def judged(decision: dict[str, Any]) -> dict[str, Any]:
-    """What every decision tells: status, cases, and each bound with its values, which round
-    differently in the last.
-    """
+    """What every decision tells: status, cases, and each bound with its rounded values."""
     told = {key: decision[key] for key in ("status", "scheme", "met", "verdict", "causes", "cases")}
     told["requirement"] = [
         {key: round(value, 9) if isinstance(value, float) else value for key, value in line.items()}

@@ -1,6 +1,4 @@
-"""The broken spacecraft files of files/broken_files.txt, with the faults that must be found in
-them.
-"""
+"""The broken spacecraft files of files/broken_files.txt, with the faults to be found in them."""
 
 from pathlib import Path
 

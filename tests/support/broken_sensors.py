@@ -1,6 +1,4 @@
-"""Records with sensors that are broken: what happens to the columns of a CSV file of telemetry, and
-what `fit` says.
-"""
+"""Records with broken sensors: what happens to their columns, and what `fit` says."""
 
 import math
 from collections.abc import Callable
@@ -19,9 +17,7 @@ Fault = Callable[[Array, np.random.Generator], None]
 """What is done to the columns (n, k) of a record, in place."""
 
 CROSSED = (("star",), ("star", "omega_3"), ("sun",), ("quaternion",))
-"""Kinds of records besides those of `KINDS`: of crossings of a star or the Sun,
-or of quaternions.
-"""
+"""Kinds of records besides `KINDS`: crossings of a star or the Sun, or quaternions."""
 
 SENSORS = ("bias", "misalignment", "wobble")
 """First words of what is estimated of the sensors themselves."""
@@ -149,9 +145,7 @@ def _apart(name: str, difference: float) -> float:
 
 
 def outcome(folder: Path, number: int, fault: str) -> tuple[str, float, str]:
-    """What `fit` does with a record and a fault: accepted or refused; the farthest estimate in
-    sigmas; words.
-    """
+    """What `fit` does with a record and a fault: verdict; farthest estimate in sigmas; words."""
     told = record_of(folder, number)
     path = next(folder.glob(f"{7000 + number}.csv"))
     header, *rows = path.read_text().splitlines()

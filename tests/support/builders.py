@@ -1,6 +1,4 @@
-"""Spacecraft for the tests in one line each, in principal axes and SI, and a guard against endless
-loops.
-"""
+"""Spacecraft in one line each, in principal axes and SI, and a guard against endless loops."""
 
 import math
 import sys
@@ -51,9 +49,7 @@ def spinner(
     mass: float | None = None,
     attitude: Attitude | None = None,
 ) -> Spacecraft:
-    """A body with ``degrees`` of nutation and arg ω0 = ``phase`` rad; the example of the physics
-    sheet by default.
-    """
+    """A body with ``degrees`` of nutation and arg ω0 = ``phase`` rad; else that of the sheet."""
     moments = moments or (A, A, C)
     mean = 0.5 * (moments[0] + moments[1])
     omega = moments[2] * abs(spin) * math.tan(math.radians(degrees)) / mean
@@ -78,9 +74,7 @@ def aimed(spacecraft: Spacecraft, tilt: float, azimuth: float) -> Spacecraft:
 
 
 def off_target(spacecraft: Spacecraft, made: Schedule) -> float:
-    """Angle of H from the target by the reference integrator, rad; for bodies without an attitude
-    in the file.
-    """
+    """Angle of H from the target by the reference integrator, rad, without an attitude."""
     outcome = Outcome(spacecraft, made)
     return reference.angle(
         reference.momentum(spacecraft.inertia.moments, outcome.motion), spacecraft.target_axis
@@ -192,9 +186,7 @@ def within(calls: int) -> Iterator[None]:
 
 @dataclass(frozen=True, eq=False)
 class Judged(Plan):
-    """A plan whose flown residual is given, and the spin at its end where that is not the one at t
-    = 0.
-    """
+    """A plan whose flown residual is given, and perhaps the spin at its end."""
 
     ended: Residual | None = None
     ended_spin: float | None = None
@@ -240,9 +232,7 @@ def judged(
 
 
 def noted(notes: Iterable[results.Note]) -> str:
-    """Codes of notes with their values, one a line: ``momentum-shift scheme=x
-    momentum_shift_deg=0.25``.
-    """
+    """Codes of notes with values, one a line: ``momentum-shift scheme=x shift_deg=0.25``."""
     return "\n".join(" ".join((entry.code, *map(_valued, entry.items))) for entry in notes)
 
 

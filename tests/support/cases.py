@@ -1,6 +1,4 @@
-"""Which of many like cases run always (quick), which in CI too (deep),
-and which by hand (weekly).
-"""
+"""Which of many like cases run always (quick), in CI (deep), and by hand (weekly)."""
 
 import math
 from collections.abc import Iterable, Sequence

@@ -1,6 +1,4 @@
-"""Checks a certificate of ``plan --certificate`` from its numbers alone: json and numpy, nothing of
-nutdamp.
-"""
+"""Checks a certificate of ``plan --certificate`` from its numbers alone, without nutdamp."""
 
 import json
 import sys
@@ -10,9 +8,7 @@ import numpy as np
 
 
 def effects(c: dict[str, Any], t: np.ndarray) -> np.ndarray:
-    """What a second of each channel at times t (n,) adds to each equation, (equations, n,
-    channels).
-    """
+    """What a second of each channel at times t (n,) adds: (equations, n, channels)."""
     torques = np.array([one["torque_Nm"] for one in c["channels"]])
     across = torques[:, 0] + 1j * torques[:, 1]
     damped = np.exp(np.minimum(-c["growth_per_s"] * (t - c["last_s"]), 0.0))

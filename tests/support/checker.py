@@ -1,6 +1,4 @@
-"""Whether a schedule keeps the limits of its spacecraft, written from the contract and not from
-nutdamp.
-"""
+"""Whether a schedule keeps the limits of its spacecraft, written from the contract."""
 
 import itertools
 

@@ -1,6 +1,4 @@
-"""Commands as users run them: what refused ones say as one text, and the JSON, CSV and folders of
-others.
-"""
+"""Commands as users run them: what refused ones say, and the JSON, CSV and folders of others."""
 
 import csv
 import io
@@ -30,9 +28,7 @@ WIDER = {
     "A": "0.5 %", "C": "0.5 %", "omega0": "0.1 deg/s", "thrust": "2 %", "thrust_per_pulse": "1 %",
     "thrust_direction": "0.5 deg", "position": "5 mm", "attitude": "0.2 deg",
 }  # fmt: skip
-"""Tolerances of the built-in example with which no plan that is made without them complies often
-enough.
-"""
+"""Tolerances of the built-in example with which no nominal plan complies often enough."""
 WIDE = [
     part
     for key, size in WIDER.items()
@@ -67,9 +63,7 @@ def written(folder: Path, **files: str) -> None:
 def refusals(
     run: Run, folder: Path, commands: Iterable[str], status: int = 2, stdin: str | None = None
 ) -> str:
-    """What each of the commands says, behind it; none prints a result, and none touches a file of
-    the folder.
-    """
+    """What each of the commands says, behind it; none prints a result or touches a file."""
     before = contents(folder)
     said = []
     for command in commands:

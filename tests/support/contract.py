@@ -1,6 +1,4 @@
-"""What tests of files share: plans that are exported, their motion, and the faults of what must be
-refused.
-"""
+"""What tests of files share: exported plans, their motion, and faults of what is refused."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache
@@ -34,9 +32,7 @@ Write = Callable[..., Path]
 
 
 def faults(read: Callable[..., object], *given: Any) -> list[str]:
-    """All that is wrong with what ``read(*given)`` must refuse, each as ``LINE:COLUMN: KEY:
-    problem``.
-    """
+    """What is wrong with what ``read(*given)`` must refuse: ``LINE:COLUMN: KEY: problem``."""
     try:
         read(*given)
     except FaultyFile as wrong:
@@ -66,8 +62,8 @@ def check_faults(
 
 
 ORBIT = (
-    "orbit={position: [7000 km, -12 km, 3.5 km], velocity: [0.1 km/s, 7400, 120 m/s], center: "
-    "earth}"
+    "orbit={position: [7000 km, -12 km, 3.5 km], "
+    "velocity: [0.1 km/s, 7400, 120 m/s], center: earth}"
 )
 PUSHED = ("ace", "communications-spinner", "couples-minisat")
 """Files whose thrusters push the body too."""
@@ -140,9 +136,7 @@ def velocity_change(plan: planning.Plan, pulse: Pulse) -> Vector:
 
 @st.composite
 def slips(draw: st.DrawFn, text: str) -> list[str]:
-    """The lines of ``text`` after some slips of hand: dropped, doubled, swapped, cut, with
-    something put in.
-    """
+    """The lines of ``text`` after slips of hand: dropped, doubled, swapped, cut, or added to."""
     lines = text.splitlines(keepends=True)
     for _ in range(draw(st.integers(1, 4))):
         if not lines:

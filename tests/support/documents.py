@@ -1,6 +1,4 @@
-"""The file of a spacecraft that a test has built, for `verify`, which flies by the values of a file
-alone.
-"""
+"""The file of a spacecraft that a test has built, for `verify`."""
 
 from dataclasses import replace
 from typing import Any

@@ -1,6 +1,4 @@
-"""Flights that tests of several packages look at: the spin axis on its way, and dispersed command
-blocks.
-"""
+"""Flights that several packages look at: the spin axis on its way, dispersed command blocks."""
 
 import math
 from dataclasses import replace
@@ -64,9 +62,7 @@ def by_blocks(
     moments: tuple[float, float, float] = (110.0, 110.0, 150.0),
     **fields: Any,
 ) -> DispersedModel:
-    """Three blocks of two thrusters, one of them with an axial torque, of an oblate body that
-    nutates by 2 deg.
-    """
+    """Three blocks of two thrusters, one with axial torque, of an oblate body with 2 deg."""
     body = spinner(
         moments=moments, spin=spin, degrees=2.0, channels=(channel("T", 8.0, 3.0, 2.0), *cross(9.0))
     )

@@ -29,9 +29,7 @@ RESIDUE = re.compile(r"\d(?:\.\d+)?e-(?:1\d|[2-9]\d)\b")
 
 
 def check_text(key: str, text: str) -> None:
-    """Fails where ``text`` is not the one kept as ``key``; digits that are rounding residue do not
-    count.
-    """
+    """Fails where ``text`` is not the one kept as ``key``; residue of rounding does not count."""
     text = RESIDUE.sub("<residue>", text).rstrip("\n")
     text = "\n".join(line.rstrip() for line in text.split("\n"))
     if os.environ.get(WRITE):

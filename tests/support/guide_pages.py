@@ -1,6 +1,4 @@
-"""Pages and lists of the guide that are made from the code: ``python tests/support/guide_pages.py``
-writes them.
-"""
+"""Pages of the guide made from the code: ``python tests/support/guide_pages.py``."""
 
 import re
 from collections.abc import Iterator
@@ -103,9 +101,7 @@ def flow(value: object) -> str:
 
 
 def _sections(key: KeyGuide, every: list[KeyGuide]) -> Iterator[str]:
-    """The keys below ``key``, section by section; those of tolerances, which are all alike,
-    once.
-    """
+    """The keys below ``key``, section by section; those of tolerances, all alike, once."""
     if key.section is None:
         return
     children = [entry for entry in every if entry.parent == key.path]
@@ -137,13 +133,15 @@ name: Sounder-1
 inertia: {A: 120 kg m^2, C: 80 kg m^2}       # transverse, axial
 state: {spin: 30 rpm, nutation: 5 deg}
 thrusters:
-  - {name: T1, position: [0, 0.5, 0.8], direction: [1, 0, 0], force: 10 N, isp: 220 s, max_on_time: 2 s}
+  - {name: T1, position: [0, 0.5, 0.8], direction: [1, 0, 0], force: 10 N, isp: 220 s,
+     max_on_time: 2 s}
 ```
 
-A number that is unlikely in SI, such as a position of 800, is accepted with a warning that names the likely unit.
+A number that is unlikely in SI, such as a position of 800, is accepted with a warning that names \
+the likely unit.
 
-A value is a number in SI or a text with a unit. Any key can also be given as --set KEY=VALUE, entries of a list \
-by name or position: --set thrusters.T1.force=12N, --set omega0[2]=3."""
+A value is a number in SI or a text with a unit. Any key can also be given as --set KEY=VALUE, \
+entries of a list by name or position: --set thrusters.T1.force=12N, --set omega0[2]=3."""
 
 
 def _file() -> str:

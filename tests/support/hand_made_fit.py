@@ -27,9 +27,7 @@ def told(
     *,
     unequal: bool = False,
 ) -> Fit:
-    """The ``given`` values of parameters, the others as the file has them; each known to a step
-    where that is all.
-    """
+    """The ``given`` values of parameters, others as in the file; known to a step if alone."""
     model = Model(body, record, unequal=unequal)
     parameters = model.parameters
     unknown = ({*given} | {*sigmas}) - {one.name for one in parameters}

@@ -1,6 +1,4 @@
-"""Texts and colours of a figure: every text that is drawn, none cut, none over another, all to be
-seen.
-"""
+"""Texts and colours of a figure: every text is whole, apart from others, and visible."""
 
 import re
 from itertools import combinations
@@ -95,9 +93,7 @@ def contrast(one: Colour, other: str) -> float:
 
 
 def best(handle: Artist, paper: str, shades: dict[str, str]) -> float:
-    """How well a swatch of a legend is seen: by its fill, its edge or its line, whichever is seen
-    best.
-    """
+    """How well a swatch of a legend is seen: by its fill, edge or line, whichever is best."""
     if isinstance(handle, Line2D):
         colours = [handle.get_color()] if handle.get_linestyle() != "None" else []
         colours += [handle.get_markeredgecolor()] if handle.get_marker() != "None" else []

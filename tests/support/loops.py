@@ -85,9 +85,7 @@ def transverse_size(rates: Vector) -> float:
 
 
 def follow_few_cycles(patch: pytest.MonkeyPatch) -> None:
-    """Budgets by 8 chains of 4 cycles or 60 firings: known to some 3 %, which changes none of their
-    texts.
-    """
+    """Budgets by 8 chains of 4 cycles or 60 firings: known to 3 %, their texts the same."""
     patch.setattr(budget.Map.cycle, "__defaults__", (8, 4))
     patch.setattr(budget.Map.attractors, "__defaults__", ((), 8))
     patch.setattr(budget, "FIRINGS", 60)

@@ -1,6 +1,4 @@
-"""Plans to write as messages: every file in configs/ that has an epoch, and bodies that none of
-them is.
-"""
+"""Plans to write as messages: every file in configs/ with an epoch, and other bodies."""
 
 import math
 from functools import cache

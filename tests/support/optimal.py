@@ -50,17 +50,13 @@ def flies(
 
 @contextmanager
 def as_found() -> Iterator[None]:
-    """Within it, optimal gives what it finds over the whole horizon, not what ends earlier for up
-    to 0.1 % more.
-    """
+    """Within it, optimal gives what it finds over the whole horizon, not an earlier end."""
     with mock.patch.object(alternatives, "hastened", lambda _problem, best, *_: best):
         yield
 
 
 def random_layout(seed: int) -> Spacecraft:
-    """2 to 12 skew channels, some with axial torque, 1° to 30° of nutation, 1 to 50 body nutation
-    periods.
-    """
+    """2 to 12 skew channels, 1° to 30° of nutation, 1 to 50 body nutation periods."""
     rng = np.random.default_rng(seed)
     count = int(rng.integers(2, 13))
     A = rng.uniform(60, 200)

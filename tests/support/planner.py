@@ -1,6 +1,4 @@
-"""Schedules kept from test to test: each command of the same spacecraft plans the same pulses, to
-the last digit.
-"""
+"""Schedules kept from test to test: the same spacecraft has the same pulses."""
 
 import dataclasses
 import json
@@ -68,9 +66,7 @@ class Planner:
 
 
 def _plain(value: Any) -> Any:
-    """Full precision for what JSON does not know: arrays by their numbers,
-    objects by their fields.
-    """
+    """What JSON does not know, in full precision: arrays as numbers, objects as fields."""
     if dataclasses.is_dataclass(value):
         names = [
             field.name for field in dataclasses.fields(value) if field.name not in NOT_PLANNED_WITH

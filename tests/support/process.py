@@ -14,9 +14,7 @@ import pytest
 from nutdamp.cli.main import main
 
 Run = Callable[..., "subprocess.CompletedProcess[str]"]
-"""``run("plan", "--json", "-", stdin=…, columns=80, status=0)``: the type of the fixtures that run
-the command line.
-"""
+"""``run("plan", "--json", "-", stdin=…, columns=80, status=0)`` of the fixtures."""
 
 Status = int | tuple[int, ...] | None
 """The exit status that is right, or all of them; any where it is None."""
@@ -43,9 +41,7 @@ def within(
     columns: int = 80,
     status: Status = None,
 ) -> subprocess.CompletedProcess[str]:
-    """Run the command line in this process, in ``folder``; an error that is a bug of nutdamp is
-    raised.
-    """
+    """Run the command line in this process, in ``folder``; a bug of nutdamp is raised."""
     out, err = (
         io.TextIOWrapper(io.BytesIO(), encoding="utf-8", write_through=True) for _ in range(2)
     )

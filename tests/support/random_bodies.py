@@ -1,6 +1,4 @@
-"""Random spacecraft with all kinds of limits and actuators, and random files over the whole schema,
-by seed.
-"""
+"""Random spacecraft with all kinds of limits and actuators, and random files, by seed."""
 
 import math
 from typing import Any
@@ -18,9 +16,7 @@ def power(rng: np.random.Generator, least: float, most: float) -> float:
 
 
 def random_channels(rng: np.random.Generator, needed: float, period: float) -> tuple[Channel, ...]:
-    """One to six, of any direction, mostly transverse; on-times from a thousandth to a multiple of
-    what is needed.
-    """
+    """One to six, mostly transverse; on-times from a thousandth to a multiple of the need."""
     made = []
     for index in range(rng.integers(1, 7)):
         angle = rng.choice(
@@ -59,9 +55,7 @@ def random_limits(rng: np.random.Generator, period: float, horizon: float) -> Li
 
 
 def random_spacecraft(rng: np.random.Generator) -> Spacecraft:
-    """Prolate, oblate, sphere, nearly one, flat disc; now and then triaxial; thrusters, a torquer,
-    or both.
-    """
+    """Prolate, oblate, sphere, disc, now and then triaxial; thrusters, a torquer, or both."""
     A = power(rng, -1.0, 4.0)
     usual = [rng.uniform(-0.99, 0.95), rng.uniform(-0.99, 0.95)]
     a = float(rng.choice([*usual, 0.0, -1.0, 0.25, 0.2, -1 / 3, 1e-3, -1e-9]))
@@ -89,9 +83,7 @@ def random_spacecraft(rng: np.random.Generator) -> Spacecraft:
 
 
 def disturbed_spacecraft(rng: np.random.Generator) -> Spacecraft:
-    """Any disturbances, gaps, ticks and windows: alignments wander,
-    and some are never to be had.
-    """
+    """Any disturbances, gaps, ticks and windows: alignments wander or never come."""
     A = power(rng, -1, 3)
     a = float(rng.choice([0.3, -0.5, 0.0, 1e-3, 0.9, -1.0]))
     spin, degrees = float(rng.choice([3.0, -0.2])), float(rng.choice([0.1, 5.0, 60.0]))
@@ -129,9 +121,7 @@ LAWS, KINDS = ("four-pulse", "one-pulse", "bang"), ("gyro", "accelerometer")
 
 
 class Draws:
-    """What a file holds, from a seed: ``chance`` of a section, one of several, a number between
-    two.
-    """
+    """What a file holds, from a seed: a section by ``chance``, one of several, a number."""
 
     def __init__(self, seed: int) -> None:
         self.rng = np.random.default_rng(seed)
@@ -147,9 +137,7 @@ class Draws:
 
 
 def equipped(seed: int) -> dict[str, Any]:
-    """A valid spacecraft file as a dictionary: a body with jets in their places, and anything that
-    it may carry.
-    """
+    """A valid spacecraft file as a dictionary: a body with jets, and any section."""
     draws = Draws(seed)
     A = power(draws.rng, 0.0, 3.5)
     ratio = draws.between(0.3, 1.8)

@@ -30,9 +30,7 @@ from scipy.integrate import solve_ivp
 Array = NDArray[np.float64]
 
 RTOL = 1e-13
-"""Relative tolerance of one step; what adds up over a flight of some hundred radians stays below
-1e-11.
-"""
+"""Relative tolerance of one step; over a flight of some hundred radians below 1e-11."""
 
 
 class Push(NamedTuple):
@@ -78,9 +76,7 @@ def vector(*components: float) -> Array:
 
 
 def frame_n(moments: Sequence[float], rates: Array, wheel: float = 0.0) -> Array:
-    """Rotation body -> N: z along H, the spin axis in the half plane x >= 0 of x-z, or body axis 1
-    along x.
-    """
+    """Rotation body -> N: z along H; the spin axis, or body axis 1, above x >= 0 of x-z."""
     h = np.asarray(moments) * rates + vector(0, 0, wheel)
     z = h / np.linalg.norm(h)
     spin_axis = vector(0, 0, math.copysign(1, h[2]))
@@ -176,9 +172,7 @@ def coast(
     growing: Array | None = None,
     wheel: float = 0.0,
 ) -> list[Motion]:
-    """The motion at ``times`` (n,) s > 0 under a constant body torque, or one ``growing`` by so
-    many (3,) N m/s.
-    """
+    """The motion at ``times`` (n,) s > 0 under a body torque, ``growing`` by (3,) N m/s."""
     A, B, C = (float(one) for one in moments)
     m1, m2, m3 = (float(one) for one in torque)
     g1, g2, g3 = (0.0, 0.0, 0.0) if growing is None else (float(one) for one in growing)
@@ -215,9 +209,7 @@ def sinking(
     growth: float,
     wheel: float = 0.0,
 ) -> list[Motion]:
-    """`coast` of a body in which energy dissipation lets a small nutation grow at the rate
-    ``growth`` κ, 1/s.
-    """
+    """`coast` of a body whose small nutation grows at the rate ``growth`` κ, 1/s."""
     A, B, C = (float(one) for one in moments)
     x, y_, z = (float(one) for one in torque)
     sense = math.copysign(1.0, C * float(motion.rates[2]) + wheel)
@@ -275,9 +267,7 @@ def fly(
     growth: float = 0.0,
     wheel: float = 0.0,
 ) -> Motion:
-    """The motion at ``until`` s, kicks at that moment included;
-    restarts at every edge of a torque.
-    """
+    """The motion at ``until`` s, kicks included; restarts at every edge of a torque."""
     events = list(events)
     start = frame_n(moments, rates, wheel) if rotation is None else rotation
     motion = Motion(np.asarray(rates, dtype=float), start)

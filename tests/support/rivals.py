@@ -139,9 +139,7 @@ def _descended(body: Spacecraft, free_axis: bool, rng: np.random.Generator) -> R
 
 
 def ends(body: Spacecraft, torques: Array, x: Array, free_axis: bool) -> Array:
-    """What schedules x (k, 2n), starts and on-times in s, leave: transverse momentum and shift of
-    H, over |H|.
-    """
+    """Transverse momentum and shift of H, over |H|, after x (k, 2n), starts and on-times in s."""
     A, _, C = body.inertia.moments
     count = len(torques)
     rotation = np.tile(frame_n(body.inertia.moments, body.omega0), (len(x), 1, 1))
@@ -164,9 +162,7 @@ def ends(body: Spacecraft, torques: Array, x: Array, free_axis: bool) -> Array:
 
 
 def _coasted(A: float, C: float, rotation: Array, rates: Array, time: Array) -> tuple[Array, Array]:
-    """R(t) = Rot(H t/A) R Rot3(aω3 t), for k bodies: rotation (k, 3, 3), rates (k, 3),
-    time (k,).
-    """
+    """R(t) = Rot(H t/A) R Rot3(aω3 t) of k bodies: R (k, 3, 3), rates (k, 3), time (k,)."""
     turn = (A - C) / A * rates[:, 2] * time
     cosine = np.cos(turn)
     sine = np.sin(turn)

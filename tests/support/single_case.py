@@ -1,6 +1,4 @@
-"""One case as a spacecraft and a schedule of its own, so that everything that flies those can fly
-it.
-"""
+"""One case as a spacecraft and a schedule of its own, for everything that flies those."""
 
 from dataclasses import replace
 
@@ -21,9 +19,7 @@ Array = NDArray[np.float64]
 
 
 def timed(model: DispersedModel, cases: DispersedCases) -> DispersedCases:
-    """The ``cases`` with the starts, and the impulses, that their own Sun pulses give; else as they
-    are.
-    """
+    """The ``cases`` with starts and impulses by their own Sun pulses, else as they are."""
     if not model.schedule.blocks:
         return cases
     count = number_of(cases)
@@ -42,9 +38,7 @@ def timed(model: DispersedModel, cases: DispersedCases) -> DispersedCases:
 
 
 def realised(model: DispersedModel, draws: Draws) -> tuple[Spacecraft, Schedule]:
-    """The true spacecraft, its attitude in the frame of the estimate, and the pulses that it really
-    gets.
-    """
+    """The true spacecraft, its attitude in the estimate's frame, and the pulses that it gets."""
     body = model.spacecraft
     case = timed(model, model.cases(draws))
     pulses = []
@@ -95,9 +89,7 @@ def realised(model: DispersedModel, draws: Draws) -> tuple[Spacecraft, Schedule]
 def _thrusting(
     planned: Pulse, start: float, one: Thrusting, propellant: float | None, count: int
 ) -> Pulse:
-    """What one of ``count`` thrusters gives of a pulse, as a pulse of its own; its command begins
-    at ``start`` s.
-    """
+    """One of ``count`` thrusters' share of a pulse, as a pulse that begins at ``start`` s."""
     acts, centroid, _ = (float(np.squeeze(part)) for part in one.opened.acts)
     ramps = []
     for begin, length, level, lean in (
@@ -128,9 +120,7 @@ def _thrusting(
 
 
 def flown_outputs(model: DispersedModel, draws: Draws) -> Array:
-    """The outputs (5,) of one case with real pulse widths, true moments and disturbances, by
-    `propagation.flown`.
-    """
+    """The outputs (5,) of one case with real widths and true moments, by `propagation.flown`."""
     true, schedule = realised(model, draws)
     made = propagation.flown(true, schedule)
     settled, left = made.settled, made.residual

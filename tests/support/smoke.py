@@ -25,10 +25,14 @@ inertia: {tensor: [[120, 0.2, 0], [0.2, 119, 0], [0, 0, 80]]}
 state: {spin: 30 rpm, nutation: 5 deg, phase: 40 deg}
 attitude: {quaternion: [1, 0, 0, 0], epoch: 2026-03-01T12:00:00Z, frame: EME2000}
 thrusters:
-  - {name: +M1, position: [0, 0.3 m, 0.8 m], direction: [0, -1, 0], force: 10 N, isp: 220 s, max_on_time: 2 s}
-  - {name: -M1, position: [0, -0.3 m, 0.8 m], direction: [0, 1, 0], force: 10 N, isp: 220 s, max_on_time: 2 s}
-  - {name: +M2, torque: [0, 8 N m, 0], lever_arm: 0.8 m, isp: 220 s, min_on_time: 20 ms, max_on_time: 2 s}
-  - {name: -M2, torque: [0, -8 N m, 0], lever_arm: 0.8 m, isp: 220 s, min_on_time: 20 ms, max_on_time: 2 s}
+  - {name: +M1, position: [0, 0.3 m, 0.8 m], direction: [0, -1, 0], force: 10 N, isp: 220 s,
+     max_on_time: 2 s}
+  - {name: -M1, position: [0, -0.3 m, 0.8 m], direction: [0, 1, 0], force: 10 N, isp: 220 s,
+     max_on_time: 2 s}
+  - {name: +M2, torque: [0, 8 N m, 0], lever_arm: 0.8 m, isp: 220 s, min_on_time: 20 ms,
+     max_on_time: 2 s}
+  - {name: -M2, torque: [0, -8 N m, 0], lever_arm: 0.8 m, isp: 220 s, min_on_time: 20 ms,
+     max_on_time: 2 s}
 disturbances:
   - {name: leak, torque: [2 mN m, 0, 0]}
 dispersions:
@@ -71,21 +75,26 @@ plan broken.yaml; 2
 plan --colour red; 2
 plan smoke.yaml --scheme half-cone; 2
 plan smoke.yaml --scheme two-pulse --set limits.horizon=1ms; 3
-simulate smoke.yaml --scheme two-pulse --csv track.csv --json track.json --plot motion.svg --figure motion
+simulate smoke.yaml --scheme two-pulse --csv track.csv --json track.json \
+  --plot motion.svg --figure motion
 simulate smoke.yaml --schedule pulses.csv --flown
 simulate smoke.yaml --scheme none --until 10s --plot free.pdf
 trade --points 1 --csv trade.csv --json trade.json --plot trade.png --schedules folder; 4
-disperse smoke.yaml --schedule pulses.csv --samples 200 --csv c.csv --json d.json --plot d.png --figure cases
+disperse smoke.yaml --schedule pulses.csv --samples 200 --csv c.csv \
+  --json d.json --plot d.png --figure cases
 disperse smoke.yaml --scheme two-pulse --case 7 --json case.json
 verify smoke.yaml --scheme two-pulse --json verify.json
 verify smoke.yaml --loop --set limits.horizon=15s --json loop-verified.json
-loop smoke.yaml --set limits.horizon=30s --csv fired.csv --track flown.csv --json loop.json --plot loop.png
+loop smoke.yaml --set limits.horizon=30s --csv fired.csv --track flown.csv \
+  --json loop.json --plot loop.png
 loop smoke.yaml --set loop.sensor.scale=-100% --json reversed.json; 3
 loop ace.yaml; 2
 loop smoke.yaml --set limits.horizon=15s --case 2 --json dispersed.json
-disperse smoke.yaml --loop --set disturbances=[] --until 20s --samples 10 --csv loops.csv --json l.json --plot l.png
+disperse smoke.yaml --loop --set disturbances=[] --until 20s --samples 10 \
+  --csv loops.csv --json l.json --plot l.png
 disperse smoke.yaml --loop --until 5s --samples 2; 4
-budget smoke.yaml --set dissipation.time_constant=300s --csv budget.csv --json budget.json --plot budget.png
+budget smoke.yaml --set dissipation.time_constant=300s --csv budget.csv --json budget.json \
+  --plot budget.png
 budget smoke.yaml; 2
 simulate smoke.yaml --scheme none --until 60s --samples 301 --csv telemetry.csv
 fit telemetry.csv smoke.yaml -o fitted.yaml --at 90s --json fit.json --plot fit.png

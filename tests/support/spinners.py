@@ -1,6 +1,4 @@
-"""Spinners that are commanded by blocks, and their flight by an integrator that shares nothing with
-the planner.
-"""
+"""Spinners commanded by blocks, and their flight by an integrator of its own."""
 
 import itertools
 import math
@@ -27,10 +25,12 @@ inertia: {A: 120 kg m^2, C: 180 kg m^2}
 state: {spin: 12 rpm, nutation: 0 deg}
 attitude: {epoch: 1998-01-07T12:00:00Z, frame: EME2000, quaternion: [1, 0, 0, 0]}
 thrusters:
-  - {name: T1, position: [0.5, 0, 0.8], direction: [0, 0, 1], force: 10 N, isp: 220 s, max_on_time: 2 s}
+  - {name: T1, position: [0.5, 0, 0.8], direction: [0, 0, 1], force: 10 N, isp: 220 s, \
+     max_on_time: 2 s}
 sun: epoch
 sun_sensor: {azimuth: 35 deg}
-commands: {delay_step: 2 ms, delay_max: 4.9 s, width: {step: 10 ms, min: 100 ms, max: 500 ms}, every: [1, 2]}
+commands: {delay_step: 2 ms, delay_max: 4.9 s, width: {step: 10 ms, min: 100 ms, max: 500 ms}, \
+  every: [1, 2]}
 limits: {horizon: 1200 s}
 requirement: {nutation: 0.3 deg, momentum_shift: 0.1 deg}
 """
@@ -40,9 +40,7 @@ requirement: {nutation: 0.3 deg, momentum_shift: 0.1 deg}
 def commanded(
     body: Spacecraft, sun: Array, azimuth: float = 0.4, grid: int = 500, widths: int = 40
 ) -> Spacecraft:
-    """The body with a Sun, a sensor, and blocks of delays and widths in steps of a spin turn over
-    ``grid``.
-    """
+    """The body with a Sun, a sensor, and blocks whose steps divide a spin turn by ``grid``."""
     turn = 2.0 * math.pi / abs(body.spin)
     commands = Commands(
         turn / grid,
@@ -61,9 +59,7 @@ def commanded(
 
 
 def some_body(seed: int, *, target: bool = True) -> Spacecraft:
-    """A spinner from rest, or nutating a little, with a target 1 to 60 deg away; the Sun is not
-    near its axis.
-    """
+    """A spinner from rest, or nutating a little, with a target 1 to 60 deg away."""
     rng = np.random.default_rng(seed)
     A = 100.0
     spin = rng.choice([-1.0, 1.0]) * rng.uniform(0.3, 3.0)
@@ -87,9 +83,7 @@ def some_body(seed: int, *, target: bool = True) -> Spacecraft:
 def flown_by_reference(
     body: Spacecraft, blocks: Iterable[Block]
 ) -> tuple[reference.Motion, list[float]]:
-    """The motion after the last pulse, and when each began: Euler's equations, Sun pulses as their
-    roots.
-    """
+    """The motion after the last pulse, and when each began, by Euler's equations."""
     moments = np.asarray(body.inertia.moments)
     torques = {one.name: one.torque for one in body.channels}
     assert body.sun is not None
@@ -120,9 +114,7 @@ def flown_by_reference(
         return bool(math.cos(mark) * seen[0] + math.sin(mark) * seen[1] > 0.0)
 
     def move(until: float, torque: Array, *, stops: bool = False) -> list[float]:
-        """Sun pulses on the way; ``state`` and ``now`` go on, to the first one where it ``stops``
-        there.
-        """
+        """Sun pulses on the way; ``state`` and ``now`` go on, or to the first (``stops``)."""
         nonlocal state, now
         found = solve_ivp(
             slope,

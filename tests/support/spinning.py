@@ -1,6 +1,4 @@
-"""Bodies and spins that the tables of unit/physics run over, and their motion under torques that
-change with time.
-"""
+"""Bodies and spins that tables of unit/physics run over, and motion under changing torques."""
 
 import math
 from collections.abc import Callable, Sequence

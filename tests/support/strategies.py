@@ -37,9 +37,7 @@ def triaxial_spinners(draw: st.DrawFn) -> Spacecraft:
 
 @st.composite
 def schedules(draw: st.DrawFn, *, ideal: bool = False, axial: bool = True) -> Schedule:
-    """Up to five pulses of different channels, which may overlap; widths from none to longer than a
-    nutation.
-    """
+    """Up to five pulses of different channels, which may overlap and be of any width."""
     pulses = []
     for index in range(draw(st.integers(0, 5))):
         on_time = 0.0 if ideal else draw(st.sampled_from([0.0, 0.01]) | st.floats(0.05, 3.0))

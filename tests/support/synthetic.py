@@ -1,6 +1,4 @@
-"""Synthetic telemetry by DOP853 (tests/reference.py) with noise, gaps, outliers,
-steps and biases.
-"""
+"""Synthetic telemetry by DOP853 with noise, gaps, outliers, steps and biases."""
 
 import math
 from dataclasses import dataclass
@@ -50,9 +48,7 @@ def motion(
 
 
 def gyro_case(seed: int) -> Case:
-    """A minute of gyro data or so of a prolate or oblate body of either sense of spin, drawn by
-    ``seed``.
-    """
+    """A minute or so of gyro data of a body of either shape and sense, by ``seed``."""
     draw = np.random.default_rng([16, seed])
     prolate = seed % 2 == 0
     A = 120.0

@@ -1,6 +1,4 @@
-"""Synthetic telemetry of every kind of column, as CSV files: bodies within the tolerances of files,
-flown by DOP853.
-"""
+"""Synthetic telemetry of every kind of column, as CSV files, flown by DOP853."""
 
 import math
 from dataclasses import dataclass
@@ -48,9 +46,7 @@ FARTHEST = math.cos(math.radians(25.0))
 
 @dataclass(frozen=True, eq=False)
 class Telemetry:
-    """A file, the record of a body that differs from it, and the true values of what may be
-    estimated.
-    """
+    """A file, the record of a body that differs from it, and true values of what is estimated."""
 
     spacecraft: nutdamp.Spacecraft
     record: Record
@@ -59,9 +55,7 @@ class Telemetry:
 
 
 def file_of(draw: np.random.Generator, seed: int) -> tuple[nutdamp.Spacecraft, bool]:
-    """A spacecraft file, and whether it is prolate; the Sun is so far from the axis that it goes
-    round the sensor.
-    """
+    """A spacecraft file, and whether it is prolate; the Sun goes round the sensor."""
     body, prolate = _any_file(draw, seed)
     again = np.random.default_rng([18, seed])
     up = np.array([0.0, 0.0, 1.0])
@@ -118,9 +112,7 @@ def _any_file(draw: np.random.Generator, seed: int) -> tuple[nutdamp.Spacecraft,
 
 
 def telemetry(folder: Path, seed: int, kind: tuple[str, ...] | None = None) -> Telemetry:
-    """The record of number ``seed``, of a kind or that whose turn it is, through a CSV file in
-    ``folder``.
-    """
+    """Record number ``seed``, of a kind or of that whose turn it is, from a CSV in ``folder``."""
     draw = np.random.default_rng([17, seed])
     kind = kind or KINDS[seed % len(KINDS)]
     body, prolate = file_of(draw, seed)

@@ -84,9 +84,7 @@ def unequal_body(seed: int) -> tuple[Spacecraft, float]:
 
 
 class Rival(NamedTuple):
-    """Least ``program`` cost of small angles, kg (infinite: none), and the schedule ``flown``, None
-    where none was.
-    """
+    """Least ``program`` cost of small angles, kg, and the schedule ``flown``, None without one."""
 
     program: float
     flown: Schedule | None
@@ -213,9 +211,7 @@ def _flown(body: Spacecraft, off: float, burns: list[tuple[float, float, int]]) 
 
 
 def ends(body: Spacecraft, torques: Array, x: Array) -> Array:
-    """What schedules x (k, 2n), starts and on-times in s, leave: H across axis 3, and H off its
-    target, over |H|.
-    """
+    """H across axis 3 and off its target, over |H|, after x (k, 2n), starts and on-times in s."""
     moments = np.array(body.inertia.moments)
     count = len(torques)
     size = float(np.linalg.norm(moments * body.omega0))

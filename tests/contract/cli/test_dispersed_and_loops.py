@@ -1,6 +1,4 @@
-"""disperse, loop, disperse --loop and budget as users run them: what they show, write, name and
-refuse.
-"""
+"""disperse, loop, disperse --loop and budget as users run them."""
 
 import json
 import os
@@ -32,10 +30,14 @@ name: Upper
 inertia: {A: 100 kg m^2, C: 70 kg m^2}
 omega0: [0.042 rad/s, 0.036 rad/s, 3 rad/s]
 thrusters:
-  - {name: +M1, torque: [ 20, 0, 0], isp: 220 s, lever_arm: 1 m, min_on_time: 5 ms, max_on_time: 50 ms}
-  - {name: -M1, torque: [-20, 0, 0], isp: 220 s, lever_arm: 1 m, min_on_time: 5 ms, max_on_time: 50 ms}
-  - {name: +M2, torque: [0,  20, 0], isp: 220 s, lever_arm: 1 m, min_on_time: 5 ms, max_on_time: 50 ms}
-  - {name: -M2, torque: [0, -20, 0], isp: 220 s, lever_arm: 1 m, min_on_time: 5 ms, max_on_time: 50 ms}
+  - {name: +M1, torque: [ 20, 0, 0], isp: 220 s, lever_arm: 1 m, min_on_time: 5 ms,
+     max_on_time: 50 ms}
+  - {name: -M1, torque: [-20, 0, 0], isp: 220 s, lever_arm: 1 m, min_on_time: 5 ms,
+     max_on_time: 50 ms}
+  - {name: +M2, torque: [0,  20, 0], isp: 220 s, lever_arm: 1 m, min_on_time: 5 ms,
+     max_on_time: 50 ms}
+  - {name: -M2, torque: [0, -20, 0], isp: 220 s, lever_arm: 1 m, min_on_time: 5 ms,
+     max_on_time: 50 ms}
 requirement: {nutation: 0.3 deg}
 """
 LOOP = """
@@ -606,9 +608,7 @@ SCREENS = {
 @pytest.mark.usefixtures("body")
 @pytest.mark.parametrize("kind", SCREENS)
 def test_the_screen(run: Run, kind: str) -> None:
-    """What dominates and what is unused; 50 good cases show little; a recommended plan that does
-    not damp is flown.
-    """
+    """What dominates and what is unused; 50 good cases show little."""
     shown = transcript(run, SCREENS[kind], "" if kind == "all cases" else "equirement")
     check_text(f"cli.disperse.{kind}", shown)
     assert "…" not in shown
@@ -622,9 +622,7 @@ def test_the_screen(run: Run, kind: str) -> None:
 def test_what_is_dispersed_is_the_scheme_the_schedule_or_the_recommended_plan(
     run: Run, body: Path
 ) -> None:
-    """By so many cases as other commands do; and the example of dispersions, where there are none,
-    can be pasted.
-    """
+    """As many cases as other commands fly; the example of dispersions can be pasted."""
     data = result(run, TWO)
     assert (data["scheme"], data["samples"], data["seed"]) == ("two-pulse", 20_000, 1)
     assert call(run, "plan body.yaml --scheme one-pulse --csv p.csv").returncode in (0, 4)

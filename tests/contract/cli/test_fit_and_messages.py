@@ -1,6 +1,4 @@
-"""fit, export and import: telemetry and messages in, estimates,
-messages and spacecraft files out.
-"""
+"""fit, export and import: telemetry and messages in; estimates, messages and files out."""
 
 import json
 import math
@@ -41,9 +39,7 @@ def write_rows(path: Path, header: str, rows: Array, digits: int = 5) -> None:
 def flight(
     folder: Path, seed: int, *, every: int = 1, bias: float = 0.0, wide: bool = False
 ) -> tuple[float, float, Array]:
-    """A minute of 10 Hz gyro data with 0.01 deg/s of noise, of the example or, ``wide``, of `WIDE`:
-    A, C, rates.
-    """
+    """A minute of 10 Hz gyro data, 0.01 deg/s of noise, of the example or, ``wide``, of `WIDE`."""
     draw, (moments, degrees) = np.random.default_rng(seed), (0.005, 0.1) if wide else (0.002, 0.05)
     A, C = 120.0 * (1.0 + moments * draw.normal()), 80.0 * (1.0 + moments * draw.normal())
     rates = nutdamp.example().omega0 + math.radians(degrees) * draw.normal(size=3)
@@ -62,9 +58,7 @@ def flight(
 def fly_probe(
     run: Run, folder: Path, rows: str, until: int, *changed: str, samples: int = 151
 ) -> Array:
-    """Rates in rad/s, (n, 4) with the time, of a flight in which probe.csv is fired; the file says
-    nothing of that.
-    """
+    """Time and rates in rad/s, (n, 4), of a flight in which probe.csv is fired."""
     (folder / "probe.csv").write_text(f"{PROBE}{rows}\n", encoding="utf-8")
     command = [
         "simulate",
@@ -142,9 +136,7 @@ def test_estimates_are_shown_and_become_a_file_with_comments_and_settings_at_an_
 
 
 def test_the_picture_has_a_heading_and_shows_no_rounding_as_noise(run: Run, tmp_path: Path) -> None:
-    """Of data without noise the third rate is constant: neither residuals nor autocorrelations say
-    anything.
-    """
+    """Without noise the third rate is constant: residuals and autocorrelations say nothing."""
     times = np.arange(201) / 10.0
     example = nutdamp.example()
     shown = motion((example.inertia.A, example.inertia.A, example.inertia.C), example.omega0, times)
@@ -278,9 +270,7 @@ def test_what_a_steady_spin_does_not_tell_is_as_the_file_has_it(run: Run, tmp_pa
 def test_what_is_far_from_the_file_is_written_where_that_is_accepted(
     run: Run, tmp_path: Path
 ) -> None:
-    """Both values are said; a column that was swapped makes C/A another one, and so does what it
-    leads to.
-    """
+    """Both values are said; a swapped column makes C/A another, and what follows from it."""
     files = str(places.case("fit-gyro-swap12.csv")), str(places.case("fit-sc.yaml"))
     assert run("fit", *files, "--accept", "-o", "now.yaml", "--json", "f.json").returncode == 0
     far = next(note for note in results(tmp_path)["notes"] if note["code"] == "fit-far")
@@ -347,9 +337,7 @@ def test_a_channel_that_did_not_fire_is_not_calibrated(run: Run, tmp_path: Path)
 
 @pytest.mark.weekly
 def test_a_schedule_that_does_not_match_the_record_is_doubted(run: Run, tmp_path: Path) -> None:
-    """Pulses of +M2 at 20 s: in the schedule a second late, of the channel across, or after the
-    record.
-    """
+    """+M2 at 20 s: in the schedule a second late, of the channel across, or after the record."""
     rows = fly_probe(run, tmp_path, "20,0.5,+M2", 30)
     rows[:, 1:] += 1e-4 * np.random.default_rng(3).normal(size=(len(rows), 3))
     write_rows(tmp_path / "gyro.csv", RATES, rows, digits=7)
@@ -383,9 +371,7 @@ def test_a_schedule_that_does_not_match_the_record_is_doubted(run: Run, tmp_path
 def test_the_library_gives_the_same_file_and_fits_it_again_with_what_was_known(
     run: Run, tmp_path: Path
 ) -> None:
-    """The second fit adds to the first: A keeps the sigma that two tolerances and the ratio leave
-    it.
-    """
+    """The second adds to the first: A keeps the sigma that two tolerances and the ratio leave."""
     flight(tmp_path, 8)
     fit(run, "flight.csv", "-q", "-o", "now.yaml", "--at", "80s", "--json", "f.json")
     first = nutdamp.fit(tmp_path / "flight.csv", nutdamp.example())
@@ -652,9 +638,7 @@ def test_a_spin_table_needs_no_epoch_and_goes_on_as_requested(run: Run) -> None:
 
 
 def test_angles_that_are_rounding_are_written_as_0(run: Run) -> None:
-    """The spin axis of this file lies on the equator of the frame,
-    and body axis 1 along the node.
-    """
+    """The spin axis lies on the equator of the frame, and body axis 1 along the node."""
     text = exported(
         run, f"export {places.case('geo-target.yaml')} --format apm --scheme four-pulse"
     )

@@ -1,6 +1,4 @@
-"""``check``, ``init``, ``schema``, ``simulate``, help, version and completion; what each command
-loads.
-"""
+"""check, init, schema, simulate, help, version and completion; what each command loads."""
 
 import json
 import os
@@ -172,8 +170,8 @@ def test_what_is_set_is_planned_and_checked_in_all_files(run: Run, tmp_path: Pat
     planned = result(
         run,
         (
-            "plan -q --nominal --scheme four-pulse --set 'state.nutation=8 deg' --set "
-            "limits.horizon=300s"
+            "plan -q --nominal --scheme four-pulse "
+            "--set 'state.nutation=8 deg' --set limits.horizon=300s"
         ),
     )
     assert planned["spacecraft"]["nutation_deg"] == pytest.approx(8.0)
@@ -379,9 +377,7 @@ LEAN = [
 def test_a_command_loads_what_it_needs(
     tmp_path: Path, commands: list[tuple[str, tuple[str, ...]]]
 ) -> None:
-    """A symmetric body needs no scipy; numpy.ma, as `numpy.unique` loads it, is a tenth of the
-    start-up.
-    """
+    """A symmetric body needs no scipy, and none numpy.ma, a tenth of the start-up."""
     shown = python(tmp_path, LOADED.format(commands=commands)).stdout
     loaded = [line for line in shown.splitlines() if line.startswith("LOADED by")]
     assert loaded == [f"LOADED by {words}" for words, _ in commands]
@@ -391,8 +387,8 @@ def test_a_command_loads_what_it_needs(
 def test_products_of_small_matrices_have_one_thread(tmp_path: Path) -> None:
     """Unless the environment says otherwise."""
     code = (
-        "import os, sys\n{}\nfrom nutdamp.cli.main import main\nsys.argv = ['nutdamp', "
-        "'--version']\n"
+        "import os, sys\n{}\nfrom nutdamp.cli.main import main\n"
+        "sys.argv = ['nutdamp', '--version']\n"
         "try: main()\nfinally: print(os.environ['OPENBLAS_NUM_THREADS'])"
     )
     for given, used in (
@@ -507,9 +503,7 @@ def test_free_motion_keeps_its_nutation_and_the_end_can_be_chosen(run: Run) -> N
 
 
 def test_the_exit_status_is_that_of_plan(run: Run, tmp_path: Path) -> None:
-    """3 where the scheme is infeasible, 4 where it is not shown that its plan meets the
-    requirement; so for none.
-    """
+    """3 where the scheme is infeasible, 4 where its plan is not shown to comply; so for none."""
     written(tmp_path, ideal_yaml=EXACT)
     infeasible = run("simulate", "ideal.yaml", "--scheme", "four-pulse")
     assert (infeasible.returncode, "infeasible" in infeasible.stderr) == (3, True)

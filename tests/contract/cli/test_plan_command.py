@@ -1,6 +1,4 @@
-"""``nutdamp plan``: what it prints and writes, of nominal and of robust plans, and what it leaves
-with.
-"""
+"""``nutdamp plan``: screen, files and exit status of nominal and of robust plans."""
 
 import json
 import math
@@ -109,12 +107,10 @@ def test_the_built_in_example_is_planned_in_an_empty_folder(run: Run) -> None:
 
 CONTRACT = {
     "": "nutdamp spacecraft plans recommended",
-    "spacecraft": "name A_kgm2 C_kgm2 a shape omega0_rad_s nutation_deg body_cone_deg "
-    "space_cone_deg "
-    "body_nutation_period_s inertial_nutation_period_s",
-    "plan": "scheme feasible why meets_requirement pulses total_impulse_Nms least_impulse_Nms "
-    "propellant_kg end_s "
-    "delta_v_m_s spin_change_rad_s residual flown",
+    "spacecraft": "name A_kgm2 C_kgm2 a shape omega0_rad_s nutation_deg "
+    "body_cone_deg space_cone_deg body_nutation_period_s inertial_nutation_period_s",
+    "plan": "scheme feasible why meets_requirement pulses total_impulse_Nms "
+    "least_impulse_Nms propellant_kg end_s delta_v_m_s spin_change_rad_s residual flown",
     "cases": "samples seed met_fraction low high probability",
     "residual": "nutation_deg body_cone_deg space_cone_deg momentum_shift_deg axis_error_deg",
     "pulse": "t_s start_s on_time_s channel torque_Nm impulse_Nms propellant_kg",
@@ -184,9 +180,7 @@ def test_schemes_are_named_and_a_spin_is_a_part_of_the_requirement(run: Run) -> 
 
 
 def test_nothing_feasible_is_exit_3_and_leaves_an_old_schedule(run: Run, tmp_path: Path) -> None:
-    """What misses the requirement is written too, with status 4; without nutation the schedule is
-    empty.
-    """
+    """What misses is written too, with status 4; without nutation the schedule is empty."""
     written(tmp_path, weak_yaml=WEAK, pulses_csv="old")
     late = "plan -v weak.yaml --set limits.horizon=0.1s --json plan.json --csv pulses.csv; 3"
     check_text("cli.plan.late", transcript(run, [late]))
@@ -435,9 +429,7 @@ def test_the_requirement_with_its_probability(
 
 @pytest.mark.deep
 def test_the_plan_made_for_wide_tolerances_complies_where_no_scheme_does(run: Run) -> None:
-    """85.6 % of cases comply with two-pulse, the best of them; the cheapest plan that new cases
-    confirm flies.
-    """
+    """85.6 % comply with two-pulse, the best; the cheapest plan that new cases confirm flies."""
     data = result(run, shlex.join(["plan", "--robust", *WIDE]))
     robust, fresh = data["robust"], data["robust"]["fresh"]
     assert data["decision"]["status"] == "fly"

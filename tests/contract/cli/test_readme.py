@@ -52,9 +52,7 @@ PAGES = (README, *sorted(guide.FOLDER.glob("*.md")))
 TEXTS = {page: page.read_text(encoding="utf-8") for page in PAGES}
 SESSION = re.compile(r"```console\n(\$ nutdamp .+?)\n```", re.DOTALL)
 SESSIONS = [page.stem for page in PAGES if SESSION.search(TEXTS[page]) and page.stem != "motion"]
-"""Pages with sessions; the commands of motion draw the figures of the source, and the tests of
-explain fly them.
-"""
+"""Pages with sessions; those of motion draw the figures of the source and fly in explain."""
 REST = "…"
 """Last line of an output of which only the beginning is shown."""
 
@@ -207,9 +205,7 @@ def printed(command: str, shown: str) -> Iterator[str]:
 
 
 def check_commands(run: Run, commands: Iterator[str]) -> int:
-    """Fails where one of the commands is refused, or is not to be understood;
-    the number of them.
-    """
+    """The number of commands; fails where one is refused, or is not to be understood."""
     named = {
         re.sub("|".join(NAMES_OF_FILES), lambda name: NAMES_OF_FILES[name[0]], each)
         for each in commands
@@ -448,9 +444,7 @@ VIEWS = places.ROOT / "nutdamp" / "views"
 
 
 def declared(package: str) -> Iterator[str]:
-    """Headings of tables as the code has them: of Column(…), Heading(…) and columns(…), and in
-    lists of heads.
-    """
+    """Headings of tables in the code: Column(…), Heading(…), columns(…) and lists of heads."""
     for node in nodes((places.ROOT / "nutdamp" / package).glob("*.py")):
         parts: list[ast.expr] = []
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
@@ -544,9 +538,7 @@ def columns_written() -> Iterator[str]:
 
 
 def keys_of_columns() -> Iterator[tuple[str, str]]:
-    """Names of columns that go into files, and the places that have them as far as they are written
-    out.
-    """
+    """Names of columns that go into files, and the places that have them, where written out."""
     for node in nodes(VIEWS.glob("*.py")):
         if (
             isinstance(node, ast.Call)
@@ -567,9 +559,7 @@ def keys_of_columns() -> Iterator[tuple[str, str]]:
 
 
 def keys_named(node: ast.AST, function: str) -> Iterator[str]:
-    """Names in files that a call of ``function`` has behind its first argument, with or without a
-    path.
-    """
+    """Names in files that calls of ``function`` have behind their first argument."""
     if isinstance(node, ast.Call) and ast.unparse(node.func).rpartition(".")[2] == function:
         for name in node.args[1:]:
             if isinstance(name, ast.Constant):
@@ -661,9 +651,7 @@ def transverse(row: dict[str, float]) -> complex:
 def test_abb_5_to_7_show_what_the_source_shows(
     run: Run, tmp_path: Path, name: str, a: float
 ) -> None:
-    """At least two rounds of four pulses a quarter turn apart, inwards; the axis turns by 90° (1 -
-    a)/|a| between.
-    """
+    """Two rounds of four pulses or more, inwards; the axis turns by 90° (1 - a)/|a| between."""
     flown = track(run, tmp_path, name)
     jumps = [
         (left, right) for left, right in itertools.pairwise(flown) if right["pulse"] > left["pulse"]

@@ -66,9 +66,7 @@ def test_no_digit_is_lost_on_a_narrow_screen(run: Run, command: str) -> None:
 
 @spread("name", sorted(path.stem for path in places.CONFIGS.glob("*.yaml")), quick=2, deep=20)
 def test_default_screens_are_short_and_cut_nothing(run: Run, name: str) -> None:
-    """Headline, requirement, one table, notes, next steps: 40 lines of 80 columns; a row of the
-    table is one line.
-    """
+    """Headline, requirement, one table, notes, next steps: 40 lines of 80 columns."""
     commands = ["check", "simulate --samples 100", "simulate --scheme none --samples 100"]
     text = (places.CONFIGS / f"{name}.yaml").read_text(encoding="utf-8")
     commands += ["loop"] * ("\nloop:" in text) + ["budget"] * (
@@ -138,9 +136,7 @@ def test_four_or_five_schemes_fit_a_usual_screen(run: Run, name: str) -> None:
     assert [line.split("  ")[0] for line in lines[:3]] == ["pulses", "end, s", "impulse, N m s"]
 
 
-def test_a_scheme_without_thrusters_says_so_and_a_bound_keeps_its_sign_on_its_line(
-    run: Run,
-) -> None:
+def test_a_scheme_without_thrusters_says_so_and_a_bound_keeps_its_sign(run: Run) -> None:
     """Long names of channels are broken, not "< 1e-9" after the last pulse."""
     (verdicts,) = re.findall(
         "^verdict .*?\n\n", call(run, f"plan {STEERED} -v -q").stdout, re.MULTILINE | re.DOTALL
@@ -161,9 +157,7 @@ class Terminal(io.StringIO):
 
 
 class Clock:
-    """A clock that is set by hand; its timers, in place of those of `threading`,
-    ring as it is set.
-    """
+    """A clock that is set by hand; its timers ring, in place of those of `threading`."""
 
     def __init__(self) -> None:
         self.now, self.timers = 100.0, list[tuple[float, Callable[[], None]]]()
@@ -296,9 +290,7 @@ STUDIED = [
 
 
 def check_screen(shown: str) -> None:
-    """No more lines and columns than there are, no cut value, one table with each of its rows on a
-    line, few notes.
-    """
+    """No line too many or too wide, no cut value, one table with a line a row, few notes."""
     lines = shown.splitlines()
     assert len(lines) <= LINES
     assert max(map(len, lines)) <= WIDTH
@@ -378,9 +370,7 @@ and how many of the former one of the latter is (NIST SP 811).
 
 
 def units(names: list[str]) -> re.Pattern[str]:
-    """Pattern of a unit, behind a number of its own or not: no part of a word, nor of a name such
-    as "+M1".
-    """
+    """Pattern of a unit, behind a number or not: no part of a word, nor of a name as "+M1"."""
     words = "|".join(sorted(names, key=len, reverse=True))
     return re.compile(
         rf"(?:(-?[0-9.]+(?:e-?[0-9]+)?) )?(?<![\w°µ'|.+-])({words})((?:/\w+²?)?)(?![\w|²'-]| s\b)"

@@ -1,6 +1,4 @@
-"""Where output goes when a stream, a disk or a signal is in its way; command lines that are refused
-before the work.
-"""
+"""Output where a stream, a disk or a signal is in its way; refusals before the work."""
 
 import json
 import os
@@ -87,9 +85,7 @@ def test_a_full_standard_output_is_said_in_one_line(tmp_path: Path, command: str
 
 @pytest.mark.deep
 @POSIX
-def test_a_process_without_standard_output_or_without_a_reader_does_its_work(
-    tmp_path: Path,
-) -> None:
+def test_a_process_without_standard_output_or_reader_does_its_work(tmp_path: Path) -> None:
     for command in ("plan --quiet", "plan --quiet --csv -"):
         closed = shell(tmp_path, f'exec "$0" -m nutdamp {command} --json pulses.json >&-')
         assert (closed.returncode, closed.stderr, names(tmp_path)) == (0, BUILT_IN, ["pulses.json"])
@@ -379,9 +375,8 @@ def odd(run: Run, tmp_path: Path) -> None:
         "simulate {0}.yaml --schedule {0}.csv --json out.json --plot out.svg",
         "verify {0}.yaml --schedule {0}.csv --json out.json",
         (
-            "disperse {0}.yaml --schedule {0}.csv --samples 50 --json out.json --plot out.png "
-            "--csv "
-            "{0}.out"
+            "disperse {0}.yaml --schedule {0}.csv --samples 50 "
+            "--json out.json --plot out.png --csv {0}.out"
         ),
         "trade {0}.yaml --points 1 --json out.json --schedules {0}",
         "report {0}.yaml -o {0}.html",
@@ -632,9 +627,7 @@ def test_one_file_for_two_purposes_is_exit_2(run: Run, tmp_path: Path) -> None:
     check_text("cli.refused.twice", refusals(run, tmp_path, TWICE))
 
 
-def test_what_is_no_file_may_be_named_twice_and_an_output_may_get_the_name_that_is_read_unnamed(
-    run: Run,
-) -> None:
+def test_what_is_no_file_may_be_named_twice_and_an_output_as_what_is_read_unnamed(run: Run) -> None:
     ended = run(
         "plan", "--scheme", "one-pulse", "--quiet", "--csv", os.devnull, "--json", os.devnull
     )

@@ -428,7 +428,8 @@ def test_signals_in_all_their_units(read_record: ReadRecord) -> None:
     assert_allclose(record.signals[GYROS[0]], np.radians([1.5, math.nan, -2.0]))
     assert_array_equal(record.signals[GYROS[2]], [3.0, 3.1, math.nan])
     # Dates count from the epoch of the spacecraft file.
-    text = "utc,axis_ra_deg,axis_dec_deg\n2026-03-01T12:00:01Z,90,0\n2026-03-01T13:00:02.5+01:00,0,30\n"
+    rows = ["2026-03-01T12:00:01Z,90,0", "2026-03-01T13:00:02.5+01:00,0,30"]
+    text = "\n".join(["utc,axis_ra_deg,axis_dec_deg", *rows, ""])
     record, _ = read_record(text, DATED)
     assert_array_equal(record.times, [1.0, 2.5])
     axis = np.column_stack([record.signals[name] for name in AXIS])
@@ -474,9 +475,7 @@ def test_quaternions_give_the_axis_and_the_turn_in_place_of_an_axis(
     assert_allclose(record.samples(AXIS)[1], [[0.0, -1.0, 0.0]], atol=1e-15)
 
 
-def test_sun_aspect_angles_are_those_of_their_rows_or_of_the_pulses_in_a_file(
-    read_record: ReadRecord,
-) -> None:
+def test_sun_aspect_angles_are_those_of_their_rows_or_pulses(read_record: ReadRecord) -> None:
     record, _ = read_record("t_s,sun_aspect_deg\n0,60\n2,\n")
     assert_allclose(record.signals[SUN_ASPECT], [math.pi / 3, math.nan])
     record, _ = read_record(

@@ -488,12 +488,14 @@ def test_it_is_a_schema_of_2020_12_in_plain_json() -> None:
 SLIPS_OF_KEYS = """
 mas: [250 kg]
 limits.horizn: [5]
-thrusters.0: [{name: a, position: [0, 0, 0.8], direction: [1, 0, 0]}, {name: a, torque: [8, 0, 0], force: 10}]
+thrusters.0: [{name: a, position: [0, 0, 0.8], direction: [1, 0, 0]},
+  {name: a, torque: [8, 0, 0], force: 10}]
 thrusters.0.forse: [5]
 thrusters.0.torque: [[8, 0, 0]]
 thrusters.0.lever_arm: [1]
 name: [null, "", 5]
-inertia: [null, {A: 120}, {A: 0, C: 80}, {A: 120 kg, C: 80}, {A: 1, C: 1, tensor: [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}]
+inertia: [null, {A: 120}, {A: 0, C: 80}, {A: 120 kg, C: 80},
+  {A: 1, C: 1, tensor: [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}]
 mass: [true, "250"]
 omega0: [null, [1, 2], [1, 2, 20 Hz]]
 state: [{spin: 3, nutation: 0}]

@@ -61,7 +61,8 @@ thrusters:
 channels: {+M1: [T1, T2], 1: [T2]}
 steerable: {torque: 20 N m, isp: 220 s, lever_arm: 1 m}
 requirement: {nutation: 0.5 deg, momentum_shift: 0.2 deg}
-limits: {horizon: 120 s, earliest: 5 s, gap: 0.5 s, tick: 1 ms, max_pulses: 8, blackout: [[10 s, 20 s], [1 min, 1 min]]}
+limits: {horizon: 120 s, earliest: 5 s, gap: 0.5 s, tick: 1 ms, max_pulses: 8,
+  blackout: [[10 s, 20 s], [1 min, 1 min]]}
 """
 LEAST = "name: S, inertia: {A: 120, C: 80}, omega0: [0.1, 0.2, -3]"
 
@@ -770,19 +771,24 @@ def test_positions_are_in_principal_axes_as_forces_and_torques_are() -> None:
 
 
 EVERY_TOLERANCE = """\
-{A: {normal: 1 %}, C: {normal: 1 %}, omega0: {normal: 0.01}, thrust: {normal: 1 %}, thrust_per_pulse: {normal: 1 %},
- thrust_direction: {normal: 1 deg}, position: {normal: 1 mm}, timing: {normal: 1 ms}, timing_offset: {normal: 1 ms},
- attitude: {normal: 1 deg}, open_delay: {normal: 1 ms}, cold: {normal: 1 %}, cold_pulses: {normal: 1 %},
+{A: {normal: 1 %}, C: {normal: 1 %}, omega0: {normal: 0.01}, thrust: {normal: 1 %},
+ thrust_per_pulse: {normal: 1 %}, thrust_direction: {normal: 1 deg}, position: {normal: 1 mm},
+ timing: {normal: 1 ms}, timing_offset: {normal: 1 ms}, attitude: {normal: 1 deg},
+ open_delay: {normal: 1 ms}, cold: {normal: 1 %}, cold_pulses: {normal: 1 %},
  tank_propellant: {normal: 1 %}, tank_final_pressure: {normal: 1 %}, inertia_per_kg: {normal: 1 %},
- sensor_bias: {normal: 0.01 SENSED}, sensor_scale: {normal: 1 %}, sensor_noise: {normal: 1 %}, PAIRS}
+ sensor_bias: {normal: 0.01 SENSED}, sensor_scale: {normal: 1 %}, sensor_noise: {normal: 1 %},
+ PAIRS}
 """
 CRAFT = """\
 thrusters:
-  - {name: T1, position: [0, 0.3, 0.8], direction: [0, -1, 0], force: 10 N, isp: 220 s, min_on_time: 20 ms}
-  - {name: T 2, position: [0, -0.3, 0.8], direction: [0, 1, 0], force: 10 N, isp: 220 s, min_on_time: 20 ms}
+  - {name: T1, position: [0, 0.3, 0.8], direction: [0, -1, 0], force: 10 N, isp: 220 s,
+     min_on_time: 20 ms}
+  - {name: T 2, position: [0, -0.3, 0.8], direction: [0, 1, 0], force: 10 N, isp: 220 s,
+     min_on_time: 20 ms}
 valve: {open_delay: 20 ms, close_delay: 20 ms}
 cold: {first: 90 %, pulses: 4}
-tank: {propellant: 30 kg, pressure: 22 bar, final_pressure: 8 bar, inertia_per_kg: {A: 0.1 m^2, C: 0.1 m^2}}
+tank: {propellant: 30 kg, pressure: 22 bar, final_pressure: 8 bar,
+  inertia_per_kg: {A: 0.1 m^2, C: 0.1 m^2}}
 loop: {sensor: {kind: KIND, rate: 10 Hz, noise: 0.01 SENSED}, start: 0.5 deg}
 """
 
@@ -795,7 +801,7 @@ def test_whatever_any_schedule_or_loop_draws_once_may_be_correlated(kind: str, u
     craft, tolerances = (
         text.replace("KIND", kind).replace("SENSED", unit) for text in (CRAFT, EVERY_TOLERANCE)
     )
-    alone = dispersed(tolerances.replace(", PAIRS", ""), craft)
+    alone = dispersed(tolerances.replace(",\n PAIRS", ""), craft)
     names = [
         drawn.name for drawn in reachable(alone).drawn if not drawn.name.endswith("of each pulse")
     ]

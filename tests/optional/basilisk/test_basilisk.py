@@ -1,6 +1,4 @@
-"""Flights by Basilisk against `propagation.flown`: agreement to 1e-8 rad is promised, and far less
-is found.
-"""
+"""Flights by Basilisk against `propagation.flown`: agreement to 1e-8 rad is promised."""
 
 import math
 import sys
@@ -83,9 +81,7 @@ def reference(flown: propagation.Flight, times: np.ndarray) -> tuple[np.ndarray,
 def difference(
     spacecraft: Spacecraft, schedule: Schedule, until: float, found: BasiliskFlight
 ) -> float:
-    """Largest difference from the flown motion: directions of H and of all body axes in rad, rates
-    over |ω|.
-    """
+    """Largest difference from the flown motion: H and body axes in rad, rates over |ω|."""
     rates, quaternion = reference(propagation.flown(spacecraft, schedule, until), found.t)
     inertia = spacecraft.inertia
     still = abs(inertia.wheel) / min(inertia.moments)
@@ -107,9 +103,7 @@ def difference(
 
 
 def overlapping() -> Schedule:
-    """Pulses at times that no clock of nanoseconds knows: overlapping, one within another, one with
-    axial torque.
-    """
+    """Pulses at times between nanoseconds: overlapping, nested, one with axial torque."""
     return Schedule(
         (
             pulse(1.0 / 3.0, 0.1 * math.pi, 20.0, -5.0, 0.0),
@@ -189,9 +183,7 @@ def test_ideal_impulses_and_overlapping_pulses_off_the_nanosecond_grid(name: str
 @pytest.mark.basilisk
 @pytest.mark.parametrize(("spin", "wheel"), [(0.0, 90.0), (-1.0, 150.0), (2.0, -400.0)])
 def test_a_wheel(spin: float, wheel: float) -> None:
-    """A balanced wheel without motor torque; of three moments too, through pulses with axial torque
-    and kicks.
-    """
+    """A balanced wheel without motor torque; also of three moments, with axial pulses and kicks."""
     for name in ("prolate", next(each for each in BODIES if len(set(BODIES[each][0])) == 3)):
         body = spinner(name)
         body = replace(

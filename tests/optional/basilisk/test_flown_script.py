@@ -28,9 +28,7 @@ def _installed() -> None:
 
 
 def check(plan: planning.Plan, folder: Path) -> None:
-    """What the script prints in a process without nutdamp's folder on the path is the residual of
-    the plan.
-    """
+    """The script prints the plan's residual in a process without nutdamp on its path."""
     script = folder / "fly.py"
     script.write_text(export_text(plan, "basilisk"), encoding="utf-8")
     ran = subprocess.run(

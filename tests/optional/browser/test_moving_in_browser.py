@@ -235,7 +235,8 @@ def test_no_mark_of_the_motion_lies_over_a_name_on_the_globe(
     with browse(written((CONFIGS / f"{name}.yaml").read_text(encoding="utf-8") + sun)) as page:
         globe = part(page, "globe")
         boxes = """(marks) => marks.filter((one) => getComputedStyle(one).visibility !== "hidden")
-          .map((one) => one.getBoundingClientRect()).map((one) => [one.left, one.top, one.right, one.bottom])"""
+          .map((one) => one.getBoundingClientRect())
+          .map((one) => [one.left, one.top, one.right, one.bottom])"""
         names = globe.locator("text").evaluate_all(boxes)
         assert names
         for moment in (0, int(part(page, "slider").get_attribute("max"))):
@@ -337,8 +338,11 @@ def test_no_pulse_is_passed_over_while_it_plays(browse: Browse, written: Any) ->
     """However short a pulse is, a frame shows that it fires."""
     with browse(written(TARGET)) as page:  # by impulses without any length
         part(page, "firing").evaluate(
-            """(node) => { window.fired = []; new MutationObserver(() => window.fired.push(node.textContent))
-            .observe(node, {childList: true}); }"""
+            """(node) => {
+            window.fired = [];
+            const observer = new MutationObserver(() => window.fired.push(node.textContent));
+            observer.observe(node, {childList: true});
+            }"""
         )
         part(page, "speed").select_option(index=part(page, "speed").locator("option").count() - 1)
         part(page, "slider").fill("3")
@@ -349,15 +353,15 @@ def test_no_pulse_is_passed_over_while_it_plays(browse: Browse, written: Any) ->
 
 UNUSUAL = {
     "no-nutation": "inertia: {A: 120, C: 80}\nomega0: [0, 0, 3]\n",
-    "single-pulse-spin-reversed": "inertia: {A: 80, C: 120}\nstate: {spin: -30 rpm, nutation: "
-    "3 deg}\n"
+    "single-pulse-spin-reversed": "inertia: {A: 80, C: 120}\n"
+    "state: {spin: -30 rpm, nutation: 3 deg}\n"
     "thrusters: [{name: T1, torque: [0, 12, 0]}]\nlimits: {max_pulses: 1}\n",
     "three-moments": "inertia: {tensor: [[120, 3, 0], [3, 100, 0], [0, 0, 60]]}\n"
     "state: {spin: 6 rpm, nutation: 20 deg}\n",
     "very-small": "inertia: {A: 120, C: 80}\nstate: {spin: 30 rpm, nutation: 4e-7 deg}\n",
     "dots": (
-        "inertia: {A: 120, C: 80}\nomega0: [0.1, 0, 3]\nlimits: {earliest: 3000 s, horizon: "
-        "3600 s}\n"
+        "inertia: {A: 120, C: 80}\nomega0: [0.1, 0, 3]\n"
+        "limits: {earliest: 3000 s, horizon: 3600 s}\n"
     ),
     "sphere": "inertia: {A: 100, C: 100}\nomega0: [0.1, 0, 3]\n",
 }
@@ -368,8 +372,8 @@ def test_unusual_motions_are_shown_too(browse: Browse, written: Any, name: str) 
     with browse(written(f"name: {name}\n{UNUSUAL[name]}"), 800) as page:
         assert page.locator(".moving").is_visible()
         shapes = (
-            "[...document.querySelectorAll('.moving [d], .moving [transform]')].map((one) => "
-            "one.outerHTML).join()"
+            "[...document.querySelectorAll('.moving [d], .moving [transform]')]"
+            ".map((one) => one.outerHTML).join()"
         )
         for key in ("End", "Home", "PageUp", "End"):
             part(page, "slider").focus()
@@ -422,18 +426,21 @@ def test_nothing_of_it_is_cut(browse: Browse, written: Any, width: int) -> None:
         cut = page.evaluate(
             """[...document.querySelectorAll(".moving *")].filter((one) => {
             const box = one.getBoundingClientRect();
-            return box.width > 0 && !one.closest("defs") && (box.right > innerWidth + 0.5 || box.left < -0.5);
+            const beside = box.right > innerWidth + 0.5 || box.left < -0.5;
+            return box.width > 0 && !one.closest("defs") && beside;
             }).map((one) => one.outerHTML.slice(0, 90))"""
         )
         assert cut == []
         covered = page.evaluate(
             """[...document.querySelectorAll(".moving .panel svg")].flatMap((svg) => {
-            const boxes = [...svg.querySelectorAll("text")].filter((one) => one.closest("[data-part=globe]") === null)
+            const boxes = [...svg.querySelectorAll("text")]
+              .filter((one) => one.closest("[data-part=globe]") === null)
               .map((one) => [one.textContent, one.getBoundingClientRect()]);
-            return boxes.flatMap(([name, one], place) => boxes.slice(place + 1).filter(([, other]) =>
-              one.left < other.right && other.left < one.right
-              && one.top + 2 < other.bottom && other.top + 2 < one.bottom
-            ).map(([other]) => [name, other]));
+            const overlap = (one, other) => one.left < other.right && other.left < one.right
+              && one.top + 2 < other.bottom && other.top + 2 < one.bottom;
+            return boxes.flatMap(([name, one], place) => boxes.slice(place + 1)
+              .filter(([, other]) => overlap(one, other))
+              .map(([other]) => [name, other]));
             })"""
         )
         assert covered == []
@@ -567,8 +574,8 @@ def test_the_sheet_has_a_row_for_each_of_twenty_pulses(tab: Browse) -> None:
     with tab(LONG, 1280) as page:
         assert (
             page.evaluate(
-                "document.querySelectorAll('#manoeuvre .wide')[0].querySelectorAll('tbody "
-                "tr').length"
+                "document.querySelectorAll('#manoeuvre .wide')[0]"
+                ".querySelectorAll('tbody tr').length"
             )
             == 20
         )
@@ -608,18 +615,17 @@ def test_an_accessibility_checker_finds_nothing(tab: Browse, name: str) -> None:
 
 
 def test_no_stop_of_the_keyboard_does_nothing(tab: Browse) -> None:
-    """At 1280 px no table or picture scrolls, and none is a stop;
-    on a phone those that scroll are.
-    """
+    """At 1280 px no table or picture scrolls or is a stop; on a phone those that scroll are."""
     stops = """[...document.querySelectorAll("[tabindex='0'], summary, button, input, select, a")]
-      .filter((one) => one.checkVisibility() && !one.closest(".moving")).map((one) => one.className || one.tagName)"""
+      .filter((one) => one.checkVisibility() && !one.closest(".moving"))
+      .map((one) => one.className || one.tagName)"""
     with tab(BUILT_IN, 1280) as page:
         assert set(page.evaluate(stops)) == {"SUMMARY"}
     with tab(BUILT_IN, 400) as page:
         page.wait_for_function("document.querySelectorAll('.wide[tabindex]').length > 0")
         assert page.evaluate(
-            "[...document.querySelectorAll('.wide[tabindex]')].every((one) => one.scrollWidth > "
-            "one.clientWidth)"
+            "[...document.querySelectorAll('.wide[tabindex]')]"
+            ".every((one) => one.scrollWidth > one.clientWidth)"
         )
         box = page.locator("#schemes .wide").first
         assert box.get_attribute("aria-label")
@@ -678,7 +684,8 @@ def test_a_page_is_small_enough_to_send(pages: Callable[[str], Path], name: str)
 CONTRAST = """(selector) => {
   const colour = (text) => text.match(/[\\d.]+/g).map(Number);
   const light = (rgb) => {
-    const part = rgb.slice(0, 3).map((c) => (c /= 255) <= 0.03928 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4);
+    const linear = (c) => c <= 0.03928 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4;
+    const part = rgb.slice(0, 3).map((c) => linear(c / 255));
     return 0.2126 * part[0] + 0.7152 * part[1] + 0.0722 * part[2];
   };
   const behind = (node) => {
@@ -690,7 +697,8 @@ CONTRAST = """(selector) => {
   };
   return [...document.querySelectorAll(selector)].map((node) => {
     const style = getComputedStyle(node);
-    const ink = node instanceof SVGElement ? (style.fill !== "none" ? style.fill : style.stroke) : style.color;
+    const drawn = style.fill !== "none" ? style.fill : style.stroke;
+    const ink = node instanceof SVGElement ? drawn : style.color;
     const [one, other] = [light(colour(ink)), light(behind(node))].sort();
     const ratio = (Math.max(one, other) + 0.05) / (Math.min(one, other) + 0.05);
     return [ratio, node.tagName + "." + (node.className.baseVal ?? node.className) + " " + ink];

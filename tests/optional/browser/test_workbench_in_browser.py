@@ -1,6 +1,4 @@
-"""The workbench in a real browser: what it computes is what `flown` does; drag, keys, limits and
-copies.
-"""
+"""The workbench in a real browser: it computes what `flown` does; drag, keys, limits, copies."""
 
 import csv
 import io
@@ -491,8 +489,8 @@ def test_it_fits_one_screen_and_a_phone(browse: Browse, written: Any, name: str)
         assert bottom - top <= 800.0
     with browse(written(FILES[name]), 400) as page:
         wide = (
-            "[...document.querySelectorAll('.bench, .bench *')].filter((one) => "
-            "one.checkVisibility())"
+            "[...document.querySelectorAll('.bench, .bench *')]"
+            ".filter((one) => one.checkVisibility())"
         )
         assert page.evaluate(
             f"{wide}.every((one) => one.getBoundingClientRect().right <= innerWidth)"

@@ -1,6 +1,4 @@
-"""Messages read back by Orekit and by ccsds-ndm-py, and where the Sun is seen: every number that
-goes in comes out.
-"""
+"""Messages read back by Orekit and ccsds-ndm-py, and where the Sun is seen."""
 
 import math
 import re
@@ -31,9 +29,7 @@ MID_ARC = 1e-5
 """deg; how far an interpolated attitude may be off: 0.01 is promised, some 1e-7 is found."""
 
 ROUNDED = 4e-12
-"""rad; rounding of the angles in a message, which a rate that is interpolated has in it over the
-step.
-"""
+"""rad; rounding of the angles in a message, as an interpolated rate has it over the step."""
 
 
 @pytest.fixture
@@ -331,9 +327,7 @@ def test_the_second_reader_of_orbit_messages(reader: Any, notation: str) -> None
     "text", ["1998-01-07T02:28:44", "2026-03-20T12:00:00", "2026-09-11T06:30:00"]
 )
 def test_orekit_sees_it_there(text: str) -> None:
-    """Its analytical Sun needs no ephemeris, and errs by up to 0.1 deg itself: a check of frame and
-    time.
-    """
+    """Its analytical Sun errs by up to 0.1 deg itself: a check of frame and time."""
     orekit.start_or_skip()
     provider = orekit.java("org.orekit.bodies.AnalyticalSolarPositionProvider")()
     frame = orekit.java("org.orekit.frames.FramesFactory").getEME2000()

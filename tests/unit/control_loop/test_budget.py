@@ -373,9 +373,7 @@ def test_a_search_for_cycles_ends_with_its_budget_of_work(monkeypatch: pytest.Mo
 
 
 @pytest.mark.weekly
-def test_a_tank_whose_pressure_falls_lasts_as_long_as_a_loop_that_is_flown_until_it_is_empty() -> (
-    None
-):
+def test_a_tank_whose_pressure_falls_lasts_as_long_as_a_loop_flown_until_it_is_empty() -> None:
     body = replace(craft(degrees=0.4, loop=loop(gyro())), tank=Tank(0.15, 22e5, 8e5, 1.0))
     lasts = present(held_by(body)[0].lasts)
     run = fly(body, loop(gyro()), 1.2 * lasts, seed=3)

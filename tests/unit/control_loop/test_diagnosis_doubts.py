@@ -5,9 +5,7 @@ import pytest
 from nutdamp.control_loop.law import Diagnosis, Doubt, Glimpse
 
 
-def test_a_sensor_whose_scale_may_be_off_leaves_the_effect_open_by_that_share_of_the_nutation() -> (
-    None
-):
+def test_a_sensor_whose_scale_may_be_off_leaves_the_effect_open_by_that_share() -> None:
     before, after = (Glimpse(z, 50, 0j, 0j, 50.0, 1.0) for z in (0.02 + 0j, 0.019 + 0j))
     opens = []
     for scale in (0.0, 0.01):

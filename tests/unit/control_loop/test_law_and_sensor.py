@@ -314,7 +314,7 @@ def test_accelerometer_gives_the_rate_by_the_sine_of_a_period(
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_an_accelerometer_overestimates_a_body_that_the_law_does_not_know_by_no_more_than_said(
+def test_an_accelerometer_overestimates_a_body_unknown_to_the_law_by_no_more_than_said(
     seed: int,
 ) -> None:
     draw = np.random.default_rng(seed)
@@ -345,9 +345,7 @@ def test_estimates_do_not_depend_on_the_pieces_in_which_samples_come() -> None:
         assert np.allclose(whole, parts, rtol=1e-9, atol=1e-12, equal_nan=True)
 
 
-def test_an_accelerometer_with_too_many_samples_in_a_period_is_refused_before_they_are_held() -> (
-    None
-):
+def test_an_accelerometer_with_too_many_samples_in_a_period_is_refused_at_once() -> None:
     with pytest.raises(Infeasible, match="lower loop"):
         estimates(body(), Sensor(ACCELEROMETER, 1e6, position=SIDE))
 

@@ -38,9 +38,7 @@ def test_values_of_the_ratio_that_look_alike_the_nearest_to_the_file_first(
         assert np.array_equal(np.delete(one, at or 0), np.delete(fit.values, at or 0))
 
 
-def test_one_transverse_signal_leaves_the_sense_of_the_nutation_open_however_fast_it_is_sampled() -> (
-    None
-):
+def test_one_transverse_signal_leaves_the_sense_of_the_nutation_open_at_any_rate() -> None:
     fit = told(BODY, silent("omega_2", "omega_3", until=6.0, count=61), {"C/A": 0.75}, {})
     assert [one[fit.index("C/A")] for one in neighbours(fit.model, fit.values)] == pytest.approx(
         [1.25]

@@ -338,9 +338,7 @@ def test_of_unequal_moments_pulses_and_disturbances_push_in_the_axes_of_the_file
 
 
 @pytest.mark.deep
-def test_unequal_transverse_moments_are_seen_and_their_axes_and_equal_ones_not_taken_for_them() -> (
-    None
-):
+def test_unequal_transverse_moments_and_their_axes_are_seen_and_equal_ones_not() -> None:
     times = np.linspace(0.0, 60.0, 300)
     turn = math.radians(25.0)
     size = 1.5 / 120.0
@@ -418,9 +416,7 @@ def test_noise_for_rates_ends_and_is_no_nutation() -> None:
     assert spent.done < 1.3 * work.FIT
 
 
-def test_a_spin_the_other_way_than_in_the_file_is_doubted_and_its_nutation_counts_from_its_own_sense() -> (
-    None
-):
+def test_a_spin_against_the_file_is_doubted_and_nutation_counts_from_its_own_sense() -> None:
     fitted = fit(EXAMPLE, of_example(np.linspace(0.0, 60.0, 121), spin=-SPIN))
     nutation = estimate(fitted, "nutation")
     expected = math.atan2(120.0 * math.hypot(0.14, 0.12), 80.4 * SPIN)

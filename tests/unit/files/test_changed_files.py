@@ -404,7 +404,8 @@ goal: {tilt: 20 deg, azimuth: 0.5}
 valve: {open_delay: 10 ms, close_delay: 12 ms}
 thrusters:
   - {name: T1, position: [0, 0.5, 0.8], direction: [0, -1, 0], force: 10 N, isp: 220 s}  # pushed
-  - {name: T 2, torque: [0, 8 N m, 0], lever_arm: 1 m, isp: 220 s, valve: {open_delay: 0.02, close_delay: 0.02}}
+  - {name: T 2, torque: [0, 8 N m, 0], lever_arm: 1 m, isp: 220 s,
+     valve: {open_delay: 0.02, close_delay: 0.02}}
   - {name: T3, torque: [0, -8, 0], lever_arm: 1 m, isp: 220 s}
 tank: {propellant: 10 kg, pressure: 2e6, final_pressure: 1e6}
 limits: {horizon: 90 s, earliest: 1 s}
@@ -414,7 +415,8 @@ loop:
   start: 0.5 deg
   stop: 0.05 deg
 dispersions:
-  {A: {normal: 0.5 %}, C: {normal: 0.5 %}, thrust: {T1: {normal: 3 %}, T 2: {normal: 3 %}, T3: {normal: 2 %}}}
+  {A: {normal: 0.5 %}, C: {normal: 0.5 %},
+   thrust: {T1: {normal: 3 %}, T 2: {normal: 3 %}, T3: {normal: 2 %}}}
 """
 EVERYTHING = {
     "A": 121.0,

@@ -469,9 +469,7 @@ def test_a_failure_leaves_what_was_there_and_nothing_else(tmp_path: Path) -> Non
         make_folder("a\0b")
 
 
-def test_modes_stay_names_may_be_as_long_as_the_system_allows_and_need_not_be_utf_8_in_json(
-    tmp_path: Path,
-) -> None:
+def test_modes_stay_and_names_may_be_long_and_need_not_be_utf_8_in_json(tmp_path: Path) -> None:
     path = tmp_path / ("x" * 251 + ".csv")
     path.write_text("before")
     path.chmod(0o640)

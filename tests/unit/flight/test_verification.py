@@ -365,7 +365,8 @@ thrusters:
   - {name: A1, position: [ 0.27, 0, -0.64], direction: [0, 0, 1], force: 11.18 N, isp: 180.3 s}
   - {name: A2, position: [-0.27, 0, -0.64], direction: [0, 0, 1], force: 11.18 N, isp: 180.3 s}
 channels: {DV: [A1, A2]}
-tank: {propellant: 2 kg, pressure: 20 bar, final_pressure: 10 bar, inertia_per_kg: {A: 2 m^2, C: 4 m^2}}
+tank: {propellant: 2 kg, pressure: 20 bar, final_pressure: 10 bar,
+  inertia_per_kg: {A: 2 m^2, C: 4 m^2}}
 """
 
 

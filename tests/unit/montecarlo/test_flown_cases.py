@@ -489,7 +489,8 @@ goal: {right_ascension: 10 deg, declination: 70 deg}
 keep: [{name: Sun, direction: sun, min: 5 deg}]
 limits: {earliest: 1 s}
 requirement: {nutation: 2 deg, momentum_shift: 3 deg, probability: 60 %}
-dispersions: {A: {normal: 1 %}, C: {normal: 1 %}, omega0: {normal: 0.1 deg/s}, thrust: {normal: 3 %}}
+dispersions: {A: {normal: 1 %}, C: {normal: 1 %}, omega0: {normal: 0.1 deg/s},
+  thrust: {normal: 3 %}}
 """
 """A rhumb line passes the cone by 0.05 deg with nominal values, half-cones by 1.3 deg."""
 

@@ -166,9 +166,7 @@ def test_the_worst_miss_the_requirement_most(plain: Results) -> None:
     assert free.worst.cases[0] == np.argmax(values_of(free)[0])
 
 
-def test_a_share_is_shown_beyond_its_interval_at_first_of_all_but_a_millionth_at_last_of_95_percent() -> (
-    None
-):
+def test_a_share_is_shown_beyond_its_interval_of_all_but_a_millionth_then_of_95_percent() -> None:
     for met, early, last in (
         (950, True, True),
         (880, None, True),
@@ -453,9 +451,7 @@ def test_the_percentile_of_a_small_nutation_follows_from_the_covariance() -> Non
     assert nutation.quantiles(np.array([0.99]))[0] == pytest.approx(expected, rel=0.03)
 
 
-def test_shares_sum_to_one_a_bias_has_none_and_the_attitude_moves_only_where_the_axis_points() -> (
-    None
-):
+def test_shares_sum_to_one_a_bias_has_none_and_attitude_moves_only_the_axis() -> None:
     biased = replace(present(JETS.spacecraft.dispersions), C=Tolerance("bias", 0.8))
     first = first_order(DispersedModel(replace(JETS.spacecraft, dispersions=biased), JETS.schedule))
     names = [entry.name for entry in first.inputs]
@@ -1126,7 +1122,8 @@ inertia: {A: 120, C: 80}
 state: {spin: 30 rpm, nutation: 0.4 deg, phase: 40 deg}
 thrusters:
   - {name: a, torque: [8, 0, 0], lever_arm: 0.8, isp: 220, min_on_time: 20 ms, max_on_time: 90 ms}
-  - {name: b, torque: [-8, 0, 0], lever_arm: 0.8, isp: 220, impulse_bit: [[20 ms, 0.15, 16 ms], [90 ms, 0.8, 60 ms]]}
+  - {name: b, torque: [-8, 0, 0], lever_arm: 0.8, isp: 220,
+     impulse_bit: [[20 ms, 0.15, 16 ms], [90 ms, 0.8, 60 ms]]}
   - {name: c, torque: [0, 8, 0], lever_arm: 0.8, isp: 220, min_on_time: 20 ms, max_on_time: 90 ms}
 valve: {open_delay: 8 ms, close_delay: 12 ms, rise_time: 5 ms, fall_time: 10 ms}
 """

@@ -482,9 +482,7 @@ def flown(body: Spacecraft, schedule: Schedule) -> NDArray[np.float64]:
 
 
 @pytest.mark.deep
-def test_limits_to_hold_are_those_of_cases_that_end_well_and_the_last_row_accepts_what_is_required() -> (
-    None
-):
+def test_limits_to_hold_are_of_cases_that_end_well_and_the_last_accepts_what_is_required() -> None:
     """Of this body two in three cases end well, of which half are required."""
     limits = {"nutation": "0.5 deg", "momentum_shift": "0.2 deg", "probability": 0.5}
     body = nutdamp.example().with_(

@@ -312,7 +312,7 @@ def test_magnus_17_is_the_motion(A: float, C: float, spin: float) -> None:
         assert found[2] == pytest.approx(ends, rel=2 * EPS)
 
 
-def test_magnus_17_steps_at_the_moment_of_an_impulse_and_turns_at_minus_a_omega3() -> None:
+def test_magnus_17_steps_at_an_impulse_and_turns_at_minus_a_omega3() -> None:
     times = np.linspace(0.0, 20.0, 7)
     free = summed(120.0, 80.0, reference.vector(0.3, 0.4, -2), [], *times)
     assert free[:, 0] + 1j * free[:, 1] == pytest.approx(

@@ -113,7 +113,7 @@ def raising(error: type[Exception]) -> Callable[..., object]:
     return broken
 
 
-def test_a_scheme_with_a_bug_leaves_the_others_also_where_it_shows_only_when_the_plan_is_judged(
+def test_a_scheme_with_a_bug_leaves_the_others_also_where_it_shows_when_judged(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     body = spinner(channels=cross(20.0))
@@ -230,8 +230,10 @@ name: three moments
 inertia: {tensor: [[100, 3, 1], [3, 80, -2], [1, -2, 45]]}
 omega0: [0.1, -0.15, 2.5]
 thrusters:
-  - {name: A1, position: [0, 0.5, 0.8], direction: [1, 0, 0.1], force: 12 N, isp: 220 s, max_on_time: 1 s}
-  - {name: A2, position: [0.5, 0, 0.8], direction: [0, -1, 0.2], force: 12 N, isp: 220 s, max_on_time: 1 s}
+  - {name: A1, position: [0, 0.5, 0.8], direction: [1, 0, 0.1], force: 12 N, isp: 220 s,
+     max_on_time: 1 s}
+  - {name: A2, position: [0.5, 0, 0.8], direction: [0, -1, 0.2], force: 12 N, isp: 220 s,
+     max_on_time: 1 s}
 requirement: {nutation: 0.3 deg, momentum_shift: 2 deg}
 limits: {horizon: 120 s, tick: 1 ms, max_pulses: 6}
 """
@@ -320,9 +322,7 @@ def test_schemes_and_judge_go_by_the_same_limits(
     assert keeps_limits(within(limits), fired(*pulses)) is (broken is None)
 
 
-def test_breaches_say_which_limit_which_pulse_and_by_how_much_and_each_limit_is_named_once() -> (
-    None
-):
+def test_breaches_say_which_limit_which_pulse_and_by_how_much_each_limit_once() -> None:
     body = within(replace(TIGHT, tick=0.05))
     made = fired((0.5, 0.1), (6.5, 0.2), (6.98, 0.3), (25.0, 9.0))
     lines = [
@@ -453,9 +453,7 @@ def test_spin_change_and_propellant(scheme: str) -> None:
     assert STANDARD_GRAVITY == 9.80665
 
 
-def test_propellant_of_all_thrusters_of_a_channel_and_by_lever_arms_and_one_unknown_makes_the_sum_unknown() -> (
-    None
-):
+def test_propellant_of_a_channel_and_by_lever_arms_and_one_unknown_makes_the_sum_unknown() -> None:
     pulse = channel_pulse(Channel("both", tuple(one.thrusters[0] for one in JETS[:2])), 3.0, 2.0)
     thrust = math.hypot(10.0, 1.0) + math.hypot(8.0, 2.0)
     assert pulse.propellant == pytest.approx(thrust * 2.0 / (220.0 * 9.80665), rel=1e-15)

@@ -192,9 +192,7 @@ def test_the_cheapest_plan_of_which_enough_cases_comply_in_fresh_ones_too(
     assert (found, decided) == (None if chosen is None else plans[chosen], ground)
 
 
-def test_else_the_plan_with_most_cases_or_that_leaves_least_and_the_cheapest_within_the_sampling_error() -> (
-    None
-):
+def test_else_most_cases_or_what_leaves_least_and_the_cheapest_within_the_sampling_error() -> None:
     """Angles within 5 % are equal."""
     for plans, chosen, ground, equals in (
         ([candidate(1.0, LESS), candidate(2.0, MOST)], 0, Ground.COST, 2),
@@ -235,9 +233,7 @@ def test_a_thruster_that_cannot_be_trusted_is_left_out() -> None:
 
 
 @pytest.mark.deep
-def test_where_nothing_is_better_the_plan_recommended_for_nominal_values_stays_of_many_that_keep_the_limits() -> (
-    None
-):
+def test_where_nothing_is_better_the_plan_for_nominal_values_stays_of_many_within_limits() -> None:
     body = dispersed()
     found = planned(body)
     assert best(found) is found.usual
@@ -383,9 +379,7 @@ def test_the_share_is_that_of_the_real_widths_and_how_far_it_is_can_be_watched(
     assert robust.variations_of(compare(dispersed(), ("four-pulse",))) == []
 
 
-def test_the_json_has_what_the_best_costs_fresh_cases_and_what_would_have_to_be_better_known() -> (
-    None
-):
+def test_the_json_has_what_the_best_costs_fresh_cases_and_the_tolerances_to_shrink() -> None:
     dear, usual = candidate(2.0, MOST, 0.5, end=3.0), candidate(1.0, LEAST, 1.0)
     body = usual.plan.spacecraft
     dear.plan = replace(dear.plan, spacecraft=body)
@@ -429,9 +423,7 @@ def test_the_json_has_what_the_best_costs_fresh_cases_and_what_would_have_to_be_
 
 @pytest.mark.deep
 @pytest.mark.usefixtures("untightened")
-def test_the_robust_plan_of_a_spacecraft_with_commands_can_be_commanded_unless_pulses_may_be_timed() -> (
-    None
-):
+def test_the_robust_plan_with_commands_can_be_commanded_unless_pulses_may_be_timed() -> None:
     """Timed pulses cost far less."""
     body = replace(nutdamp.load(case("cbp1004.yaml")), dispersions=EXACT)
     compared = compare(body, ("command-block", "two-pulse"), samples=200)
@@ -840,9 +832,7 @@ def test_limits_and_windows_are_kept() -> None:
     assert [violations(body, one.pulses) for one in made] == [[]] * len(made)
 
 
-def test_nothing_where_nothing_is_required_and_nothing_has_to_shrink_where_enough_cases_comply() -> (
-    None
-):
+def test_nothing_is_said_without_requirement_and_nothing_shrinks_where_enough_comply() -> None:
     body = a_body()
     assert list(chance_plan.plans(replace(body, requirement=None))) == []
     assert list(chance_plan.plans(replace(body, dispersions=None))) == []
@@ -999,9 +989,7 @@ def enough_of_fresh(plan: planning.Plan) -> bool:
 
 
 @pytest.mark.weekly
-def test_of_thirty_random_spacecraft_no_fewer_cases_comply_with_any_and_clearly_more_with_most() -> (
-    None
-):
+def test_of_thirty_random_spacecraft_no_fewer_cases_comply_and_with_most_clearly_more() -> None:
     gains = [gained(seed) for seed in range(30)]
     assert min(gains) >= -0.005
     assert sum(gain > 0.03 for gain in gains) >= 20

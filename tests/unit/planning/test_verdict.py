@@ -377,7 +377,7 @@ def test_the_cone_about_h_bounds_the_nutation_on_the_way() -> None:
 @pytest.mark.parametrize(
     ("tolerance", "rpm", "complying"), [(None, 0.2, 0.377), ("0.1 %", 0.02, 0.156)]
 )
-def test_spin_is_a_bound_like_any_other_within_one_percent_of_the_goal_unless_required_otherwise(
+def test_spin_is_a_bound_within_one_percent_of_the_goal_unless_required_otherwise(
     tolerance: str | None, rpm: float, complying: float
 ) -> None:
     """Rim spinner with two thrusters that spin it up from 15 rpm."""
@@ -463,9 +463,7 @@ def test_json_and_the_table_of_schemes_have_the_verdict_of_each(run: Run, tmp_pa
 
 
 @pytest.mark.deep
-def test_the_table_of_schemes_goes_by_cases_has_the_share_where_all_have_flown_and_what_is_infeasible(
-    run: Run,
-) -> None:
+def test_the_table_of_schemes_goes_by_cases_has_shares_and_what_is_infeasible(run: Run) -> None:
     two, four = csv_rows(run(*BOTH_SCHEMES, "--table", "-").stdout)
     assert [(row["recommended"], row["meets_requirement"]) for row in (two, four)] == [
         ("true", "true"),
@@ -716,9 +714,7 @@ def idle(body: Spacecraft, degrees: float, t: float) -> float:
     return math.degrees(seen_at(by_impulses(left, Schedule(()), t), t).final.nutation)
 
 
-def test_nutation_that_grows_or_decays_is_said_to_keep_the_requirement_for_a_while_or_from_when_on() -> (
-    None
-):
+def test_nutation_that_grows_or_decays_keeps_the_requirement_for_a_while_or_from_when_on() -> None:
     """Before any pulse and again after the last one; the times end where a flight without pulses
     says.
     """
@@ -936,9 +932,7 @@ def test_no_point_is_beaten_by_one_of_a_stricter_front() -> None:
 
 
 @pytest.mark.deep
-def test_a_point_is_judged_by_all_cases_as_any_schedule_is_or_by_nominal_values_on_request() -> (
-    None
-):
+def test_a_point_is_judged_by_all_cases_as_any_schedule_or_by_nominal_values() -> None:
     """One of four-pulse: 90 % of cases comply."""
     made = planning.plan(nutdamp.example(), "four-pulse")
     point = tradeoff.Point(made, 40.0, "kg")

@@ -1,6 +1,4 @@
-"""One pulse (21), two pulses (22) and pulses at every alignment, Magnus 1970: torquers and
-body-fixed thrusters.
-"""
+"""One pulse (21), two pulses (22) and pulses at every alignment, Magnus 1970."""
 
 import cmath
 import itertools
@@ -63,9 +61,7 @@ each_shape = pytest.mark.parametrize(
 def check_exact(
     spacecraft: Spacecraft, scheme: str, count: int, *, by_reference: bool = True
 ) -> planning.Plan:
-    """No nutation is left, and of two pulses no shift of H,
-    flown and by the reference integrator.
-    """
+    """No nutation is left, and of two pulses no shift of H, flown and by the reference."""
     plan = feasible_by(scheme, spacecraft)
     assert len(plan.pulses) == count
     ends = [(left(plan).nutation, left(plan).momentum_shift)]
@@ -195,9 +191,7 @@ def test_one_ideal_steerable_impulse_at_once(A: float, C: float, spin: float) ->
 def test_one_steerable_pulse_of_real_width_or_a_train_where_the_torquer_is_too_weak(
     A: float, C: float, spin: float
 ) -> None:
-    """Up to nine tenths of what one pulse can do at all, 2M/|aω3|; the last of a train stands
-    against what is left.
-    """
+    """Up to nine tenths of what one pulse can do at all, 2M/|aω3|; a train ends by what is left."""
     plain = spinner(A, C, spin, 8.0)
     rate = max(abs(plain.inertia.a * spin), 0.3)
     for share in (0.1, 0.9):
@@ -216,9 +210,7 @@ def test_one_steerable_pulse_of_real_width_or_a_train_where_the_torquer_is_too_w
 
 
 def test_a_steerable_pulse_starts_no_sooner_than_it_may() -> None:
-    """Not at -1e-17 s by rounding of impulse over torque; one of 1.06 s fits neither before nor
-    between windows.
-    """
+    """Not at -1e-17 s by rounding; 1.06 s fit neither before nor between windows."""
     for torque in range(5, 105):
         assert (
             planning.plan(spinner(steerable=Steerable(torque / 0.7)), "one-pulse")
@@ -235,9 +227,7 @@ def test_a_steerable_pulse_starts_no_sooner_than_it_may() -> None:
 def test_a_fixed_pulse_waits_until_it_opposes_omega_and_short_ones_make_a_train(
     A: float, C: float, spin: float
 ) -> None:
-    """Pulses of real width that leave nothing; equal ones come at successive alignments, one body
-    period apart.
-    """
+    """Pulses of real width that leave nothing; equal ones, one body period apart."""
     for channels in (cross(60.0)[:1], cross(60.0), fan(3, 50.0), fan(6, 80.0)):
         spacecraft = spinner(A, C, spin, 2.0, channels=channels)
         check_opposed(spacecraft, check_exact(spacecraft, "one-pulse", 1).pulses)
@@ -258,9 +248,7 @@ def test_a_fixed_pulse_waits_until_it_opposes_omega_and_short_ones_make_a_train(
 
 
 def test_what_one_pulse_is_chosen_and_what_ticks_and_max_pulses_leave() -> None:
-    """Half a tick of on-time in about a second, half a tick of turning at 1 rad/s,
-    of 5° are left.
-    """
+    """Of 5° half a tick of on-time in a second and of turning at 1 rad/s are left."""
     channels = (
         channel("weak", 0.0, 5.0, 0.0, max_on_time=0.2, isp=300.0, thrust=1.0),
         channel("thirsty", 40.0, 0.0, 0.0, isp=100.0, thrust=20.0),
@@ -365,9 +353,7 @@ def test_literal_reproduces_the_printed_scheme(spin: float) -> None:
         assert math.degrees(left(plan).momentum_shift) == pytest.approx(displaced, abs=digit)
 
 
-def test_the_second_waits_for_a_later_half_turn_where_a_window_or_a_gap_rules_out_the_first() -> (
-    None
-):
+def test_the_second_waits_for_a_later_half_turn_where_a_window_or_gap_rules_out_the_first() -> None:
     half = rigid_body.half_pulses(120.0, 80.0, spinner().transverse_rate, 3.0).wait
     assert check_exact(spinner(), "two-pulse", 2).pulses.end == pytest.approx(half, rel=1e-12)
     covered = spinner(limits=Limits(blackout=((0.5 * half, 2.0 * half),), earliest=0.0))
@@ -382,9 +368,7 @@ def test_the_second_waits_for_a_later_half_turn_where_a_window_or_a_gap_rules_ou
 def test_where_fixed_channels_never_line_up_the_cost_is_that_of_the_physics_sheet(
     spin: float,
 ) -> None:
-    """A/C = 1.25 with ±1, ±2 costs 1/cos 18° = 1.051 × A|ω0| at any horizon: small angle, pulses
-    short.
-    """
+    """A/C = 1.25 with ±1, ±2 costs 1/cos 18° = 1.051 × A|ω0| at any horizon, pulses short."""
     for horizon in (None, 500.0):
         body = spinner(
             100.0, 80.0, spin, 0.1, channels=cross(1000.0), limits=Limits(horizon=horizon)
@@ -424,9 +408,7 @@ def test_on_times_too_short_leave_a_remainder_and_say_so() -> None:
 def test_of_pairs_that_cost_about_the_same_the_first_to_end_is_taken(
     channels: tuple[Channel, ...],
 ) -> None:
-    """With three channels the cheapest pair saves 0.04 % and ends 2.4 s later than the first exact
-    one.
-    """
+    """Of three channels the cheapest pair saves 0.04 % and ends 2.4 s after the first exact one."""
     spacecraft = spinner(channels=channels)
     weighed = planning.alternatives(spacecraft, "two-pulse")
     taken = feasible_by("two-pulse", spacecraft).pulses
@@ -531,9 +513,7 @@ def test_fine_damping_with_a_shortest_pulse_leaves_nothing_or_half_of_it(
 
 
 def test_on_times_of_four_pulse() -> None:
-    """An eighth of the body period or the longest allowed; |ω| below J/(2A) from the start: no
-    pulse.
-    """
+    """An eighth of the body period or the longest allowed; |ω| below J/(2A) at first: no pulse."""
     for longest, expected in ((math.inf, spinner().body_period / 8), (0.3, 0.3)):
         made = feasible_by("four-pulse", spinner(channels=cross(1.0, max_on_time=longest))).pulses
         assert made.pulses[0].on_time == pytest.approx(expected, rel=1e-15)
@@ -549,9 +529,7 @@ def test_on_times_of_four_pulse() -> None:
 
 
 def test_with_a_wheel_at_no_spin_a_pair_closes_that_stands_still_in_space() -> None:
-    """No two channels were found from 3 deg on; -M2 for 1.1492 s and +M2 for 1.1478 s leave 0.002
-    deg of shift.
-    """
+    """None was found from 3 deg on; -M2 for 1.1492 s and +M2 for 1.1478 s leave 0.002 deg."""
     body = load_spacecraft(case("two-pulse-despun.yaml"))
     for omega3 in (0.0, 0.003, -0.003):
         plan = feasible_by("two-pulse", replace(body, omega0=np.array([*body.omega0[:2], omega3])))
@@ -564,9 +542,7 @@ def test_with_a_wheel_at_no_spin_a_pair_closes_that_stands_still_in_space() -> N
     ("scheme", "count"), [("one-pulse", 2), ("two-pulse", 4), ("four-pulse", 2)]
 )
 def test_where_omega_stands_still_channels_take_its_components(scheme: str, count: int) -> None:
-    """A wheel may leave ν = 0 but for rounding, which made a period of 2 Gyr, and "would leave 90
-    deg".
-    """
+    """ν = 0 but for rounding made a period of 2 Gyr, and "would leave 90 deg"."""
     body = load_spacecraft(case("standing-gyrostat.yaml"))
     assert (body.nutation_rate, body.body_period) == (0.0, math.inf)
     for craft in (body, spinner(*SPHERE, 2.0, 5.0, 0.6, channels=cross(8.0))):
@@ -607,9 +583,7 @@ def test_on_a_sphere_channels_share_the_nutation() -> None:
 
 
 def test_what_a_tick_leaves_does_not_make_another_thruster_dearer() -> None:
-    """The alignment of the dear one is on a tick, so that it leaves nothing; the cheap one leaves
-    some 0.1 %.
-    """
+    """The dear one is on a tick and leaves nothing; the cheap one leaves some 0.1 %."""
     channels = tuple(
         channel(name, *torque, 0.0, thrust=8.0, isp=isp)
         for name, torque, isp in (("dear", (8.0, 0.0), 100.0), ("cheap", (0.0, 8.0), 220.0))
@@ -652,9 +626,7 @@ def left_by(spacecraft: Spacecraft, scheme: str, options: Options | None = None)
 
 
 def test_the_model_turns_at_the_true_nutation_rate() -> None:
-    """0.775 rad/s for 120, 100, 80 kg m² and 3 rad/s, which the mean (0.818) misses; of a symmetric
-    body it is that.
-    """
+    """0.775 rad/s for 120, 100, 80 kg m² and 3 rad/s, which the mean (0.818) misses."""
     spacecraft = replace(body(120.0, 100.0, 80.0), omega0=np.array([0.1, 0.05, 3.0]))
     assert model_of(spacecraft).symmetric.inertia.a * 3.0 == pytest.approx(0.775, abs=5e-4)
     assert spacecraft.inertia.a * 3.0 == pytest.approx(0.818, abs=5e-4)
@@ -754,9 +726,7 @@ def test_steady_omega_is_the_forced_term_where_the_disturbance_beats_within_the_
 
 @pytest.mark.parametrize("spin", [3.0, -3.0])
 def test_a_walk_goes_on_while_the_spin_drifts(spin: float) -> None:
-    """A pulse of half a second at 12 s; 2 N m about axis 3 change the spin by a quarter and ω's
-    phase by 3.75 rad.
-    """
+    """Half a second at 12 s; 2 N m about axis 3: the spin by a quarter, the phase by 3.75 rad."""
     axial = np.array([0.0, 0.0, 2.0])
     jet = channel("T", 8.0, 3.0, 0.0)
     drifting = replace(
@@ -835,9 +805,7 @@ def jets(torque: float, count: int = 4, longest: float = math.inf) -> tuple[Chan
 
 
 def random_body(seed: int) -> Spacecraft:
-    """Prolate or oblate, 1 to 50 degrees, one to four channels, time constants of 1 to 1000
-    inertial periods.
-    """
+    """Prolate or oblate, 1 to 50 degrees, one to four channels, τ of 1 to 1000 inertial periods."""
     draw = np.random.default_rng(seed)
     C = 100.0 * (draw.uniform(0.2, 0.85) if draw.random() < 0.5 else draw.uniform(1.15, 1.95))
     spin = draw.choice([-1.0, 1.0]) * draw.uniform(0.5, 5.0)
@@ -903,9 +871,7 @@ def test_a_walk_coasts_as_the_flight_does(C: float, spin: float) -> None:
 
 
 def test_alignments_are_found_while_the_spin_falls_and_none_in_flat_spin() -> None:
-    """At 50 degrees, τ = 12 s: the turns of ω in the body get longer, and after some there are no
-    more.
-    """
+    """At 50 degrees, τ = 12 s, the turns of ω in the body get longer and then there are none."""
     (jet,), moments = jets(5.0, 1), list[float]()
     for earliest in np.arange(0.0, 60.0, 2.0):
         limits = Limits(horizon=1e5, earliest=float(earliest))
@@ -957,9 +923,7 @@ def test_no_bound_is_claimed_under_dissipation(run: Run, plans_shared: None) -> 
 @pytest.mark.deep
 @pytest.mark.parametrize(("A", "C"), [(80.0, 120.0), (120.0, 80.0)], ids=["oblate", "prolate"])
 def test_the_first_order_least_knows_dissipation(A: float, C: float) -> None:
-    """Small angles: with κ the optimum waits (oblate) or hurries (prolate), and costs what the
-    program says.
-    """
+    """Small angles: with κ the optimum waits (oblate) or hurries (prolate), as the program says."""
     body = spinner(A, C, degrees=0.5, channels=jets(5.0, longest=0.5), limits=Limits(horizon=60.0))
     one = planning.plan(replace(body, dissipation=100.0), "optimal")
     bounds = present(one.pulses.bounds)
@@ -972,9 +936,7 @@ def test_the_first_order_least_knows_dissipation(A: float, C: float) -> None:
 
 @pytest.mark.weekly
 def test_what_dissipation_takes_out_alone_leaves_pulses_that_can_be_commanded() -> None:
-    """An oblate body, 30 time constants of horizon: the longer it waits, the less it costs, without
-    end.
-    """
+    """An oblate body, 30 time constants of horizon: the longer it waits, the less it costs."""
     body = replace(
         spinner(80.0, 120.0, channels=jets(400.0, 3), limits=Limits(horizon=600.0)),
         dissipation=20.0,

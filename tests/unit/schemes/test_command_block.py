@@ -391,9 +391,7 @@ def test_no_other_block_is_better_is_said_of_the_best_one_alone() -> None:
 
 
 @pytest.mark.weekly
-def test_ticks_are_superseded_by_the_steps_of_commands_and_a_note_says_so_where_they_differ() -> (
-    None
-):
+def test_ticks_give_way_to_the_steps_of_commands_and_a_note_says_so_where_they_differ() -> None:
     free, ticked = planned(a_turn()), planned(a_turn(tick=0.0173))
     assert ticked.pulses.blocks == free.pulses.blocks
     assert one_of(ticked.pulses.notes, "tick-not-kept")["tick_s"] == 0.0173

@@ -49,9 +49,7 @@ def still(
 
 
 def train(spacecraft: Spacecraft, *, near: float = 1e-9, **options: Any) -> planning.Plan:
-    """The plan, which by the reference ends on the target with equal pulses behind what damps the
-    nutation.
-    """
+    """The plan, which by the reference ends on target, with equal pulses behind the damping."""
     plan = feasible_by("rhumb-line", spacecraft, Options(**options))
     sizes = np.array([pulse.on_time or pulse.magnitude for pulse in equal(plan)])
     assert sizes == pytest.approx(sizes[:1].repeat(len(sizes)), rel=1e-12)
@@ -178,9 +176,7 @@ def test_fewer_pulses_than_close_by_themselves_are_trimmed_to_close() -> None:
 
 @pytest.mark.deep
 def test_on_ticks_the_width_is_one_of_them_and_starts_leave_little() -> None:
-    """What is left is the rounding of starts: by 10 ms a pulse is turned by 1.7 deg, of its 0.7
-    deg.
-    """
+    """What is left is the rounding of starts: 10 ms turn a pulse by 1.7 deg, of its 0.7 deg."""
     body = still(
         tilt=12.0, azimuth=45.0, channels=cross(20.0), limits=Limits(horizon=400.0, tick=0.01)
     )
@@ -202,9 +198,7 @@ def test_on_ticks_the_width_is_one_of_them_and_starts_leave_little() -> None:
 def test_pulses_that_damp_make_up_for_unequal_moments_where_the_width_is_given(
     degrees: float, turn: float, on_time: float
 ) -> None:
-    """By the starts of the last eight pulses alone the end was off by up to 0.2 deg; what is left
-    is said.
-    """
+    """By the last eight starts alone the end was off by up to 0.2 deg; what is left is said."""
     channels = tuple(
         channel(name, torque, 0.0, 0.0, max_on_time=0.4)
         for name, torque in (("P", 8.0), ("N", -8.0))
@@ -233,9 +227,7 @@ def test_pulses_come_once_or_more_in_each_turn(per_turn: int) -> None:
 
 @spread(("A", "C"), [(120.0, 80.0), (80.0, 120.0), (100.0, 93.0)], quick=1)
 def test_equal_pulses_once_a_turn_leave_no_more_nutation_than_the_bound(A: float, C: float) -> None:
-    """(angle per pulse)/|sin πa|, and the count chosen closes:
-    flown by the reference integrator.
-    """
+    """(angle per pulse)/|sin πa|, and the count chosen closes, by the reference integrator."""
     body = still(A, C, 10.0, channels=cross(20.0), limits=Limits(horizon=400.0))
     pulses = feasible_by("rhumb-line", body).pulses.pulses
     bound = pulses[0].magnitude / (C * 3.0) / abs(math.sin(math.pi * (1 - C / A)))
@@ -249,9 +241,7 @@ def test_equal_pulses_once_a_turn_leave_no_more_nutation_than_the_bound(A: float
 
 
 def test_where_there_is_no_train_the_reason_is_said() -> None:
-    """Where every pulse meets the nutation in the same phase, of too little time, and of lengths no
-    pulse can have.
-    """
+    """Pulses that meet the nutation in one phase, too little time, impossible lengths."""
     short: dict[str, Any] = {
         "channels": cross(60.0),
         "limits": Limits(horizon=60.0),
@@ -276,9 +266,7 @@ def test_where_there_is_no_train_the_reason_is_said() -> None:
 @pytest.mark.deep
 @spread("seed", range(20), quick=1)
 def test_course_and_way_of_a_rhumb_line(seed: int) -> None:
-    """Small steps on the course as it is at each point end on the target after the way reported at
-    first.
-    """
+    """Small steps on the course at each point end on the target after the reported way."""
     here, target, sun = (
         axis / np.linalg.norm(axis) for axis in np.random.default_rng(seed).normal(size=(3, 3))
     )
@@ -421,9 +409,7 @@ def test_back_to_h_is_the_damping_without_drift(A: float, C: float) -> None:
 def test_from_a_pure_spin_cones_cost_the_closed_form(
     cones: int, A: float, C: float, spin: float
 ) -> None:
-    """2n C|ω3| tan(β/2n) in n + 1 pulses, half an inertial turn of the small cone apart; two pulses
-    are one of them.
-    """
+    """2n C|ω3| tan(β/2n) in n + 1 pulses, half an inertial turn of the small cone apart."""
     for tilt in (0.1, 1.0, 30.0, 100.0):
         half = math.radians(tilt) / (2 * cones)
         wait = math.pi * A * math.cos(half) / (C * 3.0)
@@ -485,9 +471,7 @@ def test_more_cones_cost_less_down_to_the_floor_and_as_many_are_taken_as_are_wor
 def test_cones_of_a_torquer_near_its_reach_are_alike(
     A: float, C: float, spin: float, torque: float, tilt: float, cones: tuple[int, ...]
 ) -> None:
-    """2J of the first, the last, and of each half between, J = 2M/ω asin(ωh tan δ/2M): no more than
-    equal ones.
-    """
+    """2J of first and last and each half between, J = 2M/ω asin(ωh tan δ/2M): at most equals."""
     h = C * abs(spin)
     rate = 0.5 * abs(spin)
     taken = []
@@ -507,9 +491,7 @@ def test_cones_of_a_torquer_near_its_reach_are_alike(
 @spread("degrees", [1.0, 5.0, 20.0], quick=1)
 @spread(("tilt", "azimuth"), [(10.0, 45.0), (60.0, -120.0)], quick=1)
 def test_cones_take_a_nutation_along(degrees: float, tilt: float, azimuth: float) -> None:
-    """The first pulse jumps straight onto the first cone: no more than damping first and turning
-    then.
-    """
+    """The first pulse jumps straight onto the first cone: no dearer than damping first."""
     spacecraft = aimed(spinner(degrees=degrees), tilt, azimuth)
     for cones in (1, 2, 4):
         cost = acquired(spacecraft, "half-cone", cones=cones).total_impulse
@@ -523,9 +505,7 @@ def test_cones_take_a_nutation_along(degrees: float, tilt: float, azimuth: float
 def test_both_free_numbers_are_the_best_on_a_grid(
     degrees: float, tilt: float, azimuth: float
 ) -> None:
-    """Start anywhere on the cone, H anywhere on the line of equal distance: written out here once
-    more.
-    """
+    """Start anywhere on the cone, H on the line of equal distance: written out once more."""
     spacecraft = aimed(spinner(degrees=degrees), tilt, azimuth)
     h = 80.0 * 3.0
     target = spacecraft.target_axis
@@ -553,9 +533,7 @@ def test_both_free_numbers_are_the_best_on_a_grid(
 
 
 def test_within_a_short_horizon_h_goes_beside_its_shortest_way_for_as_little_as_it_saves() -> None:
-    """By the shortest way at each start the two pulses would take 83.0204 N m s, 0.025 % more than
-    the best found.
-    """
+    """By the shortest way the two pulses would take 83.0204 N m s, 0.025 % more than the best."""
     body = spinner(
         120.0, 60.0, 3.0, 19.544470631881207, steerable=Steerable(), limits=Limits(horizon=3.0)
     )
@@ -648,9 +626,7 @@ def test_other_targets_that_are_reached(scheme: str, body: Spacecraft, tilt: flo
 
 
 def test_why_not() -> None:
-    """What one pulse can do is said: 2M/|ω3|; and that what damps first ends so late that no time
-    is left.
-    """
+    """What one pulse can do is said, 2M/|ω3|; and that damping first leaves no time."""
     weak = channel("+1", 1.0, 0.0, 0.0)
     late: dict[str, Any] = {
         "channels": (
@@ -738,9 +714,7 @@ def test_arc_efficiency_is_the_mean_of_the_turning_torque_and_on_time_its_invers
 def test_a_target_that_the_spin_axis_meets_by_itself_takes_one_impulse_when_it_is_there(
     name: str, scheme: str
 ) -> None:
-    """Where the spin axis is at t = 0, or on its way about H a quarter turn later: damped then and
-    there, at A|ω0|.
-    """
+    """At t = 0, or on its way about H a quarter turn later: damped then and there, at A|ω0|."""
     body = load_spacecraft(case(f"{name}.yaml"))
     quarters = float("tilt" in name)
     made = planning.plan(body, scheme).pulses

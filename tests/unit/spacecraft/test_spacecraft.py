@@ -46,9 +46,7 @@ def windows(**limits: object) -> Windows:
 
 
 def test_where_a_pulse_is_allowed() -> None:
-    """Within the horizon, once the actuators are ready; it may touch a blackout window by its edges
-    only.
-    """
+    """Within the horizon, actuators ready; it may touch a blackout window by its edges only."""
     free, dark = windows(), windows(blackout=((10.0, 20.0),))
     endless = Windows(spinner(limits=Limits(horizon=10.0, blackout=((20.0, 30.0),))), endless=True)
     for within, start, on_time, ready, allowed in [
@@ -64,9 +62,7 @@ def test_where_a_pulse_is_allowed() -> None:
 
 
 def test_earliest_start() -> None:
-    """Out of one blackout into no other, overlapping, out of order, with a hole too short for the
-    pulse; on ticks.
-    """
+    """Out of one blackout into no other: overlapping, out of order, a hole too short; on ticks."""
     dark = windows(blackout=((8.0, 12.0), (1.0, 5.0), (4.0, 7.5)))
     ticking = windows(tick=0.25, blackout=((1.1, 2.1),))
     for within, on_time, ready, start in [
@@ -211,8 +207,10 @@ mass: 250 kg
 inertia: {A: 120, C: 80}
 state: {spin: 30 rpm, nutation: 5 deg, phase: 20 deg}
 thrusters:
-  - {name: P, position: [0.1, 0.5, 1.2], direction: [0, -1, 0], force: 10 N, isp: 220 s, max_on_time: 2 s}
-  - {name: N, position: [0.1, -0.5, 1.2], direction: [0, 1, 0], force: 10 N, isp: 220 s, max_on_time: 2 s}
+  - {name: P, position: [0.1, 0.5, 1.2], direction: [0, -1, 0], force: 10 N, isp: 220 s,
+     max_on_time: 2 s}
+  - {name: N, position: [0.1, -0.5, 1.2], direction: [0, 1, 0], force: 10 N, isp: 220 s,
+     max_on_time: 2 s}
 center_of_mass: [0.1 m, 0, 40 cm]
 """
 MOVING = f"{TEXT}center_of_mass_per_kg: [0, 0, -50 mm/kg]\n"
@@ -233,8 +231,8 @@ def test_a_force_through_the_center_of_mass_turns_nothing() -> None:
 
 def test_an_accelerometer_counts_from_it_too() -> None:
     loop = (
-        "loop: {sensor: {kind: accelerometer, rate: 10 Hz, position: [0.9, 0, 0.4]}, start: "
-        "1 deg, stop: 0.1 deg}\n"
+        "loop: {sensor: {kind: accelerometer, rate: 10 Hz, position: [0.9, 0, 0.4]}, "
+        "start: 1 deg, stop: 0.1 deg}\n"
     )
     assert present(nutdamp.read(TEXT + loop).loop).sensor.position == pytest.approx([0.8, 0.0, 0.0])
 

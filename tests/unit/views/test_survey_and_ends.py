@@ -50,7 +50,8 @@ attitude: {quaternion: [1, 0, 0, 0]}
 thrusters: [{name: T1, torque: [8, 0, 0], max_on_time: 900 ms}]
 sun: [40 deg, 20 deg]
 sun_sensor: {azimuth: 35 deg}
-commands: {delay_step: 2 ms, delay_max: 1.9 s, width: {step: 1 ms, min: 20 ms, max: 1.8 s}, every: [1, 2]}
+commands: {delay_step: 2 ms, delay_max: 1.9 s, width: {step: 1 ms, min: 20 ms, max: 1.8 s},
+  every: [1, 2]}
 keep: [{name: pole, direction: [10 deg, 86 deg], min: 2 deg}]
 """
 SUN_BODY = read_spacecraft(SUNNY, "sunny.yaml")
@@ -248,7 +249,8 @@ POINTED = """
 name: Pointed
 inertia: {A: 120 kg m^2, C: 80 kg m^2}
 state: {spin: 3 rad/s, nutation: 6 deg}
-attitude: {quaternion: [0.809017, 0.081804, 0.582065, 0], epoch: 2016-12-31T23:59:59Z, frame: EME2000}
+attitude: {quaternion: [0.809017, 0.081804, 0.582065, 0], epoch: 2016-12-31T23:59:59Z,
+  frame: EME2000}
 steerable: {torque: 60 N m}
 """
 """Its axis is 2 or 3 deg from right ascension 350 deg, declination 20 deg, and dated a second

@@ -285,9 +285,7 @@ def test_zero_is_written_one_way_below_what_matters(
     assert short_angle(math.radians(degrees), math.radians(largest)) == text
 
 
-def test_a_plan_that_misses_is_no_headline_to_fly_and_digits_stand_on_their_side_of_the_limit() -> (
-    None
-):
+def test_a_plan_that_misses_is_no_headline_to_fly_and_digits_stay_on_their_side() -> None:
     body = nutdamp.example().with_(
         requirement={"nutation": "0.5 deg", "momentum_shift": "0.16836 deg"}
     )

@@ -136,9 +136,7 @@ def test_real_thrusters_keep_their_limits_and_leave_nothing(
     flies(spinner(A, C, spin, degrees, channels=REAL, limits=limits), dearest=1.02)
 
 
-def test_few_pulses_are_preferred_to_the_last_tenth_of_a_percent_and_the_plan_carries_its_proof() -> (
-    None
-):
+def test_few_pulses_come_before_a_last_tenth_of_a_percent_and_the_plan_carries_its_proof() -> None:
     made = flies(spinner(channels=REAL))
     assert len(made.pulses) <= 12
     check_text("plan.proof", noted(plan_notes(made)))
