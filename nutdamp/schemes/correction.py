@@ -372,8 +372,8 @@ ROUNDING = 1e-12  # rad; where the spin axis is that near the target already, no
 class FlownBuilder:
     """Pulses chosen so far, and the spacecraft after them.
 
-    ``at_leg`` is the spacecraft at ``now`` s, the end of the last pulse, as if its time began there,
-    with the goal of the whole. ``steps``: of integration that the flight took so far.
+    ``at_leg`` is the spacecraft at ``now`` s, the end of the last pulse, as if its time began
+    there, with the goal of the whole. ``steps``: of integration that the flight took so far.
     """
 
     def __init__(self, spacecraft: Spacecraft) -> None:

@@ -98,8 +98,8 @@ def schedule(spacecraft: Spacecraft, options: HalfConeOptions) -> Schedule:
         )
     if fewest >= MOST_CONES:
         raise Infeasible(
-            f"one pulse turns H by {turn_of(at_leg, reach)} at most, so more than {MOST_CONES} half "
-            "cones would be needed; rhumb-line takes many small pulses"
+            f"one pulse turns H by {turn_of(at_leg, reach)} at most, so more than {MOST_CONES} "
+            "half cones would be needed; rhumb-line takes many small pulses"
         )
     raise TooShort(
         f"{fewest} half cones are needed at least, each half a nutation turn long; "

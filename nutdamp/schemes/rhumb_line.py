@@ -315,8 +315,8 @@ class Train:
         )
 
     def next_pulse(self, at_leg: Spacecraft, remaining: int, attempt: Attempt) -> Pulse | None:
-        """Next pulse of ``remaining`` ones from the motion of ``at_leg``; None where the limits leave
-        no time.
+        """Next pulse of ``remaining`` ones from the motion of ``at_leg``; None where the limits
+        leave no time.
         """
         ahead, way = precession.course(at_leg.momentum, at_leg.target_axis, at_leg.goal.sun)
         share = self.h * way / (remaining * self.turns_by(attempt.size))

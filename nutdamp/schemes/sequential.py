@@ -442,8 +442,8 @@ def turn_of(spacecraft: Spacecraft, impulse: float) -> str:
 
 @dataclass(frozen=True, eq=False)
 class SymmetricModel:
-    """``symmetric`` is planned on for ``spacecraft``; ``stretch`` (2,) leads from the ellipse of (ω1,
-    ω2) to the circle.
+    """``symmetric`` is planned on for ``spacecraft``; ``stretch`` (2,) leads from the ellipse of
+    (ω1, ω2) to the circle.
     """
 
     spacecraft: Spacecraft
@@ -534,8 +534,8 @@ def model_of(
 
 
 def _aimed(symmetric: Spacecraft, spacecraft: Spacecraft) -> Spacecraft:
-    """Copy of the ``symmetric``, which has another H, with the target axis at its distance from H of the
-    ``spacecraft``.
+    """Copy of the ``symmetric``, which has another H, with the target axis at its distance from H
+    of the ``spacecraft``.
     """
     if spacecraft.goal.axis is None or symmetric is spacecraft:
         return symmetric
