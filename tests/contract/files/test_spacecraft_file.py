@@ -22,10 +22,8 @@ from support.contract import Write, check_faults
 from support.golden import check_text
 
 from nutdamp.errors import CannotRead, FaultyFile
-from nutdamp.files import study_rules, thruster_rules
 from nutdamp.files.keys import SpacecraftFile
 from nutdamp.files.reader import example_text, json_schema, load_spacecraft, read_spacecraft
-from nutdamp.files.rules import Facts
 from nutdamp.files.schedules import EFFECTIVE, read_pulses
 from nutdamp.flight import propagation
 from nutdamp.flight.dynamics import supplied
@@ -589,20 +587,6 @@ def test_faults_have_their_place() -> None:
         lambda edit: read_lines(edit[0], body=BODY.replace(edit[1], edit[2], 1)),
         others,
     )
-
-
-def test_the_thrusts_of_a_file_are_looked_up_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    calls = []
-    thrusts = thruster_rules.thrusts
-
-    def counted(facts: Facts) -> dict[str, float | None]:
-        calls.append(facts)
-        return thrusts(facts)
-
-    for rules in (study_rules, thruster_rules):
-        monkeypatch.setattr(rules, "thrusts", counted)
-    read_lines(body=with_table())
-    assert len(calls) == 1
 
 
 def test_a_plan_in_blowdown_leaves_nothing_and_says_the_pressure() -> None:
