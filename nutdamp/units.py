@@ -10,7 +10,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
@@ -45,7 +45,8 @@ class Kind:
         """The forms allowed, for messages: ``a number in kg, or a text in kg or g``."""
         if not self.factors:
             return "no unit, no quotes"
-        return f"a number{' in ' * bool(self.si)}{self.si}, or a text in {self.units}"
+        number = f"a number in {self.si}" if self.si else "a number"
+        return f"{number}, or a text in {self.units}"
 
 
 POUND, FOOT, STANDARD_GRAVITY = 0.45359237, 0.3048, 9.80665
@@ -275,6 +276,12 @@ Instance = TypeVar("Instance")
 Record = TypeVar("Record", bound=Any)
 
 
+def expect(fits: bool, name: str, value: object, expected: str) -> None:
+    """Raise BadRequest for an argument whose ``value`` does not fit."""
+    if not fits:
+        raise BadRequest(f"{name} = {as_given(value)}: expected {expected}")
+
+
 def instance(name: str, value: object, kind: type[Instance], expected: str) -> Instance:
     """``value``, where it is of the ``kind``; raises BadRequest."""
     if isinstance(value, kind):
@@ -284,86 +291,72 @@ def instance(name: str, value: object, kind: type[Instance], expected: str) -> I
 
 def path(name: str, value: str | PathLike[str], expected: str = "the name of a file") -> str:
     """The name of a file; raises BadRequest."""
-    try:
-        return instance(name, fspath(value), str, expected)
-    except TypeError:
-        raise BadRequest(f"{name}: expected {expected}, got {as_given(value)}") from None
+    named = fspath(value) if isinstance(value, PathLike) else value
+    return instance(name, named, str, expected)
 
 
 def changes(value: Any) -> Mapping[str, object]:
     """Keys and their new values; raises BadRequest."""
-    if value is None:
-        return {}
-    if isinstance(value, Mapping) and all(isinstance(key, str) for key in value):
-        return value
-    raise BadRequest(
-        f"set: expected a mapping such as {{'limits.horizon': '300 s'}}, got {as_given(value)}"
-    )
+    keys = {} if value is None else value
+    if isinstance(keys, Mapping) and all(isinstance(key, str) for key in keys):
+        return keys
+    expected = "a mapping such as {'limits.horizon': '300 s'}"
+    raise BadRequest(f"set: expected {expected}, got {as_given(value)}")
 
 
 def end_of_flight(value: Any) -> float:
     """A time in s after t = 0; raises BadRequest."""
-    if is_number(value) and value > 0.0:
-        return float(value)
-    raise BadRequest(f"until = {as_given(value)}: expected a time after t = 0, in s")
+    expect(is_number(value) and value > 0.0, "until", value, "a time after t = 0, in s")
+    return float(value)
 
 
 def seed(value: Any) -> int:
     """Seed of random numbers; raises BadRequest."""
-    if not 0 <= instance("seed", value, int, "a whole number") <= LARGEST_SEED:
-        raise BadRequest(f"seed = {value}: expected a whole number from 0 to 2**64 - 1")
+    fits = isinstance(value, int) and 0 <= value <= LARGEST_SEED
+    expect(fits, "seed", value, "a whole number from 0 to 2**64 - 1")
     return int(value)
 
 
 def tilt(value: Any, name: str = "largest") -> float:
     """An angle in rad between 0 and a right angle; raises BadRequest."""
-    if is_number(value) and 0.0 < value < 0.5 * math.pi:
-        return float(value)
-    raise BadRequest(
-        f"{name} = {as_given(value)}: expected an angle in rad between 0 and a right angle"
-    )
+    fits = is_number(value) and 0.0 < value < 0.5 * math.pi
+    expect(fits, name, value, "an angle in rad between 0 and a right angle")
+    return float(value)
 
 
 def count(name: str, value: Any, least: int = 1) -> int:
     """A whole number of at least ``least``, which is no less than 1; raises BadRequest."""
-    if is_count(value) and value >= least:
-        return int(value)
-    raise BadRequest(f"{name} = {as_given(value)}: expected a whole number of at least {least}")
+    fits = is_count(value) and value >= least
+    expect(fits, name, value, f"a whole number of at least {least}")
+    return int(value)
 
 
 def shifts(value: Any) -> tuple[float, ...]:
     """Angles in rad, infinite where any will do; raises BadRequest."""
     angles = tuple(value) if isinstance(value, Iterable) and not isinstance(value, str) else ()
-    if angles and all((is_number(angle) or angle == math.inf) and angle >= 0.0 for angle in angles):
-        return tuple(map(float, angles))
-    raise BadRequest(
-        f"allow = {as_given(value)}: expected angles of at least 0, in rad, such as (0.0, math.inf)"
-    )
+    fits = [(is_number(angle) or angle == math.inf) and angle >= 0.0 for angle in angles]
+    expected = "angles of at least 0, in rad, such as (0.0, math.inf)"
+    expect(all(fits) and fits != [], "allow", value, expected)
+    return tuple(map(float, angles))
 
 
 def thresholds(value: Any) -> tuple[tuple[float, float], ...]:
     """Pairs of angles (start, stop) in rad, stop the smaller; raises BadRequest."""
-    pairs = tuple(value) if isinstance(value, Iterable) else (value,)
-    for pair in pairs:
+    what = "angles in rad below a right angle, the second smaller, such as [(0.01, 0.002)]"
+    pairs = []
+    for pair in value if isinstance(value, Iterable) else (value,):
         angles = tuple(pair) if isinstance(pair, Sequence) and not isinstance(pair, str) else ()
-        if not (
-            len(angles) == 2
-            and all(map(is_number, angles))
-            and 0.0 <= angles[1] < angles[0] < 0.5 * math.pi
-        ):
-            what = (
-                "pairs of angles in rad below a right angle, the second smaller, "
-                "such as [(0.01, 0.002)]"
-            )
-            raise BadRequest(f"thresholds: expected {what}, got {as_given(pair)}")
-    return tuple((float(start), float(stop)) for start, stop in pairs)
+        fits = len(angles) == 2 and all(map(is_number, angles))
+        fits = fits and 0.0 <= angles[1] < angles[0] < 0.5 * math.pi
+        expect(fits, "thresholds", pair, f"pairs of {what}")
+        pairs.append((float(angles[0]), float(angles[1])))
+    return tuple(pairs)
 
 
 def one_of(name: str, value: Any, names: tuple[str, ...]) -> str:
     """One of the ``names``; raises BadRequest."""
-    if isinstance(value, str) and value in names:
-        return value
-    raise BadRequest(f"{name} = {as_given(value)}: expected one of {', '.join(names)}")
+    expect(isinstance(value, str) and value in names, name, value, f"one of {', '.join(names)}")
+    return str(value)
 
 
 def is_number(value: Any) -> bool:
@@ -379,12 +372,10 @@ def is_count(value: Any) -> bool:
 def as_given(value: object) -> str:
     """A value as a message names it: short ones in full, others by their type."""
     text = repr(value) if isinstance(value, str | Real | None) else ""
+    if 0 < len(text) <= 60:
+        return text
     kind = type(value)
-    return (
-        text
-        if 0 < len(text) <= 60
-        else f"a {kind.__module__}.{kind.__qualname__}".replace("builtins.", "")
-    )
+    return f"a {kind.__module__}.{kind.__qualname__}".replace("builtins.", "")
 
 
 def replaced(value: Record, fields: Mapping[str, object]) -> Record:
@@ -392,46 +383,27 @@ def replaced(value: Record, fields: Mapping[str, object]) -> Record:
     import numpy as np
 
     kinds = get_type_hints(type(value))
-    known = [field.name for field in dataclasses.fields(value) if field.init]
+    declared = {field.name: str(field.type) for field in dataclasses.fields(value) if field.init}
     values: dict[str, Any] = {}
     for name, entry in fields.items():
-        if name not in known:
-            raise BadRequest(f"replace: there is no {name!r}; there are {', '.join(known)}")
-        expected, fits = _meaning(kinds[name])
-        if not fits(entry):
+        if name not in declared:
+            raise BadRequest(f"replace: there is no {name!r}; there are {', '.join(declared)}")
+        vector = declared[name].startswith("Vector") and entry is not None
+        if not (_is_vector(entry) if vector else _fits(entry, kinds[name])):
+            expected = "three numbers" if vector else declared[name]
             raise BadRequest(f"{name}: expected {expected}, got {as_given(entry)}")
-        values[name] = np.array(entry, dtype=float) if expected == THREE_NUMBERS else entry
+        values[name] = np.array(entry, dtype=float) if vector else entry
     return dataclasses.replace(value, **values)
 
 
-THREE_NUMBERS = "three numbers"
-"""Words for an array in the type hints of `replaced`."""
-
-
-def _meaning(kind: Any) -> tuple[str, Callable[[Any], bool]]:
-    """A type hint in words, and the test of a value."""
-    import numpy as np
-    from numpy.typing import NDArray
-
-    parts = get_args(kind)
-    if get_origin(kind) is UnionType:
-        words, tests = zip(*map(_meaning, parts), strict=True)
-        return " or ".join(words), lambda value: any(fits(value) for fits in tests)
-    if kind == NDArray[np.float64]:  # whose parts differ between versions of numpy
-        return THREE_NUMBERS, _is_vector
-    if get_origin(kind) is tuple:
-        held = parts[0]
-        return (
-            f"a tuple of {held.__name__}",
-            lambda value: (
-                isinstance(value, tuple) and all(isinstance(entry, held) for entry in value)
-            ),
-        )
-    if kind is float:
-        return "a number", is_number
-    return {str: "a text", type(None): "None"}.get(
-        kind, f"a {kind.__name__}"
-    ), lambda value: isinstance(value, kind)
+def _fits(value: object, hint: Any) -> bool:
+    """True for a value of a type hint; arrays are not looked at."""
+    origin, parts = get_origin(hint), get_args(hint)
+    if origin is UnionType:
+        return any(_fits(value, part) for part in parts)
+    if origin is tuple:
+        return isinstance(value, tuple) and all(isinstance(entry, parts[0]) for entry in value)
+    return is_number(value) if hint is float else isinstance(value, origin or hint)
 
 
 def _is_vector(value: Any) -> bool:

@@ -22,30 +22,14 @@ from nutdamp.schemes.catalogue import SCHEMES, SUNLIT, OptionKind, Options, Sche
 if TYPE_CHECKING:
     from nutdamp.spacecraft.model import Spacecraft, Vector
 
-    ParamType = click.ParamType
-    Choice = click.Choice
-else:
 
-    class ParamType(click.ParamType):
-        """`click.ParamType`, which takes a type in brackets from click 8.4 on only."""
-
-        def __class_getitem__(cls, _: object) -> type[ParamType]:
-            return cls
-
-    class Choice(click.Choice):
-        """`click.Choice`, likewise from click 8.2 on only."""
-
-        def __class_getitem__(cls, _: object) -> type[Choice]:
-            return cls
-
-
-class NameType(Choice[str]):
+class NameType(click.Choice):  # type: ignore[type-arg]
     """One of some names; for a misspelt one the error names the nearest."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
         """The name; a usage error for anything else."""
         try:
-            return super().convert(value, param, ctx)
+            return str(super().convert(value, param, ctx))
         except click.BadParameter as wrong:
             close = nearest(str(value), self.choices)
             if close is None:
@@ -83,8 +67,10 @@ OUTPUT = OutputName()
 FOLDER = click.Path(readable=False)
 
 
-class UnitType(ParamType[float]):
-    """A number in SI, a text with a unit that passes a ``check``, or one of ``words``."""
+class UnitType(click.ParamType):  # type: ignore[type-arg]
+    """A number in SI or a text with a unit, as in a spacecraft file, that passes a ``check``, or
+    one of ``words``.
+    """
 
     def __init__(
         self,
@@ -138,7 +124,7 @@ class Angles(NamedTuple):
         return tuple(reading_of(angle, "angle", "deg") for angle in doubtful)
 
 
-class Direction(ParamType[Angles]):
+class Direction(click.ParamType):  # type: ignore[type-arg]
     """Two angles with a comma between them, of which a ``check`` holds."""
 
     name = "angle,angle"
@@ -163,7 +149,7 @@ class Direction(ParamType[Angles]):
         return Angles(first, second)
 
 
-class Count(ParamType[int]):
+class Count(click.ParamType):  # type: ignore[type-arg]
     """A whole number of cases above zero, which may be written as 1e6 or 1_000_000."""
 
     name = "n"

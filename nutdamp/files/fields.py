@@ -143,7 +143,8 @@ class Section:
         """Its keys, by name."""
         types = get_type_hints(cls, include_extras=True)
         keys = {}
-        for name, key in vars(cls).items():
+        for name in types:
+            key = getattr(cls, name, None)
             if isinstance(key, Key):
                 optional = key.default is REQUIRED and NoneType in get_args(types[name])
                 keys[name] = replace(
@@ -226,12 +227,12 @@ def _read(annotation: Any, value: Any, problems: Problems, path: KeyPath) -> Any
         return None
     if isinstance(value, dict):
         key_type, entry_type = parts
-        return {
-            _read(key_type, key, problems, (*path, key)): _read(
-                entry_type, entry, problems, (*path, key)
-            )
-            for key, entry in value.items()
-        }
+        entries = {}
+        for key, entry in value.items():
+            place = (*path, key) if key else path  # an empty name is not in the file
+            name = _read(key_type, key, problems, place)
+            entries[name] = _read(entry_type, entry, problems, place)
+        return entries
     if plain is list:
         return [
             _read(parts[0], entry, problems, (*path, index)) for index, entry in enumerate(value)
@@ -347,4 +348,17 @@ THREE = Length(3, 3)
 Position = Annotated[list[Annotated[float, Quantity("length")]], THREE]
 Direction = Annotated[list[Annotated[float, Quantity("number")]], THREE]
 LONGEST_NAME = 80  # characters: a line of a screen
-Name = Annotated[str, Length(1, LONGEST_NAME)]
+
+
+class Printable(Rule):
+    """Annotation of a text of printable characters, at least one of them not a blank."""
+
+    def read(self, value: Any, inner: Callable[[Any], Any]) -> Any:
+        """The text; raises ValueError for another."""
+        text = inner(value)
+        if text is not None and not (text.strip() and text.isprintable()):
+            raise ValueError(f"{shown(text)} is no name; expected printable characters")
+        return text
+
+
+Name = Annotated[str, Length(1, LONGEST_NAME), Printable()]

@@ -35,21 +35,11 @@ from nutdamp.common.time import Epoch
 from nutdamp.errors import Fault, FaultyFile, in_order, nearest, warn
 from nutdamp.files import keys
 from nutdamp.files.editing import Setting, overlay, settings_of, settings_within, text_of
+from nutdamp.files.facts import CANCELLED, Facts, Finding, Vector, force_vector, symmetric
 from nutdamp.files.fields import REQUIRED, KeyPath, Problems, Rule, Section, section_of
 from nutdamp.files.plausibility import doubts
-from nutdamp.files.rules import (
-    CANCELLED,
-    MOMENT,
-    Finding,
-    Vector,
-    disturbance_kind,
-    findings,
-    force_vector,
-    symmetric,
-)
+from nutdamp.files.rules import correlation_findings, disturbance_kind, findings
 from nutdamp.files.study_keys import LoopSection, by_name, dispersions, thrust_behind
-from nutdamp.files.study_rules import correlation_findings, dispersion_findings, loop_findings
-from nutdamp.files.thruster_rules import thrust_findings
 from nutdamp.files.yaml import Node, dotted, read_text, read_tree
 from nutdamp.physics import attitude, sky
 from nutdamp.physics.body import principal_axes
@@ -130,16 +120,15 @@ def _contents(
     root, unplaced = overlay(root, settings)
     faults += unplaced
     faulty = [*_spelling(root, keys.SpacecraftFile, ())]
-    faulty += [*findings(root), *dispersion_findings(root), *thrust_findings(root)]
-    if root.get("loop") is not None:
-        faulty += loop_findings(root)
+    facts = Facts(root)
+    faulty += findings(facts)
     problems: Problems = []
     contents = keys.SpacecraftFile.read(root.plain(), problems)
     unreadable = {path for path, _ in problems}
     faulty = [finding for finding in faulty if finding.at_key or finding.path not in unreadable]
     faulty += [Finding(path, problem) for path, problem in problems]
     faults += [_placed(finding, root, name) for finding in faulty]
-    for doubt in in_order(_placed(finding, root, name) for finding in doubts(root)):
+    for doubt in in_order(_placed(finding, root, name) for finding in doubts(facts)):
         warn(doubt)
     if faults or contents is None:
         raise FaultyFile(faults)
@@ -201,6 +190,8 @@ def _holds_names(annotation: Any) -> bool:
     return get_origin(annotation) is dict or any(map(_holds_names, get_args(annotation)))
 
 
+MOMENT = re.compile(r"[IJ]_?([xyz]{1,2}|[123]{1,2})", re.IGNORECASE)  # keys for parts of a tensor
+ALONG = 1e-3  # rad (0.06 deg) from the Sun, up to which the side of the Sun is not told
 POLE = 1e-9  # rad from a pole of the frame, up to which a spin axis has no ascending node
 
 
@@ -234,6 +225,12 @@ def read_spacecraft(
     channels = contents.channels or {thruster: [thruster] for thruster in thrusters}
     steerable = _part(Steerable, contents.steerable)
     sunward = _sun(contents)
+    if contents.attitude is not None and contents.attitude.sun_phase is not None:
+        axis = attitude.on_sphere(*(contents.attitude.spin_axis or ()))
+        if sunward is None or np.linalg.norm(np.cross(axis, sunward)) < ALONG:
+            problem = "the Sun lies along spin_axis, which has no side of the Sun then; give phase"
+            finding = Finding(("attitude", "sun_phase"), problem, True)
+            raise FaultyFile([_placed(finding, root, name)])
     torquer = steerable if thrusters else steerable or Steerable()
     asked = contents.requirement
     asks_nothing = asked is None or all(
@@ -478,9 +475,9 @@ def _goal(section: keys.GoalSection | None, spacecraft: Spacecraft) -> Goal:
 
 
 def _sun(contents: keys.SpacecraftFile) -> Vector | None:
-    given: list[float] | str | None = contents.sun
-    if not isinstance(given, str):
-        return None if given is None else attitude.on_sphere(*given)
+    sun: tuple[float, float] | str | None = contents.sun
+    if not isinstance(sun, str):
+        return None if sun is None else attitude.on_sphere(*sun)
     assert contents.attitude is not None
     assert contents.attitude.epoch is not None
     return sky.direction(Epoch.parse(contents.attitude.epoch).days_of_j2000)
@@ -491,8 +488,8 @@ def _cones(contents: keys.SpacecraftFile, sunward: Vector | None) -> Iterator[Ke
     way.
     """
     for entry in contents.keep:
-        given: list[float] | str = entry.direction
-        direction = sunward if isinstance(given, str) else attitude.on_sphere(*given)
+        place: tuple[float, float] | str = entry.direction
+        direction = sunward if isinstance(place, str) else attitude.on_sphere(*place)
         assert direction is not None
         yield Keep(
             entry.name, direction, entry.min or 0.0, math.pi if entry.max is None else entry.max

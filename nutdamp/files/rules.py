@@ -1,114 +1,49 @@
-"""Constraints between the keys of a spacecraft file: the plain ones in a table; body, motion, sky.
-
-The rules read the raw tree (`Facts`) and skip unreadable values, so that they work beside any other
-fault.
-"""
+"""Constraints between the keys of a spacecraft file: a table, and what body and motion need."""
 
 from __future__ import annotations
 
 import math
-import re
-from collections.abc import Callable, Iterable, Iterator
-from functools import partial
+from collections.abc import Callable, Iterator
 from itertools import pairwise
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from nutdamp.common.time import Epoch
+from nutdamp.errors import nearest, span
+from nutdamp.files.facts import (
+    CANCELLED,
+    Facts,
+    Finding,
+    Vector,
+    force_vector,
+    moments_fault,
+    symmetric,
+    tensor_fault,
+)
 from nutdamp.files.fields import SMALLEST, KeyPath
-from nutdamp.files.yaml import Node, dotted
-from nutdamp.physics import attitude, sky
+from nutdamp.files.study_keys import BY_THRUSTER, by_name
+from nutdamp.files.yaml import dotted
+from nutdamp.montecarlo.inputs import grouped, positive_definite, reachable
 from nutdamp.physics import body as rigid_body
-from nutdamp.spacecraft.model import Inertia
+from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.schedule import STEERABLE
-from nutdamp.units import KINDS, bar, parse, shown
-
-Vector = NDArray[np.float64]
-
-
-MOMENT = re.compile(r"[IJ]_?([xyz]{1,2}|[123]{1,2})", re.IGNORECASE)  # keys for parts of a tensor
-
-
-class Finding(NamedTuple):
-    """Something wrong at ``path``, which need not exist; ``at_key`` points at the key and not at
-    its value.
-    """
-
-    path: KeyPath
-    problem: str
-    at_key: bool = False
-
-
-class Facts:
-    """The values of a tree that can be read."""
-
-    def __init__(self, root: Node) -> None:
-        self.root = root
-
-    def has(self, *path: str | int) -> bool:
-        """True where something is at ``path``."""
-        return self.root.get(*path) is not None
-
-    def value(self, *path: str | int) -> object:
-        """The text, number, dict or list of nodes at ``path``; None where there is none."""
-        node = self.root.get(*path)
-        return None if node is None else node.value
-
-    def is_mapping(self, *path: str | int) -> bool:
-        """True where keys may be at ``path``."""
-        return isinstance(self.value(*path), dict)
-
-    def text(self, *path: str | int) -> str | None:
-        """The text at ``path``."""
-        value = self.value(*path)
-        return value if isinstance(value, str) else None
-
-    def number(self, kind: str, *path: str | int) -> float | None:
-        """The quantity at ``path``, SI."""
-        node = self.root.get(*path)
-        try:
-            return None if node is None else parse(node.plain(), kind)
-        except ValueError:
-            return None
-
-    def vector(self, kind: str, size: int, *path: str | int) -> Vector | None:
-        """The ``size`` quantities at ``path``, SI; None unless all can be read."""
-        if len(self.children(*path)) != size:
-            return None
-        numbers = [self.number(kind, *path, index) for index in range(size)]
-        return None if None in numbers else np.array(numbers, dtype=np.float64)
-
-    def children(self, *path: str | int) -> list[tuple[str | int, Node]]:
-        """Keys or positions at ``path``, and their nodes."""
-        node = self.root.get(*path)
-        return [] if node is None else list(node.children())
-
-    def below(self, *path: str | int) -> list[KeyPath]:
-        """Paths of the entries at ``path``."""
-        return [(*path, step) for step, _ in self.children(*path)]
-
-    def matching(self, pattern: str) -> list[KeyPath]:
-        """Paths of a pattern such as ``thrusters.*.force``; its last step need not be there."""
-        paths: list[KeyPath] = [()]
-        for step in pattern.split("."):
-            key = int(step) if step.isdigit() else step
-            deeper = [self.below(*path) if step == "*" else [(*path, key)] for path in paths]
-            paths = [path for each in deeper for path in each]
-        return paths
-
+from nutdamp.spacecraft.tolerances import KINDS as DISTRIBUTIONS
+from nutdamp.units import KINDS, bar, shown
 
 KEEP = "keep one of the two"
 SKY = "[right ascension, declination]"
 SUN = f": {SKY}, or sun: epoch"
 POINTING = ", which says where the body points at t = 0"
 SAMPLED = ", such as rate: 100 Hz: it applies to samples"
+SENSED = ", whose sensor it is of"
 MOUNTING = ".position .direction .force"
 COMPONENT = "expected at least one component other than 0"
+TURNING = "only a rotating torque turns"
+EVERYWHERE = "a gyro measures the same everywhere"
+RESERVED = f"the name {STEERABLE!r} is kept for the steerable torquer; take another"
 
 RULES = (
-    # Path; kind of rule; other keys (one beside it begins with a dot), or the quantity; the cure.
+    # Path; kind of rule; other keys (those beside it begin with a dot; | is or; =value only with
+    # that value), or the kind of quantity; the cure.
     ("omega0", "missing", ".state", "give omega0: [ω1, ω2, ω3], or state: {spin: …, nutation: …}"),
     ("state", "beside", ".omega0", KEEP),
     ("inertia.A", "missing", ".tensor", "the transverse moment of inertia, in kg m^2"),
@@ -127,6 +62,7 @@ RULES = (
     ("attitude.sun_phase", "beside", ".quaternion .phase", KEEP),
     ("attitude.sun_phase", "needs", "sun", SUN),
     ("sun", "needs", "attitude", POINTING),
+    ("sun=epoch", "needs", "attitude.epoch", f", the date of t = 0; or give {SKY}"),
     ("sun_sensor", "needs", "sun", SUN),
     ("commands", "needs", "sun_sensor", ", whose pulse fires the blocks"),
     ("commands.width.min", "at most", ".max", "time"),
@@ -144,6 +80,7 @@ RULES = (
     ),
     ("keep", "once", "name", "take another"),
     ("keep.*.direction", "needs", "attitude", POINTING),
+    ("keep.*.direction=sun", "needs", "sun", SUN),
     ("keep.*.min", "missing", ".max", "give min, max or both, else the cone has no effect"),
     ("keep.*.min", "at most", ".max", "angle"),
     (
@@ -157,11 +94,22 @@ RULES = (
     ("goal.right_ascension", "completes", ".declination", "names no direction"),
     ("goal.right_ascension", "needs", "attitude", f"{POINTING}; without it give tilt and azimuth"),
     ("goal.spin", "not zero", "rate", "expected a rate about axis 3"),
+    (
+        "requirement.probability",
+        "needs",
+        ".nutation|.momentum_shift|.spin",
+        ", of which it is the share",
+    ),
     ("limits.earliest", "below", ".horizon", "time"),
+    ("limits.blackout.*.0", "at most", ".1", "time"),
     ("disturbances", "once", "name", "take another"),
     ("disturbances.*.torque", "not zero", "torque", COMPONENT),
     ("disturbances.*.rate", "not zero", "rate", "leave rate out for a torque fixed in the body"),
+    ("disturbances.*.rate", "beside", ".kind=constant .kind=axial", TURNING),
+    ("disturbances.*.fixed_in", "beside", ".kind=constant .kind=axial .rate", KEEP),
+    ("disturbances.*.kind=rotating", "needs", ".rate|.fixed_in", ", the rate seen in the body"),
     ("thrusters", "once", "name", "take another"),
+    ("thrusters.*.name=steerable", "wrong", "", RESERVED),
     ("thrusters.*.torque", "missing", MOUNTING, "give torque, or position, direction and force"),
     ("thrusters.*.torque", "beside", MOUNTING, "keep torque, or position, direction and force"),
     ("thrusters.*.torque", "not zero", "torque", COMPONENT),
@@ -172,8 +120,11 @@ RULES = (
     ("thrusters.*.lever_arm", "beside", ".position", "leave it out, position gives the arm"),
     ("thrusters.*.min_on_time", "at most", ".max_on_time", "time"),
     ("thrusters.*.impulse_bit", "beside", ".valve", KEEP),
+    ("thrusters.*.impulse_bit", "needs", ".force|.lever_arm", ", which tells the thrust"),
     ("thrusters.*.impulse_bit", "rising", "time impulse time", "expected rows that rise"),
+    ("channels.steerable", "wrong", "", RESERVED),
     ("channels.*", "once", "", "expected once in a channel"),
+    ("channels.*.*", "named", "thruster", ""),
     ("valve", "needs", "thrusters", ", which it belongs to"),
     ("cold", "needs", "thrusters", ", whose nozzles are meant"),
     ("tank", "needs", "thrusters", ", which it feeds"),
@@ -182,9 +133,19 @@ RULES = (
     ("tank.isp", "rising", "pressure", "expected rows that rise"),
     ("loop", "needs", "thrusters", ", which it fires"),
     ("loop.stop", "below", ".start", "angle"),
-    ("loop.sensor.noise", "needs", "loop.sensor.rate", SAMPLED),
-    ("loop.sensor.quantisation", "needs", "loop.sensor.rate", SAMPLED),
-    ("loop.sensor.low_pass", "needs", "loop.sensor.rate", SAMPLED),
+    ("loop.law=bang", "needs", ".on_time", ", the length of its pulses"),
+    ("loop.on_time", "beside", ".law=one-pulse", "one-pulse fires for as long as it takes"),
+    ("loop.sensor.kind=accelerometer", "needs", ".rate", ": of samples a sine is made"),
+    ("loop.sensor.kind=accelerometer", "needs", ".position", ", from the centre of mass"),
+    ("loop.sensor.position", "beside", ".kind=gyro", EVERYWHERE),
+    ("loop.sensor.axis", "beside", ".kind=gyro", EVERYWHERE),
+    ("loop.sensor.axes", "beside", ".kind=accelerometer", "it measures along axis"),
+    ("loop.sensor.noise", "needs", ".rate", SAMPLED),
+    ("loop.sensor.quantisation", "needs", ".rate", SAMPLED),
+    ("loop.sensor.low_pass", "needs", ".rate", SAMPLED),
+    ("loop.sensor.noise", "sensed", "", ""),
+    ("loop.sensor.bias", "sensed", "", ""),
+    ("loop.sensor.quantisation", "sensed", "", ""),
     ("loop.sensor.axis", "not zero", "number", "expected a direction, such as [0, 0, 1]"),
     (
         "loop.sensor.scale",
@@ -193,67 +154,89 @@ RULES = (
         "the sensor would show nothing; expected about 100 %",
     ),
     ("loop.faults.reversed", "once", "", "expected each channel once"),
+    ("loop.faults.reversed.*", "named", "channel", ""),
+    ("dispersions.sensor_bias", "needs", "loop", SENSED),
+    ("dispersions.sensor_bias.*", "sensed", "", ""),
+    ("dispersions.sensor_scale", "needs", "loop", SENSED),
+    ("dispersions.sensor_noise", "needs", "loop", SENSED),
+    ("dispersions.sensor_delay", "needs", "loop", SENSED),
 )
 
 
-def _others(path: KeyPath, others: str) -> list[KeyPath]:
-    """Paths of the other keys in a row of the table."""
-    paths: list[KeyPath] = []
-    for other in others.split():
-        beside = other.startswith(".")
-        paths.append((*path[:-1], other[1:]) if beside else tuple(other.split(".")))
-    return paths
+def _place(path: KeyPath, other: str) -> KeyPath:
+    """Path of another key in a row of the table."""
+    if not other.startswith("."):
+        return tuple(other.split("."))
+    return (*path[:-1], int(other[1:]) if other[1:].isdigit() else other[1:])
+
+
+def _holds(facts: Facts, path: KeyPath, other: str) -> bool:
+    """True where another key in a row of the table is there, or has the value."""
+    key, _, value = other.partition("=")
+    place = _place(path, key)
+    return facts.text(*place) == value if value else facts.has(*place)
+
+
+def _words(others: list[str]) -> str:
+    """The other keys in a row: ``position and force``, ``kind: gyro``, ``rate or fixed_in``."""
+    alone = " and ".join(other.removeprefix(".") for other in others)
+    return alone.replace("|.", " or ").replace("=", ": ")
 
 
 def _beside(facts: Facts, path: KeyPath, others: str, cure: str) -> Iterator[Finding]:
-    there = [str(other[-1]) for other in _others(path, others) if facts.has(*other)]
-    if there and facts.has(*path):
-        yield Finding(path, f"given together with {' and '.join(there)}; {cure}", True)
+    present = [other for other in others.split() if _holds(facts, path, other)]
+    if present and facts.has(*path):
+        yield Finding(path, f"given together with {_words(present)}; {cure}", True)
 
 
 def _needs(facts: Facts, path: KeyPath, others: str, why: str) -> Iterator[Finding]:
-    lacking = [dotted(other) for other in _others(path, others) if not facts.has(*other)]
+    lacking = [
+        other
+        for other in others.split()
+        if not any(_holds(facts, path, choice) for choice in other.split("|"))
+    ]
     if lacking and facts.has(*path):
-        yield Finding(path, f"needs {' and '.join(lacking)}{why}", True)
+        yield Finding(path, f"needs {_words(lacking)}{why}", True)
 
 
 def _missing(facts: Facts, path: KeyPath, others: str, cure: str) -> Iterator[Finding]:
     """A key that must be there unless one of the others is."""
-    there = any(facts.has(*other) for other in (path, *_others(path, others)))
-    if not there and facts.is_mapping(*path[:-1]):
+    present = facts.has(*path) or any(_holds(facts, path, other) for other in others.split())
+    if not present and facts.is_mapping(*path[:-1]):
         yield Finding(path, f"missing; {cure}")
 
 
 def _completes(facts: Facts, path: KeyPath, others: str, what: str) -> Iterator[Finding]:
     """A key that must be there beside each of the others."""
-    there = [str(other[-1]) for other in _others(path, others) if facts.has(*other)]
-    if there and not facts.has(*path):
-        yield Finding(path, f"missing; {' and '.join(there)} alone {what}")
+    present = [other for other in others.split() if _holds(facts, path, other)]
+    if present and not facts.has(*path):
+        yield Finding(path, f"missing; {_words(present)} alone {what}")
 
 
-def _bounded(
-    facts: Facts,
-    path: KeyPath,
-    other: str,
-    kind: str,
-    *,
-    equal: bool,
-) -> Iterator[Finding]:
-    (bound,) = _others(path, other)
-    value, limit = facts.number(kind, *path), facts.number(kind, *bound)
-    if value is None or limit is None:
-        return
-    if value > limit and equal:
-        problem = f"exceeds {bound[-1]}; expected at most {amount(kind, limit)}"
-        yield Finding(path, f"{amount(kind, value)} {problem}")
-    elif value >= limit and not equal:
-        problem = f"is not below {bound[-1]}; expected less than {amount(kind, limit)}"
-        yield Finding(path, f"{amount(kind, value)} {problem}")
+def _wrong(facts: Facts, path: KeyPath, _: str, problem: str) -> Iterator[Finding]:
+    if facts.has(*path):
+        yield Finding(path, problem, facts.text(*path) is None)
+
+
+def _at_most(facts: Facts, path: KeyPath, other: str, kind: str) -> Iterator[Finding]:
+    place = _place(path, other)
+    value, limit = facts.number(kind, *path), facts.number(kind, *place)
+    if value is not None and limit is not None and value > limit:
+        problem = f"{amount(kind, value)} exceeds {dotted(place)}"
+        yield Finding(path, f"{problem}; expected at most {amount(kind, limit)}")
+
+
+def _below(facts: Facts, path: KeyPath, other: str, kind: str) -> Iterator[Finding]:
+    place = _place(path, other)
+    value, limit = facts.number(kind, *path), facts.number(kind, *place)
+    if value is not None and limit is not None and value >= limit:
+        problem = f"{amount(kind, value)} is not below {dotted(place)}"
+        yield Finding(path, f"{problem}; expected less than {amount(kind, limit)}")
 
 
 def _not_zero(facts: Facts, path: KeyPath, kind: str, cure: str) -> Iterator[Finding]:
     """A quantity, or a list of such, that is no zero."""
-    size = len(facts.children(*path))
+    size = len(facts.below(*path))
     numbers = facts.vector(kind, size, *path) if size else facts.number(kind, *path)
     if numbers is not None and np.max(np.abs(numbers)) < SMALLEST:
         yield Finding(path, f"zero; {cure}")
@@ -280,16 +263,56 @@ def _once(facts: Facts, path: KeyPath, key: str, cure: str) -> Iterator[Finding]
             yield Finding(place, f"{shown(name)} is given twice, first in {dotted(other)}; {cure}")
 
 
-RULE_KINDS: dict[str, Callable[[Facts, KeyPath, str, str], Iterator[Finding]]] = {
+def _named(facts: Facts, path: KeyPath, what: str, _: str) -> Iterator[Finding]:
+    """The name of a thruster or channel of the file."""
+    name = facts.text(*path)
+    if name is not None and name not in facts.names[what]:
+        yield Finding(path, _unknown(name, what, [*facts.names[what]]))
+
+
+def _unknown(name: str, what: str, names: list[str]) -> str:
+    """The problem of a name that is none, with the one that was meant, or those that there are."""
+    few = names[:20]  # to look for the nearest of very many takes long
+    close = nearest(name, few)
+    cure = f"there are {', '.join(map(shown, few))}" if names else "the file has none"
+    if len(names) > len(few):
+        cure = f"{cure} …"
+    if close is not None:
+        cure = f"did you mean {shown(close)}?"
+    return f"no {what} is called {shown(name)}; {cure}"
+
+
+OTHER_SENSOR = {
+    "gyro": ("acceleration", "a gyro: rad/s, deg/s or rpm"),
+    "accelerometer": ("rate", "an accelerometer: m/s^2"),
+}
+"""Kind of quantity that a sensor does not measure, and the units that it has."""
+
+
+def _sensed(facts: Facts, path: KeyPath, *_: str) -> Iterator[Finding]:
+    """A value in a unit of the sensor of the loop."""
+    kind = facts.text("loop", "sensor", "kind") or ""
+    text = facts.text(*path)
+    if text is None or kind not in OTHER_SENSOR:
+        return
+    quantity, units = OTHER_SENSOR[kind]
+    if facts.number(quantity, *path) is not None:
+        yield Finding(path, f"{shown(text)} is not in a unit of {units}")
+
+
+KINDS_OF_RULES: dict[str, Callable[[Facts, KeyPath, str, str], Iterator[Finding]]] = {
     "beside": _beside,
     "needs": _needs,
     "missing": _missing,
     "completes": _completes,
-    "at most": partial(_bounded, equal=True),
-    "below": partial(_bounded, equal=False),
+    "wrong": _wrong,
+    "at most": _at_most,
+    "below": _below,
     "not zero": _not_zero,
     "rising": _rising,
     "once": _once,
+    "named": _named,
+    "sensed": _sensed,
 }
 
 
@@ -300,186 +323,59 @@ def amount(kind: str, value: float) -> str:
     return bar(value) if kind == "pressure" else f"{value:g} {KINDS[kind].si}"
 
 
-def findings(root: Node) -> Iterator[Finding]:
-    """All faults of the table, and those of body, motion and sky."""
-    facts = Facts(root)
+def findings(facts: Facts) -> Iterator[Finding]:
+    """All faults of the table, and those of body, motion, thrusters and studies."""
     for pattern, kind, others, cure in RULES:
         for path in facts.matching(pattern):
-            yield from RULE_KINDS[kind](facts, path, others, cure)
-    for rule in (_names, _inertia, _motion, _disturbances, _blackout, _sun, _declinations):
+            yield from KINDS_OF_RULES[kind](facts, path, others, cure)
+    for rule in (_inertia, _motion, _disturbances, _thrusters, _tank, _dispersions, _loop):
         yield from rule(facts)
 
 
-def _names(facts: Facts) -> Iterator[Finding]:
-    lists = ("name", "thrusters.*.name", "disturbances.*.name", "keep.*.name", "orbit.center")
-    named = [(path, facts.text(*path), False) for each in lists for path in facts.matching(each)]
-    named += [(path, str(path[-1]), True) for path in facts.below("channels")]
-    for path, name, at_key in named:
-        if name is None:
-            continue
-        if not name.strip() or not name.isprintable():
-            yield Finding(path, f"{shown(name)} is no name; expected printable characters", at_key)
-        elif name == STEERABLE and path[0] in ("thrusters", "channels"):
-            problem = f"the name {STEERABLE!r} is kept for the steerable torquer; take another"
-            yield Finding(path, problem, at_key)
-
-
-CANCELLED = 1e-12  # a sum that is smaller than its terms by this factor counts as zero
-
-SYMMETRIC = 1e-9  # asymmetry of an inertia tensor that is rounding, relative to its largest entry
-
-
-def norm(vector: Vector) -> float:
-    """Length of a vector, without the underflow of squares."""
-    return math.hypot(*vector)
-
-
-def force_vector(direction: Iterable[float], force: float) -> Vector:
-    """Force in N along ``direction``, which need not have length one."""
-    components = tuple(direction)
-    return np.array([part / math.hypot(*components) * force for part in components])
-
-
-def symmetric(tensor: Vector) -> Vector:
-    """A tensor without the asymmetry that passes for rounding."""
-    return 0.5 * (tensor + tensor.T)
-
-
 def _inertia(facts: Facts) -> Iterator[Finding]:
-    tensor = tensor_of(facts)
-    fault = None if tensor is None else tensor_fault(tensor) or _spin_axis_fault(tensor, facts)
-    if fault is not None:
-        yield fault
     A, C = facts.number("inertia", "inertia", "A"), facts.number("inertia", "inertia", "C")
     if A is not None and C is not None and C > 2 * A > 0:
-        most = "not physically possible (A and C swapped?); at most 2 A (a flat disc)"
-        yield Finding(("inertia", "C"), f"C = {C:g} exceeds 2 A = {2 * A:g} kg m^2: {most}")
-
-
-def tensor_of(facts: Facts) -> Vector | None:
-    """The inertia tensor (3, 3) kg m²; None where there is none, or it cannot be read."""
-    rows = [facts.vector("inertia", 3, "inertia", "tensor", row) for row in range(3)]
-    if len(facts.children("inertia", "tensor")) != 3 or any(row is None for row in rows):
-        return None
-    return np.array(rows)
-
-
-def tensor_fault(tensor: Vector) -> Finding | None:
-    """The fault that makes a 3×3 tensor impossible as an inertia tensor."""
+        cure = "not physically possible (A and C swapped?); at most 2 A (a flat disc)"
+        yield Finding(("inertia", "C"), f"C = {C:g} exceeds 2 A = {2 * A:g} kg m^2: {cure}")
+    if facts.tensor is None:
+        return
     path: KeyPath = ("inertia", "tensor")
-    skew = np.abs(tensor - tensor.T)
-    if skew.max() > SYMMETRIC * np.abs(tensor).max():
-        column, row = map(int, np.unravel_index(np.argmax(skew), skew.shape))
-        mirrored = f"{tensor[column, row]:g} at [{column}][{row}]; both must be equal"
-        return Finding(
-            (*path, row, column), f"not symmetric: {tensor[row, column]:g} here, but {mirrored}"
-        )
-    fault = moments_fault(np.asarray(np.linalg.eigvalsh(symmetric(tensor))))
-    return None if fault is None else Finding(path, fault)
-
-
-def moments_fault(moments: Vector) -> str | None:
-    """The reason why no body has these principal moments (3,) kg m²."""
-    values = f"principal moments {', '.join(f'{moment:g}' for moment in moments)} kg m^2"
-    least, middle, largest = np.sort(moments).tolist()
-    if least <= (smallest := max(SMALLEST, 1e-14 * largest)):
-        wrong = " or ".join(f"{moment:g}" for moment in moments if moment <= smallest)
-        return f"{values}; all three must be above 0, not {wrong}"
-    if largest > (least + middle) * (1 + SYMMETRIC):
-        limit = "the largest must not exceed the sum of the other two (triangle inequality)"
-        return f"{values}: {limit}"
-    return None
-
-
-def principal_of(facts: Facts) -> tuple[rigid_body.Moments, Vector] | None:
-    """Principal moments, kg m², and axes, by the tensor or by A and C; None where they cannot be
-    read.
-    """
-    tensor = tensor_of(facts)
-    if tensor is not None:
-        return None if tensor_fault(tensor) else rigid_body.principal_axes(symmetric(tensor))
-    A, C = (facts.number("inertia", "inertia", key) for key in "AC")
-    return None if A is None or C is None or A <= 0.0 or C <= 0.0 else ((A, A, C), np.eye(3))
-
-
-def inertia_of(facts: Facts) -> Inertia | None:
-    """The inertia; None where it cannot be read, or no body can have it and spin."""
-    principal = principal_of(facts)
-    if principal is None or principal[0][2] > sum(principal[0][:2]) * (1.0 + SYMMETRIC):
-        return None
-    try:
-        return Inertia(*principal, wheel_of(facts))
-    except ValueError:
-        return None
-
-
-def wheel_of(facts: Facts) -> float:
-    """Momentum of the wheel, N m s; zero where there is none or it cannot be read."""
-    return facts.number("momentum", "wheel", "momentum") or 0.0
-
-
-def _spin_axis_fault(tensor: Vector, facts: Facts) -> Finding | None:
-    """The reason why free spin about principal axis 3 is unstable, and its growth, if the spin is
-    known.
-    """
-    moments = rigid_body.principal_axes(symmetric(tensor))[0]
-    spin = spin_of(facts)
-    wheel = wheel_of(facts)
+    fault = tensor_fault(facts.tensor)
+    if fault is not None:
+        yield fault
+        return
+    moments = rigid_body.principal_axes(symmetric(facts.tensor))[0]
+    spin, wheel = facts.spin, facts.wheel
     if wheel != 0.0:
-        if spin is None or (grows := rigid_body.growth(moments, spin, wheel)).stable:
-            return None
-        low, high = sorted(moment * spin - moments[2] * spin for moment in moments[:2])
-        growth = (
-            f"grows e-fold in {grows.growth_time:.2g} s"
-            if grows.squared_exponent
-            else "is not turned back"
-        )
-        cure = f"expected a momentum below {low:.4g} or above {high:.4g} N m s"
-        return Finding(
-            ("wheel", "momentum"), f"nutation about the spin axis {growth} with it; {cure}"
-        )
-    named = sorted(zip(moments, ("I1", "I2", "I3"), strict=True), reverse=True)
-    values = ", ".join(f"{name} = {moment:.10g}" for moment, name in named)
+        if spin is not None and not rigid_body.growth(moments, spin, wheel).stable:
+            low, high = sorted(moment * spin - moments[2] * spin for moment in moments[:2])
+            problem = "nutation about the spin axis grows with it"
+            cure = f"expected a momentum below {low:.4g} or above {high:.4g} N m s"
+            yield Finding(("wheel", "momentum"), f"{problem}; {cure}")
+        return
+    unstable = {
+        "degenerate": "the same principal moment as just one other axis",
+        "intermediate": "the middle principal moment",
+    }
     kind = rigid_body.axis_class(moments)
-    growth = ""
-    if kind == "degenerate":
-        problem = f"the same principal moment as just one other axis ({values} kg m^2)"
-        growth = " and drifts evenly"
-    elif kind == "intermediate":
-        problem = f"the middle principal moment ({values} kg m^2)"
-        if spin is not None:
-            growth = f" and grows e-fold in {rigid_body.growth(moments, spin).growth_time:.2g} s"
-    else:
-        return None
-    cure = "spin about the axis of the smallest or largest moment, or hold it by a wheel"
-    problem = f"the spin axis has {problem}: free spin about it is unstable{growth}; {cure}"
-    return Finding(("inertia", "tensor"), problem)
-
-
-def spin_of(facts: Facts) -> float | None:
-    """The rate about principal axis 3; None where it is zero without a wheel or cannot be read."""
-    spin = (
-        _spin_of_omega0(facts)[1] if facts.has("omega0") else facts.number("rate", "state", "spin")
-    )
-    return spin if spin is not None and (abs(spin) >= SMALLEST or wheel_of(facts)) else None
+    if kind in unstable:
+        named = sorted(zip(moments, ("I1", "I2", "I3"), strict=True), reverse=True)
+        values = ", ".join(f"{name} = {moment:.10g}" for moment, name in named)
+        problem = f"the spin axis has {unstable[kind]} ({values} kg m^2)"
+        cure = "spin about the axis of the smallest or largest moment, or hold it by a wheel"
+        yield Finding(path, f"{problem}: free spin about it is unstable; {cure}")
 
 
 def _motion(facts: Facts) -> Iterator[Finding]:
-    for path, spin in (
-        (("state", "spin"), facts.number("rate", "state", "spin")),
-        _spin_of_omega0(facts),
-    ):
-        if spin is not None and abs(spin) < SMALLEST and not wheel_of(facts):
-            cure = "expected a rate about axis 3, or a wheel; nothing nutates without"
-            yield Finding(path, f"the spin is zero; {cure}")
-    spin = spin_of(facts)
-    inertia = inertia_of(facts)
+    path, stated = facts.stated_spin
+    if stated is not None and abs(stated) < SMALLEST and not facts.wheel:
+        cure = "expected a rate about axis 3, or a wheel; nothing nutates without"
+        yield Finding(path, f"the spin is zero; {cure}")
+    spin, inertia = facts.spin, facts.inertia
     final = facts.number("rate", "goal", "spin")
     if final is not None and spin is not None and final * spin < 0.0:
-        yield Finding(
-            ("goal", "spin"),
-            "of the other sign than the spin at t = 0; the spin cannot be reversed",
-        )
+        problem = "of the other sign than the spin at t = 0; the spin cannot be reversed"
+        yield Finding(("goal", "spin"), problem)
     if spin is None or inertia is None or not inertia.wheel:
         return
     axial = inertia.axial(spin)
@@ -495,91 +391,174 @@ def _motion(facts: Facts) -> Iterator[Finding]:
         yield Finding(("dissipation", "nutation"), problem)
 
 
-def _spin_of_omega0(facts: Facts) -> tuple[KeyPath, float | None]:
-    """The rate about principal axis 3, and its path; a transverse rate that is rounding counts as
-    zero.
-    """
-    omega0 = facts.vector("rate", 3, "omega0")
-    tensor = tensor_of(facts)
-    if omega0 is None or (tensor is not None and tensor_fault(tensor) is not None):
-        return (), None
-    if tensor is None:
-        return ("omega0", 2), float(omega0[2])
-    _, axes = rigid_body.principal_axes(symmetric(tensor))
-    spin = float(axes[:, 2] @ omega0)
-    return ("omega0",), spin if abs(spin) > CANCELLED * norm(omega0) else 0.0
-
-
 def disturbance_kind(kind: str | None, turns: bool) -> str:
     """Kind of a disturbance that says ``kind`` or nothing; ``turns``: rate or fixed_in is given."""
     return kind or ("rotating" if turns else "constant")
 
 
 def _disturbances(facts: Facts) -> Iterator[Finding]:
-    for path in filter(lambda path: facts.is_mapping(*path), facts.below("disturbances")):
-        turning = [key for key in ("rate", "fixed_in") if facts.has(*path, key)]
-        stated = facts.value(*path, "kind")
-        kind = disturbance_kind(None if stated is None else str(stated), bool(turning))
-        if kind in ("constant", "axial"):
-            for key in turning:
-                problem = f"goes with kind rotating, not {kind}; leave one of the two out"
-                yield Finding((*path, key), problem, True)
-        elif len(turning) == 2:
-            yield Finding((*path, "fixed_in"), f"given together with rate; {KEEP}", True)
-        elif kind == "rotating" and not turning:
-            cure = "give rate: … rad/s, as seen in the body, or fixed_in: inertial"
-            yield Finding((*path, "rate"), f"missing; {cure}")
-        if kind in ("constant", "rotating") and facts.number("torque", *path, "torque") is not None:
+    for path in facts.matching("disturbances.*.torque"):
+        across = facts.value(*path[:-1], "kind") in (None, "constant", "rotating")
+        if across and facts.number("torque", *path) is not None:
             problem = "expected three components, [M1, M2, M3], got a single torque"
-            cure = "; or, for a torque about axis 3 only, kind: axial"
-            yield Finding((*path, "torque"), problem + cure)
+            yield Finding(path, f"{problem}; or, for a torque about axis 3 only, kind: axial")
 
 
-def _blackout(facts: Facts) -> Iterator[Finding]:
-    for path in facts.below("limits", "blackout"):
-        window = facts.vector("time", 2, *path)
-        if window is not None and window[1] < window[0]:
-            yield Finding(path, "ends before it begins; expected [begin, end]")
-
-
-ALONG = 1e-3  # rad from the spin axis, up to which the Sun counts as along it
-
-
-def _sun(facts: Facts) -> Iterator[Finding]:
-    """A Sun that is asked for and not there, cannot be computed, or has no side."""
-    for path in facts.matching("keep.*.direction"):
-        if facts.text(*path) == "sun" and not facts.has("sun"):
-            yield Finding(path, f"needs sun{SUN}")
-    sun = _to_sun(facts)
-    axis = facts.vector("angle", 2, "attitude", "spin_axis")
-    undated = facts.has("attitude") and not facts.has("attitude", "epoch")
-    if sun is None and facts.text("sun") == "epoch" and undated:
-        yield Finding(("sun",), f"epoch needs attitude.epoch, the date of t = 0; or give {SKY}")
-    if sun is not None and axis is not None and facts.has("attitude", "sun_phase"):
-        angle = float(attitude.angle_between(attitude.on_sphere(*axis.tolist()), sun))
-        if min(angle, math.pi - angle) < ALONG:
-            problem = "the Sun lies along spin_axis, which has no side of the Sun then; give phase"
-            yield Finding(("attitude", "sun_phase"), problem, True)
-
-
-def _to_sun(facts: Facts) -> Vector | None:
-    """The direction (3,) to the Sun, given or of the epoch; None where it cannot be read."""
-    given = facts.vector("angle", 2, "sun")
-    if given is not None:
-        return attitude.on_sphere(*given.tolist())
-    epoch = facts.text("attitude", "epoch")
-    if facts.text("sun") != "epoch" or epoch is None:
+def torque_of(facts: Facts, path: KeyPath) -> tuple[Vector, float] | None:
+    """Torque of a mounted thruster, N m, and the magnitude that its rounding goes by."""
+    position = facts.vector("length", 3, *path, "position")
+    direction = facts.vector("number", 3, *path, "direction")
+    force = facts.number("force", *path, "force")
+    if position is None or direction is None or not force or math.hypot(*direction) < SMALLEST:
         return None
-    try:
-        return sky.direction(Epoch.parse(epoch).days_of_j2000)
-    except ValueError:
-        return None
+    center = facts.vector("length", 3, "center_of_mass")
+    arm = position if center is None else position - center
+    return np.cross(arm, force_vector(direction, force)), math.hypot(*position) * abs(force)
 
 
-def _declinations(facts: Facts) -> Iterator[Finding]:
-    for pattern in ("sun", "attitude.spin_axis", "keep.*.direction"):
-        for path in facts.matching(pattern):
-            angle = facts.number("angle", *path, 1)
-            if angle is not None and abs(angle) > 0.5 * math.pi * (1.0 + 1e-12):
-                problem = f"{math.degrees(angle):g} deg is no declination"
-                yield Finding((*path, 1), f"{problem}; expected -90 deg to 90 deg")
+def _thrusters(facts: Facts) -> Iterator[Finding]:
+    for path in facts.below("thrusters"):
+        torque = None if facts.has(*path, "torque") else torque_of(facts, path)
+        if torque is not None and math.hypot(*torque[0]) <= CANCELLED * torque[1]:
+            cure = "the force passes through the centre of mass; move or turn the thruster"
+            yield Finding((*path, "position"), f"no torque: {cure}")
+    # A channel has one valve, so that thrusters with another one would not fire as planned.
+    thrusters = facts.names["thruster"]
+    for path in facts.below("channels"):
+        members = [thrusters.get(facts.text(*entry) or "") for entry in facts.below(*path)]
+        nodes = [
+            [facts.root.get(*member, key) for key in ("valve", "impulse_bit")]
+            for member in members
+            if member is not None
+        ]
+        valves = [[None if node is None else node.plain() for node in pair] for pair in nodes]
+        if any(valve != valves[0] for valve in valves):
+            problem = "its thrusters do not have the same valve or impulse_bit"
+            yield Finding(path, f"{problem}; write them alike, or use channels of their own")
+
+
+def _tank(facts: Facts) -> Iterator[Finding]:
+    """Faults of a tank: it is of no use where the propellant that is used is not known."""
+    for path in facts.below("thrusters") if facts.has("tank") else ():
+        for key, other in (("isp", ("tank", "isp")), ("lever_arm", (*path, "force"))):
+            if not facts.has(*path, key) and not facts.has(*other):
+                yield Finding((*path, key), "missing; by it tank knows the propellant used")
+    # Once all propellant is used, the moments must be those of a body.
+    path = ("tank", "inertia_per_kg")
+    propellant = facts.number("mass", "tank", "propellant")
+    rows = facts.vector("shed", 3, *path)
+    transverse, axial = (facts.number("shed", *path, key) for key in "AC")
+    if rows is None and transverse is not None and axial is not None:
+        rows = np.array([transverse, transverse, axial])
+    if propellant is None or facts.principal is None or rows is None:
+        return
+    fault = moments_fault(np.asarray(facts.principal[0]) - propellant * rows)
+    if fault is not None:
+        yield Finding(path, f"once {propellant:g} kg are used it leaves {fault}")
+
+
+def _dispersions(facts: Facts) -> Iterator[Finding]:
+    """Faults of tolerances by thruster, and of thrusts in N, which become a share of the thrust."""
+    for key in BY_THRUSTER:
+        value = facts.value("dispersions", key)
+        path: KeyPath = ("dispersions", key)
+        places = dict.fromkeys(facts.thrusts, path)
+        if isinstance(value, dict) and by_name(value):
+            places = {str(entry[-1]): entry for entry in facts.below(*path)}
+        for name, place in places.items():
+            if name not in facts.thrusts:
+                yield Finding(place, _unknown(name, "thruster", [*facts.thrusts]), True)
+            elif key == "thrust" and facts.thrusts[name] is None:
+                for size in DISTRIBUTIONS:
+                    if facts.number("force", *place, size) is not None:
+                        problem = f"needs the thrust of {shown(name)}, which is not known"
+                        yield Finding((*place, size), f"{problem}; give its lever_arm, or a %")
+
+
+SAMPLES = 4.0  # samples a nutation period without which the phase of the nutation is hardly seen
+
+
+def _loop(facts: Facts) -> Iterator[Finding]:
+    """Faults of the loop: an on-time that a channel does not allow, a sensor that shows nothing."""
+    on_time = facts.number("time", "loop", "on_time")
+    thrusters = facts.names["thruster"]
+    for name, path in facts.names["channel"].items() if on_time is not None else ():
+        entries = [facts.text(*entry) for entry in facts.below(*path)] or [name]
+        members = [thrusters[entry] for entry in entries if entry in thrusters]
+        shortest = [facts.number("time", *member, "min_on_time") or 0.0 for member in members]
+        longest = [facts.number("time", *member, "max_on_time") for member in members]
+        low = max(shortest, default=0.0)
+        high = min((time for time in longest if time is not None), default=math.inf)
+        if on_time is not None and not low <= on_time <= high:
+            problem = f"{on_time:g} s is outside what {name} allows: {span(low, high, 's')}"
+            yield Finding(("loop", "on_time"), problem)
+    inertia, spin = facts.inertia, facts.spin
+    if inertia is None or spin is None:
+        return
+    sensor: KeyPath = ("loop", "sensor")
+    rate = facts.number("frequency", *sensor, "rate")
+    lowest = SAMPLES * abs(inertia.nutation_rate(spin)) / (2.0 * math.pi)
+    if rate is not None and 0.0 < rate < lowest and facts.value("loop", "alias") is not True:
+        problem = f"{rate:g} Hz is below four times the nutation frequency"
+        cure = f"expected at least {lowest:.4g} Hz, or alias: true beside start"
+        yield Finding((*sensor, "rate"), f"{problem}; {cure}")
+    if facts.text(*sensor, "kind") != "accelerometer":
+        return
+    if inertia.wheel != 0.0:
+        problem = "accelerometer: with a wheel only gyros are modelled; expected gyro"
+        yield Finding((*sensor, "kind"), problem)
+        return
+    position = facts.vector("length", 3, *sensor, "position")
+    axis = facts.vector("number", 3, *sensor, "axis")
+    if not facts.has(*sensor, "axis"):
+        axis = np.array([0.0, 0.0, 1.0])
+    if position is None or axis is None or not axis.any():
+        return
+    from nutdamp.control_loop.sensor import is_blind
+
+    turn = inertia.axes.T
+    if is_blind(inertia.moments, turn @ position, turn @ axis / math.hypot(*axis)):
+        problem = "blind: here it shows nothing of the nutation"
+        yield Finding((*sensor, "position"), f"{problem}; move it off axis 3, or turn its axis")
+
+
+def correlation_findings(spacecraft: Spacecraft) -> Iterator[Finding]:
+    """Faults of correlated inputs, whose names are known once the spacecraft is."""
+    pairs = () if spacecraft.dispersions is None else spacecraft.dispersions.correlation
+    if not pairs:
+        return
+    path = ("dispersions", "correlation")
+    inputs = reachable(spacecraft)
+    names = [*(entry.name for entry in inputs.drawn), *(entry.name for entry in inputs.unused)]
+    correlated = [name for name in names if not name.endswith("of each pulse")]
+    fixed = {entry.name for entry in inputs.drawn if entry.kind == "bias"}
+    before: set[frozenset[str]] = set()
+    faults: list[Finding] = []
+    for row, (first, second, size) in enumerate(pairs):
+        for place, name in enumerate((first, second)):
+            if name not in correlated:
+                close = nearest(name, correlated)
+                cure = f"known here: {', '.join(correlated) or 'none'}"
+                if close is not None:
+                    cure = f"did you mean {shown(close)}?"
+                problem = f"the dispersions have no input called {shown(name)}; {cure}"
+                faults.append(Finding((*path, row, place), problem))
+            elif name in fixed:
+                problem = f"{shown(name)} is a fixed offset (bias), which does not vary"
+                faults.append(Finding((*path, row, place), problem))
+        if first == second:
+            problem = f"{shown(first)} again; expected two different inputs"
+            faults.append(Finding((*path, row, 1), problem))
+        elif frozenset((first, second)) in before:
+            problem = f"{first} and {second} are given before; keep one of the two"
+            faults.append(Finding((*path, row), problem))
+        elif abs(size) == 1.0:
+            problem = f"{size:g}: one would follow from the other; expected less than 1 in size"
+            faults.append(Finding((*path, row, 2), problem))
+        before.add(frozenset((first, second)))
+    yield from faults
+    for group in () if faults else grouped(pairs):
+        if not positive_definite(group):
+            problem = f"not positive definite for {', '.join(group.names)}"
+            why = "no numbers have these correlations; pairs that are not given count as 0"
+            yield Finding(path, f"{problem}: {why}")

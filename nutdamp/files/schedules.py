@@ -74,13 +74,10 @@ def read_blocks(path: str | Path, spacecraft: Spacecraft) -> tuple[tuple[Block, 
         block = _block(row, spacecraft)
         if block is None:
             continue
-        over = blocks[-1].sun_pulses[-1] if blocks else 0
-        if block.first <= over:
-            problem = (
-                f"Sun pulse {block.first} comes before the block before is over; "
-                f"expected {over + 1} or later"
-            )
-            row.fault("first_sun_pulse", problem)
+        last = blocks[-1].sun_pulses[-1] if blocks else 0
+        if block.first <= last:
+            problem = f"Sun pulse {block.first} comes before the block before is over"
+            row.fault("first_sun_pulse", f"{problem}; expected {last + 1} or later")
         for column, value, possible in misfits(spacecraft.commands, block):
             row.warn(column, f"{column} = {value} cannot be commanded, {possible}: flown as given")
         blocks.append(block)
@@ -100,77 +97,64 @@ def _counted(table: Table, spacecraft: Spacecraft, name: str) -> bool:
     """
     alone = f"{name}_s" not in table.header and f"{name}_counts" in table.header
     if alone and spacecraft.commands is None:
-        problem = (
-            f"the spacecraft file has no commands to count the {name} in; "
-            f"expected the column {name}_s"
-        )
-        table.fault(1, f"{name}_counts", problem)
+        problem = f"the spacecraft file has no commands to count the {name} in"
+        table.fault(1, f"{name}_counts", f"{problem}; expected the column {name}_s")
     return alone
 
 
 def _block(row: Row, spacecraft: Spacecraft) -> Block | None:
+    """The block of a row; None for a fault."""
     faults = len(row.table.faults)
     channels = [channel.name for channel in spacecraft.channels]
     name = row["channel"]
     if name not in channels:
+        cure = f"it has {', '.join(map(shown, channels)) or 'none'}"
         close = nearest(name, channels)
-        cure = (
-            f"did you mean {shown(close)}?"
-            if close
-            else f"it has {', '.join(map(shown, channels)) or 'none'}"
-        )
+        if close is not None:
+            cure = f"did you mean {shown(close)}?"
         row.fault("channel", f"the spacecraft file has no channel {shown(name)}; {cure}")
     delay, width = (_time(row, spacecraft, name) for name in TIMES)
     if width == 0.0:
-        row.fault(
-            "width_s" if "width_s" in row else "width_counts",
-            "0 s fires nothing; expected a time above 0",
-        )
-    numbers = [1, 1, 1]
-    for place, (column, most) in enumerate(
-        (("first_sun_pulse", LATEST), ("count", MOST_FIRED), ("every", LATEST))
-    ):
-        value = row.number(column) if column != "every" or row.get("every") else 1.0
-        if value is not None and not (value.is_integer() and 1 <= value <= most):
-            row.fault(column, f"expected a whole number from 1 to {most}, got {row[column]}")
-        numbers[place] = int(value or 1)
-    first, count, every = numbers
-    return (
-        None
-        if len(row.table.faults) > faults
-        else Block(name, first, delay or 0.0, width or 0.0, count, every)
-    )
+        column = "width_s" if "width_s" in row else "width_counts"
+        row.fault(column, "0 s fires nothing; expected a time above 0")
+    row.setdefault("every", "1")
+    first = _whole(row, "first_sun_pulse", LATEST)
+    count = _whole(row, "count", MOST_FIRED)
+    every = _whole(row, "every", LATEST)
+    if len(row.table.faults) > faults:
+        return None
+    return Block(name, first, delay or 0.0, width or 0.0, count, every)
+
+
+def _whole(row: Row, column: str, highest: int) -> int:
+    """A whole number of at least 1; 1 for a fault."""
+    value = row.number(column)
+    if value is not None and not (value.is_integer() and 1 <= value <= highest):
+        row.fault(column, f"expected a whole number from 1 to {highest}, got {row[column]}")
+    return int(value or 1)
 
 
 def _time(row: Row, spacecraft: Spacecraft, name: str) -> float | None:
     """A delay or width, s: as it is given, or so many steps; None for a fault."""
-    column = f"{name}_s" if f"{name}_s" in row else f"{name}_counts"
+    in_seconds = f"{name}_s" in row
+    column = f"{name}_s" if in_seconds else f"{name}_counts"
     commands = spacecraft.commands
     value = row.number(column)
     if value is None:
         return None
     if value < 0.0:
-        least = (
-            " s is negative; expected a time"
-            if column.endswith("_s")
-            else " is negative; expected a number"
-        )
-        row.fault(column, f"{value:g}{least} of at least 0")
+        unit = " s" if in_seconds else ""
+        row.fault(column, f"{value:g}{unit} is negative; expected at least 0")
         return None
-    if column.endswith("_s"):
+    if in_seconds or commands is None:
         return value
     if not value.is_integer():
         row.fault(column, f"expected a whole number of steps, got {row[column]}")
         return None
-    if commands is None:
-        return 0.0
     time = commands.time(name, value)
     if time is None:
-        most = len(commands.widths)
-        row.fault(
-            column,
-            f"expected the number of an entry of commands.width, 1 to {most}, got {row[column]}",
-        )
+        expected = f"the number of an entry of commands.width, 1 to {len(commands.widths)}"
+        row.fault(column, f"expected {expected}, got {row[column]}")
     return time
 
 
@@ -247,10 +231,26 @@ def _pulse(row: Row, spacecraft: Spacecraft, channels: Channels) -> Pulse | None
         if len(row.table.faults) == faults:
             row.fault("on_time_s" if channel else "channel", _missing(name, channels, on_time))
         return None
-    given = spacecraft.inertia.axes.T @ impulse
-    push = None if on_time == 0.0 else given / on_time
-    propellant = _propellant(row, name, spacecraft, channels, given, push)
-    return Pulse(t, on_time, name, given, push, None, propellant)
+    principal = spacecraft.inertia.axes.T @ impulse
+    push = None if on_time == 0.0 else principal / on_time
+    propellant = None
+    torquer = spacecraft.torquer
+    if channel is not None:
+        flown = "flown as an ideal impulse, its propellant is unknown"
+        row.warn(f"ideal {name}", f"{shown(name)} has an on-time of 0: {flown}")
+    elif name != STEERABLE or torquer is None:
+        names = ", ".join(map(shown, channels)) or STEERABLE
+        problem = f"channel {shown(name)} is not in the spacecraft file ({names})"
+        row.warn(f"unknown {name}", f"{problem}: flown as given, propellant unknown")
+    else:
+        size = float(np.linalg.norm(principal))
+        rated = None if torquer.torque is None else torquer.torque * on_time
+        if rated and abs(size - rated) > AGREES * rated:
+            problem = f"{size / on_time:g} N m is not the torque of the steerable torquer"
+            row.warn("steerable torque", f"{problem}, {torquer.torque:g} N m: flown as given")
+        rate = torquer.propellant_per_impulse
+        propellant = None if rate is None else rate * size
+    return Pulse(t, on_time, name, principal, push, None, propellant)
 
 
 def _timing(row: Row, channel: Channel | None) -> tuple[float, float, float | None] | None:
@@ -263,18 +263,23 @@ def _timing(row: Row, channel: Channel | None) -> tuple[float, float, float | No
     if time is None or on_time is None:
         return None
     if on_time < 0.0:
-        least = 0.0 if channel is None else channel.min_on_time
-        most = math.inf if channel is None else channel.max_on_time
-        allowed = f"{least:g} s or more" if most == math.inf else f"{least:g} s to {most:g} s"
-        row.fault(
-            "on_time_s",
-            f"{on_time:g} s is negative; {allowed} is expected (0 for an ideal impulse)",
-        )
+        cure = "0 s or more is expected (0 for an ideal impulse)"
+        row.fault("on_time_s", f"{on_time:g} s is negative; {cure}")
         return None
-    lead = None if channel is None or on_time == 0.0 else _lead(row, channel, on_time)
-    centre = 0.5 * on_time if lead is None else lead
+    centre = 0.5 * on_time
+    valve = None if channel is None or on_time == 0.0 else channel.valve
+    if channel is not None and valve is not None:
+        shortest, longest = valve.known
+        if not shortest <= on_time <= longest:
+            rows = f"the impulse_bit of {shown(channel.name)}, {shortest:g} s to {longest:g} s"
+            row.fault("on_time_s", f"{on_time:g} s is outside {rows}")
+        thrust = valve.thrust(on_time)
+        if not thrust.ramps:
+            problem = f"{on_time:g} s is too short for the valve of {shown(channel.name)}"
+            row.warn(f"closed {channel.name}", f"{problem}: it does not open")
+        centre = thrust.centroid
     start = time if column == STARTS[0] else time - centre
-    if start < -1e-9:
+    if start < -1e-9:  # s; an earlier start is no rounding of 0
         row.fault(column, f"the pulse would start at {start:g} s; 0 s or later is expected")
         return None
     t = max(start, 0.0) + centre if column == STARTS[0] else max(time, centre)
@@ -283,23 +288,7 @@ def _timing(row: Row, channel: Channel | None) -> tuple[float, float, float | No
         row.fault("on_time_s", f"{on_time:g} s is too short at {t:g} s, {apart}")
         return None
     begins = max(start, 0.0) if column == STARTS[0] else t - centre
-    return t, on_time, None if lead is None else begins
-
-
-def _lead(row: Row, channel: Channel, on_time: float) -> float | None:
-    """Time (s) from the start of a command to the centroid of its thrust; None without a valve."""
-    if channel.valve is None:
-        return None
-    least, most = channel.valve.known
-    named = shown(channel.name)
-    thrust = channel.valve.thrust(on_time)
-    if not least <= on_time <= most:
-        known = f"{least:g} s to {most:g} s"
-        row.fault("on_time_s", f"{on_time:g} s is outside the impulse_bit of {named}, {known}")
-    if not thrust.ramps:
-        short = f"{on_time:g} s is too short for the valve of {named}: it does not open"
-        row.warn(f"closed {channel.name}", short)
-    return thrust.centroid
+    return t, on_time, None if valve is None else begins
 
 
 def _missing(name: str, channels: Channels, on_time: float) -> str:
@@ -311,39 +300,11 @@ def _missing(name: str, channels: Channels, on_time: float) -> str:
         return f"{nothing}, unless {columns} give an ideal impulse"
     if name == STEERABLE:
         return f"a steered pulse needs {columns}"
+    names = f" (it has {', '.join(map(shown, channels))})" if channels else ""
     close = nearest(name, channels)
-    known = f" (it has {', '.join(map(shown, channels))})" if channels else ""
-    known = f" (did you mean {shown(close)}?)" if close else known
-    return f"{shown(name)}, not in the spacecraft file{known}, needs {columns}"
-
-
-def _propellant(
-    row: Row,
-    name: str,
-    spacecraft: Spacecraft,
-    channels: Channels,
-    impulse: Vector,
-    torque: Vector | None,
-) -> float | None:
-    """Propellant, kg, of a pulse flown as the schedule has it; a warning where it is not known."""
-    named = shown(name)
-    torquer = spacecraft.torquer
-    if name in channels:
-        ideal = f"{named} has an on-time of 0: flown as an ideal impulse, its propellant is unknown"
-        row.warn(f"ideal {name}", ideal)
-        return None
-    if name != STEERABLE or torquer is None:
-        known = ", ".join(map(shown, channels)) or STEERABLE
-        missing = f"channel {named} is not in the spacecraft file ({known})"
-        row.warn(f"unknown {name}", f"{missing}: flown as given, propellant unknown")
-        return None
-    if torque is not None and torquer.torque is not None:
-        size = float(np.linalg.norm(torque))
-        if abs(size - torquer.torque) > AGREES * torquer.torque:
-            others = f"the torque of the steerable torquer, {torquer.torque:g} N m"
-            row.warn("steerable torque", f"{size:g} N m is not {others}: flown as given")
-    rate = torquer.propellant_per_impulse
-    return None if rate is None else rate * float(np.linalg.norm(impulse))
+    if close is not None:
+        names = f" (did you mean {shown(close)}?)"
+    return f"{shown(name)}, not in the spacecraft file{names}, needs {columns}"
 
 
 def _numbers(row: Row, columns: Sequence[str]) -> Vector | None:

@@ -1,7 +1,5 @@
 """Keys of a spacecraft file for studies: dispersions and the closed loop, with their units and
 ranges.
-
-Sizes of tolerances stay as they are written here: `study_rules` finds the faults in them.
 """
 
 from __future__ import annotations
@@ -10,18 +8,21 @@ from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import fields
 from functools import cache
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 from nutdamp.files.fields import (
+    RIGHT_ANGLE,
     AcuteAngle,
     Direction,
     Field,
     Key,
+    KeyPath,
     Length,
     Name,
     Nutation,
     Position,
     PositiveTime,
+    Problems,
     Quantity,
     Rule,
     Section,
@@ -74,12 +75,25 @@ def by_name(value: Mapping[Any, object]) -> bool:
     return any(isinstance(getattr(entry, "value", entry), dict) for entry in value.values())
 
 
+LARGEST_SIGMA = 0.5
+"""One sigma, as a share of a value or of a right angle: with more one draw in forty turns its
+sign.
+"""
+
+LARGEST_OFFSET = 1.0
+"""Half a width and a fixed offset: with more any turns its sign."""
+
+EXAMPLES = {"rate": "0.1 deg/s", "angle": "0.5 deg", "length": "5 mm", "time": "5 ms"}
+
+
 class ToleranceSection(Section):
     """Tolerance of a quantity: one of normal (one sigma), uniform, triangular (half width), bias
     (offset).
     """
 
     written = "a tolerance, such as {normal: 2 %}"
+    quantity = ""
+    tolerance: Tolerance
 
     normal: Any = Field(
         "One sigma of a normal distribution, in its unit or in %.", "2 %", default=None
@@ -92,11 +106,49 @@ class ToleranceSection(Section):
     )
     bias: Any = Field("Fixed offset, signed, in its unit or in %.", "-2 ms", default=None)
 
-    def tolerance(self, key: str) -> Tolerance:
-        """The checked tolerance, which is at ``key`` of the dispersions."""
-        kind = next(kind for kind in KINDS if getattr(self, kind) is not None)
-        size, relative = size_of(getattr(self, kind), QUANTITIES[key])
-        return Tolerance(kind, size, relative)
+    @classmethod
+    def read(cls, value: Any, problems: Problems, path: KeyPath = ()) -> Self | None:
+        """The section, with its ``tolerance`` of the ``quantity``; problems as of any section."""
+        section = super().read(value, problems, path)
+        if section is None:
+            return None
+        kinds = [key for key in value if key in KINDS]
+        if not kinds:
+            size = EXAMPLES.get(cls.quantity, "2 %")
+            cure = f"give {{normal: {size}}}, or uniform, triangular, bias"
+            problems.append((path, f"names no distribution; {cure}"))
+        for kind in kinds[1:]:
+            problem = f"given together with {kinds[0]}; keep one of the two"
+            problems.append(((*path, kind), problem))
+        for kind in kinds:
+            try:
+                if value[kind] is not None:
+                    section.tolerance = _tolerance(kind, value[kind], cls.quantity)
+            except ValueError as wrong:
+                problems.append(((*path, kind), str(wrong)))
+        return section
+
+
+def _tolerance(kind: str, value: object, quantity: str) -> Tolerance:
+    """The tolerance of a ``quantity``; raises ValueError with the values allowed."""
+    size, relative = size_of(value, quantity)
+    what = {"normal": "one sigma", "bias": "an offset"}.get(kind, "half a width")
+    if kind != "bias" and size < 0.0:
+        cure = f"expected {what} of at least 0, or bias for a fixed offset"
+        raise ValueError(f"{shown(value)} is negative; {cure}")
+    share = abs(size) if relative else abs(size) / RIGHT_ANGLE if quantity == "angle" else 0.0
+    bound = LARGEST_SIGMA if kind == "normal" else LARGEST_OFFSET
+    if share > bound or share == LARGEST_OFFSET:
+        limit = f"{100 * bound:g} %" if relative else f"{90 * bound:g} deg"
+        words = "of at most" if kind == "normal" else "below"
+        raise ValueError(f"{shown(value)} is out of range; expected {what} {words} {limit}")
+    return Tolerance(kind, size, relative)
+
+
+@cache
+def tolerance_section(quantity: str) -> type[ToleranceSection]:
+    """The section of the tolerances of a ``quantity``."""
+    return type("ToleranceSection", (ToleranceSection,), {"quantity": quantity})
 
 
 class _Tolerance(Rule):
@@ -108,9 +160,7 @@ class _Tolerance(Rule):
         self.kind, self.each = kind, each
 
     def read(self, value: Any, inner: Callable[[Any], Any]) -> Any:
-        """A single tolerance is that of all three axes, or for all thrusters."""
-        if isinstance(value, dict) and self.each == "axis":
-            return inner([value] * 3)
+        """A single tolerance is for all thrusters."""
         alone = isinstance(value, dict) and self.each == "thruster" and not by_name(value)
         return inner({ALL: value} if alone else value)
 
@@ -142,11 +192,13 @@ class _Tolerance(Rule):
         return single
 
 
-_WRITTEN: dict[str, Any] = {
-    "": ToleranceSection,
-    "axis": Annotated[list[ToleranceSection], Length(3, 3)],
-    "thruster": dict[str, ToleranceSection],
-}
+def _written(section: type[ToleranceSection], each: Each) -> Any:
+    """The type of a tolerance, or of those of each axis or thruster."""
+    if each == "axis":
+        return Annotated[list[section], Length(3, 3)] | section  # type: ignore[valid-type]
+    return dict[str, section] if each == "thruster" else section  # type: ignore[valid-type]
+
+
 _TOLERANCES = {each.name: each.metadata for each in fields(Dispersions) if each.metadata}
 QUANTITIES = {
     key: declared["kind"] for key, declared in _TOLERANCES.items()
@@ -176,8 +228,9 @@ class DispersionsSection(Section):
         keys = {}
         for key, declared in _TOLERANCES.items():
             rule = _Tolerance(declared["kind"], declared["each"])
+            written = _written(tolerance_section(rule.kind), rule.each)
             keys[key] = Key(
-                Annotated[_WRITTEN[rule.each], rule] | None,
+                Annotated[written, rule] | None,
                 None,
                 declared["text"],
                 [declared["example"]],
@@ -202,11 +255,12 @@ def dispersions(
     for key in QUANTITIES:
         entry = getattr(section, key)
         if isinstance(entry, ToleranceSection):
-            entries[key] = entry.tolerance(key)
+            by_axis = _TOLERANCES[key]["each"] == "axis"
+            entries[key] = (entry.tolerance,) * 3 if by_axis else entry.tolerance
         elif isinstance(entry, list | tuple):  # by axis
-            entries[key] = tuple(None if part is None else part.tolerance(key) for part in entry)
+            entries[key] = tuple(None if part is None else part.tolerance for part in entry)
         elif entry is not None:  # by thruster
-            named = {name: part.tolerance(key) for name, part in entry.items()}
+            named = {name: part.tolerance for name, part in entry.items()}
             entries[key] = dict.fromkeys(thrusts, named[ALL]) if ALL in named else named
     for name, tolerance in entries.get("thrust", {}).items():
         thrust = thrusts[name]

@@ -6,7 +6,6 @@ An empty cell of CSV is a missing sample; a track of ``simulate --csv`` is such 
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -35,27 +34,27 @@ from nutdamp.files.tabular import HEADER as TRACK
 from nutdamp.files.tabular import Table
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.schedule import Schedule
-from nutdamp.units import KINDS, shown
+from nutdamp.units import KINDS
 
 
 def record_of(history: History, spacecraft: Spacecraft, schedule: Schedule) -> Record:
     """Telemetry of a history, from attitude.epoch of the file on; raises BadRequest where it has
     none.
     """
-    given = spacecraft.attitude
-    if given is None or given.epoch is None:
+    start = spacecraft.attitude
+    if start is None or start.epoch is None:
         raise BadRequest(
             "the spacecraft file has no attitude.epoch to count the times of a history from"
         )
-    if history.frame is not None and given.frame not in (None, history.frame):
+    if history.frame is not None and start.frame not in (None, history.frame):
         raise BadRequest(
-            f"the history is in {history.frame}, the spacecraft file in {given.frame}: "
+            f"the history is in {history.frame}, the spacecraft file in {start.frame}: "
             "expected one frame"
         )
     signals = of_quaternions(history.quaternions, spacecraft)
     if history.rates is not None:
         signals |= dict(zip(GYROS, history.rates.T, strict=True))
-    times = history.times + history.epoch.since(Epoch.parse(given.epoch))
+    times = history.times + history.epoch.since(Epoch.parse(start.epoch))
     return Record(times, signals, np.empty(0), 0.0, schedule)
 
 
@@ -97,17 +96,15 @@ LIMITS = {
 """Least and largest angles of columns, deg."""
 
 UNIT_LENGTH = 0.01  # deviation from length one that a measured axis or quaternion may have
-MEANT: dict[str, Sequence[str]] = {
-    "omega|rate|gyro": ["omega_1_rad_s … omega_3_rad_s or omega_1_deg_s … omega_3_deg_s"],
-    "accel": [ACCELERATIONS],
-    "sun": [SUN_PULSE, ASPECTS],
-    "cross": [*CROSSED, *TOWARDS],
-    "q[_0-9]": QUATERNION,
-    "axis|(ra|dec)(_|$)": [*ANGLES, *AXIS],
+TWICE = {
+    TIMES[1]: TIMES[0],
+    ANGLES[0]: AXIS[0],
+    **{f"{name}_deg_s": f"{name}_rad_s" for name in GYROS},
 }
-"""Beginnings of names of columns that are meant to be measured, and the columns that there are of
-the kind.
-"""
+"""Columns, and those of the same in other units."""
+
+GROUPS = (ANGLES, AXIS, QUATERNION, CROSSED, TOWARDS)
+"""Columns that go together."""
 
 SAME = 0.03  # part by which a ratio of rates may differ from that of two units
 
@@ -160,44 +157,23 @@ def _read_samples(
     table = Table(path, (*TIMES, *MEASURED, *TRACK), "samples")
     _expect_time(table)
     header = table.header
-    for name in header:
-        kind = next((kind for kind in MEANT if re.match(kind, name, re.IGNORECASE)), None)
-        if name not in table.known and kind is not None:
-            problem = f"{shown(name)} is no column of telemetry; expected {', '.join(MEANT[kind])}"
-            table.fault(1, name, problem)
     if not table.faults and not {*MEASURED} & {*header}:
         table.fault(1, "", f"no column of samples; expected some of {', '.join(MEASURED)}")
-    for name in GYROS:
-        if f"{name}_rad_s" in header and f"{name}_deg_s" in header:
-            table.fault(
-                1, f"{name}_deg_s", f"given twice, also as {name}_rad_s; remove one of them"
-            )
-    for group in (ANGLES, AXIS, QUATERNION, CROSSED, TOWARDS):
-        missing = [name for name in group if name not in header]
-        if 0 < len(missing) < len(group):
-            table.fault(
-                1,
-                missing[0],
-                f"the column is missing beside {next(name for name in group if name in header)}",
-            )
+    for name, other in TWICE.items():
+        if name in header and other in header:
+            table.fault(1, name, f"given twice, also as {other}; remove one of them")
+    for group in GROUPS:
+        present = [name for name in group if name in header]
+        for name in group if present else ():
+            if name not in header:
+                table.fault(1, name, f"the column is missing beside {present[0]}")
     if TOWARDS[0] in header and CROSSED[0] not in header:
         table.fault(1, CROSSED[0], f"the column is missing beside {TOWARDS[0]}")
-    if set(ANGLES) & set(header) and set(AXIS) & set(header):
-        table.fault(
-            1, ANGLES[0], f"the axis is given twice, also as {', '.join(AXIS)}; remove one of them"
-        )
+    if CROSSED[0] in header and TOWARDS[0] not in header and spacecraft.sun is None:
+        problem = "no direction: that of the Sun needs the key sun in the spacecraft file"
+        table.fault(1, CROSSED[0], problem)
     table.expect()
     times, columns = _samples(table, spacecraft)
-    there = {name: np.isfinite(values) for name, values in columns.items()}
-    for group in (CROSSED, TOWARDS, QUATERNION):
-        if group[0] in columns:
-            parts = np.array([there[name] for name in group])
-            wrong = np.asarray(parts.any(axis=0) & ~parts.all(axis=0))
-            _fault_first(table, wrong, group[0], f"expected all of {', '.join(group)}, or none")
-    if CROSSED[0] in columns and spacecraft.sun is None:
-        wrong = there[CROSSED[0]] & ~there.get(TOWARDS[0], np.zeros(len(table.rows), dtype=bool))
-        problem = "no direction: that of the Sun needs the key sun in the spacecraft file"
-        _fault_first(table, wrong, TOWARDS[0], problem)
     table.check()
     signals = _signals(table, columns, spacecraft)
     for name in sorted(KIND.keys() & signals.keys()):
@@ -226,15 +202,15 @@ def _samples(table: Table, spacecraft: Spacecraft) -> tuple[Vector, dict[str, Ve
     if not table.rows:
         table.fault(1, "", "no rows of samples below the names of the columns")
     column = TIMES[0] if TIMES[0] in table.header else TIMES[1]
-    given = None if spacecraft.attitude is None else spacecraft.attitude.epoch
-    if column == TIMES[1] and given is None:
+    start = None if spacecraft.attitude is None else spacecraft.attitude.epoch
+    if column == TIMES[1] and start is None:
         table.fault(
             1,
             column,
             "the spacecraft file has no attitude.epoch to count from; expected the column t_s",
         )
     table.check()
-    epoch = Epoch.parse(given) if column == TIMES[1] and given is not None else None
+    epoch = Epoch.parse(start) if column == TIMES[1] and start is not None else None
     moments: list[float] = []
     for row in table.rows:
         try:
@@ -253,11 +229,11 @@ def _samples(table: Table, spacecraft: Spacecraft) -> tuple[Vector, dict[str, Ve
             row.number(name) if row[name].lower() not in ("", "nan") else None for row in table.rows
         )
         columns[name] = np.array([math.nan if number is None else number for number in numbers])
-    for name, (least, most) in LIMITS.items():
+    for name, (low, high) in LIMITS.items():
         if name not in columns:
             continue
-        wrong = (columns[name] < least) | (columns[name] > most)
-        _fault_first(table, wrong, name, f"expected an angle of {least:g} to {most:g} deg")
+        wrong = (columns[name] < low) | (columns[name] > high)
+        _fault_first(table, wrong, name, f"expected an angle of {low:g} to {high:g} deg")
     return np.array(moments), columns
 
 
@@ -268,11 +244,8 @@ def _fault_first(table: Table, wrong: NDArray[np.bool_], name: str, problem: str
 
 
 def _expect_time(table: Table) -> None:
-    there = {*TIMES} & {*table.header}
-    if not there:
+    if not {*TIMES} & {*table.header}:
         table.fault(1, TIMES[0], f"the column is missing (or {TIMES[1]}){table.misspelt(TIMES[0])}")
-    if len(there) == 2:
-        table.fault(1, TIMES[1], f"two columns of times: expected {TIMES[0]} or {TIMES[1]}")
 
 
 def _signals(

@@ -4,6 +4,8 @@ import re
 from collections.abc import Iterator
 from typing import Any, Literal, NamedTuple, get_args, get_origin
 
+from support.builders import present
+
 from nutdamp.errors import listed
 from nutdamp.files import fields
 from nutdamp.files.keys import SpacecraftFile
@@ -39,7 +41,7 @@ class KeyGuide(NamedTuple):
         unit = ""
         default = ""
         example = next(iter(self.field.examples), None)
-        if self.section is ToleranceSection:
+        if self.section is not None and issubclass(self.section, ToleranceSection):
             names = [
                 unit for kind in unit_kinds(QUANTITIES[self.name]) for unit in KINDS[kind].factors
             ]
@@ -108,7 +110,7 @@ def _sections(key: KeyGuide, every: list[KeyGuide]) -> Iterator[str]:
     about = " ".join((key.section.__doc__ or "").split())
     yield f"## {key.path}\n\n{about}\n\n{_listed(children)}"
     below = [child for child in children if child.section is not None]
-    if below and all(child.section is ToleranceSection for child in below):
+    if below and all(issubclass(present(child.section), ToleranceSection) for child in below):
         alike = [entry for entry in every if entry.parent == below[0].path]
         names = ", ".join(child.name for child in below)
         yield f"## {key.path}: each of {names}\n\n{_listed(alike)}"

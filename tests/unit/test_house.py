@@ -219,10 +219,6 @@ WORDED = {
     ("views/dispersion.py", "met"): "key of JSON",
     ("planning/notes.py", "met-without-pulse-from"): "code of a note",
     ("planning/notes.py", "met-without-pulse-until"): "code of a note",
-    (
-        "files/study_rules.py",
-        "given alone; name what must be met with it: nutation, momentum_shift or spin",
-    ): "a fault",
 }
 """Texts with a word of the verdict that do not tell one."""
 

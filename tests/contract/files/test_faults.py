@@ -222,8 +222,6 @@ DOUBTED = (
     "state: {spin: 3, nutation: 0.1, phase: 40}",
     "omega0: [0.1, 0, 180]",
     "state: {spin: 3, nutation: 0.5}",
-    "requirement: {nutation: 0.3 deg}\nthrusters: [{name: T, torque: [1, 0, 0]}]\n"
-    "loop: {sensor: {kind: gyro, rate: 20 Hz}, start: 0.5 deg, stop: 0.1 deg}",
     "goal: {spin: 28}",
     THRUSTER.format(300, 0),
     THRUSTER.format(0.3, 20),

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from nutdamp.files import reader, rules
+from nutdamp.files import facts, reader
 from nutdamp.flight.verification import Verification, verify
 from nutdamp.physics import attitude, body, response, triaxial
 from nutdamp.physics.thruster import Trapezoid
@@ -102,7 +102,7 @@ def to_body(patch: pytest.MonkeyPatch) -> None:
 
 
 def stronger(patch: pytest.MonkeyPatch) -> None:
-    usual = rules.force_vector
+    usual = facts.force_vector
     patch.setattr(reader, "force_vector", lambda *parts: 1.02 * usual(*parts))
 
 
