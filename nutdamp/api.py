@@ -205,7 +205,12 @@ def compare(
     schemes = expect_names(names)
     count = samples if samples in (None, 0) else units.count("samples", samples)
     return decision.compare(
-        spacecraft, schemes, expect_options(options, chosen), samples=count, timed=timed
+        spacecraft,
+        schemes,
+        expect_options(options, chosen),
+        samples=count,
+        timed=timed,
+        robust=True,
     )
 
 
@@ -240,11 +245,7 @@ def robust(
     expect_dispersions(
         units.instance("compared", compared, Comparison, "a Comparison").spacecraft.dispersions
     )
-    trials = search.variations_of(compared, options)
-    with work.steps(
-        1.5 * len(trials), hook=lambda done, _: progress(done, len(trials))
-    ) as task:  # a third: flights
-        return search.compare(compared, trials, task.reach)
+    return search.compare(compared, options, progress=progress)
 
 
 def load_schedule(path: PathName, spacecraft: Spacecraft) -> Plan:

@@ -270,6 +270,8 @@ def _missed(plan: Plan) -> float:
     return float(missed(plan.spacecraft, plan.flown.nutation, plan.flown.axis_error))
 
 
+ROBUST = "robust"  # name of the robust plan beside those of schemes
+
 BUG = "internal error, please report"
 """Message on a plan whose scheme raised an unexpected exception, which follows by name."""
 
@@ -485,12 +487,14 @@ def compare(
     *,
     samples: int | None = None,
     timed: bool = False,
+    robust: bool = False,
 ) -> Comparison:
     """Plan the schemes named, else the `usual` ones, and recommend one; one that has a bug takes no
     other down.
 
     With dispersions each plan flies as many of ``samples`` cases (default as `disperse`, without a
-    requirement 0) as it takes to know whether enough comply. ``timed``: see `Comparison`. Raises
+    requirement 0) as it takes to know whether enough comply. ``robust``: of the usual schemes, and
+    where too few comply with each, a robust plan is tried. ``timed``: see `Comparison`. Raises
     NutdampError, such as BadRequest, and KeyError for a name not in `schemes.NAMES`.
     """
     unknown = set(names) - set(catalogue.NAMES)
@@ -501,7 +505,8 @@ def compare(
         for name in names or usual(spacecraft)
     ]
     flies = SEARCH if _flies(spacecraft, samples) else 0.0
-    with work.steps(sum(size for _, size in sizes) + flies):
+    searched = flies if robust and not names and samples is None else 0.0
+    with work.steps(sum(size for _, size in sizes) + flies + searched):
         plans = []
         with work.budget("the comparison", work.COMMAND):
             for name, size in sizes:
@@ -512,13 +517,18 @@ def compare(
             if isinstance(options, catalogue.Options)
             else getattr(options, "least", None)
         )
-        return compare_plans(
+        compared = compare_plans(
             plans,
             named=bool(names),
             samples=samples,
             timed=timed,
             least=least or catalogue.LEAST[0],
         )
+        if not searched:
+            return compared
+        from nutdamp.planning.robust import with_robust
+
+        return with_robust(compared, options)
 
 
 def compare_plans(
