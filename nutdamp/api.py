@@ -204,14 +204,15 @@ def compare(
     spacecraft = _expected(spacecraft)
     schemes = expect_names(names)
     count = samples if samples in (None, 0) else units.count("samples", samples)
-    return decision.compare(
-        spacecraft,
-        schemes,
-        expect_options(options, chosen),
-        samples=count,
-        timed=timed,
-        robust=True,
-    )
+    chosen_options = expect_options(options, chosen)
+    compared = decision.compare(spacecraft, schemes, chosen_options, samples=count, timed=timed)
+    if count is not None or not compared.too_few_comply:
+        return compared
+    from nutdamp.planning.robust import with_robust
+    from nutdamp.schemes.catalogue import Options
+
+    several = chosen_options if isinstance(chosen_options, Options) else None
+    return with_robust(compared, several)
 
 
 def robust(

@@ -100,9 +100,13 @@ def compared_with(
         tuple(dict.fromkeys(names)) or usual(job.spacecraft), job.options, job.spacecraft, job.doubt
     )
     with job.working("planning"):
-        return compare(
-            job.spacecraft, names, job.options, samples=samples, timed=timed, robust=robust
-        )
+        compared = compare(job.spacecraft, names, job.options, samples=samples, timed=timed)
+    if not robust or samples is not None or not compared.too_few_comply:
+        return compared
+    from nutdamp.planning.robust import with_robust
+
+    with job.working("trying robust plans"):
+        return with_robust(compared, job.options)
 
 
 def robust_of(job: Job, compared: Comparison) -> RobustComparison:

@@ -428,6 +428,12 @@ class Comparison(results.Data, results.Tabled):
         """Recommended plan; None where no scheme is feasible."""
         return self.recommendation.plan
 
+    @property
+    def too_few_comply(self) -> bool:
+        """True where of no plan of the usual schemes dispersed cases show that enough comply."""
+        flown = any(cases.samples for cases in self.cases.values())
+        return flown and not self.named and self.verdict.met is False
+
     @cached_property
     def with_disturbances(self) -> Plan | None:
         """Recommendation among the schemes planned with the disturbances; None where they were, or
@@ -487,14 +493,12 @@ def compare(
     *,
     samples: int | None = None,
     timed: bool = False,
-    robust: bool = False,
 ) -> Comparison:
     """Plan the schemes named, else the `usual` ones, and recommend one; one that has a bug takes no
     other down.
 
     With dispersions each plan flies as many of ``samples`` cases (default as `disperse`, without a
-    requirement 0) as it takes to know whether enough comply. ``robust``: of the usual schemes, and
-    where too few comply with each, a robust plan is tried. ``timed``: see `Comparison`. Raises
+    requirement 0) as it takes to know whether enough comply. ``timed``: see `Comparison`. Raises
     NutdampError, such as BadRequest, and KeyError for a name not in `schemes.NAMES`.
     """
     unknown = set(names) - set(catalogue.NAMES)
@@ -505,8 +509,7 @@ def compare(
         for name in names or usual(spacecraft)
     ]
     flies = SEARCH if _flies(spacecraft, samples) else 0.0
-    searched = flies if robust and not names and samples is None else 0.0
-    with work.steps(sum(size for _, size in sizes) + flies + searched):
+    with work.steps(sum(size for _, size in sizes) + flies):
         plans = []
         with work.budget("the comparison", work.COMMAND):
             for name, size in sizes:
@@ -517,18 +520,13 @@ def compare(
             if isinstance(options, catalogue.Options)
             else getattr(options, "least", None)
         )
-        compared = compare_plans(
+        return compare_plans(
             plans,
             named=bool(names),
             samples=samples,
             timed=timed,
             least=least or catalogue.LEAST[0],
         )
-        if not searched:
-            return compared
-        from nutdamp.planning.robust import with_robust
-
-        return with_robust(compared, options)
 
 
 def compare_plans(

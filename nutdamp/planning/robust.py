@@ -37,7 +37,7 @@ from nutdamp.planning.decision import (
 from nutdamp.planning.notes import beside
 from nutdamp.planning.plan import Plan, Standing, judge
 from nutdamp.planning.screening import LIKELIER, FlownPlan, entered
-from nutdamp.planning.verdict import Cases, Status, Verdict, cases_of
+from nutdamp.planning.verdict import Cases, Verdict, cases_of
 from nutdamp.schemes import planner
 from nutdamp.schemes.catalogue import LEAST, OPTIMAL, SCHEMES, OptimalOptions, Options
 from nutdamp.spacecraft import requirements
@@ -259,19 +259,14 @@ def compare(
     return _result(comparison, entries, chosen, ground, _fresh(chosen), needed, equals)
 
 
-def with_robust(comparison: Comparison, options: planner.Choice = None) -> Comparison:
-    """The comparison with a robust plan, where cases show of none of its plans that enough comply.
+def with_robust(comparison: Comparison, options: Options | None = None) -> Comparison:
+    """Comparison with the best robust plan that is found with the work of `work.ROBUST`.
 
-    It is searched with the work of `work.ROBUST`, and not at all where to first order no pulses
-    keep the requirement in so many cases.
+    None is searched where, to first order, no pulses keep the requirement in enough cases.
     """
-    if comparison.verdict.status not in (Status.NOT_ENOUGH, Status.NOT_SHOWN):
+    if chance_plan.hopeless(comparison.spacecraft, options):
         return comparison
-    flown = any(cases.samples for cases in comparison.cases.values())
-    if not flown or chance_plan.hopeless(comparison.spacecraft, options):
-        return comparison
-    chosen = options if isinstance(options, Options) else None  # of one scheme: of none besides
-    return compare(comparison, chosen, most=work.ROBUST, allocate=False).joined
+    return compare(comparison, options, most=work.ROBUST, allocate=False).joined
 
 
 def _entered(comparison: Comparison, plan: Plan, variant: str) -> FlownPlan | None:
@@ -279,15 +274,15 @@ def _entered(comparison: Comparison, plan: Plan, variant: str) -> FlownPlan | No
     flown.
     """
     spacecraft = comparison.spacecraft
-    compared = (comparison.flown or {}).get(plan)
-    if compared is not None:
-        return replace(compared, variant=variant)
     # Planned for other limits or channels, perhaps, but always flown by this spacecraft.
     if not plan.feasible or not keeps_limits(spacecraft, plan.pulses):
         return None
     own = plan if plan.spacecraft is spacecraft else replace(plan, spacecraft=spacecraft)
     if comparison.only_commanded and not own.commandable:
         return None
+    compared = (comparison.flown or {}).get(plan)
+    if compared is not None:
+        return replace(compared, variant=variant)
     try:
         return entered(own, None, variant)
     except Infeasible:  # such as cases that take too long

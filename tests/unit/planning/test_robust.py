@@ -336,11 +336,16 @@ def test_the_earliest_end_is_a_candidate() -> None:
 
 
 @pytest.mark.deep
-def test_the_spin_is_set_with_h_kept_where_that_damps_in_more_cases() -> None:
-    """Where H may end anywhere no plan has more than 80 %."""
+def test_the_spin_is_set_for_no_more_than_with_h_kept() -> None:
+    """Of the cheapest plans that end early 99.98 % of cases comply with H kept, and with H free 80
+    % at most.
+    """
     body = nutdamp.load(case("rim-spin-up.yaml")).with_(goal={"spin": "20 rpm"})
     robust_plan = planned(body, "optimal")
-    assert (robust_plan.verdict.status, best(robust_plan).variant[-6:]) == (Status.FLY, "H kept")
+    early = robust._early(body, Options(free_axis=False, shift=0.0), "")
+    costs = [plan.pulses.cost for _, plan in early if share(body, plan) >= 0.997]
+    assert robust_plan.verdict.status is Status.FLY
+    assert best(robust_plan).plan.pulses.cost <= min(costs)
 
 
 @pytest.mark.deep
