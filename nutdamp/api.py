@@ -204,9 +204,15 @@ def compare(
     spacecraft = _expected(spacecraft)
     schemes = expect_names(names)
     count = samples if samples in (None, 0) else units.count("samples", samples)
-    return decision.compare(
-        spacecraft, schemes, expect_options(options, chosen), samples=count, timed=timed
-    )
+    chosen_options = expect_options(options, chosen)
+    compared = decision.compare(spacecraft, schemes, chosen_options, samples=count, timed=timed)
+    if count is not None or not compared.too_few_comply:
+        return compared
+    from nutdamp.planning.robust import with_robust
+    from nutdamp.schemes.catalogue import Options
+
+    several = chosen_options if isinstance(chosen_options, Options) else None
+    return with_robust(compared, several)
 
 
 def robust(
@@ -240,11 +246,7 @@ def robust(
     expect_dispersions(
         units.instance("compared", compared, Comparison, "a Comparison").spacecraft.dispersions
     )
-    trials = search.variations_of(compared, options)
-    with work.steps(
-        1.5 * len(trials), hook=lambda done, _: progress(done, len(trials))
-    ) as task:  # a third: flights
-        return search.compare(compared, trials, task.reach)
+    return search.compare(compared, options, progress=progress)
 
 
 def load_schedule(path: PathName, spacecraft: Spacecraft) -> Plan:

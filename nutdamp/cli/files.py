@@ -494,7 +494,7 @@ def report_command(
     compared = (
         compare_plans((plan_or_read(job),), samples=samples)
         if read
-        else compared_with(job, names, samples)
+        else compared_with(job, names, samples, robust=not robust)
     )
     if robust:
         compared = robust_of(job, compared).joined

@@ -78,17 +78,31 @@ def flown_options(verb: str, scheme: str | None = None) -> Callable[[Command], C
 
 
 def compared_with(
-    job: Job, names: Sequence[str], samples: int | None = None, *, timed: bool = False
+    job: Job,
+    names: Sequence[str],
+    samples: int | None = None,
+    *,
+    timed: bool = False,
+    robust: bool = True,
 ) -> Comparison:
-    """Comparison of the schemes named, else the usual ones; remarks on options that none reads."""
-    from nutdamp.api import compare
-    from nutdamp.planning.decision import usual
+    """Comparison of the schemes named, else the usual ones; a remark names the options that none of
+    them reads.
+
+    ``robust``: of the usual ones a robust plan is tried where too few cases comply.
+    """
+    from nutdamp.planning.decision import compare, usual
 
     expect_read(
         tuple(dict.fromkeys(names)) or usual(job.spacecraft), job.options, job.spacecraft, job.doubt
     )
     with job.working("planning"):
-        return compare(job.spacecraft, names, job.options, samples=samples, timed=timed)
+        compared = compare(job.spacecraft, names, job.options, samples=samples, timed=timed)
+    if not robust or samples is not None or not compared.too_few_comply:
+        return compared
+    from nutdamp.planning.robust import with_robust
+
+    with job.working("trying robust plans"):
+        return with_robust(compared, job.options)
 
 
 def robust_of(job: Job, compared: Comparison) -> RobustComparison:
@@ -230,7 +244,7 @@ def plan_command(
                 f"a certificate is of {OPTIMAL.name}, which fires channels, "
                 "and the spacecraft has none"
             )
-    compared = compared_with(job, names, 0 if nominal else None, timed=timed)
+    compared = compared_with(job, names, 0 if nominal else None, timed=timed, robust=not robust)
     dispersed = robust_of(job, compared) if robust else None
     shown = compared if dispersed is None else dispersed.joined
     judged, chosen = shown.verdict, shown.recommended

@@ -27,6 +27,9 @@ CASES, SAMPLES = (
 # units for cases beyond that number, where they leave it undecided whether enough comply
 MORE_CASES = 5_000.0
 FRONTS = 30_000.0  # units for all points of `trade` but those that `plan` finds
+# units for the robust plans that `plan` tries by itself: at most 8 s, for programs and flights of
+# cases take 0.5 ms a unit (products.yaml) or less
+ROBUST = 12_000.0
 LOOP = 20_000.0  # units for the flight of one closed loop
 CYCLES = 30_000.0  # units: limit cycles of one pair of thresholds, and lifetime of the tank
 FIT, FITTED = (

@@ -270,6 +270,8 @@ def _missed(plan: Plan) -> float:
     return float(missed(plan.spacecraft, plan.flown.nutation, plan.flown.axis_error))
 
 
+ROBUST = "robust"  # name of the robust plan beside those of schemes
+
 BUG = "internal error, please report"
 """Message on a plan whose scheme raised an unexpected exception, which follows by name."""
 
@@ -425,6 +427,12 @@ class Comparison(results.Data, results.Tabled):
     def recommended(self) -> Plan | None:
         """Recommended plan; None where no scheme is feasible."""
         return self.recommendation.plan
+
+    @property
+    def too_few_comply(self) -> bool:
+        """True where of no plan of the usual schemes dispersed cases show that enough comply."""
+        flown = any(cases.samples for cases in self.cases.values())
+        return flown and not self.named and self.verdict.met is False
 
     @cached_property
     def with_disturbances(self) -> Plan | None:

@@ -12,7 +12,7 @@ from nutdamp.common.results import Note, Value, note
 from nutdamp.flight import end_state
 from nutdamp.flight.end_state import Aspect, at_start
 from nutdamp.flight.propagation import Flight
-from nutdamp.planning.decision import TIES, Comparison, Gain, Ground
+from nutdamp.planning.decision import ROBUST, TIES, Comparison, Gain, Ground
 from nutdamp.planning.plan import Plan, Standing
 from nutdamp.planning.verdict import Verdict
 from nutdamp.schemes import catalogue
@@ -161,7 +161,8 @@ def _left(plan: Plan) -> Iterator[Note]:
     )
     nutation = plan.flight.residual.nutation
     if nutation >= TELLING and not options.uncorrected:
-        allowed = spacecraft.goal.spin is not None and plan.meets_requirement
+        spared = spacecraft.goal.spin is not None or plan.scheme == ROBUST
+        allowed = spared and plan.meets_requirement
         yield (
             note("remains-allowed", nutation_deg=math.degrees(nutation))
             if allowed

@@ -1,8 +1,8 @@
-"""Robust plans: selection by the share of complying cases.
+"""Robust plans: variations × dispersed cases → the cheapest of which enough cases comply.
 
-Candidates are the schedules of the schemes, and variants: later starts, channels left unused, other
-alignments; of `optimal` its earliest ends too, for errors of the rates grow with time, and those of
-`chance_plan`.
+Variations are the schedules of the schemes; plans with a margin of so many sigmas (`chance_plan`);
+the earliest ends of `optimal`, for errors of the rates grow with time; and variants: later starts,
+channels left unused, other alignments.
 """
 
 from __future__ import annotations
@@ -11,9 +11,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from enum import IntEnum
 from functools import cached_property, partial
-from operator import attrgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -26,6 +24,8 @@ from nutdamp.planning import chance_plan
 from nutdamp.planning import plan as planning
 from nutdamp.planning.chance_plan import Tightening, tightening
 from nutdamp.planning.decision import (
+    ROBUST,
+    SEARCH,
     TIES,
     Comparison,
     Ground,
@@ -35,8 +35,8 @@ from nutdamp.planning.decision import (
     nearest,
 )
 from nutdamp.planning.notes import beside
-from nutdamp.planning.plan import Plan, Standing
-from nutdamp.planning.screening import FlownPlan, entered
+from nutdamp.planning.plan import Plan, Standing, judge
+from nutdamp.planning.screening import LIKELIER, FlownPlan, entered
 from nutdamp.planning.verdict import Cases, Verdict, cases_of
 from nutdamp.schemes import planner
 from nutdamp.schemes.catalogue import LEAST, OPTIMAL, SCHEMES, OptimalOptions, Options
@@ -52,8 +52,12 @@ LATER = (0.25, 0.5, 0.75, 1.0, 2.0)
 # others.
 WITHIN = (1.35, 1.5, 2.0)
 
-ROBUST = "robust"  # name of the robust plan beside those of schemes
 FRESH = 211  # seed of cases that nothing was chosen by
+
+SLACK = 1.02
+"""Cost over that of `optimal` without margins from which on no more is tried: the difference
+between two margins is as large.
+"""
 
 AS_GOOD = 1.05
 """Without a requirement: candidates within this factor of the least angle count as equal, so far
@@ -133,6 +137,7 @@ class RobustComparison(results.Data):
         flown = dict(self.comparison.flown or {})
         same = next((plan for plan in plans if plan.feasible and _kind(plan) == kind), None)
         plan = same or replace(self.chosen.plan, scheme=ROBUST)
+        vars(plan)["verdict"] = judge(plan, self.chosen.cases, self.chosen.results)
         flown[plan] = self.chosen
         return replace(
             self.comparison, plans=plans if same else (*plans, plan), flown=flown, preferred=plan
@@ -145,115 +150,106 @@ class RobustComparison(results.Data):
         return "" if self.chosen is None or plan is None else plan.scheme
 
 
-class VariationKind(IntEnum):
-    """Kind of the plans that a variation makes, in the order in which they are tried."""
-
-    PLANNED, MARGINS, EARLY, VARIED = range(4)
-
-
 class Variation(NamedTuple):
-    """Lazy generator of plans, each with the label of its variant, and their ``kind``."""
+    """Lazy ``plans``, each with the label of its variant.
+
+    ``falling``: from the surest one down, so that those after one with which too few cases comply,
+    and no more than with the one before, need not be made.
+    """
 
     plans: Callable[[], Iterable[tuple[str, Plan]]]
-    kind: VariationKind = VariationKind.VARIED
+    falling: bool = False
 
 
-def variations_of(comparison: Comparison, options: Options | None = None) -> list[Variation]:
-    """Variations of `compare`: the plans compared, and variants of each."""
+Rounds = tuple[list[Variation], list[Variation], list[Variation]]
+
+
+def variations_of(comparison: Comparison, options: Options | None = None) -> Rounds:
+    """Variations of the plans compared, in three rounds.
+
+    As planned and with margins; early ends of `optimal`; other alignments, later starts and fewer
+    channels. Only of schemes that may be recommended.
+    """
     spacecraft = comparison.spacecraft
     options = options or Options()
-    tried = list[Variation]()
+    first, early, others = list[Variation](), list[Variation](), list[Variation]()
     timed = spacecraft.commands is None or not comparison.only_commanded
-    for base in (plan for plan in comparison.plans if plan.failure is None):
-        if not (timed or SCHEMES[base.scheme].reads_commands or not SCHEMES[base.scheme].fires):
-            continue  # none of its variants may be chosen
-        tried.append(Variation(partial(list, [("as planned", base)]), VariationKind.PLANNED))
-        tried.append(Variation(partial(_alignments, spacecraft, base.scheme, options)))
-        tried += [
-            Variation(partial(_planned, *other, base.scheme, options))
-            for other in _others(spacecraft, base)
-        ]
-        if base.scheme == OPTIMAL.name:
-            tried.append(
-                Variation(partial(chance_plan.plans, spacecraft, options), VariationKind.MARGINS)
-            )
-            tried.append(Variation(partial(_early, spacecraft, options), VariationKind.EARLY))
-    return sorted(tried, key=attrgetter("kind"))
+    for base in comparison.plans:
+        scheme = SCHEMES[base.scheme]
+        if base.failure is not None or not (timed or scheme.reads_commands or not scheme.fires):
+            continue
+        first.append(Variation(partial(list, [("as planned", base)])))
+        others.append(Variation(partial(_alignments, spacecraft, base.scheme, options)))
+        for variant, other in _others(spacecraft, base):
+            others.append(Variation(partial(_planned, variant, other, base.scheme, options)))
+        if scheme is OPTIMAL:
+            first.append(Variation(partial(chance_plan.plans, spacecraft, options), True))
+            settled = planner.settled(OPTIMAL, options, spacecraft)
+            early.append(Variation(partial(_early, spacecraft, options, ""), True))
+            # Free, the pulses on either side of a long axial one damp what the moments of inertia
+            # decide; spin-up.yaml: 73 % of its cases comply, and 99.98 % with H kept.
+            if isinstance(settled, OptimalOptions) and settled.free_axis:
+                keeping = Options(**{**options.chosen, "free_axis": False, "shift": 0.0})
+                early.append(Variation(partial(_early, spacecraft, keeping, ", H kept"), True))
+    return first, early, others
 
 
 def compare(
     comparison: Comparison,
-    variations: Sequence[Variation],
-    watch: Callable[[int], None] = lambda _: None,
+    options: Options | None = None,
+    *,
+    most: float = work.FRONTS,
+    allocate: bool = True,
+    progress: Callable[[int, int], object] = lambda _done, _all: None,
 ) -> RobustComparison:
-    """Make the plans of the ``variations``, let dispersed cases fly each, and recommend one; no
-    schedule comes twice.
+    """Let dispersed cases fly the `variations_of` the plans compared, and recommend one of them.
 
-    The cheapest plan of which enough cases comply, in fresh ones too, beyond the intervals of both.
-    ``watch`` is called with how many variations are done. Raises BadRequest for a spacecraft
-    without dispersions.
+    The cheapest plan of which enough cases comply, in fresh ones too, beyond the intervals of both;
+    else that with which most comply. ``most``: units of work; ``allocate``: find the tolerances
+    that are needed where too few comply; ``progress`` is called with the number of variations made,
+    and that of all. Raises BadRequest for a spacecraft without dispersions.
     """
     spacecraft = comparison.spacecraft
+    if comparison.preferred is not None:  # found with less work
+        usual = tuple(plan for plan in comparison.plans if plan.scheme != ROBUST)
+        comparison = replace(comparison, plans=usual, preferred=None)
+    rounds = variations_of(comparison, options)
+    count = sum(map(len, rounds))
     entries: dict[object, FlownPlan] = {}
-    # No early end costs less than the plan of the whole horizon that leaves as little.
-    least = min(
-        (plan.pulses.cost for plan in comparison.plans if plan.scheme == OPTIMAL.name), default=0.0
-    )
-    with work.budget("the robust plans", work.FRONTS) as budget:
-        for number, variation in enumerate(variations):
-            watch(number)
-            planned = False
-            # The earliest ends have a budget of their own, whatever the margins took.
-            budget.most = work.FRONTS + (
-                budget.done if variation.kind is VariationKind.EARLY else 0.0
-            )
-            for variant, plan in () if work.exhausted() else variation.plans():
-                kind = _kind(plan)
-                # Planned for other limits or channels, perhaps, but always flown by this
-                # spacecraft.
-                if (
-                    not plan.feasible
-                    or kind in entries
-                    or not keeps_limits(spacecraft, plan.pulses)
-                ):
-                    continue
-                own = (
-                    plan if plan.spacecraft is spacecraft else replace(plan, spacecraft=spacecraft)
-                )
-                if comparison.only_commanded and not own.commandable:
-                    continue
-                planned = True
-                with suppress(
-                    Infeasible
-                ):  # cases that cannot be flown, such as those that take too long
-                    known = (comparison.flown or {}).get(plan)
-                    candidate = (
-                        entered(own, None, variant)
-                        if known is None
-                        else replace(known, variant=variant)
-                    )
-                    if candidate is not None:
-                        entries[kind] = candidate
-            if planned and variation.kind in (VariationKind.MARGINS, VariationKind.EARLY):
-                chosen, ground, fresh = _confirmed(
-                    entries, comparison.recommended, comparison.least
-                )
-                cheap = (
-                    chosen is not None
-                    and comparison.least == LEAST[0]
-                    and chosen.plan.pulses.cost <= least
-                )
-                done = variation.kind is VariationKind.EARLY or cheap
-                if chosen is not None and done:  # other variants seldom cost less
-                    return _result(comparison, entries, chosen, ground, fresh)
-    watch(len(variations))
-    chosen, ground, fresh = _confirmed(entries, comparison.recommended, comparison.least)
+    nominal = [plan.pulses.cost for plan in comparison.plans if plan.scheme == OPTIMAL.name]
+    cheap = SLACK * min(nominal, default=0.0)
+    chosen: FlownPlan | None = None
+    with (
+        work.steps(1.5 * count, SEARCH, hook=lambda done, _: progress(done, count)) as steps,
+        work.budget("the robust plans", most),
+    ):
+        for number, variations in enumerate(rounds):
+            before = len(entries)
+            for variation in variations:
+                share = 0.0
+                for variant, plan in () if work.exhausted() else variation.plans():
+                    candidate = _entered(comparison, plan, variant)
+                    if candidate is None or _kind(plan) in entries:
+                        continue
+                    entries[_kind(plan)] = candidate
+                    complying = candidate.cases.complying or 0.0
+                    worse = candidate.cases.enough is False and complying <= share
+                    if work.exhausted() or (variation.falling and worse):
+                        break
+                    share = complying
+                steps.reach(steps.done + 1)
+            chosen, ground, fresh = _confirmed(entries, comparison.recommended, comparison.least)
+            if chosen is not None:
+                saves = comparison.least == LEAST[0] and chosen.plan.pulses.cost <= cheap
+                if saves or (number == 1 and len(entries) > before):
+                    break  # other variants seldom cost less
+        steps.reach(count)
     if chosen is not None:
         return _result(comparison, entries, chosen, ground, fresh)
     chosen, ground, equals = _nearest(
         list(entries.values()), comparison.recommended, comparison.least
     )
-    if chosen is None or not requirements.judged(spacecraft):
+    if chosen is None or not allocate or not requirements.judged(spacecraft):
         return _result(comparison, entries, chosen, ground, equals=equals)
     needed = (
         None
@@ -261,6 +257,36 @@ def compare(
         else tightening(chosen.plan, required_share(spacecraft.requirement))
     )
     return _result(comparison, entries, chosen, ground, _fresh(chosen), needed, equals)
+
+
+def with_robust(comparison: Comparison, options: Options | None = None) -> Comparison:
+    """Comparison with the best robust plan that is found with the work of `work.ROBUST`.
+
+    None is searched where, to first order, no pulses keep the requirement in enough cases.
+    """
+    if chance_plan.hopeless(comparison.spacecraft, options):
+        return comparison
+    return compare(comparison, options, most=work.ROBUST, allocate=False).joined
+
+
+def _entered(comparison: Comparison, plan: Plan, variant: str) -> FlownPlan | None:
+    """A plan that has flown its first cases; None where it may not be chosen, or they cannot be
+    flown.
+    """
+    spacecraft = comparison.spacecraft
+    # Planned for other limits or channels, perhaps, but always flown by this spacecraft.
+    if not plan.feasible or not keeps_limits(spacecraft, plan.pulses):
+        return None
+    own = plan if plan.spacecraft is spacecraft else replace(plan, spacecraft=spacecraft)
+    if comparison.only_commanded and not own.commandable:
+        return None
+    compared = (comparison.flown or {}).get(plan)
+    if compared is not None:
+        return replace(compared, variant=variant)
+    try:
+        return entered(own, None, variant)
+    except Infeasible:  # such as cases that take too long
+        return None
 
 
 def _confirmed(
@@ -280,18 +306,18 @@ def _confirmed(
         return 0.0 if each.plan.standing is Standing.COMPLIES else each.left
 
     hopeful = {
-        each.plan: each for each in entries.values() if each.plan.meets_requirement is not False
+        each.plan: each
+        for each in entries.values()
+        if each.plan.meets_requirement is not False and each.cases.enough is not False
     }
-    while hopeful := {
-        plan: each for plan, each in hopeful.items() if each.cases.enough is not False
-    }:
+    while hopeful:
         least = min(map(undamped, hopeful.values()))
         plan, ground = cheapest(
             [plan for plan, each in hopeful.items() if undamped(each) == least], usual, saved
         )
         candidate = hopeful.pop(plan)
         with suppress(Infeasible):
-            candidate.decide(None)
+            candidate.decide(work.SAMPLES)  # one that takes more cases costs hardly less
             if candidate.cases.enough:
                 candidate.finish(None)
             if candidate.cases.enough:
@@ -304,8 +330,9 @@ def _confirmed(
 def _fresh(candidate: FlownPlan) -> Cases | None:
     """Plan in cases that it was not chosen by; None where one of them cannot be flown."""
     plan = candidate.plan
+    study = study_of(plan.spacecraft, plan.pulses, seed=FRESH)
     try:
-        return cases_of(flown_in_stages(study_of(plan.spacecraft, plan.pulses, seed=FRESH)))
+        return cases_of(flown_in_stages(study, work.SAMPLES))
     except Infeasible:
         return None
 
@@ -331,14 +358,15 @@ def _nearest(
         equals = [candidate.plan for candidate in candidates]
         best, ground = nearest(equals)
     else:
-        hopeful = max(candidate.cases.low for candidate in candidates)
-        for candidate in candidates:
-            if candidate.cases.high >= hopeful:
+        low = 0.0
+        final = list[FlownPlan]()
+        for candidate in sorted(candidates, key=lambda candidate: -candidate.cases.high):
+            if not final or candidate.cases.high >= low + LIKELIER:
                 with suppress(Infeasible):
-                    candidate.finish(None)
-        final = [candidate for candidate in candidates if candidate.final]
-        most = max(final, key=lambda candidate: candidate.cases.complying or 0.0)
-        equals = [each.plan for each in final if (each.cases.complying or 0.0) >= most.cases.low]
+                    candidate.finish(work.SAMPLES)
+                    final.append(candidate)
+                    low = max(low, candidate.cases.low)
+        equals = [each.plan for each in final if (each.cases.complying or 0.0) >= low]
         best, ground = cheapest(equals, usual, saved)
     return next(each for each in candidates if each.plan is best), ground, len(equals)
 
@@ -408,26 +436,18 @@ def _others(spacecraft: Spacecraft, base: Plan) -> Iterator[tuple[str, Spacecraf
             yield f"without {name}", replace(spacecraft, channels=left)
 
 
-def _early(spacecraft: Spacecraft, options: Options) -> Iterator[tuple[str, Plan]]:
-    """Earliest end of `optimal`, and its cheapest plans that end little later; the same with H kept
-    where it is free.
-
-    Free, the pulses on either side of a long axial one damp what the moments of inertia decide;
-    spin-up.yaml: 73 % of its cases comply, and 99.98 % with H kept.
-    """
-    settled = planner.settled(SCHEMES[OPTIMAL.name], options, spacecraft)
-    free = isinstance(settled, OptimalOptions) and settled.free_axis is True
-    for label, choice in (("", {}), (", H kept", {"free_axis": False, "shift": 0.0}))[: 1 + free]:
-        chosen = Options(**{**options.chosen, **choice})
-        first = attempt(spacecraft, OPTIMAL.name, Options(**{**chosen.chosen, "least": "time"}))
-        if not first.feasible:
-            continue
-        yield f"earliest end{label}", first
-        for times in WITHIN:
-            horizon = times * first.end
-            if horizon < spacecraft.horizon:
-                soon = with_limits(spacecraft, horizon=horizon)
-                yield f"by {horizon:.4g} s{label}", attempt(soon, OPTIMAL.name, chosen)
+def _early(spacecraft: Spacecraft, options: Options, label: str) -> Iterator[tuple[str, Plan]]:
+    """Earliest end of `optimal`, and its cheapest plans that end little later."""
+    soonest = Options(**{**options.chosen, "least": "time"})
+    first = attempt(spacecraft, OPTIMAL.name, soonest)
+    if not first.feasible:
+        return
+    yield f"earliest end{label}", first
+    for times in WITHIN:
+        horizon = times * first.end
+        if horizon < spacecraft.horizon:
+            limited = with_limits(spacecraft, horizon=horizon)
+            yield f"by {horizon:.4g} s{label}", attempt(limited, OPTIMAL.name, options)
 
 
 def _planned(

@@ -122,6 +122,7 @@ class FlownPlan:
 
     def finish(self, samples: int | None) -> None:
         """Fly all stages, as of a plan that is shown."""
+        self.final = False  # fewer may have been enough before
         while not self.final:
             self.further(samples)
 

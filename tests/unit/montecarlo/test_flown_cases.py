@@ -556,8 +556,7 @@ def test_a_robust_plan_keeps_the_cone_in_most_cases(tmp_path: Path) -> None:
     assert [one.recommended and one.recommended.scheme for one in (compared, counted)] == list(
         names
     )
-    trials = robust.variations_of(compared)
-    judged = robust.compare(compared, trials[:1] + trials[-2:])
+    judged = robust.compare(compared)
     shares = {one.plan.scheme: one.cases.complying for one in judged.candidates}
     assert planning.plan(body, "rhumb-line").meets_requirement
     assert (shares["rhumb-line"] or 1.0) < 0.7
