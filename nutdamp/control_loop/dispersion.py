@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.control_loop.controller import Case, Scatter
-from nutdamp.control_loop.law import Ending, Law
+from nutdamp.control_loop.controller import Case, Ending, Scatter
+from nutdamp.control_loop.law import Law
 from nutdamp.control_loop.simulation import (
     Fleet,
     FlownLoops,

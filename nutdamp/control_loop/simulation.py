@@ -25,13 +25,14 @@ from nutdamp.control_loop.controller import (
     Case,
     Coast,
     Course,
+    Ending,
     Joined,
     Pilot,
     Scatter,
     Seen,
     Watch,
 )
-from nutdamp.control_loop.law import Ending, Law
+from nutdamp.control_loop.law import Law
 from nutdamp.control_loop.sensor import Noise, Signal, felt, stepped
 from nutdamp.control_loop.stability import dead_band
 from nutdamp.errors import Infeasible
