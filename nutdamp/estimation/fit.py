@@ -14,6 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import bdtrc
 
 from nutdamp.common import work
 from nutdamp.errors import Infeasible
@@ -244,12 +245,7 @@ def left_out_together(fitted: Fit) -> tuple[str, float, float, int] | None:
             at = int(np.argmax(counts))
             elsewhere = max(float(sums[-1] - counts[at]), 1.0) / (len(rows) - width)
             share = min(elsewhere, 1.0)
-            most = int(counts[at])
-            tail = (
-                math.comb(width, n) * share**n * (1.0 - share) ** (width - n)
-                for n in range(most, width + 1)
-            )
-            chance = len(rows) * math.fsum(tail)
+            chance = len(rows) * float(bdtrc(int(counts[at]) - 1, width, share))
             if counts[at] > 0 and chance < least:
                 least = chance
                 those = model.times[rows][at : at + width][out[at : at + width]]

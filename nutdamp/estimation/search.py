@@ -22,9 +22,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
+from scipy.special import chdtrc
 
 from nutdamp.common import work
-from nutdamp.common.numerics import chi_square_tail
 from nutdamp.errors import Infeasible
 from nutdamp.estimation.model import Model
 from nutdamp.estimation.parameters import KIND, SUN_PULSE, Matrix, Vector, quantisation
@@ -259,6 +259,7 @@ CURVED = 7.0
 GROWS = 3.0  # standard deviations of κ from which on it shows
 KEPT = 0.9  # share of its prior above which a parameter's sigma is where the data do not tell it
 MOVED = 0.1  # share of its prior from which on a parameter has moved from the file
+WHITE = 1e-3  # chance below which residuals are not white: one of a thousand records of noise
 
 
 def unmoved(change: float, sigma: float, prior: float) -> bool:
@@ -371,15 +372,9 @@ class Fit:
         )
 
     def white(self, signal: int) -> bool:
-        """True where the autocorrelations are as small as those of white noise (Ljung-Box, 1 in
-        1000).
-        """
+        """True where the autocorrelations are as small as those of white noise (Ljung-Box)."""
         count = int((self.used & (self.model.signal == signal)).sum())
         correlations = self.whiteness(signal, 20)
         lags = np.arange(1, len(correlations) + 1)
-        return (
-            chi_square_tail(
-                len(lags), float(count * (count + 2) * np.sum(correlations**2 / (count - lags)))
-            )
-            > 0.001
-        )
+        statistic = count * (count + 2) * np.sum(correlations**2 / (count - lags))
+        return bool(chdtrc(len(lags), statistic) > WHITE)
