@@ -490,13 +490,15 @@ class Pilot:
         """True response of the channel to its command; None where not allowed, or not before the
         end.
         """
-        known = decision.actuator.channel
+        commanded = decision.actuator.channel
         channel = self.channels[decision.actuator.channel.name]
-        pulse = channel_pulse(known, decision.start + decision.firing.lead, decision.firing.on_time)
-        if known.valve is not None:
+        pulse = channel_pulse(
+            commanded, decision.start + decision.firing.lead, decision.firing.on_time
+        )
+        if commanded.valve is not None:
             pulse = commandable(self.law.spacecraft, pulse)
         factor, late = (1.0, 0.0) if self.scatter is None else self.scatter.of(len(self.fired))
-        if channel is not known or late != 0.0:
+        if channel is not commanded or late != 0.0:
             begins, lasts = pulse.loaded
             pulse = on_command(channel, max(begins + late, decision.now), lasts)
         if pulse.over > self.until:
