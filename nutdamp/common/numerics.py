@@ -1,4 +1,4 @@
-"""Numerics: quadrature, zeros, tails of χ², rounding of bounds and of shown numbers."""
+"""Numerics: quadrature, zeros, rounding of bounds, and removal of rounding from shown numbers."""
 
 from __future__ import annotations
 
@@ -84,13 +84,3 @@ def rising_zero(excess: Callable[[float], float], low: float, high: float) -> fl
             above = value
             below = 0.5 * below
     return high
-
-
-def chi_square_tail(count: int, value: float) -> float:
-    """Probability that ``count`` squares of standard normal numbers exceed ``value`` > 0."""
-    half = max(0.5 * value, 1e-300)
-    powers = [0.5 * (count % 2) + index for index in range(count // 2)]
-    series = math.fsum(
-        math.exp(power * math.log(half) - half - math.lgamma(power + 1.0)) for power in powers
-    )
-    return series + (math.erfc(math.sqrt(half)) if count % 2 else 0.0)

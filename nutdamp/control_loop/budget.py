@@ -490,8 +490,8 @@ class Map:
 
     def _fire(self, at: Chains, row: int, pulse: Pulse, actuator: Actuator) -> None:
         """Propagate through a pulse, and on to the first estimate after it."""
-        given = Supply(self.truth, used=self.used).fire(pulse, actuator.channel)
-        level = given.magnitude / pulse.magnitude
+        supplied = Supply(self.truth, used=self.used).fire(pulse, actuator.channel)
+        level = supplied.magnitude / pulse.magnitude
         (begins, ends), time = pulse.thrust, int(at.number[row]) * self.seen.step
         before = complex(at.z[row])
         sums = at.sums[row]
@@ -503,16 +503,16 @@ class Map:
             self.turn * (ends - pulse.t)
         )
         # Dissipation takes spin as |z| grows at the same H: cos θ goes with ω3.
-        grown, least = (
+        grown, settled = (
             math.cos(float(self.law.nutation(angle, self.spin))) for angle in (size, sums.last)
         )
-        slowed = float(self.law.inertia.equivalent(self.spin)) * (1.0 - grown / least)
+        slowed = float(self.law.inertia.equivalent(self.spin)) * (1.0 - grown / settled)
         at.sums[row] = sums._replace(
             time=pulse.t,
             pulses=sums.pulses + 1.0,
-            impulse=sums.impulse + given.magnitude,
+            impulse=sums.impulse + supplied.magnitude,
             propellant=sums.propellant
-            + (math.nan if given.propellant is None else given.propellant),
+            + (math.nan if supplied.propellant is None else supplied.propellant),
             spin=sums.spin + (actuator.spin_rate * level * pulse.on_time - slowed),
             largest=max(sums.largest, size),
             last=abs(after),

@@ -1,4 +1,6 @@
-"""On-board controller of one loop: samples of a coast, stretch by stretch, to firings."""
+"""On-board controller of one loop: samples of a coast, stretch by stretch, to firings, and the
+diagnosis of these.
+"""
 
 from __future__ import annotations
 
@@ -13,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.common import work
-from nutdamp.control_loop.law import Actuator, ComplexArray, Diagnosis, Ending, Firing, Glimpse, Law
-from nutdamp.control_loop.sensor import Estimator, Signal
+from nutdamp.control_loop.law import Actuator, ComplexArray, Firing, Law
+from nutdamp.control_loop.sensor import Doubt, Estimator, Signal
 from nutdamp.errors import Infeasible, Unsuitable
 from nutdamp.flight.dynamics import Dynamics, Path, Supply, shed, weakened
 from nutdamp.physics import taylor
@@ -267,6 +269,85 @@ class Coast(Watch):
         return Decided(row, now, now, actuator, firing)
 
 
+class Ending(Enum):
+    """Reason for the end of the flight of a loop."""
+
+    END = "the end of the time"
+    FULL = "limits.max_pulses"
+    EMPTY = "the tank is empty"
+    SENSOR = "the sensor is reversed"
+    CHANNEL = "a channel is wired backwards"
+    UNCLEAR = "a channel is wired backwards, or the sensor is reversed"
+    FED = "the firings feed the nutation"
+
+    @property
+    def fault(self) -> bool:
+        """True if the loop was stopped before it could feed the nutation, or has nothing left to
+        fire.
+        """
+        return self not in (Ending.END, Ending.FULL)
+
+
+# Share of what a firing was to take off the nutation that tells whether it helped or added that:
+# wired backwards it adds all of it, late by a quarter of a period nothing.
+HELPS = 0.25
+SIGMAS = 5.0  # of noise within which a firing is not judged: 1 in 3 million by chance
+# Share of |z| by which estimates change as it turns, besides by unlike scales of two gyros: those
+# of an accelerometer whose sine is fitted at a rate that is 1 % off.
+UNEVEN = 2e-3
+FED = 0.5  # growth of the nutation under fire, as a share of its first size, that stops a loop
+LARGE = 100.0  # exponent of growth beyond which further growth does not matter
+
+
+class Glimpse(NamedTuple):
+    """Size |z| of an estimate, rad/s, at ``time`` s."""
+
+    size: float
+    time: float
+
+
+@dataclass(slots=True)
+class Diagnosis:
+    """Judge of firings by what each takes off the nutation: two in a row that do not help stop the
+    loop.
+
+    After one that does not, the next shows whether it is its channel or all: the sensor.
+    """
+
+    rate: float  # at which z turns, rad/s
+    growth: float  # of |z|, 1/s
+    failed: str | None = None  # channel of the last firing that did not help
+    first: Glimpse | None = None  # what was first fired at since the loop was quiet
+
+    def judge(
+        self, channel: str, before: Glimpse, after: Glimpse, acts: float, doubt: Doubt
+    ) -> tuple[Ending, str] | None:
+        """Reason to stop after a firing that adds ``acts`` rad/s, and the channel to name."""
+        first, failed = self.first or before, self.failed
+        self.first = first
+        apart = after.time - before.time
+        size = after.size / self._grown(apart)
+        # A bias shows alike in both as far as z has not turned meanwhile.
+        unsure = SIGMAS * doubt.noise + doubt.bias * min(self.rate * apart, 2.0)
+        unsure += 2.0 * doubt.steps + (UNEVEN + doubt.scale) * before.size
+        wanted = min(acts, 2.0 * before.size - acts)  # more than |z| leaves what is left over
+        taken = before.size - size
+        if taken + unsure < -HELPS * wanted:
+            self.failed = channel
+            if failed is not None:
+                return Ending.UNCLEAR if failed == channel else Ending.SENSOR, channel
+        elif taken >= HELPS * wanted and taken - unsure > -HELPS * wanted:
+            self.failed = None
+            if failed not in (None, channel):
+                return Ending.CHANNEL, failed
+        allowed = (1.0 + FED) * first.size * self._grown(after.time - first.time)
+        allowed += 2.0 * (SIGMAS * doubt.noise + doubt.bias + doubt.steps)
+        return (Ending.FED, channel) if self.failed is None and after.size > allowed else None
+
+    def _grown(self, lasts: float) -> float:
+        return math.exp(min(self.growth * lasts, LARGE))
+
+
 EARLIER = "an earlier end, or a lower rate, helps"
 MOST_FIRINGS = 10_000  # largest number of firings of one flight
 NO_NOISE = 8.0  # sigmas that noise does not reach: a chance of 1e-15 a sample
@@ -360,9 +441,7 @@ class Pilot:
         self.loop = truth.loop or law.loop
         self.scatter = case.scatter
         self.until, self.free, self.down_to = until, free, down_to
-        self.diagnosis = Diagnosis(
-            law.period, law.growth, math.tan(float(law.nutation(1.0, truth.spin)))
-        )
+        self.diagnosis = Diagnosis(2.0 * math.pi / law.period, law.growth)
         self.most = min(MOST_FIRINGS, truth.limits.max_pulses or MOST_FIRINGS)
         self.channels = {channel.name: channel for channel in truth.channels}
         self.supply = Supply(truth)
@@ -371,9 +450,9 @@ class Pilot:
         self.active, self.looked_at = False, 0
         self.ready = truth.limits.earliest
         self.ending = (Ending.END, "")
-        self._found: Decided | None = None
-        self._pending: tuple[Pulse, Firing, Glimpse] | None = None
-        self._seen: list[tuple[Vector, ComplexArray, Vector]] = []
+        self._decision: Decided | None = None
+        self._latest: Seen | None = None
+        self._unjudged: tuple[str, Glimpse, float] | None = None  # last firing, see `Diagnosis`
         looks = until * (self.loop.sensor.rate or GRID / law.period)
         if looks > MOST and not (free and self._reach(truth.spin) > 0.0):  # it never rests
             raise Infeasible(f"{looks:.2g} samples by {until:.6g} s, {MOST:.2g} at most: {EARLIER}")
@@ -388,28 +467,15 @@ class Pilot:
             raise Infeasible(f"{self.looked_at:.2g} samples by {seen.times[0]:.6g} s: {EARLIER}")
         if self.fired and seen.size <= self.down_to:
             return Course.OVER
-        self._seen.append((seen.times, seen.best, seen.spin))
-        self._latest = len(seen.times)
-        self._shown = seen.shown
-        self._found = self._decide(coast, seen)
+        self._latest = seen
+        self._judge(coast, seen)
+        self._decision = None if self.ending[0].fault else self._decide(coast, seen)
         if self.ending[0].fault:
             return Course.OVER
-        if self._found is not None:
-            return self._pulse(self._found) or Course.OVER
-        if self._pending is None:
-            edge = seen.times[-1] - self.law.period
-            if seen.times[0] <= edge:
-                row = int(np.searchsorted(seen.times, edge))
-                self._seen = [
-                    (seen.times[row:].copy(), seen.best[row:].copy(), seen.spin[row:].copy())
-                ]
-            else:
-                self._seen = self._seen[-3:]  # the last period is among them
-        later = None if self.active or self._pending is not None else self._idle_until(seen)
-        if later is None:
-            return Course.ON
-        self._seen = []
-        return later
+        if self._decision is not None:
+            return self._pulse(self._decision) or Course.OVER
+        later = None if self.active or self._unjudged is not None else self._idle_until(seen)
+        return Course.ON if later is None else later
 
     @property
     def lost(self) -> bool:
@@ -424,13 +490,15 @@ class Pilot:
         """True response of the channel to its command; None where not allowed, or not before the
         end.
         """
-        known = decision.actuator.channel
+        commanded = decision.actuator.channel
         channel = self.channels[decision.actuator.channel.name]
-        pulse = channel_pulse(known, decision.start + decision.firing.lead, decision.firing.on_time)
-        if known.valve is not None:
+        pulse = channel_pulse(
+            commanded, decision.start + decision.firing.lead, decision.firing.on_time
+        )
+        if commanded.valve is not None:
             pulse = commandable(self.law.spacecraft, pulse)
         factor, late = (1.0, 0.0) if self.scatter is None else self.scatter.of(len(self.fired))
-        if channel is not known or late != 0.0:
+        if channel is not commanded or late != 0.0:
             begins, lasts = pulse.loaded
             pulse = on_command(channel, max(begins + late, decision.now), lasts)
         if pulse.over > self.until:
@@ -449,35 +517,27 @@ class Pilot:
         return pulse if sense == 1.0 else weakened(pulse, sense)
 
     def take(self, pulse: Pulse, size: float, spin: float) -> None:
-        """Record a firing, with true |z| and ω3 (rad/s) at its start, and the samples before it."""
-        decision = self._found
+        """Record a firing, with true |z| and ω3 (rad/s) at its start."""
+        decision, seen = self._decision, self._latest
         assert decision is not None
+        assert seen is not None
+        row = decision.row
         true = float(self.law.nutation(size, spin))
-        self.fired.append(Fired(pulse, decision.now, float(self._shown[decision.row]), true))
-        glimpse = self._glimpse(pulse.t, decision.row, last=True)
-        self._pending = None if glimpse is None else (pulse, decision.firing, glimpse)
-        self._seen = []
+        self.fired.append(Fired(pulse, decision.now, float(seen.shown[row]), true))
+        before = Glimpse(abs(complex(seen.best[row])), float(seen.times[row]))
+        self._unjudged = pulse.channel, before, abs(decision.firing.acts)
         self.ready = pulse.over + max(self.law.loop.min_interval, self.truth.limits.gap)
 
-    def _glimpse(self, centre: float, row: int, *, last: bool) -> Glimpse | None:
-        """Samples of this coast up to a ``row`` of the last stretch: of the ``last`` period, or of
-        the first.
-        """
-        times, best, spin = (
-            self._seen[0]
-            if len(self._seen) == 1
-            else map(np.concatenate, zip(*self._seen, strict=True))
-        )
-        count = len(times) - self._latest + row + 1
-        times, best, spin = times[:count], best[:count], spin[:count]
-        known = ~np.isnan(best)
-        if not known.any():
-            return None
-        times, best, spin = times[known], best[known], spin[known]
-        edge = times[-1] - self.law.period if last else times[0] + self.law.period
-        near = times >= edge if last else times <= edge
-        rate = complex(self.law.rate(float(spin[-1])), self.law.growth)
-        return Glimpse.of(times[near], best[near], rate, centre)
+    def _judge(self, coast: Watch, seen: Seen) -> None:
+        """Judge the last firing by the first estimate after it."""
+        row = _first(~np.isnan(seen.best), 0)
+        if self._unjudged is None or row is None:
+            return
+        channel, before, acts = self._unjudged
+        after = Glimpse(abs(complex(seen.best[row])), float(seen.times[row]))
+        fault = self.diagnosis.judge(channel, before, after, acts, coast.estimator.doubts)
+        self._unjudged = None
+        self.ending = fault or self.ending
 
     def _decide(self, coast: Watch, seen: Seen) -> Decided | None:
         """First firing among the moments of a stretch; thresholds and firings are judged in their
@@ -504,52 +564,15 @@ class Pilot:
                 continue
             if fire is None:
                 break
-            if self._faulty(coast, seen, fire):
-                return None
             decision = self._allowed(coast, seen, fire, np.flatnonzero(fires[:, fire]).tolist())
             if decision is not None:
                 return decision
             row = fire + 1
-        last = self.until - self.loop.sensor.delay - coast.estimator.step
-        enough = min(
-            float(coast.estimator.first) + self.law.period, last
-        )  # of the coast, to judge a firing by it
-        if self._pending is None or seen.times[-1] >= enough:
-            self._faulty(coast, seen, count - 1)
         return None
-
-    def _faulty(self, coast: Watch, seen: Seen, row: int) -> bool:
-        """Judge the last firing by the samples since, up to a ``row``; True if the loop has to
-        stop.
-        """
-        if self._pending is not None:
-            pulse, firing, before = self._pending
-            after = self._glimpse(pulse.t, row, last=False)
-            if after is not None:
-                self._pending = None
-                now = max(float(seen.now[row]), self.ready)
-                verdict = self.diagnosis.judge(
-                    pulse.channel, now, before, after, firing.acts, coast.estimator.doubts
-                )
-                if verdict is not None:
-                    self.ending = verdict
-        suspect = self.diagnosis.suspect
-        overdue = bool(seen.now[row] > self.diagnosis.deadline)
-        if overdue and suspect is not None and self._pending is None and not self.ending[0].fault:
-            self.ending = (
-                Ending.UNCLEAR,
-                suspect,
-            )  # no other channel has fired in time to tell which it is
-        return self.ending[0].fault
 
     def _allowed(self, coast: Watch, seen: Seen, row: int, channels: list[int]) -> Decided | None:
         """Firing at a row, on a tick, if the limits allow it."""
-        actuators = [self.law.actuators[index] for index in channels]
-        fired = [
-            coast.firing(seen, row, each)
-            for each in actuators
-            if each.channel.name != self.diagnosis.suspect
-        ]
+        fired = (coast.firing(seen, row, self.law.actuators[index]) for index in channels)
         decided = [decision for decision in fired if decision is not None]
         if not decided:
             return None

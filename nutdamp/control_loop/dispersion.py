@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.control_loop.controller import Case, Scatter
-from nutdamp.control_loop.law import Ending, Law
+from nutdamp.control_loop.controller import Case, Ending, Scatter
+from nutdamp.control_loop.law import Law
 from nutdamp.control_loop.simulation import (
     Fleet,
     FlownLoops,
@@ -67,9 +67,9 @@ class LoopModel(DispersedModel):
         super().__init__(law.spacecraft, Schedule(tuple(pulses)))
         self.law = law
         drawn = self.inputs.drawn
-        kept = tuple(entry for entry in drawn if entry.tolerance not in OF_FIRINGS)
+        per_case = tuple(entry for entry in drawn if entry.tolerance not in OF_FIRINGS)
         self.inputs = with_sensor(
-            self.spacecraft, Inputs(kept, self.inputs.unused), "the loop does not fire"
+            self.spacecraft, Inputs(per_case, self.inputs.unused), "the loop does not fire"
         )
         each = {entry.tolerance: entry for entry in drawn if entry.tolerance in OF_FIRINGS}
         self.of_firings = tuple(entry._replace(name=name) for name, entry in each.items())
@@ -80,7 +80,7 @@ class LoopModel(DispersedModel):
         """
         spacecraft = self.spacecraft
         loop = self.law.loop
-        given = self.spacecraft.dispersions
+        dispersions = self.spacecraft.dispersions
         count = len(numbers)
         draws = _at_pressure(spacecraft, draws)
 
@@ -97,7 +97,11 @@ class LoopModel(DispersedModel):
             for channel in spacecraft.channels
             for thruster in channel.thrusters
         }
-        each_firing = (None, None) if given is None else (given.thrust_per_pulse, given.timing)
+        each_firing = (
+            (None, None)
+            if dispersions is None
+            else (dispersions.thrust_per_pulse, dispersions.timing)
+        )
         whole = {name: rows(draw)[:, 0].tolist() for name, draw in draws.items()}
         cases = []
         for row, number in enumerate(numbers.tolist()):
@@ -204,7 +208,9 @@ def _valve(channel: Channel, draw: dict[str, float]) -> Any:
     if isinstance(valve, Measured):
         factor = 1.0 + off("impulse_bit")
         return Measured(
-            tuple((command, factor * given, centroid) for command, given, centroid in valve.rows)
+            tuple(
+                (command, factor * impulse, centroid) for command, impulse, centroid in valve.rows
+            )
         )
     return replace(
         valve, **{key: max(getattr(valve, key) + off(key), 0.0) for key in BY_VALVE[:-1]}
@@ -319,10 +325,10 @@ class LoopStudy(DrawnCases):
         looked = self._nominal_flown.pilots[0].looked_at
         price = looked * (ALONE if self.alone else 1)
         if price * samples > MOST_SAMPLES:
-            most = max(MOST_SAMPLES // price, 1)
+            affordable = max(MOST_SAMPLES // price, 1)
             raise BadRequest(
                 f"{samples} cases look at about {looked * samples:.2g} samples: too many; "
-                f"at most {most} --samples, or an earlier --until"
+                f"at most {affordable} --samples, or an earlier --until"
             )
         return looked * samples
 
@@ -366,9 +372,13 @@ class LoopStudy(DrawnCases):
         out[6] = [math.fsum(math.nan if kg is None else kg for kg in pulses) for pulses in used]
         out[7] = [len(pilot.fired) for pilot in pilots]
         aim = out[3] if spacecraft.goal.axis is None else out[4]
-        left = Left(out[2], aim, flown.rates[2], flown.aspects if spacecraft.keep else None)
+        residuals = Left(out[2], aim, flown.rates[2], flown.aspects if spacecraft.keep else None)
         lost = np.array([pilot.lost for pilot in pilots])
-        return out, left, np.where(lost, math.inf, requirements.severity(spacecraft, left))
+        return (
+            out,
+            residuals,
+            np.where(lost, math.inf, requirements.severity(spacecraft, residuals)),
+        )
 
 
 def loop_study(spacecraft: Spacecraft, until: float | None = None, *, seed: int = 1) -> LoopStudy:
@@ -433,7 +443,7 @@ class LoopResults(Counted):
         return None if self.lost.all() else Exact(self._values(bound)[~self.lost])
 
     def take(
-        self, values: Array, left: Left, severity: Array, angles: Array, stops: list[Ending]
+        self, values: Array, residuals: Left, severity: Array, angles: Array, stops: list[Ending]
     ) -> None:
         """Count further cases: `LoopStudy.measured`, ``angles`` (m, 2, n), and why they were flown
         no further.
@@ -441,10 +451,10 @@ class LoopResults(Counted):
         rows = slice(self.done, self.done + values.shape[1])
         self.values[:, rows], self.angles[:, :, rows] = values, angles
         goal = self.study.spacecraft.goal.spin
-        self.spin[rows] = math.nan if goal is None else abs(left.spin - goal)
+        self.spin[rows] = math.nan if goal is None else abs(residuals.spin - goal)
         self.stops.update(stops)
         self.lost = np.concatenate([self.lost, np.isinf(severity)])
-        self.count(severity, left, ~np.isinf(severity))
+        self.count(severity, residuals, ~np.isinf(severity))
 
     def shares(self, output: str) -> dict[str, float]:
         """Share of each input in the variance of an output over the cases that settle: its squared
@@ -498,11 +508,13 @@ class LoopDispersion(Dispersed):
         and by nominal values with the noise of the seed.
         """
         study, spacecraft = self.core.study, self.core.study.spacecraft
-        cases, (_, left, severity) = cases_of(self.core), study.nominal_measured
+        cases, (_, residuals, severity) = cases_of(self.core), study.nominal_measured
         nutation, aim, spin = (
-            float(np.ravel(part)[0]) for part in (left.nutation, left.aim, left.spin)
+            float(np.ravel(part)[0]) for part in (residuals.nutation, residuals.aim, residuals.spin)
         )
-        alone = Left(nutation, aim, spin, None if left.angles is None else left.angles[:, :, 0])
+        alone = Left(
+            nutation, aim, spin, None if residuals.angles is None else residuals.angles[:, :, 0]
+        )
         lost = math.isinf(severity[0])
         return judge_loop(
             spacecraft, requirements.held(spacecraft, alone), cases, self.core, lost=lost
@@ -539,9 +551,9 @@ def run(
             flown = study.fly(cases, partial(_seen, watch, stopped, first))
         except _Interrupted:
             break
-        values, left, severity = study.measured(flown)
+        values, residuals, severity = study.measured(flown)
         stops = [pilot.ending[0] for pilot in flown.pilots]
-        results.take(values, left, severity, flown.aspects, stops)
+        results.take(values, residuals, severity, flown.aspects, stops)
         if collect is not None:
             collect(first, values, stops, flown.aspects)
         watch(results.done)

@@ -22,12 +22,12 @@ import cmath
 import copy
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.control_loop.law import ComplexArray, Doubt, Law, known_to
+from nutdamp.control_loop.law import ComplexArray, Law
 from nutdamp.errors import Infeasible
 from nutdamp.spacecraft.equipment import ACCELEROMETER, Sensor
 from nutdamp.spacecraft.model import Spacecraft, Vector
@@ -161,6 +161,15 @@ def stepped(sensor: Sensor, values: Vector) -> Vector:
         if sensor.quantisation == 0.0
         else np.rint(values / sensor.quantisation) * sensor.quantisation
     )
+
+
+class Doubt(NamedTuple):
+    """Uncertainty of an estimate of z, rad/s."""
+
+    noise: float  # root mean square, of both components
+    bias: float  # of a coast, which does not turn with z
+    steps: float  # by the quantisation, at most
+    scale: float  # share by which it may be off: two sigma of the dispersions
 
 
 WINDOW = 1_000_000
@@ -341,21 +350,25 @@ class Estimator:
     @property
     def doubts(self) -> Doubt:
         """Uncertainties of the estimates."""
-        sensor, spacecraft, memory = self.sensor, self.law.spacecraft, self._memory
-        off = known_to(spacecraft)
-        lift = max(
-            abs(complex(self.best(1.0, spacecraft.spin))), 1.0
-        )  # of a constant, as `best` inverts the filter for z
+        sensor = self.sensor
+        memory = self._memory
+        spin = self.law.spacecraft.spin
+        dispersions = self.law.spacecraft.dispersions
+        tolerance = None if dispersions is None else dispersions.sensor_scale
+        scale = 0.0 if tolerance is None else 2.0 * abs(tolerance.size)
+        # What a constant is lifted by, as `best` inverts the filter for z.
+        lift = max(abs(complex(self.best(1.0, spin))), 1.0)
         if sensor.kind == ACCELEROMETER:
-            least = abs(self.seen_gain) * abs(spacecraft.spin)
-            noise = 2.0 * sensor.noise * lift / (math.sqrt(self.window) * least)
-            return Doubt(noise, noise, noise, lift, 0.0, sensor.quantisation * lift / least, *off)
+            gained = abs(self.seen_gain) * abs(spin)
+            noise = 2.0 * sensor.noise * lift / (math.sqrt(self.window) * gained)
+            return Doubt(noise, 0.0, sensor.quantisation * lift / gained, scale)
         widest = max(self.law.gauge)
-        white = sensor.noise * math.sqrt(2.0) * widest
-        noise = white * (lift * math.sqrt((1.0 - memory) / (1.0 + memory)))
-        steps = sensor.quantisation / math.sqrt(2.0) * lift * widest
+        filtered = lift * math.sqrt((1.0 - memory) / (1.0 + memory))
         return Doubt(
-            noise, white, 0.0, lift, abs(self.standing(spacecraft.spin)) * lift, steps, *off
+            noise=sensor.noise * math.sqrt(2.0) * widest * filtered,
+            bias=abs(self.standing(spin)) * lift,
+            steps=sensor.quantisation / math.sqrt(2.0) * lift * widest,
+            scale=scale,
         )
 
 

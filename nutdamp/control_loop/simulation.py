@@ -25,13 +25,14 @@ from nutdamp.control_loop.controller import (
     Case,
     Coast,
     Course,
+    Ending,
     Joined,
     Pilot,
     Scatter,
     Seen,
     Watch,
 )
-from nutdamp.control_loop.law import Ending, Law
+from nutdamp.control_loop.law import Law
 from nutdamp.control_loop.sensor import Noise, Signal, felt, stepped
 from nutdamp.control_loop.stability import dead_band
 from nutdamp.errors import Infeasible
@@ -121,11 +122,11 @@ class LoopRun:
         """
         path: Path = Joined(coast.parts)
         if coast.parts and not self.dynamics.free:
-            there = coast.at(end)
+            arrived = coast.at(end)
         else:
-            path, there = self.dynamics.path(state, start, end, most=taylor.MOST_STEPS)
+            path, arrived = self.dynamics.path(state, start, end, most=taylor.MOST_STEPS)
         self._leg(start, end, path)
-        return there
+        return arrived
 
     def _fire(self, pulse: Pulse, state: SpinState) -> SpinState:
         self.dynamics.command(pulse)
@@ -212,9 +213,9 @@ def largest_since(run: LoopRun) -> tuple[float, float]:
         spacecraft.inertia.wheel,
     )
     later = track.t >= run.settled
-    most = float(track.nutation[later].max())
+    peak = float(track.nutation[later].max())
     row = int(
-        np.argmax(later & (track.nutation >= most * (1.0 - 1e-9)))
+        np.argmax(later & (track.nutation >= peak * (1.0 - 1e-9)))
     )  # not where rounding has its largest
     return float(track.nutation[row]), float(track.t[row])
 
@@ -362,9 +363,9 @@ class Fleet:
             fresh = np.array(sorted([row for row, _ in (*fired, *later)]), dtype=int)
             if len(fresh):
                 groups.append(self._begun(fresh))
-            left = sum(len(group.rows) for group in groups)
-            if len(self.pilots) - left > over:
-                over = len(self.pilots) - left
+            flying = sum(len(group.rows) for group in groups)
+            if len(self.pilots) - flying > over:
+                over = len(self.pilots) - flying
                 watch(over)
         rows = np.arange(len(self.pilots))
         self._go(rows, np.maximum(self.until, self.now))
@@ -496,11 +497,11 @@ class Fleet:
         self, rows: Rows, lasts: Vector, torque: Vector | None, slope: Vector | None
     ) -> None:
         motion = self.now[rows], self.rates[:, rows], self.quaternion[:, rows]
-        here = batch.MotionStretch(self.bodies.some(rows), *motion, torque, slope)
+        stretch = batch.MotionStretch(self.bodies.some(rows), *motion, torque, slope)
         if self.law.spacecraft.keep:
-            self.watch.some(rows).motion(here, lasts)
-        batch.advance(here, lasts)
-        self.rates[:, rows], self.quaternion[:, rows] = here.rates, here.quaternion
+            self.watch.some(rows).motion(stretch, lasts)
+        batch.advance(stretch, lasts)
+        self.rates[:, rows], self.quaternion[:, rows] = stretch.rates, stretch.quaternion
 
     def _fire(self, fired: list[tuple[int, Pulse]]) -> None:
         rows = np.array([row for row, _ in fired])

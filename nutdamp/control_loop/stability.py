@@ -106,11 +106,11 @@ def _margin(law: Law, actuator: Actuator, theta: float, spin: float) -> Margin:
     if firing is not None and not loop.predict:
         sampling = 0.0 if loop.sensor.rate is None else 1.0 / loop.sensor.rate
         late = abs(lag(law, loop.sensor, spin)) + rate * (firing.lead + sampling)
-    most = _most_late(pull, growth)
+    latest = _most_late(pull, growth)
     turned = (loop.sensor.scale < 0.0) != (actuator.channel.name in loop.reversed)
     gain = abs(1.0 - pull * cmath.exp(1j * late))
     return Margin(
-        actuator.channel.name, theta, late, most, gain, growth, (most - late) / rate, turned
+        actuator.channel.name, theta, late, latest, gain, growth, (latest - late) / rate, turned
     )
 
 
@@ -157,15 +157,19 @@ def dead_band(spacecraft: Spacecraft, loop: Loop) -> Band:
     noise = (doubts.bias + doubts.steps + noise) / abs(loop.sensor.scale)
     steps = []
     for actuator in law.actuators:
-        least = effective_on_time(actuator.channel, shortest_on_time(spacecraft, actuator.channel))
-        steps.append(abs(actuator.kick) * max(actuator.shortest, least))
+        shortest = effective_on_time(
+            actuator.channel, shortest_on_time(spacecraft, actuator.channel)
+        )
+        steps.append(abs(actuator.kick) * max(actuator.shortest, shortest))
     stop = law.size(loop.stop, spin) / abs(loop.sensor.scale)
     floor = 0.5 * max(steps)
-    most = stop + noise if floor <= stop else floor + 3.0 * noise
+    left_over = stop + noise if floor <= stop else floor + 3.0 * noise
     grown = math.exp(min(max(law.growth, 0.0) * loop.sensor.delay, math.log(NEVER)))
     unbiased = Estimator(law, replace(sensor, bias=0.0, second=None), 0.0)
     tilt = 0.0 if sensor.kind == ACCELEROMETER else abs(unbiased.standing(spin))
-    angles = [float(law.nutation(size, spin)) for size in (most * grown, noise, max(steps), tilt)]
+    angles = [
+        float(law.nutation(size, spin)) for size in (left_over * grown, noise, max(steps), tilt)
+    ]
     return Band(*angles)
 
 

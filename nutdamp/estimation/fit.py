@@ -14,6 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import bdtrc
 
 from nutdamp.common import work
 from nutdamp.errors import Infeasible
@@ -41,8 +42,8 @@ from nutdamp.estimation.search import (
     absurd,
     covariance_of,
     jacobian,
-    least,
     named_of,
+    noise_floor,
     plain,
     residuals,
     robust,
@@ -126,8 +127,8 @@ def _sensors(model: Model) -> Iterator[tuple[str, Vector, Vector]]:
         if name == CROSSING:
             yield f"the elevation of {name}", times, values[:, 2:3].round(12)
         elif name != SUN_PULSE:
-            least = NOTHING * usual(model.spacecraft, KIND[name].unit)
-            yield name, times, np.where(np.abs(values) > least, values, 0.0)
+            floor = NOTHING * usual(model.spacecraft, KIND[name].unit)
+            yield name, times, np.where(np.abs(values) > floor, values, 0.0)
 
 
 def expect_enough(model: Model) -> None:
@@ -199,16 +200,16 @@ def expect_explained(fitted: Fit) -> None:
             f"{count} samples would "
             f"have to be left out, which is motion and no outlier; {_cure(fitted)}"
         )
-    left = [index for index in range(len(model.signals)) if _more_than_noise(fitted, index)]
-    if not left:
+    unexplained = [index for index in range(len(model.signals)) if _more_than_noise(fitted, index)]
+    if not unexplained:
         return
-    signals = ", ".join(model.signals[index] for index in left)
-    more = max(fitted.noise[index] / _noise(fitted, index) for index in left)
+    signals = ", ".join(model.signals[index] for index in unexplained)
+    more = max(fitted.noise[index] / _noise(fitted, index) for index in unexplained)
     says = (
         f"the motion fitted does not explain {signals}: residuals are {more:.2g} times the "
         "noise between samples"
     )
-    time = step(fitted, left)
+    time = step(fitted, unexplained)
     where = "" if time is None else f", with a step at about {time:.4g} s"
     raise Infeasible(f"{says}{where}; {_cure(fitted)}")
 
@@ -231,7 +232,7 @@ def left_out_together(fitted: Fit) -> tuple[str, float, float, int] | None:
     no more than by the share left out elsewhere (binomial tail, `CHANCE` for all windows).
     """
     model = fitted.model
-    least = CHANCE
+    unlikeliest = CHANCE
     burst = None
     for index, signal in enumerate(model.signals):
         rows = np.flatnonzero(model.signal == index)
@@ -244,14 +245,9 @@ def left_out_together(fitted: Fit) -> tuple[str, float, float, int] | None:
             at = int(np.argmax(counts))
             elsewhere = max(float(sums[-1] - counts[at]), 1.0) / (len(rows) - width)
             share = min(elsewhere, 1.0)
-            most = int(counts[at])
-            tail = (
-                math.comb(width, n) * share**n * (1.0 - share) ** (width - n)
-                for n in range(most, width + 1)
-            )
-            chance = len(rows) * math.fsum(tail)
-            if counts[at] > 0 and chance < least:
-                least = chance
+            chance = len(rows) * float(bdtrc(int(counts[at]) - 1, width, share))
+            if counts[at] > 0 and chance < unlikeliest:
+                unlikeliest = chance
                 those = model.times[rows][at : at + width][out[at : at + width]]
                 burst = signal, float(those[0]), float(those[-1]), int(counts[at])
     return burst
@@ -263,7 +259,7 @@ def _noise(fitted: Fit, signal: int) -> float:
     """
     second = np.diff(fitted.residuals[fitted.model.signal == signal], 2)
     noise = NORMAL_MAD * float(np.median(np.abs(second))) / math.sqrt(6.0)
-    return max(noise, float(least(fitted.model)[signal]))
+    return max(noise, float(noise_floor(fitted.model)[signal]))
 
 
 def _more_than_noise(fitted: Fit, signal: int) -> bool:
@@ -290,7 +286,7 @@ def step(fitted: Fit, signals: Sequence[int], *, small: bool = False) -> float |
     ]
     splits = np.linspace(model.record.start, model.record.end, SPLITS + 2)[1:-1]
     total = 0.0
-    left = np.zeros(len(splits))
+    remaining = np.zeros(len(splits))
     for index in chosen:
         rows = np.flatnonzero(model.signal == index)
         rate = _rate(fitted, index)
@@ -299,9 +295,9 @@ def step(fitted: Fit, signals: Sequence[int], *, small: bool = False) -> float |
             without, with_step = _with_step(
                 fitted, part[fitted.used[part] | (not small)], rate, splits
             )
-            total, left = total + without, left + with_step
-    best = int(np.argmin(left))
-    shows = total - left[best] > SHOWN if small else left[best] < STEP**2 * total
+            total, remaining = total + without, remaining + with_step
+    best = int(np.argmin(remaining))
+    shows = total - remaining[best] > SHOWN if small else remaining[best] < STEP**2 * total
     return float(splits[best]) if chosen and shows else None
 
 
@@ -428,7 +424,7 @@ def _steady(model: Model, constant: tuple[str, ...]) -> Fit:
     """
     shown = {name: float(model.samples[model.signals.index(name)][0, 0]) for name in GYROS}
     values = np.array([shown.get(each.name, each.file) for each in model.parameters])
-    noise = np.maximum(least(model), ROUNDING * usual(model.spacecraft, "rad/s"))
+    noise = np.maximum(noise_floor(model), ROUNDING * usual(model.spacecraft, "rad/s"))
     slopes = jacobian(model, values, range(len(values)))
     used = np.ones(len(model.measured), dtype=bool)
     scaled = slopes / noise[model.signal, None]
@@ -451,10 +447,10 @@ def _with_steps(fitted: Fit) -> Fit:
     used = fitted.used
     off = np.zeros(len(fitted.values))
     loud = [at for at, name in enumerate(model.signals) if not KIND[name].off]
-    found = (
+    quantised = (
         (at, model.signal == at, quantisation(model.measured[model.signal == at])) for at in loud
     )
-    steps = [(at, rows, step) for at, rows, step in found if fitted.noise[at] < LARGE * step]
+    steps = [(at, rows, step) for at, rows, step in quantised if fitted.noise[at] < LARGE * step]
     weights = fitted.jacobian[used] / fitted.noise[model.signal[used], None] ** 2
     for _ in range(3 if steps else 0):  # of a motion that is less off each time
         shown = model.predicted(named_of(model, fitted.values - off))
@@ -604,17 +600,17 @@ def _try(model: Model, begins: Sequence[dict[str, float]]) -> tuple[Vector, floa
 
 def _settled(model: Model, values: Vector) -> Fit:
     """The last fits: noise and outliers found, then plain least squares over what is no outlier."""
-    floor = least(model)
+    floor = noise_floor(model)
     noise = np.maximum(robust(model, residuals(model, values)), floor)
     every = np.ones(len(model.measured), dtype=bool)
     values, _ = search(model, values, noise, every, robust=True)
     used = every
     for _ in range(ROUNDS):
         before = (noise, used)
-        left = residuals(model, values)
-        noise = np.maximum(robust(model, left), floor)
-        used = np.abs(left) < OUTLIER * noise[model.signal]
-        noise = np.maximum(plain(model, left, used), floor)
+        misfits = residuals(model, values)
+        noise = np.maximum(robust(model, misfits), floor)
+        used = np.abs(misfits) < OUTLIER * noise[model.signal]
+        noise = np.maximum(plain(model, misfits, used), floor)
         if (used == before[1]).all() and (np.abs(noise - before[0]) < STILL * noise).all():
             break
         values, _ = search(model, values, noise, used, robust=False)
@@ -626,15 +622,15 @@ def _as_noisy(
     model: Model, values: Vector, noise: Vector, used: NDArray[np.bool_], slopes: Matrix
 ) -> Fit:
     """The fit at some values, its noise corrected for what the fit takes of it."""
-    left = residuals(model, values)
-    floor = least(model)
+    misfits = residuals(model, values)
+    floor = noise_floor(model)
     for _ in range(ADJUSTED):
         scaled = slopes[used] / noise[model.signal[used], None]
         covariance = covariance_of(model, scaled)
         noise = np.maximum(
-            plain(model, left, used, np.sum((scaled @ covariance) * scaled, axis=1)), floor
+            plain(model, misfits, used, np.sum((scaled @ covariance) * scaled, axis=1)), floor
         )
-    return Fit(model, values, covariance, noise, used, left, slopes)
+    return Fit(model, values, covariance, noise, used, misfits, slopes)
 
 
 def _shown(fitted: Fit, wider: Model, at: Vector, which: Sequence[int]) -> bool:
@@ -649,9 +645,9 @@ def _shown(fitted: Fit, wider: Model, at: Vector, which: Sequence[int]) -> bool:
     )
     units = units_of(model)
     rows = len(model.prior[0])
-    known = fitted.jacobian[fitted.used] * weights[:, None] * units
+    narrow = fitted.jacobian[fitted.used] * weights[:, None] * units
     bound = np.concatenate([model.prior[0] * units, np.zeros((rows, count))], axis=1)
-    stacked = np.concatenate([np.concatenate([known, slopes], axis=1), bound])
+    stacked = np.concatenate([np.concatenate([narrow, slopes], axis=1), bound])
     target = np.concatenate([fitted.residuals[fitted.used] * weights, np.zeros(rows)])
     solved = np.linalg.lstsq(stacked, target, rcond=1e-13)[0][-count:]
     covariance = np.linalg.pinv(stacked.T @ stacked, rcond=1e-14)[-count:, -count:]

@@ -128,17 +128,17 @@ def _around(model: Model) -> tuple[float, float] | None:
     of_file = attitude.from_matrix(model.spacecraft.inertia.axes)
     times, rows = record.samples((*SEEN, *DIRECTION))
     if len(times):
-        shown, there = rows[:, :3], rows[:, 3:]
+        shown, directions = rows[:, :3], rows[:, 3:]
     else:
         times, rows = record.samples(QUATERNION)
         if not len(times):
             return None
-        there = np.broadcast_to(
+        directions = np.broadcast_to(
             attitude.rotate(reference, np.array([1.0, 0.0, 0.0])), (len(times), 3)
         )
-        shown = attitude.rotate(attitude.conjugate(rows), there)
+        shown = attitude.rotate(attitude.conjugate(rows), directions)
     shown = attitude.rotate(attitude.conjugate(of_file), shown)
-    before = attitude.rotate(attitude.conjugate(reference), there)
+    before = attitude.rotate(attitude.conjugate(reference), directions)
     angles = np.arctan2(before[:, 1], before[:, 0]) - np.arctan2(shown[:, 1], shown[:, 0])
     gyro = record.samples(GYROS[2:])[1]
     spin = float(np.median(gyro)) if len(gyro) else model.spacecraft.spin
@@ -176,8 +176,8 @@ def spin_of(pulses: Vector, step: float = 0.0) -> tuple[float, float]:
     rate = 2.0 * math.pi * float(turns[-1]) / float(pulses[-1] - pulses[0])
     if len(pulses) < 3:
         return rate, math.inf
-    slope, left = np.polyfit(turns, pulses, 1, full=True)[:2]
-    variance = max(float(left.sum()) / (len(pulses) - 2), step * step / 12.0)
+    slope, squares = np.polyfit(turns, pulses, 1, full=True)[:2]
+    variance = max(float(squares.sum()) / (len(pulses) - 2), step * step / 12.0)
     spread = math.sqrt(variance / float(np.sum((turns - turns.mean()) ** 2)))
     return 2.0 * math.pi / float(slope[0]), 2.0 * math.pi * spread / float(slope[0]) ** 2
 
@@ -197,15 +197,15 @@ def _peak(model: Model, spin: float, share: float) -> float | None:
     """The rate aω3 at which a nutation turns in the body, rad/s; None where no signal shows it."""
     record, spacecraft = model.record, model.spacecraft
     expected = spacecraft.inertia.nutation_rate(spin)
-    most = abs(spin) if spacecraft.inertia.wheel == 0.0 else max(abs(spin), 2.0 * abs(expected))
+    fastest = abs(spin) if spacecraft.inertia.wheel == 0.0 else max(abs(spin), 2.0 * abs(expected))
     count = _count(record, share)
     times = record.times[:count]
     signals = {name: values[:count] for name, values in record.signals.items()}
     if record.has(*GYROS[:2]):
-        return _strongest(times, signals[GYROS[0]], signals[GYROS[1]], -expected, most, -1.0)
+        return _strongest(times, signals[GYROS[0]], signals[GYROS[1]], -expected, fastest, -1.0)
     for name in (*GYROS[:2], ACCELERATION):
         if name in signals:
-            turning = _strongest(times, signals[name], None, expected, most, 1.0)
+            turning = _strongest(times, signals[name], None, expected, fastest, 1.0)
             return None if turning is None else math.copysign(turning, expected)
     cone = _cone(model, share)
     return None if cone is None else spin - spacecraft.sense * cone.rate * cone.cosine
@@ -244,12 +244,12 @@ def _cone(model: Model, share: float) -> _Cone | None:
         return None
     count = _count(record, share)
     times, axis = record.times[:count], _axes(record)[:count]
-    there = np.isfinite(axis).all(axis=1)
-    if there.sum() < 4:
+    complete = np.isfinite(axis).all(axis=1)
+    if complete.sum() < 4:
         return None
-    mean = np.mean(axis[there], axis=0)
+    mean = np.mean(axis[complete], axis=0)
     # A cone meets the unit sphere in a plane across H: the axis varies least along it.
-    momentum = np.linalg.svd(axis[there] - mean, full_matrices=False)[2][-1]
+    momentum = np.linalg.svd(axis[complete] - mean, full_matrices=False)[2][-1]
     momentum = momentum * math.copysign(1.0, float(momentum @ mean))
     if np.linalg.norm(mean) > NARROW:
         momentum = mean / np.linalg.norm(mean)
@@ -265,7 +265,7 @@ def _cone(model: Model, share: float) -> _Cone | None:
     )
     if rate is None:
         return None
-    begin = np.mean((x + 1j * y)[there] * np.exp(-1j * rate * (times[there] - model.start)))
+    begin = np.mean((x + 1j * y)[complete] * np.exp(-1j * rate * (times[complete] - model.start)))
     along = begin.real * first + begin.imag * second + height * momentum
     return _Cone(momentum, abs(rate), along / np.linalg.norm(along))
 
@@ -282,16 +282,23 @@ def _on_cone(model: Model, values: Values, spin: float, cone: _Cone) -> dict[str
 
 
 def _strongest(
-    times: Vector, real: Vector, imaginary: Vector | None, expected: float, most: float, sign: float
+    times: Vector,
+    real: Vector,
+    imaginary: Vector | None,
+    expected: float,
+    fastest: float,
+    sign: float,
 ) -> float | None:
     """Rate (rad/s, times ``sign``) at the peak of a spectrum, nearest to ``expected`` of those that
     look alike.
     """
-    there = np.isfinite(real) if imaginary is None else np.isfinite(real) & np.isfinite(imaginary)
-    if there.sum() < 4:
+    complete = (
+        np.isfinite(real) if imaginary is None else np.isfinite(real) & np.isfinite(imaginary)
+    )
+    if complete.sum() < 4:
         return None
-    at = times[there]
-    values = real[there] + (0j if imaginary is None else 1j * imaginary[there])
+    at = times[complete]
+    values = real[complete] + (0j if imaginary is None else 1j * imaginary[complete])
     step = float(np.median(np.diff(at)))
     count = min(math.ceil((at[-1] - at[0]) / step) + 1, LONGEST_SPECTRUM)
     place = np.rint((at - at[0]) / step).astype(int)
@@ -311,9 +318,9 @@ def _strongest(
         rates = np.abs(rates)
         expected = abs(expected)
     else:
-        rates = rates + around * np.rint((expected - rates) / around) * (most > 0.5 * around)
+        rates = rates + around * np.rint((expected - rates) / around) * (fastest > 0.5 * around)
     power = np.where(
-        (np.abs(rates) <= 1.02 * most) & (np.abs(rates) > 0.25 * 2.0 * math.pi / (count * step)),
+        (np.abs(rates) <= 1.02 * fastest) & (np.abs(rates) > 0.25 * 2.0 * math.pi / (count * step)),
         power,
         0,
     )
@@ -379,10 +386,10 @@ def _linear(model: Model, values: dict[str, float]) -> dict[str, float]:
     ]
     weights = 0.1 / scales_of(model)[model.signal]
     # Of one direction the attitude is not told about it.
-    known = {
+    certainty = {
         each.name: 1.0 / each.prior for each in model.parameters if each.name.startswith("attitude")
     }
-    held = np.array([known.get(name, 0.0) for name in names])
+    held = np.array([certainty.get(name, 0.0) for name in names])
     matrix = np.concatenate([np.column_stack(columns) * weights[:, None], np.diag(held)])
     target = np.concatenate(
         [(model.measured - at_rest) * weights, -held * [base[name] for name in names]]
@@ -442,19 +449,19 @@ def likeliest(fits: Sequence[Fit]) -> Fit:
         again = any(abs(fitted.values[at] - other.values[at]) < other.sigmas[at] for other in alike)
         if costs[index] < min(costs) + ALIKE and not again:
             alike.append(fitted)
-    left = [fitted for fitted in alike if low < fitted.values[at] < high]
-    if not left and too_slow(model, alike[0].values):
+    allowed = [fitted for fitted in alike if low < fitted.values[at] < high]
+    if not allowed and too_slow(model, alike[0].values):
         raise Infeasible(
             f"with a sample every {interval(model):.4g} s several nutation rates fit equally well, "
             "and none of their "
             "C/A is as near to the file as its tolerances allow; "
             "check A and C in the file (are the times in seconds?)"
         )
-    left = left or alike[:1]
-    if len(left) == 1:
-        return left[0]
-    ratios = sorted(float(fitted.values[at]) for fitted in left)
-    fastest = max(abs(nutation_rate(model, fitted.values)) for fitted in left)
+    allowed = allowed or alike[:1]
+    if len(allowed) == 1:
+        return allowed[0]
+    ratios = sorted(float(fitted.values[at]) for fitted in allowed)
+    fastest = max(abs(nutation_rate(model, fitted.values)) for fitted in allowed)
     raise Infeasible(
         f"with a sample every {interval(model):.4g} s several nutation rates fit equally well: "
         "C/A may be "
@@ -502,5 +509,5 @@ def interval(model: Model) -> float:
 def _range(model: Model) -> tuple[int, float, float]:
     """Position of C/A among the parameters, and the range that the file leaves it."""
     at, of_file = next((at, each) for at, each in enumerate(model.parameters) if each.name == RATIO)
-    (least, most), reach = POSSIBLE, WITHIN * of_file.prior
-    return at, max(of_file.file - reach, least), min(of_file.file + reach, most)
+    (smallest, largest), reach = POSSIBLE, WITHIN * of_file.prior
+    return at, max(of_file.file - reach, smallest), min(of_file.file + reach, largest)

@@ -106,8 +106,8 @@ class Record:
         if not self.has(*names):
             return np.empty(0), np.empty((0, len(names)))
         table = np.column_stack([self.signals[name] for name in names])
-        there = np.isfinite(table).all(axis=1)
-        return self.times[there], table[there]
+        complete = np.isfinite(table).all(axis=1)
+        return self.times[complete], table[complete]
 
     @property
     def kinds(self) -> tuple[SignalKind, ...]:
@@ -274,18 +274,18 @@ def _sun_late(seen: Sighting) -> Vector:
     return np.asarray(wrapped(ahead) / np.where(rate > 0.0, rate, abs(spacecraft.spin)))
 
 
-def _off(measured: Vector, there: Vector) -> Vector:
+def _off(measured: Vector, predicted: Vector) -> Vector:
     """Components (2n,) of unit vectors across measured ones, (n, 3) each; of opposite ones they add
     up to 2.
     """
     first = np.cross(measured, np.eye(3)[np.argmin(np.abs(measured), axis=1)])
     first /= np.linalg.norm(first, axis=1, keepdims=True)
     off = np.array(
-        [np.sum(across * there, axis=1) for across in (first, np.cross(measured, first))]
+        [np.sum(across * predicted, axis=1) for across in (first, np.cross(measured, first))]
     )
     # Beyond 90 deg what is across falls again, and would be nothing for the opposite direction.
     sizes = np.hypot(*off)
-    behind = np.sum(measured * there, axis=1) < 0.0
+    behind = np.sum(measured * predicted, axis=1) < 0.0
     return np.concatenate(off * np.where(behind, 2.0 / np.maximum(sizes, TINY) - 1.0, 1.0))
 
 
@@ -432,12 +432,12 @@ def prior(spacecraft: Spacecraft, chosen: Sequence[Parameter]) -> tuple[Matrix, 
         if parameter.name == RATIO and "A" in names:
             # What of C = A·(C/A), to first order, A does not tell.
             (A, of_A), (C, of_C), both = _of_moments(spacecraft)
-            left = of_C * math.sqrt(1.0 - both * both)
+            apart = of_C * math.sqrt(1.0 - both * both)
             row[index], row[names.index("A")] = (
-                A / left,
-                (parameter.file - both * of_C / of_A) / left,
+                A / apart,
+                (parameter.file - both * of_C / of_A) / apart,
             )
-            value = (2.0 * C - both * of_C / of_A * A) / left
+            value = (2.0 * C - both * of_C / of_A * A) / apart
         if row.any():
             rows.append(row)
             values.append(value)
@@ -449,12 +449,16 @@ EXACT = Dispersions()  # the dispersions of a file that has none
 
 def _of_moments(spacecraft: Spacecraft) -> tuple[tuple[float, float], tuple[float, float], float]:
     """Means and standard deviations of A and C by the file, kg m², and their correlation."""
-    given = spacecraft.dispersions or EXACT
+    dispersions = spacecraft.dispersions or EXACT
     inertia = spacecraft.inertia
     together = (
-        value for first, second, value in given.correlation if {first, second} == {"A", "C"}
+        value for first, second, value in dispersions.correlation if {first, second} == {"A", "C"}
     )
-    return prior_of(given.A, inertia.A), prior_of(given.C, inertia.C), next(together, 0.0)
+    return (
+        prior_of(dispersions.A, inertia.A),
+        prior_of(dispersions.C, inertia.C),
+        next(together, 0.0),
+    )
 
 
 def parameters(
@@ -463,12 +467,12 @@ def parameters(
     """The parameters of a record, motion at its start first; ``unequal``: I1 ≠ I2, ``growing``:
     with dissipation.
     """
-    given = spacecraft.dispersions or EXACT
+    dispersions = spacecraft.dispersions or EXACT
     spin = float(spacecraft.omega0[2])
     step = TINY * spacecraft.fastest
     yield from moments(spacecraft)
-    if given.wheel_momentum is not None and spacecraft.inertia.wheel != 0.0:
-        wheel, sigma = prior_of(given.wheel_momentum, spacecraft.inertia.wheel)
+    if dispersions.wheel_momentum is not None and spacecraft.inertia.wheel != 0.0:
+        wheel, sigma = prior_of(dispersions.wheel_momentum, spacecraft.inertia.wheel)
         yield Parameter("wheel", "N m s", wheel, sigma, TINY * abs(wheel))
     for number in (1, 2):
         yield Parameter(
@@ -476,8 +480,8 @@ def parameters(
         )
     if record.shows_spin:
         yield Parameter("omega_3", "rad/s", spin, math.inf, step)
-    elif given.omega0[2] is not None:
-        mean, sigma = prior_of(given.omega0[2], spin)
+    elif dispersions.omega0[2] is not None:
+        mean, sigma = prior_of(dispersions.omega0[2], spin)
         yield Parameter("omega_3", "rad/s", mean, sigma, step)
     if growing and (spacecraft.inertia.a != 0.0 or spacecraft.inertia.wheel != 0.0):
         yield Parameter(
@@ -531,12 +535,12 @@ def _attitude(spacecraft: Spacecraft, record: Record) -> Iterator[Parameter]:
 
 def _gyros(spacecraft: Spacecraft, record: Record) -> Iterator[Parameter]:
     """Biases; misalignment only beside gyro 3, for else it looks like a bias of gyros 1 and 2."""
-    loop, given = spacecraft.loop, (spacecraft.dispersions or EXACT).sensor_bias
+    loop, tolerance = spacecraft.loop, (spacecraft.dispersions or EXACT).sensor_bias
     mean = 0.0
     sigma = BIAS
     if loop is not None and loop.sensor.kind == GYRO:
         mean, sigma = (
-            (loop.sensor.bias, BIAS) if given is None else prior_of(given, loop.sensor.bias)
+            (loop.sensor.bias, BIAS) if tolerance is None else prior_of(tolerance, loop.sensor.bias)
         )
     aligned = record.has(GYROS[2])
     for name in GYROS:
@@ -552,11 +556,11 @@ def thrust_prior(spacecraft: Spacecraft, name: str) -> tuple[float, float]:
     """Thrust factor of a channel by the file, and its standard deviation; that is infinite without
     a tolerance.
     """
-    given = (spacecraft.dispersions or EXACT).thrust
+    tolerances = (spacecraft.dispersions or EXACT).thrust
     channel = next((channel for channel in spacecraft.channels if channel.name == name), None)
     if channel is None:
         return 1.0, math.inf
-    priors = [prior_of(given.get(thruster.name), 1.0) for thruster in channel.thrusters]
+    priors = [prior_of(tolerances.get(thruster.name), 1.0) for thruster in channel.thrusters]
     mean = 1.0 + math.fsum(factor - 1.0 for factor, _ in priors) / len(priors)
     return mean, math.hypot(*(sigma for _, sigma in priors)) / len(priors) or math.inf
 

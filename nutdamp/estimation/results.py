@@ -205,46 +205,50 @@ def moving(fitted: Fit, time: float) -> tuple[Body, SpinState]:
     return body, state
 
 
-def replaced(spacecraft: Spacecraft, known: Carried) -> Spacecraft:
+def replaced(spacecraft: Spacecraft, estimate: Carried) -> Spacecraft:
     """The ``spacecraft`` of the file with moments, motion and attitude of the estimate, and nothing
     else of it.
     """
     return replace(
         spacecraft,
-        inertia=known.body.inertia,
-        omega0=known.state.rates,
+        inertia=estimate.body.inertia,
+        omega0=estimate.state.rates,
         attitude=None
         if spacecraft.attitude is None
-        else replace(spacecraft.attitude, quaternion=known.quaternion),
+        else replace(spacecraft.attitude, quaternion=estimate.quaternion),
     )
 
 
-def correlations(known: Carried, given: Dispersions | None) -> tuple[tuple[str, str, float], ...]:
-    """Correlations by pairs of inputs, rounded as in files, positive definite; those ``given`` of
+def correlations(
+    estimate: Carried, dispersions: Dispersions | None
+) -> tuple[tuple[str, str, float], ...]:
+    """Correlations by pairs of inputs, rounded as in files, positive definite; ``dispersions`` of
     others stay.
     """
-    matrix = known.correlation
-    there = [index for index, sigma in enumerate(known.sigmas) if sigma > 0.0]
+    matrix = estimate.correlation
+    uncertain = [index for index, sigma in enumerate(estimate.sigmas) if sigma > 0.0]
     rounded = np.round(np.where(np.abs(matrix) < CORRELATED, 0.0, matrix), DIGITS)[
-        np.ix_(there, there)
+        np.ix_(uncertain, uncertain)
     ]
     apart = rounded - np.diag(np.diag(rounded))
-    possible = np.eye(len(there))
+    possible = np.eye(len(uncertain))
     for shrunk in (0.0, *(10.0**power for power in range(-DIGITS, 0))):
         # What is rounded may be impossible by a hair: then all correlations are taken a hair
         # smaller.
-        possible = np.eye(len(there)) + np.round(apart * (1.0 - shrunk), DIGITS)
+        possible = np.eye(len(uncertain)) + np.round(apart * (1.0 - shrunk), DIGITS)
         if np.linalg.eigvalsh(possible)[0] > 0.5 * 10.0**-DIGITS:
             break
-    names = [known.names[index] for index in there]
+    names = [estimate.names[index] for index in uncertain]
     pairs = [
         (names[i], names[j], float(possible[i, j]))
         for i in range(len(names))
         for j in range(i + 1, len(names))
     ]
-    others = () if given is None else given.correlation
-    kept = [pair for pair in others if pair[0] not in known.names and pair[1] not in known.names]
-    return (*(pair for pair in pairs if pair[2] != 0.0), *kept)
+    others = () if dispersions is None else dispersions.correlation
+    of_others = [
+        pair for pair in others if pair[0] not in estimate.names and pair[1] not in estimate.names
+    ]
+    return (*(pair for pair in pairs if pair[2] != 0.0), *of_others)
 
 
 def _told(fitted: Fit, function: Callable[[Values], Vector]) -> tuple[Vector, Matrix]:
@@ -301,12 +305,12 @@ def _of_motion(fitted: Fit, time: float) -> Iterator[Estimate]:
         ("omega", "transverse rate |ω|", "deg/s", abs(omega), None),
         ("phase", "phase arg(ω1 + iω2)", "deg", phase, None),
     )
-    for (key, label, unit, known, prior), (value, sigma) in zip(
+    for (key, label, unit, file, prior), (value, sigma) in zip(
         rows, _each(fitted, motion), strict=True
     ):
         shown = sigma if key != "phase" or model.record.shows_turn else math.inf
         if key != "phase" or not fitted.constant:  # without nutation there is none
-            yield Estimate(key, label, unit, 1.0 / DEG, value, shown, known, prior)
+            yield Estimate(key, label, unit, 1.0 / DEG, value, shown, file, prior)
 
 
 def _sigma_of(tolerance: Tolerance | None, nominal: float) -> float | None:
@@ -325,8 +329,8 @@ def _of_body(fitted: Fit) -> Iterator[Estimate]:
         body = fitted.model.body(values)
         return np.array([body.inertia.nutation_rate(body.state.spin)])
 
-    given = spacecraft.dispersions or EXACT
-    of_A, of_C = _sigma_of(given.A, inertia.A), _sigma_of(given.C, inertia.C)
+    dispersions = spacecraft.dispersions or EXACT
+    of_A, of_C = _sigma_of(dispersions.A, inertia.A), _sigma_of(dispersions.C, inertia.C)
     ratio = inertia.C / inertia.A
     both = ratio * math.hypot((of_A or 0.0) / inertia.A, (of_C or 0.0) / inertia.C) or None
     rows = (
@@ -353,9 +357,15 @@ def _of_body(fitted: Fit) -> Iterator[Estimate]:
             None,
         )
     if fitted.index("wheel") is not None:
-        known = prior_of(given.wheel_momentum, inertia.wheel)[1]
+        of_wheel = prior_of(dispersions.wheel_momentum, inertia.wheel)[1]
         yield Estimate(
-            "wheel", "wheel momentum h", "N m s", 1.0, *_at(fitted, "wheel"), inertia.wheel, known
+            "wheel",
+            "wheel momentum h",
+            "N m s",
+            1.0,
+            *_at(fitted, "wheel"),
+            inertia.wheel,
+            of_wheel,
         )
     others = (
         ("growth", "growth 1/τ", "1/s"),
@@ -387,10 +397,10 @@ def _of_others(fitted: Fit) -> Iterator[Estimate]:
         if which == "acceleration":
             unit, factor = "m/s²", 1.0
         value, sigma = _at(fitted, parameter.name)
-        known = (
+        of_file = (
             thrust_prior(fitted.model.spacecraft, which)[1] if kind == "thrust" else parameter.prior
         )
-        prior = known if math.isfinite(known) else None
+        prior = of_file if math.isfinite(of_file) else None
         yield Estimate(
             parameter.name, label.format(which), unit, factor, value, sigma, parameter.file, prior
         )
@@ -425,8 +435,8 @@ UNSAID = 0.1  # tolerance of C/A, of unequal moments and of thrust where the fil
 OTHER_SPIN = 0.01  # part by which a spin is off that is said
 
 
-def far_from_file(fitted: Fit, least: float = FAR) -> list[tuple[Estimate, float]]:
-    """The constants that are farther off than ``least`` sigmas of the file, with their own, and by
+def far_from_file(fitted: Fit, beyond: float = FAR) -> list[tuple[Estimate, float]]:
+    """The constants that are farther off than ``beyond`` sigmas of the file, with their own, and by
     how many.
     """
     far = []
@@ -435,7 +445,7 @@ def far_from_file(fitted: Fit, least: float = FAR) -> list[tuple[Estimate, float
         usual = row.key.startswith((RATIO, "unequal", "thrust"))
         unsaid = UNSAID * (file if row.key == RATIO else 1.0) if usual else math.inf
         off = (row.value - file) / math.hypot(row.prior or unsaid, row.sigma)
-        if row.key != "a" and abs(off) > least:
+        if row.key != "a" and abs(off) > beyond:
             far.append((row, off))
     return far
 
@@ -444,8 +454,8 @@ def spin_off(fitted: Fit) -> tuple[float, float] | None:
     """The spin at the start of the record and that of the file, rad/s, where they differ."""
     row = next(_of_motion(fitted, fitted.model.start))
     file = fitted.model.spacecraft.spin
-    least = min(FAR * row.prior if row.prior else math.inf, OTHER_SPIN * abs(file) or math.inf)
-    return (row.value, file) if abs(row.value - file) > max(least, FAR * row.sigma) else None
+    noticed = min(FAR * row.prior if row.prior else math.inf, OTHER_SPIN * abs(file) or math.inf)
+    return (row.value, file) if abs(row.value - file) > max(noticed, FAR * row.sigma) else None
 
 
 def refused(fitted: Fit) -> bool:
@@ -500,16 +510,18 @@ def compared(spacecraft: Spacecraft, record: Record) -> Fit:
     )
 
 
-def _near(fitted: Fit, most: float) -> bool:
-    """True where constants and spin are those of the file, and the transverse rate at ``most`` so
+def _near(fitted: Fit, times: float) -> bool:
+    """True where constants and spin are those of the file, and the transverse rate at ``times`` so
     many times.
     """
     size = math.hypot(fitted.named["omega_1"], fitted.named["omega_2"])
-    slow = size < most * float(np.linalg.norm(fitted.model.reference.rates[:2])) or math.isinf(most)
+    slow = size < times * float(np.linalg.norm(fitted.model.reference.rates[:2])) or math.isinf(
+        times
+    )
     return slow and not far_from_file(fitted) and spin_off(fitted) is None
 
 
-def _causes(spacecraft: Spacecraft, record: Record, most: float = FASTER) -> tuple[str, ...]:
+def _causes(spacecraft: Spacecraft, record: Record, times: float = FASTER) -> tuple[str, ...]:
     """Mistakes by which a motion and a body near to the file explain a record,
     the nearest first.
     """
@@ -535,7 +547,7 @@ def _causes(spacecraft: Spacecraft, record: Record, most: float = FASTER) -> tup
             if (
                 fitted is not None
                 and fitted.finished
-                and _near(fitted, most)
+                and _near(fitted, times)
                 and _shows(fitted, changes)
             ):
                 off = fitted.model.reference.rates[:2] - [
@@ -615,15 +627,15 @@ def doubts(fitted: Fit) -> Iterator[Note]:
 
 def _of_residuals(fitted: Fit) -> Iterator[Note]:
     """Possible cause of residuals that are not white, and the cure."""
-    left = [
+    coloured = [
         index
         for index in range(len(fitted.model.signals))
         if fitted.resolved[index] and not fitted.white(index)
     ]
-    if not left:
+    if not coloured:
         return
-    signals = ", ".join(fitted.model.signals[index] for index in left)
-    if (time := step(fitted, left, small=True)) is not None:
+    signals = ", ".join(fitted.model.signals[index] for index in coloured)
+    if (time := step(fitted, coloured, small=True)) is not None:
         fired = fitted.model.record.fired
         yield note(
             "fit-steps-beside-schedule" if fired else "fit-steps", signals=signals, at_s=time

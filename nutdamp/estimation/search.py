@@ -22,9 +22,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
+from scipy.special import chdtrc
 
 from nutdamp.common import work
-from nutdamp.common.numerics import chi_square_tail
 from nutdamp.errors import Infeasible
 from nutdamp.estimation.model import Model
 from nutdamp.estimation.parameters import KIND, SUN_PULSE, Matrix, Vector, quantisation
@@ -43,7 +43,7 @@ GRADIENT = 1e-8  # slope of a cost that is least
 STEP = 1e-10  # relative change of it, and of the values, from which on a search is over
 
 
-def least(model: Model) -> Vector:
+def noise_floor(model: Model) -> Vector:
     """Noise that each signal has at least: that of its steps, and rounding."""
     # A signal of zeros has no digits, but its prediction is rounded, as rates and angles are.
     turned = usual(model.spacecraft, "rad/s") * model.record.length
@@ -80,14 +80,16 @@ def absurd(spacecraft: Spacecraft, name: str, values: Vector) -> NDArray[np.bool
     )
 
 
-def robust(model: Model, left: Vector) -> Vector:
+def robust(model: Model, misfits: Vector) -> Vector:
     """One sigma of each signal by its median magnitude, which outliers hardly change."""
-    sizes = [np.median(np.abs(left[model.signal == index])) for index in range(len(model.signals))]
+    sizes = [
+        np.median(np.abs(misfits[model.signal == index])) for index in range(len(model.signals))
+    ]
     return NORMAL_MAD * np.array(sizes)
 
 
 def plain(
-    model: Model, left: Vector, used: NDArray[np.bool_], leverage: Vector | None = None
+    model: Model, misfits: Vector, used: NDArray[np.bool_], leverage: Vector | None = None
 ) -> Vector:
     """One sigma of each signal by its samples that are no outliers; ``leverage`` is what the fit
     takes of each.
@@ -100,7 +102,7 @@ def plain(
     for index in range(len(model.signals)):
         rows = signal == index
         spent = 0.0 if leverage is None else float(leverage[rows].sum()) + 2.0
-        total = float(left[used][rows] @ left[used][rows])
+        total = float(misfits[used][rows] @ misfits[used][rows])
         sigmas.append(math.sqrt(total / max(float(rows.sum()) - spent, 1.0)))
     return np.array(sigmas)
 
@@ -134,13 +136,13 @@ def scales_of(model: Model) -> Vector:
 
 def share_left(model: Model, values: Vector) -> float:
     """Least share of a signal's own variation that the residuals still have."""
-    left = residuals(model, values)
+    misfits = residuals(model, values)
     shares = []
     for index, shown in enumerate(model.samples):
         rows = model.signal == index
         varied = float(np.median(np.linalg.norm(shown - np.median(shown, axis=0), axis=1)))
         if varied > 0.0:
-            shares.append(float(np.median(np.abs(left[rows]))) / varied)
+            shares.append(float(np.median(np.abs(misfits[rows]))) / varied)
     return min(shares, default=0.0)
 
 
@@ -154,12 +156,12 @@ def jacobian(
     a search.
     """
     columns = []
-    here = model.predicted(named_of(model, values)) if one_sided else None
+    base = model.predicted(named_of(model, values)) if one_sided else None
     for index in which:
         ends = np.stack([values, values])
         ends[:, index] += np.array([1.0, 0.0 if one_sided else -1.0]) * model.parameters[index].step
         above = model.predicted(named_of(model, ends[0]))
-        below = model.predicted(named_of(model, ends[1])) if here is None else here
+        below = model.predicted(named_of(model, ends[1])) if base is None else base
         columns.append((above - below) / (ends[0, index] - ends[1, index]))
     return np.column_stack(columns)
 
@@ -200,10 +202,10 @@ def search(
     def errors(scaled: Vector) -> Vector:
         nonlocal best, place
         try:
-            left = residuals(model, scaled * units)[rows] * weights
+            misfits = residuals(model, scaled * units)[rows] * weights
         except Infeasible:  # a trial too far to be flown: the search comes nearer
             return np.full(int(rows.sum()) + len(nominal), math.inf)
-        every = np.concatenate([left, bound @ scaled - nominal])
+        every = np.concatenate([misfits, bound @ scaled - nominal])
         cost = float(np.sum(np.sqrt(1.0 + every * every) - 1.0 if robust else 0.5 * every * every))
         if cost < best:
             best = cost
@@ -219,7 +221,7 @@ def search(
     # Not so far from the minimum, where steps as long as the derivatives allow lead astray.
     scale: Literal["jac"] | float = "jac" if near else 1.0
     loss: Literal["soft_l1", "linear"] = "soft_l1" if robust else "linear"
-    most = EVALUATIONS if near else TRIAL
+    trials = EVALUATIONS if near else TRIAL
     if np.isfinite(errors(place)).all():
         with suppress(_SpentError):
             least_squares(
@@ -231,7 +233,7 @@ def search(
                 ftol=STEP,
                 xtol=STEP,
                 gtol=GRADIENT,
-                max_nfev=most,
+                max_nfev=trials,
             )
     return place * units, best
 
@@ -259,6 +261,7 @@ CURVED = 7.0
 GROWS = 3.0  # standard deviations of κ from which on it shows
 KEPT = 0.9  # share of its prior above which a parameter's sigma is where the data do not tell it
 MOVED = 0.1  # share of its prior from which on a parameter has moved from the file
+WHITE = 1e-3  # chance below which residuals are not white: one of a thousand records of noise
 
 
 def unmoved(change: float, sigma: float, prior: float) -> bool:
@@ -323,7 +326,7 @@ class Fit:
         sizes, turned = np.linalg.eigh(self.covariance / np.outer(scale, scale))
         noise = self.noise[self.model.signal[self.used]]
         slopes = self.jacobian[self.used] / noise[:, None]
-        here = self.model.predicted(self.named)
+        centre = self.model.predicted(self.named)
         shifts = []
         for direction in (scale[:, None] * turned * np.sqrt(np.maximum(sizes, 0.0))).T:
             both_ways = (self.values + direction, self.values - direction)
@@ -334,7 +337,7 @@ class Fit:
                     ]
             except Infeasible:  # of what nothing is known one sigma may be no body at all
                 continue
-            bent = (0.5 * (ends[0] + ends[1]) - here)[self.used] / noise
+            bent = (0.5 * (ends[0] + ends[1]) - centre)[self.used] / noise
             shifts.append(self.covariance @ (slopes.T @ bent))
         across = np.array([shift for shift in shifts if np.isfinite(shift).all()]).reshape(
             -1, len(scale)
@@ -354,32 +357,26 @@ class Fit:
     @cached_property
     def resolved(self) -> NDArray[np.bool_]:
         """Of each signal, whether its noise is more than its digits or its steps make anyway."""
-        return np.asarray(self.noise > least(self.model) * (1.0 + 1e-9))
+        return np.asarray(self.noise > noise_floor(self.model) * (1.0 + 1e-9))
 
     def whiteness(self, signal: int, lags: int = 40) -> Vector:
         """Autocorrelations of the residuals of a signal, from lag 1 on; of white ones 95 % are
         below 1.96/√n.
         """
         rows = self.used & (self.model.signal == signal)
-        left = self.residuals[rows] - self.residuals[rows].mean()
-        total = float(left @ left) or 1.0
+        deviations = self.residuals[rows] - self.residuals[rows].mean()
+        total = float(deviations @ deviations) or 1.0
         return np.array(
             [
-                float(left[lag:] @ left[:-lag]) / total
-                for lag in range(1, min(lags, len(left) - 1) + 1)
+                float(deviations[lag:] @ deviations[:-lag]) / total
+                for lag in range(1, min(lags, len(deviations) - 1) + 1)
             ]
         )
 
     def white(self, signal: int) -> bool:
-        """True where the autocorrelations are as small as those of white noise (Ljung-Box, 1 in
-        1000).
-        """
+        """True where the autocorrelations are as small as those of white noise (Ljung-Box)."""
         count = int((self.used & (self.model.signal == signal)).sum())
         correlations = self.whiteness(signal, 20)
         lags = np.arange(1, len(correlations) + 1)
-        return (
-            chi_square_tail(
-                len(lags), float(count * (count + 2) * np.sum(correlations**2 / (count - lags)))
-            )
-            > 0.001
-        )
+        statistic = count * (count + 2) * np.sum(correlations**2 / (count - lags))
+        return bool(chdtrc(len(lags), statistic) > WHITE)

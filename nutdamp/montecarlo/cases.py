@@ -148,13 +148,13 @@ def supplied(
     where it is not known what they take.
     """
     tank = tank_of(spacecraft, draws)
-    known = all(pulse.propellant is not None for pulse in schedule)
+    priced = all(pulse.propellant is not None for pulse in schedule)
     taken: list[Cases] = [
         (pulse.propellant or 0.0) * flow for pulse, flow in zip(schedule, flows, strict=True)
     ]
     levels: list[Cases] = [1.0] * len(flows)
     if tank is None and not ("cold" in draws or "cold_pulses" in draws):
-        return levels, tuple(taken) if known else None, 0.0
+        return levels, tuple(taken) if priced else None, 0.0
     nominal, case = (
         Supply(spacecraft),
         Supply(replace(spacecraft, cold=cold_of(spacecraft, draws), tank=tank)),
@@ -177,8 +177,8 @@ def supplied(
             level * higher / (before or 1.0),
             0.0 if used is None else used,
         )
-    drained = 0.0 if tank is None or not known else case.used / tank.propellant
-    return levels, tuple(taken) if known else None, drained
+    drained = 0.0 if tank is None or not priced else case.used / tank.propellant
+    return levels, tuple(taken) if priced else None, drained
 
 
 # rounding allowed, relatively, where moments touch the triangle inequality (flat disc, C = 2A)

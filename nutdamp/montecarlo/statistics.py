@@ -214,13 +214,13 @@ class Worst:
 
     def add(self, first: int, severities: Array) -> None:
         """Consider the cases from number ``first`` on."""
-        least = -math.inf
+        threshold = -math.inf
         spare = len(severities) - self.keep
         if len(self.cases) == self.keep:
-            least = self.severities[-1]
+            threshold = self.severities[-1]
         elif spare > 0:
-            least = np.partition(severities, spare)[spare]
-        rows = np.flatnonzero(~(severities < least))
+            threshold = np.partition(severities, spare)[spare]
+        rows = np.flatnonzero(~(severities < threshold))
         cases = np.concatenate([self.cases, first + rows])
         severities = np.concatenate([self.severities, severities[rows]])
         order = np.lexsort((cases, -severities))[: self.keep]

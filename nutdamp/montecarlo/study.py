@@ -353,7 +353,7 @@ class Counted(ABC):
             np.tile([math.pi, 0.0], (len(spacecraft.keep), 1)),
         )
 
-    def count(self, severity: Array, left: Left, able: NDArray[np.bool_]) -> None:
+    def count(self, severity: Array, residuals: Left, able: NDArray[np.bool_]) -> None:
         """Count cases from ``done`` on: their `Study.severity` (n,), residual, and who may comply
         at all.
         """
@@ -362,7 +362,7 @@ class Counted(ABC):
         astray = np.zeros((len(spacecraft.keep), len(severity)), dtype=bool)
         for row, bound in enumerate(self.bounds):
             met = np.broadcast_to(
-                bound.met(requirements.left_of(bound, left, spacecraft)), len(severity)
+                bound.met(requirements.left_of(bound, residuals, spacecraft)), len(severity)
             )
             self.kept[row] += np.count_nonzero(met)
             if bound.required:
@@ -371,9 +371,9 @@ class Counted(ABC):
                 astray[spacecraft.keep.index(bound.keep)] |= ~met
         self.met += int(np.count_nonzero(complies))
         self.broken += astray.sum(axis=1)
-        if left.angles is not None:
-            self.aspects[:, 0] = np.minimum(self.aspects[:, 0], left.angles[:, 0].min(axis=1))
-            self.aspects[:, 1] = np.maximum(self.aspects[:, 1], left.angles[:, 1].max(axis=1))
+        if residuals.angles is not None:
+            self.aspects[:, 0] = np.minimum(self.aspects[:, 0], residuals.angles[:, 0].min(axis=1))
+            self.aspects[:, 1] = np.maximum(self.aspects[:, 1], residuals.angles[:, 1].max(axis=1))
         self.worst.add(self.done, severity)
         self.done += len(severity)
 

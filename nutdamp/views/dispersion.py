@@ -43,8 +43,8 @@ from nutdamp.views.tables import (
 from nutdamp.views.text import degrees, digits
 
 if TYPE_CHECKING:
+    from nutdamp.control_loop.controller import Ending
     from nutdamp.control_loop.dispersion import LoopResults, LoopStudy
-    from nutdamp.control_loop.law import Ending
 
 
 PERCENTS = (50.0, 90.0, 95.0, 99.0, 99.7)

@@ -16,9 +16,8 @@ from rich.text import Text
 
 from nutdamp.common.results import Note, note
 from nutdamp.control_loop.budget import DAY, NOISY, WIDENED, YEAR, Budget, HeldNutation
-from nutdamp.control_loop.controller import Fired
+from nutdamp.control_loop.controller import Ending, Fired
 from nutdamp.control_loop.evaluation import AGREE, LoopPlan, LoopVerification
-from nutdamp.control_loop.law import Ending
 from nutdamp.control_loop.simulation import LoopRun
 from nutdamp.control_loop.stability import SURELY, Margin, dead_band, feeding, margins, too_late
 from nutdamp.planning.notes import verdict_notes
@@ -265,9 +264,7 @@ STOPS = {  # codes of notes on a loop that was stopped
     Ending.SENSOR: "loop-all-reversed",
     Ending.CHANNEL: "loop-channel-reversed",
     Ending.UNCLEAR: "loop-channel-or-sensor",
-    Ending.IDLE: "loop-channel-idle",
     Ending.FED: "loop-feeds",
-    Ending.FEEDS: "loop-firing-late",
 }
 
 

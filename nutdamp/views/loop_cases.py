@@ -16,8 +16,8 @@ from rich.text import Text
 
 from nutdamp import __version__
 from nutdamp.common.results import Note
+from nutdamp.control_loop.controller import Ending
 from nutdamp.control_loop.dispersion import LoopDispersion, LoopResults, LoopStudy
-from nutdamp.control_loop.law import Ending
 from nutdamp.control_loop.simulation import FlownLoops
 from nutdamp.montecarlo.inputs import DispersedInput
 from nutdamp.montecarlo.statistics import Array, share_interval

@@ -28,8 +28,9 @@ from nutdamp.control_loop.budget import (
     Thresholds,
     budget,
 )
+from nutdamp.control_loop.controller import Ending
 from nutdamp.control_loop.evaluation import loop_of
-from nutdamp.control_loop.law import Ending, Law
+from nutdamp.control_loop.law import Law
 from nutdamp.control_loop.sensor import Estimator, Signal
 from nutdamp.control_loop.simulation import fly
 from nutdamp.control_loop.stability import Odds, Transfer, exceeds, transfer

@@ -14,6 +14,7 @@ from support.dispersed import jet, normal
 from support.golden import refused
 from support.loops import fired_by, fires, rad
 
+from nutdamp.control_loop.controller import Ending
 from nutdamp.control_loop.dispersion import (
     OUTPUTS,
     LoopDispersion,
@@ -23,7 +24,6 @@ from nutdamp.control_loop.dispersion import (
     run,
 )
 from nutdamp.control_loop.evaluation import loop_of
-from nutdamp.control_loop.law import Ending
 from nutdamp.control_loop.simulation import fly
 from nutdamp.control_loop.stability import dead_band
 from nutdamp.errors import BadRequest, Infeasible

@@ -21,8 +21,8 @@ from support.loops import AXIAL, FOUR, fired_by, fires, four, ideal, rad, transv
 from support.process import Run as Process
 
 import nutdamp
+from nutdamp.control_loop.controller import Ending
 from nutdamp.control_loop.evaluation import loop_of, verify_loop
-from nutdamp.control_loop.law import Ending
 from nutdamp.control_loop.simulation import LoopRun, fly
 from nutdamp.control_loop.stability import margins
 from nutdamp.errors import Infeasible
@@ -241,7 +241,7 @@ def test_faults_that_hide_are_stopped_as_what_they_show_themselves() -> None:
     assert fly(single, SETTLING, 200.0).stop is Ending.UNCLEAR
     for wrong in (fires(reversed=("+M1",)), fires(Sensor(scale=-1.0))):
         run = fly(single, wrong)
-        assert (run.stop, run.channel, len(run.fired)) == (Ending.UNCLEAR, "+M1", 1)
+        assert (run.stop, run.channel, len(run.fired)) == (Ending.UNCLEAR, "+M1", 2)
 
 
 def test_faults_are_named_by_the_static_check() -> None:
@@ -270,7 +270,7 @@ def test_firings_that_come_too_late_are_refused_before_the_flight_and_stopped_in
     with refused(Infeasible, "loop.too-late"):
         loop_of(late(allowed + 0.01), 30.0)
     run = fly(craft, replace(loop, sensor=Sensor(delay=0.5 * craft.body_period)))
-    assert (run.stop, len(run.fired)) == (Ending.FEEDS, 1)
+    assert (run.stop, len(run.fired)) == (Ending.SENSOR, 2)
 
 
 GROWING = fired_by(

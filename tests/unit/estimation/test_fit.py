@@ -16,7 +16,6 @@ from support.cases import weekly
 from support.synthetic import gyro_case
 from support.telemetry_kinds import KINDS, telemetry
 
-from nutdamp.common.numerics import chi_square_tail
 from nutdamp.estimation.fit import fit
 from nutdamp.estimation.model import Model
 from nutdamp.estimation.parameters import GYROS, Vector, moments, prior, quantisation
@@ -172,12 +171,6 @@ def test_records_with_sun_pulses_converge_whatever_the_body_is_turned_by(
     within, ratio, omega = of_kind(tmp_path, seed)
     assert within
     assert max(abs(ratio), abs(omega)) < 4.0
-
-
-@pytest.mark.parametrize("count", [1, 2, 7, 20])
-def test_the_tail_of_a_sum_of_squares_is_that_of_chi_square(count: int) -> None:
-    for value in (1e-9, 0.1, 3.0, 40.0, 300.0):
-        assert chi_square_tail(count, value) == pytest.approx(chi2.sf(value, count), rel=1e-12)
 
 
 @pytest.mark.parametrize(
