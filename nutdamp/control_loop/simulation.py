@@ -39,8 +39,9 @@ from nutdamp.flight import end_state
 from nutdamp.flight.dynamics import Dynamics, Path, make_dynamics
 from nutdamp.flight.propagation import Flight, Leg, widest
 from nutdamp.montecarlo.cases import watch_over
-from nutdamp.physics import attitude, batch, energy_sink, taylor
-from nutdamp.physics.taylor import Forcing
+from nutdamp.physics import attitude, energy_sink
+from nutdamp.physics.motion import MOST_STEPS, MotionStretch, advance
+from nutdamp.physics.series import Bodies, Forcing
 from nutdamp.physics.triaxial import arc_cones
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.equipment import Loop
@@ -123,7 +124,7 @@ class LoopRun:
         if coast.parts and not self.dynamics.free:
             there = coast.at(end)
         else:
-            path, there = self.dynamics.path(state, start, end, most=taylor.MOST_STEPS)
+            path, there = self.dynamics.path(state, start, end, most=MOST_STEPS)
         self._leg(start, end, path)
         return there
 
@@ -132,9 +133,7 @@ class LoopRun:
         for start, end in itertools.pairwise(sorted(set(pulse.edges))):
             push = pulse.push(start, end)
             torque, slope = ([], None) if push is None else ([push[0]], push[1])
-            path, state = self.dynamics.path(
-                state, start, end, torque, slope, most=taylor.MOST_STEPS
-            )
+            path, state = self.dynamics.path(state, start, end, torque, slope, most=MOST_STEPS)
             self._leg(start, end, path, firing=True, last=end == pulse.thrust[1])
         return state
 
@@ -336,7 +335,7 @@ class Fleet:
         ).T.copy()
         moments = np.array([case.truth.inertia.moments for case in cases]).T
         wheels = np.array([case.truth.inertia.wheel for case in cases])
-        self.bodies = batch.Bodies(
+        self.bodies = Bodies(
             moments, np.zeros(3), Forcing((), law.growth, wheels, law.spacecraft.sense)
         )
         self.rates = np.array([case.truth.omega0 for case in cases]).T.copy()
@@ -496,10 +495,10 @@ class Fleet:
         self, rows: Rows, lasts: Vector, torque: Vector | None, slope: Vector | None
     ) -> None:
         motion = self.now[rows], self.rates[:, rows], self.quaternion[:, rows]
-        here = batch.MotionStretch(self.bodies.some(rows), *motion, torque, slope)
+        here = MotionStretch(self.bodies.some(rows), *motion, torque, slope)
         if self.law.spacecraft.keep:
             self.watch.some(rows).motion(here, lasts)
-        batch.advance(here, lasts)
+        advance(here, lasts)
         self.rates[:, rows], self.quaternion[:, rows] = here.rates, here.quaternion
 
     def _fire(self, fired: list[tuple[int, Pulse]]) -> None:

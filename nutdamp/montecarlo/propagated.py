@@ -39,9 +39,10 @@ from nutdamp.montecarlo.cases import (
     triple,
     watch_over,
 )
-from nutdamp.physics import attitude, batch, energy_sink, sky
-from nutdamp.physics.batch import Bodies, MotionStretch
+from nutdamp.physics import attitude, energy_sink, motion, sky
 from nutdamp.physics.energy_sink import TINY
+from nutdamp.physics.motion import MotionStretch
+from nutdamp.physics.series import Bodies
 from nutdamp.physics.sky import AxisWatch, SunPulseClock, TorqueRamp
 from nutdamp.physics.thruster import Opened
 from nutdamp.physics.triaxial import widest_cones
@@ -343,8 +344,8 @@ def fly(
     pulses = model.schedule.pulses
     begins = zip(model.schedule, cases.starts, cases.leads, strict=True)
     shifts = [start - lead - pulse.loaded[0] for pulse, start, lead in begins]
-    for begin in range(0, count, batch.BLOCK):
-        rows = slice(begin, min(begin + batch.BLOCK, count))
+    for begin in range(0, count, motion.BLOCK):
+        rows = slice(begin, min(begin + motion.BLOCK, count))
 
         def part(value: object, rows: slice = rows) -> Array:
             return np.broadcast_to(np.asarray(value, dtype=float), count)[rows]
@@ -473,7 +474,7 @@ class RealWidths:
         in_steps = min(float(np.sum(self.model.on_times)), lasts) if arcs else lasts
         turned = float(np.linalg.norm(rates)) * in_steps
         looks = turned * sky.ROWS / sky.CIRCLE if self.model.spacecraft.keep else 0.0
-        stepping = STEPPED * turned / batch.STRIDE + LOOKED * looks
+        stepping = STEPPED * turned / motion.STRIDE + LOOKED * looks
         return CASE * (1.0 + len(self.model.schedule)) + stepping
 
     def __call__(self, cases: DispersedCases) -> Ends:
@@ -508,14 +509,14 @@ class RealWidths:
             if self.model.schedule.shaped:
                 pulses = self._ramps(cases, starts, impulses, sheds)
             else:
-                pulses = batch.Pulses(
+                pulses = motion.Pulses(
                     starts, np.array(self.model.on_times).reshape(-1, 1), impulses, sheds=sheds
                 )
-            settled, turned = batch.fly(bodies, rates, upright, pulses, watch)
+            settled, turned = motion.fly(bodies, rates, upright, pulses, watch)
             over = np.max(pulses.edges, axis=0, initial=0.0)
         last = bodies if sheds is None else bodies.lighter(sheds.sum(axis=0))
         if watch is not None:
-            watch.turn(batch.MotionStretch(last, over, settled, turned))
+            watch.turn(MotionStretch(last, over, settled, turned))
         momentum = triple(last.momentum(settled))
         after = carried(tuple(turned), momentum)
         nutation = None
@@ -534,15 +535,15 @@ class RealWidths:
             drained=cases.drained,
         )
 
-    def _bodies(self, moments: Array, wheel: Cases) -> batch.Bodies:
-        return batch.Bodies(
+    def _bodies(self, moments: Array, wheel: Cases) -> Bodies:
+        return Bodies(
             moments, self._dynamics.constant, self._dynamics.forcing._replace(wheel=wheel)
         )
 
     def _ramps(
         self, cases: DispersedCases, starts: Array, impulses: Array, sheds: Array | None
-    ) -> batch.Pulses:
-        """Pulses by the ramps of their thrust, each as a pulse of its own; as in `batch.Pulses`."""
+    ) -> motion.Pulses:
+        """Pulses by the ramps of their thrust, each as a pulse of its own; as in `motion.Pulses`."""
         pieces = list(self._pieces(cases, starts, impulses))
         count = starts.shape[1]
         begins, lengths, parts, leans, numbers, shares = (
@@ -555,7 +556,7 @@ class RealWidths:
             )
             falls = falls.reshape(-1, 3, count)
         impulses = np.array(parts).reshape(-1, 3, count)
-        return batch.Pulses(
+        return motion.Pulses(
             _whole(begins, count), _whole(lengths, count), impulses, _whole(leans, count), falls
         )
 

@@ -10,6 +10,9 @@ import pytest
 from scipy.integrate import solve_ivp
 from support.reference import RTOL, Array, Motion, _turning
 
+from nutdamp.physics.motion import MOST_STEPS, MotionStretch, polynomials
+from nutdamp.physics.series import NOTHING, Bodies, Forcing, Polynomial
+
 Triple = tuple[float, float, float]
 EPS = float(np.finfo(float).eps)
 
@@ -22,6 +25,22 @@ spinners = pytest.mark.parametrize(
 plain_spinners = pytest.mark.parametrize(
     ("A", "C", "spin"), [(*b, spin) for b in BODIES[:2] for spin in (3.0, -3.0)]
 )
+
+
+def series(
+    moments: Triple,
+    torque: Array,
+    rates: Array,
+    quaternion: Array,
+    begin: float,
+    end: float,
+    forcing: Forcing = NOTHING,
+    most: int = MOST_STEPS,
+) -> list[Polynomial]:
+    """Motion of one body from ``begin`` to ``end`` s."""
+    body = Bodies(np.array(moments), np.asarray(torque, dtype=float), forcing)
+    start = MotionStretch(body, begin, rates, quaternion)
+    return list(polynomials(start, end - begin, most))
 
 
 def about(axis: Array | Sequence[float], angle: float) -> Array:

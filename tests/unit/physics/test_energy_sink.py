@@ -11,9 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support import reference
 from support.cases import deep, spread
-from support.spinning import EPS, Triple
+from support.spinning import EPS, Triple, series
 
-from nutdamp.physics import attitude, energy_sink, taylor
+from nutdamp.physics import attitude, energy_sink
+from nutdamp.physics.series import Forcing
 
 QUATERNION = reference.vector(0.5, -0.1, 0.7, 0.5)  # of length 1
 START = attitude.matrix(QUATERNION)
@@ -202,16 +203,16 @@ def test_powered_arcs_agree_with_dop853(moments: Triple, spin: float, torque: Tr
     """And those without torque with the closed form, which has two equal moments."""
     rates0 = reference.vector(0.5, -0.3, spin)
     growth = math.copysign(0.05, moments[0] - 100)
-    pieces = taylor.integrate(
+    pieces = series(
         moments,
         reference.vector(*torque),
         rates0,
         QUATERNION,
         0.0,
         6.0,
-        taylor.Forcing(growth=growth),
+        Forcing(growth=growth),
     )
-    rates, turned = pieces[-1].final
+    rates, turned = pieces[-1].end()
     (expected,) = reference.sinking(
         moments, reference.Motion(rates0, START), reference.vector(*torque), np.array([6.0]), growth
     )
@@ -237,10 +238,10 @@ def test_three_moments_lose_energy_and_end_about_the_largest(
     energies = []
     h = attitude.rotate(turned, rates * moments)
     for start in np.arange(0.0, 200.0, 10.0).tolist():
-        pieces = taylor.integrate(
-            moments, np.zeros(3), rates, turned, start, start + 10.0, taylor.Forcing(growth=growth)
+        pieces = series(
+            moments, np.zeros(3), rates, turned, start, start + 10.0, Forcing(growth=growth)
         )
-        rates, turned = pieces[-1].final
+        rates, turned = pieces[-1].end()
         energies.append(reference.energy(moments, rates))
         assert attitude.rotate(turned, rates * moments) == pytest.approx(h, abs=1e-10)
     assert np.all(np.diff(energies) < 1e-13 * energies[0])
@@ -254,7 +255,7 @@ def test_a_torque_through_rest_takes_few_steps(aside: float) -> None:
     """
     torque = reference.vector(aside, 0, -8)
     rates = reference.vector(0, 0, 1)
-    forcing = taylor.Forcing(growth=0.05)
-    pieces = taylor.integrate((120.0, 120.0, 80.0), torque, rates, QUATERNION, 0.0, 20.0, forcing)
+    forcing = Forcing(growth=0.05)
+    pieces = series((120.0, 120.0, 80.0), torque, rates, QUATERNION, 0.0, 20.0, forcing)
     assert len(pieces) < 200
-    assert pieces[-1].final[0][2] == pytest.approx(-1.0, abs=1e-9)
+    assert pieces[-1].end()[0][2] == pytest.approx(-1.0, abs=1e-9)

@@ -18,11 +18,14 @@ from support import reference
 from support.cases import deep, spread
 from support.golden import refused
 from support.places import case
+from support.spinning import series
 
 from nutdamp.files.reader import load_spacecraft
 from nutdamp.flight.dynamics import make_dynamics
-from nutdamp.physics import attitude, batch, energy_sink, response, taylor, triaxial
+from nutdamp.physics import attitude, energy_sink, response, triaxial
 from nutdamp.physics import body as rigid_body
+from nutdamp.physics.motion import MotionStretch, advance
+from nutdamp.physics.series import Bodies, Forcing
 from nutdamp.spacecraft import requirements
 
 START = np.array([0.5, -0.5, 0.5, 0.5])
@@ -547,34 +550,32 @@ def test_series_under_a_torque(
     for time in (0.7, 12.0):
         sense = math.copysign(1.0, moments[2] * spin + wheel)
         span = np.array([time])
-        forcing = taylor.Forcing(growth=growth, wheel=wheel, sense=sense)
+        forcing = Forcing(growth=growth, wheel=wheel, sense=sense)
         flown = (
             reference.sinking(moments, begin, torque, span, growth, wheel)
             if growth
             else reference.coast(moments, begin, torque, span, wheel=wheel)
         )
-        body, turned = taylor.integrate(moments, torque, rates, quaternion, 0.0, time, forcing)[
-            -1
-        ].final
+        body, turned = series(moments, torque, rates, quaternion, 0.0, time, forcing)[-1].end()
         assert body == pytest.approx(flown[0].rates, abs=1e-10)
         assert apart(turned[None], flown) < 1e-10
-        many = batch.Bodies(
+        many = Bodies(
             np.tile(moments, (3, 1)).T, np.zeros(3), forcing._replace(wheel=np.full(3, wheel))
         )
-        here = batch.MotionStretch(
+        here = MotionStretch(
             many,
             np.zeros(3),
             np.tile(rates, (3, 1)).T,
             np.tile(quaternion, (3, 1)).T,
             np.tile(torque, (3, 1)).T,
         )
-        batch.advance(here, np.array([time, 0.5 * time, time]))
+        advance(here, np.array([time, 0.5 * time, time]))
         assert here.rates[:, 2] == pytest.approx(flown[0].rates, abs=1e-10)
         assert apart(here.quaternion[:, 2][None], flown) < 1e-10
-        begun = batch.MotionStretch(
+        begun = MotionStretch(
             many, np.zeros(3), np.tile(rates, (3, 1)).T, np.tile(quaternion, (3, 1)).T
         )
-        batch.advance(begun, np.full(3, time))
+        advance(begun, np.full(3, time))
         free = (
             reference.sinking(moments, begin, np.zeros(3), span, growth, wheel)
             if growth
@@ -597,19 +598,19 @@ def test_widest_cones_of_many_bodies_are_those_that_they_reach(seed: int) -> Non
     wheel = float(draws.normal() * 150.0) if seed % 4 else 0.0
     rates[2] = 0.0 if seed % 7 == 0 else rates[2]
     sense = math.copysign(1.0, moments[2] * rates[2] + wheel)
-    series = taylor.integrate(
+    pieces = series(
         (moments[0], moments[1], moments[2]),
         np.zeros(3),
         rates,
         np.array([1.0, 0, 0, 0]),
         0.0,
         60.0,
-        taylor.Forcing(wheel=wheel),
+        Forcing(wheel=wheel),
     )
     body = np.concatenate(
         [
-            piece.at(np.linspace(piece.start, piece.start + piece.duration, 60))[0]
-            for piece in series
+            piece.motion(np.linspace(piece.start, piece.start + piece.duration, 60))[0]
+            for piece in pieces
         ]
     )
     momentum = body * moments + [0.0, 0.0, wheel]
@@ -632,17 +633,19 @@ def test_stability_and_rate_of_a_small_nutation(spin: float) -> None:
             grows = rigid_body.growth(moments, spin, wheel)
             small = np.array([1e-7, 0.0, spin])
             until = min(15.0 * grows.growth_time, 300.0) if grows.squared_exponent > 0.0 else 40.0
-            series = taylor.integrate(
+            pieces = series(
                 moments,
                 np.zeros(3),
                 small,
                 np.array([1.0, 0, 0, 0]),
                 0.0,
                 until,
-                taylor.Forcing(wheel=wheel),
+                Forcing(wheel=wheel),
             )
             sizes = np.abs(
-                np.concatenate([piece.at(np.array([piece.start]))[0] for piece in series])[:, :2]
+                np.concatenate([piece.motion(np.array([piece.start]))[0] for piece in pieces])[
+                    :, :2
+                ]
             ).max()
             assert grows.stable is bool(sizes < 1e-5)
             if grows.stable:
