@@ -1,12 +1,10 @@
 """Cases flown, many at once: through real pulse widths, and in closed form for derivatives.
 
 The closed form is the impulse sum Magnus 1970 (17) with exact attitude arcs. In the frame that
-turns with the nutation, by the phase aα with α = ∫ω3 dt, the angular momentum of a free symmetric
-body does not move: its transverse part is AΩ = Aω0 + Σ J e^{iaα}. That frame, in space, turns about
-H at |H|/A (R(t) = Rot(H t/A) R(0) Rot3(aω3 t)). So a pulse adds to a vector, and a coast turns a
-quaternion; energy dissipation draws H away from axis 3 along an arc that `energy_sink` knows.
-Nothing takes an absolute value or compares: the same code runs on complex arrays, which gives
-derivatives to rounding (`nutdamp.montecarlo.statistics`).
+turns with the nutation (`motion.nutated`), by the phase aα with α = ∫ω3 dt, the rates of a free
+symmetric body stay: Ω = ω0 + Σ J/A e^{iaα}. So a pulse adds to a vector, and a coast turns a
+quaternion. Nothing takes an absolute value or compares: the same code runs on complex arrays, which
+gives derivatives to rounding (`nutdamp.montecarlo.statistics`).
 """
 
 from __future__ import annotations
@@ -39,10 +37,10 @@ from nutdamp.montecarlo.cases import (
     triple,
     watch_over,
 )
-from nutdamp.physics import attitude, energy_sink, motion, sky
+from nutdamp.physics import motion, sky
 from nutdamp.physics.energy_sink import TINY
 from nutdamp.physics.motion import MotionStretch
-from nutdamp.physics.series import Bodies
+from nutdamp.physics.series import Bodies, Forcing
 from nutdamp.physics.sky import AxisWatch, SunPulseClock, TorqueRamp
 from nutdamp.physics.thruster import Opened
 from nutdamp.physics.triaxial import widest_cones
@@ -90,19 +88,15 @@ class ClosedForm:
         """End states of the ``cases``, whose pulses all come in the order of their centres in the
         first of them.
         """
-        # In one piece: any part of the loop would take and return nearly all of the seven numbers
-        # that run through it.
-        A, C, wheel, growth = cases.A, cases.C, cases.wheel, self.model.spacecraft.growth
-        a = 1.0 - C / A
-        per_A = 1.0 / A
-        sheds = cases.sheds
+        A, C, wheel = cases.A, cases.C, cases.wheel
+        spacecraft = self.model.spacecraft
+        forcing = Forcing((), spacecraft.growth, wheel, spacecraft.sense)
         (first, second, _), (along, across, spin) = cases.moments, cases.omega0
-        before = x, y, z = (
-            first * along,
-            second * across,
-            plus(C * spin, wheel),
-        )  # H is the true one, I1 ≠ I2 or not
-        phase, now, turn = 0.0, 0.0, None
+        # H is the true one, I1 ≠ I2 or not
+        before = first * along, second * across, plus(C * spin, wheel)
+        x, y = before[0] / A, before[1] / A
+        turn: tuple[Cases, ...] = (1.0, 0.0, 0.0, 0.0)
+        phase, now = 0.0, 0.0
         centres = [
             start + 0.5 * width for start, width in zip(cases.starts, cases.widths, strict=True)
         ]
@@ -110,44 +104,32 @@ class ClosedForm:
             [float(np.real(np.ravel(centre)[0])) for centre in centres], kind="stable"
         )
         for number in order.tolist():
-            coast = centres[number] - now
+            coast = np.asarray(centres[number] - now)
             now = centres[number]
-            turn = _turned_on(turn, (x, y, z), coast * per_A)
-            if growth == 0.0:
-                phase = phase + plus(a * spin, times(-per_A, wheel)) * coast
-            else:
-                size = np.sqrt(x * x + y * y + z * z) + TINY
-                shares = energy_sink.damper(A, C, wheel, size, self.model.spacecraft.sense)
-                effect, turn = _slipped(turn, (x, y, z), growth, coast, shares)
-                phase = phase + (a * size * effect.travel - wheel * coast) / C
-                x, y, z = x * effect.transverse, y * effect.transverse, size * effect.along
-                spin = (z - wheel) / C
-            if sheds is not None:  # half before the pulse and half after it, the rates as they are
-                x, y, A, C = _lighter(x, y, A, C, sheds[number])
-                a = 1.0 - C / A
-                per_A = 1.0 / A
-                z = plus(C * spin, wheel)
-            rate = plus(a * spin, times(-per_A, wheel))
+            (x, y, spin), turn, angle = motion.nutated(A, C, forcing, (x, y, spin), turn, coast)
+            phase = phase + angle
+            # Half of the propellant goes before the pulse and half after it, the rates as they are.
+            sheds = (0.0, 0.0) if cases.sheds is None else cases.sheds[number]
+            A, C = A - 0.5 * sheds[0], C - 0.5 * sheds[1]
+            a = 1.0 - C / A
+            rate = plus(a * spin, -wheel / A)
             impulse, width, nodes = (
                 cases.impulses[number],
                 cases.widths[number],
                 self._nodes[number],
             )
-            along, across, gained = _effective(impulse, rate, a / C, width, nodes, growth)
+            along, across, gained = _effective(
+                impulse, rate, a / C, width, nodes, spacecraft.growth
+            )
             cosine, sine = cos_sin(phase)
-            x = x + along * cosine - across * sine
-            y = y + along * sine + across * cosine
-            if not nothing(gained):
-                spin = spin + gained / C
-                z = plus(C * spin, wheel)
-            if sheds is not None:
-                x, y, A, C = _lighter(x, y, A, C, sheds[number])
-                a = 1.0 - C / A
-                per_A = 1.0 / A
-                z = plus(C * spin, wheel)
-        after = (x, y, z) if turn is None else carried(turn, (x, y, z))
+            x = x + (along * cosine - across * sine) / A
+            y = y + (along * sine + across * cosine) / A
+            spin = spin + gained / C
+            A, C = A - 0.5 * sheds[0], C - 0.5 * sheds[1]
+        momentum = A * x, A * y, plus(C * spin, wheel)
+        after = carried(turn, momentum)
         return Ends(
-            momentum=(x, y, z),
+            momentum=momentum,
             before=before,
             after=after,
             pointed=rotated(after, cases.tilt),
@@ -175,51 +157,6 @@ class ClosedForm:
             A - off_A, 0.25 * A
         )
         return tuple(nodes_for(0.5 * on_time * rate) for on_time in self.model.on_times)
-
-
-def _lighter(
-    x: Cases, y: Cases, A: Cases, C: Cases, sheds: tuple[Cases, Cases]
-) -> tuple[Cases, Cases, Cases, Cases]:
-    """AΩ1, AΩ2, A and C with half of ``sheds`` off A and C, which leaves the rates as they are."""
-    less = A - 0.5 * sheds[0]
-    return x * (less / A), y * (less / A), less, C - 0.5 * sheds[1]
-
-
-def _turned_on(turn: tuple[Cases, ...] | None, momentum: Triple, time: Cases) -> tuple[Cases, ...]:
-    """Quaternion ``turn`` followed by the turn about ``momentum`` (in the turned frame) by
-    |H|·``time``.
-    """
-    x, y, z = momentum
-    size = np.sqrt(x * x + y * y + z * z) + TINY
-    half = np.tan(0.5 * size * time)
-    w = 1.0 / np.sqrt(1.0 + half * half)
-    scale = half * w / size
-    x, y, z = scale * x, scale * y, scale * z
-    return (w, x, y, z) if turn is None else attitude.product(turn, (w, x, y, z))
-
-
-def _slipped(
-    turn: tuple[Cases, ...],
-    momentum: Triple,
-    growth: float,
-    time: Cases,
-    shares: tuple[Cases, Cases],
-) -> tuple[energy_sink.SinkEffect, tuple[Cases, ...]]:
-    """Effect of dissipation in ``time`` s, and ``turn`` with the slip against ``momentum``."""
-    x, y, z = momentum
-    across = x * x + y * y
-    size = np.sqrt(across + z * z) + TINY
-    effect = energy_sink.courses(growth, z / size, across / (size * size), time, shares)
-    w = effect.cosine
-    i = effect.sine * y / size
-    j = -effect.sine * x / size
-    p, a, b, c = turn
-    return effect, (
-        p * w - a * i - b * j,
-        p * i + a * w - c * j,
-        p * j + b * w + c * i,
-        c * w + a * j - b * i,
-    )
 
 
 def carried(turn: tuple[Cases, ...], vector: Triple) -> Triple:

@@ -98,23 +98,12 @@ def arc(
 ) -> tuple[tuple[Any, Any, Any], tuple[Any, Any, Any, Any]]:
     """Coast of symmetric bodies, exact: rates (3) and quaternions (4) after ``time`` s.
 
-    R(t) = R(0) Rot(H(0)/A t) Rot3(νt), H in body axes: the body turns about H at |H|/A and about
-    its own axis at ν = ω3 - H3/A (Poinsot's rolling cones, Magnus 1970 fig. 4), and slips as in
-    `energy_sink`. All are numbers, or arrays that broadcast, real or complex (a complex step gives
-    derivatives); at a ``time`` that is a float, plain numbers, a tenth of the cost of arrays.
+    Numbers, or arrays that broadcast; at a ``time`` that is a float, plain numbers, a tenth of the
+    cost of arrays.
     """
-    _, growth, wheel, sense = forcing
-    number = isinstance(time, float)
-    sqrt: Any = math.sqrt if number else np.sqrt
-    turn: Any = _cos_sin if number else cos_sin
-    x, y, spin = rates
-    offset = wheel / A
-    axial = C / A * spin + offset
-    size = sqrt(x * x + y * y + axial * axial) + TINY
-    cosine, sine = turn(0.5 * size * time)
-    sine = sine / size
-    p, a, b, c = attitude.product(quaternion, (cosine, sine * x, sine * y, sine * axial))
-    cosine, sine = turn(0.5 * ((1.0 - C / A) * spin - offset) * time)
+    (x, y, spin), (p, a, b, c), angle = nutated(A, C, forcing, rates, quaternion, time)
+    turn: Any = _cos_sin if isinstance(time, float) else cos_sin
+    cosine, sine = turn(0.5 * angle)
     turned = (
         p * cosine - c * sine,
         a * cosine + b * sine,
@@ -123,27 +112,40 @@ def arc(
     )
     # ω turns by minus the whole angle, whose cosine and sine follow from those of its half.
     cosine, sine = 1.0 - 2.0 * sine * sine, 2.0 * sine * cosine
-    x, y = x * cosine + y * sine, y * cosine - x * sine
+    return (x * cosine + y * sine, y * cosine - x * sine, spin), turned
+
+
+def nutated(
+    A: Any, C: Any, forcing: Forcing, rates: Sequence[Any], quaternion: Sequence[Any], time: Any
+) -> tuple[tuple[Any, Any, Any], tuple[Any, Any, Any, Any], Any]:
+    """`arc` in the frame that turns with the nutation, and the angle of the body about axis 3 in it.
+
+    R(t) = R(0) Rot(H(0)/A t) Rot3(νt), H in body axes: the frame turns about H at |H|/A, and the
+    body in it about its own axis at ν = ω3 - H3/A (Poinsot's rolling cones, Magnus 1970 fig. 4).
+    Without dissipation the rates stay in that frame; with it they and the frame slip as in
+    `energy_sink`. Real or complex: a complex step gives derivatives.
+    """
+    _, growth, wheel, sense = forcing
+    number = isinstance(time, float)
+    sqrt: Any = math.sqrt if number else np.sqrt
+    turn: Any = _cos_sin if number else cos_sin
+    x, y, spin = rates
+    axial = C / A * spin + wheel / A
+    size = sqrt(x * x + y * y + axial * axial) + TINY  # |H|/A
+    cosine, sine = turn(0.5 * size * time)
+    sine = sine / size
+    turned = attitude.product(quaternion, (cosine, sine * x, sine * y, sine * axial))
     if growth == 0.0:
-        return (x, y, spin), turned
+        return (x, y, spin), turned, ((1.0 - C / A) * spin - wheel / A) * time
     course: Any = energy_sink.course if number else energy_sink.courses
-    along = (axial + TINY) / size  # of a body at rest, axis 3
-    first, second = x / size, y / size
+    first, second, along = x / size, y / size, axial / size
+    across = (x + TINY) / size  # at rest, as of flat spin
     shares = energy_sink.damper(A, C, wheel, A * size, sense)
-    effect = course(growth, along, first * first + second * second, time, shares)
-    behind = (A / C - 1.0) * size * (effect.travel - along * time)
-    i, j = effect.sine * second, -effect.sine * first
-    cosine, sine = turn(0.5 * behind)
-    slip = (
-        effect.cosine * cosine,
-        i * cosine + j * sine,
-        j * cosine - i * sine,
-        effect.cosine * sine,
-    )
-    cosine, sine = 1.0 - 2.0 * sine * sine, 2.0 * sine * cosine
-    x, y = x * effect.transverse, y * effect.transverse
-    slowed = (x * cosine + y * sine, y * cosine - x * sine, (A * size * effect.along - wheel) / C)
-    return slowed, attitude.product(turned, slip)
+    effect = course(growth, along, across * across + second * second, time, shares)
+    slip = (effect.cosine, effect.sine * second, -effect.sine * first, 0.0)
+    slowed = x * effect.transverse, y * effect.transverse, (A * size * effect.along - wheel) / C
+    angle = ((A - C) * size * effect.travel - wheel * time) / C
+    return slowed, attitude.product(turned, slip), angle
 
 
 def _cos_sin(angle: float) -> tuple[float, float]:

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support import reference
 from support.cases import deep, spread
-from support.spinning import EPS, Triple, series
+from support.spinning import EPS, Triple, arc, series
 
 from nutdamp.physics import attitude, energy_sink
 from nutdamp.physics.series import Forcing
@@ -31,7 +31,7 @@ class Body(NamedTuple):
 
     def arc(self, *times: float) -> tuple[reference.Array, reference.Array]:
         """Rates (n, 3) and rotations (n, 3, 3) by the closed form."""
-        omega, spin, turned = energy_sink.arc(
+        omega, spin, turned = arc(
             self.A, self.C, self.growth, QUATERNION, self.omega, self.spin, np.array(times)
         )
         return np.column_stack([omega.real, omega.imag, spin]), np.array(
@@ -112,8 +112,8 @@ def test_the_example_of_the_course() -> None:
 def test_one_moment_and_many_agree(one: Body) -> None:
     for time in (0.0, 1e-9, 0.7, 30.0, 900.0, 1e6):
         sink = one.A, one.C, one.growth, QUATERNION, one.omega, one.spin
-        omega, spin, end = energy_sink.arc(*sink, time)
-        (transverse,), (axial,), (turned,) = energy_sink.arc(*sink, np.array([time]))
+        omega, spin, end = arc(*sink, time)
+        (transverse,), (axial,), (turned,) = arc(*sink, np.array([time]))
         scale = 1.0 + abs(one.spin) * time  # roundings of the angle turned
         assert omega == pytest.approx(complex(transverse), abs=8 * EPS * scale)
         assert spin == pytest.approx(float(axial), rel=8 * EPS, abs=1e-100)
@@ -129,10 +129,8 @@ def test_one_moment_and_many_agree(one: Body) -> None:
 def test_no_dissipation_is_the_free_arc(growth: float) -> None:
     times = np.array([0.0, 1.0, 50.0])
     for one in BODIES.values():
-        omega, spin, turned = energy_sink.arc(
-            one.A, one.C, growth, QUATERNION, one.omega, one.spin, times
-        )
-        free = attitude.arc(one.A, one.C, QUATERNION, one.omega, one.spin, times)
+        omega, spin, turned = arc(one.A, one.C, growth, QUATERNION, one.omega, one.spin, times)
+        free = arc(one.A, one.C, 0.0, QUATERNION, one.omega, one.spin, times)[2]
         assert turned == pytest.approx(free, abs=200 * EPS)
         assert spin == pytest.approx(np.full(3, one.spin), rel=8 * EPS)
         assert np.abs(omega) == pytest.approx(np.full(3, abs(one.omega)), rel=8 * EPS)
@@ -142,13 +140,13 @@ def test_no_dissipation_is_the_free_arc(growth: float) -> None:
 @pytest.mark.parametrize(("omega", "spin"), [(0j, 2.0), (0j, -2.0), (2.0 + 0j, 0.0), (0j, 0.0)])
 def test_pure_spin_flat_spin_and_rest_stay(growth: float, omega: complex, spin: float) -> None:
     times = np.array([0.0, 10.0, 1e5])
-    transverse, spins, turned = energy_sink.arc(120.0, 80.0, growth, QUATERNION, omega, spin, times)
+    transverse, spins, turned = arc(120.0, 80.0, growth, QUATERNION, omega, spin, times)
     assert np.array_equal(transverse, np.full(3, omega))
     assert np.array_equal(spins, np.full(3, spin))
     assert turned == pytest.approx(
-        attitude.arc(120.0, 80.0, QUATERNION, omega, spin, times), abs=1e-10
+        arc(120.0, 80.0, 0.0, QUATERNION, omega, spin, times)[2], abs=1e-10
     )
-    assert energy_sink.arc(120.0, 80.0, growth, QUATERNION, omega, spin, 10.0)[:2] == (omega, spin)
+    assert arc(120.0, 80.0, growth, QUATERNION, omega, spin, 10.0)[:2] == (omega, spin)
 
 
 def test_small_angles_from_spin_grow_and_from_flat_shrink_by_the_exponential() -> None:

@@ -18,7 +18,7 @@ from support import reference
 from support.cases import deep, spread
 from support.golden import refused
 from support.places import case
-from support.spinning import series
+from support.spinning import arc, series
 
 from nutdamp.files.reader import load_spacecraft
 from nutdamp.flight.dynamics import make_dynamics
@@ -276,14 +276,14 @@ def test_symmetric_limit_is_continuous(axial: float, spin: float) -> None:
     ideal, _ = response.impulse_sum(
         times, omega0, spin, first, axial, np.zeros(0), np.zeros(0, complex), np.zeros(0)
     )
-    arc = attitude.arc(first, axial, START, omega0, spin, times)
+    symmetric = arc(first, axial, 0.0, START, omega0, spin, times)[2]
     for apart in (1e-6, 1e-9, 1e-12, 0.0):
         moments = (first, first * (1.0 + apart), axial)
         rates0 = [omega0.real, omega0.imag, spin]
         track, attitudes = flown(moments, rates0, times)
         assert np.abs(track[:, 0] + 1j * track[:, 1] - ideal).max() < 1e-12 + 100 * apart
         assert np.abs(track[:, 2] - spin).max() < 1e-14 + 10 * apart
-        assert turned(attitudes, arc) < 1e-12 + 1000 * apart
+        assert turned(attitudes, symmetric) < 1e-12 + 1000 * apart
         close = pytest.approx(rigid_body.body_period(first, axial, spin), rel=1e-15 + 5 * apart)
         assert triaxial.nutation_period(moments, rates0) == close
         angle = rigid_body.nutation_angle(first, axial, abs(omega0), spin)
@@ -410,10 +410,11 @@ def test_arcs(A: float, C: float, spin: float, wheel: float) -> None:
     """ω turns in the body at ν = ω3 - H3/A, and the body about H at |H|/A and about axis 3 at ν."""
     motion, quaternion = start(A, C, spin, wheel)
     flown = reference.coast((A, A, C), motion, np.zeros(3), TIMES, wheel=wheel)
-    arc = attitude.arc(A, C, quaternion, OMEGA, spin, TIMES, wheel)
-    ends = [attitude.arc_end(A, C, quaternion, OMEGA, spin, time, wheel) for time in TIMES.tolist()]
-    assert apart(arc, flown) < 1e-10
-    assert np.array(ends) == pytest.approx(arc, abs=1e-12)
+    turns = arc(A, C, 0.0, quaternion, OMEGA, spin, TIMES, wheel)[2]
+    motion_to = A, C, 0.0, quaternion, OMEGA, spin
+    ends = [arc(*motion_to, time, wheel)[2] for time in TIMES.tolist()]
+    assert apart(turns, flown) < 1e-10
+    assert np.array(ends) == pytest.approx(turns, abs=1e-12)
     none = np.zeros(0)
     omega, _ = response.impulse_sum(
         TIMES, OMEGA, spin, A, C, none, none.astype(complex), none, wheel
@@ -428,14 +429,12 @@ def test_arcs_with_dissipation(A: float, C: float, spin: float, wheel: float) ->
     sense = math.copysign(1.0, C * spin + wheel)
     for growth in (0.05, -0.04):
         flown = reference.sinking((A, A, C), motion, np.zeros(3), TIMES, growth, wheel)
-        omega, spins, turned = energy_sink.arc(
-            A, C, growth, quaternion, OMEGA, spin, TIMES, wheel, sense
-        )
+        omega, spins, turned = arc(A, C, growth, quaternion, OMEGA, spin, TIMES, wheel, sense)
         assert np.column_stack([omega.real, omega.imag, spins]) == pytest.approx(
             np.array([m.rates for m in flown]), abs=1e-10
         )
         assert apart(turned, flown) < 1e-10
-        end = energy_sink.arc(A, C, growth, quaternion, OMEGA, spin, 20.0, wheel, sense)
+        end = arc(A, C, growth, quaternion, OMEGA, spin, 20.0, wheel, sense)
         assert end[0] == pytest.approx(omega[-1], abs=1e-12)
         assert end[2] == pytest.approx(turned[-1], abs=1e-12)
         rates = energy_sink.rates_on_arc(A, C, growth, OMEGA, spin, TIMES, wheel, sense)
