@@ -19,7 +19,7 @@ from nutdamp.control_loop.law import Actuator, ComplexArray, Firing, Law
 from nutdamp.control_loop.sensor import Doubt, Estimator, Signal
 from nutdamp.errors import Infeasible, Unsuitable
 from nutdamp.flight.dynamics import Dynamics, Path, Supply, shed, weakened
-from nutdamp.physics import taylor
+from nutdamp.physics.motion import MOST_STEPS
 from nutdamp.spacecraft.constraints import commandable
 from nutdamp.spacecraft.model import Spacecraft, SpinState, Vector
 from nutdamp.spacecraft.schedule import Pulse, channel_pulse, on_command
@@ -213,7 +213,7 @@ class Coast(Watch):
         """Has a path that reaches from the last moment looked at to ``end`` s."""
         if self.path is None or not self.dynamics.free:
             state = self.state if self.path is None else self.at(self._until)
-            self.path, _ = self.dynamics.path(state, self._until, end, most=taylor.MOST_STEPS)
+            self.path, _ = self.dynamics.path(state, self._until, end, most=MOST_STEPS)
             self.parts.append((self._until, self.path))
         self._until = end
 

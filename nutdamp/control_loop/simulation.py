@@ -40,8 +40,9 @@ from nutdamp.flight import end_state
 from nutdamp.flight.dynamics import Dynamics, Path, make_dynamics
 from nutdamp.flight.propagation import Flight, Leg, widest
 from nutdamp.montecarlo.cases import watch_over
-from nutdamp.physics import attitude, batch, energy_sink, taylor
-from nutdamp.physics.taylor import Forcing
+from nutdamp.physics import attitude, energy_sink
+from nutdamp.physics.motion import MOST_STEPS, MotionStretch, advance
+from nutdamp.physics.series import Bodies, Forcing
 from nutdamp.physics.triaxial import arc_cones
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.equipment import Loop
@@ -124,7 +125,7 @@ class LoopRun:
         if coast.parts and not self.dynamics.free:
             arrived = coast.at(end)
         else:
-            path, arrived = self.dynamics.path(state, start, end, most=taylor.MOST_STEPS)
+            path, arrived = self.dynamics.path(state, start, end, most=MOST_STEPS)
         self._leg(start, end, path)
         return arrived
 
@@ -133,9 +134,7 @@ class LoopRun:
         for start, end in itertools.pairwise(sorted(set(pulse.edges))):
             push = pulse.push(start, end)
             torque, slope = ([], None) if push is None else ([push[0]], push[1])
-            path, state = self.dynamics.path(
-                state, start, end, torque, slope, most=taylor.MOST_STEPS
-            )
+            path, state = self.dynamics.path(state, start, end, torque, slope, most=MOST_STEPS)
             self._leg(start, end, path, firing=True, last=end == pulse.thrust[1])
         return state
 
@@ -337,7 +336,7 @@ class Fleet:
         ).T.copy()
         moments = np.array([case.truth.inertia.moments for case in cases]).T
         wheels = np.array([case.truth.inertia.wheel for case in cases])
-        self.bodies = batch.Bodies(
+        self.bodies = Bodies(
             moments, np.zeros(3), Forcing((), law.growth, wheels, law.spacecraft.sense)
         )
         self.rates = np.array([case.truth.omega0 for case in cases]).T.copy()
@@ -497,10 +496,10 @@ class Fleet:
         self, rows: Rows, lasts: Vector, torque: Vector | None, slope: Vector | None
     ) -> None:
         motion = self.now[rows], self.rates[:, rows], self.quaternion[:, rows]
-        stretch = batch.MotionStretch(self.bodies.some(rows), *motion, torque, slope)
+        stretch = MotionStretch(self.bodies.some(rows), *motion, torque, slope)
         if self.law.spacecraft.keep:
             self.watch.some(rows).motion(stretch, lasts)
-        batch.advance(stretch, lasts)
+        advance(stretch, lasts)
         self.rates[:, rows], self.quaternion[:, rows] = stretch.rates, stretch.quaternion
 
     def _fire(self, fired: list[tuple[int, Pulse]]) -> None:

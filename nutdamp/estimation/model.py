@@ -37,7 +37,7 @@ from nutdamp.estimation.parameters import (
 from nutdamp.flight.dynamics import Arc, Dynamics, FreeCoast, Path, Push, make_dynamics
 from nutdamp.flight.propagation import Flight, flown
 from nutdamp.physics import attitude, energy_sink, triaxial
-from nutdamp.physics.taylor import Forcing
+from nutdamp.physics.series import Forcing
 from nutdamp.spacecraft.equipment import ACCELEROMETER
 from nutdamp.spacecraft.model import Attitude, Inertia, Spacecraft, SpinState
 from nutdamp.spacecraft.schedule import Schedule

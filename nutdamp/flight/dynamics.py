@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import cmath
 import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -14,8 +13,9 @@ import numpy as np
 
 from nutdamp.common import work
 from nutdamp.common.numerics import gauss_legendre
-from nutdamp.physics import attitude, energy_sink, taylor, triaxial
-from nutdamp.physics.taylor import Falling, Forcing, TaylorPiece
+from nutdamp.physics import motion, triaxial
+from nutdamp.physics.motion import MotionStretch
+from nutdamp.physics.series import Bodies, Falling, Forcing, Polynomial
 from nutdamp.physics.thruster import Ramp, Tank
 from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import (
@@ -89,30 +89,22 @@ class Arc:
 
     def motion(self, times: Vector) -> tuple[Vector, Vector]:
         """Rates (n, 3) in rad/s and quaternions (n, 4) at ``times`` (n,) s."""
-        A = self.A
-        C = self.C
-        state = self.state
-        since = np.asarray(times) - self.start
-        motion = state.quaternion, state.omega, state.spin, since, self.wheel
-        if self.growth != 0.0:
-            omega, spin, quaternion = energy_sink.arc(A, C, self.growth, *motion, self.sense)
-        else:
-            omega = state.omega * np.exp(-1j * ((A - C) / A * state.spin - self.wheel / A) * since)
-            spin = np.full(len(since), state.spin)
-            quaternion = attitude.arc(A, C, *motion)
-        return np.column_stack([omega.real, omega.imag, spin]), quaternion
+        since = np.asarray(times, dtype=float) - self.start
+        rates, quaternion = np.empty((len(since), 3)), np.empty((len(since), 4))
+        for array, columns in zip((rates, quaternion), self._after(since), strict=True):
+            for index, column in enumerate(columns):
+                array[:, index] = column
+        return rates, quaternion
 
     def end(self, time: float) -> SpinState:
         """State at ``time`` s."""
-        A = self.A
-        C = self.C
-        state = self.state
-        since = time - self.start
-        motion = state.quaternion, state.omega, state.spin, since, self.wheel
-        if self.growth != 0.0:
-            return SpinState(*energy_sink.arc(A, C, self.growth, *motion, self.sense))
-        turned = cmath.exp(-1j * ((A - C) / A * state.spin - self.wheel / A) * since)
-        return SpinState(state.omega * turned, state.spin, attitude.arc_end(A, C, *motion))
+        (first, second, third), quaternion = self._after(time - self.start)
+        return SpinState(complex(first, second), third, np.array(quaternion))
+
+    def _after(self, since: Any) -> Any:
+        state, forcing = self.state, Forcing((), self.growth, self.wheel, self.sense)
+        rates = state.omega.real, state.omega.imag, state.spin
+        return motion.arc(self.A, self.C, forcing, rates, state.quaternion.tolist(), since)
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,10 +129,10 @@ class FreeCoast:
 @dataclass(frozen=True, slots=True)
 class Integrated:
     """Motion under a constant torque, or of a body with three different moments,
-    as Taylor pieces.
+    as Taylor series.
     """
 
-    pieces: tuple[TaylorPiece, ...]
+    pieces: tuple[Polynomial, ...]
 
     @property
     def steps(self) -> int:
@@ -149,7 +141,7 @@ class Integrated:
 
     def motion(self, times: Vector) -> tuple[Vector, Vector]:
         """Rates (n, 3) in rad/s and quaternions (n, 4) at ``times`` (n,) s."""
-        return joined([(piece.start, piece.at) for piece in self.pieces], times)
+        return joined([(piece.start, piece.motion) for piece in self.pieces], times)
 
 
 LONG = 20.0
@@ -244,34 +236,33 @@ class Dynamics:
             _, growth, wheel, sense = self.forcing
             arc = Arc(self.moments[0], self.moments[2], start, state, growth, wheel, sense)
             return arc, state if end == start else arc.end(end)
-        torque = np.asarray(sum(torques, self.constant))
+        torque = np.asarray(sum(torques, np.zeros(3)))
         long = float(np.linalg.norm(state.rates)) * (end - start) > LONG
         if (
             long
             and falling is None
             and slope is None
             and not torque.any()
+            and not self.constant.any()
             and self.forcing == Forcing()
         ):
             coast = FreeCoast(self.moments, start, state)
             (rates,), (quaternion,) = coast.motion(np.array([end]))
             work.spend(PULSE)
             return coast, SpinState.of(rates, quaternion)
-        pieces = taylor.integrate(
-            self.moments,
-            torque,
+        stretch = MotionStretch(
+            Bodies(np.array(self.moments), self.constant, self.forcing),
+            start,
             state.rates,
             state.quaternion,
-            start,
-            end,
-            self.forcing,
-            most,
+            torque,
             slope,
             falling,
         )
+        pieces = tuple(motion.polynomials(stretch, end - start, most))
         step = SPUN_STEP if self.moments[0] == self.moments[1] else STEP
         work.spend(PULSE + (SUNK_STEP if self.forcing.growth != 0.0 else step) * len(pieces))
-        return Integrated(tuple(pieces)), SpinState.of(*pieces[-1].final)
+        return Integrated(pieces), SpinState.of(*pieces[-1].end())
 
     def command(self, pulse: Pulse) -> None:
         """Take note of a pulse before it is flown:

@@ -26,7 +26,8 @@ from nutdamp.flight.dynamics import (
     make_dynamics,
     shed,
 )
-from nutdamp.physics import attitude, response, taylor
+from nutdamp.physics import attitude, response
+from nutdamp.physics.motion import MOST_STEPS
 from nutdamp.physics.triaxial import arc_cones, widest_cones
 from nutdamp.spacecraft.model import Inertia, Spacecraft, SpinState, Vector
 from nutdamp.spacecraft.schedule import Pulse, Schedule
@@ -492,7 +493,7 @@ def flown(
     Coasts of symmetric bodies without disturbances are exact arcs, with dissipation too; everything
     else is Taylor series at rounding accuracy. The last leg reaches at least to ``until`` s.
     ``dynamics``: those of the spacecraft, where known. Raises Infeasible beyond `PLANNED_STEPS`, or
-    `taylor.MOST_STEPS` where a later end is requested.
+    `motion.MOST_STEPS` where a later end is requested.
     """
     dynamics = dynamics or make_dynamics(spacecraft)
     state = spacecraft.initial
@@ -552,4 +553,4 @@ def _allowed(schedule: Schedule, until: float) -> int:
     """Steps of integration that a flight may take: a plan is flown again and again,
     a track once.
     """
-    return taylor.MOST_STEPS if until > schedule.end else PLANNED_STEPS
+    return MOST_STEPS if until > schedule.end else PLANNED_STEPS

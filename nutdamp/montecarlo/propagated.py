@@ -1,12 +1,10 @@
 """Cases flown, many at once: through real pulse widths, and in closed form for derivatives.
 
 The closed form is the impulse sum Magnus 1970 (17) with exact attitude arcs. In the frame that
-turns with the nutation, by the phase aα with α = ∫ω3 dt, the angular momentum of a free symmetric
-body does not move: its transverse part is AΩ = Aω0 + Σ J e^{iaα}. That frame, in space, turns about
-H at |H|/A (R(t) = Rot(H t/A) R(0) Rot3(aω3 t)). So a pulse adds to a vector, and a coast turns a
-quaternion; energy dissipation draws H away from axis 3 along an arc that `energy_sink` knows.
-Nothing takes an absolute value or compares: the same code runs on complex arrays, which gives
-derivatives to rounding (`nutdamp.montecarlo.statistics`).
+turns with the nutation (`motion.nutated`), by the phase aα with α = ∫ω3 dt, the rates of a free
+symmetric body stay: Ω = ω0 + Σ J/A e^{iaα}. So a pulse adds to a vector, and a coast turns a
+quaternion. Nothing takes an absolute value or compares: the same code runs on complex arrays, which
+gives derivatives to rounding (`nutdamp.montecarlo.statistics`).
 """
 
 from __future__ import annotations
@@ -39,9 +37,10 @@ from nutdamp.montecarlo.cases import (
     triple,
     watch_over,
 )
-from nutdamp.physics import attitude, batch, energy_sink, sky
-from nutdamp.physics.batch import Bodies, MotionStretch
+from nutdamp.physics import motion, sky
 from nutdamp.physics.energy_sink import TINY
+from nutdamp.physics.motion import MotionStretch
+from nutdamp.physics.series import Bodies, Forcing
 from nutdamp.physics.sky import AxisWatch, SunPulseClock, TorqueRamp
 from nutdamp.physics.thruster import Opened
 from nutdamp.physics.triaxial import widest_cones
@@ -89,19 +88,15 @@ class ClosedForm:
         """End states of the ``cases``, whose pulses all come in the order of their centres in the
         first of them.
         """
-        # In one piece: any part of the loop would take and return nearly all of the seven numbers
-        # that run through it.
-        A, C, wheel, growth = cases.A, cases.C, cases.wheel, self.model.spacecraft.growth
-        a = 1.0 - C / A
-        per_A = 1.0 / A
-        sheds = cases.sheds
+        A, C, wheel = cases.A, cases.C, cases.wheel
+        spacecraft = self.model.spacecraft
+        forcing = Forcing((), spacecraft.growth, wheel, spacecraft.sense)
         (first, second, _), (along, across, spin) = cases.moments, cases.omega0
-        before = x, y, z = (
-            first * along,
-            second * across,
-            plus(C * spin, wheel),
-        )  # H is the true one, I1 ≠ I2 or not
-        phase, now, turn = 0.0, 0.0, None
+        # H is the true one, I1 ≠ I2 or not
+        before = first * along, second * across, plus(C * spin, wheel)
+        x, y = before[0] / A, before[1] / A
+        turn: tuple[Cases, ...] = (1.0, 0.0, 0.0, 0.0)
+        phase, now = 0.0, 0.0
         centres = [
             start + 0.5 * width for start, width in zip(cases.starts, cases.widths, strict=True)
         ]
@@ -109,44 +104,32 @@ class ClosedForm:
             [float(np.real(np.ravel(centre)[0])) for centre in centres], kind="stable"
         )
         for number in order.tolist():
-            coast = centres[number] - now
+            coast = np.asarray(centres[number] - now)
             now = centres[number]
-            turn = _turned_on(turn, (x, y, z), coast * per_A)
-            if growth == 0.0:
-                phase = phase + plus(a * spin, times(-per_A, wheel)) * coast
-            else:
-                size = np.sqrt(x * x + y * y + z * z) + TINY
-                shares = energy_sink.damper(A, C, wheel, size, self.model.spacecraft.sense)
-                effect, turn = _slipped(turn, (x, y, z), growth, coast, shares)
-                phase = phase + (a * size * effect.travel - wheel * coast) / C
-                x, y, z = x * effect.transverse, y * effect.transverse, size * effect.along
-                spin = (z - wheel) / C
-            if sheds is not None:  # half before the pulse and half after it, the rates as they are
-                x, y, A, C = _lighter(x, y, A, C, sheds[number])
-                a = 1.0 - C / A
-                per_A = 1.0 / A
-                z = plus(C * spin, wheel)
-            rate = plus(a * spin, times(-per_A, wheel))
+            (x, y, spin), turn, angle = motion.nutated(A, C, forcing, (x, y, spin), turn, coast)
+            phase = phase + angle
+            # Half of the propellant goes before the pulse and half after it, the rates as they are.
+            sheds = (0.0, 0.0) if cases.sheds is None else cases.sheds[number]
+            A, C = A - 0.5 * sheds[0], C - 0.5 * sheds[1]
+            a = 1.0 - C / A
+            rate = plus(a * spin, -wheel / A)
             impulse, width, nodes = (
                 cases.impulses[number],
                 cases.widths[number],
                 self._nodes[number],
             )
-            along, across, gained = _effective(impulse, rate, a / C, width, nodes, growth)
+            along, across, gained = _effective(
+                impulse, rate, a / C, width, nodes, spacecraft.growth
+            )
             cosine, sine = cos_sin(phase)
-            x = x + along * cosine - across * sine
-            y = y + along * sine + across * cosine
-            if not nothing(gained):
-                spin = spin + gained / C
-                z = plus(C * spin, wheel)
-            if sheds is not None:
-                x, y, A, C = _lighter(x, y, A, C, sheds[number])
-                a = 1.0 - C / A
-                per_A = 1.0 / A
-                z = plus(C * spin, wheel)
-        after = (x, y, z) if turn is None else carried(turn, (x, y, z))
+            x = x + (along * cosine - across * sine) / A
+            y = y + (along * sine + across * cosine) / A
+            spin = spin + gained / C
+            A, C = A - 0.5 * sheds[0], C - 0.5 * sheds[1]
+        momentum = A * x, A * y, plus(C * spin, wheel)
+        after = carried(turn, momentum)
         return Ends(
-            momentum=(x, y, z),
+            momentum=momentum,
             before=before,
             after=after,
             pointed=rotated(after, cases.tilt),
@@ -174,51 +157,6 @@ class ClosedForm:
             A - off_A, 0.25 * A
         )
         return tuple(nodes_for(0.5 * on_time * rate) for on_time in self.model.on_times)
-
-
-def _lighter(
-    x: Cases, y: Cases, A: Cases, C: Cases, sheds: tuple[Cases, Cases]
-) -> tuple[Cases, Cases, Cases, Cases]:
-    """AΩ1, AΩ2, A and C with half of ``sheds`` off A and C, which leaves the rates as they are."""
-    less = A - 0.5 * sheds[0]
-    return x * (less / A), y * (less / A), less, C - 0.5 * sheds[1]
-
-
-def _turned_on(turn: tuple[Cases, ...] | None, momentum: Triple, time: Cases) -> tuple[Cases, ...]:
-    """Quaternion ``turn`` followed by the turn about ``momentum`` (in the turned frame) by
-    |H|·``time``.
-    """
-    x, y, z = momentum
-    size = np.sqrt(x * x + y * y + z * z) + TINY
-    half = np.tan(0.5 * size * time)
-    w = 1.0 / np.sqrt(1.0 + half * half)
-    scale = half * w / size
-    x, y, z = scale * x, scale * y, scale * z
-    return (w, x, y, z) if turn is None else attitude.product(turn, (w, x, y, z))
-
-
-def _slipped(
-    turn: tuple[Cases, ...],
-    momentum: Triple,
-    growth: float,
-    time: Cases,
-    shares: tuple[Cases, Cases],
-) -> tuple[energy_sink.SinkEffect, tuple[Cases, ...]]:
-    """Effect of dissipation in ``time`` s, and ``turn`` with the slip against ``momentum``."""
-    x, y, z = momentum
-    across = x * x + y * y
-    size = np.sqrt(across + z * z) + TINY
-    effect = energy_sink.courses(growth, z / size, across / (size * size), time, shares)
-    w = effect.cosine
-    i = effect.sine * y / size
-    j = -effect.sine * x / size
-    p, a, b, c = turn
-    return effect, (
-        p * w - a * i - b * j,
-        p * i + a * w - c * j,
-        p * j + b * w + c * i,
-        c * w + a * j - b * i,
-    )
 
 
 def carried(turn: tuple[Cases, ...], vector: Triple) -> Triple:
@@ -343,8 +281,8 @@ def fly(
     pulses = model.schedule.pulses
     begins = zip(model.schedule, cases.starts, cases.leads, strict=True)
     shifts = [start - lead - pulse.loaded[0] for pulse, start, lead in begins]
-    for begin in range(0, count, batch.BLOCK):
-        rows = slice(begin, min(begin + batch.BLOCK, count))
+    for begin in range(0, count, motion.BLOCK):
+        rows = slice(begin, min(begin + motion.BLOCK, count))
 
         def part(value: object, rows: slice = rows) -> Array:
             return np.broadcast_to(np.asarray(value, dtype=float), count)[rows]
@@ -473,7 +411,7 @@ class RealWidths:
         in_steps = min(float(np.sum(self.model.on_times)), lasts) if arcs else lasts
         turned = float(np.linalg.norm(rates)) * in_steps
         looks = turned * sky.ROWS / sky.CIRCLE if self.model.spacecraft.keep else 0.0
-        stepping = STEPPED * turned / batch.STRIDE + LOOKED * looks
+        stepping = STEPPED * turned / motion.STRIDE + LOOKED * looks
         return CASE * (1.0 + len(self.model.schedule)) + stepping
 
     def __call__(self, cases: DispersedCases) -> Ends:
@@ -508,14 +446,14 @@ class RealWidths:
             if self.model.schedule.shaped:
                 pulses = self._ramps(cases, starts, impulses, sheds)
             else:
-                pulses = batch.Pulses(
+                pulses = motion.Pulses(
                     starts, np.array(self.model.on_times).reshape(-1, 1), impulses, sheds=sheds
                 )
-            settled, turned = batch.fly(bodies, rates, upright, pulses, watch)
+            settled, turned = motion.fly(bodies, rates, upright, pulses, watch)
             over = np.max(pulses.edges, axis=0, initial=0.0)
         last = bodies if sheds is None else bodies.lighter(sheds.sum(axis=0))
         if watch is not None:
-            watch.turn(batch.MotionStretch(last, over, settled, turned))
+            watch.turn(MotionStretch(last, over, settled, turned))
         momentum = triple(last.momentum(settled))
         after = carried(tuple(turned), momentum)
         nutation = None
@@ -534,15 +472,15 @@ class RealWidths:
             drained=cases.drained,
         )
 
-    def _bodies(self, moments: Array, wheel: Cases) -> batch.Bodies:
-        return batch.Bodies(
+    def _bodies(self, moments: Array, wheel: Cases) -> Bodies:
+        return Bodies(
             moments, self._dynamics.constant, self._dynamics.forcing._replace(wheel=wheel)
         )
 
     def _ramps(
         self, cases: DispersedCases, starts: Array, impulses: Array, sheds: Array | None
-    ) -> batch.Pulses:
-        """Pulses by the ramps of their thrust, each as a pulse of its own; as in `batch.Pulses`."""
+    ) -> motion.Pulses:
+        """Pulses by the ramps of their thrust, each as a pulse of its own; as in `motion.Pulses`."""
         pieces = list(self._pieces(cases, starts, impulses))
         count = starts.shape[1]
         begins, lengths, parts, leans, numbers, shares = (
@@ -555,7 +493,7 @@ class RealWidths:
             )
             falls = falls.reshape(-1, 3, count)
         impulses = np.array(parts).reshape(-1, 3, count)
-        return batch.Pulses(
+        return motion.Pulses(
             _whole(begins, count), _whole(lengths, count), impulses, _whole(leans, count), falls
         )
 

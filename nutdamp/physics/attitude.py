@@ -1,4 +1,4 @@
-"""Attitude quaternions: convention, products, rotations, free arcs.
+"""Attitude quaternions: convention, products, rotations.
 
 A quaternion (w, x, y, z) is a unit quaternion, scalar first, that leads from body axes to the
 inertial frame: v_inertial = rotate(q, v_body). ``multiply(p, q)`` turns by q first, then by p.
@@ -122,69 +122,6 @@ def frame_n(A: float, C: float, omega: complex, spin: float) -> Array:
     x = np.array([-cosine * unit.real, -cosine * unit.imag, sense * sine])
     z = np.array([sine * unit.real, sine * unit.imag, sense * cosine])
     return from_matrix(np.array([x, np.cross(z, x), z]))
-
-
-def arc(
-    A: float,
-    C: float,
-    quaternion: Array,
-    omega: complex,
-    spin: float,
-    times: Array,
-    wheel: float = 0.0,
-) -> Array:
-    """Attitude on a torque-free arc of a symmetric body, exact: (n,) s after its start -> (n, 4).
-
-    R(t) = Rot(H t/A) R(0) Rot3(ν t): the body turns about H at |H|/A and about its own axis at ν =
-    ω3 - H3/A = aω3 - h/A, because ω = H/A + ν e3 for a symmetric body (Poinsot's rolling cones,
-    Magnus 1970 fig. 4).
-    """
-    body = angular_momentum(A, C, omega, spin, wheel)
-    momentum = rotate(quaternion, body)
-    size = float(np.linalg.norm(momentum))
-    times = np.asarray(times, dtype=float)
-    half_about_momentum = 0.5 * size / A * times
-    half_about_axis = 0.5 * ((A - C) / A * spin - wheel / A) * times
-    # A body at rest has no direction of H, but then the angle about it is zero as well.
-    x, y, z = momentum / size if size > 0 else momentum
-    sine = np.sin(half_about_momentum)
-    turned = product((np.cos(half_about_momentum), sine * x, sine * y, sine * z), quaternion)
-    return np.stack(
-        product(turned, (np.cos(half_about_axis), 0.0, 0.0, np.sin(half_about_axis))), axis=-1
-    )
-
-
-def arc_end(
-    A: float,
-    C: float,
-    quaternion: Array,
-    omega: complex,
-    spin: float,
-    time: float,
-    wheel: float = 0.0,
-) -> Array:
-    """`arc` at one ``time`` in s after its start, (4,): plain numbers, a tenth of the cost of
-    arrays.
-    """
-    h1 = A * omega.real
-    h2 = A * omega.imag
-    h3 = C * spin + wheel
-    size = math.sqrt(h1 * h1 + h2 * h2 + h3 * h3)
-    half_about_momentum, half_about_axis = (
-        0.5 * size / A * time,
-        0.5 * ((A - C) / A * spin - wheel / A) * time,
-    )
-    # Turning about H by an angle is turning in the body about H's body components: q (cos, sin h) =
-    # (cos, sin Rh) q.
-    sine = math.sin(half_about_momentum) / size if size > 0.0 else 0.0
-    w, x, y, z = product(
-        quaternion.tolist(), (math.cos(half_about_momentum), sine * h1, sine * h2, sine * h3)
-    )
-    cosine = math.cos(half_about_axis)
-    sine = math.sin(half_about_axis)
-    return np.array(
-        [w * cosine - z * sine, x * cosine + y * sine, y * cosine - x * sine, z * cosine + w * sine]
-    )
 
 
 def about_axis(body_axis: Array, body_side: Array, axis: Array, side: Array, phase: float) -> Array:

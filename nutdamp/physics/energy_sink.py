@@ -38,9 +38,7 @@ law.
 
 from __future__ import annotations
 
-import cmath
 import math
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -266,68 +264,6 @@ def coast(
     )
 
 
-def slip(
-    effect: SinkEffect,
-    first: Any,
-    second: Any,
-    behind: Any,
-    cos_sin: Callable[[Any], tuple[Any, Any]],
-) -> Any:
-    """Quaternion (w, x, y, z) by which the body has slipped from its free arc; it multiplies that
-    from the right.
-
-    ``first`` and ``second``: components of h in the body at the end of the free arc; ``behind``,
-    rad: the excess turn about axis 3, |H|(1/C - 1/A)(∫cos θ dt - t cos θ0).
-    """
-    x, y = effect.sine * second, -effect.sine * first
-    cosine, sine = cos_sin(0.5 * behind)
-    return (
-        effect.cosine * cosine,
-        x * cosine + y * sine,
-        y * cosine - x * sine,
-        effect.cosine * sine,
-    )
-
-
-def arc(
-    A: float,
-    C: float,
-    growth: float,
-    quaternion: Array,
-    omega: complex,
-    spin: float,
-    times: Any,
-    wheel: float = 0.0,
-    sense: float = 1.0,
-) -> tuple[Any, Any, Array]:
-    """Coast of a symmetric body, exact: ω (n,), ω3 (n,) rad/s and attitude (n, 4) at ``times`` (n,)
-    s from its start.
-
-    ``quaternion`` (4,) body -> inertial, ``omega`` = ω1 + iω2 and ``spin`` hold at its start;
-    ``growth`` is κ in 1/s. At one time that is a number, by plain numbers: a tenth of the cost of
-    arrays.
-    """
-    many = isinstance(times, np.ndarray)
-    module, exp = (np, np.exp) if many else (math, cmath.exp)
-    first, second, third, size = _direction(A, C, omega, spin, wheel)
-    effect = coast(A, C, growth, omega, spin, times, wheel, sense)
-    offset = wheel / C
-    pace = (A - C) / A * size / C
-    free = exp(-1j * (pace * third - offset) * times)
-    behind = pace * (effect.travel - third * times)
-    there = complex(first, second) * free
-    slipped = slip(
-        effect, there.real, there.imag, behind, lambda angle: (module.cos(angle), module.sin(angle))
-    )
-    motion = A, C, quaternion, omega, spin, times, wheel
-    if many:
-        turned = attitude.multiply(attitude.arc(*motion), np.stack(slipped, axis=-1))
-    else:
-        turned = np.array(attitude.product(attitude.arc_end(*motion).tolist(), slipped))
-    spins = size * effect.along / C - offset
-    return omega * free * effect.transverse * exp(-1j * behind), spins, turned
-
-
 def rates_on_arc(
     A: Any,
     C: Any,
@@ -338,7 +274,7 @@ def rates_on_arc(
     wheel: Any = 0.0,
     sense: float = 1.0,
 ) -> tuple[ComplexArray, Array]:
-    """ω and ω3 of `arc` alone, for many bodies: ``times`` (cases, n) s from the starts of their
+    """ω and ω3 of `motion.arc` alone, for many bodies: ``times`` (cases, n) s from the starts of their
     arcs, else (cases, 1).
 
     ``omega`` and ``spin`` at the starts, rad/s, and moments, kg m², are by case; ``growth`` may be

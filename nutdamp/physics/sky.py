@@ -22,8 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.physics.attitude import angle_of_parts
-from nutdamp.physics.batch import MotionStretch, pieces
 from nutdamp.physics.energy_sink import damper
+from nutdamp.physics.motion import MotionStretch, pieces
 
 OBLIQUITY = math.radians(23.43928)  # obliquity of the ecliptic at J2000.0
 ABERRATION = 20.4898 / 3600.0  # mean aberration of the Sun, deg (Meeus, 25.10)
@@ -100,7 +100,7 @@ class AxisWatch:
         return replace(self, rows=self.rows[cases])
 
     def motion(self, here: MotionStretch, duration: Array) -> None:
-        """Record the motion that `batch.advance` makes with these arguments, which stay as they
+        """Record the motion that `motion.advance` makes with these arguments, which stay as they
         are.
         """
         if here.torque is not None or not here.bodies.free:
@@ -361,7 +361,7 @@ class SunPulseClock:
         """
         before = self.here
         half = None if sheds is None else 0.5 * sheds
-        starts = np.maximum(sun_pulse.since + delay, self.over)
+        starts: Array = np.maximum(sun_pulse.since + delay, self.over)
         self.over = starts + reduce(np.maximum, (push.end for push in pushes), width)
         if not pushes:
             return starts

@@ -25,7 +25,8 @@ from nutdamp.errors import Infeasible
 from nutdamp.flight.dynamics import Supply, make_dynamics, shed
 from nutdamp.flight.propagation import Flight
 from nutdamp.physics import attitude, precession
-from nutdamp.physics.batch import Bodies, MotionStretch
+from nutdamp.physics.motion import MotionStretch
+from nutdamp.physics.series import Bodies
 from nutdamp.physics.sky import SunPulseClock, TorqueRamp
 from nutdamp.physics.thruster import Valve, spread
 from nutdamp.spacecraft.equipment import Block, Channel

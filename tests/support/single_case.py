@@ -10,7 +10,7 @@ from nutdamp.flight.dynamics import make_dynamics
 from nutdamp.montecarlo import propagated
 from nutdamp.montecarlo.cases import DispersedCases, DispersedModel, Thrusting, number_of, triple
 from nutdamp.montecarlo.inputs import Draws
-from nutdamp.physics import attitude, batch
+from nutdamp.physics import attitude, series
 from nutdamp.physics.thruster import Ramp
 from nutdamp.spacecraft.model import Attitude, Spacecraft
 from nutdamp.spacecraft.schedule import Command, Pulse, Schedule
@@ -29,7 +29,7 @@ def timed(model: DispersedModel, cases: DispersedCases) -> DispersedCases:
         for of in (cases.moments, cases.omega0)
     )
     upright = np.tile([[1.0], [0.0], [0.0], [0.0]], count)
-    bodies = batch.Bodies(moments, dynamics.constant, dynamics.forcing._replace(wheel=cases.wheel))
+    bodies = series.Bodies(moments, dynamics.constant, dynamics.forcing._replace(wheel=cases.wheel))
     nominal = propagated.RealWidths(model).seen_nominally
     _, _, starts, fires, _ = propagated.fly(model, bodies, rates, upright, cases, nominal)
     pulses = zip(cases.impulses, fires, strict=True)

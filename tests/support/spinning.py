@@ -2,11 +2,17 @@
 
 import math
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from support.reference import RTOL, Array, Motion, _turning
+
+from nutdamp.flight.dynamics import Arc
+from nutdamp.physics.motion import MOST_STEPS, MotionStretch, polynomials
+from nutdamp.physics.series import NOTHING, Bodies, Forcing, Polynomial
+from nutdamp.spacecraft.model import SpinState
 
 Triple = tuple[float, float, float]
 EPS = float(np.finfo(float).eps)
@@ -20,6 +26,42 @@ spinners = pytest.mark.parametrize(
 plain_spinners = pytest.mark.parametrize(
     ("A", "C", "spin"), [(*b, spin) for b in BODIES[:2] for spin in (3.0, -3.0)]
 )
+
+
+def series(
+    moments: Triple,
+    torque: Array,
+    rates: Array,
+    quaternion: Array,
+    begin: float,
+    end: float,
+    forcing: Forcing = NOTHING,
+    most: int = MOST_STEPS,
+) -> list[Polynomial]:
+    """Motion of one body from ``begin`` to ``end`` s."""
+    body = Bodies(np.array(moments), np.asarray(torque, dtype=float), forcing)
+    start = MotionStretch(body, begin, rates, quaternion)
+    return list(polynomials(start, end - begin, most))
+
+
+def arc(
+    A: float,
+    C: float,
+    growth: float,
+    quaternion: Array,
+    omega: complex,
+    spin: float,
+    times: Array | float,
+    wheel: float = 0.0,
+    sense: float = 1.0,
+) -> tuple[Any, Any, Array]:
+    """ω, ω3 and attitude on a coast at ``times`` (n,) s; at one time by plain numbers."""
+    coast = Arc(A, C, 0.0, SpinState(omega, spin, quaternion), growth, wheel, sense)
+    if isinstance(times, float):
+        state = coast.end(times)
+        return state.omega, state.spin, state.quaternion
+    rates, turned = coast.motion(times)
+    return rates[:, 0] + 1j * rates[:, 1], rates[:, 2], turned
 
 
 def about(axis: Array | Sequence[float], angle: float) -> Array:

@@ -20,7 +20,9 @@ from numpy.typing import NDArray
 from nutdamp.common import work
 from nutdamp.common.numerics import cos_sin
 from nutdamp.flight.dynamics import make_dynamics
-from nutdamp.physics import attitude, batch
+from nutdamp.physics import attitude
+from nutdamp.physics.motion import BLOCK, MotionStretch, advance
+from nutdamp.physics.series import Bodies
 from nutdamp.schemes.optimal.refinement import (
     AROUND,
     EndEquations,
@@ -97,7 +99,7 @@ class Task:
         self.pace = min(1.0 / spacecraft.fastest, spacecraft.inertial_period)
         dynamics = make_dynamics(spacecraft)
         start = spacecraft.initial
-        # External torques with and without disturbances, see `batch.Bodies`.
+        # External torques with and without disturbances, see `Bodies`.
         self._forced = dynamics.constant, dynamics.forcing
         self._coasting = np.zeros(3), dynamics.forcing._replace(turning=())
         self._start = np.asarray(dynamics.moments, dtype=float), start.rates, start.quaternion
@@ -112,7 +114,7 @@ class Task:
         Pulses act as so many ``kicks`` spread over them, without disturbances, with I1 ≠ I2 as at
         small angles; 0: the true motion.
         """
-        parts = [slice(begin, begin + batch.BLOCK) for begin in range(0, len(x), batch.BLOCK)]
+        parts = [slice(begin, begin + BLOCK) for begin in range(0, len(x), BLOCK)]
         flown = [self._misses(which[part], x[part], kicks) for part in parts]
         return np.concatenate([np.zeros((0, len(self.chosen))), *flown])
 
@@ -154,7 +156,7 @@ class Task:
         )
         work.spend(turned * (RADIAN + CASE_RADIAN * count))
         moments, rates, turn = (np.repeat(part[:, None], count, axis=1) for part in self._start)
-        bodies = batch.Bodies(moments, *(self._coasting if kicks else self._forced))
+        bodies = Bodies(moments, *(self._coasting if kicks else self._forced))
         now = np.zeros(count)
         for pulse in range(n):
             begin = x[:, pulse]
@@ -162,12 +164,12 @@ class Task:
             torque = self.torques[which[:, pulse]].T
             for kick in range(kicks):
                 t = begin + on_time * ((kick + 0.5) / kicks)
-                batch.advance(batch.MotionStretch(bodies, now, rates, turn), t - now)
+                advance(MotionStretch(bodies, now, rates, turn), t - now)
                 rates += torque * (on_time / kicks) / moments
                 now = t
             if not kicks:
-                batch.advance(batch.MotionStretch(bodies, now, rates, turn), begin - now)
-                batch.advance(batch.MotionStretch(bodies, begin, rates, turn, torque), on_time)
+                advance(MotionStretch(bodies, now, rates, turn), begin - now)
+                advance(MotionStretch(bodies, begin, rates, turn, torque), on_time)
                 now = begin + on_time
         return bodies.momentum(rates), turn
 
@@ -236,11 +238,11 @@ class Task:
             / moments
         )
         turns = np.repeat(np.array([[1.0], [0.0], [0.0], [0.0]]), count, axis=1)
-        bodies = batch.Bodies(moments, *self._coasting)
-        stretch = batch.MotionStretch(
+        bodies = Bodies(moments, *self._coasting)
+        stretch = MotionStretch(
             bodies, np.zeros(count), rates, turns, self.torques[which].reshape(-1, 3).T
         )
-        batch.advance(stretch, widths.ravel())
+        advance(stretch, widths.ravel())
         pairs = (rates[0], rates[1]), (turns[0], turns[3]), (turns[1], turns[2])
         after, *turned = ((real + 1j * imaginary).reshape(which.shape) for real, imaginary in pairs)
         return after * self._start[0][0], *turned

@@ -20,6 +20,7 @@ from support.builders import channel, pulse, spinner
 from support.cases import deep
 from support.places import CASES
 from support.process import Run
+from support.spinning import series
 from support.strategies import schedules, symmetric_spinners, triaxial_spinners
 
 from nutdamp.common import work
@@ -29,7 +30,7 @@ from nutdamp.files.reader import load_spacecraft
 from nutdamp.files.tabular import HEADER, number, track_array, write_track
 from nutdamp.flight import dynamics as motion
 from nutdamp.flight import propagation
-from nutdamp.physics import attitude, taylor
+from nutdamp.physics import attitude
 from nutdamp.physics import body as rigid_body
 from nutdamp.planning import plan as planning
 from nutdamp.spacecraft.model import Attitude, Spacecraft
@@ -402,10 +403,10 @@ def test_a_flight_that_is_remembered_keeps_its_limit_of_steps() -> None:
 def test_a_long_coast_in_closed_form_is_that_of_taylor_series(body: Spacecraft) -> None:
     end = 3.0 * motion.LONG / float(np.linalg.norm(body.omega0))
     path, after = motion.make_dynamics(body).path(body.initial, 0.0, end, most=1000)
-    pieces = taylor.integrate(
+    pieces = series(
         body.inertia.moments, np.zeros(3), body.omega0, body.initial.quaternion, 0.0, end
     )
-    rates, quaternion = pieces[-1].final
+    rates, quaternion = pieces[-1].end()
     assert path.steps == 0
     assert np.allclose(after.rates, rates, rtol=0.0, atol=1e-10 * np.linalg.norm(rates))
     assert np.allclose(after.quaternion, quaternion, rtol=0.0, atol=1e-10)

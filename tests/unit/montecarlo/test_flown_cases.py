@@ -32,7 +32,7 @@ from nutdamp.montecarlo.propagated import ClosedForm, RealWidths, nodes_for
 from nutdamp.montecarlo.statistics import OUTPUTS, first_order, measure, vectors
 from nutdamp.montecarlo.study import Results, Study, run, study_of
 from nutdamp.montecarlo.study import run as fly_all
-from nutdamp.physics import attitude, batch
+from nutdamp.physics import attitude, motion
 from nutdamp.physics.thruster import Cold, Tank, Trapezoid
 from nutdamp.planning import decision, robust
 from nutdamp.planning import plan as planning
@@ -220,8 +220,17 @@ def test_a_case_that_coasts_while_others_fire_takes_no_steps(
     pulses = [channel_pulse(body.channels[number], 1.0 + number, 0.4) for number in range(3)]
     model = DispersedModel(body, Schedule(tuple(pulses)))
     spans = list[float]()
-    monkeypatch.setattr(batch, "_expect_short", spans.append)
     draws = dispersed.first_cases(Study(model), CASES)
+    for integrated in ("polynomials", "_advance_symmetric"):
+        integrate = getattr(motion, integrated)
+
+        def watched(
+            here: motion.MotionStretch, duration: Any, *limit: int, integrate: Any = integrate
+        ) -> Any:
+            spans.append(float(np.max(np.linalg.norm(here.rates, axis=0) * duration)))
+            return integrate(here, duration, *limit)
+
+        monkeypatch.setattr(motion, integrated, watched)
     flown = outputs(RealWidths, model, draws)
     assert max(spans) < 5.0
     for case in range(0, CASES, 6):
@@ -299,7 +308,7 @@ def test_blocks_of_many_cases_are_flown_some_at_once(monkeypatch: pytest.MonkeyP
     model = DispersedModel(whole.spacecraft, fired(whole.spacecraft, whole.schedule.blocks[:1]))
     draws = dispersed.first_cases(study_of(model.spacecraft, model.schedule), 12)
     at_once = outputs(RealWidths, model, draws)
-    monkeypatch.setattr("nutdamp.physics.batch.BLOCK", 5)
+    monkeypatch.setattr("nutdamp.physics.motion.BLOCK", 5)
     assert outputs(RealWidths, model, draws) == pytest.approx(at_once, abs=1e-12, nan_ok=True)
 
 

@@ -13,7 +13,7 @@ from scipy.integrate import quad
 from support import reference
 from support.builders import present, within
 from support.cases import spread
-from support.spinning import BODIES, EPS, about, plain_spinners, spinners
+from support.spinning import BODIES, EPS, about, arc, plain_spinners, spinners
 
 from nutdamp.physics import attitude, response
 from nutdamp.physics import body as rigid_body
@@ -123,16 +123,16 @@ def test_arc_is_the_motion_of_the_integrated_body(
     # Two radians of the fastest of the turns at a time: a needle near θ = 89° goes slowly about
     # itself, a disc fast.
     times = np.array([2.0, 5.0, 11.0]) / float(np.linalg.norm(start.rates))
-    quaternions = attitude.arc(A, C, begin, omega, spin, times)
+    quaternions = arc(A, C, 0.0, begin, omega, spin, times)[2]
     for quaternion, motion in zip(
         quaternions, reference.coast((A, A, C), start, np.zeros(3), times), strict=True
     ):
         assert float(np.linalg.norm(quaternion)) == pytest.approx(1.0, abs=8 * EPS)
         assert reference.turned(attitude.matrix(quaternion), motion.rotation) < FLOWN
     turned = complex(omega * np.exp(-1j * (A - C) / A * spin * times[0]))
-    rest = attitude.arc(A, C, quaternions[0], turned, spin, times[2:] - times[0])
+    rest = arc(A, C, 0.0, quaternions[0], turned, spin, times[2:] - times[0])[2]
     assert rest[0] == pytest.approx(quaternions[2], abs=50 * EPS)
-    assert attitude.arc_end(A, C, begin, omega, spin, float(times[2])) == pytest.approx(
+    assert arc(A, C, 0.0, begin, omega, spin, float(times[2]))[2] == pytest.approx(
         quaternions[2], abs=50 * EPS
     )
 
@@ -165,9 +165,7 @@ def test_frame_n(A: float, C: float, spin: float) -> None:
 
 def test_angular_momentum_in_body_axes_and_rest() -> None:
     quaternion = np.array([0.5, 0.5, 0.5, 0.5])
-    assert np.array_equal(
-        attitude.arc(3.0, 2.0, quaternion, 0j, 0.0, np.array([7.0])), [quaternion]
-    )
+    assert np.array_equal(arc(3.0, 2.0, 0.0, quaternion, 0j, 0.0, np.array([7.0]))[2], [quaternion])
     assert np.array_equal(
         attitude.angular_momentum(120.0, 80.0, 0.5 - 0.25j, -3.0), [60.0, -30.0, -240.0]
     )

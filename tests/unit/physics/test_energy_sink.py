@@ -11,9 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support import reference
 from support.cases import deep, spread
-from support.spinning import EPS, Triple
+from support.spinning import EPS, Triple, arc, series
 
-from nutdamp.physics import attitude, energy_sink, taylor
+from nutdamp.physics import attitude, energy_sink
+from nutdamp.physics.series import Forcing
 
 QUATERNION = reference.vector(0.5, -0.1, 0.7, 0.5)  # of length 1
 START = attitude.matrix(QUATERNION)
@@ -30,7 +31,7 @@ class Body(NamedTuple):
 
     def arc(self, *times: float) -> tuple[reference.Array, reference.Array]:
         """Rates (n, 3) and rotations (n, 3, 3) by the closed form."""
-        omega, spin, turned = energy_sink.arc(
+        omega, spin, turned = arc(
             self.A, self.C, self.growth, QUATERNION, self.omega, self.spin, np.array(times)
         )
         return np.column_stack([omega.real, omega.imag, spin]), np.array(
@@ -111,8 +112,8 @@ def test_the_example_of_the_course() -> None:
 def test_one_moment_and_many_agree(one: Body) -> None:
     for time in (0.0, 1e-9, 0.7, 30.0, 900.0, 1e6):
         sink = one.A, one.C, one.growth, QUATERNION, one.omega, one.spin
-        omega, spin, end = energy_sink.arc(*sink, time)
-        (transverse,), (axial,), (turned,) = energy_sink.arc(*sink, np.array([time]))
+        omega, spin, end = arc(*sink, time)
+        (transverse,), (axial,), (turned,) = arc(*sink, np.array([time]))
         scale = 1.0 + abs(one.spin) * time  # roundings of the angle turned
         assert omega == pytest.approx(complex(transverse), abs=8 * EPS * scale)
         assert spin == pytest.approx(float(axial), rel=8 * EPS, abs=1e-100)
@@ -128,10 +129,8 @@ def test_one_moment_and_many_agree(one: Body) -> None:
 def test_no_dissipation_is_the_free_arc(growth: float) -> None:
     times = np.array([0.0, 1.0, 50.0])
     for one in BODIES.values():
-        omega, spin, turned = energy_sink.arc(
-            one.A, one.C, growth, QUATERNION, one.omega, one.spin, times
-        )
-        free = attitude.arc(one.A, one.C, QUATERNION, one.omega, one.spin, times)
+        omega, spin, turned = arc(one.A, one.C, growth, QUATERNION, one.omega, one.spin, times)
+        free = arc(one.A, one.C, 0.0, QUATERNION, one.omega, one.spin, times)[2]
         assert turned == pytest.approx(free, abs=200 * EPS)
         assert spin == pytest.approx(np.full(3, one.spin), rel=8 * EPS)
         assert np.abs(omega) == pytest.approx(np.full(3, abs(one.omega)), rel=8 * EPS)
@@ -141,13 +140,13 @@ def test_no_dissipation_is_the_free_arc(growth: float) -> None:
 @pytest.mark.parametrize(("omega", "spin"), [(0j, 2.0), (0j, -2.0), (2.0 + 0j, 0.0), (0j, 0.0)])
 def test_pure_spin_flat_spin_and_rest_stay(growth: float, omega: complex, spin: float) -> None:
     times = np.array([0.0, 10.0, 1e5])
-    transverse, spins, turned = energy_sink.arc(120.0, 80.0, growth, QUATERNION, omega, spin, times)
+    transverse, spins, turned = arc(120.0, 80.0, growth, QUATERNION, omega, spin, times)
     assert np.array_equal(transverse, np.full(3, omega))
     assert np.array_equal(spins, np.full(3, spin))
     assert turned == pytest.approx(
-        attitude.arc(120.0, 80.0, QUATERNION, omega, spin, times), abs=1e-10
+        arc(120.0, 80.0, 0.0, QUATERNION, omega, spin, times)[2], abs=1e-10
     )
-    assert energy_sink.arc(120.0, 80.0, growth, QUATERNION, omega, spin, 10.0)[:2] == (omega, spin)
+    assert arc(120.0, 80.0, growth, QUATERNION, omega, spin, 10.0)[:2] == (omega, spin)
 
 
 def test_small_angles_from_spin_grow_and_from_flat_shrink_by_the_exponential() -> None:
@@ -202,16 +201,16 @@ def test_powered_arcs_agree_with_dop853(moments: Triple, spin: float, torque: Tr
     """And those without torque with the closed form, which has two equal moments."""
     rates0 = reference.vector(0.5, -0.3, spin)
     growth = math.copysign(0.05, moments[0] - 100)
-    pieces = taylor.integrate(
+    pieces = series(
         moments,
         reference.vector(*torque),
         rates0,
         QUATERNION,
         0.0,
         6.0,
-        taylor.Forcing(growth=growth),
+        Forcing(growth=growth),
     )
-    rates, turned = pieces[-1].final
+    rates, turned = pieces[-1].end()
     (expected,) = reference.sinking(
         moments, reference.Motion(rates0, START), reference.vector(*torque), np.array([6.0]), growth
     )
@@ -237,10 +236,10 @@ def test_three_moments_lose_energy_and_end_about_the_largest(
     energies = []
     h = attitude.rotate(turned, rates * moments)
     for start in np.arange(0.0, 200.0, 10.0).tolist():
-        pieces = taylor.integrate(
-            moments, np.zeros(3), rates, turned, start, start + 10.0, taylor.Forcing(growth=growth)
+        pieces = series(
+            moments, np.zeros(3), rates, turned, start, start + 10.0, Forcing(growth=growth)
         )
-        rates, turned = pieces[-1].final
+        rates, turned = pieces[-1].end()
         energies.append(reference.energy(moments, rates))
         assert attitude.rotate(turned, rates * moments) == pytest.approx(h, abs=1e-10)
     assert np.all(np.diff(energies) < 1e-13 * energies[0])
@@ -254,7 +253,7 @@ def test_a_torque_through_rest_takes_few_steps(aside: float) -> None:
     """
     torque = reference.vector(aside, 0, -8)
     rates = reference.vector(0, 0, 1)
-    forcing = taylor.Forcing(growth=0.05)
-    pieces = taylor.integrate((120.0, 120.0, 80.0), torque, rates, QUATERNION, 0.0, 20.0, forcing)
+    forcing = Forcing(growth=0.05)
+    pieces = series((120.0, 120.0, 80.0), torque, rates, QUATERNION, 0.0, 20.0, forcing)
     assert len(pieces) < 200
-    assert pieces[-1].final[0][2] == pytest.approx(-1.0, abs=1e-9)
+    assert pieces[-1].end()[0][2] == pytest.approx(-1.0, abs=1e-9)

@@ -18,11 +18,14 @@ from support import reference
 from support.cases import deep, spread
 from support.golden import refused
 from support.places import case
+from support.spinning import arc, series
 
 from nutdamp.files.reader import load_spacecraft
 from nutdamp.flight.dynamics import make_dynamics
-from nutdamp.physics import attitude, batch, energy_sink, response, taylor, triaxial
+from nutdamp.physics import attitude, energy_sink, response, triaxial
 from nutdamp.physics import body as rigid_body
+from nutdamp.physics.motion import MotionStretch, advance
+from nutdamp.physics.series import Bodies, Forcing
 from nutdamp.spacecraft import requirements
 
 START = np.array([0.5, -0.5, 0.5, 0.5])
@@ -273,14 +276,14 @@ def test_symmetric_limit_is_continuous(axial: float, spin: float) -> None:
     ideal, _ = response.impulse_sum(
         times, omega0, spin, first, axial, np.zeros(0), np.zeros(0, complex), np.zeros(0)
     )
-    arc = attitude.arc(first, axial, START, omega0, spin, times)
+    symmetric = arc(first, axial, 0.0, START, omega0, spin, times)[2]
     for apart in (1e-6, 1e-9, 1e-12, 0.0):
         moments = (first, first * (1.0 + apart), axial)
         rates0 = [omega0.real, omega0.imag, spin]
         track, attitudes = flown(moments, rates0, times)
         assert np.abs(track[:, 0] + 1j * track[:, 1] - ideal).max() < 1e-12 + 100 * apart
         assert np.abs(track[:, 2] - spin).max() < 1e-14 + 10 * apart
-        assert turned(attitudes, arc) < 1e-12 + 1000 * apart
+        assert turned(attitudes, symmetric) < 1e-12 + 1000 * apart
         close = pytest.approx(rigid_body.body_period(first, axial, spin), rel=1e-15 + 5 * apart)
         assert triaxial.nutation_period(moments, rates0) == close
         angle = rigid_body.nutation_angle(first, axial, abs(omega0), spin)
@@ -407,10 +410,11 @@ def test_arcs(A: float, C: float, spin: float, wheel: float) -> None:
     """ω turns in the body at ν = ω3 - H3/A, and the body about H at |H|/A and about axis 3 at ν."""
     motion, quaternion = start(A, C, spin, wheel)
     flown = reference.coast((A, A, C), motion, np.zeros(3), TIMES, wheel=wheel)
-    arc = attitude.arc(A, C, quaternion, OMEGA, spin, TIMES, wheel)
-    ends = [attitude.arc_end(A, C, quaternion, OMEGA, spin, time, wheel) for time in TIMES.tolist()]
-    assert apart(arc, flown) < 1e-10
-    assert np.array(ends) == pytest.approx(arc, abs=1e-12)
+    turns = arc(A, C, 0.0, quaternion, OMEGA, spin, TIMES, wheel)[2]
+    motion_to = A, C, 0.0, quaternion, OMEGA, spin
+    ends = [arc(*motion_to, time, wheel)[2] for time in TIMES.tolist()]
+    assert apart(turns, flown) < 1e-10
+    assert np.array(ends) == pytest.approx(turns, abs=1e-12)
     none = np.zeros(0)
     omega, _ = response.impulse_sum(
         TIMES, OMEGA, spin, A, C, none, none.astype(complex), none, wheel
@@ -425,14 +429,12 @@ def test_arcs_with_dissipation(A: float, C: float, spin: float, wheel: float) ->
     sense = math.copysign(1.0, C * spin + wheel)
     for growth in (0.05, -0.04):
         flown = reference.sinking((A, A, C), motion, np.zeros(3), TIMES, growth, wheel)
-        omega, spins, turned = energy_sink.arc(
-            A, C, growth, quaternion, OMEGA, spin, TIMES, wheel, sense
-        )
+        omega, spins, turned = arc(A, C, growth, quaternion, OMEGA, spin, TIMES, wheel, sense)
         assert np.column_stack([omega.real, omega.imag, spins]) == pytest.approx(
             np.array([m.rates for m in flown]), abs=1e-10
         )
         assert apart(turned, flown) < 1e-10
-        end = energy_sink.arc(A, C, growth, quaternion, OMEGA, spin, 20.0, wheel, sense)
+        end = arc(A, C, growth, quaternion, OMEGA, spin, 20.0, wheel, sense)
         assert end[0] == pytest.approx(omega[-1], abs=1e-12)
         assert end[2] == pytest.approx(turned[-1], abs=1e-12)
         rates = energy_sink.rates_on_arc(A, C, growth, OMEGA, spin, TIMES, wheel, sense)
@@ -547,34 +549,32 @@ def test_series_under_a_torque(
     for time in (0.7, 12.0):
         sense = math.copysign(1.0, moments[2] * spin + wheel)
         span = np.array([time])
-        forcing = taylor.Forcing(growth=growth, wheel=wheel, sense=sense)
+        forcing = Forcing(growth=growth, wheel=wheel, sense=sense)
         flown = (
             reference.sinking(moments, begin, torque, span, growth, wheel)
             if growth
             else reference.coast(moments, begin, torque, span, wheel=wheel)
         )
-        body, turned = taylor.integrate(moments, torque, rates, quaternion, 0.0, time, forcing)[
-            -1
-        ].final
+        body, turned = series(moments, torque, rates, quaternion, 0.0, time, forcing)[-1].end()
         assert body == pytest.approx(flown[0].rates, abs=1e-10)
         assert apart(turned[None], flown) < 1e-10
-        many = batch.Bodies(
+        many = Bodies(
             np.tile(moments, (3, 1)).T, np.zeros(3), forcing._replace(wheel=np.full(3, wheel))
         )
-        here = batch.MotionStretch(
+        here = MotionStretch(
             many,
             np.zeros(3),
             np.tile(rates, (3, 1)).T,
             np.tile(quaternion, (3, 1)).T,
             np.tile(torque, (3, 1)).T,
         )
-        batch.advance(here, np.array([time, 0.5 * time, time]))
+        advance(here, np.array([time, 0.5 * time, time]))
         assert here.rates[:, 2] == pytest.approx(flown[0].rates, abs=1e-10)
         assert apart(here.quaternion[:, 2][None], flown) < 1e-10
-        begun = batch.MotionStretch(
+        begun = MotionStretch(
             many, np.zeros(3), np.tile(rates, (3, 1)).T, np.tile(quaternion, (3, 1)).T
         )
-        batch.advance(begun, np.full(3, time))
+        advance(begun, np.full(3, time))
         free = (
             reference.sinking(moments, begin, np.zeros(3), span, growth, wheel)
             if growth
@@ -597,19 +597,19 @@ def test_widest_cones_of_many_bodies_are_those_that_they_reach(seed: int) -> Non
     wheel = float(draws.normal() * 150.0) if seed % 4 else 0.0
     rates[2] = 0.0 if seed % 7 == 0 else rates[2]
     sense = math.copysign(1.0, moments[2] * rates[2] + wheel)
-    series = taylor.integrate(
+    pieces = series(
         (moments[0], moments[1], moments[2]),
         np.zeros(3),
         rates,
         np.array([1.0, 0, 0, 0]),
         0.0,
         60.0,
-        taylor.Forcing(wheel=wheel),
+        Forcing(wheel=wheel),
     )
     body = np.concatenate(
         [
-            piece.at(np.linspace(piece.start, piece.start + piece.duration, 60))[0]
-            for piece in series
+            piece.motion(np.linspace(piece.start, piece.start + piece.duration, 60))[0]
+            for piece in pieces
         ]
     )
     momentum = body * moments + [0.0, 0.0, wheel]
@@ -632,17 +632,19 @@ def test_stability_and_rate_of_a_small_nutation(spin: float) -> None:
             grows = rigid_body.growth(moments, spin, wheel)
             small = np.array([1e-7, 0.0, spin])
             until = min(15.0 * grows.growth_time, 300.0) if grows.squared_exponent > 0.0 else 40.0
-            series = taylor.integrate(
+            pieces = series(
                 moments,
                 np.zeros(3),
                 small,
                 np.array([1.0, 0, 0, 0]),
                 0.0,
                 until,
-                taylor.Forcing(wheel=wheel),
+                Forcing(wheel=wheel),
             )
             sizes = np.abs(
-                np.concatenate([piece.at(np.array([piece.start]))[0] for piece in series])[:, :2]
+                np.concatenate([piece.motion(np.array([piece.start]))[0] for piece in pieces])[
+                    :, :2
+                ]
             ).max()
             assert grows.stable is bool(sizes < 1e-5)
             if grows.stable:

@@ -36,7 +36,7 @@ from nutdamp.errors import SenselessOption
 from nutdamp.files.reader import example_text, load_spacecraft, read_spacecraft
 from nutdamp.flight import propagation
 from nutdamp.physics import body as rigid_body
-from nutdamp.physics import response, taylor
+from nutdamp.physics import motion, response
 from nutdamp.planning import plan as planning
 from nutdamp.planning.notes import infeasibility, plan_notes
 from nutdamp.schemes.catalogue import CLASSIC, FourPulseOptions, Options
@@ -894,13 +894,13 @@ def test_alignments_are_found_while_the_spin_falls_and_none_in_flat_spin() -> No
 def test_coasts_take_no_steps(scheme: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """With dissipation, only the pulses are integrated: a long wait between them costs nothing."""
     spans = list[float]()
-    integrate = taylor.integrate
+    polynomials = motion.polynomials
 
-    def counted(*args: object, **named: object) -> object:
-        spans.append(float(args[5]) - float(args[4]))  # type: ignore[arg-type]
-        return integrate(*args, **named)  # type: ignore[arg-type]
+    def counted(here: motion.MotionStretch, duration: float, most: int) -> object:
+        spans.append(duration)
+        return polynomials(here, duration, most)
 
-    monkeypatch.setattr(taylor, "integrate", counted)
+    monkeypatch.setattr(motion, "polynomials", counted)
     body = spinner(channels=jets(5.0, 3, 0.5), limits=Limits(horizon=400.0))
     assert planning.plan(replace(body, dissipation=300.0), scheme).feasible
     assert spans

@@ -1,0 +1,573 @@
+"""Motion of rigid bodies, one or many at once: coasts, powered stretches, flights through pulses.
+
+Arrays carry the body last; those of one body have no such axis. Coasts of symmetric bodies without
+external torque are arcs in closed form, with energy dissipation too (`arc`); `triaxial` has the
+free motion of a body with three different moments. All else are the Taylor series of `series`, in
+steps of up to `STRIDE` rad.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nutdamp.common.numerics import cos_sin
+from nutdamp.errors import Infeasible
+from nutdamp.physics import attitude, energy_sink, series
+from nutdamp.physics.energy_sink import TINY
+from nutdamp.physics.series import Bodies, Falling, Forcing, Polynomial, Series
+
+Array = NDArray[np.float64]
+
+STRIDE = 2.5  # largest step, rad; the work per radian is least there
+# H that passes zero turns about within `AT_REST` of the time: 2^-40 of a step resolves that
+HALVINGS = 40
+# share of the largest |H| of a motion below which H counts as at rest for energy dissipation
+AT_REST = 1e-9
+LONGEST = 3e5  # largest angle of one integration, rad: some hundred thousand steps
+MOST_STEPS = 400_000  # of one integration: enough for `LONGEST` whatever the rates on the way
+SHORT = 8.0  # angle up to which steps of one body in turn are quicker than all at once, rad
+FEW = 256  # cases up to which steps summed at once cost less than the calls of steps in turn
+
+
+class MotionStretch(NamedTuple):
+    """Motion of ``bodies`` under one torque, None for a coast, from ``since`` on."""
+
+    bodies: Bodies
+    since: Any  # (n,) s, a number for one body
+    rates: Array  # (3, n) rad/s, at ``since``, as all below
+    quaternion: Array  # (4, n) body -> inertial
+    torque: Array | None = None  # (3, n) N m
+    slope: Array | None = None  # of the torque, (3, n) N m/s
+    falling: Falling | None = None  # of the moments
+
+    def some(self, cases: Any) -> MotionStretch:
+        """Subset of ``cases`` (an index of arrays)."""
+        torque, slope = (None if vector is None else vector[:, cases] for vector in self[4:6])
+        motion = self.since[cases], self.rates[:, cases], self.quaternion[:, cases]
+        return MotionStretch(self.bodies.some(cases), *motion, torque, slope)
+
+    def moved(self, times: Array) -> MotionStretch:
+        """Copy propagated to ``times`` (n,) s."""
+        later = self._replace(rates=self.rates.copy(), quaternion=self.quaternion.copy())
+        advance(later, times - self.since)
+        torque = self.torque_after(times - self.since)
+        return later._replace(since=times, torque=torque)
+
+    def torque_after(self, gone: Any) -> Array | None:
+        """Torque (3, n) N m after ``gone`` (n,) s."""
+        if self.torque is None or self.slope is None:
+            return self.torque
+        return np.asarray(self.torque + self.slope * gone)
+
+    @property
+    def acceleration(self) -> Array:
+        """Constant part of the angular acceleration (3, n), rad/s²."""
+        bodies = self.bodies
+        constant = bodies.constant if bodies.moments.ndim == 1 else bodies.constant[:, None]
+        torque = constant if self.torque is None else constant + self.torque
+        return np.asarray(torque / bodies.moments)
+
+    @property
+    def jerk(self) -> Array | None:
+        """Slope of `acceleration`, rad/s³, or None."""
+        slope = self.slope
+        return None if slope is None or not slope.any() else slope / self.bodies.moments
+
+    def later(self, gone: Any, rates: Array, quaternion: Array) -> MotionStretch:
+        """The same after ``gone`` (n,) s, where ``rates`` and ``quaternion`` are these."""
+        bodies, falling = self.bodies, self.falling
+        if falling is not None:
+            rate, growth = falling
+            moments = bodies.moments + gone * (rate + 0.5 * gone * growth)
+            bodies = replace(bodies, moments=moments)
+            falling = Falling(rate + gone * growth, growth)
+        now = self.since + gone
+        return MotionStretch(
+            bodies, now, rates, quaternion, self.torque_after(gone), self.slope, falling
+        )
+
+
+def arc(
+    A: Any, C: Any, forcing: Forcing, rates: Sequence[Any], quaternion: Sequence[Any], time: Any
+) -> tuple[tuple[Any, Any, Any], tuple[Any, Any, Any, Any]]:
+    """Coast of symmetric bodies, exact: rates (3) and quaternions (4) after ``time`` s.
+
+    Numbers, or arrays that broadcast; at a ``time`` that is a float, plain numbers, a tenth of the
+    cost of arrays.
+    """
+    (x, y, spin), (p, a, b, c), angle = nutated(A, C, forcing, rates, quaternion, time)
+    turn: Any = _cos_sin if isinstance(time, float) else cos_sin
+    cosine, sine = turn(0.5 * angle)
+    turned = (
+        p * cosine - c * sine,
+        a * cosine + b * sine,
+        b * cosine - a * sine,
+        c * cosine + p * sine,
+    )
+    # ω turns by minus the whole angle, whose cosine and sine follow from those of its half.
+    cosine, sine = 1.0 - 2.0 * sine * sine, 2.0 * sine * cosine
+    return (x * cosine + y * sine, y * cosine - x * sine, spin), turned
+
+
+def nutated(
+    A: Any, C: Any, forcing: Forcing, rates: Sequence[Any], quaternion: Sequence[Any], time: Any
+) -> tuple[tuple[Any, Any, Any], tuple[Any, Any, Any, Any], Any]:
+    """`arc` in the frame that turns with the nutation, and the angle of the body about axis 3 in it.
+
+    R(t) = R(0) Rot(H(0)/A t) Rot3(νt), H in body axes: the frame turns about H at |H|/A, and the
+    body in it about its own axis at ν = ω3 - H3/A (Poinsot's rolling cones, Magnus 1970 fig. 4).
+    Without dissipation the rates stay in that frame; with it they and the frame slip as in
+    `energy_sink`. Real or complex: a complex step gives derivatives.
+    """
+    _, growth, wheel, sense = forcing
+    number = isinstance(time, float)
+    sqrt: Any = math.sqrt if number else np.sqrt
+    turn: Any = _cos_sin if number else cos_sin
+    x, y, spin = rates
+    axial = C / A * spin + wheel / A
+    size = sqrt(x * x + y * y + axial * axial) + TINY  # |H|/A
+    cosine, sine = turn(0.5 * size * time)
+    sine = sine / size
+    turned = attitude.product(quaternion, (cosine, sine * x, sine * y, sine * axial))
+    if growth == 0.0:
+        return (x, y, spin), turned, ((1.0 - C / A) * spin - wheel / A) * time
+    course: Any = energy_sink.course if number else energy_sink.courses
+    first, second, along = x / size, y / size, axial / size
+    across = (x + TINY) / size  # at rest, as of flat spin
+    shares = energy_sink.damper(A, C, wheel, A * size, sense)
+    effect = course(growth, along, across * across + second * second, time, shares)
+    slip = (effect.cosine, effect.sine * second, -effect.sine * first, 0.0)
+    slowed = x * effect.transverse, y * effect.transverse, (A * size * effect.along - wheel) / C
+    angle = ((A - C) * size * effect.travel - wheel * time) / C
+    return slowed, attitude.product(turned, slip), angle
+
+
+def _cos_sin(angle: float) -> tuple[float, float]:
+    return math.cos(angle), math.sin(angle)
+
+
+def advance(here: MotionStretch, duration: Any) -> None:
+    """Propagate rates and quaternions by ``duration`` (n,) s, in place."""
+    if not np.any(duration):
+        return
+    bodies, rates, quaternion = here.bodies, here.rates, here.quaternion
+    if here.torque is None and bodies.free and here.falling is None:
+        A, _, C = bodies.moments
+        start = tuple(rates), tuple(quaternion)
+        rates[:], quaternion[:] = arc(A, C, bodies.forcing, *start, duration)
+        quaternion /= np.sqrt(np.sum(quaternion * quaternion, axis=0))
+        return
+    if quaternion.ndim == 2 and len(here.since) <= FEW and _steady(here):
+        _advance_symmetric(here, duration)
+        return
+    for piece in polynomials(here, duration):
+        last = piece
+    rates[:], quaternion[:] = last.end()
+
+
+def _steady(here: MotionStretch) -> bool:
+    """True for symmetric bodies under constant and turning torques without dissipation."""
+    constant = here.jerk is None and here.falling is None
+    return constant and here.bodies.forcing.growth == 0.0 and here.bodies.symmetric
+
+
+def polynomials(here: MotionStretch, duration: Any, most: int = MOST_STEPS) -> Iterator[Polynomial]:
+    """Motion over ``duration`` (n,) s in pieces, one after the other.
+
+    Raises Infeasible beyond `LONGEST` rad or ``most`` steps.
+    """
+    moments, forcing = here.bodies.moments, here.bodies.forcing
+    rates, quaternion = here.rates, here.quaternion
+    acceleration, jerk = here.acceleration, here.jerk
+    strength = _size(acceleration)
+    if jerk is not None:
+        strength = np.maximum(strength, _size(acceleration + jerk * duration))
+    lightest = moments.min(axis=0)
+    driven = abs(forcing.growth) + np.abs(forcing.wheel) / lightest
+    if forcing.turning:
+        strength = strength + sum(abs(size) for size, _ in forcing.turning) / lightest
+    driven = driven + np.sqrt(strength)
+    turning = max((abs(rate) for _, rate in forcing.turning), default=0.0)
+    angle = float(np.max(np.maximum(_size(rates) + driven, turning) * duration))
+    if rates.ndim == 1 and angle > SHORT and _steady(here):
+        yield from _symmetric_polynomials(here, duration, most)
+        return
+    floor = 0.0
+    if forcing.growth != 0.0:
+        size = _size(moments * rates) + np.abs(forcing.wheel)
+        floor = np.square(AT_REST * (size + strength * moments.max(axis=0) * duration)) + TINY
+    ahead = 1.0  # share of the duration
+    share = 1.0  # of the step that the pace of the motion allows
+    for _ in range(most):
+        if not angle * ahead <= LONGEST:
+            raise _refused(here, duration, angle * ahead)
+        length = share * ahead / max(math.ceil(angle * ahead / STRIDE), 1)
+        now = here.later((1.0 - ahead) * duration, rates, quaternion)
+        step = Series(
+            now.bodies,
+            now.since,
+            length * duration,
+            rates,
+            quaternion,
+            now.acceleration,
+            now.jerk,
+            now.falling,
+            floor,
+        )
+        if not step.converges():
+            share *= 0.5
+            if share < 0.5**HALVINGS:
+                break
+            continue
+        yield step.polynomial
+        share = min(2.0 * share, 1.0)
+        ahead -= length
+        if ahead == 0.0:
+            return
+        rates, quaternion = step.polynomial.end()
+        angle = float(np.max(np.maximum(_size(rates) + driven, turning) * duration))
+    raise _refused(here, duration)
+
+
+class DenseStretch(NamedTuple):
+    """Motion from a ``start`` for ``length`` (n,) s: by a ``polynomial``, or in closed form."""
+
+    start: MotionStretch
+    length: Array
+    polynomial: Polynomial | None = None
+
+    def at(self, way: Array, cases: Any) -> MotionStretch:
+        """Motion of ``cases`` after a ``way`` (m,), as a share of the length."""
+        here = self.start.some(cases)
+        since = here.since + way * self.length[cases]
+        if self.polynomial is None:
+            return here.moved(since)
+        rates, quaternion = self.polynomial.at(way, cases)
+        return here._replace(since=since, rates=rates, quaternion=quaternion)
+
+    def steps(self, count: int) -> Iterator[MotionStretch]:
+        """Motion at the end of each of ``count`` steps of equal length."""
+        ways = np.arange(1, count + 1) / count
+        times = self.start.since + ways[:, None] * self.length
+        if self.polynomial is None:
+            yield from map(self.start.moved, times)
+            return
+        for since, rates, quaternion in zip(times, *self.polynomial.along(ways), strict=True):
+            yield self.start._replace(since=since, rates=rates, quaternion=quaternion)
+
+
+def pieces(here: MotionStretch, duration: Array) -> Iterator[DenseStretch]:
+    """Motion that `advance` makes with these arguments, which stay as they are, one piece after the
+    other.
+    """
+    if here.torque is None and here.bodies.free:
+        yield DenseStretch(here, duration)
+        return
+    for piece in polynomials(here, duration):
+        terms = piece.terms[0]
+        start = here._replace(since=piece.start, rates=terms[4:], quaternion=terms[:4])
+        yield DenseStretch(start, piece.duration, piece)
+
+
+def _size(vectors: Array) -> Any:
+    """Length (n,) of vectors (3, n)."""
+    if vectors.ndim == 1:
+        return math.hypot(*vectors.tolist())
+    return np.sqrt(np.sum(vectors * vectors, axis=0))
+
+
+def _refused(here: MotionStretch, duration: Any, angle: float | None = None) -> Infeasible:
+    """Error of a motion over too large an ``angle`` rad, or None of too many steps."""
+    why = "takes too many steps" if angle is None else f"runs over {angle:.2g} rad, too many"
+    whose = "of a dispersed case"
+    if here.rates.ndim == 1:
+        whose = f"from {here.since:.4g} s to {here.since + duration:.4g} s"
+    return Infeasible(
+        f"the motion {whose} {why} to be integrated; shorten the time, "
+        "or look for a torque or rate that is too large"
+    )
+
+
+def _drive(here: MotionStretch) -> series.Drive:
+    """Drive of symmetric bodies; that of one as of an array of one."""
+    A, _, C = here.bodies.moments.reshape(3, -1)
+    first, second, third = here.acceleration.reshape(3, -1)
+    forcing = here.bodies.forcing
+    turning = tuple((np.asarray(size / A), rate) for size, rate in forcing.turning)
+    return series.Drive(1.0 - C / A, first + 1j * second, third, turning, forcing.wheel / A)
+
+
+def _advance_symmetric(here: MotionStretch, duration: Array) -> None:
+    """`advance` by many steps at once."""
+    rates, quaternion = here.rates, here.quaternion
+    drive = _drive(here)
+    omega = rates[0] + 1j * rates[1]
+    spin = rates[2]
+    angle = float(np.max(drive.pace(omega, spin, duration) * duration))
+    if not angle <= LONGEST:
+        raise _refused(here, duration, angle)
+    turned = np.stack([quaternion[0] + 1j * quaternion[3], quaternion[1] + 1j * quaternion[2]])
+    try:
+        omega, rates[2], (first, second) = series.end(
+            drive, omega, spin, turned, here.since, duration
+        )
+    except series.NotConverged:
+        raise _refused(here, duration) from None
+    rates[:2] = omega.real, omega.imag
+    quaternion[:] = first.real, second.real, second.imag, first.imag
+
+
+def _symmetric_polynomials(here: MotionStretch, time: float, most: int) -> Iterator[Polynomial]:
+    """`polynomials` of one body, many steps at once."""
+    drive = _drive(here)
+    omega, spin = np.array([complex(here.rates[0], here.rates[1])]), here.rates[2:]
+    start, duration = np.array([here.since]), np.array([time])
+    angle = float(drive.pace(omega, spin, duration)[0]) * time
+    if angle > most * series.DRIVEN_STRIDE and most < MOST_STEPS:
+        raise _refused(here, time)
+    if not angle <= LONGEST:
+        raise _refused(here, time, angle)
+    count = series.count_for(drive, omega, spin, duration)
+    quaternion, done = here.quaternion, 0
+    try:
+        for steps in series.steps(drive, omega, spin, start, duration, count):
+            done += len(steps.starts)
+            if done > most:
+                raise _refused(here, time)
+            turn = steps.turn[..., 0]  # (k, 2, s)
+            if done > 1:
+                before = series.in_turn(turn.sum(axis=0)[:, :-1, None])[..., 0]
+                later = series.product(before[:, None], np.moveaxis(turn, 1, 0)[:, :, 1:])
+                turn[:, :, 1:] = np.moveaxis(later, 0, 1)
+            p, r = turn[:, 0], turn[:, 1]
+            terms = np.zeros((*p.shape, 7))  # (k, s, 7)
+            turned = np.stack([p.real, r.real, r.imag, p.imag], axis=-1)
+            terms[..., :4] = attitude.multiply(quaternion, turned)
+            terms[..., 4], terms[..., 5] = steps.omega[..., 0].real, steps.omega[..., 0].imag
+            terms[:2, :, 6] = steps.spin[..., 0]
+            step = float(steps.duration[0])
+            for number, begin in enumerate(steps.starts[:, 0].tolist()):
+                piece = Polynomial(begin, step, terms[:, number])
+                yield piece
+            quaternion = piece.end()[1]
+    except series.NotConverged:
+        raise _refused(here, time) from None
+
+
+# --- flights of many bodies through pulses
+
+# cases flown together: enough to hide the cost of calls, few enough that their series stay in the
+# cache
+BLOCK = 2048
+
+
+@dataclass(frozen=True, slots=True)
+class Pulses:
+    """Rectangular pulses; the moments fall half as one begins and half as it ends, which errs in
+    second order.
+    """
+
+    starts: Array  # (k, n) s
+    on_times: Array  # (k, n) s, or (k, 1) for all cases; 0: an ideal impulse
+    impulses: Array  # torque × on-time, (k, 3, n) N m s
+    leans: Array | None = (
+        None  # (k, n): torques run evenly from 1 - lean to 1 + lean times their mean
+    )
+    sheds: Array | None = None  # decrease of the moments, (k, 3, n) kg m²
+
+    def some(self, cases: Any) -> Pulses:
+        """Subset of ``cases`` (an index of arrays)."""
+        on_times = self.on_times if self.on_times.shape[1] == 1 else self.on_times[:, cases]
+        leans = None if self.leans is None else self.leans[:, cases]
+        sheds = None if self.sheds is None else self.sheds[:, :, cases]
+        return Pulses(self.starts[:, cases], on_times, self.impulses[:, :, cases], leans, sheds)
+
+    @property
+    def slopes(self) -> Array | None:
+        """Slope of each torque, (k, 3, n) N m/s; None where all are constant."""
+        if self.leans is None or not self.leans.any():
+            return None
+        lasts = np.where(self.on_times == 0.0, 1.0, self.on_times)
+        return np.asarray(self.impulses * (2.0 * self.leans / lasts**2)[:, None])
+
+    @property
+    def edges(self) -> Array:
+        """Starts and ends in turn, (2k, n) s."""
+        ends = self.starts + self.on_times
+        return np.stack([self.starts, ends], axis=1).reshape(-1, self.starts.shape[1])
+
+    @property
+    def jumps(self) -> tuple[Array, Array]:
+        """Jump at each edge, (2k, 3, n) each: of the torque in N m,
+        and of the momentum in N m s.
+        """
+        on_times = self.on_times[:, None]
+        ideal = on_times == 0.0
+        first = last = np.where(ideal, 0.0, self.impulses / np.where(ideal, 1.0, on_times))
+        kick = np.where(ideal, self.impulses, 0.0)
+        if (
+            self.leans is not None
+        ):  # what begins at its first value, less than its mean, ends at its last
+            leans = self.leans[:, None]
+            first, last = (1.0 - leans) * first, (1.0 + leans) * last
+        return _edgewise(first, -last), _edgewise(kick, 0.0 * kick)
+
+
+def _edgewise(begins: Array, ends: Array) -> Array:
+    """Values at starts and ends (k, 3, n) interleaved, (2k, 3, n)."""
+    return np.stack([begins, ends], axis=1).reshape(-1, *begins.shape[1:])
+
+
+class Observer(Protocol):
+    """Observer of the motion of cases; see `sky`."""
+
+    def some(self, cases: Any) -> Observer:
+        """Observer of a subset of ``cases`` (an index of arrays)."""
+
+    def motion(self, here: MotionStretch, duration: Array) -> None:
+        """Receive the motion that `advance` is about to make with the same arguments."""
+
+
+def fly(
+    bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses, watch: Observer | None = None
+) -> tuple[Array, Array]:
+    """Rates (3, n) rad/s and unit quaternions (4, n), body -> inertial, as the last pulse of each
+    case ends.
+
+    ``rates`` and ``quaternion`` at t = 0; ``watch`` sees the motion until then. Exact to some 1e-13
+    rad for each hundred radians flown. Pulses may overlap and come in any order. Raises Infeasible
+    beyond `LONGEST` rad.
+    """
+    rates, quaternion = np.array(rates, dtype=float), np.array(quaternion, dtype=float)
+    for begin in range(0, rates.shape[1], BLOCK):
+        cases = slice(begin, begin + BLOCK)
+        seen = None if watch is None else watch.some(cases)
+        _fly_block(
+            bodies.some(cases), rates[:, cases], quaternion[:, cases], pulses.some(cases), seen
+        )
+    return rates, quaternion
+
+
+def _fly_block(
+    bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses, watch: Observer | None
+) -> None:
+    """Fly one block, in place."""
+    edges = pulses.edges
+    if not len(edges):
+        return
+    usual = np.argsort(edges.mean(axis=1), kind="stable")
+    sorted_alike = np.all(np.diff(edges[usual], axis=0) >= 0.0, axis=0)
+    if sorted_alike.all():
+        _fly_alike(bodies, rates, quaternion, pulses, watch, usual)
+        return
+    for cases, alike in (
+        (np.flatnonzero(sorted_alike), True),
+        (np.flatnonzero(~sorted_alike), False),
+    ):
+        if len(cases):
+            flown, turned = rates[:, cases], quaternion[:, cases]
+            chosen = (
+                bodies.some(cases),
+                flown,
+                turned,
+                pulses.some(cases),
+                watch and watch.some(cases),
+            )
+            if alike:
+                _fly_alike(*chosen, usual)
+            else:
+                _fly_each(*chosen)
+            rates[:, cases], quaternion[:, cases] = flown, turned
+
+
+def _fly_alike(
+    bodies: Bodies,
+    rates: Array,
+    quaternion: Array,
+    pulses: Pulses,
+    watch: Observer | None,
+    order: NDArray[np.intp],
+) -> None:
+    """Fly cases whose edges have the same ``order``, in place: between pulses all of them coast."""
+    edges, (turns, kicks), slopes = pulses.edges, pulses.jumps, pulses.slopes
+    half = None if pulses.sheds is None else 0.5 * pulses.sheds
+    now = np.zeros(rates.shape[1])
+    on = set[int]()
+    for edge in order.tolist():
+        torque = np.sum(turns[sorted(on)], axis=0) if on else None
+        slope = None
+        if torque is not None and slopes is not None:
+            rising = [first // 2 for first in sorted(on)]
+            slope = np.sum(slopes[rising], axis=0)
+            torque = torque + sum(slopes[number] * (now - edges[2 * number]) for number in rising)
+        _advance(
+            MotionStretch(bodies, now, rates, quaternion, torque, slope), edges[edge] - now, watch
+        )
+        now = edges[edge]
+        number, ends = divmod(edge, 2)
+        bodies = bodies.lighter(None if half is None else half[number])
+        if not np.any(pulses.on_times[number]):
+            rates += kicks[edge] / bodies.moments
+        elif ends:
+            on.remove(edge - 1)
+        else:
+            on.add(edge)
+
+
+def _fly_each(
+    bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses, watch: Observer | None
+) -> None:
+    """Fly cases with different orders of edges, in place.
+
+    Those that coast from one edge to the next go on in closed form: with times widely dispersed one
+    coast may be long where another case has a pulse on, whose steps it would take.
+    """
+    edges = pulses.edges
+    order = np.argsort(edges, axis=0, kind="stable")
+    on = np.cumsum(1 - 2 * (order % 2), axis=0)  # pulses that are on behind each edge
+    edges = np.take_along_axis(edges, order, axis=0)
+    of_each = order[:, None, :]
+    turns, kicks = (np.take_along_axis(jump, of_each, axis=0) for jump in pulses.jumps)
+    slopes = pulses.slopes
+    slope = None
+    half = None
+    if pulses.sheds is not None:
+        half = np.take_along_axis(np.repeat(0.5 * pulses.sheds, 2, axis=0), of_each, axis=0)
+    bends = (
+        None if slopes is None else np.take_along_axis(_edgewise(slopes, -slopes), of_each, axis=0)
+    )
+    now = np.zeros(rates.shape[1])
+    torque = np.zeros_like(rates)
+    for number, (edge, turn, kick) in enumerate(zip(edges, turns, kicks, strict=True)):
+        here = MotionStretch(bodies, now, rates, quaternion, torque, slope)
+        coasts = on[number - 1] == 0 if number else np.ones(len(now), dtype=bool)
+        groups = (
+            (np.flatnonzero(coasts), np.flatnonzero(~coasts))
+            if bodies.free
+            else (np.arange(len(now)),)
+        )
+        for cases in filter(len, groups):
+            part = here.some(cases)
+            if bodies.free and coasts[cases[0]]:
+                part = part._replace(torque=None, slope=None)
+            _advance(part, (edge - now)[cases], watch and watch.some(cases))
+            rates[:, cases], quaternion[:, cases] = part.rates, part.quaternion
+        torque = torque + turn if slope is None else torque + slope * (edge - now) + turn
+        now = edge
+        if bends is not None:
+            slope = bends[number] if slope is None else slope + bends[number]
+        bodies = bodies.lighter(None if half is None else half[number])
+        rates += kick / bodies.moments
+
+
+def _advance(here: MotionStretch, duration: Array, watch: Observer | None) -> None:
+    """Propagate in place; ``watch`` sees the motion before that."""
+    if watch is not None:
+        watch.motion(here, duration)
+    advance(here, duration)
