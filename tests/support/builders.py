@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from types import FrameType
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from support import reference
@@ -96,27 +96,22 @@ def channel(
     return Channel(name, (Thruster(name, turn, push, thrust, isp, min_on_time, max_on_time),))
 
 
-def cross(
-    torque: float, *, min_on_time: float = 0.0, max_on_time: float = math.inf
-) -> tuple[Channel, ...]:
-    """The thrusters of Magnus 1970: +1, -1, +2, -2."""
+def cross(torque: float, label: str = "", **given: Any) -> tuple[Channel, ...]:
+    """The thrusters of Magnus 1970: +1, -1, +2, -2; a ``label`` stands before the number."""
     directions = {
-        "+1": (torque, 0.0, 0.0),
-        "-1": (-torque, 0.0, 0.0),
-        "+2": (0.0, torque, 0.0),
-        "-2": (0.0, -torque, 0.0),
+        f"+{label}1": (torque, 0.0, 0.0),
+        f"-{label}1": (-torque, 0.0, 0.0),
+        f"+{label}2": (0.0, torque, 0.0),
+        f"-{label}2": (0.0, -torque, 0.0),
     }
-    return tuple(
-        channel(name, *direction, min_on_time=min_on_time, max_on_time=max_on_time)
-        for name, direction in directions.items()
-    )
+    return tuple(channel(name, *each, **given) for name, each in directions.items())
 
 
-def fan(count: int, torque: float, first: float = 0.3) -> tuple[Channel, ...]:
+def fan(count: int, torque: float, first: float = 0.3, **given: Any) -> tuple[Channel, ...]:
     """``count`` channels with evenly spread transverse directions."""
     angles = [first + 2 * math.pi * index / count for index in range(count)]
     return tuple(
-        channel(f"T{index}", torque * math.cos(angle), torque * math.sin(angle), 0.0)
+        channel(f"T{index}", torque * math.cos(angle), torque * math.sin(angle), 0.0, **given)
         for index, angle in enumerate(angles)
     )
 

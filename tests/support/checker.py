@@ -1,9 +1,13 @@
-"""Whether a schedule keeps the limits of its spacecraft, written from the contract."""
+"""Whether a schedule keeps the limits of its spacecraft, by the contract; plans that must."""
 
 import itertools
 
 import numpy as np
 
+from nutdamp.flight import propagation
+from nutdamp.planning import plan as planning
+from nutdamp.planning.notes import infeasibility
+from nutdamp.schemes.catalogue import Options
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.schedule import Schedule
 
@@ -50,3 +54,17 @@ def violations(spacecraft: Spacecraft, made: Schedule) -> list[str]:
     if limits.max_pulses is not None and len(made) > limits.max_pulses:
         found.append(f"{len(made)} pulses, allowed are {limits.max_pulses}")
     return found
+
+
+def feasible_by(
+    scheme: str, spacecraft: Spacecraft, options: Options | None = None
+) -> planning.Plan:
+    plan = planning.plan(spacecraft, scheme, options)
+    assert plan.feasible, infeasibility(plan)
+    assert violations(spacecraft, plan.pulses) == []
+    return plan
+
+
+def left(plan: planning.Plan) -> propagation.Residual:
+    assert plan.flown is not None
+    return plan.flown

@@ -13,6 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console, RenderableType
+from support import places
+from support.dispersed import FILE
 from support.process import Run, Status, environment
 
 EXACT = "name: X\ninertia: {A: 120, C: 80}\nomega0: [0.1, 0, 3]\n"
@@ -24,6 +26,111 @@ state: {spin: 30 rpm, nutation: 5 deg, phase: 40 deg}
 attitude: {epoch: 2026-03-01T12:00:00Z, frame: EME2000, quaternion: [0.3, -0.2, 0.9, 0.1]}
 steerable: {torque: 20 N m}
 """
+JETS = """\
+thrusters:
+  - {name: a, torque: [8, 0, 0], lever_arm: 0.8, isp: 220}
+  - {name: b, torque: [-8, 0, 0], lever_arm: 0.8, isp: 220}
+  - {name: c, torque: [0, 8, 0], lever_arm: 0.8, isp: 220}
+  - {name: d, torque: [0, -8, 0], lever_arm: 0.8, isp: 220}
+"""
+CALM = f"""name: Sat
+inertia: {{A: 120, C: 80}}
+state: {{spin: 3 rad/s, nutation: 5 deg, phase: 40 deg}}
+{JETS}"""
+WEAK = """
+name: Weak
+inertia: {A: 120, C: 80}
+state: {spin: 30 rpm, nutation: 5 deg}
+thrusters: [{name: T1, torque: [0, 0.5, 0], max_on_time: 100 ms}]
+requirement: {nutation: 0.01 deg}
+limits: {horizon: 20 s}
+"""
+BALL = "name: Ball\ninertia: {A: 100, C: 100}\nstate: {spin: 30 rpm, nutation: 5 deg}\n"
+TILTED = """
+name: Tilted
+inertia: {tensor: [[120, 0, 2], [0, 118, 0], [2, 0, 80]]}
+omega0: [0.1, 0, 3]
+thrusters: [{name: T1, torque: [0, 8, 0], min_on_time: 20 ms}, {name: SPIN, torque: [0, 0, 5]}]
+"""
+DRAWN = """\
+name: Sat
+inertia: {A: 120, C: 80}
+omega0: [0.1, 0.2, 3]
+thrusters:
+  - {name: left 1, position: [0, 0.3, 0.8], direction: [0, -1, 0], force: 10 N}
+  - {name: T2, torque: [0, 8, 0]}
+  - {name: T3, torque: [0, -8, 0]}
+channels: {+: [left 1], -: [T2]}
+dispersions:
+  A: {normal: 0}
+  thrust: {normal: 3 %}
+  thrust_direction: {normal: 0.5 deg}
+  timing: {uniform: 5 ms}
+"""
+KEEPER = """
+name: Keeper
+inertia: {A: 120, C: 80}
+state: {spin: 30 rpm, nutation: 5 deg}
+steerable: {torque: 60 N m}
+requirement: {nutation: 1 deg}
+attitude: {frame: EME2000, quaternion: [1, 0, 0, 0]}
+keep: [{name: star, direction: [0, 89 deg], min: 5 deg}]
+"""
+BARE = """
+name: Upper
+inertia: {A: 100 kg m^2, C: 70 kg m^2}
+omega0: [0.042 rad/s, 0.036 rad/s, 3 rad/s]
+thrusters:
+  - {name: +M1, torque: [ 20, 0, 0], isp: 220 s, lever_arm: 1 m, min_on_time: 5 ms,
+     max_on_time: 50 ms}
+  - {name: -M1, torque: [-20, 0, 0], isp: 220 s, lever_arm: 1 m, min_on_time: 5 ms,
+     max_on_time: 50 ms}
+  - {name: +M2, torque: [0,  20, 0], isp: 220 s, lever_arm: 1 m, min_on_time: 5 ms,
+     max_on_time: 50 ms}
+  - {name: -M2, torque: [0, -20, 0], isp: 220 s, lever_arm: 1 m, min_on_time: 5 ms,
+     max_on_time: 50 ms}
+requirement: {nutation: 0.3 deg}
+"""
+LOOPED = f"""{BARE}
+loop:
+  sensor: {{kind: gyro, rate: 100 Hz, noise: 0.01 deg/s, bias: 0.02 deg/s, delay: 20 ms}}
+  start: 0.2 deg
+  stop: 0.05 deg
+  min_interval: 0.5 s
+"""
+SEEN = f"""{LOOPED}
+attitude: {{quaternion: [1, 0, 0, 0], epoch: 2026-03-01T12:00:00Z, frame: EME2000}}
+keep: [{{name: star, direction: [0 deg, 85 deg], min: 8 deg}}]
+"""
+GOOD = EXACT.replace("X", "Good")
+STAGE = (places.CONFIGS / "upper-stage.yaml").read_text(encoding="utf-8")
+CRAFTS = {
+    "good_yaml": GOOD,
+    "typo_yaml": GOOD.replace("Good", "Typo").replace("C:", "c:"),
+    "fast_yaml": GOOD.replace("3]", "300]"),
+    "nameless_yaml": "name: X\n",
+    "tilted_yaml": TILTED,
+    "drawn_yaml": DRAWN,
+    "undrawn_yaml": DRAWN.partition("dispersions:")[0],
+    "keeper_yaml": KEEPER,
+    "weak_yaml": WEAK,
+    "axial_yaml": WEAK.replace("[0, 0.5, 0]", "[0, 0, 5]"),
+    "ball_yaml": BALL,
+    "rest_yaml": BALL.replace("5 deg", "0 deg"),
+    "calm_yaml": CALM,
+    "sat_yaml": CALM + "dispersions: {A: {normal: 0.1 %}, thrust: {b: {normal: 30 %}}}\n",
+    "x_yaml": EXACT,
+    "dated_yaml": DATED,
+    "body_yaml": FILE,
+    "bare_yaml": BARE,
+    "craft_yaml": LOOPED,
+    "seen_yaml": SEEN,
+    "free_yaml": SEEN.replace("8 deg", "1 deg"),
+    "stage_yaml": STAGE,
+    "undispersed_yaml": STAGE.partition("dispersions:\n")[0],
+    "unlooped_yaml": STAGE[: STAGE.index("\nloop:")] + "\n" + STAGE[STAGE.index("dispersions:") :],
+}
+"""Spacecraft files for commands, as `written` takes them."""
 WIDER = {
     "A": "0.5 %", "C": "0.5 %", "omega0": "0.1 deg/s", "thrust": "2 %", "thrust_per_pulse": "1 %",
     "thrust_direction": "0.5 deg", "position": "5 mm", "attitude": "0.2 deg",
@@ -82,23 +189,6 @@ def refusals(
         )  # each version of click says more in its own way
         said.append(f"$ {command}\n{shown}")
     return "\n".join(said)
-
-
-def transcript(run: Run, commands: Iterable[str], only: str = "") -> str:
-    """What commands print, behind each of them; behind a semicolon the exit status that is right,
-    where it is not 0.
-
-    Of their results only paragraphs that have what ``only`` is a pattern of.
-    """
-    shown = ""
-    for line in commands:
-        command, _, status = line.partition("; ")
-        ended = call(run, command, status=int(status or 0))
-        kept = "\n\n".join(
-            part for part in ended.stdout.split("\n\n") if re.search(only, part)
-        ).rstrip()
-        shown += f"$ {command}\n{kept}\n{ended.stderr}\n"
-    return shown
 
 
 def words(text: str) -> str:

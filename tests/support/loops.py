@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support.builders import channel, spinner
+from support.builders import channel, cross, fan, spinner
 
 from nutdamp.control_loop import budget
 from nutdamp.physics.attitude import matrix
@@ -15,29 +15,19 @@ from nutdamp.spacecraft.model import Spacecraft, Vector
 
 rad = math.radians
 
-NAMES = {"+M1": (1.0, 0.0), "-M1": (-1.0, 0.0), "+M2": (0.0, 1.0), "-M2": (0.0, -1.0)}
-
 
 def four(
     torque: float = 6.0, least: float = 0.002, most: float = 0.3, **given: Any
 ) -> tuple[Channel, ...]:
     """The channels of Magnus 1970."""
-    return tuple(
-        channel(name, torque * x, torque * y, 0.0, min_on_time=least, max_on_time=most, **given)
-        for name, (x, y) in NAMES.items()
-    )
+    return cross(torque, "M", min_on_time=least, max_on_time=most, **given)
 
 
 def around(
     count: int, torque: float, first: float = 0.0, least: float = 0.002
 ) -> tuple[Channel, ...]:
     """Channels ``T0``, ``T1`` … with torques evenly round axis 3."""
-    angles = [first + 2.0 * math.pi * number / count for number in range(count)]
-    torques = [(torque * math.cos(angle), torque * math.sin(angle), 0.0) for angle in angles]
-    return tuple(
-        channel(f"T{number}", *each, min_on_time=least, max_on_time=1.0)
-        for number, each in enumerate(torques)
-    )
+    return fan(count, torque, first, min_on_time=least, max_on_time=1.0)
 
 
 FOUR = four()

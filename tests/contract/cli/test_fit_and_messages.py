@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from support import places
 from support.builders import present
-from support.commands import BUILT_IN, DATED, WIDE, call, contents, refusals, result, rows, written
+from support.commands import DATED, WIDE, call, contents, refusals, result, written
 from support.golden import check_text
 from support.process import Run
 from support.synthetic import Array, motion
@@ -148,89 +148,6 @@ def test_the_picture_has_a_heading_and_shows_no_rounding_as_noise(run: Run, tmp_
     assert (
         picture.count("only rounding") == 4
     )  # a panel for each rate, and that of the autocorrelation
-
-
-def faults(text: str) -> list[str]:
-    return [
-        line
-        for line in text.removeprefix(BUILT_IN).splitlines()
-        if line and not line.startswith(("Usage", "Try"))
-    ]
-
-
-def test_faults_and_records_without_content(run: Run, tmp_path: Path) -> None:
-    flight(tmp_path, 1)
-    slow = [f"{0.05 * at:.2f},{0.1 + 0.001 * at},0.1" for at in range(20)]
-    many = [f"{at},x,{'y' if at < 6 else 0.1}" for at in range(601)]
-    files = {
-        "bad.csv": ["t_s,omega_1", "0,1"],
-        "short.csv": [RATES[:31], *slow],
-        "many.csv": [RATES[:31], *many],
-    }
-    for name, lines in files.items():
-        (tmp_path / name).write_text("\n".join(lines) + "\n")
-    texts = []
-    for name, output, status in (
-        ("bad.csv", "now.yaml", 2),
-        ("short.csv", "now.yaml", 3),
-        ("many.csv", "now.yaml", 2),
-        ("none.csv", "now.yaml", 1),
-        ("flight.csv", "flight.csv", 2),
-    ):
-        screen = run("fit", name, "-o", output, columns=200)
-        assert (screen.returncode, (tmp_path / "now.yaml").exists()) == (status, False)
-        texts += faults(screen.stderr)
-    check_text("fit.refused", "\n".join(texts))
-
-
-def test_rates_in_another_unit_are_a_fault_of_their_column(run: Run, tmp_path: Path) -> None:
-    texts = []
-    for unit, value in (
-        ("rad_s", 180.0),
-        ("rad_s", 30.0),
-        ("deg_s", math.pi),
-        ("deg_s", -30.0),
-        ("rad_s", math.pi**2 / 180.0),
-    ):
-        lines = [
-            f"{at},{0.1 * math.cos(at)},{value * (1.0 + 1e-3 * math.sin(at))}" for at in range(40)
-        ]
-        (tmp_path / "unit.csv").write_text(
-            "\n".join([f"t_s,omega_1_{unit},omega_3_{unit}", *lines]) + "\n"
-        )
-        texts += faults(run("fit", "unit.csv", status=2).stderr)
-    check_text("fit.units", "\n".join(texts))
-
-
-@pytest.mark.parametrize(
-    ("record", "body", "status", "said"),
-    [
-        ("steady-spin", "tiny", 0, "signal-constant"),
-        ("all-zero", "tiny", 3, "omega_3 does not change"),
-        ("omega12-zero", "tiny", 3, "omega_1 does not change"),
-        ("acc-zero", "sc", 3, "acceleration does not change"),
-        ("gyro-dead_last", "sc", 3, "omega_3 does not change"),
-        ("acc_gyro3-dead_last", "sc", 3, "omega_3 does not change"),
-        ("crossT-dead_one", "sc", 3, "the azimuth of crossing does not change"),
-        ("crossT-stuck_one", "sc", 3, "the azimuth of crossing does not change"),
-        ("crossS-dead_az", "sc", 3, "the azimuth of crossing does not change"),
-        ("gyro-swap12", "sc", 3, "fit-cause: omega_1 and omega_2 swapped"),
-        ("gyro-x57", "sc", 3, "fit-cause: omega_1, omega_2, omega_3 too large (57.3, rad for deg)"),
-        ("gyro-quant", "sc", 0, "fit-coarse: omega_1, omega_2"),
-    ],
-)
-def test_broken_sensors_are_named(
-    run: Run, tmp_path: Path, record: str, body: str, status: int, said: str
-) -> None:
-    """And nothing is written of what they show, but a JSON file."""
-    files = places.case(f"fit-{record}.csv"), places.case(f"fit-{body}.yaml")
-    screen = run("fit", *map(str, files), "-o", "now.yaml", "--json", "f.json")
-    assert (screen.returncode, (tmp_path / "now.yaml").exists()) == (status, status == 0), (
-        screen.stderr
-    )
-    notes = results(tmp_path).get("notes", [])
-    told = [f"{note['code']}: {' '.join(map(str, note['values'].values()))}" for note in notes]
-    assert said in "; ".join([*told, screen.stderr])
 
 
 def test_what_coarse_steps_do_to_an_estimate_is_in_its_sigma(run: Run, tmp_path: Path) -> None:
@@ -562,53 +479,6 @@ def test_what_a_format_needs_is_named_and_can_be_pasted(run: Run, tmp_path: Path
         assert exported(run, f"export {name}.yaml --format aem --scheme one-pulse")
 
 
-def test_epochs_that_messages_cannot_hold_are_refused_with_their_place(
-    run: Run, tmp_path: Path
-) -> None:
-    """And planned without dates. What no file says has no place in one."""
-    late = DATED.replace("2026-03-01T12:00:00Z", "9999-12-31T23:59:59.5Z")
-    written(tmp_path, late_yaml=late, old_yaml=DATED.replace("2026", "1960"))
-    commands = [
-        f"export late.yaml --format {form} --scheme two-pulse"
-        for form in ("apm", "aem", "opm", "stk")
-    ]
-    commands.append(
-        "export late.yaml --format aem-spin --scheme two-pulse --set "
-        "attitude.epoch=9999-12-31T23:59:59Z"
-    )
-    aem = "--format aem --scheme two-pulse"
-    commands += [
-        f"export old.yaml {aem}",
-        f"export old.yaml {aem} --set attitude.epoch=1961-03-01T12:00:00Z",
-    ]
-    commands += ["check old.yaml", "plan late.yaml --scheme two-pulse -o later.yaml --at 1s"]
-    said = refusals(run, tmp_path, commands)
-    check_text("cli.export.epochs", said + "\n" + call(run, "check late.yaml -q").stdout)
-    assert result(run, "plan late.yaml --scheme two-pulse")["plans"][0]["pulses"][1]["utc"] is None
-    assert call(run, "plan late.yaml --scheme two-pulse").returncode == 0
-    far = run(
-        "plan",
-        "-",
-        "--scheme",
-        "one-pulse",
-        stdin=DATED + "limits: {horizon: 1e15, earliest: 9e14}\n",
-    )
-    assert (far.returncode in (0, 3), far.stderr) == (True, "")
-
-
-def test_a_plan_that_misses_the_requirement_is_exported_and_an_infeasible_one_not(
-    run: Run, tmp_path: Path
-) -> None:
-    written(tmp_path, short_yaml=DATED + "limits: {horizon: 1 ms}\n")
-    written(tmp_path, strict_yaml=DATED + "requirement: {momentum_shift: 0.1 deg}\n")
-    infeasible = call(run, "export short.yaml --format apm --scheme two-pulse -o none.apm")
-    assert (infeasible.returncode, (tmp_path / "none.apm").exists()) == (3, False)
-    missed = call(run, "export strict.yaml --format apm --scheme one-pulse -o missed.apm")
-    assert (missed.returncode, (tmp_path / "missed.apm").exists()) == (4, True)
-    assert "warning: one-pulse: NOT ENOUGH: " in missed.stderr
-    assert exported(run, "export strict.yaml --format aem --scheme none")
-
-
 def test_an_orbit_makes_an_opm_whole_and_without_one_it_is_a_part(run: Run, tmp_path: Path) -> None:
     command = (
         "export",
@@ -627,29 +497,6 @@ def test_an_orbit_makes_an_opm_whole_and_without_one_it_is_a_part(run: Run, tmp_
     text = (tmp_path / "whole.xml").read_text()
     assert '<X units="km">42164.0</X>' in text
     assert text.count("<maneuverParameters>") == part.stdout.count("MAN_EPOCH_IGNITION") > 0
-
-
-def test_a_spin_table_needs_no_epoch_and_goes_on_as_requested(run: Run) -> None:
-    table = rows(
-        run("export", "--format", "spin-table", "--scheme", "two-pulse", "--until", "9 s").stdout
-    )
-    assert [row["spin"] for row in table] == ["1", "2", "3", "4", "5"]
-    assert sum(int(row["pulses"]) for row in table) == 2
-
-
-def test_angles_that_are_rounding_are_written_as_0(run: Run) -> None:
-    """The spin axis lies on the equator of the frame, and body axis 1 along the node."""
-    text = exported(
-        run, f"export {places.case('geo-target.yaml')} --format apm --scheme four-pulse"
-    )
-    angles = dict(
-        re.findall(r"^(SPIN_[A-Z]+|NUTATION_PHASE) += (\S+) \[deg\]$", text, re.MULTILINE)
-    )
-    assert (angles["SPIN_ALPHA"], angles["SPIN_DELTA"], angles["SPIN_ANGLE"]) == (
-        "270.0",
-        "0.0",
-        "0.0",
-    )
 
 
 def test_an_imported_schedule_is_simulated(run: Run, tmp_path: Path) -> None:

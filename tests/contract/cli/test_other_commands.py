@@ -12,8 +12,18 @@ from click.shell_completion import ShellComplete
 from support import places
 from support.broken import BROKEN
 from support.cases import spread, weekly
-from support.commands import EXACT, SCHEDULE, call, names, python, refusals, result, rows, written
-from support.golden import check_text
+from support.commands import (
+    CRAFTS,
+    EXACT,
+    GOOD,
+    call,
+    names,
+    python,
+    refusals,
+    result,
+    rows,
+    written,
+)
 from support.process import Run
 
 from nutdamp import __version__, errors
@@ -24,15 +34,6 @@ from nutdamp.planning import capability
 from nutdamp.spacecraft.model import Spacecraft
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
-
-GOOD = EXACT.replace("X", "Good")
-TYPO = GOOD.replace("Good", "Typo").replace("C:", "c:")
-TENSOR = """
-name: Tilted
-inertia: {tensor: [[120, 0, 2], [0, 118, 0], [2, 0, 80]]}
-omega0: [0.1, 0, 3]
-thrusters: [{name: T1, torque: [0, 8, 0], min_on_time: 20 ms}, {name: SPIN, torque: [0, 0, 5]}]
-"""
 
 
 # --- check
@@ -88,28 +89,6 @@ def test_schema_is_json_and_the_version_is_that_of_the_package(run: Run, tmp_pat
 # --------------------------------------------------------------------------------------------------
 
 
-def test_check_prints_derived_quantities(run: Run) -> None:
-    ended, full = run("check"), run("check", "-v")
-    assert ended.returncode == full.returncode == 0
-    check_text("cli.check.example", ended.stdout)
-    check_text("cli.check.full", full.stdout)
-
-
-def test_check_shows_all_faults_of_all_files(run: Run, tmp_path: Path) -> None:
-    written(tmp_path, good_yaml=GOOD, typo_yaml=TYPO, tensor_yaml=TENSOR)
-    # A bad file counts before one that cannot be read.
-    ended = call(
-        run, "check typo.yaml good.yaml missing.yaml tensor.yaml --json check.json", status=2
-    )
-    check_text("cli.check.files", ended.stderr + ended.stdout)
-    files = json.loads((tmp_path / "check.json").read_text())["files"]
-    assert [entry["valid"] for entry in files] == [False, True, False, True]
-    assert files[0]["faults"][0]["line"] == 2
-    assert files[3]["channels"][1]["damps"] is False
-    axes = files[3]["spacecraft"]["principal_axes"]
-    assert axes[0][2] == pytest.approx(-axes[2][0], abs=1e-12)  # the tilt about axis 2
-
-
 def test_check_goes_on_after_what_turns_out_late(
     run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -132,91 +111,9 @@ def test_check_goes_on_after_what_turns_out_late(
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full here")
 def test_a_bad_file_counts_before_a_report_that_cannot_be_written(run: Run, tmp_path: Path) -> None:
-    written(tmp_path, good_yaml=GOOD, typo_yaml=TYPO)
+    written(tmp_path, good_yaml=GOOD, typo_yaml=CRAFTS["typo_yaml"])
     assert call(run, "check good.yaml typo.yaml --json /dev/full").returncode == 2
     assert call(run, "check good.yaml --json /dev/full").returncode == 1
-
-
-def test_warnings_are_shown_by_every_command_and_in_json(run: Run, tmp_path: Path) -> None:
-    """Also by those that are told to be quiet."""
-    written(tmp_path, fast_yaml=GOOD.replace("3]", "300]"))
-    ended = call(run, "check fast.yaml --json check.json", status=0)
-    check_text("cli.check.warning", ended.stderr)
-    (entry,) = json.loads((tmp_path / "check.json").read_text())["files"]
-    (warning,) = entry["warnings"]
-    assert entry["valid"]
-    assert warning.pop("place").endswith(".yaml:3:18")
-    place = {"line": 3, "column": 18, "where": "omega0[2]"}
-    assert warning == place | {"problem": ended.stderr.partition("warning: ")[2].rstrip("\n")}
-    for command in ("check -q", "plan --scheme one-pulse -q", "simulate --scheme none -q"):
-        assert call(run, f"{command} fast.yaml").stderr.startswith(ended.stderr)
-    allowed = [
-        call(run, f"trade --points 1 --set limits.horizon=10ms --allow {angle}")
-        for angle in ("0.1", "0.1deg", "0")
-    ]
-    check_text("cli.check.allow", "\n".join(trade.stderr for trade in allowed))
-
-
-def test_a_misspelt_inertia_stops_every_command(run: Run, tmp_path: Path) -> None:
-    written(tmp_path, typo_yaml=TYPO)
-    commands = [
-        f"{command} typo.yaml"
-        for command in ("plan", "simulate --scheme none", "check", "verify", "report")
-    ]
-    check_text("cli.check.misspelt", refusals(run, tmp_path, commands))
-
-
-def test_what_is_set_is_planned_and_checked_in_all_files(run: Run, tmp_path: Path) -> None:
-    planned = result(
-        run,
-        (
-            "plan -q --nominal --scheme four-pulse "
-            "--set 'state.nutation=8 deg' --set limits.horizon=300s"
-        ),
-    )
-    assert planned["spacecraft"]["nutation_deg"] == pytest.approx(8.0)
-    for name in ("a.yaml", "b.yaml"):
-        run("init", name)
-    assert call(run, "check a.yaml b.yaml --set 'state.spin=31 rpm'").stdout.count("31 rpm") == 2
-    (fault,) = result(run, "check a.yaml --set mass=0", status=2)["files"][0]["faults"]
-    assert (fault["line"], fault["column"], fault["where"]) == (None, None, "mass")
-    assert fault["place"].startswith("--set mass=")
-
-
-DISPERSED = """\
-name: Sat
-inertia: {A: 120, C: 80}
-omega0: [0.1, 0.2, 3]
-thrusters:
-  - {name: left 1, position: [0, 0.3, 0.8], direction: [0, -1, 0], force: 10 N}
-  - {name: T2, torque: [0, 8, 0]}
-  - {name: T3, torque: [0, -8, 0]}
-channels: {+: [left 1], -: [T2]}
-dispersions:
-  A: {normal: 0}
-  thrust: {normal: 3 %}
-  thrust_direction: {normal: 0.5 deg}
-  timing: {uniform: 5 ms}
-"""
-
-
-def test_check_says_what_could_be_drawn_and_what_touches_nothing_that_can_fire(
-    run: Run, tmp_path: Path
-) -> None:
-    written(tmp_path, sat_yaml=DISPERSED, exact_yaml=DISPERSED.partition("dispersions:")[0])
-    check_text("cli.check.dispersions", run("check", "sat.yaml", "-v").stdout)
-    inputs = [
-        "thrust left 1",
-        "thrust T2",
-        "direction left 1 a",
-        "direction left 1 b",
-        "timing of each pulse",
-    ]
-    dispersions = result(run, "check sat.yaml")["files"][0]["dispersions"]
-    assert [entry["name"] for entry in dispersions["inputs"]] == inputs
-    assert set(dispersions["unused"]) == {"A", "thrust T3", "direction T2", "direction T3"}
-    assert "dispersion" not in run("check", "exact.yaml").stdout
-    assert result(run, "check exact.yaml")["files"][0]["dispersions"] is None
 
 
 def test_of_very_many_faults_the_first_hundred_are_shown(run: Run, tmp_path: Path) -> None:
@@ -400,19 +297,6 @@ def test_products_of_small_matrices_have_one_thread(tmp_path: Path) -> None:
 
 # --- simulate: schemes, schedules and free motion, their track, and the exit status
 
-ATTITUDE = "attitude={epoch: 2026-03-01T12:00:00Z, frame: EME2000, quaternion: [1, 0, 0, 0]}"
-
-
-def test_the_screen_of_a_scheme(run: Run) -> None:
-    """With right ascension and declination where the file has an attitude."""
-    plain, full = (run("simulate", "--scheme", "two-pulse", *more) for more in ((), ("-v",)))
-    dated = run("simulate", "--scheme", "two-pulse", "-v", "--set", ATTITUDE)
-    assert plain.returncode == full.returncode == dated.returncode == 0
-    check_text("cli.simulate.screen", plain.stdout)
-    check_text("cli.simulate.full", full.stdout)
-    assert "right ascension" in dated.stdout
-    assert "EME2000" in dated.stdout
-
 
 def test_the_track_has_the_columns_of_the_contract(run: Run, tmp_path: Path) -> None:
     assert (
@@ -469,22 +353,6 @@ def test_a_written_schedule_is_judged_as_the_plan_wherever_the_simulation_ends(
     assert ("note[judged-at-end]" in screen) is grows
 
 
-def test_schedules_by_hand_may_be_short_and_settings_are_doubted(run: Run, tmp_path: Path) -> None:
-    written(
-        tmp_path,
-        own_csv=SCHEDULE.replace(",channel", "").replace("1,0,steerable,4", "1,0,-5")
-        + "2,0.5,0,4,0\n",
-    )
-    first, second = result(run, "simulate --schedule own.csv", status=4)["pulses"]
-    assert first["torque_Nm"] is None
-    assert second["torque_Nm"] == pytest.approx([0, 8, 0])
-    run("plan", "--scheme", "one-pulse", "--csv", "pulses.csv")
-    edited = run(
-        "simulate", "--schedule", "pulses.csv", "--set", "state.nutation=0.2", "--quiet", status=4
-    )
-    check_text("cli.simulate.doubts", edited.stderr)  # which --quiet leaves
-
-
 def test_without_a_scheme_the_recommended_plan_is_propagated_and_named(run: Run) -> None:
     ended = run("simulate", status=0)
     assert "using recommended plan: two-pulse\n" in ended.stderr
@@ -500,51 +368,3 @@ def test_free_motion_keeps_its_nutation_and_the_end_can_be_chosen(run: Run) -> N
     early = result(run, "simulate --scheme two-pulse --until '3 s'")
     assert early["until_s"] == 3.0
     assert early["flown"]["nutation_deg"] > 1.0  # the second pulse is still to come
-
-
-def test_the_exit_status_is_that_of_plan(run: Run, tmp_path: Path) -> None:
-    """3 where the scheme is infeasible, 4 where its plan is not shown to comply; so for none."""
-    written(tmp_path, ideal_yaml=EXACT)
-    infeasible = run("simulate", "ideal.yaml", "--scheme", "four-pulse")
-    assert (infeasible.returncode, "infeasible" in infeasible.stderr) == (3, True)
-    tight = ("--set", "requirement.momentum_shift=1e-4 deg")
-    for scheme, settings, status in (
-        ("one-pulse", (), 4),
-        ("two-pulse", (), 0),
-        ("two-pulse", tight, 4),
-    ):
-        assert run("plan", "--scheme", scheme, *settings).returncode == status
-        ended = run("simulate", "--scheme", scheme, *settings)
-        assert (ended.returncode, "\nNOT ENOUGH: " in ended.stdout) == (status, status == 4)
-    assert run("simulate", "--scheme", "none", *tight).returncode == 4
-    early = run("simulate", "--scheme", "two-pulse", "--until", "1 ms")
-    assert (early.returncode, "0 to 0.001 s" in early.stdout) == (0, True)
-
-
-KEEPER = """
-name: Keeper
-inertia: {A: 120, C: 80}
-state: {spin: 30 rpm, nutation: 5 deg}
-steerable: {torque: 60 N m}
-requirement: {nutation: 1 deg}
-attitude: {frame: EME2000, quaternion: [1, 0, 0, 0]}
-keep: [{name: star, direction: [0, 89 deg], min: 5 deg}]
-"""
-
-
-def test_a_broken_cone_is_exit_4_and_said_once(run: Run, tmp_path: Path) -> None:
-    """By the verdict on the screen; as a remark where the results take the place of the screen."""
-    command = ("simulate", "-", "--scheme", "two-pulse")
-    assert run(*command, "--set", "keep=[]", stdin=KEEPER).returncode == 0
-    assert run(*command, "--json", "end.json", stdin=KEEPER).returncode == 4
-    assert json.loads((tmp_path / "end.json").read_text())["decision"]["met"] is False
-    for named in (command, command[:2]):
-        for outputs in ((), ("--json", "-")):
-            ended = run(*named, *outputs, stdin=KEEPER)
-            said = " ".join((ended.stderr + ended.stdout * (not outputs)).split())
-            assert said.lower().count("the spin axis comes to") == 1
-
-
-def test_with_a_target_the_screen_says_how_far_off_it_ends(run: Run) -> None:
-    done = run("simulate", "--scheme", "none", "--target", "10deg,45deg", "--samples", "2")
-    assert "axis error" in done.stdout

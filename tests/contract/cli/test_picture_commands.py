@@ -12,13 +12,11 @@ import pytest
 from support import places
 from support.cases import deep, spread, weekly
 from support.commands import (
-    BUILT_IN,
     EXACT,
     call,
     contents,
     names,
     python,
-    refusals,
     words,
     written,
 )
@@ -148,14 +146,6 @@ def test_a_film_is_written_whole_and_ends_soon_after_the_last_pulse(
 
 
 @pytest.mark.deep
-def test_a_film_of_a_schedule_file(run: Run, tmp_path: Path) -> None:
-    run("plan", "--scheme", "two-pulse", "--csv", "pulses.csv")
-    ended = run("animate", "--schedule", "pulses.csv", "-q", "-o", "a.gif", *FILM)
-    assert (ended.returncode, ended.stderr) == (0, BUILT_IN)
-    assert (tmp_path / "a.gif").exists()
-
-
-@pytest.mark.deep
 def test_figure_film_and_page_name_the_plan_that_they_show(
     run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -196,23 +186,6 @@ def test_figure_film_and_page_name_the_plan_that_they_show(
         run("report", craft, "-q", "--schedule", "p.csv", "-o", "b.html").returncode == 4
     )  # single pulses
     assert "--scheme p.csv" not in parsed((tmp_path / "b.html").read_text(encoding="utf-8")).text
-
-
-@pytest.mark.deep
-def test_a_spin_up_along_the_axis_is_drawn(run: Run, tmp_path: Path) -> None:
-    """Its only channel has no torque across the spin axis."""
-    craft = (str(places.CONFIGS / "genesis.yaml"), "-q", "--spin", "10rpm")
-    assert run("plan", *craft, "--plot", "a.png").returncode == 0
-    assert run("report", *craft, "-o", "a.html").returncode == 0
-    assert names(tmp_path) == ["a.html", "a.png"]
-
-
-def test_an_infeasible_plan_has_no_picture(run: Run, tmp_path: Path) -> None:
-    written(tmp_path, ideal_yaml=EXACT)
-    picture = run("plan", "ideal.yaml", "--scheme", "four-pulse", "--plot", "a.png")
-    assert (picture.returncode, "a.png was not written" in picture.stderr) == (3, True)
-    assert run("animate", "ideal.yaml", "--scheme", "four-pulse", "-o", "a.gif").returncode == 3
-    assert names(tmp_path) == ["ideal.yaml"]
 
 
 LACKING = """
@@ -417,13 +390,6 @@ def test_a_page_with_the_robust_plan_recommends_what_plan_robust_does(
     assert (
         f"{100.0 * data['robust']['recommended']['met_fraction']:.2f} % of cases comply"
         in verdict_of(tmp_path, "met")
-    )
-
-
-def test_an_old_page_stays_where_the_new_one_cannot_be_made(run: Run, tmp_path: Path) -> None:
-    written(tmp_path, report_html="old", nameless_yaml="name: X\n", craft_yaml=EXACT)
-    assert "has no dispersions" in refusals(
-        run, tmp_path, ["report nameless.yaml", "report craft.yaml --disperse 100"]
     )
 
 

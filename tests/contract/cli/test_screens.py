@@ -467,14 +467,3 @@ def test_files_are_si(run: Run, tmp_path: Path, command: str) -> None:
     for units in ("si", "us"):
         call(run, command.replace("FILE", units) + f" -q --units {units}")
     assert (tmp_path / "us").read_bytes() == (tmp_path / "si").read_bytes()
-
-
-def test_reasons_without_a_plan_have_no_units(run: Run) -> None:
-    """A torquer too weak for half the nutation."""
-    weak = call(
-        run,
-        "plan -v --scheme two-pulse --set steerable.torque=0.1 --set thrusters=[] --units us -q",
-        status=3,
-    )
-    assert "infeasible" in weak.stdout
-    assert not SI_UNITS.findall(weak.stdout)

@@ -22,7 +22,6 @@ from support.commands import (
     names,
     python,
     refusals,
-    result,
     written,
 )
 from support.golden import check_text
@@ -235,16 +234,6 @@ def test_sigterm_while_a_file_is_written_leaves_what_was_there(tmp_path: Path) -
 
 # --- where nothing is feasible
 # ----------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    "command",
-    ["plan", "simulate --scheme two-pulse", "verify", "disperse", "trade --points 1", "loop"],
-)
-def test_where_nothing_is_feasible_the_json_file_says_so(run: Run, command: str) -> None:
-    data = result(run, f"{command} {places.case('infeasible.yaml')}", status=3)
-    assert data["spacecraft"]["name"] == "infeasible"
-    assert data.get("feasible") is False or data.get("recommended", 0) is None or "fronts" in data
 
 
 # --- names that look like markup, control the terminal, or are not UTF-8
@@ -684,11 +673,6 @@ def test_what_cannot_be_read_or_written_is_exit_1(run: Run, tmp_path: Path) -> N
     )
     commands = [f"{command} --quiet" for command in UNREACHABLE]
     check_text("cli.refused.unreachable", refusals(run, tmp_path, commands, 1))
-
-
-def test_a_bad_file_is_reported_before_a_missing_folder(run: Run, tmp_path: Path) -> None:
-    written(tmp_path, bad_yaml="name: 5")
-    assert run("plan", "bad.yaml", "--csv", "no/x.csv").returncode == 2
 
 
 @pytest.mark.skipif(os.name != "posix", reason="links and devices")

@@ -26,8 +26,7 @@ from support.builders import (
     within,
 )
 from support.cases import deep, spread, weekly
-from support.checker import violations
-from support.feasible import feasible_by, left
+from support.checker import feasible_by, left, violations
 from support.golden import check_text, refused
 from support.places import case
 from support.process import Run

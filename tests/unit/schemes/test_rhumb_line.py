@@ -22,7 +22,7 @@ from support.builders import (
     spinner,
 )
 from support.cases import deep, spread
-from support.feasible import feasible_by, left
+from support.checker import feasible_by, left
 from support.golden import check_text
 from support.places import case
 
