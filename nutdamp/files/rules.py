@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import operator
 from collections.abc import Callable, Iterator
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -218,20 +220,21 @@ def _wrong(facts: Facts, path: KeyPath, _: str, problem: str) -> Iterator[Findin
         yield Finding(path, problem, facts.text(*path) is None)
 
 
-def _at_most(facts: Facts, path: KeyPath, other: str, kind: str) -> Iterator[Finding]:
+def _bounded(
+    fits: Callable[[float, float], bool],
+    fault: str,
+    expected: str,
+    facts: Facts,
+    path: KeyPath,
+    other: str,
+    kind: str,
+) -> Iterator[Finding]:
+    """A quantity that fits another one, where both can be read."""
     place = _place(path, other)
     value, limit = facts.number(kind, *path), facts.number(kind, *place)
-    if value is not None and limit is not None and value > limit:
-        problem = f"{amount(kind, value)} exceeds {dotted(place)}"
-        yield Finding(path, f"{problem}; expected at most {amount(kind, limit)}")
-
-
-def _below(facts: Facts, path: KeyPath, other: str, kind: str) -> Iterator[Finding]:
-    place = _place(path, other)
-    value, limit = facts.number(kind, *path), facts.number(kind, *place)
-    if value is not None and limit is not None and value >= limit:
-        problem = f"{amount(kind, value)} is not below {dotted(place)}"
-        yield Finding(path, f"{problem}; expected less than {amount(kind, limit)}")
+    if value is not None and limit is not None and not fits(value, limit):
+        problem = f"{amount(kind, value)} {fault} {dotted(place)}"
+        yield Finding(path, f"{problem}; expected {expected} {amount(kind, limit)}")
 
 
 def _not_zero(facts: Facts, path: KeyPath, kind: str, cure: str) -> Iterator[Finding]:
@@ -259,8 +262,11 @@ def _once(facts: Facts, path: KeyPath, key: str, cure: str) -> Iterator[Finding]
     for entry in facts.below(*path):
         place: KeyPath = (*entry, key) if key else entry
         name = facts.text(*place)
-        if name is not None and (other := first.setdefault(name, entry)) != entry:
-            yield Finding(place, f"{shown(name)} is given twice, first in {dotted(other)}; {cure}")
+        if name in first:
+            problem = f"{shown(name)} is given twice, first in {dotted(first[name])}"
+            yield Finding(place, f"{problem}; {cure}")
+        elif name is not None:
+            first[name] = entry
 
 
 def _named(facts: Facts, path: KeyPath, what: str, _: str) -> Iterator[Finding]:
@@ -306,8 +312,8 @@ KINDS_OF_RULES: dict[str, Callable[[Facts, KeyPath, str, str], Iterator[Finding]
     "missing": _missing,
     "completes": _completes,
     "wrong": _wrong,
-    "at most": _at_most,
-    "below": _below,
+    "at most": partial(_bounded, operator.le, "exceeds", "at most"),
+    "below": partial(_bounded, operator.lt, "is not below", "less than"),
     "not zero": _not_zero,
     "rising": _rising,
     "once": _once,
