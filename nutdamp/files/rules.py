@@ -17,7 +17,6 @@ from nutdamp.files.facts import (
     Finding,
     Vector,
     force_vector,
-    moments_fault,
     symmetric,
     tensor_fault,
 )
@@ -449,18 +448,6 @@ def _tank(facts: Facts) -> Iterator[Finding]:
         for key, other in (("isp", ("tank", "isp")), ("lever_arm", (*path, "force"))):
             if not facts.has(*path, key) and not facts.has(*other):
                 yield Finding((*path, key), "missing; by it tank knows the propellant used")
-    # Once all propellant is used, the moments must be those of a body.
-    path = ("tank", "inertia_per_kg")
-    propellant = facts.number("mass", "tank", "propellant")
-    rows = facts.vector("shed", 3, *path)
-    transverse, axial = (facts.number("shed", *path, key) for key in "AC")
-    if rows is None and transverse is not None and axial is not None:
-        rows = np.array([transverse, transverse, axial])
-    if propellant is None or facts.principal is None or rows is None:
-        return
-    fault = moments_fault(np.asarray(facts.principal[0]) - propellant * rows)
-    if fault is not None:
-        yield Finding(path, f"once {propellant:g} kg are used it leaves {fault}")
 
 
 def _dispersions(facts: Facts) -> Iterator[Finding]:
@@ -540,7 +527,7 @@ def correlation_findings(spacecraft: Spacecraft) -> Iterator[Finding]:
     fixed = {entry.name for entry in inputs.drawn if entry.kind == "bias"}
     before: set[frozenset[str]] = set()
     faults: list[Finding] = []
-    for row, (first, second, size) in enumerate(pairs):
+    for row, (first, second, _) in enumerate(pairs):
         for place, name in enumerate((first, second)):
             if name not in correlated:
                 close = nearest(name, correlated)
@@ -558,9 +545,6 @@ def correlation_findings(spacecraft: Spacecraft) -> Iterator[Finding]:
         elif frozenset((first, second)) in before:
             problem = f"{first} and {second} are given before; keep one of the two"
             faults.append(Finding((*path, row), problem))
-        elif abs(size) == 1.0:
-            problem = f"{size:g}: one would follow from the other; expected less than 1 in size"
-            faults.append(Finding((*path, row, 2), problem))
         before.add(frozenset((first, second)))
     yield from faults
     for group in () if faults else grouped(pairs):
