@@ -182,22 +182,22 @@ def _split(text: str, kind: str, bare: bool) -> tuple[float, float]:
         raise ValueError(
             f"{shown(text)} has no unit; add {expected.units}, or leave the quotes out"
         )
-    known = next(
+    named_unit = next(
         ((name, factor) for spelling, name, factor in _UNITS if spelling.fullmatch(unit)), None
     )
-    if known is None or (known[0] == "frequency" and kind != "frequency"):
+    if named_unit is None or (named_unit[0] == "frequency" and kind != "frequency"):
         noun = expected.noun.partition(" ")[2]
         turns = kind in ("rate", "angle") and _TURNS.fullmatch(unit)
         hint = f" ({match[2]} hides a factor 2π)" if turns else ""
         raise ValueError(
             f"{shown(text)}: {shown(match[2])} is not a unit of {noun}; use {expected.units}{hint}"
         )
-    if known[0] != kind:
+    if named_unit[0] != kind:
         raise ValueError(
-            f"{shown(text)} is {KINDS[known[0]].noun}; expected {expected.noun}: "
+            f"{shown(text)} is {KINDS[named_unit[0]].noun}; expected {expected.noun}: "
             f"{expected.expected}"
         )
-    return number, known[1]
+    return number, named_unit[1]
 
 
 def pattern(kind: str) -> str:

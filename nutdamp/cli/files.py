@@ -70,23 +70,23 @@ def check_command(
     from nutdamp.views.check import check_json, check_screen, checked, failed_json
 
     inputs = [FileInput(file, settings) for file in files or (None,)]
-    silent = expect_outputs(*(given.read for given in inputs), json=json)
+    silent = expect_outputs(*(entry.read for entry in inputs), json=json)
     remark = (lambda _: None) if quiet else say
     reports: list[dict[str, Any]] = []
     failures: set[int] = set()
-    for given in inputs:
+    for entry in inputs:
         doubts: list[Fault] = []
         try:
             result = checked(
-                given.source(remark, lambda text: say(f"warning: {text}")),
-                given.path,
+                entry.source(remark, lambda text: say(f"warning: {text}")),
+                entry.path,
                 doubts,
                 lambda doubt: say(doubt.as_warning),
             )
         except (FaultyFile, CannotRead) as wrong:
             tell(wrong)
             failures.add(BAD_INPUT if isinstance(wrong, FaultyFile) else UNREADABLE)
-            reports.append(failed_json(given.path, wrong, doubts))
+            reports.append(failed_json(entry.path, wrong, doubts))
             continue
         reports.append(result.to_dict())
         if not silent:
@@ -483,7 +483,9 @@ def report_command(
     from nutdamp.planning.decision import compare_plans
     from nutdamp.spacecraft.tolerances import expect_dispersions
 
-    kept = controlled(**{name: value for name, value in control.items() if value is not None})
+    identification = controlled(
+        **{name: value for name, value in control.items() if value is not None}
+    )
     if disperse is not None or robust:
         expect_dispersions(spacecraft.dispersions)
         if nominal:
@@ -505,7 +507,7 @@ def report_command(
     )
     with job.working("writing the page"):
         repeat = repeated(shlex.join(["nutdamp", *sys.argv[1:]]), job.source, job.aim.words)
-        report = made_of(compared, repeat, kept, fronts)
+        report = made_of(compared, repeat, identification, fronts)
     deliver([(output, lambda: report.content)])
     if not report.good:
         job.remark(report.summary)

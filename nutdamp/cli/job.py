@@ -132,13 +132,13 @@ def spacecraft_argument(command: Command) -> Command:
     )
 
 
-def placed(wrong: Unsuitable, given: FileInput) -> NutdampError:
+def placed(wrong: Unsuitable, named: FileInput) -> NutdampError:
     """The error as a fault with its place in the spacecraft file, where it comes from one."""
-    if given.path == "-" or any(wrong.where[:1] == setting.path[:1] for setting in given.settings):
+    if named.path == "-" or any(wrong.where[:1] == setting.path[:1] for setting in named.settings):
         return wrong
     from nutdamp.files.yaml import dotted, read_tree
 
-    source = given.source(lambda _: None, lambda _: None)
+    source = named.source(lambda _: None, lambda _: None)
     place = read_tree(source.text, source.name)[0].place_of(wrong.where)
     return FaultyFile(
         [Fault(source.name, place.line, place.column, dotted(wrong.where), wrong.problem)]
@@ -273,7 +273,7 @@ class Job:
         spacecraft = self.source.read(lambda doubt: say(doubt.as_warning))
         self.spacecraft = (
             self.aim.applied(spacecraft, self.doubt)
-            if any(given is not None for given in self.aim)
+            if any(value is not None for value in self.aim)
             else spacecraft
         )
         from nutdamp.files.tabular import check_place
@@ -359,7 +359,7 @@ class Job:
 def job_of(command: click.Command, parameters: dict[str, Any]) -> Job:
     """The job of a command line; the ``parameters`` that belong to it are taken from them."""
     types = {each.name: each.type for each in command.params if each.name in parameters}
-    given = FileInput(parameters.pop("spacecraft", None), parameters.pop("settings", ()))
+    spacecraft = FileInput(parameters.pop("spacecraft", None), parameters.pop("settings", ()))
     written = {
         name: parameters.pop(name)
         for name, kind in types.items()
@@ -378,7 +378,7 @@ def job_of(command: click.Command, parameters: dict[str, Any]) -> Job:
     aim = Aim(**{name: parameters.pop(name) for name in Aim._fields if name in parameters})
     usual = next((str(each.default) for each in command.params if each.name == "figure"), None)
     figure, quiet = parameters.pop("figure", None), parameters.pop("quiet", False)
-    return Job(given, read, written, flown, options, aim, figure, usual, quiet)
+    return Job(spacecraft, read, written, flown, options, aim, figure, usual, quiet)
 
 
 def write_infeasible(context: click.Context, reason: Exception) -> None:

@@ -231,9 +231,11 @@ def scheme_options(command: Command) -> Command:
 
 def options_in(command: click.Command, parameters: dict[str, Any]) -> Options:
     """Options of the schemes, taken from ``parameters``; a usage error for a senseless one."""
-    known = {*SHARED, *_fields()}
+    names_of_options = {*SHARED, *_fields()}
     names = [
-        each.name for each in command.params if isinstance(each, Grouped) and each.name in known
+        each.name
+        for each in command.params
+        if isinstance(each, Grouped) and each.name in names_of_options
     ]
     taken = {name: parameters.pop(name) for name in names if name is not None}
     try:

@@ -188,6 +188,10 @@ class _Progress:
         text = f"{text}, {math.floor(100.0 * self.share)} % done"
         if not BELIEVED <= self.share < 1.0:
             return text
-        left = (self.moment - self.began) / self.share - (now - self.began)
-        words = f"{math.ceil(left)} s" if left < 120.0 else f"{math.ceil(left / 60.0)} min"
-        return f"{text}, about {words} left" if left > 0.0 else text
+        remaining = (self.moment - self.began) / self.share - (now - self.began)
+        words = (
+            f"{math.ceil(remaining)} s"
+            if remaining < 120.0
+            else f"{math.ceil(remaining / 60.0)} min"
+        )
+        return f"{text}, about {words} left" if remaining > 0.0 else text

@@ -69,13 +69,13 @@ def later(flight: Flight, time: float) -> Later:
     used = float(flight.schedule.used_by(moment)[0])
     inertia, tank, turned = before.inertia, before.tank, before.attitude
     if tank is not None:
-        left = tank.propellant - tank.used - used
-        if left <= 0.0:
+        propellant = tank.propellant - tank.used - used
+        if propellant <= 0.0:
             raise BadRequest(
                 f"no propellant is left in the tank at {time:.6g} s: no file can hold that"
             )
         tank = replace(
-            tank, propellant=left, pressure=tank.pressure_after(tank.used + used), used=0.0
+            tank, propellant=propellant, pressure=tank.pressure_after(tank.used + used), used=0.0
         )
     if turned is not None:
         of_file = attitude.multiply(quaternions[0], attitude.from_matrix(inertia.axes.T))
@@ -119,12 +119,12 @@ def carried_text(flight: Flight, time: float, source: object) -> str:
     Raises BadRequest as `later` does, for values that an alias stands for, and where no file was
     read.
     """
-    given = _expected(source, "carried")
-    of_file = given.read(lambda _: None)
+    origin = _expected(source, "carried")
+    of_file = origin.read(lambda _: None)
     moved_on = later(
         replace(flight, spacecraft=replace(flight.spacecraft, goal=of_file.goal)), time
     )
-    return carry_text(*given[:3], lambda tree: _edits(tree, moved_on))
+    return carry_text(*origin[:3], lambda tree: _edits(tree, moved_on))
 
 
 def carried_spacecraft(plan: Plan, time: float) -> Spacecraft:
@@ -228,11 +228,11 @@ def notes(fit: Fit, carried: Carried) -> Iterator[Note]:
         kind, _, channel = parameter.name.partition(" ")
         if kind == "thrust" and factor <= LEAST_THRUST:
             silent = factor > -LEAST_THRUST
-            given = 100.0 * factor
+            percent = 100.0 * factor
             yield note(
                 "fit-no-thrust" if silent else "fit-thrust-reversed",
                 channel=channel,
-                thrust_percent=given,
+                thrust_percent=percent,
             )
     if carried.time != 0.0:
         yield from _limits_anew(spacecraft, carried.time)
@@ -250,15 +250,15 @@ def _fitted_edits(tree: Node, fit: Fit, carried: Carried) -> Edits:
     before = fit.model.spacecraft
     large = _seen(fit)
     after = replaced(before, carried)
-    given = before.attitude
+    start = before.attitude
     if (
-        given is not None
-        and given.epoch is not None
+        start is not None
+        and start.epoch is not None
         and after.attitude is not None
         and carried.time != 0.0
     ):
         after = replace(
-            after, attitude=replace(after.attitude, epoch=epoch_after(given.epoch, carried.time))
+            after, attitude=replace(after.attitude, epoch=epoch_after(start.epoch, carried.time))
         )
     yield from motion_edits(tree, Later(before, after, carried.state.quaternion))
     if (growth := large.get("growth")) is not None:
@@ -278,10 +278,10 @@ def _fitted_edits(tree: Node, fit: Fit, carried: Carried) -> Edits:
         # Delays so much longer; a thruster with the valve of the whole file gets its own.
         path = (*_thrusters(tree)[thruster], "valve")
         own = tree.get(*path)
-        known = own or tree.get("valve") or Node(None, Place())
-        values = {str(key): str(node.value) for key, node in known.children()}
+        valve = own or tree.get("valve") or Node(None, Place())
+        values = {str(key): str(node.value) for key, node in valve.children()}
         for key in ("open_delay", "close_delay"):
-            old = known.get(key)
+            old = valve.get(key)
             time = late if old is None else parse(old.value, "time") + late
             values[key] = as_before(old, time, "time")
             if own is not None:
@@ -350,8 +350,8 @@ def _delays(fit: Fit) -> Iterator[tuple[str, float]]:
     large = _seen(fit)
     for channel in fit.model.spacecraft.channels:
         late = large.get(f"delay {channel.name}")
-        known = channel.thrusters[0].valve or Trapezoid()
-        if late is None or len(channel.thrusters) > 1 or not isinstance(known, Trapezoid):
+        valve = channel.thrusters[0].valve or Trapezoid()
+        if late is None or len(channel.thrusters) > 1 or not isinstance(valve, Trapezoid):
             continue
-        if abs(late) <= LATE and min(known.open_delay, known.close_delay) + late >= 0.0:
+        if abs(late) <= LATE and min(valve.open_delay, valve.close_delay) + late >= 0.0:
             yield channel.thrusters[0].name, late

@@ -197,16 +197,16 @@ def _entry(entries: list[Node], step: str | int, behind: KeyPath) -> int:
     names = [node.value if node is not None else None for node in nodes]
     if step in names:
         return names.index(step)
-    known = [name for name in names if isinstance(name, str)]
-    if not known:
+    texts = [name for name in names if isinstance(name, str)]
+    if not texts:
         raise _NoPlaceError(
             f"expected a position, such as {dotted((*behind, 0))}: the entries have no names"
         )
-    close = nearest(step, known) if isinstance(step, str) else None
+    close = nearest(step, texts) if isinstance(step, str) else None
     cure = (
         f"did you mean {shown(close)}?"
         if close
-        else f"there are {', '.join(map(shown, known[:8]))}"
+        else f"there are {', '.join(map(shown, texts[:8]))}"
     )
     raise _NoPlaceError(f"no entry of {dotted(behind)} has the name {shown(step)}; {cure}")
 
@@ -416,11 +416,11 @@ def epoch_after(epoch: str, time: float) -> str:
 
 def attitude_edits(tree: Node, later: Later) -> Edits:
     """Attitude, epoch and frame; nothing for a body without attitude."""
-    given, old = later.after.attitude, later.before.attitude
-    if given is None:
+    turned, old = later.after.attitude, later.before.attitude
+    if turned is None:
         return
-    parts = flow_list(given.quaternion)
-    keys = {"quaternion": parts, "epoch": given.epoch, "frame": given.frame}
+    parts = flow_list(turned.quaternion)
+    keys = {"quaternion": parts, "epoch": turned.epoch, "frame": turned.frame}
     if (
         tree.get("attitude", "quaternion") is None
     ):  # none, or another form, which holds a direction alone
@@ -431,7 +431,8 @@ def attitude_edits(tree: Node, later: Later) -> Edits:
         return
     yield Edit(("attitude", "quaternion"), parts)
     for key in ("epoch", "frame"):
-        if (value := keys[key]) is not None and (old is None or value != getattr(old, key)):
+        value = keys[key]
+        if value is not None and (old is None or value != getattr(old, key)):
             yield Edit(("attitude", key), value)
 
 

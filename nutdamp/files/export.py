@@ -147,22 +147,23 @@ def reference(spacecraft: Spacecraft) -> Reference:
     """Epoch and frame of the file; raises BadRequest with the lines to add, or for those that no
     format knows.
     """
-    given = spacecraft.attitude
-    if given is None or given.epoch is None or given.frame is None:
-        missing = [key for key in EXAMPLE if given is None or getattr(given, key) is None]
+    start = spacecraft.attitude
+    if start is None or start.epoch is None or start.frame is None:
+        missing = [key for key in EXAMPLE if start is None or getattr(start, key) is None]
         names = " and ".join(f"attitude.{key}" for key in missing if key != "quaternion")
         lines = "\n".join(f"  {key}: {EXAMPLE[key]}" for key in missing)
-        cure = f"add{'' if given is None else ' there'}\nattitude:\n{lines}"
+        place = "add" if start is None else "add there"
+        cure = f"{place}\nattitude:\n{lines}"
         raise BadRequest(
             f"this format needs {names}, which the spacecraft file does not give; {cure}"
         )
-    if given.frame not in FRAMES:
+    if start.frame not in FRAMES:
         problem = (
-            f"{given.frame!r} is no frame that the format knows; "
+            f"{start.frame!r} is no frame that the format knows; "
             f"expected one of {', '.join(FRAMES)}"
         )
         raise Unsuitable(("attitude", "frame"), problem)
-    return Reference(Epoch.parse(given.epoch), given.frame)
+    return Reference(Epoch.parse(start.epoch), start.frame)
 
 
 def interpolated(flown: Flight, until: float) -> Iterator[AttitudeSegment]:
@@ -271,11 +272,9 @@ class SamplesWriter:
         self._study = study
         self._inputs = study.model.inputs.drawn
         spacecraft = study.model.spacecraft
-        self._outputs = [
-            *OUTPUT_COLUMNS,
-            *cone_columns(spacecraft),
-            *["spin_error_rad_s"] * (spacecraft.goal.spin is not None),
-        ]
+        self._outputs = [*OUTPUT_COLUMNS, *cone_columns(spacecraft)]
+        if spacecraft.goal.spin is not None:
+            self._outputs.append("spin_error_rad_s")
         header = ["case", *(column(entry) for entry in self._inputs), *self._outputs]
         stream.write(csv_text(header, []).encode())
         stream.flush()  # a full disk is better reported before the first case is flown

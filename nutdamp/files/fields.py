@@ -199,7 +199,8 @@ def _read(annotation: Any, value: Any, problems: Problems, path: KeyPath) -> Any
         return _ruled(parts[0], parts[1:], value, problems, path)
     if origin in (Union, UnionType):
         kinds = [part for part in parts if part is not NoneType]
-        if (expected := _either(kinds)) and not isinstance(value, list | dict):
+        expected = _either(kinds)
+        if expected and not isinstance(value, list | dict):
             problems.append((path, _mismatch(value, expected)))
             return None
         # A section is meant by a mapping, the other type by all else.
@@ -312,9 +313,9 @@ class Quantity(Rule):
                 hint = ""
             raise ValueError(f"{shown(value)} is out of range; expected {self.range}{hint}")
         if result < self.bounds.get("exclusiveMinimum", -math.inf) + SMALLEST:
-            least = f"in SI at least {SMALLEST:g}"
+            smallest = f"in SI at least {SMALLEST:g}"
             raise ValueError(
-                f"{shown(value)} is too small to be real; expected {self.range}, {least}"
+                f"{shown(value)} is too small to be real; expected {self.range}, {smallest}"
             )
         return result
 

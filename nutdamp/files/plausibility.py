@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 from nutdamp.files.facts import Facts, Finding
-from nutdamp.files.fields import KeyPath
 from nutdamp.files.study_keys import VALVE_TIMES
 from nutdamp.physics.body import momentary
 from nutdamp.units import KINDS, STANDARD_GRAVITY
@@ -125,8 +124,10 @@ def doubts(facts: Facts) -> Iterator[Finding]:
     """Numbers beyond any plausible value in SI."""
     for band in BANDS:
         for path in (path for each in band.paths.split() for path in facts.matching(each)):
-            value = _bare(facts, path)
-            if value is not None and band.test(value, facts):
+            value = facts.value(*path)  # a text has a unit
+            if isinstance(value, bool) or not isinstance(value, int | float):
+                continue
+            if math.isfinite(value) and band.test(value, facts):
                 yield Finding(path, reading(value, band.kind, band.meant))
 
 
@@ -141,11 +142,3 @@ def reading(value: float, kind: str, meant: str) -> str:
     elif meant == "m/s":  # of the exhaust
         cure = f"write {value / STANDARD_GRAVITY:.4g} s if m/s is meant"
     return f"{value} is read as {value} {unit}; {cure}, else {value} {KINDS[kind].si}"
-
-
-def _bare(facts: Facts, path: KeyPath) -> float | None:
-    """The finite number at ``path``; None where there is none, or a text with a unit."""
-    value = facts.value(*path)
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        return None
-    return value

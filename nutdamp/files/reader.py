@@ -211,11 +211,11 @@ def read_spacecraft(
     all faults.
     """
     contents, root = _contents(text, name, settings, warn)
-    given = contents.inertia
-    tensor = np.diag(np.array([given.A, given.A, given.C], dtype=float))
-    moments, axes = principal_axes(
-        tensor if given.tensor is None else symmetric(np.array(given.tensor))
-    )
+    stated = contents.inertia
+    tensor = np.diag(np.array([stated.A, stated.A, stated.C], dtype=float))
+    if stated.tensor is not None:
+        tensor = symmetric(np.array(stated.tensor))
+    moments, axes = principal_axes(tensor)
     inertia = Inertia(moments, axes, 0.0 if contents.wheel is None else contents.wheel.momentum)
     omega0 = _rates(contents, inertia)
     center = np.array(contents.center_of_mass or (0.0, 0.0, 0.0))
@@ -232,9 +232,9 @@ def read_spacecraft(
             finding = Finding(("attitude", "sun_phase"), problem, True)
             raise FaultyFile([_placed(finding, root, name)])
     torquer = steerable if thrusters else steerable or Steerable()
-    asked = contents.requirement
-    asks_nothing = asked is None or all(
-        each is None for each in (asked.nutation, asked.momentum_shift, asked.spin)
+    required = contents.requirement
+    asks_nothing = required is None or all(
+        bound is None for bound in (required.nutation, required.momentum_shift, required.spin)
     )
     loss, per_kg, limits = contents.dissipation, contents.center_of_mass_per_kg, contents.limits
     spacecraft = Spacecraft(
@@ -250,7 +250,7 @@ def read_spacecraft(
             for name, members in channels.items()
         ),
         steerable=steerable,
-        requirement=None if asks_nothing else _part(Requirement, asked),
+        requirement=None if asks_nothing else _part(Requirement, required),
         limits=_part(Limits, limits, blackout=tuple(map(tuple, limits.blackout) if limits else ()))
         or Limits(),
         disturbances=tuple(
@@ -332,10 +332,10 @@ def _part(kind: type[Part], section: Section | None, **others: object) -> Part |
     if section is None:
         return None
     named: tuple[Any, ...] = fields(kind)  # type: ignore[arg-type]
-    given = {
+    values = {
         field.name: getattr(section, field.name) for field in named if hasattr(section, field.name)
     }
-    return kind(**{**given, **others})
+    return kind(**{**values, **others})
 
 
 def _given(section: Section | None, make: Callable[..., Part], *others: object) -> Part | None:
@@ -378,13 +378,15 @@ def _thruster(
         arm = np.array(entry.position) - center
         push = force_vector(entry.direction, entry.force)
         torque, force, position = axes.T @ np.cross(arm, push), axes.T @ push, axes.T @ arm
-    least = entry.min_on_time
-    most = math.inf if entry.max_on_time is None else entry.max_on_time
+    shortest = entry.min_on_time
+    longest = math.inf if entry.max_on_time is None else entry.max_on_time
     if entry.impulse_bit is not None:  # outside its rows nothing is known
-        least = max(least, entry.impulse_bit[0][0])
-        most = min(most, entry.impulse_bit[-1][0])
+        shortest = max(shortest, entry.impulse_bit[0][0])
+        longest = min(longest, entry.impulse_bit[-1][0])
     valve = _valve(entry, every, thrust)
-    return Thruster(entry.name, torque, force, thrust, entry.isp, least, most, position, valve)
+    return Thruster(
+        entry.name, torque, force, thrust, entry.isp, shortest, longest, position, valve
+    )
 
 
 def _tank(section: keys.TankSection) -> Tank | None:
@@ -443,8 +445,8 @@ def _attitude(
     H in the body.
     """
     if section.quaternion is not None:
-        given = np.array(section.quaternion) / math.hypot(*section.quaternion)
-        return Attitude(given, section.epoch, section.frame)
+        turn = np.array(section.quaternion) / math.hypot(*section.quaternion)
+        return Attitude(turn, section.epoch, section.frame)
     assert section.spin_axis is not None
     along = np.array([0.0, 0.0, math.copysign(1.0, inertia.axial(float(omega0[2])))])
     if section.of == "momentum":
@@ -507,26 +509,26 @@ def _sun_sensor(section: keys.SunSensorSection, axes: Vector) -> SunSensor | Non
 
 
 def _commands(section: keys.CommandsSection) -> Commands:
-    given = section.width
+    width = section.width
     step = None
-    if isinstance(given, list):
-        widths = np.unique(given)
+    if isinstance(width, list):
+        widths = np.unique(width)
     else:
-        step = given.step
-        widths = given.min + step * np.array(
-            [0, math.floor((given.max - given.min) / step * (1.0 + 1e-12))]
+        step = width.step
+        widths = width.min + step * np.array(
+            [0, math.floor((width.max - width.min) / step * (1.0 + 1e-12))]
         )
     every = tuple(sorted(set(section.every)))
     return Commands(section.delay_step, section.delay_max, widths, section.max_count, every, step)
 
 
 def _loop(section: LoopSection, axes: Vector, center: Vector) -> Loop | None:
-    given = section.sensor
-    along = np.array([0.0, 0.0, 1.0] if given.axis is None else given.axis)
-    position = axes.T @ (np.array(given.position or center) - center)
-    about = (np.eye(3) if given.axes == "principal" else axes)[:2]
+    wanted = section.sensor
+    along = np.array([0.0, 0.0, 1.0] if wanted.axis is None else wanted.axis)
+    position = axes.T @ (np.array(wanted.position or center) - center)
+    about = (np.eye(3) if wanted.axes == "principal" else axes)[:2]
     sensor = _part(
-        Sensor, given, position=position, axis=axes.T @ (along / math.hypot(*along)), axes=about
+        Sensor, wanted, position=position, axis=axes.T @ (along / math.hypot(*along)), axes=about
     )
     turned = () if section.faults is None else tuple(section.faults.reversed)
     return _part(Loop, section, sensor=sensor, reversed=turned)
@@ -564,8 +566,8 @@ def _schema(annotation: Any, parts: dict[str, Any]) -> dict[str, Any]:
     if origin is Annotated:
         return _ruled_schema(of[0], of[1:], parts)
     if origin in (Union, UnionType):
-        given = [_schema(part, parts) for part in of if part is not NoneType]
-        return given[0] if len(given) == 1 else {"oneOf": given}
+        choices = [_schema(part, parts) for part in of if part is not NoneType]
+        return choices[0] if len(choices) == 1 else {"oneOf": choices}
     if origin is Literal:
         return {"type": "string", **({"enum": list(of)} if len(of) > 1 else {"const": of[0]})}
     section = section_of(annotation)

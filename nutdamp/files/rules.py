@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import operator
 from collections.abc import Callable, Iterator
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -15,7 +17,6 @@ from nutdamp.files.facts import (
     Finding,
     Vector,
     force_vector,
-    moments_fault,
     symmetric,
     tensor_fault,
 )
@@ -218,20 +219,21 @@ def _wrong(facts: Facts, path: KeyPath, _: str, problem: str) -> Iterator[Findin
         yield Finding(path, problem, facts.text(*path) is None)
 
 
-def _at_most(facts: Facts, path: KeyPath, other: str, kind: str) -> Iterator[Finding]:
+def _bounded(
+    fits: Callable[[float, float], bool],
+    fault: str,
+    expected: str,
+    facts: Facts,
+    path: KeyPath,
+    other: str,
+    kind: str,
+) -> Iterator[Finding]:
+    """A quantity that fits another one, where both can be read."""
     place = _place(path, other)
     value, limit = facts.number(kind, *path), facts.number(kind, *place)
-    if value is not None and limit is not None and value > limit:
-        problem = f"{amount(kind, value)} exceeds {dotted(place)}"
-        yield Finding(path, f"{problem}; expected at most {amount(kind, limit)}")
-
-
-def _below(facts: Facts, path: KeyPath, other: str, kind: str) -> Iterator[Finding]:
-    place = _place(path, other)
-    value, limit = facts.number(kind, *path), facts.number(kind, *place)
-    if value is not None and limit is not None and value >= limit:
-        problem = f"{amount(kind, value)} is not below {dotted(place)}"
-        yield Finding(path, f"{problem}; expected less than {amount(kind, limit)}")
+    if value is not None and limit is not None and not fits(value, limit):
+        problem = f"{amount(kind, value)} {fault} {dotted(place)}"
+        yield Finding(path, f"{problem}; expected {expected} {amount(kind, limit)}")
 
 
 def _not_zero(facts: Facts, path: KeyPath, kind: str, cure: str) -> Iterator[Finding]:
@@ -259,8 +261,11 @@ def _once(facts: Facts, path: KeyPath, key: str, cure: str) -> Iterator[Finding]
     for entry in facts.below(*path):
         place: KeyPath = (*entry, key) if key else entry
         name = facts.text(*place)
-        if name is not None and (other := first.setdefault(name, entry)) != entry:
-            yield Finding(place, f"{shown(name)} is given twice, first in {dotted(other)}; {cure}")
+        if name in first:
+            problem = f"{shown(name)} is given twice, first in {dotted(first[name])}"
+            yield Finding(place, f"{problem}; {cure}")
+        elif name is not None:
+            first[name] = entry
 
 
 def _named(facts: Facts, path: KeyPath, what: str, _: str) -> Iterator[Finding]:
@@ -306,8 +311,8 @@ KINDS_OF_RULES: dict[str, Callable[[Facts, KeyPath, str, str], Iterator[Finding]
     "missing": _missing,
     "completes": _completes,
     "wrong": _wrong,
-    "at most": _at_most,
-    "below": _below,
+    "at most": partial(_bounded, operator.le, "exceeds", "at most"),
+    "below": partial(_bounded, operator.lt, "is not below", "less than"),
     "not zero": _not_zero,
     "rising": _rising,
     "once": _once,
@@ -443,18 +448,6 @@ def _tank(facts: Facts) -> Iterator[Finding]:
         for key, other in (("isp", ("tank", "isp")), ("lever_arm", (*path, "force"))):
             if not facts.has(*path, key) and not facts.has(*other):
                 yield Finding((*path, key), "missing; by it tank knows the propellant used")
-    # Once all propellant is used, the moments must be those of a body.
-    path = ("tank", "inertia_per_kg")
-    propellant = facts.number("mass", "tank", "propellant")
-    rows = facts.vector("shed", 3, *path)
-    transverse, axial = (facts.number("shed", *path, key) for key in "AC")
-    if rows is None and transverse is not None and axial is not None:
-        rows = np.array([transverse, transverse, axial])
-    if propellant is None or facts.principal is None or rows is None:
-        return
-    fault = moments_fault(np.asarray(facts.principal[0]) - propellant * rows)
-    if fault is not None:
-        yield Finding(path, f"once {propellant:g} kg are used it leaves {fault}")
 
 
 def _dispersions(facts: Facts) -> Iterator[Finding]:
@@ -534,7 +527,7 @@ def correlation_findings(spacecraft: Spacecraft) -> Iterator[Finding]:
     fixed = {entry.name for entry in inputs.drawn if entry.kind == "bias"}
     before: set[frozenset[str]] = set()
     faults: list[Finding] = []
-    for row, (first, second, size) in enumerate(pairs):
+    for row, (first, second, _) in enumerate(pairs):
         for place, name in enumerate((first, second)):
             if name not in correlated:
                 close = nearest(name, correlated)
@@ -552,9 +545,6 @@ def correlation_findings(spacecraft: Spacecraft) -> Iterator[Finding]:
         elif frozenset((first, second)) in before:
             problem = f"{first} and {second} are given before; keep one of the two"
             faults.append(Finding((*path, row), problem))
-        elif abs(size) == 1.0:
-            problem = f"{size:g}: one would follow from the other; expected less than 1 in size"
-            faults.append(Finding((*path, row, 2), problem))
         before.add(frozenset((first, second)))
     yield from faults
     for group in () if faults else grouped(pairs):

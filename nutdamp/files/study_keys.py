@@ -206,14 +206,15 @@ QUANTITIES = {
 BY_THRUSTER = tuple(key for key, declared in _TOLERANCES.items() if declared["each"] == "thruster")
 
 
+Correlation = Annotated[float, Quantity("ratio", exclusiveMinimum=-1, exclusiveMaximum=1)]
+
+
 class DispersionsSection(Section):
     """Tolerances: {normal: one sigma}, {uniform: half width}, {triangular: half width} or {bias:
     fixed offset}.
     """
 
-    correlation: list[
-        tuple[str, str, Annotated[float, Quantity("ratio", minimum=-1, maximum=1)]]
-    ] = Field(
+    correlation: list[tuple[str, str, Correlation]] = Field(
         "Pairs of inputs that vary together, named as in disperse --json, and their correlation, "
         "-1 to 1;"
         " of uniform and triangular ones that of the normals behind them (Gaussian copula).",

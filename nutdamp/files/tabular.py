@@ -105,8 +105,9 @@ def make_folder(path: str) -> None:
     try:
         Path(path).mkdir(parents=True, exist_ok=True)
     except (OSError, ValueError) as reason:
-        there = "it is there, and no directory" if isinstance(reason, FileExistsError) else ""
-        raise CannotWrite(path, there or _reason(reason)) from reason
+        if isinstance(reason, FileExistsError):
+            raise CannotWrite(path, "it is there, and no directory") from reason
+        raise CannotWrite(path, _reason(reason)) from reason
 
 
 @contextmanager
@@ -281,18 +282,18 @@ class Table:
         """Raise FaultyFile with the faults so far: of a column the first `MOST_FAULTS`, and how
         many more.
         """
-        kept = []
+        faults = []
         for where in dict.fromkeys(fault.where for fault in self.faults):
             every = [fault for fault in self.faults if fault.where == where]
-            kept += every[:MOST_FAULTS]
+            faults += every[:MOST_FAULTS]
             more = every[MOST_FAULTS:]
-            kept += (
+            faults += (
                 more
                 if len(more) < 2
                 else [more[0]._replace(problem=f"and {len(more)} more such rows")]
             )
-        if kept:
-            raise FaultyFile(kept)
+        if faults:
+            raise FaultyFile(faults)
 
     def misspelt(self, column: str) -> str:
         """The column of the header that may be meant to be a missing one, in words."""

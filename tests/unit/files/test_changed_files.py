@@ -336,11 +336,8 @@ def test_a_target_stays_where_it_is_in_space() -> None:
 def test_comments_and_units_are_kept() -> None:
     carried = planned(SOUNDER).carried(40.0)
     assert isinstance(carried.source, Source)
-    lines = carried.source.text.splitlines()
-    assert "name: Sounder  # flown twice" in lines
-    assert lines[3].startswith("state: {spin: 30 rpm, nutation: ")
-    assert lines[3].endswith(" deg}   # as released")
-    assert lines[4:] == SOUNDER.splitlines()[4:]
+    text = re.sub(r"nutation: [^,]+ deg, phase: [^}]+ deg", "…", carried.source.text)
+    assert text == re.sub(r"nutation: 5 deg, phase: 20 deg", "…", SOUNDER)
 
 
 def test_a_chain_of_files_is_one_flight() -> None:
@@ -355,21 +352,17 @@ def test_a_chain_of_files_is_one_flight() -> None:
 
 def test_what_no_file_can_hold_is_refused() -> None:
     plan = planned(SOUNDER)
-    first = plan.pulses[0]
-    with pytest.raises(BadRequest, match="is on at"):
-        plan.carried(first.t)
     body = nutdamp.read(SOUNDER + TANK.replace("0.5 kg", "1 g"))
-    empty = nutdamp.Plan(
-        body, "by hand", Schedule(supplied(body, [channel_pulse(body.channels[0], 3.0, 5.0)]))
+    long = supplied(body, [channel_pulse(body.channels[0], 3.0, 5.0)])
+    light: nutdamp.Spacecraft = plan.spacecraft.replace(mass=3.0)
+    rows: tuple[tuple[nutdamp.Plan, float | None, str], ...] = (
+        (plan, plan.pulses[0].t, "is on at"),
+        (nutdamp.Plan(body, "by hand", Schedule(long)), None, "no propellant"),
+        *((plan, time, "after t = 0") for time in (-3.0, math.nan, math.inf)),
+        (nutdamp.plan(light, "two-pulse"), None, "no field replaced"),
     )
-    with pytest.raises(BadRequest, match="no propellant"):
-        empty.carried()
-    for time in (-3.0, float("nan"), float("inf")):
-        with pytest.raises(BadRequest, match="after t = 0"):
-            plan.carried(time)
-    replaced: nutdamp.Spacecraft = plan.spacecraft.replace(mass=3.0)
-    with pytest.raises(BadRequest, match="no field replaced"):
-        nutdamp.plan(replaced, "two-pulse").carried()
+    for flown, time, problem in rows:
+        assert problem in refusal(BadRequest, flown.carried, time)
 
 
 @pytest.mark.parametrize(("command", "lasts"), [
