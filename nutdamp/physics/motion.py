@@ -118,7 +118,7 @@ def arc(
 def nutated(
     A: Any, C: Any, forcing: Forcing, rates: Sequence[Any], quaternion: Sequence[Any], time: Any
 ) -> tuple[tuple[Any, Any, Any], tuple[Any, Any, Any, Any], Any]:
-    """`arc` in the frame that turns with the nutation, and the angle of the body in it about axis 3.
+    """`arc` in the frame that turns with the nutation, and the angle of the body about axis 3.
 
     R(t) = R(0) Rot(H(0)/A t) Rot3(νt), H in body axes: the frame turns about H at |H|/A, and the
     body in it about its own axis at ν = ω3 - H3/A (Poinsot's rolling cones, Magnus 1970 fig. 4).
