@@ -480,7 +480,7 @@ class RealWidths:
     def _ramps(
         self, cases: DispersedCases, starts: Array, impulses: Array, sheds: Array | None
     ) -> motion.Pulses:
-        """Pulses by the ramps of their thrust, each as a pulse of its own; as in `motion.Pulses`."""
+        """Pulses by the ramps of their thrust, each as a pulse of its own."""
         pieces = list(self._pieces(cases, starts, impulses))
         count = starts.shape[1]
         begins, lengths, parts, leans, numbers, shares = (

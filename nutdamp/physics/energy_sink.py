@@ -274,8 +274,8 @@ def rates_on_arc(
     wheel: Any = 0.0,
     sense: float = 1.0,
 ) -> tuple[ComplexArray, Array]:
-    """ω and ω3 of `motion.arc` alone, for many bodies: ``times`` (cases, n) s from the starts of their
-    arcs, else (cases, 1).
+    """ω and ω3 of `motion.arc` alone, for many bodies: ``times`` (cases, n) s from the starts of
+    their arcs, else (cases, 1).
 
     ``omega`` and ``spin`` at the starts, rad/s, and moments, kg m², are by case; ``growth`` may be
     zero.

@@ -118,7 +118,7 @@ def arc(
 def nutated(
     A: Any, C: Any, forcing: Forcing, rates: Sequence[Any], quaternion: Sequence[Any], time: Any
 ) -> tuple[tuple[Any, Any, Any], tuple[Any, Any, Any, Any], Any]:
-    """`arc` in the frame that turns with the nutation, and the angle of the body about axis 3 in it.
+    """`arc` in the frame that turns with the nutation, and the angle of the body about axis 3.
 
     R(t) = R(0) Rot(H(0)/A t) Rot3(νt), H in body axes: the frame turns about H at |H|/A, and the
     body in it about its own axis at ν = ω3 - H3/A (Poinsot's rolling cones, Magnus 1970 fig. 4).
@@ -189,11 +189,12 @@ def polynomials(here: MotionStretch, duration: Any, most: int = MOST_STEPS) -> I
     if jerk is not None:
         strength = np.maximum(strength, _size(acceleration + jerk * duration))
     lightest = moments.min(axis=0)
-    driven = abs(forcing.growth) + np.abs(forcing.wheel) / lightest
+    driven = abs(forcing.growth)
     if forcing.turning:
         strength = strength + sum(abs(size) for size, _ in forcing.turning) / lightest
     driven = driven + np.sqrt(strength)
-    turning = max((abs(rate) for _, rate in forcing.turning), default=0.0)
+    turning = np.abs(forcing.wheel) / lightest
+    turning = max((abs(rate) for _, rate in forcing.turning), default=0.0) + turning
     angle = float(np.max(np.maximum(_size(rates) + driven, turning) * duration))
     if rates.ndim == 1 and angle > SHORT and _steady(here):
         yield from _symmetric_polynomials(here, duration, most)
