@@ -186,6 +186,8 @@ def variations_of(comparison: Comparison, options: Options | None = None) -> Rou
             others.append(Variation(partial(_planned, variant, other, base.scheme, options)))
         if scheme is OPTIMAL:
             first.append(Variation(partial(chance_plan.plans, spacecraft, options), True))
+            large = partial(chance_plan.plans, spacecraft, options, chance_plan.LARGE)
+            first.append(Variation(large))
             settled = planner.settled(OPTIMAL, options, spacecraft)
             early.append(Variation(partial(_early, spacecraft, options, ""), True))
             # Free, the pulses on either side of a long axial one damp what the moments of inertia
