@@ -177,6 +177,7 @@ def compare(
     *,
     samples: int | None = None,
     timed: bool = False,
+    robust: bool = True,
     **chosen: Any,
 ) -> Comparison:
     """Plan schemes, compare them and recommend one, as ``nutdamp plan`` does.
@@ -192,6 +193,9 @@ def compare(
         Dispersed cases of each plan where the file has dispersions, 0 to judge nominal values
         alone; recommend pulses
         that no command block can fire, too.
+    robust
+        Try a robust plan where too few cases comply with each of the usual schemes; not with
+        ``samples``.
 
     Examples
     --------
@@ -206,7 +210,7 @@ def compare(
     count = samples if samples in (None, 0) else units.count("samples", samples)
     chosen_options = expect_options(options, chosen)
     compared = decision.compare(spacecraft, schemes, chosen_options, samples=count, timed=timed)
-    if count is not None or not compared.too_few_comply:
+    if not robust or count is not None or not compared.too_few_comply:
         return compared
     from nutdamp.planning.robust import with_robust
     from nutdamp.schemes.catalogue import Options

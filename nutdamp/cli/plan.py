@@ -90,19 +90,16 @@ def compared_with(
 
     ``robust``: of the usual ones a robust plan is tried where too few cases comply.
     """
-    from nutdamp.planning.decision import compare, usual
+    from nutdamp.api import compare
+    from nutdamp.planning.decision import usual
 
     expect_read(
         tuple(dict.fromkeys(names)) or usual(job.spacecraft), job.options, job.spacecraft, job.doubt
     )
     with job.working("planning"):
-        compared = compare(job.spacecraft, names, job.options, samples=samples, timed=timed)
-    if not robust or samples is not None or not compared.too_few_comply:
-        return compared
-    from nutdamp.planning.robust import with_robust
-
-    with job.working("trying robust plans"):
-        return with_robust(compared, job.options)
+        return compare(
+            job.spacecraft, names, job.options, samples=samples, timed=timed, robust=robust
+        )
 
 
 def robust_of(job: Job, compared: Comparison) -> RobustComparison:

@@ -52,6 +52,8 @@ LATER = (0.25, 0.5, 0.75, 1.0, 2.0)
 # others.
 WITHIN = (1.35, 1.5, 2.0)
 
+AS_PLANNED = "as planned"
+
 FRESH = 211  # seed of cases that nothing was chosen by
 
 SLACK = 1.02
@@ -178,12 +180,14 @@ def variations_of(comparison: Comparison, options: Options | None = None) -> Rou
         scheme = SCHEMES[base.scheme]
         if base.failure is not None or not (timed or scheme.reads_commands or not scheme.fires):
             continue
-        first.append(Variation(partial(list, [("as planned", base)])))
+        first.append(Variation(partial(list, [(AS_PLANNED, base)])))
         others.append(Variation(partial(_alignments, spacecraft, base.scheme, options)))
         for variant, other in _others(spacecraft, base):
             others.append(Variation(partial(_planned, variant, other, base.scheme, options)))
         if scheme is OPTIMAL:
             first.append(Variation(partial(chance_plan.plans, spacecraft, options), True))
+            large = partial(chance_plan.plans, spacecraft, options, chance_plan.LARGE)
+            first.append(Variation(large))
             settled = planner.settled(OPTIMAL, options, spacecraft)
             early.append(Variation(partial(_early, spacecraft, options, ""), True))
             # Free, the pulses on either side of a long axial one damp what the moments of inertia
@@ -198,16 +202,15 @@ def compare(
     comparison: Comparison,
     options: Options | None = None,
     *,
-    most: float = work.FRONTS,
     allocate: bool = True,
     progress: Callable[[int, int], object] = lambda _done, _all: None,
 ) -> RobustComparison:
     """Let dispersed cases fly the `variations_of` the plans compared, and recommend one of them.
 
     The cheapest plan of which enough cases comply, in fresh ones too, beyond the intervals of both;
-    else that with which most comply. ``most``: units of work; ``allocate``: find the tolerances
-    that are needed where too few comply; ``progress`` is called with the number of variations made,
-    and that of all. Raises BadRequest for a spacecraft without dispersions.
+    else that with which most comply. ``allocate``: find the tolerances that are needed where too
+    few comply; ``progress`` is called with the number of variations made, and that of all. Raises
+    BadRequest for a spacecraft without dispersions.
     """
     spacecraft = comparison.spacecraft
     if comparison.preferred is not None:  # found with less work
@@ -219,30 +222,22 @@ def compare(
     nominal = [plan.pulses.cost for plan in comparison.plans if plan.scheme == OPTIMAL.name]
     cheap = SLACK * min(nominal, default=0.0)
     chosen: FlownPlan | None = None
-    with (
-        work.steps(1.5 * count, SEARCH, hook=lambda done, _: progress(done, count)) as steps,
-        work.budget("the robust plans", most),
-    ):
+    with work.steps(1.5 * count, SEARCH, hook=lambda done, _: progress(done, count)) as steps:
         for number, variations in enumerate(rounds):
             before = len(entries)
-            for variation in variations:
-                share = 0.0
-                for variant, plan in () if work.exhausted() else variation.plans():
-                    candidate = _entered(comparison, plan, variant)
-                    if candidate is None or _kind(plan) in entries:
-                        continue
-                    entries[_kind(plan)] = candidate
-                    complying = candidate.cases.complying or 0.0
-                    worse = candidate.cases.enough is False and complying <= share
-                    if work.exhausted() or (variation.falling and worse):
-                        break
-                    share = complying
-                steps.reach(steps.done + 1)
+            with work.budget("the robust plans", work.FRONTS):
+                for variation in variations:
+                    _fly(comparison, variation, entries)
+                    steps.reach(steps.done + 1)
             chosen, ground, fresh = _confirmed(entries, comparison.recommended, comparison.least)
-            if chosen is not None:
-                saves = comparison.least == LEAST[0] and chosen.plan.pulses.cost <= cheap
-                if saves or (number == 1 and len(entries) > before):
-                    break  # other variants seldom cost less
+            saves = comparison.least == LEAST[0]
+            if saves and chosen is not None and chosen.plan.pulses.cost <= cheap:
+                break
+            # What beats the schemes beats their later starts; and others seldom cost less.
+            best = max(entries.values(), key=_complying, default=None)
+            ahead = best is not None and best.variant != AS_PLANNED
+            if number == 1 and (ahead or (chosen is not None and len(entries) > before)):
+                break
         steps.reach(count)
     if chosen is not None:
         return _result(comparison, entries, chosen, ground, fresh)
@@ -266,7 +261,30 @@ def with_robust(comparison: Comparison, options: Options | None = None) -> Compa
     """
     if chance_plan.hopeless(comparison.spacecraft, options):
         return comparison
-    return compare(comparison, options, most=work.ROBUST, allocate=False).joined
+    with work.budget("the robust plans", work.ROBUST):
+        robust = compare(comparison, options, allocate=False)
+    if robust.chosen is not None:
+        robust.chosen.finish(None)  # all cases, as of any plan that is shown
+    return robust.joined
+
+
+def _fly(comparison: Comparison, variation: Variation, entries: dict[object, FlownPlan]) -> None:
+    """Let plans of a variation fly their first cases, and enter those that are new."""
+    share = 0.0
+    for variant, plan in () if work.exhausted() else variation.plans():
+        candidate = None if _kind(plan) in entries else _entered(comparison, plan, variant)
+        if candidate is None:
+            continue
+        entries[_kind(plan)] = candidate
+        worse = candidate.cases.enough is False and _complying(candidate) <= share
+        if work.exhausted() or (variation.falling and worse):
+            return
+        share = _complying(candidate)
+
+
+def _complying(candidate: FlownPlan) -> float:
+    """Share that complies so far; 0 where nothing is required."""
+    return candidate.cases.complying or 0.0
 
 
 def _entered(comparison: Comparison, plan: Plan, variant: str) -> FlownPlan | None:
@@ -366,7 +384,7 @@ def _nearest(
                     candidate.finish(work.SAMPLES)
                     final.append(candidate)
                     low = max(low, candidate.cases.low)
-        equals = [each.plan for each in final if (each.cases.complying or 0.0) >= low]
+        equals = [each.plan for each in final if _complying(each) >= low]
         best, ground = cheapest(equals, usual, saved)
     return next(each for each in candidates if each.plan is best), ground, len(equals)
 

@@ -540,6 +540,8 @@ class GrowingProgram:
     their coefficients.
     """
 
+    charge = NONZERO  # units of work for each nonzero beyond `SMALL`
+
     def __init__(self, right: Vector, limits: Vector, level: Vector) -> None:
         self._level = level
         self._costs = np.zeros(0)
@@ -593,7 +595,7 @@ class GrowingProgram:
         highs = self._highs
         highs.setOptionValue("solver", method)
         highs.setOptionValue("presolve", "on" if presolve else "off")
-        work.spend(NONZERO * max(highs.getNumNz() - SMALL, 0))
+        work.spend(self.charge * max(highs.getNumNz() - SMALL, 0))
         if highs.run() == highspy.HighsStatus.kError:
             # Threads are set once in a process, by whoever solves first; zero takes what there is.
             highs.setOptionValue("threads", 0)

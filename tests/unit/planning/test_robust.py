@@ -373,6 +373,48 @@ def test_of_plans_with_which_all_cases_comply_the_cheapest(shift: float, scheme:
             assert share(body, other.plan) < 0.99
 
 
+ROUGH = {"A": {"normal": "0.5 %"}, "C": {"normal": "0.5 %"}}
+"""Dispersions with which too few cases comply with the schemes of the built-in example."""
+
+
+def test_a_robust_plan_is_tried_where_too_few_cases_comply_with_the_usual_schemes() -> None:
+    body = nutdamp.example().with_(dispersions=ROUGH)
+    compared = nutdamp.compare(body)
+    chosen = present(compared.recommended)
+    assert (chosen.scheme, compared.verdict.status) == ("robust", Status.FLY)
+    assert [plan.scheme for plan in compared if compared.verdicts[plan].met] == ["robust"]
+    assert compared.verdict.cases == cases_of(flown_in_stages(study_of(body, chosen.pulses)))
+    assert chosen.pulses.cost_in("kg") == pytest.approx(12.87e-3, rel=robust.SLACK - 1.0)
+    for other in (
+        nutdamp.compare(body, samples=0),
+        nutdamp.compare(body, ["two-pulse"]),
+        nutdamp.compare(nutdamp.example()),
+    ):
+        assert "robust" not in [plan.scheme for plan in other]
+
+
+def test_none_is_tried_where_no_pulses_can_keep_the_requirement_in_enough_cases() -> None:
+    """To first order: the timing of the pulses is too rough, whatever is fired."""
+    rough = nutdamp.load(case("slow-timing.yaml"))
+    fine = nutdamp.example().with_(dispersions=ROUGH)
+    assert [chance_plan.hopeless(body) for body in (rough, fine)] == [True, False]
+    compared = compare(rough)
+    assert compared.too_few_comply
+    assert robust.with_robust(compared) is compared
+
+
+@pytest.mark.deep
+def test_burns_longer_than_a_pulse_are_fired_in_pieces() -> None:
+    """A thruster of 0.5 s at most has 1.5 s to fire at once: without pieces no margin is kept."""
+    body = nutdamp.load(case("rim-spin-up.yaml"))
+    compared = nutdamp.compare(body)
+    assert (present(compared.recommended).scheme, compared.verdict.status) == (
+        "robust",
+        Status.FLY,
+    )
+    assert violations(body, present(compared.recommended).pulses) == []
+
+
 def raising(*_: object) -> object:
     raise ZeroDivisionError
 
