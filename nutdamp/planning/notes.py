@@ -109,7 +109,8 @@ def plan_notes(plan: Plan, *, cones: bool = True) -> tuple[Note, ...]:
     schedule.
     """
     if not plan.feasible:
-        return (note("infeasible", scheme=plan.scheme, why=infeasibility(plan)),)
+        code = "not-found" if plan.found_none else "infeasible"
+        return (note(code, scheme=plan.scheme, why=infeasibility(plan)),)
     notes = [*plan.pulses.notes, *[note("search-ended")] * plan.cut]
     if plan.flown is not None and len(plan.pulses):
         notes += [*_bounds(plan), *_left(plan)]
