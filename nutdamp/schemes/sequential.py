@@ -358,7 +358,7 @@ FREE_ON_TIMES = {"min_on_time": 0.0, "max_on_time": math.inf}
 
 def why(spacecraft: Spacecraft, attempt: Callable[[Spacecraft], Schedule | None]) -> str:
     """Cure of an ``attempt`` that finds no schedule: the first limit without which it finds one, by
-    its key in the file; or that none alone helps.
+    its key in the file; or that none alone helps. Empty where the work for it is spent.
     """
     with work.budget("a limit to lift", work.CURE):
         low = high = spacecraft.horizon
@@ -386,7 +386,7 @@ def why(spacecraft: Spacecraft, attempt: Callable[[Spacecraft], Schedule | None]
             if schedule is not None:
                 return f"without {name} there is a schedule of {len(schedule)} pulses"
         if work.exhausted():
-            return "the search for a limit that would help ended at its limit of work"
+            return ""
     return f"neither {LATEST:g} times the horizon nor any other limit that is lifted helps alone"
 
 

@@ -12,7 +12,6 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from dataclasses import replace
 from functools import cached_property
 from typing import NamedTuple
@@ -22,13 +21,13 @@ import numpy as np
 from nutdamp.common import work
 from nutdamp.errors import Infeasible, NotFound
 from nutdamp.flight.propagation import Flight
-from nutdamp.schemes.catalogue import OptimalOptions, SchemeOptions, TwoPulseOptions
+from nutdamp.schemes.catalogue import OptimalOptions
 from nutdamp.schemes.optimal import alternatives, multistart
 from nutdamp.schemes.optimal.descent import Task
 from nutdamp.schemes.optimal.linear_program import Burn, Program, Solution
 from nutdamp.schemes.optimal.problem import LEFT, UNMET, Problem, as_pulses, repaired, thinned
 from nutdamp.schemes.optimal.refinement import MOST_GROWN, EndEquations, Refinement, along, misses
-from nutdamp.schemes.sequential import bounded_by, why
+from nutdamp.schemes.sequential import LATEST, bounded_by, why
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import keeps_limits, rounded_off, shortest_on_time
 from nutdamp.spacecraft.model import Spacecraft, Vector
@@ -479,6 +478,10 @@ def without_overtaxed(search: Search) -> Search | None:
         ) from None
 
 
+NAMED = 5e-3
+"""Relative accuracy of a horizon that is named as needed."""
+
+
 def refusal(search: Search) -> Infeasible:
     """Reason for no schedule, and the limit without which there is one."""
     spacecraft = search.spacecraft
@@ -489,6 +492,15 @@ def refusal(search: Search) -> Infeasible:
         return by_program(other, None) if other.feasible(limited.horizon) else None
 
     cures = [why(spacecraft, attempt)]
+    horizon = spacecraft.horizon
+    while not (unproved or "horizon =" in cures[0] or work.exhausted()):
+        horizon *= 2.0
+        if horizon > LATEST * spacecraft.horizon:
+            break
+        if search.feasible(horizon):
+            needed = search.least_horizon(0.5 * horizon, horizon, NAMED)
+            cures.append(f"by small angles limits.horizon of {needed:.4g} s or more is needed")
+            break
     if search.equations.shift and spacecraft.goal.axis is None and not work.exhausted():
         free = Search(spacecraft, replace(search.options, free_axis=True, shift=None))
         if by_program(free, None) is not None:
@@ -529,22 +541,11 @@ def fewest(search: Search) -> Schedule:
     """The schedule of fewest pulses: one or two by the schemes that look for them, else as the
     program thins.
     """
-    from nutdamp.schemes import one_pulse, two_pulse
-
-    spacecraft = search.spacecraft
-    schedule = Schedule()
-    if spacecraft.torquer is None and spacecraft.goal.spin is None:
-        with suppress(Infeasible):
-            if search.options.free_axis:
-                schedule = one_pulse.schedule(spacecraft, SchemeOptions())
-            else:
-                schedule = two_pulse.schedule(spacecraft, TwoPulseOptions())
-    good = (
-        schedule.pulses
-        and keeps_limits(spacecraft, schedule)
-        and search.left(search.flown(schedule)) <= LEFT
-    )
-    return search.with_bounds(schedule) if good else least_cost(search)
+    planned = alternatives.by_other_schemes(search.spacecraft, shift=search.equations.shift)
+    schedule = next(planned, None)
+    if schedule is None or search.left(search.flown(schedule)) > LEFT:
+        return least_cost(search)
+    return search.with_bounds(schedule)
 
 
 SHARP = 0.02
