@@ -361,17 +361,6 @@ def why(spacecraft: Spacecraft, attempt: Callable[[Spacecraft], Schedule | None]
     its key in the file; or that none alone helps. Empty where the work for it is spent.
     """
     with work.budget("a limit to lift", work.CURE):
-        low = high = spacecraft.horizon
-        latest = max(LATEST * high, with_limits(spacecraft, horizon=None).horizon)
-        while high < latest and not work.exhausted():
-            low, high = high, float(f"{2.0 * high:.4g}")
-            if attempt(with_limits(spacecraft, horizon=high)) is None:
-                continue
-            for _ in range(BISECTIONS):
-                middle = float(f"{0.5 * (low + high):.4g}")
-                enough = attempt(with_limits(spacecraft, horizon=middle)) is not None
-                low, high = (low, middle) if enough else (middle, high)
-            return f"limits.horizon = {high:.4g} s is long enough"
         lifted = {
             name: with_limits(spacecraft, **{name: free})
             for name, free in FREE_LIMITS.items()
@@ -385,6 +374,17 @@ def why(spacecraft: Spacecraft, attempt: Callable[[Spacecraft], Schedule | None]
             schedule = None if work.exhausted() else attempt(limited)
             if schedule is not None:
                 return f"without {name} there is a schedule of {len(schedule)} pulses"
+        low = high = spacecraft.horizon
+        latest = max(LATEST * high, with_limits(spacecraft, horizon=None).horizon)
+        while high < latest and not work.exhausted():
+            low, high = high, float(f"{2.0 * high:.4g}")
+            if attempt(with_limits(spacecraft, horizon=high)) is None:
+                continue
+            for _ in range(BISECTIONS):
+                middle = float(f"{0.5 * (low + high):.4g}")
+                enough = attempt(with_limits(spacecraft, horizon=middle)) is not None
+                low, high = (low, middle) if enough else (middle, high)
+            return f"limits.horizon = {high:.4g} s is long enough"
         if work.exhausted():
             return ""
     return f"neither {LATEST:g} times the horizon nor any other limit that is lifted helps alone"
