@@ -165,6 +165,10 @@ class Infeasible(NutdampError):
     """A scheme that cannot work with this spacecraft within its limits; the text is the reason."""
 
 
+class NotFound(Infeasible):
+    """A search that found no schedule, which does not prove that there is none."""
+
+
 class TooShort(Infeasible):
     """A scheme that a longer horizon would make feasible: ``why``, and a ``cure`` that names it."""
 

@@ -111,7 +111,8 @@ def plan_notes(plan: Plan, *, cones: bool = True) -> tuple[Note, ...]:
     schedule.
     """
     if not plan.feasible:
-        return (note("infeasible", scheme=plan.scheme, why=infeasibility(plan)),)
+        code = "not-found" if plan.found_none else "infeasible"
+        return (note(code, scheme=plan.scheme, why=infeasibility(plan)),)
     notes = list(plan.pulses.notes)
     if plan.cut:
         notes.append(note("search-ended"))

@@ -12,7 +12,7 @@ from nutdamp import units
 from nutdamp.common import results, work
 from nutdamp.common.numerics import cleaned
 from nutdamp.common.results import note
-from nutdamp.errors import Infeasible
+from nutdamp.errors import Infeasible, NotFound
 from nutdamp.flight import end_state, propagation
 from nutdamp.flight.end_state import Aspect, left_on_the_way, seen_at
 from nutdamp.flight.propagation import Flight, Residual
@@ -65,6 +65,7 @@ class Plan(results.Data, results.Tabled):
     worse_at: float = 0.0
     from_file: bool = False
     cut: bool = False
+    found_none: bool = False
 
     @property
     def feasible(self) -> bool:
@@ -306,7 +307,8 @@ def plan(spacecraft: Spacecraft, scheme: str, options: planner.Choice = None) ->
             schedule = planner.schedule(scheme, planned_for, chosen)
             result = judged(spacecraft, scheme, schedule, chosen)
         except Infeasible as reason:
-            result = Plan(spacecraft, scheme, None, str(reason))
+            found_none = isinstance(reason, NotFound)
+            result = Plan(spacecraft, scheme, None, str(reason), found_none=found_none)
         if result.astray is not None and (
             catalogue.SCHEMES[scheme].points or catalogue.SCHEMES[scheme].reads_commands
         ):

@@ -11,10 +11,12 @@ from __future__ import annotations
 import cmath
 import itertools
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from nutdamp.common import work
 from nutdamp.common.results import note
 from nutdamp.errors import Infeasible, TooShort, listed
 from nutdamp.physics import attitude, energy_sink, response
@@ -22,6 +24,7 @@ from nutdamp.physics import body as rigid_body
 from nutdamp.spacecraft.constraints import Windows, channel_of, longest_useful, usable
 from nutdamp.spacecraft.equipment import Channel, Steerable
 from nutdamp.spacecraft.model import Attitude, Disturbance, Inertia, Spacecraft, Vector
+from nutdamp.spacecraft.roles import with_limits
 from nutdamp.spacecraft.schedule import TOUCHING, Pulse, Schedule, channel_pulse, steerable_pulse
 
 # alignments in a row that rounding to ticks or a disturbance may move to before the actuators are
@@ -341,6 +344,50 @@ def bounded_by(spacecraft: Spacecraft) -> str:
         "blackout windows": bool(limits.blackout),
     }
     return listed([name for name in there if there[name]])
+
+
+LATEST, BISECTIONS = 64.0, 3
+"""Multiple of the horizon up to which a sufficient one is sought, where the default one is not
+longer; halvings of the last doubling: the one that is named is at most an eighth of it too long.
+"""
+
+FREE_LIMITS = {"earliest": 0.0, "blackout": (), "gap": 0.0, "tick": None, "max_pulses": None}
+FREE_ON_TIMES = {"min_on_time": 0.0, "max_on_time": math.inf}
+"""Keys of limits of a file and of its thrusters, with the values that limit nothing."""
+
+
+def why(spacecraft: Spacecraft, attempt: Callable[[Spacecraft], Schedule | None]) -> str:
+    """Cure of an ``attempt`` that finds no schedule: the first limit without which it finds one, by
+    its key in the file; or that none alone helps. Empty where the work for it is spent.
+    """
+    with work.budget("a limit to lift", work.CURE):
+        lifted = {
+            name: with_limits(spacecraft, **{name: free})
+            for name, free in FREE_LIMITS.items()
+            if getattr(spacecraft.limits, name) != free
+        }
+        for name, free in FREE_ON_TIMES.items():
+            if any(getattr(channel, name) != free for channel in spacecraft.channels):
+                channels = tuple(channel.of(**{name: free}) for channel in spacecraft.channels)
+                lifted[name] = replace(spacecraft, channels=channels)
+        for name, limited in lifted.items():
+            schedule = None if work.exhausted() else attempt(limited)
+            if schedule is not None:
+                return f"without {name} there is a schedule of {len(schedule)} pulses"
+        low = high = spacecraft.horizon
+        latest = max(LATEST * high, with_limits(spacecraft, horizon=None).horizon)
+        while high < latest and not work.exhausted():
+            low, high = high, float(f"{2.0 * high:.4g}")
+            if attempt(with_limits(spacecraft, horizon=high)) is None:
+                continue
+            for _ in range(BISECTIONS):
+                middle = float(f"{0.5 * (low + high):.4g}")
+                enough = attempt(with_limits(spacecraft, horizon=middle)) is not None
+                low, high = (low, middle) if enough else (middle, high)
+            return f"limits.horizon = {high:.4g} s is long enough"
+        if work.exhausted():
+            return ""
+    return f"neither {LATEST:g} times the horizon nor any other limit that is lifted helps alone"
 
 
 NO_AXIAL = "no channel has a torque about axis 3, so none can set the spin; leave --spin out"

@@ -137,7 +137,7 @@ def planned(
                 break
             if isinstance(reason, TooShort):
                 raise TooShort(reason.why + EFFECTIVE, reason.cure) from None
-            raise Infeasible(f"{reason}{EFFECTIVE}") from None
+            raise type(reason)(f"{reason}{EFFECTIVE}") from None
         too_weak, too_strong, longer = _outside(spacecraft, schedule, without.inertia, correct)
         if too_weak or too_strong:
             weakest = min([weakest, *too_weak])

@@ -45,7 +45,8 @@ def no_plan(plan: Plan) -> str:
     """Text in the column of a scheme that has no plan."""
     if plan.failure is None:
         without = catalogue.SCHEMES[plan.scheme].body_fixed and not plan.spacecraft.channels
-        return "no thrusters" if without else "infeasible"
+        word = "not found" if plan.found_none else "infeasible"
+        return "no thrusters" if without else word
     return f"internal error,\nplease report:\n{type(plan.failure).__name__}"
 
 

@@ -22,7 +22,7 @@ from nutdamp.physics import attitude
 from nutdamp.planning.plan import plan
 from nutdamp.schemes.catalogue import OptimalOptions
 from nutdamp.schemes.optimal import bounds, multistart
-from nutdamp.schemes.optimal.search import _LeastCostSearch
+from nutdamp.schemes.optimal.search import Search
 from nutdamp.spacecraft.equipment import Channel, Thruster
 from nutdamp.spacecraft.model import Goal, Inertia, Limits, Spacecraft
 from nutdamp.spacecraft.schedule import Schedule
@@ -38,7 +38,7 @@ def test_no_bound_is_above_a_flown_schedule_and_no_plan_dear_or_missed(seed: int
     known = rival(body, off)
     if math.isinf(known.program):
         return
-    program = _LeastCostSearch(body, OptimalOptions(free_axis=False, shift=off or None)).program()
+    program = Search(body, OptimalOptions(free_axis=False, shift=off or None)).program()
     bound = bounds.first_order(program, program.solve().prices).bound
     second_order = 1.0 + 2.0 * body.nutation**2
     assert 0.99 * known.program <= bound <= known.program * second_order
@@ -103,7 +103,7 @@ def test_a_schedule_of_touching_pulses_is_taken_down_on_the_true_motion() -> Non
     made = flies(body, shift=off)
     assert made.pulses.cost_in("kg") <= DEAR * known
     # A descent from there begins with H where the pulses leave it, not on its target.
-    task = _LeastCostSearch(body, OptimalOptions(free_axis=False, shift=off)).task()
+    task = Search(body, OptimalOptions(free_axis=False, shift=off)).task()
     pulses = multistart._moments_of(task, Schedule(made.pulses.pulses))
     sequences, x = multistart.laid_out(task, multistart._together([pulses]), bounded=True)
     assert np.abs(task.misses(sequences.which, x, 0)).max() < 0.1 * off

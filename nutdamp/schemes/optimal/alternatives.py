@@ -36,7 +36,7 @@ from nutdamp.schemes.catalogue import (
 )
 from nutdamp.schemes.correction import Correction, bounded_step
 from nutdamp.schemes.optimal.descent import Task
-from nutdamp.schemes.optimal.linear_program import GrowingProgram, Shares, Solution
+from nutdamp.schemes.optimal.linear_program import GrowingProgram, Shares
 from nutdamp.schemes.optimal.problem import LEFT, UNMET, Problem
 from nutdamp.schemes.optimal.refinement import AROUND, Influence, along, misses, small_angles
 from nutdamp.schemes.sequential import SymmetricModel, model_of
@@ -44,7 +44,6 @@ from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import Windows, keeps_limits
 from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Spacecraft, Vector
-from nutdamp.spacecraft.requirements import DAMPED_ANGLE, SAME_COST
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
 
 # programs one after the other, each about the flight of the one before: at large angles small ones
@@ -110,90 +109,6 @@ def _spin_change(
     )
 
 
-CLEARLY, ABOUT = 0.8, 0.002
-"""Share of the end at which small angles must allow the cost, for an earlier one to be looked for,
-and the excess.
-"""
-
-BISECTIONS = 3
-ROUNDS = 3
-PARTS = (0.2, 0.4, 0.6)
-"""Steps in which the earliest end is found that they allow; earlier ends looked for one after the
-other; horizons that are tried in turn, as parts of the way from the earliest end that they allow to
-the end there is.
-"""
-
-EARLIER, MOST_ENDS, INTEGRATED = 300.0, 900.0, 4.0
-"""Units of `work` after which no other end is looked for, and for all of them; how many more with
-three moments.
-"""
-
-
-def hastened(
-    problem: Problem, best: Schedule, first: Solution, cheapest: Callable[[float], Schedule | None]
-) -> Schedule:
-    """The ``best``, or one that ends earlier, costs and leaves as much, and has no more pulses.
-
-    ``first`` is the program's solution for the whole horizon; ``cheapest`` gives the cheapest
-    schedule found within a horizon, s. By how much earlier an end may be small angles tell; the
-    horizons that are tried lie a little later.
-    """
-    if problem.options.least not in ("propellant", "impulse") or first.unmet > UNMET:
-        return best
-    dearest = problem.price(best) * (1.0 + SAME_COST)
-    allowed = max(problem.price(best), first.cost) * (1.0 + ABOUT)
-    left = problem.left(problem.flown(best)) + DAMPED_ANGLE
-
-    def better(schedule: Schedule) -> bool:
-        less = schedule.end < best.end and len(schedule) <= len(best)
-        return (
-            less
-            and problem.price(schedule) <= dearest
-            and problem.left(problem.flown(schedule)) <= left
-        )
-
-    more = 1.0 if problem.spacecraft.inertia.symmetric else INTEGRATED
-    with work.budget("an earlier end", more * MOST_ENDS) as spent:
-
-        def over() -> bool:
-            return not len(best) or work.exhausted() or spent.done > more * EARLIER
-
-        for _ in range(ROUNDS):
-            ends = [] if over() else _earlier_ends(problem, best.end, allowed)
-            schedules = (cheapest(end) for end in ends if not over())
-            earlier = next(
-                (schedule for schedule in schedules if schedule is not None and better(schedule)),
-                None,
-            )
-            if earlier is None:
-                break
-            best = earlier
-    return best
-
-
-def _earlier_ends(problem: Problem, end: float, most: float) -> list[float]:
-    """Horizons to try for an earlier ``end`` s, after what small angles allow at a cost of
-    ``most``; none near it.
-    """
-    begin = problem.spacecraft.limits.earliest
-    span = end - begin
-
-    def cost(share: float) -> float:
-        solution = problem.program(problem.within(begin + share * span)).solve()
-        return solution.cost if solution.unmet <= UNMET else math.inf
-
-    clearly = cost(CLEARLY)
-    # Nor may it cost them more than `ABOUT` over what they cost in all of the span.
-    if clearly > most or clearly > (most := min(most, cost(1.0) * (1.0 + ABOUT))):
-        return []
-    low = 0.0
-    high = CLEARLY
-    for _ in range(BISECTIONS):
-        middle = 0.5 * (low + high)
-        low, high = (low, middle) if cost(middle) <= most else (middle, high)
-    return [begin + (high + part * (1.0 - high)) * span for part in PARTS]
-
-
 def by_other_schemes(spacecraft: Spacecraft, *, shift: bool) -> Iterator[Schedule]:
     """Schedules by the channels of the ``spacecraft`` for the same goal, one after the other;
     ``shift``: H counts.
@@ -232,8 +147,8 @@ def by_other_schemes(spacecraft: Spacecraft, *, shift: bool) -> Iterator[Schedul
             (HALF_CONE, half_cone.schedule, HalfConeOptions(cones=cones))
             for cones in (None, 12, 6, 3)
         ]
-    for scheme, plan, options in plans:
-        if work.exhausted():
+    for number, (scheme, plan, options) in enumerate(plans):
+        if number and work.exhausted():
             return
         try:
             planned = plan(model.symmetric, options)

@@ -230,13 +230,16 @@ class Program:
         chosen = self._first() if columns is None else columns
         master = self._master(chosen, growing=generate)
         optimum = master.optimum()
+        unsolved = Solution((), math.inf, math.inf, np.zeros(2), np.zeros(count))
         if optimum is None:
-            return Solution((), math.inf, math.inf, np.zeros(2), np.zeros(count))
+            return unsolved
         for _ in range(ROUNDS if generate else 0):
             unmet = float(optimum.x[: 2 * count].sum())
-            if work.exhausted() or (
-                enough and (unmet <= SOME or self._out_of_reach(optimum.prices))
-            ):
+            if work.exhausted():
+                if unmet > SOME:  # columns that would supply it may not be among them yet
+                    return unsolved
+                break
+            if enough and (unmet <= SOME or self._out_of_reach(optimum.prices)):
                 break
             new = self._priced(optimum.prices, chosen, unmet)
             if not len(new.t):

@@ -175,10 +175,8 @@ LEFT = math.radians(
 # share by which a schedule costs less than the bound of small angles, that refutes the bound
 BEATEN = 0.005
 
-SHARPEST, DEARER = 1e-3, 0.03
-"""Relative accuracy of a least time by small angles; share above its cost from which shorter ones
-are looked at.
-"""
+SHARPEST = 1e-3
+"""Relative accuracy of a least time by small angles."""
 
 
 class Problem:
@@ -303,10 +301,6 @@ class Problem:
         """Quantity to be least: the cost, or the number of pulses."""
         return float(len(schedule)) if self.options.least == "pulses" else self.price(schedule)
 
-    def dear(self, schedule: Schedule | None, least: float, share: float = DEARER) -> bool:
-        """True where there is no schedule, or one so dear that it is worth looking for another."""
-        return schedule is None or self.price(schedule) > least * (1.0 + share)
-
     def cheaper(self, known: Schedule | None, other: Schedule | None) -> Schedule | None:
         """The cheaper of two schedules, of which there may be none; the known with fewer pulses
         where that counts.
@@ -328,41 +322,4 @@ class Problem:
         """End errors of the axis and of H in a flight."""
         return Allowed(
             flown.residual.nutation, flown.residual.axis_error if self.equations.shift else 0.0
-        )
-
-    def not_found(self) -> str:
-        """Reason for no schedule although the program has solutions: the limits that it does not
-        know of.
-        """
-        spacecraft, limits = self.spacecraft, self.spacecraft.limits
-        if (
-            limits.max_pulses is not None
-            and spacecraft.inertia.symmetric
-            and spacecraft.growth == 0.0
-            and not spacecraft.disturbances
-        ):
-            most = max(abs(channel.transverse) * channel.max_on_time for channel in self.channels)
-            if limits.max_pulses * most < spacecraft.least_impulse:
-                return (
-                    f"limits.max_pulses = {limits.max_pulses} is too few: "
-                    "so many pulses give at most "
-                    f"{100.0 * limits.max_pulses * most / spacecraft.least_impulse:.4g} % of the impulse "
-                    "that takes out the "
-                    f"nutation, {math.ceil(spacecraft.least_impulse / most)} pulses or more all of it"
-                )
-        shortest = max(channel.min_on_time for channel in self.channels)
-        longest = min(channel.max_on_time for channel in self.channels)
-        kept = {
-            f"a gap of {limits.gap:.4g} s": limits.gap > 0.0,
-            f"max_pulses {limits.max_pulses}": limits.max_pulses is not None,
-            f"on-times of {shortest:.4g} s or more": shortest > 0.0,
-            f"on-times of {longest:.4g} s or less": math.isfinite(longest),
-            f"ticks of {limits.tick or 0.0:.4g} s": limits.tick is not None,
-        }
-        named = [name for name, limited in kept.items() if limited] or ["one pulse after the other"]
-        return (
-            "not found: for small angles, without other limits than the horizon, "
-            "there are schedules; on the true "
-            f"motion none was found with {', '.join(named)}; shorter horizons were tried too, "
-            "a longer one may help"
         )

@@ -21,7 +21,7 @@ from nutdamp.planning.plan import plan
 from nutdamp.schemes.catalogue import OptimalOptions
 from nutdamp.schemes.optimal import bounds
 from nutdamp.schemes.optimal.linear_program import Program, Solution
-from nutdamp.schemes.optimal.search import _LeastCostSearch
+from nutdamp.schemes.optimal.search import Search
 from nutdamp.spacecraft.constraints import free_windows
 from nutdamp.spacecraft.model import Disturbance, Goal, Limits, Spacecraft, Vector
 from nutdamp.spacecraft.schedule import Bounds, Schedule, channel_pulse
@@ -324,7 +324,7 @@ def test_the_first_order_bound_is_not_above_the_program_on_a_dense_grid(
 
 
 def solved_program(body: Spacecraft) -> tuple[Program, Solution]:
-    program = _LeastCostSearch(body, OptimalOptions(least="impulse")).program()
+    program = Search(body, OptimalOptions(least="impulse")).program()
     return program, program.solve()
 
 

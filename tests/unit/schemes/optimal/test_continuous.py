@@ -51,7 +51,7 @@ def test_a_nutation_smaller_than_any_pulse_has_no_schedule(wheel: float) -> None
         read_spacecraft(f"{text}\nwheel: {{momentum: {wheel} N m s}}\n", "craft.yaml"), "optimal"
     )
     assert made.failure is None
-    assert "on-times of 0.02 s or more" in (made.refusal or "")
+    assert "without min_on_time there is a schedule" in (made.refusal or "")
 
 
 @pytest.mark.parametrize("name", ["continuous-opt507", deep("continuous-opt513")])
