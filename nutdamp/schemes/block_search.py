@@ -57,6 +57,7 @@ PHASED, PHASES = 4, 12
 block takes what they leave only if its pulse is as large as that.
 """
 BEAM = 16  # sequences that are continued, by each merit
+COARSE = 300  # cheapest sequences that are continued where delays are few: as in cb5030
 DOUBTFUL = 1.5  # share of a bound up to which the closed form may err
 FLOWN = 32  # sequences that are flown together, by each merit
 FLOWN_PULSES = 4000  # pulses of a batch of flights, at most: it then takes less than a second
@@ -96,7 +97,8 @@ class BlockSearch:
         self.intervals = max(len(every), 1)
         self.widths = [commandable_widths(commands, channel) for channel, _ in self.kinds]
         size = self.size(most)
-        self.whole = size <= WHOLE and self.last_delay < FEW_DELAYS
+        self.coarse = self.last_delay < FEW_DELAYS
+        self.whole = size <= WHOLE and self.coarse
         if self.whole:
             self.looked = round(size)
 
@@ -135,9 +137,11 @@ class BlockSearch:
             if not len(sequences.share):
                 break
             self.fly(sequences)
-            if work.exhausted() or not (self.whole or self._dear):
+            if work.exhausted() or not (self.coarse or self._dear):
                 break
             beam = sequences if self.whole else self.beam(sequences)
+            if not len(beam.share):
+                break
         for _ in range(ROUNDS):
             if not self.flights.of or math.isfinite(self.flights.cheapest) or work.exhausted():
                 break
@@ -312,11 +316,10 @@ class BlockSearch:
         costs = sequences.cost[distinct]
         fronts = [distinct[front(costs, share)[:BEAM]] for share in (0.9, 1.0)]
         rows = (distinct[:BEAM], *fronts, gentle[:BEAM])
-        return np.unique(
-            np.concatenate(
-                [*rows, self._spread(sequences, order if self.flights.damps else distinct)]
-            )
-        )
+        spread = self._spread(sequences, order if self.flights.damps else distinct)
+        cheap = order[np.argsort(sequences.cost[order], kind="stable")]
+        cheap = cheap[: COARSE if self.coarse else 0]
+        return np.unique(np.concatenate([*rows, spread, cheap]))
 
     def _spread(self, sequences: BlockSequences, order: Index) -> Index:
         """Of rows in order the best that have gone each of equal parts of the way to the target, or
