@@ -2,10 +2,10 @@
 legs.
 
 A command is known by its effective on-time and the centroid of its thrust (`thruster`). Schemes
-plan for the body *without valves*, which fires rectangles of full thrust within the effective bounds of its
-channels, and keeps limits that leave room for the delays. Each of its pulses becomes the command
-with the same impulse and centroid, cold and blowdown included; further effects of the shape of the
-thrust are corrected on the flown motion.
+plan for the body *without valves*, which fires rectangles of full thrust within the effective
+bounds of its channels, and keeps limits that leave room for the delays. Each of its pulses becomes
+the command with the same impulse and centroid, cold and blowdown included; further effects of the
+shape of the thrust are corrected on the flown motion.
 """
 
 from __future__ import annotations
@@ -40,7 +40,8 @@ ROUNDING = 1e-12  # share by which an on-time may pass its bounds
 # share of the longest pulse that the next plan leaves at either end of all, where there was too
 # little room
 ROOM = 0.02
-# times what the plan leaves on the body without valves, that commands may leave without another plan
+# times what the plan leaves on the body without valves, that commands may leave without another
+# plan
 NEARLY = 1.1
 EXACT = 1e-10  # rad, the same
 PLANS = (
@@ -179,11 +180,11 @@ def _left(spacecraft: Spacecraft, schedule: Schedule, correct: Correction) -> fl
 def as_commands(
     spacecraft: Spacecraft, schedule: Schedule, correct: Correction, inertia: Inertia | None = None
 ) -> Schedule:
-    """A schedule of the body without valves as commands; ``correct`` brings them to what is left on the
-    flown motion.
+    """A schedule of the body without valves as commands; ``correct`` brings them to what is left on
+    the flown motion.
 
-    ``inertia`` is that of the body without valves, default that at t = 0. Commands that give no thrust are
-    left out. Raises Infeasible where the propellant does not last.
+    ``inertia`` is that of the body without valves, default that at t = 0. Commands that give no
+    thrust are left out. Raises Infeasible where the propellant does not last.
     """
     commands = _translated(spacecraft, schedule, inertia, correct)
     first = _firing(replace(schedule.without_proof, pulses=commands))

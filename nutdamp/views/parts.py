@@ -63,8 +63,8 @@ MILLISECONDS = 3  # digits of a second that tables show of a date
 
 
 class PulseRow(NamedTuple):
-    """A pulse of the ``spacecraft``, counted from 0; motion just before and after all pulses; spin phase at
-    its start, rad.
+    """A pulse of the ``spacecraft``, counted from 0; motion just before and after all pulses; spin
+    phase at its start, rad.
     """
 
     at: int
@@ -233,7 +233,9 @@ def _dated(spacecraft: Spacecraft) -> tuple[Column, ...]:
 
 
 class BlockRow(NamedTuple):
-    """A command block of the ``spacecraft``, from 0: its pulses, the nutation after the last of them, rad."""
+    """A command block of the ``spacecraft``, from 0: its pulses, the nutation after the last of
+    them, rad.
+    """
 
     at: int
     block: Block
@@ -463,7 +465,8 @@ def _effects(flown: Flight, velocity: Vector | None) -> Iterator[tuple[str, str]
     if used is not None and tank is not None:
         spent += f" of {mass(tank.propellant)}; {mass(tank.propellant - used)} left"
     if used is not None and spacecraft.mass is not None:
-        spent += f"; mass {quantity(spacecraft.mass, 'kg', 6)} to {quantity(spacecraft.mass - used, 'kg', 6)}"
+        masses = (spacecraft.mass, spacecraft.mass - used)
+        spent += "; mass " + " to ".join(quantity(mass_, "kg", 6) for mass_ in masses)
     yield "propellant", spent
     if velocity is not None:
         yield "|ΔV|", quantity(float(np.linalg.norm(velocity)), "m/s")
