@@ -17,6 +17,7 @@ from nutdamp.files.facts import (
     Finding,
     Vector,
     force_vector,
+    moments_fault,
     symmetric,
     tensor_fault,
 )
@@ -448,6 +449,18 @@ def _tank(facts: Facts) -> Iterator[Finding]:
         for key, other in (("isp", ("tank", "isp")), ("lever_arm", (*path, "force"))):
             if not facts.has(*path, key) and not facts.has(*other):
                 yield Finding((*path, key), "missing; by it tank knows the propellant used")
+    # Once all propellant is used, the moments must be those of a body.
+    path = ("tank", "inertia_per_kg")
+    propellant = facts.number("mass", "tank", "propellant")
+    rows = facts.vector("shed", 3, *path)
+    transverse, axial = (facts.number("shed", *path, key) for key in "AC")
+    if rows is None and transverse is not None and axial is not None:
+        rows = np.array([transverse, transverse, axial])
+    if propellant is None or facts.principal is None or rows is None:
+        return
+    fault = moments_fault(np.asarray(facts.principal[0]) - propellant * rows)
+    if fault is not None:
+        yield Finding(path, f"once {propellant:g} kg are used it leaves {fault}")
 
 
 def _dispersions(facts: Facts) -> Iterator[Finding]:

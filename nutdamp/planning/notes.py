@@ -111,8 +111,10 @@ def plan_notes(plan: Plan, *, cones: bool = True) -> tuple[Note, ...]:
     schedule.
     """
     if not plan.feasible:
-        code = "not-found" if plan.found_none else "infeasible"
-        return (note(code, scheme=plan.scheme, why=infeasibility(plan)),)
+        why = infeasibility(plan)
+        if plan.found_none:
+            return (note("not-found", scheme=plan.scheme, why=why),)
+        return (note("infeasible", scheme=plan.scheme, why=why),)
     notes = list(plan.pulses.notes)
     if plan.cut:
         notes.append(note("search-ended"))

@@ -50,8 +50,10 @@ def scope_note(search: BlockSearch, chosen: FlownSequence) -> Note:
     nutation, end = (
         math.degrees(abs(float(a) - b)) for a, b in zip(form[:2], flown[:2], strict=True)
     )
-    code = "blocks-compared" if search.whole else "blocks-found"
-    return note(code, compared=search.looked, nutation_deg=nutation, end_deg=end)
+    off = {"nutation_deg": nutation, "end_deg": end}
+    if search.whole:
+        return note("blocks-compared", compared=search.looked, **off)
+    return note("blocks-found", compared=search.looked, **off)
 
 
 def cures(search: BlockSearch, chosen: FlownSequence, most: int) -> list[Note]:

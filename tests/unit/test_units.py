@@ -215,6 +215,7 @@ EVERY = [
     errors.MissingExtra("plot", "a picture"),
     errors.MissingPandas(),
     errors.Infeasible("no thrusters"),
+    errors.NotFound("no schedule within the budget"),
     errors.TooShort("no pulse fits", "limits.horizon = 90 s is long enough"),
 ]
 
