@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 from nutdamp.common.results import Note, note
 from nutdamp.control_loop.sensor import felt
 from nutdamp.montecarlo.inputs import SPREAD
-from nutdamp.physics import attitude, sky
+from nutdamp.physics import attitude
+from nutdamp.physics.sun import ahead as sun_ahead
 from nutdamp.spacecraft.equipment import GYRO
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.schedule import Pulse, Schedule
@@ -268,7 +269,7 @@ def _sun_late(seen: Sighting) -> Vector:
     assert spacecraft.sun is not None
     of_body = attitude.multiply(seen.quaternion, seen.axes)
     sun = np.broadcast_to(spacecraft.sun[:, None], (3, len(seen.rates)))
-    ahead, rate = sky.ahead(
+    ahead, rate = sun_ahead(
         (seen.rates @ spacecraft.inertia.axes).T, of_body.T, sun, sensor.azimuth, spacecraft.sense
     )
     return np.asarray(wrapped(ahead) / np.where(rate > 0.0, rate, abs(spacecraft.spin)))

@@ -41,8 +41,9 @@ from nutdamp.files.plausibility import doubts
 from nutdamp.files.rules import correlation_findings, disturbance_kind, findings
 from nutdamp.files.study_keys import LoopSection, by_name, dispersions, thrust_behind
 from nutdamp.files.yaml import Node, dotted, read_text, read_tree
-from nutdamp.physics import attitude, sky
+from nutdamp.physics import attitude
 from nutdamp.physics.body import principal_axes
+from nutdamp.physics.sun import direction
 from nutdamp.physics.thruster import Cold, Tank
 from nutdamp.spacecraft.equipment import (
     Channel,
@@ -482,7 +483,7 @@ def _sun(contents: keys.SpacecraftFile) -> Vector | None:
         return None if sun is None else attitude.on_sphere(*sun)
     assert contents.attitude is not None
     assert contents.attitude.epoch is not None
-    return sky.direction(Epoch.parse(contents.attitude.epoch).days_of_j2000)
+    return direction(Epoch.parse(contents.attitude.epoch).days_of_j2000)
 
 
 def _cones(contents: keys.SpacecraftFile, sunward: Vector | None) -> Iterator[Keep]:

@@ -24,7 +24,6 @@ from nutdamp.files.facts import (
 from nutdamp.files.fields import SMALLEST, KeyPath
 from nutdamp.files.study_keys import BY_THRUSTER, by_name
 from nutdamp.files.yaml import dotted
-from nutdamp.montecarlo.inputs import grouped, positive_definite, reachable
 from nutdamp.physics import body as rigid_body
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.schedule import STEERABLE
@@ -534,6 +533,8 @@ def correlation_findings(spacecraft: Spacecraft) -> Iterator[Finding]:
     if not pairs:
         return
     path = ("dispersions", "correlation")
+    from nutdamp.montecarlo.inputs import grouped, positive_definite, reachable  # here: few files
+
     inputs = reachable(spacecraft)
     names = [*(entry.name for entry in inputs.drawn), *(entry.name for entry in inputs.unused)]
     correlated = [name for name in names if not name.endswith("of each pulse")]

@@ -23,11 +23,12 @@ from numpy.typing import NDArray
 from nutdamp.common import work
 from nutdamp.errors import Infeasible
 from nutdamp.flight.dynamics import Supply, make_dynamics, shed
-from nutdamp.flight.propagation import Flight
-from nutdamp.physics import attitude, precession, sky
+from nutdamp.flight.propagation import Flight, to_sun_pulse
+from nutdamp.physics import attitude, precession
 from nutdamp.physics.motion import MotionStretch
 from nutdamp.physics.series import Bodies
 from nutdamp.physics.sky import SunPulseClock, TorqueRamp
+from nutdamp.physics.sun import ahead as sun_ahead
 from nutdamp.physics.thruster import Valve, spread
 from nutdamp.spacecraft.equipment import Block, Channel
 from nutdamp.spacecraft.model import Spacecraft, Vector
@@ -101,21 +102,6 @@ def _blind(time: float, angle: float) -> Infeasible:
         f"the Sun sensor does not see the Sun at {time:.4g} s, {math.degrees(angle):.4g}° from the "
         "spin axis: "
         "there is no Sun pulse"
-    )
-
-
-def to_sun_pulse(flown: Flight, times: Vector) -> Vector:
-    """Angle (n,) in [0, 2π) by which the body has to turn until the Sun passes the sensor."""
-    spacecraft = flown.spacecraft
-    assert spacecraft.sun_sensor is not None
-    assert spacecraft.sun is not None
-    _, quaternions = flown.motion(times)
-    seen = attitude.rotate(attitude.conjugate(quaternions), spacecraft.sun)
-    azimuth = np.arctan2(seen[:, 1], seen[:, 0])
-    return np.asarray(
-        math.copysign(1.0, spacecraft.spin)
-        * (azimuth - spacecraft.sun_sensor.azimuth)
-        % (2.0 * math.pi)
     )
 
 
@@ -639,7 +625,7 @@ class BlockModel:
         phasor = self.inertia.A * (rates[0] + 1j * rates[1])
         assert self.spacecraft.sun is not None
         sun = np.repeat(self.spacecraft.sun[:, None], len(since), axis=1)
-        ahead, _ = sky.ahead(rates, quaternion, sun, self.sensor.azimuth, self.sense)
+        ahead, _ = sun_ahead(rates, quaternion, sun, self.sensor.azimuth, self.sense)
         # From where the Sun is seen to where it is about H, then to the next Sun pulse.
         seen = self.sensor.azimuth + self.sense * ahead
         across = phasor * np.exp(-1j * seen) / np.abs(self.inertia.axial(spin))

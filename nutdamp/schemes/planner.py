@@ -12,7 +12,6 @@ from importlib import import_module
 from nutdamp.common import work
 from nutdamp.common.results import note
 from nutdamp.errors import BadRequest, Infeasible, TooShort
-from nutdamp.schemes import valve_commands
 from nutdamp.schemes.catalogue import POINTING, SCHEMES, Options, Scheme, SchemeOptions
 from nutdamp.schemes.correction import Correction, left
 from nutdamp.schemes.sequential import SymmetricModel, model_of
@@ -71,6 +70,10 @@ def schedule(name: str, spacecraft: Spacecraft, options: Choice = None) -> Sched
     if scheme.on_true_body:
         return planned(spacecraft, chosen)
     if spacecraft.thrust_laws:
+        from nutdamp.schemes import (
+            valve_commands,  # here: few thrusters have valves, tanks or cold nozzles
+        )
+
         on_plain = valve_commands.options(spacecraft, chosen)
         correct = Correction(scheme, on_plain)
         return valve_commands.planned(
@@ -131,6 +134,10 @@ def alternatives(name: str, spacecraft: Spacecraft, options: Choice = None) -> l
         return []
     chosen = settled(scheme, options, spacecraft)
     if spacecraft.thrust_laws:
+        from nutdamp.schemes import (
+            valve_commands,  # here: few thrusters have valves, tanks or cold nozzles
+        )
+
         schedules = alternatives(
             name,
             valve_commands.without_valves(spacecraft),
@@ -150,6 +157,10 @@ def as_commands(
 
     Raises KeyError for a name not in `NAMES`.
     """
+    from nutdamp.schemes import (
+        valve_commands,  # here: few thrusters have valves, tanks or cold nozzles
+    )
+
     scheme = SCHEMES[name]
     chosen = valve_commands.options(spacecraft, settled(scheme, options, spacecraft))
     return valve_commands.as_commands(spacecraft, schedule, Correction(scheme, chosen))

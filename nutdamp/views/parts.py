@@ -19,10 +19,9 @@ from rich.text import Text
 from nutdamp.common.results import Note
 from nutdamp.errors import listed
 from nutdamp.flight.end_state import Aspect, at_start, spin_phases
-from nutdamp.flight.propagation import Flight, Track
+from nutdamp.flight.propagation import Flight, Track, to_sun_pulse
 from nutdamp.physics import attitude
 from nutdamp.planning.plan import NO_NUTATION
-from nutdamp.schemes.block_model import to_sun_pulse
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.equipment import Block
 from nutdamp.spacecraft.model import Keep, Spacecraft, Vector
