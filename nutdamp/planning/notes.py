@@ -521,8 +521,8 @@ def _missed(chosen: Plan, compared: Comparison, *, tabulated: bool) -> Iterator[
     if parts != {Part.SPIN} and any(channel.damps for channel in spacecraft.channels):
         if OPTIMAL.name not in {plan.scheme for plan in compared.plans}:
             yield note("optimal-not-compared")
-        elif requirements.required(spacecraft):
-            yield note("try-trade")
+        elif requirements.required(spacecraft) and all(one.kept for one in at_start(spacecraft)):
+            yield note("try-trade")  # no end and no axis of H keeps a cone that is broken at t = 0
 
 
 def alternatives(compared: Comparison) -> Iterator[Note]:

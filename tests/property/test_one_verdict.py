@@ -15,6 +15,7 @@ from support.process import Run
 
 import nutdamp
 from nutdamp.files.reader import example_names, example_text
+from nutdamp.planning.decision import ROBUST
 from nutdamp.planning.verdict import Status
 from nutdamp.views.verdict import verdict_json
 
@@ -105,7 +106,7 @@ HEADLINES = {
 @spread("text", files(), quick=1, deep=4)
 def test_everything_that_judges_a_plan_says_the_same(run: Run, tmp_path: Path, text: str) -> None:
     (tmp_path / "body.yaml").write_text(text)
-    made = call(run, "plan body.yaml --json -")
+    made = call(run, "plan body.yaml --json - --csv pulses.csv")
     decision = json.loads(made.stdout)["decision"]
     status, scheme = decision["status"], decision["scheme"]
     assert made.returncode == EXIT[status]
@@ -123,13 +124,17 @@ def test_everything_that_judges_a_plan_says_the_same(run: Run, tmp_path: Path, t
     if page["signed"]:
         assert status == "fly"
 
+    pulses = "--schedule pulses.csv" if scheme == ROBUST else f"--scheme {scheme}"
     for command in ("simulate", "disperse") if decision["cases"] else ("simulate",):
-        told = result(run, f"{command} body.yaml --scheme {scheme}", status=EXIT[status])
-        assert judged(told["decision"]) == judged(decision), command
-    export = result(run, f"export body.yaml --scheme {scheme} --format json", status=EXIT[status])
-    assert judged(export["decision"]) == judged(decision)
+        told = result(run, f"{command} body.yaml {pulses}", status=EXIT[status])["decision"]
+        told["scheme"] = scheme if told["scheme"] == "pulses.csv" else told["scheme"]
+        assert judged(told) == judged(decision), command
+    export = result(run, f"export body.yaml {pulses} --format json", status=EXIT[status])
+    told = export["decision"] | {"scheme": scheme}
+    assert judged(told) == judged(decision)
 
-    known = nutdamp.plan(nutdamp.load(tmp_path / "body.yaml"), scheme).verdict
+    named = None if scheme == ROBUST else scheme
+    known = nutdamp.plan(nutdamp.load(tmp_path / "body.yaml"), named).verdict
     assert judged(json.loads(json.dumps(verdict_json(known)))) == judged(decision)
     assert known.status.exit_status == made.returncode
 

