@@ -485,6 +485,18 @@ NAMED = 5e-3
 def refusal(search: Search) -> Infeasible:
     """Reason for no schedule, and the limit without which there is one."""
     spacecraft = search.spacecraft
+    most = spacecraft.limits.max_pulses
+    undisturbed = spacecraft.growth == 0.0 and not spacecraft.disturbances
+    if most is not None and undisturbed and spacecraft.inertia.symmetric:
+        # No pulse of a symmetric body takes out more than its impulse across the axis.
+        impulse = max(abs(channel.transverse) * channel.max_on_time for channel in search.channels)
+        if most * impulse < spacecraft.least_impulse:
+            share = 100.0 * most * impulse / spacecraft.least_impulse
+            return Infeasible(
+                f"limits.max_pulses = {most} is too few: so many pulses give at most {share:.4g} % "
+                "of the impulse that takes out the nutation, "
+                f"{math.ceil(spacecraft.least_impulse / impulse)} pulses or more all of it"
+            )
     unproved = search.first.unmet <= UNMET or math.isinf(search.first.unmet)
 
     def attempt(limited: Spacecraft) -> Schedule | None:
