@@ -389,12 +389,10 @@ class RealWidths:
                 (number for block in blocks for number in block.sun_pulses), default=0
             )
         try:
-            (schedule,), sun_pulses = fire_all(spacecraft, [blocks])
+            (schedule,), seen = fire_all(spacecraft, [blocks])
         except Infeasible:
             return [False]
-        if isinstance(schedule, Infeasible):
-            return [False]
-        return [bool(sees[0]) for sees in sun_pulses.seen]
+        return [False] if isinstance(schedule, Infeasible) else [bool(sees[0]) for sees in seen]
 
     @cached_property
     def effort(self) -> float:
