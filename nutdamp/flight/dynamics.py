@@ -420,7 +420,8 @@ class Supply:
         cold = self.spacecraft.cold
         tank = self.spacecraft.tank
         flow = self.full_flow(channel)
-        warm = effective / (1.0 if cold is None else cold.factor(self.fired[channel.name]))
+        share = 1.0 if cold is None else cold.factor(self.fired[channel.name])
+        warm = effective / share
         if tank is None:
             return warm
         on_time = warm / float(tank.thrust_factor(self.used))
@@ -428,7 +429,7 @@ class Supply:
             REPEATED if flow is not None else 0
         ):  # each step errs by a small share of the error before
             before = on_time
-            on_time = warm / float(tank.burn(self.used, flow * effective / warm, on_time)[1])
+            on_time = warm / float(tank.burn(self.used, flow * share, on_time)[1])
             if abs(on_time - before) <= CLOSE * on_time:
                 break
         return on_time

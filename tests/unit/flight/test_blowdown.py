@@ -202,6 +202,7 @@ def test_an_on_time_is_found_for_each_impulse() -> None:
         assert supply.take(body.channels[0], on_time)[0] * on_time == pytest.approx(
             effective, rel=1e-12
         )
+    assert Supply(body, used=0.03).on_time_for(body.channels[0], 0.0) == 0.0
 
 
 @spread("scheme", ["two-pulse", "one-pulse", "four-pulse", "optimal"], quick=2, deep=2)
