@@ -13,6 +13,7 @@ import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -356,9 +357,16 @@ FREE_ON_TIMES = {"min_on_time": 0.0, "max_on_time": math.inf}
 """Keys of limits of a file and of its thrusters, with the values that limit nothing."""
 
 
-def why(spacecraft: Spacecraft, attempt: Callable[[Spacecraft], Schedule | None]) -> str:
-    """Cure of an ``attempt`` that finds no schedule: the first limit without which it finds one, by
-    its key in the file; or that none alone helps. Empty where the work for it is spent.
+class Cure(NamedTuple):
+    """Limit that helps where no schedule is found, by its key, and the text; empty without one."""
+
+    limit: str
+    text: str
+
+
+def why(spacecraft: Spacecraft, attempt: Callable[[Spacecraft], Schedule | None]) -> Cure:
+    """Cure of an ``attempt`` that finds no schedule: the first limit without which it finds one; or
+    that none alone helps. Without a text where the work for it is spent.
     """
     with work.budget("a limit to lift", work.CURE):
         lifted = {
@@ -373,7 +381,7 @@ def why(spacecraft: Spacecraft, attempt: Callable[[Spacecraft], Schedule | None]
         for name, limited in lifted.items():
             schedule = None if work.exhausted() else attempt(limited)
             if schedule is not None:
-                return f"without {name} there is a schedule of {len(schedule)} pulses"
+                return Cure(name, f"without {name} there is a schedule of {len(schedule)} pulses")
         low = high = spacecraft.horizon
         latest = max(LATEST * high, with_limits(spacecraft, horizon=None).horizon)
         while high < latest and not work.exhausted():
@@ -384,10 +392,11 @@ def why(spacecraft: Spacecraft, attempt: Callable[[Spacecraft], Schedule | None]
                 middle = float(f"{0.5 * (low + high):.4g}")
                 enough = attempt(with_limits(spacecraft, horizon=middle)) is not None
                 low, high = (low, middle) if enough else (middle, high)
-            return f"limits.horizon = {high:.4g} s is long enough"
+            return Cure("horizon", f"limits.horizon = {high:.4g} s is long enough")
         if work.exhausted():
-            return ""
-    return f"neither {LATEST:g} times the horizon nor any other limit that is lifted helps alone"
+            return Cure("", "")
+    none = f"neither {LATEST:g} times the horizon nor any other limit that is lifted helps alone"
+    return Cure("", none)
 
 
 NO_AXIAL = "no channel has a torque about axis 3, so none can set the spin; leave --spin out"

@@ -16,7 +16,9 @@ from nutdamp.spacecraft.roles import ROLES
 PACKAGE = places.ROOT / "nutdamp"
 LOOSE = {"__init__", "__main__", "api", "errors", "units"}
 LONGEST, SHORTEST = 480, 10
-"""Statements of a module, but of a scheme: lines can be bought with density."""
+"""Statements of a module, but of a scheme: lines can be bought with density. The most
+is what the longest has, control_loop/budget.
+"""
 
 FLOORS = 23
 """Longest chain of imports, those within functions and for types alone too."""

@@ -503,9 +503,10 @@ def refusal(search: Search) -> Infeasible:
         other = Search(limited, search.options)
         return by_program(other, None) if other.feasible(limited.horizon) else None
 
-    cures = [why(spacecraft, attempt)]
+    cure = why(spacecraft, attempt)
+    cures = [cure.text]
     horizon = spacecraft.horizon
-    while not (unproved or "horizon =" in cures[0] or work.exhausted()):
+    while not (unproved or cure.limit == "horizon" or work.exhausted()):
         horizon *= 2.0
         if horizon > LATEST * spacecraft.horizon:
             break
