@@ -404,25 +404,15 @@ class Pulses:
         return np.stack([self.starts, ends], axis=1).reshape(-1, self.starts.shape[1])
 
     @property
-    def jumps(self) -> tuple[Array, Array]:
-        """Jump at each edge, (2k, 3, n) each: of the torque in N m,
-        and of the momentum in N m s.
-        """
+    def torques(self) -> tuple[Array, Array]:
+        """Torque as each pulse begins and as it ends, (k, 3, n) N m each; 0 of ideal impulses."""
         on_times = self.on_times[:, None]
         ideal = on_times == 0.0
-        first = last = np.where(ideal, 0.0, self.impulses / np.where(ideal, 1.0, on_times))
-        kick = np.where(ideal, self.impulses, 0.0)
-        if (
-            self.leans is not None
-        ):  # what begins at its first value, less than its mean, ends at its last
-            leans = self.leans[:, None]
-            first, last = (1.0 - leans) * first, (1.0 + leans) * last
-        return _edgewise(first, -last), _edgewise(kick, 0.0 * kick)
-
-
-def _edgewise(begins: Array, ends: Array) -> Array:
-    """Values at starts and ends (k, 3, n) interleaved, (2k, 3, n)."""
-    return np.stack([begins, ends], axis=1).reshape(-1, *begins.shape[1:])
+        mean = np.where(ideal, 0.0, self.impulses / np.where(ideal, 1.0, on_times))
+        if self.leans is None:
+            return mean, mean
+        leans = self.leans[:, None]
+        return (1.0 - leans) * mean, (1.0 + leans) * mean
 
 
 class Observer(Protocol):
@@ -496,29 +486,29 @@ def _fly_alike(
     order: NDArray[np.intp],
 ) -> None:
     """Fly cases whose edges have the same ``order``, in place: between pulses all of them coast."""
-    edges, (turns, kicks), slopes = pulses.edges, pulses.jumps, pulses.slopes
+    edges, slopes = pulses.edges, pulses.slopes
+    firsts, _ = pulses.torques
     half = None if pulses.sheds is None else 0.5 * pulses.sheds
     now = np.zeros(rates.shape[1])
     on = set[int]()
     for edge in order.tolist():
-        torque = np.sum(turns[sorted(on)], axis=0) if on else None
-        slope = None
-        if torque is not None and slopes is not None:
-            rising = [first // 2 for first in sorted(on)]
-            slope = np.sum(slopes[rising], axis=0)
-            torque = torque + sum(slopes[number] * (now - edges[2 * number]) for number in rising)
+        torque = slope = None
+        if on:
+            acting = sorted(on)
+            torque = np.sum(firsts[acting], axis=0)
+            if slopes is not None:
+                slope = np.sum(slopes[acting], axis=0)
+                torque += sum(slopes[number] * (now - edges[2 * number]) for number in acting)
         _advance(
             MotionStretch(bodies, now, rates, quaternion, torque, slope), edges[edge] - now, watch
         )
         now = edges[edge]
         number, ends = divmod(edge, 2)
         bodies = bodies.lighter(None if half is None else half[number])
-        if not np.any(pulses.on_times[number]):
-            rates += kicks[edge] / bodies.moments
-        elif ends:
-            on.remove(edge - 1)
-        else:
-            on.add(edge)
+        if np.any(pulses.on_times[number]):
+            (on.remove if ends else on.add)(number)
+        elif not ends:
+            rates += pulses.impulses[number] / bodies.moments
 
 
 def _fly_each(
@@ -529,24 +519,17 @@ def _fly_each(
     Those that coast from one edge to the next go on in closed form: with times widely dispersed one
     coast may be long where another case has a pulse on, whose steps it would take.
     """
-    edges = pulses.edges
+    edges, slopes = pulses.edges, pulses.slopes
+    firsts, lasts = pulses.torques
+    ideal = np.broadcast_to(pulses.on_times == 0.0, pulses.starts.shape)
     order = np.argsort(edges, axis=0, kind="stable")
     on = np.cumsum(1 - 2 * (order % 2), axis=0)  # pulses that are on behind each edge
-    edges = np.take_along_axis(edges, order, axis=0)
-    of_each = order[:, None, :]
-    turns, kicks = (np.take_along_axis(jump, of_each, axis=0) for jump in pulses.jumps)
-    slopes = pulses.slopes
-    slope = None
-    half = None
-    if pulses.sheds is not None:
-        half = np.take_along_axis(np.repeat(0.5 * pulses.sheds, 2, axis=0), of_each, axis=0)
-    bends = (
-        None if slopes is None else np.take_along_axis(_edgewise(slopes, -slopes), of_each, axis=0)
-    )
     now = np.zeros(rates.shape[1])
     torque = np.zeros_like(rates)
-    for number, (edge, turn, kick) in enumerate(zip(edges, turns, kicks, strict=True)):
+    slope = None
+    for number, edge_of_each in enumerate(order):
         here = MotionStretch(bodies, now, rates, quaternion, torque, slope)
+        edge = _of_each(edges, edge_of_each)
         coasts = on[number - 1] == 0 if number else np.ones(len(now), dtype=bool)
         groups = (
             (np.flatnonzero(coasts), np.flatnonzero(~coasts))
@@ -559,12 +542,25 @@ def _fly_each(
                 part = part._replace(torque=None, slope=None)
             _advance(part, (edge - now)[cases], watch and watch.some(cases))
             rates[:, cases], quaternion[:, cases] = part.rates, part.quaternion
-        torque = torque + turn if slope is None else torque + slope * (edge - now) + turn
+        if slope is not None:
+            torque = torque + slope * (edge - now)
+        pulse, ends = np.divmod(edge_of_each, 2)
+        torque = torque + np.where(ends, -_of_each(lasts, pulse), _of_each(firsts, pulse))
         now = edge
-        if bends is not None:
-            slope = bends[number] if slope is None else slope + bends[number]
-        bodies = bodies.lighter(None if half is None else half[number])
-        rates += kick / bodies.moments
+        if slopes is not None:
+            bend = np.where(ends, -1.0, 1.0) * _of_each(slopes, pulse)
+            slope = bend if slope is None else slope + bend
+        if pulses.sheds is not None:
+            bodies = bodies.lighter(0.5 * _of_each(pulses.sheds, pulse))
+        kicked = _of_each(ideal, pulse) & (ends == 0)
+        if kicked.any():
+            rates += np.where(kicked, _of_each(pulses.impulses, pulse), 0.0) / bodies.moments
+
+
+def _of_each(values: Any, rows: NDArray[np.intp]) -> Any:
+    """Values (m, …, n) of one row of each case, (…, n)."""
+    index = rows.reshape(1, *(1,) * (values.ndim - 2), len(rows))
+    return np.take_along_axis(values, index, axis=0)[0]
 
 
 def _advance(here: MotionStretch, duration: Array, watch: Observer | None) -> None:
