@@ -59,6 +59,12 @@ from nutdamp.spacecraft.model import Spacecraft
 FEWEST = 20  # number of samples that are alike in a row where a sensor is stuck, at least
 COARSE = 10  # a record that has so few different values is one of coarse steps
 NOTHING = 1e-12  # times the usual size of a signal below which it shows 0
+SATURATED = 0.15
+"""Share of samples at the largest, or at the least, value of a signal that has more than `LEVELS`
+values: of a sinusoid rounded to 20 steps a tenth is there, of one clipped at 0.9 of its amplitude
+0.14, at 0.85, whose fit is off by sigmas, 0.18 (record clipped-21).
+"""
+LEVELS = 20
 OFTEN = 1.5  # radians of spin between two samples up to which a direction is seen to go round
 
 
@@ -98,12 +104,28 @@ def expect_alive(model: Model) -> tuple[str, ...]:
             faults.append(
                 f"{name} does not change from {begins:.4g} s to {ends:.4g} s ({alike} samples)"
             )
+        elif name not in spins and _at_an_end(values) > SATURATED:
+            share = 100.0 * _at_an_end(values)
+            faults.append(
+                f"{name} is at its largest or least value in {share:.3g} % of the samples"
+            )
     if faults:
         shows = {name for name in model.signals if KIND[name].nutation}
         others = " while others show a nutation" if constant & shows and shows - constant else ""
-        cure = "the sensor is dead or stuck; leave its column out, or end the record before"
+        cure = (
+            "the sensor is dead, stuck or saturated; leave its column out, or end the record before"
+        )
         raise Infeasible(f"{'; '.join(faults)}{others}: {cure}")
     return GYROS if steady else ()
+
+
+def _at_an_end(values: Vector) -> float:
+    """Share of the samples (n, k) at the largest or the least value, the larger one; 0 for
+    directions and for few levels.
+    """
+    if values.shape[1] > 1 or len(np.unique(values)) <= LEVELS:
+        return 0.0
+    return float(max(np.mean(values == values.max()), np.mean(values == values.min())))
 
 
 def _sensors(model: Model) -> Iterator[tuple[str, Vector, Vector]]:

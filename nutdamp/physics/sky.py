@@ -403,11 +403,15 @@ class SunPulseClock:
         Newton's method.
         """
         here = start
+        # A pulse more than half a turn off is lost; steps through whole turns under thrust cost
+        # 13 s a search of blocks (steerable thruster, nutation of 12°).
+        earliest, latest = start.since - CIRCLE / pace, start.since + CIRCLE / pace
         for _ in range(ITERATIONS):
             off, rate = self._off(here, sun)
             # Where the Sun is near the axis its azimuth may not change for a moment: then by the
             # mean rate.
-            here = here.moved(here.since + off / np.where(rate > 0.1 * pace, rate, pace))
+            time = here.since + off / np.where(rate > 0.1 * pace, rate, pace)
+            here = here.moved(np.clip(time, earliest, latest))
             if np.all(np.abs(off) < CIRCLE * EXACT):
                 break
         return here

@@ -81,20 +81,28 @@ class Tightening:
 
 def tightening(plan: Plan, probability: float) -> Tightening | None:
     """Fewest dominant tolerances, and their reduction, for enough complying cases; None if none
-    suffice.
+    suffice, as where the nominal values miss the requirement, or none are known to with the work of
+    `work.CASES`.
     """
-    spacecraft, given = plan.spacecraft, plan.spacecraft.dispersions
-    if given is None or not requirements.required(spacecraft):
+    if plan.spacecraft.dispersions is None or not plan.meets_requirement:
         return None
+    with work.budget("the tolerances needed", work.CASES):
+        return _tightening(plan, plan.spacecraft.dispersions, probability)
+
+
+def _tightening(plan: Plan, given: Dispersions, probability: float) -> Tightening | None:
+    spacecraft = plan.spacecraft
     study = study_of(spacecraft, plan.pulses)
 
     def tried(names: Iterable[str], factor: float, cases: int = CASES, seed: int = SEED) -> Results:
         changed = replace(spacecraft, dispersions=scaled(given, names, factor))
-        return run(
-            Results(study_of(changed, plan.pulses, seed=seed), cases), threads=threads_here()
-        )
+        tightened = study_of(changed, plan.pulses, seed=seed)
+        work.spend(tightened.flies.effort * cases)
+        return run(Results(tightened, cases), threads=threads_here())
 
     def complying(names: Iterable[str], factor: float) -> bool:
+        if work.exhausted():
+            return False
         return (tried(names, factor).met_fraction or 0.0) >= probability
 
     shares: dict[str, float] = {}  # of the required bound, by tolerance
@@ -126,6 +134,8 @@ def tightening(plan: Plan, probability: float) -> Tightening | None:
             low, high = (middle, high) if complying(names, middle) else (low, middle)
         # The tries all had the same draws, and the largest size that passes passes by luck too.
         for seed in range(FRESH, FRESH + CHECKS):
+            if work.exhausted():
+                return None
             trial = tried(names, low, fresh, seed)
             if trial.shown():
                 share = trial.met_fraction or 0.0
