@@ -120,12 +120,22 @@ def expect_alive(model: Model) -> tuple[str, ...]:
 
 
 def _at_an_end(values: Vector) -> float:
-    """Share of the samples (n, k) at the largest or the least value, the larger one; 0 for
-    directions and for few levels.
+    """Share of the samples (n, k) at their largest or least value, the larger one; of directions
+    (n, 3) those of the azimuth and of the third part. 0 for few levels and for attitudes (n, 4).
     """
-    if values.shape[1] > 1 or len(np.unique(values)) <= LEVELS:
-        return 0.0
-    return float(max(np.mean(values == values.max()), np.mean(values == values.min())))
+    signals = list(values.T) if values.shape[1] == 1 else []
+    if values.shape[1] == 3:
+        azimuth = np.arctan2(values[:, 1], values[:, 0])
+        signals = [azimuth.round(12), values[:, 2].round(12)]
+    return max(
+        (
+            float(np.mean(signal == end))
+            for signal in signals
+            if len(np.unique(signal)) > LEVELS
+            for end in (signal.min(), signal.max())
+        ),
+        default=0.0,
+    )
 
 
 def _sensors(model: Model) -> Iterator[tuple[str, Vector, Vector]]:

@@ -47,6 +47,7 @@ def test_other_kinds_of_broken_sensors_lead_to_no_wrong_estimate(
 @pytest.mark.parametrize(
     ("fault", "number"),
     [
+        ("clipped", 21),
         ("sign_last", 13),
         deep("sign_last", 14),
         deep("sign_last", 30),
@@ -55,7 +56,7 @@ def test_other_kinds_of_broken_sensors_lead_to_no_wrong_estimate(
         ("signs", 31),
     ],
 )
-def test_no_opposite_direction_and_no_mirrored_motion_is_accepted(
+def test_no_clipped_opposite_or_mirrored_motion_is_accepted(
     tmp_path: Path, fault: str, number: int
 ) -> None:
     assert outcome(tmp_path, number, fault)[0] == "refused"

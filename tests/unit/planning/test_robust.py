@@ -437,6 +437,22 @@ def test_the_share_is_that_of_the_real_widths_and_how_far_it_is_can_be_watched(
     assert robust.variations_of(compare(dispersed(), ("four-pulse",))) == ([], [], [])
 
 
+def test_tolerances_needed_only_of_a_plan_that_meets_and_within_their_budget(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A plan that misses with nominal values is helped by no tolerance."""
+    body = nutdamp.example().with_(dispersions=ROUGH)
+    plan = planning.plan(body, "two-pulse")
+    needed = present(chance_plan.tightening(plan, 0.997))
+    assert needed.complied >= needed.least >= 0.997
+    wider = replace(body, omega0=body.omega0 * np.array([2.0, 2.0, 1.0]))
+    missing = replace(plan, spacecraft=wider)
+    assert missing.meets_requirement is False
+    assert chance_plan.tightening(missing, 0.997) is None
+    monkeypatch.setattr(work, "CASES", 1.0)
+    assert chance_plan.tightening(plan, 0.997) is None
+
+
 def test_the_json_has_what_the_best_costs_fresh_cases_and_the_tolerances_to_shrink() -> None:
     dear, usual = candidate(2.0, MOST, 0.5, end=3.0), candidate(1.0, LEAST, 1.0)
     body = usual.plan.spacecraft
