@@ -90,6 +90,7 @@ def expect_alive(model: Model) -> tuple[str, ...]:
         )
         at, alike = int(np.argmax(np.diff(edges))), int(np.diff(edges).max())
         begins, ends = times[edges[at]], times[edges[at + 1] - 1]
+        at_an_end = _at_an_end(values)
         # That gyro 3 does not change all along is as it should be.
         off = (
             not steady and name not in spins
@@ -104,11 +105,9 @@ def expect_alive(model: Model) -> tuple[str, ...]:
             faults.append(
                 f"{name} does not change from {begins:.4g} s to {ends:.4g} s ({alike} samples)"
             )
-        elif name not in spins and _at_an_end(values) > SATURATED:
-            share = 100.0 * _at_an_end(values)
-            faults.append(
-                f"{name} is at its largest or least value in {share:.3g} % of the samples"
-            )
+        elif at_an_end > SATURATED and name not in spins:
+            share = 100.0 * at_an_end
+            faults.append(f"{name} is at its largest or least value in {share:.3g} % of samples")
     if faults:
         shows = {name for name in model.signals if KIND[name].nutation}
         others = " while others show a nutation" if constant & shows and shows - constant else ""

@@ -403,8 +403,8 @@ class SunPulseClock:
         Newton's method.
         """
         here = start
-        # A pulse more than half a turn off is lost; steps through whole turns under thrust cost
-        # 13 s a search of blocks (steerable thruster, nutation of 12°).
+        # A pulse more than half a turn off is lost. Under thrust Newton's steps may go on for
+        # hundreds of radians: a plan of blocks took 75 s so, and 15 s within a turn.
         earliest, latest = start.since - CIRCLE / pace, start.since + CIRCLE / pace
         for _ in range(ITERATIONS):
             off, rate = self._off(here, sun)

@@ -589,9 +589,9 @@ class GrowingProgram:
         """The cheapest solution, from the last one's basis if there is one; None where no way of
         solving succeeds.
         """
-        first, second = (
-            (SIMPLEX, INTERIOR) if len(self._costs) <= LARGE else (INTERIOR_OF_MANY, SIMPLEX)
-        )
+        first, second = SIMPLEX, INTERIOR
+        if len(self._costs) > LARGE:
+            first, second = INTERIOR_OF_MANY, SIMPLEX
         optimum = self._solved(*first)
         if optimum is None:
             self._highs.clearSolver()
