@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 from typing import Any
@@ -26,6 +26,8 @@ CASES, SAMPLES = (
 )  # units for the dispersed cases of one comparison by so many, the default number
 # units for cases beyond that number, where they leave it undecided whether enough comply
 MORE_CASES = 5_000.0
+# units for the tolerances needed: what the cases of one comparison take is too much beside it
+TOLERANCES = 5_000.0
 FRONTS = 30_000.0  # units for all points of `trade` but those that `plan` finds
 # units for the robust plans that `plan` tries by itself: at most 8 s, for programs and flights of
 # cases take 0.5 ms a unit (products.yaml) or less
@@ -87,6 +89,7 @@ class Monitor:
 
 
 _budget: ContextVar[WorkBudget | None] = ContextVar("budget", default=None)
+_cures: ContextVar[bool] = ContextVar("cures", default=True)
 _steps: ContextVar[StepCount | None] = ContextVar("steps", default=None)
 _watch: ContextVar[Monitor | None] = ContextVar("watch", default=None)
 
@@ -109,6 +112,21 @@ def budget(what: str, most: float) -> Iterator[WorkBudget]:
         _budget.reset(token)
         if watch is not None:
             watch.budget = around
+
+
+def cure(what: str) -> AbstractContextManager[WorkBudget]:
+    """Open the budget for the search of a limit that would make a scheme feasible."""
+    return budget(what, CURE if _cures.get() else 0.0)
+
+
+@contextmanager
+def no_cures() -> Iterator[None]:
+    """Search no such limits: for plans of which nobody is told why they are infeasible."""
+    token = _cures.set(False)
+    try:
+        yield
+    finally:
+        _cures.reset(token)
 
 
 def spend(units: float) -> None:

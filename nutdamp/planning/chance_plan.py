@@ -25,7 +25,7 @@ from nutdamp.flight import propagation
 from nutdamp.montecarlo.cases import DispersedModel
 from nutdamp.montecarlo.inputs import DispersedInput, mixing
 from nutdamp.montecarlo.statistics import cases_to_show
-from nutdamp.montecarlo.study import SEED, Results, Study, run, study_of, threads_here
+from nutdamp.montecarlo.study import SEED, Results, Study, affordable, run, study_of, threads_here
 from nutdamp.planning import plan as planning
 from nutdamp.planning.plan import Plan
 from nutdamp.schemes import planner, valve_commands
@@ -49,10 +49,12 @@ MOST_TOLERANCES, ALLOCATION_HALVINGS = 4, 6
 cases and enough.
 """
 
-CASES, MOST_CASES = (
-    8_192,
-    100_000,
-)  # drawn cases in which each allocation is tried, and the most of one check
+CASES = (512, 2_048, 8_192)
+"""Stages of the drawn cases in which an allocation is tried, until it is certain whether enough
+comply: far too few are seen in the first.
+"""
+
+MOST_CASES = 100_000  # of one check
 
 FRESH = 20_011
 """Seed of the first draws in which what was found is checked, which nothing was chosen by; each
@@ -82,11 +84,11 @@ class Tightening:
 def tightening(plan: Plan, probability: float) -> Tightening | None:
     """Fewest dominant tolerances, and their reduction, for enough complying cases; None if none
     suffice, as where the nominal values miss the requirement, or none are known to with the work of
-    `work.CASES`.
+    `work.TOLERANCES`.
     """
     if plan.spacecraft.dispersions is None or not plan.meets_requirement:
         return None
-    with work.budget("the tolerances needed", work.CASES):
+    with work.budget("the tolerances needed", work.TOLERANCES):
         return _tightening(plan, plan.spacecraft.dispersions, probability)
 
 
@@ -94,16 +96,24 @@ def _tightening(plan: Plan, given: Dispersions, probability: float) -> Tightenin
     spacecraft = plan.spacecraft
     study = study_of(spacecraft, plan.pulses)
 
-    def tried(names: Iterable[str], factor: float, cases: int = CASES, seed: int = SEED) -> Results:
+    def tried(names: Iterable[str], factor: float, stages: Iterable[int], seed: int) -> Results:
+        """Cases of the first of the stages that decides, else of the last that is affordable."""
         changed = replace(spacecraft, dispersions=scaled(given, names, factor))
-        tightened = study_of(changed, plan.pulses, seed=seed)
-        work.spend(tightened.flies.effort * cases)
-        return run(Results(tightened, cases), threads=threads_here())
+        results = Results(study_of(changed, plan.pulses, seed=seed), 0)
+        for stage in stages:
+            if results.done and not affordable(results.study, stage - results.done):
+                break
+            work.spend(results.study.flies.effort * (stage - results.done))
+            results = run(results.extended(stage), threads=threads_here())
+            if results.shown(certain=True) is not None:
+                break
+        return results
 
     def complying(names: Iterable[str], factor: float) -> bool:
         if work.exhausted():
             return False
-        return (tried(names, factor).met_fraction or 0.0) >= probability
+        results = tried(names, factor, CASES, SEED)
+        return (results.met_fraction or 0.0) >= probability
 
     shares: dict[str, float] = {}  # of the required bound, by tolerance
     parts = [
@@ -136,7 +146,7 @@ def _tightening(plan: Plan, given: Dispersions, probability: float) -> Tightenin
         for seed in range(FRESH, FRESH + CHECKS):
             if work.exhausted():
                 return None
-            trial = tried(names, low, fresh, seed)
+            trial = tried(names, low, [fresh], seed)
             if trial.shown():
                 share = trial.met_fraction or 0.0
                 least = trial.interval()[0]

@@ -317,7 +317,7 @@ def plan(spacecraft: Spacecraft, scheme: str, options: planner.Choice = None) ->
             rerouted = routes.schedules(known, scheme, chosen)
             others = (judged(spacecraft, scheme, schedule, chosen) for schedule in rerouted)
             result = next((other for other in others if other.feasible), result)
-    return replace(result, cut=True) if spent.exhausted else result
+    return replace(result, options=chosen, cut=spent.exhausted)
 
 
 def spinning(spacecraft: Spacecraft) -> tuple[str, ...]:

@@ -19,7 +19,7 @@ import numpy as np
 from nutdamp.common import results, work
 from nutdamp.common.results import Note, note
 from nutdamp.errors import Infeasible
-from nutdamp.montecarlo.study import flown_in_stages, study_of
+from nutdamp.montecarlo.study import Results, next_stage, study_of
 from nutdamp.planning import chance_plan
 from nutdamp.planning import plan as planning
 from nutdamp.planning.chance_plan import Tightening, tightening
@@ -37,7 +37,7 @@ from nutdamp.planning.decision import (
 from nutdamp.planning.notes import beside
 from nutdamp.planning.plan import Plan, Standing, judge
 from nutdamp.planning.screening import LIKELIER, FlownPlan, entered
-from nutdamp.planning.verdict import Cases, Verdict, cases_of
+from nutdamp.planning.verdict import Cases, Verdict
 from nutdamp.schemes import planner
 from nutdamp.schemes.catalogue import LEAST, OPTIMAL, SCHEMES, OptimalOptions, Options
 from nutdamp.spacecraft import requirements
@@ -225,7 +225,7 @@ def compare(
     with work.steps(1.5 * count, SEARCH, hook=lambda done, _: progress(done, count)) as steps:
         for number, variations in enumerate(rounds):
             before = len(entries)
-            with work.budget("the robust plans", work.FRONTS):
+            with work.budget("the robust plans", work.FRONTS), work.no_cures():
                 for variation in variations:
                     _fly(comparison, variation, entries)
                     steps.reach(steps.done + 1)
@@ -346,11 +346,16 @@ def _confirmed(
 
 
 def _fresh(candidate: FlownPlan) -> Cases | None:
-    """Plan in cases that it was not chosen by; None where one of them cannot be flown."""
+    """Plan in as many cases that it was not chosen by as decide on it; None where one of them
+    cannot be flown.
+    """
     plan = candidate.plan
     study = study_of(plan.spacecraft, plan.pulses, seed=FRESH)
     try:
-        return cases_of(flown_in_stages(study, work.SAMPLES))
+        fresh = FlownPlan(plan, next_stage(Results(study, 0), work.SAMPLES))
+        while not fresh.final and fresh.cases.enough is None:
+            fresh.further(work.SAMPLES)
+        return fresh.cases
     except Infeasible:
         return None
 

@@ -216,6 +216,7 @@ def fronts(
     count: int,
     shifts: Sequence[float],
     nominal: bool = False,
+    compared: Sequence[Plan] = (),
 ) -> tuple[Front, ...]:
     """Fronts for each of the ``shifts`` (rad, infinite for any), of at most ``count`` searches
     each.
@@ -223,8 +224,8 @@ def fronts(
     What is traded is propellant, with ``options.least`` of impulse that (then pulses do not tell
     their propellant). A schedule counts for every front whose shift it keeps; that of the whole
     horizon is what `plan` finds. Where optimal finds none, those of the other schemes count that
-    comply but for where H ends. ``nominal``: see `Point`. The count × len(shifts) searches are the
-    steps of the task.
+    comply but for where H ends. ``nominal``: see `Point`. Plans ``compared`` for the same question
+    are not searched again. The count × len(shifts) searches are the steps of the task.
     """
     if options.least == "impulse":
         # The search for the fastest saves time, and counts in kg whatever it can: one unit for all
@@ -232,6 +233,7 @@ def fronts(
         spacecraft = replace(
             spacecraft, channels=tuple(channel.of(isp=None) for channel in spacecraft.channels)
         )
+    compared = [each for each in compared if each.spacecraft is spacecraft]
     ordered = sorted(set(shifts))
     done = 0
     unspent = work.FRONTS
@@ -255,7 +257,9 @@ def fronts(
             options, free_axis=anywhere, shift=None if anywhere or shift == 0.0 else shift
         )
         # The very search of `plan`, with its budget: one question, one answer.
-        whole = plan(spacecraft, OPTIMAL.name, allowing)
+        asked = planner.settled(OPTIMAL, allowing, spacecraft)
+        same = (each for each in compared if each.scheme == OPTIMAL.name and each.options == asked)
+        whole = next(same, None) or plan(spacecraft, OPTIMAL.name, allowing)
         done += 1
         work.reach(done)
         if whole.schedule is None or whole.schedule.bounds is None:
@@ -269,14 +273,14 @@ def fronts(
     others: list[Plan] = []
     if why:
         names = [name for name in usual(spacecraft) if name != OPTIMAL.name]
-        compared = compare(
-            spacecraft, names, Options(with_disturbances=options.with_disturbances), samples=0
-        )
+        chosen = Options(with_disturbances=options.with_disturbances)
         ends = {Part.SHIFT, Part.DISTANCE}
         others = [
-            plan
-            for plan in compared
-            if len(plan.pulses) and {bound.part for bound in plan.shortfalls} <= ends
+            each
+            for each in compared or compare(spacecraft, names, chosen, samples=0)
+            if each.scheme in names
+            and len(each.pulses)
+            and {bound.part for bound in each.shortfalls} <= ends
         ]
     plans = [*(plan for _, plan, _ in entries), *others]
     counted = [plan.pulses.bounds for plan in plans if plan.pulses.bounds is not None]
@@ -387,7 +391,14 @@ def trade(
     nominal: bool = False,
 ) -> Trade:
     """Trade of the `fronts`, with the plan that a comparison of the usual schemes recommends."""
-    traded = fronts(spacecraft, options, count=count, shifts=shifts, nominal=nominal)
     usual_options = Options(least=options.least, with_disturbances=options.with_disturbances)
     compared = compare(spacecraft, options=usual_options, samples=0 if nominal else None)
+    traded = fronts(
+        spacecraft,
+        options,
+        count=count,
+        shifts=shifts,
+        nominal=nominal,
+        compared=compared.plans,
+    )
     return Trade(spacecraft, traded, compared.recommended)

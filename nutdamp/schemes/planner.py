@@ -83,7 +83,7 @@ def schedule(name: str, spacecraft: Spacecraft, options: Choice = None) -> Sched
     try:
         whole = planned(model.symmetric, chosen)
     except TooShort as short:
-        with work.budget("a longer horizon", work.CURE):
+        with work.cure("a longer horizon"):
             cure = short.cure or _longer_horizon(
                 model.symmetric, lambda limited: planned(limited, chosen)
             )

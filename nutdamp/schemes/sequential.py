@@ -368,7 +368,7 @@ def why(spacecraft: Spacecraft, attempt: Callable[[Spacecraft], Schedule | None]
     """Cure of an ``attempt`` that finds no schedule: the first limit without which it finds one; or
     that none alone helps. Without a text where the work for it is spent.
     """
-    with work.budget("a limit to lift", work.CURE):
+    with work.cure("a limit to lift"):
         lifted = {
             name: with_limits(spacecraft, **{name: free})
             for name, free in FREE_LIMITS.items()

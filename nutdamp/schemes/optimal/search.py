@@ -505,19 +505,20 @@ def refusal(search: Search) -> Infeasible:
 
     cure = why(spacecraft, attempt)
     cures = [cure.text]
-    horizon = spacecraft.horizon
-    while not (unproved or cure.limit == "horizon" or work.exhausted()):
-        horizon *= 2.0
-        if horizon > LATEST * spacecraft.horizon:
-            break
-        if search.feasible(horizon):
-            needed = search.least_horizon(0.5 * horizon, horizon, NAMED)
-            cures.append(f"by small angles limits.horizon of {needed:.4g} s or more is needed")
-            break
-    if search.equations.shift and spacecraft.goal.axis is None and not work.exhausted():
-        free = Search(spacecraft, replace(search.options, free_axis=True, shift=None))
-        if by_program(free, None) is not None:
-            cures.append("with --free-axis there is a schedule")
+    with work.cure("a limit for small angles"):
+        horizon = spacecraft.horizon
+        while not (unproved or cure.limit == "horizon" or work.exhausted()):
+            horizon *= 2.0
+            if horizon > LATEST * spacecraft.horizon:
+                break
+            if search.feasible(horizon):
+                needed = search.least_horizon(0.5 * horizon, horizon, NAMED)
+                cures.append(f"by small angles limits.horizon of {needed:.4g} s or more is needed")
+                break
+        if search.equations.shift and spacecraft.goal.axis is None and not work.exhausted():
+            free = Search(spacecraft, replace(search.options, free_axis=True, shift=None))
+            if by_program(free, None) is not None:
+                cures.append("with --free-axis there is a schedule")
     reason = f"within {spacecraft.horizon:.4g} s {shortfall(search)}"
     if unproved:
         reason = f"on the true motion none was found within {bounded_by(spacecraft)}"

@@ -157,6 +157,9 @@ def test_a_longer_horizon_is_sought_within_bounds(monkeypatch: pytest.MonkeyPatc
     assert (
         units[0] < units[1] < units[0] + 2.0 * 50.0 < units[2]
     )  # the try under way when it is spent is finished
+    with work.budget("test", 1e9) as spent, work.no_cures():  # as for plans that nobody is told of
+        planning.plan(body, "rhumb-line")
+    assert spent.done == units[0]
 
 
 def test_linear_programs_count_by_their_size(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -446,7 +446,7 @@ def test_tolerances_needed_only_of_a_plan_that_meets_and_within_their_budget(
     needed = present(chance_plan.tightening(plan, 0.997))
     assert needed.complied >= needed.least >= 0.997
     with monkeypatch.context() as patched:
-        patched.setattr(work, "CASES", 1.0)
+        patched.setattr(work, "TOLERANCES", 1.0)
         assert chance_plan.tightening(plan, 0.997) is None
     wider = replace(body, omega0=body.omega0 * np.array([2.0, 2.0, 1.0]))
     missing = replace(plan, spacecraft=wider)
@@ -928,7 +928,7 @@ def test_the_tolerances_that_have_to_shrink_are_named_with_their_sizes(
     That holds in draws which nothing was chosen by, more than it was checked in.
     """
     if probability < 0.99:  # which fewer cases show
-        monkeypatch.setattr(chance_plan, "CASES", 2_048)
+        monkeypatch.setattr(chance_plan, "CASES", (512, 2_048))
         monkeypatch.setattr(chance_plan, "SAMPLES", 4_096)
     given = Requirement(math.radians(0.5), math.radians(0.2), probability)
     wider = {"dispersions": {key: {"normal": size} for key, size in WIDER.items()}}

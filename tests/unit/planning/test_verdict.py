@@ -22,6 +22,7 @@ from support.builders import (
     HALF_A_DEGREE,
     INFEASIBLE,
     POINTING,
+    aimed,
     channel,
     codes,
     cross,
@@ -693,8 +694,8 @@ def test_what_a_plan_does_to_axis_and_spin_that_nothing_asks_for_is_noted() -> N
     for share, change in ((5e-5, False), (8e-5, True), (-8e-5, True)):
         fired = Pulse(1.0, 0.0, "T", np.array([0.0, 0.0, share * up.spin * up.inertia.C]))
         for asked in (False, True):
-            aimed = replace(up, goal=Goal(spin=up.spin * (1.0 + share)) if asked else Goal())
-            notes = noted_beside(planning.Plan(aimed, "trial", Schedule((fired,))))
+            asking = replace(up, goal=Goal(spin=up.spin * (1.0 + share)) if asked else Goal())
+            notes = noted_beside(planning.Plan(asking, "trial", Schedule((fired,))))
             assert ("spin-change" in codes(notes)) == (change and not asked)
             if change and not asked:
                 values = one_of(notes, "spin-change")
@@ -1057,6 +1058,26 @@ def test_nothing_feasible_ends_with_status_3_and_a_reason(run: Run) -> None:
         "\n".join(line.strip() for line in done.stdout.splitlines() if "none" in line),
     )
     assert run("trade", "--allow", "-1deg").returncode == 2
+
+
+def test_a_trade_searches_what_a_comparison_has_planned_no_second_time(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Of the fronts with H kept and with H free, the comparison has planned the one of the file."""
+    searched: list[tuple[bool | None, str]] = []
+
+    def counted(*question: Any) -> planning.Plan:
+        searched.append((question[2].free_axis, question[2].least))
+        return planning.plan(*question)
+
+    monkeypatch.setattr(tradeoff, "plan", counted)
+    for body, free in ((BODY, True), (aimed(BODY, 5.0, 0.0), False)):
+        searched.clear()
+        made = tradeoff.trade(body, nutdamp.OptimalOptions(), count=1, shifts=(0.0, math.inf))
+        assert searched == [(not free, "propellant")]
+        alone = tradeoff.fronts(body, nutdamp.OptimalOptions(), count=1, shifts=(0.0, math.inf))
+        costs = [[point.cost for point in front.points] for front in made.fronts]
+        assert costs == [[point.cost for point in front.points] for front in alone]
 
 
 @pytest.mark.deep
