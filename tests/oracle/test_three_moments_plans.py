@@ -14,7 +14,7 @@ from support.cases import deep, spread
 from support.optimal import flies
 from support.places import case
 from support.reference import Push, fly, nutation
-from support.three_moments import ends, rival, unequal_body
+from support.rivals import ended, rival, unequal_body
 
 import nutdamp
 from nutdamp.files.reader import load_spacecraft
@@ -94,7 +94,7 @@ def test_a_schedule_of_touching_pulses_is_taken_down_on_the_true_motion() -> Non
     body = replace(body, goal=Goal(body.direction_in_n(0.01654, 4.964)))
     which, starts = [0, 1, 2, 0], [0.0, 0.208138, 0.481617, 0.754833]
     ons = [0.208138, 0.116382, 0.097601, 0.635167]
-    (left,) = ends(body, torques[which], np.array([starts + ons]))
+    (left,) = ended(body, torques[which], np.array([starts + ons]))
     assert max(math.hypot(*left[:2]), math.hypot(*left[2:]) - off) < 1e-6
     known = sum(
         float(body.channels[index].mass_flow or 0.0) * on

@@ -14,10 +14,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from jsonschema import Draft202012Validator
 from support import places
-from support.broken import BASE, BODY, BROKEN, SPIN, THRUSTERS
 from support.builders import within
 from support.cases import deep
-from support.contract import check_faults, slips
+from support.contract import BASE, BODY, BROKEN, SPIN, THRUSTERS, check_faults, slips
 from support.golden import check_text
 
 import nutdamp

@@ -15,10 +15,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from support import places, reference
-from support.broken import BASE
 from support.builders import cross, one_of, present
 from support.cases import spread
-from support.contract import Write, check_faults
+from support.contract import BASE, Write, check_faults
 from support.golden import check_text
 
 from nutdamp.errors import CannotRead, FaultyFile

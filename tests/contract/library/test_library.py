@@ -24,8 +24,8 @@ from scipy.spatial.transform import Rotation
 from support import places
 from support.builders import present
 from support.golden import check_text, refusal, refused
-from support.markup import parsed
 from support.process import Run
+from support.shown import parsed
 
 import nutdamp
 from nutdamp import errors

@@ -14,7 +14,7 @@ from support import reference
 from support.builders import present
 from support.cases import deep, weekly
 from support.golden import check_text
-from support.synthetic import Array
+from support.telemetry import Array
 
 import nutdamp
 from nutdamp.errors import Unsuitable

@@ -13,7 +13,7 @@ from support.builders import noted, one_of, present
 from support.cases import deep, spread
 from support.golden import check_text
 from support.places import case
-from support.synthetic import Array, motion
+from support.telemetry import Array, motion
 
 import nutdamp
 from nutdamp.common import work

@@ -15,13 +15,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from support.broken import BASE, THRUSTERS
 from support.builders import noted, present
 from support.cases import spread
+from support.contract import BASE, THRUSTERS
 from support.golden import check_text, refusal
-from support.hand_made_fit import silent, told
 from support.places import case
 from support.process import Run
+from support.telemetry import silent, told
 
 import nutdamp
 from nutdamp.errors import BadRequest, Fault, FaultyFile

@@ -18,8 +18,7 @@ from support.builders import aimed, codes, cross, events, noted, present, pulse,
 from support.cases import spread, weekly
 from support.flights import axis_path
 from support.golden import check_text
-from support.planner import Planner
-from support.process import Run
+from support.process import Planner, Run
 from support.spinners import commanded
 
 import nutdamp

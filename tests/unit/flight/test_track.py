@@ -20,8 +20,7 @@ from support.builders import channel, pulse, spinner
 from support.cases import deep
 from support.places import CASES
 from support.process import Run
-from support.spinning import series
-from support.strategies import schedules, symmetric_spinners, triaxial_spinners
+from support.spinning import schedules, series, symmetric_spinners, triaxial_spinners
 
 from nutdamp.common import work
 from nutdamp.common.numerics import SAME_ANGLE

@@ -18,8 +18,7 @@ from support.cases import spread
 from support.documents import documented
 from support.golden import check_text
 from support.places import case
-from support.planner import Planner
-from support.process import Run
+from support.process import Planner, Run
 
 from nutdamp.cli.main import group
 from nutdamp.errors import MissingExtra

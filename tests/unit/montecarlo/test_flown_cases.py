@@ -17,9 +17,8 @@ from scipy.spatial.transform import Rotation
 from support import dispersed, places, reference
 from support.builders import cross, present, spinner
 from support.cases import deep, spread
-from support.flights import BODY_ERRORS, axis_path, by_blocks
+from support.flights import BODY_ERRORS, axis_path, by_blocks, flown_outputs, realised, timed
 from support.process import Run
-from support.single_case import flown_outputs, realised, timed
 from support.spinners import commanded, flown_by_reference
 
 import nutdamp

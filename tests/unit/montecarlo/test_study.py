@@ -17,8 +17,8 @@ from scipy.stats import binomtest, kstest, multivariate_normal, norm, triang, un
 from support import dispersed
 from support.builders import channel, present, spinner
 from support.cases import deep
+from support.flights import flown_outputs
 from support.golden import check_text, refused
-from support.single_case import flown_outputs
 
 from nutdamp.errors import BadRequest
 from nutdamp.files.reader import read_spacecraft

@@ -15,9 +15,9 @@ from support.cases import deep, weekly
 from support.checker import violations
 from support.commands import WIDER
 from support.dispersed import normal
+from support.flights import flown_outputs
 from support.golden import refused
 from support.places import case
-from support.single_case import flown_outputs
 
 import nutdamp
 from nutdamp.common import work
