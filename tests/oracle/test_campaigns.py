@@ -5,8 +5,6 @@ The figures are those of the status reports of Lunar Prospector and of the weekl
 the files in configs/ say what of the spacecraft is published, computed from them and assumed.
 Nothing here is fitted but what they say."""
 
-import csv
-import io
 import math
 from dataclasses import replace
 from typing import NamedTuple
@@ -15,6 +13,7 @@ import numpy as np
 import pytest
 from support.builders import one_of, present
 from support.cases import deep, spread, weekly
+from support.commands import rows as rows_of
 from support.process import Run
 
 import nutdamp
@@ -78,7 +77,7 @@ def test_lunar_prospector_is_planned_as_it_was_flown(run: Run) -> None:
     scheme = ("--scheme", "command-block", "--blocks", "-")
     screen = run("plan", "-", *goal, *scheme, stdin=example_text("lunar-prospector"))
     assert screen.returncode == 0, screen.stderr
-    (row,) = csv.DictReader(io.StringIO(screen.stdout))
+    (row,) = rows_of(screen.stdout)
     assert (row["count"], float(row["width_s"])) == ("40", 0.2)
 
 

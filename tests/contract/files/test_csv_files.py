@@ -2,8 +2,6 @@
 fault with its place.
 """
 
-import csv
-import io
 import json
 import math
 from collections.abc import Callable
@@ -16,6 +14,7 @@ import pytest
 from numpy.testing import assert_allclose
 from support.builders import Outcome, present
 from support.commands import result
+from support.commands import rows as rows_of
 from support.contract import Write, check_faults, faults
 from support.golden import check_text
 from support.process import Run
@@ -242,10 +241,6 @@ def blocks(write: Write) -> ReadBlocks:
     return lambda text, body=CRAFT: read_blocks(write(text, "blocks.csv"), body)
 
 
-def rows_of(path: Path) -> list[dict[str, str]]:
-    return list(csv.DictReader(io.StringIO(path.read_text())))
-
-
 def test_what_plan_writes_is_what_simulate_fires(run: Run, tmp_path: Path) -> None:
     """The screen has what an operator compares before and after."""
     text = (
@@ -264,12 +259,12 @@ def test_what_plan_writes_is_what_simulate_fires(run: Run, tmp_path: Path) -> No
         stdin=text,
         status=0,
     )
-    (row,) = rows_of(tmp_path / "blocks.csv")
+    (row,) = rows_of((tmp_path / "blocks.csv").read_text())
     assert tuple(row) == BLOCKS_HEADER
     assert float(row["delay_s"]) == pytest.approx(2e-3 * int(row["delay_counts"]))
     assert float(row["delay_deg"]) == pytest.approx(72.0 * float(row["delay_s"]))
     assert float(row["width_s"]) == pytest.approx(1e-2 * int(row["width_counts"]))
-    pulses = rows_of(tmp_path / "pulses.csv")
+    pulses = rows_of((tmp_path / "pulses.csv").read_text())
     assert row["first_utc"] == pulses[0]["utc"]
     assert len(pulses) == int(row["count"])
     flown = run("simulate", "-", "-v", *GOAL, *BLOCKS, "--samples", "2", stdin=text, status=0)
@@ -312,7 +307,7 @@ def test_widths_of_a_list_are_written_by_their_number(run: Run, tmp_path: Path) 
     assert run(
         "plan", "-", *GOAL, "--scheme", "command-block", *BLOCKS, stdin=WIDTHS
     ).returncode in (0, 4)
-    rows = rows_of(tmp_path / "blocks.csv")
+    rows = rows_of((tmp_path / "blocks.csv").read_text())
     assert rows
     assert {(row["width_s"], row["width_counts"]) for row in rows} <= {
         ("0.1", "1"),

@@ -143,12 +143,6 @@ PARTS: dict[str, tuple[str, dict[str, object]]] = {
 }
 
 
-@pytest.mark.parametrize(("text", "parts"), PARTS.values(), ids=PARTS)
-def test_parts_of_a_file_are_read(text: str, parts: dict[str, object]) -> None:
-    craft = read(text)
-    assert {path: at(craft, path) for path in parts} == parts
-
-
 def test_files_of_yaml_or_json_are_loaded_by_their_path(tmp_path: Path) -> None:
     path = tmp_path / "spacecraft.json"
     contents = {
@@ -532,8 +526,8 @@ ACTUATED: dict[str, tuple[str, dict[str, object]]] = {
 }
 
 
-@pytest.mark.parametrize(("text", "parts"), ACTUATED.values(), ids=ACTUATED)
-def test_valves_cold_nozzles_and_tanks_are_read(text: str, parts: dict[str, object]) -> None:
+@pytest.mark.parametrize(("text", "parts"), (PARTS | ACTUATED).values(), ids=PARTS | ACTUATED)
+def test_parts_of_a_file_are_read(text: str, parts: dict[str, object]) -> None:
     craft = read(text)
     assert {path: at(craft, path) for path in parts} == parts
 

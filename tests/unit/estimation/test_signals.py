@@ -11,13 +11,13 @@ from scipy.spatial.transform import Rotation
 from support import reference
 from support.builders import noted, one_of, present
 from support.cases import deep, spread
-from support.golden import check_text
+from support.golden import check_text, refusal
 from support.places import case
 from support.telemetry import Array, motion
 
 import nutdamp
 from nutdamp.common import work
-from nutdamp.errors import BadRequest, Infeasible, NutdampError, Unsuitable
+from nutdamp.errors import BadRequest, Infeasible, Unsuitable
 from nutdamp.estimation.fit import fit
 from nutdamp.estimation.initial_guess import spin_of
 from nutdamp.estimation.model import Model
@@ -397,7 +397,7 @@ def test_a_search_ends_with_its_budget_of_work_and_says_so(monkeypatch: pytest.M
     """Where it has not come to the motion, that is named beside the other reasons."""
     record = of_example(np.linspace(0.0, 60.0, 121))
     monkeypatch.setattr("nutdamp.common.work.FIT", 1.0)
-    nowhere = refusal(Infeasible, EXAMPLE, record)
+    nowhere = refusal(Infeasible, fit, EXAMPLE, record)
     monkeypatch.setattr("nutdamp.common.work.FIT", 50.0)
     fitted = fit(EXAMPLE, record)
     assert not fitted.finished
@@ -411,7 +411,7 @@ def test_noise_for_rates_ends_and_is_no_nutation() -> None:
     body = nutdamp.load(PLAIN | {"inertia": {"tensor": np.diag([122.0, 118.0, 84.0]).tolist()}})
     with work.budget("test", math.inf) as spent:
         assert "no nutation is seen" in refusal(
-            Infeasible, body, noisy(np.linspace(0.0, 60.0, 200), rates)
+            Infeasible, fit, body, noisy(np.linspace(0.0, 60.0, 200), rates)
         )
     assert spent.done < 1.3 * work.FIT
 
@@ -493,7 +493,7 @@ def test_sensors_that_are_stuck_are_named() -> None:
     ]
     check_text(
         "estimation.stuck",
-        "\n".join(refusal(Infeasible, body, Record(times, one)) for body, one in records),
+        "\n".join(refusal(Infeasible, fit, body, Record(times, one)) for body, one in records),
     )
     fit(BODY, Record(times, seen | {"omega_3": np.full(120, 3.0)}))
 
@@ -513,7 +513,7 @@ def test_signals_of_zeros_are_sensors_that_are_off() -> None:
         (axis, ["axis"]),
         (axis | {GYROS[2]: zeros + 3.0}, ["axis"]),
     ):
-        said = refusal(Infeasible, BODY, Record(times, signals))
+        said = refusal(Infeasible, fit, BODY, Record(times, signals))
         assert all(f"{name} does not change" in said for name in named)
 
 
@@ -532,12 +532,6 @@ def test_a_small_pulse_in_the_last_fifth_that_the_axis_shows_is_told(share: floa
     assert one_of(doubts(fitted), "fit-steps")["at_s"] == pytest.approx(at, abs=2.5)
 
 
-def refusal(error: type[NutdampError], body: nutdamp.Spacecraft, record: Record) -> str:
-    with pytest.raises(error) as raised:
-        fit(body, record)
-    return str(raised.value)
-
-
 def test_records_that_tell_nothing_say_what_would_help() -> None:
     minute = np.linspace(0.0, 60.0, 61)
     bare = nutdamp.load(PLAIN)
@@ -545,14 +539,14 @@ def test_records_that_tell_nothing_say_what_would_help() -> None:
     fired = Schedule((channel_pulse(BODY.channels[0], 10.0, 1.0),))
     begun = of_body(BODY, minute)
     refusals = [
-        refusal(Infeasible, EXAMPLE, Record(np.zeros(1), dict.fromkeys(GYROS, np.ones(1)))),
-        refusal(Infeasible, BODY, of_body(BODY, np.array([0.0, 9.0]))),
-        refusal(Infeasible, BODY, of_body(BODY, np.linspace(0.0, 2.0, 60))),
-        refusal(Infeasible, EXAMPLE, of_example(minute, names=GYROS[2:])),
-        refusal(Infeasible, BODY, Record(np.empty(0), {}, sun)),
-        refusal(Unsuitable, bare, Record(minute, {ACCELERATION: np.sin(minute)})),
-        refusal(Unsuitable, bare, Record(minute, {}, sun)),
-        refusal(BadRequest, BODY, Record(begun.times + 10.0, begun.signals, schedule=fired)),
+        refusal(Infeasible, fit, EXAMPLE, Record(np.zeros(1), dict.fromkeys(GYROS, np.ones(1)))),
+        refusal(Infeasible, fit, BODY, of_body(BODY, np.array([0.0, 9.0]))),
+        refusal(Infeasible, fit, BODY, of_body(BODY, np.linspace(0.0, 2.0, 60))),
+        refusal(Infeasible, fit, EXAMPLE, of_example(minute, names=GYROS[2:])),
+        refusal(Infeasible, fit, BODY, Record(np.empty(0), {}, sun)),
+        refusal(Unsuitable, fit, bare, Record(minute, {ACCELERATION: np.sin(minute)})),
+        refusal(Unsuitable, fit, bare, Record(minute, {}, sun)),
+        refusal(BadRequest, fit, BODY, Record(begun.times + 10.0, begun.signals, schedule=fired)),
     ]
     check_text("estimation.refused-records", "\n".join(refusals))
 
@@ -570,7 +564,8 @@ def test_nutation_rates_that_sampling_cannot_tell_apart_are_all_named(
     """
     record = of_example(np.linspace(0.0, 600.0, 61), 93.0, names)
     check_text(
-        f"estimation.rates-alike, {request.node.callspec.id}", refusal(Infeasible, body, record)
+        f"estimation.rates-alike, {request.node.callspec.id}",
+        refusal(Infeasible, fit, body, record),
     )
 
 
@@ -579,7 +574,7 @@ def test_a_nutation_below_the_noise_is_none() -> None:
     still = nutdamp.load(FILE, set={"state.nutation": "0.001 deg"})
     check_text(
         "estimation.no-nutation",
-        refusal(Infeasible, still, of_body(still, np.linspace(0.0, 60.0, 200))),
+        refusal(Infeasible, fit, still, of_body(still, np.linspace(0.0, 60.0, 200))),
     )
 
 

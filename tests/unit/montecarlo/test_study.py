@@ -114,14 +114,6 @@ def test_a_stopped_run_keeps_the_first_cases_and_goes_on(plain: Results) -> None
     same(plain, run(stopped.extended(MANY)))
 
 
-def test_cases_of_three_moments_do_not_depend_on_threads_or_interruptions() -> None:
-    model = dispersed.with_jets(moments=(120.0, 110.0, 80.0))
-    whole, parts = (
-        Results(study_of(model.spacecraft, model.schedule), count) for count in (1_500, 700)
-    )
-    same(run(whole), run(run(parts, threads=2).extended(1_500), threads=2))
-
-
 def test_beyond_what_is_kept_singly_all_is_counted(
     plain: Results, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -439,18 +431,6 @@ def test_covariances_of_the_cases_agree_within_3_percent_for_small_dispersions(
             assert np.linalg.norm(drawn - analytic) <= 0.03 * np.linalg.norm(analytic), output
 
 
-def test_the_percentile_of_a_small_nutation_follows_from_the_covariance() -> None:
-    """The length of a plane normal vector, by its covariance alone: 99 % percentile within 3 %."""
-    tolerance = Tolerance("normal", 1e-5, True)
-    study = dispersed.exact_two_pulse(0.02, timing=None, timing_offset=None, A=tolerance)
-    covariance = covariance_of(study.first_order, "nutation")
-    normal = np.random.default_rng(6).multivariate_normal(np.zeros(2), covariance, 200_000)
-    nutation = run(Results(study, 50_000)).distribution("nutation")
-    assert nutation is not None
-    expected = np.quantile(np.linalg.norm(normal, axis=1), 0.99)
-    assert nutation.quantiles(np.array([0.99]))[0] == pytest.approx(expected, rel=0.03)
-
-
 def test_shares_sum_to_one_a_bias_has_none_and_attitude_moves_only_the_axis() -> None:
     biased = replace(present(JETS.spacecraft.dispersions), C=Tolerance("bias", 0.8))
     first = first_order(DispersedModel(replace(JETS.spacecraft, dispersions=biased), JETS.schedule))
@@ -729,9 +709,13 @@ def test_neighbours_are_independent() -> None:
 
 
 def test_other_tolerances_do_not_change_the_draws_of_one() -> None:
-    """So two studies of which one has a tighter tolerance see the same cases otherwise."""
+    """A case is the same body whatever else is drawn, with correlated inputs among it."""
     others = an_input("A", "uniform", 5.0), an_input("C", size=2.0), an_input("x", "bias")
     assert np.array_equal(2.0 * drawn(an_input("C"), block=3)["C"], drawn(*others, block=3)["C"])
+    pairs = (("thrust T1", "A", 0.5), ("thrust T2", "thrust T1", 0.7))
+    whole = drawn(*map(an_input, ("A", "thrust T1", "thrust T2")), pairs=pairs)
+    for name in ("A", "thrust T2"):
+        assert np.array_equal(drawn(an_input(name), pairs=pairs)[name], whole[name])
 
 
 def test_what_cannot_be_is_drawn_again_and_reported() -> None:
@@ -823,14 +807,6 @@ def test_the_correlation_of_values_is_the_integral_over_both(kinds: tuple[str, s
     assert (matrix @ matrix.T)[0, 1] == pytest.approx(
         integral / (inputs[0].sigma * inputs[1].sigma), abs=1e-4
     )
-
-
-def test_which_others_are_drawn_makes_no_difference() -> None:
-    """A case is the same body for every schedule, whichever thrusters it fires."""
-    pairs = (("thrust T1", "A", 0.5), ("thrust T2", "thrust T1", 0.7))
-    whole = drawn(*map(an_input, ("A", "thrust T1", "thrust T2")), pairs=pairs)
-    for name in ("A", "thrust T2"):
-        assert np.array_equal(drawn(an_input(name), pairs=pairs)[name], whole[name])
 
 
 def test_a_case_drawn_again_is_correlated_too() -> None:
@@ -1153,22 +1129,6 @@ def test_what_is_drawn_and_what_touches_nothing() -> None:
     warm = craft("cold: {normal: 2 %}")
     unused += list_inputs(warm, fires(warm, commands(warm))).unused
     check_text("montecarlo.unused-valves", "\n".join(f"{one.name}: {one.reason}" for one in unused))
-
-
-def test_a_study_spreads_as_its_valves_do() -> None:
-    """Of a single pulse along ω the nutation is off by the impulse: one sigma of it is that of the
-    draws.
-    """
-    body = craft("close_delay: {a: {normal: 1 ms}}")
-    made = fires(body, commands(body, 0.05)[:1])
-    spread = run(Results(study_of(body, made, seed=3), 4000)).distribution("nutation")
-    assert spread is not None
-    early, late = (
-        nutation(RealWidths, DispersedModel(body, made), {"close_delay a": one})
-        for one in (-0.001, 0.001)
-    )
-    low, high = spread.quantiles(np.array([0.1587, 0.8413]))
-    assert high - low == pytest.approx(abs(late - early), rel=0.05)
 
 
 def test_bare_numbers_are_dispersed_and_shown_in_parts_of_their_own_values() -> None:

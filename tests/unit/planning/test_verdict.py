@@ -2,12 +2,10 @@
 and comparisons.
 """
 
-import csv
-import io
 import itertools
 import json
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -36,6 +34,7 @@ from support.builders import (
 from support.cases import weekly
 from support.certificate_checker import check
 from support.checker import violations
+from support.commands import rows as rows_of
 from support.dispersed import normal
 from support.golden import check_text, refused
 from support.process import Run
@@ -200,12 +199,6 @@ def test_every_status_of_the_built_in_example(
         light,
         EXITS[status],
     )
-
-
-def test_pulses_that_cannot_be_sent_to_a_spacecraft_that_takes_commands() -> None:
-    body = replace(nutdamp.load(places.case("cbp1004.yaml")), dispersions=None)
-    assert compare(body, ["two-pulse"]).verdict.status is Status.NOT_COMMANDABLE
-    assert compare(body, ["two-pulse"], timed=True).verdict.status is not Status.NOT_COMMANDABLE
 
 
 @pytest.mark.parametrize(("limits", "status"), [({}, "fly"), ({"gap": "60 s"}, "not-commandable")])
@@ -426,10 +419,6 @@ def test_a_broken_cone_is_in_every_file(run: Run) -> None:
         ]  # that of the Sun is any
 
 
-def csv_rows(text: str) -> Iterator[dict[str, str]]:
-    return iter(csv.DictReader(io.StringIO(text)))
-
-
 def test_json_and_the_table_of_schemes_have_the_verdict_of_each(run: Run, tmp_path: Path) -> None:
     done = run(
         *BOTH_SCHEMES, "--nominal", "--table", "schemes.csv", "--json", "plan.json", columns=80
@@ -447,7 +436,7 @@ def test_json_and_the_table_of_schemes_have_the_verdict_of_each(run: Run, tmp_pa
     assert max(map(len, done.stdout.splitlines())) <= 80
     assert shift["margin_deg"] == pytest.approx(shift["limit_deg"] - shift["nominal_deg"])
     assert decision["final"]["spin_rad_s"] == pytest.approx(math.pi)
-    rows = csv_rows((tmp_path / "schemes.csv").read_text("utf-8"))
+    rows = rows_of((tmp_path / "schemes.csv").read_text("utf-8"))
     for row, one in zip(rows, content["plans"], strict=True):
         yes = [
             str(value).lower()
@@ -465,7 +454,7 @@ def test_json_and_the_table_of_schemes_have_the_verdict_of_each(run: Run, tmp_pa
 
 @pytest.mark.deep
 def test_the_table_of_schemes_goes_by_cases_has_shares_and_what_is_infeasible(run: Run) -> None:
-    two, four = csv_rows(run(*BOTH_SCHEMES, "--table", "-").stdout)
+    two, four = rows_of(run(*BOTH_SCHEMES, "--table", "-").stdout)
     assert [(row["recommended"], row["meets_requirement"]) for row in (two, four)] == [
         ("true", "true"),
         ("false",) * 2,
@@ -473,9 +462,7 @@ def test_the_table_of_schemes_goes_by_cases_has_shares_and_what_is_infeasible(ru
     assert float(two["met_fraction"]) == pytest.approx(0.99995, abs=1e-4)
     assert four["met_fraction"] == ""
     rows = list(
-        csv_rows(
-            run(*BOTH_SCHEMES, "--robust", "--table", "-", "--set", "limits.horizon=4s").stdout
-        )
+        rows_of(run(*BOTH_SCHEMES, "--robust", "--table", "-", "--set", "limits.horizon=4s").stdout)
     )
     assert {row["feasible"] for row in rows} == {"true", "false"}
     for row in rows:
@@ -1024,7 +1011,7 @@ def test_what_plan_finds_is_traded_where_the_fastest_is_not_found(
 
 def test_where_optimal_cannot_fire_the_other_schemes_are_traded(run: Run, tmp_path: Path) -> None:
     run("trade", STEERED, "--points", "2", "--csv", "t.csv")
-    rows = list(csv.DictReader(io.StringIO((tmp_path / "t.csv").read_text("utf-8"))))
+    rows = rows_of((tmp_path / "t.csv").read_text("utf-8"))
     expected = [("two-pulse", "true"), ("one-pulse", "false"), ("two-pulse", "true")]
     assert [(row["scheme"], row["meets_requirement"]) for row in rows] == expected
     assert float(rows[0]["end_s"]) == planning.plan(nutdamp.load(STEERED), "two-pulse").end
@@ -1038,7 +1025,7 @@ def test_where_optimal_cannot_fire_the_other_schemes_are_traded(run: Run, tmp_pa
 def test_the_command_writes_table_csv_json_picture_and_schedules(run: Run, tmp_path: Path) -> None:
     files = ["--csv", "t.csv", "--json", "t.json", "--plot", "t.svg", "--schedules", "front"]
     assert run("trade", "--points", "2", "--allow", "0", *files).returncode == 0
-    rows = list(csv.DictReader(io.StringIO((tmp_path / "t.csv").read_text())))
+    rows = rows_of((tmp_path / "t.csv").read_text())
     written = json.loads((tmp_path / "t.json").read_text())["fronts"][0]["points"]
     assert len(rows) == len(written) == len(list((tmp_path / "front").glob("point-*.csv"))) == 2
     assert float(rows[0]["propellant_kg"]) == written[0]["propellant_kg"]
@@ -1099,7 +1086,7 @@ def test_the_searches_of_all_points_share_a_limit_of_work(
     monkeypatch.setattr(work, "FRONTS", 5.0)
     monkeypatch.setattr(work, "SCHEME", 5.0)
     none = run(*command, "--csv", "-", status=0)
-    assert {row["scheme"] for row in csv.DictReader(io.StringIO(none.stdout))} <= {
+    assert {row["scheme"] for row in rows_of(none.stdout)} <= {
         "two-pulse",
         "four-pulse",
     }
