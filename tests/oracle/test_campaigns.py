@@ -26,11 +26,6 @@ from nutdamp.schemes.block_model import BlockModel, fired
 from nutdamp.spacecraft.equipment import Block
 from nutdamp.spacecraft.model import Spacecraft, Vector
 
-# --- command blocks against campaigns that were flown: what the planner says of each, and by how
-# much that differs. The figures are those of the status reports of Lunar Prospector and of the
-# weekly reports of ACE; the files in configs/ say what of the spacecraft is published, computed
-# from them and assumed. Nothing here is fitted but what they say
-
 POUND = 0.45359237
 
 

@@ -41,9 +41,6 @@ from nutdamp.physics import attitude
 from nutdamp.planning import plan as planning
 from nutdamp.spacecraft.schedule import Pulse, Schedule
 
-# --- pictures as files, inline SVG and films: formats, the same bytes each time, what a frame
-# shows, what is refused
-
 pytestmark = pytest.mark.usefixtures("plans_shared")
 
 

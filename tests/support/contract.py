@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +10,7 @@ import pytest
 from hypothesis import strategies as st
 from scipy.integrate import simpson
 from support import messages, reference
-from support.builders import present
+from support.builders import events, present
 from support.cases import deep
 from support.golden import check_text
 
@@ -21,8 +20,6 @@ from nutdamp.files.reader import load_spacecraft, read_spacecraft
 from nutdamp.planning import plan as planning
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.schedule import Pulse, Schedule
-
-# --- what tests of files share: exported plans, their motion, and faults of what is refused
 
 QUICK = ("steerable-stage", "tilted tensor, backwards", "oblate, backwards")
 CASES = pytest.mark.parametrize(
@@ -106,24 +103,8 @@ def motions(
     body: Spacecraft, pulses: Schedule, times: Sequence[float], rotation: Vector
 ) -> list[reference.Motion]:
     """The motion at ``times`` s by the reference integrator, from ``rotation`` on."""
-    motion = reference.Motion(body.omega0, rotation)
-    at = {0.0: motion}
-    edges = sorted(
-        {0.0, max(times), *(edge for pulse in pulses for edge in (pulse.start, pulse.end))}
-    )
-    for begin, end in pairwise(edges):
-        middle = 0.5 * (begin + end)
-        torques = [
-            pulse.torque
-            for pulse in pulses
-            if pulse.torque is not None and pulse.start < middle < pulse.end
-        ]
-        ends = sorted({end, *(time for time in times if begin < time < end)})
-        torque = np.sum([np.zeros(3), *torques], axis=0)
-        moved = reference.coast(body.inertia.moments, motion, torque, np.array(ends) - begin)
-        at.update(zip(ends, moved, strict=True))
-        motion = moved[-1]
-    return [at[time] for time in times]
+    start = reference.Motion(body.omega0, rotation)
+    return reference.path(body.inertia.moments, start, events(pulses), times)
 
 
 def velocity_change(plan: planning.Plan, pulse: Pulse) -> Vector:

@@ -38,20 +38,14 @@ def axis_path(spacecraft: Spacecraft, made: Schedule, until: float, dense: int =
     moments = spacecraft.inertia.moments
     sense = math.copysign(1.0, spacecraft.spin)
     motion = reference.Motion(spacecraft.omega0, attitude.matrix(spacecraft.initial.quaternion))
-    pushes = [one for one in events(made) if isinstance(one, reference.Push)]
-    edges = sorted({0.0, until, *(one.start for one in pushes), *(one.end for one in pushes)})
-    path = [motion.rotation[:, 2] * sense]
-    for begin, end in pairwise(edges):
-        torque = sum(
-            (one.torque for one in pushes if one.start < 0.5 * (begin + end) < one.end), np.zeros(3)
-        )
-        count = dense * max(1, math.ceil((end - begin) / spacecraft.inertial_period))
-        motions = reference.coast(
-            moments, motion, torque, np.linspace(begin, end, count + 1)[1:] - begin
-        )
-        path += [one.rotation[:, 2] * sense for one in motions]
-        motion = motions[-1]
-    return np.array(path)
+    edges = sorted({0.0, until, *(edge for one in made for edge in (one.start, one.end))})
+    turns = [
+        (begin, end, max(1, math.ceil((end - begin) / spacecraft.inertial_period)))
+        for begin, end in pairwise(edge for edge in edges if edge <= until)
+    ]
+    times = [np.linspace(begin, end, dense * count + 1) for begin, end, count in turns]
+    path = reference.path(moments, motion, events(made), np.concatenate(times))
+    return np.array([one.rotation[:, 2] * sense for one in path])
 
 
 BODY_ERRORS = Dispersions(

@@ -49,14 +49,7 @@ def motion(
 ) -> Array:
     """Body rates (n, 3) at ``times`` (n,) s from 0, rad/s."""
     start = reference.Motion(rates, np.eye(3))
-    still = np.zeros(3)
-    later = times[times > 0.0]
-    found = (
-        reference.sinking(moments, start, still, later, growth)
-        if growth
-        else reference.coast(moments, start, still, later)
-    )
-    return np.array([rates] * (len(times) - len(later)) + [one.rates for one in found])
+    return np.array([one.rates for one in reference.path(moments, start, (), times, growth)])
 
 
 def gyro_case(seed: int) -> Case:
@@ -143,6 +136,36 @@ EPOCH = "2026-03-01T12:00:00Z"
 BIAS, TILT, ATTITUDE = math.radians(0.02), math.radians(1.0), math.radians(0.3)
 """Standard deviations of gyro biases, of tilts of sensors, and of the attitude of the file."""
 
+TOLERANCES: dict[str, object] = {
+    "A": {"normal": "0.5 %"},
+    "C": {"normal": "0.5 %"},
+    "omega0": {"normal": "0.3 deg/s"},
+    "thrust": {"normal": "3 %"},
+}
+ATTITUDE_OF_FILE = {"quaternion": [1, 0.1, 0.2, 0.3], "epoch": EPOCH, "frame": "EME2000"}
+ACCELEROMETER: dict[str, object] = {
+    "sensor": {
+        "kind": "accelerometer",
+        "rate": "10 Hz",
+        "position": ["0.8 m", 0, 0],
+        "axis": [0, 0, 1],
+    },
+    "law": "four-pulse",
+    "start": "0.5 deg",
+    "stop": "0.05 deg",
+}
+SENSED: dict[str, object] = {
+    "name": "sensed",
+    "inertia": {"A": 120.0, "C": 84.0},
+    "state": {"spin": 3.0, "nutation": "4 deg", "phase": "20 deg"},
+    "attitude": ATTITUDE_OF_FILE,
+    "sun": "epoch",
+    "sun_sensor": {"azimuth": "35 deg"},
+    "thrusters": [{"name": "T1", "torque": [8, 0, 0]}, {"name": "T2", "torque": [0, 8, 0]}],
+    "dispersions": TOLERANCES,
+}
+"""The file of a body with a Sun sensor and two thrusters."""
+
 FARTHEST = math.cos(math.radians(25.0))
 """Cosine of the angle of the Sun from the axis, at most: nutations are half of that."""
 
@@ -175,43 +198,20 @@ def _any_file(draw: np.random.Generator, seed: int) -> tuple[nutdamp.Spacecraft,
     C = 120.0 * (draw.uniform(0.45, 0.85) if prolate else draw.uniform(1.15, 1.7))
     spin = (-1.0 if draw.uniform() < 0.5 else 1.0) * draw.uniform(0.8, 4.0)
     facing = draw.normal(size=4)
-    return nutdamp.load(
-        {
-            "name": f"kind {seed}",
-            "inertia": {"A": 120.0, "C": C},
-            "state": {
-                "spin": spin,
-                "nutation": f"{draw.uniform(1.0, 12.0)} deg",
-                "phase": f"{draw.uniform(-180, 180)} deg",
-            },
-            "attitude": {
-                "quaternion": (facing / np.linalg.norm(facing)).tolist(),
-                "epoch": EPOCH,
-                "frame": "EME2000",
-            },
-            "sun": "epoch",
-            "sun_sensor": {"azimuth": "35 deg"},
-            "thrusters": [{"name": "T1", "torque": [8, 0, 0]}, {"name": "T2", "torque": [0, 8, 0]}],
-            "loop": {
-                "sensor": {
-                    "kind": "accelerometer",
-                    "rate": "10 Hz",
-                    "position": ["0.8 m", 0, 0],
-                    "axis": [0, 0, 1],
-                },
-                "law": "four-pulse",
-                "start": "0.5 deg",
-                "stop": "0.05 deg",
-            },
-            "dispersions": {
-                "A": {"normal": "0.5 %"},
-                "C": {"normal": "0.5 %"},
-                "omega0": {"normal": "0.3 deg/s"},
-                "thrust": {"normal": "3 %"},
-                "attitude": {"normal": "0.3 deg"},
-            },
-        }
-    ), prolate
+    state = {
+        "spin": spin,
+        "nutation": f"{draw.uniform(1.0, 12.0)} deg",
+        "phase": f"{draw.uniform(-180, 180)} deg",
+    }
+    keys = {
+        "name": f"kind {seed}",
+        "inertia": {"A": 120.0, "C": C},
+        "state": state,
+        "attitude": ATTITUDE_OF_FILE | {"quaternion": (facing / np.linalg.norm(facing)).tolist()},
+        "loop": ACCELEROMETER,
+        "dispersions": TOLERANCES | {"attitude": {"normal": "0.3 deg"}},
+    }
+    return nutdamp.load(SENSED | keys), prolate
 
 
 def telemetry(folder: Path, seed: int, kind: tuple[str, ...] | None = None) -> Telemetry:
@@ -240,7 +240,7 @@ def telemetry(folder: Path, seed: int, kind: tuple[str, ...] | None = None) -> T
     times: Array = np.linspace(0.0, length, count).round(6)
     fired = _fired(draw, body, length) if "fired" in kind else Schedule()
     flight = _Flight(
-        (A, A, C), reference.Motion(rates, attitude.matrix(quaternion)), truth, draw, fired, length
+        (A, A, C), reference.Motion(rates, attitude.matrix(quaternion)), truth, draw, fired
     )
     columns = _columns(draw, kind, body, flight, times, truth)
     path = folder / f"{seed}.csv"
@@ -281,39 +281,23 @@ class _Flight:
         truth: dict[str, float],
         draw: np.random.Generator,
         fired: Schedule,
-        length: float,
     ) -> None:
         """Draws thrust factors and delays of the channels of ``fired`` into ``truth``."""
         self.moments = moments
         self.growth = truth["growth"]
-        self.begins = [(0.0, start, np.zeros(3))]
+        self.start = start
+        self.events = list[reference.Push]()
         for pulse in fired:
             factor = 1.0 + 0.03 * draw.normal()
             late = 0.05 * draw.normal()
             truth |= {f"thrust {pulse.channel}": factor, f"delay {pulse.channel}": late}
             assert pulse.torque is not None
-            for time, torque in (
-                (pulse.start + late, factor * pulse.torque),
-                (pulse.end + late, np.zeros(3)),
-            ):
-                self.begins.append((time, self.at(np.array([time]))[0], torque))
-        self.length = length
+            pushed = pulse.start + late, pulse.end + late, factor * pulse.torque
+            self.events.append(reference.Push(*pushed))
 
     def at(self, times: Array) -> list[reference.Motion]:
         """The motion at rising times."""
-        found: list[reference.Motion] = []
-        ends = [one[0] for one in self.begins[1:]] + [math.inf]
-        for (begin, start, torque), end in zip(self.begins, ends, strict=True):
-            inside = times[(times > begin) & (times <= end)] - begin
-            found += [start] * int(begin == 0.0 and bool(len(times)) and times[0] == 0.0)
-            if not len(inside):
-                continue
-            found += (
-                reference.sinking(self.moments, start, torque, inside, self.growth)
-                if self.growth
-                else reference.coast(self.moments, start, torque, inside)
-            )
-        return found
+        return reference.path(self.moments, self.start, self.events, times, self.growth)
 
     def change(self, rates: Array) -> Array:
         """dω/dt (n, 3) on a coast: H stands still in space, and the body turns with ω and what

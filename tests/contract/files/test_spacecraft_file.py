@@ -560,15 +560,6 @@ FAULTY = (
     TANK.replace("30 kg", "0"),
     f"channels: {{both: [a, c], other: [b, d]}}\n{VALVE}",
 )
-FAULTY_TABLES = (
-    "impulse_bit: [[20 ms, 0.15 N s, 16 ms]]",
-    "impulse_bit: [[20 ms, 0.15 N s], [40 ms, 0.36 N s, 30 ms]]",
-    "impulse_bit: [[20 ms, 0.15 kg, 16 ms], [40 ms, 0.36 N s, 30 ms]]",
-    "impulse_bit: [[20 ms, 0.15 N s, 16 ms], [20 ms, 0.36 N s, 30 ms]]",
-    "impulse_bit: [[20 ms, 0.4 N s, 26 ms], [40 ms, 0.36 N s, 30 ms]]",
-    "impulse_bit: [[20 ms, 0.15 N s, 35 ms], [40 ms, 0.36 N s, 30 ms]]",
-    f"valve: {{open_delay: 1 ms}}, {TABLE}",
-)
 
 
 def test_faults_have_their_place() -> None:
@@ -581,7 +572,17 @@ def test_faults_have_their_place() -> None:
         FAULTY,
     )
     check_faults(
-        "files.thrust-impulse-bit", lambda table: read_lines(body=with_table(table)), FAULTY_TABLES
+        "files.thrust-impulse-bit",
+        lambda table: read_lines(body=with_table(table)),
+        (
+            "impulse_bit: [[20 ms, 0.15 N s, 16 ms]]",
+            "impulse_bit: [[20 ms, 0.15 N s], [40 ms, 0.36 N s, 30 ms]]",
+            "impulse_bit: [[20 ms, 0.15 kg, 16 ms], [40 ms, 0.36 N s, 30 ms]]",
+            "impulse_bit: [[20 ms, 0.15 N s, 16 ms], [20 ms, 0.36 N s, 30 ms]]",
+            "impulse_bit: [[20 ms, 0.4 N s, 26 ms], [40 ms, 0.36 N s, 30 ms]]",
+            "impulse_bit: [[20 ms, 0.15 N s, 35 ms], [40 ms, 0.36 N s, 30 ms]]",
+            f"valve: {{open_delay: 1 ms}}, {TABLE}",
+        ),
     )
     others = {
         "a tank that cannot know what is used": (TANK, ", lever_arm: 0.8, isp: 220", ""),
@@ -716,15 +717,6 @@ DISPERSED: tuple[tuple[str, dict[str, Any]], ...] = (
     ("{position: {normal: 5 mm}}", {"position": dict.fromkeys(NAMES, Tolerance("normal", 0.005))}),
     ("{position: {T1: {normal: 5 mm}}}", {"position": {"T1": Tolerance("normal", 0.005)}}),
 )
-OF_OTHERS = (
-    ("", "{thrust: {normal: 3 %}}", "steerable"),  # the torquer that is assumed
-    ("", "{thrust: {steerable: {normal: 3 %}}}", "steerable"),
-    (
-        "thrusters: [{name: normal, torque: [0, 8, 0]}]\n",
-        "{thrust: {normal: {normal: 3 %}}}",
-        "normal",
-    ),
-)
 
 
 KINDS = [
@@ -743,7 +735,15 @@ KINDS = [
 def test_dispersions_are_read_in_si() -> None:
     for text, fields in (*DISPERSED, *KINDS):
         assert dispersed(text).dispersions == Dispersions(**fields), text
-    for actuators, text, name in OF_OTHERS:
+    for actuators, text, name in (
+        ("", "{thrust: {normal: 3 %}}", "steerable"),  # the torquer that is assumed
+        ("", "{thrust: {steerable: {normal: 3 %}}}", "steerable"),
+        (
+            "thrusters: [{name: normal, torque: [0, 8, 0]}]\n",
+            "{thrust: {normal: {normal: 3 %}}}",
+            "normal",
+        ),
+    ):
         assert dispersed(text, actuators).dispersions == Dispersions(thrust={name: THREE_PERCENT})
 
 

@@ -1,6 +1,5 @@
 """Fits of bodies of three moments, with a wheel, and with large nutations."""
 
-import itertools
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -66,22 +65,9 @@ def flown(
         for one in fired
         if one.torque is not None
     ]
-    edges = sorted(
-        {0.0, *(time for one in events for time in (one.start, one.end)), float(times[-1])}
-    )
-    now = reference.Motion(axes.T @ rates, np.eye(3))
-    shown = [rates]
-    for begin, end in itertools.pairwise(edges):
-        torque = sum(
-            (one.torque for one in events if one.start < 0.5 * (begin + end) < one.end), np.zeros(3)
-        )
-        inside = times[(times > begin) & (times <= end)]
-        motions = reference.coast(
-            moments.tolist(), now, torque, np.unique(np.append(inside, end)) - begin
-        )
-        shown = shown + [axes @ one.rates for one in motions[: len(inside)]]
-        now = motions[-1]
-    return np.array(shown)
+    start = reference.Motion(axes.T @ rates, np.eye(3))
+    motions = reference.path(moments.tolist(), start, events, times)
+    return np.array([axes @ one.rates for one in motions])
 
 
 def test_a_pulse_pushes_where_its_thruster_is_mounted_whatever_the_principal_axes() -> None:
@@ -250,16 +236,12 @@ def coasted(
     """Gyros of a coast of 200 s at 4 Hz with noise, and the true rates at t = 0."""
     draw = np.random.default_rng([59, seed])
     rates = body.omega0 * 1.03
-    times = np.asarray(np.arange(1, 800) * 0.25, dtype=float)
+    times = np.asarray(np.arange(800) * 0.25, dtype=float)
     start = reference.Motion(rates, reference.frame_n(moments, rates, wheel))
-    motions = (
-        reference.sinking(moments, start, np.zeros(3), times, growth, wheel)
-        if growth
-        else reference.coast(moments, start, np.zeros(3), times, wheel=wheel)
-    )
-    shown = np.array([rates, *(motion.rates for motion in motions)])
+    motions = reference.path(moments, start, (), times, growth, wheel)
+    shown = np.array([motion.rates for motion in motions])
     values = shown + NOISE * draw.normal(size=shown.shape)
-    return Record(np.append(0.0, times), dict(zip(GYROS, values.T, strict=True))), rates
+    return Record(times, dict(zip(GYROS, values.T, strict=True))), rates
 
 
 @spread("motion", MOTIONS, quick=3)

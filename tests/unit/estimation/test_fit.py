@@ -371,6 +371,8 @@ def test_the_default_screen_is_short(fitted: Fitted) -> None:
     )
     lines = brief.splitlines()
     assert len(lines) <= 40
+    periods = LENGTH * (1.0 - fitted.core.named["C/A"]) * fitted.core.named["omega_3"] / math.tau
+    assert f"0 s to 30 s, nutation periods: {periods:.3g}" in brief
     assert lines[-1].startswith("-v all values")
     ratio, same = (
         [row for row in text.splitlines() if row.startswith("C/A")] for text in (brief, full)

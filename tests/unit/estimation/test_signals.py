@@ -13,7 +13,8 @@ from support.builders import noted, one_of, present
 from support.cases import deep, spread
 from support.golden import check_text, refusal
 from support.places import case
-from support.telemetry import Array, motion
+from support.telemetry import ACCELEROMETER, Array, motion
+from support.telemetry import SENSED as FILE
 
 import nutdamp
 from nutdamp.common import work
@@ -34,37 +35,7 @@ SPIN = math.pi
 A, C = 120.48, 83.76
 """Of the bodies that are flown, kg m²."""
 
-FILE: dict[str, object] = {
-    "name": "signals",
-    "inertia": {"A": 120.0, "C": 84.0},
-    "state": {"spin": 3.0, "nutation": "4 deg", "phase": "20 deg"},
-    "attitude": {
-        "quaternion": [1, 0.1, 0.2, 0.3],
-        "epoch": "2026-03-01T12:00:00Z",
-        "frame": "EME2000",
-    },
-    "sun": "epoch",
-    "sun_sensor": {"azimuth": "35 deg"},
-    "thrusters": [{"name": "T1", "torque": [8, 0, 0]}, {"name": "T2", "torque": [0, 8, 0]}],
-    "dispersions": {
-        "A": {"normal": "0.5 %"},
-        "C": {"normal": "0.5 %"},
-        "omega0": {"normal": "0.3 deg/s"},
-        "thrust": {"normal": "3 %"},
-    },
-}
 PLAIN = {name: FILE[name] for name in ("name", "inertia", "state")}
-ACCELEROMETER = {
-    "sensor": {
-        "kind": "accelerometer",
-        "rate": "10 Hz",
-        "position": ["0.8 m", 0, 0],
-        "axis": [0, 0, 1],
-    },
-    "law": "four-pulse",
-    "start": "0.5 deg",
-    "stop": "0.05 deg",
-}
 BODY = nutdamp.load(FILE)
 EXAMPLE = nutdamp.example()
 LOOSE = EXAMPLE.with_(dispersions={"A": {"normal": "30 %"}, "C": {"normal": "30 %"}})
@@ -103,9 +74,7 @@ def flown(
     """
     rates = body.omega0 * np.array([1.2, 0.7, 1.001]) + np.array([0.01, 0.02, 0.0])
     start = reference.Motion(rates, attitude.matrix(body.initial.quaternion) @ turning(0.3))
-    if not events:
-        return reference.coast((A, A, C), start, np.zeros(3), times)
-    return [reference.fly((A, A, C), rates, events, float(time), start.rotation) for time in times]
+    return reference.path((A, A, C), start, events, times)
 
 
 def gyros(motions: list[reference.Motion], seed: int, off: Array | float = 0.0) -> dict[str, Array]:
@@ -446,17 +415,8 @@ def pushed(thrust: float, rate: int) -> Record:
     start = reference.Motion(np.array([0.14, 0.12, SPIN]), np.eye(3))
     times = np.arange(60 * rate + 1) / rate
     push = reference.Push(20.0, 20.5, np.array([0.0, thrust, 0.0]))
-    rates = [start.rates]
-    now = start
-    for begin, end, torque in (
-        (0, 20 * rate, 0.0 * push.torque),
-        (20 * rate, 20 * rate + rate // 2, push.torque),
-        (20 * rate + rate // 2, 60 * rate, 0.0 * push.torque),
-    ):
-        motions = reference.coast((120.0, 120.0, 80.4), now, torque, times[1 : end - begin + 1])
-        rates = rates + [one.rates for one in motions]
-        now = motions[-1]
-    return noisy(times, np.array(rates))
+    motions = reference.path((120.0, 120.0, 80.4), start, [push], times)
+    return noisy(times, np.array([one.rates for one in motions]))
 
 
 @spread("thrust", [8.0, 1.0], quick=1, deep=1)
@@ -523,11 +483,8 @@ def test_a_small_pulse_in_the_last_fifth_that_the_axis_shows_is_told(share: floa
     times = np.linspace(0.05, 90.0, 300)
     at = share * 90.0
     start = reference.Motion(BODY.omega0, attitude.matrix(BODY.initial.quaternion))
-    before = reference.coast((A, A, C), start, np.zeros(3), np.append(times[times < at], at))
-    kicked = before[-1]._replace(rates=before[-1].rates + np.array([math.radians(0.2), 0.0, 0.0]))
-    motions = before[:-1] + reference.coast(
-        (A, A, C), kicked, np.zeros(3), times[times >= at] - at + 1e-9
-    )
+    kick = reference.Kick(at, np.array([A * math.radians(0.2), 0.0, 0.0]))
+    motions = reference.path((A, A, C), start, [kick], times)
     fitted = fit(BODY, Record(times, axes(motions, 1.0, np.random.default_rng(5), 5e-4)))
     assert one_of(doubts(fitted), "fit-steps")["at_s"] == pytest.approx(at, abs=2.5)
 

@@ -260,10 +260,8 @@ def test_with_pulses_they_are_those_of_the_reference_integrator(
             there = reference.fly(moments, body.omega0, events(made), seen.least_at, start)
             angle = reference.angle(sense * there.rotation[:, 2], np.asarray(seen.keep.direction))
             assert angle == pytest.approx(seen.least, abs=1e-6)
-        motions = (
-            reference.fly(moments, body.omega0, events(made), at, start)
-            for at in np.linspace(0.0, 14.0, 150)
-        )
+        begun = reference.Motion(body.omega0, start)
+        motions = reference.path(moments, begun, events(made), np.linspace(0.0, 14.0, 150))
         angles = [reference.nutation(moments, motion.rates, sense) for motion in motions]
         assert about_momentum.least < min(angles) + 1e-7
         assert about_momentum.largest > max(angles) - 1e-7

@@ -13,9 +13,8 @@ from typing import Any
 import numpy as np
 import pytest
 from support import reference
-from support.builders import present, spinner
+from support.builders import documented, present, spinner
 from support.cases import spread
-from support.documents import documented
 from support.golden import check_text
 from support.places import case
 from support.process import Planner, Run

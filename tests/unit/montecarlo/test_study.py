@@ -170,26 +170,27 @@ def test_a_share_is_shown_beyond_its_interval_of_all_but_a_millionth_then_of_95_
         assert (results.shown(certain=True), results.shown()) == (early, last)
 
 
-# Cases asked for, share of them that complies where 0.85 must, units a case; the stages flown.
-STAGED: list[tuple[int | None, float, float, list[int]]] = [
-    (
-        None,
-        0.5,
-        1e-9,
-        [2_048, 8_192, 20_000],
-    ),  # one share is shown, of as many cases, however early it is decided
-    (None, 0.85, 1e-9, [2_048, 8_192, 20_000, 40_000, 80_000, 160_000]),
-    (None, 0.85, 0.2, [2_048, 8_192, 20_000, 40_000]),  # within the budget for more cases
-    (None, 0.86, 1e-9, [2_048, 8_192, 20_000, 40_000]),
-    (None, 0.85, 2.0, [2_048, 8_192]),  # within that of the default number
-    (None, 0.85, 1e9, [2_048]),  # the first are flown in any case
-    (1_000, 0.85, 1e9, [1_000]),
-    (3_000, 0.85, 1e-9, [2_048, 3_000]),
-    (60_000, 0.85, 1e-9, [60_000]),  # they are counted and not kept: all at once
-]
-
-
-@pytest.mark.parametrize(("samples", "share", "effort", "stages"), STAGED)
+@pytest.mark.parametrize(
+    ("samples", "share", "effort", "stages"),
+    [
+        # Cases asked for, share of them that complies where 0.85 must, units a case; the stages
+        # flown.
+        (
+            None,
+            0.5,
+            1e-9,
+            [2_048, 8_192, 20_000],
+        ),  # one share is shown, of as many cases, however early it is decided
+        (None, 0.85, 1e-9, [2_048, 8_192, 20_000, 40_000, 80_000, 160_000]),
+        (None, 0.85, 0.2, [2_048, 8_192, 20_000, 40_000]),  # within the budget for more cases
+        (None, 0.86, 1e-9, [2_048, 8_192, 20_000, 40_000]),
+        (None, 0.85, 2.0, [2_048, 8_192]),  # within that of the default number
+        (None, 0.85, 1e9, [2_048]),  # the first are flown in any case
+        (1_000, 0.85, 1e9, [1_000]),
+        (3_000, 0.85, 1e-9, [2_048, 3_000]),
+        (60_000, 0.85, 1e-9, [60_000]),  # they are counted and not kept: all at once
+    ],
+)
 def test_cases_are_flown_in_stages_until_the_share_is_shown(
     samples: int | None,
     share: float,

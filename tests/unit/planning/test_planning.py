@@ -377,20 +377,14 @@ def flown_force(body: Spacecraft, made: Schedule) -> Vector:
     """
     moments = body.inertia.moments
     gained = np.zeros(3)
-    rotation = reference.frame_n(moments, body.omega0)
+    start = reference.Motion(body.omega0, reference.frame_n(moments, body.omega0))
     edges = sorted({edge for pulse in made for edge in (pulse.start, pulse.end)})
     for begin, end in itertools.pairwise(edges):
-        pushing = [one for one in made if one.start < 0.5 * (begin + end) < one.end]
-        if pushing:
-            start = reference.fly(moments, body.omega0, events(made), begin, rotation)
-            times = np.linspace(0.0, end - begin, 2001)
-            torque, force = (
-                np.sum([getattr(one, of) for one in pushing], axis=0) for of in ("torque", "force")
-            )
-            motions = [start, *reference.coast(moments, start, torque, times[1:])]
-            gained += simpson(
-                np.array([motion.rotation @ force for motion in motions]), x=times, axis=0
-            )
+        forces = [one.force for one in made if one.start < 0.5 * (begin + end) < one.end]
+        times = np.linspace(begin, end, 2001)
+        motions = reference.path(moments, start, events(made), times)
+        force = np.sum([np.zeros(3), *map(present, forces)], axis=0)
+        gained += simpson([motion.rotation @ force for motion in motions], x=times, axis=0)
     return gained
 
 

@@ -86,41 +86,6 @@ EXITS = {
 PROBABLE = Requirement(nutation=math.radians(0.5), probability=0.99)
 SPREAD = Dispersions(A=normal(0.5))
 
-# Requirement, dispersions, nutation left in deg, from where to where the share of all cases lies of
-# which 99.7 % must comply; status, colour, whether all that is required is met.
-VERDICTS: list[
-    tuple[Requirement | None, bool, float, tuple[float, float] | None, Status, Light, bool | None]
-] = [
-    (HALF_A_DEGREE, False, 0.4, None, Status.FLY, Light.AMBER, True),
-    (HALF_A_DEGREE, False, 0.6, None, Status.NOT_ENOUGH, Light.RED, False),
-    (
-        PROBABLE,
-        False,
-        0.4,
-        None,
-        Status.NOT_SHOWN,
-        Light.RED,
-        False,
-    ),  # a probability, and nothing to draw from
-    (PROBABLE, False, 0.6, None, Status.NOT_ENOUGH, Light.RED, False),
-    (HALF_A_DEGREE, True, 0.4, None, Status.NOT_SHOWN, Light.RED, False),  # no case was flown
-    (HALF_A_DEGREE, True, 0.4, (0.998, 0.9995), Status.FLY, Light.GREEN, True),
-    (HALF_A_DEGREE, True, 0.4, (0.997, 1.0), Status.FLY, Light.GREEN, True),
-    (HALF_A_DEGREE, True, 0.4, (0.9969, 1.0), Status.NOT_SHOWN, Light.RED, False),
-    (HALF_A_DEGREE, True, 0.4, (0.99, 0.9969), Status.NOT_ENOUGH, Light.RED, False),
-    (
-        HALF_A_DEGREE,
-        True,
-        0.6,
-        (0.998, 0.9995),
-        Status.NOT_ENOUGH,
-        Light.RED,
-        False,
-    ),  # it misses with nominal values
-    (None, False, 3.0, None, Status.FLY, Light.AMBER, None),
-    (None, True, 3.0, None, Status.FLY, Light.AMBER, None),
-]
-
 
 def within(low: float, high: float) -> Cases:
     return Cases(20_000, 1, 0.997, low, low, high)
@@ -128,7 +93,38 @@ def within(low: float, high: float) -> Cases:
 
 def test_the_status_goes_by_nominal_values_and_by_the_interval_of_the_share() -> None:
     assert {status: status.exit_status for status in Status} == EXITS
-    for required, dispersed, left, share, *expected in VERDICTS:
+    for required, dispersed, left, share, *expected in [
+        # Requirement, dispersions, nutation left in deg, from where to where the share of all cases
+        # lies of which 99.7 % must comply; status, colour, whether all that is required is met.
+        (HALF_A_DEGREE, False, 0.4, None, Status.FLY, Light.AMBER, True),
+        (HALF_A_DEGREE, False, 0.6, None, Status.NOT_ENOUGH, Light.RED, False),
+        (
+            PROBABLE,
+            False,
+            0.4,
+            None,
+            Status.NOT_SHOWN,
+            Light.RED,
+            False,
+        ),  # a probability, and nothing to draw from
+        (PROBABLE, False, 0.6, None, Status.NOT_ENOUGH, Light.RED, False),
+        (HALF_A_DEGREE, True, 0.4, None, Status.NOT_SHOWN, Light.RED, False),  # no case was flown
+        (HALF_A_DEGREE, True, 0.4, (0.998, 0.9995), Status.FLY, Light.GREEN, True),
+        (HALF_A_DEGREE, True, 0.4, (0.997, 1.0), Status.FLY, Light.GREEN, True),
+        (HALF_A_DEGREE, True, 0.4, (0.9969, 1.0), Status.NOT_SHOWN, Light.RED, False),
+        (HALF_A_DEGREE, True, 0.4, (0.99, 0.9969), Status.NOT_ENOUGH, Light.RED, False),
+        (
+            HALF_A_DEGREE,
+            True,
+            0.6,
+            (0.998, 0.9995),
+            Status.NOT_ENOUGH,
+            Light.RED,
+            False,
+        ),  # it misses with nominal values
+        (None, False, 3.0, None, Status.FLY, Light.AMBER, None),
+        (None, True, 3.0, None, Status.FLY, Light.AMBER, None),
+    ]:
         made = judged("a", left, required=required)
         made = replace(
             made, spacecraft=replace(made.spacecraft, dispersions=SPREAD if dispersed else None)
@@ -526,29 +522,26 @@ def cut(limits: Limits, disturbances: tuple[Disturbance, ...] = ()) -> Spacecraf
     )
 
 
-HINDERED: dict[str, tuple[Spacecraft, str]] = {
-    "weak": (
-        spinner(channels=cross(0.1, max_on_time=0.5), limits=Limits(horizon=30.0)),
-        "four-pulse",
-    ),
-    "no shorter": (
-        spinner(channels=cross(8.0, min_on_time=5.0), requirement=Requirement(nutation=1e-4)),
-        "two-pulse",
-    ),
-    "suspected": (BALL, "four-pulse"),
-    "no other limits in the file": (SINGLE, "one-pulse"),
-    "dark": (replace(SINGLE, limits=Limits(horizon=7.0, blackout=((0.0, 1.0),))), "one-pulse"),
-    "one pulse": (cut(Limits(max_pulses=1)), "four-pulse"),
-    "disturbed": (cut(Limits(), TILTING), "four-pulse"),
-    "steady tilt": (cut(Limits(), TILTING), "four-pulse"),
-    "ticks": (cut(Limits(tick=0.3)), "four-pulse"),
-    "ticks, and pulses left": (cut(Limits(tick=0.3, max_pulses=5)), "four-pulse"),
-}
-
-
 def test_what_stands_in_the_way_is_named_and_nothing_else() -> None:
     texts = []
-    for name, (body, scheme) in HINDERED.items():
+    for name, (body, scheme) in {
+        "weak": (
+            spinner(channels=cross(0.1, max_on_time=0.5), limits=Limits(horizon=30.0)),
+            "four-pulse",
+        ),
+        "no shorter": (
+            spinner(channels=cross(8.0, min_on_time=5.0), requirement=Requirement(nutation=1e-4)),
+            "two-pulse",
+        ),
+        "suspected": (BALL, "four-pulse"),
+        "no other limits in the file": (SINGLE, "one-pulse"),
+        "dark": (replace(SINGLE, limits=Limits(horizon=7.0, blackout=((0.0, 1.0),))), "one-pulse"),
+        "one pulse": (cut(Limits(max_pulses=1)), "four-pulse"),
+        "disturbed": (cut(Limits(), TILTING), "four-pulse"),
+        "steady tilt": (cut(Limits(), TILTING), "four-pulse"),
+        "ticks": (cut(Limits(tick=0.3)), "four-pulse"),
+        "ticks, and pulses left": (cut(Limits(tick=0.3, max_pulses=5)), "four-pulse"),
+    }.items():
         compared = compare(
             body, (scheme,), catalogue.Options(with_disturbances=name == "steady tilt")
         )
@@ -1149,22 +1142,6 @@ def halved(*keys: str | int) -> Callable[[dict[str, Any]], None]:
     return halve
 
 
-TAMPERED: list[Callable[[dict[str, Any]], None]] = [
-    halved("circle", 0),
-    halved("nutation_rad_s"),
-    halved("equations", 0, "goal_Nms"),
-    lambda c: c.update(bound=1.001 * c["bound"]),
-    halved("channels", 0, "cost_per_s"),
-    lambda c: c["channels"][0].update(
-        torque_Nm=[1.1 * one for one in c["channels"][0]["torque_Nm"]]
-    ),
-    halved("burns", 0, "on_time_s"),
-    lambda c: c["burns"][0].update(t_s=c["burns"][0]["t_s"] + 0.4),
-    halved("primer", 0, "q", "+1", 7),
-    raised,
-]
-
-
 def refutes(text: str, *tampers: Callable[[dict[str, Any]], None]) -> None:
     """The file as it is proves what it says, and as any of these make it does not."""
     for tamper in tampers:
@@ -1183,7 +1160,23 @@ def test_the_file_alone_proves_the_bound_and_a_tampered_one_does_not(name: str) 
     bounds = present(made.plan.pulses.bounds)
     assert check(text) == bounds.first_order == made.proof.bound > 0.0
     if "windows" in name:
-        refutes(text, *TAMPERED)
+        refutes(
+            text,
+            *[
+                halved("circle", 0),
+                halved("nutation_rad_s"),
+                halved("equations", 0, "goal_Nms"),
+                lambda c: c.update(bound=1.001 * c["bound"]),
+                halved("channels", 0, "cost_per_s"),
+                lambda c: c["channels"][0].update(
+                    torque_Nm=[1.1 * one for one in c["channels"][0]["torque_Nm"]]
+                ),
+                halved("burns", 0, "on_time_s"),
+                lambda c: c["burns"][0].update(t_s=c["burns"][0]["t_s"] + 0.4),
+                halved("primer", 0, "q", "+1", 7),
+                raised,
+            ],
+        )
 
 
 @pytest.mark.deep

@@ -1,7 +1,6 @@
 """What optimal tries beside its linear program: other horizons, ends and schemes, short horizons,
 divided pulses."""
 
-import csv
 import itertools
 import math
 from collections.abc import Callable
@@ -15,6 +14,7 @@ from support import places
 from support.builders import Outcome, aimed, channel, cross, fan, present, pulse, spinner
 from support.cases import deep, spread, weekly
 from support.checker import violations
+from support.commands import rows as rows_of
 from support.golden import check_text
 from support.optimal import as_found, flies, random_layout
 from support.rivals import unequal_body
@@ -46,9 +46,6 @@ from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Goal, Limits, Spacecraft
 from nutdamp.spacecraft.requirements import DAMPED_ANGLE, SAME_COST
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
-
-# --- what optimal tries beside its linear program: other horizons, ends and schemes, short
-# horizons, divided pulses
 
 BODY = spinner(channels=cross(8.0), limits=Limits(horizon=400.0))
 """400 s are 128 inertial nutation periods, so that the horizon can be halved six times."""
@@ -341,11 +338,10 @@ def test_pulses_of_two_channels_may_stand_side_by_side() -> None:
 
 def check_not_beaten(name: str, most: float, **options: Any) -> None:
     """By the schedule beside the file."""
-    with places.case(f"{name}.csv").open(encoding="utf-8") as stream:
-        impulses = [
-            [float(row[f"impulse_{axis}_Nms"]) for axis in (1, 2, 3)]
-            for row in csv.DictReader(stream)
-        ]
+    impulses = [
+        [float(row[f"impulse_{axis}_Nms"]) for axis in (1, 2, 3)]
+        for row in rows_of(places.case(f"{name}.csv").read_text(encoding="utf-8"))
+    ]
     known = math.fsum(math.hypot(*impulse) for impulse in impulses)
     assert (
         flies(
