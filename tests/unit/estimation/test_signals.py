@@ -244,43 +244,6 @@ def test_sun_pulses_tell_the_spin_and_so_the_bias_of_the_third_gyro() -> None:
     assert fitted.noise[-1] == pytest.approx(5e-4, rel=0.4)
 
 
-@pytest.mark.weekly
-def test_pulses_in_a_record_tell_thrust_and_delay_of_their_channels() -> None:
-    times = np.linspace(0.05, 40.0, 200)
-    factors = {"T1": 0.96, "T2": 1.03}
-    late = {"T1": 0.02, "T2": 0.035}
-    fired = Schedule(
-        tuple(
-            channel_pulse(one, at, 0.5) for one, at in zip(BODY.channels, (12.0, 25.0), strict=True)
-        )
-    )
-    events = tuple(
-        reference.Push(
-            one.start + late[one.channel],
-            one.end + late[one.channel],
-            factors[one.channel] * one.torque,
-        )
-        for one in fired
-        if one.torque is not None
-    )
-    fitted = fit(BODY, Record(times, gyros(flown(times, BODY, events), 5), schedule=fired))
-    of_A = fitted.index("A") or 0
-    for (
-        name,
-        factor,
-    ) in factors.items():  # a pulse shows thrust over A, so that the factor is as uncertain as A
-        at = present(fitted.index(f"thrust {name}"))
-        apart = math.sqrt(
-            fitted.covariance[at, at]
-            - fitted.covariance[at, of_A] ** 2 / fitted.covariance[of_A, of_A]
-        )
-        assert abs(fitted.values[at] / fitted.named["A"] * A - factor) < 4.0 * apart
-        assert apart < 0.002
-    expect_close(fitted, {"A": A, "C/A": C / A, **{f"delay {name}": late[name] for name in late}})
-    after = flown(np.array([40.0]), BODY, events)[0].rates
-    assert carried(fitted, 40.0).values[2:5] == pytest.approx(after, abs=6.0 * NOISE)
-
-
 def test_of_unequal_moments_pulses_and_disturbances_push_in_the_axes_of_the_file() -> None:
     """The principal axes that are estimated are turned against those of the file: by 90 deg where
     I1 < I2.
