@@ -197,6 +197,12 @@ def test_every_status_of_the_built_in_example(
     )
 
 
+def test_pulses_that_cannot_be_sent_to_a_spacecraft_that_takes_commands() -> None:
+    body = replace(nutdamp.load(places.case("cbp1004.yaml")), dispersions=None)
+    assert compare(body, ["two-pulse"]).verdict.status is Status.NOT_COMMANDABLE
+    assert compare(body, ["two-pulse"], timed=True).verdict.status is not Status.NOT_COMMANDABLE
+
+
 @pytest.mark.parametrize(("limits", "status"), [({}, "fly"), ({"gap": "60 s"}, "not-commandable")])
 def test_a_schedule_read_from_a_file_keeps_the_limits_or_cannot_be_commanded(
     run: Run, tmp_path: Path, limits: Mapping[str, str], status: str
