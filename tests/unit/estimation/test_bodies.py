@@ -382,7 +382,7 @@ def test_cones_of_any_angle_are_found(seed: int) -> None:
     axis = np.array(
         [
             math.copysign(1.0, spin) * one.rotation[:, 2]
-            for one in reference.coast((A, A, C), start, np.zeros(3), times)
+            for one in reference.path((A, A, C), start, (), times)
         ]
     )
     axis += 10.0 ** draw.uniform(-4.5, -2.5) * draw.normal(size=axis.shape)

@@ -79,12 +79,12 @@ def fly(seed: int, kind: str, length: float = 40.0) -> Flown:
     begin = begin * off * Rotation.from_rotvec([0.0, 0.0, draw.uniform(-3.0, 3.0)])
     grid = np.linspace(0.0, length, math.ceil(length * abs(body.spin) / (2.0 * math.pi) * 60))
     start = reference.Motion(rates, begin.as_matrix())
-    flight = [start, *reference.coast((moments[0], *moments), start, np.zeros(3), grid[1:])]
+    flight = reference.path((moments[0], *moments), start, (), grid)
     tilt = math.radians(1.0) * draw.normal(size=2)
     true = Rotation.from_matrix([one.rotation for one in flight])
     record = _record(draw, kind, body, grid, true, true * Rotation.from_rotvec([*tilt, 0.0]))
-    edges = np.array([max(record.start, 1e-9), record.end])
-    first, last = reference.coast((moments[0], *moments), start, np.zeros(3), edges)
+    edges = record.start, record.end
+    first, last = reference.path((moments[0], *moments), start, (), edges)
     truth = {"A": moments[0], "C/A": moments[1] / moments[0], "growth": 0.0}
     truth |= {"wobble_1": float(tilt[0]), "wobble_2": float(tilt[1])}
     truth |= {f"omega_{number + 1}": float(rate) for number, rate in enumerate(first.rates)}

@@ -254,6 +254,15 @@ def test_valves_open_and_close_while_the_pressure_falls() -> None:
     assert math.degrees(present(present(planning.plan(body, "two-pulse").flown)).nutation) < 1e-6
 
 
+def test_cases_without_deviations_are_the_flight_itself() -> None:
+    body = replace(carrier(SMALL), dispersions=Dispersions(A=normal(0.01, relative=True)))
+    made = planning.plan(body, "two-pulse")
+    study = study_of(body, made.pulses)
+    alone = flown(body, made.pulses)
+    assert study.outputs_of({})[0] == pytest.approx(alone.residual.nutation, abs=1e-9)
+    assert study.outputs_of({})[-1] == pytest.approx(made.propellant)
+
+
 def test_cases_of_another_valve_fall_as_well() -> None:
     """A valve that is a little off leaves little more than the nominal one; without the fall it
     would be a degree.
