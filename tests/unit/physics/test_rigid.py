@@ -5,6 +5,7 @@ closed forms.
 import itertools
 import math
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -326,6 +327,11 @@ def test_pulses_that_change_their_order_in_some_cases() -> None:
     case = cases(30, starts=(0.5, 1.05, 1.1), on_times=(0.5, 0.2, 0.4), jitter=0.12)
     assert len({tuple(column) for column in np.argsort(case.pulses.edges, axis=0).T}) > 3
     assert_flown_alike(case, range(0, 30, 6))
+    leans = np.tile([[-0.2], [0.1], [-0.3]], 30)
+    falling = case._replace(pulses=replace(case.pulses, leans=leans))
+    for number in range(0, 30, 6):
+        for alone, of_many in zip(falling.some([number]).fly(), falling.fly(), strict=True):
+            assert_allclose(alone[:, 0], of_many[:, number], atol=1e-13)
 
 
 def test_no_pulses_and_no_time_and_what_is_given_stays() -> None:
