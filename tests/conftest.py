@@ -12,9 +12,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import pytest
 from hypothesis import HealthCheck, settings
-from support.pages import unpictured
-from support.planner import Planner
-from support.process import Run, apart, within
+from support.process import Planner, Run, apart, unpictured, within
 
 from nutdamp.schemes import planner
 

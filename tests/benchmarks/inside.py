@@ -23,7 +23,7 @@ from scipy.integrate import solve_ivp
 
 sys.path.append(str(Path(__file__).parents[1]))
 
-from support.single_case import realised
+from support.flights import realised
 
 from nutdamp import load
 from nutdamp.flight import propagation

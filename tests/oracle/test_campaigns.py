@@ -3,11 +3,8 @@ that differs.
 
 The figures are those of the status reports of Lunar Prospector and of the weekly reports of ACE;
 the files in configs/ say what of the spacecraft is published, computed from them and assumed.
-Nothing here is fitted but what they say.
-"""
+Nothing here is fitted but what they say."""
 
-import csv
-import io
 import math
 from dataclasses import replace
 from typing import NamedTuple
@@ -15,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from support.builders import one_of, present
-from support.cases import deep, spread
+from support.cases import deep, spread, weekly
+from support.commands import rows as rows_of
 from support.process import Run
 
 import nutdamp
@@ -74,7 +72,7 @@ def test_lunar_prospector_is_planned_as_it_was_flown(run: Run) -> None:
     scheme = ("--scheme", "command-block", "--blocks", "-")
     screen = run("plan", "-", *goal, *scheme, stdin=example_text("lunar-prospector"))
     assert screen.returncode == 0, screen.stderr
-    (row,) = csv.DictReader(io.StringIO(screen.stdout))
+    (row,) = rows_of(screen.stdout)
     assert (row["count"], float(row["width_s"])) == ("40", 0.2)
 
 
@@ -189,3 +187,29 @@ def test_ace_is_planned_with_about_the_pulses_reported() -> None:
     assert plan.feasible
     (block,) = plan.pulses.blocks
     assert block.count == pytest.approx(99, abs=12)
+
+
+# --- aCE follows the Sun by a turn a week, each planned from the file of the one before
+
+WEEK = 7 * 86400.0
+
+
+@pytest.mark.deep
+@pytest.mark.parametrize("weeks", [2, weekly(52)])
+def test_weekly_turns_keep_the_cone_and_their_propellant_adds_up(weeks: int) -> None:
+    spacecraft = nutdamp.example("ace")
+    first = present(spacecraft.mass)
+    used = 0.0
+    for _ in range(weeks):
+        x, y, z = present(spacecraft.sun).tolist()
+        spacecraft = nutdamp.plan(spacecraft, "none").carried(WEEK)
+        goal = {"right_ascension": math.atan2(y, x), "declination": math.asin(z)}
+        plan = nutdamp.plan(spacecraft.with_(goal=goal), "command-block")
+        assert plan.meets_requirement
+        assert plan.kept
+        assert 0.017 < present(plan.propellant) < 0.022
+        used += present(plan.propellant)
+        spacecraft = plan.carried()
+    assert spacecraft.mass == pytest.approx(first - used, rel=1e-9)
+    if weeks == 52:
+        assert used == pytest.approx(0.99, abs=0.02)

@@ -22,8 +22,15 @@ from support.cases import deep, spread
 from support.golden import check_text
 from support.places import case
 from support.process import Run
-from support.spinning import EPS, about
-from support.strategies import UNTIL, angles, schedules, symmetric_spinners, triaxial_spinners
+from support.spinning import (
+    EPS,
+    UNTIL,
+    about,
+    angles,
+    schedules,
+    symmetric_spinners,
+    triaxial_spinners,
+)
 
 from nutdamp import load
 from nutdamp.figures.overview import title

@@ -20,7 +20,6 @@ from support import places
 from support.builders import aimed, channel, cross, present, spinner
 from support.cases import deep, spread, weekly
 from support.golden import check_text
-from support.layout import check_colours, check_layout, contrast, pages, texts
 from support.shown import (
     BODY,
     CASES,
@@ -29,14 +28,19 @@ from support.shown import (
     SIXTEEN,
     STEERED,
     WIDE,
+    check_colours,
+    check_layout,
     check_star,
+    contrast,
     drawn,
     flight_picture,
     flown,
     heading,
     kicks,
     notes,
+    pages,
     points,
+    texts,
 )
 
 from nutdamp.figures import geometry, overview, sphere, style

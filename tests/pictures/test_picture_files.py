@@ -12,7 +12,7 @@ import shutil
 import subprocess
 import sys
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import combinations
 from pathlib import Path
 from typing import Any
@@ -24,7 +24,7 @@ from matplotlib import style as matplotlib_style
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from PIL import Image
-from support import pairwise, places
+from support import places
 from support.builders import spinner
 from support.cases import deep, weekly
 from support.golden import check_text, refusal
@@ -340,6 +340,41 @@ def test_an_mp4_is_one(damped: tuple[propagation.Flight, float]) -> None:
 
 # --- every spacecraft with every option, in pairs: nothing breaks, and a file is written
 
+Row = tuple[str, ...]
+Pair = tuple[tuple[int, str], ...]
+"""Two values, each with the number of its factor."""
+
+
+def pairs(chosen: dict[int, str]) -> list[Pair]:
+    """Pairs of the values of some factors."""
+    return [*combinations(sorted(chosen.items()), 2)]
+
+
+def covering_rows(factors: Sequence[Sequence[str]], first: Iterable[Row] = ()) -> list[Row]:
+    """Rows of one value of each factor, ``first`` those, in which each pair of values stands at
+    least once.
+
+    Greedy: a row begins with the first pair that no other has, and takes on what adds most of
+    those.
+    """
+    numbers = range(len(factors))
+    both = combinations(numbers, 2)
+    missing = dict.fromkeys(
+        pairs({i: a, j: b})[0] for i, j in both for a in factors[i] for b in factors[j]
+    )
+    made = list[Row]()
+    waiting = [dict(enumerate(row)) for row in first]
+    while missing or waiting:
+        chosen = waiting.pop(0) if waiting else dict(next(iter(missing)))
+        for number in set(numbers) - {*chosen}:
+            rivals = {value: pairs({**chosen, number: value}) for value in factors[number]}
+            chosen[number] = max(rivals, key=lambda value: len(missing.keys() & {*rivals[value]}))
+        made.append(tuple(chosen[number] for number in numbers))
+        for pair in pairs(chosen):
+            missing.pop(pair, None)
+    return made
+
+
 FILES = tuple(sorted(path.stem for path in places.CONFIGS.glob("*.yaml")))
 DISPERSED = {
     name
@@ -402,7 +437,7 @@ DEEP = 4
 def listed() -> Iterator[Any]:
     """All commands, as parameters of a test."""
     for command, (factors, first) in TABLES.items():
-        rows = pairwise.rows(factors, first)
+        rows = covering_rows(factors, first)
         every = len(rows) // (DEEP - len(first))
         for number, (name, *options) in enumerate(rows):
             words = " ".join(filter(None, (command, *options)))
@@ -426,7 +461,7 @@ def test_a_file_is_written_whatever_meets(run: Run, tmp_path: Path, command: str
 
 def test_any_two_options_meet() -> None:
     for factors, first in TABLES.values():
-        rows = pairwise.rows(factors, first)
+        rows = covering_rows(factors, first)
         assert rows[: len(first)] == [*first]
         for one, other in combinations(range(len(factors)), 2):
             pairs = {(row[one], row[other]) for row in rows}

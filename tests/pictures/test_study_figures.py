@@ -16,8 +16,16 @@ from support.builders import aimed, cross, present, spinner
 from support.cases import deep, weekly
 from support.dispersed import jet, normal
 from support.golden import check_text
-from support.layout import check_colours, check_layout, texts
-from support.shown import WIDE, check_star, heading, legend_words, studied
+from support.shown import (
+    WIDE,
+    check_colours,
+    check_layout,
+    check_star,
+    heading,
+    legend_words,
+    studied,
+    texts,
+)
 from support.spinners import commanded
 
 from nutdamp.common.numerics import down

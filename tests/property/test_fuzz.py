@@ -12,8 +12,7 @@ from typing import Any, NoReturn
 import numpy as np
 import pytest
 from support.cases import spread
-from support.planner import Planner
-from support.process import within
+from support.process import Planner, within
 from support.random_bodies import equipped, power
 
 from nutdamp.schemes import planner as schemes

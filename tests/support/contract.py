@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +10,7 @@ import pytest
 from hypothesis import strategies as st
 from scipy.integrate import simpson
 from support import messages, reference
-from support.builders import present
+from support.builders import events, present
 from support.cases import deep
 from support.golden import check_text
 
@@ -104,24 +103,8 @@ def motions(
     body: Spacecraft, pulses: Schedule, times: Sequence[float], rotation: Vector
 ) -> list[reference.Motion]:
     """The motion at ``times`` s by the reference integrator, from ``rotation`` on."""
-    motion = reference.Motion(body.omega0, rotation)
-    at = {0.0: motion}
-    edges = sorted(
-        {0.0, max(times), *(edge for pulse in pulses for edge in (pulse.start, pulse.end))}
-    )
-    for begin, end in pairwise(edges):
-        middle = 0.5 * (begin + end)
-        torques = [
-            pulse.torque
-            for pulse in pulses
-            if pulse.torque is not None and pulse.start < middle < pulse.end
-        ]
-        ends = sorted({end, *(time for time in times if begin < time < end)})
-        torque = np.sum([np.zeros(3), *torques], axis=0)
-        moved = reference.coast(body.inertia.moments, motion, torque, np.array(ends) - begin)
-        at.update(zip(ends, moved, strict=True))
-        motion = moved[-1]
-    return [at[time] for time in times]
+    start = reference.Motion(body.omega0, rotation)
+    return reference.path(body.inertia.moments, start, events(pulses), times)
 
 
 def velocity_change(plan: planning.Plan, pulse: Pulse) -> Vector:
@@ -157,3 +140,39 @@ def slips(draw: st.DrawFn, text: str) -> list[str]:
                     lines[index][:place] + draw(st.text(max_size=3)) + lines[index][place:]
                 )
     return lines
+
+
+# --- the broken spacecraft files of files/broken_files.txt, with the faults to be found in them
+
+HEAD = "name: Sat\n"
+INERTIA = "inertia: {A: 120, C: 80}\n"
+BODY = HEAD + INERTIA
+BASE = BODY + "omega0: [0.1, 0.2, 3]\n"  # what follows stands in line 4
+SPIN = HEAD + "omega0: [0.1, 0.2, 3]\n"  # what follows stands in line 3
+THRUSTERS = (
+    BASE
+    + "thrusters:\n"
+    + "  - {name: T1, torque: [8, 0, 0], min_on_time: 20 ms, max_on_time: 2 s}\n"
+    + "  - {name: T2, torque: [-8, 0, 0]}\n"
+    + "  - {name: T3, torque: [0, 8, 0], max_on_time: 10 ms}\n"
+)  # what follows stands in line 8
+
+
+def broken_files() -> dict[str, tuple[str, list[str]]]:
+    """Text and expected faults of each case in broken_files.txt."""
+    beginnings = {"HEAD": HEAD, "BODY": BODY, "BASE": BASE, "SPIN": SPIN, "THRUSTERS": THRUSTERS}
+    cases: dict[str, tuple[str, list[str]]] = {}
+    for case in (
+        (Path(__file__).with_name("broken_files.txt")).read_text("utf-8").split("\n=== ")[1:]
+    ):
+        name, *lines = case.rstrip().split("\n")
+        faults = [line.removeprefix("--> ") for line in lines if line.startswith("--> ")]
+        text = "".join(
+            beginnings.get(line, f"{line}\n") for line in lines[: len(lines) - len(faults)]
+        )
+        assert name not in cases
+        cases[name] = text, faults
+    return cases
+
+
+BROKEN = broken_files()

@@ -1,4 +1,4 @@
-"""Flights that several packages look at: the spin axis on its way, dispersed command blocks."""
+"""Flights that several packages look at, and one case as a spacecraft of its own."""
 
 import math
 from dataclasses import replace
@@ -12,13 +12,20 @@ from support.builders import channel, cross, events, spinner
 from support.dispersed import normal
 from support.spinners import commanded
 
-from nutdamp.montecarlo.cases import DispersedModel
-from nutdamp.physics import attitude
+from nutdamp.flight import propagation
+from nutdamp.flight.dynamics import make_dynamics
+from nutdamp.montecarlo import propagated
+from nutdamp.montecarlo.cases import DispersedCases, DispersedModel, Thrusting, number_of, triple
+from nutdamp.montecarlo.inputs import Draws
+from nutdamp.physics import attitude, series
+from nutdamp.physics.thruster import Ramp
 from nutdamp.schemes.block_model import fired
 from nutdamp.spacecraft.equipment import Block
-from nutdamp.spacecraft.model import Spacecraft
-from nutdamp.spacecraft.schedule import Schedule
+from nutdamp.spacecraft.model import Attitude, Spacecraft
+from nutdamp.spacecraft.schedule import Command, Pulse, Schedule
 from nutdamp.spacecraft.tolerances import Dispersions
+
+# --- flights that several packages look at: the spin axis on its way, dispersed command blocks
 
 Array = NDArray[np.float64]
 
@@ -31,20 +38,14 @@ def axis_path(spacecraft: Spacecraft, made: Schedule, until: float, dense: int =
     moments = spacecraft.inertia.moments
     sense = math.copysign(1.0, spacecraft.spin)
     motion = reference.Motion(spacecraft.omega0, attitude.matrix(spacecraft.initial.quaternion))
-    pushes = [one for one in events(made) if isinstance(one, reference.Push)]
-    edges = sorted({0.0, until, *(one.start for one in pushes), *(one.end for one in pushes)})
-    path = [motion.rotation[:, 2] * sense]
-    for begin, end in pairwise(edges):
-        torque = sum(
-            (one.torque for one in pushes if one.start < 0.5 * (begin + end) < one.end), np.zeros(3)
-        )
-        count = dense * max(1, math.ceil((end - begin) / spacecraft.inertial_period))
-        motions = reference.coast(
-            moments, motion, torque, np.linspace(begin, end, count + 1)[1:] - begin
-        )
-        path += [one.rotation[:, 2] * sense for one in motions]
-        motion = motions[-1]
-    return np.array(path)
+    edges = sorted({0.0, until, *(edge for one in made for edge in (one.start, one.end))})
+    turns = [
+        (begin, end, max(1, math.ceil((end - begin) / spacecraft.inertial_period)))
+        for begin, end in pairwise(edge for edge in edges if edge <= until)
+    ]
+    times = [np.linspace(begin, end, dense * count + 1) for begin, end, count in turns]
+    path = reference.path(moments, motion, events(made), np.concatenate(times))
+    return np.array([one.rotation[:, 2] * sense for one in path])
 
 
 BODY_ERRORS = Dispersions(
@@ -74,3 +75,126 @@ def by_blocks(
     )
     body = replace(commanded(body, np.array([1.0, 0.3, -0.4])), dispersions=dispersions, **fields)
     return DispersedModel(body, fired(body, blocks))
+
+
+# --- one case as a spacecraft and a schedule of its own, for everything that flies those
+
+
+def timed(model: DispersedModel, cases: DispersedCases) -> DispersedCases:
+    """The ``cases`` with starts and impulses by their own Sun pulses, else as they are."""
+    if not model.schedule.blocks:
+        return cases
+    count = number_of(cases)
+    dynamics = make_dynamics(model.spacecraft)
+    moments, rates = (
+        np.array([np.broadcast_to(part, count) for part in of])
+        for of in (cases.moments, cases.omega0)
+    )
+    upright = np.tile([[1.0], [0.0], [0.0], [0.0]], count)
+    bodies = series.Bodies(moments, dynamics.constant, dynamics.forcing._replace(wheel=cases.wheel))
+    nominal = propagated.RealWidths(model).seen_nominally
+    _, _, starts, fires, _ = propagated.fly(model, bodies, rates, upright, cases, nominal)
+    pulses = zip(cases.impulses, fires, strict=True)
+    impulses = tuple(triple(part * seen for part in impulse) for impulse, seen in pulses)
+    return replace(cases, starts=tuple(starts), impulses=impulses)
+
+
+def realised(model: DispersedModel, draws: Draws) -> tuple[Spacecraft, Schedule]:
+    """The true spacecraft, its attitude in the estimate's frame, and the pulses that it gets."""
+    body = model.spacecraft
+    case = timed(model, model.cases(draws))
+    pulses = []
+    spent = case.spent or (None,) * len(case.starts)
+    for number, (planned, used) in enumerate(zip(model.schedule, spent, strict=True)):
+        width, start = case.widths[number], case.starts[number]
+        impulse = np.array(case.impulses[number], dtype=float).reshape(3)
+        torque = None if planned.on_time == 0.0 else impulse / planned.on_time
+        propellant = None if used is None else float(np.squeeze(used))
+        t = float(np.squeeze(start + 0.5 * width))
+        if case.thrust[number]:
+            begin = float(np.squeeze(start - case.leads[number]))
+            pulses += [
+                _thrusting(planned, begin, one, propellant, len(case.thrust[number]))
+                for one in case.thrust[number]
+            ]
+        elif planned.command is not None:
+            moved = planned.moved(t - planned.t)
+            pulses.append(replace(moved, impulse=impulse, torque=torque, propellant=propellant))
+        else:
+            pulses.append(
+                Pulse(t, planned.on_time, planned.channel, impulse, torque, propellant=propellant)
+            )
+    tilt = np.array([*case.tilt, 0.0], dtype=float)
+    angle = float(np.linalg.norm(tilt))
+    turn = np.array([np.cos(0.5 * angle), *(0.5 * np.sinc(0.5 * angle / np.pi) * tilt)])
+    axes = body.inertia.axes
+    quaternion = attitude.multiply(
+        attitude.multiply(body.initial.quaternion, turn), attitude.from_matrix(axes.T)
+    )
+    first, second, third = (float(moment) for moment in case.moments)
+    per_kg = None
+    if case.per_kg is not None:
+        one, two, three = (float(np.squeeze(part)) for part in case.per_kg)
+        per_kg = one, two, three
+    true = replace(
+        body,
+        inertia=replace(
+            body.inertia, moments=(first, second, third), wheel=float(np.squeeze(case.wheel))
+        ),
+        omega0=np.array(case.omega0, dtype=float),
+        attitude=Attitude(quaternion),
+        tank=None if body.tank is None else replace(body.tank, inertia_per_kg=per_kg),
+    )
+    return true, Schedule(tuple(pulses))
+
+
+def _thrusting(
+    planned: Pulse, start: float, one: Thrusting, propellant: float | None, count: int
+) -> Pulse:
+    """One of ``count`` thrusters' share of a pulse, as a pulse that begins at ``start`` s."""
+    acts, centroid, _ = (float(np.squeeze(part)) for part in one.opened.acts)
+    ramps = []
+    for begin, length, level, lean in (
+        tuple(float(np.squeeze(part)) for part in piece) for piece in one.opened.pieces
+    ):
+        if start + begin + length > start + begin:
+            ramps.append(
+                Ramp(
+                    start + begin,
+                    start + begin + length,
+                    level * (1.0 - lean),
+                    level * (1.0 + lean),
+                )
+            )
+    torque = np.array([float(np.squeeze(part)) for part in one.torque])
+    assert planned.command is not None
+    command = Command(start, planned.command.on_time, tuple(ramps))
+    used = None if propellant is None else propellant / count
+    return Pulse(
+        start + centroid,
+        acts,
+        planned.channel,
+        acts * torque,
+        torque,
+        propellant=used,
+        command=command,
+    )
+
+
+def flown_outputs(model: DispersedModel, draws: Draws) -> Array:
+    """The outputs (5,) of one case with real widths and true moments, by `propagation.flown`."""
+    true, schedule = realised(model, draws)
+    made = propagation.flown(true, schedule)
+    settled, left = made.settled, made.residual
+    momentum = made.last_momentum
+    target = attitude.rotate(model.spacecraft.initial.quaternion, model.target)
+    propellant = model.cases(draws).propellant
+    return np.array(
+        [
+            left.nutation,
+            left.momentum_shift,
+            float(attitude.angle_between(momentum, target)),
+            settled.spin - true.spin,
+            np.nan if propellant is None else float(propellant),
+        ]
+    )

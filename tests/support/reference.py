@@ -258,6 +258,44 @@ def sinking(
     ]
 
 
+def path(
+    moments: Sequence[float],
+    start: Motion,
+    events: Iterable[Push | Swell | Kick],
+    times: Sequence[float] | Array,
+    growth: float = 0.0,
+    wheel: float = 0.0,
+) -> list[Motion]:
+    """The motion at ``times`` s >= 0, kicks included; restarts at every edge of a torque."""
+    events = list(events)
+    asked, places = np.unique(np.asarray(times, dtype=float), return_inverse=True)
+    edges = {0.0, *asked[-1:].tolist()}
+    for event in events:
+        edges |= {event.t} if isinstance(event, Kick) else {event.start, event.end}
+    motion, now, found = start, 0.0, list[Motion]()
+    for edge in sorted(edge for edge in edges if edge <= asked[-1:].sum()):
+        if edge > now:
+            middle = 0.5 * (now + edge)
+            pushing = [e.torque for e in events if isinstance(e, Push) and e.start < middle < e.end]
+            torque = np.sum(pushing, axis=0) if pushing else np.zeros(3)
+            swelling = [e for e in events if isinstance(e, Swell) and e.start < middle < e.end]
+            growing = sum(((e.last - e.first) / (e.end - e.start) for e in swelling), np.zeros(3))
+            torque = torque + sum((e.at(now) for e in swelling), np.zeros(3))
+            spans = np.append(asked[(asked > now) & (asked < edge)], edge) - now
+            *inside, motion = (
+                sinking(moments, motion, torque, spans, growth, wheel)
+                if growth
+                else coast(moments, motion, torque, spans, growing, wheel)
+            )
+            found += inside
+            now = edge
+        for event in events:
+            if isinstance(event, Kick) and event.t == edge:
+                motion = Motion(motion.rates + event.impulse / np.asarray(moments), motion.rotation)
+        found += [motion] * np.count_nonzero(asked == edge)
+    return [found[place] for place in places]
+
+
 def fly(
     moments: Sequence[float],
     rates: Array,
@@ -267,31 +305,7 @@ def fly(
     growth: float = 0.0,
     wheel: float = 0.0,
 ) -> Motion:
-    """The motion at ``until`` s, kicks included; restarts at every edge of a torque."""
-    events = list(events)
-    start = frame_n(moments, rates, wheel) if rotation is None else rotation
-    motion = Motion(np.asarray(rates, dtype=float), start)
-    now = 0.0
-    edges = {0.0, until}
-    for event in events:
-        edges |= {event.t} if isinstance(event, Kick) else {event.start, event.end}
-    for edge in sorted(edge for edge in edges if edge <= until):
-        if edge > now:
-            middle = 0.5 * (now + edge)
-            pushing = [e.torque for e in events if isinstance(e, Push) and e.start < middle < e.end]
-            torque = np.sum(pushing, axis=0) if pushing else np.zeros(3)
-            swelling = [e for e in events if isinstance(e, Swell) and e.start < middle < e.end]
-            growing = sum(((e.last - e.first) / (e.end - e.start) for e in swelling), np.zeros(3))
-            torque = torque + sum((e.at(now) for e in swelling), np.zeros(3))
-            span = np.array([edge - now])
-            found = (
-                sinking(moments, motion, torque, span, growth, wheel)
-                if growth
-                else coast(moments, motion, torque, span, growing, wheel)
-            )
-            motion = found[0]
-            now = edge
-        for event in events:
-            if isinstance(event, Kick) and event.t == edge:
-                motion = Motion(motion.rates + event.impulse / np.asarray(moments), motion.rotation)
-    return motion
+    """The motion at ``until`` s: `path` from the frame N, unless ``rotation`` says otherwise."""
+    facing = frame_n(moments, rates, wheel) if rotation is None else rotation
+    start = Motion(np.asarray(rates, dtype=float), facing)
+    return path(moments, start, events, [until], growth, wheel)[0]

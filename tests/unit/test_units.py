@@ -93,42 +93,55 @@ def test_numbers_are_si_and_a_right_angle_is_half_of_pi() -> None:
     assert (parse("30", "time", bare=True), parse("-.5", "number", bare=True)) == (30.0, -0.5)
 
 
-REFUSED: list[tuple[object, str]] = [
-    *[
-        ("30", "time"),
-        ("20 Hz", "rate"),
-        ("2 rev/min", "rate"),
-        ("1 rev", "angle"),
-        ("5 KG", "mass"),
-        ("5 m s", "time"),
-    ],
-    *[
-        ("120 kg", "inertia"),
-        ("5 rpm", "angle"),
-        ("5 deg", "ratio"),
-        ("1 m", "number"),
-        ("1", "number"),
-    ],
-    *[
-        (text, "mass")
-        for text in ("1,5 kg", "1_000 kg", "1 500 kg", "heavy", "", "0x10 kg", "1e400 kg")
-    ],
-    *[
-        (True, "mass"),
-        (None, "time"),
-        ([1], "time"),
-        ({}, "number"),
-        (math.nan, "mass"),
-        (-math.inf, "mass"),
-    ],
-    *[("1e308 min", "time"), (10**400, "mass"), (1.1e15, "mass"), ("-2e15 N m", "torque")],
-]
-
-
 def test_refusals_say_what_is_allowed() -> None:
     check_text(
         "units.refused",
-        "\n".join(refusal(ValueError, parse, value, kind) for value, kind in REFUSED),
+        "\n".join(
+            refusal(ValueError, parse, value, kind)
+            for value, kind in [
+                *[
+                    ("30", "time"),
+                    ("20 Hz", "rate"),
+                    ("2 rev/min", "rate"),
+                    ("1 rev", "angle"),
+                    ("5 KG", "mass"),
+                    ("5 m s", "time"),
+                ],
+                *[
+                    ("120 kg", "inertia"),
+                    ("5 rpm", "angle"),
+                    ("5 deg", "ratio"),
+                    ("1 m", "number"),
+                    ("1", "number"),
+                ],
+                *[
+                    (text, "mass")
+                    for text in (
+                        "1,5 kg",
+                        "1_000 kg",
+                        "1 500 kg",
+                        "heavy",
+                        "",
+                        "0x10 kg",
+                        "1e400 kg",
+                    )
+                ],
+                *[
+                    (True, "mass"),
+                    (None, "time"),
+                    ([1], "time"),
+                    ({}, "number"),
+                    (math.nan, "mass"),
+                    (-math.inf, "mass"),
+                ],
+                *[
+                    ("1e308 min", "time"),
+                    (10**400, "mass"),
+                    (1.1e15, "mass"),
+                    ("-2e15 N m", "torque"),
+                ],
+            ]
+        ),
     )
     for unit in ("Deg", "dg", "secs", "Sec", "hrs", "rp m", "deg°", "M", "KM", "msec", "arcmin"):
         for kind in KINDS:

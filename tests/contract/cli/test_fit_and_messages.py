@@ -13,7 +13,7 @@ from support.builders import present
 from support.commands import DATED, WIDE, call, contents, refusals, result, written
 from support.golden import check_text
 from support.process import Run
-from support.synthetic import Array, motion
+from support.telemetry import Array, motion
 
 import nutdamp
 from nutdamp.errors import BadRequest

@@ -10,7 +10,6 @@ import click
 import pytest
 from click.shell_completion import ShellComplete
 from support import places
-from support.broken import BROKEN
 from support.cases import spread, weekly
 from support.commands import (
     CRAFTS,
@@ -24,6 +23,7 @@ from support.commands import (
     rows,
     written,
 )
+from support.contract import BROKEN
 from support.process import Run
 
 from nutdamp import __version__, errors

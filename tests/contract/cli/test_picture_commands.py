@@ -21,9 +21,8 @@ from support.commands import (
     written,
 )
 from support.golden import check_text
-from support.markup import parsed
 from support.process import Run
-from support.shown import downloaded
+from support.shown import downloaded, parsed
 
 from nutdamp import __version__
 from nutdamp.figures import image, style

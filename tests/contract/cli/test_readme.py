@@ -28,8 +28,8 @@ from support.cases import deep, spread
 from support.commands import call, python, rows, words
 from support.golden import WRITE, check_text
 from support.guide_pages import flow, keys, pages
-from support.markup import parsed
 from support.process import Run
+from support.shown import parsed
 
 from nutdamp import __version__
 from nutdamp.cli.main import COMMANDS, group

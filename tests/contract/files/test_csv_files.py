@@ -2,8 +2,6 @@
 fault with its place.
 """
 
-import csv
-import io
 import json
 import math
 from collections.abc import Callable
@@ -16,6 +14,7 @@ import pytest
 from numpy.testing import assert_allclose
 from support.builders import Outcome, present
 from support.commands import result
+from support.commands import rows as rows_of
 from support.contract import Write, check_faults, faults
 from support.golden import check_text
 from support.process import Run
@@ -164,22 +163,23 @@ def test_on_times_off_the_limits_are_flown_with_a_warning(run: Run, tmp_path: Pa
     check_text("files.schedule-limits", flown.stderr)
 
 
-FAULTY = (
-    f"{TOP}\n1,1,steerable\n3,1,XX\n",
-    f"{TOP},{IMPULSES}\n1,0,+M1,,,\n",
-    f"{TOP}\n1,1,\x1b[31mred\n",
-    f"{TOP}\n1e15,0.3,+M1\n",  # shorter than the clock tells
-    f"{TOP}\n9,1e-14,+M1\n",
-    f"{TOP}\n1,0.5,+m1\n",
-    f"{TOP}\n1,0.5,engine\n",
-    f"{TOP}\n1,-1,+M1\n-2,0.5,+M1\n1e16,1,+M1\n",
-    "start_s,on_time,chanel\n",
-    "start,on_time_s,channel\n",
-)
-
-
 def test_faults_say_what_would_be_right(read: Read, monkeypatch: pytest.MonkeyPatch) -> None:
-    check_faults("files.schedule", read, FAULTY)
+    check_faults(
+        "files.schedule",
+        read,
+        (
+            f"{TOP}\n1,1,steerable\n3,1,XX\n",
+            f"{TOP},{IMPULSES}\n1,0,+M1,,,\n",
+            f"{TOP}\n1,1,\x1b[31mred\n",
+            f"{TOP}\n1e15,0.3,+M1\n",  # shorter than the clock tells
+            f"{TOP}\n9,1e-14,+M1\n",
+            f"{TOP}\n1,0.5,+m1\n",
+            f"{TOP}\n1,0.5,engine\n",
+            f"{TOP}\n1,-1,+M1\n-2,0.5,+M1\n1e16,1,+M1\n",
+            "start_s,on_time,chanel\n",
+            "start,on_time_s,channel\n",
+        ),
+    )
     assert len(read(f"{TOP}\n1e15,2000,+M1\n9,1e-9,+M1\n")[0]) == 2
     with Path("huge.csv").open("wb") as stream:
         stream.truncate(tabular.MOST_BYTES + 1)
@@ -242,10 +242,6 @@ def blocks(write: Write) -> ReadBlocks:
     return lambda text, body=CRAFT: read_blocks(write(text, "blocks.csv"), body)
 
 
-def rows_of(path: Path) -> list[dict[str, str]]:
-    return list(csv.DictReader(io.StringIO(path.read_text())))
-
-
 def test_what_plan_writes_is_what_simulate_fires(run: Run, tmp_path: Path) -> None:
     """The screen has what an operator compares before and after."""
     text = (
@@ -264,12 +260,12 @@ def test_what_plan_writes_is_what_simulate_fires(run: Run, tmp_path: Path) -> No
         stdin=text,
         status=0,
     )
-    (row,) = rows_of(tmp_path / "blocks.csv")
+    (row,) = rows_of((tmp_path / "blocks.csv").read_text())
     assert tuple(row) == BLOCKS_HEADER
     assert float(row["delay_s"]) == pytest.approx(2e-3 * int(row["delay_counts"]))
     assert float(row["delay_deg"]) == pytest.approx(72.0 * float(row["delay_s"]))
     assert float(row["width_s"]) == pytest.approx(1e-2 * int(row["width_counts"]))
-    pulses = rows_of(tmp_path / "pulses.csv")
+    pulses = rows_of((tmp_path / "pulses.csv").read_text())
     assert row["first_utc"] == pulses[0]["utc"]
     assert len(pulses) == int(row["count"])
     flown = run("simulate", "-", "-v", *GOAL, *BLOCKS, "--samples", "2", stdin=text, status=0)
@@ -312,7 +308,7 @@ def test_widths_of_a_list_are_written_by_their_number(run: Run, tmp_path: Path) 
     assert run(
         "plan", "-", *GOAL, "--scheme", "command-block", *BLOCKS, stdin=WIDTHS
     ).returncode in (0, 4)
-    rows = rows_of(tmp_path / "blocks.csv")
+    rows = rows_of((tmp_path / "blocks.csv").read_text())
     assert rows
     assert {(row["width_s"], row["width_counts"]) for row in rows} <= {
         ("0.1", "1"),
@@ -321,19 +317,20 @@ def test_widths_of_a_list_are_written_by_their_number(run: Run, tmp_path: Path) 
     }
 
 
-FAULTY_BLOCKS = (
-    HEAD + "T2,1,1,0.1,4\nT1,0,-1,0,1.5\nT1,4,1,0.1,10\nT1,8,1,0.1,2\nT1,30,x,0.1,1\n",
-    HEAD + "T1,1,1,0.1,3000\nT1,3001,1,0.1,3000\n",
-    HEAD + "T1,1,1,0.1,100000\n",
-    COUNTS + "T1,3,-4,0,4\nT1,9,2.5,3,4\n",
-    "channel,delay\nT1,1\n",
-)
-
-
 def test_all_faults_of_a_file_are_listed_and_what_cannot_be_commanded_is_named(
     blocks: ReadBlocks,
 ) -> None:
-    check_faults("files.blocks", blocks, FAULTY_BLOCKS)
+    check_faults(
+        "files.blocks",
+        blocks,
+        (
+            HEAD + "T2,1,1,0.1,4\nT1,0,-1,0,1.5\nT1,4,1,0.1,10\nT1,8,1,0.1,2\nT1,30,x,0.1,1\n",
+            HEAD + "T1,1,1,0.1,3000\nT1,3001,1,0.1,3000\n",
+            HEAD + "T1,1,1,0.1,100000\n",
+            COUNTS + "T1,3,-4,0,4\nT1,9,2.5,3,4\n",
+            "channel,delay\nT1,1\n",
+        ),
+    )
     assert [block.count for block in blocks(HEAD + "T1,1,1,0.1,5000\n")[0]] == [5000]
     every = HEAD.replace("\n", ",every\n")
     check_text(
@@ -496,39 +493,40 @@ def test_a_record_is_read(read_record: ReadRecord, name: str) -> None:
         assert_allclose(read, rows, atol=1e-15)
 
 
-FAULTY_RECORDS = (
-    "omega_1_rad_s\n1\n",
-    "t_s\n1\n",
-    "t_s,omega_1\n1,2\n",
-    "t_s,omega_1_rad_s,omega_1_deg_s\n1,2,3\n",
-    "t_s,axis_x,axis_y\n1,1,0\n",
-    "t_s,utc,omega_1_rad_s\n1,2,3\n",
-    "t_s,axis_x,axis_y,axis_z\n0,1,0,0\n1,1,1,0\n",
-    "t_s,axis_x,axis_y,axis_z\n0,0,0,0\n",
-    "t_s,axis_ra_deg,axis_dec_deg\n0,1,100\n",
-    "t_s,omega_1_rad_s\n0,1\n2,1\n1,1\n1,2\n",
-    "t_s,omega_1_rad_s,pulse\n0,1,0\n0,2,1\n",
-    "t_s,omega_1_rad_s\n0,fast\n",
-    "t_s,omega_1_rad_s\n0,1,2\n",
-    "t_s,sun_pulse\n0,0\n1,2\n",
-    "t_s,q_w,q_x,q_y\n0,1,0,0\n",
-    "t_s,q_w,q_x,q_y,q_z\n0,2,0,0,0\n",
-    "t_s,crossing_azimuth_deg\n0,1\n",
-    "t_s,crossing_ra_deg,crossing_dec_deg\n0,1,2\n",
-    "t_s,crossing_azimuth_deg,crossing_elevation_deg,crossing_ra_deg,crossing_dec_deg\n"
-    "0,400,0,1,1\n1,5,-91,1,1\n",
-    "t_s,crossing_az_deg,sun_aspect,q_1\n0,5,1,1\n",
-    "t_s,sun_aspect_deg\n0,181\n",
-    "t_s;omega_1_rad_s\n0;1\n",
-    "t_s,omega_1_rad_s\n",
-    "utc,omega_1_rad_s\n2026-03-01T12:00:00Z,1\n",
-)
-
-
 def test_faults_have_their_place_and_columns_not_known_are_said(
     read_record: ReadRecord, tmp_path: Path
 ) -> None:
-    check_faults("files.telemetry", read_record, FAULTY_RECORDS)
+    check_faults(
+        "files.telemetry",
+        read_record,
+        (
+            "omega_1_rad_s\n1\n",
+            "t_s\n1\n",
+            "t_s,omega_1\n1,2\n",
+            "t_s,omega_1_rad_s,omega_1_deg_s\n1,2,3\n",
+            "t_s,axis_x,axis_y\n1,1,0\n",
+            "t_s,utc,omega_1_rad_s\n1,2,3\n",
+            "t_s,axis_x,axis_y,axis_z\n0,1,0,0\n1,1,1,0\n",
+            "t_s,axis_x,axis_y,axis_z\n0,0,0,0\n",
+            "t_s,axis_ra_deg,axis_dec_deg\n0,1,100\n",
+            "t_s,omega_1_rad_s\n0,1\n2,1\n1,1\n1,2\n",
+            "t_s,omega_1_rad_s,pulse\n0,1,0\n0,2,1\n",
+            "t_s,omega_1_rad_s\n0,fast\n",
+            "t_s,omega_1_rad_s\n0,1,2\n",
+            "t_s,sun_pulse\n0,0\n1,2\n",
+            "t_s,q_w,q_x,q_y\n0,1,0,0\n",
+            "t_s,q_w,q_x,q_y,q_z\n0,2,0,0,0\n",
+            "t_s,crossing_azimuth_deg\n0,1\n",
+            "t_s,crossing_ra_deg,crossing_dec_deg\n0,1,2\n",
+            "t_s,crossing_azimuth_deg,crossing_elevation_deg,crossing_ra_deg,crossing_dec_deg\n"
+            "0,400,0,1,1\n1,5,-91,1,1\n",
+            "t_s,crossing_az_deg,sun_aspect,q_1\n0,5,1,1\n",
+            "t_s,sun_aspect_deg\n0,181\n",
+            "t_s;omega_1_rad_s\n0;1\n",
+            "t_s,omega_1_rad_s\n",
+            "utc,omega_1_rad_s\n2026-03-01T12:00:00Z,1\n",
+        ),
+    )
     for many in (1, 2):  # one more than is shown is shown too, of two more their number
         rows = "".join(f"{number},x\n" for number in range(tabular.MOST_FAULTS + many))
         shown = faults(read_record, f"t_s,omega_1_rad_s\n{rows}")

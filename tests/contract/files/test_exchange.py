@@ -237,18 +237,6 @@ def test_without_an_orbit_only_the_manoeuvres_are_written() -> None:
 # --- what cannot be exported
 # -----------------------------------------------------------------------------------------
 
-ORBITAL = {
-    "velocity not known": (
-        "position: [0, 0.5, 0.8], direction: [1, 0, 0], force: 10 N",
-        "torque: [8, 0, 0]",
-    ),
-    "propellant not known": (
-        "direction: [1, 0, 0], force: 10 N, isp: 220 s",
-        "direction: [1, 0, 0], force: 10 N",
-    ),
-    "no mass": ("mass: 250 kg\n", ""),
-}
-
 
 def test_what_cannot_be_exported_is_refused() -> None:
     plan = messages.planned("prolate")
@@ -259,7 +247,17 @@ def test_what_cannot_be_exported_is_refused() -> None:
     halted = Schedule((channel_pulse(brake, 0.4, 0.6),))  # 80 kg m² × 3 rad/s = 400 N m × 0.6 s
     orbital = {
         name: planning.plan(read_spacecraft(VALVED.replace(*edit), "f.yaml"), "four-pulse")
-        for name, edit in ORBITAL.items()
+        for name, edit in {
+            "velocity not known": (
+                "position: [0, 0.5, 0.8], direction: [1, 0, 0], force: 10 N",
+                "torque: [8, 0, 0]",
+            ),
+            "propellant not known": (
+                "direction: [1, 0, 0], force: 10 N, isp: 220 s",
+                "direction: [1, 0, 0], force: 10 N",
+            ),
+            "no mass": ("mass: 250 kg\n", ""),
+        }.items()
     }
     cases: dict[str, tuple[planning.Plan, str, dict[str, Any]]] = {
         "an ideal impulse": (ideal, "apm", {}),

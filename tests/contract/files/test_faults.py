@@ -14,10 +14,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from jsonschema import Draft202012Validator
 from support import places
-from support.broken import BASE, BODY, BROKEN, SPIN, THRUSTERS
 from support.builders import within
 from support.cases import deep
-from support.contract import check_faults, slips
+from support.contract import BASE, BODY, BROKEN, SPIN, THRUSTERS, check_faults, slips
 from support.golden import check_text
 
 import nutdamp
@@ -142,17 +141,6 @@ def test_a_mutated_example_is_read_or_refused(data: bytes, tmp_path: Path) -> No
     judge(lambda: load_spacecraft(path))
 
 
-SECTIONS = [
-    "inertia",
-    "omega0",
-    "state",
-    "attitude",
-    "thrusters",
-    "channels",
-    "steerable",
-    "requirement",
-    "limits",
-]
 VALUES = st.recursive(
     st.none()
     | st.booleans()
@@ -178,7 +166,26 @@ DISTURBANCES = st.fixed_dictionaries(
 @settings(max_examples=40)
 @given(
     entry=st.tuples(st.just("disturbances"), st.lists(DISTURBANCES, max_size=3))
-    | st.tuples(st.sampled_from([*SECTIONS, "disturbances", "dissipation"]), VALUES)
+    | st.tuples(
+        st.sampled_from(
+            [
+                *[
+                    "inertia",
+                    "omega0",
+                    "state",
+                    "attitude",
+                    "thrusters",
+                    "channels",
+                    "steerable",
+                    "requirement",
+                    "limits",
+                ],
+                "disturbances",
+                "dissipation",
+            ]
+        ),
+        VALUES,
+    )
 )
 def test_any_value_of_any_shape_is_read_or_refused(entry: tuple[str, object]) -> None:
     key, value = entry
@@ -212,65 +219,44 @@ def doubts_of(lines: str) -> list[Fault]:
     return doubts
 
 
-DOUBTED = (
-    "state: {spin: 30, nutation: 0.1}",
-    "state: {spin: 15, nutation: 0.1}",
-    THRUSTER.format(0.3, "0, isp: 2200"),
-    "steerable: {torque: 3, isp: 2200, lever_arm: 1}",
-    "state: {spin: -101.5, nutation: 0.1}",
-    "state: {spin: 3, nutation: 0.1, phase: 40}",
-    "omega0: [0.1, 0, 180]",
-    "state: {spin: 3, nutation: 0.5}",
-    "goal: {spin: 28}",
-    THRUSTER.format(300, 0),
-    THRUSTER.format(0.3, 20),
-    THRUSTER.format(0.3, 0) + "valve: {open_delay: 8, close_delay: 12 ms}",
-    THRUSTER.format("0.3", "0, impulse_bit: [[0.02, 0.15, 16], [0.04, 0.36, 30 s]]"),
-    THRUSTER.format(0.3, "0, isp: 200")
-    + "tank: {propellant: 3, pressure: 22, final_pressure: 8 Pa}",
-    THRUSTER.format(0.3, 0) + "cold: {first: 90, pulses: 4}",
-    THRUSTER.format(0.3, "20 ms, max_on_time: 2000"),
-    "steerable: {torque: 3, lever_arm: 800}",
-    f"{DATED}orbit: {{position: [0, 7000, 0], velocity: [0, 0, 7500]}}",
-    f"{DATED}orbit: {{position: [0, 7000 km, 0], velocity: [0, 0, -7.5]}}",
-    "requirement: {nutation: 0.5}",
-    "requirement: {nutation: 0.5 deg, momentum_shift: 0.2}",
-    # 2.9 deg, more than there is
-    "state: {spin: 3, nutation: 2 deg}\nrequirement: {nutation: 0.05}",
-    "omega0: [0.02, 0, 3]\nrequirement: {nutation: 0.05}",
-    f"{TENSOR}omega0: [0.02, 0, 3]\nrequirement: {{nutation: 0.05}}",
-    # In the order of the file.
-    "omega0: [40, 0.2, 3]\n" + THRUSTER.format(300, 20) + "goal: {spin: 40}",
-    # A turn takes 2.094 s at 3 rad/s, and fifty 104.7 s.
-    THRUSTER.format(0.3, "2.15"),
-    THRUSTER.format(0.3, "20 ms, max_on_time: 106"),
-)
-UNDOUBTED = (
-    "state: {spin: 30 rad/s, nutation: 0.1, phase: 40 rad}",
-    "state: {spin: 300 rpm, nutation: 89 deg, phase: 400 deg}",
-    "state: {spin: 27.4, nutation: 0.1, phase: 6.2}",
-    "state: {spin: -12, nutation: 0.1, phase: -6.2}",
-    THRUSTER.format(0.3, "0, isp: 2200 s"),
-    THRUSTER.format(0.3, "0, isp: 460"),
-    THRUSTER.format("300 m", "20 s"),
-    THRUSTER.format(49, 2.0),
-    "goal: {tilt: 2.0, azimuth: 5, spin: 12}",
-    "requirement: {nutation: 0.01, momentum_shift: 0.09}",
-    "requirement: {nutation: 28 deg, momentum_shift: 0.2 rad}",
-    THRUSTER.format(0.3, "20 ms, max_on_time: 2000 s"),
-    THRUSTER.format(0.3, "2.05"),
-    THRUSTER.format(0.3, "20 ms, max_on_time: 103"),
-    "omega0: [0.1, 0.2, 0.3]\n" + THRUSTER.format(0.3, 20),  # a turn takes 20.9 s
-    example_text(),
-)
-
-
 def test_numbers_beyond_what_can_be_meant_are_taken_with_a_warning() -> None:
     said = (
         "\n    ".join(
             [lines.strip().replace("\n", " | "), *(doubt.as_warning for doubt in doubts_of(lines))]
         )
-        for lines in DOUBTED
+        for lines in (
+            "state: {spin: 30, nutation: 0.1}",
+            "state: {spin: 15, nutation: 0.1}",
+            THRUSTER.format(0.3, "0, isp: 2200"),
+            "steerable: {torque: 3, isp: 2200, lever_arm: 1}",
+            "state: {spin: -101.5, nutation: 0.1}",
+            "state: {spin: 3, nutation: 0.1, phase: 40}",
+            "omega0: [0.1, 0, 180]",
+            "state: {spin: 3, nutation: 0.5}",
+            "goal: {spin: 28}",
+            THRUSTER.format(300, 0),
+            THRUSTER.format(0.3, 20),
+            THRUSTER.format(0.3, 0) + "valve: {open_delay: 8, close_delay: 12 ms}",
+            THRUSTER.format("0.3", "0, impulse_bit: [[0.02, 0.15, 16], [0.04, 0.36, 30 s]]"),
+            THRUSTER.format(0.3, "0, isp: 200")
+            + "tank: {propellant: 3, pressure: 22, final_pressure: 8 Pa}",
+            THRUSTER.format(0.3, 0) + "cold: {first: 90, pulses: 4}",
+            THRUSTER.format(0.3, "20 ms, max_on_time: 2000"),
+            "steerable: {torque: 3, lever_arm: 800}",
+            f"{DATED}orbit: {{position: [0, 7000, 0], velocity: [0, 0, 7500]}}",
+            f"{DATED}orbit: {{position: [0, 7000 km, 0], velocity: [0, 0, -7.5]}}",
+            "requirement: {nutation: 0.5}",
+            "requirement: {nutation: 0.5 deg, momentum_shift: 0.2}",
+            # 2.9 deg, more than there is
+            "state: {spin: 3, nutation: 2 deg}\nrequirement: {nutation: 0.05}",
+            "omega0: [0.02, 0, 3]\nrequirement: {nutation: 0.05}",
+            f"{TENSOR}omega0: [0.02, 0, 3]\nrequirement: {{nutation: 0.05}}",
+            # In the order of the file.
+            "omega0: [40, 0.2, 3]\n" + THRUSTER.format(300, 20) + "goal: {spin: 40}",
+            # A turn takes 2.094 s at 3 rad/s, and fifty 104.7 s.
+            THRUSTER.format(0.3, "2.15"),
+            THRUSTER.format(0.3, "20 ms, max_on_time: 106"),
+        )
     )
     check_text("files.doubts", "\n".join(said))
     # What is set on the command line is doubted too.
@@ -281,7 +267,27 @@ def test_numbers_beyond_what_can_be_meant_are_taken_with_a_warning() -> None:
 
 def test_units_and_common_numbers_give_no_warning_nor_does_any_file_that_comes_along() -> None:
     configs = [path.read_text(encoding="utf-8") for path in sorted(places.CONFIGS.glob("*.yaml"))]
-    for lines in (*UNDOUBTED, *configs):
+    for lines in (
+        *(
+            "state: {spin: 30 rad/s, nutation: 0.1, phase: 40 rad}",
+            "state: {spin: 300 rpm, nutation: 89 deg, phase: 400 deg}",
+            "state: {spin: 27.4, nutation: 0.1, phase: 6.2}",
+            "state: {spin: -12, nutation: 0.1, phase: -6.2}",
+            THRUSTER.format(0.3, "0, isp: 2200 s"),
+            THRUSTER.format(0.3, "0, isp: 460"),
+            THRUSTER.format("300 m", "20 s"),
+            THRUSTER.format(49, 2.0),
+            "goal: {tilt: 2.0, azimuth: 5, spin: 12}",
+            "requirement: {nutation: 0.01, momentum_shift: 0.09}",
+            "requirement: {nutation: 28 deg, momentum_shift: 0.2 rad}",
+            THRUSTER.format(0.3, "20 ms, max_on_time: 2000 s"),
+            THRUSTER.format(0.3, "2.05"),
+            THRUSTER.format(0.3, "20 ms, max_on_time: 103"),
+            "omega0: [0.1, 0.2, 0.3]\n" + THRUSTER.format(0.3, 20),  # a turn takes 20.9 s
+            example_text(),
+        ),
+        *configs,
+    ):
         text = lines if "inertia:" in lines else whole(lines)
         doubts: list[Fault] = []
         read_spacecraft(text, "f.yaml", warn=doubts.append)
@@ -365,13 +371,6 @@ SENSELESS = {
     "on_time": "0; 1 s; .inf",
     "faults.reversed": "[X]; +M1; [+M1, +M1]",
 }
-OF_ACCELEROMETER = {
-    "sensor.axes": "principal",
-    "sensor.quantisation": "1 deg/s",
-    "sensor.noise": "-1; 1 deg/s",
-    "sensor.position": "[0, 0, 0]; [1, 0]",
-    "sensor.axis": "[0, 0, 0]; [1, 1]",
-}
 
 
 def looped(sensor: str, *settings: str) -> nutdamp.Spacecraft:
@@ -386,7 +385,17 @@ def test_senseless_values_of_every_key_are_refused_where_they_stand() -> None:
     assert set(SENSELESS) == keys | {f"faults.{key}" for key in LoopFaultsSection.fields()}
     for name, sensor, table in (
         ("gyro", GYRO, SENSELESS),
-        ("accelerometer", ACCELEROMETER, OF_ACCELEROMETER),
+        (
+            "accelerometer",
+            ACCELEROMETER,
+            {
+                "sensor.axes": "principal",
+                "sensor.quantisation": "1 deg/s",
+                "sensor.noise": "-1; 1 deg/s",
+                "sensor.position": "[0, 0, 0]; [1, 0]",
+                "sensor.axis": "[0, 0, 0]; [1, 1]",
+            },
+        ),
     ):
         assert looped(sensor).loop is not None
         cases = [(key, value) for key, values in table.items() for value in values.split("; ")]

@@ -15,10 +15,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from support import places, reference
-from support.broken import BASE
 from support.builders import cross, one_of, present
 from support.cases import spread
-from support.contract import Write, check_faults
+from support.contract import BASE, Write, check_faults
 from support.golden import check_text
 
 from nutdamp.errors import CannotRead, FaultyFile
@@ -142,12 +141,6 @@ PARTS: dict[str, tuple[str, dict[str, object]]] = {
         },
     ),
 }
-
-
-@pytest.mark.parametrize(("text", "parts"), PARTS.values(), ids=PARTS)
-def test_parts_of_a_file_are_read(text: str, parts: dict[str, object]) -> None:
-    craft = read(text)
-    assert {path: at(craft, path) for path in parts} == parts
 
 
 def test_files_of_yaml_or_json_are_loaded_by_their_path(tmp_path: Path) -> None:
@@ -533,8 +526,8 @@ ACTUATED: dict[str, tuple[str, dict[str, object]]] = {
 }
 
 
-@pytest.mark.parametrize(("text", "parts"), ACTUATED.values(), ids=ACTUATED)
-def test_valves_cold_nozzles_and_tanks_are_read(text: str, parts: dict[str, object]) -> None:
+@pytest.mark.parametrize(("text", "parts"), (PARTS | ACTUATED).values(), ids=PARTS | ACTUATED)
+def test_parts_of_a_file_are_read(text: str, parts: dict[str, object]) -> None:
     craft = read(text)
     assert {path: at(craft, path) for path in parts} == parts
 
@@ -567,15 +560,6 @@ FAULTY = (
     TANK.replace("30 kg", "0"),
     f"channels: {{both: [a, c], other: [b, d]}}\n{VALVE}",
 )
-FAULTY_TABLES = (
-    "impulse_bit: [[20 ms, 0.15 N s, 16 ms]]",
-    "impulse_bit: [[20 ms, 0.15 N s], [40 ms, 0.36 N s, 30 ms]]",
-    "impulse_bit: [[20 ms, 0.15 kg, 16 ms], [40 ms, 0.36 N s, 30 ms]]",
-    "impulse_bit: [[20 ms, 0.15 N s, 16 ms], [20 ms, 0.36 N s, 30 ms]]",
-    "impulse_bit: [[20 ms, 0.4 N s, 26 ms], [40 ms, 0.36 N s, 30 ms]]",
-    "impulse_bit: [[20 ms, 0.15 N s, 35 ms], [40 ms, 0.36 N s, 30 ms]]",
-    f"valve: {{open_delay: 1 ms}}, {TABLE}",
-)
 
 
 def test_faults_have_their_place() -> None:
@@ -588,7 +572,17 @@ def test_faults_have_their_place() -> None:
         FAULTY,
     )
     check_faults(
-        "files.thrust-impulse-bit", lambda table: read_lines(body=with_table(table)), FAULTY_TABLES
+        "files.thrust-impulse-bit",
+        lambda table: read_lines(body=with_table(table)),
+        (
+            "impulse_bit: [[20 ms, 0.15 N s, 16 ms]]",
+            "impulse_bit: [[20 ms, 0.15 N s], [40 ms, 0.36 N s, 30 ms]]",
+            "impulse_bit: [[20 ms, 0.15 kg, 16 ms], [40 ms, 0.36 N s, 30 ms]]",
+            "impulse_bit: [[20 ms, 0.15 N s, 16 ms], [20 ms, 0.36 N s, 30 ms]]",
+            "impulse_bit: [[20 ms, 0.4 N s, 26 ms], [40 ms, 0.36 N s, 30 ms]]",
+            "impulse_bit: [[20 ms, 0.15 N s, 35 ms], [40 ms, 0.36 N s, 30 ms]]",
+            f"valve: {{open_delay: 1 ms}}, {TABLE}",
+        ),
     )
     others = {
         "a tank that cannot know what is used": (TANK, ", lever_arm: 0.8, isp: 220", ""),
@@ -723,15 +717,6 @@ DISPERSED: tuple[tuple[str, dict[str, Any]], ...] = (
     ("{position: {normal: 5 mm}}", {"position": dict.fromkeys(NAMES, Tolerance("normal", 0.005))}),
     ("{position: {T1: {normal: 5 mm}}}", {"position": {"T1": Tolerance("normal", 0.005)}}),
 )
-OF_OTHERS = (
-    ("", "{thrust: {normal: 3 %}}", "steerable"),  # the torquer that is assumed
-    ("", "{thrust: {steerable: {normal: 3 %}}}", "steerable"),
-    (
-        "thrusters: [{name: normal, torque: [0, 8, 0]}]\n",
-        "{thrust: {normal: {normal: 3 %}}}",
-        "normal",
-    ),
-)
 
 
 KINDS = [
@@ -750,7 +735,15 @@ KINDS = [
 def test_dispersions_are_read_in_si() -> None:
     for text, fields in (*DISPERSED, *KINDS):
         assert dispersed(text).dispersions == Dispersions(**fields), text
-    for actuators, text, name in OF_OTHERS:
+    for actuators, text, name in (
+        ("", "{thrust: {normal: 3 %}}", "steerable"),  # the torquer that is assumed
+        ("", "{thrust: {steerable: {normal: 3 %}}}", "steerable"),
+        (
+            "thrusters: [{name: normal, torque: [0, 8, 0]}]\n",
+            "{thrust: {normal: {normal: 3 %}}}",
+            "normal",
+        ),
+    ):
         assert dispersed(text, actuators).dispersions == Dispersions(thrust={name: THREE_PERCENT})
 
 

@@ -24,8 +24,8 @@ from scipy.spatial.transform import Rotation
 from support import places
 from support.builders import present
 from support.golden import check_text, refusal, refused
-from support.markup import parsed
 from support.process import Run
+from support.shown import parsed
 
 import nutdamp
 from nutdamp import errors
@@ -249,74 +249,75 @@ CALM = nutdamp.read("name: X\ninertia: {A: 120, C: 80}\nomega0: [0, 0, 3]\n")
 LIB: Any = nutdamp
 Call = Callable[[], object]
 
-WRONG: list[Call] = [
-    lambda: LIB.plan(CRAFT, "rhumb-line", Options(per_turn=0)),
-    lambda: LIB.plan(CRAFT, "half-cone", Options(cones=-3)),
-    lambda: LIB.plan(CRAFT, "optimal", Options(shift=-0.1)),
-    lambda: LIB.plan(CRAFT, "optimal", Options(least="fuel")),
-    lambda: LIB.compare(CRAFT, ["optimal"], Options(shift=0.1, free_axis=True)),
-    lambda: LIB.plan(CRAFT, "four-pulse", Options(on_time=-1.0)),
-    lambda: LIB.plan(CRAFT, "four-pulse", Options(on_time=math.nan)),
-    lambda: LIB.plan(CRAFT, "four-pulse", Options(on_time="3 s")),
-    lambda: LIB.plan(CRAFT, "four-pulse", Options(coarse=1)),
-    lambda: LIB.plan(CRAFT, "four-pulse", Options(length=0.2)),
-    lambda: LIB.plan(CRAFT, "four-pulse", nutdamp.OptimalOptions(least="time")),
-    lambda: LIB.plan(CRAFT, "four-pulse", {"on_time": 3}),
-    lambda: LIB.plan(CRAFT, "three-pulse"),
-    lambda: LIB.plan(CALM, "three-pulse"),  # where no nutation is to be damped, too
-    lambda: LIB.plan(CRAFT, np.zeros(2)),
-    lambda: LIB.compare(CRAFT, ["three-pulse"]),
-    lambda: LIB.compare(CRAFT, "two-pulse"),
-    lambda: LIB.plan("spacecraft.yaml", "two-pulse"),
-    lambda: LIB.compare(planned()),
-    lambda: LIB.compare(CRAFT, samples=-1),
-    lambda: LIB.compare(CRAFT, samples=2.5),
-    lambda: LIB.compare(CRAFT, samples="all"),
-    lambda: LIB.read({"name": "X"}),
-    lambda: LIB.load(3),
-    lambda: LIB.load(b"x"),
-    lambda: LIB.load("x", set={3: 4}),
-    lambda: LIB.load({"name": object()}),
-    lambda: LIB.load_schedule(3, CRAFT),
-    lambda: CRAFT.with_(limits={"horizon": ...}),
-    lambda: CRAFT.with_(limits={3: 4}),
-    lambda: CRAFT.replace(mass=3).with_(name="X"),
-    lambda: CRAFT.replace(mass="3 kg"),
-    lambda: CRAFT.replace(omega0=(0.1, 3.0)),
-    lambda: CRAFT.replace(channels=("+M1",)),
-    lambda: CRAFT.replace(weight=3),
-    lambda: CRAFT.replace(mass=-3),
-    lambda: LIB.plan(CRAFT, "four-pulse", per_turn=2),
-    lambda: LIB.plan(CRAFT, "four-pulse", Options(on_time=1.0), on_time=0.2),
-    lambda: LIB.simulate(planned(), -1.0),
-    lambda: LIB.robust(planned()),
-    lambda: LIB.loop(CRAFT),
-    lambda: LIB.loop(nutdamp.example("upper-stage"), case=0),
-    lambda: LIB.report(planned()),
-    lambda: LIB.report(CRAFT, "page.txt"),
-    lambda: LIB.report(CRAFT, "page.html", disperse=-1),
-    lambda: LIB.trade(CRAFT, 0),
-    lambda: LIB.trade(CRAFT, allow=0.1),
-    lambda: LIB.trade(CRAFT, allow=[-0.1]),
-    lambda: LIB.trade(CRAFT, least="time"),
-    lambda: LIB.verify("two-pulse"),
-    lambda: LIB.disperse(nutdamp.plan(nutdamp.read(TILTED), "none")),
-    lambda: LIB.export(planned(), "oem", "x"),
-    lambda: LIB.example("lunar-prospecter"),
-    lambda: LIB.disperse_loop(CRAFT, 40, seed=-1),
-    lambda: planned().fly(until=-1.0),
-    lambda: planned().fly(until="3"),
-    lambda: planned().fly(samples=1),
-    lambda: planned().fly(samples=2.5),
-    lambda: planned().to_csv(3),
-    lambda: planned().fly().figure("portrait"),
-    lambda: planned().fly().figure([]),
-]
-
 
 @pytest.mark.usefixtures("plans_shared")
 def test_a_wrong_argument_is_reported_with_what_was_expected() -> None:
-    messages = (refusal(errors.BadRequest, call).partition("; there are ")[0] for call in WRONG)
+    messages = (
+        refusal(errors.BadRequest, call).partition("; there are ")[0]
+        for call in [
+            lambda: LIB.plan(CRAFT, "rhumb-line", Options(per_turn=0)),
+            lambda: LIB.plan(CRAFT, "half-cone", Options(cones=-3)),
+            lambda: LIB.plan(CRAFT, "optimal", Options(shift=-0.1)),
+            lambda: LIB.plan(CRAFT, "optimal", Options(least="fuel")),
+            lambda: LIB.compare(CRAFT, ["optimal"], Options(shift=0.1, free_axis=True)),
+            lambda: LIB.plan(CRAFT, "four-pulse", Options(on_time=-1.0)),
+            lambda: LIB.plan(CRAFT, "four-pulse", Options(on_time=math.nan)),
+            lambda: LIB.plan(CRAFT, "four-pulse", Options(on_time="3 s")),
+            lambda: LIB.plan(CRAFT, "four-pulse", Options(coarse=1)),
+            lambda: LIB.plan(CRAFT, "four-pulse", Options(length=0.2)),
+            lambda: LIB.plan(CRAFT, "four-pulse", nutdamp.OptimalOptions(least="time")),
+            lambda: LIB.plan(CRAFT, "four-pulse", {"on_time": 3}),
+            lambda: LIB.plan(CRAFT, "three-pulse"),
+            lambda: LIB.plan(CALM, "three-pulse"),  # where no nutation is to be damped, too
+            lambda: LIB.plan(CRAFT, np.zeros(2)),
+            lambda: LIB.compare(CRAFT, ["three-pulse"]),
+            lambda: LIB.compare(CRAFT, "two-pulse"),
+            lambda: LIB.plan("spacecraft.yaml", "two-pulse"),
+            lambda: LIB.compare(planned()),
+            lambda: LIB.compare(CRAFT, samples=-1),
+            lambda: LIB.compare(CRAFT, samples=2.5),
+            lambda: LIB.compare(CRAFT, samples="all"),
+            lambda: LIB.read({"name": "X"}),
+            lambda: LIB.load(3),
+            lambda: LIB.load(b"x"),
+            lambda: LIB.load("x", set={3: 4}),
+            lambda: LIB.load({"name": object()}),
+            lambda: LIB.load_schedule(3, CRAFT),
+            lambda: CRAFT.with_(limits={"horizon": ...}),
+            lambda: CRAFT.with_(limits={3: 4}),
+            lambda: CRAFT.replace(mass=3).with_(name="X"),
+            lambda: CRAFT.replace(mass="3 kg"),
+            lambda: CRAFT.replace(omega0=(0.1, 3.0)),
+            lambda: CRAFT.replace(channels=("+M1",)),
+            lambda: CRAFT.replace(weight=3),
+            lambda: CRAFT.replace(mass=-3),
+            lambda: LIB.plan(CRAFT, "four-pulse", per_turn=2),
+            lambda: LIB.plan(CRAFT, "four-pulse", Options(on_time=1.0), on_time=0.2),
+            lambda: LIB.simulate(planned(), -1.0),
+            lambda: LIB.robust(planned()),
+            lambda: LIB.loop(CRAFT),
+            lambda: LIB.loop(nutdamp.example("upper-stage"), case=0),
+            lambda: LIB.report(planned()),
+            lambda: LIB.report(CRAFT, "page.txt"),
+            lambda: LIB.report(CRAFT, "page.html", disperse=-1),
+            lambda: LIB.trade(CRAFT, 0),
+            lambda: LIB.trade(CRAFT, allow=0.1),
+            lambda: LIB.trade(CRAFT, allow=[-0.1]),
+            lambda: LIB.trade(CRAFT, least="time"),
+            lambda: LIB.verify("two-pulse"),
+            lambda: LIB.disperse(nutdamp.plan(nutdamp.read(TILTED), "none")),
+            lambda: LIB.export(planned(), "oem", "x"),
+            lambda: LIB.example("lunar-prospecter"),
+            lambda: LIB.disperse_loop(CRAFT, 40, seed=-1),
+            lambda: planned().fly(until=-1.0),
+            lambda: planned().fly(until="3"),
+            lambda: planned().fly(samples=1),
+            lambda: planned().fly(samples=2.5),
+            lambda: planned().to_csv(3),
+            lambda: planned().fly().figure("portrait"),
+            lambda: planned().fly().figure([]),
+        ]
+    )
     check_text("library.wrong-arguments", "\n".join(messages))
     for below in (planning.plan, planning.alternatives):
         with pytest.raises(KeyError):

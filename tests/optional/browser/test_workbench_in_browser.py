@@ -16,8 +16,7 @@ import numpy as np
 import pytest
 from support import places
 from support.cases import spread
-from support.pages import plain_page
-from support.process import Run
+from support.process import Run, plain_page
 from support.shown import compared_text
 
 from nutdamp.files.reader import example_text

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support import messages, orekit
+from support import messages
 from support.builders import present
 from support.contract import PUSHED, pushing, valved, velocity_change
 
@@ -34,7 +34,7 @@ ROUNDED = 4e-12
 
 @pytest.fixture
 def _orekit() -> None:
-    orekit.start_or_skip()
+    messages.start_or_skip()
 
 
 @pytest.fixture
@@ -47,7 +47,7 @@ def reader() -> Any:
 
 def data_of(form: str, text: str) -> Any:
     """The data of a message of one segment as Orekit reads it."""
-    return orekit.parse(form, text).getSegments().get(0).getData()
+    return messages.parse(form, text).getSegments().get(0).getData()
 
 
 @pytest.mark.usefixtures("_orekit")
@@ -63,9 +63,9 @@ def test_parameters(case: str, xml: bool) -> None:
         "J2000", "EME2000"
     )
     rates = messages.in_file_axes(body, body.initial.rates)
-    assert orekit.components(state.getSpin()) == pytest.approx(rates, rel=1e-12, abs=1e-14)
+    assert messages.components(state.getSpin()) == pytest.approx(rates, rel=1e-12, abs=1e-14)
     axes = messages.columns(body, body.initial.quaternion)
-    assert orekit.body_axes(state.getRotation()) == pytest.approx(axes, abs=1e-14)
+    assert messages.body_axes(state.getRotation()) == pytest.approx(axes, abs=1e-14)
     # Orekit hands on the products as they stand in the message; by annex F6 the matrix has minus
     # them.
     matrix = np.array(data.getInertiaBlock().getInertiaMatrix().getData())
@@ -78,7 +78,7 @@ def test_parameters(case: str, xml: bool) -> None:
         )
         assert manoeuvre.getDuration() == pytest.approx(pulse.on_time, rel=1e-15)
         torque = messages.in_file_axes(body, present(pulse.torque))
-        assert orekit.components(manoeuvre.getTorque()) == pytest.approx(
+        assert messages.components(manoeuvre.getTorque()) == pytest.approx(
             torque, rel=1e-14, abs=1e-14
         )
         if pulse.propellant is not None:
@@ -121,11 +121,11 @@ def test_spin_and_nutation_alone_give_the_motion(case: str, xml: bool) -> None:
         text = re.sub(block, "", text, flags=re.DOTALL)
     text = re.sub(r"(QUAT|ANGVEL)_START.*?\1_STOP", "", text, flags=re.DOTALL)
     state = data_of("apm", text).getAttitude(None, None)
-    assert orekit.components(state.getSpin()) == pytest.approx(
+    assert messages.components(state.getSpin()) == pytest.approx(
         body.initial.rates, rel=1e-10, abs=1e-12
     )
     expected = messages.columns(body, body.initial.quaternion)
-    assert messages.turned(orekit.body_axes(state.getRotation()), expected) == pytest.approx(
+    assert messages.turned(messages.body_axes(state.getRotation()), expected) == pytest.approx(
         0.0, abs=1e-10
     )
 
@@ -134,7 +134,7 @@ def test_spin_and_nutation_alone_give_the_motion(case: str, xml: bool) -> None:
 def test_epochs_pass_a_leap_second() -> None:
     plan = messages.planned("single-thruster")
     data = data_of("apm", export_text(plan, "apm"))
-    begins = orekit.date("2016-12-31T23:59:50.000")
+    begins = messages.date("2016-12-31T23:59:50.000")
     assert data.getEpoch().durationFrom(begins) == 0.0
     first = next(iter(data.getManeuvers())).getEpochStart()
     assert first.durationFrom(begins) == pytest.approx(next(iter(plan.pulses)).start, abs=1e-9)
@@ -146,7 +146,7 @@ def ephemeris(case: str, xml: bool, form: str = "aem") -> tuple[propagation.Flig
     """The flight, the epoch, and the segments of a history."""
     plan = messages.planned(case)
     epoch = data_of("apm", export_text(plan, "apm")).getEpoch()
-    read = orekit.parse("aem", export_text(plan, form, xml=xml))
+    read = messages.parse("aem", export_text(plan, form, xml=xml))
     until = plan.pulses.end + plan.spacecraft.inertial_period
     return propagation.flown(plan.spacecraft, plan.pulses, until), epoch, list(read.getSegments())
 
@@ -171,7 +171,7 @@ def test_attitude_history(case: str, xml: bool, form: str) -> None:
     """
     alone = form == "aem-spin" and not messages.spacecraft(case).inertia.symmetric
     flown, epoch, segments = ephemeris(case, xml, form)
-    frames = orekit.java("org.orekit.frames.FramesFactory")
+    frames = messages.java("org.orekit.frames.FramesFactory")
     frame = (
         frames.getGCRF()
         if present(flown.spacecraft.attitude).frame == "GCRF"
@@ -192,11 +192,11 @@ def test_attitude_history(case: str, xml: bool, form: str) -> None:
             seen.append((t, two - one, between.getRotation(), between.getSpin()))
         for t, step, rotation, spin in seen:
             rates, axes = motion(flown, min(max(t, 0.0), flown.legs[-1].end))
-            worst_turn = max(worst_turn, messages.turned(orekit.body_axes(rotation), axes))
+            worst_turn = max(worst_turn, messages.turned(messages.body_axes(rotation), axes))
             off = (
                 0.0
                 if alone
-                else float(np.linalg.norm(orekit.components(spin) - rates)) - ROUNDED / step
+                else float(np.linalg.norm(messages.components(spin) - rates)) - ROUNDED / step
             )
             worst_rate = max(worst_rate, off / float(np.linalg.norm(rates)))
     assert worst_turn <= (WITHOUT_RATES if alone else MID_ARC)
@@ -236,7 +236,7 @@ def test_orekit_turns_as_the_standard_does() -> None:
     text = export_text(messages.planned("prolate"), "apm")
     for keyword, value in (("Q1", 0.0), ("Q2", 0.0), ("Q3", half), ("QC", half)):
         text = re.sub(rf"{keyword}( +)= .*", f"{keyword} = {value}", text)
-    axes = orekit.body_axes(data_of("apm", text).getAttitude(None, None).getRotation())
+    axes = messages.body_axes(data_of("apm", text).getAttitude(None, None).getRotation())
     assert axes == pytest.approx(attitude.matrix(np.array([half, 0.0, 0.0, half])), abs=1e-12)
     assert axes[:, 0] == pytest.approx([0.0, 1.0, 0.0], abs=1e-12)
 
@@ -246,7 +246,7 @@ def test_orekit_turns_as_the_standard_does() -> None:
 @NOTATIONS
 def test_orbit_messages(name: str, xml: bool) -> None:
     plan = pushing(name)
-    (segment,) = orekit.parse("opm", export_text(plan, "opm", xml=xml)).getSegments()
+    (segment,) = messages.parse("opm", export_text(plan, "opm", xml=xml)).getSegments()
     data = segment.getData()
     assert (
         str(segment.getMetadata().getReferenceFrame().getName())
@@ -254,10 +254,10 @@ def test_orbit_messages(name: str, xml: bool) -> None:
     )
     state = data.getStateVectorBlock()
     coordinates = state.toTimeStampedPVCoordinates()
-    assert orekit.components(coordinates.getPosition()) == pytest.approx(
+    assert messages.components(coordinates.getPosition()) == pytest.approx(
         [7e6, -12e3, 3.5e3], rel=1e-15
     )
-    assert orekit.components(coordinates.getVelocity()) == pytest.approx(
+    assert messages.components(coordinates.getVelocity()) == pytest.approx(
         [100.0, 7400.0, 120.0], rel=1e-15
     )
     assert data.getMass() == plan.spacecraft.mass
@@ -266,7 +266,7 @@ def test_orbit_messages(name: str, xml: bool) -> None:
         assert ignition == pytest.approx(pulse.start, abs=0.51e-9)
         assert manoeuvre.getDuration() == pytest.approx(pulse.on_time, rel=1e-15)
         change = velocity_change(plan, pulse)
-        assert orekit.components(manoeuvre.getDV()) == pytest.approx(change, rel=1e-7, abs=1e-12)
+        assert messages.components(manoeuvre.getDV()) == pytest.approx(change, rel=1e-7, abs=1e-12)
         assert (
             str(manoeuvre.getReferenceFrame().getName()) == present(plan.spacecraft.attitude).frame
         )
@@ -328,9 +328,9 @@ def test_the_second_reader_of_orbit_messages(reader: Any, notation: str) -> None
 )
 def test_orekit_sees_it_there(text: str) -> None:
     """Its analytical Sun errs by up to 0.1 deg itself: a check of frame and time."""
-    orekit.start_or_skip()
-    provider = orekit.java("org.orekit.bodies.AnalyticalSolarPositionProvider")()
-    frame = orekit.java("org.orekit.frames.FramesFactory").getEME2000()
-    seen = orekit.components(provider.getPosition(orekit.date(text), frame))
+    messages.start_or_skip()
+    provider = messages.java("org.orekit.bodies.AnalyticalSolarPositionProvider")()
+    frame = messages.java("org.orekit.frames.FramesFactory").getEME2000()
+    seen = messages.components(provider.getPosition(messages.date(text), frame))
     expected = sun.direction(Epoch.parse(f"{text}Z").days_of_j2000)
     assert math.degrees(attitude.angle_between(seen, expected)) < 0.1

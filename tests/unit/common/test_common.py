@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from support import orekit, places
+from support import messages, places
 from support.builders import aimed, codes, cross, spinner
 from support.cases import deep, spread
 from support.golden import check_text, refusal
@@ -183,7 +183,7 @@ def test_linear_programs_count_by_their_size(monkeypatch: pytest.MonkeyPatch) ->
 
 
 def test_the_leap_seconds_are_those_of_another_list() -> None:
-    lines = orekit.tai_utc().splitlines()
+    lines = messages.tai_utc().splitlines()
     assert len(lines) == 28
     days = [round(float(line.split("=JD")[1].split()[0]) - 1721424.5) for line in lines]
     assert (days[0], days[1:]) == (FIRST_DAY, [day + 1 for day in LEAP_DAYS])
@@ -301,7 +301,7 @@ def test_days_count_from_j2000_in_terrestrial_time_and_barycentric_time_swings()
 
 
 def test_the_direction_of_the_sun_is_right_to_a_hundredth_of_a_degree_from_1972_to_2100() -> None:
-    """Against ERFA (golden/make_sun.py)."""
+    """Against ERFA (golden/make_golden.py)."""
     rows = np.loadtxt(places.GOLDEN / "sun.csv", delimiter=",", skiprows=1)
     errors = [
         float(attitude.angle_between(sun.direction(days), row)) for days, *row in rows.tolist()

@@ -43,6 +43,14 @@ from nutdamp.spacecraft.model import Limits, Requirement, Spacecraft
 from nutdamp.spacecraft.requirements import reached
 from nutdamp.views.loop import _budget_notes
 
+few_cycles = pytest.mark.usefixtures("_few_cycles")
+"""Budgets follow few cycles, which is quick."""
+
+
+@pytest.fixture
+def _few_cycles(monkeypatch: pytest.MonkeyPatch) -> None:
+    follow_few_cycles(monkeypatch)
+
 
 def thrusters(
     torque: float = 6.0, least: float = 0.002, isp: float | None = 220.0
@@ -187,13 +195,13 @@ CASES = Path(__file__).parents[2] / "cases"
 @pytest.mark.parametrize(
     ("name", "pulses"), [("budget-bistable", 3340.0), ("budget-never-quiet", 2151.0)]
 )
+@few_cycles
 def test_a_budget_is_of_the_state_in_which_the_loop_of_the_file_ends(
-    monkeypatch: pytest.MonkeyPatch, name: str, pulses: float
+    name: str, pulses: float
 ) -> None:
     """Never quiet, though loops at less nutation fall quiet: pulses a day of loops flown for 60,000
     s and 40,000 s.
     """
-    follow_few_cycles(monkeypatch)
     made = nutdamp.budget(nutdamp.load(CASES / f"{name}.yaml"))
     (held,) = made.held
     assert (present(held.cycle).cycles, present(held.other).cycles > 0.0, held.share) == (
@@ -330,8 +338,8 @@ def held_by(body: Spacecraft) -> tuple[HeldNutation, Cycle]:
     return held, present(held.cycle, held.why)
 
 
-def test_propellant_follows_from_impulse_and_isp(monkeypatch: pytest.MonkeyPatch) -> None:
-    follow_few_cycles(monkeypatch)
+@few_cycles
+def test_propellant_follows_from_impulse_and_isp() -> None:
     cycle = held_by(craft(loop=loop(gyro())))[1]
     assert cycle.propellant == pytest.approx(
         cycle.impulse / (220.0 * 9.80665), rel=1e-9
@@ -382,8 +390,8 @@ def test_a_tank_whose_pressure_falls_lasts_as_long_as_a_loop_flown_until_it_is_e
     assert run.fired[-1].pulse.t - run.fired[0].pulse.t == pytest.approx(lasts, rel=0.02)
 
 
-def test_noise_above_a_tenth_of_start_widens_what_is_known(monkeypatch: pytest.MonkeyPatch) -> None:
-    follow_few_cycles(monkeypatch)
+@few_cycles
+def test_noise_above_a_tenth_of_start_widens_what_is_known() -> None:
     start = Law(craft(), loop(gyro())).size(rad(0.5), 3.0)
     for share, noisy in ((0.05, False), (0.2, True)):
         held, cycle = held_by(craft(loop=loop(gyro(noise=share * start))))
@@ -393,8 +401,8 @@ def test_noise_above_a_tenth_of_start_widens_what_is_known(monkeypatch: pytest.M
     check_text("budget.noisy", noted(notes))
 
 
-def test_pairs_of_thresholds_are_rows(monkeypatch: pytest.MonkeyPatch) -> None:
-    follow_few_cycles(monkeypatch)
+@few_cycles
+def test_pairs_of_thresholds_are_rows() -> None:
     body = craft(loop=loop(gyro()), requirement=Requirement(nutation=rad(0.6)))
     both = budget(body, [Thresholds(rad(0.5), rad(0.05)), Thresholds(rad(1.0), rad(0.05))])
     assert [held.meets_requirement for held in both.held] == [True, False]
@@ -411,8 +419,8 @@ def test_pairs_of_thresholds_are_rows(monkeypatch: pytest.MonkeyPatch) -> None:
     )
 
 
-def test_what_cannot_be_held_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
-    follow_few_cycles(monkeypatch)
+@few_cycles
+def test_what_cannot_be_held_says_why() -> None:
     weak, tense = craft(channels=thrusters(0.4)), craft(channels=thrusters(4.0))
     slow = loop(gyro(), 2.0, min_interval=10.0)
     budgets = [
@@ -439,8 +447,8 @@ def test_without_growth_nothing_is_held() -> None:
         budget(replace(craft(), dissipation=None))
 
 
-def test_the_library_gives_what_the_command_writes(monkeypatch: pytest.MonkeyPatch) -> None:
-    follow_few_cycles(monkeypatch)
+@few_cycles
+def test_the_library_gives_what_the_command_writes() -> None:
     made = nutdamp.budget(STAGE, [(rad(0.5), rad(0.1))])
     (row,) = made.to_dict()["thresholds"]
     cycle = present(made.held[0].cycle)
@@ -455,8 +463,8 @@ def test_the_library_gives_what_the_command_writes(monkeypatch: pytest.MonkeyPat
         nutdamp.budget(replace(STAGE, loop=None), [(0.1, 0.05)])
 
 
-def test_the_table_says_what_its_columns_are(monkeypatch: pytest.MonkeyPatch) -> None:
-    follow_few_cycles(monkeypatch)
+@few_cycles
+def test_the_table_says_what_its_columns_are() -> None:
     body = craft(loop=loop(gyro()))
     held = budget(body).held
     named = codes(_budget_notes(Budget(body, None, held)))

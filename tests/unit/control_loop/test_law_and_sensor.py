@@ -39,14 +39,9 @@ def after(
     """Rates after a coast from ``rates`` and a pulse, by DOP853; then rates along an arc of 7.5 s:
     (n, 3).
     """
-    motion = reference.Motion(rates, np.eye(3))
-    for push, times in (
-        (np.zeros(3), [start]),
-        (torque, [width]),
-        (np.zeros(3), np.linspace(0.02, 7.5, 350)),
-    ):
-        path = reference.coast(moments, motion, push, np.array(times))
-        motion = path[-1]
+    begun, end = reference.Motion(rates, np.eye(3)), start + width
+    times = end + np.linspace(0.0, 7.5, 376)
+    path = reference.path(moments, begun, [reference.Push(start, end, torque)], times)
     return np.array([each.rates for each in path])
 
 

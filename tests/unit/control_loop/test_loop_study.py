@@ -289,14 +289,6 @@ def test_a_loop_whose_tank_is_empty_fires_no_more_and_does_not_comply() -> None:
     assert np.all(used <= tanks)
 
 
-def test_faults_stop_each_case_on_its_own() -> None:
-    results = results_of(craft(reversed=("+M1",)), 20)
-    assert results.stops[Ending.CHANNEL] >= 18
-    assert results.settled == 20 - sum(
-        count for stop, count in results.stops.items() if stop is not Ending.END
-    )
-
-
 def test_what_a_study_needs(monkeypatch: pytest.MonkeyPatch) -> None:
     for key, error, body in (
         ("no-dispersions", BadRequest, replace(craft(), dispersions=None)),

@@ -13,9 +13,8 @@ from typing import Any
 import numpy as np
 import pytest
 from support import reference
-from support.builders import codes, present
+from support.builders import codes, documented, present
 from support.cases import deep, spread
-from support.documents import documented
 from support.golden import check_text, refused
 from support.loops import AXIAL, FOUR, fired_by, fires, four, ideal, rad, transverse_size
 from support.process import Run as Process

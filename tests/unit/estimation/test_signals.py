@@ -11,13 +11,14 @@ from scipy.spatial.transform import Rotation
 from support import reference
 from support.builders import noted, one_of, present
 from support.cases import deep, spread
-from support.golden import check_text
+from support.golden import check_text, refusal
 from support.places import case
-from support.synthetic import Array, motion
+from support.telemetry import ACCELEROMETER, Array, motion
+from support.telemetry import SENSED as FILE
 
 import nutdamp
 from nutdamp.common import work
-from nutdamp.errors import BadRequest, Infeasible, NutdampError, Unsuitable
+from nutdamp.errors import BadRequest, Infeasible, Unsuitable
 from nutdamp.estimation.fit import fit
 from nutdamp.estimation.initial_guess import spin_of
 from nutdamp.estimation.model import Model
@@ -34,37 +35,7 @@ SPIN = math.pi
 A, C = 120.48, 83.76
 """Of the bodies that are flown, kg m²."""
 
-FILE: dict[str, object] = {
-    "name": "signals",
-    "inertia": {"A": 120.0, "C": 84.0},
-    "state": {"spin": 3.0, "nutation": "4 deg", "phase": "20 deg"},
-    "attitude": {
-        "quaternion": [1, 0.1, 0.2, 0.3],
-        "epoch": "2026-03-01T12:00:00Z",
-        "frame": "EME2000",
-    },
-    "sun": "epoch",
-    "sun_sensor": {"azimuth": "35 deg"},
-    "thrusters": [{"name": "T1", "torque": [8, 0, 0]}, {"name": "T2", "torque": [0, 8, 0]}],
-    "dispersions": {
-        "A": {"normal": "0.5 %"},
-        "C": {"normal": "0.5 %"},
-        "omega0": {"normal": "0.3 deg/s"},
-        "thrust": {"normal": "3 %"},
-    },
-}
 PLAIN = {name: FILE[name] for name in ("name", "inertia", "state")}
-ACCELEROMETER = {
-    "sensor": {
-        "kind": "accelerometer",
-        "rate": "10 Hz",
-        "position": ["0.8 m", 0, 0],
-        "axis": [0, 0, 1],
-    },
-    "law": "four-pulse",
-    "start": "0.5 deg",
-    "stop": "0.05 deg",
-}
 BODY = nutdamp.load(FILE)
 EXAMPLE = nutdamp.example()
 LOOSE = EXAMPLE.with_(dispersions={"A": {"normal": "30 %"}, "C": {"normal": "30 %"}})
@@ -103,9 +74,7 @@ def flown(
     """
     rates = body.omega0 * np.array([1.2, 0.7, 1.001]) + np.array([0.01, 0.02, 0.0])
     start = reference.Motion(rates, attitude.matrix(body.initial.quaternion) @ turning(0.3))
-    if not events:
-        return reference.coast((A, A, C), start, np.zeros(3), times)
-    return [reference.fly((A, A, C), rates, events, float(time), start.rotation) for time in times]
+    return reference.path((A, A, C), start, events, times)
 
 
 def gyros(motions: list[reference.Motion], seed: int, off: Array | float = 0.0) -> dict[str, Array]:
@@ -275,43 +244,6 @@ def test_sun_pulses_tell_the_spin_and_so_the_bias_of_the_third_gyro() -> None:
     assert fitted.noise[-1] == pytest.approx(5e-4, rel=0.4)
 
 
-@pytest.mark.weekly
-def test_pulses_in_a_record_tell_thrust_and_delay_of_their_channels() -> None:
-    times = np.linspace(0.05, 40.0, 200)
-    factors = {"T1": 0.96, "T2": 1.03}
-    late = {"T1": 0.02, "T2": 0.035}
-    fired = Schedule(
-        tuple(
-            channel_pulse(one, at, 0.5) for one, at in zip(BODY.channels, (12.0, 25.0), strict=True)
-        )
-    )
-    events = tuple(
-        reference.Push(
-            one.start + late[one.channel],
-            one.end + late[one.channel],
-            factors[one.channel] * one.torque,
-        )
-        for one in fired
-        if one.torque is not None
-    )
-    fitted = fit(BODY, Record(times, gyros(flown(times, BODY, events), 5), schedule=fired))
-    of_A = fitted.index("A") or 0
-    for (
-        name,
-        factor,
-    ) in factors.items():  # a pulse shows thrust over A, so that the factor is as uncertain as A
-        at = present(fitted.index(f"thrust {name}"))
-        apart = math.sqrt(
-            fitted.covariance[at, at]
-            - fitted.covariance[at, of_A] ** 2 / fitted.covariance[of_A, of_A]
-        )
-        assert abs(fitted.values[at] / fitted.named["A"] * A - factor) < 4.0 * apart
-        assert apart < 0.002
-    expect_close(fitted, {"A": A, "C/A": C / A, **{f"delay {name}": late[name] for name in late}})
-    after = flown(np.array([40.0]), BODY, events)[0].rates
-    assert carried(fitted, 40.0).values[2:5] == pytest.approx(after, abs=6.0 * NOISE)
-
-
 def test_of_unequal_moments_pulses_and_disturbances_push_in_the_axes_of_the_file() -> None:
     """The principal axes that are estimated are turned against those of the file: by 90 deg where
     I1 < I2.
@@ -397,7 +329,7 @@ def test_a_search_ends_with_its_budget_of_work_and_says_so(monkeypatch: pytest.M
     """Where it has not come to the motion, that is named beside the other reasons."""
     record = of_example(np.linspace(0.0, 60.0, 121))
     monkeypatch.setattr("nutdamp.common.work.FIT", 1.0)
-    nowhere = refusal(Infeasible, EXAMPLE, record)
+    nowhere = refusal(Infeasible, fit, EXAMPLE, record)
     monkeypatch.setattr("nutdamp.common.work.FIT", 50.0)
     fitted = fit(EXAMPLE, record)
     assert not fitted.finished
@@ -411,7 +343,7 @@ def test_noise_for_rates_ends_and_is_no_nutation() -> None:
     body = nutdamp.load(PLAIN | {"inertia": {"tensor": np.diag([122.0, 118.0, 84.0]).tolist()}})
     with work.budget("test", math.inf) as spent:
         assert "no nutation is seen" in refusal(
-            Infeasible, body, noisy(np.linspace(0.0, 60.0, 200), rates)
+            Infeasible, fit, body, noisy(np.linspace(0.0, 60.0, 200), rates)
         )
     assert spent.done < 1.3 * work.FIT
 
@@ -446,17 +378,8 @@ def pushed(thrust: float, rate: int) -> Record:
     start = reference.Motion(np.array([0.14, 0.12, SPIN]), np.eye(3))
     times = np.arange(60 * rate + 1) / rate
     push = reference.Push(20.0, 20.5, np.array([0.0, thrust, 0.0]))
-    rates = [start.rates]
-    now = start
-    for begin, end, torque in (
-        (0, 20 * rate, 0.0 * push.torque),
-        (20 * rate, 20 * rate + rate // 2, push.torque),
-        (20 * rate + rate // 2, 60 * rate, 0.0 * push.torque),
-    ):
-        motions = reference.coast((120.0, 120.0, 80.4), now, torque, times[1 : end - begin + 1])
-        rates = rates + [one.rates for one in motions]
-        now = motions[-1]
-    return noisy(times, np.array(rates))
+    motions = reference.path((120.0, 120.0, 80.4), start, [push], times)
+    return noisy(times, np.array([one.rates for one in motions]))
 
 
 @spread("thrust", [8.0, 1.0], quick=1, deep=1)
@@ -493,7 +416,7 @@ def test_sensors_that_are_stuck_are_named() -> None:
     ]
     check_text(
         "estimation.stuck",
-        "\n".join(refusal(Infeasible, body, Record(times, one)) for body, one in records),
+        "\n".join(refusal(Infeasible, fit, body, Record(times, one)) for body, one in records),
     )
     fit(BODY, Record(times, seen | {"omega_3": np.full(120, 3.0)}))
 
@@ -513,7 +436,7 @@ def test_signals_of_zeros_are_sensors_that_are_off() -> None:
         (axis, ["axis"]),
         (axis | {GYROS[2]: zeros + 3.0}, ["axis"]),
     ):
-        said = refusal(Infeasible, BODY, Record(times, signals))
+        said = refusal(Infeasible, fit, BODY, Record(times, signals))
         assert all(f"{name} does not change" in said for name in named)
 
 
@@ -523,19 +446,10 @@ def test_a_small_pulse_in_the_last_fifth_that_the_axis_shows_is_told(share: floa
     times = np.linspace(0.05, 90.0, 300)
     at = share * 90.0
     start = reference.Motion(BODY.omega0, attitude.matrix(BODY.initial.quaternion))
-    before = reference.coast((A, A, C), start, np.zeros(3), np.append(times[times < at], at))
-    kicked = before[-1]._replace(rates=before[-1].rates + np.array([math.radians(0.2), 0.0, 0.0]))
-    motions = before[:-1] + reference.coast(
-        (A, A, C), kicked, np.zeros(3), times[times >= at] - at + 1e-9
-    )
+    kick = reference.Kick(at, np.array([A * math.radians(0.2), 0.0, 0.0]))
+    motions = reference.path((A, A, C), start, [kick], times)
     fitted = fit(BODY, Record(times, axes(motions, 1.0, np.random.default_rng(5), 5e-4)))
     assert one_of(doubts(fitted), "fit-steps")["at_s"] == pytest.approx(at, abs=2.5)
-
-
-def refusal(error: type[NutdampError], body: nutdamp.Spacecraft, record: Record) -> str:
-    with pytest.raises(error) as raised:
-        fit(body, record)
-    return str(raised.value)
 
 
 def test_records_that_tell_nothing_say_what_would_help() -> None:
@@ -545,14 +459,14 @@ def test_records_that_tell_nothing_say_what_would_help() -> None:
     fired = Schedule((channel_pulse(BODY.channels[0], 10.0, 1.0),))
     begun = of_body(BODY, minute)
     refusals = [
-        refusal(Infeasible, EXAMPLE, Record(np.zeros(1), dict.fromkeys(GYROS, np.ones(1)))),
-        refusal(Infeasible, BODY, of_body(BODY, np.array([0.0, 9.0]))),
-        refusal(Infeasible, BODY, of_body(BODY, np.linspace(0.0, 2.0, 60))),
-        refusal(Infeasible, EXAMPLE, of_example(minute, names=GYROS[2:])),
-        refusal(Infeasible, BODY, Record(np.empty(0), {}, sun)),
-        refusal(Unsuitable, bare, Record(minute, {ACCELERATION: np.sin(minute)})),
-        refusal(Unsuitable, bare, Record(minute, {}, sun)),
-        refusal(BadRequest, BODY, Record(begun.times + 10.0, begun.signals, schedule=fired)),
+        refusal(Infeasible, fit, EXAMPLE, Record(np.zeros(1), dict.fromkeys(GYROS, np.ones(1)))),
+        refusal(Infeasible, fit, BODY, of_body(BODY, np.array([0.0, 9.0]))),
+        refusal(Infeasible, fit, BODY, of_body(BODY, np.linspace(0.0, 2.0, 60))),
+        refusal(Infeasible, fit, EXAMPLE, of_example(minute, names=GYROS[2:])),
+        refusal(Infeasible, fit, BODY, Record(np.empty(0), {}, sun)),
+        refusal(Unsuitable, fit, bare, Record(minute, {ACCELERATION: np.sin(minute)})),
+        refusal(Unsuitable, fit, bare, Record(minute, {}, sun)),
+        refusal(BadRequest, fit, BODY, Record(begun.times + 10.0, begun.signals, schedule=fired)),
     ]
     check_text("estimation.refused-records", "\n".join(refusals))
 
@@ -570,7 +484,8 @@ def test_nutation_rates_that_sampling_cannot_tell_apart_are_all_named(
     """
     record = of_example(np.linspace(0.0, 600.0, 61), 93.0, names)
     check_text(
-        f"estimation.rates-alike, {request.node.callspec.id}", refusal(Infeasible, body, record)
+        f"estimation.rates-alike, {request.node.callspec.id}",
+        refusal(Infeasible, fit, body, record),
     )
 
 
@@ -579,7 +494,7 @@ def test_a_nutation_below_the_noise_is_none() -> None:
     still = nutdamp.load(FILE, set={"state.nutation": "0.001 deg"})
     check_text(
         "estimation.no-nutation",
-        refusal(Infeasible, still, of_body(still, np.linspace(0.0, 60.0, 200))),
+        refusal(Infeasible, fit, still, of_body(still, np.linspace(0.0, 60.0, 200))),
     )
 
 

@@ -3,6 +3,7 @@ stretches of the track.
 """
 
 import math
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -120,26 +121,18 @@ def test_the_mark_stays_where_it_is_in_the_body(body: Spacecraft) -> None:
     assert marks[0][0] > 0.0
 
 
-def test_without_nutation_there_are_no_cones() -> None:
+@pytest.mark.parametrize("wheel", [0.0, 42.0])
+def test_without_nutation_there_are_no_cones(wheel: float) -> None:
+    """With a wheel: H is that of it, and there is no ω to have a direction."""
     body = spinner(degrees=0.0)
-    found = geometry.cones(
-        propagation.flown(body, Schedule(), 1.0), body.omega0, body.initial.quaternion
-    )
-    assert len(found.body) == len(found.space) == 0
-    assert np.isnan(geometry.body_mark(found, body.initial.quaternion)).all()
-
-
-def test_a_despun_body_at_rest_has_no_cones() -> None:
-    """H is that of its wheel, and there is no ω to have a direction."""
-    state = {"spin": 0.0, "nutation": 0.0}
-    body = nutdamp.load(
-        {"name": "still", "inertia": {"A": 120, "C": 80}, "wheel": {"momentum": 42}, "state": state}
-    )
+    if wheel:
+        body = replace(body, inertia=replace(body.inertia, wheel=wheel), omega0=np.zeros(3))
     found = geometry.cones(
         propagation.flown(body, Schedule(), 1.0), body.omega0, body.initial.quaternion
     )
     assert len(found.body) == len(found.space) == 0
     assert found.rotation == pytest.approx(found.momentum)
+    assert np.isnan(geometry.body_mark(found, body.initial.quaternion)).all()
 
 
 # --- the sky
@@ -298,21 +291,21 @@ def test_ticks_are_round_and_few(low: float, high: float, most: int) -> None:
         assert min(abs(mantissa - round_) for round_ in (1.0, 2.0, 5.0, 10.0)) < 1e-6
 
 
-@pytest.mark.parametrize("turned", [False, True])
-def test_the_pole_curve_says_where_its_axes_are_not_those_of_the_file(turned: bool) -> None:
-    tensor = (
-        [[100.0, 1.0, 0.0], [1.0, 120.0, 0.0], [0.0, 0.0, 80.0]]
-        if turned
-        else np.diag([100.0, 120.0, 80.0])
-    )
-    state = {"spin": 3.0, "nutation": "5 deg"}
-    body = nutdamp.load(
-        {"name": "turned", "inertia": {"tensor": np.asarray(tensor).tolist()}, "state": state}
-    )
-    assert (
-        geometry.pole_note(propagation.flown(body, Schedule(), 1.0)) == ", principal axes" * turned
-    )
-
-
-def test_the_pole_curve_says_that_the_spin_is_reversed() -> None:
-    assert geometry.pole_note(flown(BODIES["oblate, reversed"])[0]) == ", spin about −3"
+@pytest.mark.parametrize(
+    ("tensor", "spin", "note"),
+    [
+        (np.diag([100.0, 120.0, 80.0]), 3.0, ""),
+        (
+            np.array([[100.0, 1.0, 0.0], [1.0, 120.0, 0.0], [0.0, 0.0, 80.0]]),
+            3.0,
+            ", principal axes",
+        ),
+        (np.diag([80.0, 80.0, 120.0]), -3.0, ", spin about −3"),
+    ],
+)
+def test_the_pole_curve_says_where_its_axes_are_not_those_of_the_file_and_spin_is_reversed(
+    tensor: Vector, spin: float, note: str
+) -> None:
+    state = {"spin": spin, "nutation": "5 deg"}
+    body = nutdamp.load({"name": "x", "inertia": {"tensor": tensor.tolist()}, "state": state})
+    assert geometry.pole_note(propagation.flown(body, Schedule(), 1.0)) == note

@@ -15,13 +15,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from support.broken import BASE, THRUSTERS
 from support.builders import noted, present
 from support.cases import spread
+from support.contract import BASE, THRUSTERS
 from support.golden import check_text, refusal
-from support.hand_made_fit import silent, told
 from support.places import case
 from support.process import Run
+from support.telemetry import silent, told
 
 import nutdamp
 from nutdamp.errors import BadRequest, Fault, FaultyFile
@@ -139,41 +139,25 @@ def test_values_that_aliases_share_change_only_where_they_are_set() -> None:
     assert [channel.thrusters[0].torque[0] for channel in craft.channels] == [8.0, -1.0]
 
 
-FAULTY = (
-    "limits.horizon=-3 s",
-    "limits.horizn=300s",
-    "limits.earlist=300s",
-    ("thrusters.T11.torque=[1, 0, 0]"),
-    "thrusters.Z.torque=[1, 0, 0]",
-    "thrusters[3].torque=[1, 0, 0]",
-    "omega0.x=1",
-    "limits.blackout[0]=[1, 2]",
-    "name.x=1",
-    "limits.blackout=[[1, 2]",
-    "mass=",
-    "limits.tick={a: 1, a: 2}",
-    "name=!!python/object:os.system x",
-    f"{'x.' * 40}y=1",
-    "mass=\x1b[31m",
-)
-NO_SETTINGS = (
-    "",
-    "mass",
-    "=3",
-    "a..b=1",
-    ".a=1",
-    "a[=1",
-    "a[1=2",
-    "a]=1",
-    "'a=1",
-    "a.'\\x=1",
-    "[]=1",
-)
-
-
 def test_a_fault_names_the_setting_as_its_place() -> None:
     lines = list[str]()
-    for setting in FAULTY:
+    for setting in (
+        "limits.horizon=-3 s",
+        "limits.horizn=300s",
+        "limits.earlist=300s",
+        ("thrusters.T11.torque=[1, 0, 0]"),
+        "thrusters.Z.torque=[1, 0, 0]",
+        "thrusters[3].torque=[1, 0, 0]",
+        "omega0.x=1",
+        "limits.blackout[0]=[1, 2]",
+        "name.x=1",
+        "limits.blackout=[[1, 2]",
+        "mass=",
+        "limits.tick={a: 1, a: 2}",
+        "name=!!python/object:os.system x",
+        f"{'x.' * 40}y=1",
+        "mass=\x1b[31m",
+    ):
         faults = faults_of(THRUSTERS + "limits: {horizon: 120 s}\n", setting)
         assert faults
         assert all(
@@ -183,7 +167,19 @@ def test_a_fault_names_the_setting_as_its_place() -> None:
         lines += map(str, faults)
     lines += map(str, faults_of(THRUSTERS, "thrusters[0].name=T2"))  # a name that another entry has
     check_text("files.settings", "\n".join(lines))
-    for text in NO_SETTINGS:
+    for text in (
+        "",
+        "mass",
+        "=3",
+        "a..b=1",
+        ".a=1",
+        "a[=1",
+        "a[1=2",
+        "a]=1",
+        "'a=1",
+        "a.'\\x=1",
+        "[]=1",
+    ):
         with pytest.raises(ValueError, match=r"is not KEY=VALUE, such as limits\.horizon=300s"):
             parse_setting(text)
 
@@ -411,31 +407,6 @@ dispersions:
   {A: {normal: 0.5 %}, C: {normal: 0.5 %},
    thrust: {T1: {normal: 3 %}, T 2: {normal: 3 %}, T3: {normal: 2 %}}}
 """
-EVERYTHING = {
-    "A": 121.0,
-    "C/A": 0.7,
-    "omega_1": 0.1,
-    "omega_2": -0.2,
-    "omega_3": 3.1,
-    "attitude_1": 0.01,
-    "attitude_2": -0.02,
-    "attitude_3": 0.3,
-    "bias_omega_1": 1e-3,
-    "wobble_2": 2e-3,
-    "bias_acceleration": 0.03,
-    "thrust T1": 0.96,
-    "thrust T 2": 1.05,
-    "delay T1": 0.005,
-    "delay T 2": -0.015,
-}
-SIGMAS = {
-    "A": 0.4,
-    "C/A": 1e-3,
-    "omega_1": 1e-3,
-    "thrust T1": 0.01,
-    "attitude_1": 2e-3,
-    "attitude_2": 2e-3,
-}
 
 
 def test_the_file_holds_all_that_is_known_now() -> None:
@@ -445,7 +416,35 @@ def test_the_file_holds_all_that_is_known_now() -> None:
         tuple(channel_pulse(one, t, 0.5) for one, t in zip(body.channels, (3.0, 6.0), strict=False))
     )
     record = silent(*GYROS, "axis_x", "axis_y", "axis_z", "acceleration", schedule=fired)
-    fit = told(body, record, EVERYTHING, SIGMAS)
+    fit = told(
+        body,
+        record,
+        {
+            "A": 121.0,
+            "C/A": 0.7,
+            "omega_1": 0.1,
+            "omega_2": -0.2,
+            "omega_3": 3.1,
+            "attitude_1": 0.01,
+            "attitude_2": -0.02,
+            "attitude_3": 0.3,
+            "bias_omega_1": 1e-3,
+            "wobble_2": 2e-3,
+            "bias_acceleration": 0.03,
+            "thrust T1": 0.96,
+            "thrust T 2": 1.05,
+            "delay T1": 0.005,
+            "delay T 2": -0.015,
+        },
+        {
+            "A": 0.4,
+            "C/A": 1e-3,
+            "omega_1": 1e-3,
+            "thrust T1": 0.01,
+            "attitude_1": 2e-3,
+            "attitude_2": 2e-3,
+        },
+    )
     known = carried(fit, 7.5)
     text = fitted_text(fit, known)
     now = read_spacecraft(text, "now.yaml")

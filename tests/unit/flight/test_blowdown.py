@@ -2,7 +2,6 @@
 propellant: by DOP853.
 """
 
-import itertools
 import math
 from collections.abc import Callable
 from dataclasses import replace
@@ -13,10 +12,9 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from support import reference
-from support.builders import channel, cross, noted, present, spinner
+from support.builders import channel, cross, documented, noted, present, spinner
 from support.cases import deep, spread, weekly
 from support.dispersed import normal
-from support.documents import documented
 from support.golden import check_text
 from support.spinners import FILE as SPINNER
 
@@ -61,39 +59,55 @@ def carrier(
 
 
 def by_reference(
-    body: Spacecraft, starts: list[tuple[str, float, float]], until: float
-) -> tuple[Array, Array, float]:
-    """Rates, the matrix body -> inertial and the propellant used, kg,
-    after rectangles of commands.
+    body: Spacecraft, made: Schedule, until: float = math.inf
+) -> tuple[Array, Array, Array, float]:
+    """Rates, the matrix body -> inertial, moments of inertia and propellant used, kg, at ``until``
+    s or the last pulse's end: Euler's equations with I(t), from commands, valves and pressure.
     """
     tank = present(body.tank)
-    moments = np.array(body.inertia.moments)
+    start = np.asarray(body.inertia.moments)
+    per_kg = np.asarray(tank.inertia_per_kg or (0.0, 0.0, 0.0))
     channels = {one.name: one for one in body.channels}
+    full = float(np.linalg.norm(body.channels[0].torque))  # N m that 10 N give, of all alike
+    swells = list[reference.Swell]()
+    for pulse in made:
+        one = channels[pulse.channel]
+        valve = one.valve if isinstance(one.valve, Trapezoid) else Trapezoid()
+        swells += reference.through_valve(
+            *pulse.loaded,
+            one.torque,
+            opening=valve.open_delay,
+            closing=valve.close_delay,
+            rise=valve.rise_time,
+            fall=valve.fall_time,
+        )
 
-    def slope(t: float, y: Array, firing: list[str]) -> Array:
-        omega = y[:3]
-        turned = y[3:12].reshape(3, 3)
-        used = y[12]
+    def slope(t: float, y: Array, firing: list[reference.Swell]) -> Array:
+        rates, rotation, used = y[:3], y[3:12].reshape(3, 3), y[12]
+        moments = start - (used - tank.used) * per_kg
         pressure = tank.pressure / (
             1.0 + (tank.pressure / tank.final_pressure - 1.0) * used / tank.propellant
         )
-        factor = (pressure / tank.pressure) ** tank.exponent
+        level = (pressure / tank.pressure) ** tank.exponent
         isp = ISP if tank.isp is None else float(np.interp(pressure, *np.array(tank.isp).T))
-        torque = sum((channels[name].torque * factor for name in firing), np.zeros(3))
-        flow = sum(10.0 * factor / (isp * STANDARD_GRAVITY) for _ in firing)
-        across = np.array(
-            [[0, -omega[2], omega[1]], [omega[2], 0, -omega[0]], [-omega[1], omega[0], 0]]
-        )
-        rates = (torque - np.cross(omega, moments * omega)) / moments
-        return np.concatenate([rates, (turned @ across).ravel(), [flow]])
+        pushes = [level * one.at(t) for one in firing]
+        thrust = 10.0 * sum(float(np.linalg.norm(push)) for push in pushes) / full
+        torque = sum(pushes, np.zeros(3))
+        across = np.cross(np.eye(3), rates)
+        turning = (torque - np.cross(rates, moments * rates)) / moments
+        flow = thrust / (isp * STANDARD_GRAVITY)
+        return np.concatenate([turning, (rotation @ across).ravel(), [flow]])
 
-    edges = sorted({0.0, until, *(t for _, start, lasts in starts for t in (start, start + lasts))})
-    y = np.concatenate([body.omega0, np.eye(3).ravel(), [tank.used]])
+    rotation = reference.frame_n(body.inertia.moments, body.omega0)
+    y = np.concatenate([body.omega0, rotation.ravel(), [tank.used]])
+    until = min(until, made.end)
+    edges = sorted({0.0, until, *(edge for one in swells for edge in one[:2] if edge < until)})
     for begin, end in pairwise(edges):
-        firing = [name for name, start, lasts in starts if start <= begin and end <= start + lasts]
-        solved = solve_ivp(slope, (begin, end), y, "DOP853", rtol=1e-12, atol=1e-13, args=(firing,))
+        firing = [one for one in swells if one.start <= 0.5 * (begin + end) <= one.end]
+        solved = solve_ivp(slope, (begin, end), y, "DOP853", rtol=1e-13, atol=1e-15, args=(firing,))
         y = solved.y[:, -1]
-    return y[:3], y[3:12].reshape(3, 3), float(y[12] - tank.used)
+    used = float(y[12] - tank.used)
+    return y[:3], y[3:12].reshape(3, 3), start - used * per_kg, used
 
 
 COMMANDS = [("+1", 0.4, 1.5), ("-2", 2.6, 0.9), ("-1", 4.0, 1.2)]
@@ -113,7 +127,7 @@ def test_pulses_are_flown_as_the_pressure_falls(name: str) -> None:
                 body, [on_command(channels[one], start, lasts) for one, start, lasts in COMMANDS]
             )
         )
-        rates, _, used = by_reference(body, COMMANDS, made.end)
+        rates, *_, used = by_reference(body, made)
         assert flown(body, made).settled.rates == pytest.approx(rates, abs=1e-8)
         assert made.propellant == pytest.approx(used, rel=1e-9)
 
@@ -211,8 +225,7 @@ def test_a_plan_takes_out_the_nutation_as_the_pressure_falls(scheme: str) -> Non
     body = carrier(SMALL)
     made = planning.plan(body, scheme)
     assert made.feasible
-    commands = [(pulse.channel, *pulse.loaded) for pulse in made.pulses]
-    rates, _, used = by_reference(body, commands, made.pulses.end)
+    rates, *_, used = by_reference(body, made.pulses)
     assert abs(complex(rates[0], rates[1])) * 120.0 < 1e-7 * 80.0 * 3.0
     assert made.propellant == pytest.approx(used, rel=1e-9)
 
@@ -311,51 +324,6 @@ def fires(body: Spacecraft, *numbers: int, on_time: float = 0.05) -> Schedule:
     return Schedule(supplied(body, list(commands)))
 
 
-def independent(
-    body: Spacecraft, made: Schedule, until: float = math.inf
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Rates (3,), rotation (3, 3), moments (3,) at ``until`` s or the last pulse's end, from
-    commands and pressure.
-    """
-    start, per_kg = np.asarray(body.inertia.moments), np.asarray(present(body.tank).inertia_per_kg)
-    channels = {one.name: one for one in body.channels}
-    swells = []
-    for pulse in sorted(made, key=lambda one: one.loaded[0]):
-        one = channels[pulse.channel]
-        slow = dict(
-            zip(("opening", "closing", "rise", "fall"), (0.015, 0.012, 0.005, 0.010), strict=True)
-        )
-        times = slow if isinstance(one.valve, Trapezoid) else dict.fromkeys(slow, 0.0)
-        swells += reference.through_valve(*pulse.loaded, one.torque, **times)
-
-    def slope(t: float, y: np.ndarray, firing: list[reference.Swell]) -> np.ndarray:
-        moments = start - y[12] * per_kg
-        rotation = y[3:12].reshape(3, 3)
-        w = y[:3]
-        level = 1.0 / (1.0 + (22.0 / 16.0 - 1.0) * y[12] / 0.002)
-        torque = level * sum((one.at(t) for one in firing), np.zeros(3))
-        thrust = (
-            level * sum(float(np.linalg.norm(one.at(t))) for one in firing) / math.hypot(8.0, 0.3)
-        )
-        flow = thrust * 10.0 / (220.0 * 9.80665)
-        spins = np.array([[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]])
-        return np.concatenate(
-            [(torque - spins @ (moments * w)) / moments, (rotation @ spins).ravel(), [flow]]
-        )
-
-    y = np.concatenate(
-        [body.omega0, reference.frame_n(body.inertia.moments, body.omega0).ravel(), [0.0]]
-    )
-    until = min(until, made.end)
-    edges = sorted({0.0, until, *(edge for one in swells for edge in one[:2] if edge < until)})
-    for now, end in itertools.pairwise(edges):
-        firing = [one for one in swells if one.start <= 0.5 * (now + end) <= one.end]
-        y = solve_ivp(slope, (now, end), y, "DOP853", rtol=1e-13, atol=1e-15, args=(firing,)).y[
-            :, -1
-        ]
-    return y[:3], y[3:12].reshape(3, 3), start - y[12] * per_kg
-
-
 @pytest.mark.parametrize(
     ("shed", "valve"), [(AXIAL, None), (THREE, SLOW), deep(AXIAL, SLOW), deep(THREE, None)]
 )
@@ -364,7 +332,7 @@ def test_the_flight_is_that_of_eulers_equations_with_falling_moments(
 ) -> None:
     body = craft(shed, valve)
     made = fires(body, 0, 2, 1, 3, 0)
-    rates, rotation, moments = independent(body, made)
+    rates, rotation, moments, _ = by_reference(body, made)
     by_flight = flown(body, made)
     momentum = rotation @ (moments * rates)
     assert moments[0] < 0.98 * 120.0
@@ -378,9 +346,9 @@ def test_the_flight_is_that_of_eulers_equations_with_falling_moments(
     amid = made.pulses[2].t
     assert summed.motion(np.array([made.end]))[0][0] == pytest.approx(rates, abs=2e-6)
     assert by_flight.moments_at(np.array([amid]))[0] == pytest.approx(
-        independent(body, made, amid)[2], rel=1e-6
+        by_reference(body, made, amid)[2], rel=1e-6
     )
-    before, after = (independent(body, made, one)[2] for one in (amid - 0.3, amid + 0.3))
+    before, after = (by_reference(body, made, one)[2] for one in (amid - 0.3, amid + 0.3))
     assert summed.moments_at(np.array([amid - 1e-6, amid])) == pytest.approx(
         np.array([before, after]), rel=1e-9
     )
@@ -450,7 +418,7 @@ def test_plans_leave_nothing_and_without_falling_moments_they_would(scheme: str)
     body = craft((3000.0, 3000.0, 1500.0))
     plan = planning.plan(body, scheme)
     assert present(plan.flown).nutation < math.radians(1e-6)
-    rates, _, moments = independent(body, plan.pulses)
+    rates, _, moments, _ = by_reference(body, plan.pulses)
     assert reference.nutation(moments.tolist(), rates, 1.0) < math.radians(1e-6)
     kept = planning.plan(replace(body, tank=TANK), scheme).pulses
     assert flown(body, kept).residual.nutation > math.radians(1e-3)

@@ -2,7 +2,6 @@
 that keep cones.
 """
 
-import csv
 import itertools
 import json
 import math
@@ -16,14 +15,13 @@ from numpy.typing import NDArray
 from support import reference
 from support.builders import aimed, codes, cross, events, noted, present, pulse, spinner
 from support.cases import spread, weekly
+from support.commands import rows as rows_of
 from support.flights import axis_path
 from support.golden import check_text
-from support.planner import Planner
-from support.process import Run
+from support.process import Planner, Run
 from support.spinners import commanded
 
 import nutdamp
-from nutdamp.figures.overview import title
 from nutdamp.files.reader import read_spacecraft
 from nutdamp.flight import propagation
 from nutdamp.flight.end_state import ANGLE, aspects, deviations, seen_at, tolerated
@@ -104,17 +102,6 @@ def test_models_may_differ_by_a_tenth_of_what_is_required(planned: Planner) -> N
     assert deviations(flown, flown) == ()
 
 
-def test_a_library_flight_ends_where_its_track_does() -> None:
-    body = nutdamp.read(
-        "name: X\ninertia: {A: 120, C: 80}\nomega0: [0.2, 0, 3]\ndissipation: {time_constant: "
-        "100 s}\n"
-    )
-    flown = nutdamp.plan(body, "none").fly(until=60.0)
-    assert flown.residual.nutation == pytest.approx(flown.track.nutation[-1], rel=1e-12)
-    assert flown.residual.nutation > 1.5 * body.nutation
-    assert "→" in title(flown)
-
-
 NUTATION = re.compile(r"^nutation +([<0-9.e -]+) deg +([<0-9.e -]+) deg$", re.MULTILINE)
 
 
@@ -139,7 +126,7 @@ def test_screen_json_and_last_row_of_the_track_are_one(
     files = ("--csv", "track.csv", "--json", "flight.json")
     screen = run("simulate", *given, *options, "--until", f"{until} s", *files).stdout
     data = json.loads((tmp_path / "flight.json").read_text())
-    *_, last = csv.DictReader((tmp_path / "track.csv").read_text().splitlines())
+    *_, last = rows_of((tmp_path / "track.csv").read_text())
     named, final = ("flown", "final") if options else ("residual", "final_by_impulses")
     assert data["propagated"] == named
     assert data["until_s"] == float(last["t_s"]) == until
@@ -241,19 +228,20 @@ def test_in_free_motion_the_axis_stays_within_its_cone_about_H(shape: tuple[floa
 def test_with_pulses_they_are_those_of_the_reference_integrator(
     moments: tuple[float, float, float],
 ) -> None:
+    """To directions in space, and to H, which is the nutation on the way."""
     rng = np.random.default_rng(5)
     for sense in (-1.0, 1.0):
         body = spinner(moments=moments, spin=2.0 * sense, degrees=rng.uniform(1.0, 12.0))
-        body = replace(
-            body, keep=tuple(Keep(name, unit(rng.normal(size=3))) for name in ("one", "two"))
-        )
+        stars = (Keep(name, unit(rng.normal(size=3))) for name in ("one", "two"))
+        body = replace(body, keep=(*stars, Keep("H", None, 0.0, 0.1)))
         pushes = (
             pulse(4.0 * k + 2.0, rng.uniform(0.1, 2.0), rng.normal(size=3) * 6.0) for k in range(3)
         )
         made = Schedule(tuple(pushes))
         start = attitude.matrix(body.initial.quaternion)
         path = axis_path(body, made, 14.0, 400)
-        for seen in aspects(flown(body, made), 14.0):
+        *directions, about_momentum = aspects(flown(body, made), 14.0)
+        for seen in directions:
             apart = attitude.angle_between(path, np.asarray(seen.keep.direction))
             assert (seen.least, seen.largest) == pytest.approx((apart.min(), apart.max()), abs=1e-4)
             assert seen.least < apart.min() + 1e-6  # the reference is asked at other moments
@@ -272,37 +260,19 @@ def test_with_pulses_they_are_those_of_the_reference_integrator(
             there = reference.fly(moments, body.omega0, events(made), seen.least_at, start)
             angle = reference.angle(sense * there.rotation[:, 2], np.asarray(seen.keep.direction))
             assert angle == pytest.approx(seen.least, abs=1e-6)
-
-
-@spread(
-    "moments", [(120.0, 120.0, 80.0), (90.0, 90.0, 140.0), (120.0, 100.0, 70.0)], quick=1, deep=2
-)
-def test_the_nutation_on_the_way_is_that_of_the_reference_integrator(
-    moments: tuple[float, float, float],
-) -> None:
-    rng = np.random.default_rng(6)
-    for sense in (-1.0, 1.0):
-        body = spinner(moments=moments, spin=2.0 * sense, degrees=rng.uniform(1.0, 12.0))
-        body = replace(body, keep=(Keep("H", None, 0.0, 0.1),))
-        made = Schedule(
-            tuple(
-                pulse(4.0 * k + 2.0, rng.uniform(0.1, 2.0), rng.normal(size=3) * 6.0)
-                for k in range(3)
-            )
+        begun = reference.Motion(body.omega0, start)
+        motions = reference.path(moments, begun, events(made), np.linspace(0.0, 14.0, 150))
+        angles = [reference.nutation(moments, motion.rates, sense) for motion in motions]
+        assert about_momentum.least < min(angles) + 1e-7
+        assert about_momentum.largest > max(angles) - 1e-7
+        assert (about_momentum.least, about_momentum.largest) == pytest.approx(
+            (min(angles), max(angles)), abs=2e-3
         )
-        (seen,) = aspects(flown(body, made), 14.0)
-        start = attitude.matrix(body.initial.quaternion)
-        pushes = events(made)
-        there = [
-            reference.fly(moments, body.omega0, pushes, at, start)
-            for at in np.linspace(0.0, 14.0, 150)
-        ]
-        angles = [reference.nutation(moments, motion.rates, sense) for motion in there]
-        assert seen.least < min(angles) + 1e-7
-        assert seen.largest > max(angles) - 1e-7
-        assert (seen.least, seen.largest) == pytest.approx((min(angles), max(angles)), abs=2e-3)
-        for at, value in ((seen.least_at, seen.least), (seen.largest_at, seen.largest)):
-            motion = reference.fly(moments, body.omega0, pushes, at, start)
+        for at, value in (
+            (about_momentum.least_at, about_momentum.least),
+            (about_momentum.largest_at, about_momentum.largest),
+        ):
+            motion = reference.fly(moments, body.omega0, events(made), at, start)
             assert reference.nutation(moments, motion.rates, sense) == pytest.approx(
                 value, abs=1e-7
             )
@@ -467,32 +437,6 @@ def test_in_random_cases_the_axis_never_enters_a_cone(scheme: str, seeds: range)
         if plan.feasible:
             check_kept(plan)
     assert scheme in ("half-cone", "optimal") or planned >= 0.7 * len(seeds)
-
-
-WATCHING = """
-name: Spinner
-inertia: {A: 80 kg m^2, C: 120 kg m^2}
-state: {spin: 30 rpm, nutation: 0.2 deg}
-attitude: {epoch: 2026-03-20T12:00:00Z, frame: EME2000, quaternion: [1, 0, 0, 0]}
-thrusters: [{name: T1, torque: [8, 0, 0], isp: 220 s, lever_arm: 1 m, max_on_time: 300 ms}]
-limits: {horizon: 600 s}
-sun: epoch
-keep: [{name: pole star, direction: [10 deg, 86 deg], min: 2 deg}]
-"""
-
-
-@pytest.mark.weekly
-def test_screens_and_json_show_how_near_the_axis_comes(run: Run, tmp_path: Path) -> None:
-    options = ("--target", "10deg,80deg", "--scheme", "rhumb-line", "--json", "plan.json")
-    shown = run("plan", "-v", "-", *options, stdin=WATCHING)
-    assert shown.returncode == 0, shown.stderr
-    for text in ("axis from pole star", "(at least 2 deg)", "axis from Sun"):
-        assert text in " ".join(shown.stdout.split())
-    (plan,) = json.loads((tmp_path / "plan.json").read_text(encoding="utf-8"))["plans"]
-    star, sun = plan["aspects"]
-    assert star["kept"]
-    assert star["least_deg"] >= 2.0
-    assert sun["least_deg"] > 60.0  # at the equinox the Sun is square to the pole
 
 
 BROKEN = """

@@ -13,13 +13,11 @@ from typing import Any
 import numpy as np
 import pytest
 from support import reference
-from support.builders import present, spinner
+from support.builders import documented, present, spinner
 from support.cases import spread
-from support.documents import documented
 from support.golden import check_text
 from support.places import case
-from support.planner import Planner
-from support.process import Run
+from support.process import Planner, Run
 
 from nutdamp.cli.main import group
 from nutdamp.errors import MissingExtra
@@ -304,33 +302,6 @@ def test_dop853_by_the_torque_law_confirms_flights_with_dissipation(
         for index, t in ((0, 2.0), (2, 21.0), (1, 50.0))
     ]
     assert confirmed(verify(documented(body), Schedule(tuple(pulses))), 1e-10)
-
-
-@pytest.mark.weekly
-def test_the_course_example_of_dissipation() -> None:
-    """C = 1000, A = 2000 kg m², 60 rpm, ω_t = 0.10 rad/s, τ = 100 s: one law in both flights and in
-    DOP853.
-    """
-    body = Spacecraft(
-        "x", Inertia((2000.0, 2000.0, 1000.0)), np.array([0.1, 0.0, 2 * math.pi]), dissipation=100.0
-    )
-    times = np.array([0.0, 50.0, 100.0, 200.0, 300.0, 345.0, 600.0])
-    _, states = states_of(documented(body), *times)
-    motions = (
-        (states[:3].T, None),
-        *(
-            fly(body, Schedule(), 600.0).motion(times)
-            for fly in (propagation.flown, propagation.by_impulses)
-        ),
-    )
-    by_torque, *others = (
-        np.degrees(np.arctan2(2.0 * np.hypot(rates[:, 0], rates[:, 1]), rates[:, 2]))
-        for rates, _ in motions
-    )
-    assert by_torque[:-2] == pytest.approx([1.82, 3.00, 4.95, 13.24, 32.59], abs=0.005)
-    assert by_torque[-2:] == pytest.approx([45.0, 85.5], abs=0.1)
-    for angles in others:
-        assert angles == pytest.approx(by_torque, abs=1e-9)
 
 
 def test_the_command_prints_both_tables(run: Run) -> None:

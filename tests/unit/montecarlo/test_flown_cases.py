@@ -2,7 +2,6 @@
 derivatives.
 """
 
-import csv
 import json
 import math
 from collections.abc import Mapping
@@ -17,13 +16,12 @@ from scipy.spatial.transform import Rotation
 from support import dispersed, places, reference
 from support.builders import cross, present, spinner
 from support.cases import deep, spread
-from support.flights import BODY_ERRORS, axis_path, by_blocks
+from support.commands import rows as rows_of
+from support.flights import BODY_ERRORS, axis_path, by_blocks, flown_outputs, realised, timed
 from support.process import Run
-from support.single_case import flown_outputs, realised, timed
 from support.spinners import commanded, flown_by_reference
 
 import nutdamp
-from nutdamp.common.numerics import cos_sin
 from nutdamp.files.schedules import read_plan
 from nutdamp.flight import propagation
 from nutdamp.flight.end_state import aspects
@@ -118,13 +116,8 @@ def test_the_impulse_sum_agrees_with_an_independent_integrator(name: str) -> Non
 
 
 @pytest.mark.parametrize("name", SYMMETRIC)
-def test_the_impulse_sum_of_each_case_is_that_of_its_own_spacecraft(name: str) -> None:
+def test_the_impulse_sum_without_deviations_is_that_of_the_spacecraft(name: str) -> None:
     model = SYMMETRIC[name]
-    draws = dispersed.first_cases(Study(model), CASES)
-    by_sum = outputs(ClosedForm, model, draws)
-    for case in range(0, CASES, 4):
-        left = propagation.by_impulses(*realised(model, dispersed.one_of(draws, case))).residual
-        assert by_sum[:2, case] == pytest.approx([left.nutation, left.momentum_shift], abs=1e-12)
     left = propagation.by_impulses(model.spacecraft, model.schedule).residual
     nominal = outputs(ClosedForm, model, {})[:, 0]
     assert nominal[:3] == pytest.approx(
@@ -186,8 +179,6 @@ def test_the_quadrature_of_wide_pulses_is_exact_to_rounding() -> None:
         nodes, weights = np.polynomial.legendre.leggauss(nodes_for(phase))
         mean = 0.5 * float(weights @ np.cos(phase * nodes))
         assert mean == pytest.approx(np.sinc(phase / np.pi), abs=1e-14), phase
-    angle = np.concatenate([np.linspace(-400.0, 400.0, 20_001), [0.0, np.pi, -np.pi, 1e-300]])
-    assert np.abs(np.subtract(cos_sin(angle), (np.cos(angle), np.sin(angle)))).max() < 1e-15
 
 
 FLOWN = {
@@ -535,7 +526,7 @@ def test_the_csv_has_the_angles_of_each_case(run: Run, tmp_path: Path) -> None:
         return study, (tmp_path / "cases.csv").read_text()
 
     study, content = csv_of("keep: [{name: Sun, direction: sun, min: 5 deg}]")
-    rows = list(csv.DictReader(content.splitlines()))
+    rows = rows_of(content)
     assert list(rows[0])[-3:] == ["propellant_kg", "Sun_least_deg", "Sun_largest_deg"]
     least, largest = np.array(
         [[float(row[f"Sun_{end}_deg"]) for row in rows] for end in ("least", "largest")]

@@ -17,8 +17,8 @@ from scipy.stats import binomtest, kstest, multivariate_normal, norm, triang, un
 from support import dispersed
 from support.builders import channel, present, spinner
 from support.cases import deep
+from support.flights import flown_outputs
 from support.golden import check_text, refused
-from support.single_case import flown_outputs
 
 from nutdamp.errors import BadRequest
 from nutdamp.files.reader import read_spacecraft
@@ -114,14 +114,6 @@ def test_a_stopped_run_keeps_the_first_cases_and_goes_on(plain: Results) -> None
     same(plain, run(stopped.extended(MANY)))
 
 
-def test_cases_of_three_moments_do_not_depend_on_threads_or_interruptions() -> None:
-    model = dispersed.with_jets(moments=(120.0, 110.0, 80.0))
-    whole, parts = (
-        Results(study_of(model.spacecraft, model.schedule), count) for count in (1_500, 700)
-    )
-    same(run(whole), run(run(parts, threads=2).extended(1_500), threads=2))
-
-
 def test_beyond_what_is_kept_singly_all_is_counted(
     plain: Results, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -178,26 +170,27 @@ def test_a_share_is_shown_beyond_its_interval_of_all_but_a_millionth_then_of_95_
         assert (results.shown(certain=True), results.shown()) == (early, last)
 
 
-# Cases asked for, share of them that complies where 0.85 must, units a case; the stages flown.
-STAGED: list[tuple[int | None, float, float, list[int]]] = [
-    (
-        None,
-        0.5,
-        1e-9,
-        [2_048, 8_192, 20_000],
-    ),  # one share is shown, of as many cases, however early it is decided
-    (None, 0.85, 1e-9, [2_048, 8_192, 20_000, 40_000, 80_000, 160_000]),
-    (None, 0.85, 0.2, [2_048, 8_192, 20_000, 40_000]),  # within the budget for more cases
-    (None, 0.86, 1e-9, [2_048, 8_192, 20_000, 40_000]),
-    (None, 0.85, 2.0, [2_048, 8_192]),  # within that of the default number
-    (None, 0.85, 1e9, [2_048]),  # the first are flown in any case
-    (1_000, 0.85, 1e9, [1_000]),
-    (3_000, 0.85, 1e-9, [2_048, 3_000]),
-    (60_000, 0.85, 1e-9, [60_000]),  # they are counted and not kept: all at once
-]
-
-
-@pytest.mark.parametrize(("samples", "share", "effort", "stages"), STAGED)
+@pytest.mark.parametrize(
+    ("samples", "share", "effort", "stages"),
+    [
+        # Cases asked for, share of them that complies where 0.85 must, units a case; the stages
+        # flown.
+        (
+            None,
+            0.5,
+            1e-9,
+            [2_048, 8_192, 20_000],
+        ),  # one share is shown, of as many cases, however early it is decided
+        (None, 0.85, 1e-9, [2_048, 8_192, 20_000, 40_000, 80_000, 160_000]),
+        (None, 0.85, 0.2, [2_048, 8_192, 20_000, 40_000]),  # within the budget for more cases
+        (None, 0.86, 1e-9, [2_048, 8_192, 20_000, 40_000]),
+        (None, 0.85, 2.0, [2_048, 8_192]),  # within that of the default number
+        (None, 0.85, 1e9, [2_048]),  # the first are flown in any case
+        (1_000, 0.85, 1e9, [1_000]),
+        (3_000, 0.85, 1e-9, [2_048, 3_000]),
+        (60_000, 0.85, 1e-9, [60_000]),  # they are counted and not kept: all at once
+    ],
+)
 def test_cases_are_flown_in_stages_until_the_share_is_shown(
     samples: int | None,
     share: float,
@@ -437,18 +430,6 @@ def test_covariances_of_the_cases_agree_within_3_percent_for_small_dispersions(
             analytic = covariance_of(first, output)
             drawn = np.atleast_2d(np.cov(flown[VECTORS[output]]))
             assert np.linalg.norm(drawn - analytic) <= 0.03 * np.linalg.norm(analytic), output
-
-
-def test_the_percentile_of_a_small_nutation_follows_from_the_covariance() -> None:
-    """The length of a plane normal vector, by its covariance alone: 99 % percentile within 3 %."""
-    tolerance = Tolerance("normal", 1e-5, True)
-    study = dispersed.exact_two_pulse(0.02, timing=None, timing_offset=None, A=tolerance)
-    covariance = covariance_of(study.first_order, "nutation")
-    normal = np.random.default_rng(6).multivariate_normal(np.zeros(2), covariance, 200_000)
-    nutation = run(Results(study, 50_000)).distribution("nutation")
-    assert nutation is not None
-    expected = np.quantile(np.linalg.norm(normal, axis=1), 0.99)
-    assert nutation.quantiles(np.array([0.99]))[0] == pytest.approx(expected, rel=0.03)
 
 
 def test_shares_sum_to_one_a_bias_has_none_and_attitude_moves_only_the_axis() -> None:
@@ -729,9 +710,13 @@ def test_neighbours_are_independent() -> None:
 
 
 def test_other_tolerances_do_not_change_the_draws_of_one() -> None:
-    """So two studies of which one has a tighter tolerance see the same cases otherwise."""
+    """A case is the same body whatever else is drawn, with correlated inputs among it."""
     others = an_input("A", "uniform", 5.0), an_input("C", size=2.0), an_input("x", "bias")
     assert np.array_equal(2.0 * drawn(an_input("C"), block=3)["C"], drawn(*others, block=3)["C"])
+    pairs = (("thrust T1", "A", 0.5), ("thrust T2", "thrust T1", 0.7))
+    whole = drawn(*map(an_input, ("A", "thrust T1", "thrust T2")), pairs=pairs)
+    for name in ("A", "thrust T2"):
+        assert np.array_equal(drawn(an_input(name), pairs=pairs)[name], whole[name])
 
 
 def test_what_cannot_be_is_drawn_again_and_reported() -> None:
@@ -823,14 +808,6 @@ def test_the_correlation_of_values_is_the_integral_over_both(kinds: tuple[str, s
     assert (matrix @ matrix.T)[0, 1] == pytest.approx(
         integral / (inputs[0].sigma * inputs[1].sigma), abs=1e-4
     )
-
-
-def test_which_others_are_drawn_makes_no_difference() -> None:
-    """A case is the same body for every schedule, whichever thrusters it fires."""
-    pairs = (("thrust T1", "A", 0.5), ("thrust T2", "thrust T1", 0.7))
-    whole = drawn(*map(an_input, ("A", "thrust T1", "thrust T2")), pairs=pairs)
-    for name in ("A", "thrust T2"):
-        assert np.array_equal(drawn(an_input(name), pairs=pairs)[name], whole[name])
 
 
 def test_a_case_drawn_again_is_correlated_too() -> None:
@@ -1153,22 +1130,6 @@ def test_what_is_drawn_and_what_touches_nothing() -> None:
     warm = craft("cold: {normal: 2 %}")
     unused += list_inputs(warm, fires(warm, commands(warm))).unused
     check_text("montecarlo.unused-valves", "\n".join(f"{one.name}: {one.reason}" for one in unused))
-
-
-def test_a_study_spreads_as_its_valves_do() -> None:
-    """Of a single pulse along ω the nutation is off by the impulse: one sigma of it is that of the
-    draws.
-    """
-    body = craft("close_delay: {a: {normal: 1 ms}}")
-    made = fires(body, commands(body, 0.05)[:1])
-    spread = run(Results(study_of(body, made, seed=3), 4000)).distribution("nutation")
-    assert spread is not None
-    early, late = (
-        nutation(RealWidths, DispersedModel(body, made), {"close_delay a": one})
-        for one in (-0.001, 0.001)
-    )
-    low, high = spread.quantiles(np.array([0.1587, 0.8413]))
-    assert high - low == pytest.approx(abs(late - early), rel=0.05)
 
 
 def test_bare_numbers_are_dispersed_and_shown_in_parts_of_their_own_values() -> None:

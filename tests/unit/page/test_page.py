@@ -26,10 +26,8 @@ from support import places, reference
 from support.builders import present
 from support.cases import deep, weekly
 from support.golden import check_text
-from support.markup import Node
-from support.pages import plain_page
-from support.process import Run
-from support.shown import WIDE, cells, downloaded, facts, section, sheet, tree
+from support.process import Run, plain_page
+from support.shown import WIDE, Node, cells, downloaded, facts, section, sheet, tree
 from support.spinners import FILE
 
 import nutdamp

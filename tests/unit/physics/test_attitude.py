@@ -13,7 +13,7 @@ from scipy.integrate import quad
 from support import reference
 from support.builders import present, within
 from support.cases import spread
-from support.spinning import BODIES, EPS, about, arc, plain_spinners, spinners
+from support.spinning import EPS, about, arc, plain_spinners, spinners
 
 from nutdamp.physics import attitude, response
 from nutdamp.physics import body as rigid_body
@@ -550,16 +550,6 @@ def test_magnus_21_and_22_made_exact(A: float, C: float, spin: float, degrees: f
     assert halves.first + halves.second == pytest.approx(A * size, rel=2 * EPS)
     assert min(halves) > 0.0
     assert max(after_two(A, C, spin, omega, *halves)) < 2 * FLOWN
-
-
-@pytest.mark.parametrize("half_turns", [3, 9])
-@pytest.mark.parametrize(("A", "C"), BODIES[:2])
-def test_the_second_pulse_may_come_any_odd_number_of_half_turns_later(
-    A: float, C: float, half_turns: int
-) -> None:
-    size = rigid_body.transverse_rate(A, C, math.radians(25), -2.0)
-    first, second, wait = rigid_body.half_pulses(A, C, size, -2.0)
-    assert max(after_two(A, C, -2.0, size + 0j, first, second, half_turns * wait)) < 2 * FLOWN
 
 
 @pytest.mark.parametrize(

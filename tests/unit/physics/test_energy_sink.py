@@ -74,7 +74,6 @@ BODIES = {
     "nearly a sphere": body(100, 100.001, 2.0, 40.0, 50.0),
     "about -e3": body(120, 80, 3.0, 120.0, 150.0),
 }
-every_body = pytest.mark.parametrize("one", BODIES.values(), ids=BODIES)
 
 
 @spread("one", BODIES.values(), quick=2, deep=7, ids=BODIES)
@@ -106,19 +105,6 @@ def test_the_example_of_the_course() -> None:
     # In the end flat, at 30 rpm.
     assert rates[7, 2] == pytest.approx(0.0, abs=1e-100)
     assert across[7] * 30 / math.pi == pytest.approx(30.0, rel=1e-3)
-
-
-@every_body
-def test_one_moment_and_many_agree(one: Body) -> None:
-    for time in (0.0, 1e-9, 0.7, 30.0, 900.0, 1e6):
-        sink = one.A, one.C, one.growth, QUATERNION, one.omega, one.spin
-        omega, spin, end = arc(*sink, time)
-        (transverse,), (axial,), (turned,) = arc(*sink, np.array([time]))
-        scale = 1.0 + abs(one.spin) * time  # roundings of the angle turned
-        assert omega == pytest.approx(complex(transverse), abs=8 * EPS * scale)
-        assert spin == pytest.approx(float(axial), rel=8 * EPS, abs=1e-100)
-        assert end == pytest.approx(turned, abs=8 * EPS * scale)
-        assert float(np.linalg.norm(end)) == pytest.approx(1.0, abs=20 * EPS)
 
 
 # --- limits

@@ -550,11 +550,8 @@ def test_series_under_a_torque(
         sense = math.copysign(1.0, moments[2] * spin + wheel)
         span = np.array([time])
         forcing = Forcing(growth=growth, wheel=wheel, sense=sense)
-        flown = (
-            reference.sinking(moments, begin, torque, span, growth, wheel)
-            if growth
-            else reference.coast(moments, begin, torque, span, wheel=wheel)
-        )
+        push = reference.Push(0.0, time, torque)
+        flown = reference.path(moments, begin, [push], span, growth, wheel)
         body, turned = series(moments, torque, rates, quaternion, 0.0, time, forcing)[-1].end()
         assert body == pytest.approx(flown[0].rates, abs=1e-10)
         assert apart(turned[None], flown) < 1e-10
@@ -575,11 +572,7 @@ def test_series_under_a_torque(
             many, np.zeros(3), np.tile(rates, (3, 1)).T, np.tile(quaternion, (3, 1)).T
         )
         advance(begun, np.full(3, time))
-        free = (
-            reference.sinking(moments, begin, np.zeros(3), span, growth, wheel)
-            if growth
-            else reference.coast(moments, begin, np.zeros(3), span, wheel=wheel)
-        )
+        free = reference.path(moments, begin, (), span, growth, wheel)
         assert begun.rates[:, 1] == pytest.approx(free[0].rates, abs=1e-10)
 
 

@@ -9,15 +9,14 @@ from functools import partial
 
 import numpy as np
 import pytest
-from support import places
 from support.builders import HALF_A_DEGREE, channel, cross, judged, present, spinner
 from support.cases import deep, weekly
 from support.checker import violations
 from support.commands import WIDER
 from support.dispersed import normal
+from support.flights import flown_outputs
 from support.golden import refused
 from support.places import case
-from support.single_case import flown_outputs
 
 import nutdamp
 from nutdamp.common import work
@@ -134,58 +133,64 @@ def flown_out(monkeypatch: pytest.MonkeyPatch) -> None:
 
 IDLE = Requirement(momentum_shift=0.1)
 
-# Plans, of which the first is recommended without --robust; those of which enough fresh cases
-# comply too; the chosen one and what decided; None: that with most cases is taken.
-CHOICES: list[tuple[list[screening.FlownPlan], set[int], int | None, Ground | None]] = [
-    ([candidate(2.0, ENOUGH), candidate(1.0, ENOUGH)], {0, 1}, 1, Ground.COST),
-    (
-        [candidate(2.0, ENOUGH), candidate(1.0, ENOUGH)],
-        {0},
-        0,
-        Ground.ONLY,
-    ),  # the cheaper one complied by luck
-    ([candidate(2.0, ENOUGH), candidate(1.0, TOO_FEW)], {0, 1}, 0, Ground.ONLY),
-    ([candidate(2.0, ENOUGH), candidate(1.0, UNKNOWN)], {0, 1}, 0, Ground.ONLY),
-    (
-        [candidate(2.0, ENOUGH), candidate(1.0, ENOUGH, flown=0.6)],
-        {0, 1},
-        0,
-        Ground.ONLY,
-    ),  # it misses nominally
-    ([candidate(1.0, ENOUGH, end=2.0), candidate(1.0 - 1e-12, ENOUGH)], {0, 1}, 0, Ground.NOMINAL),
-    (
-        [candidate(2.0, ENOUGH), candidate(1.0, ENOUGH, end=2.0), candidate(1.0, ENOUGH)],
-        {0, 1, 2},
-        2,
-        Ground.END,
-    ),
-    # What is not required is damped all the same, or at least as far as it goes.
-    (
-        [
-            candidate(2.0, ENOUGH, required=IDLE),
-            candidate(1.0, ENOUGH, 4.0, required=IDLE, flown=3.0),
-        ],
-        {0, 1},
-        0,
-        Ground.ONLY,
-    ),
-    (
-        [
-            candidate(1.0, ENOUGH, 4.0, required=IDLE, flown=3.0),
-            candidate(2.0, ENOUGH, 2.0, required=IDLE, flown=1.0),
-        ],
-        {0, 1},
-        1,
-        Ground.ONLY,
-    ),
-    ([candidate(2.0, ENOUGH), candidate(1.0, ENOUGH)], set(), None, None),
-    ([candidate(2.0, TOO_FEW), candidate(1.0, UNKNOWN)], {0, 1}, None, None),
-    ([candidate(1.0, required=None)], {0}, None, None),  # nothing is required
-]
-
 
 @pytest.mark.usefixtures("flown_out")
-@pytest.mark.parametrize(("plans", "fresh", "chosen", "ground"), CHOICES)
+@pytest.mark.parametrize(
+    ("plans", "fresh", "chosen", "ground"),
+    [
+        # Plans, of which the first is recommended without --robust; those of which enough fresh
+        # cases comply too; the chosen one and what decided; None: that with most cases is taken.
+        ([candidate(2.0, ENOUGH), candidate(1.0, ENOUGH)], {0, 1}, 1, Ground.COST),
+        (
+            [candidate(2.0, ENOUGH), candidate(1.0, ENOUGH)],
+            {0},
+            0,
+            Ground.ONLY,
+        ),  # the cheaper one complied by luck
+        ([candidate(2.0, ENOUGH), candidate(1.0, TOO_FEW)], {0, 1}, 0, Ground.ONLY),
+        ([candidate(2.0, ENOUGH), candidate(1.0, UNKNOWN)], {0, 1}, 0, Ground.ONLY),
+        (
+            [candidate(2.0, ENOUGH), candidate(1.0, ENOUGH, flown=0.6)],
+            {0, 1},
+            0,
+            Ground.ONLY,
+        ),  # it misses nominally
+        (
+            [candidate(1.0, ENOUGH, end=2.0), candidate(1.0 - 1e-12, ENOUGH)],
+            {0, 1},
+            0,
+            Ground.NOMINAL,
+        ),
+        (
+            [candidate(2.0, ENOUGH), candidate(1.0, ENOUGH, end=2.0), candidate(1.0, ENOUGH)],
+            {0, 1, 2},
+            2,
+            Ground.END,
+        ),
+        # What is not required is damped all the same, or at least as far as it goes.
+        (
+            [
+                candidate(2.0, ENOUGH, required=IDLE),
+                candidate(1.0, ENOUGH, 4.0, required=IDLE, flown=3.0),
+            ],
+            {0, 1},
+            0,
+            Ground.ONLY,
+        ),
+        (
+            [
+                candidate(1.0, ENOUGH, 4.0, required=IDLE, flown=3.0),
+                candidate(2.0, ENOUGH, 2.0, required=IDLE, flown=1.0),
+            ],
+            {0, 1},
+            1,
+            Ground.ONLY,
+        ),
+        ([candidate(2.0, ENOUGH), candidate(1.0, ENOUGH)], set(), None, None),
+        ([candidate(2.0, TOO_FEW), candidate(1.0, UNKNOWN)], {0, 1}, None, None),
+        ([candidate(1.0, required=None)], {0}, None, None),  # nothing is required
+    ],
+)
 def test_the_cheapest_plan_of_which_enough_cases_comply_in_fresh_ones_too(
     plans: list[screening.FlownPlan],
     fresh: set[int],
@@ -532,49 +537,6 @@ SHORT, LONG, ALL = STAGES[:3]
 FAILS = (-1.0, -1.0)  # a case cannot be flown
 Told = list[tuple[float, float]]
 
-# Of each plan, the cheapest first, between which shares of all cases those lie that comply, as far
-# as the cases of each stage tell; how many it flies; which of them is recommended, and its status.
-FLOWN: list[tuple[list[tuple[Told, int]], int, Status]] = [
-    # As many as it takes to know whether enough comply, and all with the plan to fly.
-    ([([(0.9, 0.95)], SHORT), ([(0.99, 1.0), (0.996, 0.999), (0.998, 0.998)], ALL)], 1, Status.FLY),
-    (
-        [([(0.998, 1.0)] * 2 + [(0.9985,) * 2], ALL), ([(0.99, 1.0), (0.998, 0.9995)], LONG)],
-        0,
-        Status.FLY,
-    ),
-    (
-        [
-            ([(0.99, 1.0), (0.99, 0.998), (0.996,) * 2], ALL),
-            ([(0.998, 1.0)] * 2 + [(0.999,) * 2], ALL),
-        ],
-        1,
-        Status.FLY,
-    ),
-    # Too few with each: all that may be better than the best by a hundredth.
-    (
-        [
-            ([(0.5, 0.6), (0.55, 0.57), (0.56,) * 2], ALL),
-            ([(0.3, 0.58), (0.4, 0.5), (0.45,) * 2], ALL),
-            ([(0.2, 0.569)], SHORT),
-        ],
-        0,
-        Status.NOT_ENOUGH,
-    ),
-    (
-        [
-            ([(0.5, 0.6), (0.51, 0.56), (0.52,) * 2], ALL),
-            ([(0.4, 0.6), (0.5, 0.58), (0.54,) * 2], ALL),
-        ],
-        1,
-        Status.NOT_ENOUGH,
-    ),
-    # Not known with all cases that are flown.
-    ([([(0.9, 0.95)], SHORT), ([(0.99, 1.0)] * 3, ALL)], 1, Status.NOT_SHOWN),
-    # Plans with a case that cannot be flown are out, at once or later.
-    ([([FAILS], 0), ([(0.998, 1.0)] * 2 + [(0.999,) * 2], ALL)], 1, Status.FLY),
-    ([([(0.998, 1.0), FAILS], 0), ([(0.998, 1.0)] * 2 + [(0.999,) * 2], ALL)], 1, Status.FLY),
-]
-
 
 @pytest.fixture
 def staged(monkeypatch: pytest.MonkeyPatch) -> dict[float, Told]:
@@ -619,7 +581,56 @@ def flown_of(
     return [flown[one].cases.samples if one in flown else 0 for one in plans]
 
 
-@pytest.mark.parametrize(("told", "chosen", "status"), FLOWN)
+@pytest.mark.parametrize(
+    ("told", "chosen", "status"),
+    [
+        # Of each plan, the cheapest first, between which shares of all cases those lie that comply,
+        # as far as the cases of each stage tell; how many it flies; which of them is recommended,
+        # and its status.
+        # As many as it takes to know whether enough comply, and all with the plan to fly.
+        (
+            [([(0.9, 0.95)], SHORT), ([(0.99, 1.0), (0.996, 0.999), (0.998, 0.998)], ALL)],
+            1,
+            Status.FLY,
+        ),
+        (
+            [([(0.998, 1.0)] * 2 + [(0.9985,) * 2], ALL), ([(0.99, 1.0), (0.998, 0.9995)], LONG)],
+            0,
+            Status.FLY,
+        ),
+        (
+            [
+                ([(0.99, 1.0), (0.99, 0.998), (0.996,) * 2], ALL),
+                ([(0.998, 1.0)] * 2 + [(0.999,) * 2], ALL),
+            ],
+            1,
+            Status.FLY,
+        ),
+        # Too few with each: all that may be better than the best by a hundredth.
+        (
+            [
+                ([(0.5, 0.6), (0.55, 0.57), (0.56,) * 2], ALL),
+                ([(0.3, 0.58), (0.4, 0.5), (0.45,) * 2], ALL),
+                ([(0.2, 0.569)], SHORT),
+            ],
+            0,
+            Status.NOT_ENOUGH,
+        ),
+        (
+            [
+                ([(0.5, 0.6), (0.51, 0.56), (0.52,) * 2], ALL),
+                ([(0.4, 0.6), (0.5, 0.58), (0.54,) * 2], ALL),
+            ],
+            1,
+            Status.NOT_ENOUGH,
+        ),
+        # Not known with all cases that are flown.
+        ([([(0.9, 0.95)], SHORT), ([(0.99, 1.0)] * 3, ALL)], 1, Status.NOT_SHOWN),
+        # Plans with a case that cannot be flown are out, at once or later.
+        ([([FAILS], 0), ([(0.998, 1.0)] * 2 + [(0.999,) * 2], ALL)], 1, Status.FLY),
+        ([([(0.998, 1.0), FAILS], 0), ([(0.998, 1.0)] * 2 + [(0.999,) * 2], ALL)], 1, Status.FLY),
+    ],
+)
 def test_plans_compared_fly_as_many_cases_as_decide(
     told: list[tuple[Told, int]], chosen: int, status: Status, staged: dict[float, Told]
 ) -> None:
@@ -733,7 +744,7 @@ def test_what_costs_more_than_is_left_of_the_budget_is_not_begun(
     """The first cases are flown at once: they alone may take long, where coasts are no arcs and
     cones are looked at.
     """
-    body = load_spacecraft(places.case("rob2.yaml"))
+    body = load_spacecraft(case("rob2.yaml"))
     monkeypatch.setattr(RealWidths, "effort", 1e9)
     compared = compare(body, ["two-pulse"])
     assert (compared.flown, compared.verdict.status) == ({}, Status.NOT_SHOWN)

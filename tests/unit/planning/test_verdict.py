@@ -2,12 +2,10 @@
 and comparisons.
 """
 
-import csv
-import io
 import itertools
 import json
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -36,6 +34,7 @@ from support.builders import (
 from support.cases import weekly
 from support.certificate_checker import check
 from support.checker import violations
+from support.commands import rows as rows_of
 from support.dispersed import normal
 from support.golden import check_text, refused
 from support.process import Run
@@ -87,41 +86,6 @@ EXITS = {
 PROBABLE = Requirement(nutation=math.radians(0.5), probability=0.99)
 SPREAD = Dispersions(A=normal(0.5))
 
-# Requirement, dispersions, nutation left in deg, from where to where the share of all cases lies of
-# which 99.7 % must comply; status, colour, whether all that is required is met.
-VERDICTS: list[
-    tuple[Requirement | None, bool, float, tuple[float, float] | None, Status, Light, bool | None]
-] = [
-    (HALF_A_DEGREE, False, 0.4, None, Status.FLY, Light.AMBER, True),
-    (HALF_A_DEGREE, False, 0.6, None, Status.NOT_ENOUGH, Light.RED, False),
-    (
-        PROBABLE,
-        False,
-        0.4,
-        None,
-        Status.NOT_SHOWN,
-        Light.RED,
-        False,
-    ),  # a probability, and nothing to draw from
-    (PROBABLE, False, 0.6, None, Status.NOT_ENOUGH, Light.RED, False),
-    (HALF_A_DEGREE, True, 0.4, None, Status.NOT_SHOWN, Light.RED, False),  # no case was flown
-    (HALF_A_DEGREE, True, 0.4, (0.998, 0.9995), Status.FLY, Light.GREEN, True),
-    (HALF_A_DEGREE, True, 0.4, (0.997, 1.0), Status.FLY, Light.GREEN, True),
-    (HALF_A_DEGREE, True, 0.4, (0.9969, 1.0), Status.NOT_SHOWN, Light.RED, False),
-    (HALF_A_DEGREE, True, 0.4, (0.99, 0.9969), Status.NOT_ENOUGH, Light.RED, False),
-    (
-        HALF_A_DEGREE,
-        True,
-        0.6,
-        (0.998, 0.9995),
-        Status.NOT_ENOUGH,
-        Light.RED,
-        False,
-    ),  # it misses with nominal values
-    (None, False, 3.0, None, Status.FLY, Light.AMBER, None),
-    (None, True, 3.0, None, Status.FLY, Light.AMBER, None),
-]
-
 
 def within(low: float, high: float) -> Cases:
     return Cases(20_000, 1, 0.997, low, low, high)
@@ -129,7 +93,38 @@ def within(low: float, high: float) -> Cases:
 
 def test_the_status_goes_by_nominal_values_and_by_the_interval_of_the_share() -> None:
     assert {status: status.exit_status for status in Status} == EXITS
-    for required, dispersed, left, share, *expected in VERDICTS:
+    for required, dispersed, left, share, *expected in [
+        # Requirement, dispersions, nutation left in deg, from where to where the share of all cases
+        # lies of which 99.7 % must comply; status, colour, whether all that is required is met.
+        (HALF_A_DEGREE, False, 0.4, None, Status.FLY, Light.AMBER, True),
+        (HALF_A_DEGREE, False, 0.6, None, Status.NOT_ENOUGH, Light.RED, False),
+        (
+            PROBABLE,
+            False,
+            0.4,
+            None,
+            Status.NOT_SHOWN,
+            Light.RED,
+            False,
+        ),  # a probability, and nothing to draw from
+        (PROBABLE, False, 0.6, None, Status.NOT_ENOUGH, Light.RED, False),
+        (HALF_A_DEGREE, True, 0.4, None, Status.NOT_SHOWN, Light.RED, False),  # no case was flown
+        (HALF_A_DEGREE, True, 0.4, (0.998, 0.9995), Status.FLY, Light.GREEN, True),
+        (HALF_A_DEGREE, True, 0.4, (0.997, 1.0), Status.FLY, Light.GREEN, True),
+        (HALF_A_DEGREE, True, 0.4, (0.9969, 1.0), Status.NOT_SHOWN, Light.RED, False),
+        (HALF_A_DEGREE, True, 0.4, (0.99, 0.9969), Status.NOT_ENOUGH, Light.RED, False),
+        (
+            HALF_A_DEGREE,
+            True,
+            0.6,
+            (0.998, 0.9995),
+            Status.NOT_ENOUGH,
+            Light.RED,
+            False,
+        ),  # it misses with nominal values
+        (None, False, 3.0, None, Status.FLY, Light.AMBER, None),
+        (None, True, 3.0, None, Status.FLY, Light.AMBER, None),
+    ]:
         made = judged("a", left, required=required)
         made = replace(
             made, spacecraft=replace(made.spacecraft, dispersions=SPREAD if dispersed else None)
@@ -426,10 +421,6 @@ def test_a_broken_cone_is_in_every_file(run: Run) -> None:
         ]  # that of the Sun is any
 
 
-def csv_rows(text: str) -> Iterator[dict[str, str]]:
-    return iter(csv.DictReader(io.StringIO(text)))
-
-
 def test_json_and_the_table_of_schemes_have_the_verdict_of_each(run: Run, tmp_path: Path) -> None:
     done = run(
         *BOTH_SCHEMES, "--nominal", "--table", "schemes.csv", "--json", "plan.json", columns=80
@@ -447,7 +438,7 @@ def test_json_and_the_table_of_schemes_have_the_verdict_of_each(run: Run, tmp_pa
     assert max(map(len, done.stdout.splitlines())) <= 80
     assert shift["margin_deg"] == pytest.approx(shift["limit_deg"] - shift["nominal_deg"])
     assert decision["final"]["spin_rad_s"] == pytest.approx(math.pi)
-    rows = csv_rows((tmp_path / "schemes.csv").read_text("utf-8"))
+    rows = rows_of((tmp_path / "schemes.csv").read_text("utf-8"))
     for row, one in zip(rows, content["plans"], strict=True):
         yes = [
             str(value).lower()
@@ -465,7 +456,7 @@ def test_json_and_the_table_of_schemes_have_the_verdict_of_each(run: Run, tmp_pa
 
 @pytest.mark.deep
 def test_the_table_of_schemes_goes_by_cases_has_shares_and_what_is_infeasible(run: Run) -> None:
-    two, four = csv_rows(run(*BOTH_SCHEMES, "--table", "-").stdout)
+    two, four = rows_of(run(*BOTH_SCHEMES, "--table", "-").stdout)
     assert [(row["recommended"], row["meets_requirement"]) for row in (two, four)] == [
         ("true", "true"),
         ("false",) * 2,
@@ -473,9 +464,7 @@ def test_the_table_of_schemes_goes_by_cases_has_shares_and_what_is_infeasible(ru
     assert float(two["met_fraction"]) == pytest.approx(0.99995, abs=1e-4)
     assert four["met_fraction"] == ""
     rows = list(
-        csv_rows(
-            run(*BOTH_SCHEMES, "--robust", "--table", "-", "--set", "limits.horizon=4s").stdout
-        )
+        rows_of(run(*BOTH_SCHEMES, "--robust", "--table", "-", "--set", "limits.horizon=4s").stdout)
     )
     assert {row["feasible"] for row in rows} == {"true", "false"}
     for row in rows:
@@ -539,29 +528,26 @@ def cut(limits: Limits, disturbances: tuple[Disturbance, ...] = ()) -> Spacecraf
     )
 
 
-HINDERED: dict[str, tuple[Spacecraft, str]] = {
-    "weak": (
-        spinner(channels=cross(0.1, max_on_time=0.5), limits=Limits(horizon=30.0)),
-        "four-pulse",
-    ),
-    "no shorter": (
-        spinner(channels=cross(8.0, min_on_time=5.0), requirement=Requirement(nutation=1e-4)),
-        "two-pulse",
-    ),
-    "suspected": (BALL, "four-pulse"),
-    "no other limits in the file": (SINGLE, "one-pulse"),
-    "dark": (replace(SINGLE, limits=Limits(horizon=7.0, blackout=((0.0, 1.0),))), "one-pulse"),
-    "one pulse": (cut(Limits(max_pulses=1)), "four-pulse"),
-    "disturbed": (cut(Limits(), TILTING), "four-pulse"),
-    "steady tilt": (cut(Limits(), TILTING), "four-pulse"),
-    "ticks": (cut(Limits(tick=0.3)), "four-pulse"),
-    "ticks, and pulses left": (cut(Limits(tick=0.3, max_pulses=5)), "four-pulse"),
-}
-
-
 def test_what_stands_in_the_way_is_named_and_nothing_else() -> None:
     texts = []
-    for name, (body, scheme) in HINDERED.items():
+    for name, (body, scheme) in {
+        "weak": (
+            spinner(channels=cross(0.1, max_on_time=0.5), limits=Limits(horizon=30.0)),
+            "four-pulse",
+        ),
+        "no shorter": (
+            spinner(channels=cross(8.0, min_on_time=5.0), requirement=Requirement(nutation=1e-4)),
+            "two-pulse",
+        ),
+        "suspected": (BALL, "four-pulse"),
+        "no other limits in the file": (SINGLE, "one-pulse"),
+        "dark": (replace(SINGLE, limits=Limits(horizon=7.0, blackout=((0.0, 1.0),))), "one-pulse"),
+        "one pulse": (cut(Limits(max_pulses=1)), "four-pulse"),
+        "disturbed": (cut(Limits(), TILTING), "four-pulse"),
+        "steady tilt": (cut(Limits(), TILTING), "four-pulse"),
+        "ticks": (cut(Limits(tick=0.3)), "four-pulse"),
+        "ticks, and pulses left": (cut(Limits(tick=0.3, max_pulses=5)), "four-pulse"),
+    }.items():
         compared = compare(
             body, (scheme,), catalogue.Options(with_disturbances=name == "steady tilt")
         )
@@ -1024,7 +1010,7 @@ def test_what_plan_finds_is_traded_where_the_fastest_is_not_found(
 
 def test_where_optimal_cannot_fire_the_other_schemes_are_traded(run: Run, tmp_path: Path) -> None:
     run("trade", STEERED, "--points", "2", "--csv", "t.csv")
-    rows = list(csv.DictReader(io.StringIO((tmp_path / "t.csv").read_text("utf-8"))))
+    rows = rows_of((tmp_path / "t.csv").read_text("utf-8"))
     expected = [("two-pulse", "true"), ("one-pulse", "false"), ("two-pulse", "true")]
     assert [(row["scheme"], row["meets_requirement"]) for row in rows] == expected
     assert float(rows[0]["end_s"]) == planning.plan(nutdamp.load(STEERED), "two-pulse").end
@@ -1038,7 +1024,7 @@ def test_where_optimal_cannot_fire_the_other_schemes_are_traded(run: Run, tmp_pa
 def test_the_command_writes_table_csv_json_picture_and_schedules(run: Run, tmp_path: Path) -> None:
     files = ["--csv", "t.csv", "--json", "t.json", "--plot", "t.svg", "--schedules", "front"]
     assert run("trade", "--points", "2", "--allow", "0", *files).returncode == 0
-    rows = list(csv.DictReader(io.StringIO((tmp_path / "t.csv").read_text())))
+    rows = rows_of((tmp_path / "t.csv").read_text())
     written = json.loads((tmp_path / "t.json").read_text())["fronts"][0]["points"]
     assert len(rows) == len(written) == len(list((tmp_path / "front").glob("point-*.csv"))) == 2
     assert float(rows[0]["propellant_kg"]) == written[0]["propellant_kg"]
@@ -1099,7 +1085,7 @@ def test_the_searches_of_all_points_share_a_limit_of_work(
     monkeypatch.setattr(work, "FRONTS", 5.0)
     monkeypatch.setattr(work, "SCHEME", 5.0)
     none = run(*command, "--csv", "-", status=0)
-    assert {row["scheme"] for row in csv.DictReader(io.StringIO(none.stdout))} <= {
+    assert {row["scheme"] for row in rows_of(none.stdout)} <= {
         "two-pulse",
         "four-pulse",
     }
@@ -1162,22 +1148,6 @@ def halved(*keys: str | int) -> Callable[[dict[str, Any]], None]:
     return halve
 
 
-TAMPERED: list[Callable[[dict[str, Any]], None]] = [
-    halved("circle", 0),
-    halved("nutation_rad_s"),
-    halved("equations", 0, "goal_Nms"),
-    lambda c: c.update(bound=1.001 * c["bound"]),
-    halved("channels", 0, "cost_per_s"),
-    lambda c: c["channels"][0].update(
-        torque_Nm=[1.1 * one for one in c["channels"][0]["torque_Nm"]]
-    ),
-    halved("burns", 0, "on_time_s"),
-    lambda c: c["burns"][0].update(t_s=c["burns"][0]["t_s"] + 0.4),
-    halved("primer", 0, "q", "+1", 7),
-    raised,
-]
-
-
 def refutes(text: str, *tampers: Callable[[dict[str, Any]], None]) -> None:
     """The file as it is proves what it says, and as any of these make it does not."""
     for tamper in tampers:
@@ -1196,7 +1166,23 @@ def test_the_file_alone_proves_the_bound_and_a_tampered_one_does_not(name: str) 
     bounds = present(made.plan.pulses.bounds)
     assert check(text) == bounds.first_order == made.proof.bound > 0.0
     if "windows" in name:
-        refutes(text, *TAMPERED)
+        refutes(
+            text,
+            *[
+                halved("circle", 0),
+                halved("nutation_rad_s"),
+                halved("equations", 0, "goal_Nms"),
+                lambda c: c.update(bound=1.001 * c["bound"]),
+                halved("channels", 0, "cost_per_s"),
+                lambda c: c["channels"][0].update(
+                    torque_Nm=[1.1 * one for one in c["channels"][0]["torque_Nm"]]
+                ),
+                halved("burns", 0, "on_time_s"),
+                lambda c: c["burns"][0].update(t_s=c["burns"][0]["t_s"] + 0.4),
+                halved("primer", 0, "q", "+1", 7),
+                raised,
+            ],
+        )
 
 
 @pytest.mark.deep

@@ -11,9 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 from support import reference
-from support.builders import aimed, channel, codes, cross, one_of, present, spinner
+from support.builders import aimed, channel, codes, cross, documented, one_of, present, spinner
 from support.cases import deep, spread, weekly
-from support.documents import documented
 from support.golden import refused
 
 from nutdamp.common.results import Value

@@ -231,12 +231,10 @@ def test_equal_pulses_once_a_turn_leave_no_more_nutation_than_the_bound(A: float
     body = still(A, C, 10.0, channels=cross(20.0), limits=Limits(horizon=400.0))
     pulses = feasible_by("rhumb-line", body).pulses.pulses
     bound = pulses[0].magnitude / (C * 3.0) / abs(math.sin(math.pi * (1 - C / A)))
-    nutations = []
-    for number in range(1, len(pulses)):
-        moving = reference.fly(
-            (A, A, C), body.omega0, events(pulses[:number]), pulses[number].start
-        )
-        nutations.append(reference.nutation((A, A, C), moving.rates, 1.0))
+    start = reference.Motion(body.omega0, np.eye(3))
+    starts = [pulse.start for pulse in pulses[1:]]
+    motions = reference.path((A, A, C), start, events(pulses), starts)
+    nutations = [reference.nutation((A, A, C), one.rates, 1.0) for one in motions]
     assert 0.7 * bound < max(nutations) < 1.02 * bound  # it is reached, so the bound is no idle one
 
 

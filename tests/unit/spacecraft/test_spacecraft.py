@@ -218,23 +218,17 @@ TENSOR = "{tensor: [[120, 2, 1], [2, 110, 0.5], [1, 0.5, 80]]}"
 
 
 def test_arms_count_from_the_center_of_mass() -> None:
-    body = nutdamp.read(TEXT)
-    assert body.channels[0].torque == pytest.approx(np.cross([0.0, 0.5, 0.8], [0.0, -10.0, 0.0]))
-    assert body.channels[1].torque == pytest.approx(np.cross([0.0, -0.5, 0.8], [0.0, 10.0, 0.0]))
-
-
-def test_a_force_through_the_center_of_mass_turns_nothing() -> None:
-    through = TEXT.replace("direction: [0, -1, 0]", "direction: [0, 0.5, 0.8]")
-    with pytest.raises(nutdamp.errors.FaultyFile, match="centre of mass"):
-        nutdamp.read(through)
-
-
-def test_an_accelerometer_counts_from_it_too() -> None:
+    """Of thrusters and of an accelerometer; a force through it turns nothing."""
     loop = (
         "loop: {sensor: {kind: accelerometer, rate: 10 Hz, position: [0.9, 0, 0.4]}, "
         "start: 1 deg, stop: 0.1 deg}\n"
     )
-    assert present(nutdamp.read(TEXT + loop).loop).sensor.position == pytest.approx([0.8, 0.0, 0.0])
+    body = nutdamp.read(TEXT + loop)
+    for one, side in zip(body.channels, (0.5, -0.5), strict=True):
+        assert one.torque == pytest.approx(np.cross([0.0, side, 0.8], [0.0, -20.0 * side, 0.0]))
+    assert present(body.loop).sensor.position == pytest.approx([0.8, 0.0, 0.0])
+    with pytest.raises(nutdamp.errors.FaultyFile, match="centre of mass"):
+        nutdamp.read(TEXT.replace("direction: [0, -1, 0]", "direction: [0, 0.5, 0.8]"))
 
 
 @pytest.mark.parametrize("inertia", ["{A: 120, C: 80}", TENSOR])

@@ -1,6 +1,7 @@
-"""Synthetic telemetry of every kind of column, as CSV files, flown by DOP853."""
+"""Synthetic telemetry by DOP853, of every kind of column, and fits whose values are given."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,12 +13,107 @@ from support import reference
 
 import nutdamp
 from nutdamp.common.time import Epoch
+from nutdamp.estimation.model import Model
 from nutdamp.estimation.parameters import GYROS, Record
+from nutdamp.estimation.search import Fit
 from nutdamp.files.telemetry import read_telemetry
 from nutdamp.physics import attitude
+from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
 
+# --- synthetic telemetry by DOP853 with noise, gaps, outliers, steps and biases
+
 Array = NDArray[np.float64]
+
+SIGMA = 0.005
+"""Standard deviation of A and C in the files, as a share."""
+
+GYRO_BIAS = math.radians(0.02)
+"""Standard deviation of the biases, as fits take it where a file says nothing."""
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """A file, the record of a body that differs from it,
+    and the true values of what is estimated.
+    """
+
+    spacecraft: nutdamp.Spacecraft
+    record: Record
+    truth: dict[str, float]
+    noise: float
+
+
+def motion(
+    moments: tuple[float, float, float], rates: Array, times: Array, growth: float = 0.0
+) -> Array:
+    """Body rates (n, 3) at ``times`` (n,) s from 0, rad/s."""
+    start = reference.Motion(rates, np.eye(3))
+    return np.array([one.rates for one in reference.path(moments, start, (), times, growth)])
+
+
+def gyro_case(seed: int) -> Case:
+    """A minute or so of gyro data of a body of either shape and sense, by ``seed``."""
+    draw = np.random.default_rng([16, seed])
+    prolate = seed % 2 == 0
+    A = 120.0
+    C = A * (draw.uniform(0.45, 0.85) if prolate else draw.uniform(1.15, 1.8))
+    spin = (-1.0 if seed % 4 > 1 else 1.0) * draw.uniform(0.8, 4.0)
+    nutation = math.radians(draw.uniform(0.5, 15.0))
+    phase = draw.uniform(-math.pi, math.pi)
+    nominal = nutdamp.load(
+        {
+            "name": "synthetic",
+            "inertia": {"A": A, "C": C},
+            "state": {
+                "spin": spin,
+                "nutation": f"{math.degrees(nutation)} deg",
+                "phase": f"{math.degrees(phase)} deg",
+            },
+            "dispersions": {"A": {"normal": "0.5 %"}, "C": {"normal": "0.5 %"}},
+        }
+    )
+    truth = {"A": A * (1.0 + SIGMA * draw.normal()), "C": C * (1.0 + SIGMA * draw.normal())}
+    rates = nominal.omega0 + math.radians(0.5) * draw.normal(size=3)
+    truth |= {f"omega_{number}": float(rates[number - 1]) for number in (1, 2, 3)}
+    growing = draw.uniform() < 0.5
+    truth["growth"] = draw.uniform(0.0005, 0.003) * (1.0 if prolate else -1.0) if growing else 0.0
+    period = 2.0 * math.pi / abs(1.0 - truth["C"] / truth["A"]) / abs(spin)
+    length = draw.uniform(3.0, 12.0) * period
+    count = int(draw.integers(150, 500))
+    times = (
+        np.sort(draw.uniform(0.0, length, count))
+        if draw.uniform() < 0.3
+        else np.linspace(0.0, length, count)
+    )
+    times -= times[0]
+    rates_ = motion((truth["A"], truth["A"], truth["C"]), rates, times, truth["growth"])
+    tilt = math.radians(1.0) * draw.normal(size=2)
+    bias = GYRO_BIAS * draw.normal(size=3)
+    truth |= {"misalignment_1": float(tilt[0]), "misalignment_2": float(tilt[1])}
+    truth |= {f"bias_{name}": float(one) for name, one in zip(GYROS, bias, strict=True)}
+    turned = Rotation.from_rotvec([-tilt[0], -tilt[1], 0.0]).apply(rates_)
+    noise = math.radians(10.0 ** draw.uniform(-2.5, -1.3))
+    shown = turned + bias + noise * draw.normal(size=turned.shape)
+    outliers = draw.uniform(size=shown.shape) < draw.choice([0.0, 0.01, 0.03])
+    shown = np.where(
+        outliers,
+        shown + noise * draw.choice([-1.0, 1.0], shown.shape) * draw.uniform(15, 500, shown.shape),
+        shown,
+    )
+    if draw.uniform() < 0.5:  # steps up to twice the noise
+        step = draw.uniform(0.5, 2.0) * noise
+        shown = np.rint(shown / step) * step
+    gaps = draw.uniform(size=shown.shape) < draw.choice([0.0, 0.1, 0.3])
+    if draw.uniform() < 0.3:
+        begin = draw.uniform(0.2, 0.6) * length
+        gaps |= ((times > begin) & (times < begin + 0.2 * length))[:, None]
+    shown = np.where(gaps, np.nan, shown)
+    record = Record(times, {name: shown[:, at] for at, name in enumerate(GYROS)})
+    return Case(nominal, record, truth, noise)
+
+
+# --- synthetic telemetry of every kind of column, as CSV files, flown by DOP853
 
 KINDS = (
     ("omega_12",),
@@ -39,6 +135,36 @@ KINDS = (
 EPOCH = "2026-03-01T12:00:00Z"
 BIAS, TILT, ATTITUDE = math.radians(0.02), math.radians(1.0), math.radians(0.3)
 """Standard deviations of gyro biases, of tilts of sensors, and of the attitude of the file."""
+
+TOLERANCES: dict[str, object] = {
+    "A": {"normal": "0.5 %"},
+    "C": {"normal": "0.5 %"},
+    "omega0": {"normal": "0.3 deg/s"},
+    "thrust": {"normal": "3 %"},
+}
+ATTITUDE_OF_FILE = {"quaternion": [1, 0.1, 0.2, 0.3], "epoch": EPOCH, "frame": "EME2000"}
+ACCELEROMETER: dict[str, object] = {
+    "sensor": {
+        "kind": "accelerometer",
+        "rate": "10 Hz",
+        "position": ["0.8 m", 0, 0],
+        "axis": [0, 0, 1],
+    },
+    "law": "four-pulse",
+    "start": "0.5 deg",
+    "stop": "0.05 deg",
+}
+SENSED: dict[str, object] = {
+    "name": "sensed",
+    "inertia": {"A": 120.0, "C": 84.0},
+    "state": {"spin": 3.0, "nutation": "4 deg", "phase": "20 deg"},
+    "attitude": ATTITUDE_OF_FILE,
+    "sun": "epoch",
+    "sun_sensor": {"azimuth": "35 deg"},
+    "thrusters": [{"name": "T1", "torque": [8, 0, 0]}, {"name": "T2", "torque": [0, 8, 0]}],
+    "dispersions": TOLERANCES,
+}
+"""The file of a body with a Sun sensor and two thrusters."""
 
 FARTHEST = math.cos(math.radians(25.0))
 """Cosine of the angle of the Sun from the axis, at most: nutations are half of that."""
@@ -72,43 +198,20 @@ def _any_file(draw: np.random.Generator, seed: int) -> tuple[nutdamp.Spacecraft,
     C = 120.0 * (draw.uniform(0.45, 0.85) if prolate else draw.uniform(1.15, 1.7))
     spin = (-1.0 if draw.uniform() < 0.5 else 1.0) * draw.uniform(0.8, 4.0)
     facing = draw.normal(size=4)
-    return nutdamp.load(
-        {
-            "name": f"kind {seed}",
-            "inertia": {"A": 120.0, "C": C},
-            "state": {
-                "spin": spin,
-                "nutation": f"{draw.uniform(1.0, 12.0)} deg",
-                "phase": f"{draw.uniform(-180, 180)} deg",
-            },
-            "attitude": {
-                "quaternion": (facing / np.linalg.norm(facing)).tolist(),
-                "epoch": EPOCH,
-                "frame": "EME2000",
-            },
-            "sun": "epoch",
-            "sun_sensor": {"azimuth": "35 deg"},
-            "thrusters": [{"name": "T1", "torque": [8, 0, 0]}, {"name": "T2", "torque": [0, 8, 0]}],
-            "loop": {
-                "sensor": {
-                    "kind": "accelerometer",
-                    "rate": "10 Hz",
-                    "position": ["0.8 m", 0, 0],
-                    "axis": [0, 0, 1],
-                },
-                "law": "four-pulse",
-                "start": "0.5 deg",
-                "stop": "0.05 deg",
-            },
-            "dispersions": {
-                "A": {"normal": "0.5 %"},
-                "C": {"normal": "0.5 %"},
-                "omega0": {"normal": "0.3 deg/s"},
-                "thrust": {"normal": "3 %"},
-                "attitude": {"normal": "0.3 deg"},
-            },
-        }
-    ), prolate
+    state = {
+        "spin": spin,
+        "nutation": f"{draw.uniform(1.0, 12.0)} deg",
+        "phase": f"{draw.uniform(-180, 180)} deg",
+    }
+    keys = {
+        "name": f"kind {seed}",
+        "inertia": {"A": 120.0, "C": C},
+        "state": state,
+        "attitude": ATTITUDE_OF_FILE | {"quaternion": (facing / np.linalg.norm(facing)).tolist()},
+        "loop": ACCELEROMETER,
+        "dispersions": TOLERANCES | {"attitude": {"normal": "0.3 deg"}},
+    }
+    return nutdamp.load(SENSED | keys), prolate
 
 
 def telemetry(folder: Path, seed: int, kind: tuple[str, ...] | None = None) -> Telemetry:
@@ -137,7 +240,7 @@ def telemetry(folder: Path, seed: int, kind: tuple[str, ...] | None = None) -> T
     times: Array = np.linspace(0.0, length, count).round(6)
     fired = _fired(draw, body, length) if "fired" in kind else Schedule()
     flight = _Flight(
-        (A, A, C), reference.Motion(rates, attitude.matrix(quaternion)), truth, draw, fired, length
+        (A, A, C), reference.Motion(rates, attitude.matrix(quaternion)), truth, draw, fired
     )
     columns = _columns(draw, kind, body, flight, times, truth)
     path = folder / f"{seed}.csv"
@@ -178,39 +281,23 @@ class _Flight:
         truth: dict[str, float],
         draw: np.random.Generator,
         fired: Schedule,
-        length: float,
     ) -> None:
         """Draws thrust factors and delays of the channels of ``fired`` into ``truth``."""
         self.moments = moments
         self.growth = truth["growth"]
-        self.begins = [(0.0, start, np.zeros(3))]
+        self.start = start
+        self.events = list[reference.Push]()
         for pulse in fired:
             factor = 1.0 + 0.03 * draw.normal()
             late = 0.05 * draw.normal()
             truth |= {f"thrust {pulse.channel}": factor, f"delay {pulse.channel}": late}
             assert pulse.torque is not None
-            for time, torque in (
-                (pulse.start + late, factor * pulse.torque),
-                (pulse.end + late, np.zeros(3)),
-            ):
-                self.begins.append((time, self.at(np.array([time]))[0], torque))
-        self.length = length
+            pushed = pulse.start + late, pulse.end + late, factor * pulse.torque
+            self.events.append(reference.Push(*pushed))
 
     def at(self, times: Array) -> list[reference.Motion]:
         """The motion at rising times."""
-        found: list[reference.Motion] = []
-        ends = [one[0] for one in self.begins[1:]] + [math.inf]
-        for (begin, start, torque), end in zip(self.begins, ends, strict=True):
-            inside = times[(times > begin) & (times <= end)] - begin
-            found += [start] * int(begin == 0.0 and bool(len(times)) and times[0] == 0.0)
-            if not len(inside):
-                continue
-            found += (
-                reference.sinking(self.moments, start, torque, inside, self.growth)
-                if self.growth
-                else reference.coast(self.moments, start, torque, inside)
-            )
-        return found
+        return reference.path(self.moments, self.start, self.events, times, self.growth)
 
     def change(self, rates: Array) -> Array:
         """dω/dt (n, 3) on a coast: H stands still in space, and the body turns with ω and what
@@ -318,4 +405,38 @@ def _spoilt(draw: np.random.Generator, values: Array, noise: float) -> Array:
         shown = np.rint(shown / step) * step
     return np.asarray(
         np.where(draw.uniform(size=len(values)) < draw.choice([0.0, 0.2]), math.nan, shown)
+    )
+
+
+# --- fits whose values and sigmas are given, as if a record had told them
+
+
+def silent(
+    *signals: str, until: float = 10.0, count: int = 11, schedule: Schedule | None = None
+) -> Record:
+    """A record of ``signals`` that are all zero but for the axis, which points along z."""
+    zeros = {name: np.full(count, float(name == "axis_z")) for name in signals}
+    return Record(np.linspace(0.0, until, count), zeros, schedule=schedule or Schedule())
+
+
+def told(
+    body: Spacecraft,
+    record: Record,
+    given: Mapping[str, float],
+    sigmas: Mapping[str, float],
+    *,
+    unequal: bool = False,
+) -> Fit:
+    """The ``given`` values of parameters, others as in the file; known to a step if alone."""
+    model = Model(body, record, unequal=unequal)
+    parameters = model.parameters
+    unknown = ({*given} | {*sigmas}) - {one.name for one in parameters}
+    assert not unknown, unknown
+    values = np.array([given.get(one.name, one.file) for one in parameters])
+    covariance = np.diag([sigmas.get(one.name, one.step) ** 2 for one in parameters])
+    count = len(model.measured)
+    used = np.ones(count, dtype=bool)
+    noise = np.ones(len(model.signals))
+    return Fit(
+        model, values, covariance, noise, used, np.zeros(count), np.zeros((count, len(parameters)))
     )
