@@ -83,7 +83,6 @@ class BlockSearch:
         self.model = BlockModel(spacecraft)
         self.flights = BlockFlights(spacecraft)
         self.limit = {bound.part: bound.limit for bound in self.flights.bounds}
-        self.looked = 0
         self.rows = dict[Blocks, tuple[BlockSequences, int]]()  # of those that are flown
         limits, turn, step = spacecraft.limits, self.model.turn, commands.delay_step
         self.allowed = min(commands.max_count, LONGEST, limits.max_pulses or LONGEST)
@@ -99,8 +98,7 @@ class BlockSearch:
         size = self.size(most)
         self.coarse = self.last_delay < FEW_DELAYS
         self.whole = size <= WHOLE and self.coarse
-        if self.whole:
-            self.looked = round(size)
+        self.looked = round(size) if self.whole else 0
 
     def size(self, most: int) -> float:
         """Number of sequences of up to ``most`` blocks up to the horizon."""

@@ -22,11 +22,7 @@ from nutdamp.flight import propagation
 from nutdamp.flight.end_state import left_by
 from nutdamp.schemes.block_flights import BlockFlights, FlownSequence
 from nutdamp.schemes.block_model import BlockModel, acts, spin_turn
-from nutdamp.schemes.block_search import (
-    BLOCKS,
-    LONGEST,
-    BlockSearch,
-)
+from nutdamp.schemes.block_search import BLOCKS, LONGEST, BlockSearch
 from nutdamp.schemes.catalogue import CommandBlockOptions
 from nutdamp.schemes.sequential import NO_AXIAL, at_hand
 from nutdamp.schemes.valve_commands import Legs
@@ -50,8 +46,10 @@ def scope_note(search: BlockSearch, chosen: FlownSequence) -> Note:
     nutation, end = (
         math.degrees(abs(float(a) - b)) for a, b in zip(form[:2], flown[:2], strict=True)
     )
-    code = "blocks-compared" if search.whole else "blocks-found"
-    return note(code, compared=search.looked, nutation_deg=nutation, end_deg=end)
+    figures = {"compared": search.looked, "nutation_deg": nutation, "end_deg": end}
+    if search.whole:
+        return note("blocks-compared", **figures)
+    return note("blocks-found", **figures)
 
 
 def cures(search: BlockSearch, chosen: FlownSequence, most: int) -> list[Note]:
