@@ -44,9 +44,9 @@ BLIND = 32  # spin turns in a row without a Sun pulse, after which none is waite
 ALWAYS = 500  # Sun pulses that flights of blocks may take whatever work is spent
 NEVER = np.iinfo(np.int64).max  # number of a Sun pulse that is not waited for
 
-FIRED, STEPPED, INTEGRATED = 0.05, 0.7, 12.0
+FIRED, STEPPED, INTEGRATED = 0.05, 0.7, 6.0
 """Units of `work` of a pulse that is fired, of the motion of all flights to the next Sun pulse, and
-of that where it is integrated (64 flights of 20 pulses take 50 ms, of ACE 400 ms).
+of that where it is integrated (64 flights of 20 pulses take 50 ms, of ACE 190 ms).
 """
 
 KEPT = 4_000_000  # entries of tables of the supply that are kept

@@ -153,19 +153,23 @@ class BlockSearch:
     def _dear(self) -> bool:
         """True where more blocks may cost much less than those that comply.
 
-        The least is what kicks cost that all point against ω, or two pulses; or the way to the
-        target.
+        The least is what kicks cost that all point against ω, or two pulses; or what the straight
+        way to the target costs. A bound on the shift may take any more than that.
         """
-        if not self.flights.damps or Part.SHIFT in self.limit:
+        if self.spacecraft.goal.spin is not None or not math.isfinite(self.flights.cheapest):
             return not math.isfinite(self.flights.cheapest)
         allowed = math.tan(self.limit[Part.NUTATION]) * abs(self.spacecraft.axial)
         kicked = abs(self.model.start.phasor) - allowed
         costs = []
         for channel in self.channels:
-            if channel.transverse:
-                widths = commandable_widths(self.commands, channel)
-                on_times = acts(channel, widths).on_time if len(widths) else np.array([math.inf])
+            widths = commandable_widths(self.commands, channel)
+            if channel.transverse and len(widths):
+                on_times = acts(channel, widths).on_time
                 lasts = max(kicked / abs(channel.transverse), 2.0 * float(on_times.min()))
+                if self.spacecraft.goal.axis is not None:
+                    turns = self.model.turned_by(channel, widths, self.spacecraft.spin)
+                    way = self.spacecraft.to_turn - self.limit[Part.DISTANCE]
+                    lasts = max(way * float(np.min(on_times / turns)), float(on_times.min()))
                 costs.append(channel.cost_rate(by_propellant=True) * lasts)
         return self.flights.cheapest > DEAR * min(costs, default=math.inf)
 
