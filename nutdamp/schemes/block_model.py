@@ -46,7 +46,7 @@ NEVER = np.iinfo(np.int64).max  # number of a Sun pulse that is not waited for
 
 FIRED, STEPPED, INTEGRATED = 0.05, 0.7, 6.0
 """Units of `work` of a pulse that is fired, of the motion of all flights to the next Sun pulse, and
-of that where it is integrated (64 flights of 20 pulses take 50 ms, of ACE 190 ms).
+of a turn of theirs that is integrated (64 flights of 20 pulses take 50 ms, of ACE 190 ms).
 """
 
 KEPT = 4_000_000  # entries of tables of the supply that are kept
@@ -248,9 +248,12 @@ def fire_all(
     count = len(sequences)
     arcs = spacecraft.inertia.symmetric and not spacecraft.disturbances
     per_kg = shed(spacecraft)
-    over = np.zeros(count)
+    over, passed = np.zeros(count), np.zeros(count)
+    turn = spin_turn(spacecraft)
     for motion, flights in sun_pulses:
-        work.spend((STEPPED if arcs else INTEGRATED) + FIRED * len(flights))
+        turns = 1.0 if arcs else float(np.max(motion.since - passed)) / turn
+        passed = motion.since
+        work.spend((STEPPED if arcs else INTEGRATED * turns) + FIRED * len(flights))
         delays = motion.since * 0.0
         widths = np.zeros(count)
         given = dict[int, Pulse]()

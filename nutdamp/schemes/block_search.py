@@ -34,7 +34,7 @@ from nutdamp.schemes.block_model import BlockModel, BlockState, Trial, acts, eve
 from nutdamp.spacecraft.constraints import Windows, commandable_widths
 from nutdamp.spacecraft.equipment import Block, Channel, Commands
 from nutdamp.spacecraft.model import Spacecraft
-from nutdamp.spacecraft.requirements import SAME_COST, Left, Part, complies
+from nutdamp.spacecraft.requirements import SAME_COST, Part, complies
 
 BLOCKS = 3  # blocks of a schedule, at most
 WHOLE = 5_000_000  # sequences of a grid that is searched whole, at most: some ten seconds
@@ -64,7 +64,7 @@ FLOWN_PULSES = 4000  # pulses of a batch of flights, at most: it then takes less
 # multiple of the least cost above which further blocks are looked for though one complies
 DEAR = 1.5
 NEIGHBOURS = 12  # flights near which others are looked for
-ROUNDS = 6  # searches near the best flights, where none complies
+ROUNDS = 4  # searches near the best flights, where none complies
 CHUNK = 200_000  # trials whose motion is computed at once: arrays that the caches hold
 LOOKED = 1e-6  # units of `work` of a block that is looked at
 
@@ -156,13 +156,12 @@ class BlockSearch:
         The least is what kicks cost that all point against ω, or two pulses; or what the straight
         way to the target costs. A bound on the shift may take any more than that.
         """
-        if self.spacecraft.goal.spin is not None or not math.isfinite(self.flights.cheapest):
-            return not math.isfinite(self.flights.cheapest)
+        if self.spacecraft.goal.spin is not None or self.flights.cheapest == math.inf:
+            return self.flights.cheapest == math.inf
         allowed = math.tan(self.limit[Part.NUTATION]) * abs(self.spacecraft.axial)
         kicked = abs(self.model.start.phasor) - allowed
         costs = []
-        for channel in self.channels:
-            widths = commandable_widths(self.commands, channel)
+        for (channel, _), widths in zip(self.kinds, self.widths, strict=True):
             if channel.transverse and len(widths):
                 on_times = acts(channel, widths).on_time
                 lasts = max(kicked / abs(channel.transverse), 2.0 * float(on_times.min()))
@@ -599,11 +598,6 @@ class BlockSearch:
             every if count > 1 else self.commands.every[0],
         )
         return (*self.blocks(sequences.before, int(sequences.parent[row])), block)
-
-    def form(self, blocks: Blocks) -> Left:
-        """Residual of flown blocks in closed form."""
-        sequences, row = self.rows[blocks]
-        return self.model.left(sequences.state.some(row))
 
     def neighbours(self) -> list[BlockSequences]:
         """Blocks about as long and as late as those of the best flights, where the closed form errs

@@ -41,7 +41,8 @@ FLOWN_PULSES = 2000  # pulses that are flown, after which no further sequence is
 
 def scope_note(search: BlockSearch, chosen: FlownSequence) -> Note:
     """Scope of the search, and flight against closed form."""
-    form = search.form(chosen.schedule.blocks)
+    sequences, row = search.rows[chosen.schedule.blocks]
+    form = search.model.left(sequences.state.some(row))
     flown = left_by(propagation.flown(search.spacecraft, chosen.schedule))
     nutation, end = (
         math.degrees(abs(float(a) - b)) for a, b in zip(form[:2], flown[:2], strict=True)
