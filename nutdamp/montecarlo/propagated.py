@@ -389,10 +389,12 @@ class RealWidths:
                 (number for block in blocks for number in block.sun_pulses), default=0
             )
         try:
-            (schedule,), seen = fire_all(spacecraft, [blocks])
+            (schedule,), sun_pulses = fire_all(spacecraft, [blocks])
         except Infeasible:
             return [False]
-        return [False] if isinstance(schedule, Infeasible) else [bool(sees[0]) for sees in seen]
+        if isinstance(schedule, Infeasible):
+            return [False]
+        return [bool(sees[0]) for sees in sun_pulses.seen]
 
     @cached_property
     def effort(self) -> float:

@@ -362,7 +362,7 @@ class SunPulseClock:
             pace, (ahead, _) = self._pace, self._ahead(self.here, self.sun)
             passed = np.rint((pace * (self.here.since - self.time) + ahead) / CIRCLE)
             expected = self.here.since + (ahead + CIRCLE * (step - passed)) / pace
-            stretch = self._root(self.here.moved(expected), pace, self.sun)
+            stretch = self._root(self.here.moved(expected), pace, self.sun, ~self.lost)
             self._look_back(stretch, expected, pace)
             off, rate = self._off(stretch, self.sun)
             astray = np.abs(stretch.since - expected) * pace > math.pi
@@ -390,7 +390,7 @@ class SunPulseClock:
     def _look_back(self, sun_pulse: MotionStretch, expected: Array, pace: Array) -> None:
         """Recompute in place the Sun pulses that came before the end of the last pulse."""
         for stretch, over in zip(self._stretches[-2::-1], self._stretches[:0:-1], strict=True):
-            cases = np.flatnonzero(sun_pulse.since < over.since)
+            cases = np.flatnonzero((sun_pulse.since < over.since) & ~self.lost)
             if not len(cases):
                 return
             start = stretch.some(cases).moved(np.minimum(expected, over.since)[cases])
@@ -398,22 +398,41 @@ class SunPulseClock:
             for whole, part in zip(sun_pulse[1:4], again[1:4], strict=True):
                 whole[..., cases] = part
 
-    def _root(self, start: MotionStretch, pace: Array, sun: Array) -> MotionStretch:
+    def _root(
+        self,
+        start: MotionStretch,
+        pace: Array,
+        sun: Array,
+        wanted: NDArray[np.bool_] | None = None,
+    ) -> MotionStretch:
         """Motion as the Sun passes the sensor, at the time nearest to that of ``start``: by
-        Newton's method.
+        Newton's method, of those ``wanted`` (n,), default all.
         """
         here = start
+        count = len(start.since)
+        pending = np.ones(count, dtype=bool) if wanted is None else wanted.copy()
         # A pulse more than half a turn off is lost. Under thrust Newton's steps may go on for
         # hundreds of radians: a plan of blocks took 75 s so, and 15 s within a turn.
         earliest, latest = start.since - CIRCLE / pace, start.since + CIRCLE / pace
         for _ in range(ITERATIONS):
-            off, rate = self._off(here, sun)
+            rows = np.flatnonzero(pending)
+            if not len(rows):
+                break
+            # Few that take long, as at an end of that turn, do not keep the others.
+            few = 2 * len(rows) < count
+            rows = rows if few else np.arange(count)
+            some = here.some(rows) if few else here
+            off, rate = self._off(some, sun[:, rows])
             # Where the Sun is near the axis its azimuth may not change for a moment: then by the
             # mean rate.
-            time = here.since + off / np.where(rate > 0.1 * pace, rate, pace)
-            here = here.moved(np.clip(time, earliest, latest))
-            if np.all(np.abs(off) < CIRCLE * EXACT):
-                break
+            time = some.since + off / np.where(rate > 0.1 * pace[rows], rate, pace[rows])
+            moved = some.moved(np.clip(time, earliest[rows], latest[rows]))
+            pending[rows] &= (np.abs(off) >= CIRCLE * EXACT) & (moved.since != some.since)
+            if few:
+                for whole, part in zip(here[1:4], moved[1:4], strict=True):
+                    whole[..., rows] = part
+            else:
+                here = moved
         return here
 
     def _off(self, here: MotionStretch, sun: Array) -> tuple[Array, Array]:

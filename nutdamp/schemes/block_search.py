@@ -1,785 +1,635 @@
-"""Search over command blocks in closed form, and the flights of the best.
+"""Search over command blocks: a beam in closed form, and flights in batches.
 
-Every block of one channel, width, number of pulses and interval is looked at in closed form
-(`block_model`), at the delays next to the two that serve best: one for the heading of H, one for
-the nutation. Second and third blocks are looked for behind the most promising. The best dozen are
-flown from the Sun pulses of the nutating body.
+Block after block, each sequence of the beam is continued by blocks of every channel and interval:
+pairs of width and number of pulses by their merits, after some waits, at the delays next to the two
+that serve best: one for the heading of H, one for the nutation. `BlockModel` gives the motion of
+all of them at once. The most promising are flown together from the Sun pulses of the nutating body.
+Grids of up to `WHOLE` sequences are searched whole: of these no pair, wait or delay is left out but
+what surely misses, or costs more than a flight that complies.
 """
 
 from __future__ import annotations
 
 import itertools
 import math
-import operator
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import suppress
-from dataclasses import fields
-from heapq import nsmallest
-from itertools import islice
-from typing import Any, NamedTuple
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.common import work
-from nutdamp.errors import Infeasible
-from nutdamp.flight import propagation
-from nutdamp.flight.end_state import left_by
-from nutdamp.schemes.block_model import BlockModel, BlockState, Trial, acts, evenly, fire_all
-from nutdamp.spacecraft import requirements
-from nutdamp.spacecraft.constraints import Windows, commandable_widths, keeps_limits
+from nutdamp.schemes.block_flights import (
+    Array,
+    BlockFlights,
+    Blocks,
+    BlockSequences,
+    Index,
+    front,
+    joined,
+    least,
+)
+from nutdamp.schemes.block_model import BlockModel, BlockState, Trial, acts, evenly
+from nutdamp.spacecraft.constraints import Windows, commandable_widths
 from nutdamp.spacecraft.equipment import Block, Channel, Commands
 from nutdamp.spacecraft.model import Spacecraft
-from nutdamp.spacecraft.requirements import SAME_COST, Left, Part, complies
-from nutdamp.spacecraft.schedule import Schedule
+from nutdamp.spacecraft.requirements import SAME_COST, Part, complies
 
-GENTLE = (
-    10  # multiple of `FLOWN`: sequences among which those with the smallest pulses are flown too
-)
-# blocks after one wait up to which all are looked at, and the cheapest of them behind which others
-# are
-ALL_BLOCKS = 400
-ALL_FIRSTS = 300
+BLOCKS = 3  # blocks of a schedule, at most
+WHOLE = 5_000_000  # sequences of a grid that is searched whole, at most: some ten seconds
 LONGEST = 5000  # pulses of a block, at most: more would take the whole budget of work to fire
 SOME_COUNTS = 256  # numbers of pulses that are looked at, where a block may have more
 FEW_DELAYS = 16  # delays, up to which each is looked at
-AROUND = (0, 1)  # steps of the delay that are looked at, from the one below the best delay
-MOST_WIDTHS = (
-    24  # widths that are looked at for a second and a third block, where more can be commanded
-)
-# share of a spin turn by which blocks in closed form keep away from blackout windows: nutation
-# moves Sun pulses
-BESIDE = 0.01
-CHEAPER = (
-    0.9  # multiple of the cost of a sequence below which one that leaves more is looked at, too
-)
-# multiple of the least cost of lowering the nutation above which further blocks are looked for
-# though one complies
-DEAR = 1.5
-CORRECTED = 4  # flights whose neighbours are looked at where none complies
-SURELY = (
-    3.0  # largest difference of a block's length from the way to the target, over its end error
-)
-TOGETHER = 32  # sequences behind which others are looked for at once
-
-Array = NDArray[np.float64]
-
+AROUND = np.array([0.0, 1.0])  # steps from the one below the best delay that are looked at
 WAITS = 24  # Sun pulses that may pass before a block, so that its nutation meets the one before
 # blackout windows after which a block is begun, or before which one ends, at most: the first ones
 WINDOWS = 8
-
-FIRST = 24
-"""First blocks behind which others are looked for: so many of the best, of small ones, and of parts
-of the way.
+# share of a spin turn by which blocks in closed form keep away from blackout windows: nutation
+# moves Sun pulses
+BESIDE = 0.01
+FIRST_PAIRS, PAIRS = 256, 16
+"""Pairs of width and number that are looked at by each merit, for the first block and others."""
+GENTLE = 4  # pulses of a block that is gentle
+WIDTHS = 24  # widths near that of a flown block that are looked at
+PHASED, PHASES = 4, 12
+"""Cheapest pairs that are looked at not only where they damp most, but at as many delays: the next
+block takes what they leave only if its pulse is as large as that.
 """
-
-BLOCKS = 3  # blocks of a schedule, at most
-
-DOUBTFUL, DOUBTS = 1.5, 100
-"""Share of a bound up to which the closed form may err, and sequences flown since that would make
-them good.
-"""
-
-ALIKE = 4  # sequences that may come with the same blocks, over those that are wanted
-
-CLOSEST, FEW = 24, 4
-"""Widths and numbers of later blocks that are looked at, by each of their merits, and pulses that
-count as few.
-"""
-
-LOOKED = 2e-6  # units of `work` of a block that is looked at
-
-Blocks = tuple[Block, ...]
-
-FLOWN = 12  # sequences of blocks that are flown; as many more where none of them complies
-DEARER = (
-    1.01  # multiple of the cost of a sequence that complied in a flight from which on none is flown
-)
-
-
-class BlockSequence(NamedTuple):
-    """Blocks, and their rank in closed form, the less, the better: the share of a bound, 0 where
-    all are kept, then the cost, then the time of the end; and the ``share``.
-    """
-
-    blocks: Blocks
-    rank: tuple[float, float, float]
-    share: float = math.inf
-
-
-class FlownSequence(NamedTuple):
-    """Flight of a sequence; ``rank``: breaks a limit, share of a bound that is passed, cost, end in
-    s.
-    """
-
-    rank: tuple[bool, float, float, float]
-    schedule: Schedule
-    sequence: BlockSequence
-
-
-START = BlockSequence((), (math.inf, math.inf, math.inf))  # no blocks, before which all others come
-
-
-class BlockFlights:
-    """Flights of sequences of one spacecraft: ``of`` each, and the least cost that is ``known`` to
-    comply.
-
-    ``bounds``: what they are judged by; ``damps``: where the nutation alone is to be lowered.
-    """
-
-    def __init__(self, spacecraft: Spacecraft) -> None:
-        self.spacecraft = spacecraft
-        self.known = math.inf
-        self.damps = spacecraft.goal.axis is None and spacecraft.goal.spin is None
-        lower = (
-            0.98 * spacecraft.nutation if self.damps else math.inf
-        )  # blocks without a goal are to lower it
-        self.bounds = []
-        for bound in requirements.bounds(spacecraft):
-            if bound.part is Part.NUTATION:
-                bound = bound._replace(limit=min(bound.limit, lower))
-            elif bound.part is Part.SPIN:
-                bound = bound._replace(limit=requirements.AIMED_SPIN * bound.limit)
-            self.bounds.append(bound)
-        self.of: dict[Blocks, FlownSequence] = {}
-        self._fired: dict[Blocks, Schedule | Infeasible] = {}
-
-    def share(self, left: Left) -> NDArray[np.float64]:
-        """Largest share of a bound that is ``left``: 1 or less keeps all."""
-        return np.asarray(np.max(np.broadcast_arrays(*self.shares(left).values()), axis=0))
-
-    def shares(self, left: Left) -> dict[Part, NDArray[np.float64]]:
-        """Share of each bound that is ``left``."""
-        left_of, spacecraft = requirements.left_of, self.spacecraft
-        return {
-            bound.part: np.asarray(bound.used(left_of(bound, left, spacecraft)))
-            for bound in self.bounds
-        }
-
-    def fired(self, sequences: Sequence[BlockSequence]) -> Iterator[BlockSequence]:
-        """The sequences that cost no more than one that complied in a flight; a dozen of them are
-        fired together.
-        """
-        for begin in range(0, len(sequences), FLOWN):
-            some = [
-                each
-                for each in sequences[begin : begin + FLOWN]
-                if each.rank[1] <= self.known * DEARER
-            ]
-            new = [sequence.blocks for sequence in some if sequence.blocks not in self._fired]
-            if new:
-                self._fired.update(zip(new, self._together(new), strict=True))
-            yield from (each for each in some if each.rank[1] <= self.known * DEARER)
-
-    def _together(self, some: Sequence[Blocks]) -> Sequence[Schedule | Infeasible]:
-        """Pulses of sequences; one by one where the motion of one of them cannot be followed."""
-        try:
-            return fire_all(self.spacecraft, some)[0]
-        except Infeasible as reason:
-            return [reason] if len(some) == 1 else [self._together([blocks])[0] for blocks in some]
-
-    def flown(self, sequence: BlockSequence) -> FlownSequence:
-        """The flight of the blocks, with its rank. Raises Infeasible where they cannot be flown."""
-        if sequence.blocks not in self.of:
-            if sequence.blocks not in self._fired:
-                self._fired[sequence.blocks] = self._together([sequence.blocks])[0]
-            schedule = self._fired[sequence.blocks]
-            if isinstance(schedule, Infeasible):
-                raise schedule
-            share = float(self.share(left_by(propagation.flown(self.spacecraft, schedule))))
-            missed = (
-                0.0 if complies(share) else float(f"{share:.9g}")
-            )  # rounding is no reason to wait for a Sun pulse
-            rank = not keeps_limits(self.spacecraft, schedule), missed, schedule.cost, schedule.end
-            self.of[sequence.blocks] = FlownSequence(rank, schedule, sequence)
-            if rank[:2] == (False, 0.0):
-                self.known = min(self.known, sequence.rank[1])
-        return self.of[sequence.blocks]
-
-    @property
-    def all(self) -> list[FlownSequence]:
-        """All flights so far, the best first."""
-        return sorted(self.of.values(), key=lambda flight: flight.rank)
-
-    @property
-    def complies(self) -> bool:
-        """True if a sequence complied in its flight."""
-        return math.isfinite(self.known)
-
-
-def by_blocks(sequences: Iterable[BlockSequence]) -> dict[tuple[Block, ...], BlockSequence]:
-    """Sequences by their blocks, the last of equal ones at the place of the first."""
-    return {sequence.blocks: sequence for sequence in sequences}
-
-
-def of_each_kind(ranked: Iterable[BlockSequence], *names: str) -> list[BlockSequence]:
-    """The first sequence of each kind, by the fields of its blocks that are named; default channel
-    and interval.
-    """
-    kinds: dict[tuple[object, ...], BlockSequence] = {}
-    fields = operator.attrgetter(*(names or ("channel", "every")))
-    for sequence in ranked:
-        kinds.setdefault(tuple(map(fields, sequence.blocks)), sequence)
-    return list(kinds.values())
+BEAM = 32  # sequences that are continued, by each merit
+COARSE = 300  # cheapest sequences that are continued where delays are few: as in cb5030
+DOUBTFUL = 1.5  # share of a bound up to which the closed form may err
+FLOWN = 64  # sequences that are flown together, by each merit
+FLOWN_PULSES = 4000  # pulses of a batch of flights, at most: it then takes less than a second
+# multiple of the least cost above which further blocks are looked for though one complies
+DEAR = 1.5
+NEIGHBOURS = 12  # flights near which others are looked for
+ROUNDS = 4  # searches near the best flights, where none complies
+CHUNK = 200_000  # trials whose motion is computed at once: arrays that the caches hold
+LOOKED = 1e-6  # units of `work` of a block that is looked at
 
 
 class BlockSearch:
-    """The command blocks of one spacecraft and their ranking in closed form."""
+    """Search of the command blocks of one spacecraft, of up to ``most`` blocks.
 
-    def __init__(
-        self, spacecraft: Spacecraft, channels: Sequence[Channel], commands: Commands
-    ) -> None:
-        self.spacecraft, self.channels, self.commands = spacecraft, channels, commands
+    ``looked``: sequences compared; ``whole``: these are all there are.
+    """
+
+    def __init__(self, spacecraft: Spacecraft, channels: Sequence[Channel], most: int) -> None:
+        commands = spacecraft.commands
+        assert commands is not None
+        self.spacecraft, self.channels, self.most = spacecraft, channels, most
+        self.commands: Commands = commands
         self.model = BlockModel(spacecraft)
         self.flights = BlockFlights(spacecraft)
-        self._most = {bound.part: bound.limit for bound in self.flights.bounds}
-        self._named = {channel.name: channel for channel in channels}
-        self.looked = 0
-        self.most = math.inf  # what a sequence may cost
-        self._states: dict[Blocks, BlockState] = {(): self.model.start}
-        self.doubtful: list[
-            BlockSequence
-        ] = []  # those that may comply in a flight, the cheapest first
+        self.limit = {bound.part: bound.limit for bound in self.flights.bounds}
+        self.rows = dict[Blocks, tuple[BlockSequences, int]]()  # of those that are flown
         limits, turn, step = spacecraft.limits, self.model.turn, commands.delay_step
         self.allowed = min(commands.max_count, LONGEST, limits.max_pulses or LONGEST)
         self.pause = math.ceil(limits.gap / turn)
         self.dark = Windows(spacecraft).dark
         self.earliest = max(math.ceil((limits.earliest - self.model.start.sun_pulse) / turn), 0)
-        # Where the nutation alone is to be lowered, and H may end anywhere, delays alone meet
-        # phases: fewer waits do.
-        self._damps = self.flights.damps
-        self._waiting = WAITS // 3 if self._damps and Part.SHIFT not in self._most else WAITS
-        self._every = [
-            every
-            for every in commands.every
-            if every * turn >= limits.gap + float(commands.widths[0])
-        ]
-        self._kinds = list(itertools.product(channels, self._every))
-        last_delay = math.floor(min(commands.delay_max, turn) / step * (1.0 + 1e-12))
-        self._last_delay = last_delay
-        self._few_delays = last_delay < FEW_DELAYS
-        few = min(last_delay + 1, FEW_DELAYS)
-        self._delays = np.asarray(
-            np.arange(few) * step, dtype=np.float64
-        )  # all that can be commanded, where few
-        widths = sum(len(commandable_widths(commands, channel)) for channel in channels)
-        # So few blocks after one wait that all are looked at.
-        self.small = self._few_delays and widths * few * self.allowed <= ALL_BLOCKS
+        self.last_delay = math.floor(min(commands.delay_max, turn) / step * (1.0 + 1e-12))
+        shortest = float(commands.widths[0])
+        every = [each for each in commands.every if each * turn >= limits.gap + shortest]
+        self.kinds = list(itertools.product(channels, every))
+        self.intervals = max(len(every), 1)
+        self.widths = [commandable_widths(commands, channel) for channel, _ in self.kinds]
+        size = self.size(most)
+        self.coarse = self.last_delay < FEW_DELAYS
+        self.whole = size <= WHOLE and self.coarse
+        self.looked = round(size) if self.whole else 0
 
-    def best(self, most: int) -> list[BlockSequence]:
-        """The best few sequences of up to ``most`` blocks, those that are flown."""
-        sequences = self._single()
-        firsts: list[BlockSequence] = []
-        for number in range(2, most + 1):
-            complying = (sequence for sequence in sequences if sequence.rank[0] <= 0.0)
-            cheapest = by_blocks(nsmallest(ALIKE * DOUBTS, complying, key=_rank))
-            self.most = self._first_complying(list(cheapest.values()))
-            if work.exhausted() or (self.most < math.inf and not (self.small or self._dear)):
-                break
-            if number == 2:
-                small = self._further([START], few=2) if abs(self.model.start.phasor) > 0.0 else []
-                firsts = [
-                    *_promising(sequences, FIRST),
-                    *_promising(small, FIRST),
-                    *self._parts()[:FIRST],
-                ]
-                if self.small:  # the 300 cheapest of all
-                    grid = self._grid(self.model.start, self.earliest)
-                    every = self.behind([START], self.model.start, grid, ALL_FIRSTS)
-                    firsts += sorted(every, key=lambda first: first.rank[1])[:ALL_FIRSTS]
-            else:
-                firsts = _promising(firsts, FIRST // 2)
-            firsts = self._further([first for first in firsts if first.rank[1] < self.most], few=4)
-            sequences += firsts
-        self.most = math.inf
-        unsure = (each for each in sequences if each.share <= DOUBTFUL)
-        self.doubtful = list(
-            by_blocks(nsmallest(ALIKE * DOUBTS, unsure, key=lambda each: each.rank[1:])).values()
+    def size(self, most: int) -> float:
+        """Number of sequences of up to ``most`` blocks up to the horizon."""
+        turns = (self.spacecraft.horizon - self.model.start.sun_pulse) / self.model.turn + 1.0
+        turns = int(turns) - self.earliest
+        if turns > 100:  # of one pulse each they are too many
+            return math.inf
+        spans = np.zeros(turns + 1)
+        for (_, every), widths in zip(self.kinds, self.widths, strict=True):
+            for count in range(1, min(self.allowed, (turns - 1) // every + 1) + 1):
+                spans[(count - 1) * every + 1] += len(widths) * (self.last_delay + 1.0)
+        total = 0.0
+        ends = np.zeros(turns + 1)
+        ends[0] = 1.0
+        for _ in range(most):
+            ends = np.convolve(np.cumsum(ends), spans)[: turns + 1]
+            total += float(ends.sum())
+        return total
+
+    @property
+    def start(self) -> BlockSequences:
+        """The sequence of no blocks."""
+        row = np.zeros(1, dtype=np.intp)
+        state = self.model.start.some(row)
+        return BlockSequences(
+            None, row, row, row + 1, row + 0.0, row + 0.0, row, row + math.inf, state
         )
-        # The flight differs a little, and the more the larger the nutation on the way: half of them
-        # are the cheapest that comply, half those that do most clearly, and the best one of each
-        # number of blocks is among them.
-        ranked = [
-            next(alike) for _, alike in itertools.groupby(sorted(sequences, key=_rank), _blocks)
-        ]
-        clear = nsmallest(GENTLE * FLOWN, ranked, key=_share)
-        each = {len(sequence.blocks): sequence for sequence in reversed(ranked)}.values()
-        first = by_blocks((*ranked[: FLOWN // 2], *clear[: FLOWN // 2], *each))
-        # Nutation on the way goes with what one pulse turns H by: where all those miss, the
-        # gentlest of many follow.
-        gentle = sorted(clear, key=self._largest_pulse)
-        more = by_blocks((*_front(ranked)[:FLOWN], *of_each_kind(ranked)[:FLOWN], *gentle))
-        others = (sequence for blocks, sequence in more.items() if blocks not in first)
-        return [*first.values(), *islice(others, 4 * FLOWN)]
 
-    def _first_complying(self, sequences: Sequence[BlockSequence]) -> float:
-        """Fly sequences until one complies, and return its cost, kg; infinite where none does."""
-        for sequence in self.flights.fired(sequences[: DOUBTS if self.small else FLOWN]):
-            if work.exhausted():
+    def run(self) -> None:
+        """Search, and fly what is promising; ``flights`` has the results."""
+        beam = self.start
+        for number in range(1, self.most + 1):
+            sequences = self.continued(beam, last=number == self.most)
+            if not len(sequences.share):
                 break
-            with suppress(Infeasible):
-                if self.flights.flown(sequence).rank[:2] == (False, 0.0):
-                    return sequence.rank[1]
-        return math.inf
+            self.fly(sequences)
+            if work.exhausted() or not (self.coarse or self._dear):
+                break
+            beam = sequences if self.whole else self.beam(sequences)
+            if not len(beam.share):
+                break
+        for _ in range(ROUNDS):
+            if not self.flights.of or math.isfinite(self.flights.cheapest) or work.exhausted():
+                break
+            flown = len(self.flights.of)
+            for sequences in self.neighbours():
+                self.fly(sequences)
+            if len(self.flights.of) == flown:
+                break
 
     @property
     def _dear(self) -> bool:
-        """True where the nutation alone has to be lowered, and more blocks may cost much less than
-        those that comply.
+        """True where more blocks may cost much less than those that comply.
 
-        The least is what kicks cost that all point against ω, or two pulses.
+        The least is what kicks cost that all point against ω, or two pulses; or what the straight
+        way to the target costs. A bound on the shift may take any more than that.
         """
-        if self._waiting == WAITS:
-            return False
-        kicked = abs(self.model.start.phasor) - math.tan(self._most[Part.NUTATION]) * abs(
-            self.spacecraft.axial
-        )
-        least = math.inf
-        for channel in filter(lambda each: each.transverse, self.channels):
-            shortest = float(
-                acts(channel, commandable_widths(self.commands, channel)).on_time.min()
-            )
-            lasts = max(kicked / abs(channel.transverse), 2.0 * shortest)
-            least = min(least, channel.cost_rate(by_propellant=True) * lasts)
-        return self.most > DEAR * least
+        if self.spacecraft.goal.spin is not None or self.flights.cheapest == math.inf:
+            return self.flights.cheapest == math.inf
+        allowed = math.tan(self.limit[Part.NUTATION]) * abs(self.spacecraft.axial)
+        kicked = abs(self.model.start.phasor) - allowed
+        costs = []
+        for (channel, _), widths in zip(self.kinds, self.widths, strict=True):
+            if channel.transverse and len(widths):
+                on_times = acts(channel, widths).on_time
+                lasts = max(kicked / abs(channel.transverse), 2.0 * float(on_times.min()))
+                if self.spacecraft.goal.axis is not None:
+                    turns = self.model.turned_by(channel, widths, self.spacecraft.spin)
+                    way = self.spacecraft.to_turn - self.limit[Part.DISTANCE]
+                    lasts = max(way * float(np.min(on_times / turns)), float(on_times.min()))
+                costs.append(channel.cost_rate(by_propellant=True) * lasts)
+        return self.flights.cheapest > DEAR * min(costs, default=math.inf)
 
-    def _largest_pulse(self, sequence: BlockSequence) -> float:
-        """The most by which one of its pulses turns H, rad."""
-        pulses = ((self._named[block.channel], block.width) for block in sequence.blocks)
-        return max(float(self.model.turned_by(*pulse, self.spacecraft.spin)) for pulse in pulses)
+    # --- the beam
 
-    def state(self, blocks: Blocks) -> BlockState:
-        """Motion after blocks, in closed form."""
-        if blocks not in self._states:
-            *before, last = blocks
-            trial = Trial(
-                last.first - _following(before), last.delay, last.width, last.count, last.every
-            )
-            self._states[blocks] = self.model.after(
-                self.state(tuple(before)), self._named[last.channel], trial
-            )
-        return self._states[blocks]
+    def continued(self, before: BlockSequences, *, last: bool) -> BlockSequences:
+        """Sequences of one block more."""
+        first = before.before is None
+        earliest = self.earliest if first else self.pause
+        parts = list[BlockSequences]()
+        for rows in self._groups(before.state):
+            if work.exhausted() and parts:
+                break
+            group = before.some(rows)
+            for kind in range(len(self.kinds)):
+                pairs = self.pairs(group, kind, first=first, last=last)
+                waits = self.waits(group.state, earliest)
+                pairs = rows[pairs[0]], *pairs[1:]
+                parts += self.behind(before, kind, pairs, waits, last=last)
+                if self.flights.damps and not (last or self.whole):
+                    cheap = np.flatnonzero(pairs[2] <= 2)
+                    cheap = cheap[np.argsort(pairs[1][cheap] * pairs[2][cheap], kind="stable")]
+                    cheap = cheap[:PHASED]
+                    some = pairs[0][cheap], pairs[1][cheap], pairs[2][cheap]
+                    steps = np.linspace(0.0, self.last_delay, PHASES) * self.commands.delay_step
+                    delays = self.commanded(steps)
+                    early = waits[: WAITS // 3]
+                    parts += self.behind(before, kind, some, early, last=last, delays=delays)
+        return joined(before, parts)
 
-    def _motions(self, before: Sequence[BlockSequence]) -> BlockState:
-        """Motions after some sequences in one,
-        with three more axes behind that of the sequences.
+    def _groups(self, state: BlockState) -> list[Index]:
+        """Rows that are continued together: after as much propellant, and waits of their own
+        where there are blackouts.
         """
-        states = [self.state(sequence.blocks) for sequence in before]
-        if len(states) == 1:
-            return states[0]
-        names = [field.name for field in fields(BlockState)][:-1]  # of numbers
-        columns: dict[str, Any] = {
-            name: np.array([getattr(state, name) for state in states]) for name in names
-        }
-        return BlockState(**{name: column[:, None, None, None] for name, column in columns.items()})
+        rows = np.arange(len(state.sun_pulse))
+        if len(self.dark[0]) > 0 and not self.whole:
+            return list(rows[:, None])
+        if self.model.steady or not len(rows):
+            return [rows]
+        supplies = np.array([state.used, *state.fired.values()])
+        _, group = np.unique(supplies, axis=1, return_inverse=True)
+        group = group.ravel()
+        return [np.flatnonzero(group == number) for number in range(int(group.max()) + 1)]
+
+    def pairs(
+        self, before: BlockSequences, kind: int, *, first: bool, last: bool
+    ) -> tuple[Index, Array, Index]:
+        """Rows of those ``before``, widths and numbers of the blocks that are looked at behind
+        them.
+        """
+        channel, every = self.kinds[kind]
+        counts = self.counts(before.state, every)
+        widths = self.widths[kind]
+        rows = np.arange(len(before.share))
+        width, count = np.repeat(widths, len(counts)), np.tile(counts, len(widths))
+        if kind % self.intervals:  # one pulse has no interval
+            width, count = width[count > 1], count[count > 1]
+        size = len(width)
+        if not size:
+            return rows[:0], width, count
+        if self.whole and not last:
+            chosen = np.ones((len(rows), size), dtype=bool)
+        else:
+            misses = self.misses(before.state, channel, every, width, count)
+        if self.whole:
+            spent = count * acts(channel, width).on_time * channel.cost_rate(by_propellant=True)
+            if last:
+                chosen = misses <= max(DOUBTFUL, float(misses.min()))
+            if self.model.steady:
+                chosen &= before.cost[:, None] + spent < self.flights.cheapest
+        else:
+            few = FIRST_PAIRS if first else PAIRS
+            chosen = self._by_merits(before.state, kind, (width, count), misses, few)
+            if not last:
+                chosen[:, self._part_way(before.state, kind, width, count)] = True
+        at = np.nonzero(chosen)
+        return rows[at[0]], width[at[1]], count[at[1]]
+
+    def _by_merits(
+        self,
+        state: BlockState,
+        kind: int,
+        pairs: tuple[Array, Index],
+        misses: Array,
+        few: int,
+    ) -> NDArray[np.bool_]:
+        """Of pairs the ``few`` cheapest that do, the nearest, the gentle that damp most, and some
+        of these.
+        """
+        channel, every = self.kinds[kind]
+        width, count = pairs
+        spent = acts(channel, width).on_time * count
+        gentle = np.flatnonzero(count <= GENTLE)
+        damped = misses
+        if not self.flights.damps:
+            damped = self.damping_misses(state, channel, every, width[gentle], count[gentle])
+        else:
+            damped = misses[:, gentle]
+        chosen = np.zeros(misses.shape, dtype=bool)
+        rows = np.arange(len(misses))[:, None]
+        in_order = np.where(complies(misses), spent / spent.max() - 2.0 + 1e-9 * misses, misses)
+        chosen[rows, least(in_order, few)] = True
+        chosen[rows, least(misses, few)] = True
+        chosen[rows, gentle[least(damped, few)]] = True
+        chosen[:, evenly(gentle, few)] = True
+        return chosen
+
+    def _part_way(self, state: BlockState, kind: int, width: Array, count: Index) -> Index:
+        """Pairs of three widths that go a part of the way to the target, or end at a blackout."""
+        channel, every = self.kinds[kind]
+        if self.spacecraft.goal.axis is None or not channel.transverse:
+            return np.zeros(0, dtype=np.intp)
+        way = float(np.max(self.model.course(state)[1]))
+        rows = list[Index]()
+        for size in evenly(self.widths[kind], 3).tolist():
+            step = float(self.model.turned_by(channel, size, self.spacecraft.spin))
+            numbers = [*np.linspace(0.0, 1.0, 13)[1:] * way / step]
+            to_dark = (self.dark[0][:WINDOWS] - float(np.min(state.sun_pulse))) / self.model.turn
+            numbers += [*np.floor(to_dark / every), *np.floor(to_dark / every) + 1.0]
+            at = np.flatnonzero(width == size)
+            nearest = np.abs(count[at][:, None] - np.clip(numbers, 1.0, count.max())).argmin(axis=0)
+            rows.append(at[nearest])
+        return np.unique(np.concatenate(rows))
+
+    def beam(self, sequences: BlockSequences) -> BlockSequences:
+        """The promising sequences, with the motion of their flights."""
+        rows = self._fly(sequences, self.promising(sequences))
+        flights = [self.flights.of.get(self.blocks(sequences, int(row))) for row in rows]
+        rows = rows[[flight is not None for flight in flights]]
+        beam = sequences.some(rows)
+        if not len(rows):
+            return beam
+        ends = np.array([flight.end for flight in flights if flight is not None]).T
+        return replace(beam, state=beam.state.shifted(self.model.apart(beam.state, ends)))
+
+    def promising(self, sequences: BlockSequences) -> Index:
+        """Rows that are continued: the best of each width, number and interval, those that leave
+        least for their cost, and the gentle.
+        """
+        order = sequences.ranked
+        order = order[sequences.cost[order] < self.flights.cheapest]
+        kinds = np.array([sequences.width, sequences.count, sequences.kind % self.intervals])
+        _, index = np.unique(kinds[:, order].T, axis=0, return_index=True)
+        distinct = order[np.sort(index)]
+        gentle = distinct[sequences.count[distinct] <= GENTLE]
+        costs = sequences.cost[distinct]
+        fronts = [distinct[front(costs, share)[:BEAM]] for share in (0.9, 1.0)]
+        rows = (distinct[:BEAM], *fronts, gentle[:BEAM])
+        spread = self._spread(sequences, order if self.flights.damps else distinct)
+        cheap = order[np.argsort(sequences.cost[order], kind="stable")]
+        cheap = cheap[: COARSE if self.coarse else 0]
+        return np.unique(np.concatenate([*rows, spread, cheap]))
+
+    def _spread(self, sequences: BlockSequences, order: Index) -> Index:
+        """Of rows in order the best that have gone each of equal parts of the way to the target, or
+        those of which one gentle block more may be the cheapest that do.
+        """
+        state = sequences.state.some(order)
+        if not self.flights.damps:
+            if self.spacecraft.goal.axis is None or not len(order):
+                return order[:0]
+            way = self.model.course(state)[1]
+            part = np.floor(BEAM * way / max(float(np.max(way, initial=0.0)), 1e-300))
+            _, index = np.unique(part, return_index=True)
+            return np.asarray(order[index])
+        totals = np.full(len(order), np.inf)
+        for kind, (channel, every) in enumerate(self.kinds):
+            width = np.repeat(self.widths[kind], GENTLE)
+            count = np.tile(np.arange(1, GENTLE + 1), len(self.widths[kind]))
+            misses = self.damping_misses(state, channel, every, width, count)
+            spent = acts(channel, width).on_time * count * channel.cost_rate(by_propellant=True)
+            total = np.where(complies(misses), state.cost[:, None] + spent, np.inf)
+            totals = np.minimum(totals, total.min(axis=1, initial=np.inf))
+        both = np.array([np.round(totals, 12), sequences.kind[order]])
+        _, index = np.unique(both, axis=1, return_index=True)
+        index = index[np.isfinite(totals[index])][: 2 * BEAM]
+        return np.asarray(order[index])
+
+    # --- the kernel
 
     def behind(
         self,
-        before: Sequence[BlockSequence],
-        state: BlockState,
-        trials: Iterable[tuple[Channel, Trial]],
-        few: int = FLOWN,
+        before: BlockSequences,
+        kind: int,
+        pairs: tuple[Index, Array, Index],
+        waits: Index,
+        *,
+        last: bool,
+        delays: Array | None = None,
         off: BlockState | None = None,
-    ) -> list[BlockSequence]:
-        """The best of the ``trials`` of each channel, after the blocks ``before``, from their
-        `_motions`, ``state``.
+    ) -> Iterator[BlockSequences]:
+        """Blocks of ``pairs`` behind the rows ``before``, after ``waits``: of each pair the best
+        two, or in whole searches all that may be of use.
 
-        The axes of trials are the sequences before, and three more: the best ``few`` are chosen
-        along the last two. ``off``: by how much they end elsewhere than the closed form says.
+        ``delays`` s: default those that serve best. ``off``: by how much they end elsewhere than
+        the closed form says.
         """
-        following = np.array([_following(each.blocks) for each in before])
-        sequences = list[BlockSequence]()
-        for channel, trial in trials:
+        channel, every = self.kinds[kind]
+        size = len(waits) * (self.last_delay + 1 if self.whole else 4)
+        step = max(CHUNK // size, 1)
+        for begin in range(0, len(pairs[0]), step):
+            rows, width, count = (part[begin : begin + step] for part in pairs)
+            state = before.state.some(rows).shaped()
+            trial = Trial(waits[:, None], 0.0, width[:, None, None], count[:, None, None], every)
+            best = self.delays(state, channel, trial) if delays is None else delays
+            trial = trial._replace(delay=best)
             after = self.model.after(state, channel, trial)
-            left = self.model.left(after if off is None else after.shifted(off))
-            shape = np.broadcast_shapes(
-                (len(before), 1, 1, 1), *map(np.shape, (*trial, left.nutation))
-            )
-            self.looked += math.prod(shape)
+            residual = self.model.left(after if off is None else after.shifted(off))
+            share = self.flights.share(residual)
+            shape = np.broadcast_shapes((len(rows), len(waits), 1), np.shape(share))
             work.spend(LOOKED * math.prod(shape))
-            share = self.flights.share(
-                left
-            )  # largest one of a bound; infinite for blocks that may not be
-            over = np.asarray(after.sun_pulse) > self.spacecraft.horizon + self.model.turn
-            over = over | self._dark(state, channel, trial, after)
-            if (
-                self.spacecraft.goal.axis is not None
-            ):  # H has gone round the Sun the longer way to the target, or once more
-                over = over | (
-                    np.abs(after.longitude - state.longitude - self.model.ahead(state)) > math.pi
-                )
-            over = (
-                over
-                if self.spacecraft.tank is None
-                else over | (after.used > self.spacecraft.tank.propellant)
+            if not self.whole:
+                self.looked += math.prod(shape)
+            share = np.where(self._barred(state, channel, trial, after), np.inf, share)
+            share = np.where(np.isnan(share), np.inf, share)
+            table = np.broadcast_to(share, shape).reshape(len(rows), -1)
+            if self.whole and not last:
+                pair, rest = np.nonzero(np.isfinite(table))
+            elif self.whole:
+                nearest = least(table.reshape(1, -1), 8 * FLOWN)
+                use = table <= DOUBTFUL
+                use.ravel()[nearest] = True
+                pair, rest = np.nonzero(use & np.isfinite(table))
+            else:
+                rest = least(table, 2 if last or delays is None else table.shape[1])
+                pair = np.repeat(np.arange(len(rows)), rest.size // len(rows))
+                rest = rest.ravel()
+                finite = np.isfinite(table[pair, rest])
+                pair, rest = pair[finite], rest[finite]
+            at: tuple[Index, ...] = (pair, rest // shape[2], rest % shape[2])
+
+            def picked(values: object, at: Any = at, shape: Any = shape) -> Array:
+                return np.asarray(np.broadcast_to(np.asarray(values), shape)[at])
+
+            parent = rows[pair]
+            wait = picked(trial.wait)
+            yield BlockSequences(
+                before,
+                parent,
+                np.full(len(pair), kind),
+                self._following(before, parent) + wait,
+                np.round(picked(trial.delay), 12),
+                np.round(picked(trial.width), 12),
+                picked(trial.count),
+                table[pair, rest],
+                after.map(picked),
             )
-            share = np.where(over | np.isnan(share) | (after.cost >= self.most), np.inf, share)
-            table = shape[0] * shape[1], shape[2] * shape[3]
-            severity, cost = (
-                np.broadcast_to(part, shape).reshape(table) for part in (share, after.cost)
-            )
-            doubted = np.where(severity <= DOUBTFUL, cost, np.inf)
-            keys = (
-                (_in_order(severity, cost), few),
-                (severity, DOUBTS if self.small else few // 2),
-                (doubted, DOUBTS if self.small else few),
-            )
-            index = np.unique(np.concatenate([_least_of_all(*key) for key in keys]))
-            at = np.unravel_index(index, shape)
-            wait, delay, width, count, every = (np.broadcast_to(part, shape)[at] for part in trial)
-            every = np.where(count > 1, every, self.commands.every[0])
-            share, ends = severity.ravel()[index], np.broadcast_to(after.sun_pulse, shape)[at]
-            ranks = np.where(complies(share), 0.0, share), cost.ravel()[index], ends
-            columns = (
-                following[at[0]] + wait,
-                np.round(delay, 12),
-                np.round(width, 12),
-                count,
-                every,
-            )
-            lists = zip(
-                *(column.tolist() for column in (at[0], share, *ranks, *columns)), strict=True
-            )
-            for parent, severe, failed, spent, end, *block in lists:
-                blocks = (*before[parent].blocks, Block(channel.name, *block))
-                sequences.append(BlockSequence(blocks, (failed, spent, end), severe))
-        return sequences
 
-    def _counts(self, state: BlockState, every: int) -> NDArray[np.int64]:
-        """Numbers of pulses up to the horizon."""
-        most = (
-            int(
-                (self.spacecraft.horizon - float(np.min(state.sun_pulse)))
-                / (every * self.model.turn)
-            )
-            + 1
-        )
-        most = max(min(most, self.allowed), 0)
-        if most > SOME_COUNTS:
-            return np.unique(np.geomspace(1, most, SOME_COUNTS).round().astype(int))
-        return np.arange(1, most + 1)
+    def _following(self, before: BlockSequences, rows: Index) -> Index:
+        """Number of the first Sun pulse after sequences."""
+        every = np.array([every for _, every in self.kinds])[before.kind[rows]]
+        count = before.count[rows]
+        passed = np.where(count > 0, (count - 1) * every + 1, 0)
+        return np.asarray(before.first[rows] + passed)
 
-    def _single(self) -> list[BlockSequence]:
-        """The best single blocks at the delays that serve best, without those that surely end worse
-        by `_short_by`.
-        """
-        start = self.model.start
-        waits = self._waits(start, self.earliest, self._waiting if abs(start.phasor) > 0.0 else 1)
-        short = [
-            (channel, every, self._short_by(start, channel, every))
-            for channel, every in self._kinds
-        ]
-        most = max((lacks.max() for _, _, lacks in short if lacks.size), default=0.0)
-        within = surely = DOUBTFUL if self._damps else SURELY
-        while True:
-            trials = (
-                (
-                    channel,
-                    self._at_delays(
-                        start, channel, waits, np.flatnonzero(lacks[0] <= within)[None], every
-                    ),
-                )
-                for channel, every, lacks in short
-                if np.any(lacks <= within)
-            )
-            sequences = sorted(self.behind([START], start, trials), key=_rank)
-            enough = surely * max(sequences[0].rank[0], 1.0) if sequences else math.inf
-            if enough <= within or within >= most or work.exhausted():
-                return sequences
-            within = min(enough, 10.0 * within, most)
-
-    def _short_by(self, state: BlockState, channel: Channel, every: int) -> Array:
-        """Least miss of blocks of each width and number, (k, w n) after each of k motions, in
-        shares of its bound.
-
-        Of the spin where it is to change; with a target of the length of the rhumb line, of which a
-        block ends no nearer than a third of the difference; else of the nutation, lowered by the
-        sum of their kicks at most.
-        """
-        widths = commandable_widths(self.commands, channel)[:, None]
-        counts = self._counts(state, every)
-        work.spend(LOOKED * widths.size * counts.size * np.size(state.phasor))
-        if self._damps:
-            return self._undamped(state, channel, every)
-        if self.spacecraft.goal.spin is not None:
-            gained = channel.axial * acts(channel, widths).on_time * counts / self.model.inertia.C
-            lacks = np.abs(self.spacecraft.goal.spin - state.spin - gained) / self._most[Part.SPIN]
-        else:
-            full, _ = self.model.full_pulses(state, channel, widths, counts)
-            length = full * self.model.turned_by(channel, widths, self.spacecraft.spin)
-            lacks = np.abs(length - self.model.course(state)[1]) / self._most[Part.DISTANCE]
-        return np.asarray(lacks).reshape(-1, len(widths) * len(counts))
-
-    def _undamped(self, state: BlockState, channel: Channel, every: int) -> Array:
-        """Nutation that is left at least, as in `_short_by`."""
-        widths = commandable_widths(self.commands, channel)[:, None]
-        counts = self._counts(state, every)
-        trial = Trial(0, 0.0, widths, counts, every)
-        step = self.model.rate(self.spacecraft.spin) * self.model.turn
-        kicks = abs(channel.transverse) * np.abs(
-            self.model.kicks(state, channel, trial, every * step)
-        )
-        left = np.abs(np.abs(state.phasor) - kicks) / abs(self.spacecraft.axial)
-        return np.asarray(left / self._most.get(Part.NUTATION, math.inf)).reshape(
-            -1, len(widths) * len(counts)
-        )
-
-    def _further(self, before: Sequence[BlockSequence], few: int) -> list[BlockSequence]:
-        """Blocks behind those ``before`` that go the rest of the way, or take the nutation that is
-        left.
-        """
-        step = TOGETHER if self.model.steady and not len(self.dark[0]) else 1
-        least = self.pause if before and before[0].blocks else self.earliest
-        sequences = list[BlockSequence]()
-        for begin in range(0, len(before), step):
-            some = before[begin : begin + step]
-            state = self._motions(some)
-            trials = self._grid(state, least) if self.small else self._rest(state, least)
-            sequences += self.behind(some, state, trials, few)
-        return sequences
-
-    def _rest(self, state: BlockState, least: int) -> Iterator[tuple[Channel, Trial]]:
-        """Blocks of the widths and numbers that may miss least, the cheapest and the nearest, and
-        of few pulses.
-        """
-        waits = self._waits(state, least, self._waiting)
-        for channel, every in self._kinds:
-            lacks = self._short_by(state, channel, every)
-            counts = self._counts(state, every)
-            if not lacks.size:
-                continue
-            widths = commandable_widths(self.commands, channel)
-            spent = np.multiply.outer(acts(channel, widths).on_time, counts).ravel()
-            gentle = np.tile(counts <= FEW, len(widths))
-            damping = np.where(
-                gentle, lacks if self._damps else self._undamped(state, channel, every), np.inf
-            )
-            nearest = np.concatenate(
-                [_least(_in_order(lacks, spent), CLOSEST), _least(lacks, CLOSEST)], axis=1
-            )
-            some = evenly(np.flatnonzero(gentle), CLOSEST if len(lacks) > 1 else FEW * CLOSEST)
-            for index in (nearest, _least(damping, CLOSEST), some[None]):
-                yield channel, self._at_delays(state, channel, waits, index, every)
-
-    def _parts(self) -> list[BlockSequence]:
-        """First blocks that go a part of the way to the target."""
-        start = self.model.start
-        sequences = list[BlockSequence]()
-        heading, way = self.model.course(start)
-        if self.spacecraft.goal.axis is None or not self._every:
-            return sequences
-        every, shares = self._every[0], np.linspace(0.0, 1.0, 13)[1:]
-        for channel in (channel for channel in self.channels if channel.transverse):
-            for width in evenly(commandable_widths(self.commands, channel), 3).tolist():
-                step = float(self.model.turned_by(channel, width, start.spin))
-                delay = self.commanded(self.model.delay(channel, heading, width))
-                first = start.sun_pulse + float(delay) + float(acts(channel, width).over)
-                fits = (self.dark[0][:WINDOWS] - first) / (
-                    every * self.model.turn
-                ) - self.earliest / every
-                counts = np.rint(
-                    [*shares * float(way) / step, *np.floor(fits), *np.floor(fits) + 1.0]
-                )
-                counts = np.unique(counts.clip(1, self.allowed).astype(int))
-                rows = np.meshgrid(self._waits(start, self.earliest, 1), counts)
-                wait, count = (row.reshape(-1, 1, 1) for row in rows)
-                sequences += self.behind(
-                    [START], start, [(channel, Trial(wait, delay, width, count, every))], 1
-                )
-        return sequences
-
-    def _grid(self, state: BlockState, least: int) -> Iterator[tuple[Channel, Trial]]:
-        """All blocks, from ``least`` Sun pulses on: by wait, width and number of pulses, and by
-        delay.
-        """
-        for channel, every in self._kinds:
-            widths = commandable_widths(self.commands, channel)
-            counts = np.arange(1, self.allowed + 1)
-            parts = np.meshgrid(self._waits(state, least, WAITS), widths, counts)
-            wait, width, count = (part.reshape(-1, 1) for part in parts)
-            yield channel, Trial(wait, self._delays, width, count, every)
-
-    def _waits(self, state: BlockState, least: int, few: int) -> list[int]:
-        """Sun pulses that may be let pass before a block: the ``least`` few, and those up to the
-        end of a blackout.
-        """
-        after = np.floor((self.dark[1] - np.min(state.sun_pulse)) / self.model.turn)
-        later = (
-            after[(after > least) & (self.dark[1] < self.spacecraft.horizon)][:WINDOWS]
-            .astype(int)
-            .tolist()
-        )
-        return sorted(
-            {begin + more for begin in (least, *later) for more in range(few + (begin != least))}
-        )
-
-    def _dark(
+    def _barred(
         self, state: BlockState, channel: Channel, trial: Trial, after: BlockState
     ) -> NDArray[np.bool_]:
-        """True where a pulse of the blocks is on in a blackout window, or just beside it."""
-        dark = np.zeros(np.shape(after.sun_pulse), dtype=bool)
-        if not len(self.dark[0]):
-            return dark
-        work.spend(LOOKED * dark.size * len(self.dark[0]))
+        """True for blocks that may not be, or cost more than a flight that complies."""
+        barred = np.asarray(after.sun_pulse > self.spacecraft.horizon + self.model.turn)
+        barred = barred | (after.cost >= self.flights.cheapest * (1.0 - SAME_COST))
+        if self.spacecraft.goal.axis is not None:
+            # H has gone round the Sun the longer way to the target, or once more.
+            way = after.longitude - state.longitude - self.model.ahead(state)
+            barred = barred | (np.abs(way) > math.pi)
+        if self.spacecraft.tank is not None:
+            barred = barred | (after.used > self.spacecraft.tank.propellant)
         turn = self.model.turn
         first = state.sun_pulse + trial.wait * turn
         interval = (after.sun_pulse - turn - first) / np.maximum(trial.count - 1, 1)
         interval = np.where(np.asarray(trial.count) > 1, interval, turn)
-        # aside: nutation moves Sun pulses
         aside = BESIDE * turn
         lasts = acts(channel, trial.width).over
         for begins, ends in zip(*self.dark, strict=True):
             low = np.ceil((begins - aside - lasts - first - trial.delay) / interval)
             high = np.floor((ends + aside - first - trial.delay) / interval)
-            dark |= np.maximum(low, 0.0) <= np.minimum(high, trial.count - 1)
-        return dark
+            barred = barred | (np.maximum(low, 0.0) <= np.minimum(high, trial.count - 1))
+        return np.asarray(barred)
 
-    def _at_delays(
-        self,
-        state: BlockState,
-        channel: Channel,
-        waits: Sequence[int],
-        index: NDArray[np.intp],
-        every: int,
-    ) -> Trial:
-        """Blocks after each of the ``waits`` at the delays that serve the heading best, and the
-        nutation best.
+    def counts(self, state: BlockState, every: int) -> Index:
+        """Numbers of pulses up to the horizon."""
+        time = self.spacecraft.horizon - float(np.min(state.sun_pulse))
+        most = max(min(int(time / (every * self.model.turn)) + 1, self.allowed), 0)
+        if most > SOME_COUNTS:
+            return np.unique(np.geomspace(1, most, SOME_COUNTS).round().astype(int))
+        return np.arange(1, most + 1)
 
-        ``index`` (k, m): widths and numbers as in `_short_by`, for each of k motions.
+    def waits(self, state: BlockState, earliest: int) -> Index:
+        """Sun pulses that may be let pass before a block: the ``earliest`` few, and those up to the
+        end of a blackout; in whole searches all.
         """
-        counts = self._counts(state, every)
-        widths = commandable_widths(self.commands, channel)[index // len(counts)][:, None, :, None]
-        wait, count = np.array(waits)[:, None, None], counts[index % len(counts)][:, None, :, None]
-        trial = Trial(wait, self._delays, widths, count, every)
-        if self._few_delays:
-            return trial
+        since = float(np.min(state.sun_pulse))
+        if self.whole:
+            turns = int((self.spacecraft.horizon - since) / self.model.turn) + 1
+            return np.arange(earliest, max(turns, earliest) + 1)
+        few = WAITS
+        if not np.any(state.phasor):
+            few = 1
+        elif self.flights.damps and Part.SHIFT not in self.limit:
+            few = WAITS // 3  # delays alone meet the phase of the nutation, H may end anywhere
+        after = np.floor((self.dark[1] - since) / self.model.turn)
+        later = (after > earliest) & (self.dark[1] < self.spacecraft.horizon)
+        ends = after[later][:WINDOWS].astype(int)
+        waits = [
+            np.arange(earliest, earliest + few),
+            *(np.arange(end, end + few + 1) for end in ends),
+        ]
+        return np.unique(np.concatenate(waits))
+
+    def delays(self, state: BlockState, channel: Channel, trial: Trial) -> Array:
+        """Delays that can be commanded: all where few, else those that serve the heading best, and
+        the nutation best.
+        """
+        if self.last_delay < FEW_DELAYS:
+            return self.commanded(np.arange(self.last_delay + 1.0) * self.commands.delay_step)
         best = list[Array]()
         if self.spacecraft.goal.axis is not None:
-            best.append(self.model.delay(channel, self.model.course(state)[0], widths))
+            ahead = self.model.delay(channel, self.model.course(state)[0], trial.width)
+            turn = 2.0 * math.pi / abs(self.spacecraft.spin)
+            best.append((ahead - self.model.late(state, trial)) % turn)
         if np.any(state.phasor):
-            best.append(self.model.damping_delay(state, channel, trial._replace(delay=0.0)))
-        steps = [
-            np.floor(delay / self.commands.delay_step) + more for delay in best for more in AROUND
-        ]
-        alike = np.broadcast_arrays(
-            *steps, np.zeros((1, 1, 1, 1))
-        )  # none at all: best just before a Sun pulse
-        return trial._replace(
-            delay=self.commanded(np.concatenate(alike, axis=-1) * self.commands.delay_step)
-        )
+            best.append(self.model.damping_delay(state, channel, trial))
+        if not best:  # just before a Sun pulse
+            return np.zeros((1, 1, 1))
+        step = self.commands.delay_step
+        steps = np.broadcast_arrays(*(np.floor(delay / step) + AROUND for delay in best))
+        return self.commanded(np.concatenate(steps, axis=-1) * step)
 
     def commanded(self, delay: Array) -> Array:
         """The nearest delay that can be commanded, of those within a spin turn."""
         step = self.commands.delay_step
-        counts = np.clip(np.rint(delay / step), 0, self._last_delay)
-        return np.asarray((counts + 0.0) * step)  # 0, not -0
+        steps = np.clip(np.rint(delay / step), 0, self.last_delay)
+        return np.asarray((steps + 0.0) * step)  # 0, not -0
 
-    def doubted(self) -> None:
-        """Fly sequences cheaper than the best of the flights, the cheapest first, until one
-        complies.
+    def misses(
+        self, state: BlockState, channel: Channel, every: int, width: Array, count: Index
+    ) -> Array:
+        """Least miss (k, n) of n blocks after each of k motions, in shares of its bound.
+
+        Of the spin where it is to change; with a target of the length of the rhumb line, of which a
+        block ends no nearer than a third of the difference; else of the nutation.
         """
-        most = self.flights.known * (1.0 - SAME_COST)
-        flown = self.flights.of
-        self._first_complying(
-            [each for each in self.doubtful if each.rank[1] < most and each.blocks not in flown]
+        if self.flights.damps:
+            return self.damping_misses(state, channel, every, width, count)
+        shaped = state.shaped(1)
+        if self.spacecraft.goal.spin is not None:
+            gained = channel.axial * acts(channel, width).on_time * count / self.model.inertia.C
+            change = self.spacecraft.goal.spin - shaped.spin - gained
+            misses = np.abs(change) / self.limit[Part.SPIN]
+        else:
+            full, _ = self.model.full_pulses(shaped, channel, width, count)
+            length = full * self.model.turned_by(channel, width, self.spacecraft.spin)
+            misses = np.abs(length - self.model.course(shaped)[1]) / self.limit[Part.DISTANCE]
+            misses = misses / 3.0
+        return np.asarray(misses).reshape(-1, len(width))
+
+    def damping_misses(
+        self, state: BlockState, channel: Channel, every: int, width: Array, count: Index
+    ) -> Array:
+        """Nutation (k, n) beyond what n blocks take at most, or what they add, as in `misses`."""
+        shaped = state.shaped(1)
+        step = self.model.rate(self.spacecraft.spin) * self.model.turn
+        trial = Trial(0, 0.0, width, count, every)
+        kicks = np.abs(self.model.kicks(shaped, channel, trial, every * step))
+        remains = np.abs(np.abs(shaped.phasor) - abs(channel.transverse) * kicks)
+        share = remains / abs(self.spacecraft.axial) / self.limit.get(Part.NUTATION, math.inf)
+        return np.asarray(share).reshape(-1, len(width))
+
+    # --- flights
+
+    def fly(self, sequences: BlockSequences) -> None:
+        """Fly what is promising: where the search is whole all that may comply, the cheapest first.
+
+        Nutation on the way goes with what one pulse turns H by: where all those miss, the gentlest
+        of many may not.
+        """
+        share, cost = sequences.share, sequences.cost
+        ranked = sequences.ranked
+        clear = np.argsort(share, kind="stable")
+        if self.whole:
+            order = np.lexsort((share, cost, share > DOUBTFUL))
+            order = order[: max(int(np.sum(share <= DOUBTFUL)), 8 * FLOWN)]
+            for begin in range(0, len(order), 8 * FLOWN):
+                some = order[begin : begin + 8 * FLOWN]
+                if cost[some[0]] >= self.flights.cheapest * (1.0 - SAME_COST) or work.exhausted():
+                    break
+                self._fly(sequences, some)
+            return
+        self._fly(sequences, np.unique(np.concatenate([ranked[:8], clear[:4]])))
+        if work.exhausted():
+            return
+        doubtful = np.lexsort((share, cost, share > DOUBTFUL))
+        largest = np.zeros(len(share))
+        for kind, (channel, _) in enumerate(self.kinds):
+            of_kind = np.flatnonzero(sequences.kind == kind)
+            turns = self.model.turned_by(channel, sequences.width[of_kind], self.spacecraft.spin)
+            largest[of_kind] = turns
+        some = clear[: 8 * FLOWN]
+        gentle = some[np.argsort(largest[some], kind="stable")]
+        mixed = np.array([each[:FLOWN] for each in (ranked, clear, gentle, doubtful)]).T.ravel()
+        _, index = np.unique(mixed, return_index=True)
+        rows = mixed[np.sort(index)]
+        self._fly(sequences, rows[cost[rows] < self.flights.cheapest * (1.0 - SAME_COST)])
+
+    def _fly(self, sequences: BlockSequences, rows: Index) -> Index:
+        """Fly rows, and return those that were: the first ones, if all have too many pulses."""
+        pulses = np.cumsum(sequences.pulses(rows))
+        rows = rows[(pulses <= FLOWN_PULSES) | (np.arange(len(rows)) < 8)]
+        blocks = [self.blocks(sequences, int(row)) for row in rows]
+        for each, row in zip(blocks, rows.tolist(), strict=True):
+            self.rows[each] = sequences, row
+        self.flights.fly(blocks, sequences.cost[rows].tolist())
+        return rows
+
+    def blocks(self, sequences: BlockSequences, row: int) -> Blocks:
+        """Blocks of a row."""
+        if sequences.before is None:
+            return ()
+        channel, every = self.kinds[int(sequences.kind[row])]
+        count = int(sequences.count[row])
+        block = Block(
+            channel.name,
+            int(sequences.first[row]),
+            float(sequences.delay[row]),
+            float(sequences.width[row]),
+            count,
+            every if count > 1 else self.commands.every[0],
         )
+        return (*self.blocks(sequences.before, int(sequences.parent[row])), block)
 
-    def nearer(self) -> list[BlockSequence]:
-        """Neighbours of the best of the flights that leave least where the closed form errs as it
-        does for those.
+    def neighbours(self) -> list[BlockSequences]:
+        """Blocks about as long and as late as those of the best flights, where the closed form errs
+        as it does for these.
         """
-        sequences = list[BlockSequence]()
-        best = of_each_kind(flight.sequence for flight in self.flights.all)
-        for flight in (self.flights.of[each.blocks] for each in best[:CORRECTED]):
-            *earlier, last = flight.sequence.blocks
-            before = START._replace(blocks=tuple(earlier))
-            state = self.state(tuple(earlier))
-            off = self.model.apart(
-                self.state(flight.sequence.blocks),
-                propagation.flown(self.spacecraft, flight.schedule),
+        channels = dict[tuple[str, ...], Blocks]()
+        for blocks in sorted(self.flights.of, key=lambda blocks: self.flights.of[blocks].rank):
+            channels.setdefault(tuple(block.channel for block in blocks), blocks)
+        near = list[BlockSequences]()
+        for blocks in list(channels.values())[:NEIGHBOURS]:
+            sequences, row = self.rows[blocks]
+            before, block = sequences.before, blocks[-1]
+            assert before is not None
+            kind, parent = int(sequences.kind[row]), sequences.parent[[row]]
+            end = self.flights.of[blocks].end[:, None]
+            off = self.model.apart(sequences.state.some(row), end)
+            channel = self.kinds[kind][0]
+            widths = self.widths[kind]
+            at = int(np.argmin(np.abs(widths - block.width)))
+            edges = widths[max(at - 3, 0)] - 1e-12, widths[min(at + 3, len(widths) - 1)] + 1e-12
+            closer = commandable_widths(self.commands, channel, *edges, count=WIDTHS)
+            widths = np.union1d(evenly(widths, WIDTHS), closer)
+            on_time = acts(channel, np.array([block.width])).on_time
+            counts = np.rint(block.count * on_time / acts(channel, widths).on_time)
+            counts = (counts[:, None] + np.arange(-2, 3)).clip(1, self.allowed).astype(int)
+            width = np.broadcast_to(widths[:, None], counts.shape).ravel()
+            pairs = np.repeat(parent, width.size), width, counts.ravel()
+            waits = np.arange(-1, 2) + block.first - self._following(before, parent)
+            waits = waits[waits >= (self.earliest if before.before is None else self.pause)]
+            delays = block.delay + np.arange(-3, 4) * self.commands.delay_step
+            parts = self.behind(
+                before, kind, pairs, waits, last=True, delays=self.commanded(delays), off=off
             )
-            trials = [(self._named[last.channel], self._around(before, last))]
-            sequences += self.behind([before], state, trials, off=off)
-        other = (sequence for sequence in sequences if sequence.blocks not in self.flights.of)
-        ranked = by_blocks(sorted(other, key=_rank))
-        clear = nsmallest(FLOWN // 2, ranked.values(), key=_share)
-        first = islice(ranked.values(), FLOWN // 2)
-        chosen = by_blocks((*first, *clear, *of_each_kind(ranked.values())))
-        for blocks, sequence in chosen.items():  # ranked by the closed form alone
-            share = float(self.flights.share(self.model.left(self.state(blocks))))
-            missed = 0.0 if complies(share) else share
-            chosen[blocks] = sequence._replace(rank=(missed, *sequence.rank[1:]), share=share)
-        return list(chosen.values())
-
-    def _around(self, before: BlockSequence, last: Block) -> Trial:
-        """Blocks about as long and as late as the ``last`` one, behind those ``before``."""
-        channel = self._named[last.channel]
-        number = _following(before.blocks)
-        every = commandable_widths(self.commands, channel)
-        at = int(np.argmin(np.abs(every - last.width)))
-        near = every[max(at - 3, 0)] - 1e-12, every[min(at + 3, len(every) - 1)] + 1e-12
-        closer = commandable_widths(self.commands, channel, *near, count=MOST_WIDTHS)
-        widths = np.union1d(evenly(every, MOST_WIDTHS), closer)
-        as_long = np.rint(
-            last.count
-            * acts(channel, np.array([last.width])).on_time
-            / acts(channel, widths).on_time
-        )
-        waits = np.arange(-1, 2) + (last.first - number)
-        waits = waits[waits >= (self.pause if before.blocks else self.earliest)]
-        delays = self.commanded(
-            np.asarray(last.delay + np.arange(-3, 4) * self.commands.delay_step, dtype=np.float64)
-        )
-        counts = (as_long[:, None] + np.arange(-2, 3)).clip(1, self.allowed).astype(int)
-        parts = np.broadcast_arrays(waits[:, None, None], widths[:, None], counts)
-        wait, width, count = (part.reshape(-1, 1) for part in parts)
-        return Trial(wait, delays, width, count, last.every)
-
-
-_rank, _share, _blocks = map(operator.attrgetter, ("rank", "share", "blocks"))
-
-
-def _following(blocks: Sequence[Block]) -> int:
-    """Number of the first Sun pulse after blocks."""
-    return blocks[-1].sun_pulses[-1] + 1 if blocks else 1
-
-
-def _least(keys: Array, most: int) -> NDArray[np.intp]:
-    """Indices of the ``most`` least keys of each row, in any order."""
-    rows, count = keys.shape
-    if most >= count:
-        return np.tile(np.arange(count), (rows, 1))
-    return np.asarray(np.argpartition(keys, most - 1, axis=1)[:, :most])
-
-
-def _least_of_all(keys: Array, most: int) -> NDArray[np.intp]:
-    """Indices into all keys of the ``most`` least of each row, but for infinite ones."""
-    index = (_least(keys, most) + keys.shape[1] * np.arange(len(keys))[:, None]).ravel()
-    return np.asarray(index[np.isfinite(keys.ravel()[index])])
-
-
-def _in_order(shares: Array, cost: Array) -> Array:
-    """Keys that put first what keeps its bounds, by cost, and then what does not, by the share of a
-    bound.
-    """
-    dearest = float(np.max(cost, where=np.isfinite(cost), initial=1e-300))
-    return np.where(complies(shares), cost / dearest - 2.0 + 1e-9 * shares, shares)
-
-
-def _promising(sequences: Iterable[BlockSequence], most: int) -> list[BlockSequence]:
-    """Sequences that leave least, and a front of miss against cost: ``most`` of each."""
-    ranked = of_each_kind(sorted(sequences, key=_rank), "width", "count", "every")
-    return list(
-        by_blocks((*ranked[:most], *_front(ranked)[:most], *_front(ranked, 1.0)[:most])).values()
-    )
-
-
-def _front(ranked: Iterable[BlockSequence], share: float = CHEAPER) -> list[BlockSequence]:
-    """Of sequences in order of their rank those that cost less than a ``share`` of the cost of all
-    before them.
-    """
-    front = list[BlockSequence]()
-    for sequence in ranked:
-        if not front or sequence.rank[1] < share * front[-1].rank[1]:
-            front.append(sequence)
-    return front
+            near.append(joined(before, list(parts)))
+        return near

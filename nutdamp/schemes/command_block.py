@@ -20,16 +20,9 @@ from nutdamp.common.results import Note, note
 from nutdamp.errors import Infeasible
 from nutdamp.flight import propagation
 from nutdamp.flight.end_state import left_by
+from nutdamp.schemes.block_flights import BlockFlights, FlownSequence
 from nutdamp.schemes.block_model import BlockModel, acts, spin_turn
-from nutdamp.schemes.block_search import (
-    BLOCKS,
-    FLOWN,
-    LONGEST,
-    BlockFlights,
-    BlockSearch,
-    BlockSequence,
-    FlownSequence,
-)
+from nutdamp.schemes.block_search import BLOCKS, LONGEST, BlockSearch
 from nutdamp.schemes.catalogue import CommandBlockOptions
 from nutdamp.schemes.sequential import NO_AXIAL, at_hand
 from nutdamp.schemes.valve_commands import Legs
@@ -37,7 +30,7 @@ from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import OFF_TICK, commandable_widths, usable
 from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Requirement, Spacecraft
-from nutdamp.spacecraft.requirements import SAME_COST, Left, Part, left_of
+from nutdamp.spacecraft.requirements import Part
 from nutdamp.spacecraft.roles import with_limits
 from nutdamp.spacecraft.schedule import Schedule
 
@@ -46,18 +39,18 @@ AMPLE = 1.5  # multiple of the time of the fewest pulses that a change of the sp
 FLOWN_PULSES = 2000  # pulses that are flown, after which no further sequence is
 
 
-def scope_note(search: BlockSearch, chosen: FlownSequence, *, first: bool) -> Note:
-    """Scope of the search, and flight against closed form; ``first``:
-    it is the best in that form.
-    """
-    form = search.model.left(search.state(chosen.sequence.blocks))
+def scope_note(search: BlockSearch, chosen: FlownSequence) -> Note:
+    """Scope of the search, and flight against closed form."""
+    sequences, row = search.rows[chosen.schedule.blocks]
+    form = search.model.left(sequences.state.some(row))
     flown = left_by(propagation.flown(search.spacecraft, chosen.schedule))
     nutation, end = (
         math.degrees(abs(float(a) - b)) for a, b in zip(form[:2], flown[:2], strict=True)
     )
-    if first:
-        return note("blocks-compared", compared=search.looked, nutation_deg=nutation, end_deg=end)
-    return note("blocks-flown", nutation_deg=nutation, end_deg=end)
+    figures = {"compared": search.looked, "nutation_deg": nutation, "end_deg": end}
+    if search.whole:
+        return note("blocks-compared", **figures)
+    return note("blocks-found", **figures)
 
 
 def cures(search: BlockSearch, chosen: FlownSequence, most: int) -> list[Note]:
@@ -196,40 +189,22 @@ def _searched(spacecraft: Spacecraft, most: int | None) -> FlownSequence:
         raise Infeasible(
             "no width that can be commanded (commands.width) is one that a channel allows"
         )
-    search = BlockSearch(spacecraft, channels, commands)
-    outside = " outside the blackout windows" if spacecraft.limits.blackout else ""
-    why = (
-        f"no block that can be commanded ends within the horizon{outside}; "
-        "a longer limits.horizon may help"
-    )
-    best = search.best(most or BLOCKS)
-    if not best and work.exhausted():
-        why = "the budget of work is spent before a block is found"
-    for round_ in range(4):  # the best ones, and three searches near the best flights so far
-        if round_ > 0 and search.flights.complies:
-            break
-        for number, sequence in enumerate(
-            search.flights.fired(best if round_ == 0 else search.nearer())
-        ):
-            pulses = sum(len(flight.schedule) for flight in search.flights.of.values())
-            enough = search.flights.complies and number >= FLOWN * (round_ == 0)
-            spent = pulses > FLOWN_PULSES * (1 + round_) or (work.exhausted() and pulses > 0)
-            if spent or enough:
-                break
-            try:
-                search.flights.flown(sequence)
-            except Infeasible as reason:
-                why = f"the best block in closed form cannot be flown: {reason}"
-    search.doubted()
-    if not search.flights.of:
+    search = BlockSearch(spacecraft, channels, most or BLOCKS)
+    search.run()
+    flights = search.flights
+    if not flights.of:
+        outside = " outside the blackout windows" if spacecraft.limits.blackout else ""
+        why = (
+            f"no block that can be commanded ends within the horizon{outside}; "
+            "a longer limits.horizon may help"
+        )
+        if flights.why is not None:
+            why = f"the best block in closed form cannot be flown: {flights.why}"
+        elif work.exhausted():
+            why = "the budget of work is spent before a block is found"
         raise Infeasible(why)
-    # Of those that cost as much as the best the fewest pulses, then the earlier end.
-    broken, missed, cost, _ = search.flights.all[0].rank
-    alike = [flight for flight in search.flights.all if flight.rank[:2] == (broken, missed)]
-    equal = [flight for flight in alike if flight.rank[2] <= cost * (1.0 + SAME_COST)]
-    chosen = min(equal, key=lambda flight: (len(flight.schedule), flight.schedule.end, flight.rank))
-    first = chosen.sequence.rank[:2] <= best[0].rank[:2]
-    notes = [scope_note(search, chosen, first=first)]
+    chosen = flights.chosen()
+    notes = [scope_note(search, chosen)]
     if not requirements.complies(chosen.rank[1]):
         notes += cures(search, chosen, most or BLOCKS)
     return chosen._replace(schedule=replace(chosen.schedule, notes=tuple(notes)))
@@ -245,95 +220,110 @@ that may add.
 
 def spin_and_turn(spacecraft: Spacecraft, most: int | None) -> FlownSequence:
     """Blocks, ``most`` of them, that bring the spin to its goal, and turn or damp: the best of the
-    orders tried.
+    rows of legs tried.
 
-    The other order is tried where the cheaper one does not comply. Raises Infeasible with the first
-    reason.
+    The other order is tried where the cheaper one does not comply; where its turn takes the spin
+    off the goal, once more with that taken off before. Raises Infeasible with the first reason.
     """
-    goal, inertia = spacecraft.goal.spin, spacecraft.inertia
-    assert goal is not None
-    turns_first = abs(inertia.axial(goal)) >= abs(spacecraft.axial)
-    flights = BlockFlights(spacecraft)
-    why = list[Infeasible]()
-    for first in (turns_first, not turns_first):
-        try:
-            gained = _flown(spacecraft, flights, most, goal, turns_first=first)
-            if not first and gained != 0.0 and not work.exhausted():
-                _flown(spacecraft, flights, most, goal - gained, turns_first=first)
-        except Infeasible as reason:
-            why.append(reason)
-        if flights.complies or work.exhausted():
-            break
-    if not flights.of:
-        raise next(iter(why), Infeasible("no pulse is needed"))
-    return flights.all[0]
-
-
-def _flown(
-    spacecraft: Spacecraft,
-    flights: BlockFlights,
-    most: int | None,
-    aim: float,
-    *,
-    turns_first: bool,
-) -> float:
-    """Fly a row of legs, the first of the spin to ``aim`` rad/s; returns the change of the spin,
-    rad/s, by a second leg that turned, where it takes the spin off its goal.
-    """
-    legs = Legs(spacecraft)
     goal = spacecraft.goal.spin
-    gained = 0.0
     assert goal is not None
-    ends = [bound for bound in requirements.bounds(spacecraft) if bound.part is not Part.SPIN]
-    bounds = {bound.part: bound.limit for bound in ends}
-    nutation = bounds[Part.NUTATION]
-    shift = bounds.get(requirements.aim(spacecraft))
-    for number in range(LEGS):
-        at_leg = legs.at_leg
-        turns = turns_first == (number % 2 == 0)
-        at_leg = replace(
-            at_leg,
-            goal=replace(at_leg.goal, axis=None if shift is None else at_leg.goal.axis, spin=None),
-        )
-        slower = min(
-            max(abs(spacecraft.inertia.axial(goal) / at_leg.axial), SLOWEST), 1.0
-        )  # nutation opens by its inverse
-        there = requirements.spins_at(at_leg, aim)
-        if turns:
-            now = Left(at_leg.nutation, at_leg.to_turn, at_leg.spin)
-            there = all(bool(bound.met(left_of(bound, now, spacecraft))) for bound in ends)
-        room = None if most is None else most - len(legs.blocks) - (number == 0)
-        if turns and not requirements.spins_at(at_leg, goal):
-            allowed = MARGIN * slower * nutation, None if shift is None else MARGIN * shift
-            horizon = max(at_leg.horizon - _least_time(at_leg, goal), 0.5 * at_leg.horizon)
-        elif turns:
-            allowed = (nutation, shift)
-            horizon = at_leg.horizon
-        else:
-            opened, off = at_leg.nutation / slower / MARGIN, at_leg.to_turn / MARGIN
-            allowed = (max(opened, nutation), None if shift is None else max(off, shift))
-            horizon = at_leg.horizon
-            spinning = tuple(channel for channel in at_leg.channels if not channel.damps)
-            at_leg = replace(at_leg, goal=replace(at_leg.goal, spin=aim), channels=spinning)
-            aim = goal
-        if there or (room is not None and room < 1):
-            continue
+    turns_first = abs(spacecraft.inertia.axial(goal)) >= abs(spacecraft.axial)
+    flights = BlockFlights(spacecraft)
+    rows = [(turns_first, goal), (not turns_first, goal)]
+    reasons = list[Infeasible]()
+    for turns, aim in rows:  # which one more may join
+        legs = Legs(spacecraft)
+        gained = 0.0
         try:
-            leg = replace(
-                at_leg,
-                requirement=Requirement(*allowed),
-                limits=replace(at_leg.limits, horizon=horizon),
-            )
-            legs.fire(_searched(leg, room).schedule)
-        except Infeasible:
-            if number < 2:
-                raise
+            for number in range(LEGS):
+                at_leg = legs.at_leg
+                turning = turns == (number % 2 == 0)
+                leg = (
+                    turn_leg(spacecraft, at_leg)
+                    if turning
+                    else spin_leg(spacecraft, at_leg, aim if number < 2 else goal)
+                )
+                room = None if most is None else most - len(legs.blocks) - (number == 0)
+                if leg is None or (room is not None and room < 1):
+                    continue
+                try:
+                    legs.fire(_searched(leg, room).schedule)
+                except Infeasible:
+                    if number < 2:
+                        raise
+                    break
+                if turning and number == 1 and not requirements.spins_at(legs.at_leg, goal):
+                    gained = legs.at_leg.spin - at_leg.spin
+            if legs.blocks:
+                flights.fly([tuple(legs.blocks)], [0.0])
+        except Infeasible as reason:
+            reasons.append(reason)
+        if math.isfinite(flights.cheapest) or work.exhausted():
             break
-        if turns and number == 1 and not requirements.spins_at(legs.at_leg, goal):
-            gained = legs.at_leg.spin - at_leg.spin
-    if legs.blocks:
-        flights.flown(BlockSequence(tuple(legs.blocks), (0.0, 0.0, 0.0)))
-    return gained
+        if len(rows) == 2 and (turns, aim) == rows[1] and gained != 0.0 and not turns_first:
+            rows.append((turns, goal - gained))
+    if not flights.of:
+        raise next(iter(reasons), flights.why or Infeasible("no pulse is needed"))
+    return flights.best()
+
+
+def _at_end(spacecraft: Spacecraft) -> tuple[float, float | None]:
+    """Bounds of nutation and momentum axis, rad; None where H may end anywhere."""
+    bounds = {bound.part: bound.limit for bound in requirements.bounds(spacecraft)}
+    return bounds[Part.NUTATION], bounds.get(requirements.aim(spacecraft))
+
+
+def turn_leg(spacecraft: Spacecraft, at_leg: Spacecraft) -> Spacecraft | None:
+    """Spacecraft of a leg that turns or damps, with room for the change of spin that is to
+    follow; None where nothing is to be done.
+    """
+    goal = spacecraft.goal.spin
+    assert goal is not None
+    nutation, shift = _at_end(spacecraft)
+    if at_leg.nutation <= nutation and (shift is None or at_leg.to_turn <= shift):
+        return None
+    horizon = at_leg.horizon
+    if not requirements.spins_at(at_leg, goal):
+        nutation *= MARGIN * _slower(spacecraft, at_leg)
+        shift = None if shift is None else MARGIN * shift
+        horizon = max(horizon - _least_time(at_leg, goal), 0.5 * horizon)
+    return _leg(at_leg, None, (nutation, shift), horizon)
+
+
+def spin_leg(spacecraft: Spacecraft, at_leg: Spacecraft, aim: float) -> Spacecraft | None:
+    """Spacecraft of a leg that brings the spin to ``aim`` rad/s, on channels that do that
+    alone; None where it is there.
+    """
+    if requirements.spins_at(at_leg, aim):
+        return None
+    nutation, shift = _at_end(spacecraft)
+    nutation = max(at_leg.nutation / _slower(spacecraft, at_leg) / MARGIN, nutation)
+    shift = None if shift is None else max(at_leg.to_turn / MARGIN, shift)
+    spinning = tuple(channel for channel in at_leg.channels if not channel.damps)
+    return _leg(replace(at_leg, channels=spinning), aim, (nutation, shift), at_leg.horizon)
+
+
+def _slower(spacecraft: Spacecraft, at_leg: Spacecraft) -> float:
+    """Share of |H3| that a change of spin leaves: the nutation opens by its inverse."""
+    assert spacecraft.goal.spin is not None
+    share = abs(float(spacecraft.inertia.axial(spacecraft.goal.spin)) / at_leg.axial)
+    return min(max(share, SLOWEST), 1.0)
+
+
+def _leg(
+    at_leg: Spacecraft,
+    spin: float | None,
+    bounds: tuple[float, float | None],
+    horizon: float,
+) -> Spacecraft:
+    """Spacecraft of a leg, with its own goal and requirement."""
+    axis = None if bounds[1] is None else at_leg.goal.axis
+    return replace(
+        at_leg,
+        goal=replace(at_leg.goal, axis=axis, spin=spin),
+        requirement=Requirement(*bounds),
+        limits=replace(at_leg.limits, horizon=horizon),
+    )
 
 
 def _least_time(spacecraft: Spacecraft, spin: float) -> float:
