@@ -228,3 +228,24 @@ def front(costs: Array, share: float) -> Index:
             return np.array(rows, dtype=np.intp)
         rows.append(int(lower[0]))
         cheapest = float(costs[lower[0]])
+
+
+def grid_size(turns: int, kinds: Sequence[tuple[int, int]], allowed: int, most: int) -> float:
+    """Number of sequences of up to ``most`` blocks within so many ``turns``, each of up to
+    ``allowed`` pulses; infinite where there are very many.
+
+    ``kinds``: interval in turns, and number of blocks of one place and number of pulses.
+    """
+    if turns > 100:  # of one pulse each they are too many
+        return math.inf
+    spans = np.zeros(max(turns, 0) + 1)
+    for every, blocks in kinds:
+        for count in range(1, min(allowed, (turns - 1) // every + 1) + 1):
+            spans[(count - 1) * every + 1] += blocks
+    total = 0.0
+    ends = np.zeros(len(spans))
+    ends[0] = 1.0
+    for _ in range(most):
+        ends = np.convolve(np.cumsum(ends), spans)[: len(spans)]
+        total += float(ends.sum())
+    return total

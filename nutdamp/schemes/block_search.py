@@ -27,6 +27,7 @@ from nutdamp.schemes.block_flights import (
     BlockSequences,
     Index,
     front,
+    grid_size,
     joined,
     least,
 )
@@ -60,6 +61,7 @@ BEAM = 32  # sequences that are continued, by each merit
 COARSE = 300  # cheapest sequences that are continued where delays are few: as in cb5030
 DOUBTFUL = 1.5  # share of a bound up to which the closed form may err
 FLOWN = 64  # sequences that are flown together, by each merit
+BATCHES = 16  # multiple of `FLOWN` of doubtful sequences that are flown, the cheapest first
 FLOWN_PULSES = 4000  # pulses of a batch of flights, at most: it then takes less than a second
 # multiple of the least cost above which further blocks are looked for though one complies
 DEAR = 1.5
@@ -95,28 +97,15 @@ class BlockSearch:
         self.kinds = list(itertools.product(channels, every))
         self.intervals = max(len(every), 1)
         self.widths = [commandable_widths(commands, channel) for channel, _ in self.kinds]
-        size = self.size(most)
+        turns = (spacecraft.horizon - self.model.start.sun_pulse) / turn + 1.0
+        one_of = [
+            (every, len(widths) * (self.last_delay + 1))
+            for (_, every), widths in zip(self.kinds, self.widths, strict=True)
+        ]
+        size = grid_size(int(turns) - self.earliest, one_of, self.allowed, most)
         self.coarse = self.last_delay < FEW_DELAYS
         self.whole = size <= WHOLE and self.coarse
         self.looked = round(size) if self.whole else 0
-
-    def size(self, most: int) -> float:
-        """Number of sequences of up to ``most`` blocks up to the horizon."""
-        turns = (self.spacecraft.horizon - self.model.start.sun_pulse) / self.model.turn + 1.0
-        turns = int(turns) - self.earliest
-        if turns > 100:  # of one pulse each they are too many
-            return math.inf
-        spans = np.zeros(turns + 1)
-        for (_, every), widths in zip(self.kinds, self.widths, strict=True):
-            for count in range(1, min(self.allowed, (turns - 1) // every + 1) + 1):
-                spans[(count - 1) * every + 1] += len(widths) * (self.last_delay + 1.0)
-        total = 0.0
-        ends = np.zeros(turns + 1)
-        ends[0] = 1.0
-        for _ in range(most):
-            ends = np.convolve(np.cumsum(ends), spans)[: turns + 1]
-            total += float(ends.sum())
-        return total
 
     @property
     def start(self) -> BlockSequences:
@@ -572,6 +561,15 @@ class BlockSearch:
         _, index = np.unique(mixed, return_index=True)
         rows = mixed[np.sort(index)]
         self._fly(sequences, rows[cost[rows] < self.flights.cheapest * (1.0 - SAME_COST)])
+        # Where the closed form errs by much, the cheapest that comply are far behind.
+        doubtful = doubtful[FLOWN : BATCHES * FLOWN]
+        doubtful = doubtful[share[doubtful] <= DOUBTFUL]
+        for begin in range(0, len(doubtful), 2 * FLOWN):
+            some = doubtful[begin : begin + 2 * FLOWN]
+            some = some[cost[some] < self.flights.cheapest * (1.0 - SAME_COST)]
+            if not len(some) or work.exhausted():
+                break
+            self._fly(sequences, some)
 
     def _fly(self, sequences: BlockSequences, rows: Index) -> Index:
         """Fly rows, and return those that were: the first ones, if all have too many pulses."""
