@@ -9,7 +9,6 @@ import re
 from collections.abc import Callable
 from typing import Annotated, Any, ClassVar, Literal
 
-from nutdamp.common.time import Epoch
 from nutdamp.files.fields import (
     RIGHT_ANGLE,
     THREE,
@@ -106,9 +105,10 @@ class _DateAndTime(Rule):
                 raise ValueError(
                     f"{shown(text)} is no epoch; expected ISO 8601: 2026-03-01T12:00:00Z"
                 )
-            Epoch.parse(
-                text
-            )  # raises for a day that is none, and for one without UTC or beyond four digits
+            from nutdamp.common.time import Epoch  # an epoch
+
+            # raises for a day that is none, and for one without UTC or beyond four digits
+            Epoch.parse(text)
         return text
 
     def schema(self, inner: Callable[[], dict[str, Any]]) -> dict[str, Any]:

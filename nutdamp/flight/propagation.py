@@ -28,7 +28,6 @@ from nutdamp.flight.dynamics import (
 )
 from nutdamp.physics import attitude, response
 from nutdamp.physics.motion import MOST_STEPS
-from nutdamp.physics.triaxial import arc_cones, widest_cones
 from nutdamp.spacecraft.model import Inertia, Spacecraft, SpinState, Vector
 from nutdamp.spacecraft.schedule import Pulse, Schedule
 
@@ -62,6 +61,8 @@ def widest(track: Track, moments: Array, sense: float, wheel: float) -> Track:
     """
     if np.array_equal(moments[..., 0], moments[..., 1]):
         return track
+    from nutdamp.physics.triaxial import widest_cones  # three different moments
+
     nutation, body_cone = widest_cones(
         np.broadcast_to(moments, track.rates.shape).T, track.rates.T, sense, wheel
     )
@@ -269,9 +270,8 @@ class Flight(Tabled):
         spacecraft, target = self.spacecraft, self.spacecraft.goal.axis
         after = self.last_momentum
         shift = float(attitude.angle_between(spacecraft.momentum, after))
-        left = arc_cones(
-            self.last_moments, self.settled.rates, spacecraft.sense, spacecraft.inertia.wheel
-        )
+        inertia = replace(spacecraft.inertia, moments=self.last_moments)
+        left = inertia.cones(self.settled.rates, spacecraft.sense)
         error = shift if target is None else float(attitude.angle_between(target, after))
         return Residual(left.nutation, left.body, left.space, shift, error, self.model)
 

@@ -19,7 +19,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.common.numerics import cos_sin, gauss_legendre
+from nutdamp.common.numerics import TINY, cos_sin, gauss_legendre
 from nutdamp.errors import Infeasible
 from nutdamp.flight.dynamics import make_dynamics
 from nutdamp.montecarlo.cases import (
@@ -38,7 +38,6 @@ from nutdamp.montecarlo.cases import (
     watch_over,
 )
 from nutdamp.physics import motion, sky
-from nutdamp.physics.energy_sink import TINY
 from nutdamp.physics.motion import MotionStretch
 from nutdamp.physics.series import Bodies, Forcing
 from nutdamp.physics.sky import AxisWatch, SunPulseClock, TorqueRamp

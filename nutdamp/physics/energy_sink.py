@@ -44,6 +44,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from nutdamp.common.numerics import TINY
 from nutdamp.physics import attitude
 
 Array = NDArray[np.float64]
@@ -59,8 +60,6 @@ MOST_TURNED = (
 )
 # time constants after which the sink has finished: θ is then 0 or 90° to far beyond rounding
 FOR_EVER = 300.0
-# offset that keeps quotients like asinh x / x defined at zero and changes nothing elsewhere
-TINY = 1e-200
 # least cosine of a nutation angle that is distinguished from zero: its square is still a number
 SMALLEST = 1e-150
 

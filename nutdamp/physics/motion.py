@@ -16,10 +16,9 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.common.numerics import cos_sin
+from nutdamp.common.numerics import TINY, cos_sin
 from nutdamp.errors import Infeasible
-from nutdamp.physics import attitude, energy_sink, series
-from nutdamp.physics.energy_sink import TINY
+from nutdamp.physics import attitude, series
 from nutdamp.physics.series import Bodies, Falling, Forcing, Polynomial, Series
 
 Array = NDArray[np.float64]
@@ -137,6 +136,8 @@ def nutated(
     turned = attitude.product(quaternion, (cosine, sine * x, sine * y, sine * axial))
     if growth == 0.0:
         return (x, y, spin), turned, ((1.0 - C / A) * spin - wheel / A) * time
+    from nutdamp.physics import energy_sink  # dissipation
+
     course: Any = energy_sink.course if number else energy_sink.courses
     first, second, along = x / size, y / size, axial / size
     across = (x + TINY) / size  # at rest, as of flat spin

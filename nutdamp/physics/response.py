@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.common.numerics import gauss_legendre, rising_zero
-from nutdamp.physics import energy_sink
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -82,9 +81,11 @@ def width_factor(
     ``drift`` (rad/s²) is a change of ν that goes on after the pulse.
     """
     half = 0.5 * on_time
-    growth = (
-        math.copysign(min(abs(growth), energy_sink.FOR_EVER / half), growth) if half > 0.0 else 0.0
-    )
+    if growth != 0.0:
+        from nutdamp.physics.energy_sink import FOR_EVER  # dissipation
+
+        most = FOR_EVER / half if half > 0.0 else 0.0
+        growth = math.copysign(min(abs(growth), most), growth)
     if slope == 0.0 and drift == 0.0:
         angle = (rate + 1j * growth) * half
         return cmath.sin(angle) / angle if angle != 0.0 else 1.0 + 0.0j

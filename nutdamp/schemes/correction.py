@@ -20,7 +20,7 @@ from nutdamp.common.results import Note
 from nutdamp.errors import Infeasible
 from nutdamp.flight import propagation
 from nutdamp.flight.dynamics import lightened, make_dynamics, supplied
-from nutdamp.physics import attitude, precession
+from nutdamp.physics import attitude
 from nutdamp.schemes.catalogue import OptimalOptions, Scheme, SchemeOptions
 from nutdamp.schemes.sequential import steady_omega
 from nutdamp.spacecraft.constraints import (
@@ -146,7 +146,7 @@ def _missed(flight_: propagation.Flight, *, spin: bool = False) -> Vector:
     after = flight_.last_momentum
     steady = steady_omega(spacecraft, schedule.end)
     body[:2] -= np.array(inertia.moments[:2]) * (steady.real, steady.imag)
-    aside = precession.square_to(spacecraft.target_axis)
+    aside = attitude.square_to(spacecraft.target_axis)
     across = np.array([aside @ after, np.cross(spacecraft.target_axis, aside) @ after])
     left = np.concatenate([body[:2], across]) / float(np.linalg.norm(body))
     final = spacecraft.goal.spin

@@ -14,7 +14,7 @@ from support.contract import PUSHED, pushing, valved, velocity_change
 
 from nutdamp.common.time import Epoch
 from nutdamp.flight import propagation
-from nutdamp.physics import attitude, sun
+from nutdamp.physics import attitude, sky
 from nutdamp.views.exchange import export_text
 
 pytestmark = [pytest.mark.orekit, pytest.mark.usefixtures("plans_shared")]
@@ -332,5 +332,5 @@ def test_orekit_sees_it_there(text: str) -> None:
     provider = orekit.java("org.orekit.bodies.AnalyticalSolarPositionProvider")()
     frame = orekit.java("org.orekit.frames.FramesFactory").getEME2000()
     seen = orekit.components(provider.getPosition(orekit.date(text), frame))
-    expected = sun.direction(Epoch.parse(f"{text}Z").days_of_j2000)
+    expected = sky.sun_direction(Epoch.parse(f"{text}Z").days_of_j2000)
     assert math.degrees(attitude.angle_between(seen, expected)) < 0.1
