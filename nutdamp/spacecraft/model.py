@@ -397,7 +397,9 @@ class Spacecraft(results.Data, results.Shown):
         Names, types and signs are checked; `with_` checks all that a file is checked for, and keeps
         the ``document``. Raises BadRequest.
         """
-        changed = units.replaced(self, {"document": None, **fields})
+        from nutdamp.physics import thruster  # types of fields
+
+        changed = units.replaced(self, {"document": None, **fields}, vars(thruster))
         for name in ("mass", "dissipation"):
             value = getattr(changed, name)
             if value is not None and value <= 0.0:
