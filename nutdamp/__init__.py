@@ -120,7 +120,6 @@ if not TYPE_CHECKING:  # or else a type checker would believe in any name
 
         if name == "errors":
             return import_module("nutdamp.errors")
-        import_module("nutdamp.api")  # results show themselves by what it names
         home = next(module for module, names in _HOMES.items() if name in names)
         value = getattr(import_module(home), name)
         globals()[name] = value

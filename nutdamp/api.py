@@ -22,7 +22,7 @@ from os import PathLike
 from typing import TYPE_CHECKING, Any
 
 from nutdamp import units
-from nutdamp.common import results, work
+from nutdamp.common import work
 from nutdamp.errors import Infeasible, warn
 from nutdamp.schemes.catalogue import LEAST, OptimalOptions, Options, expect_names, expect_options
 
@@ -47,8 +47,6 @@ PathName = str | PathLike[str]
 Progress = Callable[
     [int, int], None
 ]  # called now and then with the number of steps done, and that of all
-
-results.register("nutdamp.page.results")
 
 
 def load(

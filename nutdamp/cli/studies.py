@@ -21,7 +21,7 @@ from nutdamp.cli.job import (
     screen_options,
     spacecraft_argument,
 )
-from nutdamp.cli.main import leave, stoppable
+from nutdamp.cli.main import leave, say, stoppable
 from nutdamp.cli.options import (
     END,
     FILE,
@@ -37,8 +37,7 @@ from nutdamp.cli.options import (
     goal_options,
     reading_of,
 )
-from nutdamp.cli.plan import flown_options, fronts_of, plan_or_read
-from nutdamp.cli.screen import say
+from nutdamp.cli.simulate import flown_options, fronts_of, plan_or_read
 from nutdamp.common.work import SAMPLES
 from nutdamp.errors import CannotWrite, printable
 from nutdamp.schemes.catalogue import LEAST, OPTIMAL

@@ -35,9 +35,8 @@ from nutdamp.errors import Fault, FaultyFile, in_order, nearest, warn
 from nutdamp.files import keys
 from nutdamp.files.facts import CANCELLED, Facts, Finding, Vector, force_vector, symmetric
 from nutdamp.files.fields import REQUIRED, KeyPath, Problems, Rule, Section, section_of
-from nutdamp.files.plausibility import doubts
-from nutdamp.files.rules import correlation_findings, disturbance_kind, findings
-from nutdamp.files.study_keys import LoopSection, by_name, dispersions, thrust_behind
+from nutdamp.files.keys import LoopSection, by_name, dispersions, thrust_behind
+from nutdamp.files.rules import correlation_findings, disturbance_kind, doubts, findings
 from nutdamp.files.yaml import Node, dotted, read_text, read_tree
 from nutdamp.physics import attitude
 from nutdamp.physics.body import principal_axes

@@ -37,7 +37,7 @@ from nutdamp.montecarlo.cases import (
     triple,
     watch_over,
 )
-from nutdamp.physics import motion, sky
+from nutdamp.physics import flights, motion, sky
 from nutdamp.physics.motion import MotionStretch
 from nutdamp.physics.series import Bodies, Forcing
 from nutdamp.physics.sky import AxisWatch, SunPulseClock, TorqueRamp
@@ -280,8 +280,8 @@ def fly(
     pulses = model.schedule.pulses
     begins = zip(model.schedule, cases.starts, cases.leads, strict=True)
     shifts = [start - lead - pulse.loaded[0] for pulse, start, lead in begins]
-    for begin in range(0, count, motion.BLOCK):
-        rows = slice(begin, min(begin + motion.BLOCK, count))
+    for begin in range(0, count, flights.BLOCK):
+        rows = slice(begin, min(begin + flights.BLOCK, count))
 
         def part(value: object, rows: slice = rows) -> Array:
             return np.broadcast_to(np.asarray(value, dtype=float), count)[rows]
@@ -445,10 +445,10 @@ class RealWidths:
             if self.model.schedule.shaped:
                 pulses = self._ramps(cases, starts, impulses, sheds)
             else:
-                pulses = motion.Pulses(
+                pulses = flights.Pulses(
                     starts, np.array(self.model.on_times).reshape(-1, 1), impulses, sheds=sheds
                 )
-            settled, turned = motion.fly(bodies, rates, upright, pulses, watch)
+            settled, turned = flights.fly(bodies, rates, upright, pulses, watch)
             over = np.max(pulses.edges, axis=0, initial=0.0)
         last = bodies if sheds is None else bodies.lighter(sheds.sum(axis=0))
         if watch is not None:
@@ -478,7 +478,7 @@ class RealWidths:
 
     def _ramps(
         self, cases: DispersedCases, starts: Array, impulses: Array, sheds: Array | None
-    ) -> motion.Pulses:
+    ) -> flights.Pulses:
         """Pulses by the ramps of their thrust, each as a pulse of its own."""
         pieces = list(self._pieces(cases, starts, impulses))
         count = starts.shape[1]
@@ -492,7 +492,7 @@ class RealWidths:
             )
             falls = falls.reshape(-1, 3, count)
         impulses = np.array(parts).reshape(-1, 3, count)
-        return motion.Pulses(
+        return flights.Pulses(
             _whole(begins, count), _whole(lengths, count), impulses, _whole(leans, count), falls
         )
 

@@ -1,6 +1,4 @@
-"""Display and output of the results: functions that `nutdamp.api` names for
-`nutdamp.common.results`.
-"""
+"""Display and output of the results: functions for `nutdamp.common.results`, by their names."""
 
 from __future__ import annotations
 

@@ -22,7 +22,8 @@ from numpy.typing import NDArray
 
 from nutdamp.physics.attitude import angle_of_parts
 from nutdamp.physics.energy_sink import damper
-from nutdamp.physics.motion import MotionStretch, pieces
+from nutdamp.physics.motion import MotionStretch, polynomials
+from nutdamp.physics.series import Polynomial
 
 Array = NDArray[np.float64]
 
@@ -35,6 +36,46 @@ ABERRATION = 20.4898 / 3600.0  # mean aberration of the Sun, deg (Meeus, 25.10)
 
 TILTING, NODE = math.radians(0.013056), math.radians(174.876)
 """Tilt of the ecliptic per century, and the longitude of its axis."""
+
+
+class DenseStretch(NamedTuple):
+    """Motion from a ``start`` for ``length`` (n,) s: by a ``polynomial``, or in closed form."""
+
+    start: MotionStretch
+    length: Array
+    polynomial: Polynomial | None = None
+
+    def at(self, way: Array, cases: Any) -> MotionStretch:
+        """Motion of ``cases`` after a ``way`` (m,), as a share of the length."""
+        here = self.start.some(cases)
+        since = here.since + way * self.length[cases]
+        if self.polynomial is None:
+            return here.moved(since)
+        rates, quaternion = self.polynomial.at(way, cases)
+        return here._replace(since=since, rates=rates, quaternion=quaternion)
+
+    def steps(self, count: int) -> Iterator[MotionStretch]:
+        """Motion at the end of each of ``count`` steps of equal length."""
+        ways = np.arange(1, count + 1) / count
+        times = self.start.since + ways[:, None] * self.length
+        if self.polynomial is None:
+            yield from map(self.start.moved, times)
+            return
+        for since, rates, quaternion in zip(times, *self.polynomial.along(ways), strict=True):
+            yield self.start._replace(since=since, rates=rates, quaternion=quaternion)
+
+
+def pieces(here: MotionStretch, duration: Array) -> Iterator[DenseStretch]:
+    """Motion that `advance` makes with these arguments, which stay as they are, one piece after the
+    other.
+    """
+    if here.torque is None and here.bodies.free:
+        yield DenseStretch(here, duration)
+        return
+    for piece in polynomials(here, duration):
+        terms = piece.terms[0]
+        start = here._replace(since=piece.start, rates=terms[4:], quaternion=terms[:4])
+        yield DenseStretch(start, piece.duration, piece)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
