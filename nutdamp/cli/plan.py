@@ -71,10 +71,10 @@ def compared_with(
 
 def robust_of(job: Job, compared: Comparison) -> RobustComparison:
     """The plans compared and their variants in dispersed cases."""
-    from nutdamp.api import robust
+    from nutdamp.planning.robust import compare
 
     with job.working("dispersing"):
-        return robust(compared, job.options)
+        return compare(compared, job.options)
 
 
 @click.command("plan", cls=SessionCommand)

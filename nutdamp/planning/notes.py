@@ -17,7 +17,7 @@ from nutdamp.planning.plan import Plan, Standing
 from nutdamp.planning.verdict import Verdict
 from nutdamp.schemes import catalogue
 from nutdamp.schemes.catalogue import OPTIMAL
-from nutdamp.schemes.sequential import steady_omega
+from nutdamp.schemes.correction import steady_omega
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import Breach, Limit, breaches, rounded_off
 from nutdamp.spacecraft.model import LIGHTER, Spacecraft

@@ -39,7 +39,8 @@ from nutdamp.physics import motion, response
 from nutdamp.planning import plan as planning
 from nutdamp.planning.notes import infeasibility, plan_notes
 from nutdamp.schemes.catalogue import CLASSIC, FourPulseOptions, Options
-from nutdamp.schemes.sequential import ImpulseBuilder, model_of, steady_omega
+from nutdamp.schemes.correction import model_of, steady_omega
+from nutdamp.schemes.sequential import ImpulseBuilder
 from nutdamp.spacecraft.equipment import Channel, Steerable
 from nutdamp.spacecraft.model import Disturbance, Inertia, Limits, Spacecraft
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
