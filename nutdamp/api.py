@@ -33,10 +33,11 @@ if TYPE_CHECKING:
     from nutdamp.estimation.results import Fitted
     from nutdamp.montecarlo.study import Results
     from nutdamp.page.report import Report
-    from nutdamp.planning.decision import Comparison, Simulation
-    from nutdamp.planning.plan import Plan, Verified
+    from nutdamp.planning.decision import Comparison
+    from nutdamp.planning.plan import Plan
     from nutdamp.planning.robust import RobustComparison
     from nutdamp.planning.screening import Dispersion
+    from nutdamp.planning.simulation import Simulation, Verified
     from nutdamp.planning.tradeoff import Trade
     from nutdamp.schemes.planner import Choice
     from nutdamp.spacecraft.model import Spacecraft
@@ -292,8 +293,8 @@ def simulate(
     True
     """
     from nutdamp.figures.geometry import shown_until
-    from nutdamp.planning.decision import Simulation
     from nutdamp.planning.plan import feasible
+    from nutdamp.planning.simulation import Simulation
 
     spacecraft, pulses = feasible(plan).spacecraft, plan.pulses
     end = units.end_of_flight(pulses.end + spacecraft.inertial_period if until is None else until)
@@ -473,11 +474,12 @@ def verify(plan: Plan) -> Verified:
     True
     """
     from nutdamp.flight import verification
-    from nutdamp.planning import plan as planning
+    from nutdamp.planning.plan import feasible
+    from nutdamp.planning.simulation import Verified, unrounded
 
-    spacecraft, known = planning.feasible(plan).spacecraft, plan.options.with_disturbances
-    core = verification.verify(spacecraft, plan.pulses, planning.unrounded(plan), expected=known)
-    return planning.Verified(core, plan)
+    spacecraft, expected = feasible(plan).spacecraft, plan.options.with_disturbances
+    core = verification.verify(spacecraft, plan.pulses, unrounded(plan), expected=expected)
+    return Verified(core, plan)
 
 
 def verify_loop(spacecraft: Spacecraft, until: float | None = None) -> LoopVerification:

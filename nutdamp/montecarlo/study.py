@@ -53,7 +53,7 @@ from nutdamp.montecarlo.statistics import (
     share_interval,
     vectors,
 )
-from nutdamp.physics import flights
+from nutdamp.physics import motion
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import Spacecraft, required_share
 from nutdamp.spacecraft.requirements import Bound, Left, Part
@@ -62,7 +62,7 @@ from nutdamp.spacecraft.tolerances import expect_dispersions
 
 Array = NDArray[np.float64]
 
-STRIDE = flights.BLOCK  # cases that are always flown together
+STRIDE = motion.BLOCK  # cases that are always flown together
 PORTION = 2 * STRIDE  # cases that a thread takes at once; blocks are multiples of it
 
 

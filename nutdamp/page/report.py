@@ -51,7 +51,8 @@ from nutdamp.page.manoeuvre import manoeuvre_blocks
 from nutdamp.page.moving import moving_of
 from nutdamp.planning.decision import Comparison
 from nutdamp.planning.notes import broken_limits, plan_notes, reasons
-from nutdamp.planning.plan import NO_NUTATION, Plan, unrounded
+from nutdamp.planning.plan import NO_NUTATION, Plan
+from nutdamp.planning.simulation import unrounded
 from nutdamp.planning.tradeoff import Front
 from nutdamp.planning.verdict import Light, Line, Verdict
 from nutdamp.spacecraft.model import Spacecraft

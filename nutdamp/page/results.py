@@ -12,9 +12,10 @@ from nutdamp.common import results
 from nutdamp.errors import BadRequest, Infeasible, MissingExtra
 from nutdamp.files.tabular import track_array, write_track, write_whole
 from nutdamp.flight.propagation import Flight
-from nutdamp.planning.decision import Comparison, Simulation
+from nutdamp.planning.decision import Comparison
 from nutdamp.planning.notes import comparison_warnings, plan_notes, reasons
 from nutdamp.planning.plan import Plan, feasible
+from nutdamp.planning.simulation import Simulation
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.views.decisions import comparison_json
 from nutdamp.views.glance import scheme_table

@@ -37,6 +37,11 @@ SHORT = 8.0  # angle up to which steps of one body in turn are quicker than all 
 FEW = 256  # cases up to which steps summed at once cost less than the calls of steps in turn
 
 
+# cases flown together: enough to hide the cost of calls, few enough that their series stay in the
+# cache
+BLOCK = 2048
+
+
 class MotionStretch(NamedTuple):
     """Motion of ``bodies`` under one torque, None for a coast, from ``since`` on."""
 

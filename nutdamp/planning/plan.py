@@ -6,7 +6,6 @@ import math
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 from nutdamp import units
 from nutdamp.common import results, work
@@ -22,12 +21,8 @@ from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import Breach, breaches, keeps_limits, misfits
 from nutdamp.spacecraft.model import Spacecraft, Vector, required_share
 from nutdamp.spacecraft.requirements import Bound, Held, Left
-from nutdamp.spacecraft.roles import as_known, with_limits
+from nutdamp.spacecraft.roles import as_known
 from nutdamp.spacecraft.schedule import Schedule
-
-if TYPE_CHECKING:
-    from nutdamp.flight.verification import Verification
-
 
 NO_NUTATION = 1e-12  # rad of nutation below which there is nothing to plan
 ROUNDING = 1e-11  # relative decrease of the nutation that may be rounding
@@ -414,27 +409,6 @@ def judge(
     )
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Verified(results.Data):
-    """A ``plan`` flown by independent methods: ``core`` holds them, conserved quantities and the
-    error budget.
-    """
-
-    core: Verification
-    plan: Plan
-
-    @property
-    def agree(self) -> bool:
-        """True where an independent integration was flown, and all of them confirm the flown
-        motion.
-        """
-        return self.core.agree
-
-    def __repr__(self) -> str:
-        agreeing = ", ".join(self.core.checks) if self.agree else "nothing"
-        return f"<Verified {self.plan.scheme}: agrees with {agreeing}>"
-
-
 def feasible(plan: Plan) -> Plan:
     """A plan with a schedule; raises BadRequest for anything but a `Plan`, Infeasible for one
     without.
@@ -443,20 +417,6 @@ def feasible(plan: Plan) -> Plan:
     if not plan.feasible:
         raise Infeasible(f"{plan.scheme} is infeasible: {plan.why}")
     return plan
-
-
-def unrounded(plan_: Plan) -> Schedule | None:
-    """Schedule with commands of any resolution; None without a tick, such a schedule, or a scheme
-    that planned it.
-    """
-    spacecraft = plan_.spacecraft
-    if spacecraft.limits.tick is None or plan_.from_file or plan_.scheme not in catalogue.SCHEMES:
-        return None
-    return plan(
-        with_limits(spacecraft, tick=None),
-        plan_.scheme,
-        plan_.options,
-    ).schedule
 
 
 def unflown(plan: Plan) -> Cases:

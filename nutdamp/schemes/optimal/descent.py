@@ -21,8 +21,7 @@ from nutdamp.common import work
 from nutdamp.common.numerics import cos_sin
 from nutdamp.flight.dynamics import make_dynamics
 from nutdamp.physics import attitude
-from nutdamp.physics.flights import BLOCK
-from nutdamp.physics.motion import MotionStretch, advance
+from nutdamp.physics.motion import BLOCK, MotionStretch, advance
 from nutdamp.physics.series import Bodies
 from nutdamp.schemes.optimal.refinement import (
     AROUND,

@@ -308,7 +308,7 @@ def test_blocks_of_many_cases_are_flown_some_at_once(monkeypatch: pytest.MonkeyP
     model = DispersedModel(whole.spacecraft, fired(whole.spacecraft, whole.schedule.blocks[:1]))
     draws = dispersed.first_cases(study_of(model.spacecraft, model.schedule), 12)
     at_once = outputs(RealWidths, model, draws)
-    monkeypatch.setattr("nutdamp.physics.flights.BLOCK", 5)
+    monkeypatch.setattr("nutdamp.physics.motion.BLOCK", 5)
     assert outputs(RealWidths, model, draws) == pytest.approx(at_once, abs=1e-12, nan_ok=True)
 
 

@@ -18,10 +18,11 @@ from support.spinning import EPS, Triple, about, arc, driven, series, turning
 
 from nutdamp.common.numerics import cos_sin
 from nutdamp.errors import Infeasible
+from nutdamp.montecarlo.propagated import Pulses
+from nutdamp.montecarlo.propagated import fly_pulses as fly
 from nutdamp.physics import attitude
 from nutdamp.physics import driven as taylor
-from nutdamp.physics.flights import BLOCK, Pulses, fly
-from nutdamp.physics.motion import MotionStretch, advance, polynomials
+from nutdamp.physics.motion import BLOCK, MotionStretch, advance, polynomials
 from nutdamp.physics.series import NOTHING, Bodies, Falling, Forcing
 from nutdamp.physics.sky import AxisWatch
 
