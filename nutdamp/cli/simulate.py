@@ -76,7 +76,8 @@ def plan_or_read(job: Job, *, judged: bool = False) -> Plan:
     ``judged``: a verdict names the cones that are broken.
     """
     from nutdamp import api
-    from nutdamp.planning.notes import comparison_warnings, infeasibility, plan_notes, reasons
+    from nutdamp.planning.causes import infeasibility
+    from nutdamp.planning.notes import comparison_warnings, plan_notes, reasons
     from nutdamp.views.text import joined
 
     scheme, schedule, blocks = job.flown
@@ -112,7 +113,7 @@ def plan_or_read(job: Job, *, judged: bool = False) -> Plan:
 def _fired(job: Job, path: str) -> Plan:
     """The pulses that a file of command blocks fires, as a plan; Infeasible without Sun pulses."""
     from nutdamp.files.schedules import read_blocks
-    from nutdamp.planning.notes import broken_limits
+    from nutdamp.planning.causes import broken_limits
     from nutdamp.planning.plan import Plan
     from nutdamp.schemes.block_model import fired
 
@@ -218,7 +219,7 @@ def simulate_command(
     plan = plan_or_read(job, judged=not job.silent)
 
     from nutdamp.api import simulate
-    from nutdamp.planning.notes import model_warnings
+    from nutdamp.planning.simulation import model_warnings
     from nutdamp.views.simulation import simulation_screen
 
     simulation = simulate(plan, until, flown=real, samples=samples)

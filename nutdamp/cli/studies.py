@@ -101,7 +101,7 @@ def trade_command(
     verdicts, and 3 where there is none. SPACECRAFT and FILE are as for `nutdamp plan`.
     """
     from nutdamp.files.tabular import make_folder
-    from nutdamp.planning.notes import CUT
+    from nutdamp.planning.causes import CUT
     from nutdamp.planning.tradeoff import numbered
     from nutdamp.views.trade import schedule_files, schedule_paths, trade_brief
 

@@ -47,7 +47,7 @@ VIEWS = {
     "Plan.data": "views.decisions:plan_json",
     "Plan.sentences": "page.results:remarks",
     "Plan.verdict": "planning.screening:verdict_of",
-    "Plan.reason": "planning.notes:infeasibility",
+    "Plan.reason": "planning.causes:infeasibility",
     "Comparison.data": "views.decisions:comparison_json",
     "Comparison.sentences": "page.results:remarks",
     "Comparison.reason": "page.results:comparison_reason",

@@ -13,13 +13,15 @@ from numpy.typing import NDArray
 
 from nutdamp.common import results
 from nutdamp.common.numerics import SAME_ANGLE
-from nutdamp.flight import propagation
+from nutdamp.common.results import Note, note
+from nutdamp.flight import end_state, propagation
 from nutdamp.flight.end_state import seen_at
 from nutdamp.flight.propagation import Flight, Track
 from nutdamp.physics import attitude
 from nutdamp.planning.plan import Plan, judge, plan
 from nutdamp.planning.verdict import Verdict
 from nutdamp.schemes import catalogue
+from nutdamp.spacecraft.requirements import Part
 from nutdamp.spacecraft.roles import with_limits
 from nutdamp.spacecraft.schedule import Schedule
 
@@ -218,3 +220,19 @@ def unrounded(planned: Plan) -> Schedule | None:
     if spacecraft.limits.tick is None or not schemed:
         return None
     return plan(with_limits(spacecraft, tick=None), planned.scheme, planned.options).schedule
+
+
+def model_warnings(impulses: Flight, flown: Flight) -> Iterator[Note]:
+    """Difference between the impulse sum (17) and real widths at the end, where it exceeds the
+    tolerance.
+    """
+    for apart in end_state.deviations(impulses, flown):
+        if apart.part is Part.SPIN:
+            yield note(
+                "models-differ-in-spin", difference_rad_s=apart.error, limit_rad_s=apart.most
+            )
+            continue
+        difference, most = math.degrees(apart.error), math.degrees(apart.most)
+        yield note(
+            "models-differ", difference_deg=difference, part=apart.part.label, limit_deg=most
+        )

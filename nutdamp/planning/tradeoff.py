@@ -18,8 +18,8 @@ import numpy as np
 
 from nutdamp.common import results, work
 from nutdamp.errors import BadRequest, Infeasible
+from nutdamp.planning.causes import infeasibility
 from nutdamp.planning.decision import by_propellant, compare, usual
-from nutdamp.planning.notes import infeasibility
 from nutdamp.planning.plan import Plan, judge, plan
 from nutdamp.planning.verdict import Verdict
 from nutdamp.schemes import planner, valve_commands

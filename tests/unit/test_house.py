@@ -23,7 +23,7 @@ is what the longest has, control_loop/budget.
 FLOORS = 23
 """Longest chain of imports, those within functions and for types alone too."""
 
-MOST_MODULES, MOST_OUTSIDE = 137, 107
+MOST_MODULES, MOST_OUTSIDE = 138, 108
 """Modules without the markers of packages, and of them those outside views,
 figures and the page.
 """

@@ -22,8 +22,9 @@ from nutdamp.files.reader import load_spacecraft
 from nutdamp.flight import dynamics, propagation
 from nutdamp.physics import attitude, sky
 from nutdamp.planning import plan as planning
+from nutdamp.planning.causes import CUT, infeasibility
 from nutdamp.planning.decision import compare
-from nutdamp.planning.notes import CUT, comparison_warnings, infeasibility, plan_notes
+from nutdamp.planning.notes import comparison_warnings, plan_notes
 from nutdamp.schemes.optimal import linear_program
 from nutdamp.spacecraft.model import Disturbance, Goal, Limits
 from nutdamp.spacecraft.schedule import Schedule

@@ -37,7 +37,8 @@ from nutdamp.flight import propagation
 from nutdamp.physics import body as rigid_body
 from nutdamp.physics import motion, response
 from nutdamp.planning import plan as planning
-from nutdamp.planning.notes import infeasibility, plan_notes
+from nutdamp.planning.causes import infeasibility
+from nutdamp.planning.notes import plan_notes
 from nutdamp.schemes.catalogue import CLASSIC, FourPulseOptions, Options
 from nutdamp.schemes.correction import model_of, steady_omega
 from nutdamp.schemes.sequential import ImpulseBuilder

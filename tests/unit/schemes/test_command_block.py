@@ -30,8 +30,8 @@ from nutdamp.flight.end_state import aspects, left_by
 from nutdamp.physics import attitude, precession
 from nutdamp.physics.thruster import Cold, Tank, Trapezoid, Valve
 from nutdamp.planning import plan as planning
+from nutdamp.planning.causes import infeasibility
 from nutdamp.planning.decision import usual
-from nutdamp.planning.notes import infeasibility
 from nutdamp.schemes.block_model import BlockModel, BlockState, Trial, fired, sun_clock, sun_pulses
 from nutdamp.schemes.block_search import (
     BLOCKS,

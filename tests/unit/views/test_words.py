@@ -29,12 +29,12 @@ from support.process import Run
 import nutdamp
 from nutdamp.common.results import Note, Value, note
 from nutdamp.planning import plan as planning
+from nutdamp.planning.causes import infeasibility
 from nutdamp.planning.decision import TIES, WHY, Gain
 from nutdamp.planning.notes import (
     LEAST_CODES,
     alternatives,
     comparison_warnings,
-    infeasibility,
     plan_notes,
     reasons,
     verdict_notes,
