@@ -23,8 +23,16 @@ from typing import TYPE_CHECKING, Any
 
 from nutdamp import units
 from nutdamp.common import work
-from nutdamp.errors import Infeasible, warn
-from nutdamp.schemes.catalogue import LEAST, OptimalOptions, Options, expect_names, expect_options
+from nutdamp.errors import BadRequest, Infeasible, nearest, warn
+from nutdamp.schemes.catalogue import (
+    LEAST,
+    NAMES,
+    SCHEMES,
+    OptimalOptions,
+    Options,
+    SchemeOptions,
+    names_of,
+)
 
 if TYPE_CHECKING:
     from nutdamp.control_loop.budget import Budget
@@ -132,6 +140,46 @@ def _expected(spacecraft: Spacecraft) -> Spacecraft:
     )
 
 
+def _expect_names(values: Iterable[str]) -> tuple[str, ...]:
+    """Names of schemes that there are, each once; raises BadRequest."""
+    if isinstance(values, str) or not isinstance(values, Iterable):
+        raise BadRequest(
+            "names: expected a list of schemes, such as ['two-pulse'], "
+            f"got {units.as_given(values)}"
+        )
+    names = tuple(values)
+    for name in names:
+        if not isinstance(name, str) or name not in NAMES:
+            close = nearest(name, NAMES) if isinstance(name, str) else None
+            cure = f"there are {', '.join(NAMES)}" if close is None else f"did you mean {close!r}?"
+            raise BadRequest(f"there is no scheme {units.as_given(name)}; {cure}")
+    return tuple(dict.fromkeys(names))
+
+
+def _expect_options(
+    value: Any, chosen: Mapping[str, Any], scheme: str | None = None
+) -> Options | SchemeOptions | None:
+    """Options of schemes, or those ``chosen`` by keyword, which the ``scheme`` must have; raises
+    BadRequest.
+    """
+    if not (value is None or isinstance(value, Options | SchemeOptions)) or (
+        value is not None and chosen
+    ):
+        raise BadRequest(
+            f"options: expected nutdamp.Options(…) or keywords, got {units.as_given(value)}"
+        )
+    if not chosen:
+        return value
+    options = Options(**chosen)
+    if scheme is not None:
+        own = SCHEMES[scheme].options
+        for unread in options.without_effect([own]):
+            raise BadRequest(
+                f"options: {scheme} has no {unread!r}; there are {', '.join(names_of(own))}"
+            )
+    return options
+
+
 def plan(
     spacecraft: Spacecraft, scheme: str | None = None, options: Choice = None, **chosen: Any
 ) -> Plan:
@@ -159,8 +207,8 @@ def plan(
     from nutdamp.planning import plan as planning
 
     spacecraft = _expected(spacecraft)
-    named = None if scheme is None else expect_names([scheme])[0]
-    settled = expect_options(options, chosen, named)
+    named = None if scheme is None else _expect_names([scheme])[0]
+    settled = _expect_options(options, chosen, named)
     if named is not None:
         return planning.plan(spacecraft, named, settled)
     compared = compare(spacecraft, options=settled)
@@ -205,9 +253,9 @@ def compare(
     from nutdamp.planning import decision
 
     spacecraft = _expected(spacecraft)
-    schemes = expect_names(names)
+    schemes = _expect_names(names)
     count = samples if samples in (None, 0) else units.count("samples", samples)
-    chosen_options = expect_options(options, chosen)
+    chosen_options = _expect_options(options, chosen)
     compared = decision.compare(spacecraft, schemes, chosen_options, samples=count, timed=timed)
     if not robust or count is not None or not compared.too_few_comply:
         return compared

@@ -105,36 +105,6 @@ def leave(judged: Status | None = None, *, failed: bool = False, infeasible: boo
         sys.exit(INTERNAL if failed else INFEASIBLE if infeasible else status)
 
 
-class Interruption:
-    """Request to stop a run, and the signal that made it."""
-
-    number: int | None = None
-
-    def __call__(self) -> bool:
-        """True where a stop was requested."""
-        return self.number is not None
-
-
-@contextmanager
-def stoppable() -> Iterator[Interruption]:
-    """An `Interruption` by Ctrl-C or SIGTERM ends a run in order; a second Ctrl-C at once."""
-    stop = Interruption()
-
-    def ask(number: int, _: FrameType | None) -> None:
-        if stop() and number == signal.SIGINT:
-            raise KeyboardInterrupt
-        stop.number = number
-
-    before = {number: signal.signal(number, ask) for number in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        yield stop
-    except KeyboardInterrupt:
-        raise Terminated() if stop.number == signal.SIGTERM else KeyboardInterrupt from None
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
-
-
 def _terminate(number: int, frame: FrameType | None) -> None:  # noqa: ARG001 - signature of handlers
     signal.signal(signal.SIGTERM, signal.SIG_IGN)  # a second one would interrupt the clearing up
     raise Terminated

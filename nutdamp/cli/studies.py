@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import math
+import signal
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import partial
+from types import FrameType
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -21,7 +24,7 @@ from nutdamp.cli.job import (
     screen_options,
     spacecraft_argument,
 )
-from nutdamp.cli.main import leave, say, stoppable
+from nutdamp.cli.main import Terminated, leave, say
 from nutdamp.cli.options import (
     END,
     FILE,
@@ -326,6 +329,36 @@ def fit_command(
 
 
 FIGURES = ("overview", "cases", "momentum")  # figures that ``--plot`` draws
+
+
+class Interruption:
+    """Request to stop a run, and the signal that made it."""
+
+    number: int | None = None
+
+    def __call__(self) -> bool:
+        """True where a stop was requested."""
+        return self.number is not None
+
+
+@contextmanager
+def stoppable() -> Iterator[Interruption]:
+    """An `Interruption` by Ctrl-C or SIGTERM ends a run in order; a second Ctrl-C at once."""
+    stop = Interruption()
+
+    def ask(number: int, _: FrameType | None) -> None:
+        if stop() and number == signal.SIGINT:
+            raise KeyboardInterrupt
+        stop.number = number
+
+    before = {number: signal.signal(number, ask) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield stop
+    except KeyboardInterrupt:
+        raise Terminated() if stop.number == signal.SIGTERM else KeyboardInterrupt from None
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 @click.command("disperse", cls=SessionCommand)

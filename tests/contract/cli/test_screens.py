@@ -23,7 +23,7 @@ from support.commands import call, printed
 from support.process import Run
 
 from nutdamp.cli import main
-from nutdamp.cli.main import stoppable
+from nutdamp.cli.studies import stoppable
 from nutdamp.common import work
 from nutdamp.files.reader import example_text
 from nutdamp.planning import plan as planning
