@@ -43,7 +43,7 @@ from nutdamp.cli.options import (
     goal_options,
 )
 from nutdamp.cli.plan import compared_with, robust_of, scheme_option
-from nutdamp.cli.simulate import flown_options, fronts_of, plan_or_read
+from nutdamp.cli.studies import flown_options, fronts_of, plan_or_read
 from nutdamp.common.work import SAMPLES
 from nutdamp.errors import BadRequest, nearest, printable
 from nutdamp.schemes.catalogue import LEAST, PLANNED

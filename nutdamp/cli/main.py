@@ -308,7 +308,7 @@ class _Progress:
 # the subcommands in the order of a first use, with their modules and their lines on the help page
 COMMANDS = {
     "plan": ("plan", "Plan pulse schedules that damp the nutation, and compare them."),
-    "simulate": ("simulate", "Propagate a scheme or a schedule; cone angles and axis track."),
+    "simulate": ("studies", "Propagate a scheme or a schedule; cone angles and axis track."),
     "trade": ("studies", "Trade finish time against propellant."),
     "loop": ("studies", "Fire from a gyro or an accelerometer, in a closed loop."),
     "budget": ("studies", "Hold the nutation: pulses a day, propellant a year."),
@@ -316,7 +316,7 @@ COMMANDS = {
     "disperse": ("studies", "Fly many dispersed cases; percentiles, tolerance budget."),
     "verify": ("files", "Fly a schedule by independent means; an error budget."),
     "report": ("files", "Write a report, one page of HTML."),
-    "animate": ("simulate", "Film the body cone rolling on the space cone."),
+    "animate": ("studies", "Film the body cone rolling on the space cone."),
     "check": ("files", "Check spacecraft files: all faults, derived quantities."),
     "export": ("files", "A schedule for other tools: CCSDS, STK, Basilisk, JSON."),
     "import": ("files", "A spacecraft file from a CCSDS attitude parameter message."),

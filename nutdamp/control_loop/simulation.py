@@ -36,7 +36,7 @@ from nutdamp.control_loop.law import Law
 from nutdamp.control_loop.sensor import Noise, Signal, felt, stepped
 from nutdamp.control_loop.stability import dead_band
 from nutdamp.errors import Infeasible
-from nutdamp.flight import end_state
+from nutdamp.flight import cones
 from nutdamp.flight.dynamics import Dynamics, Path, make_dynamics
 from nutdamp.flight.propagation import Flight, Leg, widest
 from nutdamp.montecarlo.cases import watch_over
@@ -308,7 +308,7 @@ def fly_alone(
         if law.spacecraft.keep:
             seen = (
                 aspect
-                for aspect in end_state.aspects(run.flight, run.until)
+                for aspect in cones.aspects(run.flight, run.until)
                 if aspect.keep in law.spacecraft.keep
             )
             aspects[:, :, row] = [(aspect.least, aspect.largest) for aspect in seen]

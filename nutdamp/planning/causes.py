@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 from nutdamp.common.numerics import RPM
 from nutdamp.common.results import Note, note
-from nutdamp.flight.end_state import Aspect
+from nutdamp.flight.cones import Aspect
 from nutdamp.planning.plan import Plan
 from nutdamp.planning.verdict import Verdict
 from nutdamp.schemes.correction import steady_omega

@@ -6,10 +6,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 from nutdamp.common.numerics import RPM, down
 from nutdamp.common.results import Note, Value, note
-from nutdamp.flight.end_state import Aspect, at_start
 from nutdamp.flight.propagation import Flight
 from nutdamp.planning.decision import ROBUST, TIES, Comparison, Gain, Ground
 from nutdamp.planning.plan import Plan, Standing
@@ -19,6 +19,9 @@ from nutdamp.schemes.catalogue import OPTIMAL
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import LIGHTER, Spacecraft
 from nutdamp.spacecraft.requirements import Part
+
+if TYPE_CHECKING:
+    from nutdamp.flight.cones import Aspect
 
 TELLING = math.radians(1e-6)  # remaining nutation angle in rad from which there is a note on it
 
@@ -278,12 +281,13 @@ def comparison_warnings(compared: Comparison, *, tabulated: bool = False) -> Ite
     keeping = [plan.scheme for plan in compared.plans if plan.feasible and plan.kept]
     if broken and keeping:
         yield note("plans-keep-cones", schemes=", ".join(keeping))
-    for aspect in at_start(compared.spacecraft):
-        if not aspect.kept:
-            yield Note(
-                "cone-broken-at-start",
-                tuple(item for item in broken_cone(aspect).items if item[0] != "at_s"),
-            )
+    if compared.spacecraft.watched:
+        from nutdamp.flight.cones import at_start  # directions to watch
+
+        for aspect in at_start(compared.spacecraft):
+            if not aspect.kept:
+                items = (item for item in broken_cone(aspect).items if item[0] != "at_s")
+                yield Note("cone-broken-at-start", tuple(items))
     others = [plan.scheme for plan in compared.plans if plan.feasible and not plan.commandable]
     better = [scheme for scheme in others if compared.verdicts[compared[scheme]].met]
     if better and chosen.commandable and compared.verdicts[chosen].met is False:
@@ -316,7 +320,8 @@ def _missed(chosen: Plan, compared: Comparison, *, tabulated: bool) -> Iterator[
                 required_share=share,
             )
         return
-    from nutdamp.planning.causes import obstacles, shortfalls  # a requirement is missed
+    from nutdamp.flight.cones import at_start
+    from nutdamp.planning.causes import obstacles, shortfalls
 
     yield from shortfalls(chosen, tabulated=tabulated)
     spacecraft = chosen.spacecraft

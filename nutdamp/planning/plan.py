@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 from nutdamp import units
 from nutdamp.common import results, work
@@ -13,7 +14,7 @@ from nutdamp.common.numerics import cleaned
 from nutdamp.common.results import note
 from nutdamp.errors import Infeasible, NotFound
 from nutdamp.flight import end_state, propagation
-from nutdamp.flight.end_state import Aspect, left_on_the_way, seen_at
+from nutdamp.flight.end_state import left_on_the_way, seen_at
 from nutdamp.flight.propagation import Flight, Residual
 from nutdamp.planning.verdict import Cases, JudgedCases, Verdict, judge_schedule, no_plan
 from nutdamp.schemes import catalogue, planner
@@ -23,6 +24,9 @@ from nutdamp.spacecraft.model import Spacecraft, Vector, required_share
 from nutdamp.spacecraft.requirements import Bound, Held, Left
 from nutdamp.spacecraft.roles import as_known
 from nutdamp.spacecraft.schedule import Schedule
+
+if TYPE_CHECKING:
+    from nutdamp.flight.cones import Aspect
 
 NO_NUTATION = 1e-12  # rad of nutation below which there is nothing to plan
 ROUNDING = 1e-11  # relative decrease of the nutation that may be rounding
@@ -266,9 +270,13 @@ class Plan(results.Data, results.Tabled):
     @cached_property
     def aspects(self) -> tuple[Aspect, ...]:
         """Extreme angles of the flown spin axis from each watched direction; see
-        `end_state.aspects`.
+        `cones.aspects`.
         """
-        return end_state.aspects(self.flight)
+        if not self.spacecraft.watched:
+            return ()
+        from nutdamp.flight.cones import aspects  # a direction to watch
+
+        return aspects(self.flight)
 
     @property
     def kept(self) -> bool | None:
@@ -291,9 +299,12 @@ def plan(spacecraft: Spacecraft, scheme: str, options: planner.Choice = None) ->
         able = " and ".join(spinning(spacecraft))
         why = f"cannot set the spin; {able} can, with channels that have a torque about axis 3"
         return Plan(spacecraft, scheme, None, why)
-    forbidden = end_state.at_target(spacecraft) if scheme in catalogue.PLANNED else None
-    if forbidden is not None:
-        return Plan(spacecraft, scheme, None, astray=forbidden)
+    if spacecraft.goal.axis is not None and scheme in catalogue.PLANNED:
+        from nutdamp.flight.cones import at_target  # a target
+
+        forbidden = at_target(spacecraft)
+        if forbidden is not None:
+            return Plan(spacecraft, scheme, None, astray=forbidden)
     chosen = planner.settled(catalogue.SCHEMES[scheme], options, spacecraft)
     known = as_known(spacecraft, disturbed=chosen.with_disturbances)
     with work.budget(scheme, work.SCHEME) as spent:
@@ -359,7 +370,9 @@ def judged(
     if breach is not None:
         return Plan(spacecraft, scheme, None, breach=breach)
     if spacecraft.goal.axis is not None and scheme in catalogue.PLANNED:
-        astray = end_state.broken(spacecraft, flown.flight)
+        from nutdamp.flight.cones import broken  # a target
+
+        astray = broken(spacecraft, flown.flight)
         if astray is not None:
             return Plan(spacecraft, scheme, None, astray=astray)
     if scheme in catalogue.PLANNED and left is not None:
@@ -393,8 +406,10 @@ def judge(
         return no_plan(spacecraft, plan.scheme, plan.why or "")
     flight, observed, held = plan.flight, plan.aspects, plan.held
     if seen is not None:
+        from nutdamp.flight.cones import aspects  # free motion, simulated
+
         flight = seen
-        observed = end_state.aspects(seen, seen.until)
+        observed = aspects(seen, seen.until)
         held = requirements.held(spacecraft, left_on_the_way(flight, observed))
     return judge_schedule(
         flight,

@@ -12,7 +12,7 @@ import numpy as np
 
 from nutdamp import __version__
 from nutdamp.common.numerics import cleaned
-from nutdamp.flight.end_state import Aspect
+from nutdamp.flight.cones import Aspect
 from nutdamp.flight.propagation import Flight, Residual
 from nutdamp.planning.causes import infeasibility
 from nutdamp.planning.decision import Comparison

@@ -19,10 +19,11 @@ from rich.theme import Theme
 from nutdamp.errors import BadRequest, nearest
 from nutdamp.views import guide
 from nutdamp.views.guide import Topic
+from nutdamp.views.text import note_entries
 
 
 def _notes() -> Iterator[tuple[str, str]]:
-    for code, entry in guide.note_entries().items():
+    for code, entry in note_entries().items():
         sentence = re.sub(
             r"\{(\w+?)(_[a-zA-Z]+)?\}",
             lambda name: f"[{name[1].replace('_', ' ')}]",

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
 from operator import attrgetter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Group, RenderableType
 from rich.table import Table
@@ -15,7 +15,6 @@ from rich.text import Text
 from nutdamp.common.numerics import RPM
 from nutdamp.common.results import Note, note
 from nutdamp.errors import listed
-from nutdamp.flight.end_state import Aspect
 from nutdamp.flight.propagation import REAL_WIDTHS, Flight, model_name
 from nutdamp.planning.decision import Comparison, speed
 from nutdamp.planning.notes import (
@@ -56,6 +55,9 @@ from nutdamp.views.text import (
     small_angle,
     text,
 )
+
+if TYPE_CHECKING:
+    from nutdamp.flight.cones import Aspect
 
 NOT = "✗"  # sign before a value above the requirement
 SHORT_NAMES = ("RA", "dec")  # right ascension and declination, where there is little room

@@ -23,7 +23,8 @@ from nutdamp.common.results import Note, note
 from nutdamp.errors import BadRequest
 from nutdamp.files.tabular import number
 from nutdamp.flight import end_state, propagation
-from nutdamp.flight.end_state import LEGENDRE, aspects
+from nutdamp.flight.cones import aspects
+from nutdamp.flight.end_state import LEGENDRE
 from nutdamp.flight.propagation import IMPULSE_SUM, REAL_WIDTHS, Flight
 from nutdamp.flight.verification import AGREE, AS_FLOWN, IDEAL, WITHOUT, Conservation, Verification
 from nutdamp.physics.attitude import full_turn

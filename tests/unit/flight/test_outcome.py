@@ -26,7 +26,8 @@ import nutdamp
 from nutdamp.figures.overview import title
 from nutdamp.files.reader import read_spacecraft
 from nutdamp.flight import propagation
-from nutdamp.flight.end_state import ANGLE, aspects, deviations, seen_at, tolerated
+from nutdamp.flight.cones import aspects
+from nutdamp.flight.end_state import ANGLE, deviations, seen_at, tolerated
 from nutdamp.flight.propagation import by_impulses, flown
 from nutdamp.physics import attitude
 from nutdamp.planning import plan as planning

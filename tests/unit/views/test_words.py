@@ -45,10 +45,19 @@ from nutdamp.spacecraft.model import Disturbance, Goal, Limits, Requirement
 from nutdamp.spacecraft.schedule import Schedule
 from nutdamp.spacecraft.tolerances import SpinTolerance
 from nutdamp.views import verdict
-from nutdamp.views.guide import note_entries
 from nutdamp.views.loop import STOPS
 from nutdamp.views.parts import required
-from nutdamp.views.text import NAME, NOTE, REASON, WARNING, note_json, ordered, screen_line, text
+from nutdamp.views.text import (
+    NAME,
+    NOTE,
+    REASON,
+    WARNING,
+    note_entries,
+    note_json,
+    ordered,
+    screen_line,
+    text,
+)
 
 FIRED = spinner(channels=cross(8.0))
 WIDE = Goal(spin=3.0)
