@@ -19,17 +19,15 @@ from rich.theme import Theme
 from nutdamp.errors import BadRequest, nearest
 from nutdamp.views import guide
 from nutdamp.views.guide import Topic
-from nutdamp.views.text import note_entries
 
 
 def _notes() -> Iterator[tuple[str, str]]:
-    for code, entry in note_entries().items():
-        sentence = re.sub(
-            r"\{(\w+?)(_[a-zA-Z]+)?\}",
-            lambda name: f"[{name[1].replace('_', ' ')}]",
-            entry.sentence,
+    for heading, entry in guide.page("notes").sections[1:]:
+        words = " ".join(entry.replace("\n> ", " ").split()).removeprefix("> ")
+        shown = re.sub(
+            r"\{(\w+?)(_[a-zA-Z]+)?\}", lambda name: f"[{name[1].replace('_', ' ')}]", words
         )
-        yield code, f"{sentence} {entry.paragraph}"
+        yield heading.partition(" (")[0], shown
 
 
 WORDS: tuple[tuple[str, Callable[[], Iterable[tuple[str, str]]]], ...] = (
