@@ -22,7 +22,7 @@ import numpy as np
 from nutdamp.common import work
 from nutdamp.flight import propagation
 from nutdamp.flight.dynamics import make_dynamics, supplied
-from nutdamp.physics import attitude, response
+from nutdamp.physics import attitude
 from nutdamp.schemes.catalogue import OptimalOptions, Scheme, SchemeOptions
 from nutdamp.spacecraft.constraints import (
     Windows,
@@ -222,6 +222,10 @@ def settles(spacecraft: Spacecraft, disturbance: Disturbance) -> bool:
 
 def steady_omega(spacecraft: Spacecraft, time: float) -> complex:
     """Steady-state ω of the settling disturbances at ``time`` s, which needs no damping."""
+    if not spacecraft.disturbances:
+        return 0.0 + 0.0j
+    from nutdamp.physics import driven  # disturbances
+
     A = spacecraft.inertia.A
     nutation_rate = spacecraft.nutation_rate
     steady = 0.0 + 0.0j
@@ -229,7 +233,7 @@ def steady_omega(spacecraft: Spacecraft, time: float) -> complex:
         if disturbance.transverse and settles(spacecraft, disturbance):
             turned = cmath.rect(1.0, disturbance.rate * time)
             steady += (
-                response.steady_response(A, nutation_rate, disturbance.transverse, disturbance.rate)
+                driven.steady_response(A, nutation_rate, disturbance.transverse, disturbance.rate)
                 * turned
             )
     return steady

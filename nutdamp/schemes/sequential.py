@@ -15,7 +15,7 @@ from nutdamp.common import work
 from nutdamp.common.results import note
 from nutdamp.errors import Infeasible, TooShort, listed
 from nutdamp.physics import body as rigid_body
-from nutdamp.physics import energy_sink, response
+from nutdamp.physics import driven, energy_sink, response
 from nutdamp.schemes.correction import ALIGNED, FADED
 from nutdamp.spacecraft.constraints import Windows, longest_useful, usable
 from nutdamp.spacecraft.equipment import Channel, Steerable
@@ -124,17 +124,17 @@ class ImpulseBuilder:
         if not self.spacecraft.disturbances:
             return free
         since = np.array([time - self.now])
-        driven = 0.0 + 0.0j
+        forced = 0.0 + 0.0j
         for disturbance in self.spacecraft.disturbances:
             if disturbance.transverse != 0.0:
                 torque = np.array(
                     [disturbance.transverse * cmath.exp(1j * disturbance.rate * self.now)]
                 )
                 rate = np.array([disturbance.rate])
-                driven += complex(
-                    response.rotating_torques(since, 0.0, self.turning, self.A, torque, rate)[0]
+                forced += complex(
+                    driven.rotating_torques(since, 0.0, self.turning, self.A, torque, rate)[0]
                 )
-        return free + driven
+        return free + forced
 
     def acts(self, pulse: Pulse) -> complex:
         """Effective impulse of ``pulse`` on ω, J1 + iJ2 in N m s."""

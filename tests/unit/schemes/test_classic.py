@@ -35,7 +35,7 @@ from nutdamp.errors import SenselessOption
 from nutdamp.files.reader import example_text, load_spacecraft, read_spacecraft
 from nutdamp.flight import propagation
 from nutdamp.physics import body as rigid_body
-from nutdamp.physics import motion, response
+from nutdamp.physics import driven, motion
 from nutdamp.planning import plan as planning
 from nutdamp.planning.causes import infeasibility
 from nutdamp.planning.notes import plan_notes
@@ -714,7 +714,7 @@ def test_steady_omega_is_the_forced_term_where_the_disturbance_beats_within_the_
     shape = spacecraft.inertia
     start = steady_omega(spacecraft, 0.0)
     torque = np.array([0.3 + 0.1j]), np.array([2.0])
-    moved = response.rotating_torques(
+    moved = driven.rotating_torques(
         times, start, shape.nutation_rate(spacecraft.spin), shape.A, *torque
     )
     assert moved == pytest.approx(
