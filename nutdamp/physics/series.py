@@ -13,10 +13,13 @@ from __future__ import annotations
 
 import cmath
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from nutdamp.physics.energy_sink import SinkSeries
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -138,7 +141,7 @@ class Series:
 
     ``terms`` (order+1, 9, n) hold the quaternion, then ω1, ω2, ω3, ω1, ω2, so that the products in
     Euler's equations are one product of two slices. Those of one body are summed by matrices and
-    joined as plain numbers, a quarter of the cost of arrays. ``floor``: see `_Sink`.
+    joined as plain numbers, a quarter of the cost of arrays. ``floor``: see `SinkSeries`.
     """
 
     def __init__(
@@ -181,9 +184,13 @@ class Series:
             rate, growth = falling
             parts += [step * rate, 0.5 * step**2 * growth]
         self.products = list[Any]()  # coefficients of ω2 ω3, ω3 ω1, ω1 ω2
-        self.sink = None
+        self.sink: SinkSeries | None = None
         if forcing.growth != 0.0:
-            self.sink = _Sink(parts, forcing, floor)
+            from nutdamp.physics.energy_sink import SinkSeries  # dissipation
+
+            self.sink = SinkSeries(
+                parts, forcing.growth, forcing.wheel, forcing.sense, floor, LARGEST_ORDER
+            )
         self.parts = [part.tolist() for part in parts] if self.one else parts
 
     def converges(self) -> bool:
@@ -255,7 +262,7 @@ class Series:
                 change[axis] += torque / moments[axis]
             speeds = speeds + self.sink.slip[: k + 1]
             if self.one:
-                turns = _products(terms[:, :4], speeds)
+                turns = self.sink.products(terms[:, :4], speeds)
         if not self.one:
             turns = self._turns(terms[:, :4], speeds)
         w, x, y, z = turns
@@ -294,74 +301,3 @@ def _differences(moments: Any, over: Any) -> tuple[Any, Any, Any]:
     """(I2 - I3)/J1 and round, of (parts of) moments I and moments J."""
     (first, second, third), (x, y, z) = moments, over
     return (second - third) / x, (third - first) / y, (first - second) / z
-
-
-def _products(left: Array, right: Array) -> Any:
-    """Coefficients of the products of series (k, a, n) and (k, b, n), (a, b, n)."""
-    if left.ndim == 2:
-        return (left.T @ right[::-1]).tolist()
-    return np.einsum("kan,kbn->abn", left, right[::-1])
-
-
-def _product(left: Array, right: Array) -> Any:
-    """Coefficient of the product of two series (k, n)."""
-    return left @ right[::-1] if left.ndim == 1 else np.einsum("kn,kn->n", left, right[::-1])
-
-
-class _Sink:
-    """`energy_sink` as series: torque of dissipation on H in body axes, and slip of the body.
-
-    With q = H3/|H|² the slip is s = κq (H2, -H1, 0), and H × s is added to dH/dt in the body.
-    ``floor`` keeps q regular where external torques bring H to rest: there is nothing to dissipate
-    there. With a wheel q is ((C - A)H3 + Ah)/((C - A)|H|² + σAh|H|). The moments may fall:
-    ``parts`` are their series.
-    """
-
-    def __init__(self, parts: list[Array], forcing: Forcing, floor: Any) -> None:
-        _, self.growth, self.wheel, self.sense = forcing
-        self.parts, self.floor = parts, floor
-        self.with_wheel = bool(np.any(self.wheel))
-        self.by_wheel = [0.5 * (part[0] + part[1]) for part in parts]
-        self.by_body = [part[2] - A for part, A in zip(parts, self.by_wheel, strict=True)]
-        shape = parts[0].shape
-        self.momentum, self.slip = np.zeros((2, LARGEST_ORDER, *shape))  # H and s
-        # |H|², |H|, the denominator of q, and q
-        tables = np.zeros((4, LARGEST_ORDER, *shape[1:]))
-        self.squares, self.size, self.below, self.quotient = tables
-
-    def torque(self, k: int, rates: Array) -> tuple[Any, Any, Any]:
-        """Coefficient k of H × s, (3, n), from those of ω up to it, (k+1, 3, n); stores that of
-        ``slip``.
-        """
-        momentum, slip = self.momentum[: k + 1], self.slip[: k + 1]
-        momentum[k] = self.parts[0] * rates[k]
-        for order, part in enumerate(self.parts[1 : k + 1], 1):
-            momentum[k] += part * rates[k - order]
-        if k == 0:
-            momentum[0, 2] += self.wheel
-        if rates.ndim == 2:
-            self.squares[k] = momentum.ravel() @ momentum[::-1].ravel()
-        else:
-            self.squares[k] = np.einsum("kcn,kcn->n", momentum, momentum[::-1])
-        if k == 0:
-            self.squares[0] += self.floor
-        above, self.below[k] = momentum[k, 2], self.squares[k]
-        if self.with_wheel:
-            if k == 0:
-                self.size[0] = np.sqrt(self.squares[0])
-            else:
-                between = _product(self.size[1:k], self.size[1:k])
-                self.size[k] = 0.5 * (self.squares[k] - between) / self.size[0]
-            above = self.by_wheel[k] * self.wheel if k < len(self.parts) else 0.0
-            self.below[k] = 0.0
-            for order, apart in enumerate(self.by_body[: k + 1]):
-                above = above + apart * momentum[k - order, 2]
-                by_wheel = self.sense * self.wheel * self.by_wheel[order]
-                self.below[k] += apart * self.squares[k - order] + by_wheel * self.size[k - order]
-        before = _product(self.below[1 : k + 1], self.quotient[:k])
-        quotient = self.quotient[: k + 1]
-        quotient[k] = (above - before) / self.below[0]
-        slip[k, 0] = self.growth * _product(quotient, momentum[:, 1])
-        slip[k, 1] = -self.growth * _product(quotient, momentum[:, 0])
-        first, second, third = _products(momentum, slip[:, :2])
-        return -third[1], third[0], first[1] - second[0]
