@@ -39,11 +39,11 @@ if TYPE_CHECKING:
     from nutdamp.flight.propagation import Track as Track
     from nutdamp.page.report import Report as Report
     from nutdamp.planning.decision import Comparison as Comparison
-    from nutdamp.planning.decision import Simulation as Simulation
     from nutdamp.planning.plan import Plan as Plan
-    from nutdamp.planning.plan import Verified as Verified
     from nutdamp.planning.robust import RobustComparison as RobustComparison
     from nutdamp.planning.screening import Dispersion as Dispersion
+    from nutdamp.planning.simulation import Simulation as Simulation
+    from nutdamp.planning.simulation import Verified as Verified
     from nutdamp.planning.tradeoff import Trade as Trade
     from nutdamp.planning.verdict import Verdict as Verdict
     from nutdamp.schemes.catalogue import FourPulseOptions as FourPulseOptions
@@ -86,10 +86,11 @@ _HOMES: dict[str, tuple[str, ...]] = {
     "nutdamp.estimation.results": ("Fitted",),
     "nutdamp.flight.propagation": ("Flight", "Residual", "Track"),
     "nutdamp.page.report": ("Report",),
-    "nutdamp.planning.decision": ("Comparison", "Simulation"),
-    "nutdamp.planning.plan": ("Plan", "Verified"),
+    "nutdamp.planning.decision": ("Comparison",),
+    "nutdamp.planning.plan": ("Plan",),
     "nutdamp.planning.robust": ("RobustComparison",),
     "nutdamp.planning.screening": ("Dispersion",),
+    "nutdamp.planning.simulation": ("Simulation", "Verified"),
     "nutdamp.planning.tradeoff": ("Trade",),
     "nutdamp.planning.verdict": ("Verdict",),
     "nutdamp.schemes.catalogue": (
@@ -120,7 +121,6 @@ if not TYPE_CHECKING:  # or else a type checker would believe in any name
 
         if name == "errors":
             return import_module("nutdamp.errors")
-        import_module("nutdamp.api")  # results show themselves by what it names
         home = next(module for module, names in _HOMES.items() if name in names)
         value = getattr(import_module(home), name)
         globals()[name] = value

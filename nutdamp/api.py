@@ -22,9 +22,17 @@ from os import PathLike
 from typing import TYPE_CHECKING, Any
 
 from nutdamp import units
-from nutdamp.common import results, work
-from nutdamp.errors import Infeasible, warn
-from nutdamp.schemes.catalogue import LEAST, OptimalOptions, Options, expect_names, expect_options
+from nutdamp.common import work
+from nutdamp.errors import BadRequest, Infeasible, nearest, warn
+from nutdamp.schemes.catalogue import (
+    LEAST,
+    NAMES,
+    SCHEMES,
+    OptimalOptions,
+    Options,
+    SchemeOptions,
+    names_of,
+)
 
 if TYPE_CHECKING:
     from nutdamp.control_loop.budget import Budget
@@ -33,10 +41,11 @@ if TYPE_CHECKING:
     from nutdamp.estimation.results import Fitted
     from nutdamp.montecarlo.study import Results
     from nutdamp.page.report import Report
-    from nutdamp.planning.decision import Comparison, Simulation
-    from nutdamp.planning.plan import Plan, Verified
+    from nutdamp.planning.decision import Comparison
+    from nutdamp.planning.plan import Plan
     from nutdamp.planning.robust import RobustComparison
     from nutdamp.planning.screening import Dispersion
+    from nutdamp.planning.simulation import Simulation, Verified
     from nutdamp.planning.tradeoff import Trade
     from nutdamp.schemes.planner import Choice
     from nutdamp.spacecraft.model import Spacecraft
@@ -47,8 +56,6 @@ PathName = str | PathLike[str]
 Progress = Callable[
     [int, int], None
 ]  # called now and then with the number of steps done, and that of all
-
-results.register("nutdamp.page.results")
 
 
 def load(
@@ -133,6 +140,46 @@ def _expected(spacecraft: Spacecraft) -> Spacecraft:
     )
 
 
+def _expect_names(values: Iterable[str]) -> tuple[str, ...]:
+    """Names of schemes that there are, each once; raises BadRequest."""
+    if isinstance(values, str) or not isinstance(values, Iterable):
+        raise BadRequest(
+            "names: expected a list of schemes, such as ['two-pulse'], "
+            f"got {units.as_given(values)}"
+        )
+    names = tuple(values)
+    for name in names:
+        if not isinstance(name, str) or name not in NAMES:
+            close = nearest(name, NAMES) if isinstance(name, str) else None
+            cure = f"there are {', '.join(NAMES)}" if close is None else f"did you mean {close!r}?"
+            raise BadRequest(f"there is no scheme {units.as_given(name)}; {cure}")
+    return tuple(dict.fromkeys(names))
+
+
+def _expect_options(
+    value: Any, chosen: Mapping[str, Any], scheme: str | None = None
+) -> Options | SchemeOptions | None:
+    """Options of schemes, or those ``chosen`` by keyword, which the ``scheme`` must have; raises
+    BadRequest.
+    """
+    if not (value is None or isinstance(value, Options | SchemeOptions)) or (
+        value is not None and chosen
+    ):
+        raise BadRequest(
+            f"options: expected nutdamp.Options(…) or keywords, got {units.as_given(value)}"
+        )
+    if not chosen:
+        return value
+    options = Options(**chosen)
+    if scheme is not None:
+        own = SCHEMES[scheme].options
+        for unread in options.without_effect([own]):
+            raise BadRequest(
+                f"options: {scheme} has no {unread!r}; there are {', '.join(names_of(own))}"
+            )
+    return options
+
+
 def plan(
     spacecraft: Spacecraft, scheme: str | None = None, options: Choice = None, **chosen: Any
 ) -> Plan:
@@ -160,8 +207,8 @@ def plan(
     from nutdamp.planning import plan as planning
 
     spacecraft = _expected(spacecraft)
-    named = None if scheme is None else expect_names([scheme])[0]
-    settled = expect_options(options, chosen, named)
+    named = None if scheme is None else _expect_names([scheme])[0]
+    settled = _expect_options(options, chosen, named)
     if named is not None:
         return planning.plan(spacecraft, named, settled)
     compared = compare(spacecraft, options=settled)
@@ -206,9 +253,9 @@ def compare(
     from nutdamp.planning import decision
 
     spacecraft = _expected(spacecraft)
-    schemes = expect_names(names)
+    schemes = _expect_names(names)
     count = samples if samples in (None, 0) else units.count("samples", samples)
-    chosen_options = expect_options(options, chosen)
+    chosen_options = _expect_options(options, chosen)
     compared = decision.compare(spacecraft, schemes, chosen_options, samples=count, timed=timed)
     if not robust or count is not None or not compared.too_few_comply:
         return compared
@@ -294,8 +341,8 @@ def simulate(
     True
     """
     from nutdamp.figures.geometry import shown_until
-    from nutdamp.planning.decision import Simulation
     from nutdamp.planning.plan import feasible
+    from nutdamp.planning.simulation import Simulation
 
     spacecraft, pulses = feasible(plan).spacecraft, plan.pulses
     end = units.end_of_flight(pulses.end + spacecraft.inertial_period if until is None else until)
@@ -475,11 +522,12 @@ def verify(plan: Plan) -> Verified:
     True
     """
     from nutdamp.flight import verification
-    from nutdamp.planning import plan as planning
+    from nutdamp.planning.plan import feasible
+    from nutdamp.planning.simulation import Verified, unrounded
 
-    spacecraft, known = planning.feasible(plan).spacecraft, plan.options.with_disturbances
-    core = verification.verify(spacecraft, plan.pulses, planning.unrounded(plan), expected=known)
-    return planning.Verified(core, plan)
+    spacecraft, expected = feasible(plan).spacecraft, plan.options.with_disturbances
+    core = verification.verify(spacecraft, plan.pulses, unrounded(plan), expected=expected)
+    return Verified(core, plan)
 
 
 def verify_loop(spacecraft: Spacecraft, until: float | None = None) -> LoopVerification:

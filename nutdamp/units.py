@@ -378,11 +378,13 @@ def as_given(value: object) -> str:
     return f"a {kind.__module__}.{kind.__qualname__}".replace("builtins.", "")
 
 
-def replaced(value: Record, fields: Mapping[str, object]) -> Record:
-    """A dataclass with some of its fields replaced, looked at by their types; raises BadRequest."""
+def replaced(value: Record, fields: Mapping[str, object], types: dict[str, Any]) -> Record:
+    """A dataclass with some of its fields replaced, looked at by their types, some of which only
+    ``types`` has; raises BadRequest.
+    """
     import numpy as np
 
-    kinds = get_type_hints(type(value))
+    kinds = get_type_hints(type(value), localns=types)
     declared = {field.name: str(field.type) for field in dataclasses.fields(value) if field.init}
     values: dict[str, Any] = {}
     for name, entry in fields.items():

@@ -22,7 +22,17 @@ from nutdamp.cli.job import (
     set_option,
     spacecraft_argument,
 )
-from nutdamp.cli.main import BAD_INPUT, UNREADABLE, leave, tell
+from nutdamp.cli.main import (
+    BAD_INPUT,
+    UNREADABLE,
+    console,
+    leave,
+    look_of_screen,
+    say,
+    show,
+    show_failures,
+    tell,
+)
 from nutdamp.cli.options import (
     END,
     FILE,
@@ -32,15 +42,8 @@ from nutdamp.cli.options import (
     NameType,
     goal_options,
 )
-from nutdamp.cli.plan import (
-    compared_with,
-    flown_options,
-    fronts_of,
-    plan_or_read,
-    robust_of,
-    scheme_option,
-)
-from nutdamp.cli.screen import console, look_of_screen, say, show, show_failures
+from nutdamp.cli.plan import compared_with, robust_of, scheme_option
+from nutdamp.cli.studies import flown_options, fronts_of, plan_or_read
 from nutdamp.common.work import SAMPLES
 from nutdamp.errors import BadRequest, nearest, printable
 from nutdamp.schemes.catalogue import LEAST, PLANNED

@@ -16,6 +16,7 @@ from typing import IO, TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import click
 
+from nutdamp.cli.main import QUIET, UNITS, look_of_screen, say, show, working
 from nutdamp.cli.options import (
     END,
     FILE,
@@ -30,8 +31,7 @@ from nutdamp.cli.options import (
     OutputName,
     options_in,
 )
-from nutdamp.cli.screen import QUIET, UNITS, look_of_screen, say, show, working
-from nutdamp.errors import Fault, FaultyFile, NutdampError, Unsuitable, printable
+from nutdamp.errors import Fault, FaultyFile, Infeasible, NutdampError, Unsuitable, printable
 from nutdamp.schemes.catalogue import SCHEMES, SUNLIT, Options, names_of
 from nutdamp.units import SI, US
 
@@ -215,8 +215,6 @@ Files = dict[str, Callable[[], Content]]
 Output = tuple[str | None, Callable[[], Content]]
 """Path of a file to write, if one is requested, and the function of its content."""
 
-# key of the JSON file and the spacecraft of the job that has begun, in the context
-UNDER_WAY = "nutdamp.cli.job"
 KINDS = (
     ("csv", "csv"),
     ("json", "data"),
@@ -234,7 +232,7 @@ class FlownChoice(NamedTuple):
 
 @dataclass
 class Job:
-    """Request of a command line, and from `begin` on the ``spacecraft``, its ``source``, and
+    """Request of a command line, and once `begun` the ``spacecraft``, its ``source``, and
     ``silent``: no screens.
 
     ``read``, ``written``: files; ``figure``: the picture of ``plot``, None for the only one;
@@ -253,6 +251,7 @@ class Job:
     spacecraft: Spacecraft = field(init=False)
     source: Source = field(init=False)
     silent: bool = field(init=False)
+    begun: bool = field(init=False, default=False)
 
     def begin(self, folder: Iterable[str] = ()) -> Spacecraft:
         """Check the files of the command line, those that go to a ``folder`` too, and load its
@@ -276,13 +275,11 @@ class Job:
             if any(value is not None for value in self.aim)
             else spacecraft
         )
-        from nutdamp.files.tabular import check_place
-
         for path in filter(None, self.written.values()):
+            from nutdamp.files.tabular import check_place
+
             check_place(path)
-        context = click.get_current_context(silent=True)
-        if context is not None and self.written.get("json") is not None:
-            context.meta[UNDER_WAY] = self.written["json"], self.spacecraft
+        self.begun = True
         return self.spacecraft
 
     def remark(self, text: str) -> None:
@@ -302,6 +299,15 @@ class Job:
         """Print warnings about the data on standard error, quiet or not."""
         for warning in warnings:
             say(f"warning: {warning}")
+
+    def refuse(self, reason: Infeasible) -> None:
+        """Write the JSON file, if any: nothing is feasible, and the reason."""
+        path = self.written.get("json")
+        if self.begun and path is not None:
+            from nutdamp.views.decisions import heading
+
+            why = {**heading(self.spacecraft), "feasible": False, "why": str(reason)}
+            deliver([(path, lambda: why)])
 
     def working(self, what: str) -> AbstractContextManager[None]:
         """Show that ``what`` is under way."""
@@ -381,16 +387,6 @@ def job_of(command: click.Command, parameters: dict[str, Any]) -> Job:
     return Job(spacecraft, read, written, flown, options, aim, figure, usual, quiet)
 
 
-def write_infeasible(context: click.Context, reason: Exception) -> None:
-    """Write the JSON file of the job, if any: nothing is feasible, and the reason."""
-    if UNDER_WAY not in context.meta:
-        return
-    from nutdamp.views.decisions import heading
-
-    path, spacecraft = context.meta[UNDER_WAY]
-    deliver([(path, lambda: {**heading(spacecraft), "feasible": False, "why": str(reason)})])
-
-
 def deliver(
     outputs: Sequence[Output],
     *screens: Callable[[], RenderableType],
@@ -445,6 +441,9 @@ class SessionCommand(click.Command):
             return super().invoke(ctx)
         except Unsuitable as wrong:
             raise placed(wrong, job.given) from None
+        except Infeasible as reason:
+            job.refuse(reason)
+            raise
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """The options under their headings, those without one first."""

@@ -1,30 +1,42 @@
-"""The ``nutdamp`` command: its subcommands, loaded when used, and errors as messages and exit
-statuses.
+"""The ``nutdamp`` command: subcommands, loaded when used, what it prints, errors as messages and
+exit statuses.
 
-No other module turns errors into exit statuses; a bug keeps its traceback.
+No other module turns errors into exit statuses; a bug keeps its traceback. Results go to standard
+output, messages and progress to standard error, none with control characters: names of files,
+channels or units come from elsewhere; on a terminal their control characters could clear the
+screen, change its title or pass for output of this program.
 """
 
 from __future__ import annotations
 
 import gc
 import io
+import math
 import os
 import signal
 import sys
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
+from time import monotonic as clock
 from types import FrameType
 from typing import TYPE_CHECKING
 
 import click
 
 from nutdamp import __version__
-from nutdamp.cli.screen import say
-from nutdamp.errors import Infeasible, nearest
+from nutdamp.errors import Infeasible, nearest, printable
+from nutdamp.units import SI, screen_units
 
 if TYPE_CHECKING:
+    from rich import status
+    from rich.console import Console, ConsoleOptions, RenderableType, RenderResult
+
+    from nutdamp.common.work import Monitor
+    from nutdamp.planning.decision import Comparison
     from nutdamp.planning.verdict import Status
 
 DONE = 0
@@ -93,36 +105,6 @@ def leave(judged: Status | None = None, *, failed: bool = False, infeasible: boo
         sys.exit(INTERNAL if failed else INFEASIBLE if infeasible else status)
 
 
-class Interruption:
-    """Request to stop a run, and the signal that made it."""
-
-    number: int | None = None
-
-    def __call__(self) -> bool:
-        """True where a stop was requested."""
-        return self.number is not None
-
-
-@contextmanager
-def stoppable() -> Iterator[Interruption]:
-    """An `Interruption` by Ctrl-C or SIGTERM ends a run in order; a second Ctrl-C at once."""
-    stop = Interruption()
-
-    def ask(number: int, _: FrameType | None) -> None:
-        if stop() and number == signal.SIGINT:
-            raise KeyboardInterrupt
-        stop.number = number
-
-    before = {number: signal.signal(number, ask) for number in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        yield stop
-    except KeyboardInterrupt:
-        raise Terminated() if stop.number == signal.SIGTERM else KeyboardInterrupt from None
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
-
-
 def _terminate(number: int, frame: FrameType | None) -> None:  # noqa: ARG001 - signature of handlers
     signal.signal(signal.SIGTERM, signal.SIG_IGN)  # a second one would interrupt the clearing up
     raise Terminated
@@ -152,10 +134,181 @@ def _explain(wrong: Exception) -> int:
     return BAD_INPUT if isinstance(wrong, BadRequest | FaultyFile) else UNREADABLE
 
 
+# --- what is printed
+
+NARROWEST = 20  # characters of a line at least
+
+
+def visible(text: str) -> str:
+    """`errors.printable` of each line of a text."""
+    return text if text.isprintable() else "\n".join(printable(line) for line in text.split("\n"))
+
+
+def say(text: str) -> None:
+    """Print a message on standard error."""
+    click.echo(visible(text), err=True)
+
+
+def show(renderable: RenderableType) -> None:
+    """Print a result on standard output;
+    in a file or a pipe without the blanks that fill up lines.
+    """
+    shown = console()
+    renderable = _Visible(renderable)
+    if shown.is_terminal:
+        shown.print(renderable)
+        return
+    with shown.capture() as captured:
+        shown.print(renderable)
+    click.echo("\n".join(line.rstrip() for line in captured.get().split("\n")), nl=False)
+
+
+def console() -> Console:
+    """Standard output as rich sees it, at least `NARROWEST` wide; no markup and no emoji."""
+    import shutil
+
+    from rich.console import Console
+
+    requested = os.environ.get("COLUMNS", "")
+    width = None
+    if requested.isdigit() and int(requested) < NARROWEST:
+        width = max(shutil.get_terminal_size().columns, NARROWEST)
+    return Console(highlight=False, markup=False, emoji=False, soft_wrap=False, width=width)
+
+
+class _Visible:
+    """Something to print, with all its text made `visible`; the codes of colours stay."""
+
+    def __init__(self, renderable: RenderableType) -> None:
+        self.renderable = renderable
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        from rich.segment import Segment
+
+        for text, style, control in console.render(self.renderable, options):
+            yield Segment(text if control else visible(text), style, control)
+
+
+UNITS = "nutdamp.units"  # key of ``--units`` in the context of a command line
+
+
+QUIET = "nutdamp.quiet"  # key of ``--quiet`` in the context of a command line
+
+
+@contextmanager
+def look_of_screen() -> Iterator[None]:
+    """Context of texts for people: the units of ``--units``, no notes with ``--quiet``."""
+    from nutdamp.views.text import quietly
+
+    context = click.get_current_context(silent=True)
+    meta = {} if context is None else context.meta
+    with screen_units(meta.get(UNITS, SI)), quietly(meta.get(QUIET, False)):
+        yield
+
+
+DEBUG = "nutdamp.debug"  # key of ``--debug`` in the context of a command line
+
+
+def _debugging(ctx: click.Context, _: click.Parameter, value: bool) -> None:
+    ctx.meta[DEBUG] = value
+
+
+debug_option = click.option(
+    "--debug",
+    is_flag=True,
+    expose_value=False,
+    callback=_debugging,
+    help="Show the traceback of an internal error.",
+)
+
+
+def show_failures(compared: Comparison) -> bool:
+    """Name the schemes that have a bug, with ``--debug`` their tracebacks; True if any has."""
+    for plan in compared.failed:
+        if click.get_current_context().meta.get(DEBUG):
+            import traceback
+
+            say("".join(traceback.format_exception(plan.failure)).rstrip("\n"))
+        say(f"nutdamp: {plan.scheme}: {plan.refusal} (--debug shows the traceback)")
+    return bool(compared.failed)
+
+
+PATIENCE = 1.0  # seconds that pass before progress is shown
+BELIEVED = 0.1  # share of the steps that have to be done before a time left is named
+
+
+@contextmanager
+def working(what: str, *, quiet: bool = False) -> Iterator[None]:
+    """Show ``what`` is under way, on a terminal, after `PATIENCE`; it leaves nothing behind."""
+    if quiet or not sys.stderr.isatty():
+        yield
+        return
+    from nutdamp.common.work import watched
+
+    shown: list[status.Status] = []
+
+    def appear() -> None:
+        from rich.console import Console
+
+        shown.append(Console(stderr=True).status(_Progress(what, watch, began, began)))
+        shown[0].start()
+
+    with watched() as watch:
+        began = clock()
+        timer = threading.Timer(PATIENCE, appear)
+        timer.daemon = True
+        timer.start()
+        try:
+            yield
+        finally:
+            timer.cancel()
+            timer.join()
+            for shown_status in shown:
+                shown_status.stop()
+
+
+@dataclass
+class _Progress:
+    """Text of ``what`` has gone on since it ``began``, s: share of the steps done, time left, and
+    the search that runs.
+
+    The time left goes by the last step, ``share`` at ``moment``, from `BELIEVED` on; none where a
+    step takes longer.
+    """
+
+    what: str
+    watch: Monitor
+    began: float
+    moment: float
+    share: float = 0.0
+
+    def __rich__(self) -> str:
+        task, search = self.watch.task, self.watch.budget
+        text = self.what if search is None else f"{self.what}: {search.what}"
+        if task is None:
+            return text
+        now = clock()
+        if task.share != self.share:
+            self.share = task.share
+            self.moment = now
+        text = f"{text}, {math.floor(100.0 * self.share)} % done"
+        if not BELIEVED <= self.share < 1.0:
+            return text
+        remaining = (self.moment - self.began) / self.share - (now - self.began)
+        words = (
+            f"{math.ceil(remaining)} s"
+            if remaining < 120.0
+            else f"{math.ceil(remaining / 60.0)} min"
+        )
+        return f"{text}, about {words} left" if remaining > 0.0 else text
+
+
+# --- the subcommands
+
 # the subcommands in the order of a first use, with their modules and their lines on the help page
 COMMANDS = {
     "plan": ("plan", "Plan pulse schedules that damp the nutation, and compare them."),
-    "simulate": ("plan", "Propagate a scheme or a schedule; cone angles and axis track."),
+    "simulate": ("studies", "Propagate a scheme or a schedule; cone angles and axis track."),
     "trade": ("studies", "Trade finish time against propellant."),
     "loop": ("studies", "Fire from a gyro or an accelerometer, in a closed loop."),
     "budget": ("studies", "Hold the nutation: pulses a day, propellant a year."),
@@ -163,7 +316,7 @@ COMMANDS = {
     "disperse": ("studies", "Fly many dispersed cases; percentiles, tolerance budget."),
     "verify": ("files", "Fly a schedule by independent means; an error budget."),
     "report": ("files", "Write a report, one page of HTML."),
-    "animate": ("plan", "Film the body cone rolling on the space cone."),
+    "animate": ("studies", "Film the body cone rolling on the space cone."),
     "check": ("files", "Check spacecraft files: all faults, derived quantities."),
     "export": ("files", "A schedule for other tools: CCSDS, STK, Basilisk, JSON."),
     "import": ("files", "A spacecraft file from a CCSDS attitude parameter message."),
@@ -194,16 +347,6 @@ class _CommandGroup(click.Group):
                 f"there is no command {name!r}" + (f"; did you mean {close!r}?" if close else "")
             )
         return super().resolve_command(ctx, args)
-
-    def invoke(self, ctx: click.Context) -> object:
-        """Run the command; where nothing is feasible its JSON file says so all the same."""
-        try:
-            return super().invoke(ctx)
-        except Infeasible as reason:
-            from nutdamp.cli.job import write_infeasible
-
-            write_infeasible(ctx, reason)
-            raise
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002
         if cmd_name not in COMMANDS:

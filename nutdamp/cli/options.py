@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 import click
 
 from nutdamp import units
-from nutdamp.cli.screen import debug_option
+from nutdamp.cli.main import debug_option
 from nutdamp.errors import BadRequest, SenselessOption, nearest
 from nutdamp.schemes.catalogue import SCHEMES, SUNLIT, OptionKind, Options, SchemeOptions, names_of
 
@@ -102,8 +102,8 @@ END = UnitType("time", units.end_of_flight, "expected a time after t = 0")
 
 
 def reading_of(value: float, kind: str, meant: str) -> str:
-    """See `plausibility.reading`, of a number on the command line."""
-    from nutdamp.files.plausibility import reading
+    """See `rules.reading`, of a number on the command line."""
+    from nutdamp.files.rules import reading
 
     return reading(int(value) if value.is_integer() else float(value), kind, meant)
 

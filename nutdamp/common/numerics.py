@@ -14,6 +14,8 @@ RPM = 30.0 / math.pi  # turns a minute of one rad/s
 MISSING = "–"  # text of a number that is not known
 # part of the largest component below which another component of a vector counts as rounding
 NOISE = 1e-13
+# offset that keeps quotients like asinh x / x defined at zero and changes nothing elsewhere
+TINY = 1e-200
 # rad; angles closer than this count as equal, and a direction this near a pole has no longitude
 SAME_ANGLE = 1e-11
 

@@ -1,8 +1,7 @@
-"""Public interface of results (to_dict, to_csv, figure ...), whose functions `nutdamp.api`
-registers.
+"""Public interface of results (to_dict, to_csv, figure ...), whose functions a module of the page
+names.
 
-A `Plan` thus writes itself as CSV although its module knows no files. The functions are there as
-soon as a public name of `nutdamp` is used; without them these methods raise TypeError.
+A `Plan` thus writes itself as CSV although its module knows no files.
 """
 
 from __future__ import annotations
@@ -26,7 +25,13 @@ if TYPE_CHECKING:
 Table = NDArray[
     np.void
 ]  # structured array: one row per pulse or sample, fields named as the columns of the CSV files
-_home: list[str] = []  # module that has the table of `view`
+HOME = "nutdamp.page.results"
+"""Module with the table of `view`, ``VIEWS``, loaded when it is needed first.
+
+Its keys are the class of a result and a subject (``Trade.csv``). Its values are
+``module:function`` of the package, which takes the result, or ``module:function name key=name``,
+which takes these attributes of it.
+"""
 
 
 Value = str | int | float | None
@@ -56,19 +61,8 @@ def note(code: str, **values: Value) -> Note:
     return Note(code, tuple(values.items()))
 
 
-def register(module: str) -> None:
-    """Take the functions of `view` from the table ``VIEWS`` of a module, which is loaded when it is
-    needed first.
-
-    Its keys are the class of a result and a subject (``Trade.csv``). Its values are
-    ``module:function`` of the package, which takes the result, or ``module:function name
-    key=name``, which takes these attributes of it.
-    """
-    _home[:] = [module]
-
-
 def _entry(result: object, what: str) -> str | None:
-    views: dict[str, str] = import_module(_home[0]).VIEWS if _home else {}
+    views: dict[str, str] = import_module(HOME).VIEWS
     keys = (f"{kind.__name__}.{what}" for kind in type(result).__mro__)
     return next((views[key] for key in keys if key in views), None)
 
@@ -96,7 +90,7 @@ class Shown:
     """Mixin of results that show themselves at a prompt and in notebooks."""
 
     def __repr__(self) -> str:
-        return str(view(self, "line")) if _home else object.__repr__(self)
+        return str(view(self, "line"))
 
     def _repr_html_(self) -> str | None:
         shown: str | None = view(self, "html")

@@ -18,8 +18,9 @@ from nutdamp.control_loop.controller import Case
 from nutdamp.control_loop.simulation import SEED, LoopRun, fly, largest_since
 from nutdamp.control_loop.stability import Band, Margin, dead_band, expect_in_time, margins
 from nutdamp.errors import BadRequest, Infeasible
+from nutdamp.flight.cones import Aspect, aspects
 from nutdamp.flight.dynamics import Dynamics, Path, Push
-from nutdamp.flight.end_state import Aspect, aspects, left_on_the_way, seen_at
+from nutdamp.flight.end_state import left_on_the_way, seen_at
 from nutdamp.flight.propagation import Flight
 from nutdamp.flight.verification import command, reference_model
 from nutdamp.physics import attitude

@@ -36,14 +36,13 @@ from nutdamp.control_loop.law import Law
 from nutdamp.control_loop.sensor import Noise, Signal, felt, stepped
 from nutdamp.control_loop.stability import dead_band
 from nutdamp.errors import Infeasible
-from nutdamp.flight import end_state
+from nutdamp.flight import cones
 from nutdamp.flight.dynamics import Dynamics, Path, make_dynamics
 from nutdamp.flight.propagation import Flight, Leg, widest
 from nutdamp.montecarlo.cases import watch_over
 from nutdamp.physics import attitude, energy_sink
 from nutdamp.physics.motion import MOST_STEPS, MotionStretch, advance
 from nutdamp.physics.series import Bodies, Forcing
-from nutdamp.physics.triaxial import arc_cones
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.equipment import Loop
 from nutdamp.spacecraft.model import Spacecraft, SpinState, Vector
@@ -202,9 +201,8 @@ def largest_since(run: LoopRun) -> tuple[float, float]:
     flight, spacecraft = run.flight, run.flight.spacecraft
     if run.settled is None:
         rates = flight.motion(np.array([run.until]))[0][0]
-        return arc_cones(
-            flight.moments, rates, spacecraft.sense, spacecraft.inertia.wheel
-        ).nutation, run.until
+        inertia = replace(spacecraft.inertia, moments=flight.moments)
+        return inertia.cones(rates, spacecraft.sense).nutation, run.until
     track = widest(
         flight.sampled(ROWS, run.until),
         np.asarray(flight.moments),
@@ -305,13 +303,12 @@ def fly_alone(
         )
         if run.settled is not None:
             at = run.flight.motion(np.array([run.settled]))[0][0]
-            inertia = case.truth.inertia
-            quiet[row] = arc_cones(inertia.moments, at, case.truth.sense, inertia.wheel).nutation
+            quiet[row] = case.truth.inertia.cones(at, case.truth.sense).nutation
         largest[row] = largest_since(run)[0]
         if law.spacecraft.keep:
             seen = (
                 aspect
-                for aspect in end_state.aspects(run.flight, run.until)
+                for aspect in cones.aspects(run.flight, run.until)
                 if aspect.keep in law.spacecraft.keep
             )
             aspects[:, :, row] = [(aspect.least, aspect.largest) for aspect in seen]

@@ -21,7 +21,7 @@ from nutdamp.common.results import Note, note
 from nutdamp.control_loop.sensor import felt
 from nutdamp.montecarlo.inputs import SPREAD
 from nutdamp.physics import attitude
-from nutdamp.physics.sun import ahead as sun_ahead
+from nutdamp.physics.sky import ahead as sun_ahead
 from nutdamp.spacecraft.equipment import GYRO
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.schedule import Pulse, Schedule

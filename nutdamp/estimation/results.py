@@ -40,7 +40,6 @@ from nutdamp.estimation.parameters import (
 )
 from nutdamp.estimation.search import Fit, unmoved
 from nutdamp.physics import attitude
-from nutdamp.physics.triaxial import arc_cones
 from nutdamp.spacecraft.model import Spacecraft, SpinState
 from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
 
@@ -291,7 +290,7 @@ def _of_motion(fitted: Fit, time: float) -> Iterator[Estimate]:
         x, y, _ = inertia.axes @ state.rates
         turned = math.remainder(math.atan2(y, x) - phase0, 2.0 * math.pi)
         sense = math.copysign(1.0, inertia.axial(state.spin))
-        nutation = arc_cones(inertia.moments, state.rates, sense, inertia.wheel).nutation
+        nutation = inertia.cones(state.rates, sense).nutation
         return np.array([state.spin, nutation, math.hypot(x, y), phase0 + turned])
 
     omega = complex(*spacecraft.rates[:2])

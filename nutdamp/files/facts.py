@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.files.fields import SMALLEST, KeyPath
-from nutdamp.files.study_keys import thrust_behind
+from nutdamp.files.keys import thrust_behind
 from nutdamp.files.yaml import Node
 from nutdamp.physics import body as rigid_body
 from nutdamp.spacecraft.model import Inertia

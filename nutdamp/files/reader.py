@@ -31,20 +31,15 @@ from typing import (
 import numpy as np
 
 from nutdamp import units
-from nutdamp.common.time import Epoch
 from nutdamp.errors import Fault, FaultyFile, in_order, nearest, warn
 from nutdamp.files import keys
-from nutdamp.files.editing import Setting, overlay, settings_of, settings_within, text_of
 from nutdamp.files.facts import CANCELLED, Facts, Finding, Vector, force_vector, symmetric
 from nutdamp.files.fields import REQUIRED, KeyPath, Problems, Rule, Section, section_of
-from nutdamp.files.plausibility import doubts
-from nutdamp.files.rules import correlation_findings, disturbance_kind, findings
-from nutdamp.files.study_keys import LoopSection, by_name, dispersions, thrust_behind
+from nutdamp.files.keys import LoopSection, by_name, dispersions, thrust_behind
+from nutdamp.files.rules import correlation_findings, disturbance_kind, doubts, findings
 from nutdamp.files.yaml import Node, dotted, read_text, read_tree
 from nutdamp.physics import attitude
 from nutdamp.physics.body import principal_axes
-from nutdamp.physics.sun import direction
-from nutdamp.physics.thruster import Cold, Tank
 from nutdamp.spacecraft.equipment import (
     Channel,
     Commands,
@@ -68,7 +63,8 @@ from nutdamp.spacecraft.model import (
 from nutdamp.units import shown
 
 if TYPE_CHECKING:
-    from nutdamp.physics.thruster import Valve
+    from nutdamp.files.editing import Setting
+    from nutdamp.physics.thruster import Cold, Tank, Valve
 
 
 Part = TypeVar("Part")
@@ -118,8 +114,11 @@ def _contents(
 ) -> tuple[keys.SpacecraftFile, Node]:
     """The contents of a file without faults, and its tree."""
     root, faults = read_tree(text, name)
-    root, unplaced = overlay(root, settings)
-    faults += unplaced
+    if settings:
+        from nutdamp.files.editing import overlay  # keys set beside the file
+
+        root, unplaced = overlay(root, settings)
+        faults += unplaced
     faulty = [*_spelling(root, keys.SpacecraftFile, ())]
     facts = Facts(root)
     faulty += findings(facts)
@@ -265,7 +264,7 @@ def read_spacecraft(
             contents.orbit,
             lambda at: Orbit(np.array(at.position), np.array(at.velocity), at.center.upper()),
         ),
-        cold=_part(Cold, contents.cold),
+        cold=_given(contents.cold, _cold),
         tank=_given(contents.tank, _tank),
         sun=sunward,
         keep=tuple(_cones(contents, sunward)),
@@ -310,6 +309,8 @@ class Source(NamedTuple):
 
     def changed(self, keys: Mapping[str, object]) -> Spacecraft:
         """See `Spacecraft.with_`."""
+        from nutdamp.files.editing import settings_within  # keys set beside the file
+
         return self._replace(settings=(*self.settings, *settings_within(keys))).read()
 
 
@@ -319,6 +320,8 @@ def source_of(
     """Source of a spacecraft in a file, or a dict of its keys, with ``changes``; raises CannotRead
     or BadRequest.
     """
+    from nutdamp.files.editing import settings_of, text_of  # keys set beside the file
+
     if isinstance(path, Mapping):
         return Source(text_of(path, "dict"), "dict", settings_of(units.changes(changes)))
     name = units.path("path", path, "the name of a file or a dict of its keys")
@@ -390,7 +393,15 @@ def _thruster(
     )
 
 
+def _cold(section: keys.ColdSection) -> Cold | None:
+    from nutdamp.physics.thruster import Cold  # cold nozzles
+
+    return _part(Cold, section)
+
+
 def _tank(section: keys.TankSection) -> Tank | None:
+    from nutdamp.physics.thruster import Tank  # a tank in blowdown
+
     isp, shed = section.isp, section.inertia_per_kg
     rows = (shed.A, shed.A, shed.C) if isinstance(shed, keys.ShedSection) else tuple(shed or ())
     return _part(
@@ -409,7 +420,7 @@ def _valve(
     """
     if entry.impulse_bit is None and entry.valve is None and every is None:
         return None
-    from nutdamp.physics import thruster
+    from nutdamp.physics import thruster  # valves
 
     if entry.impulse_bit is not None:
         assert thrust is not None
@@ -483,7 +494,10 @@ def _sun(contents: keys.SpacecraftFile) -> Vector | None:
         return None if sun is None else attitude.on_sphere(*sun)
     assert contents.attitude is not None
     assert contents.attitude.epoch is not None
-    return direction(Epoch.parse(contents.attitude.epoch).days_of_j2000)
+    from nutdamp.common.time import Epoch  # the Sun by the epoch
+    from nutdamp.physics.sky import sun_direction
+
+    return sun_direction(Epoch.parse(contents.attitude.epoch).days_of_j2000)
 
 
 def _cones(contents: keys.SpacecraftFile, sunward: Vector | None) -> Iterator[Keep]:

@@ -16,7 +16,7 @@ import numpy as np
 from nutdamp.errors import nearest, printable
 from nutdamp.files.tabular import Row, Table
 from nutdamp.flight.dynamics import Supply
-from nutdamp.planning.notes import broken_limits
+from nutdamp.planning.causes import broken_limits
 from nutdamp.planning.plan import Plan
 from nutdamp.schemes.catalogue import SchemeOptions
 from nutdamp.spacecraft.constraints import misfits

@@ -212,6 +212,9 @@ def read_value(text: str, name: str) -> tuple[Node, list[Fault]]:
     return builder.document("expected a value", "expected one value"), builder.faults
 
 
+_END_OF_LINE = re.compile("[\0\r\n\x85\u2028\u2029]")
+
+
 class _Events(Reader, Scanner, Parser):
     """PyYAML's event stream in pure Python, whose messages are the same on every machine."""
 
@@ -221,12 +224,26 @@ class _Events(Reader, Scanner, Parser):
         Parser.__init__(self)
 
     def scan_to_next_token(self) -> None:
-        # YAML allows tabs wherever they do not indent, and JSON is often indented with them; PyYAML
-        # allows none.
-        super().scan_to_next_token()
-        while self.peek() == "\t" and (self.flow_level or not self.allow_simple_key):
-            self.forward()
-            super().scan_to_next_token()
+        """Skip blanks, comments and ends of lines.
+
+        YAML allows tabs wherever they do not indent, and JSON is often indented with them; PyYAML
+        allows none, and goes through comments character by character.
+        """
+        while True:
+            while self.peek() == " " or (
+                self.peek() == "\t" and (self.flow_level or not self.allow_simple_key)
+            ):
+                self.forward()
+            if self.peek() == "#":
+                end = _END_OF_LINE.search(self.buffer, self.pointer)
+                assert end is not None  # the buffer ends in a zero
+                self.index += end.start() - self.pointer
+                self.column += end.start() - self.pointer
+                self.pointer = end.start()
+            if not self.scan_line_break():  # type: ignore[no-untyped-call]
+                return
+            if not self.flow_level:
+                self.allow_simple_key = True
 
 
 class _Builder:

@@ -7,23 +7,20 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 
 from nutdamp.common import work
 from nutdamp.common.numerics import gauss_legendre
-from nutdamp.physics import motion, triaxial
+from nutdamp.physics import motion
 from nutdamp.physics.motion import MotionStretch
 from nutdamp.physics.series import Bodies, Falling, Forcing, Polynomial
-from nutdamp.physics.thruster import Ramp, Tank
 from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import (
     BLOWDOWN,
     COLD,
-    LIGHTER,
     TRAVEL,
-    VALVES,
     Inertia,
     Spacecraft,
     SpinState,
@@ -31,6 +28,9 @@ from nutdamp.spacecraft.model import (
 )
 from nutdamp.spacecraft.schedule import Command, Pulse, Schedule, on_command
 from nutdamp.units import STANDARD_GRAVITY
+
+if TYPE_CHECKING:
+    from nutdamp.physics.thruster import Tank
 
 # a pulse has the root of its fall over this of straight pieces, which so err by 1e-10 of it at most
 EVEN = 2e-4
@@ -120,6 +120,8 @@ class FreeCoast:
 
     def motion(self, times: Vector) -> tuple[Vector, Vector]:
         """Rates (n, 3) in rad/s and quaternions (n, 4) at ``times`` (n,) s."""
+        from nutdamp.physics import triaxial  # three different moments
+
         since = np.asarray(times) - self.start
         rates = self.state.rates
         turned = triaxial.free_attitude(self.moments, rates, self.state.quaternion, since)
@@ -530,6 +532,8 @@ def falling(pulse: Pulse, tank: Tank, used: float, flow: float) -> Pulse:
     ``flow`` as in `Tank.burn`. Its ramps are straight pieces, each with impulse and centroid of the
     thrust there.
     """
+    from nutdamp.physics.thruster import Ramp  # a tank in blowdown
+
     start, on_time = pulse.loaded
     command = pulse.command or Command(
         start, on_time, (Ramp(pulse.start, pulse.end, 1.0, 1.0),), valve=False
@@ -567,31 +571,3 @@ def supplied(spacecraft: Spacecraft, pulses: Iterable[Pulse]) -> tuple[Pulse, ..
         return tuple(pulses)
     ordered = sorted(pulses, key=lambda pulse: pulse.loaded[0])
     return tuple(supply.fire(pulse, channels.get(pulse.channel)) for pulse in ordered)
-
-
-def lacking(spacecraft: Spacecraft, schedule: Schedule, law: str) -> tuple[Spacecraft, Schedule]:
-    """Body without one ``law`` of `Spacecraft.thrust_laws`, and the response to the commands of
-    ``schedule``.
-    """
-    if law == VALVES:
-        without = replace(
-            spacecraft, channels=tuple(channel.of(valve=None) for channel in spacecraft.channels)
-        )
-    elif law == LIGHTER and spacecraft.tank is not None:
-        without = replace(spacecraft, tank=replace(spacecraft.tank, inertia_per_kg=None))
-    elif law == TRAVEL:
-        without = replace(spacecraft, center_of_mass_per_kg=None)
-    elif (
-        law == BLOWDOWN and spacecraft.tank is not None
-    ):  # once it is empty nothing fires, at full pressure too
-        without = replace(
-            spacecraft, tank=replace(spacecraft.tank, final_pressure=spacecraft.tank.pressure)
-        )
-    else:
-        without = replace(spacecraft, cold=None)
-    known = {channel.name: channel for channel in without.channels}
-    fired = []
-    for pulse in schedule:
-        commanded = pulse.channel in known and pulse.torque is not None
-        fired.append(on_command(known[pulse.channel], *pulse.loaded) if commanded else pulse)
-    return without, Schedule(supplied(without, fired))

@@ -15,7 +15,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.common.numerics import SAME_ANGLE
 from nutdamp.common.results import Tabled
 from nutdamp.flight.dynamics import (
     Dynamics,
@@ -28,15 +27,12 @@ from nutdamp.flight.dynamics import (
 )
 from nutdamp.physics import attitude, response
 from nutdamp.physics.motion import MOST_STEPS
-from nutdamp.physics.triaxial import arc_cones, widest_cones
 from nutdamp.spacecraft.model import Inertia, Spacecraft, SpinState, Vector
 from nutdamp.spacecraft.schedule import Pulse, Schedule
 
 Array = NDArray[np.float64]
 
 PIECE = 20_000  # rows of a track that are held at a time where many are written
-# parts of a turn by which a range of right ascension is distinguished from a whole turn: 0.05 deg
-BINS = 7200
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +58,8 @@ def widest(track: Track, moments: Array, sense: float, wheel: float) -> Track:
     """
     if np.array_equal(moments[..., 0], moments[..., 1]):
         return track
+    from nutdamp.physics.triaxial import widest_cones  # three different moments
+
     nutation, body_cone = widest_cones(
         np.broadcast_to(moments, track.rates.shape).T, track.rates.T, sense, wheel
     )
@@ -90,97 +88,6 @@ def even_times(
         if samples > 1:
             times[index == samples - 1] = until
         yield times[(times > start) & (times < end)], begin == low, begin + PIECE >= high
-
-
-@dataclass(frozen=True, slots=True)
-class Extremes:
-    """Excursion of the spin axis over ``rows`` rows from 0 to ``until`` s, in rad."""
-
-    rows: int
-    until: float
-    farthest: tuple[float, float]  # angle from H at t = 0, and its time, s
-    nearest: tuple[float, float]
-    x: tuple[float, float]  # range of the angle from the inertial y-z plane
-    y: tuple[float, float]  # from the x-z plane
-    right_ascension: tuple[float, float]  # shortest range, which may pass 2π
-    declination: tuple[float, float]
-
-
-def extremes(pieces: Iterable[Track]) -> Extremes:
-    """Extremes of the axis track over the rows of its pieces, at least one."""
-    rows = 0
-    until = 0.0
-    start = np.zeros(3)
-    far = _Record()
-    near = _Record()
-    ascension = _Circle()
-    low, high = np.full(3, math.inf), np.full(3, -math.inf)
-    for piece in pieces:
-        if not len(piece.t):
-            continue
-        start = piece.momentum[0] if rows == 0 else start
-        rows = rows + len(piece.t)
-        until = float(piece.t[-1])
-        away = attitude.angle_between(piece.axis, start)
-        far.add(away, piece.t)
-        near.add(-away, piece.t)
-        declination = np.arctan2(piece.axis[:, 2], np.hypot(piece.axis[:, 0], piece.axis[:, 1]))
-        angles = np.column_stack([np.arcsin(np.clip(piece.axis[:, :2], -1.0, 1.0)), declination])
-        low = np.minimum(low, angles.min(axis=0))
-        high = np.maximum(high, angles.max(axis=0))
-        ascension.add(np.arctan2(piece.axis[:, 1], piece.axis[:, 0]))
-    nearest, when = near.first
-    x, y, declinations = zip(low.tolist(), high.tolist(), strict=True)
-    return Extremes(
-        rows, until, far.first, (-nearest, when), x, y, ascension.shortest, declinations
-    )
-
-
-class _Record:
-    """Running maximum, and the first time it was reached, but for rounding."""
-
-    def __init__(self) -> None:
-        self.values, self.times = np.empty(0), np.empty(0)
-
-    def add(self, values: Array, times: Array) -> None:
-        """Update by the values of further rows."""
-        before = self.values[-1] if len(self.values) else -math.inf
-        so_far = np.maximum.accumulate(np.concatenate([[before], values]))
-        new = values > so_far[:-1]
-        self.values, self.times = (
-            np.append(self.values, values[new]),
-            np.append(self.times, times[new]),
-        )
-        kept = self.values >= so_far[-1] - SAME_ANGLE
-        self.values, self.times = self.values[kept], self.times[kept]
-
-    @property
-    def first(self) -> tuple[float, float]:
-        return float(self.values[0]), float(self.times[0])
-
-
-class _Circle:
-    """Shortest arc that holds many angles: all but the widest gap between neighbours in different
-    `BINS`.
-    """
-
-    def __init__(self) -> None:
-        self.low, self.high = np.full(BINS, math.inf), np.full(BINS, -math.inf)
-
-    def add(self, angles: Array) -> None:
-        turned = angles % (2.0 * math.pi)
-        bins = np.minimum((turned * (BINS / (2.0 * math.pi))).astype(int), BINS - 1)
-        np.minimum.at(self.low, bins, turned)
-        np.maximum.at(self.high, bins, turned)
-
-    @property
-    def shortest(self) -> tuple[float, float]:
-        used = self.high >= self.low
-        low, high = self.low[used], self.high[used]
-        gaps = np.append(low[1:], low[0] + 2.0 * math.pi) - high
-        widest = int(np.argmax(gaps))
-        west = float(low[(widest + 1) % len(low)])
-        return west, west + 2.0 * math.pi - float(gaps[widest])
 
 
 IMPULSE_SUM = "impulse sum (17)"
@@ -269,9 +176,8 @@ class Flight(Tabled):
         spacecraft, target = self.spacecraft, self.spacecraft.goal.axis
         after = self.last_momentum
         shift = float(attitude.angle_between(spacecraft.momentum, after))
-        left = arc_cones(
-            self.last_moments, self.settled.rates, spacecraft.sense, spacecraft.inertia.wheel
-        )
+        inertia = replace(spacecraft.inertia, moments=self.last_moments)
+        left = inertia.cones(self.settled.rates, spacecraft.sense)
         error = shift if target is None else float(attitude.angle_between(target, after))
         return Residual(left.nutation, left.body, left.space, shift, error, self.model)
 

@@ -14,13 +14,19 @@ import numpy as np
 from nutdamp.common import work
 from nutdamp.errors import Infeasible, MissingExtra
 from nutdamp.flight import basilisk, propagation
-from nutdamp.flight.dynamics import lacking, shed, supplied
+from nutdamp.flight.dynamics import shed, supplied
 from nutdamp.flight.propagation import Flight
 from nutdamp.physics import attitude, response
-from nutdamp.physics.triaxial import arc_cones
 from nutdamp.spacecraft.constraints import commandable
-from nutdamp.spacecraft.model import Spacecraft, Vector
-from nutdamp.spacecraft.schedule import Pulse, Schedule
+from nutdamp.spacecraft.model import (
+    BLOWDOWN,
+    LIGHTER,
+    TRAVEL,
+    VALVES,
+    Spacecraft,
+    Vector,
+)
+from nutdamp.spacecraft.schedule import Pulse, Schedule, on_command
 
 if TYPE_CHECKING:
     from nutdamp.flight.reference_model import ReferenceModel
@@ -312,7 +318,7 @@ def _from_outside(
     shift = float(
         attitude.angle_between(craft.momentum, attitude.rotate(quaternion, inertia.momentum(rates)))
     )
-    nutation = arc_cones(inertia.moments, rates, craft.sense, inertia.wheel).nutation
+    nutation = inertia.cones(rates, craft.sense).nutation
     return Method(
         name,
         nutation,
@@ -423,7 +429,7 @@ def _budget(
         rows.append((f"{WITHOUT}I1 ≠ I2", replace(ideal, inertia=mean), sharp))
     if spacecraft.growth != 0.0:
         rows.append((f"{WITHOUT}dissipation", replace(ideal, dissipation=None), sharp))
-    rows += [(f"{WITHOUT}{name}", *lacking(ideal, exact, name)) for name in spacecraft.thrust_laws]
+    rows += [(f"{WITHOUT}{name}", *_lacking(ideal, exact, name)) for name in spacecraft.thrust_laws]
     if spacecraft.disturbances and expected:
         rows.append((f"{WITHOUT}disturbances", replace(ideal, disturbances=()), sharp))
     ends = [(name, propagation.flown(body, fired).residual) for name, body, fired in rows]
@@ -442,3 +448,31 @@ def _sharp(spacecraft: Spacecraft, schedule: Schedule) -> Schedule:
         impulse = np.array([effective.real, effective.imag, pulse.impulse[2]])
         pulses.append(Pulse(pulse.t, 0.0, pulse.channel, impulse, propellant=pulse.propellant))
     return Schedule(tuple(pulses))
+
+
+def _lacking(spacecraft: Spacecraft, schedule: Schedule, law: str) -> tuple[Spacecraft, Schedule]:
+    """Body without one ``law`` of `Spacecraft.thrust_laws`, and the response to the commands of
+    ``schedule``.
+    """
+    if law == VALVES:
+        without = replace(
+            spacecraft, channels=tuple(channel.of(valve=None) for channel in spacecraft.channels)
+        )
+    elif law == LIGHTER and spacecraft.tank is not None:
+        without = replace(spacecraft, tank=replace(spacecraft.tank, inertia_per_kg=None))
+    elif law == TRAVEL:
+        without = replace(spacecraft, center_of_mass_per_kg=None)
+    elif (
+        law == BLOWDOWN and spacecraft.tank is not None
+    ):  # once it is empty nothing fires, at full pressure too
+        without = replace(
+            spacecraft, tank=replace(spacecraft.tank, final_pressure=spacecraft.tank.pressure)
+        )
+    else:
+        without = replace(spacecraft, cold=None)
+    known = {channel.name: channel for channel in without.channels}
+    fired = []
+    for pulse in schedule:
+        commanded = pulse.channel in known and pulse.torque is not None
+        fired.append(on_command(known[pulse.channel], *pulse.loaded) if commanded else pulse)
+    return without, Schedule(supplied(without, fired))

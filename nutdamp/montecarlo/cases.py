@@ -14,11 +14,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.common.numerics import cos_sin
+from nutdamp.common.numerics import TINY, cos_sin
 from nutdamp.flight.dynamics import Supply, shed
 from nutdamp.montecarlo.inputs import BY_VALVE, Draws, Group, groups_of, list_inputs
 from nutdamp.physics import attitude
-from nutdamp.physics.energy_sink import TINY
 from nutdamp.physics.sky import AxisWatch
 from nutdamp.physics.thruster import Cold, Measured, Opened, Tank, Trapezoid, possible, spread
 from nutdamp.spacecraft.equipment import Thruster

@@ -20,8 +20,8 @@ from nutdamp.common import results, work
 from nutdamp.common.numerics import finite
 from nutdamp.errors import CannotWrite
 from nutdamp.flight import propagation
+from nutdamp.flight.cones import aspects
 from nutdamp.flight.dynamics import shed
-from nutdamp.flight.end_state import aspects
 from nutdamp.flight.propagation import Flight
 from nutdamp.montecarlo.cases import DispersedModel
 from nutdamp.montecarlo.inputs import (

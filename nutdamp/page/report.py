@@ -49,13 +49,15 @@ from nutdamp.page.document import (
 )
 from nutdamp.page.manoeuvre import manoeuvre_blocks
 from nutdamp.page.moving import moving_of
+from nutdamp.planning.causes import broken_limits
 from nutdamp.planning.decision import Comparison
-from nutdamp.planning.notes import broken_limits, plan_notes, reasons
-from nutdamp.planning.plan import NO_NUTATION, Plan, unrounded
+from nutdamp.planning.notes import plan_notes, reasons
+from nutdamp.planning.plan import NO_NUTATION, Plan
+from nutdamp.planning.simulation import unrounded
 from nutdamp.planning.tradeoff import Front
 from nutdamp.planning.verdict import Light, Line, Verdict
 from nutdamp.spacecraft.model import Spacecraft
-from nutdamp.views import decisions, glance, guide
+from nutdamp.views import glance, guide
 from nutdamp.views import verdict as verdicts
 from nutdamp.views.check import check_screen
 from nutdamp.views.glance import scheme_table
@@ -469,7 +471,7 @@ def _background(compared: Comparison, judged: Verdict, repeat: Repeat) -> Iterat
     )
     chosen = compared.recommended
     if chosen is not None:
-        ends = document.facts_of("Final state", decisions.end_facts(chosen))
+        ends = document.facts_of("Final state", glance.end_facts(chosen))
         fired = pulse_table(chosen.flight, scheme=chosen.scheme)
         yield Details("Pulses and final state, all values", (document.sheet(fired), ends))
     yield Details("Method and symbols", tuple(_method(compared)))

@@ -1,6 +1,4 @@
-"""Display and output of the results: functions that `nutdamp.api` names for
-`nutdamp.common.results`.
-"""
+"""Display and output of the results: functions for `nutdamp.common.results`, by their names."""
 
 from __future__ import annotations
 
@@ -14,9 +12,10 @@ from nutdamp.common import results
 from nutdamp.errors import BadRequest, Infeasible, MissingExtra
 from nutdamp.files.tabular import track_array, write_track, write_whole
 from nutdamp.flight.propagation import Flight
-from nutdamp.planning.decision import Comparison, Simulation
+from nutdamp.planning.decision import Comparison
 from nutdamp.planning.notes import comparison_warnings, plan_notes, reasons
 from nutdamp.planning.plan import Plan, feasible
+from nutdamp.planning.simulation import Simulation
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.views.decisions import comparison_json
 from nutdamp.views.glance import scheme_table
@@ -48,7 +47,7 @@ VIEWS = {
     "Plan.data": "views.decisions:plan_json",
     "Plan.sentences": "page.results:remarks",
     "Plan.verdict": "planning.screening:verdict_of",
-    "Plan.reason": "planning.notes:infeasibility",
+    "Plan.reason": "planning.causes:infeasibility",
     "Comparison.data": "views.decisions:comparison_json",
     "Comparison.sentences": "page.results:remarks",
     "Comparison.reason": "page.results:comparison_reason",

@@ -169,3 +169,10 @@ def on_sphere(right_ascension: float, declination: float) -> Array:
             math.sin(declination),
         ]
     )
+
+
+def square_to(vector: Array) -> Array:
+    """Some unit vector perpendicular to ``vector`` (3,)."""
+    other = np.eye(3)[int(np.argmin(np.abs(vector)))]
+    square = np.cross(vector, other)
+    return np.asarray(square / np.linalg.norm(square))

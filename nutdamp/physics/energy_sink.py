@@ -44,6 +44,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from nutdamp.common.numerics import TINY
 from nutdamp.physics import attitude
 
 Array = NDArray[np.float64]
@@ -59,8 +60,6 @@ MOST_TURNED = (
 )
 # time constants after which the sink has finished: θ is then 0 or 90° to far beyond rounding
 FOR_EVER = 300.0
-# offset that keeps quotients like asinh x / x defined at zero and changes nothing elsewhere
-TINY = 1e-200
 # least cosine of a nutation angle that is distinguished from zero: its square is still a number
 SMALLEST = 1e-150
 
@@ -302,3 +301,85 @@ def _direction(
     h1, h2, h3 = attitude.angular_momentum(A, C, omega, spin, wheel).tolist()
     size = math.hypot(h1, h2, h3)
     return (h1 / size, h2 / size, h3 / size, size) if size > 0.0 else (0.0, 0.0, 1.0, 0.0)
+
+
+# --- the sink as Taylor series
+
+
+def _product(left: Array, right: Array) -> Any:
+    """Coefficient of the product of two series (k, n)."""
+    return left @ right[::-1] if left.ndim == 1 else np.einsum("kn,kn->n", left, right[::-1])
+
+
+class SinkSeries:
+    """`energy_sink` as series: torque of dissipation on H in body axes, and slip of the body.
+
+    With q = H3/|H|² the slip is s = κq (H2, -H1, 0), and H × s is added to dH/dt in the body.
+    ``floor`` keeps q regular where external torques bring H to rest: there is nothing to dissipate
+    there. With a wheel q is ((C - A)H3 + Ah)/((C - A)|H|² + σAh|H|). The moments may fall:
+    ``parts`` are their series, of at most so many ``orders``.
+    """
+
+    def __init__(
+        self,
+        parts: list[Array],
+        growth: float,
+        wheel: Any,
+        sense: float,
+        floor: Any,
+        orders: int,
+    ) -> None:
+        self.growth, self.wheel, self.sense = growth, wheel, sense
+        self.parts, self.floor = parts, floor
+        self.with_wheel = bool(np.any(self.wheel))
+        self.by_wheel = [0.5 * (part[0] + part[1]) for part in parts]
+        self.by_body = [part[2] - A for part, A in zip(parts, self.by_wheel, strict=True)]
+        shape = parts[0].shape
+        self.momentum, self.slip = np.zeros((2, orders, *shape))  # H and s
+        # |H|², |H|, the denominator of q, and q
+        tables = np.zeros((4, orders, *shape[1:]))
+        self.squares, self.size, self.below, self.quotient = tables
+
+    def torque(self, k: int, rates: Array) -> tuple[Any, Any, Any]:
+        """Coefficient k of H × s, (3, n), from those of ω up to it, (k+1, 3, n); stores that of
+        ``slip``.
+        """
+        momentum, slip = self.momentum[: k + 1], self.slip[: k + 1]
+        momentum[k] = self.parts[0] * rates[k]
+        for order, part in enumerate(self.parts[1 : k + 1], 1):
+            momentum[k] += part * rates[k - order]
+        if k == 0:
+            momentum[0, 2] += self.wheel
+        if rates.ndim == 2:
+            self.squares[k] = momentum.ravel() @ momentum[::-1].ravel()
+        else:
+            self.squares[k] = np.einsum("kcn,kcn->n", momentum, momentum[::-1])
+        if k == 0:
+            self.squares[0] += self.floor
+        above, self.below[k] = momentum[k, 2], self.squares[k]
+        if self.with_wheel:
+            if k == 0:
+                self.size[0] = np.sqrt(self.squares[0])
+            else:
+                between = _product(self.size[1:k], self.size[1:k])
+                self.size[k] = 0.5 * (self.squares[k] - between) / self.size[0]
+            above = self.by_wheel[k] * self.wheel if k < len(self.parts) else 0.0
+            self.below[k] = 0.0
+            for order, apart in enumerate(self.by_body[: k + 1]):
+                above = above + apart * momentum[k - order, 2]
+                by_wheel = self.sense * self.wheel * self.by_wheel[order]
+                self.below[k] += apart * self.squares[k - order] + by_wheel * self.size[k - order]
+        before = _product(self.below[1 : k + 1], self.quotient[:k])
+        quotient = self.quotient[: k + 1]
+        quotient[k] = (above - before) / self.below[0]
+        slip[k, 0] = self.growth * _product(quotient, momentum[:, 1])
+        slip[k, 1] = -self.growth * _product(quotient, momentum[:, 0])
+        first, second, third = self.products(momentum, slip[:, :2])
+        return -third[1], third[0], first[1] - second[0]
+
+    @staticmethod
+    def products(left: Array, right: Array) -> Any:
+        """Coefficients of the products of series (k, a, n) and (k, b, n), (a, b, n)."""
+        if left.ndim == 2:
+            return (left.T @ right[::-1]).tolist()
+        return np.einsum("kan,kbn->abn", left, right[::-1])

@@ -1,4 +1,4 @@
-"""Motion of rigid bodies, one or many at once: coasts, powered stretches, flights through pulses.
+"""Motion of rigid bodies, one or many at once: coasts and powered stretches.
 
 Arrays carry the body last; those of one body have no such axis. Coasts of symmetric bodies without
 external torque are arcs in closed form, with energy dissipation too (`arc`); `triaxial` has the
@@ -10,17 +10,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from typing import Any, NamedTuple, Protocol
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.common.numerics import cos_sin
+from nutdamp.common.numerics import TINY, cos_sin
 from nutdamp.errors import Infeasible
-from nutdamp.physics import attitude, energy_sink, series
-from nutdamp.physics.energy_sink import TINY
+from nutdamp.physics import attitude
 from nutdamp.physics.series import Bodies, Falling, Forcing, Polynomial, Series
+
+if TYPE_CHECKING:
+    from nutdamp.physics.driven import Drive
 
 Array = NDArray[np.float64]
 
@@ -33,6 +35,11 @@ LONGEST = 3e5  # largest angle of one integration, rad: some hundred thousand st
 MOST_STEPS = 400_000  # of one integration: enough for `LONGEST` whatever the rates on the way
 SHORT = 8.0  # angle up to which steps of one body in turn are quicker than all at once, rad
 FEW = 256  # cases up to which steps summed at once cost less than the calls of steps in turn
+
+
+# cases flown together: enough to hide the cost of calls, few enough that their series stay in the
+# cache
+BLOCK = 2048
 
 
 class MotionStretch(NamedTuple):
@@ -137,6 +144,8 @@ def nutated(
     turned = attitude.product(quaternion, (cosine, sine * x, sine * y, sine * axial))
     if growth == 0.0:
         return (x, y, spin), turned, ((1.0 - C / A) * spin - wheel / A) * time
+    from nutdamp.physics import energy_sink  # dissipation
+
     course: Any = energy_sink.course if number else energy_sink.courses
     first, second, along = x / size, y / size, axial / size
     across = (x + TINY) / size  # at rest, as of flat spin
@@ -189,13 +198,13 @@ def polynomials(here: MotionStretch, duration: Any, most: int = MOST_STEPS) -> I
     if jerk is not None:
         strength = np.maximum(strength, _size(acceleration + jerk * duration))
     lightest = moments.min(axis=0)
-    driven = abs(forcing.growth)
+    pushed = abs(forcing.growth)
     if forcing.turning:
         strength = strength + sum(abs(size) for size, _ in forcing.turning) / lightest
-    driven = driven + np.sqrt(strength)
+    pushed = pushed + np.sqrt(strength)
     turning = np.abs(forcing.wheel) / lightest
     turning = max((abs(rate) for _, rate in forcing.turning), default=0.0) + turning
-    angle = float(np.max(np.maximum(_size(rates) + driven, turning) * duration))
+    angle = float(np.max(np.maximum(_size(rates) + pushed, turning) * duration))
     if rates.ndim == 1 and angle > SHORT and _steady(here):
         yield from _symmetric_polynomials(here, duration, most)
         return
@@ -232,48 +241,8 @@ def polynomials(here: MotionStretch, duration: Any, most: int = MOST_STEPS) -> I
         if ahead == 0.0:
             return
         rates, quaternion = step.polynomial.end()
-        angle = float(np.max(np.maximum(_size(rates) + driven, turning) * duration))
+        angle = float(np.max(np.maximum(_size(rates) + pushed, turning) * duration))
     raise _refused(here, duration)
-
-
-class DenseStretch(NamedTuple):
-    """Motion from a ``start`` for ``length`` (n,) s: by a ``polynomial``, or in closed form."""
-
-    start: MotionStretch
-    length: Array
-    polynomial: Polynomial | None = None
-
-    def at(self, way: Array, cases: Any) -> MotionStretch:
-        """Motion of ``cases`` after a ``way`` (m,), as a share of the length."""
-        here = self.start.some(cases)
-        since = here.since + way * self.length[cases]
-        if self.polynomial is None:
-            return here.moved(since)
-        rates, quaternion = self.polynomial.at(way, cases)
-        return here._replace(since=since, rates=rates, quaternion=quaternion)
-
-    def steps(self, count: int) -> Iterator[MotionStretch]:
-        """Motion at the end of each of ``count`` steps of equal length."""
-        ways = np.arange(1, count + 1) / count
-        times = self.start.since + ways[:, None] * self.length
-        if self.polynomial is None:
-            yield from map(self.start.moved, times)
-            return
-        for since, rates, quaternion in zip(times, *self.polynomial.along(ways), strict=True):
-            yield self.start._replace(since=since, rates=rates, quaternion=quaternion)
-
-
-def pieces(here: MotionStretch, duration: Array) -> Iterator[DenseStretch]:
-    """Motion that `advance` makes with these arguments, which stay as they are, one piece after the
-    other.
-    """
-    if here.torque is None and here.bodies.free:
-        yield DenseStretch(here, duration)
-        return
-    for piece in polynomials(here, duration):
-        terms = piece.terms[0]
-        start = here._replace(since=piece.start, rates=terms[4:], quaternion=terms[:4])
-        yield DenseStretch(start, piece.duration, piece)
 
 
 def _size(vectors: Array) -> Any:
@@ -295,17 +264,21 @@ def _refused(here: MotionStretch, duration: Any, angle: float | None = None) -> 
     )
 
 
-def _drive(here: MotionStretch) -> series.Drive:
+def _drive(here: MotionStretch) -> Drive:
     """Drive of symmetric bodies; that of one as of an array of one."""
+    from nutdamp.physics.driven import Drive
+
     A, _, C = here.bodies.moments.reshape(3, -1)
     first, second, third = here.acceleration.reshape(3, -1)
     forcing = here.bodies.forcing
     turning = tuple((np.asarray(size / A), rate) for size, rate in forcing.turning)
-    return series.Drive(1.0 - C / A, first + 1j * second, third, turning, forcing.wheel / A)
+    return Drive(1.0 - C / A, first + 1j * second, third, turning, forcing.wheel / A)
 
 
 def _advance_symmetric(here: MotionStretch, duration: Array) -> None:
     """`advance` by many steps at once."""
+    from nutdamp.physics import driven  # many cases, or long pulses
+
     rates, quaternion = here.rates, here.quaternion
     drive = _drive(here)
     omega = rates[0] + 1j * rates[1]
@@ -315,10 +288,10 @@ def _advance_symmetric(here: MotionStretch, duration: Array) -> None:
         raise _refused(here, duration, angle)
     turned = np.stack([quaternion[0] + 1j * quaternion[3], quaternion[1] + 1j * quaternion[2]])
     try:
-        omega, rates[2], (first, second) = series.end(
+        omega, rates[2], (first, second) = driven.end(
             drive, omega, spin, turned, here.since, duration
         )
-    except series.NotConverged:
+    except driven.NotConverged:
         raise _refused(here, duration) from None
     rates[:2] = omega.real, omega.imag
     quaternion[:] = first.real, second.real, second.imag, first.imag
@@ -326,25 +299,27 @@ def _advance_symmetric(here: MotionStretch, duration: Array) -> None:
 
 def _symmetric_polynomials(here: MotionStretch, time: float, most: int) -> Iterator[Polynomial]:
     """`polynomials` of one body, many steps at once."""
+    from nutdamp.physics import driven  # long pulses
+
     drive = _drive(here)
     omega, spin = np.array([complex(here.rates[0], here.rates[1])]), here.rates[2:]
     start, duration = np.array([here.since]), np.array([time])
     angle = float(drive.pace(omega, spin, duration)[0]) * time
-    if angle > most * series.DRIVEN_STRIDE and most < MOST_STEPS:
+    if angle > most * driven.DRIVEN_STRIDE and most < MOST_STEPS:
         raise _refused(here, time)
     if not angle <= LONGEST:
         raise _refused(here, time, angle)
-    count = series.count_for(drive, omega, spin, duration)
+    count = driven.count_for(drive, omega, spin, duration)
     quaternion, done = here.quaternion, 0
     try:
-        for steps in series.steps(drive, omega, spin, start, duration, count):
+        for steps in driven.steps(drive, omega, spin, start, duration, count):
             done += len(steps.starts)
             if done > most:
                 raise _refused(here, time)
             turn = steps.turn[..., 0]  # (k, 2, s)
             if done > 1:
-                before = series.in_turn(turn.sum(axis=0)[:, :-1, None])[..., 0]
-                later = series.product(before[:, None], np.moveaxis(turn, 1, 0)[:, :, 1:])
+                before = driven.in_turn(turn.sum(axis=0)[:, :-1, None])[..., 0]
+                later = driven.product(before[:, None], np.moveaxis(turn, 1, 0)[:, :, 1:])
                 turn[:, :, 1:] = np.moveaxis(later, 0, 1)
             p, r = turn[:, 0], turn[:, 1]
             terms = np.zeros((*p.shape, 7))  # (k, s, 7)
@@ -357,214 +332,5 @@ def _symmetric_polynomials(here: MotionStretch, time: float, most: int) -> Itera
                 piece = Polynomial(begin, step, terms[:, number])
                 yield piece
             quaternion = piece.end()[1]
-    except series.NotConverged:
+    except driven.NotConverged:
         raise _refused(here, time) from None
-
-
-# --- flights of many bodies through pulses
-
-# cases flown together: enough to hide the cost of calls, few enough that their series stay in the
-# cache
-BLOCK = 2048
-
-
-@dataclass(frozen=True, slots=True)
-class Pulses:
-    """Rectangular pulses; the moments fall half as one begins and half as it ends, which errs in
-    second order.
-    """
-
-    starts: Array  # (k, n) s
-    on_times: Array  # (k, n) s, or (k, 1) for all cases; 0: an ideal impulse
-    impulses: Array  # torque × on-time, (k, 3, n) N m s
-    leans: Array | None = (
-        None  # (k, n): torques run evenly from 1 - lean to 1 + lean times their mean
-    )
-    sheds: Array | None = None  # decrease of the moments, (k, 3, n) kg m²
-
-    def some(self, cases: Any) -> Pulses:
-        """Subset of ``cases`` (an index of arrays)."""
-        on_times = self.on_times if self.on_times.shape[1] == 1 else self.on_times[:, cases]
-        leans = None if self.leans is None else self.leans[:, cases]
-        sheds = None if self.sheds is None else self.sheds[:, :, cases]
-        return Pulses(self.starts[:, cases], on_times, self.impulses[:, :, cases], leans, sheds)
-
-    @property
-    def slopes(self) -> Array | None:
-        """Slope of each torque, (k, 3, n) N m/s; None where all are constant."""
-        if self.leans is None or not self.leans.any():
-            return None
-        lasts = np.where(self.on_times == 0.0, 1.0, self.on_times)
-        return np.asarray(self.impulses * (2.0 * self.leans / lasts**2)[:, None])
-
-    @property
-    def edges(self) -> Array:
-        """Starts and ends in turn, (2k, n) s."""
-        ends = self.starts + self.on_times
-        return np.stack([self.starts, ends], axis=1).reshape(-1, self.starts.shape[1])
-
-    @property
-    def torques(self) -> tuple[Array, Array]:
-        """Torque as each pulse begins and as it ends, (k, 3, n) N m each; 0 of ideal impulses."""
-        on_times = self.on_times[:, None]
-        ideal = on_times == 0.0
-        mean = np.where(ideal, 0.0, self.impulses / np.where(ideal, 1.0, on_times))
-        if self.leans is None:
-            return mean, mean
-        leans = self.leans[:, None]
-        return (1.0 - leans) * mean, (1.0 + leans) * mean
-
-
-class Observer(Protocol):
-    """Observer of the motion of cases; see `sky`."""
-
-    def some(self, cases: Any) -> Observer:
-        """Observer of a subset of ``cases`` (an index of arrays)."""
-
-    def motion(self, here: MotionStretch, duration: Array) -> None:
-        """Receive the motion that `advance` is about to make with the same arguments."""
-
-
-def fly(
-    bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses, watch: Observer | None = None
-) -> tuple[Array, Array]:
-    """Rates (3, n) rad/s and unit quaternions (4, n), body -> inertial, as the last pulse of each
-    case ends.
-
-    ``rates`` and ``quaternion`` at t = 0; ``watch`` sees the motion until then. Exact to some 1e-13
-    rad for each hundred radians flown. Pulses may overlap and come in any order. Raises Infeasible
-    beyond `LONGEST` rad.
-    """
-    rates, quaternion = np.array(rates, dtype=float), np.array(quaternion, dtype=float)
-    for begin in range(0, rates.shape[1], BLOCK):
-        cases = slice(begin, begin + BLOCK)
-        seen = None if watch is None else watch.some(cases)
-        _fly_block(
-            bodies.some(cases), rates[:, cases], quaternion[:, cases], pulses.some(cases), seen
-        )
-    return rates, quaternion
-
-
-def _fly_block(
-    bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses, watch: Observer | None
-) -> None:
-    """Fly one block, in place."""
-    edges = pulses.edges
-    if not len(edges):
-        return
-    usual = np.argsort(edges.mean(axis=1), kind="stable")
-    sorted_alike = np.all(np.diff(edges[usual], axis=0) >= 0.0, axis=0)
-    if sorted_alike.all():
-        _fly_alike(bodies, rates, quaternion, pulses, watch, usual)
-        return
-    for cases, alike in (
-        (np.flatnonzero(sorted_alike), True),
-        (np.flatnonzero(~sorted_alike), False),
-    ):
-        if len(cases):
-            flown, turned = rates[:, cases], quaternion[:, cases]
-            chosen = (
-                bodies.some(cases),
-                flown,
-                turned,
-                pulses.some(cases),
-                watch and watch.some(cases),
-            )
-            if alike:
-                _fly_alike(*chosen, usual)
-            else:
-                _fly_each(*chosen)
-            rates[:, cases], quaternion[:, cases] = flown, turned
-
-
-def _fly_alike(
-    bodies: Bodies,
-    rates: Array,
-    quaternion: Array,
-    pulses: Pulses,
-    watch: Observer | None,
-    order: NDArray[np.intp],
-) -> None:
-    """Fly cases whose edges have the same ``order``, in place: between pulses all of them coast."""
-    edges, slopes = pulses.edges, pulses.slopes
-    firsts, _ = pulses.torques
-    half = None if pulses.sheds is None else 0.5 * pulses.sheds
-    now = np.zeros(rates.shape[1])
-    on = set[int]()
-    for edge in order.tolist():
-        torque = slope = None
-        if on:
-            acting = sorted(on)
-            torque = np.sum(firsts[acting], axis=0)
-            if slopes is not None:
-                slope = np.sum(slopes[acting], axis=0)
-                torque += sum(slopes[number] * (now - edges[2 * number]) for number in acting)
-        _advance(
-            MotionStretch(bodies, now, rates, quaternion, torque, slope), edges[edge] - now, watch
-        )
-        now = edges[edge]
-        number, ends = divmod(edge, 2)
-        bodies = bodies.lighter(None if half is None else half[number])
-        if np.any(pulses.on_times[number]):
-            (on.remove if ends else on.add)(number)
-        elif not ends:
-            rates += pulses.impulses[number] / bodies.moments
-
-
-def _fly_each(
-    bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses, watch: Observer | None
-) -> None:
-    """Fly cases with different orders of edges, in place.
-
-    Those that coast from one edge to the next go on in closed form: with times widely dispersed one
-    coast may be long where another case has a pulse on, whose steps it would take.
-    """
-    edges, slopes = pulses.edges, pulses.slopes
-    firsts, lasts = pulses.torques
-    ideal = np.broadcast_to(pulses.on_times == 0.0, pulses.starts.shape)
-    order = np.argsort(edges, axis=0, kind="stable")
-    on = np.cumsum(1 - 2 * (order % 2), axis=0)  # pulses that are on behind each edge
-    now = np.zeros(rates.shape[1])
-    torque = np.zeros_like(rates)
-    slope = None
-    for number, edge_of_each in enumerate(order):
-        here = MotionStretch(bodies, now, rates, quaternion, torque, slope)
-        edge = _of_each(edges, edge_of_each)
-        coasts = on[number - 1] == 0 if number else np.ones(len(now), dtype=bool)
-        groups = (
-            (np.flatnonzero(coasts), np.flatnonzero(~coasts))
-            if bodies.free
-            else (np.arange(len(now)),)
-        )
-        for cases in filter(len, groups):
-            part = here.some(cases)
-            if bodies.free and coasts[cases[0]]:
-                part = part._replace(torque=None, slope=None)
-            _advance(part, (edge - now)[cases], watch and watch.some(cases))
-            rates[:, cases], quaternion[:, cases] = part.rates, part.quaternion
-        if slope is not None:
-            torque = torque + slope * (edge - now)
-        pulse, ends = np.divmod(edge_of_each, 2)
-        torque = torque + np.where(ends, -_of_each(lasts, pulse), _of_each(firsts, pulse))
-        now = edge
-        if slopes is not None:
-            bend = np.where(ends, -1.0, 1.0) * _of_each(slopes, pulse)
-            slope = bend if slope is None else slope + bend
-        if pulses.sheds is not None:
-            bodies = bodies.lighter(0.5 * _of_each(pulses.sheds, pulse))
-        kicked = _of_each(ideal, pulse) & (ends == 0)
-        if kicked.any():
-            rates += np.where(kicked, _of_each(pulses.impulses, pulse), 0.0) / bodies.moments
-
-
-def _of_each(values: Any, rows: NDArray[np.intp]) -> Any:
-    """Values (m, …, n) of one row of each case, (…, n)."""
-    index = rows.reshape(1, *(1,) * (values.ndim - 2), len(rows))
-    return np.take_along_axis(values, index, axis=0)[0]
-
-
-def _advance(here: MotionStretch, duration: Array, watch: Observer | None) -> None:
-    """Propagate in place; ``watch`` sees the motion before that."""
-    if watch is not None:
-        watch.motion(here, duration)
-    advance(here, duration)

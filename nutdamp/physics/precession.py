@@ -125,7 +125,7 @@ def two_jumps(
     along = np.cross(axes, target)
     size = np.linalg.norm(along, axis=-1, keepdims=True)
     with np.errstate(divide="ignore", invalid="ignore"):
-        along = np.where(size > 0.0, along / size, square_to(target))
+        along = np.where(size > 0.0, along / size, attitude.square_to(target))
         foot = (
             h * (axes + target) / (1.0 + axes @ target)[:, None]
         )  # of the line, nearest to hS and to hT
@@ -169,7 +169,7 @@ def half_cone(
     sideways = target - (axes @ target)[:, None] * axes
     size = np.linalg.norm(sideways, axis=-1, keepdims=True)
     with np.errstate(divide="ignore", invalid="ignore"):
-        sideways = np.where(size > 0.0, sideways / size, square_to(target))
+        sideways = np.where(size > 0.0, sideways / size, attitude.square_to(target))
     return h * (axes + np.tan(half + more)[:, None] * sideways), h * np.tan(half)
 
 
@@ -205,13 +205,6 @@ def on_times_to_turn(impulses: Array, torque: float, spin: float) -> Array:
         return impulses / torque
     with np.errstate(invalid="ignore"):
         return np.asarray(np.arcsin(rate * impulses / torque) / rate)
-
-
-def square_to(vector: Array) -> Array:
-    """Some unit vector perpendicular to ``vector`` (3,)."""
-    other = np.eye(3)[int(np.argmin(np.abs(vector)))]
-    square = np.cross(vector, other)
-    return np.asarray(square / np.linalg.norm(square))
 
 
 def course(momentum: Array, target: Array, sun: Array | None) -> tuple[Array, float]:

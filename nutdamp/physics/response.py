@@ -1,4 +1,4 @@
-"""Body rates under pulses and lasting torques, in closed form: Magnus 1970 (8)-(17), (23)-(27).
+"""Body rates under pulses, in closed form: Magnus 1970 (15)-(17).
 
 Equation of motion in time, Magnus 1970 (1) and (4)-(6) without the division by ω3, ω = ω1 + iω2:
 dω/dt = -i a ω3(t) ω + M(t)/A,  dω3/dt = M3/C. Nothing is divided by ω3 (Magnus' m = M/(Aω3) breaks
@@ -15,8 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.common.numerics import gauss_legendre, rising_zero
-from nutdamp.physics import energy_sink
+from nutdamp.common.numerics import rising_zero
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -82,9 +81,11 @@ def width_factor(
     ``drift`` (rad/s²) is a change of ν that goes on after the pulse.
     """
     half = 0.5 * on_time
-    growth = (
-        math.copysign(min(abs(growth), energy_sink.FOR_EVER / half), growth) if half > 0.0 else 0.0
-    )
+    if growth != 0.0:
+        from nutdamp.physics.energy_sink import FOR_EVER  # dissipation
+
+        most = FOR_EVER / half if half > 0.0 else 0.0
+        growth = math.copysign(min(abs(growth), most), growth)
     if slope == 0.0 and drift == 0.0:
         angle = (rate + 1j * growth) * half
         return cmath.sin(angle) / angle if angle != 0.0 else 1.0 + 0.0j
@@ -160,143 +161,3 @@ def on_time_for(
         low = high
         high = min(1.1 * high, longest)
     return None
-
-
-PANEL = 2.0  # phase in rad of one Gauss-Legendre panel; ten nodes then err by less than a rounding
-
-
-def phase_integral(slope: Array, bend: Array, length: Array) -> ComplexArray:
-    """∫ exp(i(slope s + bend s²)) ds from 0 to ``length``, (n,) each, to rounding, by
-    Gauss-Legendre panels.
-
-    Bödewadt writes it with Fresnel's integrals, which cancel as bend -> 0.
-    """
-    slope, bend, length = (
-        np.asarray(part, dtype=float) for part in np.broadcast_arrays(slope, bend, length)
-    )
-    # The phase may turn back where slope + 2 bend s = 0; this bounds its total variation.
-    variation = np.abs(slope) * np.abs(length) + np.abs(bend) * np.square(length)
-    counts = np.maximum(np.ceil(variation / PANEL), 1.0).astype(int)
-    owner = np.repeat(np.arange(len(counts)), counts)
-    firsts = np.concatenate([[0], np.cumsum(counts)[:-1]])
-    number = np.arange(len(owner)) - firsts[owner]
-    width = length[owner] / counts[owner]
-    nodes, weights = gauss_legendre(10)
-    s = (number + 0.5)[:, None] * width[:, None] + 0.5 * width[:, None] * nodes
-    phase = (slope[owner][:, None] + bend[owner][:, None] * s) * s
-    panels = 0.5 * width * (np.exp(1j * phase) @ weights)
-    return np.asarray(np.add.reduceat(panels, firsts))
-
-
-def stepwise_torque(
-    times: Array, omega0: complex, spin0: float, A: float, C: float, edges: Array, torques: Array
-) -> tuple[ComplexArray, Array]:
-    """General solution, Magnus 1970 (8)-(10), for a torque that is constant between edges; exact at
-    any angle.
-
-    ``times`` (n,) s within ``edges`` (k+1,) s ascending; ``omega0``, ``spin0`` in rad/s are those
-    at edges[0]; ``torques`` (k, 3) N m. Returns ω (n,) and ω3 (n,) in rad/s.
-    """
-    edges, torques = np.asarray(edges, dtype=float), np.asarray(torques, dtype=float)
-    times = np.asarray(times, dtype=float)
-    a = (A - C) / A
-    spin_rates = torques[:, 2] / C
-    lengths = np.diff(edges)
-    spins = spin0 + np.concatenate([[0.0], np.cumsum(spin_rates * lengths)])
-    alphas = np.concatenate([[0.0], np.cumsum((spins[:-1] + 0.5 * spin_rates * lengths) * lengths)])
-    transverse = (torques[:, 0] + 1j * torques[:, 1]) / A
-
-    def gained(step: NDArray[np.intp], since: Array) -> ComplexArray:
-        turned = phase_integral(a * spins[step], 0.5 * a * spin_rates[step], since)
-        return np.asarray(transverse[step] * np.exp(1j * a * alphas[step]) * turned)
-
-    sums = omega0 + np.concatenate([[0.0], np.cumsum(gained(np.arange(len(lengths)), lengths))])
-    step = np.clip(np.searchsorted(edges, times, side="right") - 1, 0, len(lengths) - 1)
-    since = times - edges[step]
-    spin = spins[step] + spin_rates[step] * since
-    alpha = alphas[step] + 0.5 * (spins[step] + spin) * since
-    return (sums[step] + gained(step, since)) * np.exp(-1j * a * alpha), spin
-
-
-def rotating_torques(
-    times: Array, omega0: complex, nutation: float, A: float, torques: ComplexArray, rates: Array
-) -> ComplexArray:
-    """Transverse rate ω under torques that turn uniformly in the body, M(t) = Σ M_p exp(i r_p t),
-    with ω3 constant.
-
-    Magnus 1970 (23), (24) with r_p = b_p ω3, where ω0 of the print is an integration constant: with
-    ω(0) given it is ω(0) + i Σ m_p/(a + b_p). Both are one here, without cancellation near
-    resonance r_p = -aω3, which is (25): ω(t) = e^{-iaω3t} [ω(0) + (1/A) Σ M_p t e^{iδ_p t/2}
-    sinc(δ_p t/2)], δ_p = aω3 + r_p. r_p = aω3 is (26), r_p = -ω3 the nearly space-fixed torque of
-    (27), r_p = 0 the constant one of (11).
-
-    ``times`` (n,) s, ``nutation`` aω3 rad/s, with a wheel ω3 - H3/A; ``torques`` (p,) N m,
-    ``rates`` (p,) rad/s. Returns (n,) rad/s.
-    """
-    times = np.asarray(times, dtype=float)[:, None]
-    half = 0.5 * (nutation + np.asarray(rates, dtype=float)) * times
-    # numpy.sinc(x) is sin(πx)/(πx)
-    forced = np.asarray(torques) * times * np.exp(1j * half) * np.sinc(half / math.pi) / A
-    return np.asarray((omega0 + forced.sum(axis=1)) * np.exp(-1j * nutation * times[:, 0]))
-
-
-def steady_response(A: float, nutation: float, torque: complex, rate: float = 0.0) -> complex:
-    """Part of ω that follows a torque M e^{irt} for ever, at t = 0: -i M/(A(aω3 + r)) in rad/s.
-
-    For r = 0 the permanent rotation Magnus 1970 (13), which is the centre of the pole cone of (11)
-    and K(14), (M2 - iM1)/((A - C)ω3); for r = -ω3 the forced term of (27), which in the axes of the
-    despun frame is K(15), iM/(Cω3). K(14) and K(15) hold without axial torque: the third component
-    of K(15) is 0, and the last line of K(14) must read M = ω_P × ω_z (J_z - J_xy). Infinite at
-    resonance, r = -aω3, and for r = 0 on a sphere. ``nutation`` is aω3.
-    """
-    detuning = nutation + rate
-    if detuning == 0.0:
-        return complex(math.inf)
-    return -1j * torque / (A * detuning)
-
-
-def permanent_rotation(
-    A: float, C: float, spin: float, torque: complex
-) -> tuple[complex, float, float, float]:
-    """The permanent rotation that a constant body torque allows, Magnus 1970 (13), constant in body
-    and space.
-
-    Returns ω (rad/s), its rate ψ̇0 = |ω_i| and the Euler angles ϑ0, φ0 (rad), (14).
-
-    tan ϑ0 = |M|/(|A - C| ω3²), tan φ0 = ω1/ω2 by arctan2; ψ̇0 is |ω|, where the source prints |ω̇|.
-    With ω1 = ψ̇0 sin ϑ0 sin φ0, ω2 = ψ̇0 sin ϑ0 cos φ0, ω3 = ψ̇0 cos ϑ0. Infinite for a sphere.
-    """
-    omega = steady_response(A, (A - C) / A * spin, torque)
-    rate = math.hypot(abs(omega), spin)
-    return omega, rate, math.atan2(abs(omega), spin), math.atan2(omega.real, omega.imag)
-
-
-def beat(A: float, nutation: float, torque: complex, rate: float) -> tuple[float, float]:
-    """Largest |ω| (rad/s) that a turning torque adds to rest, and the period (s) of the swelling,
-    Magnus 1970 (27).
-
-    ω(t) from rest swells to 2|M|/(A|δ|) and back within 2π/|δ|, δ = aω3 + r; both infinite at
-    resonance.
-    """
-    detuning = abs(nutation + rate)
-    if detuning == 0.0:
-        return math.inf, math.inf
-    return 2.0 * abs(torque) / (A * detuning), 2.0 * math.pi / detuning
-
-
-def resonant_time(
-    A: float, axial: float, omega0: complex, torque: complex, nutation: float
-) -> float:
-    """Time in s for a resonant torque (r = -aω3) to drive the nutation angle to ``nutation`` rad;
-    Magnus 1970 (25).
-
-    |ω0 + M t/A| = |H3| tan θ/A with H3 = ``axial``, Cω3: the later root, since the pole curve may
-    first run inwards; 0 if it is there already.
-    """
-    needed = abs(axial) * math.tan(nutation) / A
-    speed = torque / A
-    if abs(omega0) >= needed:
-        return 0.0
-    along = (omega0 * speed.conjugate()).real / abs(speed)
-    across = abs((omega0 * speed.conjugate()).imag) / abs(speed)
-    return (math.sqrt(needed * needed - across * across) - along) / abs(speed)

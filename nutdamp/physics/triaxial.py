@@ -27,7 +27,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from nutdamp.physics import attitude
 from nutdamp.physics import body as rigid_body
-from nutdamp.physics.body import ConeAngles, momentary
 
 Array = NDArray[np.float64]
 
@@ -124,27 +123,14 @@ def nutation_period(moments: ArrayLike, rates0: ArrayLike) -> float:
     return 4.0 * quarter / (polhode.pace * polhode.rate_unit)
 
 
-def arc_cones(moments: ArrayLike, rates: ArrayLike, sense: float, wheel: float = 0.0) -> ConeAngles:
-    """Cone angles at the instant of largest nutation on the torque-free motion through ``rates``
-    (3,) rad/s.
-
-    The spin axis is ``sense``·e3, so that angles above 90 deg mean a spin that has been reversed.
-    Constant with I1 = I2; else θ swings between two values while H is fixed in space.
-    """
-    first, second, _ = np.asarray(moments, dtype=float).tolist()
-    if first == second:
-        return momentary(moments, rates, sense, wheel)
-    nutation, body = widest_cones(
-        np.asarray(moments, dtype=float), np.asarray(rates, dtype=float), sense, wheel
-    )
-    return ConeAngles(float(nutation), float(body))
-
-
 def widest_cones(
     moments: Array, rates: Array, sense: float, wheel: ArrayLike = 0.0
 ) -> tuple[Array, Array]:
-    """Nutation and body cone (...), rad, of `arc_cones` for bodies with ``moments`` and ``rates``
-    (3, ...).
+    """Nutation and body cone (...), rad, at the instant of largest nutation on the torque-free
+    motion of bodies with ``moments`` through ``rates`` (3, ...).
+
+    The spin axis is ``sense``·e3. Constant with I1 = I2; else θ swings between two values while H
+    is fixed in space.
 
     Where H3 has fallen by δ, |H| and the energy leave H2² = H2(0)² + [2(ω3 - H3/I1)δ + (1/I1 -
     1/I3)δ²]/(1/I2 - 1/I1), H3 and ω3 at t = 0, and H1² likewise: H3 turns back at the first δ at

@@ -13,7 +13,7 @@ import numpy as np
 
 from nutdamp.errors import Infeasible
 from nutdamp.physics import body as rigid_body
-from nutdamp.physics import precession, response
+from nutdamp.physics import driven, precession, response
 from nutdamp.schemes import block_model
 from nutdamp.schemes.block_model import acts
 from nutdamp.spacecraft.constraints import (
@@ -231,20 +231,20 @@ def consequences(spacecraft: Spacecraft) -> Iterator[Consequence]:
         if torque == 0.0:
             yield Consequence(disturbance, 0.0, None, 0.0, 0.0, 0.0, math.inf, (), spin_rate)
             continue
-        largest, period = response.beat(A, turning, torque, disturbance.rate)
+        largest, period = driven.beat(A, turning, torque, disturbance.rate)
         # A beat that takes longer than everything planned, several times over, is a resonance for
         # the user.
         if period > RESONANT * spacecraft.horizon:
             marks = [mark for mark in MARKS if mark > spacecraft.nutation]
             times = [
-                (mark, response.resonant_time(A, spacecraft.axial, omega0, torque, mark))
+                (mark, driven.resonant_time(A, spacecraft.axial, omega0, torque, mark))
                 for mark in marks
             ]
             yield Consequence(
                 disturbance, None, None, None, None, None, period, tuple(times), spin_rate
             )
             continue
-        steady = abs(response.steady_response(A, turning, torque, disturbance.rate))
+        steady = abs(driven.steady_response(A, turning, torque, disturbance.rate))
         turns = abs(spacecraft.spin + disturbance.rate)  # of the torque in space
         precession = abs(torque) / float(np.linalg.norm(spacecraft.momentum))
         steadily = turns * spacecraft.horizon < 1.0

@@ -30,11 +30,11 @@ from nutdamp.planning import plan as planning
 from nutdamp.planning.plan import Plan
 from nutdamp.schemes import planner, valve_commands
 from nutdamp.schemes.catalogue import OPTIMAL, OptimalOptions
+from nutdamp.schemes.correction import model_of
 from nutdamp.schemes.optimal.chance import ChanceLimit, ChanceProgram, Sure, Uncertain
 from nutdamp.schemes.optimal.linear_program import SLOTS, Burn
 from nutdamp.schemes.optimal.problem import Problem, as_pulses, broken_by
 from nutdamp.schemes.optimal.refinement import EndEquations, Refinement, small_angles
-from nutdamp.schemes.sequential import model_of
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import Spacecraft, Vector, required_share
 from nutdamp.spacecraft.requirements import Part

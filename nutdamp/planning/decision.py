@@ -1,6 +1,4 @@
-"""Comparison of plans: the verdict on each, the recommendation by residuals and cost; simulations
-to a given time.
-"""
+"""Comparison of plans: the verdict on each, the recommendation by residuals and cost."""
 
 from __future__ import annotations
 
@@ -15,9 +13,6 @@ from nutdamp.common import results, work
 from nutdamp.common.numerics import RPM
 from nutdamp.common.results import Note, note
 from nutdamp.errors import NutdampError
-from nutdamp.flight import propagation
-from nutdamp.flight.end_state import seen_at
-from nutdamp.flight.propagation import Extremes, Flight, Track, extremes
 from nutdamp.planning.plan import Plan, Standing, judge, plan, spinning, unflown
 from nutdamp.planning.verdict import Cases, Cheaper, Line, Verdict, no_plan
 from nutdamp.schemes import catalogue, planner
@@ -34,9 +29,6 @@ from nutdamp.spacecraft.requirements import (
 
 if TYPE_CHECKING:
     from nutdamp.planning.screening import FlownPlan
-
-PICTURED = 100_000  # largest number of rows of the track of a picture
-
 
 # share of the recommended plan's momentum shift below which another plan keeps H much better
 STEADIER_SHIFT = 0.2
@@ -602,64 +594,3 @@ def note_on(line: Line) -> Note:
     if bound.part is Part.CONE and bound.keep is not None:
         return note(code, angle_deg=math.degrees(line.nominal), direction=bound.keep.name)
     return note(code, angle_deg=math.degrees(line.nominal))
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Simulation(results.Data, results.Tabled):
-    """Propagation of a ``plan`` to ``until`` s, shown through ``real`` widths or by the impulse sum
-    (17).
-
-    Its track has ``samples`` rows; pictures show it to ``drawn_to`` s.
-    """
-
-    plan: Plan
-    until: float
-    real: bool
-    samples: int
-    drawn_to: float
-
-    @cached_property
-    def _both(self) -> tuple[Flight, Flight]:
-        spacecraft, pulses = self.plan.spacecraft, self.plan.pulses
-        return propagation.by_impulses(spacecraft, pulses, self.until), propagation.flown(
-            spacecraft, pulses, self.until
-        )
-
-    @cached_property
-    def impulses(self) -> Flight:
-        """Flight by the impulse sum (17), truncated at ``until``."""
-        return seen_at(self._both[0], self.until)
-
-    @cached_property
-    def flown(self) -> Flight:
-        """Flight through the real widths, truncated at ``until``."""
-        return seen_at(self._both[1], self.until)
-
-    @cached_property
-    def shown(self) -> Flight:
-        """The shown one of them."""
-        return replace(self.flown if self.real else self.impulses, scheme=self.plan.scheme)
-
-    @cached_property
-    def verdict(self) -> Verdict:
-        """Judgement of the plan; of free motion that fails at t = 0, that at the end of the
-        simulation.
-        """
-        judged = self.plan.verdict
-        return (
-            judged if self.plan.pulses.pulses or judged.met else judge(self.plan, seen=self.flown)
-        )
-
-    @cached_property
-    def extremes(self) -> Extremes:
-        """Extremes of the axis track."""
-        return extremes(self.pieces())
-
-    def pieces(self) -> Iterator[Track]:
-        """Track of the flight shown, in pieces."""
-        return self._both[self.real].pieces(self.samples, self.until)
-
-    @cached_property
-    def pictured(self) -> Track:
-        """Track of pictures, of at most 100,000 rows."""
-        return self._both[self.real].sampled(min(self.samples, PICTURED), self.drawn_to)

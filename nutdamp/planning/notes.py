@@ -6,101 +6,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 from nutdamp.common.numerics import RPM, down
 from nutdamp.common.results import Note, Value, note
-from nutdamp.flight import end_state
-from nutdamp.flight.end_state import Aspect, at_start
 from nutdamp.flight.propagation import Flight
 from nutdamp.planning.decision import ROBUST, TIES, Comparison, Gain, Ground
 from nutdamp.planning.plan import Plan, Standing
 from nutdamp.planning.verdict import Verdict
 from nutdamp.schemes import catalogue
 from nutdamp.schemes.catalogue import OPTIMAL
-from nutdamp.schemes.sequential import steady_omega
 from nutdamp.spacecraft import requirements
-from nutdamp.spacecraft.constraints import Breach, Limit, breaches, rounded_off
 from nutdamp.spacecraft.model import LIGHTER, Spacecraft
-from nutdamp.spacecraft.requirements import NEGLIGIBLE, Part
-from nutdamp.spacecraft.schedule import Schedule
+from nutdamp.spacecraft.requirements import Part
+
+if TYPE_CHECKING:
+    from nutdamp.flight.cones import Aspect
 
 TELLING = math.radians(1e-6)  # remaining nutation angle in rad from which there is a note on it
-
-CUT = "the search ended at its limit of work"
-
-
-def infeasibility(plan: Plan) -> str:
-    """Reason for the lack of a schedule; empty where there is one."""
-    if plan.breach is not None:
-        why = f"the only schedule found breaks a limit: {_broken(plan.breach)}"
-    elif plan.astray is not None:
-        why = strays(plan.astray)
-        if math.isfinite(plan.astray.least_at):
-            why += "; no way round it was found within the limits"
-    elif plan.worse is not None:
-        why = f"the best schedule found would leave {math.degrees(plan.worse):.3g}° of nutation"
-        decayed = requirements.decayed(plan.spacecraft, plan.worse_at)
-        if decayed < plan.spacecraft.nutation:
-            why += (
-                f" at {plan.worse_at:.4g} s; without a pulse it decays to "
-                f"{math.degrees(decayed):.3g}° by then"
-            )
-    else:
-        why = plan.refusal or ""
-    return f"{why}; {CUT}" if why and plan.cut else why
-
-
-def strays(aspect: Aspect) -> str:
-    """Message on a broken cone."""
-    assert aspect.broken_at is not None
-    bound, angle, at = aspect.broken_at
-    edge = "min" if bound.inner else "max"
-    limit = f"{edge} = {math.degrees(bound.limit):.6g}°"
-    shown = math.degrees(angle) if angle > NEGLIGIBLE else 0.0
-    seen = f"{shown:.4g}°"
-    if math.isinf(at):
-        return f"the target is {seen} from {aspect.keep.name} ({limit})"
-    return f"the spin axis comes to {seen} from {aspect.keep.name} at {at:.4g} s ({limit})"
-
-
-def broken_limits(spacecraft: Spacecraft, schedule: Schedule) -> list[str]:
-    """Broken limits of a schedule, each in a sentence with the first pulse that breaks it and the
-    number of others.
-    """
-    grouped: dict[tuple[Limit, tuple[float, float] | None], list[Breach]] = {}
-    for breach in breaches(spacecraft, schedule):
-        grouped.setdefault((breach.limit, breach.window), []).append(breach)
-    counts = [(_broken(broken[0]), len(broken) - 1) for broken in grouped.values()]
-    return [f"{text}; further pulses alike: {more}" if more else text for text, more in counts]
-
-
-def _broken(breach: Breach) -> str:
-    """Message on a pulse that breaks a limit."""
-    pulse = breach.pulse
-    bound = f"{breach.bound:.6g} s"
-    limit = breach.limit
-    if limit is Limit.MAX_PULSES:
-        return f"{breach.number} pulses are more than {breach.bound:.0f}"
-    begins, ends = breach.window or (math.nan, math.nan)
-    start, on_time = pulse.loaded
-    on = f"is on for {on_time:.6g} s"
-    early = (
-        f"comes less than {bound} after the one before"
-        if breach.bound
-        else "starts before the one before ends"
-    )
-    how = {
-        Limit.RESOLUTION: f"is too short for its time, where times are {breach.by:.2g} s apart",
-        Limit.EARLIEST: f"starts before {bound}",
-        Limit.HORIZON: f"ends after the horizon of {bound}",
-        Limit.GAP: early,
-        Limit.BLACKOUT: f"lies in the blackout window {begins:.6g} s to {ends:.6g} s",
-        Limit.MIN_ON_TIME: f"{on}, less than the shortest on-time of {bound}",
-        Limit.MAX_ON_TIME: f"{on}, more than the longest on-time of {bound}",
-        Limit.START_TICK: f"does not start on a tick of {bound}",
-        Limit.ON_TIME_TICK: f"has an on-time that is not a multiple of the tick of {bound}",
-    }[limit]
-    return f"pulse {breach.number} ({pulse.channel}, {start:.6g} s to {pulse.over:.6g} s) {how}"
 
 
 TURNED = math.radians(0.1)  # turn of H, rad, from which it is mentioned
@@ -111,6 +34,8 @@ def plan_notes(plan: Plan, *, cones: bool = True) -> tuple[Note, ...]:
     schedule.
     """
     if not plan.feasible:
+        from nutdamp.planning.causes import infeasibility  # no plan
+
         why = infeasibility(plan)
         if plan.found_none:
             return (note("not-found", scheme=plan.scheme, why=why),)
@@ -120,7 +45,8 @@ def plan_notes(plan: Plan, *, cones: bool = True) -> tuple[Note, ...]:
         notes.append(note("search-ended"))
     if plan.flown is not None and len(plan.pulses):
         notes += [*_bounds(plan), *_left(plan)]
-        notes += [broken_cone(aspect) for aspect in plan.aspects if cones and not aspect.kept]
+        broken = [aspect for aspect in plan.aspects if cones and not aspect.kept]
+        notes += map(broken_cone, broken)
     return tuple(entry.of(plan.scheme) for entry in notes)
 
 
@@ -165,12 +91,12 @@ def _left(plan: Plan) -> Iterator[Note]:
     nutation = plan.flight.residual.nutation
     if nutation >= TELLING and not options.uncorrected:
         spared = spacecraft.goal.spin is not None or plan.scheme == ROBUST
-        allowed = spared and plan.meets_requirement
-        yield (
-            note("remains-allowed", nutation_deg=math.degrees(nutation))
-            if allowed
-            else remaining(plan)
-        )
+        if spared and plan.meets_requirement:
+            yield note("remains-allowed", nutation_deg=math.degrees(nutation))
+        else:
+            from nutdamp.planning.causes import remaining  # nutation remains
+
+            yield remaining(plan)
     simple = inertia.symmetric and not spacecraft.disturbances and spacecraft.growth == 0.0
     if (
         left is not None
@@ -182,70 +108,6 @@ def _left(plan: Plan) -> Iterator[Note]:
         off = float(requirements.missed(spacecraft, left.nutation, left.aim))
         if off >= TELLING:
             yield note("fixed-length", off_deg=math.degrees(off))
-
-
-def hindrances(plan: Plan) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Keys of the file for the limits that certainly end a schedule, and for those that may.
-
-    Certainty of the latter takes a plan without them. The horizon ends it where less than a
-    nutation period is left.
-    """
-    spacecraft, limits = plan.spacecraft, plan.spacecraft.limits
-    channels = {channel.name: channel for channel in spacecraft.channels}
-    fired = [
-        (channels[pulse.channel], pulse.loaded[1])
-        for pulse in plan.pulses
-        if pulse.channel in channels
-    ]
-    full = 0 < len(fired) == len(plan.pulses) and all(
-        on >= each.max_on_time * (1.0 - 1e-9) for each, on in fired
-    )
-    late = spacecraft.horizon - plan.pulses.end < spacecraft.nutation_period
-    ended = full or late
-    least = not ended and any(
-        0.0 < on <= channel.min_on_time * (1.0 + 1e-9) for channel, on in fired
-    )
-    certain = {"max_on_time": full, "limits.horizon": late, "min_on_time": least}
-    possible = {
-        "limits.tick": limits.tick is not None and not ended,
-        "limits.blackout": bool(limits.blackout),
-    }
-    return tuple(key for key in certain if certain[key]), tuple(
-        key for key in possible if possible[key]
-    )
-
-
-def remaining(plan: Plan) -> Note:
-    """Nutation that remains, and the dominant obstacle to less of it."""
-    spacecraft, nutation, (certain, possible) = (
-        plan.spacecraft,
-        plan.flight.residual.nutation,
-        hindrances(plan),
-    )
-    left = math.degrees(nutation)
-    if not {"max_on_time", "limits.horizon"} <= {*certain}:
-        if spacecraft.disturbances and not plan.options.with_disturbances:
-            return note("remains-unplanned", nutation_deg=left)
-        if spacecraft.disturbances:
-            tilt = math.atan(
-                spacecraft.inertia.A
-                * abs(steady_omega(spacecraft, plan.pulses.end))
-                / abs(spacecraft.axial)
-            )
-            return note("remains-steady-tilt", nutation_deg=left, tilt_deg=math.degrees(tilt))
-        # Worst over root mean square: the centre is off by half the on-time's error and the
-        # start's.
-        rounding = math.hypot(1.0, 1.5) * math.fsum(rounded_off(spacecraft, plan.pulses))
-        if nutation <= rounding:
-            return note("remains-rounding", nutation_deg=left, rounding_deg=math.degrees(rounding))
-        if len(plan.pulses) == spacecraft.limits.max_pulses:
-            return note(
-                "remains-max-pulses", nutation_deg=left, pulses=spacecraft.limits.max_pulses
-            )
-    if not certain and not possible:
-        return note("remains-scheme", nutation_deg=left)
-    sure, unsure = (", ".join(keys) or "none" for keys in (certain, possible))
-    return note("remains-limits", nutation_deg=left, certain=sure, possible=unsure)
 
 
 def broken_cone(aspect: Aspect) -> Note:
@@ -282,6 +144,8 @@ def verdict_notes(verdict: Verdict, plan: Plan, *, looped: bool = False) -> Iter
     if verdict.empties:
         yield note("tank-empties")
     if verdict.met is False:
+        from nutdamp.planning.causes import main_causes  # a requirement is missed
+
         yield from main_causes(verdict)
     if code := ideal_code(plan):
         yield note(code, scheme=plan.scheme)
@@ -343,19 +207,6 @@ def verdict_notes(verdict: Verdict, plan: Plan, *, looped: bool = False) -> Iter
     yield from _spin_change(plan, flight)
     if spacecraft.loop is not None:
         yield note("loop-not-judged")
-
-
-def main_causes(verdict: Verdict) -> Iterator[Note]:
-    """Inputs that decide the failing cases."""
-    if verdict.causes and verdict.tightest is not None:
-        part = verdict.tightest.bound.label
-        causes = ", ".join(
-            f"{cause.input} ({100.0 * cause.share:.3g} %)" for cause in verdict.causes
-        )
-        if verdict.met is False:
-            yield note("causes-of-failure", part=part, causes=causes)
-        else:
-            yield note("main-causes", part=part, causes=causes)
 
 
 def _spin_change(plan: Plan, flight: Flight) -> Iterator[Note]:
@@ -422,31 +273,32 @@ def comparison_warnings(compared: Comparison, *, tabulated: bool = False) -> Ite
     chosen = compared.recommended
     if chosen is None:
         return
-    yield from _missed(chosen, compared, tabulated=tabulated)
+    complies = compared.recommendation.standing is Standing.COMPLIES
+    if not complies:
+        yield from _missed(chosen, compared, tabulated=tabulated)
     broken = [aspect for aspect in chosen.aspects if not aspect.kept]
     yield from (broken_cone(aspect).of(chosen.scheme) for aspect in broken if not tabulated)
     keeping = [plan.scheme for plan in compared.plans if plan.feasible and plan.kept]
     if broken and keeping:
         yield note("plans-keep-cones", schemes=", ".join(keeping))
-    for aspect in at_start(compared.spacecraft):
-        if not aspect.kept:
-            yield Note(
-                "cone-broken-at-start",
-                tuple(item for item in broken_cone(aspect).items if item[0] != "at_s"),
-            )
+    if compared.spacecraft.watched:
+        from nutdamp.flight.cones import at_start  # directions to watch
+
+        for aspect in at_start(compared.spacecraft):
+            if not aspect.kept:
+                items = (item for item in broken_cone(aspect).items if item[0] != "at_s")
+                yield Note("cone-broken-at-start", tuple(items))
     others = [plan.scheme for plan in compared.plans if plan.feasible and not plan.commandable]
     better = [scheme for scheme in others if compared.verdicts[compared[scheme]].met]
     if better and chosen.commandable and compared.verdicts[chosen].met is False:
         yield note("blocks-cannot", schemes=", ".join(better))
     cut = [plan.scheme for plan in compared.plans if plan.cut]
-    if cut and compared.recommendation.standing is not Standing.COMPLIES:
+    if cut and not complies:
         yield note("search-incomplete", schemes=", ".join(cut))
 
 
 def _missed(chosen: Plan, compared: Comparison, *, tabulated: bool) -> Iterator[Note]:
     """Requirements that the recommended plan misses, and the causes, the best cure first."""
-    if compared.recommendation.standing is Standing.COMPLIES:
-        return
     cases = compared.verdicts[chosen].cases
     if (
         chosen.standing is not Standing.MISSES
@@ -468,24 +320,10 @@ def _missed(chosen: Plan, compared: Comparison, *, tabulated: bool) -> Iterator[
                 required_share=share,
             )
         return
-    left = chosen.left
-    assert left is not None
-    for bound in chosen.shortfalls:
-        if bound.required and tabulated:
-            continue
-        if bound.part is Part.SPIN:
-            goal = chosen.spacecraft.goal.spin or 0.0
-            yield note(
-                "spin-missed", scheme=chosen.scheme, spin_rpm=RPM * left.spin, goal_rpm=RPM * goal
-            )
-            continue
-        yield note(
-            "requirement-missed" if bound.required else "not-damped",
-            scheme=chosen.scheme,
-            left_deg=math.degrees(requirements.left_of(bound, left, chosen.spacecraft)),
-            part=bound.label,
-            limit_deg=math.degrees(bound.limit),
-        )
+    from nutdamp.flight.cones import at_start
+    from nutdamp.planning.causes import obstacles, shortfalls
+
+    yield from shortfalls(chosen, tabulated=tabulated)
     spacecraft = chosen.spacecraft
     parts = {bound.part for bound in chosen.shortfalls}
     if spacecraft.disturbances and not chosen.options.with_disturbances:
@@ -496,24 +334,8 @@ def _missed(chosen: Plan, compared: Comparison, *, tabulated: bool) -> Iterator[
             yield note("disturbances-helped", scheme=aware.scheme)
         else:
             yield note("disturbances-not-helped")
-    cause = remaining(chosen) if Part.NUTATION in parts else None
-    if cause is not None and cause.code != "remains-unplanned":
-        reached = [limit for limits in hindrances(chosen) for limit in limits]
-        short = (
-            chosen.pulses.total_impulse < spacecraft.least_impulse
-            and cause.code != "remains-max-pulses"
-        )
-        if reached and short:
-            yield note(
-                "pulses-at-limits",
-                given_Nms=chosen.pulses.total_impulse,
-                needed_Nms=spacecraft.least_impulse,
-                end_s=chosen.pulses.end,
-                horizon_s=spacecraft.horizon,
-                limits=", ".join(reached),
-            )
-        else:
-            yield cause.of(chosen.scheme)
+    if Part.NUTATION in parts:
+        yield from obstacles(chosen)
     if Part.DISTANCE in parts and chosen.scheme not in (*catalogue.POINTING, *catalogue.COMMANDED):
         yield note(
             "scheme-does-not-turn", scheme=chosen.scheme, schemes=", ".join(catalogue.POINTING)
@@ -613,19 +435,3 @@ def reasons(compared: Comparison) -> Iterator[Note]:
         yield note(LEAST_CODES.get(recommendation.least, usual), count=count)
     if ground in TIES:
         yield note(ground.value)
-
-
-def model_warnings(impulses: Flight, flown: Flight) -> Iterator[Note]:
-    """Difference between the impulse sum (17) and real widths at the end, where it exceeds the
-    tolerance.
-    """
-    for apart in end_state.deviations(impulses, flown):
-        if apart.part is Part.SPIN:
-            yield note(
-                "models-differ-in-spin", difference_rad_s=apart.error, limit_rad_s=apart.most
-            )
-            continue
-        difference, most = math.degrees(apart.error), math.degrees(apart.most)
-        yield note(
-            "models-differ", difference_deg=difference, part=apart.part.label, limit_deg=most
-        )

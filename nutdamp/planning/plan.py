@@ -14,7 +14,7 @@ from nutdamp.common.numerics import cleaned
 from nutdamp.common.results import note
 from nutdamp.errors import Infeasible, NotFound
 from nutdamp.flight import end_state, propagation
-from nutdamp.flight.end_state import Aspect, left_on_the_way, seen_at
+from nutdamp.flight.end_state import left_on_the_way, seen_at
 from nutdamp.flight.propagation import Flight, Residual
 from nutdamp.planning.verdict import Cases, JudgedCases, Verdict, judge_schedule, no_plan
 from nutdamp.schemes import catalogue, planner
@@ -22,12 +22,11 @@ from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import Breach, breaches, keeps_limits, misfits
 from nutdamp.spacecraft.model import Spacecraft, Vector, required_share
 from nutdamp.spacecraft.requirements import Bound, Held, Left
-from nutdamp.spacecraft.roles import as_known, with_limits
+from nutdamp.spacecraft.roles import as_known
 from nutdamp.spacecraft.schedule import Schedule
 
 if TYPE_CHECKING:
-    from nutdamp.flight.verification import Verification
-
+    from nutdamp.flight.cones import Aspect
 
 NO_NUTATION = 1e-12  # rad of nutation below which there is nothing to plan
 ROUNDING = 1e-11  # relative decrease of the nutation that may be rounding
@@ -271,9 +270,13 @@ class Plan(results.Data, results.Tabled):
     @cached_property
     def aspects(self) -> tuple[Aspect, ...]:
         """Extreme angles of the flown spin axis from each watched direction; see
-        `end_state.aspects`.
+        `cones.aspects`.
         """
-        return end_state.aspects(self.flight)
+        if not self.spacecraft.watched:
+            return ()
+        from nutdamp.flight.cones import aspects  # a direction to watch
+
+        return aspects(self.flight)
 
     @property
     def kept(self) -> bool | None:
@@ -296,9 +299,12 @@ def plan(spacecraft: Spacecraft, scheme: str, options: planner.Choice = None) ->
         able = " and ".join(spinning(spacecraft))
         why = f"cannot set the spin; {able} can, with channels that have a torque about axis 3"
         return Plan(spacecraft, scheme, None, why)
-    forbidden = end_state.at_target(spacecraft) if scheme in catalogue.PLANNED else None
-    if forbidden is not None:
-        return Plan(spacecraft, scheme, None, astray=forbidden)
+    if spacecraft.goal.axis is not None and scheme in catalogue.PLANNED:
+        from nutdamp.flight.cones import at_target  # a target
+
+        forbidden = at_target(spacecraft)
+        if forbidden is not None:
+            return Plan(spacecraft, scheme, None, astray=forbidden)
     chosen = planner.settled(catalogue.SCHEMES[scheme], options, spacecraft)
     known = as_known(spacecraft, disturbed=chosen.with_disturbances)
     with work.budget(scheme, work.SCHEME) as spent:
@@ -364,7 +370,9 @@ def judged(
     if breach is not None:
         return Plan(spacecraft, scheme, None, breach=breach)
     if spacecraft.goal.axis is not None and scheme in catalogue.PLANNED:
-        astray = end_state.broken(spacecraft, flown.flight)
+        from nutdamp.flight.cones import broken  # a target
+
+        astray = broken(spacecraft, flown.flight)
         if astray is not None:
             return Plan(spacecraft, scheme, None, astray=astray)
     if scheme in catalogue.PLANNED and left is not None:
@@ -398,8 +406,10 @@ def judge(
         return no_plan(spacecraft, plan.scheme, plan.why or "")
     flight, observed, held = plan.flight, plan.aspects, plan.held
     if seen is not None:
+        from nutdamp.flight.cones import aspects  # free motion, simulated
+
         flight = seen
-        observed = end_state.aspects(seen, seen.until)
+        observed = aspects(seen, seen.until)
         held = requirements.held(spacecraft, left_on_the_way(flight, observed))
     return judge_schedule(
         flight,
@@ -414,27 +424,6 @@ def judge(
     )
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Verified(results.Data):
-    """A ``plan`` flown by independent methods: ``core`` holds them, conserved quantities and the
-    error budget.
-    """
-
-    core: Verification
-    plan: Plan
-
-    @property
-    def agree(self) -> bool:
-        """True where an independent integration was flown, and all of them confirm the flown
-        motion.
-        """
-        return self.core.agree
-
-    def __repr__(self) -> str:
-        agreeing = ", ".join(self.core.checks) if self.agree else "nothing"
-        return f"<Verified {self.plan.scheme}: agrees with {agreeing}>"
-
-
 def feasible(plan: Plan) -> Plan:
     """A plan with a schedule; raises BadRequest for anything but a `Plan`, Infeasible for one
     without.
@@ -443,20 +432,6 @@ def feasible(plan: Plan) -> Plan:
     if not plan.feasible:
         raise Infeasible(f"{plan.scheme} is infeasible: {plan.why}")
     return plan
-
-
-def unrounded(plan_: Plan) -> Schedule | None:
-    """Schedule with commands of any resolution; None without a tick, such a schedule, or a scheme
-    that planned it.
-    """
-    spacecraft = plan_.spacecraft
-    if spacecraft.limits.tick is None or plan_.from_file or plan_.scheme not in catalogue.SCHEMES:
-        return None
-    return plan(
-        with_limits(spacecraft, tick=None),
-        plan_.scheme,
-        plan_.options,
-    ).schedule
 
 
 def unflown(plan: Plan) -> Cases:

@@ -18,18 +18,18 @@ import numpy as np
 
 from nutdamp.common import results, work
 from nutdamp.errors import BadRequest, Infeasible
+from nutdamp.planning.causes import infeasibility
 from nutdamp.planning.decision import by_propellant, compare, usual
-from nutdamp.planning.notes import infeasibility
 from nutdamp.planning.plan import Plan, judge, plan
 from nutdamp.planning.verdict import Verdict
 from nutdamp.schemes import planner, valve_commands
 from nutdamp.schemes.catalogue import OPTIMAL, OptimalOptions, Options
+from nutdamp.schemes.correction import model_of
 from nutdamp.schemes.optimal import bounds
 from nutdamp.schemes.optimal.bounds import Proof, SmallAngles
 from nutdamp.schemes.optimal.linear_program import Burn, Program
 from nutdamp.schemes.optimal.problem import LEFT, UNMET, Problem
 from nutdamp.schemes.optimal.refinement import growth_from
-from nutdamp.schemes.sequential import model_of
 from nutdamp.spacecraft.constraints import free_windows
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.requirements import SAME_COST, Part

@@ -16,13 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.common.results import Note
-from nutdamp.flight.end_state import Aspect
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import Spacecraft, required_share
 from nutdamp.spacecraft.requirements import Bound, Held
 from nutdamp.spacecraft.schedule import Schedule
 
 if TYPE_CHECKING:
+    from nutdamp.flight.cones import Aspect
     from nutdamp.flight.propagation import Flight
 
 LOOP = "loop"  # name in place of a scheme

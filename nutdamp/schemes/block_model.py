@@ -27,8 +27,7 @@ from nutdamp.flight.propagation import Flight, to_sun_pulse
 from nutdamp.physics import attitude, precession
 from nutdamp.physics.motion import MotionStretch
 from nutdamp.physics.series import Bodies
-from nutdamp.physics.sky import SunPulseClock, TorqueRamp
-from nutdamp.physics.sun import ahead
+from nutdamp.physics.sky import SunPulseClock, TorqueRamp, ahead
 from nutdamp.physics.thruster import Valve, spread
 from nutdamp.spacecraft.equipment import Block, Channel
 from nutdamp.spacecraft.model import Spacecraft, Vector

@@ -8,11 +8,11 @@ alone.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self, TypeVar
 
-from nutdamp.errors import BadRequest, SenselessOption, nearest
+from nutdamp.errors import BadRequest, SenselessOption
 from nutdamp.units import as_given, is_count, is_number
 
 LEAST = (
@@ -343,40 +343,3 @@ POINTING = tuple(
 SPINNING = tuple(name for name, scheme in SCHEMES.items() if scheme.sets_spin)
 SUNLIT = tuple(name for name, scheme in SCHEMES.items() if scheme.reads_sun)
 COMMANDED = tuple(name for name, scheme in SCHEMES.items() if scheme.reads_commands)
-
-
-def expect_names(values: Iterable[str]) -> tuple[str, ...]:
-    """Names of schemes that there are, each once; raises BadRequest."""
-    if isinstance(values, str) or not isinstance(values, Iterable):
-        raise BadRequest(
-            f"names: expected a list of schemes, such as ['two-pulse'], got {as_given(values)}"
-        )
-    names = tuple(values)
-    for name in names:
-        if not isinstance(name, str) or name not in NAMES:
-            close = nearest(name, NAMES) if isinstance(name, str) else None
-            cure = f"there are {', '.join(NAMES)}" if close is None else f"did you mean {close!r}?"
-            raise BadRequest(f"there is no scheme {as_given(name)}; {cure}")
-    return tuple(dict.fromkeys(names))
-
-
-def expect_options(
-    value: Any, chosen: Mapping[str, Any], scheme: str | None = None
-) -> Options | SchemeOptions | None:
-    """Options of schemes, or those ``chosen`` by keyword, which the ``scheme`` must have; raises
-    BadRequest.
-    """
-    if not (value is None or isinstance(value, Options | SchemeOptions)) or (
-        value is not None and chosen
-    ):
-        raise BadRequest(f"options: expected nutdamp.Options(…) or keywords, got {as_given(value)}")
-    if not chosen:
-        return value
-    options = Options(**chosen)
-    if scheme is not None:
-        own = SCHEMES[scheme].options
-        for unread in options.without_effect([own]):
-            raise BadRequest(
-                f"options: {scheme} has no {unread!r}; there are {', '.join(names_of(own))}"
-            )
-    return options

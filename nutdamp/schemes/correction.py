@@ -1,8 +1,12 @@
-"""Correction of schedules by least squares on the flown motion, whole or stage by stage.
+"""The equivalent symmetric body on which schemes plan, and the correction of their schedules by
+least squares on the flown motion.
 
-Moments, on-times and directions are adjusted by a damped Gauss-Newton iteration with bounds for a
-handful of unknowns. scipy.optimize would do it too, but loading it takes longer than a whole plan.
-Schemes that point the spin axis lay their schedules stage by stage along the flown motion.
+Three different moments turn in the body at another rate than their mean, on an ellipse instead of a
+circle; lasting disturbances move the point about which ω turns. Both are taken out here, so that
+every scheme plans free motion of a symmetric body, and put back in: the schedule is translated to
+the true actuators and corrected on the true motion. Moments, on-times and directions are adjusted
+by a damped Gauss-Newton iteration with bounds for a handful of unknowns. scipy.optimize would do it
+too, but loading it takes longer than a whole plan.
 """
 
 from __future__ import annotations
@@ -16,14 +20,12 @@ from typing import NamedTuple
 import numpy as np
 
 from nutdamp.common import work
-from nutdamp.common.results import Note
-from nutdamp.errors import Infeasible
 from nutdamp.flight import propagation
-from nutdamp.flight.dynamics import lightened, make_dynamics, supplied
-from nutdamp.physics import attitude, precession
+from nutdamp.flight.dynamics import make_dynamics, supplied
+from nutdamp.physics import attitude
 from nutdamp.schemes.catalogue import OptimalOptions, Scheme, SchemeOptions
-from nutdamp.schemes.sequential import steady_omega
 from nutdamp.spacecraft.constraints import (
+    Windows,
     channel_of,
     commandable,
     effective_on_times,
@@ -31,7 +33,7 @@ from nutdamp.spacecraft.constraints import (
     longest_on_time,
 )
 from nutdamp.spacecraft.equipment import Channel
-from nutdamp.spacecraft.model import Attitude, Spacecraft, Vector
+from nutdamp.spacecraft.model import Attitude, Disturbance, Inertia, Spacecraft, Vector
 from nutdamp.spacecraft.schedule import STEERABLE, Pulse, Schedule, channel_pulse, steerable_pulse
 
 CONVERGED = 1e-14  # rad; a few roundings of the integration
@@ -55,6 +57,13 @@ LEFT_OVER_BY_TICKS = 0.5  # largest residual where the resolution of commands ma
 # equations
 TAIL = 4
 
+# angle in rad below which a standing ω counts as opposed to a torque (a sphere, where nothing
+# turns)
+ALIGNED = 1e-9
+
+# fraction of the nutation below which pulses have nothing to do: dissipation has removed it
+FADED = 1e-6
+
 MOVED, BEFORE, AFTER = 8, 12, 24
 """Pulses corrected at the end of a schedule of equal ones, each of which has one variable less; of
 given length so many before the equal ones, which damp the nutation, and at the end.
@@ -68,6 +77,166 @@ CLOSE_IN_COST, CLOSE_IN_SHORT = 1.02, 1.1
 """Factors of cost and miss within which candidates count as equal: of those the one that ends first
 is preferred.
 """
+
+
+@dataclass(frozen=True, eq=False)
+class SymmetricModel:
+    """``symmetric`` is planned on for ``spacecraft``; ``stretch`` (2,) leads from the ellipse of
+    (ω1, ω2) to the circle.
+    """
+
+    spacecraft: Spacecraft
+    symmetric: Spacecraft
+    stretch: Vector
+
+    @property
+    def exact(self) -> bool:
+        """True if the model moves as the spacecraft does, so that nothing has to be corrected."""
+        spacecraft = self.spacecraft
+        alike = self.symmetric.inertia.moments == spacecraft.inertia.moments
+        return alike and not spacecraft.disturbances and spacecraft.growth == 0.0
+
+    def translate(self, schedule: Schedule) -> Schedule:
+        """Schedule with the true actuators."""
+        if self.symmetric.inertia.moments == self.spacecraft.inertia.moments:
+            return schedule
+        torquer = self.spacecraft.torquer
+        windows = Windows(self.spacecraft)
+        ready = self.spacecraft.limits.earliest
+        pulses = list[Pulse]()
+        for pulse in schedule:
+            channel = channel_of(self.spacecraft, pulse)
+            if channel is not None:
+                true = channel_pulse(channel, pulse.t, pulse.on_time)
+            else:  # longer or shorter, and so moved where the limits require it
+                assert torquer is not None
+                first, second = pulse.impulse[:2] / self.stretch
+                impulse = math.hypot(first, second)
+                t = pulse.t
+                on_time = 0.0
+                if torquer.torque is not None:
+                    on_time = windows.on_time(impulse / torquer.torque, 0.0, math.inf)
+                    start = windows.earliest_start(on_time, max(pulse.start, ready))
+                    t = t if start is None else start + 0.5 * on_time
+                true = steerable_pulse(
+                    torquer, t, math.atan2(second, first), impulse=impulse, on_time=on_time
+                )
+            pulses.append(true)
+            ready = true.end + self.spacecraft.limits.gap
+        return Schedule(tuple(pulses), schedule.notes, schedule.bounds)
+
+
+def model_of(
+    spacecraft: Spacecraft, *, turning: bool = False, three_moments: bool = False
+) -> SymmetricModel:
+    """Model of a spacecraft, whose torques change ω as the true ones do.
+
+    ``turning``: they turn H so, and ω at t = 0 is as much larger or smaller on average: the circle
+    may be of any size. ``three_moments``: the model has those of the spacecraft.
+    """
+    undisturbed = _without_steady(spacecraft)
+    inertia = spacecraft.inertia
+    if inertia.symmetric or three_moments:
+        return SymmetricModel(spacecraft, _aimed(undisturbed, spacecraft), np.ones(2))
+    # Its nutation has the true rate, and (s1 ω1, s2 ω2) moves on a circle (linearised Euler
+    # equations).
+    A = inertia.nutating(spacecraft.spin)
+    C = inertia.C
+    across = np.array(inertia.moments[:2])
+    scale = inertia.circle(spacecraft.spin) * across
+    scale /= math.sqrt(scale[0] * scale[1])
+    stretch = scale * A / across  # for torques and impulses
+    mean = float(np.mean(stretch))
+    torquer = undisturbed.steerable
+    if (
+        torquer is not None and torquer.torque is not None
+    ):  # the stretch differs by direction: near enough for a plan
+        torquer = replace(torquer, torque=torquer.torque * mean)
+    factors = np.ones(3) if turning else np.array([*stretch, 1.0])
+    channels = []
+    for channel in undisturbed.channels:
+        thrusters = tuple(
+            replace(thruster, torque=thruster.torque * factors) for thruster in channel.thrusters
+        )
+        channels.append(replace(channel, thrusters=thrusters, spends=channel.strength))
+    symmetric = replace(
+        undisturbed,
+        inertia=Inertia((A, A, C), inertia.axes, inertia.wheel),
+        omega0=np.array(
+            [*(scale * undisturbed.omega0[:2] / (mean if turning else 1.0)), undisturbed.omega0[2]]
+        ),
+        channels=tuple(channels),
+        steerable=torquer,
+        limits=replace(spacecraft.limits, horizon=spacecraft.horizon),
+    )
+    return SymmetricModel(spacecraft, _aimed(symmetric, spacecraft), stretch)
+
+
+def _aimed(symmetric: Spacecraft, spacecraft: Spacecraft) -> Spacecraft:
+    """Copy of the ``symmetric``, which has another H, with the target axis at its distance from H
+    of the ``spacecraft``.
+    """
+    if spacecraft.goal.axis is None or symmetric is spacecraft:
+        return symmetric
+    quaternion = spacecraft.initial.quaternion
+    given = spacecraft.attitude or Attitude(quaternion)
+    in_file_axes = attitude.multiply(quaternion, attitude.from_matrix(spacecraft.inertia.axes.T))
+    held = replace(symmetric, attitude=replace(given, quaternion=in_file_axes))
+    before, after = (
+        momentum / float(np.linalg.norm(momentum))
+        for momentum in (spacecraft.momentum, held.momentum)
+    )
+    # The shortest turn from the one H to the other: two reflections, at the middle between both and
+    # at the second.
+    middle = (before + after) / float(np.linalg.norm(before + after))
+    axis = spacecraft.goal.axis - 2.0 * (middle @ spacecraft.goal.axis) * middle
+    return replace(held, goal=replace(spacecraft.goal, axis=axis - 2.0 * (after @ axis) * after))
+
+
+def _without_steady(spacecraft: Spacecraft) -> Spacecraft:
+    """Spacecraft with ω counted from the steady response to its disturbances; those without one
+    stay.
+    """
+    if not spacecraft.disturbances:
+        return spacecraft
+    steady = steady_omega(spacecraft, 0.0)
+    left = (
+        replace(each, transverse=0j) if settles(spacecraft, each) else each
+        for each in spacecraft.disturbances
+    )
+    return replace(
+        spacecraft,
+        omega0=spacecraft.omega0 - np.array([steady.real, steady.imag, 0.0]),
+        disturbances=tuple(
+            disturbance for disturbance in left if disturbance.axial or disturbance.transverse
+        ),
+    )
+
+
+def settles(spacecraft: Spacecraft, disturbance: Disturbance) -> bool:
+    """True if ω beats against the disturbance at least once within the horizon; else it counts as
+    resonant.
+    """
+    return abs(spacecraft.nutation_rate + disturbance.rate) * spacecraft.horizon > 2.0 * math.pi
+
+
+def steady_omega(spacecraft: Spacecraft, time: float) -> complex:
+    """Steady-state ω of the settling disturbances at ``time`` s, which needs no damping."""
+    if not spacecraft.disturbances:
+        return 0.0 + 0.0j
+    from nutdamp.physics import driven  # disturbances
+
+    A = spacecraft.inertia.A
+    nutation_rate = spacecraft.nutation_rate
+    steady = 0.0 + 0.0j
+    for disturbance in spacecraft.disturbances:
+        if disturbance.transverse and settles(spacecraft, disturbance):
+            turned = cmath.rect(1.0, disturbance.rate * time)
+            steady += (
+                driven.steady_response(A, nutation_rate, disturbance.transverse, disturbance.rate)
+                * turned
+            )
+    return steady
 
 
 class PairCandidate(NamedTuple):
@@ -146,7 +315,7 @@ def _missed(flight_: propagation.Flight, *, spin: bool = False) -> Vector:
     after = flight_.last_momentum
     steady = steady_omega(spacecraft, schedule.end)
     body[:2] -= np.array(inertia.moments[:2]) * (steady.real, steady.imag)
-    aside = precession.square_to(spacecraft.target_axis)
+    aside = attitude.square_to(spacecraft.target_axis)
     across = np.array([aside @ after, np.cross(spacecraft.target_axis, aside) @ after])
     left = np.concatenate([body[:2], across]) / float(np.linalg.norm(body))
     final = spacecraft.goal.spin
@@ -367,106 +536,6 @@ def bounded_step(
 
 
 ROUNDING = 1e-12  # rad; where the spin axis is that near the target already, no pulses are needed
-
-
-class FlownBuilder:
-    """Pulses chosen so far, and the spacecraft after them.
-
-    ``at_leg`` is the spacecraft at ``now`` s, the end of the last pulse, as if its time began
-    there, with the goal of the whole. ``steps``: of integration that the flight took so far.
-    """
-
-    def __init__(self, spacecraft: Spacecraft) -> None:
-        self.at_leg = replace(
-            spacecraft,
-            goal=replace(spacecraft.goal, axis=spacecraft.target_axis),
-            limits=replace(spacecraft.limits, horizon=spacecraft.horizon),
-        )
-        self.now = 0.0
-        self.steps = 0
-        self.pulses: list[Pulse] = []
-        self._before: list[tuple[float, Spacecraft]] = []
-
-    @property
-    def left(self) -> float:
-        """Residual, rad: nutation or distance of H from the target, whichever is larger."""
-        return max(self.at_leg.nutation, self.at_leg.to_turn)
-
-    def fork(self) -> FlownBuilder:
-        """Another builder that goes on from here."""
-        other = FlownBuilder(self.at_leg)
-        other.now, other.pulses, other._before = self.now, list(self.pulses), list(self._before)
-        return other
-
-    def fire(self, pulses: Iterable[Pulse], *, bounded: bool = False) -> None:
-        """Take and fly ``pulses``, in order, timed from ``now``; Infeasible where they are
-        ``bounded`` by work left.
-        """
-        base = self.now
-        for pulse in pulses:
-            if bounded and work.exhausted():
-                raise Infeasible("the flight of the pulses for that was not finished")
-            self._before.append((self.now, self.at_leg))
-            timed = pulse.moved(base)
-            at_leg = self.at_leg
-            pulse_ = timed.moved(-self.now)
-            flown = propagation.flown(at_leg, Schedule((pulse_,)))
-            settled, since, limits = flown.settled, pulse_.over, at_leg.limits
-            to_principal = attitude.from_matrix(at_leg.inertia.axes.T)
-            given = at_leg.attitude or Attitude(settled.quaternion)
-            self.at_leg = replace(
-                at_leg,
-                inertia=lightened(at_leg, pulse_.propellant or 0.0),
-                omega0=settled.rates,
-                attitude=replace(
-                    given,
-                    quaternion=attitude.multiply(settled.quaternion, to_principal),
-                    epoch=None,
-                ),
-                disturbances=tuple(
-                    replace(
-                        disturbance,
-                        transverse=disturbance.transverse
-                        * cmath.exp(1j * disturbance.rate * since),
-                    )
-                    for disturbance in at_leg.disturbances
-                ),
-                limits=replace(
-                    limits,
-                    horizon=at_leg.horizon - since,
-                    earliest=limits.gap,
-                    max_pulses=None if limits.max_pulses is None else limits.max_pulses - 1,
-                    blackout=tuple(
-                        (begins - since, ends - since)
-                        for begins, ends in limits.blackout
-                        if ends > since
-                    ),
-                ),
-            )
-            self.steps += flown.steps
-            self.pulses.append(timed)
-            self.now = timed.over
-
-    def correct(self, last: int, *, resized: int = 0) -> None:
-        """Move the ``last`` pulses until nothing is left; sizes stay, but those of ``resized``
-        equal ones, as one.
-        """
-        taken = min(max(last, resized), len(self.pulses))
-        if last == 0 or taken == 0:
-            return
-        self.now, self.at_leg = self._before[-taken]
-        made = Schedule(tuple(pulse.moved(-self.now) for pulse in self.pulses[-taken:]))
-        del self.pulses[-taken:], self._before[-taken:]
-        chosen = range(max(taken - last, 0), taken)
-        self.fire(
-            correct(
-                self.at_leg, made, chosen=chosen, momentum=True, equal=True, resizable=resized > 0
-            )
-        )
-
-    def schedule(self, *notes: Note) -> Schedule:
-        """Chosen pulses."""
-        return Schedule(tuple(self.pulses), notes)
 
 
 def tolerable(spacecraft: Spacecraft) -> float:

@@ -11,9 +11,7 @@ import numpy as np
 from nutdamp.common import work
 from nutdamp.errors import Infeasible, span
 from nutdamp.flight import propagation
-from nutdamp.physics.triaxial import widest_cones
 from nutdamp.schemes.catalogue import DEFAULT_SHARE, FourPulseOptions
-from nutdamp.schemes.correction import FlownBuilder
 from nutdamp.schemes.sequential import ImpulseBuilder, at_hand, fire_components, no_alignment
 from nutdamp.spacecraft.constraints import Windows, usable
 from nutdamp.spacecraft.equipment import Channel
@@ -74,6 +72,8 @@ def on_true_motion(spacecraft: Spacecraft, options: FourPulseOptions) -> Schedul
     Each pulse is one that lowers, as an impulse, the largest nutation of the motion that follows
     most.
     """
+    from nutdamp.schemes.valve_commands import FlownBuilder
+
     channels = at_hand(spacecraft, usable(spacecraft))
     builder = FlownBuilder(spacecraft)
     most = spacecraft.limits.max_pulses or MOST_FLOWN
@@ -95,6 +95,8 @@ def _best_pulse(
     """The pulse to fire next, within a period of the motion;
     None where none lowers the nutation.
     """
+    from nutdamp.physics.triaxial import widest_cones
+
     windows = Windows(at_leg)
     earliest = at_leg.limits.earliest
     period = min(at_leg.motion_period, at_leg.horizon)

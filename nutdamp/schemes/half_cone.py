@@ -20,9 +20,9 @@ from nutdamp.flight.dynamics import Arc
 from nutdamp.physics import attitude, precession
 from nutdamp.schemes import one_pulse, pulse_pairs
 from nutdamp.schemes.catalogue import HalfConeOptions
-from nutdamp.schemes.correction import FlownBuilder
 from nutdamp.schemes.pulse_pairs import SteerablePair
 from nutdamp.schemes.sequential import expect_aim, turn_of
+from nutdamp.schemes.valve_commands import FlownBuilder
 from nutdamp.spacecraft.constraints import Windows, commandable, usable
 from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Spacecraft, Vector

@@ -5,18 +5,21 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 from nutdamp.common import work
 from nutdamp.errors import Infeasible, TooShort
 from nutdamp.physics import response
 from nutdamp.schemes.catalogue import SchemeOptions
-from nutdamp.schemes.correction import FlownBuilder
 from nutdamp.schemes.sequential import ImpulseBuilder, at_hand, fire_components, no_alignment
 from nutdamp.spacecraft.constraints import longest_useful, usable
 from nutdamp.spacecraft.equipment import Channel, Steerable
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.roles import with_limits
 from nutdamp.spacecraft.schedule import Schedule
+
+if TYPE_CHECKING:
+    from nutdamp.schemes.valve_commands import FlownBuilder
 
 TRAIN_SHARE = (
     0.25  # longest pulse of a train, as a share of T_ω: it loses 10 % of its impulse to its width

@@ -13,8 +13,7 @@ from nutdamp.common import work
 from nutdamp.common.results import note
 from nutdamp.errors import BadRequest, Infeasible, TooShort
 from nutdamp.schemes.catalogue import POINTING, SCHEMES, Options, Scheme, SchemeOptions
-from nutdamp.schemes.correction import Correction, left
-from nutdamp.schemes.sequential import SymmetricModel, model_of
+from nutdamp.schemes.correction import Correction, SymmetricModel, left, model_of
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.roles import with_limits
 from nutdamp.spacecraft.schedule import Schedule

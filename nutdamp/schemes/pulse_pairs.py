@@ -25,8 +25,8 @@ from nutdamp.flight.dynamics import Arc
 from nutdamp.physics import attitude, precession
 from nutdamp.physics.precession import TwoJumps
 from nutdamp.schemes import correction
-from nutdamp.schemes.correction import PairCandidate, shortlist, tolerable
-from nutdamp.schemes.sequential import at_hand, model_of, turn_of
+from nutdamp.schemes.correction import PairCandidate, model_of, shortlist, tolerable
+from nutdamp.schemes.sequential import at_hand, turn_of
 from nutdamp.spacecraft.constraints import Windows, commandable, for_pairs, keeps_limits
 from nutdamp.spacecraft.equipment import Channel, Steerable
 from nutdamp.spacecraft.model import Spacecraft, SpinState, Vector

@@ -27,8 +27,9 @@ from nutdamp.flight.dynamics import Arc
 from nutdamp.physics import attitude, precession
 from nutdamp.schemes import correction, one_pulse
 from nutdamp.schemes.catalogue import RhumbLineOptions
-from nutdamp.schemes.correction import ROUNDING, FlownBuilder, tolerable
+from nutdamp.schemes.correction import ROUNDING, tolerable
 from nutdamp.schemes.sequential import expect_aim
+from nutdamp.schemes.valve_commands import FlownBuilder
 from nutdamp.spacecraft.constraints import Windows, usable
 from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Spacecraft, Vector

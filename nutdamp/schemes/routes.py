@@ -17,7 +17,7 @@ import numpy as np
 from nutdamp.common import work
 from nutdamp.common.results import note
 from nutdamp.errors import Infeasible
-from nutdamp.physics import attitude, precession
+from nutdamp.physics import attitude
 from nutdamp.schemes import catalogue, planner, valve_commands
 from nutdamp.schemes.valve_commands import Legs
 from nutdamp.spacecraft.model import Keep, Spacecraft, Vector
@@ -103,7 +103,7 @@ def _bent(
     on_the_way = [_along(start, target, np.array([place]))[0] for place in places]
     normal = np.cross(start, target)
     size = float(np.linalg.norm(normal))
-    left = normal / size if size > 0.0 else precession.square_to(start)
+    left = normal / size if size > 0.0 else attitude.square_to(start)
     for bend in BENDS if places else BENDS[:1]:
         route = (*(math.cos(bend) * point + math.sin(bend) * left for point in on_the_way), target)
         if _clear((start, *route), keeps, margin):

@@ -1,10 +1,4 @@
-"""Schedules laid pulse by pulse on the equivalent symmetric body; reasons of infeasibility.
-
-Three different moments turn in the body at another rate than their mean, on an ellipse instead of a
-circle; lasting disturbances move the point about which ω turns. Both are taken out here, so that
-every scheme plans free motion of a symmetric body, and put back in: the schedule is translated to
-the true actuators and corrected on the true motion.
-"""
+"""Schedules laid pulse by pulse on the equivalent symmetric body; reasons of infeasibility."""
 
 from __future__ import annotations
 
@@ -12,7 +6,7 @@ import cmath
 import itertools
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -20,11 +14,12 @@ import numpy as np
 from nutdamp.common import work
 from nutdamp.common.results import note
 from nutdamp.errors import Infeasible, TooShort, listed
-from nutdamp.physics import attitude, energy_sink, response
 from nutdamp.physics import body as rigid_body
-from nutdamp.spacecraft.constraints import Windows, channel_of, longest_useful, usable
+from nutdamp.physics import driven, energy_sink, response
+from nutdamp.schemes.correction import ALIGNED, FADED
+from nutdamp.spacecraft.constraints import Windows, longest_useful, usable
 from nutdamp.spacecraft.equipment import Channel, Steerable
-from nutdamp.spacecraft.model import Attitude, Disturbance, Inertia, Spacecraft, Vector
+from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.roles import with_limits
 from nutdamp.spacecraft.schedule import TOUCHING, Pulse, Schedule, channel_pulse, steerable_pulse
 
@@ -34,10 +29,6 @@ MISSED = 50
 # share of A|ω0| left to correction under dissipation: `response.width_factor` holds at small angles
 # only
 CORRECTED = 1e-4
-
-# angle in rad below which a standing ω counts as opposed to a torque (a sphere, where nothing
-# turns)
-ALIGNED = 1e-9
 
 MOST_PULSES = 2000
 """Pulses that are laid one by one, at most: nobody commands more, and each takes its time to be
@@ -133,17 +124,17 @@ class ImpulseBuilder:
         if not self.spacecraft.disturbances:
             return free
         since = np.array([time - self.now])
-        driven = 0.0 + 0.0j
+        forced = 0.0 + 0.0j
         for disturbance in self.spacecraft.disturbances:
             if disturbance.transverse != 0.0:
                 torque = np.array(
                     [disturbance.transverse * cmath.exp(1j * disturbance.rate * self.now)]
                 )
                 rate = np.array([disturbance.rate])
-                driven += complex(
-                    response.rotating_torques(since, 0.0, self.turning, self.A, torque, rate)[0]
+                forced += complex(
+                    driven.rotating_torques(since, 0.0, self.turning, self.A, torque, rate)[0]
                 )
-        return free + driven
+        return free + forced
 
     def acts(self, pulse: Pulse) -> complex:
         """Effective impulse of ``pulse`` on ω, J1 + iJ2 in N m s."""
@@ -328,10 +319,6 @@ def components(channels: list[Channel], target: complex) -> list[tuple[Channel, 
     return [(channel, impulse) for channel, impulse in best if impulse > 1e-12 * abs(target)]
 
 
-# fraction of the nutation below which pulses have nothing to do: dissipation has removed it
-FADED = 1e-6
-
-
 def bounded_by(spacecraft: Spacecraft) -> str:
     """Limits on a schedule of its channels, by name: the horizon, and those that the file sets."""
     limits, channels = spacecraft.limits, spacecraft.channels
@@ -494,159 +481,3 @@ def no_alignment(spacecraft: Spacecraft, channels: list[Channel]) -> Infeasible:
 def turn_of(spacecraft: Spacecraft, impulse: float) -> str:
     """Turn of H in degrees by an ``impulse`` across the spin axis, N m s; of A|ω|, the nutation."""
     return f"{math.degrees(math.atan2(impulse, abs(spacecraft.axial))):.4g} deg"
-
-
-@dataclass(frozen=True, eq=False)
-class SymmetricModel:
-    """``symmetric`` is planned on for ``spacecraft``; ``stretch`` (2,) leads from the ellipse of
-    (ω1, ω2) to the circle.
-    """
-
-    spacecraft: Spacecraft
-    symmetric: Spacecraft
-    stretch: Vector
-
-    @property
-    def exact(self) -> bool:
-        """True if the model moves as the spacecraft does, so that nothing has to be corrected."""
-        spacecraft = self.spacecraft
-        alike = self.symmetric.inertia.moments == spacecraft.inertia.moments
-        return alike and not spacecraft.disturbances and spacecraft.growth == 0.0
-
-    def translate(self, schedule: Schedule) -> Schedule:
-        """Schedule with the true actuators."""
-        if self.symmetric.inertia.moments == self.spacecraft.inertia.moments:
-            return schedule
-        torquer = self.spacecraft.torquer
-        windows = Windows(self.spacecraft)
-        ready = self.spacecraft.limits.earliest
-        pulses = list[Pulse]()
-        for pulse in schedule:
-            channel = channel_of(self.spacecraft, pulse)
-            if channel is not None:
-                true = channel_pulse(channel, pulse.t, pulse.on_time)
-            else:  # longer or shorter, and so moved where the limits require it
-                assert torquer is not None
-                first, second = pulse.impulse[:2] / self.stretch
-                impulse = math.hypot(first, second)
-                t = pulse.t
-                on_time = 0.0
-                if torquer.torque is not None:
-                    on_time = windows.on_time(impulse / torquer.torque, 0.0, math.inf)
-                    start = windows.earliest_start(on_time, max(pulse.start, ready))
-                    t = t if start is None else start + 0.5 * on_time
-                true = steerable_pulse(
-                    torquer, t, math.atan2(second, first), impulse=impulse, on_time=on_time
-                )
-            pulses.append(true)
-            ready = true.end + self.spacecraft.limits.gap
-        return Schedule(tuple(pulses), schedule.notes, schedule.bounds)
-
-
-def model_of(
-    spacecraft: Spacecraft, *, turning: bool = False, three_moments: bool = False
-) -> SymmetricModel:
-    """Model of a spacecraft, whose torques change ω as the true ones do.
-
-    ``turning``: they turn H so, and ω at t = 0 is as much larger or smaller on average: the circle
-    may be of any size. ``three_moments``: the model has those of the spacecraft.
-    """
-    undisturbed = _without_steady(spacecraft)
-    inertia = spacecraft.inertia
-    if inertia.symmetric or three_moments:
-        return SymmetricModel(spacecraft, _aimed(undisturbed, spacecraft), np.ones(2))
-    # Its nutation has the true rate, and (s1 ω1, s2 ω2) moves on a circle (linearised Euler
-    # equations).
-    A = inertia.nutating(spacecraft.spin)
-    C = inertia.C
-    across = np.array(inertia.moments[:2])
-    scale = inertia.circle(spacecraft.spin) * across
-    scale /= math.sqrt(scale[0] * scale[1])
-    stretch = scale * A / across  # for torques and impulses
-    mean = float(np.mean(stretch))
-    torquer = undisturbed.steerable
-    if (
-        torquer is not None and torquer.torque is not None
-    ):  # the stretch differs by direction: near enough for a plan
-        torquer = replace(torquer, torque=torquer.torque * mean)
-    factors = np.ones(3) if turning else np.array([*stretch, 1.0])
-    channels = []
-    for channel in undisturbed.channels:
-        thrusters = tuple(
-            replace(thruster, torque=thruster.torque * factors) for thruster in channel.thrusters
-        )
-        channels.append(replace(channel, thrusters=thrusters, spends=channel.strength))
-    symmetric = replace(
-        undisturbed,
-        inertia=Inertia((A, A, C), inertia.axes, inertia.wheel),
-        omega0=np.array(
-            [*(scale * undisturbed.omega0[:2] / (mean if turning else 1.0)), undisturbed.omega0[2]]
-        ),
-        channels=tuple(channels),
-        steerable=torquer,
-        limits=replace(spacecraft.limits, horizon=spacecraft.horizon),
-    )
-    return SymmetricModel(spacecraft, _aimed(symmetric, spacecraft), stretch)
-
-
-def _aimed(symmetric: Spacecraft, spacecraft: Spacecraft) -> Spacecraft:
-    """Copy of the ``symmetric``, which has another H, with the target axis at its distance from H
-    of the ``spacecraft``.
-    """
-    if spacecraft.goal.axis is None or symmetric is spacecraft:
-        return symmetric
-    quaternion = spacecraft.initial.quaternion
-    given = spacecraft.attitude or Attitude(quaternion)
-    in_file_axes = attitude.multiply(quaternion, attitude.from_matrix(spacecraft.inertia.axes.T))
-    held = replace(symmetric, attitude=replace(given, quaternion=in_file_axes))
-    before, after = (
-        momentum / float(np.linalg.norm(momentum))
-        for momentum in (spacecraft.momentum, held.momentum)
-    )
-    # The shortest turn from the one H to the other: two reflections, at the middle between both and
-    # at the second.
-    middle = (before + after) / float(np.linalg.norm(before + after))
-    axis = spacecraft.goal.axis - 2.0 * (middle @ spacecraft.goal.axis) * middle
-    return replace(held, goal=replace(spacecraft.goal, axis=axis - 2.0 * (after @ axis) * after))
-
-
-def _without_steady(spacecraft: Spacecraft) -> Spacecraft:
-    """Spacecraft with ω counted from the steady response to its disturbances; those without one
-    stay.
-    """
-    if not spacecraft.disturbances:
-        return spacecraft
-    steady = steady_omega(spacecraft, 0.0)
-    left = (
-        replace(each, transverse=0j) if settles(spacecraft, each) else each
-        for each in spacecraft.disturbances
-    )
-    return replace(
-        spacecraft,
-        omega0=spacecraft.omega0 - np.array([steady.real, steady.imag, 0.0]),
-        disturbances=tuple(
-            disturbance for disturbance in left if disturbance.axial or disturbance.transverse
-        ),
-    )
-
-
-def settles(spacecraft: Spacecraft, disturbance: Disturbance) -> bool:
-    """True if ω beats against the disturbance at least once within the horizon; else it counts as
-    resonant.
-    """
-    return abs(spacecraft.nutation_rate + disturbance.rate) * spacecraft.horizon > 2.0 * math.pi
-
-
-def steady_omega(spacecraft: Spacecraft, time: float) -> complex:
-    """Steady-state ω of the settling disturbances at ``time`` s, which needs no damping."""
-    A = spacecraft.inertia.A
-    nutation_rate = spacecraft.nutation_rate
-    steady = 0.0 + 0.0j
-    for disturbance in spacecraft.disturbances:
-        if disturbance.transverse and settles(spacecraft, disturbance):
-            turned = cmath.rect(1.0, disturbance.rate * time)
-            steady += (
-                response.steady_response(A, nutation_rate, disturbance.transverse, disturbance.rate)
-                * turned
-            )
-    return steady

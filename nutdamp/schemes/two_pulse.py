@@ -22,18 +22,16 @@ import numpy as np
 from nutdamp.common.results import note
 from nutdamp.errors import Infeasible
 from nutdamp.physics import body as rigid_body
-from nutdamp.physics import energy_sink, response
+from nutdamp.physics import response
 from nutdamp.schemes import correction
 from nutdamp.schemes.catalogue import TwoPulseOptions
-from nutdamp.schemes.correction import CLOSE_IN_COST, PairCandidate, tolerable
-from nutdamp.schemes.sequential import (
+from nutdamp.schemes.correction import (
     ALIGNED,
+    CLOSE_IN_COST,
     FADED,
-    ImpulseBuilder,
-    at_hand,
-    bounded_by,
-    components,
+    PairCandidate,
     model_of,
+    tolerable,
 )
 from nutdamp.spacecraft.constraints import Windows, for_pairs, keeps_limits, longest_useful
 from nutdamp.spacecraft.equipment import Channel, Steerable
@@ -82,13 +80,19 @@ def _damping(spacecraft: Spacecraft, options: TwoPulseOptions) -> Schedule:
     """
     if spacecraft.torquer is not None:
         return _steered(spacecraft, spacecraft.torquer, options)
-    channels = at_hand(spacecraft, for_pairs(spacecraft))
+    channels = for_pairs(spacecraft)
+    if not channels:
+        from nutdamp.schemes.sequential import at_hand  # it has the reason
+
+        at_hand(spacecraft, channels)
     best, broken = correction.best_of(spacecraft, _shortlist(spacecraft, channels, options))
     schedule = best or broken
     if schedule is None and spacecraft.nutation_rate == 0.0:
         schedule = _standing(spacecraft, channels)
     if schedule is not None:
         return schedule
+    from nutdamp.schemes.sequential import bounded_by  # it has the reason
+
     names = ", ".join(channel.name for channel in channels)
     if spacecraft.nutation_rate == 0.0:
         raise Infeasible(
@@ -110,6 +114,8 @@ def _standing(spacecraft: Spacecraft, channels: list[Channel]) -> Schedule | Non
     """A pair of pulses of each channel beside -ω where ω does not turn in the body: it brings H
     back by itself.
     """
+    from nutdamp.schemes.sequential import components  # ω stands still in the body
+
     wait = _halves(spacecraft).wait
     at_leg = spacecraft
     pulses = list[Pulse]()
@@ -136,6 +142,8 @@ def _steered(spacecraft: Spacecraft, torquer: Steerable, options: TwoPulseOption
     """Try every start that touches the limits and every odd number of half turns; the earliest end
     wins.
     """
+    from nutdamp.schemes.sequential import ImpulseBuilder, bounded_by  # a steerable torquer
+
     windows = Windows(spacecraft)
     halves = _halves(spacecraft, options.literal)
     on_times = list[float]()
@@ -394,6 +402,8 @@ def _grown(spacecraft: Spacecraft, time: float) -> float:
     """Factor of dissipation on the transverse rate until ``time`` s."""
     if spacecraft.growth == 0.0:
         return 1.0
+    from nutdamp.physics import energy_sink  # dissipation
+
     inertia, (first, second, spin) = spacecraft.inertia, spacecraft.omega0.tolist()
     omega = complex(first, second)
     motion = omega, spin, time, inertia.wheel, spacecraft.sense

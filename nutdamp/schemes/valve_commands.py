@@ -10,7 +10,8 @@ shape of the thrust are corrected on the flown motion.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import cmath
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -20,10 +21,11 @@ from nutdamp.common.results import Note, note
 from nutdamp.errors import Infeasible, TooShort
 from nutdamp.flight import propagation
 from nutdamp.flight.dynamics import Supply, lightened, shed, supplied
+from nutdamp.physics import attitude
 from nutdamp.schemes import correction
 from nutdamp.schemes.block_model import fired, sun_pulses
 from nutdamp.schemes.catalogue import SchemeOptions
-from nutdamp.schemes.correction import TAIL, Correction, FlownBuilder
+from nutdamp.schemes.correction import TAIL, Correction
 from nutdamp.spacecraft.constraints import (
     commandable,
     effective_on_time,
@@ -32,7 +34,7 @@ from nutdamp.spacecraft.constraints import (
     shortest_on_time,
 )
 from nutdamp.spacecraft.equipment import Block, Channel
-from nutdamp.spacecraft.model import Inertia, Limits, Spacecraft
+from nutdamp.spacecraft.model import Attitude, Inertia, Limits, Spacecraft
 from nutdamp.spacecraft.roles import with_limits
 from nutdamp.spacecraft.schedule import Pulse, Schedule, channel_pulse
 
@@ -339,6 +341,106 @@ def _on_ticks(spacecraft: Spacecraft, made: Schedule, correct: Correction) -> Sc
         schedule for schedule in roundings if keeps_limits(spacecraft, schedule.pulses)
     ] or roundings
     return min(kept, key=lambda schedule: _left(spacecraft, schedule, correct))
+
+
+class FlownBuilder:
+    """Pulses chosen so far, and the spacecraft after them.
+
+    ``at_leg`` is the spacecraft at ``now`` s, the end of the last pulse, as if its time began
+    there, with the goal of the whole. ``steps``: of integration that the flight took so far.
+    """
+
+    def __init__(self, spacecraft: Spacecraft) -> None:
+        self.at_leg = replace(
+            spacecraft,
+            goal=replace(spacecraft.goal, axis=spacecraft.target_axis),
+            limits=replace(spacecraft.limits, horizon=spacecraft.horizon),
+        )
+        self.now = 0.0
+        self.steps = 0
+        self.pulses: list[Pulse] = []
+        self._before: list[tuple[float, Spacecraft]] = []
+
+    @property
+    def left(self) -> float:
+        """Residual, rad: nutation or distance of H from the target, whichever is larger."""
+        return max(self.at_leg.nutation, self.at_leg.to_turn)
+
+    def fork(self) -> FlownBuilder:
+        """Another builder that goes on from here."""
+        other = FlownBuilder(self.at_leg)
+        other.now, other.pulses, other._before = self.now, list(self.pulses), list(self._before)
+        return other
+
+    def fire(self, pulses: Iterable[Pulse], *, bounded: bool = False) -> None:
+        """Take and fly ``pulses``, in order, timed from ``now``; Infeasible where they are
+        ``bounded`` by work left.
+        """
+        base = self.now
+        for pulse in pulses:
+            if bounded and work.exhausted():
+                raise Infeasible("the flight of the pulses for that was not finished")
+            self._before.append((self.now, self.at_leg))
+            timed = pulse.moved(base)
+            at_leg = self.at_leg
+            pulse_ = timed.moved(-self.now)
+            flown = propagation.flown(at_leg, Schedule((pulse_,)))
+            settled, since, limits = flown.settled, pulse_.over, at_leg.limits
+            to_principal = attitude.from_matrix(at_leg.inertia.axes.T)
+            given = at_leg.attitude or Attitude(settled.quaternion)
+            self.at_leg = replace(
+                at_leg,
+                inertia=lightened(at_leg, pulse_.propellant or 0.0),
+                omega0=settled.rates,
+                attitude=replace(
+                    given,
+                    quaternion=attitude.multiply(settled.quaternion, to_principal),
+                    epoch=None,
+                ),
+                disturbances=tuple(
+                    replace(
+                        disturbance,
+                        transverse=disturbance.transverse
+                        * cmath.exp(1j * disturbance.rate * since),
+                    )
+                    for disturbance in at_leg.disturbances
+                ),
+                limits=replace(
+                    limits,
+                    horizon=at_leg.horizon - since,
+                    earliest=limits.gap,
+                    max_pulses=None if limits.max_pulses is None else limits.max_pulses - 1,
+                    blackout=tuple(
+                        (begins - since, ends - since)
+                        for begins, ends in limits.blackout
+                        if ends > since
+                    ),
+                ),
+            )
+            self.steps += flown.steps
+            self.pulses.append(timed)
+            self.now = timed.over
+
+    def correct(self, last: int, *, resized: int = 0) -> None:
+        """Move the ``last`` pulses until nothing is left; sizes stay, but those of ``resized``
+        equal ones, as one.
+        """
+        taken = min(max(last, resized), len(self.pulses))
+        if last == 0 or taken == 0:
+            return
+        self.now, self.at_leg = self._before[-taken]
+        made = Schedule(tuple(pulse.moved(-self.now) for pulse in self.pulses[-taken:]))
+        del self.pulses[-taken:], self._before[-taken:]
+        chosen = range(max(taken - last, 0), taken)
+        self.fire(
+            correction.correct(
+                self.at_leg, made, chosen=chosen, momentum=True, equal=True, resizable=resized > 0
+            )
+        )
+
+    def schedule(self, *notes: Note) -> Schedule:
+        """Chosen pulses."""
+        return Schedule(tuple(self.pulses), notes)
 
 
 class Legs:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -214,7 +215,7 @@ class Thruster:
 CANCELLED = 1e-12  # share of its largest thruster torque below which a channel's is rounding
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Channel:
     """Channel: thrusters that fire together, as one body-fixed torque.
 
@@ -232,12 +233,14 @@ class Channel:
             self, thrusters=tuple(replace(thruster, **changed) for thruster in self.thrusters)
         )
 
-    @property
+    @cached_property
     def torque(self) -> Vector:
         """Sum of the torques, (3,) N m; zero where they cancel but for rounding."""
         torques = np.array([thruster.torque for thruster in self.thrusters], dtype=np.float64)
-        total = torques.sum(axis=0)
-        return np.asarray(np.where(np.abs(total) > CANCELLED * np.abs(torques).max(), total, 0.0))
+        total: Vector = torques.sum(axis=0)
+        total[np.abs(total) <= CANCELLED * np.abs(torques).max()] = 0.0
+        total.setflags(write=False)
+        return total
 
     @property
     def valve(self) -> Valve | None:

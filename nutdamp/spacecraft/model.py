@@ -12,7 +12,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,14 +20,10 @@ from numpy.typing import NDArray
 from nutdamp import units
 from nutdamp.common import results
 from nutdamp.common.numerics import cleaned
-from nutdamp.common.time import DIGITS, Epoch
 from nutdamp.errors import BadRequest
-from nutdamp.physics import attitude, energy_sink
+from nutdamp.physics import attitude
 from nutdamp.physics import body as rigid_body
 from nutdamp.physics.body import ConeAngles
-from nutdamp.physics.thruster import Cold as Cold
-from nutdamp.physics.thruster import Tank as Tank
-from nutdamp.physics.triaxial import arc_cones, nutation_period
 from nutdamp.spacecraft.equipment import Channel as Channel
 from nutdamp.spacecraft.equipment import Commands as Commands
 from nutdamp.spacecraft.equipment import Loop as Loop
@@ -35,6 +31,9 @@ from nutdamp.spacecraft.equipment import Steerable as Steerable
 from nutdamp.spacecraft.equipment import SunSensor as SunSensor
 from nutdamp.spacecraft.equipment import Thruster as Thruster
 from nutdamp.spacecraft.tolerances import Dispersions, SpinTolerance
+
+if TYPE_CHECKING:
+    from nutdamp.physics.thruster import Cold, Tank
 
 Vector = NDArray[np.float64]
 
@@ -166,7 +165,7 @@ class Inertia:
         That of the mean of I1 and I2 where a small nutation grows instead.
         """
         if self._swings(spin):
-            from nutdamp.physics import triaxial  # few bodies need it
+            from nutdamp.physics import triaxial  # three different moments
 
             return triaxial.body_nutation_rate(self.moments, spin, self.wheel)
         return rigid_body.body_rate(self.A, self.C, spin, self.wheel)
@@ -191,6 +190,18 @@ class Inertia:
         """
         slope = self.nutation_slope(spin)
         return slope, 0.0 if self.wheel == 0.0 else self.nutation_rate(spin) - slope * spin
+
+    def cones(self, rates: Vector, sense: float) -> ConeAngles:
+        """Cone angles at the largest nutation of the free motion through ``rates`` (3,) rad/s.
+
+        The spin axis is ``sense``·e3: angles above 90 deg mean a spin that has been reversed.
+        """
+        if self.symmetric:
+            return rigid_body.momentary(self.moments, rates, sense, self.wheel)
+        from nutdamp.physics import triaxial  # three different moments
+
+        widest = triaxial.widest_cones(np.array(self.moments), rates, sense, self.wheel)
+        return ConeAngles(*map(float, widest))
 
     def _swings(self, spin: float) -> bool:
         """True if I1 ≠ I2 and a small nutation turns on an ellipse."""
@@ -386,7 +397,9 @@ class Spacecraft(results.Data, results.Shown):
         Names, types and signs are checked; `with_` checks all that a file is checked for, and keeps
         the ``document``. Raises BadRequest.
         """
-        changed = units.replaced(self, {"document": None, **fields})
+        from nutdamp.physics import thruster  # types of fields
+
+        changed = units.replaced(self, {"document": None, **fields}, vars(thruster))
         for name in ("mass", "dissipation"):
             value = getattr(changed, name)
             if value is not None and value <= 0.0:
@@ -438,6 +451,8 @@ class Spacecraft(results.Data, results.Shown):
     @property
     def damper(self) -> tuple[float, float]:
         """Shares u and v of `energy_sink` at t = 0, for the angle from the spin axis."""
+        from nutdamp.physics import energy_sink  # dissipation
+
         inertia = self.inertia
         size = float(np.linalg.norm(self.momentum))
         return energy_sink.damper(inertia.A, inertia.C, self.sense * inertia.wheel, size, 1.0)
@@ -542,22 +557,25 @@ class Spacecraft(results.Data, results.Shown):
             math.hypot(*direction[:2]), direction[2]
         ) if self.attitude is None else declination
 
-    def utc(self, time: float, digits: int = DIGITS) -> str | None:
+    def utc(self, time: float, digits: int | None = None) -> str | None:
         """Date and time in UTC ``time`` s after the epoch, rounded to ``digits`` of a second.
 
         None without an epoch and after the year 9999.
         """
         if self.attitude is None or self.attitude.epoch is None:
             return None
+        from nutdamp.common.time import DIGITS, Epoch  # an epoch
+
         try:
-            return f"{Epoch.parse(self.attitude.epoch).plus(time).rounded(digits)}Z"
+            moment = Epoch.parse(self.attitude.epoch).plus(time)
+            return f"{moment.rounded(DIGITS if digits is None else digits)}Z"
         except ValueError:
             return None
 
     @cached_property
     def widest(self) -> ConeAngles:
         """Cone angles at the largest nutation of the free motion; constant where I1 = I2."""
-        return arc_cones(self.inertia.moments, self.omega0, self.sense, self.inertia.wheel)
+        return self.inertia.cones(self.omega0, self.sense)
 
     @property
     def nutation(self) -> float:
@@ -612,7 +630,9 @@ class Spacecraft(results.Data, results.Shown):
         """Period of ω in the body, s; with I1 ≠ I2 that of the motion at hand (no wheel)."""
         if self.inertia.symmetric or self.inertia.wheel:
             return self.body_period
-        return nutation_period(self.inertia.moments, self.omega0)
+        from nutdamp.physics import triaxial  # three different moments
+
+        return triaxial.nutation_period(self.inertia.moments, self.omega0)
 
     @property
     def inertial_period(self) -> float:

@@ -14,7 +14,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from nutdamp.errors import BadRequest
-from nutdamp.physics import energy_sink
 from nutdamp.spacecraft.equipment import Loop
 from nutdamp.spacecraft.model import SLACK, Keep, Spacecraft
 from nutdamp.spacecraft.tolerances import SpinTolerance
@@ -253,6 +252,8 @@ def decayed(spacecraft: Spacecraft, t: float) -> float:
 
 def idle(spacecraft: Spacecraft, t: Any) -> Any:
     """Nutation, rad, at ``t`` s without control or disturbance, where I1 = I2."""
+    from nutdamp.physics import energy_sink  # dissipation
+
     sine = math.sin(spacecraft.nutation)
     cosine = math.cos(spacecraft.nutation)
     effect = energy_sink.courses(spacecraft.growth, cosine, sine * sine, t, spacecraft.damper)
@@ -274,6 +275,8 @@ def reached(spacecraft: Spacecraft, nutation: float, now: float | None = None) -
         return 0.0
     if growth == 0.0 or now == 0.0 or nutation == 0.0:
         return math.inf
+    from nutdamp.physics import energy_sink  # dissipation
+
     return energy_sink.time_to_angle(growth, now, nutation, spacecraft.damper)
 
 

@@ -18,7 +18,7 @@ from nutdamp.common.results import Data, Note, note
 from nutdamp.control_loop.stability import margins
 from nutdamp.errors import CannotRead, Fault, FaultyFile, NutdampError, listed
 from nutdamp.files.reader import Source
-from nutdamp.flight.end_state import at_start
+from nutdamp.flight.cones import at_start
 from nutdamp.montecarlo.inputs import reachable
 from nutdamp.physics.thruster import Tank
 from nutdamp.planning import capability

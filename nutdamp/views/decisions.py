@@ -1,5 +1,4 @@
-"""Final motion and cost in words; plans, comparisons, certificates and spacecraft as JSON-ready
-dictionaries.
+"""Plans, comparisons, certificates and spacecraft as JSON-ready dictionaries.
 
 Vectors are in the axes of the file, angles in degrees.
 """
@@ -7,98 +6,33 @@ Vectors are in the axes of the file, angles in degrees.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from rich.table import Table
 
 from nutdamp import __version__
 from nutdamp.common.numerics import cleaned
-from nutdamp.common.results import note
-from nutdamp.flight.end_state import Aspect
+from nutdamp.flight.cones import Aspect
 from nutdamp.flight.propagation import Flight, Residual
+from nutdamp.planning.causes import infeasibility
 from nutdamp.planning.decision import Comparison
 from nutdamp.planning.notes import (
     alternatives,
     comparison_warnings,
-    infeasibility,
     plan_notes,
     reasons,
     verdict_notes,
 )
 from nutdamp.planning.plan import Plan
 from nutdamp.planning.verdict import Verdict, lines_of
-from nutdamp.schemes import catalogue
 from nutdamp.spacecraft.model import Spacecraft, Vector
-from nutdamp.spacecraft.schedule import Schedule
-from nutdamp.views.parts import aspect_facts, commanded, direction_text, spin_text
-from nutdamp.views.tables import facts, values_of
-from nutdamp.views.text import degrees, joined, moment, note_json, ordered, text
-from nutdamp.views.verdict import cases_json, line_json, spent, verdict_json
+from nutdamp.views.parts import commanded
+from nutdamp.views.tables import values_of
+from nutdamp.views.text import joined, note_json, ordered
+from nutdamp.views.verdict import cases_json, line_json, verdict_json
 
 if TYPE_CHECKING:
     from nutdamp.planning.tradeoff import Certificate
-
-
-def no_plan(plan: Plan) -> str:
-    """Text in the column of a scheme that has no plan."""
-    if plan.failure is None:
-        without = catalogue.SCHEMES[plan.scheme].body_fixed and not plan.spacecraft.channels
-        word = "not found" if plan.found_none else "infeasible"
-        return "no thrusters" if without else word
-    return f"internal error,\nplease report:\n{type(plan.failure).__name__}"
-
-
-# factor of distance or of time by which H ends farther off, or later, for a plan to be worse in it
-FARTHER = 1.1
-
-
-def cost(schedule: Schedule) -> Iterator[tuple[str, str]]:
-    """Cost and end of a schedule: names and values."""
-    yield (
-        "impulse" if schedule.propellant is None else "propellant",
-        f"{spent(schedule)}, pulses: {len(schedule)}",
-    )
-    yield "last pulse ends", moment(schedule.end) if len(schedule) else "no pulse is needed"
-
-
-def end_facts(plan: Plan) -> Table:
-    """Final spin axis, H and spin, cost, and end time."""
-    return facts([*end_rows(plan.flight, plan.aspects), *cost(plan.pulses)])
-
-
-def end_rows(flown: Flight, watched: Iterable[Aspect]) -> Iterator[tuple[str, str]]:
-    """Spin axis and H after the last pulse, beside the target and directions ``watched``, and the
-    motion from there.
-    """
-    spacecraft, final = flown.spacecraft, flown.final
-    yield "spin axis ends at", direction_text(spacecraft, final.axis)
-    yield "H ends at", direction_text(spacecraft, final.momentum)
-    if spacecraft.goal.axis is not None:
-        off = degrees(flown.residual.axis_error)
-        yield "target", f"{direction_text(spacecraft, spacecraft.goal.axis)}; H ends {off} off"
-    yield "final state", f"spin {spin_text(final.spin)}, nutation {degrees(final.nutation)}"
-    if lasting(flown):
-        yield "", lasting(flown)
-    yield from aspect_facts(watched)
-    if spacecraft.attitude is None:
-        yield "", text(note("frame-n"))
-    elif spacecraft.attitude.frame is not None:
-        yield "frame", spacecraft.attitude.frame
-
-
-def lasting(flown: Flight) -> str:
-    """Time of the end shown where the motion does not last, and the cause of its change; empty
-    where it lasts.
-    """
-    spacecraft = flown.spacecraft
-    causes = [
-        *["dissipation"] * (spacecraft.growth != 0.0),
-        *["disturbances"] * bool(spacecraft.disturbances),
-    ]
-    end = moment(flown.schedule.end if flown.until is None else flown.until)
-    return f"at {end}; then changing by {' and '.join(causes)}" if causes else ""
 
 
 def heading(spacecraft: Spacecraft) -> dict[str, Any]:

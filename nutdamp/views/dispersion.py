@@ -21,7 +21,7 @@ from nutdamp.flight.propagation import IDEAL_IMPULSES, model_name
 from nutdamp.montecarlo.inputs import DispersedInput
 from nutdamp.montecarlo.statistics import OUTPUTS, Array, Distribution, cases_to_show
 from nutdamp.montecarlo.study import Results, Study
-from nutdamp.planning.notes import main_causes
+from nutdamp.planning.causes import main_causes
 from nutdamp.planning.screening import Dispersion
 from nutdamp.planning.verdict import Verdict
 from nutdamp.spacecraft.model import Keep, Spacecraft
@@ -29,6 +29,7 @@ from nutdamp.spacecraft.requirements import Part
 from nutdamp.units import screen_unit
 from nutdamp.views import decisions, tolerances
 from nutdamp.views import verdict as verdicts
+from nutdamp.views.glance import end_rows
 from nutdamp.views.parts import bounds_text, named, summary
 from nutdamp.views.tables import (
     TEXT,
@@ -126,7 +127,7 @@ def dispersion_screen(flown: Dispersion, *, worst: int) -> Group:
                 style="dim",
             )
         )
-    ends = facts(decisions.end_rows(flown.plan.flight, flown.plan.aspects))
+    ends = facts(end_rows(flown.plan.flight, flown.plan.aspects))
     parts += [Text(), Text("Nominal case", style="bold"), ends]
     events = [*cone_lines(results), *_emptied(results)]
     parts += [*[Text()] * bool(events), *events, Text(), *tolerances.tolerance_budget(results)]

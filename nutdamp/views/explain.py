@@ -22,13 +22,12 @@ from nutdamp.views.guide import Topic
 
 
 def _notes() -> Iterator[tuple[str, str]]:
-    for code, entry in guide.note_entries().items():
-        sentence = re.sub(
-            r"\{(\w+?)(_[a-zA-Z]+)?\}",
-            lambda name: f"[{name[1].replace('_', ' ')}]",
-            entry.sentence,
+    for heading, entry in guide.page("notes").sections[1:]:
+        words = " ".join(entry.replace("\n> ", " ").split()).removeprefix("> ")
+        shown = re.sub(
+            r"\{(\w+?)(_[a-zA-Z]+)?\}", lambda name: f"[{name[1].replace('_', ' ')}]", words
         )
-        yield code, f"{sentence} {entry.paragraph}"
+        yield heading.partition(" (")[0], shown
 
 
 WORDS: tuple[tuple[str, Callable[[], Iterable[tuple[str, str]]]], ...] = (

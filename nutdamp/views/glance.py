@@ -3,35 +3,35 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
 from operator import attrgetter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
 from nutdamp.common.numerics import RPM
-from nutdamp.common.results import Note
+from nutdamp.common.results import Note, note
 from nutdamp.errors import listed
-from nutdamp.flight.propagation import REAL_WIDTHS, model_name
+from nutdamp.flight.propagation import REAL_WIDTHS, Flight, model_name
 from nutdamp.planning.decision import Comparison, speed
 from nutdamp.planning.notes import (
     alternatives,
     comparison_warnings,
-    infeasibility,
     plan_notes,
     reasons,
     verdict_notes,
 )
 from nutdamp.planning.plan import Plan
+from nutdamp.schemes import catalogue
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.requirements import Bound, Part
-from nutdamp.views import decisions, parts
+from nutdamp.spacecraft.schedule import Schedule
+from nutdamp.views import parts
 from nutdamp.views import verdict as verdicts
-from nutdamp.views.decisions import lasting
 from nutdamp.views.tables import (
     TEXT,
     WHOLE,
@@ -44,8 +44,10 @@ from nutdamp.views.tables import (
     to_figures,
 )
 from nutdamp.views.text import (
+    degrees,
     digits,
     joined,
+    moment,
     ordered,
     screen_line,
     sentence,
@@ -53,6 +55,9 @@ from nutdamp.views.text import (
     small_angle,
     text,
 )
+
+if TYPE_CHECKING:
+    from nutdamp.flight.cones import Aspect
 
 NOT = "✗"  # sign before a value above the requirement
 SHORT_NAMES = ("RA", "dec")  # right ascension and declination, where there is little room
@@ -85,7 +90,66 @@ def _feasible(get: Callable[[Plan], Any] | str) -> Callable[[Plan], Any]:
 
 def scheme_verdict(compared: Comparison, plan: Plan) -> str:
     """Verdict on a plan, or why it is not recommended, or why there is none."""
-    return verdicts.scheme_word(compared, plan) if plan.feasible else decisions.no_plan(plan)
+    return verdicts.scheme_word(compared, plan) if plan.feasible else no_plan(plan)
+
+
+def no_plan(plan: Plan) -> str:
+    """Text in the column of a scheme that has no plan."""
+    if plan.failure is None:
+        without = catalogue.SCHEMES[plan.scheme].body_fixed and not plan.spacecraft.channels
+        word = "not found" if plan.found_none else "infeasible"
+        return "no thrusters" if without else word
+    return f"internal error,\nplease report:\n{type(plan.failure).__name__}"
+
+
+def cost(schedule: Schedule) -> Iterator[tuple[str, str]]:
+    """Cost and end of a schedule: names and values."""
+    yield (
+        "impulse" if schedule.propellant is None else "propellant",
+        f"{verdicts.spent(schedule)}, pulses: {len(schedule)}",
+    )
+    yield "last pulse ends", moment(schedule.end) if len(schedule) else "no pulse is needed"
+
+
+def end_facts(plan: Plan) -> Table:
+    """Final spin axis, H and spin, cost, and end time."""
+    return facts([*end_rows(plan.flight, plan.aspects), *cost(plan.pulses)])
+
+
+def end_rows(flown: Flight, watched: Iterable[Aspect]) -> Iterator[tuple[str, str]]:
+    """Spin axis and H after the last pulse, beside the target and directions ``watched``, and the
+    motion from there.
+    """
+    spacecraft, final = flown.spacecraft, flown.final
+    yield "spin axis ends at", parts.direction_text(spacecraft, final.axis)
+    yield "H ends at", parts.direction_text(spacecraft, final.momentum)
+    if spacecraft.goal.axis is not None:
+        off = degrees(flown.residual.axis_error)
+        yield (
+            "target",
+            f"{parts.direction_text(spacecraft, spacecraft.goal.axis)}; H ends {off} off",
+        )
+    yield "final state", f"spin {parts.spin_text(final.spin)}, nutation {degrees(final.nutation)}"
+    if lasting(flown):
+        yield "", lasting(flown)
+    yield from parts.aspect_facts(watched)
+    if spacecraft.attitude is None:
+        yield "", text(note("frame-n"))
+    elif spacecraft.attitude.frame is not None:
+        yield "frame", spacecraft.attitude.frame
+
+
+def lasting(flown: Flight) -> str:
+    """Time of the end shown where the motion does not last, and the cause of its change; empty
+    where it lasts.
+    """
+    spacecraft = flown.spacecraft
+    causes = [
+        *["dissipation"] * (spacecraft.growth != 0.0),
+        *["disturbances"] * bool(spacecraft.disturbances),
+    ]
+    end = moment(flown.schedule.end if flown.until is None else flown.until)
+    return f"at {end}; then changing by {' and '.join(causes)}" if causes else ""
 
 
 def _four(value: float) -> str:
@@ -158,15 +222,15 @@ def _columns(compared: Comparison, chosen: Plan | None) -> Iterator[Column]:
             small_angle,
             where.removeprefix("screen ") + " csv",
         )
-    keys = (
-        ("tilt_deg", "azimuth_deg")
+    angles = (  # and their places among `angles_of`
+        {"tilt_deg": 1, "azimuth_deg": 0}
         if spacecraft.attitude is None
-        else ("right_ascension_deg", "declination_deg")
+        else {"right_ascension_deg": 0, "declination_deg": 1}
     )
     names = parts.angle_names(spacecraft) if spacecraft.attitude is None else SHORT_NAMES
-    for at, key in enumerate(keys):
+    for at, (key, place) in enumerate(angles.items()):
         yield Column(
-            f"axis_{key}", "", "", _feasible(partial(_direction, "axis", key)), where="csv"
+            f"axis_{key}", "", "", _feasible(partial(_direction, "axis", place)), where="csv"
         )
         yield Column(
             "",
@@ -175,9 +239,13 @@ def _columns(compared: Comparison, chosen: Plan | None) -> Iterator[Column]:
             _feasible(partial(_shown_direction, at)),
             where="full page",
         )
-    for key in keys:
+    for key, place in angles.items():
         yield Column(
-            f"momentum_{key}", "", "", _feasible(partial(_direction, "momentum", key)), where="csv"
+            f"momentum_{key}",
+            "",
+            "",
+            _feasible(partial(_direction, "momentum", place)),
+            where="csv",
         )
     yield Column("spin_rad_s", "", "", _feasible("flight.final.spin"), where="csv")
     if spacecraft.goal.spin is not None:
@@ -201,11 +269,18 @@ def _columns(compared: Comparison, chosen: Plan | None) -> Iterator[Column]:
         kind=TEXT,
         met=met,
     )
-    yield Column("why", "", "", infeasibility, where="csv", kind=TEXT)
+    yield Column("why", "", "", _why, where="csv", kind=TEXT)
 
 
-def _direction(which: str, key: str, plan: Plan) -> float | None:
-    return decisions.direction_json(plan.spacecraft, getattr(plan.flight.final, which))[key]
+def _why(plan: Plan) -> str:
+    from nutdamp.planning.causes import infeasibility  # the CSV file of the schemes
+
+    return infeasibility(plan)
+
+
+def _direction(which: str, at: int, plan: Plan) -> float | None:
+    angle = plan.spacecraft.angles_of(getattr(plan.flight.final, which))[at]
+    return None if angle is None else math.degrees(angle)
 
 
 def _shown_direction(at: int, plan: Plan) -> str:
@@ -355,6 +430,6 @@ def comparison_screen(compared: Comparison) -> RenderableType:
         ),
         *map(screen_line, ordered(beside)),
         *(Text(), verdicts.bound_table(judged).screen("screen")),
-        *(Text(), decisions.end_facts(chosen)),
+        *(Text(), end_facts(chosen)),
         *results,
     )

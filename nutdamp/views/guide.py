@@ -208,28 +208,3 @@ EQUATIONS = tuple(map(Equation.of, entries("equations")))
 """Equations of Magnus 1970, of the lecture texts "Kreisel-Bewegungen" and "Kreiseltheorie", and of
 nutdamp itself.
 """
-
-
-class NoteEntry(NamedTuple):
-    """A code of the catalogue: its severity, its sentence with names of values in braces, and what
-    it means.
-    """
-
-    severity: str
-    sentence: str
-    paragraph: str
-
-
-NOTE_ENTRY = re.compile(
-    r"^## (\S+) \((\w+)\)\n\n((?:> [^\n]*\n)+)\n(.*?)(?=\n## |\Z)", re.MULTILINE | re.DOTALL
-)
-
-
-@cache
-def note_entries() -> dict[str, NoteEntry]:
-    """All codes."""
-    entries = NOTE_ENTRY.findall((FOLDER / "notes.md").read_text(encoding="utf-8"))
-    return {
-        code: NoteEntry(severity, " ".join(quoted[2:-1].split("\n> ")), " ".join(paragraph.split()))
-        for code, severity, quoted, paragraph in entries
-    }

@@ -25,7 +25,7 @@ from nutdamp.planning.verdict import Verdict
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.equipment import GYRO, Loop
 from nutdamp.spacecraft.model import Spacecraft
-from nutdamp.views import decisions, tables
+from nutdamp.views import decisions, glance, tables
 from nutdamp.views import verdict as verdicts
 from nutdamp.views.decisions import heading
 from nutdamp.views.parts import opening, pulse_table, seconds, summary
@@ -183,7 +183,7 @@ def margin_table(rows: tuple[Margin, ...]) -> DataTable:
 def loop_screen(plan: LoopPlan, *, verbose: bool = True) -> RenderableType:
     """The screen of ``loop``."""
     run, judged = plan.flown_run, plan.verdict
-    (_, spent), (_, end) = decisions.cost(plan.flight.schedule)
+    (_, spent), (_, end) = glance.cost(plan.flight.schedule)
     fired = f"{spent}, last ends at {end}" if run.fired else "no firing"
     headline = Text.assemble(
         "LOOP ", (run.loop.law, "bold"), f": {fired}; first quiet {_settled(run)}"
@@ -197,7 +197,7 @@ def loop_screen(plan: LoopPlan, *, verbose: bool = True) -> RenderableType:
         "--plot loop.png · nutdamp disperse --loop",
         more=[
             margin_table(plan.margins).screen("screen"),
-            facts(decisions.end_rows(plan.flight, plan.aspects)),
+            facts(glance.end_rows(plan.flight, plan.aspects)),
         ],
         verbose=verbose,
     )

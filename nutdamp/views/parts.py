@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import accumulate
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from rich.console import Group, RenderableType
@@ -18,7 +18,7 @@ from rich.text import Text
 
 from nutdamp.common.results import Note
 from nutdamp.errors import listed
-from nutdamp.flight.end_state import Aspect, at_start, spin_phases
+from nutdamp.flight.end_state import spin_phases
 from nutdamp.flight.propagation import Flight, Track, to_sun_pulse
 from nutdamp.physics import attitude
 from nutdamp.planning.plan import NO_NUTATION
@@ -57,6 +57,9 @@ from nutdamp.views.text import (
     small_angle,
     steering,
 )
+
+if TYPE_CHECKING:
+    from nutdamp.flight.cones import Aspect
 
 MILLISECONDS = 3  # digits of a second that tables show of a date
 
@@ -565,6 +568,8 @@ def required(spacecraft: Spacecraft) -> str:
 
 def derived_table(spacecraft: Spacecraft, more: Iterable[tuple[str, str]] = ()) -> Table:
     """Derived quantities of the spacecraft at t = 0, and ``more`` of them (name, value)."""
+    from nutdamp.flight.cones import at_start
+
     return facts([*_derived(spacecraft), *aspect_facts(at_start(spacecraft)), *more])
 
 

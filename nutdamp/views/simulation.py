@@ -23,13 +23,14 @@ from nutdamp.common.results import Note, note
 from nutdamp.errors import BadRequest
 from nutdamp.files.tabular import number
 from nutdamp.flight import end_state, propagation
-from nutdamp.flight.end_state import LEGENDRE, aspects
+from nutdamp.flight.cones import aspects
+from nutdamp.flight.end_state import LEGENDRE
 from nutdamp.flight.propagation import IMPULSE_SUM, REAL_WIDTHS, Flight
 from nutdamp.flight.verification import AGREE, AS_FLOWN, IDEAL, WITHOUT, Conservation, Verification
 from nutdamp.physics.attitude import full_turn
-from nutdamp.planning.decision import Simulation
-from nutdamp.planning.notes import TELLING, model_warnings, verdict_notes
+from nutdamp.planning.notes import TELLING, verdict_notes
 from nutdamp.planning.plan import Plan
+from nutdamp.planning.simulation import Simulation, model_warnings
 from nutdamp.planning.verdict import Light
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.requirements import Part

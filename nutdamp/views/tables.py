@@ -23,7 +23,6 @@ from rich.table import Table
 from rich.text import Text
 
 from nutdamp.common.numerics import MISSING
-from nutdamp.files.tabular import csv_text, number
 from nutdamp.units import screen_unit
 
 NARROW = 60  # characters below which a table becomes one block a row
@@ -339,6 +338,8 @@ class DataTable:
 
     def csv(self) -> str:
         """A CSV file; unknown values are empty."""
+        from nutdamp.files.tabular import csv_text, number
+
         names, _, rows = self._fields()
         texts = (
             [number(cell) if isinstance(cell, float) else str(cell) for cell in row] for row in rows

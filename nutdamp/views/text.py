@@ -11,7 +11,9 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
-from typing import Any
+from functools import cache
+from pathlib import Path
+from typing import Any, NamedTuple
 
 from rich.text import Text
 
@@ -22,7 +24,8 @@ from nutdamp.common.results import Note, Value
 from nutdamp.errors import listed
 from nutdamp.schemes.catalogue import NAMES
 from nutdamp.units import screen_unit
-from nutdamp.views.guide import note_entries
+
+CATALOGUE = Path(__file__).parents[1] / "guide" / "notes.md"
 
 LONG = (  # units of long times: their length, s, and the time, s, up to which they are used
     ("s", 1.0, 3600.0),
@@ -201,6 +204,31 @@ UNITS: dict[
     "_bar": lambda value: quantity(value, "bar"),
     "_s": duration,
 }
+
+
+class NoteEntry(NamedTuple):
+    """A code of the catalogue: its severity, its sentence with names of values in braces, and what
+    it means.
+    """
+
+    severity: str
+    sentence: str
+    paragraph: str
+
+
+NOTE_ENTRY = re.compile(
+    r"^## (\S+) \((\w+)\)\n\n((?:> [^\n]*\n)+)\n(.*?)(?=\n## |\Z)", re.MULTILINE | re.DOTALL
+)
+
+
+@cache
+def note_entries() -> dict[str, NoteEntry]:
+    """All codes of the catalogue."""
+    entries = NOTE_ENTRY.findall(CATALOGUE.read_text(encoding="utf-8"))
+    return {
+        code: NoteEntry(severity, " ".join(quoted[2:-1].split("\n> ")), " ".join(paragraph.split()))
+        for code, severity, quoted, paragraph in entries
+    }
 
 
 def severity(note: Note) -> str:

@@ -23,7 +23,7 @@ from nutdamp.planning.verdict import Light, Verdict
 from nutdamp.schemes.catalogue import OPTIMAL
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.requirements import DAMPED_ANGLE, SAME_COST, Part
-from nutdamp.views.decisions import FARTHER, heading, plan_json
+from nutdamp.views.decisions import heading, plan_json
 from nutdamp.views.parts import derived_table, named, pulse_table, requested, summary
 from nutdamp.views.tables import (
     TEXT,
@@ -39,6 +39,8 @@ from nutdamp.views.tables import (
 from nutdamp.views.text import cost, degrees, fixed, sentences, small_angle
 from nutdamp.views.verdict import coloured, lead, share_text, verdict_json
 
+# factor of distance by which H ends farther off for a plan to be worse in it
+FARTHER = 1.1
 ROWS = 18  # points on the default screen, at most: evenly some of more
 # share of its time by which a plan that costs as much has to end sooner to be worth a remark
 SOONER = 0.05

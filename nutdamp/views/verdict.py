@@ -15,7 +15,7 @@ from rich.text import Text
 
 from nutdamp.common.numerics import MISSING, RPM
 from nutdamp.planning.decision import Comparison
-from nutdamp.planning.notes import reasons, strays
+from nutdamp.planning.notes import reasons
 from nutdamp.planning.verdict import Cases, Light, Line, Status, Verdict
 from nutdamp.spacecraft.model import required_share
 from nutdamp.spacecraft.requirements import Bound, Part
@@ -126,7 +126,11 @@ def statement(verdict: Verdict) -> str:
     cases, spacecraft = verdict.cases, verdict.spacecraft
     if verdict.status is Status.NO_PLAN:
         return verdict.why or "no plan is feasible"
-    broken = " and ".join(strays(aspect) for aspect in verdict.aspects if not aspect.kept)
+    broken = ""
+    if not all(aspect.kept for aspect in verdict.aspects):
+        from nutdamp.planning.causes import strays  # a cone is broken
+
+        broken = " and ".join(strays(aspect) for aspect in verdict.aspects if not aspect.kept)
     counted = ""
     if cases is not None and cases.complying is not None:
         counted = (

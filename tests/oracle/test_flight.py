@@ -39,7 +39,6 @@ from nutdamp.montecarlo.cases import DispersedModel
 from nutdamp.montecarlo.propagated import ClosedForm
 from nutdamp.montecarlo.statistics import measure
 from nutdamp.physics import attitude
-from nutdamp.physics.triaxial import arc_cones
 from nutdamp.spacecraft.model import Attitude, Inertia, Spacecraft, Vector
 from nutdamp.spacecraft.schedule import Pulse, Schedule, channel_pulse
 from nutdamp.views.decisions import residual_json, spacecraft_json
@@ -407,13 +406,14 @@ def test_the_cones_of_an_arc_are_those_where_its_nutation_is_largest(
     motion = reference.coast(moments, start, np.zeros(3), np.linspace(0.01, 40.0, ROWS))
     angles = [reference.nutation(moments, one.rates, sense) for one in motion]
     widest = int(np.argmax(angles))
-    cones = arc_cones(moments, rates, sense)
+    inertia = Inertia(moments)
+    cones = inertia.cones(np.array(rates), sense)
     assert cones.nutation == pytest.approx(angles[widest], rel=2e-5)
     assert cones.body == pytest.approx(
         reference.angle(motion[widest].rates, np.array([0.0, 0.0, sense])), rel=2e-5
     )
     # From the other end of the axis the largest angle is π less the least.
-    assert arc_cones(moments, rates, -sense).nutation == pytest.approx(
+    assert inertia.cones(np.array(rates), -sense).nutation == pytest.approx(
         math.pi - min(angles), rel=2e-5
     )
     left = propagation.flown(

@@ -36,8 +36,9 @@ from nutdamp.errors import Infeasible
 from nutdamp.files.reader import load_spacecraft
 from nutdamp.flight import propagation
 from nutdamp.planning import plan as planning
+from nutdamp.planning.causes import infeasibility
 from nutdamp.planning.decision import Comparison, compare, usual
-from nutdamp.planning.notes import comparison_warnings, infeasibility, plan_notes
+from nutdamp.planning.notes import comparison_warnings, plan_notes
 from nutdamp.planning.plan import Plan, Standing
 from nutdamp.planning.screening import FlownPlan
 from nutdamp.planning.verdict import Cases, Status

@@ -35,8 +35,6 @@ from nutdamp.spacecraft.schedule import Pulse, Schedule
 
 T = TypeVar("T")
 
-results.register("nutdamp.page.results")  # which has the words of a plan that is infeasible
-
 
 def spinner(
     A: float = 120.0,

@@ -6,7 +6,7 @@ import numpy as np
 
 from nutdamp.flight import propagation
 from nutdamp.planning import plan as planning
-from nutdamp.planning.notes import infeasibility
+from nutdamp.planning.causes import infeasibility
 from nutdamp.schemes.catalogue import Options
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.schedule import Schedule

@@ -8,8 +8,7 @@ from support.builders import present
 
 from nutdamp.errors import listed
 from nutdamp.files import fields
-from nutdamp.files.keys import SpacecraftFile
-from nutdamp.files.study_keys import QUANTITIES, ToleranceSection, unit_kinds
+from nutdamp.files.keys import QUANTITIES, SpacecraftFile, ToleranceSection, unit_kinds
 from nutdamp.units import KINDS, Kind
 from nutdamp.views.guide import FOLDER
 

@@ -10,7 +10,7 @@ import numpy as np
 from support.builders import Outcome, off_target, spinner
 from support.checker import violations
 
-from nutdamp.planning.notes import infeasibility
+from nutdamp.planning.causes import infeasibility
 from nutdamp.planning.plan import Plan, plan
 from nutdamp.schemes.catalogue import OptimalOptions
 from nutdamp.schemes.optimal import search

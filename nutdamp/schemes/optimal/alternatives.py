@@ -34,12 +34,11 @@ from nutdamp.schemes.catalogue import (
     SchemeOptions,
     TwoPulseOptions,
 )
-from nutdamp.schemes.correction import Correction, bounded_step
+from nutdamp.schemes.correction import Correction, SymmetricModel, bounded_step, model_of
 from nutdamp.schemes.optimal.descent import Task
 from nutdamp.schemes.optimal.linear_program import GrowingProgram, Shares
 from nutdamp.schemes.optimal.problem import LEFT, UNMET, Problem
 from nutdamp.schemes.optimal.refinement import AROUND, Influence, along, misses, small_angles
-from nutdamp.schemes.sequential import SymmetricModel, model_of
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import Windows, keeps_limits
 from nutdamp.spacecraft.equipment import Channel

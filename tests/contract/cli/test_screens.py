@@ -22,8 +22,8 @@ from support.cases import deep, spread
 from support.commands import call, printed
 from support.process import Run
 
-from nutdamp.cli import screen
-from nutdamp.cli.main import stoppable
+from nutdamp.cli import main
+from nutdamp.cli.studies import stoppable
 from nutdamp.common import work
 from nutdamp.files.reader import example_text
 from nutdamp.planning import plan as planning
@@ -193,8 +193,8 @@ class Status(NamedTuple):
 @pytest.fixture
 def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
     clock = Clock()
-    monkeypatch.setattr(screen, "clock", clock)
-    monkeypatch.setattr(screen, "threading", clock)
+    monkeypatch.setattr(main, "clock", clock)
+    monkeypatch.setattr(main, "threading", clock)
     return clock
 
 
@@ -210,7 +210,7 @@ def test_progress_is_shown_after_a_second_and_a_time_after_a_tenth_of_the_steps(
 ) -> None:
     monkeypatch.setattr(sys, "stderr", Terminal())
     seen: list[str] = []
-    with screen.working("verifying"):
+    with main.working("verifying"):
         clock.set(0.9)
         assert not lines
         clock.set(1.0)
@@ -257,7 +257,7 @@ def test_no_progress_is_shown_in_a_pipe_or_where_it_is_not_wanted(
     quiet: bool,
 ) -> None:
     monkeypatch.setattr(sys, "stderr", stream)
-    with screen.working("planning", quiet=quiet), work.steps(2.0) as task:
+    with main.working("planning", quiet=quiet), work.steps(2.0) as task:
         task.reach(1.0)
         clock.set(60.0)
         assert (lines, clock.timers, stream.getvalue()) == ([], [], "")

@@ -27,7 +27,7 @@ from support.commands import (
 from support.golden import check_text
 from support.process import Run
 
-from nutdamp.cli.screen import visible
+from nutdamp.cli.main import visible
 from nutdamp.files.reader import example_text
 
 pytestmark = pytest.mark.usefixtures("plans_shared")

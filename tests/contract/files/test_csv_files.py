@@ -39,7 +39,7 @@ from nutdamp.files.telemetry import read_telemetry
 from nutdamp.flight import propagation
 from nutdamp.physics.thruster import Tank
 from nutdamp.planning import plan as planning
-from nutdamp.planning.notes import infeasibility
+from nutdamp.planning.causes import infeasibility
 from nutdamp.schemes.block_model import fired
 from nutdamp.spacecraft.equipment import Block, Steerable
 from nutdamp.spacecraft.model import Limits

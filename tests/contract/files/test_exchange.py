@@ -30,9 +30,8 @@ from nutdamp.files.reader import read_spacecraft
 from nutdamp.flight import propagation
 from nutdamp.physics import attitude
 from nutdamp.physics.thruster import Tank
-from nutdamp.physics.triaxial import arc_cones
 from nutdamp.planning import plan as planning
-from nutdamp.spacecraft.model import Disturbance, Limits, Spacecraft, Vector
+from nutdamp.spacecraft.model import Disturbance, Inertia, Limits, Spacecraft, Vector
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse, on_command
 from nutdamp.views.exchange import export_notes, export_text, lacking
 from nutdamp.views.simulation import SPINS, spin_table
@@ -340,7 +339,7 @@ def test_the_cones_that_the_script_prints_are_those_of_the_residual(
     exec(compile(ast.Module([cones], []), "fly.py", "exec"), names)
     for rates in ([0.4, 0.1, 2.0], [0.1, -0.4, -2.0], [1e-6, 1e-7, 2.0]):
         for sense in (1.0, -1.0):
-            expected = tuple(arc_cones(moments, rates, sense))
+            expected = tuple(Inertia(moments).cones(np.array(rates), sense))
             assert names["largest_cones"](np.array(rates), sense) == pytest.approx(
                 expected, rel=1e-9
             )

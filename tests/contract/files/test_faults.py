@@ -22,8 +22,8 @@ from support.golden import check_text
 import nutdamp
 from nutdamp.errors import Fault, FaultyFile
 from nutdamp.files.editing import overlay, parse_setting, settings_of
+from nutdamp.files.keys import LoopFaultsSection, LoopSection, LoopSensorSection
 from nutdamp.files.reader import example_text, json_schema, load_spacecraft, read_spacecraft
-from nutdamp.files.study_keys import LoopFaultsSection, LoopSection, LoopSensorSection
 from nutdamp.files.yaml import read_tree
 
 

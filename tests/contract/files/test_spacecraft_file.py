@@ -32,8 +32,8 @@ from nutdamp.montecarlo.study import Results, run, study_of
 from nutdamp.physics import attitude
 from nutdamp.physics.thruster import Cold, Tank, Trapezoid
 from nutdamp.planning import plan as planning
+from nutdamp.planning.causes import broken_limits, infeasibility
 from nutdamp.planning.decision import compare
-from nutdamp.planning.notes import broken_limits, infeasibility
 from nutdamp.schemes.catalogue import CLASSIC
 from nutdamp.spacecraft.equipment import Channel, Steerable
 from nutdamp.spacecraft.model import Disturbance, Limits, Spacecraft

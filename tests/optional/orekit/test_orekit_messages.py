@@ -14,7 +14,7 @@ from support.contract import PUSHED, pushing, valved, velocity_change
 
 from nutdamp.common.time import Epoch
 from nutdamp.flight import propagation
-from nutdamp.physics import attitude, sun
+from nutdamp.physics import attitude, sky
 from nutdamp.views.exchange import export_text
 
 pytestmark = [pytest.mark.orekit, pytest.mark.usefixtures("plans_shared")]
@@ -332,5 +332,5 @@ def test_orekit_sees_it_there(text: str) -> None:
     provider = messages.java("org.orekit.bodies.AnalyticalSolarPositionProvider")()
     frame = messages.java("org.orekit.frames.FramesFactory").getEME2000()
     seen = messages.components(provider.getPosition(messages.date(text), frame))
-    expected = sun.direction(Epoch.parse(f"{text}Z").days_of_j2000)
+    expected = sky.sun_direction(Epoch.parse(f"{text}Z").days_of_j2000)
     assert math.degrees(attitude.angle_between(seen, expected)) < 0.1

@@ -20,10 +20,11 @@ from nutdamp.common import work
 from nutdamp.common.time import FIRST_DAY, LEAP_DAYS, Epoch
 from nutdamp.files.reader import load_spacecraft
 from nutdamp.flight import dynamics, propagation
-from nutdamp.physics import attitude, sun
+from nutdamp.physics import attitude, sky
 from nutdamp.planning import plan as planning
+from nutdamp.planning.causes import CUT, infeasibility
 from nutdamp.planning.decision import compare
-from nutdamp.planning.notes import CUT, comparison_warnings, infeasibility, plan_notes
+from nutdamp.planning.notes import comparison_warnings, plan_notes
 from nutdamp.schemes.optimal import linear_program
 from nutdamp.spacecraft.model import Disturbance, Goal, Limits
 from nutdamp.spacecraft.schedule import Schedule
@@ -304,7 +305,7 @@ def test_the_direction_of_the_sun_is_right_to_a_hundredth_of_a_degree_from_1972_
     """Against ERFA (golden/make_golden.py)."""
     rows = np.loadtxt(places.GOLDEN / "sun.csv", delimiter=",", skiprows=1)
     errors = [
-        float(attitude.angle_between(sun.direction(days), row)) for days, *row in rows.tolist()
+        float(attitude.angle_between(sky.sun_direction(days), row)) for days, *row in rows.tolist()
     ]
     assert len(errors) == 100
     assert math.degrees(max(errors)) < 0.01

@@ -24,11 +24,13 @@ from support.spinners import commanded
 import nutdamp
 from nutdamp.files.reader import read_spacecraft
 from nutdamp.flight import propagation
-from nutdamp.flight.end_state import ANGLE, aspects, deviations, seen_at, tolerated
+from nutdamp.flight.cones import aspects
+from nutdamp.flight.end_state import ANGLE, deviations, seen_at, tolerated
 from nutdamp.flight.propagation import by_impulses, flown
 from nutdamp.physics import attitude
 from nutdamp.planning import plan as planning
-from nutdamp.planning.notes import infeasibility, plan_notes, reasons
+from nutdamp.planning.causes import infeasibility
+from nutdamp.planning.notes import plan_notes, reasons
 from nutdamp.planning.verdict import Status
 from nutdamp.spacecraft.equipment import Steerable
 from nutdamp.spacecraft.model import Disturbance, Goal, Keep, Limits, Requirement, Spacecraft

@@ -32,6 +32,7 @@ from nutdamp.flight import propagation
 from nutdamp.physics import attitude
 from nutdamp.physics import body as rigid_body
 from nutdamp.planning import plan as planning
+from nutdamp.planning.simulation import extremes
 from nutdamp.spacecraft.model import Attitude, Spacecraft
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
 
@@ -184,7 +185,7 @@ def test_ranges_of_the_spin_axis(
 ) -> None:
     """By right ascensions and declinations, deg."""
     r, d = np.radians(places).T
-    found = propagation.extremes(
+    found = extremes(
         [pointing(np.column_stack([np.cos(d) * np.cos(r), np.cos(d) * np.sin(r), np.sin(d)]))]
     )
     assert {name: np.degrees(getattr(found, name)) for name in expected} == {
@@ -199,7 +200,7 @@ def test_ranges_of_the_spin_axis(
 def test_free_nutation_circles_h_at_the_nutation_angle(spin: float) -> None:
     body = spinner(spin=spin, degrees=12.0)
     until = body.inertial_period
-    found = propagation.extremes([propagation.flown(body, Schedule(), until).sampled(4001, until)])
+    found = extremes([propagation.flown(body, Schedule(), until).sampled(4001, until)])
     for ends in (found.x, found.y):
         assert np.degrees(ends) == pytest.approx(
             [-12, 12], abs=1e-4
@@ -220,7 +221,7 @@ def test_extremes_in_the_frame_of_the_file(right_ascension: float) -> None:
     place = np.array([[0, math.sin(r), math.cos(r)], [0, -math.cos(r), math.sin(r)], [1, 0, 0]])
     facing = attitude.from_matrix(place @ attitude.matrix(spinner(degrees=12.0).initial.quaternion))
     there = spinner(degrees=12.0, attitude=Attitude(facing))
-    found = propagation.extremes([propagation.flown(there, Schedule(), until).sampled(4001, until)])
+    found = extremes([propagation.flown(there, Schedule(), until).sampled(4001, until)])
     west = (right_ascension - 12) % 360
     assert np.degrees(found.declination) == pytest.approx([-12, 12], abs=1e-4)
     assert np.degrees(found.right_ascension) == pytest.approx([west, west + 24], abs=1e-4)
@@ -260,19 +261,16 @@ def test_extremes_of_pieces_are_those_of_the_whole() -> None:
     generator = np.random.default_rng(4)
     for count in (1, 5, 40, 500):
         whole = made.sampled(count, UNTIL)
-        found = propagation.extremes([whole])
+        found = extremes([whole])
         assert (
-            propagation.extremes(
-                cut(whole, np.sort(generator.integers(0, len(whole.t), 3)).tolist())
-            )
-            == found
+            extremes(cut(whole, np.sort(generator.integers(0, len(whole.t), 3)).tolist())) == found
         )
         assert (found.rows, found.until) == (len(whole.t), UNTIL)
     # Of what is equal but for rounding the first time counts.
     angles = np.array([0.1, 0.3, 0.2, 0.3 + 0.4 * SAME_ANGLE, 0.25, 0.3 + 0.9 * SAME_ANGLE, 0.1])
     whole = pointing(np.column_stack([np.sin(angles), np.zeros(7), np.cos(angles)]))
     for size in (1, 2, 3, 7):
-        found = propagation.extremes(cut(whole, range(size, 7, size)))
+        found = extremes(cut(whole, range(size, 7, size)))
         assert found.farthest == pytest.approx((0.3, 1.0), abs=1e-15)
         assert found.nearest == pytest.approx((0.1, 0.0), abs=1e-15)
 
@@ -298,7 +296,7 @@ def test_memory_does_not_grow_with_the_rows() -> None:
     for samples in (150_000, 450_000):
         tracemalloc.start()
         try:
-            propagation.extremes(made.pieces(samples, UNTIL))
+            extremes(made.pieces(samples, UNTIL))
             with io.BytesIO() as nowhere:
                 nowhere.write = len  # type: ignore[method-assign, assignment]
                 write_track(made.pieces(samples, UNTIL), made.spacecraft.inertia, nowhere)

@@ -35,6 +35,7 @@ from nutdamp.flight.verification import (
     verify,
 )
 from nutdamp.planning import plan as planning
+from nutdamp.planning.simulation import unrounded
 from nutdamp.schemes.catalogue import Options
 from nutdamp.spacecraft.equipment import Steerable
 from nutdamp.spacecraft.model import Disturbance, Inertia, Limits, Spacecraft
@@ -100,7 +101,7 @@ def test_in_the_axes_of_the_file_too_and_the_budget_names_each_imperfection(
     planned: Planner,
 ) -> None:
     plan = planned(TILTED, "two-pulse")
-    verified = verify(TILTED, plan.pulses, planning.unrounded(plan))
+    verified = verify(TILTED, plan.pulses, unrounded(plan))
     assert confirmed(verified, 1e-11)
     check_text("flight.error-budget", "\n".join(left_in(verified)))
     assert left_in(verified)[AS_FLOWN] == present(plan.flown).nutation

@@ -24,7 +24,7 @@ from support.spinners import commanded, flown_by_reference
 import nutdamp
 from nutdamp.files.schedules import read_plan
 from nutdamp.flight import propagation
-from nutdamp.flight.end_state import aspects
+from nutdamp.flight.cones import aspects
 from nutdamp.montecarlo.cases import DispersedModel
 from nutdamp.montecarlo.propagated import ClosedForm, RealWidths, nodes_for
 from nutdamp.montecarlo.statistics import OUTPUTS, first_order, measure, vectors

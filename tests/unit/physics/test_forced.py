@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from support import reference
 from support.spinning import BODIES, driven, plain_spinners, spinners, turning
 
-from nutdamp.physics import response
+from nutdamp.physics import driven as forced
 
 PROLATE = (120.0, 80.0, 3.0)
 RATE = (120.0 - 80.0) / 120.0 * 3.0
@@ -33,7 +33,7 @@ def rotating(
     *torques: tuple[complex, float],
 ) -> np.ndarray:
     sizes, rates = (np.array(part) for part in zip(*torques, strict=True))
-    return response.rotating_torques(
+    return forced.rotating_torques(
         np.array(times), omega0, (A - C) / A * spin, A, sizes.astype(complex), rates
     )
 
@@ -50,7 +50,7 @@ def test_stepwise_torques_8_9_10(A: float, C: float, spin: float) -> None:
             (A, A, C), motions[-1], torque, np.array([0.5, 1.0]) * (end - begin)
         )
         times += [0.5 * (begin + end), end]
-    omega, spins = response.stepwise_torque(np.array(times), 0.1 - 0.2j, spin, A, C, edges, torques)
+    omega, spins = forced.stepwise_torque(np.array(times), 0.1 - 0.2j, spin, A, C, edges, torques)
     expected = np.array([motion.rates for motion in motions])
     assert np.abs(np.column_stack([omega.real, omega.imag, spins]) - expected).max() < 1e-11
 
@@ -61,7 +61,7 @@ def test_stepwise_torques_8_9_10(A: float, C: float, spin: float) -> None:
     st.floats(0.01, 15),
 )
 def test_phase_integral_by_quadrature(slope: float, bend: float, length: float) -> None:
-    integral = response.phase_integral(np.array([slope]), np.array([bend]), np.array([length]))[0]
+    integral = forced.phase_integral(np.array([slope]), np.array([bend]), np.array([length]))[0]
     edges = np.linspace(0.0, length, 400)
     nodes, weights = np.polynomial.legendre.leggauss(24)
     half = 0.5 * (edges[1] - edges[0])
@@ -77,11 +77,11 @@ def test_constant_torque_11_circles_the_centre_of_its_pole_cone() -> None:
     A, C, spin = PROLATE
     omega0 = 0.05 + 0.1j
     torque = 5.0 - 2.0j
-    centre = response.steady_response(A, (A - C) / A * spin, torque)
+    centre = forced.steady_response(A, (A - C) / A * spin, torque)
     # Magnus' centre: ω1P = M2/((A-C)ω3), ω2P = -M1/((A-C)ω3)
     assert centre == pytest.approx(complex(torque.imag, -torque.real) / ((A - C) * spin), rel=1e-14)
     times = np.linspace(0.0, 12.0, 40)
-    omega, _ = response.stepwise_torque(
+    omega, _ = forced.stepwise_torque(
         times,
         omega0,
         spin,
@@ -99,7 +99,7 @@ def test_permanent_rotation_13_stays_and_has_the_euler_angles_14(
     A: float, C: float, spin: float
 ) -> None:
     torque = 5.0 - 2.0j
-    omega, rate, theta, phi = response.permanent_rotation(A, C, spin, torque)
+    omega, rate, theta, phi = forced.permanent_rotation(A, C, spin, torque)
     start = start_of(omega, spin)
     (later,) = reference.coast((A, A, C), start, reference.vector(5.0, -2.0, 0.0), np.array([7.0]))
     assert later.rates == pytest.approx(start.rates, abs=1e-13)
@@ -141,10 +141,10 @@ def test_the_resonant_torque_reaches_a_cone_when_it_says() -> None:
     A, C, spin = PROLATE
     torque = 0.5 + 0.2j
     for start in (0.0, 0.03 - 0.02j, -0.05 + 0.01j):
-        time = response.resonant_time(A, C * spin, start, torque, math.radians(4.0))
+        time = forced.resonant_time(A, C * spin, start, torque, math.radians(4.0))
         (omega,) = rotating([time], start, A, C, spin, (torque, -RATE))
         assert math.atan2(A * abs(omega), C * spin) == pytest.approx(math.radians(4.0), rel=1e-12)
-    assert response.resonant_time(A, C * spin, 1.0, torque, 0.01) == 0.0
+    assert forced.resonant_time(A, C * spin, 1.0, torque, 0.01) == 0.0
 
 
 @pytest.mark.parametrize("turn", [0.0, 1.0, 2.5])
@@ -169,10 +169,10 @@ def test_26_opposite_rotation_and_its_straight_pole_curves(turn: float) -> None:
 def test_27_nearly_space_fixed_torque_and_its_beat() -> None:
     A, C, spin, torque = 100.0, 10.0, 3.0, 0.4
     forced_term = 1j * torque / (A * spin) * A / C
-    assert response.steady_response(A, (A - C) / A * spin, torque, -spin) == pytest.approx(
+    assert forced.steady_response(A, (A - C) / A * spin, torque, -spin) == pytest.approx(
         forced_term, rel=1e-13
     )
-    largest, period = response.beat(A, (A - C) / A * spin, torque, -spin)
+    largest, period = forced.beat(A, (A - C) / A * spin, torque, -spin)
     omega = rotating(np.linspace(0.0, period, 2001), 0.0, A, C, spin, (torque, -spin))
     assert np.abs(omega).max() == pytest.approx(largest, rel=1e-6)
     assert abs(omega[-1]) < 1e-12 * largest
@@ -180,9 +180,9 @@ def test_27_nearly_space_fixed_torque_and_its_beat() -> None:
 
 
 def test_a_sphere_and_a_resonance_have_no_steady_response() -> None:
-    assert math.isinf(abs(response.steady_response(100.0, 0.0, 1.0)))
-    assert response.beat(100.0, 0.0, 1.0, 0.0) == (math.inf, math.inf)
-    assert response.permanent_rotation(100.0, 100.0, 3.0, 1.0)[2] == pytest.approx(math.pi / 2)
+    assert math.isinf(abs(forced.steady_response(100.0, 0.0, 1.0)))
+    assert forced.beat(100.0, 0.0, 1.0, 0.0) == (math.inf, math.inf)
+    assert forced.permanent_rotation(100.0, 100.0, 3.0, 1.0)[2] == pytest.approx(math.pi / 2)
 
 
 @pytest.mark.parametrize("torque", [2.0 + 0.0j, -1.0 + 3.0j])
@@ -192,7 +192,7 @@ def test_precession_k14_k15_is_steady(A: float, C: float, spin: float, torque: c
     once steady.
     """
     despun, body = (
-        response.steady_response(A, (A - C) / A * spin, torque, rate) for rate in (-spin, 0.0)
+        forced.steady_response(A, (A - C) / A * spin, torque, rate) for rate in (-spin, 0.0)
     )
     assert despun == pytest.approx(1j * torque / (C * spin))
     assert body == pytest.approx(-1j * torque / ((A - C) * spin))

@@ -19,9 +19,11 @@ from support.spinning import EPS, Triple, about, arc, driven, series, turning
 
 from nutdamp.common.numerics import cos_sin
 from nutdamp.errors import Infeasible
+from nutdamp.montecarlo.propagated import Pulses
+from nutdamp.montecarlo.propagated import fly_pulses as fly
 from nutdamp.physics import attitude
-from nutdamp.physics import series as taylor
-from nutdamp.physics.motion import BLOCK, MotionStretch, Pulses, advance, fly, polynomials
+from nutdamp.physics import driven as taylor
+from nutdamp.physics.motion import BLOCK, MotionStretch, advance, polynomials
 from nutdamp.physics.series import NOTHING, Bodies, Falling, Forcing
 from nutdamp.physics.sky import AxisWatch
 

@@ -91,7 +91,8 @@ def extremes(
     """Least and largest nutation angle."""
     sense = math.copysign(1.0, rates0[2])
     least, largest = (
-        triaxial.arc_cones(moments, rates0, end * sense).nutation for end in (-1.0, 1.0)
+        float(triaxial.widest_cones(np.array(moments), np.array(rates0), end * sense)[0])
+        for end in (-1.0, 1.0)
     )
     return math.pi - least, largest
 

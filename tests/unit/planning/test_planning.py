@@ -33,8 +33,9 @@ from nutdamp.flight import end_state
 from nutdamp.flight.propagation import by_impulses
 from nutdamp.physics import attitude
 from nutdamp.planning import plan as planning
+from nutdamp.planning.causes import broken_limits, infeasibility
 from nutdamp.planning.decision import compare
-from nutdamp.planning.notes import broken_limits, infeasibility, plan_notes, reasons
+from nutdamp.planning.notes import plan_notes, reasons
 from nutdamp.planning.plan import Plan, plan
 from nutdamp.schemes import catalogue, routes, two_pulse
 from nutdamp.spacecraft.constraints import Limit, Windows, breaches, keeps_limits

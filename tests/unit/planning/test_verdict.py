@@ -49,15 +49,9 @@ from nutdamp.flight.propagation import by_impulses
 from nutdamp.montecarlo.study import Results, run, study_of
 from nutdamp.planning import plan as planning
 from nutdamp.planning import tradeoff
+from nutdamp.planning.causes import hindrances, remaining
 from nutdamp.planning.decision import Comparison, compare
-from nutdamp.planning.notes import (
-    comparison_warnings,
-    hindrances,
-    plan_notes,
-    reasons,
-    remaining,
-    verdict_notes,
-)
+from nutdamp.planning.notes import comparison_warnings, plan_notes, reasons, verdict_notes
 from nutdamp.planning.verdict import Cases, Light, Status, cases_of
 from nutdamp.schemes import catalogue
 from nutdamp.spacecraft.equipment import Steerable

@@ -34,11 +34,13 @@ from nutdamp.errors import SenselessOption
 from nutdamp.files.reader import example_text, load_spacecraft, read_spacecraft
 from nutdamp.flight import propagation
 from nutdamp.physics import body as rigid_body
-from nutdamp.physics import motion, response
+from nutdamp.physics import driven, motion
 from nutdamp.planning import plan as planning
-from nutdamp.planning.notes import infeasibility, plan_notes
+from nutdamp.planning.causes import infeasibility
+from nutdamp.planning.notes import plan_notes
 from nutdamp.schemes.catalogue import CLASSIC, FourPulseOptions, Options
-from nutdamp.schemes.sequential import ImpulseBuilder, model_of, steady_omega
+from nutdamp.schemes.correction import model_of, steady_omega
+from nutdamp.schemes.sequential import ImpulseBuilder
 from nutdamp.spacecraft.equipment import Channel, Steerable
 from nutdamp.spacecraft.model import Disturbance, Inertia, Limits, Spacecraft
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
@@ -711,7 +713,7 @@ def test_steady_omega_is_the_forced_term_where_the_disturbance_beats_within_the_
     shape = spacecraft.inertia
     start = steady_omega(spacecraft, 0.0)
     torque = np.array([0.3 + 0.1j]), np.array([2.0])
-    moved = response.rotating_torques(
+    moved = driven.rotating_torques(
         times, start, shape.nutation_rate(spacecraft.spin), shape.A, *torque
     )
     assert moved == pytest.approx(

@@ -23,13 +23,14 @@ from nutdamp.common import work
 from nutdamp.errors import Infeasible
 from nutdamp.files.reader import read_spacecraft
 from nutdamp.flight import propagation
+from nutdamp.flight.cones import aspects
 from nutdamp.flight.dynamics import Supply
-from nutdamp.flight.end_state import aspects, left_by
+from nutdamp.flight.end_state import left_by
 from nutdamp.physics import attitude, precession
 from nutdamp.physics.thruster import Cold, Tank, Trapezoid, Valve
 from nutdamp.planning import plan as planning
+from nutdamp.planning.causes import infeasibility
 from nutdamp.planning.decision import usual
-from nutdamp.planning.notes import infeasibility
 from nutdamp.schemes.block_model import (
     BlockModel,
     BlockState,

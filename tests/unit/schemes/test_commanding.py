@@ -23,7 +23,7 @@ from nutdamp.montecarlo.cases import DispersedModel
 from nutdamp.montecarlo.propagated import ClosedForm, RealWidths
 from nutdamp.physics.thruster import Cold, Measured, Tank, Trapezoid, Valve
 from nutdamp.planning import plan as planning
-from nutdamp.planning.notes import infeasibility
+from nutdamp.planning.causes import infeasibility
 from nutdamp.schemes import valve_commands
 from nutdamp.schemes.catalogue import RHUMB_LINE, Options, RhumbLineOptions
 from nutdamp.schemes.correction import TAIL, Correction

@@ -29,10 +29,11 @@ from support.places import case
 from nutdamp.files.reader import example_text, load_spacecraft, read_spacecraft
 from nutdamp.physics import precession
 from nutdamp.planning import plan as planning
-from nutdamp.planning.notes import infeasibility, plan_notes
+from nutdamp.planning.causes import infeasibility
+from nutdamp.planning.notes import plan_notes
 from nutdamp.schemes.catalogue import Options, RhumbLineOptions
+from nutdamp.schemes.correction import model_of
 from nutdamp.schemes.rhumb_line import Train
-from nutdamp.schemes.sequential import model_of
 from nutdamp.spacecraft.equipment import Steerable
 from nutdamp.spacecraft.model import Attitude, Limits, Spacecraft
 from nutdamp.spacecraft.schedule import Schedule

@@ -26,7 +26,7 @@ from nutdamp.common import numerics
 from nutdamp.figures import overview
 from nutdamp.files.reader import example_text, load_spacecraft, read_spacecraft
 from nutdamp.flight import propagation
-from nutdamp.physics import attitude, response
+from nutdamp.physics import attitude, driven
 from nutdamp.planning import capability
 from nutdamp.planning import plan as planning
 from nutdamp.schemes import block_model, one_pulse
@@ -158,7 +158,7 @@ def test_the_forced_tilt_stays_and_the_beat_swells_from_rest() -> None:
         )
         assert swollen.max() == pytest.approx(present(effect.beat), rel=1e-4)
         assert swollen[-1] < 1e-12
-        steady = response.steady_response(A, (A - C) / A * 3.0, torque, rate)
+        steady = driven.steady_response(A, (A - C) / A * 3.0, torque, rate)
         assert effect.forced == pytest.approx(abs(steady), rel=1e-12)
         assert forced is None or effect.forced == pytest.approx(forced, rel=1e-12)
         if rate == -3.0:  # fixed in space: from rest H leaves at M/|H|

@@ -29,12 +29,12 @@ from support.process import Run
 import nutdamp
 from nutdamp.common.results import Note, Value, note
 from nutdamp.planning import plan as planning
+from nutdamp.planning.causes import infeasibility
 from nutdamp.planning.decision import TIES, WHY, Gain
 from nutdamp.planning.notes import (
     LEAST_CODES,
     alternatives,
     comparison_warnings,
-    infeasibility,
     plan_notes,
     reasons,
     verdict_notes,
@@ -45,10 +45,19 @@ from nutdamp.spacecraft.model import Disturbance, Goal, Limits, Requirement
 from nutdamp.spacecraft.schedule import Schedule
 from nutdamp.spacecraft.tolerances import SpinTolerance
 from nutdamp.views import verdict
-from nutdamp.views.guide import note_entries
 from nutdamp.views.loop import STOPS
 from nutdamp.views.parts import required
-from nutdamp.views.text import NAME, NOTE, REASON, WARNING, note_json, ordered, screen_line, text
+from nutdamp.views.text import (
+    NAME,
+    NOTE,
+    REASON,
+    WARNING,
+    note_entries,
+    note_json,
+    ordered,
+    screen_line,
+    text,
+)
 
 FIRED = spinner(channels=cross(8.0))
 WIDE = Goal(spin=3.0)

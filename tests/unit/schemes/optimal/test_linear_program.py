@@ -21,7 +21,7 @@ from support.places import case
 from nutdamp.common import work
 from nutdamp.files.reader import load_spacecraft
 from nutdamp.flight import propagation
-from nutdamp.planning.notes import infeasibility
+from nutdamp.planning.causes import infeasibility
 from nutdamp.planning.plan import plan
 from nutdamp.schemes.catalogue import OptimalOptions
 from nutdamp.schemes.optimal import linear_program, refinement

@@ -15,7 +15,8 @@ from support.cases import deep, spread, weekly
 from support.golden import check_text
 from support.optimal import as_found, flies, random_layout
 
-from nutdamp.planning.notes import infeasibility, plan_notes
+from nutdamp.planning.causes import infeasibility
+from nutdamp.planning.notes import plan_notes
 from nutdamp.planning.plan import plan
 from nutdamp.schemes.catalogue import OptimalOptions, Options
 from nutdamp.schemes.optimal.linear_program import Program

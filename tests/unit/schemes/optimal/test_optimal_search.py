@@ -24,7 +24,7 @@ from nutdamp.common import work
 from nutdamp.errors import Infeasible
 from nutdamp.files.reader import example_text, load_spacecraft, read_spacecraft
 from nutdamp.physics import attitude
-from nutdamp.planning.notes import infeasibility
+from nutdamp.planning.causes import infeasibility
 from nutdamp.planning.plan import plan
 from nutdamp.schemes import correction, two_pulse
 from nutdamp.schemes.catalogue import (
