@@ -409,11 +409,9 @@ def simulate_command(
 
     from nutdamp.api import simulate
     from nutdamp.planning.notes import model_warnings
-    from nutdamp.views.simulation import simulation_screen
 
     simulation = simulate(plan, until, flown=real, samples=samples)
     if job.silent:
         job.note(model_warnings(simulation.impulses, simulation.flown))
-    screen = partial(simulation_screen, simulation, verbose=verbose)
-    job.deliver(simulation, screen, more=job.carried(plan, at, simulation.until))
+    job.deliver(simulation, more=job.carried(plan, at, simulation.until), verbose=verbose)
     leave(simulation.verdict.status)

@@ -54,6 +54,7 @@ VIEWS = {
     "Comparison.reason": "page.results:comparison_reason",
     "RobustComparison.data": "page.results:robust_data",
     "Simulation.data": "views.simulation:simulation_json",
+    "Simulation.screen": "views.simulation:simulation_screen",
     **{f"Simulation.{what}": f"page.results:{what} shown" for what in ("line", "html")},
     "Trade.data": "views.trade:trade_json spacecraft fronts",
     "Trade.csv": "views.trade:trade_csv fronts",

@@ -99,38 +99,42 @@ EMPTY = (
 """Note on a case whose tank runs empty."""
 
 
-def dispersion_brief(flown: Dispersion) -> RenderableType:
-    """The default screen of ``disperse``: verdict, percentiles, what counts most, and the worst
-    case.
-    """
-    results, judged = flown.core, flown.verdict
-    head = [_title(results, flown.plan.scheme), *verdict_lines(judged, results), *_emptied(results)]
-    notes = [*main_causes(judged)]
-    case = f" · {again(results)} (worst)" * _varies(results)
-    notes += tolerances.unused_notes(results.study.model.inputs.unused)
-    return summary(
-        head, lambda **_: _percentiles(results).screen("screen"), notes, f"--plot cases.png{case}"
-    )
-
-
-def dispersion_screen(flown: Dispersion, *, worst: int) -> Group:
-    """All tables of ``disperse``."""
-    results, study, spacecraft = flown.core, flown.core.study, flown.plan.spacecraft
-    head = [_title(results, flown.plan.scheme), *verdict_lines(flown.verdict, results)]
-    parts: list[RenderableType] = [*head, Text(), _percentiles(results).screen("full")]
-    parts.append(angles_note(spacecraft))
-    if not results.exact:
-        parts.append(
-            Text(
-                "Percentiles are right to 0.006 % of their value; nominal and max are exact.",
-                style="dim",
-            )
+def dispersion_screen(flown: Dispersion, *, worst: int, verbose: bool = True) -> RenderableType:
+    """The screen of ``disperse``: verdict, percentiles, what counts most, and worst cases."""
+    results, judged, spacecraft = flown.core, flown.verdict, flown.plan.spacecraft
+    study = results.study
+    ideal = model_name([study.model.schedule]) == IDEAL_IMPULSES
+    how = "ideal impulses" if ideal else "full simulation"
+    drawn = f"cases: {results.done:,}, seed {study.seed}"
+    if results.redrawn:
+        drawn += f", unphysical and drawn again: {results.redrawn:,}"
+    title = named(study.model.spacecraft, f": {flown.plan.scheme}, {how}; {drawn}")
+    head = [title, *verdict_lines(judged, results)]
+    emptied = []
+    if results.emptied:
+        share = verdicts.percent(results.emptied / results.done, 1.0 - results.probability)
+        words = (f"empty too soon in {share} of cases", "red")
+        emptied.append(Text.assemble(("Tank ", "bold"), words, f": {EMPTY}."))
+    varies = any(entry.sigma for entry in study.model.inputs.drawn)
+    if not verbose:
+        case = f" · {again(results)} (worst)" if varies else ""
+        return summary(
+            [*head, *emptied],
+            lambda **_: _percentiles(results).screen("screen"),
+            [*main_causes(judged), *tolerances.unused_notes(study.model.inputs.unused)],
+            f"--plot cases.png{case}",
         )
+    parts = [*head, Text(), _percentiles(results).screen("full"), angles_note(spacecraft)]
+    if not results.exact:
+        right = "Percentiles are right to 0.006 % of their value; nominal and max are exact."
+        parts.append(Text(right, style="dim"))
     ends = facts(decisions.end_rows(flown.plan.flight, flown.plan.aspects))
     parts += [Text(), Text("Nominal case", style="bold"), ends]
-    events = [*cone_lines(results), *_emptied(results)]
-    parts += [*[Text()] * bool(events), *events, Text(), *tolerances.tolerance_budget(results)]
-    if worst and _varies(results):
+    events = [*cone_lines(results), *emptied]
+    if events:
+        parts += [Text(), *events]
+    parts += [Text(), *tolerances.tolerance_budget(results)]
+    if worst and varies:
         cases = case_table(study, FLOWN_OUTPUTS, _worst(results, worst), _effects(study))
         parts += [Text(), Text(cases.title, "bold"), cases.screen("screen")]
         parts.append(Text(f"Inspect one: nutdamp disperse, as here, with {again(results)}", "dim"))
@@ -180,26 +184,9 @@ def _worst(results: Results, count: int) -> list[CaseRow]:
     return [_flown(study, case, study.draws_of(case)) for case in cases]
 
 
-def _title(results: Results, scheme: str) -> Text:
-    study = results.study
-    how = (
-        "ideal impulses"
-        if model_name([study.model.schedule]) == IDEAL_IMPULSES
-        else "full simulation"
-    )
-    drawn = f"cases: {results.done:,}, seed {study.seed}"
-    if results.redrawn:
-        drawn += f", unphysical and drawn again: {results.redrawn:,}"
-    return named(study.model.spacecraft, f": {scheme}, {how}; {drawn}")
-
-
 def again(results: Results | LoopResults) -> str:
     """Options that show the worst case alone."""
     return f"--seed {results.study.seed} --case {results.worst.cases[0] + 1}"
-
-
-def _varies(results: Results) -> bool:
-    return any(entry.sigma for entry in results.study.model.inputs.drawn)
 
 
 # --- percentiles
@@ -363,14 +350,6 @@ def _cones(results: Results | LoopResults) -> Iterator[tuple[Keep, dict[str, Any
         entry |= {"broken_fraction": float(results.broken[index] / results.done)}
         entry |= {"least_deg": least_of_all, "largest_deg": largest_of_all}
         yield keep, entry | {"nominal_least_deg": least, "nominal_largest_deg": largest}
-
-
-def _emptied(results: Results) -> Iterator[Text]:
-    if results.emptied:
-        share = verdicts.percent(results.emptied / results.done, 1.0 - results.probability)
-        yield Text.assemble(
-            ("Tank ", "bold"), (f"empty too soon in {share} of cases", "red"), f": {EMPTY}."
-        )
 
 
 # --- cases

@@ -77,32 +77,50 @@ def _flown_case(study: LoopStudy, case: int, flown: FlownLoops) -> CaseRow:
     )
 
 
-def loop_cases_brief(flown: LoopDispersion) -> RenderableType:
-    """The default screen of ``disperse --loop``: verdict, percentiles, what counts most, and the
-    worst case.
-    """
-    results = flown.core
-    notes = list[Note]()
-    for output, part in zip(
-        SHARED, ("the time to quiet", "the largest nutation", "propellant"), strict=True
-    ):
-        shares = results.shares(output.name).items()  # the rest is noise
-        notes += leading(part, {in_words(name): share for name, share in shares if share >= MAIN})
-    notes += unused_notes(results.study.model.inputs.unused)
-    worst = [f"{dispersion.again(results)} (worst)"] * bool(len(results.worst.cases))
-    head = [*_title(results), *_verdicts(flown)]
-    table = _percentiles(results)
-    return summary(
-        head, lambda **_: table.screen("screen"), notes, " · ".join(["--csv cases.csv", *worst])
-    )
-
-
-def _title(results: LoopResults) -> list[RenderableType]:
-    study = results.study
+def loop_cases_screen(flown: LoopDispersion, *, worst: int, verbose: bool = True) -> RenderableType:
+    """The screen of ``disperse --loop``: verdict, percentiles, main causes, and worst cases."""
+    results, study = flown.core, flown.core.study
     drawn = f"cases: {results.done:,}, seed {study.seed}"
-    drawn += f", unphysical ones drawn again: {results.redrawn:,}" if results.redrawn else ""
+    if results.redrawn:
+        drawn += f", unphysical ones drawn again: {results.redrawn:,}"
     title = named(study.spacecraft, f": loop, 0 to {duration(study.until)}, {drawn}")
-    return [title, Text(described(study.law.loop))]
+    head = [title, Text(described(study.law.loop))]
+    percentiles = _percentiles(results)
+    unused = study.model.inputs.unused
+    if not verbose:
+        notes = list[Note]()
+        for output, part in zip(
+            SHARED, ("the time to quiet", "the largest nutation", "propellant"), strict=True
+        ):
+            shares = results.shares(output.name).items()  # the rest is noise
+            main = {in_words(name): share for name, share in shares if share >= MAIN}
+            notes += leading(part, main)
+        steps = "--csv cases.csv"
+        if len(results.worst.cases):
+            steps += f" · {dispersion.again(results)} (worst)"
+        return summary(
+            [*head, *_verdicts(flown)],
+            lambda **_: percentiles.screen("screen"),
+            [*notes, *unused_notes(unused)],
+            steps,
+        )
+    angles = dispersion.angles_note(study.spacecraft)
+    parts: list[RenderableType] = [*head, Text(), percentiles.screen("full"), angles, Text()]
+    parts += [*_verdicts(flown), *_shares(results)]
+    anew = ", ".join(
+        f"{in_words(entry.name)} {size_text(entry)}" for entry in study.model.of_firings
+    )
+    if anew:
+        parts.append(Text(f"Each firing draws anew, one sigma or bias: {anew}.", "dim"))
+    rows = _worst(results, worst)
+    if rows:
+        table = _cases(study, rows)
+        options = dispersion.again(results)
+        parts += [Text(), Text(table.title, style="bold"), table.screen("screen")]
+        parts.append(
+            Text(f"Inspect one: {options}; firing by firing: nutdamp loop {options}", "dim")
+        )
+    return Group(*parts, *unused_table(unused))
 
 
 def _verdicts(flown: LoopDispersion) -> Iterator[RenderableType]:
@@ -131,32 +149,6 @@ def _verdicts(flown: LoopDispersion) -> Iterator[RenderableType]:
     yield Text.assemble(
         ("Dead band ", "bold"), f"(at most {expected}, from the nominal sensor): kept in {share}."
     )
-
-
-def loop_cases_screen(flown: LoopDispersion, *, worst: int) -> Group:
-    """All tables of ``disperse --loop``."""
-    results, study = flown.core, flown.core.study
-    parts: list[RenderableType] = [*_title(results), Text(), _percentiles(results).screen("full")]
-    parts += [
-        dispersion.angles_note(study.spacecraft),
-        Text(),
-        *_verdicts(flown),
-        *_shares(results),
-    ]
-    anew = ", ".join(
-        f"{in_words(entry.name)} {size_text(entry)}" for entry in study.model.of_firings
-    )
-    if anew:
-        parts.append(Text(f"Each firing draws anew, one sigma or bias: {anew}.", "dim"))
-    rows = _worst(results, worst)
-    if rows:
-        table = _cases(study, rows)
-        options = dispersion.again(results)
-        parts += [Text(), Text(table.title, style="bold"), table.screen("screen")]
-        parts.append(
-            Text(f"Inspect one: {options}; firing by firing: nutdamp loop {options}", "dim")
-        )
-    return Group(*parts, *unused_table(study.model.inputs.unused))
 
 
 def _percentiles(results: LoopResults) -> DataTable:

@@ -379,8 +379,31 @@ BUDGET_NOTE = (  # note on `budget_table`
 )
 
 
-def verification_brief(plan: Plan, verification: Verification) -> RenderableType:
-    """The default screen of ``verify``: verdict, requirement, methods."""
+def verification_screen(plan: Plan, verification: Verification, *, verbose: bool) -> RenderableType:
+    """The screen of ``verify``: verdict, methods, and what each imperfection leaves."""
+    spacecraft, judged = plan.spacecraft, plan.verdict
+    confirmed = Light.GREEN if verification.agree else Light.RED
+    lead, about = verdicts.headline(judged)
+    head = [
+        parts.named(spacecraft, f": {plan.scheme}; Δ: maximum difference from the flown motion"),
+        verdicts.coloured(verdict(verification), confirmed),
+        Text.assemble((lead, verdicts.STYLES[judged.light]), about),
+        verdicts.coloured(verdicts.statement(judged), judged.light),
+    ]
+    missing = [
+        note("method-missing", method=method.name, why=method.missing)
+        for method in verification.methods
+        if method.missing
+    ]
+    if verbose:
+        return Group(
+            *head,
+            *(Text(), parts.derived_table(spacecraft)),
+            *(Text(), methods_table(verification)),
+            *(Text(), *map(screen_line, (*missing, conservation(verification)))),
+            *(Text(), Text(BUDGET, "bold")),
+            *(Text(), budget_table(spacecraft, verification), Text(BUDGET_NOTE, "dim")),
+        )
     notes = [conservation(verification)]
     # The imperfection that leaves the most nutation alone, where one leaves more than ideal
     # impulses.
@@ -398,36 +421,8 @@ def verification_brief(plan: Plan, verification: Verification) -> RenderableType
                 nutation_deg=math.degrees(most.nutation),
             )
         )
-    notes += _missing(verification)
     return parts.summary(
-        [*_head(plan, verification)],
-        lambda **_: methods_table(verification),
-        notes,
-        "--json verified.json",
-    )
-
-
-def _head(plan: Plan, verification: Verification) -> Iterator[Text]:
-    """Title, verdict, and the residual of the flown motion beside the requirement."""
-    spacecraft = plan.spacecraft
-    yield parts.named(spacecraft, f": {plan.scheme}; Δ: maximum difference from the flown motion")
-    yield verdicts.coloured(verdict(verification), Light.GREEN if verification.agree else Light.RED)
-    judged = plan.verdict
-    lead, about = verdicts.headline(judged)
-    yield Text.assemble((lead, verdicts.STYLES[judged.light]), about)
-    yield verdicts.coloured(verdicts.statement(judged), judged.light)
-
-
-def verification_screen(plan: Plan, verification: Verification) -> RenderableType:
-    """All tables of ``verify``."""
-    spacecraft = plan.spacecraft
-    return Group(
-        *_head(plan, verification),
-        *(Text(), parts.derived_table(spacecraft)),
-        *(Text(), methods_table(verification)),
-        *(Text(), *map(screen_line, (*_missing(verification), conservation(verification)))),
-        *(Text(), Text(BUDGET, "bold")),
-        *(Text(), budget_table(spacecraft, verification), Text(BUDGET_NOTE, "dim")),
+        head, lambda **_: methods_table(verification), [*notes, *missing], "--json verified.json"
     )
 
 
@@ -505,11 +500,6 @@ def budget_table(spacecraft: Spacecraft, verification: Verification) -> FittedCo
     plans include.
     """
     return DataTable(BUDGET, IMPERFECTIONS, verification.budget, spacecraft).screen("screen")
-
-
-def _missing(verification: Verification) -> list[Note]:
-    absent = ((method.name, method.missing) for method in verification.methods if method.missing)
-    return [note("method-missing", method=name, why=why) for name, why in absent]
 
 
 def verdict(verification: Verification) -> str:

@@ -146,11 +146,32 @@ def _saved(row: TradeRow) -> str:
     return fixed(100.0 * (row.point.cost / row.front.points[0].cost - 1.0), 1)
 
 
-def trade_brief(spacecraft: Spacecraft, fronts: Sequence[Front]) -> RenderableType:
-    """The default screen of ``trade``: the cheapest and the earliest schedule, the points of all
-    fronts.
-    """
+def trade_screen(
+    spacecraft: Spacecraft, fronts: Sequence[Front], *, verbose: bool
+) -> RenderableType:
+    """The screen of ``trade``: the cheapest and the earliest schedule, the points of all fronts."""
     points = rows_of(fronts)
+    head = [named(spacecraft, f": finish time against cost; schedules: {len(points)}")]
+    good = [row for row in points if not fails(row.point)]
+    for name, order in (("Cheapest", itemgetter(0, 1)), ("Earliest", itemgetter(1, 0))):
+        row = min(
+            good or points,
+            key=lambda row: order((row.point.cost, row.point.plan.pulses.end)),
+            default=None,
+        )
+        if row is not None:
+            end = f"ends at {row.point.plan.pulses.end:.3f} s (point {row.number})"
+            head.append(Text.assemble((f"{name}: ", "bold"), f"{row.spent(row.point.cost)}, {end}"))
+    required = requested(spacecraft)
+    if not points:
+        head.append(Text("NO SCHEDULE", "bold red"))
+    elif required:
+        light = next((row.point.verdict.light for row in good), Light.RED)
+        words = coloured(f"{len(good)} of {len(points)} schedules may be flown", light)
+        head.append(Text.assemble(("Requirement ", "bold"), f"({required}) ", words))
+    if verbose:
+        derived = derived_table(spacecraft)
+        return Group(*head, Text(), derived, *front_parts(spacecraft, fronts))
     notes = missing(spacecraft, fronts)
     if points and spacecraft.commands is not None:
         notes.append(note("trade-not-commandable"))
@@ -159,42 +180,10 @@ def trade_brief(spacecraft: Spacecraft, fronts: Sequence[Front]) -> RenderableTy
     if len(rows) < len(points):
         notes.append(note("trade-points", shown=len(rows), count=len(points)))
     return summary(
-        [*_head(spacecraft, fronts)],
+        head,
         (lambda **_: _table(rows).screen("brief")) if points else None,
         [*notes, *_ends_off(fronts)],
         "--csv points.csv · --plot trade.png · --schedules FOLDER",
-    )
-
-
-def _head(spacecraft: Spacecraft, fronts: Sequence[Front]) -> Iterator[Text]:
-    points = rows_of(fronts)
-    yield named(spacecraft, f": finish time against cost; schedules: {len(points)}")
-    if not points:
-        yield Text("NO SCHEDULE", "bold red")
-        return
-    good = [row for row in points if not fails(row.point)]
-    for name, order in (("Cheapest", itemgetter(0, 1)), ("Earliest", itemgetter(1, 0))):
-        row = min(
-            good or points, key=lambda row: order((row.point.cost, row.point.plan.pulses.end))
-        )
-        costs = (
-            f"{row.spent(row.point.cost)}, ends at {row.point.plan.pulses.end:.3f} s (point "
-            f"{row.number})"
-        )
-        yield Text.assemble((f"{name}: ", "bold"), costs)
-    if required := requested(spacecraft):
-        light = next((row.point.verdict.light for row in good), Light.RED)
-        words = f"{len(good)} of {len(points)} schedules may be flown"
-        yield Text.assemble(("Requirement ", "bold"), f"({required}) ", coloured(words, light))
-
-
-def trade_screen(spacecraft: Spacecraft, fronts: Sequence[Front]) -> RenderableType:
-    """All tables of ``trade``."""
-    return Group(
-        *_head(spacecraft, fronts),
-        Text(),
-        derived_table(spacecraft),
-        *front_parts(spacecraft, fronts),
     )
 
 
