@@ -53,7 +53,7 @@ def loop_figure(plan: LoopPlan) -> Figure:
     """
     run = plan.flown_run
     first = first_seconds(plan)
-    spans = [run.until, *[first] * (first < SHORT * run.until)]
+    spans = [run.until, first] if first < SHORT * run.until else [run.until]
     heights = [1.8, 1.8, *firings_height(run.flight)]
     figure = style.sheet(7.4 if len(spans) == 1 else 10.4, 1.8 + sum(heights))
     shape: dict[str, Any] = {"height_ratios": heights, "width_ratios": [1.5, 1.0][: len(spans)]}
@@ -150,16 +150,12 @@ def budget_figure(budget: Budget) -> Figure:
     spacecraft, growth, until = budget.spacecraft, budget.spacecraft.growth, budget.until_largest
     # Cycles, or pulses of a loop that never pauses; with no nutation from the first that could grow
     # at once.
-    held = [
-        (
-            row.thresholds,
-            cycle,
-            1.0 / (cycle.cycles or cycle.pulses),
-            row.begins if math.isfinite(row.begins) else 0.0,
-        )
-        for row in budget.held
-        if (cycle := row.cycle) is not None
-    ]
+    held = []
+    for row in budget.held:
+        if row.cycle is not None:
+            period = 1.0 / (row.cycle.cycles or row.cycle.pulses)
+            begins = row.begins if math.isfinite(row.begins) else 0.0
+            held.append((row.thresholds, row.cycle, period, begins))
     size = max([PERIODS * period + begins for _, _, period, begins in held], default=0.0)
     if until is not None and math.isfinite(until):
         size = max(size, 1.2 * until)

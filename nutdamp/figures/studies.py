@@ -336,7 +336,7 @@ def trade_figure(
         axes.axhline(least, **{**style.LIMIT, "label": name})
     if chosen is not None and len(chosen.pulses):
         place = chosen.pulses.end, scale * chosen.pulses.cost_in(points[0].unit)
-        ideal = ", ideal impulses" * chosen.pulses.idealised
+        ideal = ", ideal impulses" if chosen.pulses.idealised else ""
         other = "" if chosen.scheme in schemes_of(fronts) else f" (not traded{ideal})"
         axes.plot(*place, "D", label=f"recommended: {chosen.scheme}{other}", **CHOSEN)
     axes.set_xlim(right=reach if reach > 1.03 * max(ends) else 1.03 * reach)

@@ -77,10 +77,8 @@ def manoeuvre_blocks(
     if flies and points is None:
         yield Prose("Tolerances not checked.")
     if flies:
-        yield FactList(
-            f"GO at t = 0 with{' (nominal)' * (points is None)}",
-            tuple(_conditions(spacecraft, points)),
-        )
+        title = "GO at t = 0 with (nominal)" if points is None else "GO at t = 0 with"
+        yield FactList(title, tuple(_conditions(spacecraft, points)))
     yield _fired(plan, judged, points, flies=flies)
     totals = [("totals", _totals(plan)), ("phase", _phase_note(spacecraft))]
     if not flies:
@@ -223,7 +221,7 @@ def _columns(plan: Plan, rows: Sequence[SheetRow]) -> Iterator[Column]:
         kind=TEXT
     )
     if blocks:
-        counts = " (counts)" * (spacecraft.commands is not None)
+        counts = "" if spacecraft.commands is None else " (counts)"
         yield column(Shared.FIRST_SUN_PULSE, "", lambda row: row.block.first)
         yield column(
             Shared.DELAY, f"s{counts}", lambda row: _counted(spacecraft, "delay", row.block.delay)
@@ -246,8 +244,8 @@ def _columns(plan: Plan, rows: Sequence[SheetRow]) -> Iterator[Column]:
         lambda row: row.nutation,
         lambda angle: short_angle(angle, least),
     )
-    for name, value in (("hold if outside", "hold"), ("decide before", "decide")):
-        yield column(name, "deg" * (value == "hold"), attrgetter(value))._replace(when=bool)
+    yield column("hold if outside", "deg", attrgetter("hold"))._replace(when=bool)
+    yield column("decide before", "", attrgetter("decide"))._replace(when=bool)
     yield column("done", "", lambda _: "☐")._replace(kind=TEXT, when=bool)
 
 
@@ -297,7 +295,7 @@ def _phase_note(spacecraft: Spacecraft) -> str:
             "Sun phase: angle from the Sun sensor to the Sun about axis 3, against the spin, "
             "at the commanded start."
         )
-    falls = ", positive about +3, so that it falls with this spin" * (spacecraft.spin < 0.0)
+    falls = ", positive about +3, so that it falls with this spin" if spacecraft.spin < 0.0 else ""
     return (
         f"Spin phase: angle by which the body has turned about axis 3 since t = 0{falls}, "
         "at the commanded start."

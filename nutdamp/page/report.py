@@ -231,7 +231,8 @@ class Repeat(NamedTuple):
         if not built_in and not Path(self.name).is_file():
             return "SPACECRAFT"
         keys = (f"--set={key}={value}" for key, value in self.settings)
-        return printable(shlex.join([*[self.name] * (not built_in), *keys, *self.goal]))
+        words = [*keys, *self.goal] if built_in else [self.name, *keys, *self.goal]
+        return printable(shlex.join(words))
 
     @property
     def digest(self) -> str:
@@ -267,25 +268,20 @@ def report_page(
     remarks = glance.notes(compared)
     notes = [text(note) for note in remarks if severity(note) != WARNING]
     warnings = [text(note) for note in remarks if severity(note) == WARNING]
+    contenders = []
+    for plan in compared.plans:
+        word = glance.scheme_verdict(compared, plan)
+        texts = (verdicts.spent(plan.pulses), word) if plan.feasible else (word,)
+        contenders.append(document.Contender(plan.scheme, texts, plan is chosen))
     with work.steps(2.0) as task:  # pictures, and the flights of the verification
         page = Page(
             title=control.title or _title(spacecraft),
             control=control,
-            source=f"input {repeat.digest[:8]}" * bool(repeat.digest),
+            source=f"input {repeat.digest[:8]}" if repeat.digest else "",
             state=judged.light.value,
             headline=(lead, about),
             notes=tuple(notes[:NOTES]),
-            contenders=tuple(
-                document.Contender(
-                    plan.scheme,
-                    (
-                        *[verdicts.spent(plan.pulses)] * plan.feasible,
-                        glance.scheme_verdict(compared, plan),
-                    ),
-                    plan is chosen,
-                )
-                for plan in compared.plans
-            ),
+            contenders=tuple(contenders),
             made_by=f"nutdamp {__version__}",
             verdict="" if chosen is None else verdicts.statement(judged),
             warnings=tuple(warnings),
@@ -322,14 +318,14 @@ def _bar(judged: Verdict, line: Line) -> document.Bar:
     alone = (
         ""
         if line.share is None or judged.cases is None
-        else verdicts.percent(line.share, judged.cases.probability)
+        else f"{verdicts.percent(line.share, judged.cases.probability)} keep it"
     )
     texts = (
         f"nominal {verdicts.value(bound, line.nominal)}",
         "" if dispersed is None else level + verdicts.value(bound, dispersed),
         f"limit {verdicts.limit(bound)}",
         f"margin {verdicts.margin(line)}",
-        f"{alone} keep it" * bool(alone),
+        alone,
         verdicts.line_word(line),
     )
     used = tuple(
@@ -379,14 +375,15 @@ def _cases_of(compared: Comparison) -> Dispersion | None:
 
 
 def _title(spacecraft: Spacecraft) -> str:
-    aims = [f"damp {math.degrees(spacecraft.tilt):.4g}° nutation"] * (spacecraft.tilt > NO_NUTATION)
-    aims += [f"turn by {math.degrees(spacecraft.to_turn):.4g}°"] * (
-        spacecraft.goal.axis is not None
-    )
-    aims += (
-        [] if spacecraft.goal.spin is None else [f"spin at {RPM * spacecraft.goal.spin:.4g} rpm"]
-    )
-    aims += ["built-in example"] * spacecraft.built_in
+    aims = []
+    if spacecraft.tilt > NO_NUTATION:
+        aims.append(f"damp {math.degrees(spacecraft.tilt):.4g}° nutation")
+    if spacecraft.goal.axis is not None:
+        aims.append(f"turn by {math.degrees(spacecraft.to_turn):.4g}°")
+    if spacecraft.goal.spin is not None:
+        aims.append(f"spin at {RPM * spacecraft.goal.spin:.4g} rpm")
+    if spacecraft.built_in:
+        aims.append("built-in example")
     return " · ".join([spacecraft.name, ", ".join(aims)]) if aims else spacecraft.name
 
 
@@ -399,7 +396,8 @@ def _dispersion(dispersed: Dispersion) -> Iterator[Block]:
     judged, results = dispersed.verdict, dispersed.core
     told = [line for line in verdict_lines(judged, results) if isinstance(line, Text)]
     lines = [Prose(document.plain(line)) for line in (*told, *cone_lines(results))]
-    lines += [Prose(f"Note: {note}.")] if (note := results.study.lightening_error) else []
+    note = results.study.lightening_error
+    lines += [Prose(f"Note: {note}.")] if note else []
     required = document.sheet(verdicts.bound_table(judged))
     yield from lines
     yield required
@@ -446,19 +444,17 @@ def _verification(chosen: Plan) -> Iterator[Block]:
         spacecraft, chosen.pulses, unrounded(chosen), expected=chosen.options.with_disturbances
     )
     yield Prose(f"{verdict(verified)} {sentence(text(conservation(verified)))}")
-    missing = tuple(
+    table = methods_table(verified)
+    blocks: list[Block] = [document.sheet_of("Maximum differences from the flown motion", table)]
+    missing = [
         (method.name, f"not flown; {method.missing}")
         for method in verified.methods
         if method.missing
-    )
-    flights = document.sheet_of(
-        "Maximum differences from the flown motion", methods_table(verified)
-    )
-    budget = document.sheet_of(BUDGET, budget_table(spacecraft, verified)), Prose(BUDGET_NOTE)
-    yield Details(
-        "Independent flights and error budget",
-        (flights, *[Points(missing)] * bool(missing), *budget),
-    )
+    ]
+    if missing:
+        blocks.append(Points(tuple(missing)))
+    blocks += [document.sheet_of(BUDGET, budget_table(spacecraft, verified)), Prose(BUDGET_NOTE)]
+    yield Details("Independent flights and error budget", tuple(blocks))
 
 
 def _background(compared: Comparison, judged: Verdict, repeat: Repeat) -> Iterator[Block]:
@@ -588,10 +584,11 @@ EQUATIONS = (
 
 def _method(compared: Comparison) -> Iterator[Block]:
     """A paragraph on the method, the equations used with their symbols, the sources."""
-    unequal = "; with I1 ≠ I2 the true tensor moves freely in between" * (
-        not compared.spacecraft.inertia.symmetric
-    )
-    wheel = " With the wheel H3 = Cω3 + h stands for the Cω3 below, and ω3 - H3/A for aω3."
+    inertia = compared.spacecraft.inertia
+    moves = "; with I1 ≠ I2 the true tensor moves freely in between"
+    unequal = "" if inertia.symmetric else moves
+    holds = " With the wheel H3 = Cω3 + h stands for the Cω3 below, and ω3 - H3/A for aω3."
+    wheel = holds if inertia.wheel else ""
     yield Prose(
         "Schemes plan on the nominal values of the input file "
         f"({', '.join(plan.scheme for plan in compared.plans)}). "
@@ -601,7 +598,7 @@ def _method(compared: Comparison) -> Iterator[Block]:
         "Recommendation, requirement and "
         "verdict go by that flight. By M(17), the impulse sum, "
         "each pulse acts at its centre with its effective "
-        f"impulse{unequal}.{wheel * (compared.spacecraft.inertia.wheel != 0.0)}"
+        f"impulse{unequal}.{wheel}"
     )
     chosen = compared.recommended
     topics = [guide.found(number) for number in EQUATIONS]

@@ -6,7 +6,6 @@ Vectors are in the axes of the file, angles in degrees.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Any
 
@@ -32,7 +31,14 @@ from nutdamp.planning.verdict import Verdict, lines_of
 from nutdamp.schemes import catalogue
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.schedule import Schedule
-from nutdamp.views.parts import aspect_facts, commanded, direction_text, spin_text
+from nutdamp.views.parts import (
+    aspect_facts,
+    changing,
+    commanded,
+    direction_columns,
+    direction_text,
+    spin_text,
+)
 from nutdamp.views.tables import facts, values_of
 from nutdamp.views.text import degrees, joined, moment, note_json, ordered, text
 from nutdamp.views.verdict import cases_json, line_json, spent, verdict_json
@@ -93,10 +99,7 @@ def lasting(flown: Flight) -> str:
     where it lasts.
     """
     spacecraft = flown.spacecraft
-    causes = [
-        *["dissipation"] * (spacecraft.growth != 0.0),
-        *["disturbances"] * bool(spacecraft.disturbances),
-    ]
+    causes = changing(spacecraft)
     end = moment(flown.schedule.end if flown.until is None else flown.until)
     return f"at {end}; then changing by {' and '.join(causes)}" if causes else ""
 
@@ -227,15 +230,7 @@ def aspects_json(aspects: tuple[Aspect, ...]) -> dict[str, Any]:
 
 def direction_json(spacecraft: Spacecraft, direction: Vector) -> dict[str, float | None]:
     """The two angles that name an inertial direction (3,), as `Spacecraft.angles_of`."""
-    around, other = (
-        None if angle is None else math.degrees(angle) for angle in spacecraft.angles_of(direction)
-    )
-    named = {"tilt_deg": other, "azimuth_deg": around}
-    return (
-        named
-        if spacecraft.attitude is None
-        else {"right_ascension_deg": around, "declination_deg": other}
-    )
+    return {column.key: column.value(direction) for column in direction_columns(spacecraft)}
 
 
 def residual_json(residual: Residual | None) -> dict[str, float | None]:

@@ -55,7 +55,8 @@ from nutdamp.views.text import (
 )
 
 NOT = "✗"  # sign before a value above the requirement
-SHORT_NAMES = ("RA", "dec")  # right ascension and declination, where there is little room
+# names of angles of directions where there is little room
+SHORT_NAMES = {"right ascension": "RA", "declination": "dec"}
 
 
 def scheme_table(compared: Comparison, chosen: Plan | None) -> DataTable:
@@ -126,7 +127,7 @@ def _columns(compared: Comparison, chosen: Plan | None) -> Iterator[Column]:
     end, impulse = _feasible("pulses.end"), _feasible("pulses.total_impulse")
     yield Column("", "end", "s", end, to_figures(4), "screen")
     yield Column("end_s", "end", "s", end, lambda value: f"{value:.3f}", "full page csv")
-    where = "full page csv" + " screen" * (not fuelled)
+    where = "full page csv" if fuelled else "full page csv screen"
     yield Column("total_impulse_Nms", Shared.IMPULSE, "N m s", impulse, _four, where)
     yield Column("least_impulse_Nms", "", "", _feasible("spacecraft.least_impulse"), where="csv")
     spent = _feasible("pulses.propellant")
@@ -158,33 +159,21 @@ def _columns(compared: Comparison, chosen: Plan | None) -> Iterator[Column]:
             small_angle,
             where.removeprefix("screen ") + " csv",
         )
-    keys = (
-        ("tilt_deg", "azimuth_deg")
-        if spacecraft.attitude is None
-        else ("right_ascension_deg", "declination_deg")
-    )
-    names = parts.angle_names(spacecraft) if spacecraft.attitude is None else SHORT_NAMES
-    for at, key in enumerate(keys):
-        yield Column(
-            f"axis_{key}", "", "", _feasible(partial(_direction, "axis", key)), where="csv"
-        )
-        yield Column(
-            "",
-            f"axis {names[at]}",
-            "deg",
-            _feasible(partial(_shown_direction, at)),
-            where="full page",
-        )
-    for key in keys:
-        yield Column(
-            f"momentum_{key}", "", "", _feasible(partial(_direction, "momentum", key)), where="csv"
-        )
+    directions = parts.direction_columns(spacecraft)
+    for column in directions:
+        name = SHORT_NAMES.get(column.heading, column.heading)
+        value = _feasible(partial(_direction, "axis", column))
+        where = "full page csv"
+        yield Column(f"axis_{column.key}", f"axis {name}", "deg", value, column.text, where)
+    for column in directions:
+        value = _feasible(partial(_direction, "momentum", column))
+        yield Column(f"momentum_{column.key}", "", "", value, where="csv")
     yield Column("spin_rad_s", "", "", _feasible("flight.final.spin"), where="csv")
     if spacecraft.goal.spin is not None:
         yield Column(
             "", "final spin", "rad/s", _feasible("flight.settled.spin"), to_figures(6), "full"
         )
-    where = "full csv" + " page" * any(plan.spin_change for plan in compared.plans)
+    where = "full csv page" if any(plan.spin_change for plan in compared.plans) else "full csv"
     yield Column(
         "spin_change_rad_s", "spin change", "rad/s", attrgetter("spin_change"), _four, where
     )
@@ -204,12 +193,8 @@ def _columns(compared: Comparison, chosen: Plan | None) -> Iterator[Column]:
     yield Column("why", "", "", infeasibility, where="csv", kind=TEXT)
 
 
-def _direction(which: str, key: str, plan: Plan) -> float | None:
-    return decisions.direction_json(plan.spacecraft, getattr(plan.flight.final, which))[key]
-
-
-def _shown_direction(at: int, plan: Plan) -> str:
-    return parts.angle_texts(plan.spacecraft, plan.flight.final.axis)[at].removesuffix(" deg")
+def _direction(which: str, angle: Column, plan: Plan) -> Any:
+    return angle.value(getattr(plan.flight.final, which))
 
 
 def _bound(bound: Bound, plan: Plan) -> str:
@@ -280,31 +265,30 @@ def headline(compared: Comparison) -> Text:
 def ends(plan: Plan) -> Table:
     """End of the flight, flown and by the impulse sum (17), and where the spin axis points."""
     flight, spacecraft = plan.flight, plan.spacecraft
-    left = flight.residual
-    formula, (least, turn) = plan.residual, limits(spacecraft)
-    angles = [f"nutation {short_angle(left.nutation, least)}"]
-    if (
-        not spacecraft.inertia.wheel and left.body_cone < 0.5 * math.pi
-    ):  # where ω need not lie near H, cones tell nothing
-        angles += [f"body cone {short_angle(left.body_cone, least)}"]
-        angles += [f"space cone {short_angle(left.space_cone, least)}"]
-    if (
-        formula is not None
-        and (by_impulses := short_angle(formula.nutation, least)) not in angles[0].split()
-    ):
-        angles[0] += f" (17: {by_impulses})"
+    residual = flight.residual
+    limit, turn = limits(spacecraft)
+    nutation = short_angle(residual.nutation, limit)
+    angles = [f"nutation {nutation}"]
+    if plan.residual is not None:
+        by_impulses = short_angle(plan.residual.nutation, limit)
+        if by_impulses != nutation:
+            angles[0] += f" (17: {by_impulses})"
+    # Where ω need not lie near H, cones tell nothing.
+    if not spacecraft.inertia.wheel and residual.body_cone < 0.5 * math.pi:
+        angles.append(f"body cone {short_angle(residual.body_cone, limit)}")
+        angles.append(f"space cone {short_angle(residual.space_cone, limit)}")
     rows = [("after pulses, deg", "  ".join(angles))]
-    first, second = parts.angle_texts(spacecraft, flight.final.axis)
-    names = parts.angle_names(spacecraft) if spacecraft.attitude is None else SHORT_NAMES
-    turned = f"turned by {short_angle(left.momentum_shift, turn)} deg"
-    turned = (
-        turned
-        if spacecraft.goal.axis is None
-        else f"{short_angle(left.axis_error, turn)} deg off target"
+    axis = ", ".join(
+        f"{SHORT_NAMES.get(column.heading, column.heading)} {column.worded(flight.final.axis)}"
+        for column in parts.direction_columns(spacecraft)
     )
+    if spacecraft.goal.axis is None:
+        momentum = f"turned by {short_angle(residual.momentum_shift, turn)} deg"
+    else:
+        momentum = f"{short_angle(residual.axis_error, turn)} deg off target"
     final = flight.final.spin
-    spin = f"; spin {final * RPM:.5g} rpm" * (not requirements.spins_at(spacecraft, final))
-    rows.append(("axis", f"{names[0]} {first}, {names[1]} {second}; H {turned}{spin}"))
+    spin = "" if requirements.spins_at(spacecraft, final) else f"; spin {final * RPM:.5g} rpm"
+    rows.append(("axis", f"{axis}; H {momentum}{spin}"))
     if len(plan.pulses) and lasting(flight):
         rows.append(("", lasting(flight)))
     return facts(rows)

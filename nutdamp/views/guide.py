@@ -136,9 +136,11 @@ def found(requested: str) -> Topic:
     name = {"energy-sink": "dissipation", "gyrostat": "wheel"}.get(name, name)
     if name in NAMES or _FIGURE.fullmatch(name):
         return page_or_topic(name if name in NAMES else "figures")
-    if match := NUMBER.fullmatch(requested.strip().casefold()):
+    match = NUMBER.fullmatch(requested.strip().casefold())
+    if match:
+        source = "K" if match["source"] == "k" else "M"
         number = match["number"]
-        called = number if "." in number else f"{'K' if match['source'] == 'k' else 'M'}({number})"
+        called = number if "." in number else f"{source}({number})"
         if equation := next((entry for entry in EQUATIONS if entry.number == called), None):
             return equation.topic
         raise BadRequest(

@@ -396,15 +396,19 @@ def summary(
         body = [Text(), table()] if table is not None else []
         for part in more:
             body += [Text(), part]
-        return Group(*head, *warnings, *body, *[Text()] * bool(others), *others)
+        if others:
+            body += [Text(), *others]
+        return Group(*head, *warnings, *body)
 
     def screen(rows: int, count: int) -> Group:
         body = [Text(), table(first=rows)] if table is not None else []
         if quiet():
             return Group(*head, *warnings, *body)
+        if body:
+            body.append(Text())
         hidden = f" ({len(others) - count} more)" if len(others) > count else ""
         last = Text(f"-v all values{hidden} · {steps}", style="dim")
-        return Group(*head, *warnings, *body, *[Text()] * bool(body), *others[:count], last)
+        return Group(*head, *warnings, *body, *others[:count], last)
 
     for size in SIZES[:-1]:
         if lines_of(shown := screen(*size)) <= LINES:
@@ -441,11 +445,9 @@ def _effects(flown: Flight, velocity: Vector | None) -> Iterator[tuple[str, str]
         start = pulse.loaded[0]
         dated = spacecraft.utc(start, 3)
         yield name, f"starts at {moment(start)}" + (f", {dated}" if dated else "")
-    turned = (
-        angle_texts(spacecraft, momentum) for momentum in (spacecraft.momentum, final.momentum)
-    )
-    for name, *ends in zip(angle_names(spacecraft), *turned, strict=True):
-        yield f"H: {name}", " to ".join(ends)
+    for column in direction_columns(spacecraft):
+        begin, end = map(column.worded, (spacecraft.momentum, final.momentum))
+        yield f"H: {column.heading}", f"{begin} to {end}"
     assert spacecraft.sun is not None
     aspects = (
         attitude.angle_between(momentum, spacecraft.sun)
@@ -486,35 +488,37 @@ def named(spacecraft: Spacecraft, *more: str | tuple[str, str]) -> Text:
     """Name of a spacecraft, with a word where it is one that nobody asked for, and ``more`` text
     after it.
     """
-    return Text.assemble(
-        (spacecraft.name, "bold"), " (built-in example)" * spacecraft.built_in, *more
-    )
+    origin = " (built-in example)" if spacecraft.built_in else ""
+    return Text.assemble((spacecraft.name, "bold"), origin, *more)
 
 
-def angle_names(spacecraft: Spacecraft) -> tuple[str, str]:
-    """Names of the two angles of a direction: along and above the equator, or from H(0) and about
-    it.
+def direction_columns(spacecraft: Spacecraft) -> tuple[Column, Column]:
+    """The two angles of an inertial direction (3,): along and above the equator, or from H(0) and
+    about it.
     """
-    return (
-        ("tilt", "azimuth") if spacecraft.attitude is None else ("right ascension", "declination")
-    )
 
+    def angle(at: int, direction: Vector) -> float | None:
+        value = spacecraft.angles_of(direction)[at]
+        return None if value is None else math.degrees(value)
 
-def angle_texts(spacecraft: Spacecraft, direction: Vector) -> tuple[str, str]:
-    """The two angles of an inertial direction (3,), in the order of `angle_names`."""
-    around, other = spacecraft.angles_of(direction)
+    around = partial(angle, 0)
+    other = partial(angle, 1)
+    if spacecraft.attitude is None:
+        return (
+            Column("tilt_deg", "tilt", "deg", other, pointing),
+            Column("azimuth_deg", "azimuth", "deg", around, longitude),
+        )
     return (
-        (pointing(other), longitude(around))
-        if spacecraft.attitude is None
-        else (longitude(around), pointing(other))
+        Column("right_ascension_deg", "right ascension", "deg", around, longitude),
+        Column("declination_deg", "declination", "deg", other, pointing),
     )
 
 
 def direction_text(spacecraft: Spacecraft, direction: Vector) -> str:
     """An inertial direction (3,) by name and number of its angles."""
-    names = angle_names(spacecraft)
-    texts = angle_texts(spacecraft, direction)
-    return ", ".join(f"{name} {text}" for name, text in zip(names, texts, strict=True))
+    return ", ".join(
+        f"{column.heading} {column.worded(direction)}" for column in direction_columns(spacecraft)
+    )
 
 
 def spin_text(spin: float) -> str:
@@ -583,10 +587,8 @@ def _derived(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
     if inertia.wheel:
         whole = f"H3 = C ω3 + h = {quantity(spacecraft.axial, 'N m s')}"
         yield "wheel", f"h = {quantity(inertia.wheel, 'N m s')} along axis 3: {whole}"
-    yield (
-        "spin",
-        spin_text(spacecraft.spin) + ": the spin axis is body axis -3" * (spacecraft.sense < 0.0),
-    )
+    reversed_ = ": the spin axis is body axis -3" if spacecraft.sense < 0.0 else ""
+    yield "spin", f"{spin_text(spacecraft.spin)}{reversed_}"
     now = "" if inertia.symmetric else f"{degrees(spacecraft.tilt)} at t = 0, at most "
     cones = f"body cone {degrees(motion.body)} + space cone {degrees(motion.space)}"
     yield "nutation", f"{now}{degrees(motion.nutation)} = {cones}"
@@ -598,19 +600,16 @@ def _derived(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
     yield "nutation period", f"{in_body}, {duration(spacecraft.inertial_period)} inertially"
     if spacecraft.dissipation is not None:
         yield "dissipation", _dissipation(spacecraft, spacecraft.dissipation)
-    causes = [  # that break the floors A|ω0| and C|ω3|β
-        *["I1 ≠ I2"] * (not inertia.symmetric),
-        *["dissipation"] * (spacecraft.growth != 0.0),
-        *["disturbances"] * bool(spacecraft.disturbances),
-    ]
-    beyond = " and ".join(causes)
+    # Causes that break the floors A|ω0| and C|ω3|β.
+    unequal = [] if inertia.symmetric else ["I1 ≠ I2"]
+    beyond = " and ".join([*unequal, *changing(spacecraft)])
     floor = f"no least impulse with {beyond}" if beyond else "lower bound"
     name = "impulse" if beyond else "least impulse"
     yield name, f"A|ω0| = {quantity(spacecraft.least_impulse, 'N m s')}; {floor}"
     if spacecraft.goal.axis is not None:
         symbol = "|H3|β" if inertia.wheel else "C|ω3|β"
-        there = spacecraft.to_turn < NO_NUTATION  # but for rounding
-        turn = quantity(0.0 if there else spacecraft.turning_impulse, "N m s")
+        turned = spacecraft.to_turn < NO_NUTATION  # but for rounding
+        turn = quantity(0.0 if turned else spacecraft.turning_impulse, "N m s")
         least = "" if beyond else ", the least to turn H"
         yield "target", direction_text(spacecraft, spacecraft.goal.axis)
         yield "", f"β = {degrees(spacecraft.to_turn)} from H; {symbol} = {turn}{least}"
@@ -625,10 +624,21 @@ def _derived(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
     if spacecraft.channels:
         actuators.append("channels " + " ".join(channel.name for channel in spacecraft.channels))
     yield "actuators", "; ".join(actuators)
-    if text := required(spacecraft):
-        yield "requirement", text
+    bounds = required(spacecraft)
+    if bounds:
+        yield "requirement", bounds
     if any(bound.part is Part.DISTANCE for bound in requirements.required(spacecraft)):
         yield "", "momentum_shift bounds the axis error: the angle of H from the target"
+
+
+def changing(spacecraft: Spacecraft) -> list[str]:
+    """Causes that change the motion while nothing fires."""
+    causes = []
+    if spacecraft.growth != 0.0:
+        causes.append("dissipation")
+    if spacecraft.disturbances:
+        causes.append("disturbances")
+    return causes
 
 
 def _dissipation(spacecraft: Spacecraft, time_constant: float) -> str:

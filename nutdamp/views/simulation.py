@@ -63,29 +63,22 @@ MODELS = {
 }  # names of the two models
 
 
-def _direction(name: str, at: int, flight: Flight) -> str:
-    return parts.angle_texts(flight.spacecraft, getattr(flight.final, name))[at]
+def _direction(name: str, angle: Column, flight: Flight) -> str:
+    return angle.worded(getattr(flight.final, name))
 
 
 def _columns(simulation: Simulation) -> Iterator[Column]:
     spacecraft = simulation.flown.spacecraft
     yield Column("", "model", "", lambda flight: MODELS[flight.model], where="screen", kind=TEXT)
-    names = [
-        "nutation",
-        "body_cone",
-        "space_cone",
-        "momentum_shift",
-        *["axis_error"] * (spacecraft.goal.axis is not None),
-    ]
-    for name in names:
+    names = ["nutation", "body_cone", "space_cone", "momentum_shift"]
+    for name in names if spacecraft.goal.axis is None else [*names, "axis_error"]:
         yield Column(
             "", name.replace("_", " "), "", attrgetter(f"residual.{name}"), degrees, "screen"
         )
     for heading, name in (("spin axis", "axis"), ("H", "momentum")):
-        for at, angle in enumerate(parts.angle_names(spacecraft)):
-            yield Column(
-                "", f"{heading}: {angle}", "", partial(_direction, name, at), where="screen"
-            )
+        for angle in parts.direction_columns(spacecraft):
+            value = partial(_direction, name, angle)
+            yield Column("", f"{heading}: {angle.heading}", "", value, where="screen")
     yield Column("", Shared.SPIN, "rad/s", attrgetter("final.spin"), to_figures(6), "screen")
 
 
@@ -163,19 +156,16 @@ def _extremes(simulation: Simulation) -> Iterator[tuple[str, str]]:
     )
     if spacecraft.attitude is not None:
         frame = spacecraft.attitude.frame or "the frame of the file"
-        west, east = map(longitude, extremes.right_ascension)
-        yield (
-            "right ascension",
-            f"{west.removesuffix(' deg')} to {east} in {frame}, from its axis x towards y",
-        )
+        west, east = (longitude(math.degrees(angle)) for angle in extremes.right_ascension)
+        yield "right ascension", f"{west} to {east} deg in {frame}, from its axis x towards y"
         yield "declination", _range(extremes.declination)
     yield from parts.aspect_facts(aspects(simulation.shown, extremes.until))
     yield "track", f"{extremes.rows} rows, 0 to {moment(extremes.until)}"
 
 
 def _range(values: tuple[float, float]) -> str:
-    low, high = map(pointing, values)
-    return f"{low.removesuffix(' deg')} to {high}"
+    low, high = (pointing(math.degrees(angle)) for angle in values)
+    return f"{low} to {high} deg"
 
 
 def simulation_json(simulation: Simulation) -> dict[str, Any]:

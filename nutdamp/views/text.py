@@ -156,18 +156,14 @@ def vector(components: Iterable[float]) -> str:
     return "(" + ", ".join(f"{part:.4g}" for part in cleaned(list(components)).tolist()) + ")"
 
 
-def pointing(angle: float | None) -> str:
-    """An angle of a direction given in rad, in degrees to four decimals,
-    as every place shows it.
-    """
-    return MISSING if angle is None else f"{fixed(math.degrees(angle), 4)} deg"
+def pointing(angle: float) -> str:
+    """An angle of a direction given in degrees, to four decimals, as every place shows it."""
+    return fixed(angle, 4)
 
 
-def longitude(angle: float | None) -> str:
-    """A right ascension or azimuth given in rad, in degrees from 0 to below 360; a direction at the
-    pole has none.
-    """
-    return MISSING if angle is None else f"{fixed(math.degrees(angle) % 360.0, 4, 360.0)} deg"
+def longitude(angle: float) -> str:
+    """A right ascension or azimuth given in degrees, from 0 to below 360."""
+    return fixed(angle % 360.0, 4, 360.0)
 
 
 def steering(impulse: Sequence[float]) -> str:
@@ -180,7 +176,8 @@ def steering(impulse: Sequence[float]) -> str:
 def fixed(value: float, digits: int, period: float = math.inf) -> str:
     """A number with so many decimals, without -0; one that rounds up to ``period`` is 0."""
     rounded = round(value, digits)
-    return f"{0.0 if rounded >= period else rounded + 0.0:.{digits}f}"
+    turned = 0.0 if rounded >= period else rounded + 0.0
+    return f"{turned:.{digits}f}"
 
 
 WARNING, NOTE, REASON = "warning", "note", "reason"
