@@ -47,11 +47,9 @@ def channel_table(spacecraft: Spacecraft) -> DataTable:
     """
 
     def on_times(row: ChannelSteps) -> str:
-        most = row.channel.max_on_time
-        return (
-            f"{duration(row.channel.min_on_time)} to "
-            f"{'any' if math.isinf(most) else duration(most)}"
-        )
+        longest = row.channel.max_on_time
+        until = "any" if math.isinf(longest) else duration(longest)
+        return f"{duration(row.channel.min_on_time)} to {until}"
 
     columns = (
         Column(

@@ -196,13 +196,13 @@ def percentiles_json(
     column: str, nominal: float | None, distribution: Distribution | None
 ) -> dict[str, float | None]:
     """The ``nominal`` value and the distribution in the unit of a ``column``."""
-    spread: list[float | None] = [None] * (len(PERCENTS) + 2)
+    values: dict[str, float | None] = dict.fromkeys(("nominal", "min", *LEVELS, "max"))
+    values["nominal"] = nominal
     if distribution is not None:
-        shares = np.array(PERCENTS) / 100.0
-        levels = distribution.quantiles(shares).tolist()
-        spread = [distribution.minimum, *levels, distribution.maximum]
-    values = zip(("nominal", "min", *LEVELS, "max"), (nominal, *spread), strict=True)
-    return {name: None if value is None else shown(column, value) for name, value in values}
+        levels = distribution.quantiles(np.array(PERCENTS) / 100.0).tolist()
+        values |= zip(LEVELS, levels, strict=True)
+        values |= {"min": distribution.minimum, "max": distribution.maximum}
+    return {name: None if value is None else shown(column, value) for name, value in values.items()}
 
 
 def percentiles_of(
@@ -434,7 +434,7 @@ def _case_columns(
         yield Column(column(entry), "", "", partial(_true_value, entry), where="csv")
     for at, output in enumerate(outputs):
         value = partial(_output, at, output)
-        where = "csv" + " screen" * output.ranks
+        where = "csv screen" if output.ranks else "csv"
         yield Column(
             output.key, output.heading, output.unit, value, to_figures(4, output.scale), where
         )
@@ -452,10 +452,11 @@ def _case_columns(
     for at, (key, (which, cone)) in enumerate(
         zip(cone_columns(study.model.spacecraft), angles, strict=True)
     ):
-        where = "csv case" + " screen" * (which in bounded(cone))
+        where = "csv case screen" if which in bounded(cone) else "csv case"
         name = f"{which} from {cone.name}"
         yield Column(key, name, "deg", partial(_angle, at), to_figures(4), where)
-    heading = f"largest {'inputs' if effects is None else 'contributors'}, in sigmas"
+    ranked = "inputs" if effects is None else "contributors"
+    heading = f"largest {ranked}, in sigmas"
     yield Column("", heading, "", partial(_largest, inputs, effects), where="screen", kind=TEXT)
 
 
@@ -499,17 +500,18 @@ def case_screen(study: Study, case: int, draws: dict[str, float], *, scheme: str
     """One case (from 0): every input, and the ends of it and of the nominal case."""
     rows = [_flown(study, ESTIMATE, {}), _flown(study, case, draws)]
     outcome = case_table(study, FLOWN_OUTPUTS, rows, _effects(study))
-    empty = [Text(f"Tank empty too soon: {EMPTY}.", "red")] * bool(
-        study.ends_of(draws).drained > 1.0
-    )
     title = named(study.model.spacecraft, f": {scheme}, seed {study.seed}, case {case + 1}")
     inputs = tolerances.inputs_table(study.model.inputs.drawn, draws)
-    return Group(title, Text(), inputs, Text(), outcome.transposed("case"), *empty)
+    parts: list[RenderableType] = [title, Text(), inputs, Text(), outcome.transposed("case")]
+    if study.ends_of(draws).drained > 1.0:
+        parts.append(Text(f"Tank empty too soon: {EMPTY}.", "red"))
+    return Group(*parts)
 
 
 def bounded(keep: Keep) -> list[str]:
     """Bounded ones of the angles to the direction of a cone: the least, the largest."""
-    return ["least"] * (keep.least > 0.0) + ["largest"] * (keep.most < math.pi)
+    angles = (("least", keep.least > 0.0), ("largest", keep.most < math.pi))
+    return [angle for angle, limited in angles if limited]
 
 
 def _shares(results: Results) -> Iterator[dict[str, Any]]:

@@ -134,15 +134,12 @@ def _columns(robust: RobustComparison) -> Iterator[Column]:
     level = exact_percent(robust.probability)
     fuelled = all(candidate.plan.pulses.propellant is not None for candidate in robust.candidates)
     yield Column("scheme", "plan", "", attrgetter("plan.scheme"), where="full json", kind=TEXT)
+
+    def variant(row: FlownPlan) -> str:
+        return f"{row.variant} *" if row is robust.usual else row.variant
+
     yield from file_columns("json", "variant")
-    yield Column(
-        "",
-        "variant",
-        "",
-        lambda row: row.variant + " *" * (row is robust.usual),
-        where="full",
-        kind=TEXT,
-    )
+    yield Column("", "variant", "", variant, where="full", kind=TEXT)
     yield Column("pulses", "", "", lambda row: len(row.plan.pulses), where="json")
     yield Column(
         "end_s",
@@ -155,27 +152,17 @@ def _columns(robust: RobustComparison) -> Iterator[Column]:
     impulse = attrgetter("plan.pulses.total_impulse")
     where = "json" if fuelled else "full json"
     yield Column("total_impulse_Nms", Shared.IMPULSE, "N m s", impulse, to_figures(4), where)
-    yield from file_columns("json", "propellant_kg=plan.pulses.propellant")
-    yield Column(
-        "",
-        Shared.PROPELLANT,
-        "g",
-        attrgetter("plan.pulses.propellant"),
-        to_figures(4, 1e3),
-        "full" * fuelled,
-    )
-    yield from file_columns("json", "nominal_nutation_deg=plan.flown.nutation", "left_deg=left")
-    yield Column("", Shared.NOMINAL, "deg", angle_of("plan.flown.nutation"), small_angle, "full")
-    yield Column("", level, "deg", angle_of("left"), small_angle, "full")
+    where = "full json" if fuelled else "json"
+    propellant = attrgetter("plan.pulses.propellant")
+    yield Column("propellant_kg", Shared.PROPELLANT, "g", propellant, to_figures(4, 1e3), where)
+    nominal = angle_of("plan.flown.nutation")
+    where = "full json"
+    yield Column("nominal_nutation_deg", Shared.NOMINAL, "deg", nominal, small_angle, where)
+    yield Column("left_deg", level, "deg", angle_of("left"), small_angle, where)
     yield from file_columns("json", "samples=cases.samples", "met_fraction=cases.complying")
-    yield Column(
-        "",
-        "cases that comply",
-        "",
-        attrgetter("cases"),
-        share_text,
-        "full" * requirements.judged(spacecraft),
-    )
+    if requirements.judged(spacecraft):
+        comply = attrgetter("cases")
+        yield Column("", "cases that comply", "", comply, share_text, "full")
     yield Column("final", "", "", lambda row: final_json(row.plan.flight), where="json")
 
 
@@ -186,17 +173,17 @@ def _candidates(robust: RobustComparison) -> list[RenderableType]:
     ]
     rest = len(robust.candidates) - len(named)
     level = exact_percent(robust.probability)
-    pointed = robust.comparison.spacecraft.goal.axis is not None
-    left = "nutation" + " or axis error" * pointed
-    notes = [
-        *[f"Plans that rank below these: {rest}."] * bool(rest),
-        *["Losing plans stopped early."] * any(not entry.final for entry in robust.candidates),
-        (
-            f"nominal, {level}: the {left} left with nominal values, "
-            "and not exceeded in so many cases."
-        ),
-        *["* is recommended without --robust."] * (robust.usual is not None),
-    ]
+    free = robust.comparison.spacecraft.goal.axis is None
+    residual = "nutation" if free else "nutation or axis error"
+    notes = [] if not rest else [f"Plans that rank below these: {rest}."]
+    if any(not entry.final for entry in robust.candidates):
+        notes.append("Losing plans stopped early.")
+    notes.append(
+        f"nominal, {level}: the {residual} left with nominal values, "
+        "and not exceeded in so many cases."
+    )
+    if robust.usual is not None:
+        notes.append("* is recommended without --robust.")
     return [_table(robust, named).screen("full"), Text(" ".join(notes), style="dim")]
 
 

@@ -79,10 +79,12 @@ def _columns(rows: Sequence[TradeRow]) -> Iterator[Column]:
     flown = any(row.point.verdict.cases is not None for row in rows)
     bounded = any(row.least is not None for row in rows)
     yield Column("point", "point", "", attrgetter("number"), where="csv full brief", kind=WHOLE)
-    yield Column("", "H within", "deg", attrgetter("front.shift"),
-                 lambda shift: "any" if math.isinf(shift) else degrees(shift).removesuffix(" deg"),
-                 "brief")  # fmt: skip
-    yield from file_columns("csv", "shift_allowed_deg=front.shift")
+
+    def within(shift: float) -> str:
+        return "any" if math.isinf(shift) else degrees(math.radians(shift)).removesuffix(" deg")
+
+    shift = angle_of("front.shift")
+    yield Column("shift_allowed_deg", "H within", "deg", shift, within, "csv brief")
     yield Column(
         "end_s",
         Shared.END,
@@ -92,9 +94,8 @@ def _columns(rows: Sequence[TradeRow]) -> Iterator[Column]:
         "csv full brief",
     )
     yield Column("", "cost", "", lambda row: row.spent(row.point.cost), where="full brief")
-    yield Column(
-        "", "small-angle bound", "", lambda row: row.spent(row.least), where="full" * bounded
-    )
+    if bounded:
+        yield Column("", "small-angle bound", "", lambda row: row.spent(row.least), where="full")
     yield Column(
         "pulses",
         Shared.PULSES,
@@ -116,7 +117,8 @@ def _columns(rows: Sequence[TradeRow]) -> Iterator[Column]:
     )
     yield from file_columns("csv", "axis_error_deg=point.plan.flight.residual.axis_error")
     yield Column("", f"vs point {first}", "%", _saved, where="full")
-    yield Column("", "vs first", "%", _saved, where="" if others else "brief")
+    if not others:
+        yield Column("", "vs first", "%", _saved, where="brief")
     scheme = "csv full brief" if others else "csv"
     yield Column(
         "scheme", Shared.SCHEME, "", attrgetter("point.plan.scheme"), where=scheme, kind=TEXT
@@ -126,19 +128,13 @@ def _columns(rows: Sequence[TradeRow]) -> Iterator[Column]:
     yield Column(
         "meets_requirement", "", "", lambda row: row.point.verdict.met, where="csv", kind=YES_NO
     )
-    yield Column(
-        "", "comply", "", attrgetter("point.verdict.cases"), share_text, "full brief" * flown
-    )
-    yield Column(
-        "",
-        Shared.VERDICT,
-        "",
-        attrgetter("point.verdict"),
-        lead,
-        "full brief" * judged,
-        kind=TEXT,
-        met=lambda row: row.point.verdict.met,
-    )
+    where = "full brief"
+    if flown:
+        yield Column("", "comply", "", attrgetter("point.verdict.cases"), share_text, where)
+    if judged:
+        met = attrgetter("point.verdict.met")
+        verdict = attrgetter("point.verdict")
+        yield Column("", Shared.VERDICT, "", verdict, lead, where, kind=TEXT, met=met)
 
 
 def _saved(row: TradeRow) -> str:
@@ -203,9 +199,9 @@ def front_parts(spacecraft: Spacecraft, fronts: Sequence[Front]) -> list[Rendera
             )
     priced = [(row.spent(row.point.cost), row.spent(row.least)) for row in rows_of(fronts)
               if row.least is not None and row.point.cost < row.least]  # fmt: skip
-    below = [note("trade-below-bound")] * any(
-        spent != least for spent, least in priced
-    )  # as the table writes both
+    # As the table writes both.
+    differ = any(spent != bound for spent, bound in priced)
+    below = [note("trade-below-bound")] if differ else []
     for sentence in sentences((*below, *_ends_off(fronts))):
         parts += [Text(), Text(sentence, style="dim")]
     return parts
@@ -227,7 +223,7 @@ def fails(point: Point) -> bool:
 
 
 def _without_optimal(front: Front) -> str:
-    return f"{'no schedule of optimal' if front.points else 'none'}: {front.why}"
+    return f"no schedule of optimal: {front.why}" if front.points else f"none: {front.why}"
 
 
 def missing(spacecraft: Spacecraft, traded: Sequence[Front]) -> list[Note]:
@@ -338,11 +334,11 @@ def trade_notes(fronts: Sequence[Front], chosen: Plan, judged: Verdict) -> Itera
     if better is not None:
         row = better[2]
         shift = better[2].front.shift
-        bound = (
-            "--free-axis " if math.isinf(shift) else f'--shift "{degrees(shift)}" ' * (shift > 0.0)
-        )
+        aim = "--free-axis " if math.isinf(shift) else ""
+        if 0.0 < shift < math.inf:
+            aim = f'--shift "{degrees(shift)}" '
         horizon = f'--set "limits.horizon={row.point.horizon:.6g} s"'
-        command = f"nutdamp plan SPACECRAFT --scheme {row.point.plan.scheme} {bound}{horizon}"
+        command = f"nutdamp plan SPACECRAFT --scheme {row.point.plan.scheme} {aim}{horizon}"
         shown = notes.figures(row.point.plan, chosen, row.point.unit == "kg")
         if judged.met is False:
             yield note("trade-meets", point=row.number, command=command, **shown)
