@@ -32,7 +32,6 @@ from nutdamp.views.tables import (
     Column,
     DataTable,
     Shared,
-    angle_of,
     file_columns,
     to_figures,
     values_of,
@@ -52,9 +51,7 @@ def channel_table(spacecraft: Spacecraft) -> DataTable:
         return f"{duration(row.channel.min_on_time)} to {until}"
 
     columns = (
-        Column(
-            "name", Shared.CHANNEL, "", lambda row: row.channel.name, where="screen json", kind=TEXT
-        ),
+        Column.named("name=channel.name", Shared.CHANNEL, "", where="screen json", kind=TEXT),
         Column(
             "torque#_Nm",
             "torque, file axes",
@@ -68,22 +65,14 @@ def channel_table(spacecraft: Spacecraft) -> DataTable:
         *file_columns(
             "json", "min_on_time_s=channel.min_on_time", "max_on_time_s=channel.max_on_time"
         ),
-        Column(
-            "smallest_step_deg",
+        Column.named(
+            "smallest_step_deg=smallest",
             "smallest step",
             "deg",
-            angle_of("smallest"),
             lambda step: small_angle(step) if step else "any",
             "screen json",
         ),
-        Column(
-            "largest_step_deg",
-            "largest step",
-            "deg",
-            angle_of("largest"),
-            small_angle,
-            "screen json",
-        ),
+        Column.named("largest_step_deg=largest", "largest step", "deg", small_angle, "screen json"),
         *file_columns("json", "damps=channel.damps"),
     )
     return DataTable("Channels", columns, capability.channel_steps(spacecraft))
@@ -145,35 +134,16 @@ def valve_table(spacecraft: Spacecraft) -> DataTable:
 
 
 TURNS = (
-    Column(
-        "name", "command blocks", "", lambda row: row.channel.name, where="screen json", kind=TEXT
+    Column.named("name=channel.name", "command blocks", "", where="screen json", kind=TEXT),
+    Column.named(
+        "smallest_turn_deg=smallest", "least turn of H", "deg", small_angle, "screen json"
     ),
-    Column(
-        "smallest_turn_deg",
-        "least turn of H",
-        "deg",
-        angle_of("smallest"),
-        small_angle,
-        "screen json",
+    Column.named(
+        "smallest_turn_width_s=smallest_width", "by a pulse of", "", duration, "screen json"
     ),
-    Column(
-        "smallest_turn_width_s",
-        "by a pulse of",
-        "",
-        lambda row: row.smallest_width,
-        duration,
-        "screen json",
-    ),
-    Column(
-        "largest_turn_deg", "largest turn", "deg", angle_of("largest"), small_angle, "screen json"
-    ),
-    Column(
-        "largest_turn_width_s",
-        "by a pulse of",
-        "",
-        lambda row: row.largest_width,
-        duration,
-        "screen json",
+    Column.named("largest_turn_deg=largest", "largest turn", "deg", small_angle, "screen json"),
+    Column.named(
+        "largest_turn_width_s=largest_width", "by a pulse of", "", duration, "screen json"
     ),
 )
 

@@ -83,7 +83,7 @@ def _digits(estimate: Estimate) -> int:
 
 
 ESTIMATES = (
-    Column("quantity", "", "", lambda row: row.key, where="json", kind=TEXT),
+    Column.named("quantity=key", "", "", where="json", kind=TEXT),
     Column("", "quantity", "", lambda row: row.label, where="screen", kind=TEXT),
     Column("value", "", "", lambda row: row.value * row.factor, where="json"),
     Column("", "value", "", _value, where="screen"),
@@ -93,8 +93,8 @@ ESTIMATES = (
     Column("file", "", "", lambda row: _scaled("file", row), where="json"),
     Column("", "file", "", _file, where="screen"),
     Column("file_sigma", "", "", lambda row: _scaled("prior", row), where="json"),
-    Column("change_sigmas", "change", "sigmas", lambda row: row.change, _changed, "screen json"),
-    Column("from", "from", "", lambda row: row.source, where="screen json", kind=TEXT),
+    Column.named("change_sigmas=change", "change", "sigmas", _changed, "screen json"),
+    Column.named("from=source", "from", "", where="screen json", kind=TEXT),
 )
 
 

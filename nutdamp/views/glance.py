@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from operator import attrgetter
 from typing import Any
@@ -93,7 +93,7 @@ def _four(value: float) -> str:
     return digits(value, 4) if value else "0"
 
 
-def _columns(compared: Comparison, chosen: Plan | None) -> Iterator[Column]:
+def _columns(compared: Comparison, chosen: Plan | None) -> list[Column]:
     spacecraft = compared.spacecraft
     least = limits(compared.spacecraft)
     feasible = [plan for plan in compared.plans if plan.feasible]
@@ -108,36 +108,15 @@ def _columns(compared: Comparison, chosen: Plan | None) -> Iterator[Column]:
         cases = compared.verdicts[plan].cases
         return None if cases is None or not cases.final else cases.complying
 
+    def status(plan: Plan) -> str:
+        return compared.verdicts[plan].status.value
+
+    def count(plan: Plan) -> int | None:
+        return len(plan.pulses) if plan.feasible else None
+
     def shortly(largest: float) -> Callable[[float], str]:
         return lambda angle: short_angle(math.radians(angle), largest)
 
-    yield Column(
-        "scheme", Shared.SCHEME, "", attrgetter("scheme"), where=f"{everywhere} csv", kind=TEXT
-    )
-    yield Column("feasible", "", "", attrgetter("feasible"), where="csv", kind=YES_NO)
-    yield Column("recommended", "", "", lambda plan: plan is chosen, where="csv", kind=YES_NO)
-    yield Column(
-        "status", "", "", lambda plan: compared.verdicts[plan].status.value, where="csv", kind=TEXT
-    )
-    yield Column("meets_requirement", "", "", met, where="csv", kind=YES_NO)
-    yield Column("met_fraction", "", "", share, where="csv")
-    count = _feasible(lambda plan: len(plan.pulses))
-    yield Column("", Shared.PULSES, "", count, where=everywhere, kind=WHOLE)
-    yield Column("pulses", "", "", lambda plan: len(plan.pulses), where="csv", kind=WHOLE)
-    end, impulse = _feasible("pulses.end"), _feasible("pulses.total_impulse")
-    yield Column("", "end", "s", end, to_figures(4), "screen")
-    yield Column("end_s", "end", "s", end, lambda value: f"{value:.3f}", "full page csv")
-    where = "full page csv" if fuelled else "full page csv screen"
-    yield Column("total_impulse_Nms", Shared.IMPULSE, "N m s", impulse, _four, where)
-    yield Column("least_impulse_Nms", "", "", _feasible("spacecraft.least_impulse"), where="csv")
-    spent = _feasible("pulses.propellant")
-    yield Column("propellant_kg", Shared.PROPELLANT, "kg", spent, where="csv")
-    if fuelled:
-        yield Column("", Shared.PROPELLANT, "g", spent, lambda mass: _four(1e3 * mass), "full page")
-        yield Column("", Shared.PROPELLANT, "g", spent, to_figures(4, 1e3), "screen")
-    for name in ("nutation", "momentum_shift"):
-        heading = f"{name.replace('_', ' ')}, impulses (17)"
-        yield Column("", heading, "deg", angle_of(f"residual.{name}"), small_angle, "full")
     ends = ("full page", everywhere) if aimed else (everywhere, "")
     shown = {
         "nutation": everywhere,
@@ -146,51 +125,107 @@ def _columns(compared: Comparison, chosen: Plan | None) -> Iterator[Column]:
         "momentum_shift": ends[0],
         "axis_error": ends[1],
     }
+    residuals = []
     for name, where in shown.items():
         heading = name.replace("_", " ")
         angle = angle_of(f"flown.{name}")
         if "screen" in where:
-            yield Column("", heading, "", angle, shortly(least[name != "nutation"]), "screen")
-        yield Column(
-            f"{name}_deg",
-            heading,
-            "deg",
-            angle,
-            small_angle,
-            where.removeprefix("screen ") + " csv",
-        )
-    directions = parts.direction_columns(spacecraft)
-    for column in directions:
+            short = shortly(least[name != "nutation"])
+            residuals.append(Column("", heading, "", angle, short, "screen"))
+        where = f"{where.removeprefix('screen ')} csv"
+        residuals.append(Column(f"{name}_deg", heading, "deg", angle, small_angle, where))
+    axes, momenta = [], []
+    for column in parts.direction_columns(spacecraft):
         name = SHORT_NAMES.get(column.heading, column.heading)
         value = _feasible(partial(_direction, "axis", column))
         where = "full page csv"
-        yield Column(f"axis_{column.key}", f"axis {name}", "deg", value, column.text, where)
-    for column in directions:
+        axes.append(Column(f"axis_{column.key}", f"axis {name}", "deg", value, column.text, where))
         value = _feasible(partial(_direction, "momentum", column))
-        yield Column(f"momentum_{column.key}", "", "", value, where="csv")
-    yield Column("spin_rad_s", "", "", _feasible("flight.final.spin"), where="csv")
-    if spacecraft.goal.spin is not None:
-        yield Column(
-            "", "final spin", "rad/s", _feasible("flight.settled.spin"), to_figures(6), "full"
+        momenta.append(Column(f"momentum_{column.key}", "", "", value, where="csv"))
+    bounds = [
+        Column(
+            "",
+            f"{bound.label} {verdicts.limit(bound)}",
+            "",
+            _feasible(partial(_bound, bound)),
+            where="full",
+            kind=TEXT,
         )
-    where = "full csv page" if any(plan.spin_change for plan in compared.plans) else "full csv"
-    yield Column(
-        "spin_change_rad_s", "spin change", "rad/s", attrgetter("spin_change"), _four, where
-    )
-    yield Column("delta_v_m_s", "", "", speed, where="csv")
-    for bound in (*requirements.required(spacecraft), *requirements.cones(spacecraft)):
-        name = f"{bound.label} {verdicts.limit(bound)}"
-        yield Column("", name, "", _feasible(partial(_bound, bound)), where="full", kind=TEXT)
-    yield Column(
-        "",
-        Shared.VERDICT,
-        "",
-        partial(scheme_verdict, compared),
-        where=everywhere,
-        kind=TEXT,
-        met=met,
-    )
-    yield Column("why", "", "", infeasibility, where="csv", kind=TEXT)
+        for bound in (*requirements.required(spacecraft), *requirements.cones(spacecraft))
+    ]
+    return [
+        Column.named("scheme", Shared.SCHEME, "", where=f"{everywhere} csv", kind=TEXT),
+        Column.named("feasible", "", "", where="csv", kind=YES_NO),
+        Column("recommended", "", "", lambda plan: plan is chosen, where="csv", kind=YES_NO),
+        Column("status", "", "", status, where="csv", kind=TEXT),
+        Column("meets_requirement", "", "", met, where="csv", kind=YES_NO),
+        Column("met_fraction", "", "", share, where="csv"),
+        Column("", Shared.PULSES, "", count, where=everywhere, kind=WHOLE),
+        Column("pulses", "", "", lambda plan: len(plan.pulses), where="csv", kind=WHOLE),
+        Column("", "end", "s", _feasible("schedule.end"), to_figures(4), "screen"),
+        Column.named("end_s=schedule.end", "end", "s", "{:.3f}".format, "full page csv"),
+        Column.named(
+            "total_impulse_Nms=schedule.total_impulse",
+            Shared.IMPULSE,
+            "N m s",
+            _four,
+            "full page csv" if fuelled else "full page csv screen",
+        ),
+        Column("least_impulse_Nms", "", "", _feasible("spacecraft.least_impulse"), where="csv"),
+        Column.named(
+            "propellant_kg=schedule.propellant",
+            Shared.PROPELLANT,
+            "g",
+            lambda mass: _four(1e3 * mass),
+            "csv full page" if fuelled else "csv",
+        ),
+        Column(
+            "",
+            Shared.PROPELLANT,
+            "g",
+            _feasible("schedule.propellant"),
+            to_figures(4, 1e3),
+            "screen" if fuelled else "",
+        ),
+        *(
+            Column("", f"{name}, impulses (17)", "deg", angle, small_angle, "full")
+            for name, angle in (
+                ("nutation", angle_of("residual.nutation")),
+                ("momentum shift", angle_of("residual.momentum_shift")),
+            )
+        ),
+        *residuals,
+        *axes,
+        *momenta,
+        Column("spin_rad_s", "", "", _feasible("flight.final.spin"), where="csv"),
+        Column(
+            "",
+            "final spin",
+            "rad/s",
+            _feasible("flight.settled.spin"),
+            to_figures(6),
+            "" if spacecraft.goal.spin is None else "full",
+        ),
+        Column.named(
+            "spin_change_rad_s",
+            "spin change",
+            "rad/s",
+            _four,
+            "full csv page" if any(plan.spin_change for plan in compared.plans) else "full csv",
+        ),
+        Column("delta_v_m_s", "", "", speed, where="csv"),
+        *bounds,
+        Column(
+            "",
+            Shared.VERDICT,
+            "",
+            partial(scheme_verdict, compared),
+            where=everywhere,
+            kind=TEXT,
+            met=met,
+        ),
+        Column("why", "", "", infeasibility, where="csv", kind=TEXT),
+    ]
 
 
 def _direction(which: str, angle: Column, plan: Plan) -> Any:

@@ -75,11 +75,10 @@ APART = "{:.1e}".format  # text of a difference
 
 FIRINGS = (
     Column("", "firing", "", lambda row: row.at + 1, where="screen verified", kind=WHOLE),
-    Column(
-        "channel",
+    Column.named(
+        "channel=firing.pulse.channel",
         Shared.CHANNEL,
         "",
-        lambda row: row.firing.pulse.channel,
         where="verified verified_json",
         kind=TEXT,
     ),
@@ -119,7 +118,7 @@ FIRINGS = (
     ),
     Column("", Shared.CHANNEL, "", lambda row: row.firing.pulse.channel, where="screen", kind=TEXT),
     *tables.file_columns("json", "decided_s=firing.decided"),
-    Column("seen_deg", "nutation seen", "deg", angle_of("firing.seen"), small_angle, "screen json"),
+    Column.named("seen_deg=firing.seen", "nutation seen", "deg", small_angle, "screen json"),
     Column("", "before", "deg", angle_of("before"), small_angle, "screen"),
     Column("", "after", "deg", angle_of("after"), small_angle, "screen"),
     Column("", "nutation", "deg", angle_of("firing.true_nutation"), small_angle, "verified"),
@@ -144,22 +143,20 @@ def firing_table(run: LoopRun) -> DataTable:
 
 
 MARGINS = (
-    Column("channel", Shared.CHANNEL, "", lambda row: row.channel, where="screen json", kind=TEXT),
-    Column("late_deg", "late", "deg", angle_of("late"), to_figures(4), "screen json"),
+    Column.named("channel", Shared.CHANNEL, "", where="screen json", kind=TEXT),
+    Column.named("late_deg", "late", "deg", to_figures(4), "screen json"),
     *tables.file_columns("json", "latest_deg"),
-    Column(
+    Column.named(
         "gain",
         "remaining",
         "%",
-        lambda row: row.gain,
         lambda gain: f"{100.0 * gain:.4g}" if gain >= ROUNDING else "0",
         "screen json",
     ),
-    Column(
+    Column.named(
         "growth",
         "growth in a period",
         "%",
-        lambda row: row.growth,
         lambda growth: f"{100.0 * (growth - 1.0):.3g}",
         "screen json",
     ),
@@ -415,10 +412,8 @@ FILES, EVERYWHERE = "csv json", "screen csv json"
 
 
 HELD = (
-    Column(
-        "start_deg", Shared.START, "deg", angle_of("thresholds.start"), to_figures(4), EVERYWHERE
-    ),
-    Column("stop_deg", "stop", "deg", angle_of("thresholds.stop"), to_figures(4), EVERYWHERE),
+    Column.named("start_deg=thresholds.start", Shared.START, "deg", to_figures(4), EVERYWHERE),
+    Column.named("stop_deg=thresholds.stop", "stop", "deg", to_figures(4), EVERYWHERE),
     *tables.file_columns(FILES, "first_firing_s=begins"),
     Column(
         "pulses_per_day",
@@ -448,24 +443,10 @@ HELD = (
         "screen",
     ),
     Column("spin_change_rad_s_per_day", "", "", _of_cycle("spin_rate", DAY), where=FILES),
-    Column(
-        "nutation_low_deg", "after firing", "deg", angle_of("cycle.low"), to_figures(3), EVERYWHERE
-    ),
-    Column(
-        "nutation_high_deg",
-        "before firing",
-        "deg",
-        angle_of("cycle.high"),
-        to_figures(3),
-        EVERYWHERE,
-    ),
-    Column(
-        "nutation_largest_deg",
-        Shared.MOST,
-        "deg",
-        angle_of("cycle.largest"),
-        to_figures(3),
-        EVERYWHERE,
+    Column.named("nutation_low_deg=cycle.low", "after firing", "deg", to_figures(3), EVERYWHERE),
+    Column.named("nutation_high_deg=cycle.high", "before firing", "deg", to_figures(3), EVERYWHERE),
+    Column.named(
+        "nutation_largest_deg=cycle.largest", Shared.MOST, "deg", to_figures(3), EVERYWHERE
     ),
     Column(
         "",
@@ -502,9 +483,7 @@ HELD = (
         when=lambda budget: budget.meets_requirement is not None,
         met=lambda held: held.meets_requirement,
     ),
-    Column(
-        "meets_requirement", "", "", lambda held: held.meets_requirement, where=FILES, kind=YES_NO
-    ),
+    Column.named("meets_requirement", "", "", where=FILES, kind=YES_NO),
     Column("why", "", "", lambda held: held.why or None, where=FILES, kind=TEXT),
 )
 

@@ -35,7 +35,6 @@ from nutdamp.views.tables import (
     Column,
     DataTable,
     Shared,
-    angle_of,
     facts,
     lines_of,
     to_figures,
@@ -136,7 +135,7 @@ def _valves(schedule: Schedule) -> bool:
 PEOPLE, FILES = "screen full simulate page", "csv json flown"
 PULSES = (
     Column("pulse", "pulse", "", lambda row: row.at + 1, where=f"{PEOPLE} csv", kind=WHOLE),
-    Column("t_s", "centre", "s", lambda row: row.pulse.t, seconds, FILES),
+    Column.named("t_s=pulse.t", "centre", "s", seconds, FILES),
     Column("start_s", Shared.START, "s", lambda row: row.pulse.loaded[0], seconds, FILES),
     Column(
         "on_time_s",
@@ -155,10 +154,10 @@ PULSES = (
         where=PEOPLE,
         kind=TEXT,
     ),
-    Column("channel", Shared.CHANNEL, "", lambda row: row.pulse.channel, where=FILES, kind=TEXT),
+    Column.named("channel=pulse.channel", Shared.CHANNEL, "", where=FILES, kind=TEXT),
     _vector("torque", "Nm"),
     _vector("impulse", "Nms"),
-    Column("propellant_kg", Shared.PROPELLANT, "kg", lambda row: row.pulse.propellant, where=FILES),
+    Column.named("propellant_kg=pulse.propellant", Shared.PROPELLANT, "kg", where=FILES),
     Column(
         "",
         Shared.IMPULSE,
@@ -173,8 +172,8 @@ PULSES = (
     _cone("body_cone", "after", "simulate page flown"),
     _cone("space_cone", "before", "page flown"),
     _cone("space_cone", "after", "simulate page flown"),
-    Column("effective_start_s", "", "", lambda row: row.pulse.start, where=FILES, when=_valves),
-    Column("effective_on_time_s", "", "", lambda row: row.pulse.on_time, where=FILES, when=_valves),
+    Column.named("effective_start_s=pulse.start", "", "", where=FILES, when=_valves),
+    Column.named("effective_on_time_s=pulse.on_time", "", "", where=FILES, when=_valves),
     Column(
         "utc", "", "", lambda row: row.spacecraft.utc(row.pulse.loaded[0]), where=FILES, kind=TEXT
     ),
@@ -256,16 +255,9 @@ def _nine(value: float) -> float:
 EVERYWHERE = "screen page csv"
 BLOCKS = (
     Column("block", "block", "", lambda row: row.at + 1, where=EVERYWHERE, kind=WHOLE),
-    Column(
-        "channel", Shared.CHANNEL, "", lambda row: row.block.channel, where=EVERYWHERE, kind=TEXT
-    ),
-    Column(
-        "first_sun_pulse",
-        Shared.FIRST_SUN_PULSE,
-        "",
-        lambda row: row.block.first,
-        where=EVERYWHERE,
-        kind=WHOLE,
+    Column.named("channel=block.channel", Shared.CHANNEL, "", where=EVERYWHERE, kind=TEXT),
+    Column.named(
+        "first_sun_pulse=block.first", Shared.FIRST_SUN_PULSE, "", where=EVERYWHERE, kind=WHOLE
     ),
     Column(
         "first_utc",
@@ -275,7 +267,7 @@ BLOCKS = (
         where="csv page",
         kind=TEXT,
     ),
-    Column("delay_s", Shared.DELAY, "s", lambda row: row.block.delay, to_figures(6), EVERYWHERE),
+    Column.named("delay_s=block.delay", Shared.DELAY, "s", to_figures(6), EVERYWHERE),
     Column(
         "delay_counts",
         Shared.DELAY,
@@ -292,14 +284,12 @@ BLOCKS = (
         lambda angle: f"{angle:.2f}",
         EVERYWHERE,
     ),
-    Column("width_s", "width", "s", lambda row: row.block.width, to_figures(6), EVERYWHERE),
+    Column.named("width_s=block.width", "width", "s", to_figures(6), EVERYWHERE),
     Column(
         "width_counts", "width", "counts", partial(_counts, "width"), where=EVERYWHERE, kind=WHOLE
     ),
-    Column("count", Shared.PULSES, "", lambda row: row.block.count, where=EVERYWHERE, kind=WHOLE),
-    Column(
-        "every", Shared.EVERY, "turn", lambda row: row.block.every, where=EVERYWHERE, kind=WHOLE
-    ),
+    Column.named("count=block.count", Shared.PULSES, "", where=EVERYWHERE, kind=WHOLE),
+    Column.named("every=block.every", Shared.EVERY, "turn", where=EVERYWHERE, kind=WHOLE),
     Column(
         "impulse_Nms",
         Shared.IMPULSE,
@@ -308,13 +298,8 @@ BLOCKS = (
         to_figures(6),
         "csv page",
     ),
-    Column(
-        "nutation_after_deg",
-        Shared.NUTATION_AFTER,
-        "deg",
-        angle_of("nutation"),
-        small_angle,
-        "csv page",
+    Column.named(
+        "nutation_after_deg=nutation", Shared.NUTATION_AFTER, "deg", small_angle, "csv page"
     ),
 )
 

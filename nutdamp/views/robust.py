@@ -23,7 +23,6 @@ from nutdamp.views.tables import (
     Column,
     DataTable,
     Shared,
-    angle_of,
     file_columns,
     to_figures,
     values_of,
@@ -122,48 +121,52 @@ def robust_json(robust: RobustComparison) -> dict[str, Any]:
 
 
 def _table(robust: RobustComparison, candidates: list[FlownPlan]) -> DataTable:
+    """One row a candidate; ``full``: of the screen, with propellant only where all have it."""
     mark = next((index for index, entry in enumerate(candidates) if entry is robust.chosen), None)
-    return DataTable("Candidates", tuple(_columns(robust)), candidates, robust, mark)
-
-
-def _columns(robust: RobustComparison) -> Iterator[Column]:
-    """Columns of the candidates; ``full``: of the screen,
-    with propellant only where all have it.
-    """
-    spacecraft = robust.comparison.spacecraft
     level = exact_percent(robust.probability)
     fuelled = all(candidate.plan.pulses.propellant is not None for candidate in robust.candidates)
-    yield Column("scheme", "plan", "", attrgetter("plan.scheme"), where="full json", kind=TEXT)
+    judged = requirements.judged(robust.comparison.spacecraft)
+    both = "full json"
 
     def variant(row: FlownPlan) -> str:
         return f"{row.variant} *" if row is robust.usual else row.variant
 
-    yield from file_columns("json", "variant")
-    yield Column("", "variant", "", variant, where="full", kind=TEXT)
-    yield Column("pulses", "", "", lambda row: len(row.plan.pulses), where="json")
-    yield Column(
-        "end_s",
-        Shared.END,
-        "s",
-        attrgetter("plan.pulses.end"),
-        lambda end: f"{end:.3f}",
-        "full json",
-    )
-    impulse = attrgetter("plan.pulses.total_impulse")
-    where = "json" if fuelled else "full json"
-    yield Column("total_impulse_Nms", Shared.IMPULSE, "N m s", impulse, to_figures(4), where)
-    where = "full json" if fuelled else "json"
-    propellant = attrgetter("plan.pulses.propellant")
-    yield Column("propellant_kg", Shared.PROPELLANT, "g", propellant, to_figures(4, 1e3), where)
-    nominal = angle_of("plan.flown.nutation")
-    where = "full json"
-    yield Column("nominal_nutation_deg", Shared.NOMINAL, "deg", nominal, small_angle, where)
-    yield Column("left_deg", level, "deg", angle_of("left"), small_angle, where)
-    yield from file_columns("json", "samples=cases.samples", "met_fraction=cases.complying")
-    if requirements.judged(spacecraft):
-        comply = attrgetter("cases")
-        yield Column("", "cases that comply", "", comply, share_text, "full")
-    yield Column("final", "", "", lambda row: final_json(row.plan.flight), where="json")
+    columns = [
+        Column.named("scheme=plan.scheme", "plan", "", where=both, kind=TEXT),
+        *file_columns("json", "variant"),
+        Column("", "variant", "", variant, where="full", kind=TEXT),
+        Column("pulses", "", "", lambda row: len(row.plan.pulses), where="json"),
+        Column.named("end_s=plan.pulses.end", Shared.END, "s", "{:.3f}".format, both),
+        Column.named(
+            "total_impulse_Nms=plan.pulses.total_impulse",
+            Shared.IMPULSE,
+            "N m s",
+            to_figures(4),
+            "json" if fuelled else both,
+        ),
+        Column.named(
+            "propellant_kg=plan.pulses.propellant",
+            Shared.PROPELLANT,
+            "g",
+            to_figures(4, 1e3),
+            both if fuelled else "json",
+        ),
+        Column.named(
+            "nominal_nutation_deg=plan.flown.nutation", Shared.NOMINAL, "deg", small_angle, both
+        ),
+        Column.named("left_deg", level, "deg", small_angle, both),
+        *file_columns("json", "samples=cases.samples", "met_fraction=cases.complying"),
+        Column(
+            "",
+            "cases that comply",
+            "",
+            attrgetter("cases"),
+            share_text,
+            "full" if judged else "",
+        ),
+        Column("final", "", "", lambda row: final_json(row.plan.flight), where="json"),
+    ]
+    return DataTable("Candidates", columns, candidates, robust, mark)
 
 
 def _candidates(robust: RobustComparison) -> list[RenderableType]:

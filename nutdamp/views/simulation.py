@@ -239,8 +239,8 @@ def _several(value: Callable[[SpinRow, Pulse], float]) -> Callable[[SpinRow], st
 
 
 SPINS = (
-    Column("spin", "", "", attrgetter("number"), where="csv", kind=WHOLE),
-    Column("start_utc", "", "", attrgetter("utc"), where="csv", kind=TEXT),
+    Column.named("spin=number", "", "", where="csv", kind=WHOLE),
+    Column.named("start_utc=utc", "", "", where="csv", kind=TEXT),
     Column("start_s", "", "", lambda row: round(row.begin, DIGITS), where="csv"),
     Column("period_s", "", "", lambda row: round(row.period, DIGITS), where="csv"),
     Column("pulses", "", "", lambda row: len(row.fired), where="csv", kind=WHOLE),
@@ -443,30 +443,19 @@ def _difference(value: float | None) -> str:
     return "0" if value == 0.0 else "< 1e-12" if value < 1e-12 else f"{value:.1e}"
 
 
-NUTATION = Column(
-    "nutation_deg", Part.NUTATION.label, "deg", angle_of("nutation"), small_angle, "json screen"
-)
+NUTATION = Column.named("nutation_deg", Part.NUTATION.label, "deg", small_angle, "json screen")
 METHODS = (
-    Column("name", "method", "", attrgetter("name"), where="json screen", kind=TEXT),
+    Column.named("name", "method", "", where="json screen", kind=TEXT),
     NUTATION,
-    Column(
-        "momentum_shift_deg",
-        Part.SHIFT.label,
-        "deg",
-        angle_of("momentum_shift"),
-        small_angle,
-        "json screen",
-    ),
-    Column("axis_difference_rad", "Δaxis", "rad", attrgetter("axis"), _difference, "json screen"),
-    Column(
-        "momentum_difference_rad", "ΔH", "rad", attrgetter("momentum"), _difference, "json screen"
-    ),
-    Column("rate_difference", "Δrates", "relative", attrgetter("rate"), _difference, "json screen"),
-    Column("result_difference", "", "", attrgetter("result"), where="json"),
+    Column.named("momentum_shift_deg", Part.SHIFT.label, "deg", small_angle, "json screen"),
+    Column.named("axis_difference_rad=axis", "Δaxis", "rad", _difference, "json screen"),
+    Column.named("momentum_difference_rad=momentum", "ΔH", "rad", _difference, "json screen"),
+    Column.named("rate_difference=rate", "Δrates", "relative", _difference, "json screen"),
+    Column.named("result_difference=result", "", "", where="json"),
     Column("missing", "", "", lambda row: row.missing or None, where="json", kind=TEXT),
 )
 IMPERFECTIONS = (
-    Column("imperfection", "imperfection", "", attrgetter("name"), where="json screen", kind=TEXT),
+    Column.named("imperfection=name", "imperfection", "", where="json screen", kind=TEXT),
     NUTATION,
     *tables.file_columns("json", "momentum_shift_deg"),
     Column("", Part.SHIFT.label, "deg", angle_of("momentum_shift"), small_angle, "screen",

@@ -208,7 +208,7 @@ def values_of(source: Any, *names: str) -> dict[str, Any]:
 
 def file_columns(where: str, *names: str) -> list[Column]:
     """Columns of numbers in files alone, with names as in `values_of`."""
-    return [Column(key, "", "", value, where=where) for key, value in map(_named_value, names)]
+    return [Column.named(name, "", "", where=where) for name in names]
 
 
 def to_figures(count: int, scale: float = 1.0) -> Callable[[float], str]:
@@ -236,6 +236,20 @@ class Column(NamedTuple):
     when: Callable[[Any], bool] | None = None
     kind: str = REAL
     met: Callable[[Any], bool | None] | None = None
+
+    @classmethod
+    def named(
+        cls,
+        name: str,
+        heading: str,
+        unit: str,
+        text: Callable[[Any], str] = str,
+        where: str = "",
+        **more: Any,
+    ) -> Column:
+        """Column whose key and value are those of `values_of` by a ``name``."""
+        key, value = _named_value(name)
+        return cls(key, heading, unit, value, text, where, **more)
 
     def shown(self, row: Any) -> str:
         """The value of a row as people read it."""

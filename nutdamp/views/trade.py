@@ -15,6 +15,7 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from nutdamp.common.results import Note, note
+from nutdamp.flight.propagation import Residual
 from nutdamp.planning import notes
 from nutdamp.planning.decision import SAME_ANGLE
 from nutdamp.planning.plan import Plan
@@ -23,6 +24,7 @@ from nutdamp.planning.verdict import Light, Verdict
 from nutdamp.schemes.catalogue import OPTIMAL
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.requirements import DAMPED_ANGLE, SAME_COST, Part
+from nutdamp.spacecraft.schedule import Schedule
 from nutdamp.views.decisions import FARTHER, heading, plan_json
 from nutdamp.views.parts import derived_table, named, pulse_table, requested, summary
 from nutdamp.views.tables import (
@@ -32,7 +34,6 @@ from nutdamp.views.tables import (
     Column,
     DataTable,
     Shared,
-    angle_of,
     file_columns,
     values_of,
 )
@@ -53,6 +54,16 @@ class TradeRow(NamedTuple):
     point: Point
 
     @property
+    def pulses(self) -> Schedule:
+        """Its schedule."""
+        return self.point.plan.pulses
+
+    @property
+    def residual(self) -> Residual:
+        """Residual of its flight."""
+        return self.point.plan.flight.residual
+
+    @property
     def least(self) -> float | None:
         """Lower bound of the cost for small angles."""
         return self.front.least(self.point)
@@ -68,73 +79,80 @@ def rows_of(fronts: Sequence[Front]) -> list[TradeRow]:
 
 
 def _table(rows: Sequence[TradeRow]) -> DataTable:
-    return DataTable("Schedules by their ends", tuple(_columns(rows)), rows)
-
-
-def _columns(rows: Sequence[TradeRow]) -> Iterator[Column]:
-    """``full`` is the table of one front, ``brief`` that of all."""
+    """One row a point; ``full`` is the table of one front, ``brief`` that of all."""
     first = rows[0].number if rows else 1
     others = any(row.point.plan.scheme != OPTIMAL.name for row in rows)
     judged = any(row.point.verdict.met is not None for row in rows)
     flown = any(row.point.verdict.cases is not None for row in rows)
     bounded = any(row.least is not None for row in rows)
-    yield Column("point", "point", "", attrgetter("number"), where="csv full brief", kind=WHOLE)
+    shown = "full brief"
+    everywhere = "csv full brief"
 
     def within(shift: float) -> str:
         return "any" if math.isinf(shift) else degrees(math.radians(shift)).removesuffix(" deg")
 
-    shift = angle_of("front.shift")
-    yield Column("shift_allowed_deg", "H within", "deg", shift, within, "csv brief")
-    yield Column(
-        "end_s",
-        Shared.END,
-        "s",
-        attrgetter("point.plan.pulses.end"),
-        lambda end: f"{end:.3f}",
-        "csv full brief",
-    )
-    yield Column("", "cost", "", lambda row: row.spent(row.point.cost), where="full brief")
-    if bounded:
-        yield Column("", "small-angle bound", "", lambda row: row.spent(row.least), where="full")
-    yield Column(
-        "pulses",
-        Shared.PULSES,
-        "",
-        lambda row: len(row.point.plan.pulses),
-        where="csv full brief",
-        kind=WHOLE,
-    )
-    spent = (
-        "propellant_kg=point.plan.pulses.propellant",
-        "total_impulse_Nms=point.plan.pulses.total_impulse",
-    )
-    yield from file_columns("csv", *spent, "first_order_least=least")
-    yield Column("least_unit", "", "", attrgetter("point.unit"), where="csv", kind=TEXT)
-    yield from file_columns("csv", "nutation_deg=point.plan.flight.residual.nutation")
-    shift = angle_of("point.plan.flight.residual.momentum_shift")
-    yield Column(
-        "momentum_shift_deg", Part.SHIFT.label, "deg", shift, small_angle, "csv full brief"
-    )
-    yield from file_columns("csv", "axis_error_deg=point.plan.flight.residual.axis_error")
-    yield Column("", f"vs point {first}", "%", _saved, where="full")
-    if not others:
-        yield Column("", "vs first", "%", _saved, where="brief")
-    scheme = "csv full brief" if others else "csv"
-    yield Column(
-        "scheme", Shared.SCHEME, "", attrgetter("point.plan.scheme"), where=scheme, kind=TEXT
-    )
-    yield Column("status", "", "", attrgetter("point.verdict.status.value"), where="csv", kind=TEXT)
-    yield from file_columns("csv", "share=point.verdict.cases.complying")
-    yield Column(
-        "meets_requirement", "", "", lambda row: row.point.verdict.met, where="csv", kind=YES_NO
-    )
-    where = "full brief"
-    if flown:
-        yield Column("", "comply", "", attrgetter("point.verdict.cases"), share_text, where)
-    if judged:
-        met = attrgetter("point.verdict.met")
-        verdict = attrgetter("point.verdict")
-        yield Column("", Shared.VERDICT, "", verdict, lead, where, kind=TEXT, met=met)
+    def count(row: TradeRow) -> int:
+        return len(row.pulses)
+
+    def met(row: TradeRow) -> bool | None:
+        return row.point.verdict.met
+
+    columns = [
+        Column.named("point=number", "point", "", where=everywhere, kind=WHOLE),
+        Column.named("shift_allowed_deg=front.shift", "H within", "deg", within, "csv brief"),
+        Column.named("end_s=pulses.end", Shared.END, "s", "{:.3f}".format, everywhere),
+        Column("", "cost", "", lambda row: row.spent(row.point.cost), where=shown),
+        Column(
+            "",
+            "small-angle bound",
+            "",
+            lambda row: row.spent(row.least),
+            where="full" if bounded else "",
+        ),
+        Column("pulses", Shared.PULSES, "", count, where=everywhere, kind=WHOLE),
+        *file_columns(
+            "csv",
+            "propellant_kg=pulses.propellant",
+            "total_impulse_Nms=pulses.total_impulse",
+            "first_order_least=least",
+        ),
+        Column.named("least_unit=point.unit", "", "", where="csv", kind=TEXT),
+        *file_columns("csv", "nutation_deg=residual.nutation"),
+        Column.named(
+            "momentum_shift_deg=residual.momentum_shift",
+            Part.SHIFT.label,
+            "deg",
+            small_angle,
+            everywhere,
+        ),
+        *file_columns("csv", "axis_error_deg=residual.axis_error"),
+        Column("", f"vs point {first}", "%", _saved, where="full"),
+        Column("", "vs first", "%", _saved, where="" if others else "brief"),
+        Column.named(
+            "scheme=point.plan.scheme",
+            Shared.SCHEME,
+            "",
+            where=everywhere if others else "csv",
+            kind=TEXT,
+        ),
+        Column.named("status=point.verdict.status.value", "", "", where="csv", kind=TEXT),
+        *file_columns("csv", "share=point.verdict.cases.complying"),
+        Column("meets_requirement", "", "", met, where="csv", kind=YES_NO),
+        Column(
+            "", "comply", "", attrgetter("point.verdict.cases"), share_text, shown if flown else ""
+        ),
+        Column(
+            "",
+            Shared.VERDICT,
+            "",
+            attrgetter("point.verdict"),
+            lead,
+            shown if judged else "",
+            kind=TEXT,
+            met=met,
+        ),
+    ]
+    return DataTable("Schedules by their ends", columns, rows)
 
 
 def _saved(row: TradeRow) -> str:
@@ -152,11 +170,11 @@ def trade_screen(
     for name, order in (("Cheapest", itemgetter(0, 1)), ("Earliest", itemgetter(1, 0))):
         row = min(
             good or points,
-            key=lambda row: order((row.point.cost, row.point.plan.pulses.end)),
+            key=lambda row: order((row.point.cost, row.pulses.end)),
             default=None,
         )
         if row is not None:
-            end = f"ends at {row.point.plan.pulses.end:.3f} s (point {row.number})"
+            end = f"ends at {row.pulses.end:.3f} s (point {row.number})"
             head.append(Text.assemble((f"{name}: ", "bold"), f"{row.spent(row.point.cost)}, {end}"))
     required = requested(spacecraft)
     if not points:
@@ -208,11 +226,7 @@ def front_parts(spacecraft: Spacecraft, fronts: Sequence[Front]) -> list[Rendera
 
 
 def _ends_off(fronts: Sequence[Front]) -> Iterator[Note]:
-    off = [
-        row.point.plan.flight.residual.axis_error
-        for row in rows_of(fronts)
-        if row.front.shift == 0.0
-    ]
+    off = [row.residual.axis_error for row in rows_of(fronts) if row.front.shift == 0.0]
     if max(off, default=0.0) > DAMPED_ANGLE:
         yield note("trade-ends-off")
 
@@ -309,7 +323,7 @@ def _better(
     better = []
     for row in rows_of(fronts):
         saved = 1.0 - row.point.cost / chosen.pulses.cost_in(row.point.unit)
-        end = row.point.plan.pulses.end
+        end = row.pulses.end
         cheaper = saved > SAME_COST and end <= until
         able = row.point.verdict.met and not fails(row.point)
         if able and (misses or cheaper or _sooner(row.point.plan, chosen, saved)):
@@ -347,7 +361,7 @@ def trade_notes(fronts: Sequence[Front], chosen: Plan, judged: Verdict) -> Itera
     rows = [
         row
         for row in rows_of(fronts)
-        if row.point.plan.pulses.end <= chosen.pulses.end and not fails(row.point)
+        if row.pulses.end <= chosen.pulses.end and not fails(row.point)
     ]
     nearest = min(rows, key=lambda row: row.point.cost, default=None)
     if nearest is None:
