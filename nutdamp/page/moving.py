@@ -39,7 +39,7 @@ from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.requirements import Part
 from nutdamp.spacecraft.schedule import Schedule
 from nutdamp.views.parts import channel_text, direction_columns
-from nutdamp.views.text import MISSING, most, quantity
+from nutdamp.views.text import MISSING, limit_text, quantity
 
 ROWS_A_TURN, LEAST_ROWS, MOST_ROWS = 24, 600, 2400
 """Even rows in the quickest nutation turn; least and largest number of them altogether."""
@@ -69,7 +69,7 @@ def named_directions(spacecraft: Spacecraft) -> tuple[NamedDirection, ...]:
         circles = (
             []
             if shift is None
-            else [Circle(f"H at most {most(shift)} from target", shift, "target")]
+            else [Circle(f"H at most {limit_text(shift)} from target", shift, "target")]
         )
         directions.append(NamedDirection("target", spacecraft.goal.axis, "target", tuple(circles)))
     for keep in spacecraft.watched:
@@ -79,7 +79,7 @@ def named_directions(spacecraft: Spacecraft) -> tuple[NamedDirection, ...]:
                 ("most", keep.most, "keep-in", keep.most < math.pi),
             ]
             circles = [
-                Circle(f"axis at {word} {most(size)} from {keep.name}", size, kind)
+                Circle(f"axis at {word} {limit_text(size)} from {keep.name}", size, kind)
                 for word, size, kind, bounded in bounds
                 if bounded
             ]
@@ -397,7 +397,7 @@ def strip_of(flown: Flight, track: Track, until: float) -> tuple[Strip, list[flo
         ),
         zero=rise(0.0),
         required=rise(level) if low < level < high else None,
-        outside="" if required is None or low < level < high else most(math.radians(level)),
+        outside="" if required is None or low < level < high else limit_text(math.radians(level)),
         channels=channels,
         bars=tuple(
             (channels.index(pulse.channel), *spread(*span))
@@ -438,7 +438,7 @@ def workbench_of(flown: Flight, craft: str) -> Workbench:
         (
             part.value,
             part.label,
-            f"≤ {most(limits[part]).removesuffix(' deg')}°" if part in limits else "",
+            f"≤ {limit_text(limits[part]).removesuffix(' deg')}°" if part in limits else "",
         )
         for part in parts
     ]

@@ -62,7 +62,6 @@ from nutdamp.views.glance import scheme_table
 from nutdamp.views.guide import Topic
 from nutdamp.views.parts import NOTES, pulse_table
 from nutdamp.views.simulation import (
-    BUDGET,
     BUDGET_NOTE,
     budget_table,
     conservation,
@@ -353,8 +352,8 @@ def _sections(
     if chosen is not None:
         title = f"Manoeuvre sheet: {compared.spacecraft.name}, {chosen.scheme}"
         identity = [("document", page.control.line), ("input file", _file_line(repeat))]
-        known = [(name, text) for name, text in identity if text]
-        blocks = manoeuvre_blocks(chosen, judged, known, page.summary)
+        entries = [(name, text) for name, text in identity if text]
+        blocks = manoeuvre_blocks(chosen, judged, entries, page.summary)
         # Before the sheet, which is a page of its own in print: one line after it would be another.
         yield PageSection("verification", "Verification", tuple(_verification(chosen)))
         yield PageSection("manoeuvre", title, tuple(blocks))
@@ -444,8 +443,7 @@ def _verification(chosen: Plan) -> Iterator[Block]:
         spacecraft, chosen.pulses, unrounded(chosen), expected=chosen.options.with_disturbances
     )
     yield Prose(f"{verdict(verified)} {sentence(text(conservation(verified)))}")
-    table = methods_table(verified)
-    blocks: list[Block] = [document.sheet_of("Maximum differences from the flown motion", table)]
+    blocks: list[Block] = [document.sheet(methods_table(verified), "screen")]
     missing = [
         (method.name, f"not flown; {method.missing}")
         for method in verified.methods
@@ -453,7 +451,8 @@ def _verification(chosen: Plan) -> Iterator[Block]:
     ]
     if missing:
         blocks.append(Points(tuple(missing)))
-    blocks += [document.sheet_of(BUDGET, budget_table(spacecraft, verified)), Prose(BUDGET_NOTE)]
+    budget = budget_table(spacecraft, verified)
+    blocks += [document.sheet(budget, "screen"), Prose(BUDGET_NOTE)]
     yield Details("Independent flights and error budget", tuple(blocks))
 
 
@@ -601,9 +600,11 @@ def _method(compared: Comparison) -> Iterator[Block]:
         f"impulse{unequal}.{wheel}"
     )
     chosen = compared.recommended
-    topics = [guide.found(number) for number in EQUATIONS]
+    topics = [guide.topic_of(number) for number in EQUATIONS]
     scheme = (
-        guide.found(chosen.scheme) if chosen is not None and chosen.scheme in guide.NAMES else None
+        guide.topic_of(chosen.scheme)
+        if chosen is not None and chosen.scheme in guide.NAMES
+        else None
     )
     formulas = [(topic, -1) for topic in topics]  # of an equation the last one, which is in use
     formulas += [] if scheme is None else [(scheme, 0)]

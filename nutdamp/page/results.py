@@ -182,10 +182,9 @@ def line(result: Spacecraft | Plan | Flight | Comparison) -> str:
         )
         return f"<Comparison of {', '.join(plan.scheme for plan in result)}: {verdict}>"
     if isinstance(result, Flight):
-        left = result.residual
-        ended = (
-            f"nutation left {degrees(left.nutation)}, momentum shift {degrees(left.momentum_shift)}"
-        )
+        residual = result.residual
+        shift = degrees(residual.momentum_shift)
+        ended = f"nutation left {degrees(residual.nutation)}, momentum shift {shift}"
         return f"<Flight of {_summary(result)}: {ended}>"
     if result.flown is None:
         return f"<Plan {result.scheme}: infeasible, {result.why}>"

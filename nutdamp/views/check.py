@@ -237,9 +237,9 @@ def tolerance_table(spacecraft: Spacecraft) -> DataTable:
     alike: dict[tuple[str, str, str], list[str]] = {}
     for entry in () if spacecraft.dispersions is None else reachable(spacecraft)[0]:
         thrusters = alike.setdefault((entry.tolerance, entry.kind, size_text(entry)), [])
-        given = getattr(spacecraft.dispersions, entry.tolerance)
+        tolerance = getattr(spacecraft.dispersions, entry.tolerance)
         rest = entry.name.partition(" ")[2]  # the thruster, and behind a blank the axis
-        names = given if isinstance(given, Mapping) else ()
+        names = tolerance if isinstance(tolerance, Mapping) else ()
         thrusters += [name for name in names if name in (rest, rest[:-2]) and name not in thrusters]
     return DataTable("Dispersions", TOLERANCES, list(alike.items()))
 
@@ -250,7 +250,7 @@ def check_screen(spacecraft: Spacecraft, *, verbose: bool = True) -> RenderableT
     tolerances = tolerance_table(spacecraft)
     counted = f" (channels: {len(table.rows)}, tolerances: {len(tolerances.rows)})"
     head = [named(spacecraft, "   ", ("VALID", "bold green"), counted)]
-    known = (*_spin_axis(spacecraft), *sun_pulse_facts(spacecraft)) if verbose else ()
+    more = (*_spin_axis(spacecraft), *sun_pulse_facts(spacecraft)) if verbose else ()
     tables = [
         turn_table(spacecraft),
         valve_table(spacecraft),
@@ -258,7 +258,7 @@ def check_screen(spacecraft: Spacecraft, *, verbose: bool = True) -> RenderableT
     ]
     tables += [disturbance_table(spacecraft), _margins(spacecraft), tolerances]
     return summary(
-        [*head, derived_table(spacecraft, known)],
+        [*head, derived_table(spacecraft, more)],
         partial(table.screen, "screen") if table.rows else None,
         (*warnings(spacecraft), *_notes(spacecraft, verbose)),
         "nutdamp plan · nutdamp report",

@@ -155,7 +155,8 @@ def fit_screen(fit: Fit, time: float, *, verbose: bool = True) -> RenderableType
         if colored
         else "residuals: noise"
     )
-    if outliers := int((~fit.used).sum()):
+    outliers = int((~fit.used).sum())
+    if outliers:
         test += f"; outliers left out: {outliers}"
     record, values, spacecraft = fit.model.record, fit.named, fit.model.spacecraft
     wheel = values.get("wheel", spacecraft.inertia.wheel) / in_moments(spacecraft, values)[0]
@@ -181,9 +182,9 @@ def told(fit: Fit, rows: Sequence[Estimate]) -> Iterator[Note]:
     """Parameters that the data do not determine, or only together, and unexpected estimates."""
     yield from doubts(fit)
     yield from untold(fit.model.record)
-    kept = [estimate.label for estimate in rows if estimate.source == UNTOLD]
-    if kept:
-        yield note("fit-kept", estimates=", ".join(kept))
+    of_file = [estimate.label for estimate in rows if estimate.source == UNTOLD]
+    if of_file:
+        yield note("fit-kept", estimates=", ".join(of_file))
     both = float(carried(fit, fit.model.start).correlation[0, 1])
     tied = [f"A and C {both:+.4f}"] if abs(both) > CORRELATED else []
     tied += [

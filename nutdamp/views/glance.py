@@ -73,9 +73,9 @@ def scheme_table(compared: Comparison, chosen: Plan | None) -> DataTable:
 
 def limits(spacecraft: Spacecraft) -> tuple[float, float]:
     """Limits, rad, of the nutation and of the end of H, infinite where there are none."""
-    most = {bound.part: bound.limit for bound in requirements.required(spacecraft)}
-    ends = [most[part] for part in (Part.SHIFT, Part.DISTANCE) if part in most]
-    return most.get(Part.NUTATION, math.inf), min(ends, default=math.inf)
+    largest = {bound.part: bound.limit for bound in requirements.required(spacecraft)}
+    ends = [largest[part] for part in (Part.SHIFT, Part.DISTANCE) if part in largest]
+    return largest.get(Part.NUTATION, math.inf), min(ends, default=math.inf)
 
 
 def _feasible(get: Callable[[Plan], Any] | str) -> Callable[[Plan], Any]:
@@ -95,7 +95,7 @@ def _four(value: float) -> str:
 
 def _columns(compared: Comparison, chosen: Plan | None) -> list[Column]:
     spacecraft = compared.spacecraft
-    least = limits(compared.spacecraft)
+    largest = limits(compared.spacecraft)
     feasible = [plan for plan in compared.plans if plan.feasible]
     fuelled = any(plan.pulses.propellant is not None for plan in feasible)
     aimed = spacecraft.goal.axis is not None
@@ -130,7 +130,7 @@ def _columns(compared: Comparison, chosen: Plan | None) -> list[Column]:
         heading = name.replace("_", " ")
         angle = angle_of(f"flown.{name}")
         if "screen" in where:
-            short = shortly(least[name != "nutation"])
+            short = shortly(largest[name != "nutation"])
             residuals.append(Column("", heading, "", angle, short, "screen"))
         where = f"{where.removeprefix('screen ')} csv"
         residuals.append(Column(f"{name}_deg", heading, "deg", angle, small_angle, where))
@@ -251,12 +251,10 @@ def glance(compared: Comparison, robust: Sequence[Note] | None = None) -> Render
     if plan is not None:
         head.append(verdicts.coloured(verdicts.statement(judged), judged.light))
         ending = [verdicts.bound_table(judged).screen("screen"), ends(plan), Text()]
-        least = limits(compared.spacecraft)[0]
-        fired = (
-            parts.block_table(plan.flight)
-            if plan.pulses.blocks
-            else parts.pulse_table(plan.flight, least=least)
-        )
+        if plan.pulses.blocks:
+            fired = parts.block_table(plan.flight)
+        else:
+            fired = parts.pulse_table(plan.flight, limit=limits(compared.spacecraft)[0])
     schemes = scheme_table(compared, plan).screen("screen", between=" ")
 
     def table(first: int | None = None) -> RenderableType:

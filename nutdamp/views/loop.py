@@ -43,8 +43,8 @@ from nutdamp.views.tables import (
 from nutdamp.views.text import (
     duration,
     lasting,
+    limit_text,
     moment,
-    most,
     note_json,
     ordered,
     quantity,
@@ -214,9 +214,9 @@ def _notes(plan: LoopPlan, judged: Verdict) -> Iterator[Note]:
         yield note(
             "dead-band-held", band_deg=band, cases_share=share, largest_deg=largest, at_s=when
         )
-    least = min(plan.margins, key=lambda margin: margin.delay, default=None)
-    if least is not None and least.delay >= 0.0:
-        yield note("delay-margin", margin_s=least.delay, channel=least.channel)
+    first = min(plan.margins, key=lambda margin: margin.delay, default=None)
+    if first is not None and first.delay >= 0.0:
+        yield note("delay-margin", margin_s=first.delay, channel=first.channel)
     yield note("loop-in-file", loop=described(run.loop))
     if run.case is None:
         yield note("loop-flown", until_s=run.until, seed=run.seed)
@@ -252,7 +252,11 @@ def described(loop: Loop, *, thresholds: bool = True) -> str:
         if loop.predict
         else "firings begun as the sensor shows their moment"
     )
-    band = f"; fires from {most(loop.start)} down to {most(loop.stop)}" if thresholds else ""
+    band = (
+        f"; fires from {limit_text(loop.start)} down to {limit_text(loop.stop)}"
+        if thresholds
+        else ""
+    )
     return f"Loop: {loop.law}, from {kind} ({rate}){band}; {timing}"
 
 
@@ -551,9 +555,9 @@ def _budget_notes(budget: Budget) -> Iterator[Note]:
         yield note("spin-changes", change_percent=100.0 * max(changes, key=abs) * DAY / YEAR)
     if spacecraft.disturbances:
         yield note("disturbances-left-out")
-    known = [row.cycle.doubt for row in budget.held if row.cycle is not None]
-    if known:
-        yield note("budget-accuracy", sigma=f"{100.0 * max(known):.2g} %")
+    sigmas = [row.cycle.doubt for row in budget.held if row.cycle is not None]
+    if sigmas:
+        yield note("budget-accuracy", sigma=f"{100.0 * max(sigmas):.2g} %")
     yield note("cycle-angles")
     band = next((row.band for row in budget.held if row.band is not None), None)
     if band is not None:
@@ -561,7 +565,7 @@ def _budget_notes(budget: Budget) -> Iterator[Note]:
         yield note("smallest-pulse", step_deg=step, least_deg=0.5 * step)
     for begins in dict.fromkeys(row.begins for row in budget.held):
         starts = ", ".join(
-            most(row.thresholds.start) for row in budget.held if row.begins == begins
+            limit_text(row.thresholds.start) for row in budget.held if row.begins == begins
         )
         if math.isinf(begins):
             yield note("first-firing-by-noise")

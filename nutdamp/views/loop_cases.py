@@ -22,7 +22,7 @@ from nutdamp.control_loop.simulation import FlownLoops
 from nutdamp.montecarlo.inputs import DispersedInput
 from nutdamp.montecarlo.statistics import Array, share_interval
 from nutdamp.views import decisions, dispersion
-from nutdamp.views.dispersion import CaseRow, StudyOutput, row_json
+from nutdamp.views.dispersion import CaseRow, StudyOutput, case_row
 from nutdamp.views.loop import described
 from nutdamp.views.parts import named, summary
 from nutdamp.views.tables import TEXT, Column, DataTable, Shared
@@ -59,22 +59,21 @@ def _cases(study: LoopStudy, rows: Sequence[CaseRow]) -> DataTable:
     return dispersion.case_table(study, SHOWN_OUTPUTS, rows)
 
 
+def _row(study: LoopStudy, case: int, values: Array, angles: Array | None, **more: Any) -> CaseRow:
+    draws = study.draws_of(case)
+    return case_row(study, SHOWN_OUTPUTS, case, draws, values.tolist(), angles, **more)
+
+
 def _worst(results: LoopResults, count: int) -> list[CaseRow]:
-    study = results.study
-    cases = results.worst.cases[:count].tolist()
     return [
-        CaseRow(
-            case, study.draws_of(case), results.values[:, case].tolist(), results.angles[:, :, case]
-        )
-        for case in cases
+        _row(results.study, case, results.values[:, case], results.angles[:, :, case])
+        for case in results.worst.cases[:count].tolist()
     ]
 
 
 def _flown_case(study: LoopStudy, case: int, flown: FlownLoops) -> CaseRow:
-    values = study.measured(flown)[0][:, 0].tolist()
-    return CaseRow(
-        case, study.draws_of(case), values, flown.aspects[:, :, 0], flown.pilots[0].ending[0]
-    )
+    values = study.measured(flown)[0][:, 0]
+    return _row(study, case, values, flown.aspects[:, :, 0], stop=flown.pilots[0].ending[0])
 
 
 def loop_cases_screen(flown: LoopDispersion, *, worst: int, verbose: bool = True) -> RenderableType:
@@ -85,7 +84,7 @@ def loop_cases_screen(flown: LoopDispersion, *, worst: int, verbose: bool = True
         drawn += f", unphysical ones drawn again: {results.redrawn:,}"
     title = named(study.spacecraft, f": loop, 0 to {duration(study.until)}, {drawn}")
     head = [title, Text(described(study.law.loop))]
-    percentiles = _percentiles(results)
+    percentiles = dispersion.percentile_table(results, SHOWN_OUTPUTS, study.nominal)
     unused = study.model.inputs.unused
     if not verbose:
         notes = list[Note]()
@@ -151,21 +150,12 @@ def _verdicts(flown: LoopDispersion) -> Iterator[RenderableType]:
     )
 
 
-def _percentiles(results: LoopResults) -> DataTable:
-    rows = []
-    for output, plan in zip(SHOWN_OUTPUTS, results.study.nominal.tolist(), strict=True):
-        distribution = results.distribution(output.name)
-        nominal = None if distribution is None else plan
-        rows.append(dispersion.percentile_row(output, nominal, distribution))
-    return DataTable("Percentiles", dispersion.PERCENTILES, rows)
-
-
 def _share(count: int, of: int) -> str:
     if not of:
         return "no case"
-    low, high = share_interval(count, of)
-    share, least, most = (percent(fraction, 0.99) for fraction in (count / of, low, high))
-    return f"{share} of cases (95 % interval {least} to {most})"
+    shares = (count / of, *share_interval(count, of))
+    share, low, high = (percent(fraction, 0.99) for fraction in shares)
+    return f"{share} of cases (95 % interval {low} to {high})"
 
 
 def _shares(results: LoopResults) -> Iterator[RenderableType]:
@@ -218,7 +208,14 @@ def _shares(results: LoopResults) -> Iterator[RenderableType]:
 def loop_case_screen(study: LoopStudy, case: int, flown: FlownLoops) -> Group:
     """One case (from 0), ``flown`` alone: every input, and its end beside the nominal one."""
     row = _flown_case(study, case, flown)
-    nominal = CaseRow(dispersion.ESTIMATE, {}, study.nominal.tolist(), study.nominal_aspects)
+    nominal = case_row(
+        study,
+        SHOWN_OUTPUTS,
+        dispersion.ESTIMATE,
+        {},
+        study.nominal.tolist(),
+        study.nominal_aspects,
+    )
     table = _cases(study, [nominal, row]).transposed("case", names="")
     title = named(study.spacecraft, f": loop, seed {study.seed}, case {case + 1}")
     parts: list[RenderableType] = [
@@ -266,7 +263,7 @@ def loop_cases_json(flown: LoopDispersion, *, worst: int) -> dict[str, Any]:
         **correlation_json(study.spacecraft),
         "each_firing": {entry.name: entry._asdict() for entry in study.model.of_firings},
         "unused_because": dict(study.model.inputs.unused),
-        "worst": [row_json(study, SHOWN_OUTPUTS, row) for row in _worst(results, worst)],
+        "worst": [row.data for row in _worst(results, worst)],
     }
 
 
@@ -275,7 +272,7 @@ def loop_case_json(study: LoopStudy, case: int, flown: FlownLoops) -> dict[str, 
     row = _flown_case(study, case, flown)
     data = {"nutdamp": __version__, "seed": study.seed, "until_s": study.until}
     data |= {} if row.stop is None else {"stopped": row.stop.name.lower()}
-    return data | row_json(study, SHOWN_OUTPUTS, row)
+    return data | row.data
 
 
 def _fraction(count: int, of: int) -> dict[str, float | None]:
@@ -304,7 +301,6 @@ class LoopCasesWriter:
                 name: draw if isinstance(draw, float) else float(draw[row])
                 for name, draw in drawn.items()
             }
-            rows.append(
-                CaseRow(first + row, draws, values[:, row].tolist(), angles[..., row], stop)
-            )
+            of_case = values[:, row].tolist(), angles[..., row]
+            rows.append(case_row(self._study, SHOWN_OUTPUTS, first + row, draws, *of_case, stop))
         self._stream.write(replace(self._table, rows=rows).csv().partition("\n")[2].encode())

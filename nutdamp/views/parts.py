@@ -44,10 +44,10 @@ from nutdamp.views.text import (
     degrees,
     digits,
     duration,
+    limit_text,
     longitude,
     mass,
     moment,
-    most,
     pointing,
     quantity,
     quiet,
@@ -186,10 +186,10 @@ def commanded(schedule: Schedule, spacecraft: Spacecraft) -> DataTable:
     return DataTable("Pulses", _dated(spacecraft), rows, schedule)
 
 
-def pulse_table(flown: Flight, *, scheme: str = "", least: float = math.inf) -> DataTable:
+def pulse_table(flown: Flight, *, scheme: str = "", limit: float = math.inf) -> DataTable:
     """The pulses of a flight with the cone angles before and after each.
 
-    ``scheme``: its name, on pages; ``least``: limit of the nutation, rad, on default screens.
+    ``scheme``: its name, on pages; ``limit``: that of the nutation, rad, on default screens.
     """
     before, after = flown.around_pulses()
     pulses, spacecraft = flown.schedule.pulses, flown.spacecraft
@@ -197,9 +197,15 @@ def pulse_table(flown: Flight, *, scheme: str = "", least: float = math.inf) -> 
     rows = [
         PulseRow(index, pulse, spacecraft, before, after, phase) for index, (pulse, phase) in phased
     ]
-    left = Column("", Shared.NUTATION_AFTER, "deg", lambda row: float(row.after.nutation[row.at]),
-                  lambda angle: short_angle(angle, least), "screen")  # fmt: skip
-    return DataTable(f"Pulses of {scheme}", (*_dated(spacecraft), left), rows, flown.schedule)
+    nutation = Column(
+        "",
+        Shared.NUTATION_AFTER,
+        "deg",
+        lambda row: float(row.after.nutation[row.at]),
+        lambda angle: short_angle(angle, limit),
+        "screen",
+    )
+    return DataTable(f"Pulses of {scheme}", (*_dated(spacecraft), nutation), rows, flown.schedule)
 
 
 def _dated(spacecraft: Spacecraft) -> tuple[Column, ...]:
@@ -490,12 +496,12 @@ def direction_columns(spacecraft: Spacecraft) -> tuple[Column, Column]:
     other = partial(angle, 1)
     if spacecraft.attitude is None:
         return (
-            Column("tilt_deg", "tilt", "deg", other, pointing),
-            Column("azimuth_deg", "azimuth", "deg", around, longitude),
+            Column("tilt_deg", "tilt", "deg", other, pointing, "json"),
+            Column("azimuth_deg", "azimuth", "deg", around, longitude, "json"),
         )
     return (
-        Column("right_ascension_deg", "right ascension", "deg", around, longitude),
-        Column("declination_deg", "declination", "deg", other, pointing),
+        Column("right_ascension_deg", "right ascension", "deg", around, longitude, "json"),
+        Column("declination_deg", "declination", "deg", other, pointing, "json"),
     )
 
 
@@ -529,9 +535,9 @@ def aspect_facts(aspects: Iterable[Aspect]) -> Iterator[tuple[str, str]]:
 
 def bounds_text(keep: Keep) -> str:
     """Limits of the spin axis to a direction; empty where it is only watched."""
-    least = f"at least {most(keep.least)}" if keep.least > 0.0 else ""
-    largest = f"at most {most(keep.most)}" if keep.most < math.pi else ""
-    return " and ".join(filter(None, (least, largest)))
+    inner = f"at least {limit_text(keep.least)}" if keep.least > 0.0 else ""
+    outer = f"at most {limit_text(keep.most)}" if keep.most < math.pi else ""
+    return " and ".join(filter(None, (inner, outer)))
 
 
 def requested(spacecraft: Spacecraft) -> str:
@@ -548,7 +554,7 @@ def required(spacecraft: Spacecraft) -> str:
             spin = (spacecraft.goal.spin or 0.0) * RPM
             texts.append(f"spin within {RPM * bound.limit:.4g} rpm of {spin:.5g} rpm")
         else:
-            texts.append(f"{bound.label} within {most(bound.limit)}")
+            texts.append(f"{bound.label} within {limit_text(bound.limit)}")
     return listed(texts)
 
 
@@ -595,9 +601,9 @@ def _derived(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
         symbol = "|H3|β" if inertia.wheel else "C|ω3|β"
         turned = spacecraft.to_turn < NO_NUTATION  # but for rounding
         turn = quantity(0.0 if turned else spacecraft.turning_impulse, "N m s")
-        least = "" if beyond else ", the least to turn H"
+        bound = "" if beyond else ", the least to turn H"
         yield "target", direction_text(spacecraft, spacecraft.goal.axis)
-        yield "", f"β = {degrees(spacecraft.to_turn)} from H; {symbol} = {turn}{least}"
+        yield "", f"β = {degrees(spacecraft.to_turn)} from H; {symbol} = {turn}{bound}"
     if spacecraft.goal.spin is not None:
         yield "final spin", spin_text(spacecraft.goal.spin)
     actuators = []

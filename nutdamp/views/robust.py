@@ -81,8 +81,8 @@ def robust_json(robust: RobustComparison) -> dict[str, Any]:
     fly, and its cost.
     """
     chosen, fresh, cost, needed = robust.chosen, robust.fresh, robust.cost, robust.tightening
-    given = [entry for entry in (*robust.candidates, chosen, robust.usual) if entry is not None]
-    entries = dict(zip(map(id, given), _table(robust, given).json(), strict=True))
+    plans = [entry for entry in (*robust.candidates, chosen, robust.usual) if entry is not None]
+    entries = dict(zip(map(id, plans), _table(robust, plans).json(), strict=True))
     return {
         **values_of(robust, "probability"),
         "target": target_json(robust.comparison.spacecraft),
@@ -126,35 +126,38 @@ def _table(robust: RobustComparison, candidates: list[FlownPlan]) -> DataTable:
     level = exact_percent(robust.probability)
     fuelled = all(candidate.plan.pulses.propellant is not None for candidate in robust.candidates)
     judged = requirements.judged(robust.comparison.spacecraft)
-    both = "full json"
 
     def variant(row: FlownPlan) -> str:
         return f"{row.variant} *" if row is robust.usual else row.variant
 
     columns = [
-        Column.named("scheme=plan.scheme", "plan", "", where=both, kind=TEXT),
+        Column.named("scheme=plan.scheme", "plan", "", where="full json", kind=TEXT),
         *file_columns("json", "variant"),
         Column("", "variant", "", variant, where="full", kind=TEXT),
         Column("pulses", "", "", lambda row: len(row.plan.pulses), where="json"),
-        Column.named("end_s=plan.pulses.end", Shared.END, "s", "{:.3f}".format, both),
+        Column.named("end_s=plan.pulses.end", Shared.END, "s", "{:.3f}".format, "full json"),
         Column.named(
             "total_impulse_Nms=plan.pulses.total_impulse",
             Shared.IMPULSE,
             "N m s",
             to_figures(4),
-            "json" if fuelled else both,
+            "json" if fuelled else "full json",
         ),
         Column.named(
             "propellant_kg=plan.pulses.propellant",
             Shared.PROPELLANT,
             "g",
             to_figures(4, 1e3),
-            both if fuelled else "json",
+            "full json" if fuelled else "json",
         ),
         Column.named(
-            "nominal_nutation_deg=plan.flown.nutation", Shared.NOMINAL, "deg", small_angle, both
+            "nominal_nutation_deg=plan.flown.nutation",
+            Shared.NOMINAL,
+            "deg",
+            small_angle,
+            "full json",
         ),
-        Column.named("left_deg", level, "deg", small_angle, both),
+        Column.named("left_deg", level, "deg", small_angle, "full json"),
         *file_columns("json", "samples=cases.samples", "met_fraction=cases.complying"),
         Column(
             "",

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from functools import partial
 from itertools import pairwise
 from operator import attrgetter
 from typing import Any, NamedTuple
@@ -41,7 +40,6 @@ from nutdamp.views.tables import (
     WHOLE,
     Column,
     DataTable,
-    FittedColumns,
     Shared,
     angle_of,
     facts,
@@ -63,32 +61,38 @@ MODELS = {
 }  # names of the two models
 
 
-def _direction(name: str, angle: Column, flight: Flight) -> str:
-    return angle.worded(getattr(flight.final, name))
-
-
-def _columns(simulation: Simulation) -> Iterator[Column]:
+def _end_table(simulation: Simulation) -> DataTable:
+    """End of the track by both models."""
     spacecraft = simulation.flown.spacecraft
-    yield Column("", "model", "", lambda flight: MODELS[flight.model], where="screen", kind=TEXT)
-    names = ["nutation", "body_cone", "space_cone", "momentum_shift"]
-    for name in names if spacecraft.goal.axis is None else [*names, "axis_error"]:
-        yield Column(
-            "", name.replace("_", " "), "", attrgetter(f"residual.{name}"), degrees, "screen"
-        )
-    for heading, name in (("spin axis", "axis"), ("H", "momentum")):
-        for angle in parts.direction_columns(spacecraft):
-            value = partial(_direction, name, angle)
-            yield Column("", f"{heading}: {angle.heading}", "", value, where="screen")
-    yield Column("", Shared.SPIN, "rad/s", attrgetter("final.spin"), to_figures(6), "screen")
+
+    def direction(name: str, angle: Column) -> Callable[[Flight], str]:
+        return lambda flight: angle.worded(getattr(flight.final, name))
+
+    residuals = ["nutation", "body_cone", "space_cone", "momentum_shift"]
+    if spacecraft.goal.axis is not None:
+        residuals.append("axis_error")
+    columns = [
+        Column("", "model", "", lambda flight: MODELS[flight.model], where="screen", kind=TEXT),
+        *(
+            Column(
+                "", name.replace("_", " "), "", attrgetter(f"residual.{name}"), degrees, "screen"
+            )
+            for name in residuals
+        ),
+        *(
+            Column("", f"{heading}: {angle.heading}", "", direction(name, angle), where="screen")
+            for heading, name in (("spin axis", "axis"), ("H", "momentum"))
+            for angle in parts.direction_columns(spacecraft)
+        ),
+        Column("", Shared.SPIN, "rad/s", attrgetter("final.spin"), to_figures(6), "screen"),
+    ]
+    return DataTable("", columns, (simulation.impulses, simulation.flown))
 
 
 def simulation_screen(simulation: Simulation, *, verbose: bool = True) -> RenderableType:
     """The screen of ``simulate``."""
-    judged, spacecraft, extremes = (
-        simulation.verdict,
-        simulation.flown.spacecraft,
-        simulation.extremes,
-    )
+    judged, extremes = simulation.verdict, simulation.extremes
+    spacecraft = simulation.flown.spacecraft
     pulses = simulation.flown.schedule
     fired = verdicts.fired(pulses) if len(pulses) else "no pulse"
     track = f"track by the {simulation.shown.model}, 0 to {moment(extremes.until)}"
@@ -99,7 +103,7 @@ def simulation_screen(simulation: Simulation, *, verbose: bool = True) -> Render
         verdicts.coloured(*verdicts.stated(judged)),
     ]
     head += [verdicts.bound_table(judged).screen("screen")] if judged.lines else []
-    ends = DataTable("", tuple(_columns(simulation)), (simulation.impulses, simulation.flown))
+    ends = _end_table(simulation)
     return parts.summary(
         head,
         lambda **_: ends.transposed("screen", f"end of track, {moment(extremes.until)}"),
@@ -172,12 +176,8 @@ def simulation_json(simulation: Simulation) -> dict[str, Any]:
     """Pulses with the cone angles around them, ends of both models, and extremes of the axis track
     in degrees.
     """
-    flight, extremes, impulses, flown = (
-        simulation.shown,
-        simulation.extremes,
-        simulation.impulses,
-        simulation.flown,
-    )
+    flight, extremes = simulation.shown, simulation.extremes
+    impulses, flown = simulation.impulses, simulation.flown
     attitude = flight.spacecraft.attitude
     return {
         **decisions.heading(flight.spacecraft),
@@ -385,14 +385,15 @@ def verification_screen(plan: Plan, verification: Verification, *, verbose: bool
         for method in verification.methods
         if method.missing
     ]
+    methods = methods_table(verification).screen("screen")
     if verbose:
         return Group(
             *head,
             *(Text(), parts.derived_table(spacecraft)),
-            *(Text(), methods_table(verification)),
+            *(Text(), methods),
             *(Text(), *map(screen_line, (*missing, conservation(verification)))),
-            *(Text(), Text(BUDGET, "bold")),
-            *(Text(), budget_table(spacecraft, verification), Text(BUDGET_NOTE, "dim")),
+            *(Text(), Text(BUDGET, "bold"), Text()),
+            *(budget_table(spacecraft, verification).screen("screen"), Text(BUDGET_NOTE, "dim")),
         )
     notes = [conservation(verification)]
     # The imperfection that leaves the most nutation alone, where one leaves more than ideal
@@ -402,18 +403,11 @@ def verification_screen(plan: Plan, verification: Verification, *, verbose: bool
         for row in verification.budget
         if row.name not in (IDEAL, AS_FLOWN) and WITHOUT not in row.name
     ]
-    most = max(single, key=lambda row: row.nutation, default=None)
-    if most is not None and most.nutation - verification.budget[0].nutation > SHOWN:
-        notes.append(
-            note(
-                "largest-imperfection",
-                imperfection=most.name,
-                nutation_deg=math.degrees(most.nutation),
-            )
-        )
-    return parts.summary(
-        head, lambda **_: methods_table(verification), [*notes, *missing], "--json verified.json"
-    )
+    worst = max(single, key=lambda row: row.nutation, default=None)
+    if worst is not None and worst.nutation - verification.budget[0].nutation > SHOWN:
+        angle = math.degrees(worst.nutation)
+        notes.append(note("largest-imperfection", imperfection=worst.name, nutation_deg=angle))
+    return parts.summary(head, lambda **_: methods, [*notes, *missing], "--json verified.json")
 
 
 def verification_json(flown: Flight, name: str, verification: Verification) -> dict[str, Any]:
@@ -433,7 +427,7 @@ def verification_json(flown: Flight, name: str, verification: Verification) -> d
             verification, "momentum_drift=momentum.drift", "momentum_kept=momentum.kept"
         ),
         **tables.values_of(verification, "energy_drift=energy.drift", "energy_kept=energy.kept"),
-        "budget": DataTable("", IMPERFECTIONS, verification.budget, spacecraft).json(),
+        "budget": budget_table(spacecraft, verification).json(),
     }
 
 
@@ -466,19 +460,19 @@ IMPERFECTIONS = (
 )  # fmt: skip
 
 
-def methods_table(verification: Verification) -> FittedColumns:
+def methods_table(verification: Verification) -> DataTable:
     """One row a way to fly the schedule: its residuals,
     and its difference from the flown motion.
     """
     rows = [method for method in verification.methods if not method.missing]
-    return DataTable("Methods", METHODS, rows).screen("screen")
+    return DataTable("Maximum differences from the flown motion", METHODS, rows)
 
 
-def budget_table(spacecraft: Spacecraft, verification: Verification) -> FittedColumns:
+def budget_table(spacecraft: Spacecraft, verification: Verification) -> DataTable:
     """One row an imperfection: residuals with it alone; then residuals without each effect that
     plans include.
     """
-    return DataTable(BUDGET, IMPERFECTIONS, verification.budget, spacecraft).screen("screen")
+    return DataTable(BUDGET, IMPERFECTIONS, verification.budget, spacecraft)
 
 
 def verdict(verification: Verification) -> str:

@@ -93,11 +93,11 @@ def short_angle(angle: float | None, largest: float = math.inf) -> str:
     """
     if angle is None or math.isnan(angle):
         return MISSING
-    least = COARSE if math.isinf(largest) else min(COARSE, FINE * math.degrees(largest))
-    return "0" if abs(math.degrees(angle)) < least else f"{math.degrees(angle):.3g}"
+    rounding = COARSE if math.isinf(largest) else min(COARSE, FINE * math.degrees(largest))
+    return "0" if abs(math.degrees(angle)) < rounding else f"{math.degrees(angle):.3g}"
 
 
-def most(angle: float) -> str:
+def limit_text(angle: float) -> str:
     """The bound of an angle, given in rad, in degrees: as it was given, however small."""
     return f"{math.degrees(angle):.4g} deg"
 

@@ -64,7 +64,7 @@ class TradeRow(NamedTuple):
         return self.point.plan.flight.residual
 
     @property
-    def least(self) -> float | None:
+    def bound(self) -> float | None:
         """Lower bound of the cost for small angles."""
         return self.front.least(self.point)
 
@@ -84,7 +84,7 @@ def _table(rows: Sequence[TradeRow]) -> DataTable:
     others = any(row.point.plan.scheme != OPTIMAL.name for row in rows)
     judged = any(row.point.verdict.met is not None for row in rows)
     flown = any(row.point.verdict.cases is not None for row in rows)
-    bounded = any(row.least is not None for row in rows)
+    bounded = any(row.bound is not None for row in rows)
     shown = "full brief"
     everywhere = "csv full brief"
 
@@ -106,7 +106,7 @@ def _table(rows: Sequence[TradeRow]) -> DataTable:
             "",
             "small-angle bound",
             "",
-            lambda row: row.spent(row.least),
+            lambda row: row.spent(row.bound),
             where="full" if bounded else "",
         ),
         Column("pulses", Shared.PULSES, "", count, where=everywhere, kind=WHOLE),
@@ -114,7 +114,7 @@ def _table(rows: Sequence[TradeRow]) -> DataTable:
             "csv",
             "propellant_kg=pulses.propellant",
             "total_impulse_Nms=pulses.total_impulse",
-            "first_order_least=least",
+            "first_order_least=bound",
         ),
         Column.named("least_unit=point.unit", "", "", where="csv", kind=TEXT),
         *file_columns("csv", "nutation_deg=residual.nutation"),
@@ -215,8 +215,8 @@ def front_parts(spacecraft: Spacecraft, fronts: Sequence[Front]) -> list[Rendera
             parts.append(
                 _table([row for row in rows_of(fronts) if row.front is front]).screen("full")
             )
-    priced = [(row.spent(row.point.cost), row.spent(row.least)) for row in rows_of(fronts)
-              if row.least is not None and row.point.cost < row.least]  # fmt: skip
+    priced = [(row.spent(row.point.cost), row.spent(row.bound)) for row in rows_of(fronts)
+              if row.bound is not None and row.point.cost < row.bound]  # fmt: skip
     # As the table writes both.
     differ = any(spent != bound for spent, bound in priced)
     below = [note("trade-below-bound")] if differ else []

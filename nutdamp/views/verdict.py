@@ -20,7 +20,16 @@ from nutdamp.spacecraft.model import required_share
 from nutdamp.spacecraft.requirements import Bound, Part
 from nutdamp.spacecraft.schedule import Schedule
 from nutdamp.views.tables import TEXT, Column, DataTable, Shared, values_of
-from nutdamp.views.text import degrees, duration, joined, mass, most, quantity, short_angle, text
+from nutdamp.views.text import (
+    degrees,
+    duration,
+    joined,
+    limit_text,
+    mass,
+    quantity,
+    short_angle,
+    text,
+)
 
 HEADLINES = {
     Status.FLY: "FLY",
@@ -212,7 +221,7 @@ def coloured(words: str, light: Light) -> Text:
 
 def limit(bound: Bound) -> str:
     """The limit of a bound with its sign and unit."""
-    size = f"{RPM * bound.limit:.4g} rpm" if bound.part is Part.SPIN else most(bound.limit)
+    size = f"{RPM * bound.limit:.4g} rpm" if bound.part is Part.SPIN else limit_text(bound.limit)
     return f"≥ {size}" if bound.inner else f"≤ {size}"
 
 

@@ -256,7 +256,7 @@ def test_every_command_on_a_page_runs(run: Run, tmp_path: Path, craft: str) -> N
 
 # --- explain: every topic prints what it is for, at any width, and loads nothing heavy
 
-FIGURES = guide.found("figures")
+FIGURES = guide.topic_of("figures")
 TOPICS = (
     *guide.NAMES,
     *(equation.number for equation in guide.EQUATIONS),
@@ -353,9 +353,10 @@ def test_numbers_and_figures_as_people_write_them() -> None:
         "24.4": "24.4",
         "§24.4": "24.4",
     }
-    assert {requested: guide.found(requested).name for requested in written} == written
+    assert {requested: guide.topic_of(requested).name for requested in written} == written
     assert all(
-        guide.found(name) is FIGURES for name in ("Abb. 5", "abb8", "fig. 6", "Figures", "FIGURES")
+        guide.topic_of(name) is FIGURES
+        for name in ("Abb. 5", "abb8", "fig. 6", "Figures", "FIGURES")
     )
 
 
