@@ -178,14 +178,14 @@ def disturbance_table(spacecraft: Spacecraft) -> DataTable:
 
     columns = (
         Column(
-            "",
+            "name",
             "disturbance",
             "",
-            lambda row: row.disturbance.name or f"number {numbers[id(row)]}",
-            where="screen",
+            lambda row: row.disturbance.name or None,
+            where="screen json",
             kind=TEXT,
+            words=lambda row: row.disturbance.name or f"number {numbers[id(row)]}",
         ),
-        Column("name", "", "", lambda row: row.disturbance.name or None, where="json", kind=TEXT),
         Column("", "effect", "", lambda row: "; ".join(_effects(row)), where="screen", kind=TEXT),
         *file_columns(
             "json",

@@ -30,7 +30,6 @@ from nutdamp.planning.plan import Plan
 from nutdamp.planning.verdict import Verdict, lines_of
 from nutdamp.schemes import catalogue
 from nutdamp.spacecraft.model import Spacecraft, Vector
-from nutdamp.spacecraft.schedule import Schedule
 from nutdamp.views.parts import (
     aspect_facts,
     changing,
@@ -60,18 +59,18 @@ def no_plan(plan: Plan) -> str:
 FARTHER = 1.1
 
 
-def cost(schedule: Schedule) -> Iterator[tuple[str, str]]:
-    """Cost and end of a schedule: names and values."""
-    yield (
-        "impulse" if schedule.propellant is None else "propellant",
-        f"{spent(schedule)}, pulses: {len(schedule)}",
-    )
-    yield "last pulse ends", moment(schedule.end) if len(schedule) else "no pulse is needed"
-
-
 def end_facts(plan: Plan) -> Table:
     """Final spin axis, H and spin, cost, and end time."""
-    return facts([*end_rows(plan.flight, plan.aspects), *cost(plan.pulses)])
+    pulses = plan.pulses
+    name = "impulse" if pulses.propellant is None else "propellant"
+    end = moment(pulses.end) if len(pulses) else "no pulse is needed"
+    return facts(
+        [
+            *end_rows(plan.flight, plan.aspects),
+            (name, f"{spent(pulses)}, pulses: {len(pulses)}"),
+            ("last pulse ends", end),
+        ]
+    )
 
 
 def end_rows(flown: Flight, watched: Iterable[Aspect]) -> Iterator[tuple[str, str]]:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from functools import partial
+from operator import attrgetter
 from typing import Any
 
 from rich.console import RenderableType
@@ -26,7 +28,7 @@ from nutdamp.files.carried import notes
 from nutdamp.units import screen_unit
 from nutdamp.views.decisions import heading
 from nutdamp.views.parts import opening, summary
-from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, to_figures, values_of
+from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, values_of
 from nutdamp.views.text import note_json
 
 NOTHING = 1e-3  # sigmas below which a value, or a change, is zero
@@ -61,18 +63,20 @@ def _value(row: Estimate) -> str:
     return f"{shown * _unit(row)[1]:.{_digits(row)}g}"
 
 
+def _sigma(row: Estimate) -> str | None:
+    sigma = _scaled("sigma", row)
+    return None if sigma is None else f"{sigma:.2g}"
+
+
 def _file(row: Estimate) -> str | None:
-    return None if row.file is None else f"{row.file * _unit(row)[1]:.{max(_digits(row) - 2, 4)}g}"
+    digits = max(_digits(row) - 2, 4)
+    return None if row.file is None else f"{row.file * _unit(row)[1]:.{digits}g}"
 
 
 def _changed(change: float) -> str:
-    return (
-        "0"
-        if abs(change) <= NOTHING
-        else f"{change:+.2g}"
-        if abs(change) < 99.5
-        else f"{change:+.0f}"
-    )
+    if abs(change) <= NOTHING:
+        return "0"
+    return f"{change:+.2g}" if abs(change) < 99.5 else f"{change:+.0f}"
 
 
 def _digits(estimate: Estimate) -> int:
@@ -83,15 +87,27 @@ def _digits(estimate: Estimate) -> int:
 
 
 ESTIMATES = (
-    Column.named("quantity=key", "", "", where="json", kind=TEXT),
-    Column("", "quantity", "", lambda row: row.label, where="screen", kind=TEXT),
-    Column("value", "", "", lambda row: row.value * row.factor, where="json"),
-    Column("", "value", "", _value, where="screen"),
-    Column("", "sigma", "", lambda row: _scaled("sigma", row), to_figures(2), "screen"),
-    Column("sigma", "", "", lambda row: row.sigma * row.factor, where="json"),
+    Column.named(
+        "quantity=key", "quantity", "", where="screen json", kind=TEXT, words=attrgetter("label")
+    ),
+    Column(
+        "value",
+        "value",
+        "",
+        lambda row: row.value * row.factor,
+        where="screen json",
+        words=_value,
+    ),
+    Column(
+        "sigma",
+        "sigma",
+        "",
+        lambda row: row.sigma * row.factor,
+        where="screen json",
+        words=_sigma,
+    ),
     Column("unit", "unit", "", lambda row: _unit(row)[0], where="screen json", kind=TEXT),
-    Column("file", "", "", lambda row: _scaled("file", row), where="json"),
-    Column("", "file", "", _file, where="screen"),
+    Column("file", "file", "", partial(_scaled, "file"), where="screen json", words=_file),
     Column("file_sigma", "", "", lambda row: _scaled("prior", row), where="json"),
     Column.named("change_sigmas=change", "change", "sigmas", _changed, "screen json"),
     Column.named("from=source", "from", "", where="screen json", kind=TEXT),
@@ -127,20 +143,18 @@ def signal_table(fit: Fit) -> DataTable:
             where="screen json",
             kind=WHOLE,
         ),
-        Column("noise_SI", "", "", lambda at: float(fit.noise[at]), where="json"),
         Column(
-            "",
+            "noise_SI",
             "noise",
             "",
-            lambda at: fit.noise[at] * in_shown(fit.model.signals[at])[1],
-            to_figures(3),
-            "screen",
+            lambda at: float(fit.noise[at]),
+            where="screen json",
+            words=lambda at: f"{fit.noise[at] * in_shown(fit.model.signals[at])[1]:.3g}",
         ),
         Column(
             "", "unit", "", lambda at: in_shown(fit.model.signals[at])[0], where="screen", kind=TEXT
         ),
-        Column("white", "", "", fit.white, where="json"),
-        Column("", "residuals", "", verdict, where="screen", kind=TEXT),
+        Column("white", "residuals", "", fit.white, where="screen json", kind=TEXT, words=verdict),
     )
     return DataTable("Signals", columns, range(len(of_signal)))
 

@@ -180,8 +180,9 @@ def margin_table(rows: tuple[Margin, ...]) -> DataTable:
 def loop_screen(plan: LoopPlan, *, verbose: bool = True) -> RenderableType:
     """The screen of ``loop``."""
     run, judged = plan.flown_run, plan.verdict
-    (_, spent), (_, end) = decisions.cost(plan.flight.schedule)
-    fired = f"{spent}, last ends at {end}" if run.fired else "no firing"
+    schedule = plan.flight.schedule
+    spent = f"{verdicts.spent(schedule)}, pulses: {len(schedule)}"
+    fired = f"{spent}, last ends at {moment(schedule.end)}" if run.fired else "no firing"
     headline = Text.assemble(
         "LOOP ", (run.loop.law, "bold"), f": {fired}; first quiet {_settled(run)}"
     )

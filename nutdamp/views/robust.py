@@ -132,8 +132,7 @@ def _table(robust: RobustComparison, candidates: list[FlownPlan]) -> DataTable:
 
     columns = [
         Column.named("scheme=plan.scheme", "plan", "", where="full json", kind=TEXT),
-        *file_columns("json", "variant"),
-        Column("", "variant", "", variant, where="full", kind=TEXT),
+        Column.named("variant", "variant", "", where="full json", kind=TEXT, words=variant),
         Column("pulses", "", "", lambda row: len(row.plan.pulses), where="json"),
         Column.named("end_s=plan.pulses.end", Shared.END, "s", "{:.3f}".format, "full json"),
         Column.named(

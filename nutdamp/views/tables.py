@@ -222,9 +222,9 @@ class Column(NamedTuple):
     ``key``: its name in CSV and JSON; ``#`` stands for the three components of a vector, which CSV
     has in columns of their own. ``value`` of a row in the unit of the key, or of the heading
     without a key; None where it is not known. ``text``: the value as people read it, in the unit of
-    screens. ``where``: the places that have the column, separated by blanks. ``when``: tables that
-    have it, by their source, else all. ``met``: whether a requirement is met, where a verdict is
-    coloured.
+    screens; ``words``: where that takes more than the value, the text of a row. ``where``: the
+    places that have the column, separated by blanks. ``when``: tables that have it, by their
+    source, else all. ``met``: whether a requirement is met, where a verdict is coloured.
     """
 
     key: str
@@ -236,6 +236,7 @@ class Column(NamedTuple):
     when: Callable[[Any], bool] | None = None
     kind: str = REAL
     met: Callable[[Any], bool | None] | None = None
+    words: Callable[[Any], str | None] | None = None
 
     @classmethod
     def named(
@@ -253,6 +254,8 @@ class Column(NamedTuple):
 
     def shown(self, row: Any) -> str:
         """The value of a row as people read it."""
+        if self.words is not None:
+            return self.words(row) or MISSING
         value = self.value(row)
         if value is None:
             return MISSING
