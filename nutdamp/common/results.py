@@ -8,7 +8,6 @@ soon as a public name of `nutdamp` is used; without them these methods raise Typ
 from __future__ import annotations
 
 from importlib import import_module
-from operator import attrgetter
 from os import PathLike
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -61,8 +60,7 @@ def register(module: str) -> None:
     needed first.
 
     Its keys are the class of a result and a subject (``Trade.csv``). Its values are
-    ``module:function`` of the package, which takes the result, or ``module:function name
-    key=name``, which takes these attributes of it.
+    ``module:function`` of the package, which takes the result.
     """
     _home[:] = [module]
 
@@ -78,13 +76,8 @@ def view(result: object, what: str, *arguments: Any, **options: Any) -> Any:
     entry = _entry(result, what)
     if entry is None:
         raise TypeError(f"expected a result with {what}, got a {type(result).__qualname__}")
-    place, *names = entry.split()
-    module, _, function = place.partition(":")
-    keyed = [name.split("=") for name in names if "=" in name]
-    parts = [attrgetter(name)(result) for name in names if "=" not in name]
-    named = {key: attrgetter(name)(result) for key, name in keyed}
-    call = getattr(import_module(f"nutdamp.{module}"), function)
-    return call(*(parts if names else [result]), *arguments, **named, **options)
+    module, _, function = entry.partition(":")
+    return getattr(import_module(f"nutdamp.{module}"), function)(result, *arguments, **options)
 
 
 def has(result: object, what: str) -> bool:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from nutdamp.estimation.results import Estimate
+    from nutdamp.estimation.results import Estimate, Fitted
     from nutdamp.estimation.search import Fit
 
 SAMPLES = 3000  # largest number of samples of the sensor drawn
@@ -211,12 +211,13 @@ FARTHEST = 6.0  # pulls beyond are drawn at the edge
 
 
 @style.styled()
-def fit_figure(fit: Fit) -> Figure:
+def fit_figure(fitted: Fitted) -> Figure:
     """Residuals of the signals below each other; beside them autocorrelations, and pulls of the
     parameters.
     """
     from nutdamp.estimation.results import estimates
 
+    fit = fitted.core
     signals = fit.model.signals
     figure = style.sheet(8.6, max(4.8, 1.2 + 1.15 * len(signals)))
     sides = figure.add_gridspec(1, 2, width_ratios=[1.2, 1.0])

@@ -15,7 +15,7 @@ import re
 import shlex
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache, partial
+from functools import cache
 from html import escape
 from importlib.metadata import PackageNotFoundError, version
 from importlib.resources import files
@@ -52,7 +52,7 @@ from nutdamp.page.moving import moving_of
 from nutdamp.planning.decision import Comparison
 from nutdamp.planning.notes import broken_limits, plan_notes, reasons
 from nutdamp.planning.plan import NO_NUTATION, Plan, unrounded
-from nutdamp.planning.tradeoff import Front
+from nutdamp.planning.tradeoff import Front, Trade
 from nutdamp.planning.verdict import Light, Line, Verdict
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.views import decisions, glance, guide
@@ -555,8 +555,9 @@ def trade_picture(compared: Comparison, fronts: Sequence[Front]) -> Picture:
     """Time against cost, with the recommended plan among the schedules of the fronts; raises
     MissingExtra.
     """
-    draw = partial(studies.trade_figure, compared.spacecraft, fronts, compared.recommended)
-    return _picture("trade", draw(), draw(narrow=True))
+    traded = Trade(compared.spacecraft, tuple(fronts), compared.recommended)
+    figures = (studies.trade_figure(traded, narrow=narrow) for narrow in (False, True))
+    return _picture("trade", *figures)
 
 
 def dispersion_pictures(dispersed: Dispersion) -> tuple[Picture, ...]:

@@ -18,6 +18,7 @@ from nutdamp.estimation.results import (
     UNTOLD,
     Carried,
     Estimate,
+    Fitted,
     carried,
     correlated,
     doubts,
@@ -211,12 +212,12 @@ def told(fit: Fit, rows: Sequence[Estimate]) -> Iterator[Note]:
         yield note("fit-one-moment")
 
 
-def fit_json(fit: Fit, at_time: Carried, warnings: Sequence[str] = ()) -> dict[str, Any]:
+def fit_json(fitted: Fitted, at_time: Carried) -> dict[str, Any]:
     """Estimates with sigmas, values of the file, signals, covariance of the inputs of dispersions.
 
-    ``warnings`` of reading the record go into the notes, before the doubts about the estimates.
+    Warnings of reading the record stand in the notes, before the doubts about the estimates.
     """
-    model = fit.model
+    fit, model = fitted.core, fitted.core.model
     return {
         **heading(model.spacecraft),
         "record": {
@@ -236,7 +237,7 @@ def fit_json(fit: Fit, at_time: Carried, warnings: Sequence[str] = ()) -> dict[s
         "notes": [
             note_json(entry)
             for entry in (
-                *(note("record-read", warning=warning) for warning in warnings),
+                *(note("record-read", warning=warning) for warning in fitted.warnings),
                 *(*doubts(fit), *untold(model.record), *notes(fit, at_time)),
             )
         ],

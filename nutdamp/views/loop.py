@@ -183,11 +183,32 @@ def loop_screen(plan: LoopPlan, *, verbose: bool = True) -> RenderableType:
     schedule = plan.flight.schedule
     spent = f"{verdicts.spent(schedule)}, pulses: {len(schedule)}"
     fired = f"{spent}, last ends at {moment(schedule.end)}" if run.fired else "no firing"
-    headline = Text.assemble(
-        "LOOP ", (run.loop.law, "bold"), f": {fired}; first quiet {_settled(run)}"
-    )
-    head = [*opening(plan.spacecraft, verbose), headline, *_verdict(plan)]
-    head.append(verdicts.bound_table(judged).screen("screen"))
+    if run.settled is not None:
+        quiet = f"at {moment(run.settled)}"
+    elif not run.fired and not run.lost:
+        quiet = "always: it never shows the start threshold"
+    elif run.loop.stop > 0.0:
+        quiet = "never: the loop is not down to the stop threshold"
+    else:
+        quiet = "never: loop.stop is 0"
+    words = verdicts.loop_sentence(judged)
+    if run.lost:
+        full = run.stop is Ending.FULL
+        why = (
+            "limits.max_pulses is reached"
+            if full
+            else "the loop is never down to its stop threshold"
+        )
+        words = f"{verdicts.lead(judged)}: {why}"
+    if run.case is not None:
+        words = f"dispersed case {run.case} of seed {run.seed}: {words}"
+    stated = verdicts.coloured(words, judged.light)
+    head = [
+        *opening(plan.spacecraft, verbose),
+        Text.assemble("LOOP ", (run.loop.law, "bold"), f": {fired}; first quiet {quiet}"),
+        screen_line(stopped(run)) if run.stop.fault else stated,
+        verdicts.bound_table(judged).screen("screen"),
+    ]
     return summary(
         head,
         partial(firing_table(run).screen, "screen", first=SHOWN - 1) if run.fired else None,
@@ -223,24 +244,6 @@ def _notes(plan: LoopPlan, judged: Verdict) -> Iterator[Note]:
         yield note("loop-flown", until_s=run.until, seed=run.seed)
     else:
         yield note("loop-case-flown", until_s=run.until, seed=run.seed, case=run.case)
-
-
-def _verdict(plan: LoopPlan) -> Iterator[Text]:
-    run, judged = plan.flown_run, plan.verdict
-    case = "" if run.case is None else f"dispersed case {run.case} of seed {run.seed}: "
-    words = verdicts.loop_sentence(judged)
-    if run.stop.fault:
-        yield screen_line(stopped(run))
-    elif run.lost:
-        full = run.stop is Ending.FULL
-        why = (
-            "limits.max_pulses is reached"
-            if full
-            else "the loop is never down to its stop threshold"
-        )
-        yield verdicts.coloured(f"{case}{verdicts.lead(judged)}: {why}", judged.light)
-    else:
-        yield verdicts.coloured(f"{case}{words}", judged.light)
 
 
 def described(loop: Loop, *, thresholds: bool = True) -> str:
@@ -309,18 +312,6 @@ def warnings(spacecraft: Spacecraft) -> Iterator[Note]:
         yield note("start-below-noise", start_deg=start, noise_deg=noise)
     elif band.noise > loop.stop > 0.0:
         yield note("stop-below-noise", stop_deg=stop, noise_deg=noise)
-
-
-def _settled(run: LoopRun) -> str:
-    if run.settled is not None:
-        return f"at {moment(run.settled)}"
-    if not run.fired and not run.lost:
-        return "always: it never shows the start threshold"
-    return (
-        "never: the loop is not down to the stop threshold"
-        if run.loop.stop > 0.0
-        else "never: loop.stop is 0"
-    )
 
 
 def verification_screen(verification: LoopVerification) -> RenderableType:

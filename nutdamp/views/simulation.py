@@ -28,7 +28,7 @@ from nutdamp.flight.verification import AGREE, AS_FLOWN, IDEAL, WITHOUT, Conserv
 from nutdamp.physics.attitude import full_turn
 from nutdamp.planning.decision import Simulation
 from nutdamp.planning.notes import TELLING, model_warnings, verdict_notes
-from nutdamp.planning.plan import Plan
+from nutdamp.planning.plan import Verified
 from nutdamp.planning.verdict import Light
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.requirements import Part
@@ -369,8 +369,9 @@ BUDGET_NOTE = (  # note on `budget_table`
 )
 
 
-def verification_screen(plan: Plan, verification: Verification, *, verbose: bool) -> RenderableType:
+def verification_screen(verified: Verified, *, verbose: bool) -> RenderableType:
     """The screen of ``verify``: verdict, methods, and what each imperfection leaves."""
+    plan, verification = verified.plan, verified.core
     spacecraft, judged = plan.spacecraft, plan.verdict
     confirmed = Light.GREEN if verification.agree else Light.RED
     lead, about = verdicts.headline(judged)
@@ -410,14 +411,13 @@ def verification_screen(plan: Plan, verification: Verification, *, verbose: bool
     return parts.summary(head, lambda **_: methods, [*notes, *missing], "--json verified.json")
 
 
-def verification_json(flown: Flight, name: str, verification: Verification) -> dict[str, Any]:
-    """Methods with their differences from the motion of ``flown`` (rad), conservation, error
-    budget.
-    """
+def verification_json(verified: Verified) -> dict[str, Any]:
+    """Methods with their differences from the flown motion (rad), conservation, error budget."""
+    flown, verification = verified.plan.flight, verified.core
     spacecraft = flown.spacecraft
     return {
         **decisions.heading(spacecraft),
-        "scheme": name,
+        "scheme": verified.plan.scheme,
         "agree": verification.agree if verification.checks else None,
         "disagreeing": list(verification.disagreeing),
         "final": decisions.final_json(flown),

@@ -19,7 +19,7 @@ from nutdamp.flight.propagation import Residual
 from nutdamp.planning import notes
 from nutdamp.planning.decision import SAME_ANGLE
 from nutdamp.planning.plan import Plan
-from nutdamp.planning.tradeoff import Front, Point, numbered
+from nutdamp.planning.tradeoff import Front, Point, Trade, numbered
 from nutdamp.planning.verdict import Light, Verdict
 from nutdamp.schemes.catalogue import OPTIMAL
 from nutdamp.spacecraft.model import Spacecraft
@@ -160,10 +160,9 @@ def _saved(row: TradeRow) -> str:
     return fixed(100.0 * (row.point.cost / row.front.points[0].cost - 1.0), 1)
 
 
-def trade_screen(
-    spacecraft: Spacecraft, fronts: Sequence[Front], *, verbose: bool
-) -> RenderableType:
+def trade_screen(traded: Trade, *, verbose: bool) -> RenderableType:
     """The screen of ``trade``: the cheapest and the earliest schedule, the points of all fronts."""
+    spacecraft, fronts = traded.spacecraft, traded.fronts
     points = rows_of(fronts)
     head = [named(spacecraft, f": finish time against cost; schedules: {len(points)}")]
     good = [row for row in points if not fails(row.point)]
@@ -274,16 +273,16 @@ def front_name(front: Front, *, pointing: bool) -> str:
 # --- files
 
 
-def trade_csv(fronts: Sequence[Front]) -> str:
+def trade_csv(traded: Trade) -> str:
     """One row a point; a shift allowed of any size is empty."""
-    return _table(rows_of(fronts)).csv()
+    return _table(rows_of(traded.fronts)).csv()
 
 
-def trade_json(spacecraft: Spacecraft, fronts: Sequence[Front]) -> dict[str, Any]:
+def trade_json(traded: Trade) -> dict[str, Any]:
     """All fronts with their plans, in the form of ``plan --json``."""
     entries = []
-    for front in fronts:
-        rows = [row for row in rows_of(fronts) if row.front is front]
+    for front in traded.fronts:
+        rows = [row for row in rows_of(traded.fronts) if row.front is front]
         points = [
             {
                 **values_of(row, "point=number", "horizon_s=point.horizon"),
@@ -296,7 +295,7 @@ def trade_json(spacecraft: Spacecraft, fronts: Sequence[Front]) -> dict[str, Any
             for row in rows
         ]
         entries.append({**values_of(front, "shift_allowed_deg=shift", "why"), "points": points})
-    return {**heading(spacecraft), "fronts": entries}
+    return {**heading(traded.spacecraft), "fronts": entries}
 
 
 def schedule_files(fronts: Sequence[Front], folder: str) -> list[tuple[str, str]]:
