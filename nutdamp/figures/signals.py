@@ -160,9 +160,11 @@ def budget_figure(budget: Budget) -> Figure:
     if until is not None and math.isfinite(until):
         size = max(size, 1.2 * until)
     size = size or 3.0 / max(abs(growth), 1e-300)
-    unit, seconds = (
-        ("days", DAY) if size > 2.0 * DAY else ("hours", 3600.0) if size > 7200.0 else ("s", 1.0)
-    )
+    unit, seconds = "s", 1.0
+    if size > 2.0 * DAY:
+        unit, seconds = "days", DAY
+    elif size > 7200.0:
+        unit, seconds = "hours", 3600.0
     figure = style.sheet(7.4, 4.0)
     axes = figure.subplots()
     times = np.linspace(0.0, size, ROWS)

@@ -46,7 +46,6 @@ from nutdamp.views.tables import (
     to_figures,
 )
 from nutdamp.views.text import (
-    MISSING,
     degrees,
     longitude,
     moment,
@@ -431,10 +430,10 @@ def verification_json(verified: Verified) -> dict[str, Any]:
     }
 
 
-def _difference(value: float | None) -> str:
-    if value is None:
-        return MISSING
-    return "0" if value == 0.0 else "< 1e-12" if value < 1e-12 else f"{value:.1e}"
+def _difference(value: float) -> str:
+    if value == 0.0:
+        return "0"
+    return "< 1e-12" if value < 1e-12 else f"{value:.1e}"
 
 
 NUTATION = Column.named("nutation_deg", Part.NUTATION.label, "deg", small_angle, "json screen")

@@ -171,6 +171,9 @@ TEXT, REAL, WHOLE, YES_NO = "U", "f8", "i8", "bool"
 """Kinds of values: text, number, whole number, and yes or no."""
 
 
+COLOURS = {None: "", True: "green", False: "bold red"}
+"""Colours of a verdict on a bound that is met, or not."""
+
 UNIT = re.compile(
     r"_(deg|rad_s|s|kg|Nms?|kgm2|Pa)$"
 )  # ends of names in files that are no part of an attribute
@@ -341,8 +344,7 @@ class DataTable:
 
     def _cell(self, column: Column, row: Any, index: int, first: bool) -> Text:
         met = None if column.met is None else column.met(row)
-        style = "" if met is None else "green" if met else "bold red"
-        return Text(column.shown(row), "bold" if first and index == self.mark else style)
+        return Text(column.shown(row), "bold" if first and index == self.mark else COLOURS[met])
 
     def transposed(self, place: str, corner: str = "", names: str = "dim") -> FittedColumns:
         """Quantities down and rows across, named by the first column; ``corner``: heading,
