@@ -171,8 +171,7 @@ TEXT, REAL, WHOLE, YES_NO = "U", "f8", "i8", "bool"
 """Kinds of values: text, number, whole number, and yes or no."""
 
 
-COLOURS = {None: "", True: "green", False: "bold red"}
-"""Colours of a verdict on a bound that is met, or not."""
+COLOURS = {None: "", True: "green", False: "bold red"}  # of a cell, by `Column.met`
 
 UNIT = re.compile(
     r"_(deg|rad_s|s|kg|Nms?|kgm2|Pa)$"
