@@ -269,7 +269,7 @@ def report_page(
     warnings = [text(note) for note in remarks if severity(note) == WARNING]
     contenders = []
     for plan in compared.plans:
-        word = glance.scheme_verdict(compared, plan)
+        word = verdicts.scheme_word(compared, plan)
         texts = (verdicts.spent(plan.pulses), word) if plan.feasible else (word,)
         contenders.append(document.Contender(plan.scheme, texts, plan is chosen))
     with work.steps(2.0) as task:  # pictures, and the flights of the verification

@@ -28,7 +28,6 @@ from nutdamp.planning.notes import (
 )
 from nutdamp.planning.plan import Plan
 from nutdamp.planning.verdict import Verdict, lines_of
-from nutdamp.schemes import catalogue
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.views.parts import (
     aspect_facts,
@@ -44,15 +43,6 @@ from nutdamp.views.verdict import cases_json, line_json, spent, verdict_json
 
 if TYPE_CHECKING:
     from nutdamp.planning.tradeoff import Certificate
-
-
-def no_plan(plan: Plan) -> str:
-    """Text in the column of a scheme that has no plan."""
-    if plan.failure is None:
-        without = catalogue.SCHEMES[plan.scheme].body_fixed and not plan.spacecraft.channels
-        word = "not found" if plan.found_none else "infeasible"
-        return "no thrusters" if without else word
-    return f"internal error,\nplease report:\n{type(plan.failure).__name__}"
 
 
 # factor of distance or of time by which H ends farther off, or later, for a plan to be worse in it

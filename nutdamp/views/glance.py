@@ -84,11 +84,6 @@ def _feasible(get: Callable[[Plan], Any] | str) -> Callable[[Plan], Any]:
     return lambda plan: value(plan) if plan.feasible else None
 
 
-def scheme_verdict(compared: Comparison, plan: Plan) -> str:
-    """Verdict on a plan, or why it is not recommended, or why there is none."""
-    return verdicts.scheme_word(compared, plan) if plan.feasible else decisions.no_plan(plan)
-
-
 def _four(value: float) -> str:
     return digits(value, 4) if value else "0"
 
@@ -219,7 +214,7 @@ def _columns(compared: Comparison, chosen: Plan | None) -> list[Column]:
             "",
             Shared.VERDICT,
             "",
-            partial(scheme_verdict, compared),
+            partial(verdicts.scheme_word, compared),
             where=everywhere,
             kind=TEXT,
             met=met,

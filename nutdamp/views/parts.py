@@ -41,6 +41,7 @@ from nutdamp.views.tables import (
 )
 from nutdamp.views.text import (
     RPM,
+    WARNING,
     degrees,
     digits,
     duration,
@@ -48,10 +49,12 @@ from nutdamp.views.text import (
     longitude,
     mass,
     moment,
+    ordered,
     pointing,
     quantity,
     quiet,
-    screen_lines,
+    screen_line,
+    severity,
     short_angle,
     small_angle,
     steering,
@@ -381,7 +384,9 @@ def summary(
 
     ``verbose``: with all rows and notes, and ``more`` parts.
     """
-    warnings, others = screen_lines(notes)
+    every = ordered(notes)
+    warnings = [screen_line(note) for note in every if severity(note) == WARNING]
+    others = [screen_line(note) for note in every if severity(note) != WARNING]
     if verbose:
         body = [Text(), table()] if table is not None else []
         for part in more:

@@ -282,14 +282,6 @@ def ordered(notes: Iterable[Note]) -> list[Note]:
     return sorted(shown, key=lambda note: severity(note) != WARNING)
 
 
-def screen_lines(notes: Iterable[Note]) -> tuple[list[Text], list[Text]]:
-    """Lines of warnings, and of other notes, without repetition."""
-    every = ordered(notes)
-    first = sum(severity(note) == WARNING for note in every)
-    lines = list(map(screen_line, every))
-    return lines[:first], lines[first:]
-
-
 def joined(notes: Iterable[Note]) -> str:
     """Sentences of several notes in one line."""
     return "; ".join(map(text, notes))

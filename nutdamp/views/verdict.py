@@ -15,7 +15,9 @@ from rich.text import Text
 from nutdamp.common.numerics import MISSING, RPM
 from nutdamp.planning.decision import Comparison
 from nutdamp.planning.notes import reasons, strays
+from nutdamp.planning.plan import Plan
 from nutdamp.planning.verdict import Cases, Light, Line, Status, Verdict
+from nutdamp.schemes.catalogue import SCHEMES
 from nutdamp.spacecraft.model import required_share
 from nutdamp.spacecraft.requirements import Bound, Part
 from nutdamp.spacecraft.schedule import Schedule
@@ -285,12 +287,20 @@ def bound_table(verdict: Verdict) -> DataTable:
     return DataTable("Requirement", columns, verdict.lines)
 
 
-def scheme_word(compared: Comparison, plan: Any) -> str:
-    """Verdict on one of the plans compared, or in short why it is not recommended."""
-    verdict = compared.verdicts[plan]
+def scheme_word(compared: Comparison, plan: Plan) -> str:
+    """Verdict on one of the plans compared, or in short why it is not recommended, or why there is
+    none.
+    """
+    if plan.failure is not None:
+        return f"internal error,\nplease report:\n{type(plan.failure).__name__}"
+    if not plan.feasible:
+        if SCHEMES[plan.scheme].body_fixed and not plan.spacecraft.channels:
+            return "no thrusters"
+        return "not found" if plan.found_none else "infeasible"
     why = compared.shortcoming(plan)
     if why is not None:
         return text(why)
+    verdict = compared.verdicts[plan]
     if verdict.required:
         return MET[True]
     return ", ".join(line_word(line) for line in verdict.lines)
